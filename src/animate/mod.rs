@@ -1,0 +1,1 @@
+//! Joints to rotations, and the files people open: BVH, MP4.

@@ -1,0 +1,14 @@
+//! Arguments several verbs share.
+
+use std::path::PathBuf;
+
+/// Where the configuration is, and what the command line changes in it.
+#[derive(clap::Args, Clone, Debug)]
+pub struct ConfigArgs {
+    /// The configuration file.
+    #[arg(short, long, default_value = "pipeline.toml", value_name = "FILE")]
+    pub config: PathBuf,
+    /// Change one key of the configuration, for instance `--set extract.fps=15`; may be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}

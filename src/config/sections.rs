@@ -1,0 +1,234 @@
+//! The sections of `pipeline.toml` with their defaults. What each key means, its unit and its reason stand in the
+//! top level `pipeline.toml`; here are the types.
+
+use crate::types::time::FrameRate;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Everything a run needs to know. Paths are absolute once resolved.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+#[derive(Default)]
+pub struct Settings {
+    pub work: Work,
+    pub models: Models,
+    pub extract: Extract,
+    pub pose2d: Pose2d,
+    pub segment: Segment,
+    pub lift: Lift,
+    pub shard: Shard,
+    pub gan: Gan,
+    pub speaker: Vec<Speaker>,
+}
+
+/// `[[speaker]]`: one person, with the videos that show them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Speaker {
+    pub name: String,
+    /// Paths or glob patterns.
+    pub videos: Vec<String>,
+}
+
+/// `[work]`: where the stages write.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Work {
+    pub dir: PathBuf,
+    /// Units worked on side by side; 0: one a core.
+    pub jobs: usize,
+}
+
+impl Default for Work {
+    fn default() -> Self {
+        Self { dir: "work".into(), jobs: 0 }
+    }
+}
+
+/// `[models]`: where the ONNX models and the ONNX Runtime library are.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Models {
+    pub dir: PathBuf,
+    /// Path of `libonnxruntime.so`; empty: searched for (see `orator doctor`).
+    pub onnxruntime: PathBuf,
+}
+
+impl Default for Models {
+    fn default() -> Self {
+        Self { dir: "models".into(), onnxruntime: PathBuf::new() }
+    }
+}
+
+/// `[extract]`: the dataset's clock.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Extract {
+    /// Dataset frames a second.
+    pub fps: u32,
+    /// Scene change score, 0..1, from which a frame begins a new shot.
+    pub shot_threshold: f64,
+    /// Write every dataset frame as PNG as well.
+    pub keep_frames: bool,
+}
+
+impl Extract {
+    /// The dataset rate.
+    pub fn rate(&self) -> FrameRate {
+        FrameRate::new(self.fps, 1)
+    }
+}
+
+impl Default for Extract {
+    fn default() -> Self {
+        Self { fps: 15, shot_threshold: 0.1, keep_frames: false }
+    }
+}
+
+/// `[pose2d]`: which models look at a frame (ids of `models/manifest.toml`), and the tracking of the one speaker.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Pose2d {
+    pub person: String,
+    pub body: String,
+    pub hand: String,
+    /// Palm detector, asked when a hand is lost; empty: none.
+    pub palm: String,
+    /// The person detector looks at every n-th frame of a shot.
+    pub person_every: usize,
+    /// The palm detector looks at every n-th frame while a hand is missing.
+    pub palm_every: usize,
+    /// Weight of a new person box against the followed one, 0..1.
+    pub person_follow: f64,
+    /// A hand whose score is below this is not there.
+    pub hand_score: f64,
+    /// An arm joint whose score is below this does not guide a hand search.
+    pub joint_score: f64,
+}
+
+impl Default for Pose2d {
+    fn default() -> Self {
+        Self {
+            person: "person-rtmdet-nano".into(),
+            body: "body-tinypose-256x192".into(),
+            hand: "hand-mediapipe-lite".into(),
+            palm: "palm-mediapipe-full".into(),
+            person_every: 15,
+            palm_every: 5,
+            person_follow: 0.3,
+            hand_score: 0.5,
+            joint_score: 0.3,
+        }
+    }
+}
+
+/// `[segment]`: which stretches are worth keeping.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Segment {
+    /// Shortest interval, in frames (a window of the paper: 64).
+    pub min_frames: usize,
+    /// A face or arm joint is visible from this score on, 0..1.
+    pub joint_score: f64,
+    /// Longest gap of an arm or the face that is filled and masked, seconds.
+    pub max_body_gap_secs: f64,
+    /// Longest gap of one hand that is masked, seconds.
+    pub max_hand_gap_secs: f64,
+    /// Least distance between the shoulders, pixels.
+    pub min_shoulder_px: f64,
+    /// Largest step of the neck between two frames, in shoulder widths.
+    pub max_jump: f64,
+}
+
+impl Default for Segment {
+    fn default() -> Self {
+        Self {
+            min_frames: 64,
+            joint_score: 0.3,
+            max_body_gap_secs: 0.34,
+            max_hand_gap_secs: 1.0,
+            min_shoulder_px: 40.0,
+            max_jump: 0.5,
+        }
+    }
+}
+
+/// `[lift]`: 2D keypoints to 3D joints.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Lift {
+    /// Weights of the body lifter (safetensors); empty: the built-in ones.
+    pub body_weights: PathBuf,
+    /// Weights of the hand lifter (safetensors); empty: the built-in ones.
+    pub hand_weights: PathBuf,
+    /// Width of the Gaussian that smooths arms, in frames at 15 fps; 0: none.
+    pub smooth_arms: f64,
+    /// The same for hands.
+    pub smooth_hands: f64,
+}
+
+impl Default for Lift {
+    fn default() -> Self {
+        Self { body_weights: PathBuf::new(), hand_weights: PathBuf::new(), smooth_arms: 1.0, smooth_hands: 1.5 }
+    }
+}
+
+/// `[shard]`: the dataset on disk.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Shard {
+    /// A shard is closed when it holds this many megabytes.
+    pub max_mb: u32,
+    /// Shares of the videos for validation and test, 0..1; the rest trains.
+    pub validation: f64,
+    pub test: f64,
+}
+
+impl Default for Shard {
+    fn default() -> Self {
+        Self { max_mb: 256, validation: 0.15, test: 0.15 }
+    }
+}
+
+/// `[gan]`: the generator's training.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Gan {
+    /// Network preset: `light` (CPU) or `paper`.
+    pub preset: String,
+    /// Window length in frames.
+    pub window_frames: usize,
+    /// Frames between the starts of two windows of an interval.
+    pub stride_frames: usize,
+    pub batch: usize,
+    pub steps: usize,
+    pub learning_rate: f64,
+    /// Weights of the losses.
+    pub lambda_l1: f64,
+    pub lambda_gan: f64,
+    pub lambda_bone: f64,
+    pub seed: u64,
+    /// Steps between checkpoints.
+    pub checkpoint_every: usize,
+    /// Checkpoints kept.
+    pub keep_checkpoints: usize,
+}
+
+impl Default for Gan {
+    fn default() -> Self {
+        Self {
+            preset: "light".into(),
+            window_frames: 64,
+            stride_frames: 5,
+            batch: 16,
+            steps: 3000,
+            learning_rate: 1e-4,
+            lambda_l1: 1.0,
+            lambda_gan: 1.0,
+            lambda_bone: 0.1,
+            seed: 1337,
+            checkpoint_every: 250,
+            keep_checkpoints: 3,
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Speech to motion with a trained speaker.

@@ -1,0 +1,1 @@
+//! The only room that knows ffmpeg: probing, sound, frames as a stream by presentation time, encoding.

@@ -1,0 +1,1 @@
+//! Stage 3: keypoints to intervals worth keeping; every refused stretch with its reason and measured value.

@@ -1,0 +1,45 @@
+//! How any step of the road runs, is recorded, and resumes. This room knows no concrete step: a step is a `Stage`, a
+//! thing to do is a `Unit`, and what was done is a `record::Record` written last.
+
+pub mod progress;
+
+use progress::Progress;
+use std::path::{Path, PathBuf};
+
+/// One thing a stage works on: a video of a speaker, or (for `shard`) a whole speaker.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Unit {
+    pub speaker: String,
+    /// Work folder name of the video: slug of its stem, `-`, 8 hex digits of its path; empty for a whole speaker.
+    pub video: String,
+    /// The video file; for a whole speaker the configuration file.
+    pub source: PathBuf,
+}
+
+/// A file a stage reads: its role (`video`, `keypoints`, `model:body`) and where it is.
+#[derive(Clone, Debug)]
+pub struct Input {
+    pub role: String,
+    pub path: PathBuf,
+}
+
+/// One line of a stage's report on a unit, for people; and the numbers behind it, for programs.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    pub line: String,
+    pub facts: serde_json::Map<String, serde_json::Value>,
+}
+
+/// A step of the road. The same inputs and settings give the same bytes, whatever else runs beside it.
+pub trait Stage: Sync {
+    /// Its name: a folder of `work/` and an argument of `--from`.
+    fn name(&self) -> &'static str;
+    /// Goes up when the bytes it writes change their meaning.
+    fn version(&self) -> u32;
+    /// Every setting that has a say in the bytes, and the versions of the tools that have.
+    fn settings(&self) -> serde_json::Value;
+    /// The files it reads for `unit`; their contents are part of the fingerprint.
+    fn inputs(&self, unit: &Unit) -> anyhow::Result<Vec<Input>>;
+    /// Does the work: writes its files into the empty folder `out` and nowhere else.
+    fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> anyhow::Result<Report>;
+}

@@ -1,0 +1,1 @@
+//! Losses, optimiser, checkpoints, logs, and the training loops.

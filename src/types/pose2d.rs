@@ -1,0 +1,88 @@
+//! 2D keypoints: one frame as the detectors give it, and a whole video as it is stored.
+
+use super::time::FrameRate;
+use ndarray::Array3;
+
+/// Points of a body, COCO-17: nose, left/right eye, ear, shoulder, elbow, wrist, hip, knee, ankle (odd = left).
+pub const N_BODY: usize = 17;
+/// Points of a hand: wrist, then thumb, index, middle, ring, little, each base to tip.
+pub const N_HAND: usize = 21;
+
+/// COCO-17 indices.
+pub mod coco {
+    pub const NOSE: usize = 0;
+    pub const L_EYE: usize = 1;
+    pub const R_EYE: usize = 2;
+    pub const L_EAR: usize = 3;
+    pub const R_EAR: usize = 4;
+    pub const L_SHOULDER: usize = 5;
+    pub const R_SHOULDER: usize = 6;
+    pub const L_ELBOW: usize = 7;
+    pub const R_ELBOW: usize = 8;
+    pub const L_WRIST: usize = 9;
+    pub const R_WRIST: usize = 10;
+    pub const L_HIP: usize = 11;
+    pub const R_HIP: usize = 12;
+}
+
+/// A point of the picture in pixels (x right, y down, the centre of the top left pixel is 0, 0) and how sure the
+/// detector is, 0..1; score 0 means missing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Keypoint {
+    pub x: f32,
+    pub y: f32,
+    pub score: f32,
+}
+
+/// A box of the picture in pixels, top left corner and size, with the detector's score.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PersonBox {
+    pub x: f32,
+    pub y: f32,
+    pub width: f32,
+    pub height: f32,
+    pub score: f32,
+}
+
+/// What was found in one frame. A hand or body not found is all zeros.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pose2d {
+    pub person: PersonBox,
+    pub n_people: u8,
+    pub body: [Keypoint; N_BODY],
+    pub left_hand: [Keypoint; N_HAND],
+    pub right_hand: [Keypoint; N_HAND],
+}
+
+impl Default for Pose2d {
+    fn default() -> Self {
+        Self {
+            person: PersonBox::default(),
+            n_people: 0,
+            body: [Keypoint::default(); N_BODY],
+            left_hand: [Keypoint::default(); N_HAND],
+            right_hand: [Keypoint::default(); N_HAND],
+        }
+    }
+}
+
+/// The keypoints of a whole video at the dataset rate; last axis x px, y px, score; score 0 = missing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Keypoints {
+    pub fps: FrameRate,
+    /// Width and height in px of the upright picture.
+    pub image_size: [u32; 2],
+    /// [T, 17, 3]
+    pub body: Array3<f32>,
+    /// [T, 21, 3]
+    pub left_hand: Array3<f32>,
+    /// [T, 21, 3]
+    pub right_hand: Array3<f32>,
+}
+
+impl Keypoints {
+    /// Number of frames T.
+    pub fn n_frames(&self) -> usize {
+        self.body.shape()[0]
+    }
+}

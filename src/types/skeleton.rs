@@ -1,0 +1,121 @@
+//! The 49-joint skeleton of Rebol et al. 2021 in house order: neck, right arm, left arm, left hand, right hand; a
+//! hand is its wrist, then thumb, index, middle, ring, little, each BASE TO TIP (the OpenPose / MediaPipe order).
+//! The authors' text files run each finger tip first: `AUTHORS_FROM_HOUSE` is that permutation, its own inverse.
+
+/// Joints of the skeleton.
+pub const N_JOINTS: usize = 49;
+/// Joints of a hand, its root (the wrist again) included.
+pub const N_HAND_JOINTS: usize = 21;
+/// Bones: every joint but the neck has one, to its parent.
+pub const N_BONES: usize = N_JOINTS - 1;
+
+pub const NECK: usize = 0;
+pub const R_SHOULDER: usize = 1;
+pub const R_ELBOW: usize = 2;
+pub const R_WRIST: usize = 3;
+pub const L_SHOULDER: usize = 4;
+pub const L_ELBOW: usize = 5;
+pub const L_WRIST: usize = 6;
+/// Root of the left hand; equals `L_WRIST` exactly.
+pub const L_HAND: usize = 7;
+/// Root of the right hand; equals `R_WRIST` exactly.
+pub const R_HAND: usize = 28;
+
+/// Side of the speaker's own body a joint belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    Centre,
+    Left,
+    Right,
+}
+
+const FINGERS: [&str; 5] = ["Thumb", "Index", "Middle", "Ring", "Little"];
+const PHALANGES: [&str; 4] = ["Base", "Inter", "Distal", "Tip"];
+
+/// Parent of each joint; the neck's is `None`.
+pub const fn parent(joint: usize) -> Option<usize> {
+    match joint {
+        NECK => None,
+        R_SHOULDER | L_SHOULDER => Some(NECK),
+        R_ELBOW | R_WRIST | L_ELBOW | L_WRIST => Some(joint - 1),
+        L_HAND => Some(L_WRIST),
+        R_HAND => Some(R_WRIST),
+        _ => {
+            let root = if joint < R_HAND { L_HAND } else { R_HAND };
+            if (joint - root) % 4 == 1 { Some(root) } else { Some(joint - 1) }
+        }
+    }
+}
+
+/// Side of each joint.
+pub const fn side(joint: usize) -> Side {
+    match joint {
+        NECK => Side::Centre,
+        R_SHOULDER..=R_WRIST => Side::Right,
+        L_SHOULDER..R_HAND => Side::Left,
+        _ => Side::Right,
+    }
+}
+
+/// Name of a joint, for instance `RWrist`, `LIndexTip`.
+pub fn name(joint: usize) -> String {
+    const BODY: [&str; 7] = ["Neck", "RShoulder", "RElbow", "RWrist", "LShoulder", "LElbow", "LWrist"];
+    if joint < L_HAND {
+        return BODY[joint].to_owned();
+    }
+    let (side, root) = if joint < R_HAND { ("L", L_HAND) } else { ("R", R_HAND) };
+    match joint - root {
+        0 => format!("{side}HandRoot"),
+        k => format!("{side}{}{}", FINGERS[(k - 1) / 4], PHALANGES[(k - 1) % 4]),
+    }
+}
+
+/// The same joint of the other side of the body.
+pub const fn mirror(joint: usize) -> usize {
+    match joint {
+        NECK => NECK,
+        R_SHOULDER..=R_WRIST => joint + 3,
+        L_SHOULDER..=L_WRIST => joint - 3,
+        L_HAND..R_HAND => joint + 21,
+        _ => joint - 21,
+    }
+}
+
+/// `house[j] = authors[authors_from_house(j)]` and the other way round: fingers are reversed within themselves.
+pub const fn authors_from_house(joint: usize) -> usize {
+    if joint < L_HAND {
+        return joint;
+    }
+    let root = if joint < R_HAND { L_HAND } else { R_HAND };
+    if joint == root {
+        return joint;
+    }
+    let k = joint - root - 1;
+    root + 1 + 4 * (k / 4) + (3 - k % 4)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parents_come_before_their_children() {
+        for joint in 1..N_JOINTS {
+            assert!(parent(joint).is_some_and(|p| p < joint), "{}", name(joint));
+        }
+    }
+
+    #[test]
+    fn mirror_and_authors_order_are_their_own_inverses() {
+        for joint in 0..N_JOINTS {
+            assert_eq!(mirror(mirror(joint)), joint);
+            assert_eq!(authors_from_house(authors_from_house(joint)), joint);
+            if let Some(p) = parent(joint) {
+                assert_eq!(parent(mirror(joint)), Some(mirror(p)));
+            }
+        }
+        assert_eq!(name(8), "LThumbBase");
+        assert_eq!(authors_from_house(8), 11);
+        assert_eq!((name(48).as_str(), side(48)), ("RLittleTip", Side::Right));
+    }
+}

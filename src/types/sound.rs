@@ -1,0 +1,18 @@
+//! Sound in memory.
+
+/// The rate of all sound inside the pipeline, in samples a second.
+pub const SAMPLE_RATE: u32 = 16_000;
+
+/// Mono samples in -1..1 at `rate` samples a second.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sound {
+    pub rate: u32,
+    pub samples: Vec<f32>,
+}
+
+impl Sound {
+    /// Length in seconds.
+    pub fn secs(&self) -> f64 {
+        self.samples.len() as f64 / f64::from(self.rate.max(1))
+    }
+}

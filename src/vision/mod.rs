@@ -1,0 +1,1 @@
+//! The only room that knows OpenCV: warps, letterboxes, colour, heat-map filters, drawing.
