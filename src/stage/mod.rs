@@ -2,6 +2,7 @@
 //! thing to do is a `Unit`, and what was done is a `record::Record` written last.
 
 pub mod progress;
+pub mod workdir;
 
 use progress::Progress;
 use std::path::{Path, PathBuf};

@@ -1,0 +1,123 @@
+//! Writing so that a kill at any moment leaves either the old or the new, whole: write an attempt beside the place,
+//! flush it to disk, rename. The only renames of the project are here.
+
+use anyhow::{Context, Result};
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Writes `bytes` to `path` atomically; its folder is made if missing.
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
+    replace(path, |attempt| Ok(File::create(attempt)?.write_all(bytes)?))
+}
+
+/// Lets `write` make a file under an attempt name beside `path` (the same extension), then puts it in place.
+/// If `write` fails, the attempt is removed and what was at `path` stays.
+pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    let folder = parent(path);
+    fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let attempt = attempt_beside(path);
+    let written = write(&attempt).and_then(|()| flush(&attempt)).and_then(|()| {
+        fs::rename(&attempt, path)?;
+        flush(&folder)
+    });
+    if written.is_err() {
+        let _ = fs::remove_file(&attempt);
+    }
+    written.with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// Puts the finished folder `attempt` in the place of `place`, which may exist. Every file is flushed first.
+pub fn replace_folder(attempt: &Path, place: &Path) -> Result<()> {
+    let moved = || -> Result<()> {
+        flush_tree(attempt)?;
+        if place.exists() {
+            let old = attempt_beside(place).with_extension("old");
+            let _ = fs::remove_dir_all(&old);
+            fs::rename(place, &old)?;
+            fs::rename(attempt, place)?;
+            let _ = fs::remove_dir_all(&old);
+        } else {
+            fs::rename(attempt, place)?;
+        }
+        flush(&parent(place))
+    };
+    moved().with_context(|| format!("cannot put {} in its place", place.display()))
+}
+
+/// An empty folder beside `place` to work in; what an earlier killed attempt left there is removed.
+pub fn attempt_folder(place: &Path) -> Result<PathBuf> {
+    let attempt = attempt_beside(place);
+    let made = || -> std::io::Result<()> {
+        for stale in [attempt.clone(), attempt.with_extension("old")] {
+            match fs::remove_dir_all(&stale) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+                _ => {}
+            }
+        }
+        fs::create_dir_all(&attempt)
+    };
+    made().with_context(|| format!("cannot write in the work folder {}", parent(place).display()))?;
+    Ok(attempt)
+}
+
+fn parent(path: &Path) -> PathBuf {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
+        _ => PathBuf::from("."),
+    }
+}
+
+/// `.NAME.attempt.EXT` beside `path`: hidden, and with the extension that writers choose their format by.
+fn attempt_beside(path: &Path) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = match path.extension() {
+        Some(extension) => format!(".{stem}.attempt.{}", extension.to_string_lossy()),
+        None => format!(".{stem}.attempt"),
+    };
+    path.with_file_name(name)
+}
+
+fn flush(path: &Path) -> Result<()> {
+    Ok(File::open(path)?.sync_all()?)
+}
+
+fn flush_tree(folder: &Path) -> Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.is_dir() { flush_tree(&path)? } else { flush(&path)? }
+    }
+    flush(folder)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_leaves_what_was_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("deep/a.json");
+        write_file(&path, b"old").unwrap();
+        let failed = replace(&path, |attempt| {
+            fs::write(attempt, b"half")?;
+            anyhow::bail!("power cut")
+        });
+        assert!(failed.is_err());
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_folder_replaces_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = folder.path().join("unit");
+        for round in ["1", "2"] {
+            let attempt = attempt_folder(&place).unwrap();
+            fs::write(attempt.join(round), round).unwrap();
+            replace_folder(&attempt, &place).unwrap();
+        }
+        assert!(place.join("2").exists() && !place.join("1").exists());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}
