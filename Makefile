@@ -1,0 +1,77 @@
+# make demo    the whole road on a synthetic speaker, from a bare machine to a trained model and its motion
+# make test    everything CI runs
+# make build   target/release/orator
+# Needs: Debian 12 (x86-64), Rust. The rest is installed by `make setup` and `make runtime`.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := build
+.PHONY: setup runtime build test demo prove clean-demo
+
+TARGET := $(or $(CARGO_TARGET_DIR),target)
+ORATOR := $(TARGET)/release/orator
+
+PACKAGES := libavformat-dev libavcodec-dev libavutil-dev libswscale-dev libswresample-dev \
+	libopencv-core-dev libopencv-imgproc-dev clang pkg-config g++ ffmpeg ca-certificates
+
+# ONNX Runtime (MIT) is inside this wheel; both hashes are checked.
+RUNTIME_VERSION := 1.31.1
+RUNTIME_WHEEL_SHA256 := 5752bd508126ae7c49894d3b9d2e83f0c3d487319246d04c444b393308d7ad7f
+RUNTIME_SHA256 := fc44112fbe06d7d689c57e11d3862031f64711007e4ee020f8eed5185fd2c1d3
+RUNTIME := $(TARGET)/lib/libonnxruntime.so.$(RUNTIME_VERSION)
+
+# Asks for root only where something is missing.
+define INSTALL
+install() { \
+	local root=''; [ "$$(id -u)" = 0 ] || root=sudo; \
+	command -v apt-get >/dev/null || { echo "no apt-get here: install these by hand: $$*" >&2; exit 1; }; \
+	$$root apt-get update -q </dev/null; \
+	$$root env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "$$@" </dev/null; \
+}
+endef
+
+setup:
+	@$(INSTALL); missing=(); \
+	for package in $(PACKAGES); do \
+		dpkg-query -W -f '$${Status}' $$package 2>/dev/null | grep -q '^install ok installed$$' || missing+=($$package); \
+	done; \
+	if [ $${#missing[@]} -gt 0 ]; then echo "setup: installing $${missing[*]}"; install "$${missing[@]}"; fi; \
+	command -v cargo >/dev/null || { echo 'setup: no cargo; install Rust 1.89 or newer with rustup' >&2; exit 1; }; \
+	for tool in clippy fmt; do \
+		cargo $$tool --version >/dev/null 2>&1 || rustup component add clippy rustfmt || true; \
+	done; \
+	echo 'setup: all there'
+
+runtime: $(RUNTIME)
+
+$(RUNTIME):
+	@$(INSTALL); pip=''; \
+	find_pip() { for python in python3 /usr/bin/python3; do if $$python -m pip --version >/dev/null 2>&1; then pip="$$python -m pip"; return; fi; done; }; \
+	find_pip; [ -n "$$pip" ] || { install python3-pip; hash -r; find_pip; }; \
+	[ -n "$$pip" ] || { echo 'runtime: no pip for any python3' >&2; exit 1; }; \
+	attempt=$(TARGET)/lib/attempt; rm -rf $$attempt; mkdir -p $$attempt; \
+	echo 'onnxruntime==$(RUNTIME_VERSION) --hash=sha256:$(RUNTIME_WHEEL_SHA256)' > $$attempt/requirements.txt; \
+	$$pip download --quiet --disable-pip-version-check --no-input --no-deps --require-hashes --only-binary=:all: \
+		--platform manylinux_2_28_x86_64 --python-version 3.11 --implementation cp -d $$attempt -r $$attempt/requirements.txt; \
+	$${pip% -m pip} -m zipfile -e $$attempt/onnxruntime-*.whl $$attempt; \
+	library=$$(ls $$attempt/onnxruntime/capi/libonnxruntime.so* | head -n 1); \
+	echo "$(RUNTIME_SHA256)  $$library" | sha256sum --check --quiet; \
+	mv $$library $@; touch $@; rm -rf $$attempt; echo "runtime: $@"
+
+build: setup runtime
+	cargo build --release --locked
+
+test: build
+	cargo fmt --check
+	cargo clippy --locked --all-targets -- -D warnings
+	cargo test --locked
+	@echo 'make test: all passed'
+
+prove: build
+	@echo 'no long proofs yet'
+
+demo: build
+	@echo 'the demo is not built yet'
+
+clean-demo:
+	rm -rf $(TARGET)/demo
