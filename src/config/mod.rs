@@ -2,6 +2,139 @@
 //! defaults in, paths absolute, every value in its range). Each section is one small struct whose defaults are the
 //! documented ones; the top level `pipeline.toml` documents them and a test holds the two together.
 
+mod file;
+mod rules;
 mod sections;
+pub mod videos;
 
+pub use file::{Place, Problem};
 pub use sections::*;
+
+use anyhow::{Context, Result};
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// The documented default, embedded: what `orator init` writes.
+pub const DEFAULT_FILE: &str = include_str!("../../pipeline.toml");
+
+/// A configuration ready to use.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// Resolved: paths absolute, values in range.
+    pub settings: Settings,
+    /// The file it was read from, absolute.
+    pub file: PathBuf,
+}
+
+/// Everything wrong with a configuration, one line a problem.
+#[derive(Debug, thiserror::Error)]
+pub struct Invalid {
+    pub file: PathBuf,
+    pub problems: Vec<Problem>,
+}
+
+impl fmt::Display for Invalid {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let plural = if self.problems.len() == 1 { "problem" } else { "problems" };
+        write!(f, "{} {plural} in {}", self.problems.len(), self.file.display())?;
+        self.problems.iter().try_for_each(|problem| write!(f, "\n  {problem}"))
+    }
+}
+
+/// Reads `file` and lays the `--set` changes over it. Paths in the file are relative to its folder, paths given by
+/// `--set` to the current folder.
+///
+/// # Errors
+/// A file that cannot be read, or `Invalid` with every problem at once.
+pub fn load(file: &Path, sets: &[String]) -> Result<Config> {
+    let text = std::fs::read_to_string(file).with_context(|| {
+        format!("cannot read the configuration {}; `orator init DIR` writes one, -c FILE names another", file.display())
+    })?;
+    let file = std::path::absolute(file)?;
+    let mut settings = resolve(&text, sets, &file)?;
+    let here = std::env::current_dir()?;
+    let folder = file.parent().unwrap_or(&here).to_owned();
+    let on_command_line = |key: &str| sets.iter().any(|set| set.starts_with(&format!("{key}=")));
+    let paths: [(&str, &mut PathBuf); 5] = [
+        ("work.dir", &mut settings.work.dir),
+        ("models.dir", &mut settings.models.dir),
+        ("models.onnxruntime", &mut settings.models.onnxruntime),
+        ("lift.body_weights", &mut settings.lift.body_weights),
+        ("lift.hand_weights", &mut settings.lift.hand_weights),
+    ];
+    for (key, path) in paths {
+        if !path.as_os_str().is_empty() {
+            *path = if on_command_line(key) { here.join(&*path) } else { folder.join(&*path) };
+        }
+    }
+    Ok(Config { settings, file })
+}
+
+/// The settings a text gives, checked but with paths as written.
+fn resolve(text: &str, sets: &[String], file: &Path) -> Result<Settings> {
+    let given = file::read(text, sets);
+    let mut problems = given.problems;
+    problems.extend(rules::check(&given.settings, &given.places));
+    problems.sort_by(|a, b| (a.place, &a.key).cmp(&(b.place, &b.key)));
+    if problems.is_empty() { Ok(given.settings) } else { Err(Invalid { file: file.to_owned(), problems }.into()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn problems(text: &str, sets: &[&str]) -> Vec<String> {
+        let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+        match resolve(text, &sets, Path::new("pipeline.toml")) {
+            Ok(_) => Vec::new(),
+            Err(error) => error.to_string().lines().skip(1).map(|line| line.trim().to_owned()).collect(),
+        }
+    }
+
+    #[test]
+    fn the_documented_file_is_the_default() {
+        let settings = resolve(DEFAULT_FILE, &[], Path::new("pipeline.toml")).unwrap();
+        assert_eq!(Settings { speaker: Vec::new(), ..settings }, Settings::default());
+        let defaults = toml::Table::try_from(Settings::default()).unwrap();
+        for (section, keys) in defaults {
+            for key in keys.as_table().into_iter().flat_map(|table| table.keys()) {
+                let documented = DEFAULT_FILE
+                    .lines()
+                    .any(|line| line.trim_start_matches('#').trim_start().starts_with(&format!("{key} =")));
+                assert!(documented, "{section}.{key} is not in pipeline.toml");
+            }
+        }
+    }
+
+    #[test]
+    fn the_smallest_file_works() {
+        let text = "[[speaker]]\nname = \"host\"\nvideos = [\"videos/host/*.mp4\"]\n";
+        let settings = resolve(text, &["extract.fps=10".into()], Path::new("p.toml")).unwrap();
+        assert_eq!((settings.speaker[0].name.as_str(), settings.extract.fps), ("host", 10));
+    }
+
+    #[test]
+    fn all_problems_are_reported_at_once_with_key_and_line() {
+        let text = "[extract]\nfsp = 15\nshot_threshold = 7\n[work]\njobs = \"two\"\n[[speaker]]\nname = \"a b\"\n";
+        assert_eq!(
+            problems(text, &["gan.batch=0", "nothing=1", "lift.smooth_arms"]),
+            [
+                "line 2: extract.fsp: unknown key (did you mean fps?)",
+                "line 3: extract.shot_threshold: 7 is out of range: expected 0 to 1",
+                "line 5: work.jobs: expected a whole number, found string",
+                "line 6: speaker[0]: the key videos is missing",
+                "line 7: speaker[0].name: \"a b\": expected letters, digits, - and _ (it names folders)",
+                "--set: lift.smooth_arms: expected KEY=VALUE, like extract.fps=15",
+                "--set: gan.batch: 0 is out of range: expected 1 to 4096 windows",
+                "--set: nothing: unknown key",
+            ]
+        );
+    }
+
+    #[test]
+    fn broken_toml_says_where() {
+        assert!(problems("[extract\nfps = 15", &[])[0].starts_with("line 1: not valid TOML"));
+        assert!(problems("extract = 3", &[])[0].contains("expected a table"));
+        assert!(problems("speaker = 3", &[])[0].contains("[[speaker]]"));
+    }
+}

@@ -1,10 +1,14 @@
 //! How any step of the road runs, is recorded, and resumes. This room knows no concrete step: a step is a `Stage`, a
 //! thing to do is a `Unit`, and what was done is a `record::Record` written last.
 
+pub mod fingerprint;
 pub mod progress;
+pub mod record;
+pub mod runner;
 pub mod workdir;
 
 use progress::Progress;
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// One thing a stage works on: a video of a speaker, or (for `shard`) a whole speaker.
@@ -15,6 +19,12 @@ pub struct Unit {
     pub video: String,
     /// The video file; for a whole speaker the configuration file.
     pub source: PathBuf,
+}
+
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.video.is_empty() { write!(f, "{}", self.speaker) } else { write!(f, "{}/{}", self.speaker, self.video) }
+    }
 }
 
 /// A file a stage reads: its role (`video`, `keypoints`, `model:body`) and where it is.
@@ -33,8 +43,12 @@ pub struct Report {
 
 /// A step of the road. The same inputs and settings give the same bytes, whatever else runs beside it.
 pub trait Stage: Sync {
-    /// Its name: a folder of `work/` and an argument of `--from`.
+    /// Its name, an argument of `--from`.
     fn name(&self) -> &'static str;
+    /// Its folder under `work/`.
+    fn folder(&self) -> &'static str {
+        self.name()
+    }
     /// Goes up when the bytes it writes change their meaning.
     fn version(&self) -> u32;
     /// Every setting that has a say in the bytes, and the versions of the tools that have.

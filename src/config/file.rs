@@ -1,0 +1,225 @@
+//! `pipeline.toml` as written: the text becomes a table laid over the defaults, and every key that is unknown or of
+//! the wrong type is a `Problem` with its line. All problems are found before any is reported.
+
+use super::Settings;
+use std::collections::BTreeMap;
+use std::fmt;
+use toml::de::{DeTable, DeValue};
+use toml::{Table, Value};
+
+/// Something wrong with one key.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Problem {
+    /// Dotted, `extract.fps`; a speaker's is `speaker[0].name`.
+    pub key: String,
+    pub place: Place,
+    pub message: String,
+}
+
+/// Where a key was given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Place {
+    /// Line of the file, from 1.
+    Line(usize),
+    CommandLine,
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.place {
+            Place::Line(line) => write!(f, "line {line}: ")?,
+            Place::CommandLine => write!(f, "--set: ")?,
+        }
+        if self.key.is_empty() { write!(f, "{}", self.message) } else { write!(f, "{}: {}", self.key, self.message) }
+    }
+}
+
+/// The settings as given, the place of every key given, and what was wrong with the rest.
+pub struct Given {
+    pub settings: Settings,
+    pub places: BTreeMap<String, Place>,
+    pub problems: Vec<Problem>,
+}
+
+/// Reads the text of a `pipeline.toml` and `--set key=value` changes over the defaults.
+pub fn read(text: &str, sets: &[String]) -> Given {
+    let mut reader = Reader { places: BTreeMap::new(), problems: Vec::new() };
+    let mut table = defaults();
+    match DeTable::parse(text) {
+        Ok(document) => reader.lay(document.get_ref(), &mut table, "", &|span| Place::Line(line_of(text, span))),
+        Err(error) => {
+            let line = line_of(text, error.span().map_or(0, |span| span.start));
+            reader.problem("", Place::Line(line), format!("not valid TOML: {}", error.message().replace('\n', ", ")));
+        }
+    }
+    for set in sets {
+        reader.set(set, &mut table);
+    }
+    let settings = table.try_into::<Settings>().unwrap_or_else(|error| {
+        reader.problem("", Place::Line(1), error.message().to_owned());
+        Settings::default()
+    });
+    Given { settings, places: reader.places, problems: reader.problems }
+}
+
+fn defaults() -> Table {
+    // The defaults are plain numbers, strings and paths: they always have a TOML form.
+    Table::try_from(Settings::default()).unwrap_or_default()
+}
+
+/// What a `[[speaker]]` may hold.
+fn speaker_schema() -> Table {
+    let videos = Value::Array(vec![Value::String(String::new())]);
+    Table::from_iter([("name".to_owned(), Value::String(String::new())), ("videos".to_owned(), videos)])
+}
+
+struct Reader {
+    places: BTreeMap<String, Place>,
+    problems: Vec<Problem>,
+}
+
+impl Reader {
+    fn problem(&mut self, key: &str, place: Place, message: String) {
+        self.problems.push(Problem { key: key.to_owned(), place, message });
+    }
+
+    /// Lays what is written over `table`, key by key.
+    fn lay(&mut self, written: &DeTable<'_>, table: &mut Table, prefix: &str, place_at: &dyn Fn(usize) -> Place) {
+        for (name, value) in written {
+            let key = format!("{prefix}{}", name.get_ref());
+            let place = place_at(name.span().start);
+            if key == "speaker" {
+                self.lay_speakers(value.get_ref(), table, place, place_at);
+                continue;
+            }
+            let Some(default) = table.get_mut(name.get_ref().as_ref()) else {
+                let near = nearest(name.get_ref(), table.keys());
+                self.problem(&key, place, format!("unknown key{near}"));
+                continue;
+            };
+            if let (Value::Table(inner), DeValue::Table(written)) = (&mut *default, value.get_ref()) {
+                self.lay(written, inner, &format!("{key}."), place_at);
+                continue;
+            }
+            match typed(value.get_ref(), default) {
+                Ok(value) => {
+                    *default = value;
+                    self.places.insert(key, place);
+                }
+                Err(message) => self.problem(&key, place, message),
+            }
+        }
+    }
+
+    fn lay_speakers(
+        &mut self,
+        value: &DeValue<'_>,
+        table: &mut Table,
+        place: Place,
+        place_at: &dyn Fn(usize) -> Place,
+    ) {
+        let DeValue::Array(entries) = value else {
+            return self.problem("speaker", place, "expected [[speaker]] tables".to_owned());
+        };
+        let mut speakers = Vec::new();
+        for (at, entry) in entries.iter().enumerate() {
+            let key = format!("speaker[{at}]");
+            let place = place_at(entry.span().start);
+            let DeValue::Table(written) = entry.get_ref() else {
+                self.problem(&key, place, "expected a [[speaker]] table".to_owned());
+                continue;
+            };
+            let mut speaker = speaker_schema();
+            self.places.insert(key.clone(), place);
+            self.lay(written, &mut speaker, &format!("{key}."), place_at);
+            for name in ["name", "videos"].iter().filter(|name| !written.keys().any(|key| key.get_ref() == **name)) {
+                self.problem(&key, place, format!("the key {name} is missing"));
+            }
+            speakers.push(Value::Table(speaker));
+        }
+        table.insert("speaker".to_owned(), Value::Array(speakers));
+    }
+
+    /// One `--set key=value`; a value that is no TOML is a string.
+    fn set(&mut self, set: &str, table: &mut Table) {
+        let Some((key, value)) = set.split_once('=') else {
+            return self.problem("", Place::CommandLine, format!("{set}: expected KEY=VALUE, like extract.fps=15"));
+        };
+        if key.starts_with("speaker") {
+            return self.problem(key, Place::CommandLine, "speakers are written in the file".to_owned());
+        }
+        let is_key = !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '.');
+        let quoted = toml::Value::String(value.to_owned()).to_string();
+        let as_string = format!("{key} = {quoted}");
+        let as_toml = format!("{key} = {value}");
+        let parsed = DeTable::parse(&as_toml).or_else(|_| DeTable::parse(&as_string));
+        match parsed {
+            Ok(document) if is_key => self.lay(document.get_ref(), table, "", &|_| Place::CommandLine),
+            _ => self.problem(key, Place::CommandLine, "not a key of the configuration".to_owned()),
+        }
+    }
+}
+
+/// `value` in the type of `default`, or what was expected.
+fn typed(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
+    let wrong = |expected: &str| Err(format!("expected {expected}, found {}", value.type_str()));
+    match (default, value) {
+        (Value::Boolean(_), DeValue::Boolean(b)) => Ok(Value::Boolean(*b)),
+        (Value::Boolean(_), _) => wrong("true or false"),
+        (Value::String(_), DeValue::String(s)) => Ok(Value::String(s.to_string())),
+        (Value::String(_), _) => wrong("a string"),
+        (Value::Integer(_), DeValue::Integer(i)) => match i64::from_str_radix(i.as_str(), i.radix()) {
+            Ok(i) if i >= 0 => Ok(Value::Integer(i)),
+            _ => Err(format!("{i} is out of range: expected a whole number from 0 up")),
+        },
+        (Value::Integer(_), _) => wrong("a whole number"),
+        (Value::Float(_), DeValue::Integer(_) | DeValue::Float(_)) => {
+            let text = match value {
+                DeValue::Float(f) => f.as_str().to_owned(),
+                DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix()).unwrap_or_default().to_string(),
+                _ => String::new(),
+            };
+            match text.parse::<f64>() {
+                Ok(number) if number.is_finite() => Ok(Value::Float(number)),
+                _ => Err(format!("{text} is no finite number")),
+            }
+        }
+        (Value::Float(_), _) => wrong("a number"),
+        (Value::Array(_), DeValue::Array(items)) => {
+            let model = Value::String(String::new());
+            items.iter().map(|item| typed(item.get_ref(), &model)).collect::<Result<_, _>>().map(Value::Array)
+        }
+        (Value::Array(_), _) => wrong("a list of strings"),
+        (Value::Table(_), _) => wrong("a table"),
+        (Value::Datetime(_), _) => wrong("another value"),
+    }
+}
+
+/// ` (did you mean X?)` where a known key is close.
+fn nearest<'k>(name: &str, known: impl Iterator<Item = &'k String>) -> String {
+    let best = known.map(|key| (distance(name, key), key)).min();
+    match best {
+        Some((steps, key)) if steps <= 1 + key.len() / 3 => format!(" (did you mean {key}?)"),
+        _ => String::new(),
+    }
+}
+
+/// Levenshtein distance.
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, ca) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, cb) in b.iter().enumerate() {
+            let step = (row[j].min(row[j + 1]) + 1).min(diagonal + usize::from(ca != *cb));
+            diagonal = row[j + 1];
+            row[j + 1] = step;
+        }
+    }
+    row[b.len()]
+}
+
+fn line_of(text: &str, offset: usize) -> usize {
+    1 + text.as_bytes().iter().take(offset).filter(|byte| **byte == b'\n').count()
+}

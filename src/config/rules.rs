@@ -1,0 +1,86 @@
+//! Which values are possible: one line a key.
+
+use super::Settings;
+use super::file::{Place, Problem};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Every value out of its range, with what was expected.
+pub fn check(settings: &Settings, places: &BTreeMap<String, Place>) -> Vec<Problem> {
+    let mut rules = Rules { places, problems: Vec::new() };
+    let s = settings;
+    rules.within("extract.fps", f64::from(s.extract.fps), 1.0, 120.0, "frames a second");
+    rules.within("extract.shot_threshold", s.extract.shot_threshold, 0.0, 1.0, "");
+    rules.within("pose2d.person_every", s.pose2d.person_every as f64, 1.0, 10_000.0, "frames");
+    rules.within("pose2d.palm_every", s.pose2d.palm_every as f64, 1.0, 10_000.0, "frames");
+    rules.within("pose2d.person_follow", s.pose2d.person_follow, 0.0, 1.0, "");
+    rules.within("pose2d.hand_score", s.pose2d.hand_score, 0.0, 1.0, "");
+    rules.within("pose2d.joint_score", s.pose2d.joint_score, 0.0, 1.0, "");
+    rules.within("segment.min_frames", s.segment.min_frames as f64, 1.0, 1e6, "frames");
+    rules.within("segment.joint_score", s.segment.joint_score, 0.0, 1.0, "");
+    rules.within("segment.max_body_gap_secs", s.segment.max_body_gap_secs, 0.0, 60.0, "seconds");
+    rules.within("segment.max_hand_gap_secs", s.segment.max_hand_gap_secs, 0.0, 60.0, "seconds");
+    rules.within("segment.min_shoulder_px", s.segment.min_shoulder_px, 1.0, 1e5, "pixels");
+    rules.within("segment.max_jump", s.segment.max_jump, 0.01, 100.0, "shoulder widths");
+    rules.within("lift.smooth_arms", s.lift.smooth_arms, 0.0, 30.0, "frames");
+    rules.within("lift.smooth_hands", s.lift.smooth_hands, 0.0, 30.0, "frames");
+    rules.within("shard.max_mb", f64::from(s.shard.max_mb), 1.0, 100_000.0, "megabytes");
+    rules.within("shard.validation", s.shard.validation, 0.0, 0.9, "");
+    rules.within("shard.test", s.shard.test, 0.0, 0.9, "");
+    if s.shard.validation + s.shard.test > 0.95 {
+        rules.problem("shard.test", "validation and test together leave less than 5 % to train on".to_owned());
+    }
+    if !["light", "paper"].contains(&s.gan.preset.as_str()) {
+        rules.problem("gan.preset", format!("{:?} is not known: expected \"light\" or \"paper\"", s.gan.preset));
+    }
+    rules.within("gan.window_frames", s.gan.window_frames as f64, 32.0, 4096.0, "frames");
+    if !s.gan.window_frames.is_multiple_of(32) {
+        rules.problem("gan.window_frames", format!("{} is not a multiple of 32", s.gan.window_frames));
+    }
+    rules.within("gan.stride_frames", s.gan.stride_frames as f64, 1.0, 4096.0, "frames");
+    rules.within("gan.batch", s.gan.batch as f64, 1.0, 4096.0, "windows");
+    rules.within("gan.steps", s.gan.steps as f64, 1.0, 1e9, "steps");
+    rules.within("gan.learning_rate", s.gan.learning_rate, 1e-9, 1.0, "");
+    rules.within("gan.lambda_l1", s.gan.lambda_l1, 0.0, 1e4, "");
+    rules.within("gan.lambda_gan", s.gan.lambda_gan, 0.0, 1e4, "");
+    rules.within("gan.lambda_bone", s.gan.lambda_bone, 0.0, 1e4, "");
+    rules.within("gan.checkpoint_every", s.gan.checkpoint_every as f64, 1.0, 1e9, "steps");
+    rules.within("gan.keep_checkpoints", s.gan.keep_checkpoints as f64, 1.0, 1e6, "checkpoints");
+    rules.speakers(settings);
+    rules.problems
+}
+
+struct Rules<'a> {
+    places: &'a BTreeMap<String, Place>,
+    problems: Vec<Problem>,
+}
+
+impl Rules<'_> {
+    fn problem(&mut self, key: &str, message: String) {
+        let place = self.places.get(key).copied().unwrap_or(Place::Line(1));
+        self.problems.push(Problem { key: key.to_owned(), place, message });
+    }
+
+    fn within(&mut self, key: &str, value: f64, low: f64, high: f64, unit: &str) {
+        if !(low..=high).contains(&value) {
+            let message = format!("{value} is out of range: expected {low} to {high} {unit}");
+            self.problem(key, message.trim_end().to_owned());
+        }
+    }
+
+    fn speakers(&mut self, settings: &Settings) {
+        let mut seen = BTreeSet::new();
+        for (at, speaker) in settings.speaker.iter().enumerate() {
+            let key = format!("speaker[{at}].name");
+            let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+            if speaker.name.is_empty() || !speaker.name.chars().all(plain) {
+                let message = "expected letters, digits, - and _ (it names folders)";
+                self.problem(&key, format!("{:?}: {message}", speaker.name));
+            } else if !seen.insert(speaker.name.to_ascii_lowercase()) {
+                self.problem(&key, format!("{:?} is there twice", speaker.name));
+            }
+            if speaker.videos.is_empty() {
+                self.problem(&format!("speaker[{at}].videos"), "no video named".to_owned());
+            }
+        }
+    }
+}

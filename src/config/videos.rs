@@ -1,0 +1,125 @@
+//! From the `videos` of the speakers to units: patterns are expanded, folders listed, and every video gets its work
+//! name. What names no video is a unit too, so that its failure is reported and the others go on.
+
+use super::{Config, Speaker};
+use crate::stage::Unit;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Endings taken for videos when a folder is named.
+const ENDINGS: [&str; 10] = ["mp4", "mkv", "mov", "webm", "avi", "m4v", "mpg", "mpeg", "ts", "wmv"];
+
+/// The videos of one speaker.
+#[derive(Clone, Debug)]
+pub struct Videos {
+    pub speaker: String,
+    /// Sorted by their work names, each once.
+    pub units: Vec<Unit>,
+    /// Entries of the configuration that lead to no video, each with what to do.
+    pub missing: Vec<String>,
+}
+
+/// The videos of every speaker of the configuration.
+pub fn of(config: &Config) -> Vec<Videos> {
+    let folder = config.file.parent().unwrap_or(Path::new(".")).to_owned();
+    config.settings.speaker.iter().map(|speaker| of_speaker(speaker, &folder)).collect()
+}
+
+fn of_speaker(speaker: &Speaker, folder: &Path) -> Videos {
+    let mut found = BTreeMap::new();
+    let mut missing = Vec::new();
+    for entry in &speaker.videos {
+        match expand(entry, folder) {
+            Ok(paths) => {
+                for path in paths {
+                    let video = work_name(&path, folder);
+                    found.insert(video.clone(), Unit { speaker: speaker.name.clone(), video, source: path });
+                }
+            }
+            Err(message) => missing.push(message),
+        }
+    }
+    Videos { speaker: speaker.name.clone(), units: found.into_values().collect(), missing }
+}
+
+/// The files an entry names: itself, the videos of the folder it is, or what its pattern matches. A plain path is
+/// taken as it is, so that a missing file fails by itself.
+fn expand(entry: &str, folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let path = folder.join(entry);
+    if path.is_dir() {
+        let mut paths: Vec<PathBuf> = std::fs::read_dir(&path)
+            .map_err(|error| format!("{entry}: cannot list the folder: {error}"))?
+            .filter_map(|entry| entry.ok().map(|entry| entry.path()))
+            .filter(|path| has_video_ending(path))
+            .collect();
+        paths.sort();
+        let nothing = || format!("{entry}: the folder holds no video ({})", ENDINGS.join(", "));
+        return if paths.is_empty() { Err(nothing()) } else { Ok(paths) };
+    }
+    if path.exists() || !entry.contains(['*', '?', '[']) {
+        return Ok(vec![path]);
+    }
+    let matches = glob::glob(&path.to_string_lossy()).map_err(|error| format!("{entry}: no pattern: {error}"))?;
+    let paths: Vec<PathBuf> = matches.filter_map(Result::ok).collect();
+    if paths.is_empty() { Err(format!("{entry}: no file matches, looked in {}", folder.display())) } else { Ok(paths) }
+}
+
+fn has_video_ending(path: &Path) -> bool {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+    ending.is_some_and(|ending| ENDINGS.contains(&ending.as_str()))
+}
+
+/// `<slug of the stem>-<8 hex of BLAKE3 of the path relative to the configuration>`: stable when other videos come,
+/// different for equal names in two folders.
+fn work_name(path: &Path, folder: &Path) -> String {
+    let relative = path.strip_prefix(folder).unwrap_or(path).to_string_lossy().replace('\\', "/");
+    let hash = blake3::hash(relative.as_bytes()).to_hex();
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    format!("{}-{}", slug(&stem), &hash[..8])
+}
+
+/// Lower case letters, digits and single dashes, at most 40 of them; `video` where nothing is left.
+pub fn slug(text: &str) -> String {
+    let mut slug = String::new();
+    for c in text.chars().flat_map(char::to_lowercase) {
+        if c.is_ascii_alphanumeric() {
+            slug.push(c);
+        } else if !slug.is_empty() && !slug.ends_with('-') {
+            slug.push('-');
+        }
+        if slug.len() == 40 {
+            break;
+        }
+    }
+    let slug = slug.trim_end_matches('-');
+    if slug.is_empty() { "video".to_owned() } else { slug.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_names_in_two_folders_differ_and_no_dot_is_left() {
+        let folder = Path::new("/data");
+        let a = work_name(Path::new("/data/a/My Talk.v2.mp4"), folder);
+        let b = work_name(Path::new("/data/b/My Talk.v2.mp4"), folder);
+        assert!(a.starts_with("my-talk-v2-") && a.len() == "my-talk-v2-".len() + 8 && a != b);
+        assert_eq!(slug("Ünï"), "n");
+        assert_eq!(slug("..."), "video");
+    }
+
+    #[test]
+    fn a_pattern_a_folder_and_a_missing_file() {
+        let dir = tempfile::tempdir().unwrap();
+        for name in ["b.mp4", "a.MKV", "notes.txt"] {
+            std::fs::write(dir.path().join(name), "").unwrap();
+        }
+        std::fs::create_dir(dir.path().join("empty")).unwrap();
+        let videos = ["*.mp4", ".", "empty", "none-*.mp4", "gone.mp4"].map(str::to_owned).to_vec();
+        let videos = of_speaker(&Speaker { name: "host".into(), videos }, dir.path());
+        let names: Vec<&str> = videos.units.iter().map(|unit| unit.video.split('-').next().unwrap()).collect();
+        assert_eq!(names, ["a", "b", "gone"]);
+        assert_eq!(videos.missing.len(), 2);
+    }
+}

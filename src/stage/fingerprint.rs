@@ -1,0 +1,100 @@
+//! What decides whether work must be done again.
+//!
+//! | part | why it is in the key |
+//! |---|---|
+//! | stage name and version | the code that made the bytes |
+//! | settings | every setting that has a say in the bytes, and the versions of tools that have |
+//! | inputs: role and BLAKE3 of the content | videos, files of earlier stages, models, weights |
+//!
+//! Not in it: paths, times, the number of workers. Contents are hashed once and remembered by size and time of
+//! change (`HashCache`), so that asking again costs nothing.
+
+use super::{Stage, Unit, workdir};
+use anyhow::{Context, Result};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::UNIX_EPOCH;
+
+/// The key of one unit at one stage, in its parts so that a difference can be named.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Fingerprint {
+    pub stage: String,
+    pub version: u32,
+    pub settings: serde_json::Value,
+    /// Role to BLAKE3 of the content, in hex.
+    pub inputs: BTreeMap<String, String>,
+}
+
+impl Fingerprint {
+    /// The fingerprint of `unit` at `stage` now. Errors when an input cannot be read.
+    pub fn now(stage: &dyn Stage, unit: &Unit, hashes: &HashCache) -> Result<Self> {
+        let mut inputs = BTreeMap::new();
+        for input in stage.inputs(unit)? {
+            let hash = hashes.hash(&input.path).with_context(|| format!("the {} of this stage", input.role))?;
+            inputs.insert(input.role, hash);
+        }
+        Ok(Self { stage: stage.name().to_owned(), version: stage.version(), settings: stage.settings(), inputs })
+    }
+}
+
+/// BLAKE3 of files, remembered between runs by path, size and time of change.
+pub struct HashCache {
+    file: PathBuf,
+    known: Mutex<BTreeMap<String, Known>>,
+}
+
+#[derive(Clone, Serialize, Deserialize)]
+struct Known {
+    bytes: u64,
+    changed_ns: u64,
+    hash: String,
+}
+
+impl HashCache {
+    /// Reads what is known from `file`; a missing or damaged file knows nothing.
+    pub fn open(file: &Path) -> Self {
+        let known = fs::read(file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default();
+        Self { file: file.to_owned(), known: Mutex::new(known) }
+    }
+
+    /// BLAKE3 of the content of `path`, in hex.
+    pub fn hash(&self, path: &Path) -> Result<String> {
+        let meta = fs::metadata(path).with_context(|| format!("cannot read {}", path.display()))?;
+        anyhow::ensure!(meta.is_file(), "{} is not a file", path.display());
+        let changed = meta.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+        let changed_ns = changed.map_or(0, |age| age.as_nanos() as u64);
+        let name = path.to_string_lossy().into_owned();
+        if let Some(known) = self.known().get(&name)
+            && known.bytes == meta.len()
+            && known.changed_ns == changed_ns
+        {
+            return Ok(known.hash.clone());
+        }
+        let hash = hash_file(path)?;
+        self.known().insert(name, Known { bytes: meta.len(), changed_ns, hash: hash.clone() });
+        Ok(hash)
+    }
+
+    /// Keeps what is known for the next run.
+    pub fn save(&self) -> Result<()> {
+        let bytes = serde_json::to_vec(&*self.known())?;
+        workdir::write_file(&self.file, &bytes)
+    }
+
+    fn known(&self) -> std::sync::MutexGuard<'_, BTreeMap<String, Known>> {
+        self.known.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+}
+
+/// BLAKE3 of a file's content, in hex, read in pieces.
+pub fn hash_file(path: &Path) -> Result<String> {
+    let read = || -> std::io::Result<String> {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update_reader(fs::File::open(path)?)?;
+        Ok(hasher.finalize().to_hex().to_string())
+    };
+    read().with_context(|| format!("cannot read {}", path.display()))
+}

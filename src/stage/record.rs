@@ -1,0 +1,180 @@
+//! The record of work done, written last, and why a unit is not fresh as a value that prints.
+
+use super::fingerprint::{Fingerprint, hash_file};
+use super::workdir;
+use anyhow::Result;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What was done for a unit: its key, and every file it made.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Record {
+    pub fingerprint: Fingerprint,
+    pub outputs: Vec<Output>,
+    /// The stage's line for people.
+    pub line: String,
+    /// The stage's numbers for programs.
+    pub facts: serde_json::Map<String, serde_json::Value>,
+}
+
+/// One file of a unit's folder, with `/` between folders.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Output {
+    pub file: String,
+    pub bytes: u64,
+    pub hash: String,
+}
+
+/// The last failure of a unit, kept beside what an earlier success made.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Failure {
+    pub fingerprint: Option<Fingerprint>,
+    pub error: String,
+}
+
+/// Why a unit must be worked on.
+#[derive(Clone, Debug, PartialEq)]
+pub enum DirtyReason {
+    NeverDone,
+    Forced,
+    StageChanged { was: u32, now: u32 },
+    SettingChanged { key: String, was: String, now: String },
+    InputChanged { role: String },
+    InputAdded { role: String },
+    InputRemoved { role: String },
+    OutputMissing { file: String },
+    OutputChanged { file: String },
+    WaitsFor { stage: String },
+}
+
+impl fmt::Display for DirtyReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NeverDone => write!(f, "never done"),
+            Self::Forced => write!(f, "asked for by --force"),
+            Self::StageChanged { was, now } => write!(f, "the stage changed from version {was} to {now}"),
+            Self::SettingChanged { key, was, now } => write!(f, "{key} changed from {was} to {now}"),
+            Self::InputChanged { role } => write!(f, "the {role} changed"),
+            Self::InputAdded { role } => write!(f, "the {role} is new"),
+            Self::InputRemoved { role } => write!(f, "the {role} is gone"),
+            Self::OutputMissing { file } => write!(f, "its file {file} is missing"),
+            Self::OutputChanged { file } => write!(f, "its file {file} is not what was written"),
+            Self::WaitsFor { stage } => write!(f, "waits for {stage}"),
+        }
+    }
+}
+
+/// The record of a unit whose folder is `place`: `NAME.record.json` beside it.
+pub fn record_path(place: &Path) -> PathBuf {
+    beside(place, "record.json")
+}
+
+/// The failure of a unit whose folder is `place`: `NAME.failed.json` beside it.
+pub fn failure_path(place: &Path) -> PathBuf {
+    beside(place, "failed.json")
+}
+
+fn beside(place: &Path, suffix: &str) -> PathBuf {
+    let name = place.file_name().unwrap_or_default().to_string_lossy();
+    place.with_file_name(format!("{name}.{suffix}"))
+}
+
+impl Record {
+    /// The record of the unit in `place`; `None` where there is none that can be read.
+    pub fn read(place: &Path) -> Option<Self> {
+        serde_json::from_slice(&fs::read(record_path(place)).ok()?).ok()
+    }
+
+    /// Writes the record of the unit in `place`, and forgets an earlier failure.
+    pub fn write(&self, place: &Path) -> Result<()> {
+        workdir::write_file(&record_path(place), &serde_json::to_vec_pretty(self)?)?;
+        let _ = fs::remove_file(failure_path(place));
+        Ok(())
+    }
+
+    /// Why the unit in `place` is not fresh under the fingerprint `now`; `None`: it is. Sizes of outputs are
+    /// compared, not contents.
+    pub fn dirty(&self, now: &Fingerprint, place: &Path) -> Option<DirtyReason> {
+        difference(&self.fingerprint, now).or_else(|| self.outputs.iter().find_map(|output| output.missing(place)))
+    }
+}
+
+impl Output {
+    fn missing(&self, place: &Path) -> Option<DirtyReason> {
+        let file = self.file.clone();
+        match fs::metadata(place.join(&self.file)) {
+            Err(_) => Some(DirtyReason::OutputMissing { file }),
+            Ok(meta) if meta.len() != self.bytes => Some(DirtyReason::OutputChanged { file }),
+            Ok(_) => None,
+        }
+    }
+
+    /// Every file under `folder`, sorted by name.
+    pub fn list(folder: &Path) -> Result<Vec<Self>> {
+        let mut outputs = Vec::new();
+        collect(folder, "", &mut outputs)?;
+        outputs.sort_by(|a, b| a.file.cmp(&b.file));
+        Ok(outputs)
+    }
+}
+
+fn collect(folder: &Path, prefix: &str, outputs: &mut Vec<Output>) -> Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        let file = format!("{prefix}{}", path.file_name().unwrap_or_default().to_string_lossy());
+        if path.is_dir() {
+            collect(&path, &format!("{file}/"), outputs)?;
+        } else {
+            outputs.push(Output { file, bytes: fs::metadata(&path)?.len(), hash: hash_file(&path)? });
+        }
+    }
+    Ok(())
+}
+
+impl Failure {
+    /// The failure of the unit in `place`, if its last attempt failed.
+    pub fn read(place: &Path) -> Option<Self> {
+        serde_json::from_slice(&fs::read(failure_path(place)).ok()?).ok()
+    }
+
+    /// Keeps the failure beside what is there.
+    pub fn write(&self, place: &Path) -> Result<()> {
+        workdir::write_file(&failure_path(place), &serde_json::to_vec_pretty(self)?)
+    }
+}
+
+fn difference(was: &Fingerprint, now: &Fingerprint) -> Option<DirtyReason> {
+    if was.version != now.version || was.stage != now.stage {
+        return Some(DirtyReason::StageChanged { was: was.version, now: now.version });
+    }
+    if let Some(reason) = setting_difference("", &was.settings, &now.settings) {
+        return Some(reason);
+    }
+    for (role, hash) in &now.inputs {
+        match was.inputs.get(role) {
+            None => return Some(DirtyReason::InputAdded { role: role.clone() }),
+            Some(old) if old != hash => return Some(DirtyReason::InputChanged { role: role.clone() }),
+            Some(_) => {}
+        }
+    }
+    let gone = was.inputs.keys().find(|role| !now.inputs.contains_key(*role));
+    gone.map(|role| DirtyReason::InputRemoved { role: role.clone() })
+}
+
+/// The first setting that differs, by its dotted key.
+fn setting_difference(key: &str, was: &serde_json::Value, now: &serde_json::Value) -> Option<DirtyReason> {
+    if let (Some(was), Some(now)) = (was.as_object(), now.as_object()) {
+        let mut names: Vec<&String> = was.keys().chain(now.keys()).collect();
+        names.sort();
+        names.dedup();
+        let null = serde_json::Value::Null;
+        return names.into_iter().find_map(|name| {
+            let inner = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
+            setting_difference(&inner, was.get(name).unwrap_or(&null), now.get(name).unwrap_or(&null))
+        });
+    }
+    let changed = || DirtyReason::SettingChanged { key: key.to_owned(), was: was.to_string(), now: now.to_string() };
+    (was != now).then(changed)
+}

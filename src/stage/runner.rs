@@ -1,0 +1,162 @@
+//! Runs a stage over its units: fresh ones are skipped, the rest is worked on by several workers, a failed unit does
+//! not stop the others. What a unit makes does not depend on who made it.
+
+use super::fingerprint::{Fingerprint, HashCache};
+use super::progress::{Progress, Task};
+use super::record::{DirtyReason, Failure, Output, Record};
+use super::{Report, Stage, Unit, workdir};
+use anyhow::{Context, Result};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Where a unit stands at a stage.
+#[derive(Clone, Debug)]
+pub enum State {
+    Fresh(Record),
+    Stale(DirtyReason),
+    Failed(String),
+}
+
+/// How a unit came out of a run.
+#[derive(Clone, Debug)]
+pub enum Ended {
+    /// It was fresh already.
+    Skipped(Report),
+    Done(Report),
+    Failed(String),
+}
+
+/// The folder of `unit` at the stage whose folder is `stage`: `work/<stage>/<speaker>/<video>`, for a whole speaker
+/// `work/<stage>/<speaker>`.
+pub fn place(work: &Path, stage: &str, unit: &Unit) -> PathBuf {
+    let speaker = work.join(stage).join(&unit.speaker);
+    if unit.video.is_empty() { speaker } else { speaker.join(&unit.video) }
+}
+
+/// Where `unit` stands. An unreadable input is a failure.
+pub fn state(stage: &dyn Stage, unit: &Unit, work: &Path, hashes: &HashCache) -> State {
+    let place = place(work, stage.folder(), unit);
+    let now = match Fingerprint::now(stage, unit, hashes) {
+        Ok(now) => now,
+        Err(error) => return State::Failed(format!("{error:#}")),
+    };
+    let record = Record::read(&place);
+    let dirty = match &record {
+        Some(record) => record.dirty(&now, &place),
+        None => Some(DirtyReason::NeverDone),
+    };
+    match (dirty, record) {
+        (None, Some(record)) => State::Fresh(record),
+        (dirty, _) => match Failure::read(&place) {
+            Some(failure) if failure.fingerprint.as_ref() == Some(&now) => State::Failed(failure.error),
+            _ => State::Stale(dirty.unwrap_or(DirtyReason::NeverDone)),
+        },
+    }
+}
+
+/// Runs `stage` for every unit on `jobs` workers (at least one); the answers stand in the order of `units`.
+pub fn run(
+    stage: &dyn Stage,
+    units: &[Unit],
+    work: &Path,
+    hashes: &HashCache,
+    (jobs, force): (usize, bool),
+    progress: &dyn Progress,
+) -> Vec<Ended> {
+    let next = AtomicUsize::new(0);
+    let ended: Vec<Mutex<Option<Ended>>> = units.iter().map(|_| Mutex::new(None)).collect();
+    let bar = progress.begin(stage.name(), units.len() as u64);
+    std::thread::scope(|scope| {
+        for _ in 0..jobs.clamp(1, units.len().max(1)) {
+            scope.spawn(|| {
+                loop {
+                    let at = next.fetch_add(1, Ordering::SeqCst);
+                    let Some(unit) = units.get(at) else { break };
+                    let answer = run_unit(stage, unit, work, hashes, force, progress);
+                    report(&answer, stage, unit, &*bar, progress);
+                    if let Ok(mut slot) = ended[at].lock() {
+                        *slot = Some(answer);
+                    }
+                }
+            });
+        }
+    });
+    let unknown = || Ended::Failed("the worker was lost".to_owned());
+    ended.into_iter().map(|slot| slot.into_inner().ok().flatten().unwrap_or_else(unknown)).collect()
+}
+
+fn report(answer: &Ended, stage: &dyn Stage, unit: &Unit, bar: &dyn Task, progress: &dyn Progress) {
+    bar.advance(1);
+    match answer {
+        Ended::Failed(error) => progress.say(&format!("failed  {} {unit}: {error}", stage.name())),
+        Ended::Done(report) if !report.line.is_empty() => {
+            progress.say(&format!("done    {} {unit}: {}", stage.name(), report.line));
+        }
+        Ended::Done(_) | Ended::Skipped(_) => {}
+    }
+}
+
+fn run_unit(
+    stage: &dyn Stage,
+    unit: &Unit,
+    work: &Path,
+    hashes: &HashCache,
+    force: bool,
+    progress: &dyn Progress,
+) -> Ended {
+    let place = place(work, stage.folder(), unit);
+    let fingerprint = match Fingerprint::now(stage, unit, hashes) {
+        Ok(now) => now,
+        Err(error) => return failed(&place, None, error),
+    };
+    if !force
+        && let Some(record) = Record::read(&place)
+        && record.dirty(&fingerprint, &place).is_none()
+    {
+        return Ended::Skipped(Report { line: record.line, facts: record.facts });
+    }
+    // A panic is a defect, but one video must not take the night's run with it.
+    let outcome = catch_unwind(AssertUnwindSafe(|| attempt(stage, unit, &place, &fingerprint, progress)));
+    match outcome {
+        Ok(Ok(report)) => Ended::Done(report),
+        Ok(Err(error)) => failed(&place, Some(fingerprint), error),
+        Err(panic) => failed(&place, Some(fingerprint), anyhow::anyhow!("internal error: {}", panic_text(&*panic))),
+    }
+}
+
+fn attempt(
+    stage: &dyn Stage,
+    unit: &Unit,
+    place: &Path,
+    fingerprint: &Fingerprint,
+    progress: &dyn Progress,
+) -> Result<Report> {
+    let attempt = workdir::attempt_folder(place)?;
+    let finish = || -> Result<Report> {
+        let report = stage.run(unit, &attempt, progress)?;
+        let outputs = Output::list(&attempt)?;
+        workdir::replace_folder(&attempt, place)?;
+        let Report { line, facts } = report.clone();
+        Record { fingerprint: fingerprint.clone(), outputs, line, facts }.write(place).context("cannot record it")?;
+        Ok(report)
+    };
+    let finished = finish();
+    if finished.is_err() {
+        let _ = std::fs::remove_dir_all(&attempt);
+    }
+    finished
+}
+
+fn failed(place: &Path, fingerprint: Option<Fingerprint>, error: anyhow::Error) -> Ended {
+    let error = format!("{error:#}");
+    // The failure is shown either way; where even this cannot be written the work folder itself is the trouble.
+    let _ = Failure { fingerprint, error: error.clone() }.write(place);
+    Ended::Failed(error)
+}
+
+fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<String>().cloned();
+    text.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned())).unwrap_or_else(|| "no message".to_owned())
+}
