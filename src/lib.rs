@@ -1,10 +1,39 @@
-//! Videos of one speaker to a 3D speech-gesture dataset, and to a model that gestures like that speaker.
+//! Videos of one speaker to a 3D speech-gesture dataset, and to a model that gestures like that speaker
+//! (Rebol, Guetl, Pietroszek 2021; FineMotion's entry to GENEA 2020). This file is the map.
 //!
 //! The way of a frame, never turning back:
 //! `media::frames` -> `vision` (crop, warp) -> `onnx` -> `pose2d` (decode, track) -> *keypoints file* -> `segment` ->
-//! `lift` -> *joints file* -> `dataset` -> *shard* -> `dataset::loader` -> `train::gan`.
-//! The way of a sample of sound: `media::audio` -> *audio file* -> `dataset` -> *shard* -> loader -> `audio::mel` ->
-//! `nn` generator. The two meet by time in seconds, in one place.
+//! `lift` -> *joints file* -> `dataset` -> *shard* -> `dataset::windows` -> `train::gan`.
+//!
+//! The way of a sample of sound: `media::audio` -> *audio file* -> `dataset` -> *shard* -> `dataset::windows` ->
+//! `audio::mel` -> `nn` generator. The two meet by time in seconds, in one place: where a shard is written.
+//!
+//! | room | what lives there | imports |
+//! |---|---|---|
+//! | `types` | plain values: time, picture, keypoints, joints, sound, interval | nothing |
+//! | `stage` | how any step runs, is recorded and resumes; knows no step | `types` |
+//! | `config` | `pipeline.toml`, as written and resolved | `types stage` |
+//! | `media` | the only room that knows ffmpeg | `types stage` |
+//! | `vision` | the only room that knows OpenCV | `types stage` |
+//! | `onnx` | the only room that knows ONNX Runtime; the model manifest | `types stage config` |
+//! | `audio` | sound to features | `types` |
+//! | `motion` | motion as numbers: bones, rotations, smoothing; motion files | `types` |
+//! | `nn` | network architectures | `types motion` |
+//! | `extract` | stage 1: sound, timeline, shots | `media vision` |
+//! | `pose2d` | stage 2: 2D keypoints of the one speaker | `media vision onnx motion` |
+//! | `segment` | stage 3: intervals worth keeping, refusals with reasons | `motion media` |
+//! | `lift` | stage 4: 2D to 3D | `motion nn` |
+//! | `dataset` | stage 5: shards; and reading them back | `motion media audio` |
+//! | `train` | losses, optimiser, checkpoints, the two training loops | `motion nn audio dataset` |
+//! | `generate` | speech to motion with a trained speaker | `motion nn audio train` |
+//! | `animate` | joints to rotations; BVH and drawn video | `motion media vision` |
+//!
+//! Stages meet in files, never in code; all of them may use `types`, `stage` and `config`. `cli` (in the program
+//! only) imports everything and is the one place that prints. `tests/it/house.rs` holds the code to this table.
+//!
+//! Invariants: the same input, configuration and seed give the same bytes, whatever the number of workers. A write is
+//! an attempt, flushed, renamed (`stage::workdir`), and its record comes last. Memory does not grow with the length of
+//! a video, except for its keypoints. No user input panics.
 
 pub mod animate;
 pub mod audio;

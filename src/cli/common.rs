@@ -12,3 +12,10 @@ pub struct ConfigArgs {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
 }
+
+impl ConfigArgs {
+    /// Reads it, with every problem at once.
+    pub fn load(&self) -> anyhow::Result<orator::config::Config> {
+        orator::config::load(&self.config, &self.set)
+    }
+}
