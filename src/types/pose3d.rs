@@ -15,6 +15,12 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// From joints [T, 49, 3] alone: what is not finite was not seen.
+    pub fn from_joints(fps: FrameRate, joints: Array3<f32>) -> Self {
+        let mask = joints.map_axis(ndarray::Axis(2), |place| place.iter().all(|v| v.is_finite()));
+        Self { fps, joints, mask }
+    }
+
     /// Number of frames T.
     pub fn n_frames(&self) -> usize {
         self.joints.shape()[0]

@@ -1,0 +1,158 @@
+//! Motion in the text layout of Rebol et al. 2021: one frame a line, 147 floats `x0 y0 z0 x1 ...`, metres, the neck
+//! first and at the origin, each finger TIP FIRST (in memory: base first, `skeleton::authors_from_house`). Numbers
+//! are written as numpy's `savetxt` writes them. Values are taken as they are, rounded to f32: in the
+//! authors' predictions the hand roots (7, 28) lie some mm beside the wrists.
+
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::{N_JOINTS, authors_from_house};
+use crate::types::time::FrameRate;
+use anyhow::{Context as _, bail, ensure};
+use ndarray::Array3;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Numbers on a line.
+const N_NUMBERS: usize = 3 * N_JOINTS;
+/// How far the neck may stand from the origin, metres, before the file is taken for something else.
+const NECK_TOLERANCE: f32 = 1e-3;
+
+/// Reads a motion of `fps` (the authors': 15). `nan` marks a missing joint. Errors name the line.
+pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    parse(&text, fps).with_context(|| format!("{} is not motion in the authors' layout", path.display()))
+}
+
+/// The same from text.
+pub fn parse(text: &str, fps: FrameRate) -> anyhow::Result<Motion> {
+    let mut numbers: Vec<f32> = Vec::with_capacity(text.len() / 26);
+    for (line, n) in text.lines().zip(1..).filter(|(line, _)| !line.trim().is_empty()) {
+        let before = numbers.len();
+        for (word, column) in line.split_whitespace().zip(1..) {
+            match word.parse::<f32>() {
+                Ok(number) => numbers.push(number),
+                Err(_) => bail!("line {n}, number {column}: `{word}` is no number"),
+            }
+        }
+        let found = numbers.len() - before;
+        ensure!(found == N_NUMBERS, "line {n}: {found} numbers, expected {N_NUMBERS} ({N_JOINTS} joints x 3)");
+        let neck = &numbers[before..before + 3];
+        ensure!(
+            !neck.iter().any(|v| v.abs() > NECK_TOLERANCE),
+            "line {n}: the first joint (the neck) stands at {neck:?} m, expected the origin"
+        );
+    }
+    let n_frames = numbers.len() / N_NUMBERS;
+    ensure!(n_frames > 0, "no frame in it");
+    let joints = Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(frame, joint, axis)| {
+        numbers[frame * N_NUMBERS + 3 * authors_from_house(joint) + axis]
+    });
+    Ok(Motion::from_joints(fps, joints))
+}
+
+/// The motion as text; a missing joint is `nan nan nan`.
+pub fn format(motion: &Motion) -> String {
+    let mut text = String::with_capacity(motion.n_frames() * N_NUMBERS * 26);
+    for frame in motion.joints.outer_iter() {
+        for n in 0..N_NUMBERS {
+            if n > 0 {
+                text.push(' ');
+            }
+            push_number(&mut text, frame[[authors_from_house(n / 3), n % 3]]);
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// numpy's `%.18e`: at least two digits of exponent, with its sign.
+fn push_number(text: &mut String, number: f32) {
+    if !number.is_finite() {
+        text.push_str("nan");
+        return;
+    }
+    let rust = format!("{:.18e}", f64::from(number));
+    match rust.split_once('e').map(|(digits, exponent)| (digits, exponent.parse::<i32>())) {
+        Some((digits, Ok(exponent))) => {
+            let sign = if exponent < 0 { '-' } else { '+' };
+            let _ = write!(text, "{digits}e{sign}{:02}", exponent.abs());
+        }
+        _ => text.push_str(&rust),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::skeleton::{L_HAND, L_WRIST, NECK, R_HAND, R_WRIST};
+
+    const FPS: FrameRate = FrameRate::new(15, 1);
+
+    #[test]
+    fn a_motion_survives_the_round_trip_and_fingers_are_tip_first() {
+        let mut joints = Array3::from_shape_fn((3, N_JOINTS, 3), |(t, j, k)| (t * 147 + j * 3 + k) as f32 * 0.37e-3);
+        joints.slice_mut(ndarray::s![.., NECK, ..]).fill(0.0);
+        joints.slice_mut(ndarray::s![1, 30, ..]).fill(f32::NAN);
+        let motion = Motion::from_joints(FPS, joints);
+        let text = format(&motion);
+        let again = parse(&text, FPS).unwrap();
+        assert!(again.joints.iter().zip(&motion.joints).all(|(a, b)| a == b || (a.is_nan() && b.is_nan())));
+        assert_eq!(again.mask, motion.mask);
+        // The house's left thumb tip (joint 11) is the authors' joint 8.
+        let numbers: Vec<f32> = text.lines().next().unwrap().split(' ').map(|w| w.parse().unwrap()).collect();
+        assert_eq!(numbers[24], motion.joints[[0, 11, 0]]);
+    }
+
+    #[test]
+    fn errors_name_the_line() {
+        let line = vec!["0.5"; 144].join(" ");
+        let good = format!("0 0 0 {line}\n");
+        let said = |text: &str| format!("{:#}", parse(text, FPS).unwrap_err());
+        assert!(said(&format!("{good}{good}0 0 0 1\n")).contains("line 3: 4 numbers, expected 147"));
+        assert!(said(&format!("{good}0 0 zero {line}\n")).contains("line 2, number 3: `zero`"));
+        assert!(said(&format!("1 0 0 {line}\n")).contains("line 1: the first joint"));
+        assert!(said("\n\n").contains("no frame"));
+    }
+
+    #[test]
+    fn the_released_clips_read_as_they_should_and_survive_the_round_trip() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/released_clips");
+        if !folder.exists() {
+            eprintln!("SKIPPED: the_released_clips...: {} is not there", folder.display());
+            return;
+        }
+        for (name, n_frames) in
+            [("gt_interval_3821", 242), ("gt_interval_102571", 679), ("prediction_interval_3821", 242)]
+        {
+            let path = folder.join(name).with_extension("txt");
+            let motion = read(&path, FPS).unwrap();
+            assert_eq!(motion.n_frames(), n_frames);
+            let (written, original) = (format(&motion), std::fs::read_to_string(&path).unwrap());
+            assert_eq!(written.len(), original.len(), "{name}: the same layout to the byte");
+            for (ours, theirs) in written.split_whitespace().zip(original.split_whitespace()) {
+                let (ours, theirs): (f64, f64) = (ours.parse().unwrap(), theirs.parse().unwrap());
+                assert!((ours - theirs).abs() < 4e-8, "{name}: {ours} for {theirs}");
+            }
+            let distance = |frame: usize, a: usize, b: usize| {
+                (0..3)
+                    .map(|k| (motion.joints[[frame, a, k]] - motion.joints[[frame, b, k]]).powi(2))
+                    .sum::<f32>()
+                    .sqrt()
+            };
+            let (mut tips_further, mut seen) = (0, 0);
+            for frame in 0..n_frames {
+                assert!((0..3).all(|k| motion.joints[[frame, NECK, k]] == 0.0));
+                if name.starts_with("gt") {
+                    assert!(distance(frame, L_HAND, L_WRIST) < 2e-6 && distance(frame, R_HAND, R_WRIST) < 2e-6);
+                }
+                for root in [L_HAND, R_HAND] {
+                    for finger in 0..5 {
+                        let base = root + 1 + 4 * finger;
+                        seen += 1;
+                        tips_further += usize::from(distance(frame, root, base + 3) > distance(frame, root, base));
+                    }
+                }
+            }
+            assert!(tips_further * 10 > seen * 8, "{name}: {tips_further} of {seen} finger tips lie beyond their base");
+        }
+    }
+}

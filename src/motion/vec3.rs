@@ -1,0 +1,49 @@
+//! Vectors of three f64: the handful of operations that rotations and skeletons need.
+
+/// x, y, z.
+pub type Vec3 = [f64; 3];
+
+pub fn add(a: Vec3, b: Vec3) -> Vec3 {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+/// `a - b`
+pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub fn scale(a: Vec3, by: f64) -> Vec3 {
+    [a[0] * by, a[1] * by, a[2] * by]
+}
+
+pub fn dot(a: Vec3, b: Vec3) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+pub fn norm(a: Vec3) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// The direction of `a`; `None` where it is shorter than `least` or not a number.
+pub fn unit(a: Vec3, least: f64) -> Option<Vec3> {
+    let length = norm(a);
+    (length > least).then(|| scale(a, 1.0 / length))
+}
+
+/// The part of `a` at right angles to the unit vector `axis`.
+pub fn across(a: Vec3, axis: Vec3) -> Vec3 {
+    sub(a, scale(axis, dot(a, axis)))
+}
+
+/// Some unit vector at right angles to the unit vector `a`.
+pub fn any_across(a: Vec3) -> Vec3 {
+    let least = (0..3).min_by(|&i, &j| a[i].abs().total_cmp(&a[j].abs())).unwrap_or(0);
+    let mut pick = [0.0; 3];
+    pick[least] = 1.0;
+    let side = across(pick, a);
+    scale(side, 1.0 / norm(side))
+}
