@@ -1,8 +1,14 @@
 //! Motion as numbers: forward kinematics, rotations, Procrustes, smoothing, bone lengths; readers and writers of motion files. Pure but for those files.
 
 pub mod authors_txt;
+pub mod bones;
 pub mod bvh_write;
 pub mod fk;
+pub mod joints_npz;
+pub mod keypoints_npz;
 pub mod npy;
+pub mod npz;
+pub mod procrustes;
 pub mod rotation;
+pub mod smooth;
 pub mod vec3;

@@ -1,0 +1,151 @@
+//! Bone lengths of a motion: measuring one robust set, and giving a motion exactly that set.
+
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::{L_HAND, N_BONES, N_JOINTS, NECK, R_HAND, parent};
+
+/// One length a bone in metres: the median over the frames where both its ends were seen (mask true), else over the
+/// frames where both are there. Bone `joint - 1` leads from the parent to `joint`. A bone that is never there, and the
+/// two hand roots (which are the wrists), measure 0.
+pub fn measure(motion: &Motion) -> [f32; N_BONES] {
+    let mut lengths = [0.0; N_BONES];
+    for joint in 1..N_JOINTS {
+        let Some(parent) = parent(joint) else { continue };
+        if joint == L_HAND || joint == R_HAND {
+            continue;
+        }
+        let over = |seen_only: bool| {
+            let frames =
+                (0..motion.n_frames()).filter(|&t| !seen_only || (motion.mask[[t, joint]] && motion.mask[[t, parent]]));
+            median(
+                frames.map(|t| length(at(motion, t, parent), at(motion, t, joint))).filter(|l| l.is_finite()).collect(),
+            )
+        };
+        lengths[joint - 1] = over(true).or_else(|| over(false)).unwrap_or(0.0);
+    }
+    lengths
+}
+
+/// Gives every bone its length: each joint is put in the direction it had from its parent, from the neck outwards, the
+/// neck at 0. A length of 0 (not measured) leaves that bone as long as it was. The hand roots become the wrists
+/// exactly. A missing joint (NaN) stays missing, and a joint whose parent is missing becomes so.
+pub fn with_lengths(motion: &mut Motion, lengths: &[f32; N_BONES]) {
+    for t in 0..motion.n_frames() {
+        let before: [[f32; 3]; N_JOINTS] = std::array::from_fn(|j| at(motion, t, j));
+        let mut after = [[f32::NAN; 3]; N_JOINTS];
+        if before[NECK].iter().all(|v| v.is_finite()) {
+            after[NECK] = [0.0; 3];
+        }
+        for joint in 1..N_JOINTS {
+            let Some(parent) = parent(joint) else { continue };
+            let own = length(before[parent], before[joint]);
+            let hand_root = joint == L_HAND || joint == R_HAND;
+            after[joint] = match lengths[joint - 1] {
+                _ if hand_root => after[parent],
+                _ if !own.is_finite() => [f32::NAN; 3],
+                wanted if wanted > 0.0 && own > 1e-9 => {
+                    let grow = wanted / own;
+                    std::array::from_fn(|k| after[parent][k] + (before[joint][k] - before[parent][k]) * grow)
+                }
+                // no direction to keep: hang the joint straight down
+                wanted if wanted > 0.0 => [after[parent][0], after[parent][1] + wanted, after[parent][2]],
+                _ => std::array::from_fn(|k| after[parent][k] + before[joint][k] - before[parent][k]),
+            };
+        }
+        for (joint, position) in after.iter().enumerate() {
+            let there = position.iter().all(|v| v.is_finite());
+            motion.mask[[t, joint]] &= there;
+            for (k, &v) in position.iter().enumerate() {
+                motion.joints[[t, joint, k]] = if there { v } else { f32::NAN };
+            }
+        }
+    }
+}
+
+/// The middle value (the lower of two); `None` of nothing. Values must be finite.
+pub fn median(mut values: Vec<f32>) -> Option<f32> {
+    if values.is_empty() {
+        return None;
+    }
+    let middle = (values.len() - 1) / 2;
+    Some(*values.select_nth_unstable_by(middle, f32::total_cmp).1)
+}
+
+fn at(motion: &Motion, t: usize, joint: usize) -> [f32; 3] {
+    std::array::from_fn(|k| motion.joints[[t, joint, k]])
+}
+
+fn length(a: [f32; 3], b: [f32; 3]) -> f32 {
+    (0..3).map(|k| (b[k] - a[k]).powi(2)).sum::<f32>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::skeleton::{L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
+    use crate::types::time::FrameRate;
+    use ndarray::{Array2, Array3, s};
+
+    /// Five frames; joint j lies at its parent + (0.01 j, 0.02, 0), frame 4 has everything twice as long.
+    fn motion() -> Motion {
+        let mut joints = Array3::zeros((5, N_JOINTS, 3));
+        for t in 0..5 {
+            for j in 1..N_JOINTS {
+                let p = parent(j).unwrap();
+                let grow = if t == 4 { 2.0 } else { 1.0 };
+                let step =
+                    if j == L_HAND || j == R_HAND { [0.0; 3] } else { [0.01 * j as f32 * grow, 0.02 * grow, 0.0] };
+                for k in 0..3 {
+                    joints[[t, j, k]] = joints[[t, p, k]] + step[k];
+                }
+            }
+        }
+        Motion { fps: FrameRate::new(15, 1), joints, mask: Array2::from_elem((5, N_JOINTS), true) }
+    }
+
+    #[test]
+    fn the_median_ignores_an_outlier_and_unseen_frames() {
+        let mut m = motion();
+        let lengths = measure(&m);
+        let expected = (0.03f32.powi(2) + 0.02f32.powi(2)).sqrt();
+        assert!((lengths[R_WRIST - 1] - expected).abs() < 1e-6);
+        assert_eq!((lengths[L_HAND - 1], lengths[R_HAND - 1]), (0.0, 0.0));
+        m.mask.slice_mut(s![..4, R_WRIST]).fill(false);
+        assert!((measure(&m)[R_WRIST - 1] - 2.0 * expected).abs() < 1e-6);
+    }
+
+    #[test]
+    fn lengths_become_exact_directions_stay_and_nan_stays() {
+        let mut m = motion();
+        m.joints.slice_mut(s![2, R_ELBOW, ..]).fill(f32::NAN);
+        let before = m.clone();
+        let lengths = measure(&before).map(|l| l * 1.5);
+        with_lengths(&mut m, &lengths);
+        for t in 0..5 {
+            assert_eq!(m.joints.slice(s![t, L_HAND, ..]), m.joints.slice(s![t, L_WRIST, ..]));
+            for j in 1..N_JOINTS {
+                let below_gap = t == 2 && ((R_ELBOW..=R_WRIST).contains(&j) || j >= R_HAND);
+                assert_eq!(m.joints[[t, j, 0]].is_nan(), below_gap, "frame {t} joint {j}");
+                assert_eq!(m.mask[[t, j]], !below_gap);
+                let p = parent(j).unwrap();
+                if !below_gap && lengths[j - 1] > 0.0 {
+                    assert!((length(at(&m, t, p), at(&m, t, j)) - lengths[j - 1]).abs() < 1e-6);
+                    let ratio = (m.joints[[t, j, 0]] - m.joints[[t, p, 0]])
+                        / (before.joints[[t, j, 0]] - before.joints[[t, p, 0]]);
+                    assert!(ratio > 0.0);
+                }
+            }
+        }
+        assert!((m.joints[[0, R_SHOULDER, 0]] - 0.015).abs() < 1e-6);
+    }
+
+    #[test]
+    fn an_unmeasured_bone_keeps_its_length_and_an_empty_motion_is_fine() {
+        let mut m = motion();
+        let before = m.clone();
+        with_lengths(&mut m, &[0.0; N_BONES]);
+        assert!((&m.joints - &before.joints).iter().all(|d| d.abs() < 1e-6));
+        let mut empty = Motion { joints: Array3::zeros((0, N_JOINTS, 3)), mask: Array2::default((0, N_JOINTS)), ..m };
+        assert_eq!(measure(&empty), [0.0; N_BONES]);
+        with_lengths(&mut empty, &[1.0; N_BONES]);
+    }
+}

@@ -1,0 +1,170 @@
+//! The keypoints file `keypoints.npz`: the 2D keypoints of a video at the dataset rate. Arrays: `body` f32 [T,17,3]
+//! (COCO-17; x px, y px, score), `left_hand` and `right_hand` f32 [T,21,3], `image_size` i64 [2] (width, height),
+//! `fps` f64 [2] (numerator, denominator; one number is read too), `time_secs` f64 [T], `person` f32 [T,5]
+//! (x, y, width, height, score), `n_people` i64 [T].
+
+use super::npz::Npz;
+use crate::types::pose2d::{Keypoints, N_BODY, N_HAND};
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, bail};
+use ndarray::{Array1, Array2, Array3, ArrayD, Ix1, Ix2, Ix3, array};
+use ndarray_npy::NpzWriter;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+/// What the file holds beside the keypoints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Extras {
+    /// Source time of each frame in seconds, [T].
+    pub time_secs: Array1<f64>,
+    /// Box of the followed person: x, y, width, height in px, score; [T, 5].
+    pub person: Array2<f32>,
+    /// People seen in each frame, [T].
+    pub n_people: Array1<i64>,
+}
+
+/// Reads the keypoints. A point with a number that is not finite is a missing one (all zeros). Errors: unreadable,
+/// `body` missing, arrays of wrong or unequal shapes.
+pub fn read(path: &Path) -> Result<Keypoints> {
+    Ok(read_noting(path)?.0)
+}
+
+/// `read`, and a sentence for each array that was not there with what stands in for it.
+pub fn read_noting(path: &Path) -> Result<(Keypoints, Vec<String>)> {
+    let mut npz = Npz::open(path)?;
+    let mut notes = Vec::new();
+    let body = points(npz.floats("body", &[None, Some(N_BODY), Some(3)])?)?;
+    let n_frames = body.shape()[0];
+    let mut hand = |name: &str, notes: &mut Vec<String>| {
+        if !npz.has(name) {
+            notes.push(format!("no `{name}`: taken as not seen"));
+            return Ok(Array3::zeros((n_frames, N_HAND, 3)));
+        }
+        points(npz.floats(name, &[Some(n_frames), Some(N_HAND), Some(3)])?)
+    };
+    let left_hand = hand("left_hand", &mut notes)?;
+    let right_hand = hand("right_hand", &mut notes)?;
+    let fps = if npz.has("fps") {
+        npz.frame_rate("fps")?
+    } else {
+        notes.push("no `fps`: taken as 15".to_owned());
+        FrameRate::new(15, 1)
+    };
+    let image_size = if npz.has("image_size") {
+        let size = npz.numbers("image_size", &[Some(2)])?;
+        let side = |v: f64| if (1.0..=1e6).contains(&v) { Some(v as u32) } else { None };
+        match (side(size[0]), side(size[1])) {
+            (Some(width), Some(height)) => [width, height],
+            _ => bail!("{}: `image_size` is {size}, expected width and height in px", path.display()),
+        }
+    } else {
+        notes.push("no `image_size`: taken from the farthest points".to_owned());
+        let extent = |axis: usize| body.slice(ndarray::s![.., .., axis]).fold(1.0f32, |m, &v| m.max(v)).min(1e6).ceil();
+        [extent(0) as u32, extent(1) as u32]
+    };
+    Ok((Keypoints { fps, image_size, body, left_hand, right_hand }, notes))
+}
+
+/// Reads what the file holds beside the keypoints. Errors: unreadable, missing, wrong shapes.
+pub fn read_extras(path: &Path) -> Result<Extras> {
+    let mut npz = Npz::open(path)?;
+    let time_secs = npz.numbers("time_secs", &[None])?.into_dimensionality::<Ix1>()?;
+    let n_frames = Some(time_secs.len());
+    let person = npz.floats("person", &[n_frames, Some(5)])?.into_dimensionality::<Ix2>()?;
+    let n_people = npz.numbers("n_people", &[n_frames])?.mapv(|v| v as i64).into_dimensionality::<Ix1>()?;
+    Ok(Extras { time_secs, person, n_people })
+}
+
+/// Writes the file at `path`; the same keypoints give the same bytes.
+pub fn write(path: &Path, keypoints: &Keypoints, extras: &Extras) -> Result<()> {
+    let attempt = || -> Result<()> {
+        let mut npz = NpzWriter::new(BufWriter::new(File::create(path)?));
+        npz.add_array("body", &keypoints.body)?;
+        npz.add_array("left_hand", &keypoints.left_hand)?;
+        npz.add_array("right_hand", &keypoints.right_hand)?;
+        npz.add_array("image_size", &array![i64::from(keypoints.image_size[0]), i64::from(keypoints.image_size[1])])?;
+        npz.add_array("fps", &array![f64::from(keypoints.fps.num), f64::from(keypoints.fps.den)])?;
+        npz.add_array("time_secs", &extras.time_secs)?;
+        npz.add_array("person", &extras.person)?;
+        npz.add_array("n_people", &extras.n_people)?;
+        npz.finish()?;
+        Ok(())
+    };
+    attempt().with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// [T, n, 3] with every point that is not finite made a missing one.
+fn points(array: ArrayD<f32>) -> Result<Array3<f32>> {
+    let mut points = array.into_dimensionality::<Ix3>()?;
+    for mut point in points.lanes_mut(ndarray::Axis(2)) {
+        if point.iter().any(|v| !v.is_finite()) {
+            point.fill(0.0);
+        }
+    }
+    Ok(points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::PathBuf;
+
+    fn sample() -> (Keypoints, Extras) {
+        let body = Array3::from_shape_fn((4, N_BODY, 3), |(t, j, k)| (t + j * 2 + k) as f32);
+        let hand = Array3::from_shape_fn((4, N_HAND, 3), |(t, j, k)| (t * j + k) as f32);
+        let keypoints = Keypoints {
+            fps: FrameRate::new(30000, 1001),
+            image_size: [640, 480],
+            body,
+            left_hand: hand.clone(),
+            right_hand: hand * 2.0,
+        };
+        let extras = Extras {
+            time_secs: Array1::linspace(0.0, 1.0, 4),
+            person: Array2::ones((4, 5)),
+            n_people: Array1::from(vec![1, 2, 1, 0]),
+        };
+        (keypoints, extras)
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_and_the_bytes_repeat() {
+        let dir = tempfile::tempdir().unwrap();
+        let (a, b) = (dir.path().join("a.npz"), dir.path().join("b.npz"));
+        let (keypoints, extras) = sample();
+        write(&a, &keypoints, &extras).unwrap();
+        write(&b, &keypoints, &extras).unwrap();
+        assert_eq!(read(&a).unwrap(), keypoints);
+        assert_eq!(read_extras(&a).unwrap(), extras);
+        assert_eq!(std::fs::read(&a).unwrap(), std::fs::read(&b).unwrap());
+    }
+
+    fn body_only(dir: &Path, body: &Array3<f64>) -> PathBuf {
+        let path = dir.join("body.npz");
+        let mut npz = NpzWriter::new(File::create(&path).unwrap());
+        npz.add_array("body", body).unwrap();
+        npz.finish().unwrap();
+        path
+    }
+
+    #[test]
+    fn a_bare_body_is_enough_and_what_stands_in_is_said() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut body = Array3::from_elem((2, N_BODY, 3), 7.0);
+        body[[1, 3, 0]] = f64::NAN;
+        let (keypoints, notes) = read_noting(&body_only(dir.path(), &body)).unwrap();
+        assert_eq!((keypoints.fps, keypoints.image_size, notes.len()), (FrameRate::new(15, 1), [7, 7], 4));
+        assert_eq!((keypoints.body[[1, 3, 2]], keypoints.body[[0, 3, 2]]), (0.0, 7.0));
+        let empty = read(&body_only(dir.path(), &Array3::zeros((0, N_BODY, 3)))).unwrap();
+        assert_eq!(empty.n_frames(), 0);
+    }
+
+    #[test]
+    fn a_wrong_shape_is_an_error() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = body_only(dir.path(), &Array3::zeros((2, 18, 3)));
+        let text = format!("{:#}", read(&path).unwrap_err());
+        assert!(text.contains("[2, 18, 3]") && text.contains("[T, 17, 3]"), "{text}");
+    }
+}

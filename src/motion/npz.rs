@@ -1,0 +1,175 @@
+//! Named arrays in a `.npz` file, with errors that name the file, the array, what was expected and what is there.
+//! The files of the pipeline (`keypoints_npz`, `joints_npz`) say what their arrays mean; this file does not.
+
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, bail};
+use ndarray::{ArrayD, OwnedRepr};
+use ndarray_npy::{NpzReader, ReadNpyError, ReadNpzError, ReadableElement};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+/// An open `.npz` file.
+pub struct Npz {
+    path: PathBuf,
+    names: Vec<String>,
+    reader: NpzReader<BufReader<File>>,
+}
+
+/// Length expected of one axis; `None`: any.
+pub type Axis = Option<usize>;
+
+impl Npz {
+    /// Opens the archive. Errors: no such file, no zip archive.
+    pub fn open(path: &Path) -> Result<Self> {
+        let file = File::open(path).with_context(|| format!("cannot open {}", path.display()))?;
+        let reader = NpzReader::new(BufReader::new(file));
+        let mut reader =
+            reader.with_context(|| format!("{} is no .npz file (numpy.savez writes one)", path.display()))?;
+        let names = reader.names().with_context(|| format!("cannot list the arrays of {}", path.display()))?;
+        Ok(Self { path: path.to_owned(), names, reader })
+    }
+
+    /// Whether the file has this array.
+    pub fn has(&self, name: &str) -> bool {
+        self.names.iter().any(|n| n == name)
+    }
+
+    /// A number array of any float or integer type as f64. Errors: missing, another shape, another type.
+    pub fn numbers(&mut self, name: &str, shape: &[Axis]) -> Result<ArrayD<f64>> {
+        let array = if let Some(a) = self.typed::<f32>(name)? {
+            a.mapv(f64::from)
+        } else if let Some(a) = self.typed::<f64>(name)? {
+            a
+        } else if let Some(a) = self.typed::<i64>(name)? {
+            a.mapv(|v| v as f64)
+        } else if let Some(a) = self.typed::<i32>(name)? {
+            a.mapv(f64::from)
+        } else if let Some(a) = self.typed::<u32>(name)? {
+            a.mapv(f64::from)
+        } else {
+            bail!("{}: array `{name}` has an unknown number type; save it as float32 or float64", self.path.display());
+        };
+        self.check(name, array.shape(), shape)?;
+        Ok(array)
+    }
+
+    /// A float array as f32. Errors as `numbers`.
+    pub fn floats(&mut self, name: &str, shape: &[Axis]) -> Result<ArrayD<f32>> {
+        if let Some(array) = self.typed::<f32>(name)? {
+            self.check(name, array.shape(), shape)?;
+            return Ok(array);
+        }
+        Ok(self.numbers(name, shape)?.mapv(|v| v as f32))
+    }
+
+    /// An array of truth values. Errors: missing, another shape, another type.
+    pub fn bools(&mut self, name: &str, shape: &[Axis]) -> Result<ArrayD<bool>> {
+        let Some(array) = self.typed::<bool>(name)? else {
+            bail!("{}: array `{name}` must be of type bool", self.path.display());
+        };
+        self.check(name, array.shape(), shape)?;
+        Ok(array)
+    }
+
+    /// The frame rate in array `name`: two numbers, numerator and denominator, or one number of frames a second.
+    pub fn frame_rate(&mut self, name: &str) -> Result<FrameRate> {
+        let values = self.numbers(name, &[])?.into_raw_vec_and_offset().0;
+        let rate = match values[..] {
+            [rate] => rate_near(rate),
+            [num, 1.0] => rate_near(num),
+            [num, den] if num >= 1.0 && den >= 1.0 && num.max(den) <= 1e9 && num.fract() + den.fract() == 0.0 => {
+                Some(FrameRate::new(num as u32, den as u32))
+            }
+            [num, den] => rate_near(num / den),
+            _ => None,
+        };
+        rate.with_context(|| {
+            format!(
+                "{}: `{name}` is {values:?}, no frame rate (one number, or numerator and denominator)",
+                self.path.display()
+            )
+        })
+    }
+
+    /// The array if it is of type `T`; `None` if it is of another type.
+    fn typed<T: ReadableElement>(&mut self, name: &str) -> Result<Option<ArrayD<T>>> {
+        if !self.has(name) {
+            bail!("{} has no array `{name}`; it has: {}", self.path.display(), self.names.join(", "));
+        }
+        match self.reader.by_name::<OwnedRepr<T>, _>(name) {
+            Ok(array) => Ok(Some(array)),
+            Err(ReadNpzError::Npy(ReadNpyError::WrongDescriptor(_))) => Ok(None),
+            Err(error) => Err(error).with_context(|| format!("{}: array `{name}` cannot be read", self.path.display())),
+        }
+    }
+
+    /// An empty `expected` takes every shape.
+    fn check(&self, name: &str, shape: &[usize], expected: &[Axis]) -> Result<()> {
+        let fits =
+            shape.len() == expected.len() && shape.iter().zip(expected).all(|(&n, want)| want.is_none_or(|w| w == n));
+        if !expected.is_empty() && !fits {
+            let want: Vec<String> =
+                expected.iter().map(|a| a.map_or_else(|| "T".to_owned(), |n| n.to_string())).collect();
+            bail!("{}: array `{name}` has shape {shape:?}, expected [{}]", self.path.display(), want.join(", "));
+        }
+        Ok(())
+    }
+}
+
+/// The simplest fraction within one part in 100 000 of `rate`: whole, NTSC (over 1001), or thousandths.
+fn rate_near(rate: f64) -> Option<FrameRate> {
+    if !rate.is_finite() || !(0.01..=100_000.0).contains(&rate) {
+        return None;
+    }
+    [1u32, 1001, 1000]
+        .into_iter()
+        .map(|den| FrameRate::new((rate * f64::from(den)).round() as u32, den))
+        .find(|r| (r.per_sec() / rate - 1.0).abs() < 1e-5)
+        .or_else(|| Some(FrameRate::new((rate * 10_000.0).round() as u32, 10_000)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::{Array1, arr0};
+    use ndarray_npy::NpzWriter;
+
+    fn file_with(dir: &Path, write: impl FnOnce(&mut NpzWriter<File>)) -> PathBuf {
+        let path = dir.join("a.npz");
+        let mut npz = NpzWriter::new(File::create(&path).unwrap());
+        write(&mut npz);
+        npz.finish().unwrap();
+        path
+    }
+
+    #[test]
+    fn rates_come_as_one_number_or_as_a_fraction() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = file_with(dir.path(), |npz| {
+            npz.add_array("one", &arr0(15i64)).unwrap();
+            npz.add_array("ntsc", &Array1::from(vec![29.97f64])).unwrap();
+            npz.add_array("pair", &Array1::from(vec![30000.0f64, 1001.0])).unwrap();
+            npz.add_array("bad", &Array1::from(vec![f64::NAN])).unwrap();
+        });
+        let mut npz = Npz::open(&path).unwrap();
+        assert_eq!(npz.frame_rate("one").unwrap(), FrameRate::new(15, 1));
+        assert_eq!(npz.frame_rate("ntsc").unwrap(), FrameRate::new(30000, 1001));
+        assert_eq!(npz.frame_rate("pair").unwrap(), FrameRate::new(30000, 1001));
+        assert!(npz.frame_rate("bad").is_err());
+    }
+
+    #[test]
+    fn errors_name_the_file_the_array_and_the_shape() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = file_with(dir.path(), |npz| npz.add_array("body", &Array1::<f32>::zeros(5)).unwrap());
+        let mut npz = Npz::open(&path).unwrap();
+        let text = format!("{:#}", npz.floats("body", &[None, Some(17)]).unwrap_err());
+        assert!(text.contains("a.npz") && text.contains("[5]") && text.contains("[T, 17]"), "{text}");
+        let text = format!("{:#}", npz.floats("hand", &[]).unwrap_err());
+        assert!(text.contains("no array `hand`") && text.contains("body"), "{text}");
+        std::fs::write(dir.path().join("b.npz"), b"no zip").unwrap();
+        assert!(Npz::open(&dir.path().join("b.npz")).is_err());
+        assert!(Npz::open(&dir.path().join("none.npz")).is_err());
+    }
+}
