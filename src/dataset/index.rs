@@ -1,0 +1,61 @@
+//! `index.json`: where each sample lies in which shard, and the BLAKE3 hash of both, for random access and checks.
+
+use super::split::Split;
+use serde::{Deserialize, Serialize};
+
+/// The whole file.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Index {
+    pub schema: u32,
+    pub shards: Vec<Shard>,
+    /// In the order of the shards.
+    pub samples: Vec<SampleRef>,
+}
+
+/// One tar file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Shard {
+    pub file: String,
+    pub split: Split,
+    pub bytes: u64,
+    pub n_samples: usize,
+    pub blake3: String,
+}
+
+/// One sample and its members; offsets count from the beginning of the shard.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SampleRef {
+    pub key: String,
+    pub split: Split,
+    /// File name of the shard.
+    pub shard: String,
+    /// The sample with its tar headers: a valid tar stream by itself.
+    pub offset: u64,
+    pub size: u64,
+    pub n_frames: usize,
+    /// Of the `size` bytes at `offset`.
+    pub blake3: String,
+    pub json: Span,
+    pub mask: Span,
+    pub pose2d: Span,
+    pub pose3d: Span,
+    pub wav: Span,
+}
+
+/// Bytes of a shard.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Span {
+    pub offset: u64,
+    pub size: u64,
+}
+
+impl SampleRef {
+    /// Whether every member lies inside the sample, and the sample inside its shard.
+    pub fn fits(&self, shard_bytes: u64) -> bool {
+        let end = |offset: u64, size: u64| offset.checked_add(size);
+        let Some(sample_end) = end(self.offset, self.size) else { return false };
+        let members = [self.json, self.mask, self.pose2d, self.pose3d, self.wav];
+        sample_end <= shard_bytes
+            && members.iter().all(|m| m.offset >= self.offset && end(m.offset, m.size).is_some_and(|e| e <= sample_end))
+    }
+}

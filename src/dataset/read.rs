@@ -1,0 +1,208 @@
+//! Reading a dataset's folder: opened once, then any sample or any stretch of one by its place. Damaged, missing or
+//! foreign files are errors that name the file and what to do; nothing here panics on what is in a file.
+
+use super::index::{Index, SampleRef, Span};
+use super::info::Info;
+use super::npy::{self, Element, Layout};
+use super::sample::{N_KEYPOINTS, Sample};
+use super::split::Split;
+use super::stats::Stats;
+use super::{sync, wav, write};
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::N_JOINTS;
+use crate::types::sound::Sound;
+use anyhow::{Context, Result, ensure};
+use ndarray::{Array2, Array3};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::ops::Range;
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+
+/// An open dataset. Reading needs no lock: threads may share it.
+pub struct Dataset {
+    dir: PathBuf,
+    info: Info,
+    stats: Stats,
+    index: Index,
+    shards: BTreeMap<String, File>,
+}
+
+impl Dataset {
+    /// Opens the folder of one speaker (`work/dataset/<speaker>`): reads its JSON files, and checks that every shard
+    /// is there with the size it should have. Contents are checked by `read` and `verify`.
+    pub fn open(dir: impl AsRef<Path>) -> Result<Dataset> {
+        let dir = dir.as_ref().to_owned();
+        ensure!(
+            dir.join(write::INFO).is_file(),
+            "{} is no dataset: it has no {}; the shard stage of `orator run` writes one to work/dataset/<speaker>",
+            dir.display(),
+            write::INFO
+        );
+        let schema: Schema = read_json(&dir.join(write::INFO))?;
+        ensure!(
+            schema.schema == super::SCHEMA,
+            "{} has layout version {}, this program reads {}: run the shard stage again",
+            dir.display(),
+            schema.schema,
+            super::SCHEMA
+        );
+        let info: Info = read_json(&dir.join(write::INFO))?;
+        let stats: Stats = read_json(&dir.join(write::STATS))?;
+        ensure!(stats.is_whole(), "{}: its tables do not have 49 rows", dir.join(write::STATS).display());
+        let index: Index = read_json(&dir.join(write::INDEX))?;
+        let mut shards = BTreeMap::new();
+        for shard in &index.shards {
+            let path = dir.join(&shard.file);
+            let file = File::open(&path).with_context(|| format!("opening the shard {}", path.display()))?;
+            let bytes = file.metadata().with_context(|| format!("looking at {}", path.display()))?.len();
+            ensure!(
+                bytes == shard.bytes,
+                "{} has {bytes} bytes, {} were written: the file is damaged; run the shard stage again with --force",
+                path.display(),
+                shard.bytes
+            );
+            shards.insert(shard.file.clone(), (file, bytes));
+        }
+        for sample in &index.samples {
+            let fits = shards.get(&sample.shard).is_some_and(|(_, bytes)| sample.fits(*bytes));
+            ensure!(fits, "{}: {} lies outside its shard", dir.join(write::INDEX).display(), sample.key);
+        }
+        let shards = shards.into_iter().map(|(name, (file, _))| (name, file)).collect();
+        Ok(Dataset { dir, info, stats, index, shards })
+    }
+
+    /// The folder.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// What the numbers mean.
+    pub fn info(&self) -> &Info {
+        &self.info
+    }
+
+    /// What the numbers are like.
+    pub fn stats(&self) -> &Stats {
+        &self.stats
+    }
+
+    /// The samples of a split, in the order of the shards.
+    pub fn samples(&self, split: Split) -> Vec<SampleRef> {
+        self.index.samples.iter().filter(|sample| sample.split == split).cloned().collect()
+    }
+
+    /// Reads every shard and compares its hash with the index.
+    pub fn verify(&self) -> Result<()> {
+        for shard in &self.index.shards {
+            let path = self.dir.join(&shard.file);
+            let mut hasher = blake3::Hasher::new();
+            let file = File::open(&path).with_context(|| format!("opening the shard {}", path.display()))?;
+            hasher.update_reader(file).with_context(|| format!("reading {}", path.display()))?;
+            ensure!(
+                hasher.finalize().to_hex().as_str() == shard.blake3,
+                "{} is damaged (its hash is not the one written): run the shard stage again with --force",
+                path.display()
+            );
+        }
+        Ok(())
+    }
+
+    /// Reads a whole sample and checks its hash.
+    pub fn read(&self, sample: &SampleRef) -> Result<Sample> {
+        let hash = blake3::hash(&self.bytes(sample, Span { offset: sample.offset, size: sample.size })?);
+        ensure!(
+            hash.to_hex().as_str() == sample.blake3,
+            "{}: the sample {} is damaged (its hash is not the one written): run the shard stage again with --force",
+            self.dir.join(&sample.shard).display(),
+            sample.key
+        );
+        let meta = serde_json::from_slice(&self.bytes(sample, sample.json)?)
+            .with_context(|| format!("reading {}.json in {}", sample.key, sample.shard))?;
+        let frames = 0..sample.n_frames;
+        let pose2d = npy::floats(&self.rows(sample, sample.pose2d, Element::F32, &[N_KEYPOINTS, 3], frames.clone())?);
+        let pose2d = Array3::from_shape_vec((frames.len(), N_KEYPOINTS, 3), pose2d).context("shaping keypoints")?;
+        let n_samples = (sample.wav.size.saturating_sub(wav::HEADER_BYTES as u64) / 2) as usize;
+        let sound = self.sound(sample, 0..n_samples)?;
+        Ok(Sample { key: sample.key.clone(), motion: self.motion(sample, frames)?, pose2d, sound, meta })
+    }
+
+    /// The motion of the frames `frames` of a sample; only these are read, no hash is checked.
+    pub fn motion(&self, sample: &SampleRef, frames: Range<usize>) -> Result<Motion> {
+        let n_frames = frames.len();
+        let joints = npy::floats(&self.rows(sample, sample.pose3d, Element::F32, &[N_JOINTS, 3], frames.clone())?);
+        let mask = npy::bools(&self.rows(sample, sample.mask, Element::Bool, &[N_JOINTS], frames)?);
+        Ok(Motion {
+            fps: self.info.fps,
+            joints: Array3::from_shape_vec((n_frames, N_JOINTS, 3), joints).context("shaping joints")?,
+            mask: Array2::from_shape_vec((n_frames, N_JOINTS), mask).context("shaping the mask")?,
+        })
+    }
+
+    /// The sound under the frames `start..start + n_frames` of a sample: always `round(n_frames / fps * rate)`
+    /// samples, whatever `start` is, silence where the interval's sound ends earlier.
+    pub fn sound_of_frames(&self, sample: &SampleRef, start: usize, n_frames: usize) -> Result<Sound> {
+        let (fps, rate) = (self.info.fps, self.info.sound_rate);
+        let begin = sync::sample_at(fps, rate, start);
+        let length = sync::sample_at(fps, rate, n_frames);
+        let held = (sample.wav.size.saturating_sub(wav::HEADER_BYTES as u64) / 2) as usize;
+        let mut sound = self.sound(sample, begin.min(held)..(begin + length).min(held))?;
+        sound.samples.resize(length, 0.0);
+        Ok(sound)
+    }
+
+    fn sound(&self, sample: &SampleRef, range: Range<usize>) -> Result<Sound> {
+        let place = || format!("reading {}.wav in {}", sample.key, self.dir.join(&sample.shard).display());
+        let (rate, at) = (self.info.sound_rate, sample.wav.offset + wav::HEADER_BYTES as u64);
+        let head = Span { offset: sample.wav.offset, size: sample.wav.size.min(wav::HEADER_BYTES as u64) };
+        let n_samples = wav::n_samples(&self.bytes(sample, head)?, sample.wav.size, rate).with_context(place)?;
+        ensure!(range.end <= n_samples, "{}: it holds {n_samples} samples, not {}", place(), range.end);
+        let span = Span { offset: at + 2 * range.start as u64, size: 2 * range.len() as u64 };
+        Ok(Sound { rate, samples: wav::samples(&self.bytes(sample, span)?) })
+    }
+
+    /// The bytes of the rows `frames` of an array.
+    fn rows(
+        &self,
+        sample: &SampleRef,
+        span: Span,
+        element: Element,
+        row: &[usize],
+        frames: Range<usize>,
+    ) -> Result<Vec<u8>> {
+        let place = || format!("reading an array of {} in {}", sample.key, self.dir.join(&sample.shard).display());
+        let head = Span { offset: span.offset, size: span.size.min(npy::HEADER_BYTES as u64) };
+        let layout = Layout::parse(&self.bytes(sample, head)?, span.size, element, row).with_context(place)?;
+        ensure!(
+            frames.start <= frames.end && frames.end <= layout.n_rows,
+            "{}: it has {} frames, {}..{} were asked for",
+            place(),
+            layout.n_rows,
+            frames.start,
+            frames.end
+        );
+        let offset = span.offset + (layout.data_at + frames.start * layout.row_bytes) as u64;
+        self.bytes(sample, Span { offset, size: (frames.len() * layout.row_bytes) as u64 })
+    }
+
+    fn bytes(&self, sample: &SampleRef, span: Span) -> Result<Vec<u8>> {
+        let place = || format!("reading {} in {}", sample.key, self.dir.join(&sample.shard).display());
+        let file = self.shards.get(&sample.shard).with_context(|| format!("{}: no such shard", place()))?;
+        // spans lie inside the file (checked when it was opened, and by the layouts), so this allocation is honest
+        ensure!(span.size <= sample.size, "{}: {} bytes of a smaller sample were asked for", place(), span.size);
+        let mut bytes = vec![0; span.size as usize];
+        file.read_exact_at(&mut bytes, span.offset).with_context(place)?;
+        Ok(bytes)
+    }
+}
+
+#[derive(serde::Deserialize)]
+struct Schema {
+    schema: u32,
+}
+
+fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
+    let bytes = std::fs::read(path).with_context(|| format!("reading {}", path.display()))?;
+    serde_json::from_slice(&bytes)
+        .with_context(|| format!("{} is not as the shard stage writes it; run the stage again", path.display()))
+}

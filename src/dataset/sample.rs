@@ -1,0 +1,63 @@
+//! One sample of the dataset: an interval's motion, keypoints, sound and facts, and its members as bytes.
+
+use super::{npy, sync, wav};
+use crate::types::pose2d::{N_BODY, N_HAND};
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::N_JOINTS;
+use crate::types::sound::{SAMPLE_RATE, Sound};
+use anyhow::{Context, Result, ensure};
+use ndarray::Array3;
+
+/// Keypoints of a frame in a shard: 17 of the body, 21 of the left hand, 21 of the right hand.
+pub const N_KEYPOINTS: usize = N_BODY + 2 * N_HAND;
+
+/// An interval: continuous motion of the speaker with its sound.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sample {
+    /// `<slug>-<8 hex of the video's content>-<first frame, 6 digits>`; [a-z0-9_-] only.
+    pub key: String,
+    pub motion: Motion,
+    /// [T, 59, 3]: x px, y px, score.
+    pub pose2d: Array3<f32>,
+    /// 16 kHz mono, from the beginning of the first frame to the end of the last.
+    pub sound: Sound,
+    /// Where it comes from, and what is special about it (see `stage`).
+    pub meta: serde_json::Value,
+}
+
+/// The members of a sample, in the order in which they lie in a shard: extension and bytes.
+pub const EXTENSIONS: [&str; 5] = ["json", "mask.npy", "pose2d.npy", "pose3d.npy", "wav"];
+
+impl Sample {
+    /// Number of frames T.
+    pub fn n_frames(&self) -> usize {
+        self.motion.n_frames()
+    }
+
+    /// The bytes of each of `EXTENSIONS`. Fails when shapes or lengths contradict each other.
+    pub fn members(&self) -> Result<[Vec<u8>; 5]> {
+        let (key, n_frames) = (&self.key, self.n_frames());
+        let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
+        ensure!(!key.is_empty() && key.len() <= 80 && key.chars().all(plain), "`{key}` is not a key of a sample");
+        ensure!(n_frames > 0, "{key}: a sample without frames");
+        ensure!(self.motion.joints.shape() == [n_frames, N_JOINTS, 3], "{key}: joints are not [T, 49, 3]");
+        ensure!(self.motion.mask.shape() == [n_frames, N_JOINTS], "{key}: the mask is not [{n_frames}, 49]");
+        ensure!(self.pose2d.shape() == [n_frames, N_KEYPOINTS, 3], "{key}: keypoints are not [{n_frames}, 59, 3]");
+        ensure!(self.sound.rate == SAMPLE_RATE, "{key}: sound at {} Hz, not {SAMPLE_RATE}", self.sound.rate);
+        let expected = sync::sample_at(self.motion.fps, SAMPLE_RATE, n_frames);
+        ensure!(
+            self.sound.samples.len().abs_diff(expected) <= 1,
+            "{key}: {} samples of sound for {n_frames} frames, expected {expected}",
+            self.sound.samples.len()
+        );
+        let mut json = serde_json::to_vec_pretty(&self.meta).context("writing a sample's facts as JSON")?;
+        json.push(b'\n');
+        Ok([
+            json,
+            npy::write_bool(self.motion.mask.shape(), self.motion.mask.iter()),
+            npy::write_f32(self.pose2d.shape(), self.pose2d.iter()),
+            npy::write_f32(self.motion.joints.shape(), self.motion.joints.iter()),
+            wav::write(&self.sound),
+        ])
+    }
+}
