@@ -1,11 +1,26 @@
-//! `orator train`.
+//! `orator train`: one file a network.
+
+mod gan;
+mod lifter;
 
 use super::{Outcome, ui::Ui};
 
-/// Train the lifters or the speaker's generator.
+/// Train the lifters or a speaker's generator.
 #[derive(clap::Args)]
-pub struct Args {}
+pub struct Args {
+    #[command(subcommand)]
+    network: Network,
+}
 
-pub fn run(_args: Args, _ui: &Ui) -> anyhow::Result<Outcome> {
-    anyhow::bail!("not built yet")
+#[derive(clap::Subcommand)]
+enum Network {
+    Gan(gan::Args),
+    Lifter(lifter::Args),
+}
+
+pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
+    match args.network {
+        Network::Gan(args) => gan::run(args, ui),
+        Network::Lifter(args) => lifter::run(args, ui),
+    }
 }

@@ -1,1 +1,26 @@
-//! Network architectures: tensors in, tensors out. No files, no optimiser.
+//! Network architectures and the operators they are made of: tensors in, tensors out. No files, no optimiser.
+//!
+//! candle's own operators are used only where finite differences proved their gradients (`tests/it/operators.rs`
+//! holds the list, and keeps the others out); convolution over time and batch norm are this room's.
+
+pub mod batch_norm;
+pub mod conv1d;
+pub mod cpu;
+pub mod dropout;
+pub mod finite_difference;
+pub mod hand_lifter;
+pub mod linear;
+pub mod params;
+pub mod temporal_lifter;
+
+/// Whether a forward pass trains (batch statistics, dropout masks drawn from the generator) or evaluates.
+pub enum Mode<'a> {
+    Train(&'a mut rand_chacha::ChaCha8Rng),
+    Eval,
+}
+
+impl Mode<'_> {
+    pub fn trains(&self) -> bool {
+        matches!(self, Mode::Train(_))
+    }
+}

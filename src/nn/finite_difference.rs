@@ -1,0 +1,45 @@
+//! The proof of a gradient: what backpropagation says against central differences in f64. Tests only; it is public
+//! so that the unit tests and the integration tests share it.
+
+use candle_core::{Device, Result, Tensor, Var};
+
+/// Numbers in -1..1 that look random and are the same everywhere.
+pub fn pattern(shape: &[usize], phase: f64) -> Result<Tensor> {
+    let n: usize = shape.iter().product();
+    let values: Vec<f64> = (0..n).map(|i| ((i as f64 + phase) * 12.9898).sin() * 43758.5453 % 1.0).collect();
+    Tensor::from_vec(values, shape, &Device::Cpu)
+}
+
+/// Largest difference between the gradient of `sum(f(inputs) * fixed pattern)` by backpropagation and by central
+/// differences, over all numbers of all `inputs` (f64), relative to 1 + |gradient|.
+pub fn worst(inputs: &[Tensor], f: impl Fn(&[Tensor]) -> Result<Tensor>) -> Result<f64> {
+    let vars: Vec<Var> = inputs.iter().map(Var::from_tensor).collect::<Result<_>>()?;
+    let tensors = |vars: &[Var]| vars.iter().map(|var| var.as_tensor().clone()).collect::<Vec<_>>();
+    let objective = |inputs: &[Tensor]| {
+        let y = f(inputs)?;
+        (&y * pattern(y.dims(), 0.5)?)?.sum_all()
+    };
+    let gradients = objective(&tensors(&vars))?.backward()?;
+    let mut worst = 0.0f64;
+    for (which, var) in vars.iter().enumerate() {
+        let Some(gradient) = gradients.get(var) else {
+            candle_core::bail!("input {which} has no gradient");
+        };
+        let gradient = gradient.flatten_all()?.to_vec1::<f64>()?;
+        let values = var.flatten_all()?.to_vec1::<f64>()?;
+        for (i, backpropagated) in gradient.iter().enumerate() {
+            let at = |step: f64| -> Result<f64> {
+                let mut moved = values.clone();
+                moved[i] += step;
+                let mut inputs = inputs.to_vec();
+                inputs[which] = Tensor::from_vec(moved, var.shape(), &Device::Cpu)?;
+                objective(&inputs)?.to_scalar()
+            };
+            let step = 1e-6;
+            let difference = (at(step)? - at(-step)?) / (2.0 * step);
+            let error = (backpropagated - difference).abs() / (1.0 + difference.abs());
+            worst = if error.is_nan() { f64::INFINITY } else { worst.max(error) };
+        }
+    }
+    Ok(worst)
+}

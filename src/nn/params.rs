@@ -1,0 +1,155 @@
+//! The numbers of a network: named tensors, made from a seed, kept in the order of their names. Each tensor's first
+//! values depend on the seed and its own name only, so adding a layer leaves the others as they were.
+
+use anyhow::{Context, bail, ensure};
+use candle_core::{DType, Device, Result, Tensor, Var};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::collections::BTreeMap;
+
+/// How a tensor begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Init {
+    Constant(f64),
+    /// Uniform in +-sqrt(6 / (fan in + fan out)), fans of a weight [out, in, taps...] (Glorot 2010).
+    Glorot,
+    /// Uniform in +-sqrt(6 / fan in) (He 2015).
+    He,
+}
+
+/// Named tensors of one or more networks.
+pub struct Params {
+    seed: u64,
+    dtype: DType,
+    trainable: BTreeMap<String, Var>,
+    /// Savable, but not moved by the optimiser: running statistics.
+    buffers: BTreeMap<String, Var>,
+}
+
+impl Params {
+    /// An empty set in f32.
+    pub fn new(seed: u64) -> Self {
+        Self::with_dtype(seed, DType::F32)
+    }
+
+    /// An empty set of this type (f64 is for proving gradients).
+    pub fn with_dtype(seed: u64, dtype: DType) -> Self {
+        Self { seed, dtype, trainable: BTreeMap::new(), buffers: BTreeMap::new() }
+    }
+
+    /// A new tensor that the optimiser moves. Errors when the name is taken.
+    pub fn trainable(&mut self, name: &str, shape: &[usize], init: Init) -> Result<Tensor> {
+        let var = self.make(name, shape, init)?;
+        let tensor = var.as_tensor().clone();
+        self.trainable.insert(name.to_owned(), var);
+        Ok(tensor)
+    }
+
+    /// A new tensor that is saved with the others and moved by its owner alone.
+    pub fn buffer(&mut self, name: &str, shape: &[usize], value: f64) -> Result<Var> {
+        let var = self.make(name, shape, Init::Constant(value))?;
+        self.buffers.insert(name.to_owned(), var.clone());
+        Ok(var)
+    }
+
+    fn make(&self, name: &str, shape: &[usize], init: Init) -> Result<Var> {
+        if self.trainable.contains_key(name) || self.buffers.contains_key(name) {
+            candle_core::bail!("two tensors are called {name}");
+        }
+        let fan = |dims: &[usize]| dims.iter().product::<usize>().max(1) as f64;
+        let taps = fan(shape.get(2..).unwrap_or(&[]));
+        let (fan_out, fan_in) = (fan(&shape[..shape.len().min(1)]) * taps, fan(shape.get(1..).unwrap_or(&[])));
+        let n: usize = shape.iter().product();
+        let values: Vec<f64> = match init {
+            Init::Constant(value) => vec![value; n],
+            Init::Glorot => self.uniform(name, n, (6.0 / (fan_in + fan_out)).sqrt()),
+            Init::He => self.uniform(name, n, (6.0 / fan_in).sqrt()),
+        };
+        Var::from_tensor(&Tensor::from_vec(values, shape, &Device::Cpu)?.to_dtype(self.dtype)?)
+    }
+
+    fn uniform(&self, name: &str, n: usize, bound: f64) -> Vec<f64> {
+        let key = [&self.seed.to_le_bytes(), name.as_bytes()].concat();
+        let mut rng = ChaCha8Rng::from_seed(*blake3::hash(&key).as_bytes());
+        (0..n).map(|_| rng.random_range(-bound..bound)).collect()
+    }
+
+    /// What the optimiser moves, sorted by name.
+    pub fn trainables(&self) -> impl Iterator<Item = (&str, &Var)> {
+        self.trainable.iter().map(|(name, var)| (name.as_str(), var))
+    }
+
+    /// Everything that is saved, sorted by name within trainables, then buffers.
+    pub fn all(&self) -> impl Iterator<Item = (&str, &Var)> {
+        self.trainable.iter().chain(&self.buffers).map(|(name, var)| (name.as_str(), var))
+    }
+
+    /// How many numbers the optimiser moves.
+    pub fn n_parameters(&self) -> usize {
+        self.trainable.values().map(|var| var.elem_count()).sum()
+    }
+
+    /// Copies of everything, to save.
+    pub fn tensors(&self) -> Result<BTreeMap<String, Tensor>> {
+        self.all().map(|(name, var)| Ok((name.to_owned(), var.as_tensor().copy()?))).collect()
+    }
+
+    /// Overwrites every tensor with that of the same name. Errors, naming the tensor, when one is missing, too many
+    /// or of another shape.
+    pub fn load(&self, tensors: &BTreeMap<String, Tensor>) -> anyhow::Result<()> {
+        for (name, var) in self.all() {
+            let tensor = tensors.get(name).with_context(|| format!("tensor {name} is missing"))?;
+            ensure!(
+                tensor.shape() == var.shape(),
+                "tensor {name} has shape {:?}, expected {:?}",
+                tensor.dims(),
+                var.dims()
+            );
+            var.set(&tensor.to_dtype(self.dtype)?)?;
+        }
+        match tensors.keys().find(|name| !self.all().any(|(own, _)| own == name.as_str())) {
+            Some(name) => bail!("tensor {name} belongs to no layer of this network"),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_values_depend_on_seed_and_name_only() -> anyhow::Result<()> {
+        let values = |seed, names: &[&str]| -> Result<Vec<f32>> {
+            let mut params = Params::new(seed);
+            for name in names {
+                params.trainable(name, &[3, 4, 5], Init::Glorot)?;
+            }
+            params.tensors()?["b"].flatten_all()?.to_vec1()
+        };
+        let first = values(1, &["b"])?;
+        assert_eq!(first, values(1, &["a", "b"])?);
+        assert_ne!(first, values(2, &["b"])?);
+        let bound = (6.0f32 / (15.0 + 20.0)).sqrt();
+        assert!(first.iter().all(|v| v.abs() <= bound) && first.iter().any(|v| v.abs() > 0.8 * bound));
+        Ok(())
+    }
+
+    #[test]
+    fn loading_names_what_does_not_fit() -> anyhow::Result<()> {
+        let mut params = Params::new(0);
+        params.trainable("w", &[2, 2], Init::He)?;
+        params.buffer("mean", &[2], 0.0)?;
+        let mut tensors = params.tensors()?;
+        params.load(&tensors)?;
+        assert_eq!(params.n_parameters(), 4);
+        tensors.insert("extra".into(), tensors["w"].clone());
+        assert!(params.load(&tensors).unwrap_err().to_string().contains("extra"));
+        tensors.remove("extra");
+        tensors.remove("mean");
+        assert!(params.load(&tensors).unwrap_err().to_string().contains("mean"));
+        tensors.insert("mean".into(), tensors["w"].clone());
+        assert!(params.load(&tensors).unwrap_err().to_string().contains("shape"));
+        Ok(())
+    }
+}
