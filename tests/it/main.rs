@@ -3,3 +3,7 @@
 mod dataset;
 mod house;
 mod runner;
+
+mod blender;
+mod bvh;
+mod figures;
