@@ -1,1 +1,24 @@
-//! The only room that knows ffmpeg: probing, sound, frames as a stream by presentation time, encoding.
+//! The only room that knows ffmpeg. `probe` says what a file holds, `frames` streams its pictures at a chosen rate by
+//! presentation time, `audio` its sound on the same clock, `encode` writes mp4. Beneath them: `source` opens files and
+//! names what is wrong with them, `decode` turns one stream into decoded frames, `picture` makes those upright RGB.
+//!
+//! One clock for all: time 0 is the first picture that decodes; a file without pictures starts with its first sample.
+
+pub mod audio;
+mod decode;
+pub mod encode;
+pub mod frames;
+mod picture;
+pub mod probe;
+mod resample;
+mod source;
+
+/// Starts ffmpeg, once; its own log lines are kept off the terminal, since every error is told by this room.
+fn init() {
+    static ONCE: std::sync::Once = std::sync::Once::new();
+    ONCE.call_once(|| {
+        // Registers nothing since ffmpeg 4 and cannot fail there; a failure would show at the first file opened.
+        let _ = ffmpeg_next::init();
+        ffmpeg_next::log::set_level(ffmpeg_next::log::Level::Quiet);
+    });
+}

@@ -7,3 +7,7 @@ mod runner;
 mod blender;
 mod bvh;
 mod figures;
+
+mod clips;
+mod media_frames;
+mod media_sound;

@@ -1,0 +1,172 @@
+//! The sound of a file as mono at one rate, on the clock of its pictures: sample k belongs to second k / rate after
+//! the first picture. Sound before that is cut, a late start and gaps in the container are silence. A file without
+//! pictures starts with its first sample.
+
+use super::decode::Decode;
+use super::resample::{Resampler, format_of};
+use super::{frames, source};
+use crate::types::sound::Sound;
+use anyhow::{Context, Result, bail};
+use ffmpeg_next::frame;
+use std::path::Path;
+
+/// Timestamps may wander this far from the count of samples before it is taken for a gap, seconds: less than a frame,
+/// more than the rounding of any container.
+const JITTER_SECS: f64 = 0.04;
+
+/// The whole sound of `path` (wav, flac, mp3, a video, ...) as mono at `rate` samples a second; `None` when it has no
+/// sound.
+pub fn read_mono(path: &Path, rate: u32) -> Result<Option<Sound>> {
+    let mut samples = Vec::new();
+    let n_samples = stream_mono(path, rate, &mut |piece| {
+        samples.extend_from_slice(piece);
+        Ok(())
+    })?;
+    Ok(n_samples.map(|_| Sound { rate, samples }))
+}
+
+/// Writes the sound of `path` to the 16-bit mono wav `out`, a piece at a time; its length in seconds, or `None` (and
+/// no file) when there is no sound.
+pub fn extract_wav(path: &Path, out: &Path, rate: u32) -> Result<Option<f64>> {
+    let mut wav = None;
+    let n_samples = stream_mono(path, rate, &mut |piece| {
+        if wav.is_none() {
+            wav = Some(WavWriter::create(out, rate)?);
+        }
+        wav.as_mut().map_or(Ok(()), |wav: &mut WavWriter| wav.push(piece))
+    })?;
+    if let Some(wav) = wav {
+        wav.finish()?;
+    }
+    Ok(n_samples.map(|n| n as f64 / f64::from(rate)))
+}
+
+/// Writes `sound` to the 16-bit mono wav `out`.
+pub fn write_wav(out: &Path, sound: &Sound) -> Result<()> {
+    let mut wav = WavWriter::create(out, sound.rate)?;
+    wav.push(&sound.samples)?;
+    wav.finish()
+}
+
+/// A 16-bit mono wav file being written.
+struct WavWriter {
+    path: std::path::PathBuf,
+    file: hound::WavWriter<std::io::BufWriter<std::fs::File>>,
+}
+
+impl WavWriter {
+    fn create(path: &Path, rate: u32) -> Result<Self> {
+        let sample_format = hound::SampleFormat::Int;
+        let spec = hound::WavSpec { channels: 1, sample_rate: rate, bits_per_sample: 16, sample_format };
+        let file = hound::WavWriter::create(path, spec).with_context(|| format!("cannot write {}", path.display()))?;
+        Ok(Self { path: path.to_owned(), file })
+    }
+
+    fn push(&mut self, samples: &[f32]) -> Result<()> {
+        for sample in samples {
+            let sample = (sample * 32_768.0).round().clamp(-32_768.0, 32_767.0) as i16;
+            self.file.write_sample(sample).with_context(|| format!("cannot write {}", self.path.display()))?;
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> Result<()> {
+        self.file.finalize().with_context(|| format!("cannot write {}", self.path.display()))
+    }
+}
+
+/// Decodes the sound of `path` and hands it to `sink` piece by piece; the number of samples, `None` without sound.
+fn stream_mono(path: &Path, rate: u32, sink: &mut dyn FnMut(&[f32]) -> Result<()>) -> Result<Option<u64>> {
+    let input = source::open(path)?;
+    let Some(stream) = source::audio_stream(&input) else { return Ok(None) };
+    let stream_idx = stream.index();
+    let end_secs = source::stated_secs(&input, &stream).map_or(f64::INFINITY, |secs| secs + 60.0);
+    let mut zero_secs = frames::first_picture_secs(path)?;
+    let mut decode = Decode::new(path, input, stream_idx, 1)?;
+    let secs_per_tick = f64::from(decode.time_base());
+    let mut timeline = Timeline { rate, n_written: 0, n_skip: 0, run: None, ready: Vec::new(), sink };
+    let mut frame = frame::Audio::empty();
+    let mut n_frames = 0u64;
+    while decode.next(&mut frame)? {
+        if frame.samples() == 0 || frame.rate() == 0 {
+            continue;
+        }
+        n_frames += 1;
+        let at = frame.timestamp().map(|ticks| ticks as f64 * secs_per_tick);
+        let zero = *zero_secs.get_or_insert(at.unwrap_or(0.0));
+        // A time far beyond the file's stated end is a broken one: the sound goes on where it was.
+        let at = at.map(|at| at - zero).filter(|at| *at < end_secs);
+        timeline.push(at, &frame).with_context(|| format!("the sound of {}", path.display()))?;
+    }
+    if n_frames == 0 {
+        let Some(damage) = decode.damage() else { return Ok(None) };
+        bail!("no sound of {} can be decoded ({damage}): copy or download it again", path.display());
+    }
+    timeline.end_run()?;
+    Ok(Some(timeline.n_written))
+}
+
+/// Lays runs of continuous sound at their places in time.
+struct Timeline<'a> {
+    rate: u32,
+    n_written: u64,
+    /// Samples at the start of the run that are before time 0, or that were heard already.
+    n_skip: u64,
+    /// The run at hand, and its start in seconds.
+    run: Option<(Resampler, f64)>,
+    ready: Vec<f32>,
+    sink: &'a mut dyn FnMut(&[f32]) -> Result<()>,
+}
+
+impl Timeline<'_> {
+    /// Sound that starts at second `at`; without a time it goes on where the sound before it ended.
+    fn push(&mut self, at: Option<f64>, frame: &frame::Audio) -> Result<()> {
+        let format = format_of(frame);
+        let expected = self.run.as_ref().map(|(run, start)| start + run.secs_in());
+        let at = at.or(expected).unwrap_or(self.n_written as f64 / f64::from(self.rate));
+        let goes_on = expected.is_some_and(|expected| (at - expected).abs() <= JITTER_SECS);
+        if !goes_on || self.run.as_ref().is_none_or(|(run, _)| run.format() != format) {
+            self.end_run()?;
+            self.begin_run(Resampler::new(format, self.rate)?, at)?;
+        }
+        if let Some((run, _)) = &mut self.run {
+            run.push(frame, &mut self.ready)?;
+        }
+        self.deliver()
+    }
+
+    fn begin_run(&mut self, run: Resampler, at: f64) -> Result<()> {
+        let place = (at * f64::from(self.rate)).round() as i64;
+        let late = place - i64::try_from(self.n_written)?;
+        self.n_skip = late.min(0).unsigned_abs();
+        self.run = Some((run, at));
+        const SILENCE: [f32; 4096] = [0.0; 4096];
+        let mut n_silent = late.max(0) as u64;
+        while n_silent > 0 {
+            let n = n_silent.min(SILENCE.len() as u64);
+            (self.sink)(&SILENCE[..n as usize])?;
+            self.n_written += n;
+            n_silent -= n;
+        }
+        Ok(())
+    }
+
+    fn end_run(&mut self) -> Result<()> {
+        if let Some((run, _)) = self.run.take() {
+            run.finish(&mut self.ready)?;
+        }
+        self.deliver()
+    }
+
+    fn deliver(&mut self) -> Result<()> {
+        let n_skip = self.n_skip.min(self.ready.len() as u64);
+        self.n_skip -= n_skip;
+        let heard = &self.ready[n_skip as usize..];
+        if !heard.is_empty() {
+            (self.sink)(heard)?;
+            self.n_written += heard.len() as u64;
+        }
+        self.ready.clear();
+        Ok(())
+    }
+}

@@ -1,0 +1,68 @@
+//! Opening a media file: its streams, or an error that names the file, what is wrong with it and what was expected.
+
+use anyhow::{Context, Result, bail, ensure};
+use ffmpeg_next as ffmpeg;
+use ffmpeg_next::format::context::Input;
+use ffmpeg_next::format::stream::{Disposition, Stream};
+use std::io::Read;
+use std::path::Path;
+
+const EXPECTED: &str = "expected a video or sound file (mp4, mov, mkv, webm, avi, wav, flac, mp3, ...)";
+
+/// Opens `path` and reads its headers.
+pub(super) fn open(path: &Path) -> Result<Input> {
+    super::init();
+    let mut file = std::fs::File::open(path).with_context(|| format!("cannot read {}: {EXPECTED}", path.display()))?;
+    let size = file.metadata().with_context(|| format!("cannot read {}", path.display()))?;
+    if size.is_dir() {
+        bail!("{} is a folder: {EXPECTED}", path.display());
+    }
+    if size.is_file() && size.len() == 0 {
+        bail!("{} is empty (0 bytes): {EXPECTED}; copy it again", path.display());
+    }
+    let mut head = [0u8; 12];
+    let n = file.read(&mut head).with_context(|| format!("cannot read {}", path.display()))?;
+    let is_mp4 = n == head.len() && &head[4..8] == b"ftyp";
+    let cut_short = || {
+        format!(
+            "{} is cut short: it begins like an mp4 but its index (moov) is missing or broken; copy or download it again",
+            path.display()
+        )
+    };
+    let input = match ffmpeg::format::input(&url(path)?) {
+        Ok(input) => input,
+        Err(ffmpeg::Error::InvalidData) if is_mp4 => bail!(cut_short()),
+        Err(ffmpeg::Error::InvalidData) => bail!("{} is not a media file: {EXPECTED}", path.display()),
+        Err(error) => bail!("cannot open {} ({error}): {EXPECTED}", path.display()),
+    };
+    if video_stream(&input).is_none() && audio_stream(&input).is_none() {
+        ensure!(!is_mp4, cut_short());
+        bail!("{} holds neither pictures nor sound: {EXPECTED}", path.display());
+    }
+    Ok(input)
+}
+
+/// `path` as ffmpeg wants it: text, and marked as a file so that a colon in its name is not taken for a protocol.
+pub(super) fn url(path: &Path) -> Result<String> {
+    let text = path.to_str().filter(|text| !text.contains('\0'));
+    let text = text.with_context(|| format!("the name {} is not UTF-8: rename the file", path.display()))?;
+    Ok(format!("file:{text}"))
+}
+
+/// The stream of moving pictures, if there is one; the cover picture of a sound file is none.
+pub(super) fn video_stream(input: &Input) -> Option<Stream<'_>> {
+    let stream = input.streams().best(ffmpeg::media::Type::Video)?;
+    (!stream.disposition().contains(Disposition::ATTACHED_PIC)).then_some(stream)
+}
+
+/// The stream of sound, if there is one.
+pub(super) fn audio_stream(input: &Input) -> Option<Stream<'_>> {
+    input.streams().best(ffmpeg::media::Type::Audio)
+}
+
+/// Length in seconds as the container states it for this stream, or else for the whole file.
+pub(super) fn stated_secs(input: &Input, stream: &Stream) -> Option<f64> {
+    let own = stream.duration() as f64 * f64::from(stream.time_base());
+    let whole = input.duration() as f64 / f64::from(ffmpeg::ffi::AV_TIME_BASE);
+    [own, whole].into_iter().find(|secs| secs.is_finite() && *secs > 0.0)
+}
