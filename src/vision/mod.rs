@@ -1,3 +1,13 @@
-//! The only room that knows OpenCV: warps, letterboxes, colour, heat-map filters, drawing.
+//! The only room that knows OpenCV: warps and letterboxes, pixels to tensors, heat-map filters, drawing; and PNG files.
 
+pub mod blur;
 pub mod draw;
+pub mod png;
+pub mod tensor;
+pub mod warp;
+
+/// Version of the OpenCV library linked.
+pub fn version() -> String {
+    use opencv::core::{get_version_major, get_version_minor, get_version_revision};
+    format!("{}.{}.{}", get_version_major(), get_version_minor(), get_version_revision())
+}

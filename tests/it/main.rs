@@ -1,13 +1,12 @@
 //! The integration tests: one binary, a module a concern.
 
-mod dataset;
-mod house;
-mod runner;
-
 mod blender;
 mod bvh;
-mod figures;
-
 mod clips;
+mod dataset;
+mod figures;
+mod golden;
+mod house;
 mod media_frames;
 mod media_sound;
+mod runner;

@@ -1,0 +1,199 @@
+//! The description of one model: where it comes from, how its input is made and its outputs are read. Typed, strict (an
+//! unknown key is an error) and data only.
+
+use serde::{Deserialize, Serialize};
+
+/// One model file: what it is, where it is from, how it is fed and read.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelEntry {
+    pub id: String,
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub about: String,
+    pub role: Role,
+    pub file: String,
+    /// 64 hex digits of the file's content.
+    pub sha256: String,
+    pub bytes: u64,
+    /// Serves exactly the pinned bytes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub url: Option<String>,
+    /// Tool and steps that made the file from its origin.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub conversion: Option<String>,
+    pub inputs: Vec<Port>,
+    pub outputs: Vec<Port>,
+    pub picture: Picture,
+    pub fit: Fit,
+    pub decode: Decode,
+    #[serde(default, skip_serializing_if = "Points::is_empty")]
+    pub points: Points,
+    pub origin: Origin,
+}
+
+/// What a model is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    Person,
+    Body,
+    Hand,
+    Palm,
+    Other,
+}
+
+/// Where the weights come from and under which terms.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Origin {
+    pub repository: String,
+    pub commit: String,
+    pub path: String,
+    pub licence: String,
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub note: String,
+}
+
+/// A named tensor; -1 stands for any size.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Port {
+    pub name: String,
+    pub shape: Vec<i64>,
+}
+
+/// Pixel to tensor: `(pixel * scale - mean) / std`, in the order of `channels`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Picture {
+    pub channels: Channels,
+    pub axes: Axes,
+    #[serde(default = "one")]
+    pub scale: f64,
+    #[serde(default)]
+    pub mean: [f64; 3],
+    #[serde(default = "ones")]
+    pub std: [f64; 3],
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Channels {
+    Rgb,
+    Bgr,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Axes {
+    Nchw,
+    Nhwc,
+}
+
+/// How the picture gets into the input.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Fit {
+    /// The whole picture, its shape kept, grey level `pad` around it.
+    Letterbox { anchor: Anchor, pad: u8 },
+    /// A person's box grown to the input's shape, then by `margin`; outside black.
+    Box { margin: f64 },
+    /// A rotated square; outside black.
+    Region,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Anchor {
+    TopLeft,
+    Centre,
+}
+
+/// What the outputs mean; the names are names of outputs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Decode {
+    Detections {
+        boxes: String,
+        labels: Option<String>,
+        #[serde(default)]
+        person: i64,
+        min_score: f32,
+        max_overlap: f32,
+    },
+    YoloxGrid {
+        predictions: String,
+        strides: Vec<usize>,
+        min_score: f32,
+        max_overlap: f32,
+    },
+    Heatmap {
+        heatmap: String,
+        refine: Refine,
+        /// Width of the blur before refining: an odd number of cells.
+        #[serde(default = "three")]
+        blur: usize,
+    },
+    Simcc {
+        x: String,
+        y: String,
+        split: f64,
+    },
+    Regression {
+        landmarks: String,
+        score: String,
+        right: Option<String>,
+    },
+    SsdAnchors {
+        regressors: String,
+        scores: String,
+        strides: Vec<usize>,
+        min_score: f32,
+        max_overlap: f32,
+        wrist: usize,
+        middle: usize,
+    },
+    /// Read by no stage.
+    None,
+}
+
+/// How a heat-map's peak is placed between the cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Refine {
+    None,
+    Quarter,
+    Dark,
+}
+
+/// Which output is which keypoint; empty: the model does not give it.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Points {
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub body: Vec<usize>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub hand: Vec<usize>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left_hand: Vec<usize>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub right_hand: Vec<usize>,
+}
+
+impl Points {
+    fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn ones() -> [f64; 3] {
+    [1.0; 3]
+}
+
+fn three() -> usize {
+    3
+}

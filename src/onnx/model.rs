@@ -1,0 +1,213 @@
+//! One opened model: its file was checked against the manifest (there, the right bytes, the right names and shapes), it
+//! owns its input buffer, and it counts the seconds spent inside ONNX Runtime.
+
+use super::{ModelEntry, Port, Runtime};
+use anyhow::{Context, Result, anyhow};
+use ort::session::builder::GraphOptimizationLevel;
+use ort::session::{Session, SessionOutputs};
+use ort::value::{Outlet, TensorElementType, TensorRef, ValueType};
+use sha2::{Digest, Sha256};
+use std::fmt::Write as _;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Why a model cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    #[error(
+        "the model {id} is missing: {path} is not there; `orator models fetch` gets it, models.dir names another folder"
+    )]
+    Missing { id: String, path: PathBuf },
+    #[error("the model {id} cannot be read: {path}: {error}")]
+    Unreadable { id: String, path: PathBuf, error: String },
+    #[error(
+        "the model {id} is not the one described: {path} has sha256 {found}, expected {expected}; `orator models fetch` gets the \
+         right one, `orator models add` registers this one"
+    )]
+    WrongHash { id: String, path: PathBuf, expected: String, found: String },
+    #[error("the model {id} is no ONNX model this ONNX Runtime can open: {path}: {error}")]
+    NotOnnx { id: String, path: PathBuf, error: String },
+    #[error(
+        "the model {id} has another layout than described: {path}: {place}: expected {expected}, found {found}; describe it in \
+         manifest.toml (`orator models add FILE --like ID`)"
+    )]
+    WrongLayout { id: String, path: PathBuf, place: String, expected: String, found: String },
+}
+
+/// A model ready to run, on one thread.
+pub struct Model {
+    entry: ModelEntry,
+    session: Session,
+    shape: Vec<i64>,
+    input: Vec<f32>,
+    inside: Duration,
+    n_runs: u64,
+}
+
+impl Model {
+    /// Opens the file of `entry` in the folder `dir`.
+    ///
+    /// # Errors
+    /// Each an `OpenError`: missing, unreadable, wrong hash, not ONNX, wrong layout.
+    pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self, OpenError> {
+        let path = dir.join(&entry.file);
+        let id = || entry.id.clone();
+        if !path.exists() {
+            return Err(OpenError::Missing { id: id(), path });
+        }
+        let bytes = match std::fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(error) => return Err(OpenError::Unreadable { id: id(), path, error: error.to_string() }),
+        };
+        let found = hex(&Sha256::digest(&bytes));
+        if !found.eq_ignore_ascii_case(&entry.sha256) {
+            return Err(OpenError::WrongHash { id: id(), path, expected: entry.sha256.clone(), found });
+        }
+        let session = session(runtime, &bytes).map_err(|error| OpenError::NotOnnx {
+            id: id(),
+            path: path.clone(),
+            error: error.to_string(),
+        })?;
+        let differs = mismatch("input", session.inputs(), &entry.inputs, true)
+            .or_else(|| mismatch("output", session.outputs(), &entry.outputs, false));
+        if let Some((place, expected, found)) = differs {
+            return Err(OpenError::WrongLayout { id: id(), path, place, expected, found });
+        }
+        let shape = entry.inputs.first().map(|port| port.shape.clone()).unwrap_or_default();
+        let size = shape.iter().map(|side| usize::try_from(*side).unwrap_or(0)).product();
+        let input = vec![0.0; size];
+        Ok(Self { entry: entry.clone(), session, shape, input, inside: Duration::ZERO, n_runs: 0 })
+    }
+
+    /// Its description.
+    pub fn entry(&self) -> &ModelEntry {
+        &self.entry
+    }
+
+    /// The input tensor, row-major, as the last run left it; fill it before `run`.
+    pub fn input_mut(&mut self) -> &mut [f32] {
+        &mut self.input
+    }
+
+    /// Runs the model on what is in its input.
+    pub fn run(&mut self) -> Result<Outputs<'_>> {
+        let input = TensorRef::from_array_view((self.shape.as_slice(), self.input.as_slice()))?;
+        let start = Instant::now();
+        let outputs = self.session.run(ort::inputs![input]);
+        self.inside += start.elapsed();
+        self.n_runs += 1;
+        let outputs = outputs.map_err(|error| anyhow!("the model {} failed: {error}", self.entry.id))?;
+        Ok(Outputs { id: &self.entry.id, outputs })
+    }
+
+    /// Seconds spent inside `Session::run` since it was opened.
+    pub fn secs_inside(&self) -> f64 {
+        self.inside.as_secs_f64()
+    }
+
+    /// How often it ran.
+    pub fn n_runs(&self) -> u64 {
+        self.n_runs
+    }
+}
+
+/// What a run gave; borrowed from the model until the next run.
+pub struct Outputs<'m> {
+    id: &'m str,
+    outputs: SessionOutputs<'m>,
+}
+
+impl Outputs<'_> {
+    /// Shape and numbers of a float output.
+    pub fn floats(&self, name: &str) -> Result<(&[i64], &[f32])> {
+        self.read(name)
+    }
+
+    /// Shape and numbers of an integer output.
+    pub fn integers(&self, name: &str) -> Result<(&[i64], &[i64])> {
+        self.read(name)
+    }
+
+    fn read<T: ort::value::PrimitiveTensorElementType>(&self, name: &str) -> Result<(&[i64], &[T])> {
+        let value = self.outputs.get(name).with_context(|| format!("the model {} gave no output {name:?}", self.id))?;
+        let (shape, numbers) = value
+            .try_extract_tensor::<T>()
+            .map_err(|error| anyhow!("the output {name:?} of the model {}: {error}", self.id))?;
+        Ok((shape, numbers))
+    }
+}
+
+/// SHA-256 of a file's content, in hex.
+pub fn sha256_of(path: &Path) -> Result<String> {
+    let name = || format!("cannot read {}", path.display());
+    let mut file = std::fs::File::open(path).with_context(name)?;
+    let (mut hash, mut buffer) = (Sha256::new(), vec![0; 1 << 16]);
+    loop {
+        match file.read(&mut buffer).with_context(name)? {
+            0 => return Ok(hex(&hash.finalize())),
+            n => hash.update(&buffer[..n]),
+        }
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::with_capacity(64), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+/// One thread, no spinning, everything optimised, the same numbers on every run.
+fn session(runtime: &Runtime, bytes: &[u8]) -> Result<Session> {
+    fn plain<T>(error: ort::Error<T>) -> anyhow::Error {
+        anyhow!("{error}")
+    }
+    Session::builder(runtime.environment())?
+        .with_intra_threads(1)
+        .map_err(plain)?
+        .with_inter_threads(1)
+        .map_err(plain)?
+        .with_intra_op_spinning(false)
+        .map_err(plain)?
+        .with_optimization_level(GraphOptimizationLevel::Level3)
+        .map_err(plain)?
+        .with_deterministic_compute(true)
+        .map_err(plain)?
+        .with_log_level(ort::logging::LogLevel::Error)
+        .map_err(plain)?
+        .commit_from_memory(bytes)
+        .map_err(plain)
+}
+
+/// The first difference between what the file has and what the manifest says: place, expected, found.
+fn mismatch(what: &str, found: &[Outlet], expected: &[Port], all: bool) -> Option<(String, String, String)> {
+    let names = |ports: &mut dyn Iterator<Item = &str>| ports.collect::<Vec<_>>().join(", ");
+    if all && found.len() != expected.len() {
+        let expected = names(&mut expected.iter().map(|port| port.name.as_str()));
+        return Some((format!("its {what}s"), expected, names(&mut found.iter().map(Outlet::name))));
+    }
+    for port in expected {
+        let place = || format!("{what} {:?}", port.name);
+        let Some(outlet) = found.iter().find(|outlet| outlet.name() == port.name) else {
+            return Some((place(), "that name".into(), names(&mut found.iter().map(Outlet::name))));
+        };
+        let (element, shape) = match outlet.dtype() {
+            ValueType::Tensor { ty, shape, .. } => (*ty, shape.to_vec()),
+            other => return Some((place(), "a tensor".into(), format!("{other:?}"))),
+        };
+        let usable = if all {
+            element == TensorElementType::Float32
+        } else {
+            matches!(element, TensorElementType::Float32 | TensorElementType::Int64)
+        };
+        if !usable {
+            return Some((place(), "float32".into(), format!("{element:?}")));
+        }
+        let same = |(a, b): (&i64, &i64)| *a < 0 || *b < 0 || a == b;
+        if shape.len() != port.shape.len() || !shape.iter().zip(&port.shape).all(same) {
+            return Some((place(), format!("{:?}", port.shape), format!("{shape:?}")));
+        }
+    }
+    None
+}
