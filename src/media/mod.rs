@@ -22,3 +22,13 @@ fn init() {
         ffmpeg_next::log::set_level(ffmpeg_next::log::Level::Quiet);
     });
 }
+
+/// Versions of the ffmpeg libraries linked, for instance `libavformat 59.27.100, libavcodec 59.37.100`.
+pub fn version() -> String {
+    let dotted = |v: u32| format!("{}.{}.{}", v >> 16, (v >> 8) & 255, v & 255);
+    format!(
+        "libavformat {}, libavcodec {}",
+        dotted(ffmpeg_next::format::version()),
+        dotted(ffmpeg_next::codec::version())
+    )
+}

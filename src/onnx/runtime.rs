@@ -51,11 +51,12 @@ impl Runtime {
         &self.library
     }
 
-    /// What the library says of its version and build.
+    /// Its version, as the library's file name carries it (`libonnxruntime.so.1.31.1`).
     pub fn version(&self) -> String {
-        let info = ort::info();
-        let version = info.split("git-branch").next().unwrap_or(info);
-        version.trim_matches(|c: char| !c.is_alphanumeric()).to_owned()
+        let file = std::fs::canonicalize(&self.library).unwrap_or_else(|_| self.library.clone());
+        let name = file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let version = name.strip_prefix(LIBRARY).unwrap_or_default().trim_start_matches('.');
+        if version.is_empty() { "version unknown".to_owned() } else { version.to_owned() }
     }
 
     pub(super) fn environment(&self) -> &Environment {
