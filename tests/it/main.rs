@@ -5,6 +5,7 @@ mod bvh;
 mod clips;
 mod dataset;
 mod figures;
+mod film;
 mod golden;
 mod house;
 mod media_frames;
