@@ -134,6 +134,8 @@ pub struct Segment {
     pub max_body_gap_secs: f64,
     /// Longest gap of one hand that is masked, seconds.
     pub max_hand_gap_secs: f64,
+    /// Least share of an interval's frames in which each hand is seen, 0..1.
+    pub min_hand_share: f64,
     /// Least distance between the shoulders, pixels.
     pub min_shoulder_px: f64,
     /// Largest step of the neck between two frames, in shoulder widths.
@@ -147,6 +149,7 @@ impl Default for Segment {
             joint_score: 0.3,
             max_body_gap_secs: 0.34,
             max_hand_gap_secs: 1.0,
+            min_hand_share: 0.5,
             min_shoulder_px: 40.0,
             max_jump: 0.5,
         }

@@ -6,6 +6,7 @@
 //! a sample: `sample` (members) -> `shard` (tar) -> `write` (splits, statistics, index); back: `read` -> `windows`.
 //! Sound and motion meet by time in `sync`, nowhere else.
 
+pub mod bones;
 pub mod index;
 pub mod info;
 pub mod npy;
@@ -13,8 +14,10 @@ pub mod read;
 pub mod sample;
 pub mod shard;
 pub mod split;
+mod stage;
 pub mod stats;
 pub mod sync;
+mod video;
 pub mod wav;
 pub mod windows;
 pub mod write;
@@ -22,6 +25,7 @@ pub mod write;
 pub use read::Dataset;
 pub use sample::Sample;
 pub use split::Split;
+pub use stage::ShardStage;
 pub use windows::Windows;
 pub use write::write_dataset;
 

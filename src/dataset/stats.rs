@@ -1,7 +1,8 @@
 //! `stats.json`: what the numbers are like. Means and deviations come from the training split alone, from joints that
 //! were seen; hours, windows and refused seconds are of everything.
 
-use super::{STRIDE_FRAMES, WINDOW_FRAMES, windows};
+use super::{STRIDE_FRAMES, WINDOW_FRAMES};
+use crate::types::interval::Interval;
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
 use ndarray::Array2;
@@ -95,8 +96,9 @@ impl Gatherer {
     /// Counts the windows of a sample of `n_frames` frames.
     pub fn count(&mut self, split: &str, n_frames: usize) {
         let add = |counts: &mut BTreeMap<String, usize>, n| *counts.entry(split.to_owned()).or_default() += n;
-        add(&mut self.windows.strided, windows::count(n_frames, WINDOW_FRAMES, STRIDE_FRAMES));
-        add(&mut self.windows.apart, windows::count(n_frames, WINDOW_FRAMES, WINDOW_FRAMES));
+        let interval = Interval { start: 0, end: n_frames };
+        add(&mut self.windows.strided, interval.n_windows(WINDOW_FRAMES, STRIDE_FRAMES));
+        add(&mut self.windows.apart, interval.n_windows(WINDOW_FRAMES, WINDOW_FRAMES));
     }
 
     /// Takes in the joints that were seen in a training sample.

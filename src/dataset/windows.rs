@@ -3,19 +3,10 @@
 use super::index::SampleRef;
 use super::read::Dataset;
 use super::split::Split;
+use crate::types::interval::Interval;
 use crate::types::sound::Sound;
 use anyhow::{Result, ensure};
 use ndarray::{Array2, Array3};
-
-/// How many windows of `n_frames` an interval of `interval_frames` holds when one begins every `stride` frames.
-/// With `stride == n_frames` they lie side by side.
-pub const fn count(interval_frames: usize, n_frames: usize, stride: usize) -> usize {
-    if n_frames == 0 || stride == 0 || interval_frames < n_frames {
-        0
-    } else {
-        (interval_frames - n_frames) / stride + 1
-    }
-}
 
 /// All windows of a split, in the order of the shards.
 pub struct Windows<'a> {
@@ -49,7 +40,7 @@ impl<'a> Windows<'a> {
         let mut before = vec![0];
         let mut total = 0;
         for sample in &samples {
-            total += count(sample.n_frames, n_frames, stride);
+            total += Interval { start: 0, end: sample.n_frames }.n_windows(n_frames, stride);
             before.push(total);
         }
         Ok(Self { dataset, n_frames, stride, samples, before })

@@ -2,6 +2,7 @@
 //! thing to do is a `Unit`, and what was done is a `record::Record` written last.
 
 pub mod fingerprint;
+pub mod ledger;
 pub mod progress;
 pub mod record;
 pub mod runner;

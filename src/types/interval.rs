@@ -1,5 +1,6 @@
 //! A stretch of frames worth keeping, and why a stretch was not.
 
+use super::time::FrameRate;
 use serde::{Deserialize, Serialize};
 
 /// Frames `start..end` of a video at the dataset rate: continuous motion of the one speaker with its sound.
@@ -13,5 +14,37 @@ impl Interval {
     /// Number of frames.
     pub fn n_frames(&self) -> usize {
         self.end.saturating_sub(self.start)
+    }
+
+    /// How many windows of `n_frames` it holds when one begins every `stride` frames; with `stride == n_frames` they
+    /// lie side by side.
+    pub const fn n_windows(self, n_frames: usize, stride: usize) -> usize {
+        let length = self.end.saturating_sub(self.start);
+        if n_frames == 0 || stride == 0 || length < n_frames { 0 } else { (length - n_frames) / stride + 1 }
+    }
+}
+
+/// The intervals of a video, as they stand in `intervals.json`: in order, apart from each other.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Intervals {
+    pub fps: FrameRate,
+    pub n_frames: usize,
+    pub intervals: Vec<Interval>,
+    pub windows_64: Windows64,
+}
+
+/// Windows of 64 frames in all intervals together: one every 5 frames, and side by side.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Windows64 {
+    pub stride_5: usize,
+    pub apart: usize,
+}
+
+impl Intervals {
+    /// Counts the windows of `intervals`.
+    pub fn new(fps: FrameRate, n_frames: usize, intervals: Vec<Interval>) -> Self {
+        let count = |stride| intervals.iter().map(|interval| interval.n_windows(64, stride)).sum();
+        let windows_64 = Windows64 { stride_5: count(5), apart: count(64) };
+        Self { fps, n_frames, intervals, windows_64 }
     }
 }

@@ -1,0 +1,72 @@
+//! The speaker's one set of bone lengths: of the videos' own sets (`bones.json`, written by the lift stage) the median,
+//! each video weighing as many frames as it was measured on.
+
+use crate::types::skeleton::N_BONES;
+use anyhow::{Context, Result, ensure};
+use serde::Deserialize;
+use std::path::Path;
+
+/// The bone lengths of one video.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct VideoBones {
+    /// Of joints 1..=48 to their parents, metres; 0: not measured.
+    pub lengths_metres: Vec<f64>,
+    /// Frames they were measured on.
+    pub n_frames: usize,
+}
+
+impl VideoBones {
+    /// Reads `bones.json`.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let bones: Self =
+            serde_json::from_slice(&bytes).with_context(|| format!("{} holds no bone lengths", path.display()))?;
+        let plausible = bones.lengths_metres.iter().all(|length| (0.0..10.0).contains(length));
+        ensure!(
+            bones.lengths_metres.len() == N_BONES && plausible,
+            "{}: expected {N_BONES} lengths from 0 to 10 metres",
+            path.display()
+        );
+        Ok(bones)
+    }
+}
+
+/// The weighted median of each bone over the videos in which it was measured; 0 where it never was.
+pub fn of_speaker(videos: &[VideoBones]) -> [f32; N_BONES] {
+    std::array::from_fn(|bone| {
+        let lengths = videos.iter().filter_map(|video| {
+            let length = *video.lengths_metres.get(bone)?;
+            (length > 0.0 && video.n_frames > 0).then_some((length, video.n_frames as u64))
+        });
+        weighted_median(lengths.collect()).unwrap_or(0.0) as f32
+    })
+}
+
+/// The first value, from the smallest, at which half of the weight is reached.
+fn weighted_median(mut values: Vec<(f64, u64)>) -> Option<f64> {
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let total: u64 = values.iter().map(|(_, weight)| weight).sum();
+    let mut reached = 0;
+    let half = values.into_iter().find(|(_, weight)| {
+        reached += weight;
+        2 * reached >= total
+    });
+    half.map(|(value, _)| value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_videos_weigh_more_and_unmeasured_bones_nothing() {
+        let video = |length: f64, n_frames| {
+            let mut lengths_metres = vec![length; N_BONES];
+            lengths_metres[6] = 0.0;
+            VideoBones { lengths_metres, n_frames }
+        };
+        let lengths = of_speaker(&[video(0.3, 100), video(0.2, 40), video(0.9, 50), video(0.0, 1000)]);
+        assert_eq!((lengths[0], lengths[6]), (0.3, 0.0));
+        assert_eq!(of_speaker(&[video(0.3, 0)])[0], 0.0);
+    }
+}

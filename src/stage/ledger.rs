@@ -1,0 +1,88 @@
+//! The account of a video's seconds: every one of them is kept, or refused for a reason with what was measured. The
+//! stage that judges writes it (`ledger.json`); later ones only add up.
+
+use anyhow::{Context, Result, ensure};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The whole account; its stretches lie end to end from 0 to `duration_secs`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Ledger {
+    pub duration_secs: f64,
+    pub kept: Vec<Kept>,
+    pub refused: Vec<Refused>,
+}
+
+/// A stretch worth keeping.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Kept {
+    pub start_secs: f64,
+    pub end_secs: f64,
+}
+
+/// A stretch that was not.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Refused {
+    pub start_secs: f64,
+    pub end_secs: f64,
+    /// One word, for programs.
+    pub reason: String,
+    /// What was measured, and what it had to reach or stay below: in the unit that `says` names.
+    pub measured: f64,
+    pub threshold: f64,
+    /// The same as a sentence, for people.
+    pub says: String,
+}
+
+impl Ledger {
+    /// Reads `ledger.json` and checks that the stretches lie end to end and fill the duration.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let ledger: Self =
+            serde_json::from_slice(&bytes).with_context(|| format!("{} is no ledger", path.display()))?;
+        ensure!(
+            ledger.is_whole(),
+            "{}: its stretches do not fill {} s end to end",
+            path.display(),
+            ledger.duration_secs
+        );
+        Ok(ledger)
+    }
+
+    /// Seconds kept.
+    pub fn kept_secs(&self) -> f64 {
+        self.kept.iter().map(|kept| kept.end_secs - kept.start_secs).sum()
+    }
+
+    /// Seconds refused, by reason.
+    pub fn refused_secs(&self) -> BTreeMap<String, f64> {
+        let mut secs = BTreeMap::new();
+        for refused in &self.refused {
+            *secs.entry(refused.reason.clone()).or_default() += refused.end_secs - refused.start_secs;
+        }
+        secs
+    }
+
+    /// Whether every second from 0 to the end belongs to exactly one stretch.
+    pub fn is_whole(&self) -> bool {
+        let kept = self.kept.iter().map(|kept| (kept.start_secs, kept.end_secs));
+        let mut stretches: Vec<_> = kept.chain(self.refused.iter().map(|r| (r.start_secs, r.end_secs))).collect();
+        stretches.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let mut at = 0.0;
+        for (start, end) in stretches {
+            if start != at || end <= start {
+                return false;
+            }
+            at = end;
+        }
+        at == self.duration_secs
+    }
+}
+
+/// `reason 3.2 s, reason 1.0 s`, the longest first.
+pub fn longest_first(secs: &BTreeMap<String, f64>) -> String {
+    let mut reasons: Vec<_> = secs.iter().collect();
+    reasons.sort_by(|a, b| b.1.total_cmp(a.1).then(a.0.cmp(b.0)));
+    reasons.iter().map(|(reason, secs)| format!("{reason} {secs:.1} s")).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,171 @@
+//! The shard stage over a made-up work folder: what is in the dataset, and what has no say in its bytes.
+
+use crate::footage::{FPS, good, write};
+use ndarray::{Array2, Array3, s};
+use orator::config::{self, Settings};
+use orator::dataset::{Dataset, ShardStage, Split, sync};
+use orator::motion::joints_npz;
+use orator::segment::SegmentStage;
+use orator::stage::progress::Silent;
+use orator::stage::runner::place;
+use orator::stage::{Report, Stage, Unit};
+use orator::types::pose3d::Motion;
+use orator::types::skeleton::{L_HAND, N_BONES, R_HAND, parent};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn unit(root: &Path, name: &str) -> Unit {
+    let source = root.join("videos").join(format!("{name}.mp4"));
+    Unit { speaker: "host".into(), video: format!("{name}-00000000"), source }
+}
+
+/// What the stages before shard leave of a video of `n_frames`: a cut in the middle, random motion.
+fn video(root: &Path, name: &str, n_frames: usize, seed: u64) -> Unit {
+    let (work, unit) = (root.join("work"), unit(root, name));
+    let mut footage = good(n_frames);
+    footage.shot[n_frames / 2..].fill(1);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    if let Some(sound) = &mut footage.sound {
+        sound.iter_mut().for_each(|sample| *sample = rng.random());
+        sound.pop();
+    }
+    write(&work, &unit, &footage, &format!("film {seed}"));
+    let segment = place(&work, "segment", &unit);
+    fs::create_dir_all(&segment).unwrap();
+    SegmentStage::new(&config::Segment::default(), &work).run(&unit, &segment, &Silent).unwrap();
+
+    let lift = place(&work, "lift", &unit);
+    fs::create_dir_all(&lift).unwrap();
+    let mut joints = Array3::from_shape_fn((n_frames, 49, 3), |_| rng.random_range(-0.5f32..0.5));
+    joints.slice_mut(s![.., 0, ..]).fill(0.0);
+    let mask = Array2::from_elem((n_frames, 49), true);
+    joints_npz::write(&lift.join("joints.npz"), &Motion { fps: FPS, joints, mask }).unwrap();
+    let mut lengths = vec![0.1 + seed as f64 / 100.0; N_BONES];
+    (lengths[L_HAND - 1], lengths[R_HAND - 1]) = (0.0, 0.0);
+    let bones = serde_json::json!({ "lengths_metres": lengths, "n_frames": n_frames });
+    fs::write(lift.join("bones.json"), bones.to_string()).unwrap();
+    unit
+}
+
+fn settings(root: &Path) -> Settings {
+    let mut settings = Settings::default();
+    settings.work.dir = root.join("work");
+    settings.shard.max_mb = 1;
+    settings
+}
+
+fn shard(root: &Path, videos: &[Unit], out: &str) -> (anyhow::Result<Report>, PathBuf) {
+    let speaker = Unit { speaker: "host".into(), video: String::new(), source: root.join("pipeline.toml") };
+    let stage = ShardStage::new(&settings(root), videos);
+    let out = root.join(out);
+    fs::create_dir_all(&out).unwrap();
+    assert!(stage.inputs(&speaker).unwrap().iter().all(|input| input.path.exists()));
+    (stage.run(&speaker, &out, &Silent), out)
+}
+
+fn bytes(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut files: Vec<_> = fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files.into_iter().map(|file| (file.file_name().unwrap().into(), fs::read(&file).unwrap())).collect()
+}
+
+#[test]
+fn neither_the_order_of_videos_nor_their_folder_changes_a_byte() {
+    let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let names = ["b-roll", "a_Talk", "c"];
+    let videos = |root: &Path| -> Vec<Unit> {
+        names.iter().enumerate().map(|(seed, name)| video(root, name, 150 + seed, seed as u64)).collect()
+    };
+    let mut units = videos(one.path());
+    let (report, first) = shard(one.path(), &units, "first");
+    assert!(report.unwrap().line.contains("6 intervals"));
+    units.reverse();
+    let (_, second) = shard(one.path(), &units, "second");
+    let (_, third) = shard(two.path(), &videos(two.path()), "third");
+    assert_eq!(bytes(&first), bytes(&second));
+    assert_eq!(bytes(&first), bytes(&third));
+    let text: String = bytes(&first).iter().map(|(_, bytes)| String::from_utf8_lossy(bytes).into_owned()).collect();
+    assert!(!text.contains(&*one.path().to_string_lossy()));
+}
+
+#[test]
+fn samples_hold_the_frames_and_the_sound_of_their_interval() {
+    let dir = tempfile::tempdir().unwrap();
+    let units = [video(dir.path(), "long", 200, 3), video(dir.path(), "short", 140, 9)];
+    let (report, out) = shard(dir.path(), &units, "out");
+    let dataset = Dataset::open(&out).unwrap();
+    dataset.verify().unwrap();
+    // the longer video's bones are the weighted median
+    let lengths = &dataset.info().bone_lengths_metres;
+    assert!((lengths[0] - 0.13).abs() < 1e-6 && lengths[L_HAND - 1] == 0.0, "{lengths:?}");
+    let refs: Vec<_> = Split::ALL.iter().flat_map(|&split| dataset.samples(split)).collect();
+    assert_eq!(refs.len(), 4);
+    for sample_ref in &refs {
+        let sample = dataset.read(sample_ref).unwrap();
+        let (name, unit) = if sample.key.starts_with("long") { ("long", &units[0]) } else { ("short", &units[1]) };
+        let source = blake3::hash(&fs::read(&unit.source).unwrap()).to_hex();
+        let start = sample.meta["first_frame"].as_u64().unwrap() as usize;
+        assert_eq!(sample.key, format!("{name}-{}-{start:06}", &source[..8]));
+        let audio = place(&dir.path().join("work"), "extract", unit).join("audio.wav");
+        let whole: Vec<i16> = hound::WavReader::open(audio).unwrap().samples().map(Result::unwrap).collect();
+        let range = sync::samples_of(FPS, 16_000, start..start + sample.n_frames());
+        let mut expected: Vec<f32> =
+            whole[range.start..range.end.min(whole.len())].iter().map(|&s| f32::from(s) / 32_768.0).collect();
+        expected.resize(range.len(), 0.0);
+        assert_eq!(sample.sound.samples, expected);
+        let keypoints = good(start + sample.n_frames()).keypoints;
+        assert_eq!(sample.pose2d.slice(s![.., 17..38, ..]), keypoints.left_hand.slice(s![start.., .., ..]));
+        for joint in 1..49 {
+            let (a, b) = (parent(joint).unwrap(), joint);
+            let bone = &sample.motion.joints.slice(s![0, b, ..]) - &sample.motion.joints.slice(s![0, a, ..]);
+            assert!((f64::from(bone.mapv(|v| v * v).sum().sqrt()) - lengths[joint - 1]).abs() < 1e-5);
+        }
+    }
+    let footage = &dataset.stats().footage;
+    assert_eq!((footage.n_videos, footage.n_intervals, footage.secs), (2, 4, 340.0 / 15.0));
+    // each wav lacks its last sample, and frames are rounded to samples
+    assert!(footage.padded_sound_secs > 0.0 && footage.padded_sound_secs < 5.0 / 16_000.0);
+    assert_eq!(dataset.stats().n_seen[5], dataset.info().splits["train"].frames as u64);
+    assert!(report.unwrap().facts.contains_key("windows"));
+}
+
+#[test]
+fn a_new_video_moves_no_other_to_another_split() {
+    let dir = tempfile::tempdir().unwrap();
+    let units: Vec<Unit> = (0..14).map(|n| video(dir.path(), &format!("talk{n}"), 130, n)).collect();
+    let split_of = |out: &Path| {
+        let info = Dataset::open(out).unwrap().info().clone();
+        info.splits
+            .into_iter()
+            .flat_map(|(split, info)| info.videos.into_iter().map(move |v| (v, split.clone())))
+            .collect()
+    };
+    let few: std::collections::BTreeMap<String, String> = split_of(&shard(dir.path(), &units[..8], "few").1);
+    let many: std::collections::BTreeMap<String, String> = split_of(&shard(dir.path(), &units, "many").1);
+    assert_eq!((few.len(), many.len()), (8, 14));
+    assert!(few.iter().all(|(video, split)| many[video] == *split));
+    assert!(many.values().collect::<std::collections::BTreeSet<_>>().len() > 1);
+}
+
+#[test]
+fn what_is_not_there_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let good = video(dir.path(), "good", 150, 1);
+    let twin = video(dir.path(), "twin", 150, 2);
+    fs::write(&twin.source, "film 1").unwrap();
+    let (report, out) = shard(dir.path(), &[twin.clone(), unit(dir.path(), "never"), good.clone()], "out");
+    let line = report.unwrap().line;
+    assert!(line.contains("no video for validation and test"), "{line}");
+    assert!(line.contains("1 video left out, a stage before failed"), "{line}");
+    assert!(line.contains("1 video left out, the same content is there already"), "{line}");
+    assert_eq!(Dataset::open(&out).unwrap().info().splits["train"].videos.len(), 1);
+
+    let short = video(dir.path(), "short", 100, 5);
+    let error = shard(dir.path(), &[short], "none").0.unwrap_err().to_string();
+    assert!(error.starts_with("no interval worth keeping in 1 video of 6.7 s"), "{error}");
+    assert!(error.contains("refused: cut 6.7 s"), "{error}");
+    let error = shard(dir.path(), &[], "nothing").0.unwrap_err().to_string();
+    assert!(error.starts_with("no interval worth keeping in 0 videos"), "{error}");
+}
