@@ -81,7 +81,7 @@ impl Extract {
 
 impl Default for Extract {
     fn default() -> Self {
-        Self { fps: 15, shot_threshold: 0.1, keep_frames: false }
+        Self { fps: 15, shot_threshold: 0.2, keep_frames: false }
     }
 }
 

@@ -23,12 +23,15 @@ fn init() {
     });
 }
 
-/// Versions of the ffmpeg libraries linked, for instance `libavformat 59.27.100, libavcodec 59.37.100`.
+/// Versions of the ffmpeg libraries linked, for instance `libavformat 59.27.100, libavcodec 59.37.100, ...`.
 pub fn version() -> String {
+    use ffmpeg_next::software::{resampling, scaling};
     let dotted = |v: u32| format!("{}.{}.{}", v >> 16, (v >> 8) & 255, v & 255);
     format!(
-        "libavformat {}, libavcodec {}",
+        "libavformat {}, libavcodec {}, libswscale {}, libswresample {}",
         dotted(ffmpeg_next::format::version()),
-        dotted(ffmpeg_next::codec::version())
+        dotted(ffmpeg_next::codec::version()),
+        dotted(scaling::version()),
+        dotted(resampling::version())
     )
 }

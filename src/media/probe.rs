@@ -5,7 +5,6 @@ use super::picture::Orientation;
 use super::source;
 use crate::types::time::FrameRate;
 use anyhow::Result;
-use ffmpeg_next as ffmpeg;
 use ffmpeg_next::Rational;
 use ffmpeg_next::format::context::Input;
 use ffmpeg_next::format::stream::Stream;
@@ -107,7 +106,5 @@ fn frame_rate(rate: Rational) -> Option<FrameRate> {
 }
 
 fn codec_name(stream: &Stream) -> String {
-    ffmpeg::decoder::find(stream.parameters().id())
-        .map(|_| stream.parameters().id().name().to_owned())
-        .unwrap_or_else(|| format!("{:?}", stream.parameters().id()).to_lowercase())
+    stream.parameters().id().name().to_owned()
 }

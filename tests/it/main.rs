@@ -4,6 +4,7 @@ mod blender;
 mod bvh;
 mod clips;
 mod dataset;
+mod extract;
 mod figures;
 mod film;
 mod footage;

@@ -1,0 +1,140 @@
+//! The stage's files. `audio.wav`: 16 kHz mono s16, its first sample at the first picture (absent without sound).
+//! `timeline.npz`: `source_secs` f64 [T], `repeated` bool [T], `shot` i64 [T], `shot_score` f64 [T] at the dataset
+//! rate. `media.json`: what the video is. `frames/`, only if asked: the pictures as PNG.
+
+use super::shots::{ShotFinder, Shots, THUMBNAIL};
+use crate::config;
+use crate::media::frames::FrameReader;
+use crate::media::{self, audio};
+use crate::stage::progress::Progress;
+use crate::stage::{Input, Report, Stage, Unit};
+use crate::types::image::Image;
+use crate::types::sound::SAMPLE_RATE;
+use anyhow::{Context, Result};
+use ndarray::Array1;
+use ndarray_npy::NpzWriter;
+use serde_json::json;
+use std::fs::{self, File};
+use std::io::BufWriter;
+use std::path::Path;
+
+/// Video to sound, timeline and shots.
+pub struct Extract {
+    settings: config::Extract,
+}
+
+impl Extract {
+    pub fn new(settings: &config::Extract) -> Self {
+        Self { settings: settings.clone() }
+    }
+}
+
+/// The frames at the dataset rate, one value each.
+struct Timeline {
+    source_secs: Vec<f64>,
+    repeated: Vec<bool>,
+    shots: Shots,
+}
+
+impl Stage for Extract {
+    fn name(&self) -> &'static str {
+        "extract"
+    }
+
+    fn version(&self) -> u32 {
+        1
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        json!({ "extract": self.settings, "sample_rate": SAMPLE_RATE, "ffmpeg": media::version() })
+    }
+
+    fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
+        Ok(vec![Input { role: "video".into(), path: unit.source.clone() }])
+    }
+
+    fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
+        let rate = self.settings.rate();
+        let mut reader = FrameReader::open(&unit.source, rate)?;
+        let timeline = self.timeline(&mut reader, out, progress)?;
+        write_timeline(&out.join("timeline.npz"), &timeline)?;
+        let audio_secs = audio::extract_wav(&unit.source, &out.join("audio.wav"), SAMPLE_RATE)?;
+
+        let n_frames = timeline.source_secs.len();
+        let n_shots = timeline.shots.numbers.last().map_or(0, |number| number + 1);
+        let damage = reader.damage();
+        if let Some(damage) = &damage {
+            progress.say(&format!("{}: damaged, {damage}; what could be read is kept", unit.source.display()));
+        }
+        let video = reader.info().video.as_ref();
+        let media = json!({
+            "duration_secs": reader.duration_secs(),
+            "n_frames": n_frames,
+            "fps": rate,
+            "image_size": reader.image_size(),
+            "rotation": video.map(|video| video.rotation),
+            "codec": video.map(|video| &video.codec),
+            "source_fps": video.and_then(|video| video.fps),
+            "has_audio": audio_secs.is_some(),
+            "audio_secs": audio_secs,
+            "damage": damage,
+        });
+        let path = out.join("media.json");
+        fs::write(&path, serde_json::to_vec_pretty(&media)?).with_context(|| path.display().to_string())?;
+
+        let sound = audio_secs.map_or("no sound".to_owned(), |secs| format!("{secs:.1} s of sound"));
+        let shots = if n_shots == 1 { "1 shot".to_owned() } else { format!("{n_shots} shots") };
+        let mut facts = media.as_object().cloned().unwrap_or_default();
+        facts.insert("n_shots".into(), n_shots.into());
+        Ok(Report { line: format!("{n_frames} frames at {rate}, {shots}, {sound}"), facts })
+    }
+}
+
+impl Extract {
+    /// Reads the pictures once; of each only a thumbnail is converted, unless the frames are kept.
+    fn timeline(&self, reader: &mut FrameReader, out: &Path, progress: &dyn Progress) -> Result<Timeline> {
+        let (mut source_secs, mut repeated, mut shots) = (Vec::new(), Vec::new(), ShotFinder::default());
+        let frames = out.join("frames");
+        if self.settings.keep_frames {
+            fs::create_dir(&frames).with_context(|| format!("cannot make the folder {}", frames.display()))?;
+        }
+        let task = progress.begin("frames", reader.expected_frames().unwrap_or(0) as u64);
+        while let Some(time) = reader.advance()? {
+            source_secs.push(time.source_secs);
+            repeated.push(time.repeated);
+            shots.push(if time.repeated { None } else { Some(reader.picture(Some(THUMBNAIL))?) });
+            if self.settings.keep_frames {
+                write_png(&frames.join(format!("{:06}.png", time.frame_idx)), &reader.picture(None)?)?;
+            }
+            task.advance(1);
+        }
+        Ok(Timeline { source_secs, repeated, shots: shots.finish(self.settings.shot_threshold) })
+    }
+}
+
+fn write_timeline(path: &Path, timeline: &Timeline) -> Result<()> {
+    let write = || -> Result<()> {
+        let mut npz = NpzWriter::new(BufWriter::new(File::create(path)?));
+        npz.add_array("source_secs", &Array1::from_vec(timeline.source_secs.clone()))?;
+        npz.add_array("repeated", &Array1::from_vec(timeline.repeated.clone()))?;
+        npz.add_array("shot", &Array1::from_vec(timeline.shots.numbers.clone()))?;
+        npz.add_array("shot_score", &Array1::from_vec(timeline.shots.scores.clone()))?;
+        npz.finish()?;
+        Ok(())
+    };
+    write().with_context(|| format!("cannot write {}", path.display()))
+}
+
+fn write_png(path: &Path, image: &Image) -> Result<()> {
+    let write = || -> Result<()> {
+        let (width, height) = (u32::try_from(image.width)?, u32::try_from(image.height)?);
+        let mut encoder = png::Encoder::new(BufWriter::new(File::create(path)?), width, height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(png::Compression::Fast);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&image.data)?;
+        Ok(writer.finish()?)
+    };
+    write().with_context(|| format!("cannot write {}", path.display()))
+}

@@ -1,0 +1,122 @@
+//! The extract stage on clips made here and on real ones: its files, its shots, its refusals.
+
+use crate::clips::{self, shared, write_numbered};
+use ndarray::Array1;
+use ndarray_npy::NpzReader;
+use orator::config;
+use orator::extract::Extract;
+use orator::stage::progress::Silent;
+use orator::stage::{Report, Stage, Unit};
+use orator::types::time::FrameRate;
+use std::fs::{self, File};
+use std::path::Path;
+
+fn run(video: &Path, out: &Path, settings: &config::Extract) -> anyhow::Result<Report> {
+    fs::create_dir_all(out)?;
+    let unit = Unit { speaker: "host".into(), video: "clip".into(), source: video.to_owned() };
+    Extract::new(settings).run(&unit, out, &Silent)
+}
+
+fn array<T: ndarray_npy::ReadableElement>(out: &Path, name: &str) -> Vec<T> {
+    let mut npz = NpzReader::new(File::open(out.join("timeline.npz")).unwrap()).unwrap();
+    let array: Array1<T> = npz.by_name(name).unwrap();
+    array.into_iter().collect()
+}
+
+/// Frames that begin a shot.
+fn cuts(out: &Path) -> Vec<usize> {
+    let shot = array::<i64>(out, "shot");
+    (1..shot.len()).filter(|n| shot[*n] != shot[n - 1]).collect()
+}
+
+fn media(out: &Path) -> serde_json::Value {
+    serde_json::from_slice(&fs::read(out.join("media.json")).unwrap()).unwrap()
+}
+
+#[test]
+fn a_clip_with_sound_gives_all_files_and_the_same_bytes_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let sound = clips::tone(44_100, 2.0, 440.0);
+    let video = write_numbered(dir.path(), "in.mp4", 20, FrameRate::new(10, 1), Some(&sound));
+    let settings = config::Extract { keep_frames: true, ..Default::default() };
+    let [a, b] = ["a", "b"].map(|name| dir.path().join(name));
+    let report = run(&video, &a, &settings).unwrap();
+    run(&video, &b, &settings).unwrap();
+    assert_eq!(report.line, "30 frames at 15 fps, 1 shot, 2.0 s of sound");
+
+    let repeated = array::<bool>(&a, "repeated");
+    assert_eq!((repeated.len(), repeated.iter().filter(|r| **r).count()), (30, 10));
+    let source_secs = array::<f64>(&a, "source_secs");
+    assert!((source_secs[2] - 0.1).abs() < 1e-9 && (source_secs[29] - 1.9).abs() < 1e-9);
+    assert_eq!(array::<f64>(&a, "shot_score").len(), 30);
+    let media = media(&a);
+    assert_eq!(
+        (&media["n_frames"], &media["codec"], &media["image_size"]),
+        (&30.into(), &"h264".into(), &[128, 64][..].into())
+    );
+    assert_eq!(
+        (&media["fps"]["num"], &media["source_fps"]["num"], &media["damage"]),
+        (&15.into(), &10.into(), &serde_json::Value::Null)
+    );
+    let wav = hound::WavReader::open(a.join("audio.wav")).unwrap();
+    assert_eq!((wav.spec().sample_rate, wav.spec().channels, wav.spec().bits_per_sample), (16_000, 1, 16));
+    assert_eq!(fs::read_dir(a.join("frames")).unwrap().count(), 30);
+    for name in ["timeline.npz", "media.json", "audio.wav", "frames/000029.png"] {
+        assert_eq!(fs::read(a.join(name)).unwrap(), fs::read(b.join(name)).unwrap(), "{name}");
+    }
+}
+
+#[test]
+fn one_silent_frame_is_enough() {
+    let dir = tempfile::tempdir().unwrap();
+    let video = write_numbered(dir.path(), "in.mp4", 1, FrameRate::new(30, 1), None);
+    let out = dir.path().join("out");
+    assert_eq!(run(&video, &out, &config::Extract::default()).unwrap().line, "1 frames at 15 fps, 1 shot, no sound");
+    assert!(!out.join("audio.wav").exists());
+    assert_eq!(media(&out)["has_audio"], false);
+}
+
+#[test]
+fn a_truncated_video_keeps_what_it_holds_and_says_so() {
+    let dir = tempfile::tempdir().unwrap();
+    let sound = clips::tone(16_000, 8.0, 440.0);
+    let video = write_numbered(dir.path(), "in.mp4", 240, FrameRate::new(30, 1), Some(&sound));
+    let bytes = fs::read(&video).unwrap();
+    fs::write(&video, &bytes[..bytes.len() / 2]).unwrap();
+    let out = dir.path().join("out");
+    let report = run(&video, &out, &config::Extract::default()).unwrap();
+    let n_frames = media(&out)["n_frames"].as_u64().unwrap();
+    assert!((20..110).contains(&n_frames) && report.facts["damage"].is_string(), "{}", report.line);
+    let secs = media(&out)["audio_secs"].as_f64().unwrap();
+    assert!((2.0..6.0).contains(&secs), "{secs} s of sound");
+}
+
+#[test]
+fn a_file_that_is_no_video_is_an_error_that_names_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let video = dir.path().join("words.mp4");
+    fs::write(&video, "These are words.").unwrap();
+    let error = format!("{:#}", run(&video, &dir.path().join("out"), &config::Extract::default()).unwrap_err());
+    assert!(error.contains("words.mp4") && error.contains("not a media file"), "{error}");
+}
+
+#[test]
+fn the_cuts_of_real_clips_are_found_and_no_others() {
+    let dir = tempfile::tempdir().unwrap();
+    for (name, expected) in [
+        // 11.60 s and 16.97 s.
+        ("videos/talk_tyson_2cam_17s_720p.mp4", vec![174, 255]),
+        ("videos/talk_oliver_wan_3.5s_1080p.mp4", vec![]),
+        ("videos/generated/mdd_showcase_jon1.mp4", vec![]),
+        ("videos/silent/ted_lia_1.mp4", vec![]),
+        ("videos/silent/asl_help.mkv", vec![]),
+    ] {
+        let Some(video) = shared(name) else { continue };
+        let out = dir.path().join(name.replace('/', "_"));
+        run(&video, &out, &config::Extract::default()).unwrap();
+        let scores = array::<f64>(&out, "shot_score");
+        let others = scores.iter().enumerate().filter(|(n, _)| !expected.contains(n)).map(|(_, s)| *s);
+        eprintln!("{name}: cuts {:?}, others below {:.3}", cuts(&out), others.fold(0.0, f64::max));
+        assert_eq!(cuts(&out), expected, "{name}");
+    }
+}
