@@ -3,6 +3,7 @@
 pub mod bvh;
 pub mod draw;
 pub mod figure;
+pub mod file;
 pub mod rotations;
 pub mod video;
 

@@ -8,6 +8,7 @@ mod extract;
 mod figures;
 mod film;
 mod footage;
+mod generate;
 mod golden;
 mod house;
 mod media_frames;
