@@ -10,7 +10,7 @@ use super::stats::Stats;
 use super::{sync, wav, write};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
-use crate::types::sound::Sound;
+use crate::types::sound::{SAMPLE_RATE, Sound};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3};
 use std::collections::BTreeMap;
@@ -48,6 +48,11 @@ impl Dataset {
             super::SCHEMA
         );
         let info: Info = read_json(&dir.join(write::INFO))?;
+        ensure!(
+            info.sound_rate == SAMPLE_RATE && info.fps.num > 0 && info.fps.den > 0 && info.joints.len() == N_JOINTS,
+            "{}: expected sound at {SAMPLE_RATE} Hz, a frame rate and {N_JOINTS} joints",
+            dir.join(write::INFO).display()
+        );
         let stats: Stats = read_json(&dir.join(write::STATS))?;
         ensure!(stats.is_whole(), "{}: its tables do not have 49 rows", dir.join(write::STATS).display());
         let index: Index = read_json(&dir.join(write::INDEX))?;

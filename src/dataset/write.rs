@@ -1,11 +1,13 @@
 //! Writing a dataset's folder: samples go to their split's shards one at a time, then the three JSON files are written.
 
+use super::bones::{VideoBones, of_speaker};
 use super::index::Index;
 use super::info::{About, Info, SplitInfo};
 use super::sample::Sample;
 use super::shard::Writer;
 use super::split::Split;
 use super::stats::{Footage, Gatherer, Stats};
+use crate::motion::bones;
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result, ensure};
 use serde::Serialize;
@@ -89,13 +91,18 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
 }
 
 /// A whole dataset from samples in memory, in the folder `dir` (made if it is not there): what tests and small
-/// experiments need. The bone lengths in its `info.json` are those of no one, 0.
+/// experiments need. The samples' motion is left as it is; `info.json` names its median bone lengths.
 pub fn write_dataset(dir: &Path, speaker: &str, fps: FrameRate, samples: &[(Split, Sample)]) -> Result<(Info, Stats)> {
     std::fs::create_dir_all(dir).with_context(|| format!("making the folder {}", dir.display()))?;
+    let measure = |sample: &Sample| VideoBones {
+        lengths_metres: bones::measure(&sample.motion).map(f64::from).to_vec(),
+        n_frames: sample.n_frames(),
+    };
+    let bones: Vec<VideoBones> = samples.iter().map(|(_, sample)| measure(sample)).collect();
     let about = About {
         speaker: speaker.to_owned(),
         fps,
-        bone_lengths_metres: vec![0.0; crate::types::skeleton::N_BONES],
+        bone_lengths_metres: of_speaker(&bones).map(f64::from).to_vec(),
         models: Vec::new(),
         max_shard_bytes: 256 << 20,
     };
