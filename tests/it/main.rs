@@ -13,6 +13,7 @@ mod golden;
 mod house;
 mod media_frames;
 mod media_sound;
+mod pose_parity;
 mod runner;
 mod segment;
 mod shard;

@@ -1,0 +1,61 @@
+//! YOLOX: one row a cell of a grid for each stride, row-major: centre offset in cells, logarithm of the size in cells,
+//! objectness, class probabilities (class 0 is a person).
+
+use super::boxes;
+use crate::types::pose2d::PersonBox;
+use anyhow::{Result, ensure};
+
+/// The people in `rows` of `row_len` numbers, for an input of `width` x `height` px.
+///
+/// # Errors
+/// The number of rows is not that of the grids' cells.
+pub fn decode(
+    rows: &[f32],
+    row_len: usize,
+    [height, width]: [usize; 2],
+    strides: &[usize],
+    min_score: f32,
+    max_overlap: f32,
+) -> Result<Vec<PersonBox>> {
+    let n_cells: usize = strides.iter().map(|stride| (width / stride) * (height / stride)).sum();
+    ensure!(
+        row_len >= 6 && rows.len() == n_cells * row_len,
+        "YOLOX grids of strides {strides:?} on {width}x{height} px have {n_cells} rows of at least 6 numbers, not {} \
+         numbers in rows of {row_len}",
+        rows.len()
+    );
+    let mut rest = rows.chunks_exact(row_len);
+    let mut found = Vec::new();
+    for stride in strides {
+        let columns = width / stride;
+        for (cell, row) in rest.by_ref().take(columns * (height / stride)).enumerate() {
+            let score = row[4] * row[5];
+            if score > min_score {
+                let size = *stride as f32;
+                let (x, y) = ((row[0] + (cell % columns) as f32) * size, (row[1] + (cell / columns) as f32) * size);
+                let (w, h) = (row[2].exp() * size / 2.0, row[3].exp() * size / 2.0);
+                found.extend(boxes::from_corners([x - w, y - h, x + w, y + h], score));
+            }
+        }
+    }
+    Ok(boxes::best(found, max_overlap))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cell_becomes_a_box() {
+        let mut rows = vec![0.0; (16 + 4) * 6];
+        let at = |cell: usize| cell * 6..cell * 6 + 6;
+        rows[at(6)].copy_from_slice(&[0.5, 0.25, 1.0_f32.ln(), 2.0_f32.ln(), 0.9, 0.9]);
+        rows[at(16 + 3)].copy_from_slice(&[0.0, 0.0, 0.0, 0.0, 0.5, 0.1]);
+        let found = decode(&rows, 6, [32, 32], &[8, 16], 0.3, 0.45).unwrap();
+        assert_eq!(found.len(), 1);
+        let PersonBox { x, y, width, height, score } = found[0];
+        let close = |a: f32, b: f32| (a - b).abs() < 1e-5;
+        assert!(close(x, 16.0) && close(y, 2.0) && close(width, 8.0) && close(height, 16.0) && close(score, 0.81));
+        assert!(decode(&rows[6..], 6, [32, 32], &[8, 16], 0.3, 0.45).is_err());
+    }
+}
