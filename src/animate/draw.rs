@@ -17,7 +17,7 @@ const TRUNK: [u8; 3] = [212, 214, 216];
 const HEAD: [u8; 3] = [196, 199, 203];
 
 /// Pieces an arm bone is drawn in, so that its shade can change along it.
-const PIECES: usize = 6;
+const PIECES: usize = 12;
 /// Nearer and further than the neck by this much, metres, the shade no longer changes.
 const SHADE_METRES: f32 = 0.45;
 
@@ -86,7 +86,7 @@ struct Limb {
     radii: [f32; 2],
     left: bool,
     rgb: [u8; 3],
-    /// The seam begins at this share of its length: nearer the joint it would cut the limb this one hangs on.
+    /// The seam begins at this share of its length (1: none): nearer the joint it would cut the limb this one hangs on.
     seam_from: f32,
 }
 
@@ -121,9 +121,9 @@ fn limbs_to(joint: usize, place: impl Fn(usize) -> [f32; 3]) -> Vec<Limb> {
         .map(|piece| {
             let shares = [piece, piece + 1].map(|end| end as f32 / pieces as f32);
             let seam_from = match piece {
-                0 if is_hand => SEAM_FROM[(joint - root - 1) % 4],
-                0 => 1.0,
-                _ => 0.0,
+                _ if is_hand => SEAM_FROM[(joint - root - 1) % 4],
+                2..=10 => 0.0,
+                _ => 1.0,
             };
             Limb { ends: shares.map(at), radii: shares.map(radius), left, rgb, seam_from }
         })
@@ -138,7 +138,7 @@ impl Limb {
         let [(a, near), (b, far)] = self.ends.map(|end| view.project(end));
         let radius = |k: usize, depth: f32| (self.radii[k] * view.px_per_metre * view.nearness(depth)).max(1.0);
         let (ra, rb) = (radius(0, near), radius(1, far));
-        if let Some(seam) = view.seam {
+        if let Some(seam) = view.seam.filter(|_| self.seam_from < 1.0) {
             // Along the sides only, for the same reason.
             let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
             let length = dx.hypot(dy).max(1e-3);
