@@ -1,1 +1,3 @@
-//! Waveforms to features (log-mel). Pure.
+//! Waveforms to features. Pure: samples in, arrays out.
+
+pub mod mel;

@@ -5,13 +5,17 @@
 
 pub mod batch_norm;
 pub mod conv1d;
+pub mod conv_block;
 pub mod cpu;
+pub mod discriminator;
 pub mod dropout;
 pub mod finite_difference;
 pub mod hand_lifter;
 pub mod linear;
 pub mod params;
+pub mod resize;
 pub mod temporal_lifter;
+pub mod unet;
 
 /// Whether a forward pass trains (batch statistics, dropout masks drawn from the generator) or evaluates.
 pub enum Mode<'a> {

@@ -19,7 +19,8 @@ pub enum Init {
 
 /// Named tensors of one or more networks.
 pub struct Params {
-    seed: u64,
+    /// None: for inference.
+    seed: Option<u64>,
     dtype: DType,
     trainable: BTreeMap<String, Var>,
     /// Savable, but not moved by the optimiser: running statistics.
@@ -34,13 +35,19 @@ impl Params {
 
     /// An empty set of this type (f64 is for proving gradients).
     pub fn with_dtype(seed: u64, dtype: DType) -> Self {
-        Self { seed, dtype, trainable: BTreeMap::new(), buffers: BTreeMap::new() }
+        Self { seed: Some(seed), dtype, trainable: BTreeMap::new(), buffers: BTreeMap::new() }
+    }
+
+    /// An empty set in f32 for a network that is loaded and not trained: a forward pass keeps no graph, so that its
+    /// memory is freed on the way. Everything is 0 until loaded.
+    pub fn frozen() -> Self {
+        Self { seed: None, ..Self::new(0) }
     }
 
     /// A new tensor that the optimiser moves. Errors when the name is taken.
     pub fn trainable(&mut self, name: &str, shape: &[usize], init: Init) -> Result<Tensor> {
         let var = self.make(name, shape, init)?;
-        let tensor = var.as_tensor().clone();
+        let tensor = if self.seed.is_some() { var.as_tensor().clone() } else { var.as_detached_tensor() };
         self.trainable.insert(name.to_owned(), var);
         Ok(tensor)
     }
@@ -60,18 +67,13 @@ impl Params {
         let taps = fan(shape.get(2..).unwrap_or(&[]));
         let (fan_out, fan_in) = (fan(&shape[..shape.len().min(1)]) * taps, fan(shape.get(1..).unwrap_or(&[])));
         let n: usize = shape.iter().product();
-        let values: Vec<f64> = match init {
-            Init::Constant(value) => vec![value; n],
-            Init::Glorot => self.uniform(name, n, (6.0 / (fan_in + fan_out)).sqrt()),
-            Init::He => self.uniform(name, n, (6.0 / fan_in).sqrt()),
+        let values: Vec<f64> = match (self.seed, init) {
+            (None, _) => vec![0.0; n],
+            (_, Init::Constant(value)) => vec![value; n],
+            (Some(seed), Init::Glorot) => uniform(seed, name, n, (6.0 / (fan_in + fan_out)).sqrt()),
+            (Some(seed), Init::He) => uniform(seed, name, n, (6.0 / fan_in).sqrt()),
         };
         Var::from_tensor(&Tensor::from_vec(values, shape, &Device::Cpu)?.to_dtype(self.dtype)?)
-    }
-
-    fn uniform(&self, name: &str, n: usize, bound: f64) -> Vec<f64> {
-        let key = [&self.seed.to_le_bytes(), name.as_bytes()].concat();
-        let mut rng = ChaCha8Rng::from_seed(*blake3::hash(&key).as_bytes());
-        (0..n).map(|_| rng.random_range(-bound..bound)).collect()
     }
 
     /// What the optimiser moves, sorted by name.
@@ -112,6 +114,13 @@ impl Params {
             None => Ok(()),
         }
     }
+}
+
+/// `n` numbers in -bound..bound.
+fn uniform(seed: u64, name: &str, n: usize, bound: f64) -> Vec<f64> {
+    let key = [&seed.to_le_bytes(), name.as_bytes()].concat();
+    let mut rng = ChaCha8Rng::from_seed(*blake3::hash(&key).as_bytes());
+    (0..n).map(|_| rng.random_range(-bound..bound)).collect()
 }
 
 #[cfg(test)]

@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn it_has_the_published_size() -> anyhow::Result<()> {
-        let mut params = Params::new(0);
+        let mut params = Params::frozen();
         let net = TemporalLifter::new(&mut params, "lifter", &config(1024))?;
         assert_eq!(net.config().receptive_field(), 27);
         assert!((params.n_parameters() as f64 / 8.56e6 - 1.0).abs() < 0.001, "{}", params.n_parameters());
