@@ -94,7 +94,7 @@ impl Generator {
     /// `mels` [B, n_mels, T_mel] to poses [B, n_out, n_frames]; `n_frames` is a multiple of [`FRAMES_MULTIPLE`] and
     /// both span the same time.
     pub fn forward(&self, mels: &Tensor, n_frames: usize, train: bool) -> Result<Tensor> {
-        if n_frames == 0 || n_frames % FRAMES_MULTIPLE != 0 {
+        if n_frames == 0 || !n_frames.is_multiple_of(FRAMES_MULTIPLE) {
             candle_core::bail!("the generator makes a multiple of {FRAMES_MULTIPLE} frames, not {n_frames}");
         }
         let mut x = resize::linear(&self.front.forward(mels, train)?, n_frames)?;

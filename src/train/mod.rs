@@ -1,4 +1,14 @@
 //! Losses, optimiser, checkpoints, logs, and the training loops.
+//!
+//! The way of a window: `examples` (dataset to normalised poses and log-mels) -> `gan` (the loop) -> `checkpoint`.
+//! `speaker` is what a checkpoint of the generator means.
 
 pub mod adam;
 pub mod checkpoint;
+pub mod examples;
+pub mod gan;
+pub mod log;
+pub mod losses;
+pub mod metrics;
+pub mod poses;
+pub mod speaker;

@@ -8,6 +8,7 @@ mod extract;
 mod figures;
 mod film;
 mod footage;
+mod gan;
 mod generate;
 mod golden;
 mod house;

@@ -1,11 +1,100 @@
 //! `orator train gan`.
 
+use crate::cli::common::ConfigArgs;
 use crate::cli::{Outcome, ui::Ui};
+use anyhow::{Context, Result, bail};
+use orator::config::Config;
+use orator::dataset::Dataset;
+use orator::train::gan;
+use serde_json::json;
+use std::path::PathBuf;
+use std::time::Instant;
 
 /// Train a speaker's speech-to-gesture generator.
+///
+/// Reads the dataset that `orator run` made and trains with the settings of `[gan]`. Checkpoints and `metrics.jsonl`
+/// go to the output folder; started again, it goes on from the newest checkpoint there, and ends with the same bytes
+/// as a training that was never interrupted.
 #[derive(clap::Args)]
-pub struct Args {}
+pub struct Args {
+    #[command(flatten)]
+    config: ConfigArgs,
+    /// The speaker; may be left out when the configuration names one only.
+    #[arg(long, value_name = "NAME")]
+    speaker: Option<String>,
+    /// Steps to train altogether, instead of `gan.steps`.
+    #[arg(long, value_name = "N")]
+    steps: Option<usize>,
+    /// Folder of the checkpoints; `work/gan/<speaker>` when left out.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// The dataset; `work/dataset/<speaker>` when left out.
+    #[arg(long, value_name = "DIR")]
+    dataset: Option<PathBuf>,
+}
 
-pub fn run(_args: Args, _ui: &Ui) -> anyhow::Result<Outcome> {
-    anyhow::bail!("not built yet")
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let config = args.config.load()?;
+    let place = |given: Option<PathBuf>, room: &str| -> Result<PathBuf> {
+        match given {
+            Some(path) => Ok(path),
+            None => Ok(config.settings.work.dir.join(room).join(speaker(&args.speaker, &config)?)),
+        }
+    };
+    let (folder, out) = (place(args.dataset, "dataset")?, place(args.out, "gan")?);
+    let mut settings = config.settings.gan.clone();
+    settings.steps = args.steps.unwrap_or(settings.steps);
+    let dataset = Dataset::open(&folder).context("`orator run` makes the dataset to train on")?;
+
+    let start = Instant::now();
+    let outcome = gan::train(&dataset, &settings, &out, ui)?;
+    let steps_per_sec = (outcome.steps - outcome.began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
+    let (made, still) = (outcome.validation.generator, outcome.validation.mean_pose);
+    let text = format!(
+        "{}: {} steps ({steps_per_sec:.2} a second) on {} windows, {} parameters\n\
+         on {} {} windows   generator   mean pose\n\
+         L1 (normalised)    {:9.3}   {:9.3}\n\
+         PCK 0.2            {:9.3}   {:9.3}\n\
+         newest checkpoint  {}\n\
+         best (step {})  {}",
+        dataset.info().speaker,
+        outcome.steps,
+        outcome.n_windows,
+        outcome.n_parameters,
+        outcome.validation.n_windows,
+        outcome.validation.split,
+        made.l1,
+        still.l1,
+        made.pck,
+        still.pck,
+        outcome.newest.display(),
+        outcome.best_step,
+        outcome.best.display(),
+    );
+    let next = format!("orator generate --checkpoint {} --audio speech.wav --out motion.bvh", outcome.best.display());
+    let facts = json!({
+        "speaker": dataset.info().speaker,
+        "steps": outcome.steps,
+        "steps_per_sec": steps_per_sec,
+        "windows": outcome.n_windows,
+        "parameters": outcome.n_parameters,
+        "validation": outcome.validation,
+        "newest": outcome.newest,
+        "best": outcome.best,
+        "best_step": outcome.best_step,
+    });
+    ui.summary(&text, Some(&next), facts);
+    Ok(Outcome::Done)
+}
+
+/// The speaker's name: given, or the only one configured.
+fn speaker(given: &Option<String>, config: &Config) -> Result<String> {
+    let names: Vec<&str> = config.settings.speaker.iter().map(|speaker| speaker.name.as_str()).collect();
+    match (given, names.as_slice()) {
+        (Some(name), _) if names.contains(&name.as_str()) => Ok(name.clone()),
+        (Some(name), _) => bail!("no speaker {name:?} in {}; it names {}", config.file.display(), names.join(", ")),
+        (None, [only]) => Ok((*only).to_owned()),
+        (None, []) => bail!("{} names no speaker; say --dataset and --out", config.file.display()),
+        (None, _) => bail!("say which speaker with --speaker: {}", names.join(", ")),
+    }
 }

@@ -1,0 +1,120 @@
+//! The numbers the generator and the discriminator see: 48 joints (all but the neck) x 3, each coordinate with mean 0
+//! and deviation 1 over the training split; and the way back to joints in metres.
+
+use crate::motion::bones;
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::{L_HAND, L_WRIST, N_BONES, N_JOINTS, NECK, R_HAND, R_WRIST};
+use crate::types::time::FrameRate;
+use anyhow::ensure;
+use ndarray::{Array2, Array3, ArrayView2};
+use serde::{Deserialize, Serialize};
+
+/// Numbers of a pose. Number `3 * (joint - 1) + k` is coordinate k of a joint.
+pub const N_NUMBERS: usize = 3 * N_BONES;
+/// Least deviation a coordinate is divided by, metres: what hardly moves is not blown up.
+const LEAST_STD: f32 = 0.01;
+
+/// Whether the joint is a hand's root: the wrist again, so the networks do not learn it.
+pub const fn is_duplicate(joint: usize) -> bool {
+    joint == L_HAND || joint == R_HAND
+}
+
+/// Mean and deviation of every number, metres, and the speaker's bone lengths.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Normalisation {
+    pub mean: Vec<f32>,
+    pub std: Vec<f32>,
+    /// Bone of joint `n + 1` to its parent, metres; 0 where it was never measured.
+    pub bone_lengths: Vec<f32>,
+}
+
+impl Normalisation {
+    /// From the statistics of a dataset, [49, 3] each.
+    pub fn new(mean: &Array2<f32>, std: &Array2<f32>, bone_lengths: Vec<f32>) -> Self {
+        let numbers = |table: &Array2<f32>| table.iter().skip(3).copied().collect::<Vec<f32>>();
+        let std = numbers(std).into_iter().map(|v| v.max(LEAST_STD)).collect();
+        Self { mean: numbers(mean), std, bone_lengths }
+    }
+
+    /// Errors unless the tables have the lengths they should.
+    pub fn check(&self) -> anyhow::Result<()> {
+        let lengths = [self.mean.len(), self.std.len(), self.bone_lengths.len()];
+        ensure!(lengths == [N_NUMBERS, N_NUMBERS, N_BONES], "its normalisation has {lengths:?} numbers");
+        Ok(())
+    }
+
+    /// Motion [T, 49, 3] to numbers [144, T] and which of them to learn from, 1 or 0. A number that is missing is 0.
+    pub fn numbers(&self, motion: &Motion) -> (Array2<f32>, Array2<f32>) {
+        let n_frames = motion.n_frames();
+        let (mut numbers, mut mask) = (Array2::zeros((N_NUMBERS, n_frames)), Array2::zeros((N_NUMBERS, n_frames)));
+        for joint in 1..N_JOINTS {
+            for k in 0..3 {
+                let i = 3 * (joint - 1) + k;
+                for t in 0..n_frames {
+                    let value = (motion.joints[[t, joint, k]] - self.mean[i]) / self.std[i];
+                    if value.is_finite() {
+                        numbers[[i, t]] = value;
+                        mask[[i, t]] = f32::from(motion.mask[[t, joint]] && !is_duplicate(joint));
+                    }
+                }
+            }
+        }
+        (numbers, mask)
+    }
+
+    /// Numbers [144, T] to joints [T, 49, 3] in metres: the neck at 0, the hand roots at the wrists.
+    pub fn joints(&self, numbers: ArrayView2<f32>) -> Array3<f32> {
+        Array3::from_shape_fn((numbers.ncols(), N_JOINTS, 3), |(t, joint, k)| {
+            let joint = match joint {
+                NECK => return 0.0,
+                L_HAND => L_WRIST,
+                R_HAND => R_WRIST,
+                other => other,
+            };
+            let i = 3 * (joint - 1) + k;
+            numbers[[i, t]] * self.std[i] + self.mean[i]
+        })
+    }
+
+    /// Numbers [144, T] to motion whose bones have the speaker's lengths.
+    pub fn motion(&self, numbers: ArrayView2<f32>, fps: FrameRate) -> Motion {
+        let mut motion = Motion::from_joints(fps, self.joints(numbers));
+        let lengths = std::array::from_fn(|bone| self.bone_lengths.get(bone).copied().unwrap_or(0.0));
+        bones::with_lengths(&mut motion, &lengths);
+        motion
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_and_back() {
+        let value = |t: usize, joint: usize, k: usize| (t + 3 * joint + 7 * k) as f32 * 0.01;
+        let mut joints = Array3::from_shape_fn((5, N_JOINTS, 3), |(t, joint, k)| value(t, joint, k));
+        for t in 0..5 {
+            for k in 0..3 {
+                joints[[t, NECK, k]] = 0.0;
+                joints[[t, L_HAND, k]] = joints[[t, L_WRIST, k]];
+                joints[[t, R_HAND, k]] = joints[[t, R_WRIST, k]];
+            }
+        }
+        let whole = joints.clone();
+        joints[[2, 5, 1]] = f32::NAN;
+        let mut motion = Motion::from_joints(FrameRate::new(15, 1), joints);
+        motion.mask[[3, 9]] = false;
+        let table = |value| Array2::from_elem((N_JOINTS, 3), value);
+        let normal = Normalisation::new(&table(0.1), &table(0.0), vec![0.0; N_BONES]);
+        normal.check().unwrap();
+        let (numbers, mask) = normal.numbers(&motion);
+        assert_eq!((numbers[[13, 2]], mask[[13, 2]], mask[[24, 3]], mask[[24, 2]]), (0.0, 0.0, 0.0, 1.0));
+        assert_eq!(mask[[3 * (L_HAND - 1), 0]], 0.0);
+        let back = normal.joints(numbers.view());
+        for ((t, joint, k), expected) in whole.indexed_iter() {
+            if (t, joint, k) != (2, 5, 1) {
+                assert!((back[[t, joint, k]] - expected).abs() < 1e-5);
+            }
+        }
+    }
+}
