@@ -27,6 +27,7 @@
 //! | `train` | losses, optimiser, checkpoints, the two training loops | `motion nn audio dataset` |
 //! | `generate` | speech to motion with a trained speaker | `motion nn audio train` |
 //! | `animate` | joints to rotations; BVH and drawn video | `motion media vision` |
+//! | `demo` | the synthetic speaker: videos with known truth, and the comparison with it | `motion media vision dataset animate` |
 //!
 //! Stages meet in files, never in code; all of them may use `types`, `stage` and `config`. `cli` (in the program
 //! only) imports everything and is the one place that prints. `tests/it/house.rs` holds the code to this table.
@@ -39,6 +40,7 @@ pub mod animate;
 pub mod audio;
 pub mod config;
 pub mod dataset;
+pub mod demo;
 pub mod extract;
 pub mod generate;
 pub mod lift;

@@ -3,6 +3,7 @@
 
 mod bench;
 mod common;
+mod demo;
 mod doctor;
 mod generate;
 mod init;
@@ -38,6 +39,7 @@ enum Verb {
     Train(train::Args),
     Generate(generate::Args),
     Bench(bench::Args),
+    Demo(demo::Args),
 }
 
 /// How a verb ended, when it ended well enough to say so itself.
@@ -69,6 +71,7 @@ pub fn main() -> ExitCode {
         Verb::Train(args) => train::run(args, &ui),
         Verb::Generate(args) => generate::run(args, &ui),
         Verb::Bench(args) => bench::run(args, &ui),
+        Verb::Demo(args) => demo::run(args, &ui),
     };
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

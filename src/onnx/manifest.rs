@@ -82,7 +82,7 @@ mod tests {
     #[test]
     fn the_builtin_manifest_reads_and_writes_itself() {
         let manifest = Manifest::builtin().unwrap();
-        assert_eq!(manifest.models.len(), 10);
+        assert_eq!(manifest.models.len(), 13);
         assert_eq!(Manifest::parse(&toml::to_string(&manifest).unwrap()).unwrap(), manifest);
         for entry in &manifest.models {
             assert!(entry.url.is_some() != entry.conversion.is_some(), "{}: url or conversion", entry.id);
@@ -110,7 +110,7 @@ mod tests {
         let text = toml::to_string(&Manifest { models: vec![own.clone()] }).unwrap();
         std::fs::write(dir.path().join(MANIFEST_FILE), text).unwrap();
         let manifest = Manifest::load(dir.path()).unwrap();
-        assert_eq!((manifest.models.len(), manifest.get("person-mine").unwrap()), (11, &own));
+        assert_eq!((manifest.models.len(), manifest.get("person-mine").unwrap()), (14, &own));
         assert!(manifest.get("nobody").unwrap_err().to_string().contains("known are"));
         assert!(manifest.get_as("person-mine", Role::Hand).is_err());
     }

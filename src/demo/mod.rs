@@ -1,0 +1,18 @@
+//! The synthetic speaker: a drawn figure that talks with its hands, whose every joint is known in 3D. It is the
+//! embedded demo and the end-to-end test of the road: a video of it goes in at the front, and what comes out at the
+//! back is held against the truth. Nothing here knows a stage; `measure` reads their files.
+//!
+//! `speech` decides when syllables fall and sounds them -> `gesture` moves the body to them -> `figure` turns the
+//! body's controls into joints -> `camera` sees them -> `paint` draws them, one colour a joint (`palette`).
+
+pub mod camera;
+pub mod figure;
+pub mod folder;
+pub mod gesture;
+pub mod measure;
+pub mod paint;
+pub mod palette;
+pub mod scene;
+pub mod sheet;
+pub mod speech;
+pub mod truth;

@@ -1,0 +1,171 @@
+//! What the synthetic speaker says: phrases of syllables with stresses and pauses, and how they sound. It is no
+//! language: a pulse train through three formants, a little noise at the onsets.
+
+use crate::types::sound::{SAMPLE_RATE, Sound};
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use std::f64::consts::{PI, TAU};
+
+/// First three formants of a few vowels, Hz (Peterson and Barney 1952, men).
+const VOWELS: [[f64; 3]; 5] = [
+    [730.0, 1090.0, 2440.0],
+    [530.0, 1840.0, 2480.0],
+    [270.0, 2290.0, 3010.0],
+    [570.0, 840.0, 2410.0],
+    [300.0, 870.0, 2240.0],
+];
+const BANDWIDTHS: [f64; 3] = [80.0, 100.0, 140.0];
+
+/// One syllable: times in seconds; `stress` 0..1; `vowel` indexes the table of formants.
+#[derive(Clone, Debug)]
+pub struct Syllable {
+    pub start: f64,
+    pub end: f64,
+    pub stress: f64,
+    pub vowel: usize,
+    /// Pitch, Hz.
+    pub pitch: f64,
+}
+
+/// Syllables `first..last` said in one breath.
+#[derive(Clone, Debug)]
+pub struct Phrase {
+    pub first: usize,
+    pub last: usize,
+}
+
+/// Everything said in a clip.
+#[derive(Clone, Debug, Default)]
+pub struct Speech {
+    pub syllables: Vec<Syllable>,
+    pub phrases: Vec<Phrase>,
+}
+
+impl Speech {
+    /// Phrases that fill `secs` seconds, each followed by a pause.
+    pub fn new(secs: f64, dice: &mut ChaCha8Rng) -> Self {
+        let mut speech = Self::default();
+        let mut now = 0.25;
+        while now < secs - 0.5 {
+            let first = speech.syllables.len();
+            let count = dice.random_range(5..13);
+            let base = dice.random_range(105.0..125.0);
+            for k in 0..count {
+                let stress = if k % 3 == 1 { dice.random_range(0.7..1.0) } else { dice.random_range(0.0..0.35) };
+                let length = dice.random_range(0.13..0.2) + 0.08 * stress;
+                if now + length > secs - 0.1 {
+                    break;
+                }
+                let fall = 1.0 - 0.2 * f64::from(k) / f64::from(count);
+                let pitch = base * fall * (1.0 + 0.18 * stress);
+                let vowel = dice.random_range(0..VOWELS.len());
+                speech.syllables.push(Syllable { start: now, end: now + length, stress, vowel, pitch });
+                now += length + 0.02;
+            }
+            speech.phrases.push(Phrase { first, last: speech.syllables.len() });
+            now += dice.random_range(0.3..0.9);
+        }
+        speech
+    }
+
+    /// How loud the voice is at `secs`, 0..1: also how far the mouth is open.
+    pub fn loudness(&self, secs: f64) -> f64 {
+        let next = self.syllables.partition_point(|s| s.end <= secs);
+        self.syllables.get(next).filter(|s| s.start <= secs).map_or(0.0, |s| s.loudness(secs))
+    }
+
+    /// The sound, `secs` long.
+    pub fn sound(&self, secs: f64, dice: &mut ChaCha8Rng) -> Sound {
+        let rate = f64::from(SAMPLE_RATE);
+        let mut samples = vec![0.0f32; (secs * rate).round().max(0.0) as usize];
+        for syllable in &self.syllables {
+            let mut voice = Voice::new(syllable, rate);
+            let (start, end) = ((syllable.start * rate) as usize, (syllable.end * rate) as usize);
+            for n in start..end.min(samples.len()) {
+                let now = n as f64 / rate;
+                let hiss = dice.random_range(-1.0..1.0) * (-(now - syllable.start) / 0.015).exp();
+                let sound = voice.next(rate) + 0.25 * hiss;
+                samples[n] = (0.3 * sound * syllable.loudness(now)) as f32;
+            }
+        }
+        let peak = samples.iter().fold(1e-6f32, |peak, s| peak.max(s.abs()));
+        samples.iter_mut().for_each(|s| *s *= 0.6 / peak);
+        Sound { rate: SAMPLE_RATE, samples }
+    }
+}
+
+impl Syllable {
+    fn loudness(&self, secs: f64) -> f64 {
+        let along = ((secs - self.start) / (self.end - self.start)).clamp(0.0, 1.0);
+        (0.45 + 0.55 * self.stress) * (PI * along).sin().powf(0.6)
+    }
+}
+
+/// Pulses of the voice through three resonators in a row.
+struct Voice {
+    phase: f64,
+    pitch: f64,
+    formants: [Resonator; 3],
+}
+
+impl Voice {
+    fn new(syllable: &Syllable, rate: f64) -> Self {
+        let formants = std::array::from_fn(|k| Resonator::new(VOWELS[syllable.vowel][k], BANDWIDTHS[k], rate));
+        Self { phase: 0.0, pitch: syllable.pitch, formants }
+    }
+
+    fn next(&mut self, rate: f64) -> f64 {
+        self.phase += self.pitch / rate;
+        // A rounded saw: the flow through the glottis opens slowly and closes fast.
+        self.phase -= self.phase.floor();
+        let flow = self.phase - (self.phase / 0.95).powi(12);
+        self.formants.iter_mut().fold(flow - 0.45, |sound, formant| formant.next(sound))
+    }
+}
+
+/// A two-pole resonator with unit gain at 0 Hz (Klatt 1980, section I.A).
+struct Resonator {
+    a: f64,
+    b: f64,
+    c: f64,
+    last: [f64; 2],
+}
+
+impl Resonator {
+    fn new(hz: f64, bandwidth: f64, rate: f64) -> Self {
+        let radius = (-PI * bandwidth / rate).exp();
+        let (b, c) = (2.0 * radius * (TAU * hz / rate).cos(), -radius * radius);
+        Self { a: 1.0 - b - c, b, c, last: [0.0; 2] }
+    }
+
+    fn next(&mut self, sound: f64) -> f64 {
+        let out = self.a * sound + self.b * self.last[0] + self.c * self.last[1];
+        self.last = [out, self.last[0]];
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+
+    #[test]
+    fn it_is_loud_in_syllables_and_silent_in_pauses() {
+        let mut dice = ChaCha8Rng::seed_from_u64(7);
+        let speech = Speech::new(8.0, &mut dice);
+        let sound = speech.sound(8.0, &mut dice);
+        assert_eq!(sound.samples.len(), 8 * SAMPLE_RATE as usize);
+        assert!(sound.samples.iter().all(|s| s.is_finite() && s.abs() <= 0.61));
+        let rms = |from: f64, to: f64| {
+            let part = &sound.samples[(from * 16e3) as usize..(to * 16e3) as usize];
+            (part.iter().map(|s| s * s).sum::<f32>() / part.len() as f32).sqrt()
+        };
+        for pair in speech.phrases.windows(2) {
+            let (end, start) = (speech.syllables[pair[0].last - 1].end, speech.syllables[pair[1].first].start);
+            assert_eq!(rms(end + 0.01, start - 0.01), 0.0);
+        }
+        let stressed = speech.syllables.iter().find(|s| s.stress > 0.6).unwrap();
+        assert!(rms(stressed.start, stressed.end) > 0.05);
+    }
+}
