@@ -80,7 +80,7 @@ fn stream_mono(path: &Path, rate: u32, sink: &mut dyn FnMut(&[f32]) -> Result<()
     let input = source::open(path)?;
     let Some(stream) = source::audio_stream(&input) else { return Ok(None) };
     let stream_idx = stream.index();
-    let end_secs = source::stated_secs(&input, &stream).map_or(f64::INFINITY, |secs| secs + 60.0);
+    let latest_secs = source::latest_secs(&input, &stream);
     let mut zero_secs = frames::first_picture_secs(path)?;
     let mut decode = Decode::new(path, input, stream_idx, 1)?;
     let secs_per_tick = f64::from(decode.time_base());
@@ -95,7 +95,7 @@ fn stream_mono(path: &Path, rate: u32, sink: &mut dyn FnMut(&[f32]) -> Result<()
         let at = frame.timestamp().map(|ticks| ticks as f64 * secs_per_tick);
         let zero = *zero_secs.get_or_insert(at.unwrap_or(0.0));
         // A time far beyond the file's stated end is a broken one: the sound goes on where it was.
-        let at = at.map(|at| at - zero).filter(|at| *at < end_secs);
+        let at = at.map(|at| at - zero).filter(|at| *at < latest_secs);
         timeline.push(at, &frame).with_context(|| format!("the sound of {}", path.display()))?;
     }
     if n_frames == 0 {

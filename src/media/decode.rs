@@ -15,6 +15,7 @@ pub(super) struct Decode {
     time_base: Rational,
     draining: bool,
     n_bad: usize,
+    n_flawed: usize,
     stopped: Option<ffmpeg::Error>,
 }
 
@@ -45,7 +46,7 @@ impl Decode {
         let decoder =
             open().with_context(|| format!("cannot decode the {kind} of {}, codec {id:?}", path.display()))?;
         let path = path.to_owned();
-        Ok(Self { path, input, stream_idx, decoder, time_base, draining: false, n_bad: 0, stopped: None })
+        Ok(Self { path, input, stream_idx, decoder, time_base, draining: false, n_bad: 0, n_flawed: 0, stopped: None })
     }
 
     /// Seconds of one tick of the stream's clock, as a fraction (numerator, denominator).
@@ -57,7 +58,10 @@ impl Decode {
     pub fn next(&mut self, frame: &mut Frame) -> Result<bool> {
         loop {
             match self.decoder.receive_frame(frame) {
-                Ok(()) => return Ok(true),
+                Ok(()) => {
+                    self.n_flawed += usize::from(frame.is_corrupt() || frame.has_decode_errors());
+                    return Ok(true);
+                }
                 Err(ffmpeg::Error::Eof) => return Ok(false),
                 Err(ffmpeg::Error::Other { errno }) if errno == ffmpeg::error::EAGAIN => {
                     if self.draining {
@@ -100,7 +104,8 @@ impl Decode {
     pub fn damage(&self) -> Option<String> {
         let stopped = self.stopped.map(|error| format!("reading broke off ({error})"));
         let bad = (self.n_bad > 0).then(|| format!("{} packets could not be decoded", self.n_bad));
-        let parts: Vec<String> = stopped.into_iter().chain(bad).collect();
+        let flawed = (self.n_flawed > 0).then(|| format!("{} frames are flawed", self.n_flawed));
+        let parts: Vec<String> = stopped.into_iter().chain(bad).chain(flawed).collect();
         (!parts.is_empty()).then(|| parts.join(", "))
     }
 }

@@ -58,7 +58,9 @@ pub struct FrameReader {
     following: Option<Source>,
     next_idx: usize,
     last_shown: Option<i64>,
-    n_backwards: usize,
+    /// No time after this is believed.
+    latest_secs: f64,
+    n_misplaced: usize,
     failed: bool,
 }
 
@@ -75,6 +77,7 @@ impl FrameReader {
         let stream = source::video_stream(&input)
             .with_context(|| format!("{} has no pictures: expected a video, not sound alone", path.display()))?;
         let orientation = Orientation::of(&stream);
+        let latest_secs = source::latest_secs(&input, &stream);
         let stream_idx = stream.index();
         let mut decode = Decode::new(path, input, stream_idx, threads)?;
         let mut first = frame::Video::empty();
@@ -99,7 +102,8 @@ impl FrameReader {
             following: None,
             next_idx: 0,
             last_shown: None,
-            n_backwards: 0,
+            latest_secs,
+            n_misplaced: 0,
             failed: false,
         };
         reader.following = reader.decode_after(0)?;
@@ -129,11 +133,11 @@ impl FrameReader {
 
     /// What was wrong with the file although frames came, in words; complete once the frames are at their end.
     pub fn damage(&self) -> Option<String> {
-        let backwards = (self.n_backwards > 0).then(|| format!("{} frames went back in time", self.n_backwards));
+        let misplaced = (self.n_misplaced > 0).then(|| format!("{} frames with impossible times", self.n_misplaced));
         let read = self.duration_secs();
         let stated = self.info.duration_secs.filter(|stated| self.following.is_none() && *stated > read + 1.0);
         let short = stated.map(|stated| format!("pictures end at {read:.2} s of {stated:.2} s"));
-        let parts: Vec<String> = self.decode.damage().into_iter().chain(backwards).chain(short).collect();
+        let parts: Vec<String> = self.decode.damage().into_iter().chain(misplaced).chain(short).collect();
         (!parts.is_empty()).then(|| parts.join(", "))
     }
 
@@ -185,10 +189,10 @@ impl FrameReader {
             // A frame without a time follows the one before by that one's length.
             let own = frame.timestamp().map(|at| at.saturating_sub(self.origin));
             let at = own.unwrap_or_else(|| ticks + frame.packet().duration.max(1));
-            if at > ticks {
+            if at > ticks && self.secs(at) < self.latest_secs {
                 return Ok(Some(Source { frame, ticks: at }));
             }
-            self.n_backwards += 1;
+            self.n_misplaced += 1;
         }
         Ok(None)
     }

@@ -62,7 +62,17 @@ pub(super) fn audio_stream(input: &Input) -> Option<Stream<'_>> {
 
 /// Length in seconds as the container states it for this stream, or else for the whole file.
 pub(super) fn stated_secs(input: &Input, stream: &Stream) -> Option<f64> {
+    lengths(input, stream).into_iter().find(|secs| *secs > 0.0)
+}
+
+/// The second after which no timestamp is believed: a minute past every stated end.
+pub(super) fn latest_secs(input: &Input, stream: &Stream) -> f64 {
+    let stated = lengths(input, stream).into_iter().fold(0.0, f64::max);
+    if stated > 0.0 { stated + 60.0 } else { f64::INFINITY }
+}
+
+/// The stream's length and the file's, in seconds; negative where unknown.
+fn lengths(input: &Input, stream: &Stream) -> [f64; 2] {
     let own = stream.duration() as f64 * f64::from(stream.time_base());
-    let whole = input.duration() as f64 / f64::from(ffmpeg::ffi::AV_TIME_BASE);
-    [own, whole].into_iter().find(|secs| secs.is_finite() && *secs > 0.0)
+    [own, input.duration() as f64 / f64::from(ffmpeg::ffi::AV_TIME_BASE)]
 }

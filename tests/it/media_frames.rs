@@ -201,6 +201,38 @@ fn a_truncated_file_gives_what_it_holds_and_says_so() {
 }
 
 #[test]
+fn flawed_bytes_in_the_middle_are_reported_and_the_rest_kept() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = write_numbered(dir.path(), "in.mp4", 100, FrameRate::new(30, 1), None);
+    let mut bytes = std::fs::read(&path).unwrap();
+    // The first picture fills half the file; the flaw is among the later ones.
+    let (from, to) = (bytes.len() * 9 / 10, bytes.len() * 9 / 10 + 40);
+    bytes[from..to].fill(0xa5);
+    std::fs::write(&path, bytes).unwrap();
+    let mut reader = FrameReader::open(&path, DATASET).unwrap();
+    let n = reader.by_ref().map(Result::unwrap).count();
+    let damage = reader.damage().expect("damage");
+    assert!(n >= 45, "{n} frames, {damage}");
+}
+
+#[test]
+fn names_may_hold_colons_and_the_reader_may_move_to_a_thread() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = write_numbered(dir.path(), "talk 10:30, part 1 \u{e9}.mp4", 6, FrameRate::new(30, 1), None);
+    let mut reader = FrameReader::open(&path, DATASET).unwrap();
+    reader.next().unwrap().unwrap();
+    assert_eq!(std::thread::spawn(move || reader.count()).join().unwrap(), 2);
+    #[cfg(unix)]
+    {
+        use std::os::unix::ffi::OsStrExt;
+        let odd = dir.path().join(std::ffi::OsStr::from_bytes(b"\xff.mp4"));
+        std::fs::rename(&path, &odd).unwrap();
+        let error = format!("{:#}", FrameReader::open(&odd, DATASET).err().unwrap());
+        assert!(error.contains("not UTF-8"), "{error}");
+    }
+}
+
+#[test]
 fn real_clips_have_the_stated_frames() {
     for (name, size, n_frames, repeats) in [
         ("videos/talk_latentsync_demo1_1080x1920_hevc.mp4", [1080, 1920], 150, 0),
