@@ -8,14 +8,14 @@ use crate::media::frames::FrameReader;
 use crate::media::{self, audio};
 use crate::stage::progress::Progress;
 use crate::stage::{Input, Report, Stage, Unit};
-use crate::types::image::Image;
 use crate::types::sound::SAMPLE_RATE;
+use crate::vision::png;
 use anyhow::{Context, Result};
 use ndarray::Array1;
 use ndarray_npy::NpzWriter;
 use serde_json::json;
 use std::fs::{self, File};
-use std::io::BufWriter;
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 /// Video to sound, timeline and shots.
@@ -104,7 +104,7 @@ impl Extract {
             repeated.push(time.repeated);
             shots.push(if time.repeated { None } else { Some(reader.picture(Some(THUMBNAIL))?) });
             if self.settings.keep_frames {
-                write_png(&frames.join(format!("{:06}.png", time.frame_idx)), &reader.picture(None)?)?;
+                png::write(&frames.join(format!("{:06}.png", time.frame_idx)), &reader.picture(None)?)?;
             }
             task.advance(1);
         }
@@ -119,22 +119,7 @@ fn write_timeline(path: &Path, timeline: &Timeline) -> Result<()> {
         npz.add_array("repeated", &Array1::from_vec(timeline.repeated.clone()))?;
         npz.add_array("shot", &Array1::from_vec(timeline.shots.numbers.clone()))?;
         npz.add_array("shot_score", &Array1::from_vec(timeline.shots.scores.clone()))?;
-        npz.finish()?;
-        Ok(())
-    };
-    write().with_context(|| format!("cannot write {}", path.display()))
-}
-
-fn write_png(path: &Path, image: &Image) -> Result<()> {
-    let write = || -> Result<()> {
-        let (width, height) = (u32::try_from(image.width)?, u32::try_from(image.height)?);
-        let mut encoder = png::Encoder::new(BufWriter::new(File::create(path)?), width, height);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_compression(png::Compression::Fast);
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(&image.data)?;
-        Ok(writer.finish()?)
+        Ok(npz.finish()?.flush()?)
     };
     write().with_context(|| format!("cannot write {}", path.display()))
 }
