@@ -3,10 +3,10 @@
 use super::{Outcome, ui::Ui};
 use anyhow::{Context as _, Result, bail, ensure};
 use orator::animate::file::Format;
+use orator::generate::Speaker;
 use orator::media::audio;
 use orator::stage::progress::Progress as _;
 use orator::train::checkpoint;
-use orator::types::pose3d::Motion;
 use orator::types::sound::{SAMPLE_RATE, Sound};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -36,31 +36,27 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     if checkpoint != args.checkpoint {
         ui.say(&format!("checkpoint {}", checkpoint.display()));
     }
+    let speaker = Speaker::open(&checkpoint)?;
     let started = Instant::now();
     let (sound, motion) = {
         let task = ui.begin("speech to motion", 0);
         task.detail("reading the sound");
         let sound = read_sound(&args.audio)?;
         task.detail(&format!("{:.1} s of sound", sound.secs()));
-        let motion = speak(&checkpoint, &sound).with_context(|| format!("no motion for {}", args.audio.display()))?;
+        let motion = speaker.motion(&sound).with_context(|| format!("no motion for {}", args.audio.display()))?;
         (sound, motion)
     };
     let motion_secs = started.elapsed().as_secs_f64();
-    ensure!(
-        motion.n_frames() > 0,
-        "{} has {:.3} s of sound, less than one frame; give it longer speech",
-        args.audio.display(),
-        sound.secs()
-    );
     for (path, format) in &outputs {
         format.write(path, &motion, Some(&sound), ui)?;
     }
     let speed = sound.secs() / motion_secs.max(1e-6);
     let names: Vec<String> = outputs.iter().map(|(path, _)| path.display().to_string()).collect();
     let text = format!(
-        "{:.1} s of speech, {} frames at {}, {speed:.0} x real time\nwrote {}",
+        "{:.1} s of speech, {} frames of {} at {}, {speed:.0} x real time\nwrote {}",
         sound.secs(),
         motion.n_frames(),
+        speaker.name(),
         motion.fps,
         names.join(", ")
     );
@@ -71,16 +67,12 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         "fps": motion.fps,
         "times_real_time": speed,
         "checkpoint": checkpoint,
+        "speaker": speaker.name(),
         "outputs": names,
         "next": next,
     });
     ui.summary(&text, next.as_deref(), facts);
     Ok(Outcome::Done)
-}
-
-/// The motion a trained speaker makes to the sound.
-fn speak(checkpoint: &Path, _sound: &Sound) -> Result<Motion> {
-    bail!("{} cannot speak yet", checkpoint.display())
 }
 
 /// Output files with their formats; none may be the input or another output.
