@@ -71,18 +71,7 @@ impl Measured {
 
 /// Holds the keypoints and the dataset of the run in `dir` against `dir/truth`.
 pub fn measure(dir: &Path) -> Result<Measured> {
-    let mut measured = Measured::default();
-    let (mut body, mut hands) = (Distances::default(), Distances::default());
-    for unit in subfolders(&dir.join("work/pose2d/host"))? {
-        let truth = truth_of(dir, &unit.file_name().unwrap_or_default().to_string_lossy())?;
-        let seen = keypoints_npz::read(&unit.join("keypoints.npz"))?;
-        measured.n_drawn += truth.motion.n_frames();
-        body.compare(seen.body.slice(s![.., ..13, ..]), truth.body.view(), FOUND);
-        hands.compare(seen.left_hand.view(), truth.left_hand.view(), 0.0);
-        hands.compare(seen.right_hand.view(), truth.right_hand.view(), 0.0);
-    }
-    (measured.body, measured.hands) = (body.summary(), hands.summary());
-
+    let mut measured = measure_keypoints(dir)?;
     let (mut lifted, mut true_joints) = (Vec::new(), Vec::new());
     let dataset = Dataset::open(dir.join("work/dataset/host"))?;
     for sample in Split::ALL.into_iter().flat_map(|split| dataset.samples(split)) {
@@ -113,6 +102,22 @@ pub fn measure(dir: &Path) -> Result<Measured> {
     measured.lifted = distances(&lifted, &truth);
     measured.mean_pose = distances(&always, &truth);
     measured.mean_depth = distances(&flat, &truth);
+    Ok(measured)
+}
+
+/// The keypoints' part of it.
+pub fn measure_keypoints(dir: &Path) -> Result<Measured> {
+    let mut measured = Measured::default();
+    let (mut body, mut hands) = (Distances::default(), Distances::default());
+    for unit in subfolders(&dir.join("work/pose2d/host"))? {
+        let truth = truth_of(dir, &unit.file_name().unwrap_or_default().to_string_lossy())?;
+        let seen = keypoints_npz::read(&unit.join("keypoints.npz"))?;
+        measured.n_drawn += truth.motion.n_frames();
+        body.compare(seen.body.slice(s![.., ..13, ..]), truth.body.view(), FOUND);
+        hands.compare(seen.left_hand.view(), truth.left_hand.view(), 0.0);
+        hands.compare(seen.right_hand.view(), truth.right_hand.view(), 0.0);
+    }
+    (measured.body, measured.hands) = (body.summary(), hands.summary());
     Ok(measured)
 }
 
