@@ -70,8 +70,21 @@ test: build
 prove: build
 	@echo 'no long proofs yet'
 
+# The whole road on the synthetic speaker. DEMO: its folder; DRAW and STEPS: how much of it.
+DEMO := $(TARGET)/demo
+DRAW :=
+STEPS := 400
+
 demo: build
-	@echo 'the demo is not built yet'
+	$(ORATOR) demo draw $(DEMO) $(DRAW)
+	$(ORATOR) run -c $(DEMO)/pipeline.toml
+	$(ORATOR) train gan -c $(DEMO)/pipeline.toml --steps $(STEPS)
+	$(ORATOR) generate --checkpoint $(DEMO)/work/gan/host --audio $(DEMO)/speech.wav \
+		--out $(DEMO)/motion.npy $(DEMO)/motion.bvh $(DEMO)/motion.mp4
+	$(ORATOR) demo sheet $(DEMO) --motion $(DEMO)/motion.npy --out $(DEMO)/contact_sheet.png
+	@echo; $(ORATOR) demo measure $(DEMO)
+	@printf '\nmade:\n'; ls -d $(DEMO)/videos/host $(DEMO)/work/dataset/host $(DEMO)/work/gan/host/best.safetensors \
+		$(DEMO)/motion.npy $(DEMO)/motion.bvh $(DEMO)/motion.mp4 $(DEMO)/contact_sheet.png
 
 clean-demo:
-	rm -rf $(TARGET)/demo
+	rm -rf $(DEMO)

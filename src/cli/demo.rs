@@ -25,6 +25,7 @@ pub struct Args {
 enum Part {
     /// Draw videos of the speaker with sound, their truth, the marker models and a pipeline.toml into DIR.
     Draw {
+        /// The demo's folder; made if it is not there.
         dir: PathBuf,
         /// How many videos.
         #[arg(long, default_value_t = Plan::default().n_videos)]
@@ -40,9 +41,13 @@ enum Part {
         seed: u64,
     },
     /// Hold the keypoints and the dataset of a run in DIR against the truth; exit code 2 where a target is missed.
-    Measure { dir: PathBuf },
+    Measure {
+        /// The demo's folder.
+        dir: PathBuf,
+    },
     /// Draw a contact sheet of a run in DIR: video, keypoints, 3D figure, generated motion.
     Sheet {
+        /// The demo's folder.
         dir: PathBuf,
         /// The picture to write, .png.
         #[arg(long, value_name = "FILE")]
