@@ -2,7 +2,7 @@
 //! passes of the two built from parts. Training uses the batch's statistics and follows them with running ones;
 //! evaluation uses the running ones.
 
-use super::cpu::{GRAIN, Real, is_f64, read, slice};
+use super::cpu::{GRAIN, LANES, Real, is_f64, read, slice, sum};
 use super::params::{Init, Params};
 use candle_core::backend::BackendStorage;
 use candle_core::{CpuStorage, CustomOp3, Device, Layout, Result, Shape, Tensor, Var};
@@ -97,25 +97,48 @@ fn rows<T>(x: &[T], c: usize, (_, channels, len): Sizes) -> impl Iterator<Item =
     x.chunks_exact(len).skip(c).step_by(channels)
 }
 
-/// Sum over a row in eight lanes, which the compiler turns into vector instructions; always in the same order.
-fn sum<T: Real>(row: impl ExactSizeIterator<Item = T>) -> f64 {
-    let mut lanes = [T::zero(); 8];
-    for (i, value) in row.enumerate() {
-        lanes[i % 8] += value;
-    }
-    lanes.iter().map(|lane| lane.to_f64()).sum()
-}
-
 fn measure<T: Real>(x: &[T], s: Sizes) -> Statistics {
     let n = (s.0 * s.2) as f64;
     let per_channel = |c: usize| {
-        let mean = rows(x, c, s).map(|row| sum(row.iter().copied())).sum::<f64>() / n;
-        let centre = T::from_f64(mean);
-        let squares = |row: &[T]| sum(row.iter().map(|v| (*v - centre) * (*v - centre)));
-        (mean, rows(x, c, s).map(squares).sum::<f64>() / n)
+        let mean = rows(x, c, s).map(sum).sum::<f64>() / n;
+        (mean, rows(x, c, s).map(|row| sum_of_squares(row, T::from_f64(mean))).sum::<f64>() / n)
     };
     let (mean, variance) = (0..s.1).into_par_iter().with_min_len(GRAIN / (s.0 * s.2)).map(per_channel).unzip();
     Statistics { mean, variance }
+}
+
+/// The sum of `(x - centre)^2`, always in the same order.
+fn sum_of_squares<T: Real>(x: &[T], centre: T) -> f64 {
+    let (chunks, rest) = x.as_chunks::<LANES>();
+    let mut lanes = [T::zero(); LANES];
+    let add = |lane: &mut T, x: &T| *lane += (*x - centre) * (*x - centre);
+    chunks.iter().for_each(|x| lanes.iter_mut().zip(x).for_each(|(lane, x)| add(lane, x)));
+    lanes.iter_mut().zip(rest).for_each(|(lane, x)| add(lane, x));
+    lanes.iter().map(|lane| lane.to_f64()).sum()
+}
+
+/// The sums of `grad` and of `grad * (x - centre)`, `grad` being taken back through the activation whose result is
+/// `y`; always in the same order.
+fn sums_of_gradient<T: Real>(x: &[T], y: &[T], grad: &[T], centre: T, slope: T) -> (f64, f64) {
+    let (xs, ys, grads) = (x.as_chunks::<LANES>(), y.as_chunks::<LANES>(), grad.as_chunks::<LANES>());
+    let (mut plain, mut product) = ([T::zero(); LANES], [T::zero(); LANES]);
+    let mut add = |x: &[T], y: &[T], grad: &[T]| {
+        let lanes = plain.iter_mut().zip(&mut product);
+        for ((lanes, x), (y, grad)) in lanes.zip(x).zip(y.iter().zip(grad)) {
+            let grad = before_activation(*y, *grad, slope);
+            *lanes.0 += grad;
+            *lanes.1 += grad * (*x - centre);
+        }
+    };
+    xs.0.iter().zip(ys.0).zip(grads.0).for_each(|((x, y), grad)| add(x, y, grad));
+    add(xs.1, ys.1, grads.1);
+    let total = |lanes: [T; LANES]| lanes.iter().map(|lane| lane.to_f64()).sum();
+    (total(plain), total(product))
+}
+
+/// The gradient before the leaky ReLU whose result is `y`.
+fn before_activation<T: Real>(y: T, grad: T, slope: T) -> T {
+    if y > T::zero() { grad } else { grad * slope }
 }
 
 impl Op {
@@ -139,15 +162,14 @@ impl Op {
     /// Gradients of the input, the weight and the bias.
     fn backward<T: Real>(&self, x: &[T], weight: &[T], y: &[T], grad: &[T], s: Sizes) -> (Vec<T>, Vec<T>, Vec<T>) {
         let statistics = self.statistics.get_or_init(|| measure(x, s));
-        let (zero, one, slope) = (T::zero(), T::one(), T::from_f64(self.slope));
-        let before_activation = move |y: T, grad: T| grad * if y > zero { one } else { slope };
+        let slope = T::from_f64(self.slope);
         let per_channel = |c: usize| {
             let centre = T::from_f64(statistics.mean[c]);
             let (mut of_bias, mut of_product) = (0.0, 0.0);
             for ((x, y), grad) in rows(x, c, s).zip(rows(y, c, s)).zip(rows(grad, c, s)) {
-                let pairs = || y.iter().zip(grad).map(move |(y, grad)| before_activation(*y, *grad));
-                of_bias += sum(pairs());
-                of_product += sum(pairs().zip(x).map(|(grad, x)| grad * (*x - centre)));
+                let (plain, product) = sums_of_gradient(x, y, grad, centre, slope);
+                of_bias += plain;
+                of_product += product;
             }
             let inverse = 1.0 / (statistics.variance[c] + self.eps).sqrt();
             (T::from_f64(of_product * inverse), T::from_f64(of_bias))
@@ -155,7 +177,7 @@ impl Op {
         let (grad_weight, grad_bias): (Vec<T>, Vec<T>) =
             (0..s.1).into_par_iter().with_min_len(GRAIN / (s.0 * s.2)).map(per_channel).unzip();
         let n = (s.0 * s.2) as f64;
-        let mut grad_x = vec![zero; x.len()];
+        let mut grad_x = vec![T::zero(); x.len()];
         let inputs = x.par_chunks(s.2).zip(y.par_chunks(s.2)).zip(grad.par_chunks(s.2));
         grad_x.par_chunks_mut(s.2).zip(inputs).with_min_len(GRAIN / s.2).enumerate().for_each(
             |(row, (out, ((x, y), grad)))| {
@@ -168,7 +190,7 @@ impl Op {
                 let linear = T::from_f64(-moving * grad_weight[c].to_f64() * inverse);
                 let centre = T::from_f64(statistics.mean[c]);
                 for (((out, x), y), grad) in out.iter_mut().zip(x).zip(y).zip(grad) {
-                    *out = scale * before_activation(*y, *grad) + constant + linear * (*x - centre);
+                    *out = scale * before_activation(*y, *grad, slope) + constant + linear * (*x - centre);
                 }
             },
         );

@@ -2,10 +2,10 @@
 //! batch larger than one). All frames of the whole batch become the columns of one matrix, so that a pass is one
 //! matrix product; sums run in a fixed order, so results do not depend on the number of threads.
 
-use super::cpu::{GRAIN, Matrix, Real, is_f64, matmul, read, scratch, slice};
+use super::cpu::{GRAIN, Matrix, Real, is_f64, matmul, read, scratch, slice, sum};
 use super::params::{Init, Params};
 use candle_core::backend::BackendStorage;
-use candle_core::{CpuStorage, CustomOp2, Layout, Result, Shape, Tensor};
+use candle_core::{CpuStorage, CustomOp3, Layout, Result, Shape, Tensor};
 use rayon::prelude::*;
 
 /// How a kernel walks over the frames.
@@ -35,9 +35,10 @@ impl Walk {
     }
 }
 
-/// Convolves `x` [B, C, T] with `weight` [O, C, K]: [B, O, T'], T' = `walk.n_out(T, K)`. f32 or f64, on the CPU.
-pub fn conv1d(x: &Tensor, weight: &Tensor, walk: Walk) -> Result<Tensor> {
-    x.contiguous()?.apply_op2(&weight.contiguous()?, Op { walk })
+/// Convolves `x` [B, C, T] with `weight` [O, C, K] and adds `bias` [O]: [B, O, T'], T' = `walk.n_out(T, K)`. f32 or
+/// f64, on the CPU.
+pub fn conv1d(x: &Tensor, weight: &Tensor, bias: &Tensor, walk: Walk) -> Result<Tensor> {
+    x.contiguous()?.apply_op3(&weight.contiguous()?, &bias.contiguous()?, Op { walk })
 }
 
 /// Padding of a layer.
@@ -51,7 +52,8 @@ pub enum Padding {
 /// A convolution with its weights: `<name>.weight` [O, C, K], Glorot uniform, and `<name>.bias` [O], zero.
 pub struct Conv1d {
     weight: Tensor,
-    bias: Option<Tensor>,
+    /// Constant zeros for a layer without bias.
+    bias: Tensor,
     stride: usize,
     dilation: usize,
     padding: Padding,
@@ -61,7 +63,7 @@ impl Conv1d {
     /// `n_in` channels to `n_out`, stride 1, no dilation, padding "same", with bias.
     pub fn new(params: &mut Params, name: &str, n_in: usize, n_out: usize, kernel: usize) -> Result<Self> {
         let weight = params.trainable(&format!("{name}.weight"), &[n_out, n_in, kernel], Init::Glorot)?;
-        let bias = Some(params.trainable(&format!("{name}.bias"), &[n_out], Init::Constant(0.0))?);
+        let bias = params.trainable(&format!("{name}.bias"), &[n_out], Init::Constant(0.0))?;
         Ok(Self { weight, bias, stride: 1, dilation: 1, padding: Padding::Same })
     }
 
@@ -75,7 +77,8 @@ impl Conv1d {
         dilation: usize,
     ) -> Result<Self> {
         let weight = params.trainable(&format!("{name}.weight"), &[n_out, n_in, kernel], Init::Glorot)?;
-        Ok(Self { weight, bias: None, stride: 1, dilation, padding: Padding::Valid })
+        let bias = Tensor::zeros(n_out, weight.dtype(), weight.device())?;
+        Ok(Self { weight, bias, stride: 1, dilation, padding: Padding::Valid })
     }
 
     /// Every `stride`-th output only.
@@ -90,21 +93,14 @@ impl Conv1d {
             Padding::Same => Walk::same(x.dim(2)?, kernel, self.stride),
             Padding::Valid => Walk { stride: self.stride, dilation: self.dilation, pad: (0, 0) },
         };
-        self.add_bias(conv1d(x, &self.weight, walk)?)
+        conv1d(x, &self.weight, &self.bias, walk)
     }
 
     /// The strided form of a dilated layer: the same weights on frames that lie `dilation` apart already, kernels
     /// side by side without overlap, so that a training window of one receptive field costs no wasted work.
     pub fn forward_strided(&self, x: &Tensor) -> Result<Tensor> {
         let (_, _, kernel) = self.weight.dims3()?;
-        self.add_bias(conv1d(x, &self.weight, Walk { stride: kernel, ..Walk::VALID })?)
-    }
-
-    fn add_bias(&self, y: Tensor) -> Result<Tensor> {
-        match &self.bias {
-            Some(bias) => y.broadcast_add(&bias.reshape((1, (), 1))?),
-            None => Ok(y),
-        }
+        conv1d(x, &self.weight, &self.bias, Walk { stride: kernel, ..Walk::VALID })
     }
 }
 
@@ -125,11 +121,17 @@ struct Sizes {
 }
 
 impl Op {
-    fn sizes(&self, x: (usize, usize, usize), weight: (usize, usize, usize)) -> Result<Sizes> {
+    fn sizes(&self, x: (usize, usize, usize), weight: (usize, usize, usize), n_bias: usize) -> Result<Sizes> {
         let ((batch, n_in, t_in), (n_out, w_in, kernel)) = (x, weight);
-        let t_out = self.walk.n_out(t_in, kernel).filter(|_| n_in == w_in && batch > 0);
+        let t_out = self
+            .walk
+            .n_out(t_in, kernel)
+            .filter(|_| n_in == w_in && n_bias == n_out && n_in * n_out * batch * t_in > 0);
         let Some(t_out) = t_out else {
-            candle_core::bail!("conv1d: input {x:?} does not fit weight {weight:?} with {:?}", self.walk);
+            candle_core::bail!(
+                "conv1d: input {x:?} does not fit weight {weight:?}, bias {n_bias} with {:?}",
+                self.walk
+            );
         };
         Ok(Sizes { batch, n_in, n_out, kernel, t_in, t_out, n: batch * t_out, depth: n_in * kernel })
     }
@@ -162,39 +164,44 @@ impl Op {
         });
     }
 
-    fn forward<T: Real>(&self, x: &[T], weight: &[T], s: &Sizes) -> Vec<T> {
+    fn forward<T: Real>(&self, x: &[T], weight: &[T], bias: &[T], s: &Sizes) -> Vec<T> {
         let mut y = vec![T::zero(); s.n_out * s.n];
-        scratch(s.depth * s.n, |columns: &mut [T]| {
+        scratch(s.depth * s.n + y.len(), |memory: &mut [T]| {
+            let (columns, product) = memory.split_at_mut(s.depth * s.n);
             self.columns(columns, x, s);
-            let (weight, columns) = (Matrix::new(weight, s.depth), Matrix::new(columns, s.n));
-            if s.batch == 1 {
-                return matmul(&mut y, weight, columns, s.n_out, s.n, s.depth);
-            }
-            scratch(y.len(), |product: &mut [T]| {
-                matmul(product, weight, columns, s.n_out, s.n, s.depth);
-                swap_outer(&mut y, product, s.n_out, s.batch, s.t_out);
+            matmul(product, Matrix::new(weight, s.depth), Matrix::new(columns, s.n), s.n_out, s.n, s.depth);
+            y.par_chunks_mut(s.t_out).with_min_len(GRAIN / s.t_out).enumerate().for_each(|(row, y)| {
+                let (b, o) = (row / s.n_out, row % s.n_out);
+                let product = &product[(o * s.batch + b) * s.t_out..][..s.t_out];
+                y.iter_mut().zip(product).for_each(|(y, sum)| *y = *sum + bias[o]);
             });
         });
         y
     }
 
-    /// Gradients of `x` and of `weight`.
-    fn backward<T: Real>(&self, x: &[T], weight: &[T], grad: &[T], s: &Sizes) -> (Vec<T>, Vec<T>) {
-        let mut grad_x = vec![T::zero(); s.batch * s.n_in * s.t_in];
-        let mut grad_weight = vec![T::zero(); s.n_out * s.depth];
-        scratch(grad.len(), |grad_rows: &mut [T]| {
-            swap_outer(grad_rows, grad, s.batch, s.n_out, s.t_out);
-            let grad_rows = Matrix::new(grad_rows, s.n);
-            scratch(s.depth * s.n, |columns: &mut [T]| {
-                self.columns(columns, x, s);
-                let columns_of_x = Matrix::new(columns, s.n).transposed();
-                matmul(&mut grad_weight, grad_rows, columns_of_x, s.n_out, s.depth, s.n);
-                let weight = Matrix::new(weight, s.depth).transposed();
-                matmul(columns, weight, grad_rows, s.depth, s.n, s.n_out);
-                self.uncolumns(&mut grad_x, columns, s);
-            });
+    /// Gradients of `x`, of the weight and of the bias.
+    fn backward<T: Real>(&self, x: &[T], weight: &[T], grad: &[T], s: &Sizes) -> [Vec<T>; 3] {
+        let zeros = |n| vec![T::zero(); n];
+        let mut grad_x = zeros(s.batch * s.n_in * s.t_in);
+        let (mut grad_weight, mut grad_bias) = (zeros(s.n_out * s.depth), zeros(s.n_out));
+        scratch(s.depth * s.n + grad.len(), |memory: &mut [T]| {
+            let (columns, rows) = memory.split_at_mut(s.depth * s.n);
+            // Gradient of the batch as one row an output channel.
+            rows.par_chunks_mut(s.n).zip(&mut grad_bias).with_min_len(GRAIN / s.n).enumerate().for_each(
+                |(o, (row, grad_bias))| {
+                    for (b, row) in row.chunks_exact_mut(s.t_out).enumerate() {
+                        row.copy_from_slice(&grad[(b * s.n_out + o) * s.t_out..][..s.t_out]);
+                    }
+                    *grad_bias = T::from_f64(sum(row));
+                },
+            );
+            let rows = Matrix::new(rows, s.n);
+            self.columns(columns, x, s);
+            matmul(&mut grad_weight, rows, Matrix::new(columns, s.n).transposed(), s.n_out, s.depth, s.n);
+            matmul(columns, Matrix::new(weight, s.depth).transposed(), rows, s.depth, s.n, s.n_out);
+            self.uncolumns(&mut grad_x, columns, s);
         });
-        (grad_x, grad_weight)
+        [grad_x, grad_weight, grad_bias]
     }
 
     /// The transpose of `columns`: every column entry is added to the input frame it came from, taps in order.
@@ -213,41 +220,51 @@ impl Op {
     }
 }
 
-/// `to[b][a] = from[a][b]` for runs of `len` numbers, `from` being [n_a, n_b, len].
-fn swap_outer<T: Real>(to: &mut [T], from: &[T], n_a: usize, n_b: usize, len: usize) {
-    to.par_chunks_mut(len).with_min_len(GRAIN / len).enumerate().for_each(|(row, to)| {
-        let (b, a) = (row / n_a, row % n_a);
-        to.copy_from_slice(&from[(a * n_b + b) * len..][..len]);
-    });
-}
-
-impl CustomOp2 for Op {
+impl CustomOp3 for Op {
     fn name(&self) -> &'static str {
         "conv1d over time"
     }
 
-    fn cpu_fwd(&self, x: &CpuStorage, lx: &Layout, w: &CpuStorage, lw: &Layout) -> Result<(CpuStorage, Shape)> {
-        let s = self.sizes(lx.shape().dims3()?, lw.shape().dims3()?)?;
+    fn cpu_fwd(
+        &self,
+        x: &CpuStorage,
+        lx: &Layout,
+        w: &CpuStorage,
+        lw: &Layout,
+        b: &CpuStorage,
+        lb: &Layout,
+    ) -> Result<(CpuStorage, Shape)> {
+        let s = self.sizes(lx.shape().dims3()?, lw.shape().dims3()?, lb.shape().dims1()?)?;
         let y = if is_f64(x.dtype())? {
-            CpuStorage::F64(self.forward(slice(x, lx)?, slice(w, lw)?, &s))
+            CpuStorage::F64(self.forward(slice(x, lx)?, slice(w, lw)?, slice(b, lb)?, &s))
         } else {
-            CpuStorage::F32(self.forward(slice(x, lx)?, slice(w, lw)?, &s))
+            CpuStorage::F32(self.forward(slice(x, lx)?, slice(w, lw)?, slice(b, lb)?, &s))
         };
         Ok((y, Shape::from((s.batch, s.n_out, s.t_out))))
     }
 
-    fn bwd(&self, x: &Tensor, w: &Tensor, _y: &Tensor, grad: &Tensor) -> Result<(Option<Tensor>, Option<Tensor>)> {
-        fn typed<T: Real>(op: &Op, x: &Tensor, w: &Tensor, grad: &Tensor) -> Result<(Tensor, Tensor)> {
-            let s = op.sizes(x.dims3()?, w.dims3()?)?;
-            let (grad_x, grad_w) = read::<T, _>(x, |x_slice| {
-                read::<T, _>(w, |w| read::<T, _>(grad, |grad| Ok(op.backward(x_slice, w, grad, &s))))
-            })?;
+    fn bwd(
+        &self,
+        x: &Tensor,
+        w: &Tensor,
+        b: &Tensor,
+        _y: &Tensor,
+        grad: &Tensor,
+    ) -> Result<(Option<Tensor>, Option<Tensor>, Option<Tensor>)> {
+        fn typed<T: Real>(op: &Op, x: &Tensor, w: &Tensor, grad: &Tensor, s: &Sizes) -> Result<[Tensor; 3]> {
+            let [grad_x, grad_w, grad_b] =
+                read::<T, _>(x, |x| read::<T, _>(w, |w| read::<T, _>(grad, |grad| Ok(op.backward(x, w, grad, s)))))?;
             let device = x.device();
-            Ok((Tensor::from_vec(grad_x, x.shape(), device)?, Tensor::from_vec(grad_w, w.shape(), device)?))
+            Ok([
+                Tensor::from_vec(grad_x, x.shape(), device)?,
+                Tensor::from_vec(grad_w, w.shape(), device)?,
+                Tensor::from_vec(grad_b, s.n_out, device)?,
+            ])
         }
-        let (grad_x, grad_w) =
-            if is_f64(x.dtype())? { typed::<f64>(self, x, w, grad)? } else { typed::<f32>(self, x, w, grad)? };
-        Ok((Some(grad_x), Some(grad_w)))
+        let s = self.sizes(x.dims3()?, w.dims3()?, b.dims1()?)?;
+        let typed = if is_f64(x.dtype())? { typed::<f64> } else { typed::<f32> };
+        let [grad_x, grad_w, grad_b] = typed(self, x, w, grad, &s)?;
+        Ok((Some(grad_x), Some(grad_w), Some(grad_b)))
     }
 }
 
@@ -257,14 +274,16 @@ mod tests {
     use crate::nn::finite_difference::{pattern, worst};
 
     /// The sum as written in a textbook.
-    fn by_definition(x: &Tensor, weight: &Tensor, walk: Walk) -> Result<Vec<f64>> {
+    fn by_definition(x: &Tensor, weight: &Tensor, bias: &Tensor, walk: Walk) -> Result<Vec<f64>> {
         let (batch, n_in, t_in) = x.dims3()?;
         let (n_out, _, kernel) = weight.dims3()?;
         let (x, weight) = (x.flatten_all()?.to_vec1::<f64>()?, weight.flatten_all()?.to_vec1::<f64>()?);
+        let bias = bias.to_vec1::<f64>()?;
         let t_out = walk.n_out(t_in, kernel).unwrap_or(0);
         let mut y = vec![0.0; batch * n_out * t_out];
         for (i, y) in y.iter_mut().enumerate() {
             let (b, o, t) = (i / (n_out * t_out), i / t_out % n_out, i % t_out);
+            *y = bias[o];
             for (c, k) in (0..n_in).flat_map(|c| (0..kernel).map(move |k| (c, k))) {
                 let at = t * walk.stride + k * walk.dilation;
                 if at >= walk.pad.0 && at < walk.pad.0 + t_in {
@@ -292,11 +311,12 @@ mod tests {
         ] {
             let walk = Walk { stride, dilation, pad };
             let (x, weight) = (pattern(&[batch, 3, n_frames], 0.0)?, pattern(&[4, 3, kernel], 7.0)?);
-            let y = conv1d(&x, &weight, walk)?.flatten_all()?.to_vec1::<f64>()?;
-            let expected = by_definition(&x, &weight, walk)?;
+            let bias = pattern(&[4], 3.0)?;
+            let y = conv1d(&x, &weight, &bias, walk)?.flatten_all()?.to_vec1::<f64>()?;
+            let expected = by_definition(&x, &weight, &bias, walk)?;
             assert_eq!(y.len(), expected.len());
             assert!(y.iter().zip(&expected).all(|(y, e)| (y - e).abs() < 1e-12), "{walk:?} kernel {kernel}");
-            let error = worst(&[x, weight], |v| conv1d(&v[0], &v[1], walk))?;
+            let error = worst(&[x, weight, bias], |v| conv1d(&v[0], &v[1], &v[2], walk))?;
             assert!(error < 1e-7, "{walk:?} kernel {kernel}: {error}");
         }
         Ok(())
@@ -316,11 +336,12 @@ mod tests {
     fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
         let x = pattern(&[5, 40, 61], 0.0)?.to_dtype(candle_core::DType::F32)?;
         let weight = candle_core::Var::from_tensor(&pattern(&[70, 40, 3], 1.0)?.to_dtype(candle_core::DType::F32)?)?;
+        let bias = pattern(&[70], 5.0)?.to_dtype(candle_core::DType::F32)?;
         let run = |n_threads| -> Result<Vec<Vec<f32>>> {
             let pool =
                 rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().map_err(candle_core::Error::wrap)?;
             pool.install(|| {
-                let y = conv1d(&x, &weight, Walk::same(61, 3, 1))?;
+                let y = conv1d(&x, &weight, &bias, Walk::same(61, 3, 1))?;
                 let gradients = y.sqr()?.sum_all()?.backward()?;
                 let gradient = gradients.get(&weight).ok_or_else(|| candle_core::Error::msg("no gradient"))?;
                 Ok(vec![y.flatten_all()?.to_vec1()?, gradient.flatten_all()?.to_vec1()?])
@@ -333,8 +354,10 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_an_error() -> Result<()> {
         let (x, weight) = (pattern(&[2, 3, 2], 0.0)?, pattern(&[4, 3, 3], 0.0)?);
-        assert!(conv1d(&x, &weight, Walk::VALID).is_err());
-        assert!(conv1d(&x, &pattern(&[4, 2, 1], 0.0)?, Walk::VALID).is_err());
+        let bias = pattern(&[4], 0.0)?;
+        assert!(conv1d(&x, &weight, &bias, Walk::VALID).is_err());
+        assert!(conv1d(&x, &pattern(&[4, 2, 1], 0.0)?, &bias, Walk::VALID).is_err());
+        assert!(conv1d(&x, &pattern(&[4, 3, 1], 0.0)?, &bias.narrow(0, 0, 1)?, Walk::VALID).is_err());
         Ok(())
     }
 }

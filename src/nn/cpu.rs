@@ -7,8 +7,10 @@ use rayon::prelude::*;
 use std::cell::RefCell;
 use std::thread::LocalKey;
 
-/// Rows of a product one task computes.
-const TILE_ROWS: usize = 32;
+/// Rows and columns of a product one task computes.
+const TILE: (usize, usize) = (128, 256);
+/// Numbers summed side by side, as the processor does best.
+pub const LANES: usize = 16;
 /// A piece of element-wise work is at least this many numbers.
 pub const GRAIN: usize = 16 * 1024;
 
@@ -98,24 +100,31 @@ pub fn matmul<T: Real>(product: &mut [T], left: Matrix<T>, right: Matrix<T>, m: 
     };
     assert!(product.len() == m * n && depth > 0, "product of {m} x {n} over {depth}");
     assert!(reach(left, m, depth) < left.data.len() && reach(right, depth, n) < right.data.len());
-    product.par_chunks_mut(TILE_ROWS * n).enumerate().for_each(|(tile, rows)| {
-        let left_rows = &left.data[tile * TILE_ROWS * left.row_stride..];
-        // SAFETY: the asserts above bound every address gemm reads; it writes `rows`, row-major and ours alone.
+    let strides = |matrix: Matrix<T>| (matrix.row_stride as isize, matrix.column_stride as isize);
+    let (left_strides, right_strides) = (strides(left), strides(right));
+    let (tiles_down, tiles_across) = (m.div_ceil(TILE.0), n.div_ceil(TILE.1));
+    let start = Start(product.as_mut_ptr());
+    (0..tiles_down * tiles_across).into_par_iter().for_each(|tile| {
+        let (row, column) = (tile / tiles_across * TILE.0, tile % tiles_across * TILE.1);
+        let left = &left.data[row * left.row_stride..];
+        let right = &right.data[column * right.column_stride..];
+        // SAFETY: the asserts above bound every address gemm reads; it writes rows `row..` and columns `column..` of
+        // `product`, row-major, and no other task writes these.
         unsafe {
             gemm::gemm(
-                rows.len() / n,
-                n,
+                TILE.0.min(m - row),
+                TILE.1.min(n - column),
                 depth,
-                rows.as_mut_ptr(),
+                start.at(row * n + column),
                 1,
                 n as isize,
                 false,
-                left_rows.as_ptr(),
-                left.column_stride as isize,
-                left.row_stride as isize,
-                right.data.as_ptr(),
-                right.column_stride as isize,
-                right.row_stride as isize,
+                left.as_ptr(),
+                left_strides.1,
+                left_strides.0,
+                right.as_ptr(),
+                right_strides.1,
+                right_strides.0,
                 T::zero(),
                 T::one(),
                 false,
@@ -127,13 +136,38 @@ pub fn matmul<T: Real>(product: &mut [T], left: Matrix<T>, right: Matrix<T>, m: 
     });
 }
 
+/// Where a product begins: tasks write disjoint tiles of it.
+#[derive(Clone, Copy)]
+struct Start<T>(*mut T);
+
+// SAFETY: only the address is shared; who writes where is the affair of `matmul`.
+unsafe impl<T: Send> Send for Start<T> {}
+unsafe impl<T: Send> Sync for Start<T> {}
+
+impl<T> Start<T> {
+    /// SAFETY: `offset` lies inside the product.
+    unsafe fn at(self, offset: usize) -> *mut T {
+        unsafe { self.0.add(offset) }
+    }
+}
+
+/// The sum of `values`, always in the same order.
+pub fn sum<T: Real>(values: &[T]) -> f64 {
+    let (chunks, rest) = values.as_chunks::<LANES>();
+    let mut lanes = [T::zero(); LANES];
+    for chunk in chunks {
+        lanes.iter_mut().zip(chunk).for_each(|(lane, v)| *lane += *v);
+    }
+    lanes.iter().chain(rest).map(|v| v.to_f64()).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn products_agree_with_the_definition() {
-        let (m, n, depth) = (45, 7, 33);
+        let (m, n, depth) = (145, 300, 33);
         let left: Vec<f64> = (0..m * depth).map(|i| (i as f64 * 0.7).sin()).collect();
         let right: Vec<f64> = (0..n * depth).map(|i| (i as f64 * 0.3).cos()).collect();
         let mut product = vec![f64::NAN; m * n];

@@ -1,12 +1,45 @@
 //! Changing the number of frames: twice as many by repetition, any number by linear interpolation.
 
-use candle_core::{Device, Result, Tensor};
+use super::cpu::{Real, is_f64, read, slice};
+use candle_core::backend::BackendStorage;
+use candle_core::{CpuStorage, CustomOp1, Device, Layout, Result, Shape, Tensor};
 
-/// Every frame twice: [B, C, T] to [B, C, 2T]. Built from parts whose gradients add up where `x` is used again (the
-/// stock upsampling overwrites them).
+/// Every frame twice: [B, C, T] to [B, C, 2T]. An own operator: the stock one overwrites the gradient where `x` is
+/// used again.
 pub fn twice(x: &Tensor) -> Result<Tensor> {
-    let (batch, channels, n_frames) = x.dims3()?;
-    x.unsqueeze(3)?.broadcast_as((batch, channels, n_frames, 2))?.reshape((batch, channels, 2 * n_frames))
+    x.contiguous()?.apply_op1(Twice)
+}
+
+struct Twice;
+
+impl CustomOp1 for Twice {
+    fn name(&self) -> &'static str {
+        "every frame twice"
+    }
+
+    fn cpu_fwd(&self, x: &CpuStorage, layout: &Layout) -> Result<(CpuStorage, Shape)> {
+        fn repeat<T: Real>(x: &[T]) -> Vec<T> {
+            x.iter().flat_map(|v| [*v, *v]).collect()
+        }
+        let (batch, channels, n_frames) = layout.shape().dims3()?;
+        let y = if is_f64(x.dtype())? {
+            CpuStorage::F64(repeat(slice(x, layout)?))
+        } else {
+            CpuStorage::F32(repeat(slice(x, layout)?))
+        };
+        Ok((y, Shape::from((batch, channels, 2 * n_frames))))
+    }
+
+    fn bwd(&self, x: &Tensor, _y: &Tensor, grad: &Tensor) -> Result<Option<Tensor>> {
+        fn typed<T: Real>(grad: &Tensor) -> Result<Vec<T>> {
+            read::<T, _>(grad, |grad| Ok(grad.as_chunks::<2>().0.iter().map(|[a, b]| *a + *b).collect()))
+        }
+        Ok(Some(if is_f64(grad.dtype())? {
+            Tensor::from_vec(typed::<f64>(grad)?, x.shape(), x.device())?
+        } else {
+            Tensor::from_vec(typed::<f32>(grad)?, x.shape(), x.device())?
+        }))
+    }
 }
 
 /// Linear interpolation to `n_out` frames, [B, C, T] to [B, C, n_out], as TensorFlow 1 does without aligned corners:
