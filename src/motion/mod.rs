@@ -2,10 +2,12 @@
 
 pub mod authors_txt;
 pub mod bones;
+pub mod bvh_read;
 pub mod bvh_write;
 pub mod fk;
 pub mod joints_npz;
 pub mod keypoints_npz;
+pub mod mocap;
 pub mod npy;
 pub mod npz;
 pub mod procrustes;

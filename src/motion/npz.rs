@@ -30,6 +30,11 @@ impl Npz {
         Ok(Self { path: path.to_owned(), names, reader })
     }
 
+    /// Names of the arrays, in the order of the file.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
     /// Whether the file has this array.
     pub fn has(&self, name: &str) -> bool {
         self.names.iter().any(|n| n == name)

@@ -1,0 +1,232 @@
+//! Captured motion as the body lifter needs it: nine points of the upper body in camera-like axes, from BVH files and
+//! from `.npz` files of joint positions (CMU, 38 joints, millimetres). What is cut away: the T-pose a file begins
+//! with, and stretches are divided where the body jumps.
+
+use super::bvh_read::{Bvh, Positions};
+use super::npz::Npz;
+use super::vec3::{self, Vec3};
+use anyhow::{Context, Result, bail, ensure};
+use std::path::{Path, PathBuf};
+
+/// Points of the upper body: nose, right shoulder, elbow, wrist, left the same, right hip, left hip.
+pub const N_POINTS: usize = 9;
+pub const NOSE: usize = 0;
+pub const R_SHOULDER: usize = 1;
+pub const R_ELBOW: usize = 2;
+pub const R_WRIST: usize = 3;
+pub const L_SHOULDER: usize = 4;
+pub const L_ELBOW: usize = 5;
+pub const L_WRIST: usize = 6;
+pub const R_HIP: usize = 7;
+pub const L_HIP: usize = 8;
+
+/// The same point of the other side.
+pub const MIRROR: [usize; N_POINTS] = [NOSE, L_SHOULDER, L_ELBOW, L_WRIST, R_SHOULDER, R_ELBOW, R_WRIST, L_HIP, R_HIP];
+
+/// Nine points in metres relative to the neck (the middle of the shoulders): x right as seen from in front, y down,
+/// z away from a camera in front.
+pub type Pose = [Vec3; N_POINTS];
+
+/// A continuous stretch of captured motion.
+#[derive(Clone, Debug)]
+pub struct Take {
+    pub name: String,
+    pub fps: f64,
+    pub poses: Vec<Pose>,
+}
+
+/// Joint names of the kinds of BVH known, in the order neck, head, right upper arm, forearm, hand, left the same,
+/// right thigh, left thigh.
+const BVH_NAMES: [[&str; 10]; 2] = [
+    [
+        "CC_Base_NeckTwist01",
+        "CC_Base_Head",
+        "CC_Base_R_Upperarm",
+        "CC_Base_R_Forearm",
+        "CC_Base_R_Hand",
+        "CC_Base_L_Upperarm",
+        "CC_Base_L_Forearm",
+        "CC_Base_L_Hand",
+        "CC_Base_R_Thigh",
+        "CC_Base_L_Thigh",
+    ],
+    [
+        "Neck",
+        "Head",
+        "UpperArm_R",
+        "LowerArm_R",
+        "Hand_R",
+        "UpperArm_L",
+        "LowerArm_L",
+        "Hand_L",
+        "UpperLeg_R",
+        "UpperLeg_L",
+    ],
+];
+
+/// The same ten joints among the 38 of the CMU `.npz`.
+const CMU_38: [usize; 10] = [17, 18, 30, 31, 32, 21, 22, 23, 8, 2];
+
+/// Frames at the start of a `.npz` take that are a T-pose, not motion.
+const T_POSE_FRAMES: usize = 1;
+/// The points move less than this on average between two frames at 60 fps, in metres; else the take is divided.
+const LARGEST_JUMP: f64 = 0.1;
+/// Shorter stretches hold no motion to learn from, in seconds.
+const SHORTEST_SECS: f64 = 1.0;
+
+/// All takes below `paths`: BVH or `.npz` files, or folders searched for them, in the order of their names.
+/// Errors: nothing found, a file that cannot be read or whose joints have unknown names.
+pub fn read_all(paths: &[PathBuf]) -> Result<Vec<Take>> {
+    let mut files = Vec::new();
+    for path in paths {
+        if path.is_dir() { find(path, &mut files)? } else { files.push(path.clone()) }
+    }
+    ensure!(!files.is_empty(), "no .bvh or .npz file in {paths:?}");
+    let mut takes = Vec::new();
+    for file in files {
+        takes.extend(read(&file)?);
+    }
+    ensure!(!takes.is_empty(), "no stretch of motion of {SHORTEST_SECS} s or more in {paths:?}");
+    Ok(takes)
+}
+
+/// The takes of one file, by its extension.
+pub fn read(path: &Path) -> Result<Vec<Take>> {
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("bvh") => read_bvh(path),
+        Some("npz") => read_cmu_npz(path),
+        _ => bail!("{}: captured motion is read from .bvh and .npz files", path.display()),
+    }
+}
+
+fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
+    let entries = std::fs::read_dir(folder).with_context(|| format!("cannot list {}", folder.display()))?;
+    let mut entries = entries.map(|e| Ok(e?.path())).collect::<Result<Vec<_>>>()?;
+    entries.sort();
+    for path in entries {
+        if path.is_dir() {
+            find(&path, files)?;
+        } else if path.extension().is_some_and(|e| e == "bvh" || e == "npz") {
+            files.push(path);
+        }
+    }
+    Ok(())
+}
+
+fn read_bvh(path: &Path) -> Result<Vec<Take>> {
+    let bvh = Bvh::read(path)?;
+    let named = |names: &[&str; 10]| names.iter().map(|n| bvh.find(n)).collect::<Option<Vec<usize>>>();
+    let Some(joints) = BVH_NAMES.iter().find_map(named) else {
+        let known: Vec<String> = BVH_NAMES.iter().map(|n| n.join(" ")).collect();
+        bail!("{}: unknown joint names; known are: {}", path.display(), known.join("; or: "));
+    };
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    let poses = bvh
+        .positions(Positions::Auto)
+        .into_iter()
+        .map(|p| joints.iter().map(|&j| vec3::scale(p[j], 0.01)).collect::<Vec<_>>());
+    Ok(divided(&name, 1.0 / bvh.frame_secs, poses.map(|p| upper_body(&p)).collect()))
+}
+
+fn read_cmu_npz(path: &Path) -> Result<Vec<Take>> {
+    let mut npz = Npz::open(path)?;
+    let fps = npz.frame_rate("fps")?.per_sec();
+    let mut names: Vec<String> =
+        npz.names().iter().filter(|n| !["fps", "parents", "offsets_mm"].contains(&n.as_str())).cloned().collect();
+    names.sort();
+    let mut takes = Vec::new();
+    for name in names {
+        let joints = npz.numbers(&name, &[None, Some(38), Some(3)])?;
+        let point = |t: usize, j: usize| std::array::from_fn(|k| joints[[t, j, k]] * 0.001);
+        let poses = (T_POSE_FRAMES..joints.shape()[0]).map(|t| upper_body(&CMU_38.map(|j| point(t, j)))).collect();
+        takes.extend(divided(&name, fps, poses));
+    }
+    Ok(takes)
+}
+
+/// Ten joints (order of `BVH_NAMES`), y up and a person at rest facing +z, to a pose. The nose is put 6 cm above and
+/// 11 cm before the head joint, ahead being across the shoulders: no source says how the head is turned.
+fn upper_body(joints: &[Vec3]) -> Pose {
+    let neck = vec3::scale(vec3::add(joints[2], joints[5]), 0.5);
+    let across = vec3::sub(joints[5], joints[2]);
+    let up = vec3::sub(joints[1], joints[0]);
+    let ahead = vec3::unit(vec3::cross(across, up), 1e-9).unwrap_or([0.0, 0.0, 1.0]);
+    let up = vec3::unit(up, 1e-9).unwrap_or([0.0, 1.0, 0.0]);
+    let nose = vec3::add(vec3::add(joints[1], vec3::scale(up, 0.06)), vec3::scale(ahead, 0.11));
+    let order = [nose, joints[2], joints[3], joints[4], joints[5], joints[6], joints[7], joints[8], joints[9]];
+    order.map(|p| {
+        let [x, y, z] = vec3::sub(p, neck);
+        [x, -y, -z]
+    })
+}
+
+/// The stretches between jumps that are long enough.
+fn divided(name: &str, fps: f64, poses: Vec<Pose>) -> Vec<Take> {
+    let limit = LARGEST_JUMP * 60.0 / fps;
+    let jump =
+        |a: &Pose, b: &Pose| (0..N_POINTS).map(|j| vec3::norm(vec3::sub(a[j], b[j]))).sum::<f64>() / N_POINTS as f64;
+    let stretches = poses.chunk_by(|a, b| jump(a, b) <= limit);
+    let long = stretches.filter(|s| s.len() as f64 >= SHORTEST_SECS * fps);
+    long.enumerate().map(|(i, s)| Take { name: format!("{name}#{i}"), fps, poses: s.to_vec() }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::{Array3, arr0};
+    use ndarray_npy::NpzWriter;
+
+    /// A person at rest, arms to the sides, facing +z, y up, millimetres; the first frame is elsewhere.
+    fn standing(n_frames: usize) -> Array3<f32> {
+        let at = [[0., 500., 0.], [0., 600., 0.], [-200., 480., 0.], [-480., 480., 0.], [-700., 480., 0.]];
+        Array3::from_shape_fn((n_frames, 38, 3), |(t, j, k)| {
+            if t == 0 {
+                return 0.0;
+            }
+            let i = CMU_38.iter().position(|&c| c == j);
+            match i {
+                Some(i) if i < 5 => at[i][k],
+                Some(i) if i < 8 => {
+                    if k == 0 {
+                        -at[i - 3][0]
+                    } else {
+                        at[i - 3][k]
+                    }
+                }
+                Some(i) => [if i == 8 { -100. } else { 100. }, 0., 0.][k],
+                None => 0.0,
+            }
+        })
+    }
+
+    #[test]
+    fn axes_turn_to_the_camera_and_the_t_pose_goes() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("m.npz");
+        let mut npz = NpzWriter::new(std::fs::File::create(&path).unwrap());
+        let mut jumping = standing(200);
+        jumping.slice_mut(ndarray::s![100.., .., 1]).mapv_inplace(|v| -v);
+        npz.add_array("jumping", &jumping).unwrap();
+        npz.add_array("still", &standing(80)).unwrap();
+        npz.add_array("fps", &arr0(60f32)).unwrap();
+        npz.finish().unwrap();
+        let takes = read_all(&[dir.path().to_owned()]).unwrap();
+        let lengths: Vec<_> = takes.iter().map(|t| (t.name.as_str(), t.poses.len())).collect();
+        assert_eq!(lengths, [("jumping#0", 99), ("jumping#1", 100), ("still#0", 79)]);
+        let pose = takes[2].poses[0];
+        assert!(pose[R_SHOULDER][0] < 0.0 && pose[R_WRIST][0] < pose[R_ELBOW][0], "the speaker's right is image left");
+        assert!(pose[NOSE][1] < -0.1 && pose[NOSE][2] < -0.05, "the nose is up and towards the camera");
+        assert!(pose[R_HIP][1] > 0.4 && pose[L_HIP][0] > 0.0);
+    }
+
+    #[test]
+    fn unknown_files_say_what_is_known() {
+        let dir = tempfile::tempdir().unwrap();
+        assert!(read_all(&[dir.path().to_owned()]).is_err());
+        let path = dir.path().join("a.bvh");
+        std::fs::write(&path, "HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 0 } MOTION Frames: 0 Frame Time: 0.1").unwrap();
+        let text = format!("{:#}", read_all(&[path]).unwrap_err());
+        assert!(text.contains("a.bvh") && text.contains("UpperArm_R"), "{text}");
+        assert!(read(Path::new("motion.fbx")).is_err());
+    }
+}
