@@ -4,28 +4,10 @@
 
 use super::bvh_read::{Bvh, Positions};
 use super::npz::Npz;
+use super::upper_body::{N_POINTS, Pose};
 use super::vec3::{self, Vec3};
 use anyhow::{Context, Result, bail, ensure};
 use std::path::{Path, PathBuf};
-
-/// Points of the upper body: nose, right shoulder, elbow, wrist, left the same, right hip, left hip.
-pub const N_POINTS: usize = 9;
-pub const NOSE: usize = 0;
-pub const R_SHOULDER: usize = 1;
-pub const R_ELBOW: usize = 2;
-pub const R_WRIST: usize = 3;
-pub const L_SHOULDER: usize = 4;
-pub const L_ELBOW: usize = 5;
-pub const L_WRIST: usize = 6;
-pub const R_HIP: usize = 7;
-pub const L_HIP: usize = 8;
-
-/// The same point of the other side.
-pub const MIRROR: [usize; N_POINTS] = [NOSE, L_SHOULDER, L_ELBOW, L_WRIST, R_SHOULDER, R_ELBOW, R_WRIST, L_HIP, R_HIP];
-
-/// Nine points in metres relative to the neck (the middle of the shoulders): x right as seen from in front, y down,
-/// z away from a camera in front.
-pub type Pose = [Vec3; N_POINTS];
 
 /// A continuous stretch of captured motion.
 #[derive(Clone, Debug)]
@@ -172,6 +154,7 @@ fn divided(name: &str, fps: f64, poses: Vec<Pose>) -> Vec<Take> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::upper_body::{L_HIP, NOSE, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST};
     use super::*;
     use ndarray::{Array3, arr0};
     use ndarray_npy::NpzWriter;

@@ -4,6 +4,7 @@
 //! holds the list, and keeps the others out); convolution over time and batch norm are this room's.
 
 pub mod batch_norm;
+pub mod body_lifter;
 pub mod conv1d;
 pub mod conv_block;
 pub mod cpu;

@@ -4,6 +4,8 @@
 //! `speaker` is what a checkpoint of the generator means.
 
 pub mod adam;
+pub mod body_motion;
+pub mod body_scene;
 pub mod checkpoint;
 pub mod examples;
 pub mod gan;

@@ -1,0 +1,85 @@
+//! The body lifter: the temporal-convolution network with the views it was trained on, from keypoints over time to
+//! poses over time.
+
+use super::Mode;
+use super::params::Params;
+use super::temporal_lifter::{Config, TemporalLifter};
+use crate::motion::upper_body::{N_IN, N_OUT, Pose, Seen, View, WINDOW};
+use candle_core::{Device, Result, Tensor};
+
+/// Windows that go through the network together.
+const BATCH: usize = 256;
+/// Prefix of the network's tensors.
+const NAME: &str = "body";
+
+/// The network that turns a window of keypoints into the pose of its middle frame.
+pub struct BodyLifter {
+    net: TemporalLifter,
+}
+
+impl BodyLifter {
+    /// The network's shape for this many channels: a window of 27 frames, 27 numbers a frame in and out.
+    pub fn config(channels: usize) -> Config {
+        Config { n_in: N_IN, n_out: N_OUT, channels, widths: vec![3; WINDOW.ilog(3) as usize], dropout: 0.0 }
+    }
+
+    /// Makes the network's tensors in `params`.
+    pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
+        Ok(Self { net: TemporalLifter::new(params, NAME, config)? })
+    }
+
+    pub fn net(&self) -> &TemporalLifter {
+        &self.net
+    }
+
+    pub fn net_mut(&mut self) -> &mut TemporalLifter {
+        &mut self.net
+    }
+
+    /// A pose for every frame, in px of the picture, the neck at 0: `None` where a shoulder is not seen within half a
+    /// window. Before the first and after the last frame the body stands still.
+    pub fn poses(&self, seen: &[Seen]) -> Result<Vec<Option<Pose>>> {
+        let half = WINDOW as isize / 2;
+        let last = seen.len() as isize - 1;
+        let view = |t: usize| {
+            let around = |d: isize| seen[(t as isize + d).clamp(0, last) as usize];
+            View::of(&(-half..=half).map(around).collect::<Vec<_>>())
+        };
+        let mut poses = Vec::with_capacity(seen.len());
+        for first in (0..seen.len()).step_by(BATCH) {
+            let views: Vec<Option<View>> = (first..seen.len().min(first + BATCH)).map(view).collect();
+            let numbers: Vec<f32> = views.iter().flatten().flat_map(|v| v.numbers.iter().copied()).collect();
+            let n_views = numbers.len() / (N_IN * WINDOW);
+            let outputs = if n_views == 0 {
+                Vec::new()
+            } else {
+                let x = Tensor::from_vec(numbers, (n_views, N_IN, WINDOW), &Device::Cpu)?;
+                self.net.forward_windows(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1::<f32>()?
+            };
+            let mut outputs = outputs.chunks_exact(N_OUT);
+            poses.extend(views.iter().map(|view| Some(view.as_ref()?.pose(outputs.next()?))));
+        }
+        Ok(poses)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_frame_gets_a_pose_and_none_where_nobody_is() -> anyhow::Result<()> {
+        let mut params = Params::new(1);
+        let lifter = BodyLifter::new(&mut params, &BodyLifter::config(16))?;
+        let seen: Seen = std::array::from_fn(|j| Some([j as f32 * 10.0, (j * j) as f32]));
+        let mut frames = vec![seen; 300];
+        frames[100..200].fill([None; 9]);
+        let poses = lifter.poses(&frames)?;
+        assert_eq!(poses.len(), 300);
+        for (t, pose) in poses.iter().enumerate() {
+            assert_eq!(pose.is_none(), (113..187).contains(&t), "frame {t}");
+        }
+        assert!(lifter.poses(&[])?.is_empty());
+        Ok(())
+    }
+}
