@@ -4,11 +4,16 @@
 //! `speaker` is what a checkpoint of the generator means.
 
 pub mod adam;
+pub mod body_errors;
 pub mod body_motion;
 pub mod body_scene;
 pub mod checkpoint;
 pub mod examples;
 pub mod gan;
+pub mod hand_shape;
+pub mod lifter;
+pub mod lifter_body;
+pub mod lifter_hands;
 pub mod log;
 pub mod losses;
 pub mod metrics;

@@ -1,11 +1,94 @@
 //! `orator train lifter`.
 
 use crate::cli::{Outcome, ui::Ui};
+use anyhow::{Context, ensure};
+use orator::motion::mocap;
+use orator::train::lifter::{Lesson, Schedule, train};
+use orator::train::lifter_body::BodyLesson;
+use orator::train::lifter_hands::HandLesson;
+use std::path::PathBuf;
 
 /// Train the networks that lift 2D keypoints to 3D joints.
+///
+/// The body lifter learns from captured motion (--mocap) and from gestures made by rule, filmed by random cameras;
+/// the hand lifter from hands made by rule. An interrupted training goes on when the same command is given again.
+/// At the end the errors on held-out motion are printed beside those of trivial methods.
 #[derive(clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// body or hands.
+    #[arg(long, value_enum)]
+    part: Part,
+    /// Captured motion to learn from (body): .bvh or .npz files, or folders of them; may be given several times.
+    #[arg(long, value_name = "PATH", num_args = 1..)]
+    mocap: Vec<PathBuf>,
+    /// Captured motion that is only measured on, never learnt from.
+    #[arg(long, value_name = "PATH", num_args = 1..)]
+    measure: Vec<PathBuf>,
+    /// The weights file to write (safetensors).
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Training steps [default: 4000 body, 6000 hands]
+    #[arg(long, hide_default_value = true)]
+    steps: Option<usize>,
+    /// Samples a step.
+    #[arg(long, default_value_t = 512)]
+    batch: usize,
+    /// The highest learning rate.
+    #[arg(long, default_value_t = 2e-3)]
+    learning_rate: f64,
+    /// Width of the network [default: 256 body, 768 hands]
+    #[arg(long, hide_default_value = true)]
+    width: Option<usize>,
+    /// The same seed gives the same weights.
+    #[arg(long, default_value_t = 1337)]
+    seed: u64,
+    /// Steps between two checkpoints.
+    #[arg(long, default_value_t = 250)]
+    checkpoint_every: usize,
+}
 
-pub fn run(_args: Args, _ui: &Ui) -> anyhow::Result<Outcome> {
-    anyhow::bail!("not built yet")
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Part {
+    Body,
+    Hands,
+}
+
+pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
+    ensure!(args.learning_rate > 0.0 && args.learning_rate < 1.0, "--learning-rate must lie between 0 and 1");
+    ensure!((1..=4096).contains(&args.width.unwrap_or(256)), "--width must lie between 1 and 4096");
+    let read = |paths: &[PathBuf], option: &str| {
+        if paths.is_empty() {
+            Ok(Vec::new())
+        } else {
+            mocap::read_all(paths).with_context(|| format!("reading {option}"))
+        }
+    };
+    let (mut lesson, steps): (Box<dyn Lesson>, usize) = match args.part {
+        Part::Body => {
+            ensure!(!args.mocap.is_empty(), "the body lifter learns from captured motion: give --mocap PATH");
+            let lesson = BodyLesson::new(read(&args.mocap, "--mocap")?, args.width.unwrap_or(256), args.seed)?;
+            (Box::new(lesson.with_strangers(read(&args.measure, "--measure")?)), 4000)
+        }
+        Part::Hands => {
+            ensure!(
+                args.mocap.is_empty() && args.measure.is_empty(),
+                "the hand lifter learns from hands made by rule: no --mocap"
+            );
+            (Box::new(HandLesson::new(args.width.unwrap_or(768), args.seed)?), 6000)
+        }
+    };
+    let schedule = Schedule {
+        steps: args.steps.unwrap_or(steps),
+        batch: args.batch,
+        learning_rate: args.learning_rate,
+        seed: args.seed,
+        checkpoint_every: args.checkpoint_every,
+    };
+    let errors = train(&mut *lesson, &schedule, &args.out, ui)?;
+    let text = format!("{} written\n{}", args.out.display(), errors.join("\n"));
+    let key = if args.part == Part::Body { "body_weights" } else { "hand_weights" };
+    let next = format!("orator lift KEYPOINTS.npz --out JOINTS.npy --set lift.{key}={}", args.out.display());
+    let facts = serde_json::json!({ "out": args.out, "parameters": lesson.params().n_parameters(), "errors": errors });
+    ui.summary(&text, Some(&next), facts);
+    Ok(Outcome::Done)
 }

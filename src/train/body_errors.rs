@@ -1,0 +1,161 @@
+//! How far lifted bodies are from the truth, and what trivial methods reach on the same scenes. Convention: each frame
+//! minus its own neck; prediction and truth of a scene each scaled by one number to the reference size; no rotation.
+//! MPJPE over nose, shoulders, elbows, wrists; P-MPJPE after a similarity per frame on those and the neck.
+
+use super::body_motion::Proportions;
+use super::body_scene::Scene;
+use crate::motion::procrustes;
+use crate::motion::upper_body::{
+    L_ELBOW, L_SHOULDER, L_WRIST, N_POINTS, NOSE, Pose, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, metres_per_unit,
+};
+use crate::motion::vec3::{self, Vec3};
+use std::fmt;
+
+/// Points that count.
+const COUNTED: std::ops::Range<usize> = NOSE..R_HIP;
+
+/// Mean errors in mm.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Errors {
+    pub mpjpe: f64,
+    pub p_mpjpe: f64,
+    pub wrist: f64,
+    /// Share of `wrist` along the line of sight: |dz|.
+    pub wrist_depth: f64,
+}
+
+impl fmt::Display for Errors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { mpjpe, p_mpjpe, wrist, wrist_depth } = self;
+        write!(f, "MPJPE {mpjpe:.0}  P-MPJPE {p_mpjpe:.0}  wrist {wrist:.0} (depth {wrist_depth:.0}) mm")
+    }
+}
+
+/// A method's errors over scenes: `lift` gives a scene's poses in any one unit, the neck anywhere.
+pub fn of_method(
+    scenes: &[Scene],
+    mut lift: impl FnMut(&Scene) -> anyhow::Result<Vec<Pose>>,
+) -> anyhow::Result<Errors> {
+    let mut sum = Errors::default();
+    let mut n_frames = 0;
+    for scene in scenes {
+        let lifted = to_reference(&lift(scene)?);
+        for (p, q) in lifted.iter().zip(&to_reference(&scene.truth)) {
+            let e = of_frame(p, q);
+            sum.mpjpe += e.mpjpe;
+            sum.p_mpjpe += e.p_mpjpe;
+            sum.wrist += e.wrist;
+            sum.wrist_depth += e.wrist_depth;
+            n_frames += 1;
+        }
+    }
+    let mean = |v: f64| 1000.0 * v / f64::from(n_frames.max(1));
+    Ok(Errors {
+        mpjpe: mean(sum.mpjpe),
+        p_mpjpe: mean(sum.p_mpjpe),
+        wrist: mean(sum.wrist),
+        wrist_depth: mean(sum.wrist_depth),
+    })
+}
+
+/// Root-relative, in metres of the reference body.
+fn to_reference(poses: &[Pose]) -> Vec<Pose> {
+    let grow = metres_per_unit(poses);
+    let centred = |pose: &Pose| {
+        let neck = vec3::scale(vec3::add(pose[R_SHOULDER], pose[L_SHOULDER]), 0.5);
+        pose.map(|p| vec3::scale(vec3::sub(p, neck), grow))
+    };
+    poses.iter().map(centred).collect()
+}
+
+fn of_frame(p: &Pose, q: &Pose) -> Errors {
+    let apart = |j: usize| vec3::norm(vec3::sub(p[j], q[j]));
+    let with_neck = |pose: &Pose| pose[COUNTED].iter().copied().chain([[0.0; 3]]).collect::<Vec<Vec3>>();
+    let (from, to) = (with_neck(p), with_neck(q));
+    let aligned = procrustes::similarity(&from, &to);
+    let after = |j: usize| vec3::norm(vec3::sub(aligned.map_or(from[j], |s| s.apply(from[j])), to[j]));
+    let n = COUNTED.len() as f64;
+    Errors {
+        mpjpe: COUNTED.map(apart).sum::<f64>() / n,
+        p_mpjpe: (0..COUNTED.len()).map(after).sum::<f64>() / n,
+        wrist: (apart(R_WRIST) + apart(L_WRIST)) / 2.0,
+        wrist_depth: [R_WRIST, L_WRIST].map(|j| (p[j][2] - q[j][2]).abs()).iter().sum::<f64>() / 2.0,
+    }
+}
+
+/// The mean pose of scenes, of the reference size.
+pub fn mean_pose(scenes: &[Scene]) -> Pose {
+    let mut mean: Pose = [[0.0; 3]; N_POINTS];
+    let mut n = 0.0;
+    for pose in scenes.iter().flat_map(|s| to_reference(&s.truth)) {
+        n += 1.0;
+        for (m, p) in mean.iter_mut().zip(&pose) {
+            *m = vec3::add(*m, vec3::scale(vec3::sub(*p, *m), 1.0 / n));
+        }
+    }
+    mean
+}
+
+/// x and y of a clean scene in metres at the neck's distance, the neck at 0.
+fn flat(scene: &Scene) -> Vec<Pose> {
+    let frame = |seen: &crate::motion::upper_body::Seen| {
+        let points: Pose = seen.map(|p| {
+            let [x, y] = p.unwrap_or_default();
+            [f64::from(x) / scene.px_per_metre, f64::from(y) / scene.px_per_metre, 0.0]
+        });
+        let neck = vec3::scale(vec3::add(points[R_SHOULDER], points[L_SHOULDER]), 0.5);
+        points.map(|p| vec3::sub(p, neck))
+    };
+    scene.seen.iter().map(frame).collect()
+}
+
+/// Every point at its mean depth (of `mean`), x and y as seen. Needs a clean scene and is told its scale.
+pub fn with_mean_depth(scene: &Scene, mean: &Pose) -> Vec<Pose> {
+    let deep = |pose: Pose| std::array::from_fn(|j| [pose[j][0], pose[j][1], mean[j][2]]);
+    flat(scene).into_iter().map(deep).collect()
+}
+
+/// Depth solved from the bone lengths of the common adult, always towards the camera; the shoulders lie in the
+/// picture's plane. Needs a clean scene and is told its scale.
+pub fn with_bone_depth(scene: &Scene) -> Vec<Pose> {
+    let bones = Proportions::MEAN;
+    let solve = |mut pose: Pose| {
+        let mut hang = |joint: usize, from: Vec3, length: f64| {
+            let seen = (pose[joint][0] - from[0]).hypot(pose[joint][1] - from[1]);
+            pose[joint][2] = from[2] - (length * length - seen * seen).max(0.0).sqrt();
+            pose[joint]
+        };
+        hang(NOSE, [0.0; 3], bones.nose);
+        for (shoulder, elbow, wrist) in [(R_SHOULDER, R_ELBOW, R_WRIST), (L_SHOULDER, L_ELBOW, L_WRIST)] {
+            let shoulder = hang(shoulder, [0.0; 3], 0.0);
+            let at_elbow = hang(elbow, shoulder, bones.upper_arm);
+            hang(wrist, at_elbow, bones.forearm);
+        }
+        pose
+    };
+    flat(scene).into_iter().map(solve).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn the_truth_in_another_size_is_without_error_and_baselines_are_not() -> anyhow::Result<()> {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let scenes: Vec<Scene> = (0..8).map(|_| Scene::of_rule(20, true, &mut rng)).collect();
+        let larger =
+            |s: &Scene| Ok(s.truth.iter().map(|p| p.map(|q| vec3::add(vec3::scale(q, 7.0), [1.0; 3]))).collect());
+        let none = of_method(&scenes, larger)?;
+        assert!(none.mpjpe < 1e-6 && none.p_mpjpe < 1e-6, "{none}");
+        let mean = mean_pose(&scenes);
+        let constant = of_method(&scenes, |s| Ok(vec![mean; s.truth.len()]))?;
+        let depth = of_method(&scenes, |s| Ok(with_mean_depth(s, &mean)))?;
+        let bones = of_method(&scenes, |s| Ok(with_bone_depth(s)))?;
+        assert!(depth.mpjpe < constant.mpjpe && bones.mpjpe < constant.mpjpe, "{depth} {bones} {constant}");
+        assert!(constant.p_mpjpe < constant.mpjpe && bones.wrist_depth <= bones.wrist);
+        Ok(())
+    }
+}
