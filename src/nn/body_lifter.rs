@@ -37,12 +37,13 @@ impl BodyLifter {
     }
 
     /// A pose for every frame, in px of the picture, the neck at 0: `None` where a shoulder is not seen within half a
-    /// window. Before the first and after the last frame the body stands still.
-    pub fn poses(&self, seen: &[Seen]) -> Result<Vec<Option<Pose>>> {
+    /// window. Before the first and after the last frame the body stands still. A window takes every `step`-th frame:
+    /// the network knows motion at 15 frames a second.
+    pub fn poses(&self, seen: &[Seen], step: usize) -> Result<Vec<Option<Pose>>> {
         let half = WINDOW as isize / 2;
         let last = seen.len() as isize - 1;
         let view = |t: usize| {
-            let around = |d: isize| seen[(t as isize + d).clamp(0, last) as usize];
+            let around = |d: isize| seen[(t as isize + d * step as isize).clamp(0, last) as usize];
             View::of(&(-half..=half).map(around).collect::<Vec<_>>())
         };
         let mut poses = Vec::with_capacity(seen.len());
@@ -74,12 +75,12 @@ mod tests {
         let seen: Seen = std::array::from_fn(|j| Some([j as f32 * 10.0, (j * j) as f32]));
         let mut frames = vec![seen; 300];
         frames[100..200].fill([None; 9]);
-        let poses = lifter.poses(&frames)?;
+        let poses = lifter.poses(&frames, 1)?;
         assert_eq!(poses.len(), 300);
         for (t, pose) in poses.iter().enumerate() {
             assert_eq!(pose.is_none(), (113..187).contains(&t), "frame {t}");
         }
-        assert!(lifter.poses(&[])?.is_empty());
+        assert!(lifter.poses(&[], 2)?.is_empty());
         Ok(())
     }
 }

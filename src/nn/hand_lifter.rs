@@ -7,6 +7,9 @@ use super::{Mode, dropout::dropout};
 use candle_core::{Result, Tensor};
 use serde::{Deserialize, Serialize};
 
+/// Prefix of the network's tensors in a weights file.
+pub const NAME: &str = "hand";
+
 /// The network's shape.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {

@@ -3,9 +3,7 @@
 //! for what the free captured motion lacks: people who sit and talk.
 
 use crate::motion::rotation::Rotation;
-use crate::motion::upper_body::{
-    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, Pose, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST,
-};
+use crate::motion::upper_body::{L_HIP, L_SHOULDER, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER};
 use crate::motion::vec3::{self, Vec3};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -250,6 +248,7 @@ impl Beat {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion::upper_body::{L_ELBOW, L_WRIST, R_ELBOW, R_WRIST};
     use rand::SeedableRng;
 
     #[test]

@@ -27,7 +27,7 @@ pub fn draw(rng: &mut ChaCha8Rng) -> Hand {
     let palm = about(rng, 0.10);
     let mut hand: Hand = [[0.0; 3]; N_HAND];
     // open hands, fists and everything between; each finger goes its own way now and then
-    let curl: f64 = rng.random_range(-0.1f64..1.0).max(0.0).powf(1.3);
+    let curl: f64 = rng.random_range(-0.1f64..1.0).max(0.0).powf(1.8);
     let spread: f64 = rng.random_range(-0.4..1.2);
     let own = if rng.random_bool(0.35) { 0.45 } else { 0.12 };
     for finger in 1..5 {

@@ -7,7 +7,7 @@ use crate::motion::hand_view::{Hand, HandView, N_IN, N_OUT, SeenHand, parent};
 use crate::motion::procrustes;
 use crate::motion::vec3;
 use crate::nn::Mode;
-use crate::nn::hand_lifter::{Config, HandLifter};
+use crate::nn::hand_lifter::{Config, HandLifter, NAME};
 use crate::nn::params::Params;
 use crate::types::pose2d::N_HAND;
 use crate::types::skeleton::Side;
@@ -17,8 +17,6 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
-/// Prefix of the network's tensors.
-pub const NAME: &str = "hand";
 /// Hands that errors are measured on.
 const MEASURED: usize = 4000;
 /// The middle finger's first phalanx of a measured hand, metres.

@@ -86,8 +86,8 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
     };
     let errors = train(&mut *lesson, &schedule, &args.out, ui)?;
     let text = format!("{} written\n{}", args.out.display(), errors.join("\n"));
-    let key = if args.part == Part::Body { "body_weights" } else { "hand_weights" };
-    let next = format!("orator lift KEYPOINTS.npz --out JOINTS.npy --set lift.{key}={}", args.out.display());
+    let key = if args.part == Part::Body { "--body-weights" } else { "--hand-weights" };
+    let next = format!("orator lift KEYPOINTS.npz --out JOINTS.npy {key} {}", args.out.display());
     let facts = serde_json::json!({ "out": args.out, "parameters": lesson.params().n_parameters(), "errors": errors });
     ui.summary(&text, Some(&next), facts);
     Ok(Outcome::Done)
