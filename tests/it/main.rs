@@ -13,6 +13,7 @@ mod gan;
 mod generate;
 mod golden;
 mod house;
+mod lift;
 mod media_frames;
 mod media_sound;
 mod pose_parity;

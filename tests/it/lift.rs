@@ -1,0 +1,223 @@
+//! Lifting against known truth: bodies and hands made by rule, filmed, lifted with the built-in weights.
+
+use ndarray::{Array3, s};
+use ndarray_npy::{NpzWriter, read_npy};
+use orator::config;
+use orator::lift::Lifter;
+use orator::motion::upper_body::{
+    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, NOSE, Pose, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, metres_per_unit,
+};
+use orator::train::body_scene::Scene;
+use orator::train::hand_shape;
+use orator::types::interval::Interval;
+use orator::types::pose2d::Keypoints;
+use orator::types::pose3d::Motion;
+use orator::types::skeleton::{self, L_HAND, N_JOINTS, R_HAND};
+use orator::types::time::FrameRate;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Of the nine points: COCO's index and the arm joint, if it is one.
+const POINTS: [(usize, usize, Option<usize>); 9] = [
+    (NOSE, 0, None),
+    (R_SHOULDER, 6, Some(skeleton::R_SHOULDER)),
+    (R_ELBOW, 8, Some(skeleton::R_ELBOW)),
+    (R_WRIST, 10, Some(skeleton::R_WRIST)),
+    (L_SHOULDER, 5, Some(skeleton::L_SHOULDER)),
+    (L_ELBOW, 7, Some(skeleton::L_ELBOW)),
+    (L_WRIST, 9, Some(skeleton::L_WRIST)),
+    (R_HIP, 12, None),
+    (L_HIP, 11, None),
+];
+
+fn lifter() -> Lifter {
+    Lifter::new(&config::Lift::default()).unwrap()
+}
+
+/// The scene's keypoints, and hands of one shape turned slowly at both wrists.
+fn keypoints(scene: &Scene, rng: &mut ChaCha8Rng) -> Keypoints {
+    let n = scene.seen.len();
+    let mut k = Keypoints {
+        fps: FrameRate::new(15, 1),
+        image_size: [1280, 720],
+        body: Array3::zeros((n, 17, 3)),
+        left_hand: Array3::zeros((n, 21, 3)),
+        right_hand: Array3::zeros((n, 21, 3)),
+    };
+    let shape = hand_shape::draw(rng);
+    for (t, seen) in scene.seen.iter().enumerate() {
+        for (point, coco, _) in POINTS {
+            if let Some([x, y]) = seen[point] {
+                k.body.slice_mut(s![t, coco, ..]).assign(&ndarray::arr1(&[x, y, 0.9]));
+            }
+        }
+        for (hand, wrist, flip) in [(&mut k.right_hand, R_WRIST, 1.0), (&mut k.left_hand, L_WRIST, -1.0)] {
+            let Some([x, y]) = seen[wrist] else { continue };
+            for (j, p) in shape.iter().enumerate() {
+                let (dx, dy) = (flip * p[0] * scene.px_per_metre, p[1] * scene.px_per_metre);
+                hand.slice_mut(s![t, j, ..]).assign(&ndarray::arr1(&[x + dx as f32, y + dy as f32, 0.9]));
+            }
+        }
+    }
+    k
+}
+
+/// Mean distance of shoulders, elbows and wrists in mm, both scaled to the reference size.
+fn error_mm(motion: &Motion, truth: &[Pose]) -> f64 {
+    let grow = metres_per_unit(truth);
+    let (mut sum, mut n) = (0.0, 0);
+    for (t, pose) in truth.iter().enumerate() {
+        for (point, _, joint) in POINTS {
+            let Some(joint) = joint else { continue };
+            let square = |k: usize| (f64::from(motion.joints[[t, joint, k]]) - grow * pose[point][k]).powi(2);
+            let apart = (0..3).map(square).sum::<f64>().sqrt();
+            if apart.is_finite() {
+                sum += 1000.0 * apart;
+                n += 1;
+            }
+        }
+    }
+    assert!(n > truth.len() * 3, "most joints are told");
+    sum / f64::from(u32::try_from(n).unwrap())
+}
+
+#[test]
+fn known_motion_is_found_again() {
+    let mut rng = ChaCha8Rng::seed_from_u64(77);
+    let lifter = lifter();
+    let (mut sum, mut mean_sum, n) = (0.0, 0.0, 20);
+    for _ in 0..n {
+        let scene = Scene::of_rule(90, false, &mut rng);
+        let motion = lifter.lift(&keypoints(&scene, &mut rng)).unwrap();
+        sum += error_mm(&motion, &scene.truth);
+        // a constant pose for comparison: the truth's first frame, better than any mean of strangers
+        let mut constant = motion.clone();
+        let grow = metres_per_unit(&scene.truth);
+        for (point, _, joint) in POINTS {
+            let Some(joint) = joint else { continue };
+            let place = scene.truth[0][point].map(|v| (v * grow) as f32);
+            constant.joints.slice_mut(s![.., joint, ..]).assign(&ndarray::arr1(&place));
+        }
+        mean_sum += error_mm(&constant, &scene.truth);
+    }
+    let (error, constant) = (sum / f64::from(n), mean_sum / f64::from(n));
+    eprintln!("lifted {error:.0} mm, standing still as at first {constant:.0} mm");
+    assert!(error < 100.0 && error < 0.8 * constant, "{error} {constant}");
+}
+
+#[test]
+fn hands_hang_on_the_wrists_and_bones_keep_their_length() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let scene = Scene::of_rule(60, true, &mut rng);
+    let mut keypoints = keypoints(&scene, &mut rng);
+    keypoints.left_hand.slice_mut(s![10..20, .., ..]).fill(0.0); // a short gap: filled
+    keypoints.right_hand.slice_mut(s![30.., .., ..]).fill(0.0); // a long one: missing
+    let motion = lifter().lift(&keypoints).unwrap();
+    for t in 0..60 {
+        for (hand, wrist) in [(L_HAND, skeleton::L_WRIST), (R_HAND, skeleton::R_WRIST)] {
+            assert_eq!(motion.joints.slice(s![t, hand, ..]), motion.joints.slice(s![t, wrist, ..]));
+        }
+        assert_eq!(motion.joints.slice(s![t, 0, ..]).to_vec(), [0.0; 3]);
+        assert_eq!(motion.joints[[t, R_HAND + 8, 0]].is_nan(), t >= 30);
+        assert!(motion.joints[[t, L_HAND + 8, 0]].is_finite());
+        assert_eq!(motion.mask[[t, L_HAND + 8]], !(10..20).contains(&t));
+    }
+    for joint in 1..N_JOINTS {
+        let parent = skeleton::parent(joint).unwrap();
+        let bone = |t: usize| {
+            let step = &motion.joints.slice(s![t, joint, ..]) - &motion.joints.slice(s![t, parent, ..]);
+            step.mapv(|v| v * v).sum().sqrt()
+        };
+        assert!((0..30).all(|t| (bone(t) - bone(0)).abs() < 1e-5), "{}", skeleton::name(joint));
+    }
+    // the shape was upright and open: fingers above the wrist, the thumb of each hand towards the other side
+    let at = |joint: usize, k: usize| motion.joints[[5, joint, k]];
+    for (root, inward) in [(R_HAND, 1.0), (L_HAND, -1.0)] {
+        assert!(at(root + 9, 1) < at(root, 1) - 0.04, "the middle knuckle is above the wrist");
+        assert!(inward * (at(root + 5, 0) - at(root + 17, 0)) > 0.0, "the index is on the inner side");
+    }
+}
+
+#[test]
+fn intervals_are_lifted_apart_and_outside_is_nothing() {
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let keypoints = keypoints(&Scene::of_rule(80, false, &mut rng), &mut rng);
+    let intervals = [Interval { start: 5, end: 30 }, Interval { start: 40, end: 80 }];
+    let lifter = lifter();
+    let lifted = lifter.lift_intervals(&keypoints, &intervals).unwrap();
+    for t in 0..80 {
+        let inside = intervals.iter().any(|i| (i.start..i.end).contains(&t));
+        assert_eq!(lifted.motion.joints[[t, 0, 0]].is_nan(), !inside, "frame {t}");
+        assert!(inside || lifted.motion.mask.slice(s![t, ..]).iter().all(|m| !m));
+    }
+    assert_eq!(lifted.n_frames, 65);
+    let again = lifter.lift_intervals(&keypoints, &intervals).unwrap();
+    assert!(lifted.motion.joints.iter().zip(&again.motion.joints).all(|(a, b)| a.to_bits() == b.to_bits()));
+    assert!(lifter.lift_intervals(&keypoints, &[Interval { start: 70, end: 81 }]).is_err());
+    let none = lifter.lift_intervals(&keypoints, &[]).unwrap();
+    assert_eq!((none.n_frames, none.lengths[skeleton::R_HAND]), (0, 0.0));
+}
+
+#[test]
+fn odd_keypoints_do_no_harm() {
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let mut k = keypoints(&Scene::of_rule(40, true, &mut rng), &mut rng);
+    k.body.slice_mut(s![3..6, .., 0]).fill(f32::NAN);
+    k.body.slice_mut(s![10..12, .., ..2]).fill(7.0);
+    k.left_hand.fill(f32::INFINITY);
+    k.right_hand.slice_mut(s![.., 3.., ..]).fill(1.0);
+    let motion = lifter().lift(&k).unwrap();
+    assert!(motion.joints.slice(s![.., L_HAND + 1.., 0]).iter().take(20).all(|v| v.is_nan()));
+    assert!(motion.joints.slice(s![.., ..7, ..]).iter().all(|v| v.is_finite()));
+    k.body.slice_mut(s![.., .., 2]).fill(0.0);
+    let nobody = lifter().lift(&k).unwrap();
+    assert!(nobody.joints.iter().all(|v| v.is_nan()) && nobody.mask.iter().all(|m| !m));
+    k.body = Array3::zeros((0, 17, 3));
+    assert!(lifter().lift(&k).is_err(), "arrays of unequal length");
+    (k.left_hand, k.right_hand) = (Array3::zeros((0, 21, 3)), Array3::zeros((0, 21, 3)));
+    assert_eq!(lifter().lift(&k).unwrap().n_frames(), 0);
+}
+
+fn orator(args: &[&Path]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_orator")).arg("lift").args(args).output().unwrap()
+}
+
+#[test]
+fn the_verb_lifts_a_bare_body_and_says_what_is_wrong() {
+    let dir = tempfile::tempdir().unwrap();
+    let (npz, out) = (dir.path().join("k.npz"), dir.path().join("j.npy"));
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let k = keypoints(&Scene::of_rule(40, true, &mut rng), &mut rng);
+    let write = |name: &str, array: &Array3<f32>| {
+        let mut file = NpzWriter::new(std::fs::File::create(&npz).unwrap());
+        file.add_array(name, array).unwrap();
+        file.finish().unwrap();
+    };
+    write("body", &k.body);
+    let done = orator(&[&npz, Path::new("--out"), &out]);
+    let said = String::from_utf8_lossy(&done.stdout).into_owned() + &String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success() && said.contains("40 frames") && said.contains("no `fps`"), "{said}");
+    let joints: Array3<f32> = read_npy(&out).unwrap();
+    let before = std::fs::read(&out).unwrap();
+    assert_eq!(joints.shape(), [40, 49, 3]);
+
+    let fails = |args: &[&Path], says: &str| {
+        let failed = orator(args);
+        let said = String::from_utf8_lossy(&failed.stderr).into_owned();
+        assert!(failed.status.code() == Some(1) && said.contains(says), "{said}");
+    };
+    let to = Path::new("--out");
+    fails(&[&npz, to, &dir.path().join("j.bvh")], ".npy");
+    fails(&[&dir.path().join("none.npz"), to, &out], "none.npz");
+    write("bodies", &k.body);
+    fails(&[&npz, to, &out], "no array `body`");
+    write("body", &k.left_hand);
+    fails(&[&npz, to, &out], "[40, 21, 3]");
+    write("body", &Array3::zeros((0, 17, 3)));
+    fails(&[&npz, to, &out], "no frames");
+    std::fs::write(&npz, b"no zip").unwrap();
+    fails(&[&npz, to, &out], "k.npz");
+    assert_eq!(std::fs::read(&out).unwrap(), before, "what was there stays");
+}
