@@ -9,6 +9,7 @@ mod generate;
 mod init;
 mod lift;
 mod models;
+mod road;
 mod run;
 mod status;
 mod train;
@@ -80,5 +81,14 @@ pub fn main() -> ExitCode {
             ui.error(&error);
             ExitCode::from(1)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    /// Every argument has its help; no two clash.
+    #[test]
+    fn the_command_line_is_sound() {
+        <super::Cli as clap::CommandFactory>::command().debug_assert();
     }
 }

@@ -1,11 +1,182 @@
 //! `orator run`.
 
+use super::common::ConfigArgs;
+use super::road::{self, STEPS, Step};
 use super::{Outcome, ui::Ui};
+use anyhow::{Context, Result};
+use orator::config::{Config, videos::Videos};
+use orator::stage::Unit;
+use orator::stage::fingerprint::HashCache;
+use orator::stage::progress::Progress;
+use orator::stage::runner::{self, Ended};
+use serde_json::{Value, json};
+use std::fs::File;
+use std::path::Path;
 
 /// Run the stages extract, pose2d, segment, lift, shard for every video of every speaker.
+///
+/// What is fresh is not done again: a run that was killed goes on where it was. A video that fails is reported and
+/// the others go on. Exit code 2 says that some failed or that a speaker ended with no interval.
 #[derive(clap::Args)]
-pub struct Args {}
+pub struct Args {
+    #[command(flatten)]
+    config: ConfigArgs,
+    /// Begin with this stage.
+    #[arg(long, value_enum, value_name = "STAGE")]
+    from: Option<Step>,
+    /// End with this stage.
+    #[arg(long, value_enum, value_name = "STAGE")]
+    to: Option<Step>,
+    /// Run this stage alone.
+    #[arg(long, value_enum, value_name = "STAGE", conflicts_with_all = ["from", "to"])]
+    only: Option<Step>,
+    /// Only this speaker; may be given several times.
+    #[arg(long, value_name = "NAME")]
+    speaker: Vec<String>,
+    /// Videos worked on side by side; 0: one a processor core. Default: work.jobs of the configuration.
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+    /// Do the chosen stages again, also where they are fresh.
+    #[arg(long)]
+    force: bool,
+}
 
-pub fn run(_args: Args, _ui: &Ui) -> anyhow::Result<Outcome> {
-    anyhow::bail!("not built yet")
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let config = args.config.load()?;
+    let (from, to) = match args.only {
+        Some(step) => (step, step),
+        None => (args.from.unwrap_or(Step::Extract), args.to.unwrap_or(Step::Shard)),
+    };
+    anyhow::ensure!(from <= to, "--from {} comes after --to {}", from.name(), to.name());
+    let speakers = road::speakers(&config, &args.speaker)?;
+    if (from..=to).contains(&Step::Pose2d) {
+        road::check_models(&config.settings)?;
+    }
+    let work = &config.settings.work.dir;
+    let _lock = lock(work)?;
+    let hashes = HashCache::open(&work.join("hashes.json"));
+    let mut run = Run {
+        config: &config,
+        hashes: &hashes,
+        jobs: jobs(&args, &config),
+        force: args.force,
+        ui,
+        log: Log::default(),
+    };
+    for videos in &speakers {
+        for message in &videos.missing {
+            ui.say(&format!("failed  {}: {message}", videos.speaker));
+            run.log.failures.push(json!({ "speaker": videos.speaker, "stage": "extract", "error": message }));
+        }
+    }
+    let mut alive = speakers.clone();
+    for step in STEPS.into_iter().filter(|step| (from..=to).contains(step)) {
+        run.step(step, &mut alive)?;
+        hashes.save()?;
+    }
+    run.close(&speakers, to)
+}
+
+fn jobs(args: &Args, config: &Config) -> usize {
+    match args.jobs.unwrap_or(config.settings.work.jobs) {
+        0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
+        n => n,
+    }
+}
+
+/// One run at a time in a work folder: the lock goes with the process, however it ends.
+fn lock(work: &Path) -> Result<File> {
+    let made =
+        std::fs::create_dir_all(work).map_err(anyhow::Error::from).and_then(|()| Ok(File::create(work.join(".lock"))?));
+    let file = made.with_context(|| {
+        format!("cannot write in the work folder {}; choose another with --set work.dir=FOLDER", work.display())
+    })?;
+    file.try_lock().map_err(|_| anyhow::anyhow!("another run is at work in {}; wait for it to end", work.display()))?;
+    Ok(file)
+}
+
+struct Run<'a> {
+    config: &'a Config,
+    hashes: &'a HashCache,
+    jobs: usize,
+    force: bool,
+    ui: &'a Ui,
+    log: Log,
+}
+
+/// What the closing summary says.
+#[derive(Default)]
+struct Log {
+    lines: Vec<String>,
+    stages: serde_json::Map<String, Value>,
+    failures: Vec<Value>,
+    reports: Vec<Value>,
+}
+
+impl Run<'_> {
+    /// Runs one stage for everything alive; what fails is not alive for the stages after it.
+    fn step(&mut self, step: Step, alive: &mut [Videos]) -> Result<()> {
+        let (mut done, mut skipped, mut failed) = (0, 0, 0);
+        let units: Vec<Unit> = alive.iter().flat_map(|videos| step.units(self.config, videos)).collect();
+        let lifted: Vec<Unit> = alive.iter().flat_map(|videos| road::lifted(self.config, videos)).collect();
+        let stage = step.stage(self.config, &lifted)?;
+        let work = &self.config.settings.work.dir;
+        let ended = runner::run(&*stage, &units, work, self.hashes, (self.jobs, self.force), self.ui);
+        for (unit, ended) in units.iter().zip(ended) {
+            let mut report = |state: &str, report: &orator::stage::Report| {
+                let facts = json!({ "unit": unit.to_string(), "stage": step.name(), "state": state, "line": report.line, "facts": report.facts });
+                self.log.reports.push(facts);
+            };
+            match ended {
+                Ended::Done(made) => {
+                    done += 1;
+                    report("done", &made);
+                }
+                Ended::Skipped(made) => {
+                    skipped += 1;
+                    report("fresh", &made);
+                }
+                Ended::Failed(error) => {
+                    failed += 1;
+                    self.log.failures.push(json!({ "unit": unit.to_string(), "stage": step.name(), "error": error }));
+                    for videos in alive.iter_mut().filter(|videos| videos.speaker == unit.speaker) {
+                        videos.units.retain(|alive| alive != unit);
+                    }
+                }
+            }
+        }
+        self.log.lines.push(format!("{:8} {done} done, {skipped} fresh already, {failed} failed", step.name()));
+        self.log.stages.insert(step.name().to_owned(), json!({ "done": done, "fresh": skipped, "failed": failed }));
+        Ok(())
+    }
+
+    fn close(self, speakers: &[Videos], to: Step) -> Result<Outcome> {
+        let work = &self.config.settings.work.dir;
+        let mut lines = self.log.lines;
+        let datasets: Vec<_> = speakers
+            .iter()
+            .map(|videos| work.join("dataset").join(&videos.speaker))
+            .filter(|dir| dir.exists())
+            .collect();
+        if to == Step::Shard {
+            lines.extend(datasets.iter().map(|dir| format!("dataset  {}", dir.display())));
+        }
+        let failures = self.log.failures.len();
+        if failures > 0 {
+            lines.push(format!("{failures} failed; `orator status --why` says each error again"));
+        }
+        let config = self.config.file.display();
+        let next = match (to, speakers.first()) {
+            (Step::Shard, Some(videos)) if datasets.len() == speakers.len() => {
+                format!("orator train gan -c {config} --speaker {}", videos.speaker)
+            }
+            _ => format!("orator status -c {config} --why"),
+        };
+        let facts = json!({
+            "stages": self.log.stages, "failures": self.log.failures, "units": self.log.reports,
+            "datasets": datasets, "next": next,
+        });
+        self.ui.summary(&lines.join("\n"), Some(&next), facts);
+        Ok(if failures == 0 { Outcome::Done } else { Outcome::SomeFailed })
+    }
 }
