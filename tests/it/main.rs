@@ -16,6 +16,8 @@ mod house;
 mod lift;
 mod media_frames;
 mod media_sound;
+mod networks;
+mod operators;
 mod pose_parity;
 mod runner;
 mod segment;

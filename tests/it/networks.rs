@@ -1,0 +1,71 @@
+//! The networks give what the same networks in PyTorch give (`fixtures/reference/networks_reference.py`), weights and
+//! inputs being filled by one formula on both sides.
+
+use candle_core::{DType, Result, Tensor};
+use orator::nn::discriminator::Discriminator;
+use orator::nn::finite_difference::pattern;
+use orator::nn::params::Params;
+use orator::nn::temporal_lifter::{self, TemporalLifter};
+use orator::nn::unet::{Config, Generator, Preset};
+use orator::nn::{Mode, unet};
+use std::collections::BTreeMap;
+
+#[derive(serde::Deserialize)]
+struct Golden {
+    shape: Vec<usize>,
+    values: Vec<f64>,
+}
+
+fn golden(name: &str) -> Golden {
+    let text = include_str!("../../fixtures/reference/networks_golden.json");
+    let mut all: BTreeMap<String, Golden> = serde_json::from_str(text).unwrap();
+    all.remove(name).unwrap()
+}
+
+/// The formula of the reference.
+fn value(name: &str, shape: &[usize]) -> Result<Tensor> {
+    let phase = name.bytes().enumerate().map(|(k, c)| (k + 1) * usize::from(c)).sum::<usize>() % 1009;
+    let p = pattern(shape, phase as f64)?;
+    match name {
+        _ if name.ends_with("running_var") => p.affine(0.5, 1.0),
+        _ if name.ends_with("norm.weight") => p.affine(0.2, 1.0),
+        _ if shape.len() == 1 => p * 0.1,
+        _ => p * (3.0 / shape[1..].iter().product::<usize>() as f64).sqrt(),
+    }
+}
+
+fn fill(params: &Params) -> anyhow::Result<()> {
+    let filled = params.all().map(|(name, var)| Ok((name.to_owned(), value(name, var.dims())?)));
+    params.load(&filled.collect::<Result<_>>()?)
+}
+
+fn agree(name: &str, y: &Tensor) -> anyhow::Result<()> {
+    let golden = golden(name);
+    assert_eq!(y.dims(), golden.shape, "{name}");
+    let y = y.flatten_all()?.to_vec1::<f64>()?;
+    let step = (y.len() / 60).max(1);
+    for (i, (y, expected)) in y.iter().step_by(step).zip(&golden.values).enumerate() {
+        assert!((y - expected).abs() < 1e-5, "{name}, value {i}: {y}, expected {expected}");
+    }
+    Ok(())
+}
+
+#[test]
+fn generator_discriminator_and_lifter_agree_with_pytorch() -> anyhow::Result<()> {
+    let mut params = Params::with_dtype(0, DType::F64);
+    let config = Config { preset: Preset::Light, n_mels: 64, width: 16, n_out: 6 };
+    let net = Generator::new(&mut params, &config)?;
+    fill(&params)?;
+    agree("light", &net.forward(&pattern(&[2, 64, 427], 1.0)?, 2 * unet::FRAMES_MULTIPLE, false)?)?;
+
+    let mut params = Params::with_dtype(0, DType::F64);
+    let net = Discriminator::new(&mut params, 12)?;
+    fill(&params)?;
+    agree("discriminator", &net.forward(&pattern(&[2, 12, 63], 2.0)?, false)?)?;
+
+    let mut params = Params::with_dtype(0, DType::F64);
+    let config = temporal_lifter::Config { n_in: 8, n_out: 9, channels: 12, widths: vec![3, 3, 3], dropout: 0.25 };
+    let net = TemporalLifter::new(&mut params, "lifter", &config)?;
+    fill(&params)?;
+    agree("temporal_lifter", &net.forward(&pattern(&[2, 8, 31], 3.0)?, &mut Mode::Eval)?)
+}
