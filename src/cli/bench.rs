@@ -1,11 +1,211 @@
-//! `orator bench`.
+//! `orator bench`: how fast a part of the road is, measured so that a noisy machine cannot flatter it: the variants take
+//! turns, round after round, and the median round counts.
 
 use super::{Outcome, ui::Ui};
+use anyhow::{Context, Result, bail, ensure};
+use orator::config::Settings;
+use orator::media::frames::FrameReader;
+use orator::onnx::{Manifest, Runtime};
+use orator::pose2d::Chain;
+use orator::stage::progress::Progress;
+use orator::types::image::Image;
+use orator::types::time::FrameRate;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
 
 /// Measure the speed of a part of the road.
 #[derive(clap::Args)]
-pub struct Args {}
+pub struct Args {
+    #[command(subcommand)]
+    part: Part,
+}
 
-pub fn run(_args: Args, _ui: &Ui) -> anyhow::Result<Outcome> {
-    anyhow::bail!("not built yet")
+#[derive(clap::Subcommand)]
+enum Part {
+    Pose2d(Pose2d),
+}
+
+/// Frames to keypoints: time a frame, the share of it inside ONNX Runtime, one worker against two, and (with
+/// `--python`) against the Python reference of the same chain. Every worker is one thread.
+#[derive(clap::Args)]
+struct Pose2d {
+    /// A video of a speaker.
+    video: PathBuf,
+    /// The folder of the models.
+    #[arg(long, default_value = "models", value_name = "DIR")]
+    models_dir: PathBuf,
+    /// Frames looked at, from the beginning, at the dataset rate.
+    #[arg(long, default_value_t = 90, value_name = "N")]
+    frames: usize,
+    /// Rounds; each measures every variant once.
+    #[arg(long, default_value_t = 5, value_name = "N")]
+    rounds: usize,
+    /// Id of the person detector, instead of the default one.
+    #[arg(long, value_name = "ID")]
+    person: Option<String>,
+    /// The Python reference, run on the whole video in each round: `REFERENCE.py VIDEO OUT.npz`.
+    #[arg(long, value_name = "FILE")]
+    python: Option<PathBuf>,
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let Part::Pose2d(args) = args.part;
+    pose2d(&args, ui)
+}
+
+/// What every variant needs.
+struct Bench<'a> {
+    video: &'a Path,
+    runtime: Runtime,
+    manifest: Manifest,
+    models_dir: PathBuf,
+    settings: Settings,
+    images: Vec<Image>,
+}
+
+/// One round of one variant, in seconds.
+#[derive(Clone, Copy)]
+struct Run {
+    whole: f64,
+    inside: f64,
+}
+
+impl Bench<'_> {
+    fn chain(&self) -> Result<Chain> {
+        Chain::new(&self.runtime, &self.manifest, &self.models_dir, &self.settings.pose2d)
+    }
+
+    /// Frames that are in memory already, through one chain.
+    fn decoded(&self, chain: &mut Chain) -> Result<Run> {
+        chain.begin_shot();
+        let (start, before) = (Instant::now(), chain.secs_inside());
+        for image in &self.images {
+            chain.frame(image)?;
+        }
+        Ok(Run { whole: start.elapsed().as_secs_f64(), inside: chain.secs_inside() - before })
+    }
+
+    /// The same frames from the file.
+    fn streamed(&self, chain: &mut Chain) -> Result<Run> {
+        chain.begin_shot();
+        let (start, before) = (Instant::now(), chain.secs_inside());
+        for frame in FrameReader::open(self.video, rate(&self.settings))?.take(self.images.len()) {
+            chain.frame(&frame?.image)?;
+        }
+        Ok(Run { whole: start.elapsed().as_secs_f64(), inside: chain.secs_inside() - before })
+    }
+
+    /// Two workers, each doing all of `work`; seconds until both are done.
+    fn side_by_side(&self, chains: &mut [Chain; 2], work: impl Fn(&mut Chain) -> Result<Run> + Sync) -> Result<Run> {
+        let start = Instant::now();
+        let runs = std::thread::scope(|scope| {
+            let workers = chains.each_mut().map(|chain| scope.spawn(|| work(chain)));
+            workers.map(|worker| worker.join().unwrap_or_else(|_| bail!("a worker stopped")))
+        });
+        let whole = start.elapsed().as_secs_f64();
+        let [a, b] = runs;
+        Ok(Run { whole, inside: a?.inside + b?.inside })
+    }
+}
+
+fn rate(settings: &Settings) -> FrameRate {
+    settings.extract.rate()
+}
+
+fn pose2d(args: &Pose2d, ui: &Ui) -> Result<Outcome> {
+    let mut settings = Settings::default();
+    if let Some(person) = &args.person {
+        settings.pose2d.person.clone_from(person);
+    }
+    let models_dir = std::path::absolute(&args.models_dir)?;
+    let reader = FrameReader::open(&args.video, rate(&settings))?;
+    let images = reader.take(args.frames).map(|frame| Ok(frame?.image)).collect::<Result<Vec<_>>>()?;
+    ensure!(!images.is_empty() && args.rounds > 0, "nothing to measure: there must be frames and rounds");
+    let bench = Bench {
+        video: &args.video,
+        runtime: Runtime::load(&settings.models.onnxruntime, &models_dir)?,
+        manifest: Manifest::load(&models_dir)?,
+        models_dir,
+        settings,
+        images,
+    };
+    let mut chains = [bench.chain()?, bench.chain()?];
+    let n_frames = bench.images.len() as f64;
+    let task = ui.begin("bench pose2d", args.rounds as u64);
+    bench.decoded(&mut chains[0])?;
+    let (mut one, mut streamed, mut two, mut two_streamed, mut python) = (vec![], vec![], vec![], vec![], vec![]);
+    for _ in 0..args.rounds {
+        one.push(bench.decoded(&mut chains[0])?);
+        two.push(bench.side_by_side(&mut chains, |chain| bench.decoded(chain))?);
+        streamed.push(bench.streamed(&mut chains[0])?);
+        two_streamed.push(bench.side_by_side(&mut chains, |chain| bench.streamed(chain))?);
+        if let Some(script) = &args.python {
+            python.push(reference(script, &args.video, &bench.models_dir)?);
+        }
+        task.advance(1);
+    }
+    drop(task);
+
+    let per_frame = |secs: f64| 1e3 * secs / n_frames;
+    let whole = |runs: &[Run]| median(runs.iter().map(|run| run.whole).collect());
+    let ratio = median(one.iter().map(|run| run.whole / run.inside).collect());
+    let inside = median(one.iter().map(|run| run.inside).collect());
+    let speed_up = median(one.iter().zip(&two).map(|(one, two)| 2.0 * one.whole / two.whole).collect());
+    let fps = rate(&bench.settings).per_sec();
+    let real_time = |frames: f64, secs: f64| frames / fps / secs;
+    let one_real_time = real_time(n_frames, whole(&streamed));
+    let two_real_time = real_time(2.0 * n_frames, whole(&two_streamed));
+    let mut text = format!(
+        "{n_frames} frames, median of {} rounds, {}\n\
+         one worker, frames in memory   {:6.1} ms a frame, {:.1} of it inside ONNX Runtime: ratio {ratio:.3}\n\
+         one worker, decoding           {:6.1} ms a frame: {one_real_time:.1} x real time at {fps} fps\n\
+         two workers, frames in memory  {speed_up:.2} x one worker\n\
+         two workers, decoding          {two_real_time:.1} x real time at {fps} fps",
+        args.rounds,
+        bench.runtime.version(),
+        per_frame(whole(&one)),
+        per_frame(inside),
+        per_frame(whole(&streamed)),
+    );
+    let mut facts = json!({
+        "n_frames": n_frames, "ms_a_frame": per_frame(whole(&one)), "ms_inside": per_frame(inside), "ratio": ratio,
+        "ms_a_frame_decoding": per_frame(whole(&streamed)), "speed_up_of_two": speed_up,
+        "real_time_one": one_real_time, "real_time_two": two_real_time,
+    });
+    if !python.is_empty() {
+        let theirs = median(python.clone());
+        let against = median(python.iter().zip(&streamed).map(|(ms, run)| per_frame(run.whole) / ms).collect());
+        text += &format!(
+            "\nPython reference, decoding      {theirs:6.1} ms a frame: this program takes {against:.2} of it"
+        );
+        facts["python_ms_a_frame"] = json!(theirs);
+        facts["against_python"] = json!(against);
+    }
+    ui.summary(&text, None, facts);
+    Ok(Outcome::Done)
+}
+
+/// Milliseconds a frame of the Python reference, as it prints them, on one thread.
+fn reference(script: &Path, video: &Path, models_dir: &Path) -> Result<f64> {
+    let python = std::env::var("ORATOR_REFERENCE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let out = std::env::temp_dir().join(format!("orator-bench-{}.npz", std::process::id()));
+    let mut command = Command::new(&python);
+    command.arg(script).arg(video).arg(&out).env("OMP_NUM_THREADS", "1").env("MODELS", models_dir);
+    let output = command.output().with_context(|| {
+        format!("{python} cannot be run; ORATOR_REFERENCE_PYTHON names a Python with onnxruntime, cv2 and numpy")
+    })?;
+    let _ = std::fs::remove_file(&out);
+    let said = String::from_utf8_lossy(&output.stdout);
+    let milliseconds = said.split(" ms a frame").next().and_then(|text| text.split_whitespace().last());
+    let error = String::from_utf8_lossy(&output.stderr);
+    milliseconds.and_then(|text| text.parse().ok()).with_context(|| {
+        format!("{} gave no time: {}", script.display(), error.lines().last().unwrap_or("it said nothing"))
+    })
+}
+
+fn median(mut numbers: Vec<f64>) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    numbers.get(numbers.len() / 2).copied().unwrap_or(f64::NAN)
 }

@@ -36,10 +36,8 @@ impl ModelEntry {
         usize::try_from(size).ok().map(|size| size / share)
     }
 
-    /// Says what is wrong with the description, before any file is opened.
-    pub(super) fn check(&self) -> Result<()> {
-        let plain = |text: &str| !text.is_empty() && !text.contains(['/', '\\']) && !text.starts_with('.');
-        ensure!(plain(&self.id), "id must be a plain name");
+    /// Says what is wrong with the file's name and pin.
+    pub(super) fn check_file(&self) -> Result<()> {
         ensure!(
             plain(&self.file),
             "file must be the plain name of a file in the folder of the models: {:?}",
@@ -47,6 +45,13 @@ impl ModelEntry {
         );
         let hex = self.sha256.len() == 64 && self.sha256.bytes().all(|byte| byte.is_ascii_hexdigit());
         ensure!(hex, "sha256 must be 64 hex digits, not {:?}", self.sha256);
+        ensure!(!self.origin.licence.is_empty(), "origin must name repository, commit, path and licence");
+        Ok(())
+    }
+
+    /// Says what is wrong with the description, before any file is opened.
+    pub(super) fn check(&self) -> Result<()> {
+        ensure!(plain(&self.id), "id must be a plain name");
         ensure!(self.inputs.len() == 1, "it must have exactly one input, not {}", self.inputs.len());
         let [height, width] = self.input_size()?;
         let numbers = [self.picture.scale].into_iter().chain(self.picture.mean).chain(self.picture.std);
@@ -131,4 +136,9 @@ impl Decode {
         }
         Ok(())
     }
+}
+
+/// A name that stays in its folder.
+fn plain(name: &str) -> bool {
+    !name.is_empty() && !name.contains(['/', '\\']) && !name.starts_with('.')
 }

@@ -11,9 +11,12 @@ pub struct ModelEntry {
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub about: String,
     pub role: Role,
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub file: String,
     /// 64 hex digits of the file's content.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub sha256: String,
+    #[serde(default)]
     pub bytes: u64,
     /// Serves exactly the pinned bytes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -28,6 +31,7 @@ pub struct ModelEntry {
     pub decode: Decode,
     #[serde(default, skip_serializing_if = "Points::is_empty")]
     pub points: Points,
+    #[serde(default)]
     pub origin: Origin,
 }
 
@@ -43,7 +47,7 @@ pub enum Role {
 }
 
 /// Where the weights come from and under which terms.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
     pub repository: String,

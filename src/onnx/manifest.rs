@@ -15,8 +15,11 @@ const BUILTIN: &str = include_str!("../../models/manifest.toml");
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    #[serde(default, rename = "model")]
+    #[serde(default, rename = "model", skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<ModelEntry>,
+    /// Descriptions without a file: forms to register other models by.
+    #[serde(default, rename = "layout", skip_serializing_if = "Vec::is_empty")]
+    pub layouts: Vec<ModelEntry>,
 }
 
 impl Manifest {
@@ -31,9 +34,9 @@ impl Manifest {
         let path = dir.join(MANIFEST_FILE);
         match std::fs::read_to_string(&path) {
             Ok(text) => {
-                for entry in Self::parse(&text).with_context(|| format!("in {}", path.display()))?.models {
-                    manifest.put(entry);
-                }
+                let own = Self::parse(&text).with_context(|| format!("in {}", path.display()))?;
+                own.models.into_iter().for_each(|entry| put(&mut manifest.models, entry));
+                own.layouts.into_iter().for_each(|entry| put(&mut manifest.layouts, entry));
             }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
             Err(error) => return Err(error).with_context(|| format!("cannot read {}", path.display())),
@@ -45,18 +48,14 @@ impl Manifest {
     pub fn parse(text: &str) -> Result<Self> {
         let manifest: Self = toml::from_str(text).context("not a manifest of models")?;
         for (idx, entry) in manifest.models.iter().enumerate() {
-            entry.check().with_context(|| format!("model {:?}", entry.id))?;
+            entry.check_file().and_then(|()| entry.check()).with_context(|| format!("model {:?}", entry.id))?;
             let known = manifest.models[..idx].iter().any(|other| other.id == entry.id);
             ensure!(!known, "model {:?} stands in it twice", entry.id);
         }
-        Ok(manifest)
-    }
-
-    fn put(&mut self, entry: ModelEntry) {
-        match self.models.iter_mut().find(|known| known.id == entry.id) {
-            Some(known) => *known = entry,
-            None => self.models.push(entry),
+        for entry in &manifest.layouts {
+            entry.check().with_context(|| format!("layout {:?}", entry.id))?;
         }
+        Ok(manifest)
     }
 
     /// The model of that id.
@@ -67,11 +66,24 @@ impl Manifest {
         })
     }
 
+    /// The description, with or without a file, of that id.
+    pub fn like(&self, id: &str) -> Result<&ModelEntry> {
+        self.layouts.iter().find(|entry| entry.id == id).map_or_else(|| self.get(id), Ok)
+    }
+
     /// The model of that id, which must have the role.
     pub fn get_as(&self, id: &str, role: Role) -> Result<&ModelEntry> {
         let entry = self.get(id)?;
         ensure!(entry.role == role, "the model {id:?} is a {:?} model; a {role:?} model is wanted here", entry.role);
         Ok(entry)
+    }
+}
+
+/// Puts `entry` in the place of the one with its id, else at the end.
+fn put(entries: &mut Vec<ModelEntry>, entry: ModelEntry) {
+    match entries.iter_mut().find(|known| known.id == entry.id) {
+        Some(known) => *known = entry,
+        None => entries.push(entry),
     }
 }
 
@@ -82,7 +94,7 @@ mod tests {
     #[test]
     fn the_builtin_manifest_reads_and_writes_itself() {
         let manifest = Manifest::builtin().unwrap();
-        assert_eq!(manifest.models.len(), 13);
+        assert_eq!((manifest.models.len(), manifest.layouts.len()), (13, 5));
         assert_eq!(Manifest::parse(&toml::to_string(&manifest).unwrap()).unwrap(), manifest);
         for entry in &manifest.models {
             assert!(entry.url.is_some() != entry.conversion.is_some(), "{}: url or conversion", entry.id);
@@ -107,7 +119,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let mut own = Manifest::builtin().unwrap().get("person-rtmdet-nano").unwrap().clone();
         own.id = "person-mine".into();
-        let text = toml::to_string(&Manifest { models: vec![own.clone()] }).unwrap();
+        let text = toml::to_string(&Manifest { models: vec![own.clone()], layouts: Vec::new() }).unwrap();
         std::fs::write(dir.path().join(MANIFEST_FILE), text).unwrap();
         let manifest = Manifest::load(dir.path()).unwrap();
         assert_eq!((manifest.models.len(), manifest.get("person-mine").unwrap()), (14, &own));

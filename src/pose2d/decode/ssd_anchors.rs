@@ -45,7 +45,7 @@ pub fn decode(
         logits.len() == anchors.len()
             && row_len * anchors.len() == regressors.len()
             && row_len >= 4
-            && row_len % 2 == 0,
+            && row_len.is_multiple_of(2),
         "{} anchors need as many scores and rows of box and points, not {} scores and {} numbers",
         anchors.len(),
         logits.len(),
