@@ -106,7 +106,7 @@ mod tests {
 
     fn spread_hand() -> Hand {
         std::array::from_fn(|j| {
-            let (finger, phalanx) = ((j + 3) / 4, (j + 3) % 4);
+            let (finger, phalanx) = (j.div_ceil(4), (j + 3) % 4);
             if j == 0 { [0.0; 3] } else { [10.0 * finger as f64 - 25.0, -40.0 - 12.0 * phalanx as f64, 3.0 * j as f64] }
         })
     }
