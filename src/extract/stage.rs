@@ -63,9 +63,6 @@ impl Stage for Extract {
         let n_frames = timeline.source_secs.len();
         let n_shots = timeline.shots.numbers.last().map_or(0, |number| number + 1);
         let damage = reader.damage();
-        if let Some(damage) = &damage {
-            progress.say(&format!("{}: damaged, {damage}; what could be read is kept", unit.source.display()));
-        }
         let video = reader.info().video.as_ref();
         let media = json!({
             "duration_secs": reader.duration_secs(),
@@ -86,7 +83,9 @@ impl Stage for Extract {
         let shots = if n_shots == 1 { "1 shot".to_owned() } else { format!("{n_shots} shots") };
         let mut facts = media.as_object().cloned().unwrap_or_default();
         facts.insert("n_shots".into(), n_shots.into());
-        Ok(Report { line: format!("{n_frames} frames at {rate}, {shots}, {sound}"), facts })
+        let kept = |damage: &String| format!("; damaged, what could be read is kept: {damage}");
+        let damage = damage.as_ref().map(kept).unwrap_or_default();
+        Ok(Report { line: format!("{n_frames} frames at {rate}, {shots}, {sound}{damage}"), facts })
     }
 }
 

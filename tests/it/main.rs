@@ -1,5 +1,6 @@
 //! The integration tests: one binary, a module a concern.
 
+mod bad_input;
 mod blender;
 mod bvh;
 mod clips;
@@ -13,14 +14,17 @@ mod gan;
 mod generate;
 mod golden;
 mod house;
+mod kill;
 mod lift;
 mod media_frames;
 mod media_sound;
+mod memory;
 mod models_verb;
 mod networks;
 mod operators;
 mod pose_chain;
 mod pose_parity;
+mod real;
 mod runner;
 mod segment;
 mod shard;

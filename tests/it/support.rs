@@ -32,7 +32,7 @@ impl Project {
         let project = Self { dir };
         std::fs::create_dir_all(project.video("")).unwrap();
         let folder = project.dir().to_string_lossy().into_owned();
-        let (n, secs) = (n_clips.max(1).to_string(), secs.max(0.5).to_string());
+        let (n, secs) = (n_clips.max(1).to_string(), secs.max(1.0).to_string());
         let drawn = project.answer(&["demo", "draw", &folder, "--videos", &n, "--secs", &secs]);
         assert_eq!(drawn.code, 0, "{}", drawn.errors);
         if n_clips == 0 {
