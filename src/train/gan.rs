@@ -7,9 +7,10 @@ use super::checkpoint::{self, Contents};
 use super::examples::{Batch, Examples};
 use super::log::Log;
 use super::losses::{self, BoneConstancy};
-use super::metrics::{Correct, Figures, Validation};
+use super::metrics::Validation;
 use super::poses::{N_NUMBERS, Normalisation};
 use super::speaker::{Facts, GENERATOR};
+use super::validate::HeldOut;
 use crate::config::Gan;
 use crate::dataset::{Dataset, Split};
 use crate::motion::bones;
@@ -17,10 +18,9 @@ use crate::nn::discriminator::{Discriminator, motion};
 use crate::nn::params::Params;
 use crate::nn::unet::{Config, FRAMES_MULTIPLE, Generator};
 use crate::stage::progress::Progress;
-use crate::types::skeleton::{L_HAND, L_WRIST, N_BONES, N_JOINTS, R_HAND, R_WRIST};
+use crate::types::skeleton::N_BONES;
 use anyhow::{Context, Result, bail, ensure};
 use candle_core::{DType, Tensor};
-use ndarray::{Array2, ArrayView2};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
@@ -32,8 +32,6 @@ const ADAM_G: &str = "adam.generator.";
 const ADAM_D: &str = "adam.discriminator.";
 /// Steps between two lines of the log.
 const LOG_EVERY: usize = 10;
-/// Most windows a validation looks at.
-const N_VALIDATION: usize = 256;
 /// Gradients are clipped to this norm; a loss beyond the limit is a training that has exploded.
 const MAX_NORM: f64 = 10.0;
 const LOSS_LIMIT: f64 = 1e4;
@@ -80,7 +78,7 @@ pub fn train(dataset: &Dataset, settings: &Gan, folder: &Path, progress: &dyn Pr
         dataset.dir().display(),
         settings.window_frames
     );
-    let (split, held_out) = held_out(dataset, settings, &normal, progress)?;
+    let held_out = HeldOut::load(dataset, settings, &normal, progress)?;
     let mut training = Training::new(dataset, settings, normal)?;
     if let Some((_, newest)) = checkpoint::list(folder)?.pop() {
         training.resume(&newest)?;
@@ -102,7 +100,7 @@ pub fn train(dataset: &Dataset, settings: &Gan, folder: &Path, progress: &dyn Pr
             log.write(&losses.line(training.step))?;
         }
         if training.step % settings.checkpoint_every == 0 || training.step == settings.steps {
-            let validation = training.validate(split, &held_out)?;
+            let validation = held_out.validate(&training.generator, &training.facts.normalisation)?;
             log.write(&json!({ "step": training.step, "validation": validation }))?;
             training.save(folder, &validation)?;
             last_validation = Some(validation);
@@ -113,7 +111,7 @@ pub fn train(dataset: &Dataset, settings: &Gan, folder: &Path, progress: &dyn Pr
     };
     let validation = match last_validation {
         Some(validation) => validation,
-        None => training.validate(split, &held_out)?,
+        None => held_out.validate(&training.generator, &training.facts.normalisation)?,
     };
     Ok(Outcome {
         steps: training.step,
@@ -151,28 +149,6 @@ fn normalisation(dataset: &Dataset) -> Result<Normalisation> {
         lengths = bones::measure(&dataset.read(&longest)?.motion).to_vec();
     }
     Ok(Normalisation::new(&dataset.stats().mean(), &dataset.stats().std(), lengths))
-}
-
-/// The windows to validate on, side by side, at most `N_VALIDATION` evenly chosen: of the validation split, or where
-/// that has none of the training split, which is said.
-fn held_out(
-    dataset: &Dataset,
-    settings: &Gan,
-    normal: &Normalisation,
-    progress: &dyn Progress,
-) -> Result<(Split, Vec<Batch>)> {
-    let n_frames = settings.window_frames;
-    let mut split = Split::Validation;
-    let mut examples = Examples::load(dataset, split, normal, n_frames, n_frames)?;
-    if examples.is_empty() {
-        progress.say("the dataset has no validation window: the figures below are on training windows");
-        split = Split::Train;
-        examples = Examples::load(dataset, split, normal, n_frames, n_frames)?;
-    }
-    let n = examples.len().min(N_VALIDATION);
-    let chosen: Vec<usize> = (0..n).map(|i| i * examples.len() / n).collect();
-    let batches = chosen.chunks(settings.batch).map(|which| examples.batch(which)).collect::<Result<_>>()?;
-    Ok((split, batches))
 }
 
 /// The windows of a step, drawn with replacement.
@@ -286,40 +262,6 @@ impl<'a> Training<'a> {
         )
     }
 
-    /// The generator and the mean pose on the windows of `batches`.
-    fn validate(&self, split: Split, batches: &[Batch]) -> Result<Validation> {
-        let (mut errors, mut still_errors, mut n_numbers, mut n_windows) = (0.0, 0.0, 0.0, 0);
-        let (mut correct, mut still_correct) = (Correct::default(), Correct::default());
-        let normal = &self.facts.normalisation;
-        for batch in batches {
-            let made = self.generator.forward(&batch.mels, self.settings.window_frames, false)?.detach();
-            let seen = f64::from(batch.mask.sum_all()?.to_scalar::<f32>()?);
-            errors += number(&losses::l1(&made, &batch.poses, &batch.mask)?)? * seen;
-            still_errors += number(&losses::l1(&made.zeros_like()?, &batch.poses, &batch.mask)?)? * seen;
-            n_numbers += seen;
-            for i in 0..made.dim(0)? {
-                let window = |x: &Tensor| -> Result<Array2<f32>> {
-                    let values = x.get(i)?.flatten_all()?.to_vec1::<f32>()?;
-                    Ok(Array2::from_shape_vec((N_NUMBERS, self.settings.window_frames), values)?)
-                };
-                let (made, real) = (window(&made)?, window(&batch.poses)?);
-                let mask = joints_seen(window(&batch.mask)?.view());
-                let real = normal.joints(real.view());
-                correct.count(normal.joints(made.view()).view(), real.view(), mask.view());
-                let still = Array2::zeros(made.raw_dim());
-                still_correct.count(normal.joints(still.view()).view(), real.view(), mask.view());
-                n_windows += 1;
-            }
-        }
-        let n_numbers = f64::max(n_numbers, 1.0);
-        Ok(Validation {
-            split: split.name().to_owned(),
-            n_windows,
-            generator: Figures { l1: errors / n_numbers, pck: correct.share() },
-            mean_pose: Figures { l1: still_errors / n_numbers, pck: still_correct.share() },
-        })
-    }
-
     /// Writes the checkpoint of this step, and the best one when it is; old ones go.
     fn save(&mut self, folder: &Path, validation: &Validation) -> Result<()> {
         // In f32, whose decimals come back exactly from JSON.
@@ -381,14 +323,4 @@ impl Losses {
 
 fn number(scalar: &Tensor) -> Result<f64> {
     Ok(f64::from(scalar.to_scalar::<f32>()?))
-}
-
-/// Mask of numbers [144, T] to mask of joints [T, 49]; the hand roots are seen where the wrists are.
-fn joints_seen(mask: ArrayView2<f32>) -> Array2<bool> {
-    Array2::from_shape_fn((mask.ncols(), N_JOINTS), |(t, joint)| match joint {
-        0 => true,
-        L_HAND => mask[[3 * (L_WRIST - 1), t]] > 0.0,
-        R_HAND => mask[[3 * (R_WRIST - 1), t]] > 0.0,
-        _ => mask[[3 * (joint - 1), t]] > 0.0,
-    })
 }

@@ -19,3 +19,4 @@ pub mod losses;
 pub mod metrics;
 pub mod poses;
 pub mod speaker;
+pub mod validate;
