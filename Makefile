@@ -67,8 +67,16 @@ test: build
 	cargo test --locked
 	@echo 'make test: all passed'
 
+# The long proofs, each printing its figures: 20 kills, a 10-minute video, speed on a real clip (CLIP, MODELS).
+SHARED := ../shared
+CLIP := $(SHARED)/data/videos/talk_tyson_2cam_17s_720p.mp4
+MODELS := $(SHARED)/models
+REFERENCE := $(SHARED)/reference/pose_chain_reference.py
+
 prove: build
-	@echo 'no long proofs yet'
+	ORATOR_KILLS=20 ORATOR_LONG=1 cargo test --release --locked --test it -- --nocapture --test-threads 1 kill:: memory::
+	cargo test --release --locked --test it -- --nocapture --test-threads 1 golden:: pose_parity:: real::
+	if [ -e $(CLIP) ]; then $(ORATOR) bench pose2d $(CLIP) --models-dir $(MODELS); else echo 'SKIPPED: $(CLIP) is not there'; fi
 
 # The whole road on the synthetic speaker. DEMO: its folder; DRAW and STEPS: how much of it.
 DEMO := $(TARGET)/demo
