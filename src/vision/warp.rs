@@ -59,6 +59,7 @@ pub fn warp(src: &Image, src_from_dst: &SrcFromDst, dst: &mut Image) -> Result<(
     let size = Size::new(side(dst.width)?, side(dst.height)?);
     let matrix = Mat::from_slice_2d(&src_from_dst.0)?;
     let flags = INTER_LINEAR | WARP_INVERSE_MAP;
+    read_ahead(src, src_from_dst, [dst.width, dst.height]);
     imgproc::warp_affine(
         &borrow(src)?,
         &mut borrow_mut(dst)?,
@@ -69,6 +70,31 @@ pub fn warp(src: &Image, src_from_dst: &SrcFromDst, dst: &mut Image) -> Result<(
         Scalar::default(),
     )?;
     Ok(())
+}
+
+/// Bytes a processor fetches at once.
+const CACHE_LINE: usize = 64;
+/// A crop of more source pixels a pixel than this skips most of what `read_ahead` would bring.
+const DENSE: usize = 4;
+
+/// Touches the rows of the source a crop lies in, in order: a rotated crop reads them in an order no prefetcher guesses,
+/// and waits for each (0.4 ms a hand instead of 0.2 in a picture of 1280x720 that has left the cache).
+fn read_ahead(src: &Image, src_from_dst: &SrcFromDst, [width, height]: [usize; 2]) {
+    let corners = [[0, 0], [width, 0], [0, height], [width, height]];
+    let corners = corners.map(|corner| src_from_dst.apply(corner.map(|px| px as f64)));
+    let range = |axis: usize, size: usize| {
+        let along = corners.map(|corner| corner[axis].clamp(0.0, size as f64) as usize);
+        along.iter().copied().min().unwrap_or(0)..along.iter().copied().max().unwrap_or(0)
+    };
+    let (columns, rows) = (range(0, src.width), range(1, src.height));
+    if columns.len() * rows.len() > DENSE * width * height {
+        return;
+    }
+    let touched = rows.flat_map(|y| {
+        let row = src.data.get(3 * (y * src.width + columns.start)..3 * (y * src.width + columns.end));
+        row.unwrap_or_default().iter().step_by(CACHE_LINE)
+    });
+    std::hint::black_box(touched.fold(0_u8, |sum, byte| sum ^ byte));
 }
 
 /// Fills `dst` with the whole of `src`, stretched.
