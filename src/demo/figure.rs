@@ -25,6 +25,10 @@ const FINGER_BASES: [Vec3; 5] =
 const PHALANGES: [[f64; 3]; 5] =
     [[0.044, 0.034, 0.028], [0.044, 0.027, 0.021], [0.048, 0.03, 0.022], [0.044, 0.028, 0.022], [0.036, 0.021, 0.019]];
 
+/// Where elbows hang to, in torso axes: outwards, down, away. With it elbows are 0.27 m beside and below the neck and
+/// hardly before or behind it, as measured on speakers of talks.
+const ELBOW_POLE: [f64; 3] = [0.3, 0.95, 0.0];
+
 /// Controls of one arm, the same numbers for both sides.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Arm {
@@ -82,7 +86,7 @@ impl Figure {
         {
             let to_world = |[out, down, away]: Vec3| torso.turn([side * out, down, away]);
             let start = at([side * SHOULDER_WIDTH / 2.0, 0.0, 0.0]);
-            let (elbow, wrist) = reach(start, add(controls.neck, to_world(arm.wrist)), to_world([0.55, 0.8, 0.25]));
+            let (elbow, wrist) = reach(start, add(controls.neck, to_world(arm.wrist)), to_world(ELBOW_POLE));
             joints[shoulder] = start;
             joints[shoulder + 1] = elbow;
             joints[shoulder + 2] = wrist;

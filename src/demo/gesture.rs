@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 /// Numbers of an arm.
 const N_ARM: usize = 8;
 /// Hands folded low in front of the body.
-const REST: [f64; N_ARM] = [0.19, 0.33, -0.19, 0.6, 0.45, 0.35, 0.0, 0.06];
+const REST: [f64; N_ARM] = [0.17, 0.35, -0.19, 0.6, 0.45, 0.35, 0.0, 0.06];
 
 /// From `start` on the arms move to `arms`, within `secs`.
 #[derive(Clone, Debug)]
@@ -72,9 +72,9 @@ impl Gestures {
     fn stroke(&mut self, start: f64, only: Option<usize>, dice: &mut ChaCha8Rng) {
         let place = |dice: &mut ChaCha8Rng| -> [f64; N_ARM] {
             [
-                dice.random_range(0.19..0.36),
-                dice.random_range(0.04..0.27),
-                dice.random_range(-0.25..-0.13),
+                dice.random_range(0.16..0.3),
+                dice.random_range(0.12..0.36),
+                dice.random_range(-0.28..-0.15),
                 dice.random_range(-0.5..1.0),
                 dice.random_range(0.5..1.0),
                 dice.random_range(0.05..0.5),
