@@ -65,6 +65,7 @@ test: build
 	cargo fmt --check
 	cargo clippy --locked --all-targets -- -D warnings
 	cargo test --locked
+	$(MAKE) demo DEMO=$(TARGET)/demo-test DRAW='--videos 2 --secs 12 --fps 15' STEPS=30
 	@echo 'make test: all passed'
 
 # The long proofs, each printing its figures: 20 kills, a 10-minute video, speed on a real clip (CLIP, MODELS).
@@ -81,7 +82,7 @@ prove: build
 # The whole road on the synthetic speaker. DEMO: its folder; DRAW and STEPS: how much of it.
 DEMO := $(TARGET)/demo
 DRAW :=
-STEPS := 400
+STEPS := 600
 
 demo: build
 	$(ORATOR) demo draw $(DEMO) $(DRAW)
@@ -95,4 +96,4 @@ demo: build
 		$(DEMO)/motion.npy $(DEMO)/motion.bvh $(DEMO)/motion.mp4 $(DEMO)/contact_sheet.png
 
 clean-demo:
-	rm -rf $(DEMO)
+	rm -rf $(DEMO) $(TARGET)/demo-test
