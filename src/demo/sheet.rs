@@ -16,7 +16,7 @@ use std::path::Path;
 /// A cell, the line of words above the columns and the rows' margin, px.
 const CELL: [usize; 2] = [320, 240];
 const HEAD_PX: usize = 40;
-const N_ROWS: usize = 4;
+const N_ROWS: usize = 3;
 const COLUMNS: [&str; 5] =
     ["video", "2D keypoints", "3D, from the front", "3D, from the left", "generated from speech"];
 /// Bones between the points of COCO-17 that are drawn.
