@@ -187,12 +187,22 @@ fn pose2d(args: &Pose2d, ui: &Ui) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Milliseconds a frame of the Python reference, as it prints them, on one thread.
+/// Milliseconds a frame of the Python reference, as it prints them, held to one processor core: its decoder and OpenCV
+/// start threads of their own otherwise.
 fn reference(script: &Path, video: &Path, models_dir: &Path) -> Result<f64> {
     let python = std::env::var("ORATOR_REFERENCE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let out = std::env::temp_dir().join(format!("orator-bench-{}.npz", std::process::id()));
-    let mut command = Command::new(&python);
-    command.arg(script).arg(video).arg(&out).env("OMP_NUM_THREADS", "1").env("MODELS", models_dir);
+    let can_hold = Command::new("taskset").arg("--version").output().is_ok_and(|output| output.status.success());
+    let mut command = Command::new(if can_hold { "taskset" } else { &python });
+    if can_hold {
+        command.args(["--cpu-list", "0", &python]);
+    }
+    command.arg(script).arg(video).arg(&out).env("MODELS", models_dir);
+    for (variable, one) in
+        [("OMP_NUM_THREADS", "1"), ("OPENCV_FOR_THREADS_NUM", "1"), ("OPENCV_FFMPEG_CAPTURE_OPTIONS", "threads;1")]
+    {
+        command.env(variable, one);
+    }
     let output = command.output().with_context(|| {
         format!("{python} cannot be run; ORATOR_REFERENCE_PYTHON names a Python with onnxruntime, cv2 and numpy")
     })?;
