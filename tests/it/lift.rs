@@ -3,13 +3,18 @@
 use ndarray::{Array3, s};
 use ndarray_npy::{NpzWriter, read_npy};
 use orator::config;
-use orator::lift::Lifter;
+use orator::lift::{LiftStage, Lifter};
+use orator::motion::keypoints_npz::Extras;
 use orator::motion::upper_body::{
     L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, NOSE, Pose, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, metres_per_unit,
 };
+use orator::motion::{joints_npz, keypoints_npz, mocap};
+use orator::stage::progress::Silent;
+use orator::stage::runner::place;
+use orator::stage::{Stage, Unit};
 use orator::train::body_scene::Scene;
 use orator::train::hand_shape;
-use orator::types::interval::Interval;
+use orator::types::interval::{Interval, Intervals};
 use orator::types::pose2d::Keypoints;
 use orator::types::pose3d::Motion;
 use orator::types::skeleton::{self, L_HAND, N_JOINTS, R_HAND};
@@ -220,4 +225,60 @@ fn the_verb_lifts_a_bare_body_and_says_what_is_wrong() {
     std::fs::write(&npz, b"no zip").unwrap();
     fails(&[&npz, to, &out], "k.npz");
     assert_eq!(std::fs::read(&out).unwrap(), before, "what was there stays");
+}
+
+#[test]
+fn the_stage_writes_joints_and_bones() {
+    let dir = tempfile::tempdir().unwrap();
+    let unit = Unit { speaker: "host".into(), video: "clip-00000000".into(), source: "clip.mp4".into() };
+    let mut rng = ChaCha8Rng::seed_from_u64(12);
+    let keypoints = keypoints(&Scene::of_rule(70, false, &mut rng), &mut rng);
+    let extras = Extras {
+        time_secs: ndarray::Array1::linspace(0.0, 4.6, 70),
+        person: ndarray::Array2::zeros((70, 5)),
+        n_people: ndarray::Array1::ones(70),
+    };
+    let (pose2d, segment) = (place(dir.path(), "pose2d", &unit), place(dir.path(), "segment", &unit));
+    std::fs::create_dir_all(&pose2d).unwrap();
+    std::fs::create_dir_all(&segment).unwrap();
+    keypoints_npz::write(&pose2d.join("keypoints.npz"), &keypoints, &extras).unwrap();
+    let intervals = |n_frames| Intervals::new(keypoints.fps, n_frames, vec![Interval { start: 2, end: 68 }]);
+    std::fs::write(segment.join("intervals.json"), serde_json::to_vec(&intervals(70)).unwrap()).unwrap();
+
+    let stage = LiftStage::new(&config::Lift::default(), dir.path()).unwrap();
+    assert!(stage.inputs(&unit).unwrap().iter().all(|input| input.path.exists()));
+    let report = stage.run(&unit, dir.path(), &Silent).unwrap();
+    assert!(report.line.starts_with("66 frames in 1 interval"), "{}", report.line);
+    let motion = joints_npz::read(&dir.path().join("joints.npz")).unwrap();
+    assert!(motion.joints[[1, 0, 0]].is_nan() && motion.joints[[2, 0, 0]] == 0.0);
+    let bones: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(dir.path().join("bones.json")).unwrap()).unwrap();
+    let lengths: Vec<f64> = serde_json::from_value(bones["lengths_metres"].clone()).unwrap();
+    assert_eq!((lengths.len(), bones["n_frames"].as_u64()), (48, Some(66)));
+    assert!((lengths[0] * 2.0 + lengths[1] + lengths[2] - 0.90).abs() < 1e-3, "the reference size");
+    assert!((lengths[skeleton::L_HAND + 9] / lengths[2] - 0.20).abs() < 1e-3, "a phalanx a fifth of the forearm");
+
+    std::fs::write(segment.join("intervals.json"), serde_json::to_vec(&intervals(71)).unwrap()).unwrap();
+    let text = format!("{:#}", stage.run(&unit, dir.path(), &Silent).unwrap_err());
+    assert!(text.contains("segment again"), "{text}");
+}
+
+#[test]
+fn the_captured_gestures_face_forward_upright() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/mocap/cmu_gestures_joints38_mm.npz");
+    if !file.exists() {
+        eprintln!("SKIPPED: {} is not there", file.display());
+        return;
+    }
+    let takes = mocap::read_all(&[file]).unwrap();
+    let (mut upright, mut ahead, mut n) = (0, 0, 0);
+    for pose in takes.iter().flat_map(|take| take.poses.iter().step_by(60)) {
+        n += 1;
+        upright += usize::from(pose[NOSE][1] < 0.0 && pose[R_HIP][1] > 0.2);
+        // the face lies before the line of the shoulders, seen from above
+        let [x, _, z] = [0, 1, 2].map(|k| pose[L_SHOULDER][k] - pose[R_SHOULDER][k]);
+        ahead += usize::from(pose[NOSE][0] * z - pose[NOSE][2] * x > 0.0);
+    }
+    assert!(takes.len() >= 13 && n > 300, "{} takes, {n} frames", takes.len());
+    assert!(upright * 20 > n * 19 && ahead * 20 > n * 19, "{upright} {ahead} of {n}");
 }
