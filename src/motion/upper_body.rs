@@ -77,6 +77,18 @@ impl View {
         Some(Self { numbers, scale })
     }
 
+    /// The same window in the mirror: what the network sees of a speaker whose left is their right.
+    pub fn mirrored(&self) -> Self {
+        let n = self.numbers.len() / N_IN;
+        let mut numbers = Vec::with_capacity(self.numbers.len());
+        for other in MIRROR {
+            let channels = &self.numbers[3 * other * n..3 * (other + 1) * n];
+            numbers.extend(channels[..n].iter().map(|x| -x));
+            numbers.extend_from_slice(&channels[n..]);
+        }
+        Self { numbers, scale: self.scale }
+    }
+
     /// x and y of a point in the middle frame, in units of `scale`.
     pub fn middle(&self, point: usize) -> [f32; 2] {
         let n = self.numbers.len() / N_IN;
@@ -94,6 +106,16 @@ impl View {
         pose.iter_mut().for_each(|p| *p = vec3::sub(*p, neck));
         pose
     }
+}
+
+/// The mean of a window's output and that of the window in the mirror: left and right are lifted alike.
+pub fn mirror_mean(output: &[f32], of_mirrored: &[f32]) -> Vec<f32> {
+    let mut mean = Vec::with_capacity(N_OUT);
+    for (j, other) in MIRROR.into_iter().enumerate() {
+        let (own, back) = (&output[3 * j..3 * j + 3], &of_mirrored[3 * other..3 * other + 3]);
+        mean.extend([(own[0] - back[0]) / 2.0, (own[1] + back[1]) / 2.0, (own[2] + back[2]) / 2.0]);
+    }
+    mean
 }
 
 /// Width of the shoulders, a mean upper arm and a mean forearm together.
@@ -166,6 +188,18 @@ mod tests {
         assert_eq!(a.middle(R_SHOULDER), [-0.5, 0.0]);
         let pose = a.pose(&[0.0; N_OUT]);
         assert!((pose[L_WRIST][0] - 40.0).abs() < 1e-3 && (pose[L_WRIST][1] - 110.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_mirror_swaps_the_sides_and_back() {
+        let frames: Vec<Seen> = (0..WINDOW).map(|t| frame(3.0 * t as f32)).collect();
+        let flipped: Vec<Seen> = frames.iter().map(|f| MIRROR.map(|j| f[j].map(|[x, y]| [900.0 - x, y]))).collect();
+        let (a, b) = (View::of(&frames).unwrap(), View::of(&flipped).unwrap());
+        assert!(a.mirrored().numbers.iter().zip(&b.numbers).all(|(x, y)| (x - y).abs() < 1e-5));
+        let output: Vec<f32> = (0..N_OUT).map(|i| (i * i) as f32).collect();
+        let there: Vec<f32> =
+            MIRROR.iter().flat_map(|&j| [-output[3 * j], output[3 * j + 1], output[3 * j + 2]]).collect();
+        assert_eq!(mirror_mean(&output, &there), output);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use super::Mode;
 use super::params::Params;
 use super::temporal_lifter::{Config, TemporalLifter};
-use crate::motion::upper_body::{N_IN, N_OUT, Pose, Seen, View, WINDOW};
+use crate::motion::upper_body::{N_IN, N_OUT, Pose, Seen, View, WINDOW, mirror_mean};
 use candle_core::{Device, Result, Tensor};
 
 /// Windows that go through the network together.
@@ -38,7 +38,7 @@ impl BodyLifter {
 
     /// A pose for every frame, in px of the picture, the neck at 0: `None` where a shoulder is not seen within half a
     /// window. Before the first and after the last frame the body stands still. A window takes every `step`-th frame:
-    /// the network knows motion at 15 frames a second.
+    /// the network knows motion at 15 frames a second. Each window is looked at in the mirror as well.
     pub fn poses(&self, seen: &[Seen], step: usize) -> Result<Vec<Option<Pose>>> {
         let half = WINDOW as isize / 2;
         let last = seen.len() as isize - 1;
@@ -49,18 +49,25 @@ impl BodyLifter {
         let mut poses = Vec::with_capacity(seen.len());
         for first in (0..seen.len()).step_by(BATCH) {
             let views: Vec<Option<View>> = (first..seen.len().min(first + BATCH)).map(view).collect();
-            let numbers: Vec<f32> = views.iter().flatten().flat_map(|v| v.numbers.iter().copied()).collect();
-            let n_views = numbers.len() / (N_IN * WINDOW);
-            let outputs = if n_views == 0 {
-                Vec::new()
-            } else {
-                let x = Tensor::from_vec(numbers, (n_views, N_IN, WINDOW), &Device::Cpu)?;
-                self.net.forward_windows(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1::<f32>()?
-            };
-            let mut outputs = outputs.chunks_exact(N_OUT);
-            poses.extend(views.iter().map(|view| Some(view.as_ref()?.pose(outputs.next()?))));
+            let there: Vec<&View> = views.iter().flatten().collect();
+            let mirrored: Vec<View> = there.iter().map(|view| view.mirrored()).collect();
+            let outputs = self.outputs(there.iter().copied().chain(&mirrored))?;
+            let (own, other) = outputs.split_at(outputs.len() / 2);
+            let mut outputs = own.chunks_exact(N_OUT).zip(other.chunks_exact(N_OUT)).map(|(a, b)| mirror_mean(a, b));
+            poses.extend(views.iter().map(|view| Some(view.as_ref()?.pose(&outputs.next()?))));
         }
         Ok(poses)
+    }
+
+    /// N_OUT numbers a view.
+    fn outputs<'a>(&self, views: impl Iterator<Item = &'a View>) -> Result<Vec<f32>> {
+        let numbers: Vec<f32> = views.flat_map(|view| view.numbers.iter().copied()).collect();
+        let n_views = numbers.len() / (N_IN * WINDOW);
+        if n_views == 0 {
+            return Ok(Vec::new());
+        }
+        let x = Tensor::from_vec(numbers, (n_views, N_IN, WINDOW), &Device::Cpu)?;
+        self.net.forward_windows(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1::<f32>()
     }
 }
 

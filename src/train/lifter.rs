@@ -46,6 +46,8 @@ pub struct Schedule {
     pub seed: u64,
     /// Steps between two checkpoints.
     pub checkpoint_every: usize,
+    /// Hash of the weights it starts from (`start_from`); `None`: from the seed.
+    pub started_from: Option<String>,
 }
 
 /// Share of the steps over which the learning rate rises.
@@ -66,13 +68,34 @@ impl Schedule {
     }
 
     fn facts(&self) -> Value {
-        json!({ "steps": self.steps, "batch": self.batch, "learning_rate": self.learning_rate, "seed": self.seed })
+        let mut facts =
+            json!({ "steps": self.steps, "batch": self.batch, "learning_rate": self.learning_rate, "seed": self.seed });
+        if let Some(hash) = &self.started_from {
+            facts["started_from"] = json!(hash);
+        }
+        facts
     }
 }
 
+/// Gives the lesson's network the weights of a file; returns their hash. Errors name the file and what does not fit.
+pub fn start_from(lesson: &dyn Lesson, path: &Path) -> Result<String> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read the weights {}", path.display()))?;
+    let load = || -> Result<()> {
+        let contents = Contents::from_bytes(&bytes)?;
+        ensure!(contents.facts["kind"] == lesson.kind(), "it is a {}, not a {}", contents.facts["kind"], lesson.kind());
+        lesson.params().load(&contents.tensors)
+    };
+    load().with_context(|| format!("cannot start from {}", path.display()))?;
+    Ok(blake3::hash(&bytes).to_hex().to_string())
+}
+
 /// Trains and writes the weights to `out`. A checkpoint beside it (`<out>.checkpoint`) lets an interrupted training
-/// go on, to the same bytes, when called again with the same schedule and data; it is removed at the end.
+/// go on, to the same bytes, when called again with the same schedule and data; it is removed at the end. Gives the
+/// errors on held-out samples; with no steps that is all it does.
 pub fn train(lesson: &mut dyn Lesson, schedule: &Schedule, out: &Path, progress: &dyn Progress) -> Result<Vec<String>> {
+    if schedule.steps == 0 {
+        return lesson.errors(false);
+    }
     train_until(lesson, schedule, out, schedule.steps, progress)?;
     let errors = lesson.errors(false)?;
     let facts = json!({ "kind": lesson.kind(), "lesson": lesson.facts(), "schedule": schedule.facts() });
@@ -94,7 +117,7 @@ fn train_until(
     end: usize,
     progress: &dyn Progress,
 ) -> Result<()> {
-    ensure!(schedule.steps > 0 && schedule.batch > 1, "a training needs at least one step and two samples a batch");
+    ensure!(schedule.batch > 1, "a training needs at least two samples a batch");
     let mut adam =
         Adam::new(lesson.params(), adam::Config { amsgrad: true, max_norm: Some(1.0), ..Default::default() });
     let start = resume(lesson, schedule, out, &mut adam)?;
@@ -198,7 +221,8 @@ mod tests {
     use crate::train::lifter_body::BodyLesson;
     use crate::train::lifter_hands::HandLesson;
 
-    const SCHEDULE: Schedule = Schedule { steps: 6, batch: 8, learning_rate: 1e-3, seed: 3, checkpoint_every: 2 };
+    const SCHEDULE: Schedule =
+        Schedule { steps: 6, batch: 8, learning_rate: 1e-3, seed: 3, checkpoint_every: 2, started_from: None };
 
     fn resumed_equals_straight(lesson: impl Fn() -> Box<dyn Lesson>) {
         let dir = tempfile::tempdir().unwrap();
@@ -209,7 +233,10 @@ mod tests {
         let text = format!("{:#}", train(&mut *lesson(), &other, &resumed, &Silent).unwrap_err());
         assert!(text.contains("schedule"), "{text}");
         train(&mut *lesson(), &SCHEDULE, &resumed, &Silent).unwrap();
-        assert_eq!(std::fs::read(straight).unwrap(), std::fs::read(resumed).unwrap());
+        assert_eq!(std::fs::read(&straight).unwrap(), std::fs::read(resumed).unwrap());
+        let measured =
+            Schedule { steps: 0, started_from: Some(start_from(&*lesson(), &straight).unwrap()), ..SCHEDULE };
+        assert!(!train(&mut *lesson(), &measured, &straight, &Silent).unwrap().is_empty());
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2, "checkpoints are removed");
     }
 

@@ -3,7 +3,7 @@
 use crate::cli::{Outcome, ui::Ui};
 use anyhow::{Context, ensure};
 use orator::motion::mocap;
-use orator::train::lifter::{Lesson, Schedule, train};
+use orator::train::lifter::{Lesson, Schedule, start_from, train};
 use orator::train::lifter_body::BodyLesson;
 use orator::train::lifter_hands::HandLesson;
 use std::path::PathBuf;
@@ -27,6 +27,9 @@ pub struct Args {
     /// The weights file to write (safetensors).
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    /// Start from these weights instead of the seed's; with `--steps 0` their errors are measured, nothing is written.
+    #[arg(long, value_name = "FILE")]
+    start: Option<PathBuf>,
     /// Training steps [default: 4000 body, 6000 hands]
     #[arg(long, hide_default_value = true)]
     steps: Option<usize>,
@@ -77,14 +80,20 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
             (Box::new(HandLesson::new(args.width.unwrap_or(768), args.seed)?), 6000)
         }
     };
+    let started_from = args.start.as_deref().map(|path| start_from(&*lesson, path)).transpose()?;
     let schedule = Schedule {
         steps: args.steps.unwrap_or(steps),
         batch: args.batch,
         learning_rate: args.learning_rate,
         seed: args.seed,
         checkpoint_every: args.checkpoint_every,
+        started_from,
     };
     let errors = train(&mut *lesson, &schedule, &args.out, ui)?;
+    if schedule.steps == 0 {
+        ui.summary(&errors.join("\n"), None, serde_json::json!({ "errors": errors }));
+        return Ok(Outcome::Done);
+    }
     let text = format!("{} written\n{}", args.out.display(), errors.join("\n"));
     let key = if args.part == Part::Body { "--body-weights" } else { "--hand-weights" };
     let next = format!("orator lift KEYPOINTS.npz --out JOINTS.npy {key} {}", args.out.display());
