@@ -30,7 +30,7 @@ pub struct Args {
     /// Start from these weights instead of the seed's; with `--steps 0` their errors are measured, nothing is written.
     #[arg(long, value_name = "FILE")]
     start: Option<PathBuf>,
-    /// Training steps [default: 4000 body, 6000 hands]
+    /// Training steps [default: 9000 body, 5000 hands]
     #[arg(long, hide_default_value = true)]
     steps: Option<usize>,
     /// Samples a step.
@@ -70,14 +70,14 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
         Part::Body => {
             ensure!(!args.mocap.is_empty(), "the body lifter learns from captured motion: give --mocap PATH");
             let lesson = BodyLesson::new(read(&args.mocap, "--mocap")?, args.width.unwrap_or(256), args.seed)?;
-            (Box::new(lesson.with_strangers(read(&args.measure, "--measure")?)), 4000)
+            (Box::new(lesson.with_strangers(read(&args.measure, "--measure")?)), 9000)
         }
         Part::Hands => {
             ensure!(
                 args.mocap.is_empty() && args.measure.is_empty(),
                 "the hand lifter learns from hands made by rule: no --mocap"
             );
-            (Box::new(HandLesson::new(args.width.unwrap_or(768), args.seed)?), 6000)
+            (Box::new(HandLesson::new(args.width.unwrap_or(768), args.seed)?), 5000)
         }
     };
     let started_from = args.start.as_deref().map(|path| start_from(&*lesson, path)).transpose()?;
