@@ -1,6 +1,6 @@
 //! `orator doctor`.
 
-use super::common::ConfigArgs;
+use super::config_args::ConfigArgs;
 use super::{Outcome, ui::Ui};
 use anyhow::Result;
 use orator::config::{Config, Settings};
@@ -32,7 +32,6 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         ok("OpenCV", orator::vision::version()),
         ok("processor cores", std::thread::available_parallelism().map_or(1, |n| n.get()).to_string()),
     ];
-    let mut next = args.config.config.display().to_string();
     match config {
         Ok(config) => {
             checks.push(ok("configuration", config.file.display().to_string()));
@@ -40,7 +39,6 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             checks.push(work(&config.settings.work.dir));
         }
         Err(error) => {
-            next = "pipeline.toml".to_owned();
             checks.push(wrong(
                 "configuration",
                 format!("{error:#}"),
@@ -53,15 +51,10 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let facts: Vec<_> = checks.iter().map(Check::json).collect();
     let next = match missing.first().map(|check| &check.found) {
         Some(Err((_, fix))) => fix.clone(),
-        _ => format!("orator run -c {next}"),
+        _ => format!("orator run{}", args.config.flags()),
     };
     ui.summary(&lines.join("\n"), Some(&next), json!({ "checks": facts, "missing": missing.len(), "next": next }));
-    // Something missing is a matter of the set-up: exit code 1.
-    if missing.is_empty() {
-        Ok(Outcome::Done)
-    } else {
-        anyhow::bail!("{} of {} things are missing", missing.len(), checks.len())
-    }
+    Ok(if missing.is_empty() { Outcome::Done } else { Outcome::SetUpWrong })
 }
 
 fn defaults() -> Result<Config> {

@@ -2,7 +2,7 @@
 //! `--help`. Exit codes: 0 all done; 1 usage or configuration; 2 some units failed, the others are done.
 
 mod bench;
-mod common;
+mod config_args;
 mod demo;
 mod doctor;
 mod generate;
@@ -50,6 +50,8 @@ pub enum Outcome {
     Done,
     /// Some units failed (each was reported); the others are done.
     SomeFailed,
+    /// The set-up is not as it must be; what is missing was said.
+    SetUpWrong,
 }
 
 /// Parses the command line, runs the verb, reports an error, and gives the exit code.
@@ -77,6 +79,7 @@ pub fn main() -> ExitCode {
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::SomeFailed) => ExitCode::from(2),
+        Ok(Outcome::SetUpWrong) => ExitCode::from(1),
         Err(error) => {
             ui.error(&error);
             ExitCode::from(1)

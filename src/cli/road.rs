@@ -9,7 +9,9 @@ use orator::lift::LiftStage;
 use orator::onnx::{Model, Runtime};
 use orator::pose2d::Pose2dStage;
 use orator::segment::SegmentStage;
-use orator::stage::{Stage, Unit, runner};
+use orator::stage::fingerprint::HashCache;
+use orator::stage::runner::{self, State};
+use orator::stage::{Stage, Unit};
 
 /// A stage by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
@@ -53,11 +55,16 @@ impl Step {
     }
 }
 
-/// The videos of a speaker that have come through `lift`: those a dataset is made of.
-pub fn lifted(config: &Config, videos: &Videos) -> Vec<Unit> {
-    let work = &config.settings.work.dir;
-    let is_lifted = |unit: &&Unit| runner::place(work, "lift", unit).join("joints.npz").exists();
-    videos.units.iter().filter(is_lifted).cloned().collect()
+/// The videos of a speaker that are fresh at every stage before `shard`: those a dataset is made of.
+///
+/// # Errors
+/// As `Step::stage`.
+pub fn ready(config: &Config, videos: &Videos, hashes: &HashCache) -> Result<Vec<Unit>> {
+    let before = STEPS.iter().filter(|step| **step != Step::Shard);
+    let stages = before.map(|step| step.stage(config, &[])).collect::<Result<Vec<_>>>()?;
+    let state = |stage: &dyn Stage, unit: &Unit| runner::state(stage, unit, &config.settings.work.dir, hashes);
+    let fresh = |unit: &&Unit| stages.iter().all(|stage| matches!(state(&**stage, unit), State::Fresh(_)));
+    Ok(videos.units.iter().filter(fresh).cloned().collect())
 }
 
 /// The speakers asked for; all where none is named.

@@ -1,6 +1,6 @@
 //! `orator run`.
 
-use super::common::ConfigArgs;
+use super::config_args::ConfigArgs;
 use super::road::{self, STEPS, Step};
 use super::{Outcome, ui::Ui};
 use anyhow::{Context, Result};
@@ -52,6 +52,10 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     if (from..=to).contains(&Step::Pose2d) {
         road::check_models(&config.settings)?;
     }
+    // What a stage needs (weights, the manifest) is looked at before hours of work, not after.
+    for step in STEPS.into_iter().filter(|step| (from..=to).contains(step)) {
+        step.stage(&config, &[])?;
+    }
     let work = &config.settings.work.dir;
     let _lock = lock(work)?;
     let hashes = HashCache::open(&work.join("hashes.json"));
@@ -60,6 +64,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         hashes: &hashes,
         jobs: jobs(&args, &config),
         force: args.force,
+        flags: args.config.flags(),
         ui,
         log: Log::default(),
     };
@@ -74,7 +79,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         run.step(step, &mut alive)?;
         hashes.save()?;
     }
-    run.close(&speakers, to)
+    run.close(speakers.len())
 }
 
 fn jobs(args: &Args, config: &Config) -> usize {
@@ -100,6 +105,8 @@ struct Run<'a> {
     hashes: &'a HashCache,
     jobs: usize,
     force: bool,
+    /// The configuration's arguments, for the next command.
+    flags: String,
     ui: &'a Ui,
     log: Log,
 }
@@ -110,16 +117,17 @@ struct Log {
     lines: Vec<String>,
     stages: serde_json::Map<String, Value>,
     failures: Vec<Value>,
+    /// Speakers whose dataset stands.
+    datasets: Vec<String>,
     reports: Vec<Value>,
 }
 
 impl Run<'_> {
     /// Runs one stage for everything alive; what fails is not alive for the stages after it.
     fn step(&mut self, step: Step, alive: &mut [Videos]) -> Result<()> {
-        let (mut done, mut skipped, mut failed) = (0, 0, 0);
+        let (mut done, mut skipped, mut failed, mut failed_units) = (0, 0, 0, Vec::new());
         let units: Vec<Unit> = alive.iter().flat_map(|videos| step.units(self.config, videos)).collect();
-        let lifted: Vec<Unit> = alive.iter().flat_map(|videos| road::lifted(self.config, videos)).collect();
-        let stage = step.stage(self.config, &lifted)?;
+        let stage = step.stage(self.config, &self.dataset_videos(step, alive)?)?;
         let work = &self.config.settings.work.dir;
         let ended = runner::run(&*stage, &units, work, self.hashes, (self.jobs, self.force), self.ui);
         for (unit, ended) in units.iter().zip(ended) {
@@ -138,6 +146,7 @@ impl Run<'_> {
                 }
                 Ended::Failed(error) => {
                     failed += 1;
+                    failed_units.push(unit.speaker.clone());
                     self.log.failures.push(json!({ "unit": unit.to_string(), "stage": step.name(), "error": error }));
                     for videos in alive.iter_mut().filter(|videos| videos.speaker == unit.speaker) {
                         videos.units.retain(|alive| alive != unit);
@@ -145,32 +154,45 @@ impl Run<'_> {
                 }
             }
         }
+        if step == Step::Shard {
+            self.log.datasets = alive
+                .iter()
+                .filter(|videos| !failed_units.contains(&videos.speaker))
+                .map(|videos| videos.speaker.clone())
+                .collect();
+        }
         self.log.lines.push(format!("{:8} {done} done, {skipped} fresh already, {failed} failed", step.name()));
         self.log.stages.insert(step.name().to_owned(), json!({ "done": done, "fresh": skipped, "failed": failed }));
         Ok(())
     }
 
-    fn close(self, speakers: &[Videos], to: Step) -> Result<Outcome> {
+    /// The videos the datasets are made of; those that are not ready are named and left out.
+    fn dataset_videos(&self, step: Step, alive: &[Videos]) -> Result<Vec<Unit>> {
+        let mut all_ready = Vec::new();
+        for videos in alive.iter().filter(|_| step == Step::Shard) {
+            let ready = road::ready(self.config, videos, self.hashes)?;
+            for unit in videos.units.iter().filter(|unit| !ready.contains(unit)) {
+                self.ui.say(&format!("left out of the dataset: {unit} (`orator status --why` says why)"));
+            }
+            all_ready.extend(ready);
+        }
+        Ok(all_ready)
+    }
+
+    fn close(self, n_speakers: usize) -> Result<Outcome> {
         let work = &self.config.settings.work.dir;
         let mut lines = self.log.lines;
-        let datasets: Vec<_> = speakers
-            .iter()
-            .map(|videos| work.join("dataset").join(&videos.speaker))
-            .filter(|dir| dir.exists())
-            .collect();
-        if to == Step::Shard {
-            lines.extend(datasets.iter().map(|dir| format!("dataset  {}", dir.display())));
-        }
+        let datasets: Vec<_> = self.log.datasets.iter().map(|speaker| work.join("dataset").join(speaker)).collect();
+        lines.extend(datasets.iter().map(|dir| format!("dataset  {}", dir.display())));
         let failures = self.log.failures.len();
         if failures > 0 {
             lines.push(format!("{failures} failed; `orator status --why` says each error again"));
         }
-        let config = self.config.file.display();
-        let next = match (to, speakers.first()) {
-            (Step::Shard, Some(videos)) if datasets.len() == speakers.len() => {
-                format!("orator train gan -c {config} --speaker {}", videos.speaker)
+        let next = match self.log.datasets.first() {
+            Some(speaker) if datasets.len() == n_speakers => {
+                format!("orator train gan{} --speaker {speaker}", self.flags)
             }
-            _ => format!("orator status -c {config} --why"),
+            _ => format!("orator status{} --why", self.flags),
         };
         let facts = json!({
             "stages": self.log.stages, "failures": self.log.failures, "units": self.log.reports,

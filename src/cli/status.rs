@@ -1,6 +1,6 @@
 //! `orator status`.
 
-use super::common::ConfigArgs;
+use super::config_args::ConfigArgs;
 use super::road::{self, STEPS, Step};
 use super::{Outcome, ui::Ui};
 use anyhow::Result;
@@ -34,11 +34,14 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let config = args.config.load()?;
     let hashes = HashCache::open(&config.settings.work.dir.join("hashes.json"));
     let mut lines = vec![format!("{:44} {}", "", STEPS.map(|step| format!("{:8}", step.name())).join(" "))];
-    let (mut whys, mut facts, mut all_fresh) = (Vec::new(), Vec::new(), true);
+    let (mut whys, mut facts, mut datasets_fresh) = (Vec::new(), Vec::new(), true);
     for videos in road::speakers(&config, &args.speaker)? {
-        whys.extend(videos.missing.iter().map(|message| format!("{}: {message}", videos.speaker)));
-        let lifted = road::lifted(&config, &videos);
-        let stages: Vec<_> = STEPS.iter().map(|step| step.stage(&config, &lifted)).collect();
+        for message in &videos.missing {
+            whys.push(format!("{}: {message}", videos.speaker));
+            facts.push(json!({ "unit": videos.speaker, "stage": "extract", "state": "failed", "why": message }));
+        }
+        let ready = road::ready(&config, &videos, &hashes).unwrap_or_default();
+        let stages: Vec<_> = STEPS.iter().map(|step| step.stage(&config, &ready)).collect();
         let mut speaker_waits_for = None;
         let mut rows: Vec<(Unit, Vec<(Step, Cell)>)> = Vec::new();
         for unit in &videos.units {
@@ -47,7 +50,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let cells: Vec<_> = per_video
                 .map(|(step, stage)| (step, cell(step, stage, unit, &config, &hashes, &mut waits_for)))
                 .collect();
-            speaker_waits_for = speaker_waits_for.or(waits_for);
+            // The dataset is made without a video that failed; it waits for those that can still come.
+            let failed = cells.iter().any(|(_, cell)| cell.word == "failed");
+            speaker_waits_for = speaker_waits_for.or(waits_for.filter(|_| !failed));
             rows.push((unit.clone(), cells));
         }
         for unit in Step::Shard.units(&config, &videos) {
@@ -59,7 +64,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let word = |step: &Step| cells.iter().find(|(of, _)| of == step).map_or("", |(_, cell)| cell.word);
             lines.push(format!("{:44} {}", unit.to_string(), STEPS.map(|step| format!("{:8}", word(&step))).join(" ")));
             for (step, cell) in &cells {
-                all_fresh &= cell.word == "fresh";
+                datasets_fresh &= cell.word == "fresh" || *step != Step::Shard;
                 whys.push(format!("{unit} {}: {}: {}", step.name(), cell.word, cell.why));
                 facts.push(
                     json!({ "unit": unit.to_string(), "stage": step.name(), "state": cell.word, "why": cell.why }),
@@ -72,8 +77,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         lines.extend(whys);
     }
     hashes.save().unwrap_or_default();
-    let file = config.file.display();
-    let next = if all_fresh { format!("orator train gan -c {file}") } else { format!("orator run -c {file}") };
+    let verb = if datasets_fresh { "train gan" } else { "run" };
+    let next = format!("orator {verb}{}", args.config.flags());
     ui.summary(&lines.join("\n"), Some(&next), json!({ "units": facts, "next": next }));
     Ok(Outcome::Done)
 }

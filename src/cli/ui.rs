@@ -2,6 +2,7 @@
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use orator::stage::progress::{Progress, Task};
+use std::io::Write;
 use std::time::Duration;
 
 /// The terminal, or its absence.
@@ -19,12 +20,11 @@ impl Ui {
     /// The closing words of a verb: the summary for people and the next command to type, or `facts` for programs.
     pub fn summary(&self, text: &str, next: Option<&str>, facts: serde_json::Value) {
         if self.json {
-            println!("{facts}");
-            return;
+            return say(&facts.to_string());
         }
-        println!("{}", text.trim_end());
+        say(text.trim_end());
         if let Some(next) = next {
-            println!("next: {next}");
+            say(&format!("next: {next}"));
         }
     }
 
@@ -32,9 +32,14 @@ impl Ui {
     pub fn error(&self, error: &anyhow::Error) {
         eprintln!("error: {error:#}");
         if self.json {
-            println!("{}", serde_json::json!({ "error": format!("{error:#}") }));
+            say(&serde_json::json!({ "error": format!("{error:#}") }).to_string());
         }
     }
+}
+
+/// A line on standard output. That nobody reads it any more (`orator status | head`) is no failure.
+fn say(line: &str) {
+    let _ = writeln!(std::io::stdout(), "{line}");
 }
 
 impl Progress for Ui {

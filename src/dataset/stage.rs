@@ -105,6 +105,12 @@ impl Stage for ShardStage {
 
         let mut footage = footage(&videos);
         videos.retain(|video| !video.intervals.intervals.is_empty());
+        anyhow::ensure!(
+            footage.n_videos > 0,
+            "none of the videos of {} came through the stages before, so there is no dataset; \
+             `orator status --why` says where each stands",
+            unit.speaker
+        );
         let Some(first) = videos.first() else {
             bail!(
                 "no interval worth keeping in {} of {:.1} s, so there is no dataset of {}; refused: {}; \

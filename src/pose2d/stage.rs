@@ -4,7 +4,7 @@
 use super::chain::Chain;
 use super::store::{self, Gathered};
 use crate::config::{self, Settings};
-use crate::media::frames::FrameReader;
+use crate::media::{self, frames::FrameReader};
 use crate::motion::npz::Npz;
 use crate::onnx::{Manifest, ModelEntry, OpenError, Runtime};
 use crate::stage::progress::Progress;
@@ -84,6 +84,7 @@ impl Stage for Pose2dStage {
             "models": models,
             "onnxruntime": self.runtime().map_or_else(|_| "missing".to_owned(), |runtime| runtime.version()),
             "opencv": vision::version(),
+            "ffmpeg": media::version(),
         })
     }
 

@@ -94,6 +94,11 @@ impl Record {
         Ok(())
     }
 
+    /// Takes the record of the unit in `place` away, for good before anything else happens.
+    pub fn forget(place: &Path) -> Result<()> {
+        workdir::remove_file(&record_path(place))
+    }
+
     /// Why the unit in `place` is not fresh under the fingerprint `now`; `None`: it is. Sizes of outputs are
     /// compared, not contents.
     pub fn dirty(&self, now: &Fingerprint, place: &Path) -> Option<DirtyReason> {

@@ -107,7 +107,7 @@ fn run_unit(
     progress: &dyn Progress,
 ) -> Ended {
     let place = place(work, stage.folder(), unit);
-    let fingerprint = match Fingerprint::now(stage, unit, hashes) {
+    let fingerprint = match guarded(|| Fingerprint::now(stage, unit, hashes)) {
         Ok(now) => now,
         Err(error) => return failed(&place, None, error),
     };
@@ -117,13 +117,16 @@ fn run_unit(
     {
         return Ended::Skipped(Report { line: record.line, facts: record.facts });
     }
-    // A panic is a defect, but one video must not take the night's run with it.
-    let outcome = catch_unwind(AssertUnwindSafe(|| attempt(stage, unit, &place, &fingerprint, progress)));
-    match outcome {
-        Ok(Ok(report)) => Ended::Done(report),
-        Ok(Err(error)) => failed(&place, Some(fingerprint), error),
-        Err(panic) => failed(&place, Some(fingerprint), anyhow::anyhow!("internal error: {}", panic_text(&*panic))),
+    match guarded(|| attempt(stage, unit, &place, &fingerprint, progress)) {
+        Ok(report) => Ended::Done(report),
+        Err(error) => failed(&place, Some(fingerprint), error),
     }
+}
+
+/// Runs a stage's code. A panic is a defect, but one video must not take the night's run with it.
+fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
+    let caught = catch_unwind(AssertUnwindSafe(work));
+    caught.unwrap_or_else(|panic| Err(anyhow::anyhow!("internal error: {}", panic_text(&*panic))))
 }
 
 fn attempt(
@@ -137,6 +140,8 @@ fn attempt(
     let finish = || -> Result<Report> {
         let report = stage.run(unit, &attempt, progress)?;
         let outputs = Output::list(&attempt)?;
+        // An old record must not speak for new files, should this run be killed before it writes its own.
+        Record::forget(place)?;
         workdir::replace_folder(&attempt, place)?;
         let Report { line, facts } = report.clone();
         Record { fingerprint: fingerprint.clone(), outputs, line, facts }.write(place).context("cannot record it")?;

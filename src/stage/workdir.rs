@@ -27,6 +27,16 @@ pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<(
     written.with_context(|| format!("cannot write {}", path.display()))
 }
 
+/// Removes the file at `path`, if there is one, and flushes its folder.
+pub fn remove_file(path: &Path) -> Result<()> {
+    match fs::remove_file(path) {
+        Ok(()) => flush(&parent(path)),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(error.into()),
+    }
+    .with_context(|| format!("cannot remove {}", path.display()))
+}
+
 /// Puts the finished folder `attempt` in the place of `place`, which may exist. Every file is flushed first.
 pub fn replace_folder(attempt: &Path, place: &Path) -> Result<()> {
     let moved = || -> Result<()> {

@@ -1,6 +1,6 @@
 //! `orator train gan`.
 
-use crate::cli::common::ConfigArgs;
+use crate::cli::config_args::ConfigArgs;
 use crate::cli::{Outcome, ui::Ui};
 use anyhow::{Context, Result, bail};
 use orator::config::Config;

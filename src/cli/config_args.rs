@@ -14,6 +14,13 @@ pub struct ConfigArgs {
 }
 
 impl ConfigArgs {
+    /// The same arguments again, for the next command to type; begins with a space unless empty.
+    pub fn flags(&self) -> String {
+        let file = self.config.display().to_string();
+        let file = if file == "pipeline.toml" { String::new() } else { format!(" -c {file}") };
+        self.set.iter().fold(file, |flags, set| format!("{flags} --set {set}"))
+    }
+
     /// Reads it, with every problem at once.
     pub fn load(&self) -> anyhow::Result<orator::config::Config> {
         orator::config::load(&self.config, &self.set)
