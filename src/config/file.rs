@@ -55,6 +55,7 @@ pub fn read(text: &str, sets: &[String]) -> Given {
     for set in sets {
         reader.set(set, &mut table);
     }
+    reader.drop_too_large(&mut table);
     let settings = table.try_into::<Settings>().unwrap_or_else(|error| {
         reader.problem("", Place::Line(1), error.message().to_owned());
         Settings::default()
@@ -138,6 +139,22 @@ impl Reader {
             speakers.push(Value::Table(speaker));
         }
         table.insert("speaker".to_owned(), Value::Array(speakers));
+    }
+
+    /// Takes out each whole number that its setting's type cannot hold, so that the problem has its key and the others
+    /// are still looked at.
+    fn drop_too_large(&mut self, table: &mut Table) {
+        for (key, place) in self.places.clone() {
+            let Some((section, name)) = key.split_once('.') else { continue };
+            let Some(inner) = table.get_mut(section).and_then(Value::as_table_mut) else { continue };
+            let Some(value @ Value::Integer(_)) = inner.get(name).cloned() else { continue };
+            let alone = Table::from_iter([(name.to_owned(), value.clone())]);
+            let alone = Table::from_iter([(section.to_owned(), Value::Table(alone))]);
+            if alone.try_into::<Settings>().is_err() {
+                inner.remove(name);
+                self.problem(&key, place, format!("{value} is too large"));
+            }
+        }
     }
 
     /// One `--set key=value`; a value that is no TOML is a string.

@@ -38,7 +38,7 @@ pub fn check(settings: &Settings, places: &BTreeMap<String, Place>) -> Vec<Probl
         rules.problem("gan.window_frames", format!("{} is not a multiple of 32", s.gan.window_frames));
     }
     rules.within("gan.stride_frames", s.gan.stride_frames as f64, 1.0, 4096.0, "frames");
-    rules.within("gan.batch", s.gan.batch as f64, 1.0, 4096.0, "windows");
+    rules.within("gan.batch", s.gan.batch as f64, 2.0, 4096.0, "windows");
     rules.within("gan.steps", s.gan.steps as f64, 1.0, 1e9, "steps");
     rules.within("gan.learning_rate", s.gan.learning_rate, 1e-9, 1.0, "");
     rules.within("gan.lambda_l1", s.gan.lambda_l1, 0.0, 1e4, "");

@@ -29,22 +29,21 @@ fn of_speaker(speaker: &Speaker, folder: &Path) -> Videos {
     let mut found = BTreeMap::new();
     let mut missing = Vec::new();
     for entry in &speaker.videos {
-        match expand(entry, folder) {
-            Ok(paths) => {
-                for path in paths {
-                    let video = work_name(&path, folder);
-                    found.insert(video.clone(), Unit { speaker: speaker.name.clone(), video, source: path });
-                }
-            }
-            Err(message) => missing.push(message),
+        let paths = expand(entry, folder, &mut missing).unwrap_or_else(|message| {
+            missing.push(message);
+            Vec::new()
+        });
+        for path in paths {
+            let video = work_name(&path, folder);
+            found.insert(video.clone(), Unit { speaker: speaker.name.clone(), video, source: path });
         }
     }
     Videos { speaker: speaker.name.clone(), units: found.into_values().collect(), missing }
 }
 
 /// The files an entry names: itself, the videos of the folder it is, or what its pattern matches. A plain path is
-/// taken as it is, so that a missing file fails by itself.
-fn expand(entry: &str, folder: &Path) -> Result<Vec<PathBuf>, String> {
+/// taken as it is, so that a missing file fails by itself. A folder that a pattern could not look into is `missing`.
+fn expand(entry: &str, folder: &Path, missing: &mut Vec<String>) -> Result<Vec<PathBuf>, String> {
     let path = folder.join(entry);
     if path.is_dir() {
         let mut paths: Vec<PathBuf> = std::fs::read_dir(&path)
@@ -59,9 +58,16 @@ fn expand(entry: &str, folder: &Path) -> Result<Vec<PathBuf>, String> {
     if path.exists() || !entry.contains(['*', '?', '[']) {
         return Ok(vec![path]);
     }
-    let matches = glob::glob(&path.to_string_lossy()).map_err(|error| format!("{entry}: no pattern: {error}"))?;
-    let paths: Vec<PathBuf> = matches.filter_map(Result::ok).collect();
-    if paths.is_empty() { Err(format!("{entry}: no file matches, looked in {}", folder.display())) } else { Ok(paths) }
+    let pattern = Path::new(&glob::Pattern::escape(&folder.to_string_lossy())).join(entry);
+    let matches = glob::glob(&pattern.to_string_lossy()).map_err(|error| format!("{entry}: no pattern: {error}"))?;
+    let n_missing = missing.len();
+    let mut unread = |error: glob::GlobError| missing.push(format!("{entry}: cannot look there: {error}"));
+    let paths: Vec<PathBuf> = matches.filter_map(|found| found.map_err(&mut unread).ok()).collect();
+    if paths.is_empty() && missing.len() == n_missing {
+        Err(format!("{entry}: no file matches, looked in {}", folder.display()))
+    } else {
+        Ok(paths)
+    }
 }
 
 fn has_video_ending(path: &Path) -> bool {
@@ -121,5 +127,15 @@ mod tests {
         let names: Vec<&str> = videos.units.iter().map(|unit| unit.video.split('-').next().unwrap()).collect();
         assert_eq!(names, ["a", "b", "gone"]);
         assert_eq!(videos.missing.len(), 2);
+    }
+
+    #[test]
+    fn the_folder_of_the_configuration_is_no_pattern() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("talks [2024] *");
+        std::fs::create_dir(&folder).unwrap();
+        std::fs::write(folder.join("a.mp4"), "").unwrap();
+        let videos = of_speaker(&Speaker { name: "host".into(), videos: vec!["*.mp4".into()] }, &folder);
+        assert_eq!((videos.units.len(), videos.missing.len()), (1, 0));
     }
 }

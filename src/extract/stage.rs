@@ -58,11 +58,13 @@ impl Stage for Extract {
         let mut reader = FrameReader::open(&unit.source, rate)?;
         let timeline = self.timeline(&mut reader, out, progress)?;
         write_timeline(&out.join("timeline.npz"), &timeline)?;
-        let audio_secs = audio::extract_wav(&unit.source, &out.join("audio.wav"), SAMPLE_RATE)?;
+        let sound = audio::extract_wav(&unit.source, &out.join("audio.wav"), SAMPLE_RATE)?;
+        let audio_secs = sound.as_ref().map(|sound| sound.secs);
 
         let n_frames = timeline.source_secs.len();
         let n_shots = timeline.shots.numbers.last().map_or(0, |number| number + 1);
-        let damage = reader.damage();
+        let damage: Vec<String> = reader.damage().into_iter().chain(sound.and_then(|sound| sound.damage)).collect();
+        let damage = (!damage.is_empty()).then(|| damage.join(", "));
         let video = reader.info().video.as_ref();
         let media = json!({
             "duration_secs": reader.duration_secs(),

@@ -14,12 +14,14 @@ use std::path::Path;
 /// The built-in weights; `models/LIFTERS.md` says how they were made.
 pub const BODY: &[u8] = include_bytes!("../../models/body_lifter.safetensors");
 pub const HANDS: &[u8] = include_bytes!("../../models/hand_lifter.safetensors");
+/// Widest layer that is believed; the published ones have 1024 channels.
+const MOST_WIDTH: usize = 2048;
 
 /// The body lifter of a file, or the built-in one where `path` is empty.
 pub fn body(path: &Path) -> Result<BodyLifter> {
     load(path, BODY, "body-lifter", "body", |config, params| {
         let config: temporal_lifter::Config = serde_json::from_value(config)?;
-        let own = BodyLifter::config(config.channels);
+        let own = BodyLifter::config(config.channels.clamp(1, MOST_WIDTH));
         ensure!(config == own, "its network is {config:?}, expected {own:?}");
         Ok(BodyLifter::new(params, &config)?)
     })
@@ -29,7 +31,7 @@ pub fn body(path: &Path) -> Result<BodyLifter> {
 pub fn hands(path: &Path) -> Result<HandLifter> {
     load(path, HANDS, "hand-lifter", "hands", |config, params| {
         let config: hand_lifter::Config = serde_json::from_value(config)?;
-        let own = hand_lifter::Config { hidden: config.hidden, ..Default::default() };
+        let own = hand_lifter::Config { hidden: config.hidden.clamp(1, MOST_WIDTH), ..Default::default() };
         ensure!(config == own, "its network is {config:?}, expected {own:?}");
         Ok(HandLifter::new(params, hand_lifter::NAME, &config)?)
     })

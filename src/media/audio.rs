@@ -1,10 +1,12 @@
 //! The sound of a file as mono at one rate, on the clock of its pictures: sample k belongs to second k / rate after
 //! the first picture. Sound before that is cut, a late start and gaps in the container are silence. A file without
-//! pictures starts with its first sample.
+//! pictures starts with its first sample. Sound more than ten minutes after the sound before it, or beyond a day, is
+//! left out as damage.
 
 use super::decode::Decode;
+use super::frames;
 use super::resample::{Resampler, format_of};
-use super::{frames, source};
+use super::source::{self, LONGEST_GAP_SECS, LONGEST_SECS};
 use crate::types::sound::Sound;
 use anyhow::{Context, Result, bail};
 use ffmpeg_next::frame;
@@ -18,18 +20,26 @@ const JITTER_SECS: f64 = 0.04;
 /// sound.
 pub fn read_mono(path: &Path, rate: u32) -> Result<Option<Sound>> {
     let mut samples = Vec::new();
-    let n_samples = stream_mono(path, rate, &mut |piece| {
+    let heard = stream_mono(path, rate, &mut |piece| {
         samples.extend_from_slice(piece);
         Ok(())
     })?;
-    Ok(n_samples.map(|_| Sound { rate, samples }))
+    Ok(heard.map(|_| Sound { rate, samples }))
 }
 
-/// Writes the sound of `path` to the 16-bit mono wav `out`, a piece at a time; its length in seconds, or `None` (and
-/// no file) when there is no sound.
-pub fn extract_wav(path: &Path, out: &Path, rate: u32) -> Result<Option<f64>> {
+/// What `extract_wav` wrote.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Extracted {
+    pub secs: f64,
+    /// What was left out, in words.
+    pub damage: Option<String>,
+}
+
+/// Writes the sound of `path` to the 16-bit mono wav `out`, a piece at a time; `None` (and no file) when there is no
+/// sound.
+pub fn extract_wav(path: &Path, out: &Path, rate: u32) -> Result<Option<Extracted>> {
     let mut wav = None;
-    let n_samples = stream_mono(path, rate, &mut |piece| {
+    let heard = stream_mono(path, rate, &mut |piece| {
         if wav.is_none() {
             wav = Some(WavWriter::create(out, rate)?);
         }
@@ -38,7 +48,7 @@ pub fn extract_wav(path: &Path, out: &Path, rate: u32) -> Result<Option<f64>> {
     if let Some(wav) = wav {
         wav.finish()?;
     }
-    Ok(n_samples.map(|n| n as f64 / f64::from(rate)))
+    Ok(heard.map(|heard| Extracted { secs: heard.n_samples as f64 / f64::from(rate), damage: heard.damage() }))
 }
 
 /// Writes `sound` to the 16-bit mono wav `out`.
@@ -75,8 +85,20 @@ impl WavWriter {
     }
 }
 
-/// Decodes the sound of `path` and hands it to `sink` piece by piece; the number of samples, `None` without sound.
-fn stream_mono(path: &Path, rate: u32, sink: &mut dyn FnMut(&[f32]) -> Result<()>) -> Result<Option<u64>> {
+/// What `stream_mono` handed on.
+struct Heard {
+    n_samples: u64,
+    n_misplaced: u64,
+}
+
+impl Heard {
+    fn damage(&self) -> Option<String> {
+        (self.n_misplaced > 0).then(|| format!("{} pieces of sound with impossible times", self.n_misplaced))
+    }
+}
+
+/// Decodes the sound of `path` and hands it to `sink` piece by piece; `None` without sound.
+fn stream_mono(path: &Path, rate: u32, sink: &mut dyn FnMut(&[f32]) -> Result<()>) -> Result<Option<Heard>> {
     let input = source::open(path)?;
     let Some(stream) = source::audio_stream(&input) else { return Ok(None) };
     let stream_idx = stream.index();
@@ -86,24 +108,29 @@ fn stream_mono(path: &Path, rate: u32, sink: &mut dyn FnMut(&[f32]) -> Result<()
     let secs_per_tick = f64::from(decode.time_base());
     let mut timeline = Timeline { rate, n_written: 0, n_skip: 0, run: None, ready: Vec::new(), sink };
     let mut frame = frame::Audio::empty();
-    let mut n_frames = 0u64;
+    let (mut n_frames, mut n_misplaced) = (0u64, 0u64);
     while decode.next(&mut frame)? {
         if frame.samples() == 0 || frame.rate() == 0 {
             continue;
         }
-        n_frames += 1;
         let at = frame.timestamp().map(|ticks| ticks as f64 * secs_per_tick);
         let zero = *zero_secs.get_or_insert(at.unwrap_or(0.0));
         // A time far beyond the file's stated end is a broken one: the sound goes on where it was.
         let at = at.map(|at| at - zero).filter(|at| *at < latest_secs);
-        timeline.push(at, &frame).with_context(|| format!("the sound of {}", path.display()))?;
+        if timeline.reaches(at) {
+            n_frames += 1;
+            timeline.push(at, &frame).with_context(|| format!("the sound of {}", path.display()))?;
+        } else {
+            n_misplaced += 1;
+        }
     }
     if n_frames == 0 {
-        let Some(damage) = decode.damage() else { return Ok(None) };
+        let misplaced = Heard { n_samples: 0, n_misplaced }.damage();
+        let Some(damage) = misplaced.or_else(|| decode.damage()) else { return Ok(None) };
         bail!("no sound of {} can be decoded ({damage}): copy or download it again", path.display());
     }
     timeline.end_run()?;
-    Ok(Some(timeline.n_written))
+    Ok(Some(Heard { n_samples: timeline.n_written, n_misplaced }))
 }
 
 /// Lays runs of continuous sound at their places in time.
@@ -119,12 +146,25 @@ struct Timeline<'a> {
 }
 
 impl Timeline<'_> {
+    /// Second at which the sound so far ends.
+    fn end_secs(&self) -> f64 {
+        let written = self.n_written as f64 / f64::from(self.rate);
+        self.run.as_ref().map_or(written, |(run, start)| start + run.secs_in())
+    }
+
+    /// Whether sound at second `at` is near enough to what came before, and before the last second believed.
+    fn reaches(&self, at: Option<f64>) -> bool {
+        let end = self.end_secs();
+        let at = at.unwrap_or(end);
+        at - end.max(0.0) <= LONGEST_GAP_SECS && at < LONGEST_SECS
+    }
+
     /// Sound that starts at second `at`; without a time it goes on where the sound before it ended.
     fn push(&mut self, at: Option<f64>, frame: &frame::Audio) -> Result<()> {
         let format = format_of(frame);
-        let expected = self.run.as_ref().map(|(run, start)| start + run.secs_in());
-        let at = at.or(expected).unwrap_or(self.n_written as f64 / f64::from(self.rate));
-        let goes_on = expected.is_some_and(|expected| (at - expected).abs() <= JITTER_SECS);
+        let end = self.end_secs();
+        let at = at.unwrap_or(end);
+        let goes_on = self.run.is_some() && (at - end).abs() <= JITTER_SECS;
         if !goes_on || self.run.as_ref().is_none_or(|(run, _)| run.format() != format) {
             self.end_run()?;
             self.begin_run(Resampler::new(format, self.rate)?, at)?;
@@ -137,7 +177,7 @@ impl Timeline<'_> {
 
     fn begin_run(&mut self, run: Resampler, at: f64) -> Result<()> {
         let place = (at * f64::from(self.rate)).round() as i64;
-        let late = place - i64::try_from(self.n_written)?;
+        let late = place.saturating_sub(i64::try_from(self.n_written)?);
         self.n_skip = late.min(0).unsigned_abs();
         self.run = Some((run, at));
         const SILENCE: [f32; 4096] = [0.0; 4096];
@@ -168,5 +208,23 @@ impl Timeline<'_> {
         }
         self.ready.clear();
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_jump_in_time_is_believed_up_to_ten_minutes_and_a_day() {
+        let mut sink = |_: &[f32]| Ok(());
+        let mut timeline =
+            Timeline { rate: 10, n_written: 50, n_skip: 0, run: None, ready: Vec::new(), sink: &mut sink };
+        let reaches =
+            |timeline: &Timeline| [None, Some(-1e12), Some(604.0), Some(606.0)].map(|at| timeline.reaches(at));
+        assert_eq!(reaches(&timeline), [true, true, true, false]);
+        timeline.n_written = 864_000;
+        assert_eq!(reaches(&timeline), [false, true, true, true]);
+        assert!(!timeline.reaches(Some(f64::NAN)));
     }
 }

@@ -3,12 +3,12 @@
 //! faster one loses some, and a variable rate needs no case of its own. Only frames that are shown are converted.
 //!
 //! Time 0 is the first source frame that decodes. The last frame lasts as long as its packet says (else one source
-//! frame), which ends the video at `duration_secs`; there are `FrameRate::frames_in(duration_secs)` output frames.
+//! frame, ten minutes at most), which ends the video at `duration_secs`; there are `FrameRate::frames_in(duration_secs)` output frames.
 
 use super::decode::Decode;
 use super::picture::{Converter, Orientation};
 use super::probe::{self, MediaInfo};
-use super::source;
+use super::source::{self, LONGEST_GAP_SECS};
 use crate::types::image::Image;
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result};
@@ -128,16 +128,19 @@ impl FrameReader {
     /// Seconds of pictures read so far; once the frames are at their end, the length of the video.
     pub fn duration_secs(&self) -> f64 {
         let last = self.following.as_ref().unwrap_or(&self.shown);
-        self.secs(last.ticks) + self.secs_of(last)
+        self.secs(last.ticks) + self.secs_of(last).min(LONGEST_GAP_SECS)
     }
 
     /// What was wrong with the file although frames came, in words; complete once the frames are at their end.
     pub fn damage(&self) -> Option<String> {
         let misplaced = (self.n_misplaced > 0).then(|| format!("{} frames with impossible times", self.n_misplaced));
+        let last = self.secs_of(self.following.as_ref().unwrap_or(&self.shown));
+        let endless = (last > LONGEST_GAP_SECS).then(|| format!("the last picture claims to last {last:.0} s"));
         let read = self.duration_secs();
         let stated = self.info.duration_secs.filter(|stated| self.following.is_none() && *stated > read + 1.0);
         let short = stated.map(|stated| format!("pictures end at {read:.2} s of {stated:.2} s"));
-        let parts: Vec<String> = self.decode.damage().into_iter().chain(misplaced).chain(short).collect();
+        let parts: Vec<String> =
+            self.decode.damage().into_iter().chain(misplaced).chain(endless).chain(short).collect();
         (!parts.is_empty()).then(|| parts.join(", "))
     }
 
@@ -188,8 +191,9 @@ impl FrameReader {
         while self.decode.next(&mut frame)? {
             // A frame without a time follows the one before by that one's length.
             let own = frame.timestamp().map(|at| at.saturating_sub(self.origin));
-            let at = own.unwrap_or_else(|| ticks + frame.packet().duration.max(1));
-            if at > ticks && self.secs(at) < self.latest_secs {
+            let at = own.unwrap_or_else(|| ticks.saturating_add(frame.packet().duration.max(1)));
+            let is_near = self.secs(at.saturating_sub(ticks)) <= LONGEST_GAP_SECS;
+            if at > ticks && is_near && self.secs(at) < self.latest_secs {
                 return Ok(Some(Source { frame, ticks: at }));
             }
             self.n_misplaced += 1;
@@ -201,7 +205,7 @@ impl FrameReader {
         ticks as f64 * f64::from(self.decode.time_base())
     }
 
-    /// How long a source frame lasts.
+    /// How long a source frame lasts, as the file says.
     fn secs_of(&self, source: &Source) -> f64 {
         let stated = self.secs(source.frame.packet().duration);
         if stated > 0.0 {

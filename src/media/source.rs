@@ -9,6 +9,12 @@ use std::path::Path;
 
 const EXPECTED: &str = "expected a video or sound file (mp4, mov, mkv, webm, avi, wav, flac, mp3, ...)";
 
+/// Longest time between two frames that is believed, and that the last one lasts, seconds. What a broken time skips
+/// would be filled with repeated pictures or silence.
+pub(super) const LONGEST_GAP_SECS: f64 = 600.0;
+/// Longest video or sound that is believed, seconds: a day.
+pub(super) const LONGEST_SECS: f64 = 86_400.0;
+
 /// Opens `path` and reads its headers.
 pub(super) fn open(path: &Path) -> Result<Input> {
     super::init();
@@ -65,10 +71,10 @@ pub(super) fn stated_secs(input: &Input, stream: &Stream) -> Option<f64> {
     lengths(input, stream).into_iter().find(|secs| *secs > 0.0)
 }
 
-/// The second after which no timestamp is believed: a minute past every stated end.
+/// The second after which no timestamp is believed: a minute past every stated end, a day at most.
 pub(super) fn latest_secs(input: &Input, stream: &Stream) -> f64 {
     let stated = lengths(input, stream).into_iter().fold(0.0, f64::max);
-    if stated > 0.0 { stated + 60.0 } else { f64::INFINITY }
+    if stated > 0.0 { LONGEST_SECS.min(stated + 60.0) } else { LONGEST_SECS }
 }
 
 /// The stream's length and the file's, in seconds; negative where unknown.

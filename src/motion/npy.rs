@@ -2,16 +2,17 @@
 
 use crate::types::{pose3d::Motion, skeleton::N_JOINTS, time::FrameRate};
 use anyhow::{Context as _, ensure};
-use ndarray::Array3;
-use ndarray_npy::{ReadNpyExt as _, WriteNpyExt as _};
+use ndarray::{Array, Dimension, Ix3};
+use ndarray_npy::npy::header::Header;
+use ndarray_npy::{ReadNpyError, ReadNpyExt as _, ReadableElement, WriteNpyExt as _};
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Write as _};
+use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
 /// Reads a motion of `fps`; joints that are not finite are missing, in the mask too.
 pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
-    let file = File::open(path).with_context(|| format!("cannot open {}", path.display()))?;
-    let joints = Array3::<f32>::read_npy(BufReader::new(file))
+    let bytes = std::fs::read(path).with_context(|| format!("cannot open {}", path.display()))?;
+    let joints = parse::<f32, Ix3>(&bytes)
         .with_context(|| format!("{} is not a .npy file of float32 with three axes", path.display()))?;
     ensure!(
         joints.shape()[1..] == [N_JOINTS, 3],
@@ -22,6 +23,30 @@ pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
     Ok(Motion::from_joints(fps, joints))
 }
 
+/// An array from the bytes of its file. What the header promises is held against these bytes before anything is
+/// allocated for it.
+pub(super) fn parse<T: ReadableElement, D: Dimension>(bytes: &[u8]) -> Result<Array<T, D>, ReadNpyError> {
+    if !has_small_header(bytes) {
+        return Err(ReadNpyError::MissingData);
+    }
+    let n_numbers = Header::from_reader(&mut &*bytes)?.shape.iter().try_fold(1usize, |n, axis| n.checked_mul(*axis));
+    // A number takes a byte at least; the exact length is checked while reading.
+    if n_numbers.is_none_or(|n| n > bytes.len()) {
+        return Err(ReadNpyError::MissingData);
+    }
+    Array::read_npy(bytes)
+}
+
+/// Whether the whole header is there, without brackets in brackets in brackets (its parser is recursive).
+fn has_small_header(bytes: &[u8]) -> bool {
+    let header = match bytes {
+        [_, _, _, _, _, _, 1, _, a, b, rest @ ..] => rest.get(..usize::from(u16::from_le_bytes([*a, *b]))),
+        [_, _, _, _, _, _, _, _, a, b, c, d, rest @ ..] => rest.get(..u32::from_le_bytes([*a, *b, *c, *d]) as usize),
+        _ => None,
+    };
+    header.is_some_and(|header| header.iter().filter(|byte| b"([{".contains(byte)).count() <= 16)
+}
+
 /// Writes the joints. Call it inside `stage::workdir::replace`: it writes in place.
 pub fn write(path: &Path, motion: &Motion) -> anyhow::Result<()> {
     let mut file = BufWriter::new(File::create(path)?);
@@ -30,8 +55,15 @@ pub fn write(path: &Path, motion: &Motion) -> anyhow::Result<()> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+    use ndarray::Array3;
+
+    /// The file with another shape in its header.
+    pub fn with_shape(bytes: &[u8], old: &str, new: &str) -> Vec<u8> {
+        let header = String::from_utf8_lossy(&bytes[10..128]).replace(old, new);
+        [&bytes[..10], format!("{:<117}\n", header.trim_end()).as_bytes(), &bytes[128..]].concat()
+    }
 
     #[test]
     fn what_is_written_is_read_back_and_a_wrong_shape_is_refused() {
@@ -51,5 +83,20 @@ mod tests {
         assert!(error.contains("[4, 43, 3]"), "{error}");
         std::fs::write(&path, "no array").unwrap();
         assert!(read(&path, FrameRate::new(15, 1)).is_err());
+    }
+
+    #[test]
+    fn a_header_that_promises_too_much_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("motion.npy");
+        let mut bytes = Vec::new();
+        Array3::<f32>::zeros((2, N_JOINTS, 3)).write_npy(&mut bytes).unwrap();
+        for shape in ["(1000000000000, 49, 3)", "(18446744073709551615, 49, 3)", "(3, 49, 3)", "((((((((((((((((((2"] {
+            std::fs::write(&path, with_shape(&bytes, "(2, 49, 3)", shape)).unwrap();
+            assert!(read(&path, FrameRate::new(15, 1)).is_err(), "{shape}");
+        }
+        for end in 0..bytes.len() {
+            assert!(parse::<f32, Ix3>(&bytes[..end]).is_err());
+        }
     }
 }

@@ -1,19 +1,22 @@
 //! Named arrays in a `.npz` file, with errors that name the file, the array, what was expected and what is there.
 //! The files of the pipeline (`keypoints_npz`, `joints_npz`) say what their arrays mean; this file does not.
 
+use super::npy;
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result, bail};
-use ndarray::{ArrayD, OwnedRepr};
-use ndarray_npy::{NpzReader, ReadNpyError, ReadNpzError, ReadableElement};
+use ndarray::{ArrayD, IxDyn};
+use ndarray_npy::{ReadNpyError, ReadableElement};
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read as _};
 use std::path::{Path, PathBuf};
+use zip::ZipArchive;
 
 /// An open `.npz` file.
 pub struct Npz {
     path: PathBuf,
+    /// One an entry of the archive, in its order.
     names: Vec<String>,
-    reader: NpzReader<BufReader<File>>,
+    archive: ZipArchive<BufReader<File>>,
 }
 
 /// Length expected of one axis; `None`: any.
@@ -23,11 +26,11 @@ impl Npz {
     /// Opens the archive. Errors: no such file, no zip archive.
     pub fn open(path: &Path) -> Result<Self> {
         let file = File::open(path).with_context(|| format!("cannot open {}", path.display()))?;
-        let reader = NpzReader::new(BufReader::new(file));
-        let mut reader =
-            reader.with_context(|| format!("{} is no .npz file (numpy.savez writes one)", path.display()))?;
-        let names = reader.names().with_context(|| format!("cannot list the arrays of {}", path.display()))?;
-        Ok(Self { path: path.to_owned(), names, reader })
+        let archive = ZipArchive::new(BufReader::new(file))
+            .with_context(|| format!("{} is no .npz file (numpy.savez writes one)", path.display()))?;
+        let name = |i| archive.name_for_index(i).unwrap_or_default();
+        let names = (0..archive.len()).map(|i| name(i).strip_suffix(".npy").unwrap_or(name(i)).to_owned()).collect();
+        Ok(Self { path: path.to_owned(), names, archive })
     }
 
     /// Names of the arrays, in the order of the file.
@@ -42,15 +45,16 @@ impl Npz {
 
     /// A number array of any float or integer type as f64. Errors: missing, another shape, another type.
     pub fn numbers(&mut self, name: &str, shape: &[Axis]) -> Result<ArrayD<f64>> {
-        let array = if let Some(a) = self.typed::<f32>(name)? {
+        let bytes = self.bytes(name)?;
+        let array = if let Some(a) = self.typed::<f32>(name, &bytes)? {
             a.mapv(f64::from)
-        } else if let Some(a) = self.typed::<f64>(name)? {
+        } else if let Some(a) = self.typed::<f64>(name, &bytes)? {
             a
-        } else if let Some(a) = self.typed::<i64>(name)? {
+        } else if let Some(a) = self.typed::<i64>(name, &bytes)? {
             a.mapv(|v| v as f64)
-        } else if let Some(a) = self.typed::<i32>(name)? {
+        } else if let Some(a) = self.typed::<i32>(name, &bytes)? {
             a.mapv(f64::from)
-        } else if let Some(a) = self.typed::<u32>(name)? {
+        } else if let Some(a) = self.typed::<u32>(name, &bytes)? {
             a.mapv(f64::from)
         } else {
             bail!("{}: array `{name}` has an unknown number type; save it as float32 or float64", self.path.display());
@@ -61,7 +65,8 @@ impl Npz {
 
     /// A float array as f32. Errors as `numbers`.
     pub fn floats(&mut self, name: &str, shape: &[Axis]) -> Result<ArrayD<f32>> {
-        if let Some(array) = self.typed::<f32>(name)? {
+        let bytes = self.bytes(name)?;
+        if let Some(array) = self.typed::<f32>(name, &bytes)? {
             self.check(name, array.shape(), shape)?;
             return Ok(array);
         }
@@ -70,7 +75,8 @@ impl Npz {
 
     /// An array of truth values. Errors: missing, another shape, another type.
     pub fn bools(&mut self, name: &str, shape: &[Axis]) -> Result<ArrayD<bool>> {
-        let Some(array) = self.typed::<bool>(name)? else {
+        let bytes = self.bytes(name)?;
+        let Some(array) = self.typed::<bool>(name, &bytes)? else {
             bail!("{}: array `{name}` must be of type bool", self.path.display());
         };
         self.check(name, array.shape(), shape)?;
@@ -97,14 +103,22 @@ impl Npz {
         })
     }
 
-    /// The array if it is of type `T`; `None` if it is of another type.
-    fn typed<T: ReadableElement>(&mut self, name: &str) -> Result<Option<ArrayD<T>>> {
-        if !self.has(name) {
+    /// The array as it lies in the file.
+    fn bytes(&mut self, name: &str) -> Result<Vec<u8>> {
+        let Some(at) = self.names.iter().position(|n| n == name) else {
             bail!("{} has no array `{name}`; it has: {}", self.path.display(), self.names.join(", "));
-        }
-        match self.reader.by_name::<OwnedRepr<T>, _>(name) {
+        };
+        let mut bytes = Vec::new();
+        let read = self.archive.by_index(at).map_err(std::io::Error::from).and_then(|mut e| e.read_to_end(&mut bytes));
+        read.with_context(|| format!("{}: array `{name}` cannot be read", self.path.display()))?;
+        Ok(bytes)
+    }
+
+    /// The array if it is of type `T`; `None` if it is of another type.
+    fn typed<T: ReadableElement>(&self, name: &str, bytes: &[u8]) -> Result<Option<ArrayD<T>>> {
+        match npy::parse::<T, IxDyn>(bytes) {
             Ok(array) => Ok(Some(array)),
-            Err(ReadNpzError::Npy(ReadNpyError::WrongDescriptor(_))) => Ok(None),
+            Err(ReadNpyError::WrongDescriptor(_)) => Ok(None),
             Err(error) => Err(error).with_context(|| format!("{}: array `{name}` cannot be read", self.path.display())),
         }
     }
@@ -176,5 +190,19 @@ mod tests {
         std::fs::write(dir.path().join("b.npz"), b"no zip").unwrap();
         assert!(Npz::open(&dir.path().join("b.npz")).is_err());
         assert!(Npz::open(&dir.path().join("none.npz")).is_err());
+    }
+    #[test]
+    fn a_header_that_promises_too_much_is_an_error() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = file_with(dir.path(), |npz| npz.add_array("body", &Array1::<f32>::zeros(5)).unwrap());
+        let mut bytes = Vec::new();
+        ndarray_npy::WriteNpyExt::write_npy(&Array1::<f32>::zeros(5), &mut bytes).unwrap();
+        let promising = npy::tests::with_shape(&bytes, "(5,)", "(1000000000000,)");
+        let mut zip = zip::ZipWriter::new(File::create(&path).unwrap());
+        zip.start_file("body.npy", zip::write::SimpleFileOptions::default()).unwrap();
+        std::io::Write::write_all(&mut zip, &promising).unwrap();
+        zip.finish().unwrap();
+        let text = format!("{:#}", Npz::open(&path).unwrap().floats("body", &[]).unwrap_err());
+        assert!(text.contains("a.npz") && text.contains("body"), "{text}");
     }
 }

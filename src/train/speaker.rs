@@ -16,6 +16,10 @@ pub const GENERATOR: &str = "generator.";
 /// Name and version of the layout; another is refused.
 const KIND: &str = "orator speaker 1";
 const SKELETON: &str = "49 joints, house order";
+/// Most channels of a network that is believed; the published one has 256.
+const MOST_WIDTH: usize = 1024;
+/// Most frames a second that are believed.
+const MOST_FPS: f64 = 1000.0;
 
 /// Everything beside the tensors that generation needs. Stored under `speaker` in a checkpoint's facts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -90,9 +94,45 @@ fn build(contents: &Contents) -> Result<TrainedSpeaker> {
     ensure!(facts.skeleton == SKELETON, "its skeleton is {:?}, expected {SKELETON:?}", facts.skeleton);
     ensure!(facts.audio == Audio::present(), "its audio settings are others than this program's: {:?}", facts.audio);
     ensure!(facts.network.n_out == N_NUMBERS, "it makes {} numbers a pose, not {N_NUMBERS}", facts.network.n_out);
+    let (network, fps) = (&facts.network, facts.fps);
+    ensure!(network.n_mels == mel::N_MELS, "it reads {} mel bands, not {}", network.n_mels, mel::N_MELS);
+    ensure!((4..=MOST_WIDTH).contains(&network.width), "its width is {}, expected 4 to {MOST_WIDTH}", network.width);
+    ensure!(fps.per_sec() <= MOST_FPS, "it moves at {fps}, expected {MOST_FPS} at most");
     facts.normalisation.check()?;
     let mut params = Params::frozen();
     let generator = Generator::new(&mut params, &facts.network)?;
     params.load(&contents.part(GENERATOR))?;
     Ok(TrainedSpeaker { facts, generator })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nn::unet::Preset;
+    use crate::types::skeleton::N_BONES;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn facts_that_no_training_writes_are_refused() {
+        let table = vec![1.0; N_NUMBERS];
+        let normal = Normalisation { mean: table.clone(), std: table, bone_lengths: vec![0.1; N_BONES] };
+        let network = Config { width: 8, ..Config::of(Preset::Light, N_NUMBERS) };
+        let facts = Facts::new("host", FrameRate::new(15, 1), network.clone(), normal);
+        let mut params = Params::new(0);
+        Generator::new(&mut params, &network).unwrap();
+        let mut contents = Contents { facts: serde_json::json!({ "speaker": facts }), tensors: BTreeMap::new() };
+        contents.add(GENERATOR, params.tensors().unwrap());
+        build(&contents).unwrap();
+        for (place, value) in [
+            ("/speaker/network/width", 1_000_000),
+            ("/speaker/network/width", 0),
+            ("/speaker/network/n_mels", 1_000_000),
+            ("/speaker/fps/num", 4_000_000_000u32),
+        ] {
+            let mut facts = contents.facts.clone();
+            *facts.pointer_mut(place).unwrap() = value.into();
+            let wrong = Contents { facts, tensors: contents.tensors.clone() };
+            assert!(build(&wrong).is_err(), "{place} {value}");
+        }
+    }
 }

@@ -5,9 +5,23 @@ use std::fmt;
 
 /// Frames a second as an exact fraction (`30000/1001` is NTSC). Both parts are at least 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "Parts")]
 pub struct FrameRate {
     pub num: u32,
     pub den: u32,
+}
+
+/// A rate as it stands in a file, where a part may be 0.
+#[derive(Deserialize)]
+struct Parts {
+    num: u32,
+    den: u32,
+}
+
+impl From<Parts> for FrameRate {
+    fn from(Parts { num, den }: Parts) -> Self {
+        Self::new(num, den)
+    }
 }
 
 impl FrameRate {
@@ -51,5 +65,13 @@ mod tests {
         assert_eq!(ntsc.frames_in(ntsc.secs(600)), 600);
         assert_eq!(FrameRate::new(15, 1).frames_in(2.01), 31);
         assert_eq!(FrameRate::new(0, 0).per_sec(), 1.0);
+    }
+
+    #[test]
+    fn no_file_makes_a_rate_without_parts() {
+        let read = |text| serde_json::from_str::<FrameRate>(text).unwrap();
+        assert_eq!(read("{\"num\":0,\"den\":0}"), FrameRate::new(1, 1));
+        let ntsc = FrameRate::new(30_000, 1_001);
+        assert_eq!(read(&serde_json::to_string(&ntsc).unwrap()), ntsc);
     }
 }

@@ -201,6 +201,19 @@ fn a_truncated_file_gives_what_it_holds_and_says_so() {
 }
 
 #[test]
+fn a_jump_in_time_is_damage_not_a_thousand_repeats() {
+    let dir = tempfile::tempdir().unwrap();
+    write_numbered(dir.path(), "in.mp4", 40, FrameRate::new(30, 1), None);
+    let jump = "setpts=if(gte(N\\,20)\\,PTS+2000/TB\\,PTS)";
+    if ffmpeg(dir.path(), &format!("-i in.mp4 -vf {jump} -vsync vfr -c:v libx264 -crf 12 jump.mkv")) {
+        let mut reader = FrameReader::open(&dir.path().join("jump.mkv"), DATASET).unwrap();
+        assert_eq!(reader.by_ref().map(Result::unwrap).count(), 10);
+        let damage = reader.damage().unwrap();
+        assert!(damage.contains("20 frames with impossible times"), "{damage}");
+    }
+}
+
+#[test]
 fn flawed_bytes_in_the_middle_are_reported_and_the_rest_kept() {
     let dir = tempfile::tempdir().unwrap();
     let path = write_numbered(dir.path(), "in.mp4", 100, FrameRate::new(30, 1), None);

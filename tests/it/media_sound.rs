@@ -110,6 +110,18 @@ fn a_gap_in_the_container_is_silence() {
 }
 
 #[test]
+fn a_jump_in_time_is_damage_not_an_hour_of_silence() {
+    let dir = tempfile::tempdir().unwrap();
+    write_wav(&dir.path().join("tone.wav"), &tone(48_000, 3.0, 500.0)).unwrap();
+    let jump = "asetpts=if(gte(T\\,1)\\,PTS+3600/TB\\,PTS)";
+    if ffmpeg(dir.path(), &format!("-i tone.wav -af {jump} -c:a pcm_s16le jump.mkv")) {
+        let extracted = extract_wav(&dir.path().join("jump.mkv"), &dir.path().join("out.wav"), RATE).unwrap().unwrap();
+        assert!((extracted.secs - 1.0).abs() < 0.05, "{} s", extracted.secs);
+        assert!(extracted.damage.unwrap().contains("impossible times"));
+    }
+}
+
+#[test]
 fn rates_and_channels_become_16_khz_mono() {
     let dir = tempfile::tempdir().unwrap();
     write_wav(&dir.path().join("tone.wav"), &tone(48_000, 2.0, 440.0)).unwrap();
@@ -142,8 +154,8 @@ fn wavs_round_trip_to_the_bit_and_streaming_gives_the_same() {
     let dir = tempfile::tempdir().unwrap();
     let (path, out) = (dir.path().join("in.wav"), dir.path().join("out.wav"));
     write_wav(&path, &tone(RATE, 1.2345, 300.0)).unwrap();
-    let secs = extract_wav(&path, &out, RATE).unwrap().unwrap();
-    assert_eq!(secs, (1.2345f64 * 16_000.0).round() / 16_000.0);
+    let extracted = extract_wav(&path, &out, RATE).unwrap().unwrap();
+    assert_eq!((extracted.secs, extracted.damage), ((1.2345f64 * 16_000.0).round() / 16_000.0, None));
     assert_eq!(std::fs::read(&path).unwrap(), std::fs::read(&out).unwrap());
 }
 
