@@ -3,9 +3,9 @@
 //!
 //! The way of a frame, never turning back:
 //! `media::frames` -> `vision` (crop, warp) -> `onnx` -> `pose2d` (decode, track) -> *keypoints file* -> `segment` ->
-//! `lift` -> *joints file* -> `dataset` -> *shard* -> `dataset::windows` -> `train::gan`.
+//! `lift` -> *joints file* -> `dataset` -> *shard* -> `dataset::read` -> `train::examples` (windows) -> `train::gan`.
 //!
-//! The way of a sample of sound: `media::audio` -> *audio file* -> `dataset` -> *shard* -> `dataset::windows` ->
+//! The way of a sample of sound: `media::audio` -> *audio file* -> `dataset` -> *shard* -> `dataset::read` -> `train::examples` ->
 //! `audio::mel` -> `nn` generator. The two meet by time in seconds, in one place: where a shard is written.
 //!
 //! | room | what lives there | imports |
@@ -31,6 +31,7 @@
 //!
 //! Stages meet in files, never in code; all of them may use `types`, `stage` and `config`. `cli` (in the program
 //! only) imports everything and is the one place that prints. `tests/it/house.rs` holds the code to this table.
+//! `generate` may import `train`, since `train::speaker` alone says what a checkpoint means.
 //!
 //! Invariants: the same input, configuration and seed give the same bytes, whatever the number of workers. A write is
 //! an attempt, flushed, renamed (`stage::workdir`), and its record comes last. Memory does not grow with the length of
