@@ -1,6 +1,6 @@
 //! Arms in 3D: the nine points of the upper body from COCO keypoints, through the body lifter, to bones' directions.
 
-use super::gaps::fill_in_time;
+use super::gaps::long_gaps;
 use crate::motion::upper_body::{
     L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, Pose, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, Seen, size,
 };
@@ -69,7 +69,7 @@ pub fn lift(lifter: &BodyLifter, keypoints: &Keypoints, interval: Interval, max_
     let points: Vec<Seen> = (interval.start..interval.end).map(|t| seen_points(keypoints, t)).collect();
     let mut poses = lifter.poses(&points, step)?;
     let missing_long: [Vec<bool>; N_POINTS] =
-        std::array::from_fn(|j| fill_in_time(&points.iter().map(|p| p[j].is_some()).collect::<Vec<_>>(), max_gap));
+        std::array::from_fn(|j| long_gaps(&points.iter().map(|p| p[j].is_some()).collect::<Vec<_>>(), max_gap));
     for (t, pose) in poses.iter_mut().enumerate() {
         let Some(found) = pose else { continue };
         if missing_long[R_SHOULDER][t] || missing_long[L_SHOULDER][t] {

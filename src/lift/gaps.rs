@@ -1,7 +1,7 @@
 //! Gaps in what was seen: short ones are filled over time, long ones stay open.
 
 /// For each frame whether it lies in a gap of `seen` of more than `longest` frames; gaps at the ends count as well.
-pub fn fill_in_time(seen: &[bool], longest: usize) -> Vec<bool> {
+pub fn long_gaps(seen: &[bool], longest: usize) -> Vec<bool> {
     let mut open = vec![false; seen.len()];
     let mut start = 0;
     for gap in seen.chunk_by(|a, b| a == b) {
@@ -41,9 +41,9 @@ mod tests {
     #[test]
     fn only_long_gaps_stay_open() {
         let seen = [false, true, false, false, true, false, false, false];
-        assert_eq!(fill_in_time(&seen, 2), [false, false, false, false, false, true, true, true]);
-        assert_eq!(fill_in_time(&seen, 0), seen.map(|s| !s));
-        assert!(fill_in_time(&[], 3).is_empty());
+        assert_eq!(long_gaps(&seen, 2), [false, false, false, false, false, true, true, true]);
+        assert_eq!(long_gaps(&seen, 0), seen.map(|s| !s));
+        assert!(long_gaps(&[], 3).is_empty());
     }
 
     #[test]

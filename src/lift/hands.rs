@@ -1,7 +1,7 @@
 //! Hands in 3D: the hand lifter's shapes of one hand over an interval, freed of single wrong frames, with gaps filled.
 
 use super::body::median;
-use super::gaps::{fill_in_time, neighbours};
+use super::gaps::{long_gaps, neighbours};
 use crate::motion::hand_view::{Hand, HandView, N_IN, N_OUT, SeenHand, parent};
 use crate::motion::vec3;
 use crate::nn::Mode;
@@ -54,7 +54,7 @@ pub fn lift(
     }
     let lifted: Vec<bool> = found.iter().map(Option::is_some).collect();
     let seen = seen.iter().zip(&lifted).map(|(s, &there)| s.map(|p| there && p.is_some())).collect();
-    Ok(Shapes { hands: filled(&steadied(&found), &fill_in_time(&lifted, max_gap)), seen })
+    Ok(Shapes { hands: filled(&steadied(&found), &long_gaps(&lifted, max_gap)), seen })
 }
 
 fn seen_points(points: &Array3<f32>, t: usize) -> SeenHand {
@@ -114,6 +114,7 @@ fn filled(found: &[Option<Hand>], open: &[bool]) -> Vec<Option<Hand>> {
 /// The lengths in metres of a hand's bones for a forearm, over all `shapes` of both hands of a video: medians, of the
 /// size that the middle finger's first phalanx sets. `None` when no hand was seen. Entry j: bone from its parent to j.
 pub fn measure(shapes: &[&Shapes], forearm: f64) -> Option<[f64; N_HAND]> {
+    let any_seen = shapes.iter().flat_map(|s| &s.seen).flatten().any(|seen| *seen);
     let mut lengths = [0.0; N_HAND];
     for (joint, length) in lengths.iter_mut().enumerate().skip(1) {
         let of_frame = |(hand, seen): (&Option<Hand>, &[bool; N_HAND])| {
@@ -121,7 +122,10 @@ pub fn measure(shapes: &[&Shapes], forearm: f64) -> Option<[f64; N_HAND]> {
             Some(vec3::norm(vec3::sub(hand[joint], hand[parent(joint)])))
         };
         let all = shapes.iter().flat_map(|s| s.hands.iter().zip(&s.seen).filter_map(of_frame));
-        *length = median(all.collect())?;
+        // A bone that is never seen (a detector may leave points out) is as long as it was lifted.
+        let lifted = || shapes.iter().flat_map(|s| &s.hands).flatten();
+        let guess = || lifted().map(|hand| vec3::norm(vec3::sub(hand[joint], hand[parent(joint)]))).collect();
+        *length = median(all.collect()).or_else(|| median(guess()).filter(|_| any_seen))?;
     }
     let grow = PHALANX_OF_FOREARM * forearm / lengths[10].max(1e-9);
     Some(lengths.map(|l| l * grow))
@@ -144,6 +148,16 @@ mod tests {
         let filled = filled(&steady, &[false, false, false, false, false, false, false, true]);
         assert_eq!(filled[5].map(|h| h[3][0]), Some(6.0));
         assert!(filled[7].is_none());
+    }
+
+    #[test]
+    fn a_bone_never_seen_has_a_length_all_the_same() {
+        let spread: Hand = std::array::from_fn(|j| [0.01 * j as f64, 0.02 * j as f64, 0.0]);
+        let mut seen = [true; N_HAND];
+        seen[20] = false;
+        let shapes = Shapes { hands: vec![Some(spread); 3], seen: vec![seen; 3] };
+        let lengths = measure(&[&shapes], 0.25).unwrap();
+        assert!(lengths[1..].iter().all(|length| *length > 0.0), "{lengths:?}");
     }
 
     #[test]

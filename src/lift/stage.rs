@@ -2,10 +2,13 @@
 
 use super::Lifter;
 use crate::config;
+use crate::motion::npz::Npz;
 use crate::motion::{joints_npz, keypoints_npz};
 use crate::stage::{Input, Report, Stage, Unit, progress::Progress, runner::place};
 use crate::types::interval::Intervals;
+use crate::types::pose2d::Keypoints;
 use anyhow::{Context, Result, ensure};
+use ndarray::s;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -27,6 +30,10 @@ impl LiftStage {
         place(&self.work, "pose2d", unit).join("keypoints.npz")
     }
 
+    fn timeline(&self, unit: &Unit) -> PathBuf {
+        place(&self.work, "extract", unit).join("timeline.npz")
+    }
+
     fn intervals(&self, unit: &Unit) -> PathBuf {
         place(&self.work, "segment", unit).join("intervals.json")
     }
@@ -38,7 +45,7 @@ impl Stage for LiftStage {
     }
 
     fn version(&self) -> u32 {
-        1
+        2
     }
 
     fn settings(&self) -> serde_json::Value {
@@ -57,7 +64,11 @@ impl Stage for LiftStage {
 
     fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
         let input = |role: &str, path| Input { role: role.to_owned(), path };
-        let mut inputs = vec![input("keypoints", self.keypoints(unit)), input("intervals", self.intervals(unit))];
+        let mut inputs = vec![
+            input("timeline", self.timeline(unit)),
+            input("keypoints", self.keypoints(unit)),
+            input("intervals", self.intervals(unit)),
+        ];
         for (role, path) in
             [("body weights", &self.settings.body_weights), ("hand weights", &self.settings.hand_weights)]
         {
@@ -69,7 +80,17 @@ impl Stage for LiftStage {
     }
 
     fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
-        let keypoints = keypoints_npz::read(&self.keypoints(unit))?;
+        let mut keypoints = keypoints_npz::read(&self.keypoints(unit))?;
+        let timeline = self.timeline(unit);
+        let repeated = Npz::open(&timeline)?.bools("repeated", &[None])?.into_iter().collect::<Vec<bool>>();
+        ensure!(
+            repeated.len() == keypoints.n_frames(),
+            "the keypoints have {} frames, {} has {}: run the stage pose2d again",
+            keypoints.n_frames(),
+            timeline.display(),
+            repeated.len()
+        );
+        unsee(&mut keypoints, &repeated);
         let path = self.intervals(unit);
         let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
         let intervals: Intervals =
@@ -97,5 +118,60 @@ impl Stage for LiftStage {
         };
         let facts = json!({ "n_frames": lifted.n_frames, "filled_percent": filled });
         Ok(Report { line, facts: facts.as_object().cloned().unwrap_or_default() })
+    }
+}
+
+/// A frame that only repeats the one before shows nothing new: its points count as not seen, so that the motion between
+/// its neighbours is filled in, and masked, instead of standing still.
+fn unsee(keypoints: &mut Keypoints, repeated: &[bool]) {
+    for points in [&mut keypoints.body, &mut keypoints.left_hand, &mut keypoints.right_hand] {
+        for (mut frame, _) in points.outer_iter_mut().zip(repeated).filter(|(_, repeated)| **repeated) {
+            frame.slice_mut(s![.., 2]).fill(0.0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lift::Lifter;
+    use crate::types::pose2d::coco::{L_ELBOW, L_SHOULDER, L_WRIST, NOSE, R_ELBOW, R_SHOULDER, R_WRIST};
+    use crate::types::skeleton;
+    use crate::types::time::FrameRate;
+    use ndarray::Array3;
+
+    /// An arm that rises steadily, filmed at 10 frames a second and shown at 15: every third frame is the one before.
+    #[test]
+    fn repeated_frames_are_masked_and_do_not_stutter() {
+        let n_frames = 45;
+        let repeated: Vec<bool> = (0..n_frames).map(|t| t % 3 == 1).collect();
+        let mut body = Array3::zeros((n_frames, 17, 3));
+        for t in 0..n_frames {
+            let filmed = if repeated[t] { t - 1 } else { t } as f32;
+            let points = [
+                (NOSE, 320.0, 130.0),
+                (L_SHOULDER, 390.0, 200.0),
+                (R_SHOULDER, 250.0, 200.0),
+                (L_ELBOW, 410.0, 310.0),
+                (R_ELBOW, 230.0, 310.0),
+                (L_WRIST, 400.0, 390.0 - 4.0 * filmed),
+                (R_WRIST, 240.0, 390.0),
+            ];
+            for (point, x, y) in points {
+                body.slice_mut(s![t, point, ..]).assign(&ndarray::arr1(&[x, y, 1.0]));
+            }
+        }
+        let none = Array3::zeros((n_frames, 21, 3));
+        let (fps, image_size) = (FrameRate::new(15, 1), [640, 480]);
+        let mut keypoints = Keypoints { fps, image_size, body, left_hand: none.clone(), right_hand: none };
+        unsee(&mut keypoints, &repeated);
+        let motion = Lifter::new(&config::Lift::default()).unwrap().lift(&keypoints).unwrap();
+        let wrist = skeleton::L_WRIST;
+        for t in 3..n_frames - 3 {
+            assert_eq!(motion.mask[[t, wrist]], !repeated[t], "frame {t}");
+        }
+        let rises = |t: usize| motion.joints[[t, wrist, 1]] - motion.joints[[t + 1, wrist, 1]];
+        let (least, most) = (6..n_frames - 7).map(rises).fold((f32::MAX, 0.0_f32), |(a, b), v| (a.min(v), b.max(v)));
+        assert!(least > 0.3 * most, "steps of the wrist from {least} to {most} m");
     }
 }

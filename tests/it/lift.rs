@@ -241,6 +241,11 @@ fn the_stage_writes_joints_and_bones() {
     let (pose2d, segment) = (place(dir.path(), "pose2d", &unit), place(dir.path(), "segment", &unit));
     std::fs::create_dir_all(&pose2d).unwrap();
     std::fs::create_dir_all(&segment).unwrap();
+    let extract = place(dir.path(), "extract", &unit);
+    std::fs::create_dir_all(&extract).unwrap();
+    let mut timeline = ndarray_npy::NpzWriter::new(std::fs::File::create(extract.join("timeline.npz")).unwrap());
+    timeline.add_array("repeated", &ndarray::Array1::from_elem(70, false)).unwrap();
+    timeline.finish().unwrap();
     keypoints_npz::write(&pose2d.join("keypoints.npz"), &keypoints, &extras).unwrap();
     let intervals = |n_frames| Intervals::new(keypoints.fps, n_frames, vec![Interval { start: 2, end: 68 }]);
     std::fs::write(segment.join("intervals.json"), serde_json::to_vec(&intervals(70)).unwrap()).unwrap();
