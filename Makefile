@@ -68,16 +68,22 @@ test: build
 	$(MAKE) demo DEMO=$(TARGET)/demo-test DRAW='--videos 2 --secs 12 --fps 15' STEPS=30
 	@echo 'make test: all passed'
 
-# The long proofs, each printing its figures: 20 kills, a 10-minute video, speed on a real clip (CLIP, MODELS).
+# The long proofs, each printing its figures: 20 kills, a 10-minute video, speed on a real clip (CLIP, MODELS), alone and
+# against the Python REFERENCE. ORATOR_REFERENCE_PYTHON names a Python with onnxruntime, cv2 and numpy.
 SHARED := ../shared
 CLIP := $(SHARED)/data/videos/talk_tyson_2cam_17s_720p.mp4
 MODELS := $(SHARED)/models
 REFERENCE := $(SHARED)/reference/pose_chain_reference.py
+export ORATOR_REFERENCE_PYTHON ?= python3
 
 prove: build
 	ORATOR_KILLS=20 ORATOR_LONG=1 cargo test --release --locked --test it -- --nocapture --test-threads 1 kill:: memory::
 	cargo test --release --locked --test it -- --nocapture --test-threads 1 golden:: pose_parity:: real::
 	if [ -e $(CLIP) ]; then $(ORATOR) bench pose2d $(CLIP) --models-dir $(MODELS); else echo 'SKIPPED: $(CLIP) is not there'; fi
+	if [ ! -e $(CLIP) ] || [ ! -e $(REFERENCE) ]; then echo 'SKIPPED: $(CLIP) or $(REFERENCE) is not there'; \
+	elif ! "$$ORATOR_REFERENCE_PYTHON" -c 'import onnxruntime, cv2, numpy' 2>/dev/null; then \
+		echo "SKIPPED: $$ORATOR_REFERENCE_PYTHON has no onnxruntime, cv2 and numpy (ORATOR_REFERENCE_PYTHON names another)"; \
+	else $(ORATOR) bench pose2d $(CLIP) --models-dir $(MODELS) --person person-yolox-nano --python $(REFERENCE); fi
 
 # The whole road on the synthetic speaker. DEMO: its folder; DRAW and STEPS: how much of it.
 DEMO := $(TARGET)/demo

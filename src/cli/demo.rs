@@ -3,8 +3,9 @@
 use super::{Outcome, ui::Ui};
 use anyhow::{Context, Result, bail};
 use orator::config;
+use orator::demo::GENERATOR;
 use orator::demo::folder::{self, Plan};
-use orator::demo::measure::{self, MOST_MM, MOST_PX, Millimetres};
+use orator::demo::measure::{self, LEAST_FOUND, LEAST_FRAMES, LEAST_JOINTS, MOST_MM, MOST_PX, Millimetres};
 use orator::demo::sheet;
 use orator::motion::npy;
 use orator::stage::workdir;
@@ -94,22 +95,31 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
     text += &row("this run", &m.lifted);
     text += &row("trivial: the mean pose", &m.mean_pose);
     text += &row("trivial: true x, y and mean depth", &m.mean_depth);
+    text += &row("trivial: true x, y and bone lengths", &m.bone_depth);
     text += &format!(
-        "{} of {} frames are in the dataset. joints: 48 from the neck; fingers: from their wrist; no rotation,\n\
+        "{} of {} frames are in the dataset, {:.1} % of their joints have a number; all rows count these. joints: 48 from the neck; fingers: from their wrist; no rotation,\n\
          segments of 60 frames scaled to 0.90 m of shoulders, upper arm and forearm.\n",
-        m.n_frames, m.n_drawn
+        m.n_frames,
+        m.n_drawn,
+        100.0 * m.joints
     );
     let good = m.good();
     let met = if good { "met" } else { "MISSED" };
+    text += &format!("generator: {GENERATOR}\n");
     text += &format!(
-        "3D error against the known truth: {:.1} mm; targets: {MOST_PX} px, {MOST_MM} mm: {met}",
-        m.lifted.all
+        "3D error against the known truth: {:.1} mm; targets: {MOST_PX} px, {MOST_MM} mm, {:.0} % of points found, {:.0} % \
+         of frames, {:.0} % of joints: {met}",
+        m.lifted.all,
+        100.0 * LEAST_FOUND,
+        100.0 * LEAST_FRAMES,
+        100.0 * LEAST_JOINTS
     );
     let mm = |mm: &Millimetres| json!({ "all": mm.all, "body": mm.body, "wrists": mm.wrists, "fingers": mm.fingers });
     let facts = json!({
         "body_px": { "median": m.body.median, "p90": m.body.p90, "found": m.body.found },
         "hands_px": { "median": m.hands.median, "p90": m.hands.p90, "found": m.hands.found },
         "mm": mm(&m.lifted), "mean_pose_mm": mm(&m.mean_pose), "mean_depth_mm": mm(&m.mean_depth),
+        "bone_depth_mm": mm(&m.bone_depth), "joints": m.joints, "generator": GENERATOR,
         "n_frames": m.n_frames, "n_drawn": m.n_drawn, "good": good,
     });
     ui.summary(&text, None, facts);

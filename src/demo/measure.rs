@@ -9,15 +9,19 @@ use super::truth::Truth;
 use crate::dataset::{Dataset, Split};
 use crate::motion::keypoints_npz;
 use crate::types::skeleton::{
-    L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_ELBOW, R_HAND, R_SHOULDER, R_WRIST,
+    L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_ELBOW, R_HAND, R_SHOULDER, R_WRIST, parent,
 };
 use anyhow::{Context, Result, ensure};
-use ndarray::{Array2, Array3, ArrayView3, Axis, s};
+use ndarray::{Array2, Array3, ArrayView3, Axis, Zip, s};
 use std::path::{Path, PathBuf};
 
 /// Largest medians and means allowed.
 pub const MOST_PX: f64 = 2.0;
 pub const MOST_MM: f64 = 80.0;
+/// Least share of points found, of drawn frames in the dataset, and of their joints that have a number.
+pub const LEAST_FOUND: f64 = 0.95;
+pub const LEAST_FRAMES: f64 = 0.5;
+pub const LEAST_JOINTS: f64 = 0.95;
 /// Frames scaled by one number.
 const SEGMENT: usize = 60;
 /// Shoulder width, upper arm and forearm of a scaled figure together, metres.
@@ -54,18 +58,23 @@ pub struct Measured {
     /// Frames in the dataset, and in the videos.
     pub n_frames: usize,
     pub n_drawn: usize,
+    /// Share of the dataset's joints that have a number, 0..1. All rows of distances count these alone.
+    pub joints: f64,
     pub lifted: Millimetres,
     /// The truth's own mean pose, always.
     pub mean_pose: Millimetres,
     /// The truth's own x and y, with each joint's mean depth.
     pub mean_depth: Millimetres,
+    /// The truth's own x and y, with depth from the truth's mean bone lengths, always towards the camera.
+    pub bone_depth: Millimetres,
 }
 
 impl Measured {
     /// Whether every target is met.
     pub fn good(&self) -> bool {
-        let px = |pixels: &Pixels| pixels.median <= MOST_PX;
-        px(&self.body) && px(&self.hands) && self.n_frames > 0 && self.lifted.all <= MOST_MM
+        let px = |pixels: &Pixels| pixels.median <= MOST_PX && pixels.found >= LEAST_FOUND;
+        let enough = self.n_frames > 0 && self.n_frames as f64 >= LEAST_FRAMES * self.n_drawn as f64;
+        px(&self.body) && px(&self.hands) && enough && self.joints >= LEAST_JOINTS && self.lifted.all <= MOST_MM
     }
 }
 
@@ -99,9 +108,12 @@ pub fn measure(dir: &Path) -> Result<Measured> {
     let always = mean.broadcast(truth.raw_dim()).context("mean pose")?.to_owned();
     let mut flat = truth.clone();
     flat.slice_mut(s![.., .., 2]).assign(&always.slice(s![.., .., 2]));
+    let finite = lifted.iter().filter(|v| v.is_finite()).count();
+    measured.joints = finite as f64 / lifted.len().max(1) as f64;
     measured.lifted = distances(&lifted, &truth);
-    measured.mean_pose = distances(&always, &truth);
-    measured.mean_depth = distances(&flat, &truth);
+    measured.mean_pose = distances(&where_known(always, &lifted), &truth);
+    measured.mean_depth = distances(&where_known(flat, &lifted), &truth);
+    measured.bone_depth = distances(&where_known(with_bone_depth(&truth), &lifted), &truth);
     Ok(measured)
 }
 
@@ -185,6 +197,34 @@ fn scaled(segment: ArrayView3<f32>) -> Array3<f32> {
     segment.mapv(|v| v * ARM_METRES / size)
 }
 
+/// `told` with only the joints that have a number in `lifted`.
+fn where_known(mut told: Array3<f32>, lifted: &Array3<f32>) -> Array3<f32> {
+    Zip::from(&mut told).and(lifted).for_each(|v, known| {
+        if !known.is_finite() {
+            *v = f32::NAN;
+        }
+    });
+    told
+}
+
+/// x and y of `truth`, each joint as far in front of its parent as the bone's mean length asks; the shoulders lie in the
+/// picture's plane.
+fn with_bone_depth(truth: &Array3<f32>) -> Array3<f32> {
+    let mut told = truth.clone();
+    // House order: a parent stands before its children.
+    for (joint, parent) in (0..N_JOINTS).filter_map(|joint| Some((joint, parent(joint)?))) {
+        let bone = &truth.slice(s![.., joint, ..]) - &truth.slice(s![.., parent, ..]);
+        let squared = bone.map_axis(Axis(1), |v| v.iter().map(|v| v * v).sum::<f32>());
+        let length = squared.mapv(f32::sqrt).mean().unwrap_or_default();
+        for (t, bone) in bone.outer_iter().enumerate() {
+            let rest = (length * length - bone[0] * bone[0] - bone[1] * bone[1]).max(0.0).sqrt();
+            let depth = if parent == NECK { 0.0 } else { rest };
+            told[[t, joint, 2]] = told[[t, parent, 2]] - depth;
+        }
+    }
+    told
+}
+
 /// Mean distances between [T, 49, 3] metres; joints that are not finite are left out.
 fn distances(told: &Array3<f32>, truth: &Array3<f32>) -> Millimetres {
     let mean = |joints: &[usize], from: &dyn Fn(usize) -> usize| {
@@ -228,6 +268,40 @@ mod tests {
         turned.slice_mut(s![.., .., 2]).mapv_inplace(|v| -v);
         let wrong = distances(&scaled(turned.view()), &scaled(truth.view()));
         assert!(wrong.all > 100.0 && wrong.wrists > 100.0, "{wrong:?}");
+    }
+
+    #[test]
+    fn a_run_that_found_little_is_not_good() {
+        let pixels = Pixels { median: 0.3, p90: 1.0, found: 1.0 };
+        let mm = Millimetres { all: 40.0, ..Millimetres::default() };
+        let good = Measured {
+            body: pixels,
+            hands: pixels,
+            n_frames: 90,
+            n_drawn: 100,
+            joints: 1.0,
+            lifted: mm,
+            ..Measured::default()
+        };
+        let few = Pixels { found: 0.05, ..pixels };
+        assert!(good.good());
+        assert!(!Measured { body: few, ..good.clone() }.good() && !Measured { hands: few, ..good.clone() }.good());
+        assert!(!Measured { n_frames: 1, ..good.clone() }.good() && !Measured { joints: 0.1, ..good }.good());
+    }
+
+    #[test]
+    fn trivial_rows_count_the_joints_of_the_lifted_row_and_bones_solve_depth() {
+        let truth = Truth::of(&Scene::new(2, 4.0, [640, 480]), DATASET_FPS).motion.joints;
+        let mut lifted = truth.clone();
+        lifted.slice_mut(s![.., L_WRIST, ..]).fill(f32::NAN);
+        let mut told = truth.clone();
+        told.slice_mut(s![.., L_WRIST, ..]).mapv_inplace(|v| v + 1.0);
+        assert!(distances(&told, &truth).body > 10.0);
+        assert!(distances(&where_known(told, &lifted), &truth).body < 1e-3);
+        let mut flat = truth.clone();
+        flat.slice_mut(s![.., .., 2]).fill(0.0);
+        let (solved, flat) = (distances(&with_bone_depth(&truth), &truth), distances(&flat, &truth));
+        assert!(solved.body > 0.0 && solved.body < flat.body, "{solved:?} {flat:?}");
     }
 
     #[test]

@@ -141,6 +141,25 @@ mod tests {
     }
 
     #[test]
+    fn of_two_people_the_followed_one_stays_while_the_other_outgrows_it() {
+        let mut followed = Followed::default();
+        for step in 0..30 {
+            let grown = step as f32;
+            let mut found = [at(40.0 + 0.5 * grown, 130.0 - grown, 0.9), at(180.0 - grown, 110.0 + 2.0 * grown, 0.95)];
+            if step % 2 == 1 {
+                found.reverse();
+            }
+            followed.look(&found, 340, 0.3, true);
+            let PersonBox { x, width, score, .. } = followed.person();
+            assert!(x + width / 2.0 < 120.0 && score == 0.9, "step {step}: the box has gone to {x} + {width}");
+        }
+        // A new follower would take the other by now.
+        let mut anew = Followed::default();
+        anew.look(&[at(54.5, 101.0, 0.9), at(151.0, 168.0, 0.95)], 340, 0.3, true);
+        assert_eq!((anew.person().x, anew.n_people), (151.0, 2));
+    }
+
+    #[test]
     fn a_lost_speaker_is_kept_while_the_body_is_seen_then_replaced() {
         let mut followed = Followed::default();
         followed.look(&[at(100.0, 100.0, 0.9)], 300, 0.3, false);

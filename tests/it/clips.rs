@@ -80,13 +80,3 @@ pub fn ffmpeg(dir: &Path, args: &str) -> bool {
         }
     }
 }
-
-/// A file of the shared data folder; `None`, with a loud line, where that is absent.
-pub fn shared(path: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(path);
-    if path.exists() {
-        return Some(path);
-    }
-    eprintln!("SKIPPED: {} is not there", path.display());
-    None
-}

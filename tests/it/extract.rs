@@ -1,6 +1,7 @@
 //! The extract stage on clips made here and on real ones: its files, its shots, its refusals.
 
-use crate::clips::{self, shared, write_numbered};
+use crate::clips::{self, write_numbered};
+use crate::support::shared;
 use ndarray::Array1;
 use ndarray_npy::NpzReader;
 use orator::config;
@@ -105,11 +106,11 @@ fn the_cuts_of_real_clips_are_found_and_no_others() {
     let dir = tempfile::tempdir().unwrap();
     for (name, expected) in [
         // 11.60 s and 16.97 s.
-        ("videos/talk_tyson_2cam_17s_720p.mp4", vec![174, 255]),
-        ("videos/talk_oliver_wan_3.5s_1080p.mp4", vec![]),
-        ("videos/generated/mdd_showcase_jon1.mp4", vec![]),
-        ("videos/silent/ted_lia_1.mp4", vec![]),
-        ("videos/silent/asl_help.mkv", vec![]),
+        ("data/videos/talk_tyson_2cam_17s_720p.mp4", vec![174, 255]),
+        ("data/videos/talk_oliver_wan_3.5s_1080p.mp4", vec![]),
+        ("data/videos/generated/mdd_showcase_jon1.mp4", vec![]),
+        ("data/videos/silent/ted_lia_1.mp4", vec![]),
+        ("data/videos/silent/asl_help.mkv", vec![]),
     ] {
         let Some(video) = shared(name) else { continue };
         let out = dir.path().join(name.replace('/', "_"));

@@ -36,7 +36,7 @@ fn killed_anywhere_a_run_resumes_to_the_same_bytes() {
         random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let share = (random >> 33) as f64 / f64::from(1u32 << 31);
         let mut child = killed.start(&["run"]);
-        std::thread::sleep(Duration::from_secs_f64(0.02 + share * whole.as_secs_f64() * 0.6));
+        std::thread::sleep(Duration::from_secs_f64(0.02 + share * whole.as_secs_f64()));
         n_killed += u32::from(child.try_wait().unwrap().is_none());
         child.kill().unwrap();
         child.wait().unwrap();
@@ -51,6 +51,10 @@ fn killed_anywhere_a_run_resumes_to_the_same_bytes() {
         }
     }
     assert_eq!(killed.run(&[]).code, 0);
+    let after = records(&killed.work());
+    for (name, time) in &before {
+        assert_eq!(after.get(name), Some(time), "{name} was done again by the last run");
+    }
     assert!(dataset(&killed.work()) == expected, "the dataset differs after {n_killed} kills");
     eprintln!("killed {n_killed} of {n_kills} runs at work; the dataset is the same to the byte");
 }

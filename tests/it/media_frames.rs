@@ -1,6 +1,7 @@
 //! Which source frame comes out when: rates, variable rates, turns, codecs, damage.
 
-use crate::clips::{self, ffmpeg, number_of, shared, write_numbered, write_sized};
+use crate::clips::{self, ffmpeg, number_of, write_numbered, write_sized};
+use crate::support::shared;
 use orator::media::frames::FrameReader;
 use orator::media::probe::probe;
 use orator::types::time::FrameRate;
@@ -248,9 +249,9 @@ fn names_may_hold_colons_and_the_reader_may_move_to_a_thread() {
 #[test]
 fn real_clips_have_the_stated_frames() {
     for (name, size, n_frames, repeats) in [
-        ("videos/talk_latentsync_demo1_1080x1920_hevc.mp4", [1080, 1920], 150, 0),
-        ("videos/silent/ted_lia_2.mp4", [256, 256], 195, 65),
-        ("videos/talk_tyson_2cam_17s_720p.mp4", [1280, 720], 259, 0),
+        ("data/videos/talk_latentsync_demo1_1080x1920_hevc.mp4", [1080, 1920], 150, 0),
+        ("data/videos/silent/ted_lia_2.mp4", [256, 256], 195, 65),
+        ("data/videos/talk_tyson_2cam_17s_720p.mp4", [1280, 720], 259, 0),
     ] {
         let Some(path) = shared(name) else { continue };
         let mut reader = FrameReader::open_with(&path, DATASET, 0).unwrap();

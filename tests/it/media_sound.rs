@@ -1,6 +1,7 @@
 //! Sound on the pictures' clock: rates, channels, offsets, gaps, and a flash with its beep.
 
-use crate::clips::{ffmpeg, shared, tone, write_numbered};
+use crate::clips::{ffmpeg, tone, write_numbered};
+use crate::support::shared;
 use orator::media::audio::{extract_wav, read_mono, write_wav};
 use orator::media::encode::VideoWriter;
 use orator::media::frames::FrameReader;
@@ -172,9 +173,9 @@ fn no_sound_is_none_and_no_file() {
 #[test]
 fn real_sound_has_its_length() {
     for (name, secs) in [
-        ("audio/jfk_whisper_11s.flac", 11.0),
-        ("audio/talkshow_french.wav", f64::NAN),
-        ("videos/talk_latentsync_demo1_1080x1920_hevc.mp4", 10.008),
+        ("data/audio/jfk_whisper_11s.flac", 11.0),
+        ("data/audio/talkshow_french.wav", f64::NAN),
+        ("data/videos/talk_latentsync_demo1_1080x1920_hevc.mp4", 10.008),
     ] {
         let Some(path) = shared(name) else { continue };
         let sound = read_mono(&path, RATE).unwrap().unwrap();

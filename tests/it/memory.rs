@@ -1,7 +1,8 @@
 //! Peak memory does not grow with the length of a video. `ORATOR_LONG=1` (`make prove`) compares a 10-minute video
 //! with a 1-minute one; otherwise a short twin.
 
-use crate::support::{Project, ffmpeg};
+use crate::clips::ffmpeg;
+use crate::support::Project;
 use std::time::Duration;
 
 /// Peak resident memory in MiB of a whole run over one video.
@@ -25,10 +26,8 @@ fn peak_memory_stays_with_a_longer_video() {
     let short = Project::with_clips("short", 1, secs);
     let long = Project::with_clips("long", 0, 0.0);
     let clip = short.clips().remove(0);
-    ffmpeg(
-        &["-stream_loop", &(times - 1).to_string(), "-i", &clip.to_string_lossy(), "-c", "copy"],
-        &long.video("long.mp4"),
-    );
+    let (clip, out) = (clip.to_string_lossy(), long.video("long.mp4"));
+    assert!(ffmpeg(long.dir(), &format!("-stream_loop {} -i {clip} -c copy {}", times - 1, out.display())));
     let (short, long) = (peak_mib(&short), peak_mib(&long));
     eprintln!(
         "peak memory {short:.0} MiB at {secs} s, {long:.0} MiB at {} s: ratio {:.2}",

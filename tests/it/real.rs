@@ -1,7 +1,9 @@
 //! Real clips through the real models, where ../shared is there: a speaker without visible hands is refused with that
 //! reason, one of two people is followed, HEVC works.
 
-use crate::support::{Project, ffmpeg, shared};
+use crate::clips::ffmpeg;
+use crate::support::{Project, files_under, shared};
+use orator::motion::keypoints_npz;
 use std::path::Path;
 
 /// A project on the real models with the clips given.
@@ -15,9 +17,8 @@ fn project(name: &str, models: &Path, clips: &[&Path]) -> Project {
 
 #[test]
 fn hands_never_visible_is_a_refusal_not_a_failure() {
-    let Some(shared) = shared("data/videos/talk_kim_7s_1080p.mp4") else { return };
-    let clip = shared.join("data/videos/talk_kim_7s_1080p.mp4");
-    let project = project("kim", &shared.join("models"), &[&clip]);
+    let (Some(clip), Some(models)) = (shared("data/videos/talk_kim_7s_1080p.mp4"), shared("models")) else { return };
+    let project = project("kim", &models, &[&clip]);
     let answer = project.run(&["--to", "segment"]);
     assert_eq!(answer.code, 0, "{}", answer.errors);
     let line = answer.json["units"].to_string();
@@ -29,23 +30,23 @@ fn hands_never_visible_is_a_refusal_not_a_failure() {
 
 #[test]
 fn one_of_two_people_is_followed() {
-    let Some(shared) = shared("data/videos/talk_tyson_2cam_17s_720p.mp4") else { return };
-    let videos = shared.join("data/videos");
-    let (tyson, oliver) =
-        (videos.join("talk_tyson_2cam_17s_720p.mp4"), videos.join("talk_latentsync_demo1_1080x1920_hevc.mp4"));
-    let project = project("two", &shared.join("models"), &[Path::new("videos/host/two.mp4"), &oliver]);
+    let (Some(videos), Some(models)) = (shared("data/videos"), shared("models")) else { return };
+    let (tyson, oliver) = ("talk_tyson_2cam_17s_720p.mp4", "talk_latentsync_demo1_1080x1920_hevc.mp4");
+    if [tyson, oliver].iter().any(|name| shared(&format!("data/videos/{name}")).is_none()) {
+        return;
+    }
+    let project = project("two", &models, &[Path::new("videos/host/two.mp4"), &videos.join(oliver)]);
     let filter = "[0:v]fps=25,scale=-2:480,trim=0:5[a];[1:v]fps=25,scale=-2:480,trim=0:5[b];[a][b]hstack";
-    let (tyson, oliver) = (tyson.to_string_lossy(), oliver.to_string_lossy());
-    ffmpeg(
-        &["-i", &tyson, "-i", &oliver, "-filter_complex", filter, "-map", "0:a", "-t", "5"],
-        &project.video("two.mp4"),
-    );
+    let out = project.video("two.mp4");
+    let mix = format!("-i {tyson} -i {oliver} -filter_complex {filter} -map 0:a -t 5 {}", out.display());
+    assert!(ffmpeg(&videos, &mix));
     let answer = project.run(&["--to", "segment"]);
     assert_eq!(answer.code, 0, "{}", answer.errors);
     let units = answer.json["units"].as_array().unwrap();
     let pose =
         units.iter().find(|unit| unit["stage"] == "pose2d" && unit["unit"].to_string().contains("two-")).unwrap();
     eprintln!("{pose}");
+    assert!(pose["facts"]["several_people"].as_f64().unwrap_or_default() > 0.9, "{pose}");
     let kept = |name: &str| {
         let is_it = |unit: &&serde_json::Value| unit["stage"] == "segment" && unit["unit"].to_string().contains(name);
         units.iter().find(is_it).map(|unit| unit["line"].to_string()).unwrap_or_default()
@@ -56,4 +57,25 @@ fn one_of_two_people_is_followed() {
         kept("two-"),
         kept("latentsync")
     );
+
+    let work = project.work();
+    let made = |stage: &str, file: &str| {
+        let files = files_under(&work.join(stage)).into_iter();
+        files
+            .map(|(name, path)| (name.contains("two-") && name.ends_with(file), path))
+            .find(|(is_it, _)| *is_it)
+            .unwrap()
+            .1
+    };
+    let extras = keypoints_npz::read_extras(&made("pose2d", "keypoints.npz")).unwrap();
+    let text = std::fs::read(made("segment", "intervals.json")).unwrap();
+    let intervals: serde_json::Value = serde_json::from_slice(&text).unwrap();
+    // The first of the two pictures, 853 or 854 px wide, ends where the second begins.
+    for interval in intervals["intervals"].as_array().unwrap() {
+        let (start, end) = (interval["start"].as_u64().unwrap() as usize, interval["end"].as_u64().unwrap() as usize);
+        let left = |t: usize| extras.person[[t, 0]] + extras.person[[t, 2]] / 2.0 < 853.5;
+        let n_left = (start..end).filter(|&t| left(t)).count();
+        eprintln!("frames {start}..{end}: {n_left} on the left");
+        assert!(end > start && (n_left == 0 || n_left == end - start), "{n_left} of {start}..{end} on the left");
+    }
 }

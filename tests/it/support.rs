@@ -114,19 +114,11 @@ pub fn files_under(folder: &Path) -> Vec<(String, PathBuf)> {
     files
 }
 
-/// The ffmpeg command, which the project's set-up installs, writing `out`.
-pub fn ffmpeg(args: &[&str], out: &Path) {
-    let output = Command::new("ffmpeg").args(["-v", "error", "-y"]).args(args).arg(out).stdin(Stdio::null()).output();
-    let output = output.expect("the ffmpeg command (make setup)");
-    assert!(output.status.success(), "ffmpeg {args:?}: {}", String::from_utf8_lossy(&output.stderr));
-}
-
-/// The folder of shared real data, if `file` is in it; otherwise says loudly that the test is skipped.
-pub fn shared(file: &str) -> Option<PathBuf> {
-    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared");
-    if shared.join(file).exists() {
-        return Some(shared.canonicalize().unwrap());
+/// A file or folder of the shared real data; `None`, with a loud line, where it is absent.
+pub fn shared(path: &str) -> Option<PathBuf> {
+    let found = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(path).canonicalize().ok();
+    if found.is_none() {
+        eprintln!("SKIPPED: ../shared/{path} is not there");
     }
-    eprintln!("SKIPPED: ../shared/{file} is not there");
-    None
+    found
 }
