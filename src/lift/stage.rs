@@ -146,8 +146,8 @@ mod tests {
         let n_frames = 45;
         let repeated: Vec<bool> = (0..n_frames).map(|t| t % 3 == 1).collect();
         let mut body = Array3::zeros((n_frames, 17, 3));
-        for t in 0..n_frames {
-            let filmed = if repeated[t] { t - 1 } else { t } as f32;
+        for (t, is_repeated) in repeated.iter().enumerate() {
+            let filmed = (t - usize::from(*is_repeated)) as f32;
             let points = [
                 (NOSE, 320.0, 130.0),
                 (L_SHOULDER, 390.0, 200.0),
@@ -167,8 +167,8 @@ mod tests {
         unsee(&mut keypoints, &repeated);
         let motion = Lifter::new(&config::Lift::default()).unwrap().lift(&keypoints).unwrap();
         let wrist = skeleton::L_WRIST;
-        for t in 3..n_frames - 3 {
-            assert_eq!(motion.mask[[t, wrist]], !repeated[t], "frame {t}");
+        for (t, is_repeated) in repeated.iter().enumerate().take(n_frames - 3).skip(3) {
+            assert_eq!(motion.mask[[t, wrist]], !is_repeated, "frame {t}");
         }
         let rises = |t: usize| motion.joints[[t, wrist, 1]] - motion.joints[[t + 1, wrist, 1]];
         let (least, most) = (6..n_frames - 7).map(rises).fold((f32::MAX, 0.0_f32), |(a, b), v| (a.min(v), b.max(v)));
