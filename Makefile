@@ -65,7 +65,7 @@ test: build
 	cargo fmt --check
 	cargo clippy --locked --all-targets -- -D warnings
 	cargo test --locked
-	$(MAKE) demo DEMO=$(TARGET)/demo-test DRAW='--videos 2 --secs 12 --fps 15' STEPS=30
+	$(MAKE) demo DEMO=$(TARGET)/demo-test STEPS=30
 	@echo 'make test: all passed'
 
 # The long proofs, each printing its figures: 20 kills, a 10-minute video, speed on a real clip (CLIP, MODELS), alone and
