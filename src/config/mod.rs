@@ -154,6 +154,17 @@ mod tests {
     }
 
     #[test]
+    fn no_gap_is_kept_that_lift_leaves_open() {
+        let said = problems("", &["segment.max_body_gap_secs=1.5", "segment.max_hand_gap_secs=60"]).join("\n");
+        for key in ["segment.max_body_gap_secs: 1.5", "segment.max_hand_gap_secs: 60"] {
+            assert!(
+                said.contains(&format!("{key} is out of range: expected 0 to 1 seconds, all that lift fills")),
+                "{said}"
+            );
+        }
+    }
+
+    #[test]
     fn broken_toml_says_where() {
         assert!(problems("[extract\nfps = 15", &[])[0].starts_with("line 1: not valid TOML"));
         assert!(problems("extract = 3", &[])[0].contains("expected a table"));

@@ -17,8 +17,8 @@ pub fn check(settings: &Settings, places: &BTreeMap<String, Place>) -> Vec<Probl
     rules.within("pose2d.joint_score", s.pose2d.joint_score, 0.0, 1.0, "");
     rules.within("segment.min_frames", s.segment.min_frames as f64, 1.0, 1e6, "frames");
     rules.within("segment.joint_score", s.segment.joint_score, 0.0, 1.0, "");
-    rules.within("segment.max_body_gap_secs", s.segment.max_body_gap_secs, 0.0, 60.0, "seconds");
-    rules.within("segment.max_hand_gap_secs", s.segment.max_hand_gap_secs, 0.0, 60.0, "seconds");
+    rules.within("segment.max_body_gap_secs", s.segment.max_body_gap_secs, 0.0, 1.0, "seconds, all that lift fills");
+    rules.within("segment.max_hand_gap_secs", s.segment.max_hand_gap_secs, 0.0, 1.0, "seconds, all that lift fills");
     rules.within("segment.min_hand_share", s.segment.min_hand_share, 0.0, 1.0, "");
     rules.within("segment.min_shoulder_px", s.segment.min_shoulder_px, 1.0, 1e5, "pixels");
     rules.within("segment.max_jump", s.segment.max_jump, 0.01, 100.0, "shoulder widths");

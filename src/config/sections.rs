@@ -130,9 +130,9 @@ pub struct Segment {
     pub min_frames: usize,
     /// A face or arm joint is visible from this score on, 0..1.
     pub joint_score: f64,
-    /// Longest gap of an arm or the face that is filled and masked, seconds.
+    /// Longest gap of an arm or the face that is filled and masked, seconds; at most what lift fills, 1.
     pub max_body_gap_secs: f64,
-    /// Longest gap of one hand that is masked, seconds.
+    /// Longest gap of one hand that is masked, seconds; at most what lift fills, 1.
     pub max_hand_gap_secs: f64,
     /// Least share of an interval's frames in which each hand is seen, 0..1.
     pub min_hand_share: f64,

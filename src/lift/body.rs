@@ -65,7 +65,7 @@ pub struct Body {
 /// Lifts the body over an interval. A wrist that the body model misses is taken from the hand model; a point missing
 /// for more than `max_gap` frames is not told, nor is what hangs on it.
 pub fn lift(lifter: &BodyLifter, keypoints: &Keypoints, interval: Interval, max_gap: usize) -> Result<Body> {
-    let step = (keypoints.fps.per_sec() / TRAINED_FPS).round().max(1.0) as usize;
+    let step = keypoints.fps.per_sec() / TRAINED_FPS;
     let points: Vec<Seen> = (interval.start..interval.end).map(|t| seen_points(keypoints, t)).collect();
     let mut poses = lifter.poses(&points, step)?;
     let missing_long: [Vec<bool>; N_POINTS] =

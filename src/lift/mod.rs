@@ -25,7 +25,7 @@ use body::{ArmLengths, Body, TRAINED_FPS};
 use hands::Shapes;
 use ndarray::{Array2, Array3, s};
 
-/// A gap up to this long is filled; a longer one stays open.
+/// A gap up to this long is filled; a longer one stays open. `config` lets `[segment]` keep no longer ones.
 const MAX_GAP_SECS: f64 = 1.0;
 
 /// Which of the nine points of the upper body each arm joint is.

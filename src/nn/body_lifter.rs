@@ -37,13 +37,13 @@ impl BodyLifter {
     }
 
     /// A pose for every frame, in px of the picture, the neck at 0: `None` where a shoulder is not seen within half a
-    /// window. Before the first and after the last frame the body stands still. A window takes every `step`-th frame:
-    /// the network knows motion at 15 frames a second. Each window is looked at in the mirror as well.
-    pub fn poses(&self, seen: &[Seen], step: usize) -> Result<Vec<Option<Pose>>> {
+    /// window. Before the first and after the last frame the body stands still. The frames of a window
+    /// lie `step` frames apart, between two frames where that is no whole number: the network knows motion at 15 frames
+    /// a second. Each window is looked at in the mirror as well.
+    pub fn poses(&self, seen: &[Seen], step: f64) -> Result<Vec<Option<Pose>>> {
         let half = WINDOW as isize / 2;
-        let last = seen.len() as isize - 1;
         let view = |t: usize| {
-            let around = |d: isize| seen[(t as isize + d * step as isize).clamp(0, last) as usize];
+            let around = |d: isize| at(seen, t as f64 + d as f64 * step);
             View::of(&(-half..=half).map(around).collect::<Vec<_>>())
         };
         let mut poses = Vec::with_capacity(seen.len());
@@ -71,6 +71,23 @@ impl BodyLifter {
     }
 }
 
+/// The points at a place between two frames: in proportion where both show a point, else as in the nearer one.
+fn at(seen: &[Seen], place: f64) -> Seen {
+    let place = place.clamp(0.0, (seen.len() - 1) as f64);
+    let (before, after) = (&seen[place.floor() as usize], &seen[place.ceil() as usize]);
+    let share = place.fract() as f32;
+    std::array::from_fn(|j| match (before[j], after[j]) {
+        (Some(a), Some(b)) => Some([0, 1].map(|k| a[k] + share * (b[k] - a[k]))),
+        (a, b) => {
+            if share < 0.5 {
+                a
+            } else {
+                b
+            }
+        }
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -82,12 +99,20 @@ mod tests {
         let seen: Seen = std::array::from_fn(|j| Some([j as f32 * 10.0, (j * j) as f32]));
         let mut frames = vec![seen; 300];
         frames[100..200].fill([None; 9]);
-        let poses = lifter.poses(&frames, 1)?;
+        let poses = lifter.poses(&frames, 1.0)?;
         assert_eq!(poses.len(), 300);
         for (t, pose) in poses.iter().enumerate() {
             assert_eq!(pose.is_none(), (113..187).contains(&t), "frame {t}");
         }
-        assert!(lifter.poses(&[], 2)?.is_empty());
+        assert!(lifter.poses(&[], 2.0)?.is_empty());
         Ok(())
+    }
+
+    #[test]
+    fn between_two_frames_points_lie_in_proportion() {
+        let frames: Vec<Seen> = vec![[Some([0.0, 4.0]); 9], [Some([2.0, 8.0]); 9], [None; 9]];
+        assert_eq!(at(&frames, 0.25)[0], Some([0.5, 5.0]));
+        assert_eq!((at(&frames, 1.4)[0], at(&frames, 1.6)[0]), (Some([2.0, 8.0]), None));
+        assert_eq!((at(&frames, -3.0), at(&frames, 9.0)), (frames[0], frames[2]));
     }
 }

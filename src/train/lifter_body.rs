@@ -86,7 +86,7 @@ impl BodyLesson {
     }
 
     fn lift(&self, scene: &Scene) -> Result<Vec<crate::motion::upper_body::Pose>> {
-        let poses: Option<Vec<_>> = self.lifter.poses(&scene.seen, 1)?.into_iter().collect();
+        let poses: Option<Vec<_>> = self.lifter.poses(&scene.seen, 1.0)?.into_iter().collect();
         poses.context("a scene without shoulders")
     }
 }

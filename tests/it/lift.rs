@@ -166,6 +166,67 @@ fn intervals_are_lifted_apart_and_outside_is_nothing() {
 }
 
 #[test]
+fn a_finger_tip_never_seen_is_lifted_all_the_same() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut k = keypoints(&Scene::of_rule(40, true, &mut rng), &mut rng);
+    k.left_hand.slice_mut(s![.., 20, 2]).fill(0.0);
+    k.right_hand.slice_mut(s![.., 20, 2]).fill(0.0);
+    let lifted = lifter().lift_intervals(&k, &[Interval { start: 0, end: 40 }]).unwrap();
+    for root in [L_HAND, R_HAND] {
+        for joint in root + 1..root + 21 {
+            assert!((0.005..0.15).contains(&lifted.lengths[joint - 1]), "{}", skeleton::name(joint));
+        }
+        assert!(!lifted.motion.mask[[20, root + 20]] && lifted.motion.mask[[20, root + 19]]);
+    }
+}
+
+/// A talker with swinging arms, 6 s at `fps`.
+fn swinging(fps: u32) -> Keypoints {
+    let n = 6 * fps as usize;
+    let mut body = Array3::zeros((n, 17, 3));
+    for t in 0..n {
+        let swing = |hertz: f32, by: f32| by * (std::f32::consts::TAU * hertz * t as f32 / fps as f32).sin();
+        let (elbow, wrist) = (swing(0.4, 20.0), swing(0.7, 60.0));
+        let points = [
+            (0, 640.0, 180.0),
+            (6, 560.0, 260.0),
+            (8, 530.0 + elbow, 390.0),
+            (10, 570.0 + wrist, 470.0 - wrist),
+            (5, 720.0, 260.0),
+            (7, 750.0 + elbow, 390.0),
+            (9, 710.0 - wrist, 460.0 + elbow),
+            (12, 590.0, 500.0),
+            (11, 690.0, 500.0),
+        ];
+        for (point, x, y) in points {
+            body.slice_mut(s![t, point, ..]).assign(&ndarray::arr1(&[x, y, 0.9]));
+        }
+    }
+    let hand = Array3::zeros((n, 21, 3));
+    Keypoints { fps: FrameRate::new(fps, 1), image_size: [1280, 720], body, left_hand: hand.clone(), right_hand: hand }
+}
+
+#[test]
+fn the_frame_rate_does_not_change_the_motion() {
+    let lifter = lifter();
+    let motion = |fps| lifter.lift(&swinging(fps)).unwrap().joints;
+    let expected = motion(15);
+    for fps in [10, 20, 30] {
+        let joints = motion(fps);
+        // every fifth of a second is a frame at all these rates
+        let apart = |fifth: usize, joint: usize| {
+            let a = joints.slice(s![fifth * fps as usize / 5, joint, ..]);
+            let square = (&a - &expected.slice(s![fifth * 3, joint, ..])).mapv(|v| v * v);
+            square.sum().sqrt()
+        };
+        let most = (0..30).flat_map(|fifth| (1..7).map(move |joint| (fifth, joint)));
+        let most = most.map(|(fifth, joint)| apart(fifth, joint)).fold(0.0, f32::max);
+        eprintln!("{fps} frames a second: at most {:.1} mm from 15", 1000.0 * most);
+        assert!(most < 0.010, "{fps} frames a second: {most} m");
+    }
+}
+
+#[test]
 fn odd_keypoints_do_no_harm() {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     let mut k = keypoints(&Scene::of_rule(40, true, &mut rng), &mut rng);
@@ -238,13 +299,10 @@ fn the_stage_writes_joints_and_bones() {
         person: ndarray::Array2::zeros((70, 5)),
         n_people: ndarray::Array1::ones(70),
     };
-    let (pose2d, segment) = (place(dir.path(), "pose2d", &unit), place(dir.path(), "segment", &unit));
-    std::fs::create_dir_all(&pose2d).unwrap();
-    std::fs::create_dir_all(&segment).unwrap();
-    let extract = place(dir.path(), "extract", &unit);
-    std::fs::create_dir_all(&extract).unwrap();
-    let mut timeline = ndarray_npy::NpzWriter::new(std::fs::File::create(extract.join("timeline.npz")).unwrap());
-    timeline.add_array("repeated", &ndarray::Array1::from_elem(70, false)).unwrap();
+    let [extract, pose2d, segment] = ["extract", "pose2d", "segment"].map(|stage| place(dir.path(), stage, &unit));
+    [&extract, &pose2d, &segment].into_iter().for_each(|folder| std::fs::create_dir_all(folder).unwrap());
+    let mut timeline = NpzWriter::new(std::fs::File::create(extract.join("timeline.npz")).unwrap());
+    timeline.add_array("repeated", &ndarray::Array1::from_shape_fn(70, |t| t % 3 == 2)).unwrap();
     timeline.finish().unwrap();
     keypoints_npz::write(&pose2d.join("keypoints.npz"), &keypoints, &extras).unwrap();
     let intervals = |n_frames| Intervals::new(keypoints.fps, n_frames, vec![Interval { start: 2, end: 68 }]);
@@ -256,6 +314,10 @@ fn the_stage_writes_joints_and_bones() {
     assert!(report.line.starts_with("66 frames in 1 interval"), "{}", report.line);
     let motion = joints_npz::read(&dir.path().join("joints.npz")).unwrap();
     assert!(motion.joints[[1, 0, 0]].is_nan() && motion.joints[[2, 0, 0]] == 0.0);
+    for t in 2..68 {
+        let known = motion.mask.slice(s![t, ..]).iter().any(|m| *m);
+        assert_eq!(known, t % 3 != 2, "a repeated frame is masked: {t}");
+    }
     let bones: serde_json::Value =
         serde_json::from_slice(&std::fs::read(dir.path().join("bones.json")).unwrap()).unwrap();
     let lengths: Vec<f64> = serde_json::from_value(bones["lengths_metres"].clone()).unwrap();
