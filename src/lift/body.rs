@@ -56,9 +56,11 @@ impl ArmLengths {
     }
 }
 
-/// The upper body over an interval: poses in px, `None` where it cannot be told, and which points were seen.
+/// The upper body over an interval: poses in px, `None` where it cannot be told, a point NaN where it cannot; the whole
+/// pose's size in px (`upper_body::size`); and which points were seen.
 pub struct Body {
     pub poses: Vec<Option<Pose>>,
+    pub sizes: Vec<f64>,
     pub seen: Vec<[bool; N_POINTS]>,
 }
 
@@ -68,6 +70,7 @@ pub fn lift(lifter: &BodyLifter, keypoints: &Keypoints, interval: Interval, max_
     let step = keypoints.fps.per_sec() / TRAINED_FPS;
     let points: Vec<Seen> = (interval.start..interval.end).map(|t| seen_points(keypoints, t)).collect();
     let mut poses = lifter.poses(&points, step)?;
+    let sizes = poses.iter().map(|p| p.as_ref().map_or(f64::NAN, size)).collect();
     let missing_long: [Vec<bool>; N_POINTS] =
         std::array::from_fn(|j| long_gaps(&points.iter().map(|p| p[j].is_some()).collect::<Vec<_>>(), max_gap));
     for (t, pose) in poses.iter_mut().enumerate() {
@@ -76,13 +79,21 @@ pub fn lift(lifter: &BodyLifter, keypoints: &Keypoints, interval: Interval, max_
             *pose = None;
             continue;
         }
-        for j in [R_ELBOW, R_WRIST, L_ELBOW, L_WRIST] {
+        for j in 0..N_POINTS {
             if missing_long[j][t] {
                 found[j] = [f64::NAN; 3];
             }
         }
     }
-    Ok(Body { poses, seen: points.iter().map(|p| p.map(|p| p.is_some())).collect() })
+    Ok(Body { poses, sizes, seen: points.iter().map(|p| p.map(|p| p.is_some())).collect() })
+}
+
+impl Body {
+    /// The body's size in px around a frame.
+    pub fn size_at(&self, t: usize) -> Option<f64> {
+        let end = self.sizes.len().min(t + SIZE_FRAMES + 1);
+        median(self.sizes.get(t.saturating_sub(SIZE_FRAMES)..end)?.to_vec())
+    }
 }
 
 fn seen_points(keypoints: &Keypoints, t: usize) -> Seen {
@@ -101,11 +112,9 @@ fn seen_points(keypoints: &Keypoints, t: usize) -> Seen {
 pub fn measure<'a>(bodies: impl Iterator<Item = &'a Body>) -> ArmLengths {
     let (mut shoulders, mut upper, mut fore) = (Vec::new(), Vec::new(), Vec::new());
     for body in bodies {
-        let sizes: Vec<f64> = body.poses.iter().map(|p| p.as_ref().map_or(f64::NAN, size)).collect();
         for (t, pose) in body.poses.iter().enumerate() {
             let Some(pose) = pose else { continue };
-            let around = &sizes[t.saturating_sub(SIZE_FRAMES)..sizes.len().min(t + SIZE_FRAMES + 1)];
-            let Some(size) = median(around.to_vec()) else { continue };
+            let Some(size) = body.size_at(t) else { continue };
             let measure = |lengths: &mut Vec<f64>, a: usize, b: usize| {
                 if body.seen[t][a] && body.seen[t][b] {
                     lengths.push(vec3::norm(vec3::sub(pose[a], pose[b])) / size);
@@ -131,8 +140,9 @@ pub fn measure<'a>(bodies: impl Iterator<Item = &'a Body>) -> ArmLengths {
     .to_reference()
 }
 
-/// The pose in metres: every bone keeps its direction and is given its length. A point that is not told stays so.
-pub fn with_lengths(pose: &Pose, lengths: &ArmLengths) -> Pose {
+/// The pose in metres: every bone keeps its direction and is given its length; nose and hips grow as the body of `size`
+/// px does. A point that is not told stays so.
+pub fn with_lengths(pose: &Pose, size: f64, lengths: &ArmLengths) -> Pose {
     let along = |from: usize, to: usize, length: f64| -> Vec3 {
         let bone = vec3::sub(pose[to], pose[from]);
         if bone.iter().any(|v| v.is_nan()) {
@@ -147,7 +157,7 @@ pub fn with_lengths(pose: &Pose, lengths: &ArmLengths) -> Pose {
         arms[elbow] = vec3::add(arms[shoulder], along(shoulder, elbow, lengths.upper_arm));
         arms[wrist] = vec3::add(arms[elbow], along(elbow, wrist, lengths.forearm));
     }
-    let grow = lengths.sum() / size(pose).max(1e-9);
+    let grow = lengths.sum() / size;
     for j in [NOSE, R_HIP, L_HIP] {
         arms[j] = vec3::scale(pose[j], grow);
     }

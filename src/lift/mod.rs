@@ -8,12 +8,14 @@ mod body;
 mod gaps;
 mod hands;
 mod stage;
-mod weights;
+pub mod weights;
 
 pub use stage::LiftStage;
 
 use crate::config;
-use crate::motion::upper_body::{L_ELBOW, L_SHOULDER, L_WRIST, N_POINTS, R_ELBOW, R_SHOULDER, R_WRIST};
+use crate::motion::upper_body::{
+    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST,
+};
 use crate::motion::{bones, smooth, vec3};
 use crate::nn::{body_lifter::BodyLifter, hand_lifter::HandLifter};
 use crate::types::interval::Interval;
@@ -38,6 +40,9 @@ const ARM_JOINTS: [(usize, usize); 6] = [
     (skeleton::L_WRIST, L_WRIST),
 ];
 
+/// What is lifted beside the skeleton's joints.
+const EXTRA: [usize; 3] = [NOSE, R_HIP, L_HIP];
+
 /// Turns 2D keypoints into 3D motion.
 pub struct Lifter {
     body: BodyLifter,
@@ -50,6 +55,8 @@ pub struct Lifter {
 pub struct Lifted {
     /// NaN outside the intervals.
     pub motion: Motion,
+    /// Nose, right hip, left hip, [T, 3, 3], in metres and axes of the joints; NaN where not seen for long.
+    pub extra: Array3<f32>,
     /// The video's bone lengths in metres, of joints 1..=48; 0: never seen (and the hand roots).
     pub lengths: [f32; N_BONES],
     /// Frames that have arms.
@@ -67,12 +74,13 @@ struct Piece {
 impl Lifter {
     /// Loads the networks that `settings` name, or the built-in ones. Errors name the file.
     pub fn new(settings: &config::Lift) -> Result<Self> {
-        Ok(Self {
-            body: weights::body(&settings.body_weights)?,
-            hands: weights::hands(&settings.hand_weights)?,
-            smooth_arms: settings.smooth_arms,
-            smooth_hands: settings.smooth_hands,
-        })
+        let (body, hands) = (weights::body(&settings.body_weights)?, weights::hands(&settings.hand_weights)?);
+        Ok(Self::from_parts(body, hands, settings))
+    }
+
+    /// With networks that are there already; of `settings` only what follows the networks counts.
+    pub fn from_parts(body: BodyLifter, hands: HandLifter, settings: &config::Lift) -> Self {
+        Self { body, hands, smooth_arms: settings.smooth_arms, smooth_hands: settings.smooth_hands }
     }
 
     /// The motion of the whole video, taken as one continuous stretch.
@@ -109,40 +117,48 @@ impl Lifter {
             joints: Array3::from_elem((n_frames, N_JOINTS, 3), f32::NAN),
             mask: Array2::from_elem((n_frames, N_JOINTS), false),
         };
+        let mut extra = Array3::from_elem((n_frames, EXTRA.len(), 3), f32::NAN);
         for piece in &pieces {
             let range = piece.interval.start..piece.interval.end;
-            let (joints, mask) = self.assemble(piece, &arms, &lengths, keypoints.fps.per_sec());
+            let (joints, beside, mask) = self.assemble(piece, &arms, &lengths, keypoints.fps.per_sec());
+            extra.slice_mut(s![range.clone(), .., ..]).assign(&beside);
             motion.joints.slice_mut(s![range.clone(), .., ..]).assign(&joints);
             motion.mask.slice_mut(s![range, ..]).assign(&mask);
         }
         bones::with_lengths(&mut motion, &lengths);
         let n_frames = (0..n_frames).filter(|&t| motion.joints[[t, skeleton::R_SHOULDER, 0]].is_finite()).count();
-        Ok(Lifted { motion, lengths, n_frames })
+        Ok(Lifted { motion, extra, lengths, n_frames })
     }
 
-    /// Joints and mask of an interval: arms, hands hung on the wrists, smoothed. Lengths are exact but for smoothing.
+    /// Joints, extra points and mask of an interval: arms, hands hung on the wrists, smoothed. Lengths are exact but for smoothing.
     fn assemble(
         &self,
         piece: &Piece,
         arms: &ArmLengths,
         lengths: &[f32; N_BONES],
         fps: f64,
-    ) -> (Array3<f32>, Array2<bool>) {
+    ) -> (Array3<f32>, Array3<f32>, Array2<bool>) {
         let n_frames = piece.interval.n_frames();
         let frames = |sigma: f64| sigma * fps / TRAINED_FPS;
         let mut joints = Array3::from_elem((n_frames, N_JOINTS, 3), f32::NAN);
+        let mut extra = Array3::from_elem((n_frames, EXTRA.len(), 3), f32::NAN);
         let mut mask = Array2::from_elem((n_frames, N_JOINTS), false);
         for t in 0..n_frames {
             let seen: &[bool; N_POINTS] = &piece.body.seen[t];
             let Some(pose) = &piece.body.poses[t] else { continue };
-            let pose = body::with_lengths(pose, arms);
+            let Some(size) = piece.body.size_at(t) else { continue };
+            let pose = body::with_lengths(pose, size, arms);
             joints.slice_mut(s![t, NECK, ..]).fill(0.0);
             mask[[t, NECK]] = seen[R_SHOULDER] && seen[L_SHOULDER];
             for (joint, point) in ARM_JOINTS {
                 (0..3).for_each(|k| joints[[t, joint, k]] = pose[point][k] as f32);
                 mask[[t, joint]] = seen[point];
             }
+            for (i, point) in EXTRA.into_iter().enumerate() {
+                (0..3).for_each(|k| extra[[t, i, k]] = pose[point][k] as f32);
+            }
         }
+        smooth::gaussian(extra.view_mut(), frames(self.smooth_arms));
         smooth::gaussian(joints.slice_mut(s![.., ..L_HAND, ..]), frames(self.smooth_arms));
         for (root, wrist, shapes) in
             [(L_HAND, skeleton::L_WRIST, &piece.left), (R_HAND, skeleton::R_WRIST, &piece.right)]
@@ -160,7 +176,7 @@ impl Lifter {
                 mask[[t, root]] = mask[[t, wrist]];
             }
         }
-        (joints, mask)
+        (joints, extra, mask)
     }
 }
 

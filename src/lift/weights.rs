@@ -57,7 +57,7 @@ fn parse<T>(bytes: &[u8], kind: &str, make: impl Fn(Value, &mut Params) -> Resul
     let facts = header.metadata().as_ref().and_then(|m| m.get("orator")).context("it was not written by orator")?;
     let facts: Value = serde_json::from_str(facts)?;
     ensure!(facts["kind"] == kind, "it is of kind {}, expected {kind}", facts["kind"]);
-    let mut params = Params::new(0);
+    let mut params = Params::frozen();
     let net = make(facts["lesson"]["config"].clone(), &mut params)?;
     let tensors: BTreeMap<String, Tensor> = load_buffer(bytes, &Device::Cpu)?.into_iter().collect();
     params.load(&tensors)?;

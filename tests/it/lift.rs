@@ -158,6 +158,9 @@ fn intervals_are_lifted_apart_and_outside_is_nothing() {
         assert!(inside || lifted.motion.mask.slice(s![t, ..]).iter().all(|m| !m));
     }
     assert_eq!(lifted.n_frames, 65);
+    assert_eq!(lifted.extra.dim(), (80, 3, 3));
+    let nose = |t: usize| lifted.extra[[t, 0, 1]];
+    assert!(nose(2).is_nan() && (5..30).all(|t| (-0.4..0.0).contains(&nose(t))), "a nose above the neck");
     let again = lifter.lift_intervals(&keypoints, &intervals).unwrap();
     assert!(lifted.motion.joints.iter().zip(&again.motion.joints).all(|(a, b)| a.to_bits() == b.to_bits()));
     assert!(lifter.lift_intervals(&keypoints, &[Interval { start: 70, end: 81 }]).is_err());
