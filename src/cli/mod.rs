@@ -11,6 +11,7 @@ mod lift;
 mod models;
 mod road;
 mod run;
+mod sheet;
 mod status;
 mod train;
 mod ui;
@@ -37,6 +38,7 @@ enum Verb {
     Models(models::Args),
     Doctor(doctor::Args),
     Lift(lift::Args),
+    Sheet(sheet::Args),
     Train(train::Args),
     Generate(generate::Args),
     Bench(bench::Args),
@@ -71,6 +73,7 @@ pub fn main() -> ExitCode {
         Verb::Models(args) => models::run(args, &ui),
         Verb::Doctor(args) => doctor::run(args, &ui),
         Verb::Lift(args) => lift::run(args, &ui),
+        Verb::Sheet(args) => sheet::run(args, &ui),
         Verb::Train(args) => train::run(args, &ui),
         Verb::Generate(args) => generate::run(args, &ui),
         Verb::Bench(args) => bench::run(args, &ui),

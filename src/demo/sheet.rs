@@ -1,13 +1,13 @@
 //! The contact sheet: a few moments of a clip, each as the video shows it, with its keypoints, as the 3D figure from the
 //! front and from the left, beside a moment of generated motion.
 
-use crate::animate::draw::{INK, LEFT, PAPER, RIGHT, View, draw_pose};
+use crate::animate::draw::{INK, PAPER, View, draw_pose};
+use crate::animate::overlay::{Place, draw_keypoints};
 use crate::media::frames::FrameReader;
 use crate::motion::{joints_npz, keypoints_npz};
 use crate::types::image::Image;
 use crate::types::pose2d::Keypoints;
 use crate::types::pose3d::Motion;
-use crate::types::skeleton;
 use crate::vision::{draw, warp};
 use anyhow::{Context, Result, ensure};
 use ndarray::{ArrayView2, Axis};
@@ -19,10 +19,6 @@ const HEAD_PX: usize = 40;
 const N_ROWS: usize = 3;
 const COLUMNS: [&str; 5] =
     ["video", "2D keypoints", "3D, from the front", "3D, from the left", "generated from speech"];
-/// Bones between the points of COCO-17 that are drawn.
-const BONES: [(usize, usize); 10] =
-    [(5, 6), (5, 7), (7, 9), (6, 8), (8, 10), (5, 11), (6, 12), (11, 12), (0, 1), (0, 2)];
-
 /// Draws the sheet of one video of a run: its file, the folders of its stages, and a generated motion, where there is one.
 pub fn draw_sheet(video: &Path, pose2d: &Path, lift: &Path, generated: Option<&Motion>) -> Result<Image> {
     let keypoints = keypoints_npz::read(&pose2d.join("keypoints.npz"))?;
@@ -58,7 +54,7 @@ pub fn draw_sheet(video: &Path, pose2d: &Path, lift: &Path, generated: Option<&M
         }
         draw::text(&mut cells[0], &secs, [12.0, 228.0], 10.0, INK)?;
         for (column, cell) in cells.iter().enumerate() {
-            paste(&mut sheet, cell, [column * CELL[0], HEAD_PX + row * CELL[1]]);
+            draw::paste(&mut sheet, cell, [column * CELL[0], HEAD_PX + row * CELL[1]]);
         }
         row += 1;
     }
@@ -89,32 +85,7 @@ fn overlay(image: &Image, keypoints: &Keypoints, frame_idx: usize) -> Result<Ima
         *value = ((u16::from(*value) + u16::from(*paper)) / 2) as u8;
     }
     let scale = [CELL[0] as f32 / image.width as f32, CELL[1] as f32 / image.height as f32];
-    let at = |points: ArrayView2<f32>, point: usize| -> Option<[f32; 2]> {
-        (points[[point, 2]] > 0.3).then(|| [points[[point, 0]] * scale[0], points[[point, 1]] * scale[1]])
-    };
-    let body = keypoints.body.index_axis(Axis(0), frame_idx);
-    for (from, to) in BONES {
-        let rgb = if from == 0 || (from % 2 == 1) != (to % 2 == 1) {
-            INK
-        } else if from % 2 == 1 {
-            LEFT
-        } else {
-            RIGHT
-        };
-        if let (Some(from), Some(to)) = (at(body, from), at(body, to)) {
-            draw::line(&mut cell, from, to, 2.0, rgb)?;
-            draw::circle(&mut cell, to, 2.5, rgb)?;
-        }
-    }
-    for (hand, rgb) in [(&keypoints.left_hand, LEFT), (&keypoints.right_hand, RIGHT)] {
-        let points = hand.index_axis(Axis(0), frame_idx);
-        for point in 1..skeleton::N_HAND_JOINTS {
-            let base = if point % 4 == 1 { 0 } else { point - 1 };
-            if let (Some(from), Some(to)) = (at(points, base), at(points, point)) {
-                draw::line(&mut cell, from, to, 1.0, rgb)?;
-            }
-        }
-    }
+    draw_keypoints(&mut cell, keypoints, frame_idx, Place { scale, shift: [0.0; 2] }, 2.0)?;
     Ok(cell)
 }
 
@@ -123,13 +94,4 @@ fn figure(joints: ArrayView2<f32>, yaw_degrees: f32) -> Result<Image> {
     let view = View { yaw_degrees, ..View::front([CELL[0] as f32 / 2.0, 92.0], 215.0) };
     draw_pose(&mut cell, joints, &view)?;
     Ok(cell)
-}
-
-fn paste(sheet: &mut Image, cell: &Image, [left, top]: [usize; 2]) {
-    for (y, row) in cell.data.chunks_exact(3 * cell.width).enumerate() {
-        let start = 3 * ((top + y) * sheet.width + left);
-        if let Some(place) = sheet.data.get_mut(start..start + row.len()) {
-            place.copy_from_slice(row);
-        }
-    }
 }

@@ -4,6 +4,7 @@ pub mod authors_txt;
 pub mod bones;
 pub mod bvh_read;
 pub mod bvh_write;
+pub mod clip_figures;
 pub mod fk;
 pub mod hand_view;
 pub mod joints_npz;

@@ -99,6 +99,19 @@ pub fn text_width(words: &str, height_px: f32) -> anyhow::Result<f32> {
     Ok(size.width as f32)
 }
 
+/// Copies `cell` into the picture, its top left corner at `left`, `top`; rows that do not fit are left out.
+pub fn paste(image: &mut Image, cell: &Image, [left, top]: [usize; 2]) {
+    if cell.width == 0 || left + cell.width > image.width {
+        return;
+    }
+    for (y, row) in cell.data.chunks_exact(3 * cell.width).enumerate() {
+        let start = 3 * ((top + y) * image.width + left);
+        if let Some(place) = image.data.get_mut(start..start + row.len()) {
+            place.copy_from_slice(row);
+        }
+    }
+}
+
 /// Scale and stroke width of the font: its capitals are 21 px tall at scale 1.
 fn font(height_px: f32) -> (f64, i32) {
     let height = f64::from(height_px.clamp(4.0, 500.0));

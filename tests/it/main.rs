@@ -28,4 +28,5 @@ mod real;
 mod runner;
 mod segment;
 mod shard;
+mod sheet;
 mod support;
