@@ -25,6 +25,7 @@
 //! | `lift` | stage 4: 2D to 3D | `motion nn` |
 //! | `dataset` | stage 5: shards; and reading them back | `motion media audio` |
 //! | `train` | losses, optimiser, checkpoints, the two training loops | `motion nn audio dataset` |
+//! | `evaluate` | errors of the lifters on captured motion | `motion nn train lift` |
 //! | `generate` | speech to motion with a trained speaker | `motion nn audio train` |
 //! | `animate` | joints to rotations; BVH and drawn video | `motion media vision` |
 //! | `demo` | the synthetic speaker: videos with known truth, and the comparison with it | `motion media vision dataset animate` |
@@ -42,6 +43,7 @@ pub mod audio;
 pub mod config;
 pub mod dataset;
 pub mod demo;
+pub mod evaluate;
 pub mod extract;
 pub mod generate;
 pub mod lift;

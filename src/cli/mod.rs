@@ -5,6 +5,7 @@ mod bench;
 mod config_args;
 mod demo;
 mod doctor;
+mod evaluate;
 mod generate;
 mod init;
 mod lift;
@@ -40,6 +41,7 @@ enum Verb {
     Lift(lift::Args),
     Sheet(sheet::Args),
     Train(train::Args),
+    Evaluate(evaluate::Args),
     Generate(generate::Args),
     Bench(bench::Args),
     Demo(demo::Args),
@@ -75,6 +77,7 @@ pub fn main() -> ExitCode {
         Verb::Lift(args) => lift::run(args, &ui),
         Verb::Sheet(args) => sheet::run(args, &ui),
         Verb::Train(args) => train::run(args, &ui),
+        Verb::Evaluate(args) => evaluate::run(args, &ui),
         Verb::Generate(args) => generate::run(args, &ui),
         Verb::Bench(args) => bench::run(args, &ui),
         Verb::Demo(args) => demo::run(args, &ui),

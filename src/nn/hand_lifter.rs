@@ -4,7 +4,9 @@
 use super::linear::Linear;
 use super::params::Params;
 use super::{Mode, dropout::dropout};
-use candle_core::{Result, Tensor};
+use crate::motion::hand_view::{Hand, HandView, SeenHand};
+use crate::types::skeleton::Side;
+use candle_core::{Device, Result, Tensor};
 use serde::{Deserialize, Serialize};
 
 /// Prefix of the network's tensors in a weights file.
@@ -56,6 +58,19 @@ impl HandLifter {
         let x = dropout(&candle_nn::ops::leaky_relu(&first.forward(x)?, 0.01)?, self.config.dropout, mode)?;
         let x = dropout(&candle_nn::ops::leaky_relu(&second.forward(&x)?, 0.01)?, self.config.dropout, mode)?;
         last.forward(&x)
+    }
+
+    /// Hands of that side in px, the wrist at 0, in the axes of the picture; `None` where too little is seen.
+    pub fn lift(&self, seen: &[SeenHand], side: Side) -> Result<Vec<Option<Hand>>> {
+        let views: Vec<Option<HandView>> = seen.iter().map(|s| HandView::of(s, side)).collect();
+        let x: Vec<f32> = views.iter().flatten().flat_map(|view| view.numbers).collect();
+        if x.is_empty() {
+            return Ok(vec![None; seen.len()]);
+        }
+        let x = Tensor::from_vec(x, (views.iter().flatten().count(), self.config.n_in), &Device::Cpu)?;
+        let y = self.forward(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1::<f32>()?;
+        let mut outputs = y.chunks_exact(self.config.n_out);
+        Ok(views.iter().map(|view| view.as_ref().and_then(|view| Some(view.hand(outputs.next()?)))).collect())
     }
 }
 

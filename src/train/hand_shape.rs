@@ -1,25 +1,13 @@
 //! Hands made by rule: bones of published mean lengths, joint angles within what joints allow, from every side.
 
+use crate::motion::hand_bones::{BONES, FAN, direction};
 use crate::motion::hand_view::Hand;
 use crate::motion::rotation::Rotation;
-use crate::motion::vec3::{self, Vec3};
+use crate::motion::vec3;
 use crate::types::pose2d::N_HAND;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-
-/// Bones of the thumb, index, middle, ring and little finger in mm: from the wrist to the first joint, then the
-/// phalanges (thumb: metacarpal, two phalanges). Phalanges and metacarpals: Buryanov & Kotiuk 2010, table 2 (mean of
-/// 66 adults), the last with 4 mm of fingertip; the wrist adds 22 mm to the metacarpals.
-const BONES: [[f64; 4]; 5] = [
-    [34.0, 46.2, 31.6, 25.7],
-    [90.1, 39.8, 22.4, 19.8],
-    [86.6, 44.6, 26.3, 21.4],
-    [80.0, 41.4, 25.7, 21.3],
-    [75.7, 32.7, 18.1, 20.0],
-];
-/// Angle of the first joints within the palm, degrees from the middle finger towards the thumb.
-const FAN: [f64; 5] = [52.0, 15.0, 2.0, -11.0, -25.0];
 
 /// A right hand, metres, the wrist at 0, upright: fingers along -y, thumb towards +x, the palm facing -z.
 pub fn draw(rng: &mut ChaCha8Rng) -> Hand {
@@ -70,11 +58,6 @@ fn thumb(hand: &mut Hand, size: f64, rng: &mut ChaCha8Rng) {
         let bend: f64 = if k == 0 { rng.random_range(-12.0..60.0) } else { rng.random_range(-20.0..80.0) };
         along = Rotation::about(axis, bend.to_radians()).turn(along);
     }
-}
-
-/// A direction `aside` from the fingers' towards the thumb, then raised by `flexion` towards where the palm faces.
-fn direction(aside: f64, flexion: f64) -> Vec3 {
-    [aside.sin() * flexion.cos(), -aside.cos() * flexion.cos(), -flexion.sin()]
 }
 
 /// Any turn, all equally likely (Shoemake 1992).

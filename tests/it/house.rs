@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A room and the rooms it may import.
-const MAY_IMPORT: [(&str, &str); 18] = [
+const MAY_IMPORT: [(&str, &str); 19] = [
     ("types", ""),
     ("stage", "types"),
     ("config", "types stage"),
@@ -20,6 +20,7 @@ const MAY_IMPORT: [(&str, &str); 18] = [
     ("segment", "types stage config motion media"),
     ("lift", "types stage config motion nn"),
     ("train", "types stage config motion nn audio dataset"),
+    ("evaluate", "types stage config motion nn train lift"),
     ("generate", "types stage config motion nn audio dataset train"),
     ("animate", "types stage config motion media vision"),
     ("demo", "types stage config motion media vision dataset animate"),

@@ -1,0 +1,3 @@
+//! The lifters' errors on motion with known truth: any captured file, seen by random cameras. No training here.
+
+pub mod hands;
