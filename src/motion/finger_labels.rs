@@ -75,14 +75,13 @@ fn nyu(rows: &[Vec<f64>], name: String) -> FingerTake {
 fn icvl(rows: &[Vec<f64>], name: String) -> Result<FingerTake> {
     let frames: Vec<Vec<Vec3>> = rows.iter().map(|row| points(row, ICVL_CAMERA)).collect();
     let mut hands: Vec<Fingers> = vec![[None; N_HAND]; frames.len()];
-    for finger in 0..5 {
+    for (finger, [_, one, two, _]) in BONES.into_iter().enumerate() {
         let [first, second, third] = [1, 2, 3].map(|k| 3 * finger + k);
         let apart: Vec<f64> = frames.iter().map(|p| vec3::norm(vec3::sub(p[second], p[first]))).collect();
         let mut sorted = apart.clone();
         sorted.sort_by(f64::total_cmp);
         // half the two bones together: most frames are of straight fingers, and labels err to both sides
         let together = sorted[sorted.len() * 7 / 10];
-        let [_, one, two, _] = BONES[finger];
         let a = together * one / (one + two);
         for (p, hand) in frames.iter().zip(&mut hands) {
             let joint = meeting(p[first], p[second], p[third], a, together - a);
