@@ -168,11 +168,14 @@ pub struct Lift {
     pub smooth_arms: f64,
     /// The same for hands.
     pub smooth_hands: f64,
+    /// Turn each interval as if the camera had been level and the speaker upright.
+    pub level: bool,
 }
 
 impl Default for Lift {
     fn default() -> Self {
-        Self { body_weights: PathBuf::new(), hand_weights: PathBuf::new(), smooth_arms: 1.0, smooth_hands: 1.5 }
+        let none = PathBuf::new();
+        Self { body_weights: none.clone(), hand_weights: none, smooth_arms: 1.0, smooth_hands: 1.5, level: false }
     }
 }
 

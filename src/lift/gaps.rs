@@ -1,4 +1,7 @@
-//! Gaps in what was seen: short ones are filled over time, long ones stay open.
+//! Gaps in a track: short ones are filled over time, long ones stay open. A track is [T, n, k]; a frame of it is there
+//! or missing (its first number NaN) as a whole.
+
+use ndarray::{ArrayViewMut3, Axis};
 
 /// For each frame whether it lies in a gap of `seen` of more than `longest` frames; gaps at the ends count as well.
 pub fn long_gaps(seen: &[bool], longest: usize) -> Vec<bool> {
@@ -14,29 +17,43 @@ pub fn long_gaps(seen: &[bool], longest: usize) -> Vec<bool> {
     open
 }
 
-/// The nearest frames with a value before (or at) and after (or at) each frame.
-pub fn neighbours<T>(track: &[Option<T>]) -> Vec<(Option<usize>, Option<usize>)> {
-    let mut found = vec![(None, None); track.len()];
-    let mut last = None;
-    for t in 0..track.len() {
-        if track[t].is_some() {
-            last = Some(t);
+/// Fills each gap of up to `longest` frames between two frames that are there, in proportion to the time.
+pub fn bridge(mut track: ArrayViewMut3<f32>, longest: usize) {
+    let mut last: Option<usize> = None;
+    for t in 0..track.len_of(Axis(0)) {
+        if track[[t, 0, 0]].is_nan() {
+            continue;
         }
-        found[t].0 = last;
-    }
-    last = None;
-    for t in (0..track.len()).rev() {
-        if track[t].is_some() {
-            last = Some(t);
+        if let Some(from) = last.filter(|from| t - from > 1 && t - from <= longest + 1) {
+            for mut lane in track.lanes_mut(Axis(0)) {
+                let (a, b) = (lane[from], lane[t]);
+                (from + 1..t).for_each(|u| lane[u] = a + (b - a) * (u - from) as f32 / (t - from) as f32);
+            }
         }
-        found[t].1 = last;
+        last = Some(t);
     }
-    found
+}
+
+/// Fills a gap of up to `longest` frames before the first and after the last frame that is there with that frame.
+pub fn hold_ends(mut track: ArrayViewMut3<f32>, longest: usize) {
+    let n_frames = track.len_of(Axis(0));
+    let there = |t: &usize| !track[[*t, 0, 0]].is_nan();
+    let (Some(first), Some(last)) = ((0..n_frames).find(there), (0..n_frames).rev().find(there)) else { return };
+    for mut lane in track.lanes_mut(Axis(0)) {
+        let (a, b) = (lane[first], lane[last]);
+        if first <= longest {
+            (0..first).for_each(|t| lane[t] = a);
+        }
+        if n_frames - 1 - last <= longest {
+            (last + 1..n_frames).for_each(|t| lane[t] = b);
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ndarray::Array3;
 
     #[test]
     fn only_long_gaps_stay_open() {
@@ -47,9 +64,17 @@ mod tests {
     }
 
     #[test]
-    fn every_frame_knows_its_neighbours() {
-        let track = [None, Some(1), None, Some(3), None];
-        let expected = [(None, Some(1)), (Some(1), Some(1)), (Some(1), Some(3)), (Some(3), Some(3)), (Some(3), None)];
-        assert_eq!(neighbours(&track), expected);
+    fn short_gaps_are_bridged_and_short_ends_held() {
+        const NO: f32 = f32::NAN;
+        let numbers = [NO, 1.0, NO, NO, 4.0, NO, NO, NO, 6.0, NO, NO, NO];
+        let mut track = Array3::from_shape_fn((numbers.len(), 1, 2), |(t, _, k)| numbers[t] * (k + 1) as f32);
+        let first = |track: &Array3<f32>| track.iter().step_by(2).map(|v| format!("{v}")).collect::<Vec<_>>().join(" ");
+        bridge(track.view_mut(), 2);
+        assert_eq!(first(&track), "NaN 1 2 3 4 NaN NaN NaN 6 NaN NaN NaN");
+        hold_ends(track.view_mut(), 2);
+        assert_eq!(first(&track), "1 1 2 3 4 NaN NaN NaN 6 NaN NaN NaN");
+        assert_eq!(track[[2, 0, 1]], 4.0);
+        bridge(Array3::zeros((0, 1, 2)).view_mut(), 2);
+        hold_ends(Array3::from_elem((3, 1, 2), NO).view_mut(), 9);
     }
 }

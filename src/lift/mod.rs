@@ -1,47 +1,39 @@
-//! Stage 4: 2D keypoints to 3D joints. `body` lifts the arms, `hands` the hands; here they are joined at the wrists,
-//! given the video's one set of bone lengths, and smoothed. The networks are `nn`'s, their weights `weights`'.
+//! Stage 4: 2D keypoints to 3D joints, one straight way for each interval: `sight` (what is seen, strays out) -> `body`
+//! and `hands` (the networks, `hand_depth`) -> smoothing -> `lengths` (one set for the whole video) -> `camera` (levelled on
+//! request) -> every bone given its length, hands joined at the wrists. It is all done in place, in the arrays that come
+//! out. The networks are `nn`'s, their weights `weights`'.
 //!
 //! What is known and what is not: a joint not seen for up to a second is filled and masked; one missing for longer is
 //! NaN, with all that hangs on it. Size is a convention (`upper_body::REFERENCE_SIZE`), as no picture tells it.
 
 mod body;
+mod camera;
 mod gaps;
+mod hand_depth;
 mod hands;
+mod lengths;
+mod notes;
+mod sight;
 mod stage;
 pub mod weights;
 
+pub use camera::Camera;
+pub use notes::notes;
 pub use stage::LiftStage;
 
 use crate::config;
-use crate::motion::upper_body::{
-    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST,
-};
-use crate::motion::{bones, smooth, vec3};
+use crate::motion::{bones, smooth};
 use crate::nn::{body_lifter::BodyLifter, hand_lifter::HandLifter};
 use crate::types::interval::Interval;
 use crate::types::pose2d::{Keypoints, N_HAND};
 use crate::types::pose3d::Motion;
-use crate::types::skeleton::{self, L_HAND, N_BONES, N_JOINTS, NECK, R_HAND, Side};
+use crate::types::skeleton::{self, L_HAND, N_BONES, N_JOINTS, R_HAND, Side};
 use anyhow::{Result, ensure};
-use body::{ArmLengths, Body, TRAINED_FPS};
-use hands::Shapes;
-use ndarray::{Array2, Array3, s};
+use body::TRAINED_FPS;
+use ndarray::{Array2, Array3, ArrayViewMut2, ArrayViewMut3, s};
 
 /// A gap up to this long is filled; a longer one stays open. `config` lets `[segment]` keep no longer ones.
 const MAX_GAP_SECS: f64 = 1.0;
-
-/// Which of the nine points of the upper body each arm joint is.
-const ARM_JOINTS: [(usize, usize); 6] = [
-    (skeleton::R_SHOULDER, R_SHOULDER),
-    (skeleton::R_ELBOW, R_ELBOW),
-    (skeleton::R_WRIST, R_WRIST),
-    (skeleton::L_SHOULDER, L_SHOULDER),
-    (skeleton::L_ELBOW, L_ELBOW),
-    (skeleton::L_WRIST, L_WRIST),
-];
-
-/// What is lifted beside the skeleton's joints.
-const EXTRA: [usize; 3] = [NOSE, R_HIP, L_HIP];
 
 /// Turns 2D keypoints into 3D motion.
 pub struct Lifter {
@@ -49,6 +41,7 @@ pub struct Lifter {
     hands: HandLifter,
     smooth_arms: f64,
     smooth_hands: f64,
+    level: bool,
 }
 
 /// A video lifted.
@@ -59,16 +52,17 @@ pub struct Lifted {
     pub extra: Array3<f32>,
     /// The video's bone lengths in metres, of joints 1..=48; 0: never seen (and the hand roots).
     pub lengths: [f32; N_BONES],
+    /// How the camera was held, an entry an interval.
+    pub cameras: Vec<Camera>,
     /// Frames that have arms.
     pub n_frames: usize,
 }
 
-/// One interval before it is given lengths.
-struct Piece {
-    interval: Interval,
-    body: Body,
-    left: Shapes,
-    right: Shapes,
+/// The frames of one interval of a `Lifted`.
+struct Stretch<'a> {
+    joints: ArrayViewMut3<'a, f32>,
+    extra: ArrayViewMut3<'a, f32>,
+    mask: ArrayViewMut2<'a, bool>,
 }
 
 impl Lifter {
@@ -80,12 +74,18 @@ impl Lifter {
 
     /// With networks that are there already; of `settings` only what follows the networks counts.
     pub fn from_parts(body: BodyLifter, hands: HandLifter, settings: &config::Lift) -> Self {
-        Self { body, hands, smooth_arms: settings.smooth_arms, smooth_hands: settings.smooth_hands }
+        let config::Lift { smooth_arms, smooth_hands, level, .. } = *settings;
+        Self { body, hands, smooth_arms, smooth_hands, level }
     }
 
     /// The motion of the whole video, taken as one continuous stretch.
     pub fn lift(&self, keypoints: &Keypoints) -> Result<Motion> {
-        Ok(self.lift_intervals(keypoints, &[Interval { start: 0, end: keypoints.n_frames() }])?.motion)
+        Ok(self.lift_all(keypoints)?.motion)
+    }
+
+    /// The whole video, taken as one continuous stretch.
+    pub fn lift_all(&self, keypoints: &Keypoints) -> Result<Lifted> {
+        self.lift_intervals(keypoints, &[Interval { start: 0, end: keypoints.n_frames() }])
     }
 
     /// The motion inside each interval, each lifted and smoothed by itself, all with the same bone lengths.
@@ -95,119 +95,73 @@ impl Lifter {
         for hand in [&keypoints.left_hand, &keypoints.right_hand] {
             ensure!(hand.shape()[0] == n_frames, "{n_frames} frames of body keypoints, {} of a hand", hand.shape()[0]);
         }
-        let max_gap = (MAX_GAP_SECS * keypoints.fps.per_sec()).round() as usize;
-        let lift = |&interval: &Interval| -> Result<Piece> {
+        let mut lifted = Lifted::nothing(keypoints);
+        for &interval in intervals {
             let Interval { start, end } = interval;
             ensure!(start <= end && end <= n_frames, "interval {start}..{end} of a video of {n_frames} frames");
-            let hand = |points, side| hands::lift(&self.hands, points, side, interval, max_gap);
-            Ok(Piece {
-                interval,
-                body: body::lift(&self.body, keypoints, interval, max_gap)?,
-                left: hand(&keypoints.left_hand, Side::Left)?,
-                right: hand(&keypoints.right_hand, Side::Right)?,
-            })
-        };
-        let pieces: Vec<Piece> = intervals.iter().map(lift).collect::<Result<_>>()?;
-        let arms = body::measure(pieces.iter().map(|p| &p.body));
-        let shapes: Vec<&Shapes> = pieces.iter().flat_map(|p| [&p.left, &p.right]).collect();
-        let hand = hands::measure(&shapes, arms.forearm);
-        let lengths = all_lengths(&arms, hand.as_ref());
-        let mut motion = Motion {
-            fps: keypoints.fps,
-            joints: Array3::from_elem((n_frames, N_JOINTS, 3), f32::NAN),
-            mask: Array2::from_elem((n_frames, N_JOINTS), false),
-        };
-        let mut extra = Array3::from_elem((n_frames, EXTRA.len(), 3), f32::NAN);
-        for piece in &pieces {
-            let range = piece.interval.start..piece.interval.end;
-            let (joints, beside, mask) = self.assemble(piece, &arms, &lengths, keypoints.fps.per_sec());
-            extra.slice_mut(s![range.clone(), .., ..]).assign(&beside);
-            motion.joints.slice_mut(s![range.clone(), .., ..]).assign(&joints);
-            motion.mask.slice_mut(s![range, ..]).assign(&mask);
+            self.lift_stretch(keypoints, interval, lifted.stretch(interval))?;
         }
-        bones::with_lengths(&mut motion, &lengths);
-        let n_frames = (0..n_frames).filter(|&t| motion.joints[[t, skeleton::R_SHOULDER, 0]].is_finite()).count();
-        Ok(Lifted { motion, extra, lengths, n_frames })
+        lifted.lengths = lengths::measure(&lifted.motion);
+        for &interval in intervals {
+            let mut stretch = lifted.stretch(interval);
+            let camera = Camera::of(interval, &stretch);
+            if self.level {
+                camera.level(&mut stretch);
+            }
+            lifted.cameras.push(camera);
+        }
+        let lengths = lifted.lengths;
+        bones::with_lengths(&mut lifted.motion, &lengths);
+        for (root, wrist) in [(L_HAND, skeleton::L_WRIST), (R_HAND, skeleton::R_WRIST)] {
+            let wrists = lifted.motion.mask.column(wrist).to_owned();
+            lifted.motion.mask.column_mut(root).assign(&wrists);
+        }
+        let shoulder = lifted.motion.joints.slice(s![.., skeleton::R_SHOULDER, 0]);
+        lifted.n_frames = shoulder.iter().filter(|x| x.is_finite()).count();
+        Ok(lifted)
     }
 
-    /// Joints, extra points and mask of an interval: arms, hands hung on the wrists, smoothed. Lengths are exact but for smoothing.
-    fn assemble(
-        &self,
-        piece: &Piece,
-        arms: &ArmLengths,
-        lengths: &[f32; N_BONES],
-        fps: f64,
-    ) -> (Array3<f32>, Array3<f32>, Array2<bool>) {
-        let n_frames = piece.interval.n_frames();
+    /// One interval, smoothed, of about the reference size; each hand in its own frame, the root at 0.
+    fn lift_stretch(&self, keypoints: &Keypoints, interval: Interval, mut into: Stretch) -> Result<()> {
+        let fps = keypoints.fps.per_sec();
+        let max_gap = (MAX_GAP_SECS * fps).round() as usize;
         let frames = |sigma: f64| sigma * fps / TRAINED_FPS;
-        let mut joints = Array3::from_elem((n_frames, N_JOINTS, 3), f32::NAN);
-        let mut extra = Array3::from_elem((n_frames, EXTRA.len(), 3), f32::NAN);
-        let mut mask = Array2::from_elem((n_frames, N_JOINTS), false);
-        for t in 0..n_frames {
-            let seen: &[bool; N_POINTS] = &piece.body.seen[t];
-            let Some(pose) = &piece.body.poses[t] else { continue };
-            let Some(size) = piece.body.size_at(t) else { continue };
-            let pose = body::with_lengths(pose, size, arms);
-            joints.slice_mut(s![t, NECK, ..]).fill(0.0);
-            mask[[t, NECK]] = seen[R_SHOULDER] && seen[L_SHOULDER];
-            for (joint, point) in ARM_JOINTS {
-                (0..3).for_each(|k| joints[[t, joint, k]] = pose[point][k] as f32);
-                mask[[t, joint]] = seen[point];
-            }
-            for (i, point) in EXTRA.into_iter().enumerate() {
-                (0..3).for_each(|k| extra[[t, i, k]] = pose[point][k] as f32);
-            }
-        }
-        smooth::gaussian(extra.view_mut(), frames(self.smooth_arms));
-        smooth::gaussian(joints.slice_mut(s![.., ..L_HAND, ..]), frames(self.smooth_arms));
-        for (root, wrist, shapes) in
-            [(L_HAND, skeleton::L_WRIST, &piece.left), (R_HAND, skeleton::R_WRIST, &piece.right)]
+        body::lift(&self.body, keypoints, interval, max_gap, &mut into)?;
+        smooth::gaussian(into.joints.slice_mut(s![.., ..L_HAND, ..]), frames(self.smooth_arms));
+        smooth::gaussian(into.extra, frames(self.smooth_arms));
+        for (root, side, points) in
+            [(L_HAND, Side::Left, &keypoints.left_hand), (R_HAND, Side::Right, &keypoints.right_hand)]
         {
-            let mut hand = hand_positions(shapes, root, lengths);
-            smooth::gaussian(hand.view_mut(), frames(self.smooth_hands));
-            let wrists = joints.slice(s![.., wrist..wrist + 1, ..]).to_owned();
-            hand += &wrists;
-            joints.slice_mut(s![.., root..root + N_HAND, ..]).assign(&hand);
-            joints.slice_mut(s![.., root, ..]).assign(&wrists.slice(s![.., 0, ..]));
-            for t in 0..n_frames {
-                for j in 1..N_HAND {
-                    mask[[t, root + j]] = shapes.seen[t][j] && joints[[t, root + j, 0]].is_finite();
-                }
-                mask[[t, root]] = mask[[t, wrist]];
-            }
+            let points = points.slice(s![interval.start..interval.end, .., ..]);
+            let mut joints = into.joints.slice_mut(s![.., root..root + N_HAND, ..]);
+            let mask = into.mask.slice_mut(s![.., root..root + N_HAND]);
+            hands::lift(&self.hands, points, side, ((1.0 / fps) as f32, max_gap), joints.view_mut(), mask)?;
+            smooth::gaussian(joints, frames(self.smooth_hands));
         }
-        (joints, extra, mask)
+        Ok(())
     }
 }
 
-/// A hand from its wrist in metres, [T, 21, 3]; NaN where it is missing.
-fn hand_positions(shapes: &Shapes, root: usize, lengths: &[f32; N_BONES]) -> Array3<f32> {
-    let mut positions = Array3::from_elem((shapes.hands.len(), N_HAND, 3), f32::NAN);
-    for (t, hand) in shapes.hands.iter().enumerate() {
-        let Some(hand) = hand else { continue };
-        let mut placed = [[0.0; 3]; N_HAND];
-        for j in 1..N_HAND {
-            let parent = crate::motion::hand_view::parent(j);
-            let along = vec3::unit(vec3::sub(hand[j], hand[parent]), 1e-9).unwrap_or([0.0, 1.0, 0.0]);
-            placed[j] = vec3::add(placed[parent], vec3::scale(along, f64::from(lengths[root + j - 1])));
-        }
-        for (j, p) in placed.iter().enumerate() {
-            (0..3).for_each(|k| positions[[t, j, k]] = p[k] as f32);
+impl Lifted {
+    fn nothing(keypoints: &Keypoints) -> Self {
+        let n_frames = keypoints.n_frames();
+        let joints = Array3::from_elem((n_frames, N_JOINTS, 3), f32::NAN);
+        let mask = Array2::from_elem((n_frames, N_JOINTS), false);
+        Self {
+            motion: Motion { fps: keypoints.fps, joints, mask },
+            extra: Array3::from_elem((n_frames, 3, 3), f32::NAN),
+            lengths: [0.0; N_BONES],
+            cameras: Vec::new(),
+            n_frames: 0,
         }
     }
-    positions
-}
 
-/// The 48 bone lengths; hands that were never seen have none.
-fn all_lengths(arms: &ArmLengths, hand: Option<&[f64; N_HAND]>) -> [f32; N_BONES] {
-    std::array::from_fn(|bone| {
-        let joint = bone + 1;
-        let length = match joint {
-            skeleton::R_SHOULDER | skeleton::L_SHOULDER => arms.shoulders / 2.0,
-            skeleton::R_ELBOW | skeleton::L_ELBOW => arms.upper_arm,
-            skeleton::R_WRIST | skeleton::L_WRIST => arms.forearm,
-            _ => hand.map_or(0.0, |h| h[(joint - L_HAND) % N_HAND]),
-        };
-        length as f32
-    })
+    fn stretch(&mut self, interval: Interval) -> Stretch<'_> {
+        let frames = interval.start..interval.end;
+        Stretch {
+            joints: self.motion.joints.slice_mut(s![frames.clone(), .., ..]),
+            extra: self.extra.slice_mut(s![frames.clone(), .., ..]),
+            mask: self.motion.mask.slice_mut(s![frames, ..]),
+        }
+    }
 }

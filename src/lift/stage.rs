@@ -1,4 +1,5 @@
-//! The stage: reads the keypoints of a video and the intervals worth keeping, writes `joints.npz` and `bones.json`.
+//! The stage: reads the keypoints of a video and the intervals worth keeping, writes `joints.npz`,
+//! `bones.json` and `camera.json` (roll and pitch of each interval).
 
 use super::Lifter;
 use crate::config;
@@ -45,7 +46,7 @@ impl Stage for LiftStage {
     }
 
     fn version(&self) -> u32 {
-        2
+        3
     }
 
     fn settings(&self) -> serde_json::Value {
@@ -59,6 +60,7 @@ impl Stage for LiftStage {
             "hand_weights": hash(&self.settings.hand_weights, super::weights::HANDS),
             "smooth_arms": self.settings.smooth_arms,
             "smooth_hands": self.settings.smooth_hands,
+            "level": self.settings.level,
         })
     }
 
@@ -105,10 +107,9 @@ impl Stage for LiftStage {
         let lifted = self.lifter.lift_intervals(&keypoints, &intervals.intervals)?;
         joints_npz::write(&out.join("joints.npz"), &lifted.motion)?;
         let bones = json!({ "lengths_metres": lifted.lengths.to_vec(), "n_frames": lifted.n_frames });
-        let mut bytes = serde_json::to_vec_pretty(&bones)?;
-        bytes.push(b'\n');
-        let path = out.join("bones.json");
-        std::fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
+        write_json(&out.join("bones.json"), &bones)?;
+        let camera = json!({ "levelled": self.settings.level, "intervals": lifted.cameras });
+        write_json(&out.join("camera.json"), &camera)?;
         let seen = lifted.motion.mask.iter().filter(|m| **m).count();
         let told = lifted.motion.joints.iter().filter(|v| v.is_finite()).count() / 3;
         let filled = 100.0 * (1.0 - seen as f64 / told.max(1) as f64);
@@ -119,6 +120,12 @@ impl Stage for LiftStage {
         let facts = json!({ "n_frames": lifted.n_frames, "filled_percent": filled });
         Ok(Report { line, facts: facts.as_object().cloned().unwrap_or_default() })
     }
+}
+
+fn write_json(path: &Path, value: &serde_json::Value) -> Result<()> {
+    let mut bytes = serde_json::to_vec_pretty(value)?;
+    bytes.push(b'\n');
+    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// A frame that only repeats the one before shows nothing new: its points count as not seen, so that the motion between

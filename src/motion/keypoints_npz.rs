@@ -56,7 +56,11 @@ pub fn read_noting(path: &Path) -> Result<(Keypoints, Vec<String>)> {
         let side = |v: f64| if (1.0..=1e6).contains(&v) { Some(v as u32) } else { None };
         match (side(size[0]), side(size[1])) {
             (Some(width), Some(height)) => [width, height],
-            _ => bail!("{}: `image_size` is {size}, expected width and height in px", path.display()),
+            _ => bail!(
+                "{}: `image_size` is {size}, expected width and height of the picture in px, each 1 to 1000000; \
+                 leave the array out if they are not known",
+                path.display()
+            ),
         }
     } else {
         notes.push("no `image_size`: taken from the farthest points".to_owned());

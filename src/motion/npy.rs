@@ -2,7 +2,7 @@
 
 use crate::types::{pose3d::Motion, skeleton::N_JOINTS, time::FrameRate};
 use anyhow::{Context as _, ensure};
-use ndarray::{Array, Dimension, Ix3};
+use ndarray::{Array, Array3, Dimension, Ix3};
 use ndarray_npy::npy::header::Header;
 use ndarray_npy::{ReadNpyError, ReadNpyExt as _, ReadableElement, WriteNpyExt as _};
 use std::fs::File;
@@ -49,15 +49,19 @@ fn has_small_header(bytes: &[u8]) -> bool {
 
 /// Writes the joints. Call it inside `stage::workdir::replace`: it writes in place.
 pub fn write(path: &Path, motion: &Motion) -> anyhow::Result<()> {
+    write_points(path, &motion.joints)
+}
+
+/// Writes points [T, n, 3] of any number a frame; as `write`.
+pub fn write_points(path: &Path, points: &Array3<f32>) -> anyhow::Result<()> {
     let mut file = BufWriter::new(File::create(path)?);
-    motion.joints.as_standard_layout().write_npy(&mut file)?;
+    points.as_standard_layout().write_npy(&mut file)?;
     Ok(file.flush()?)
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use ndarray::Array3;
 
     /// The file with another shape in its header.
     pub fn with_shape(bytes: &[u8], old: &str, new: &str) -> Vec<u8> {
