@@ -1,6 +1,8 @@
 //! `orator bench`: how fast a part of the road is, measured so that a noisy machine cannot flatter it: the variants take
 //! turns, round after round, and the median round counts.
 
+mod lifter;
+
 use super::{Outcome, ui::Ui};
 use anyhow::{Context, Result, bail, ensure};
 use orator::config::Settings;
@@ -25,6 +27,7 @@ pub struct Args {
 #[derive(clap::Subcommand)]
 enum Part {
     Pose2d(Pose2d),
+    Lifter(lifter::Args),
 }
 
 /// Frames to keypoints: time a frame, the share of it inside ONNX Runtime, one worker against two, and (with
@@ -51,8 +54,10 @@ struct Pose2d {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    let Part::Pose2d(args) = args.part;
-    pose2d(&args, ui)
+    match args.part {
+        Part::Pose2d(args) => pose2d(&args, ui),
+        Part::Lifter(args) => lifter::run(&args, ui),
+    }
 }
 
 /// What every variant needs.

@@ -16,6 +16,7 @@ mod golden;
 mod house;
 mod kill;
 mod lift;
+mod lifter_parity;
 mod media_frames;
 mod media_sound;
 mod memory;

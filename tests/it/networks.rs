@@ -22,7 +22,7 @@ fn golden(name: &str) -> Golden {
     all.remove(name).unwrap()
 }
 
-/// The formula of the reference.
+/// The formula of the references: a tensor by its name and shape.
 fn value(name: &str, shape: &[usize]) -> Result<Tensor> {
     let phase = name.bytes().enumerate().map(|(k, c)| (k + 1) * usize::from(c)).sum::<usize>() % 1009;
     let p = pattern(shape, phase as f64)?;
@@ -34,7 +34,8 @@ fn value(name: &str, shape: &[usize]) -> Result<Tensor> {
     }
 }
 
-fn fill(params: &Params) -> anyhow::Result<()> {
+/// Every tensor by the formula.
+pub fn fill(params: &Params) -> anyhow::Result<()> {
     let filled = params.all().map(|(name, var)| Ok((name.to_owned(), value(name, var.dims())?)));
     params.load(&filled.collect::<Result<_>>()?)
 }

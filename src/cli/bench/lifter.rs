@@ -1,0 +1,283 @@
+//! `orator bench lifter`: a training step of the temporal lifter, one thread, in turns with PyTorch's for the same
+//! network, the same batch and the same optimiser; and how far apart the two networks' outputs are.
+
+use crate::cli::{Outcome, ui::Ui};
+use anyhow::{Context, Result, bail, ensure};
+use candle_core::{Device, Tensor};
+use orator::nn::Mode;
+use orator::nn::params::Params;
+use orator::nn::temporal_lifter::{Config, TemporalLifter};
+use orator::stage::progress::{Progress, Silent};
+use orator::train::checkpoint::Contents;
+use orator::train::lifter::{self, Lesson, Schedule};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::time::Instant;
+
+/// Numbers of a frame that go in and come out: nine points of x, y and score or z.
+const NUMBERS: usize = 27;
+
+/// Training of the temporal lifter on one thread: seconds a step and, with `--python`, against PyTorch. Both train the
+/// same network on the same batch: forward, backward, clipping, Adam with AMSGrad.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Channels of the network.
+    #[arg(long, default_value_t = 256, value_name = "N")]
+    channels: usize,
+    /// Kernel widths, odd; their product is the window in frames.
+    #[arg(long, default_values_t = [3, 3, 3], value_delimiter = ',', value_name = "N,N,...")]
+    widths: Vec<usize>,
+    /// Windows of a step.
+    #[arg(long, default_value_t = 512, value_name = "N")]
+    batch: usize,
+    /// Steps of a turn.
+    #[arg(long, default_value_t = 5, value_name = "N")]
+    steps: usize,
+    /// Rounds; each measures every variant once.
+    #[arg(long, default_value_t = 5, value_name = "N")]
+    rounds: usize,
+    /// Windows of an epoch, to say its time.
+    #[arg(long, default_value_t = 100_000, value_name = "N")]
+    epoch: usize,
+    /// The PyTorch reference, started as `REFERENCE.py serve FILE`; ORATOR_REFERENCE_PYTHON names its Python.
+    #[arg(long, value_name = "FILE")]
+    python: Option<PathBuf>,
+}
+
+/// A lesson that always draws the same batch: only the training step costs time.
+struct Fixed {
+    params: Params,
+    net: TemporalLifter,
+    /// Sample after sample.
+    x: Vec<f32>,
+    y: Vec<f32>,
+}
+
+impl Fixed {
+    fn new(config: &Config, batch: usize) -> Result<Self> {
+        let mut params = Params::new(1);
+        let net = TemporalLifter::new(&mut params, "body", config)?;
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let mut draw = |n: usize| (0..n).map(|_| rng.random_range(-1.0..1.0)).collect::<Vec<f32>>();
+        let x = draw(batch * config.n_in * config.receptive_field());
+        let y = draw(batch * config.n_out);
+        Ok(Self { params, net, x, y })
+    }
+
+    fn batch(&self) -> usize {
+        self.y.len() / self.net.config().n_out
+    }
+
+    /// The batch as tensors: `x` [B, n_in, window], `y` [B, points, 3].
+    fn tensors(&self) -> Result<(Tensor, Tensor)> {
+        let x = Tensor::from_slice(&self.x, [vec![self.batch()], self.shape_in()].concat(), &Device::Cpu)?;
+        let y = Tensor::from_slice(&self.y, (self.batch(), NUMBERS / 3, 3), &Device::Cpu)?;
+        Ok((x, y))
+    }
+
+    /// Outputs for the batch in both forms.
+    fn outputs(&self) -> Result<[Vec<f32>; 2]> {
+        let (x, _) = self.tensors()?;
+        let strided = self.net.forward_windows(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1()?;
+        let dilated = self.net.forward(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1()?;
+        Ok([strided, dilated])
+    }
+
+    /// Seconds of `steps` training steps; `scratch` is where the training leaves its weights.
+    fn train(&mut self, steps: usize, scratch: &Path) -> Result<f64> {
+        let batch = self.batch();
+        let schedule =
+            Schedule { steps, batch, learning_rate: 1e-3, seed: 0, checkpoint_every: usize::MAX, started_from: None };
+        let start = Instant::now();
+        lifter::train(self, &schedule, scratch, &Silent)?;
+        Ok(start.elapsed().as_secs_f64())
+    }
+}
+
+impl Lesson for Fixed {
+    fn kind(&self) -> &'static str {
+        "benchmark"
+    }
+    fn facts(&self) -> Value {
+        json!({ "config": self.net.config() })
+    }
+    fn params(&self) -> &Params {
+        &self.params
+    }
+    fn shape_in(&self) -> Vec<usize> {
+        vec![self.net.config().n_in, self.net.config().receptive_field()]
+    }
+    fn weights(&self) -> Vec<f32> {
+        vec![1.0; NUMBERS / 3]
+    }
+    fn draw(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
+        // a sample of the trainer has its number in its stream of random numbers
+        let sample = rng.get_stream() as usize % (self.batch() + 1);
+        let part = |all: &[f32], to: &mut [f32]| {
+            let start = sample * to.len();
+            to.iter_mut().zip(all.iter().skip(start)).for_each(|(to, from)| *to = *from);
+        };
+        part(&self.x, x);
+        part(&self.y, y);
+    }
+    fn forward(&self, x: &Tensor, mode: &mut Mode) -> candle_core::Result<Tensor> {
+        self.net.forward_windows(x, mode)
+    }
+    fn set_momentum(&mut self, momentum: f64) {
+        self.net.set_momentum(momentum);
+    }
+    fn errors(&self, _brief: bool) -> Result<Vec<String>> {
+        Ok(Vec::new())
+    }
+}
+
+pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+    ensure!(
+        args.rounds > 0 && args.steps > 0 && args.batch > 1 && args.channels > 0,
+        "nothing to measure: there must be rounds, steps, channels, and two windows a batch at least"
+    );
+    ensure!(args.widths.iter().product::<usize>() <= 10_000, "a window of more than 10000 frames");
+    let config =
+        Config { n_in: NUMBERS, n_out: NUMBERS, channels: args.channels, widths: args.widths.clone(), dropout: 0.0 };
+    let folder = std::env::temp_dir().join(format!("orator-bench-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let measured = pool.install(|| measure(args, &config, &folder, ui));
+    let _ = std::fs::remove_dir_all(&folder);
+    let (text, facts) = measured?;
+    ui.summary(&text, None, facts);
+    Ok(Outcome::Done)
+}
+
+fn measure(args: &Args, config: &Config, folder: &Path, ui: &Ui) -> Result<(String, Value)> {
+    let mut ours = Fixed::new(config, args.batch)?;
+    let scratch = folder.join("trained.safetensors");
+    // running statistics that are not the first ones
+    ours.train(2, &scratch)?;
+    let mut theirs = match &args.python {
+        Some(script) => Some(Reference::start(script, &ours, &folder.join("given.safetensors"))?),
+        None => None,
+    };
+    let apart = theirs.as_mut().map(|theirs| theirs.apart(&ours)).transpose()?;
+    let task = ui.begin("bench lifter", args.rounds as u64);
+    let (mut own, mut conv, mut linear) = (vec![], vec![], vec![]);
+    for _ in 0..args.rounds {
+        own.push(ours.train(args.steps, &scratch)? / args.steps as f64);
+        if let Some(theirs) = &mut theirs {
+            conv.push(theirs.step(args.steps, "conv")?);
+            linear.push(theirs.step(args.steps, "linear")?);
+        }
+        task.advance(1);
+    }
+    drop(task);
+    let epoch = |secs: f64| secs * (args.epoch as f64 / args.batch as f64);
+    let secs = super::median(own.clone());
+    let mut text = format!(
+        "{} parameters, window {} frames, batch {}, one thread, median of {} rounds of {} steps\n\
+         this program          {:8.1} ms a step, {:6.1} s an epoch of {} windows",
+        ours.params.n_parameters(),
+        config.receptive_field(),
+        args.batch,
+        args.rounds,
+        args.steps,
+        1e3 * secs,
+        epoch(secs),
+        args.epoch
+    );
+    let mut facts = json!({ "parameters": ours.params.n_parameters(), "window": config.receptive_field(),
+        "batch": args.batch, "secs_a_step": secs, "epoch_windows": args.epoch, "secs_an_epoch": epoch(secs) });
+    if let (Some(theirs), Some(apart)) = (theirs, apart) {
+        for (form, name, times) in [("conv", "strided conv1d", conv), ("linear", "reshape and linear", linear)] {
+            let ratio = super::median(own.iter().zip(&times).map(|(own, their)| own / their).collect());
+            let secs = super::median(times);
+            text += &format!(
+                "\nPyTorch, {name:19}{:6.1} ms a step, {:6.1} s an epoch: this program takes {ratio:.2} of it",
+                1e3 * secs,
+                epoch(secs)
+            );
+            facts[format!("pytorch_{form}_secs_a_step")] = json!(secs);
+            facts[format!("ratio_to_pytorch_{form}")] = json!(ratio);
+        }
+        text += &format!("\nPyTorch {}: outputs at most {apart:.1e} apart, over the largest output", theirs.version);
+        facts["outputs_apart"] = json!(apart);
+        facts["pytorch"] = json!(theirs.version);
+    }
+    Ok((text, facts))
+}
+
+/// The Python reference at work beside us, answering one line a command.
+struct Reference {
+    child: Child,
+    to: ChildStdin,
+    from: BufReader<ChildStdout>,
+    version: String,
+}
+
+impl Reference {
+    /// Starts it on one thread with the lesson's weights and batch, written to `given`.
+    fn start(script: &Path, lesson: &Fixed, given: &Path) -> Result<Self> {
+        let mut contents = Contents { facts: json!({ "kind": "benchmark" }), tensors: BTreeMap::new() };
+        contents.add("", lesson.params.tensors()?);
+        let (x, y) = lesson.tensors()?;
+        let weights = Tensor::from_vec(lesson.weights(), NUMBERS / 3, &Device::Cpu)?;
+        contents.add("", [("x", x), ("y", y), ("weights", weights)].map(|(name, t)| (name.to_owned(), t)).into());
+        contents.write(given)?;
+        let python = std::env::var("ORATOR_REFERENCE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+        let mut command = Command::new(&python);
+        command.arg(script).arg("serve").arg(given).env("OMP_NUM_THREADS", "1").env("MKL_NUM_THREADS", "1");
+        let mut child =
+            command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().with_context(|| {
+                format!("{python} cannot be run; ORATOR_REFERENCE_PYTHON names a Python with torch")
+            })?;
+        let (Some(to), Some(from)) = (child.stdin.take(), child.stdout.take()) else {
+            bail!("{python} has no standard input and output");
+        };
+        let mut reference = Self { child, to, from: BufReader::new(from), version: String::new() };
+        let hello = reference.answer().with_context(|| format!("{} did not start", script.display()))?;
+        reference.version = hello["torch"].as_str().unwrap_or("?").to_owned();
+        Ok(reference)
+    }
+
+    /// Largest difference of the outputs in either form, over the largest output.
+    fn apart(&mut self, lesson: &Fixed) -> Result<f64> {
+        let answer = self.ask("forward")?;
+        let mut apart = 0.0f64;
+        for (form, own) in ["strided", "dilated"].into_iter().zip(lesson.outputs()?) {
+            let their: Vec<f64> = serde_json::from_value(answer[form].clone())?;
+            ensure!(their.len() == own.len(), "the reference gave {} {form} outputs, we {}", their.len(), own.len());
+            let most = their.iter().fold(1e-9f64, |most, v| most.max(v.abs()));
+            let far = own.iter().zip(&their).map(|(a, b)| (f64::from(*a) - b).abs() / most);
+            apart = far.fold(apart, f64::max);
+        }
+        Ok(apart)
+    }
+
+    /// Seconds a step.
+    fn step(&mut self, steps: usize, form: &str) -> Result<f64> {
+        let answer = self.ask(&format!("step {steps} {form}"))?;
+        Ok(answer["secs"].as_f64().context("the reference gave no time")? / steps as f64)
+    }
+
+    fn ask(&mut self, command: &str) -> Result<Value> {
+        writeln!(self.to, "{command}").context("the reference has stopped")?;
+        self.answer().with_context(|| format!("no answer to `{command}`"))
+    }
+
+    fn answer(&mut self) -> Result<Value> {
+        let mut line = String::new();
+        self.from.read_line(&mut line)?;
+        serde_json::from_str(&line).with_context(|| format!("the reference said {line:?}"))
+    }
+}
+
+impl Drop for Reference {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
