@@ -16,12 +16,16 @@ pub const BODY: &[u8] = include_bytes!("../../models/body_lifter.safetensors");
 pub const HANDS: &[u8] = include_bytes!("../../models/hand_lifter.safetensors");
 /// Widest layer that is believed; the published ones have 1024 channels.
 const MOST_WIDTH: usize = 2048;
+/// Longest window that is believed, in frames; the published ones have up to 243.
+const MOST_FRAMES: usize = 729;
 
 /// The body lifter of a file, or the built-in one where `path` is empty.
 pub fn body(path: &Path) -> Result<BodyLifter> {
     load(path, BODY, "body-lifter", "body", |config, params| {
         let config: temporal_lifter::Config = serde_json::from_value(config)?;
-        let own = BodyLifter::config(config.channels.clamp(1, MOST_WIDTH));
+        let own = BodyLifter::config(config.channels.clamp(1, MOST_WIDTH), &config.widths);
+        let window = config.receptive_field();
+        ensure!((1..=MOST_FRAMES).contains(&window), "its network looks at {window} frames, expected 1 to {MOST_FRAMES}");
         ensure!(config == own, "its network is {config:?}, expected {own:?}");
         Ok(BodyLifter::new(params, &config)?)
     })

@@ -17,6 +17,13 @@ pub struct Take {
     pub poses: Vec<Pose>,
 }
 
+impl Take {
+    /// Whole frames at another rate.
+    pub fn n_frames_at(&self, fps: f64) -> usize {
+        ((self.poses.len() as f64 - 1.0) / self.fps * fps + 1.0 + 1e-9) as usize
+    }
+}
+
 /// Joint names of the kinds of BVH known, in the order neck, head, right upper arm, forearm, hand, left the same,
 /// right thigh, left thigh.
 const BVH_NAMES: [[&str; 10]; 2] = [
@@ -76,9 +83,29 @@ pub fn read_all(paths: &[PathBuf]) -> Result<Vec<Take>> {
 pub fn read(path: &Path) -> Result<Vec<Take>> {
     match path.extension().and_then(|e| e.to_str()) {
         Some("bvh") => read_bvh(path),
-        Some("npz") => read_cmu_npz(path),
+        Some("npz") => read_npz(path),
         _ => bail!("{}: captured motion is read from .bvh and .npz files", path.display()),
     }
+}
+
+/// Takes of one kind, called by the pattern of their names.
+pub type Set = (String, Vec<Take>);
+
+/// The takes whose names match each of the `patterns` (`*` any letters, `?` one; the first that matches counts), and
+/// the other takes. Errors: a pattern that is none, or matches nothing.
+pub fn divide(mut takes: Vec<Take>, patterns: &[String]) -> Result<(Vec<Set>, Vec<Take>)> {
+    let mut sets = Vec::new();
+    for text in patterns {
+        let pattern = glob::Pattern::new(text).with_context(|| format!("`{text}` is no pattern of names"))?;
+        let (set, others): (Vec<Take>, Vec<Take>) = takes.into_iter().partition(|take| pattern.matches(&take.name));
+        if set.is_empty() {
+            let names: Vec<&str> = others.iter().take(8).map(|take| take.name.as_str()).collect();
+            bail!("no take is called `{text}`; there are {}: {} ...", others.len(), names.join(", "));
+        }
+        sets.push((text.clone(), set));
+        takes = others;
+    }
+    Ok((sets, takes))
 }
 
 fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
@@ -110,8 +137,31 @@ fn read_bvh(path: &Path) -> Result<Vec<Take>> {
     Ok(divided(&name, 1.0 / bvh.frame_secs, poses.map(|p| upper_body(&p)).collect()))
 }
 
-fn read_cmu_npz(path: &Path) -> Result<Vec<Take>> {
-    let mut npz = Npz::open(path)?;
+fn read_npz(path: &Path) -> Result<Vec<Take>> {
+    let npz = Npz::open(path)?;
+    if npz.has("human_joints") { read_ted(path, npz) } else { read_cmu(npz) }
+}
+
+/// TED Expressive: `human_joints` [T, 43, 3] in metres, y down, and `fps`. 0 is the spine, 0.26 m below the neck (1);
+/// there are no hips, so they are put where the spine points.
+fn read_ted(path: &Path, mut npz: Npz) -> Result<Vec<Take>> {
+    let fps = npz.frame_rate("fps")?.per_sec();
+    let joints = npz.numbers("human_joints", &[None, Some(43), Some(3)])?;
+    let pose = |t: usize| -> Pose {
+        let point = |j: usize| -> Vec3 { std::array::from_fn(|k| joints[[t, j, k]]) };
+        let (right, left) = (point(3), point(2));
+        let neck = vec3::scale(vec3::add(right, left), 0.5);
+        let spine = vec3::scale(vec3::sub(point(0), point(1)), 0.5 / 0.26);
+        let half = vec3::scale(vec3::sub(left, right), 0.25);
+        let hips = [vec3::sub(spine, half), vec3::add(spine, half)].map(|p| vec3::add(p, neck));
+        let points = [point(38), right, point(5), point(7), left, point(4), point(6), hips[0], hips[1]];
+        points.map(|p| vec3::sub(p, neck))
+    };
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    Ok(divided(&name, fps, (0..joints.shape()[0]).map(pose).collect()))
+}
+
+fn read_cmu(mut npz: Npz) -> Result<Vec<Take>> {
     let fps = npz.frame_rate("fps")?.per_sec();
     let mut names: Vec<String> =
         npz.names().iter().filter(|n| !["fps", "parents", "offsets_mm"].contains(&n.as_str())).cloned().collect();

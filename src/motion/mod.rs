@@ -1,6 +1,7 @@
 //! Motion as numbers: forward kinematics, rotations, Procrustes, smoothing, bone lengths; readers and writers of motion files. Pure but for those files.
 
 pub mod authors_txt;
+pub mod body_view;
 pub mod bones;
 pub mod bvh_read;
 pub mod bvh_write;

@@ -4,7 +4,8 @@
 use super::Mode;
 use super::params::Params;
 use super::temporal_lifter::{Config, TemporalLifter};
-use crate::motion::upper_body::{N_IN, N_OUT, Pose, Seen, View, WINDOW, mirror_mean};
+use crate::motion::body_view::{N_IN, N_OUT, View, mirror_mean};
+use crate::motion::upper_body::{Pose, Seen};
 use candle_core::{Device, Result, Tensor};
 
 /// Windows that go through the network together.
@@ -18,9 +19,9 @@ pub struct BodyLifter {
 }
 
 impl BodyLifter {
-    /// The network's shape for this many channels: a window of 27 frames, 27 numbers a frame in and out.
-    pub fn config(channels: usize) -> Config {
-        Config { n_in: N_IN, n_out: N_OUT, channels, widths: vec![3; WINDOW.ilog(3) as usize], dropout: 0.0 }
+    /// The network's shape for this many channels and these kernel widths, whose product is the window's frames.
+    pub fn config(channels: usize, widths: &[usize]) -> Config {
+        Config { n_in: N_IN, n_out: N_OUT, channels, widths: widths.to_vec(), dropout: 0.0 }
     }
 
     /// Makes the network's tensors in `params`.
@@ -38,14 +39,11 @@ impl BodyLifter {
 
     /// A pose for every frame, in px of the picture, the neck at 0: `None` where a shoulder is not seen within half a
     /// window. Before the first and after the last frame the body stands still. The frames of a window
-    /// lie `step` frames apart, between two frames where that is no whole number: the network knows motion at 15 frames
-    /// a second. Each window is looked at in the mirror as well.
+    /// lie `step` frames apart: the network knows motion at 15 frames a second. Each window is looked at in the mirror
+    /// as well.
     pub fn poses(&self, seen: &[Seen], step: f64) -> Result<Vec<Option<Pose>>> {
-        let half = WINDOW as isize / 2;
-        let view = |t: usize| {
-            let around = |d: isize| at(seen, t as f64 + d as f64 * step);
-            View::of(&(-half..=half).map(around).collect::<Vec<_>>())
-        };
+        let window = self.net.config().receptive_field();
+        let view = |t: usize| View::around(seen, t, window, step);
         let mut poses = Vec::with_capacity(seen.len());
         for first in (0..seen.len()).step_by(BATCH) {
             let views: Vec<Option<View>> = (first..seen.len().min(first + BATCH)).map(view).collect();
@@ -62,30 +60,14 @@ impl BodyLifter {
     /// N_OUT numbers a view.
     fn outputs<'a>(&self, views: impl Iterator<Item = &'a View>) -> Result<Vec<f32>> {
         let numbers: Vec<f32> = views.flat_map(|view| view.numbers.iter().copied()).collect();
-        let n_views = numbers.len() / (N_IN * WINDOW);
+        let window = self.net.config().receptive_field();
+        let n_views = numbers.len() / (N_IN * window);
         if n_views == 0 {
             return Ok(Vec::new());
         }
-        let x = Tensor::from_vec(numbers, (n_views, N_IN, WINDOW), &Device::Cpu)?;
+        let x = Tensor::from_vec(numbers, (n_views, N_IN, window), &Device::Cpu)?;
         self.net.forward_windows(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1::<f32>()
     }
-}
-
-/// The points at a place between two frames: in proportion where both show a point, else as in the nearer one.
-fn at(seen: &[Seen], place: f64) -> Seen {
-    let place = place.clamp(0.0, (seen.len() - 1) as f64);
-    let (before, after) = (&seen[place.floor() as usize], &seen[place.ceil() as usize]);
-    let share = place.fract() as f32;
-    std::array::from_fn(|j| match (before[j], after[j]) {
-        (Some(a), Some(b)) => Some([0, 1].map(|k| a[k] + share * (b[k] - a[k]))),
-        (a, b) => {
-            if share < 0.5 {
-                a
-            } else {
-                b
-            }
-        }
-    })
 }
 
 #[cfg(test)]
@@ -95,7 +77,7 @@ mod tests {
     #[test]
     fn every_frame_gets_a_pose_and_none_where_nobody_is() -> anyhow::Result<()> {
         let mut params = Params::new(1);
-        let lifter = BodyLifter::new(&mut params, &BodyLifter::config(16))?;
+        let lifter = BodyLifter::new(&mut params, &BodyLifter::config(16, &[3, 3, 3]))?;
         let seen: Seen = std::array::from_fn(|j| Some([j as f32 * 10.0, (j * j) as f32]));
         let mut frames = vec![seen; 300];
         frames[100..200].fill([None; 9]);
@@ -106,13 +88,5 @@ mod tests {
         }
         assert!(lifter.poses(&[], 2.0)?.is_empty());
         Ok(())
-    }
-
-    #[test]
-    fn between_two_frames_points_lie_in_proportion() {
-        let frames: Vec<Seen> = vec![[Some([0.0, 4.0]); 9], [Some([2.0, 8.0]); 9], [None; 9]];
-        assert_eq!(at(&frames, 0.25)[0], Some([0.5, 5.0]));
-        assert_eq!((at(&frames, 1.4)[0], at(&frames, 1.6)[0]), (Some([2.0, 8.0]), None));
-        assert_eq!((at(&frames, -3.0), at(&frames, 9.0)), (frames[0], frames[2]));
     }
 }

@@ -109,18 +109,22 @@ impl TemporalLifter {
         self.shrink.forward(&x)
     }
 
-    /// Windows of one receptive field [B, n_in, RF] to their middle frames [B, n_out].
+    /// Windows of one receptive field [B, n_in, RF] to their middle frames [B, n_out]. The windows lie end to end in one
+    /// sequence: since every kernel steps by its own width, none reaches into the next window, and all work is done on
+    /// long rows.
     pub fn forward_windows(&self, x: &Tensor, mode: &mut Mode) -> Result<Tensor> {
         let p = self.config.dropout;
-        let mut x = self.expand.forward(x, true, p, mode)?;
+        let (n_windows, n, n_frames) = x.dims3()?;
+        let x = x.transpose(0, 1)?.reshape((1, n, n_windows * n_frames))?;
+        let mut x = self.expand.forward(&x, true, p, mode)?;
         for block in &self.blocks {
-            let (batch, n, n_frames) = x.dims3()?;
-            let middle = x.reshape((batch, n, n_frames / block.width, block.width))?;
+            let (_, n, n_frames) = x.dims3()?;
+            let middle = x.reshape((1, n, n_frames / block.width, block.width))?;
             let middle = middle.narrow(3, block.width / 2, 1)?.squeeze(3)?;
             let y = block.over_time.forward(&x, true, p, mode)?;
             x = (middle + block.mix.forward(&y, true, p, mode)?)?;
         }
-        self.shrink.forward(&x)?.squeeze(2)
+        self.shrink.forward(&x)?.squeeze(0)?.t()?.contiguous()
     }
 
     /// Weight of a new batch in the running statistics of every batch norm.

@@ -26,7 +26,11 @@ pub trait Lesson: Sync {
     fn shape_in(&self) -> Vec<usize>;
     /// The weight of each point in the loss; a sample comes out as three numbers a point.
     fn weights(&self) -> Vec<f32>;
-    /// Draws a sample: what goes in, and what should come out.
+    /// Samples drawn at once, from one scene.
+    fn group(&self) -> usize {
+        1
+    }
+    /// Draws a group of samples: what goes in, and what should come out. At the end of a batch a group may be smaller.
     fn draw(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]);
     /// [B, shape in] to [B, 3 x points].
     fn forward(&self, x: &Tensor, mode: &mut Mode) -> candle_core::Result<Tensor>;
@@ -194,7 +198,8 @@ fn batch(lesson: &dyn Lesson, schedule: &Schedule, step: usize, n_points: usize)
     let (n, shape) = (schedule.batch, lesson.shape_in());
     let (n_in, n_out) = (shape.iter().product::<usize>(), 3 * n_points);
     let (mut x, mut y) = (vec![0.0; n * n_in], vec![0.0; n * n_out]);
-    x.par_chunks_mut(n_in).zip(y.par_chunks_mut(n_out)).enumerate().for_each(|(i, (x, y))| {
+    let group = lesson.group();
+    x.par_chunks_mut(group * n_in).zip(y.par_chunks_mut(group * n_out)).enumerate().for_each(|(i, (x, y))| {
         lesson.draw(&mut stream(schedule.seed, step, n, i), x, y);
     });
     let x = Tensor::from_vec(x, [vec![n], shape].concat(), &Device::Cpu)?;
@@ -217,6 +222,7 @@ fn halved(tensors: BTreeMap<String, Tensor>) -> Result<BTreeMap<String, Tensor>>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::nn::body_lifter::BodyLifter;
     use crate::stage::progress::Silent;
     use crate::train::lifter_body::BodyLesson;
     use crate::train::lifter_hands::HandLesson;
@@ -242,7 +248,7 @@ mod tests {
 
     #[test]
     fn an_interrupted_body_training_ends_in_the_same_bytes() {
-        resumed_equals_straight(|| Box::new(BodyLesson::new(Vec::new(), 8, 3).unwrap()));
+        resumed_equals_straight(|| Box::new(BodyLesson::new(Vec::new(), Vec::new(), &BodyLifter::config(8, &[3, 3, 3]), 3).unwrap()));
     }
 
     #[test]

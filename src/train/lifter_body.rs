@@ -1,91 +1,79 @@
 //! What the body lifter learns: windows of captured motion and of motion made by rule, filmed by random cameras.
 
-use super::body_errors::{mean_pose, of_method, with_bone_depth, with_mean_depth};
-use super::body_scene::{Body, Scene};
+use super::body_errors::of_method;
+use super::body_scene::{Filming, Scene, scenes};
 use super::lifter::Lesson;
-use crate::motion::mocap::Take;
-use crate::motion::upper_body::{N_IN, N_OUT, N_POINTS, View, WINDOW};
+use crate::motion::body_view::{N_IN, N_OUT, View};
+use crate::motion::mocap::{Set, Take};
+use crate::motion::upper_body::{N_POINTS, Pose};
 use crate::nn::Mode;
 use crate::nn::body_lifter::BodyLifter;
 use crate::nn::params::Params;
+use crate::nn::temporal_lifter::Config;
 use anyhow::{Context, Result};
 use candle_core::Tensor;
-use rand::{Rng, SeedableRng};
+use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
 /// Weight of each point in the loss: nose, arms, hips.
 const WEIGHTS: [f32; N_POINTS] = [1.0, 1.0, 1.2, 1.5, 1.0, 1.2, 1.5, 0.4, 0.4];
-/// Share of samples from captured motion, where there is any.
-const CAPTURED: f64 = 0.45;
-/// Every n-th take, by name, is held out.
-const HELD_OUT: usize = 5;
-/// Frames of a scene that errors are measured on, and how many scenes of a kind.
-const SCENE_FRAMES: usize = 60;
-const SCENES: usize = 120;
+/// Share of scenes of captured motion, where there is any.
+const CAPTURED: f64 = 0.5;
+/// Share of those in which one arm comes from another take.
+const MIXED: f64 = 0.35;
+/// Frames of a scene, from and to, and the windows that are cut from it.
+const SCENE_FRAMES: std::ops::RangeInclusive<usize> = 30..=84;
+const WINDOWS: usize = 4;
+/// Scenes that errors are measured on, and on the way.
+const MEASURED: usize = 120;
+const MEASURED_BRIEFLY: usize = 40;
 
 /// The lesson.
 pub struct BodyLesson {
     params: Params,
     lifter: BodyLifter,
-    channels: usize,
     takes: Vec<Take>,
-    /// Sum of the frames of `takes` up to and with each: longer takes are drawn more often.
-    ends: Vec<usize>,
-    held_out: Vec<Take>,
-    /// Captured motion of other sources, only to measure errors on.
-    strangers: Vec<Take>,
+    /// Sum of the seconds of `takes` up to and with each: longer takes are drawn more often.
+    ends: Vec<f64>,
+    /// Takes that are only measured on.
+    held_out: Vec<Set>,
 }
 
 impl BodyLesson {
-    /// A network of `channels` with first values from `seed`; every fifth take is held out.
-    pub fn new(mut takes: Vec<Take>, channels: usize, seed: u64) -> Result<Self> {
+    /// A network with first values from `seed` that learns from `takes`; `held_out` takes are only measured on.
+    pub fn new(mut takes: Vec<Take>, held_out: Vec<Set>, config: &Config, seed: u64) -> Result<Self> {
         takes.sort_by(|a, b| a.name.cmp(&b.name));
-        let (mut trained, mut held_out) = (Vec::new(), Vec::new());
-        for (i, take) in takes.into_iter().enumerate() {
-            if i % HELD_OUT == HELD_OUT - 1 { held_out.push(take) } else { trained.push(take) }
-        }
         let mut params = Params::new(seed);
-        let lifter = BodyLifter::new(&mut params, &BodyLifter::config(channels))?;
-        let ends = trained.iter().scan(0, |end, take| {
-            *end += (take.poses.len() as f64 * 60.0 / take.fps) as usize;
+        let lifter = BodyLifter::new(&mut params, config)?;
+        let ends = takes.iter().scan(0.0, |end, take| {
+            *end += take.poses.len() as f64 / take.fps;
             Some(*end)
         });
         let ends = ends.collect();
-        Ok(Self { params, lifter, channels, ends, takes: trained, held_out, strangers: Vec::new() })
+        Ok(Self { params, lifter, takes, ends, held_out })
     }
 
-    /// Takes to measure errors on beside the held-out ones.
-    pub fn with_strangers(self, strangers: Vec<Take>) -> Self {
-        Self { strangers, ..self }
+    fn take(&self, rng: &mut ChaCha8Rng) -> Option<&Take> {
+        let at = rng.random_range(0.0..*self.ends.last()?);
+        self.takes.get(self.ends.partition_point(|&end| end <= at))
     }
 
     fn scene(&self, rng: &mut ChaCha8Rng) -> Scene {
-        let all = self.ends.last().copied().unwrap_or(0);
-        if all > 0 && rng.random_bool(CAPTURED) {
-            let at = rng.random_range(0..all);
-            let take = &self.takes[self.ends.partition_point(|&end| end <= at)];
-            if let Some(scene) = Scene::of_take(take, Body::Any, WINDOW, false, rng) {
-                return scene;
+        let n_frames = rng.random_range(SCENE_FRAMES);
+        if let (true, Some(take)) = (rng.random_bool(CAPTURED), self.take(rng)) {
+            let other = if rng.random_bool(MIXED) { self.take(rng) } else { None };
+            // a short take lasts for as long as it goes slowly
+            for n_frames in [n_frames, *SCENE_FRAMES.start()] {
+                if let Some(scene) = Scene::of_take(take, other, Filming::Training, n_frames, rng) {
+                    return scene;
+                }
             }
         }
-        Scene::of_rule(WINDOW, false, rng)
+        Scene::of_rule(Filming::Training, n_frames, rng)
     }
 
-    /// Scenes of takes in turn, or of motion made by rule when there are none; the same ones whenever asked.
-    fn scenes(takes: &[Take], n: usize, clean: bool) -> Vec<Scene> {
-        let mut rng = ChaCha8Rng::seed_from_u64(20_000);
-        let long: Vec<&Take> =
-            takes.iter().filter(|t| t.poses.len() as f64 / t.fps > SCENE_FRAMES as f64 / 15.0 + 0.1).collect();
-        let scene = |i: usize, rng: &mut ChaCha8Rng| {
-            let captured =
-                long.get(i % long.len().max(1)).and_then(|t| Scene::of_take(t, Body::Mean, SCENE_FRAMES, clean, rng));
-            captured.unwrap_or_else(|| Scene::of_rule(SCENE_FRAMES, clean, rng))
-        };
-        (0..n).map(|i| scene(i, &mut rng)).collect()
-    }
-
-    fn lift(&self, scene: &Scene) -> Result<Vec<crate::motion::upper_body::Pose>> {
+    fn lift(&self, scene: &Scene) -> Result<Vec<Pose>> {
         let poses: Option<Vec<_>> = self.lifter.poses(&scene.seen, 1.0)?.into_iter().collect();
         poses.context("a scene without shoulders")
     }
@@ -97,11 +85,17 @@ impl Lesson for BodyLesson {
     }
 
     fn facts(&self) -> Value {
-        let frames = |takes: &[Take]| takes.iter().map(|t| t.poses.len()).sum::<usize>();
+        let mut hash = blake3::Hasher::new();
+        for take in &self.takes {
+            hash.update(take.name.as_bytes());
+            for value in take.poses.iter().flatten().flatten() {
+                hash.update(&value.to_le_bytes());
+            }
+        }
         json!({
-            "config": BodyLifter::config(self.channels),
-            "takes": self.takes.len(), "frames": frames(&self.takes),
-            "held_out_takes": self.held_out.len(), "held_out_frames": frames(&self.held_out),
+            "config": self.lifter.net().config(),
+            "takes": self.takes.len(), "frames": self.takes.iter().map(|t| t.poses.len()).sum::<usize>(),
+            "motion": hash.finalize().to_hex().as_str(),
         })
     }
 
@@ -110,28 +104,37 @@ impl Lesson for BodyLesson {
     }
 
     fn shape_in(&self) -> Vec<usize> {
-        vec![N_IN, WINDOW]
+        vec![N_IN, self.lifter.net().config().receptive_field()]
     }
 
     fn weights(&self) -> Vec<f32> {
         WEIGHTS.to_vec()
     }
 
+    fn group(&self) -> usize {
+        WINDOWS
+    }
+
     fn draw(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
-        // a scene whose shoulders are never seen is drawn again; it is rare
-        let (scene, view) = loop {
-            let scene = self.scene(rng);
-            if let Some(view) = View::of(&scene.seen) {
-                break (scene, view);
+        let window = self.lifter.net().config().receptive_field();
+        let mut scene = self.scene(rng);
+        for (x, y) in x.chunks_exact_mut(N_IN * window).zip(y.chunks_exact_mut(N_OUT)) {
+            // where the shoulders are not seen another scene is drawn; it is rare
+            let (t, view) = loop {
+                let t = rng.random_range(0..scene.seen.len());
+                match View::around(&scene.seen, t, window, 1.0) {
+                    Some(view) => break (t, view),
+                    None => scene = self.scene(rng),
+                }
+            };
+            x.copy_from_slice(&view.numbers);
+            let grow = scene.px_per_metre / f64::from(view.scale);
+            for (j, p) in scene.truth[t].iter().enumerate() {
+                let [seen_x, seen_y] = view.middle(j);
+                y[3 * j] = (p[0] * grow) as f32 - seen_x;
+                y[3 * j + 1] = (p[1] * grow) as f32 - seen_y;
+                y[3 * j + 2] = (p[2] * grow) as f32;
             }
-        };
-        x.copy_from_slice(&view.numbers);
-        let grow = scene.px_per_metre / f64::from(view.scale);
-        for (j, p) in scene.truth[WINDOW / 2].iter().enumerate() {
-            let [seen_x, seen_y] = view.middle(j);
-            y[3 * j] = (p[0] * grow) as f32 - seen_x;
-            y[3 * j + 1] = (p[1] * grow) as f32 - seen_y;
-            y[3 * j + 2] = (p[2] * grow) as f32;
         }
     }
 
@@ -145,32 +148,20 @@ impl Lesson for BodyLesson {
     }
 
     fn errors(&self, brief: bool) -> Result<Vec<String>> {
-        let n = if brief { SCENES / 6 } else { SCENES };
-        let sets =
-            [("held-out captured", &self.held_out), ("other captured", &self.strangers), ("made by rule", &Vec::new())];
+        let n = if brief { MEASURED_BRIEFLY } else { MEASURED };
         let mut lines = Vec::new();
-        let known = Self::scenes(&self.takes, n, true);
-        let mean = mean_pose(&known);
-        for (i, (set, takes)) in sets.into_iter().enumerate() {
-            if takes.is_empty() && i < 2 {
-                continue;
+        let by_rule = ("made by rule".to_owned(), Vec::new());
+        for (set, takes) in self.held_out.iter().chain([&by_rule]) {
+            for (filming, input) in [(Filming::Drop, "drop "), (Filming::Clean, "clean")] {
+                let scenes = scenes(takes, filming, n);
+                if scenes.is_empty() {
+                    continue;
+                }
+                lines.push(format!("{set:30} {input}  {}", of_method(&scenes, |s| self.lift(s))?));
+                if brief {
+                    break;
+                }
             }
-            let spoiled = Self::scenes(takes, n, false);
-            lines.push(format!("{set:18} lifter               {}", of_method(&spoiled, |s| self.lift(s))?));
-            if brief {
-                continue;
-            }
-            let clean = Self::scenes(takes, n, true);
-            lines.push(format!("{set:18} lifter, clean input  {}", of_method(&clean, |s| self.lift(s))?));
-            lines.push(format!("{set:18} bone-length depth    {}", of_method(&clean, |s| Ok(with_bone_depth(s)))?));
-            lines.push(format!(
-                "{set:18} mean depth a joint   {}",
-                of_method(&clean, |s| Ok(with_mean_depth(s, &mean)))?
-            ));
-            lines.push(format!(
-                "{set:18} constant mean pose   {}",
-                of_method(&clean, |s| Ok(vec![mean; s.truth.len()]))?
-            ));
         }
         Ok(lines)
     }

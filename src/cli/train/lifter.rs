@@ -3,6 +3,7 @@
 use crate::cli::{Outcome, ui::Ui};
 use anyhow::{Context, ensure};
 use orator::motion::mocap;
+use orator::nn::body_lifter::BodyLifter;
 use orator::train::lifter::{Lesson, Schedule, start_from, train};
 use orator::train::lifter_body::BodyLesson;
 use orator::train::lifter_hands::HandLesson;
@@ -21,9 +22,10 @@ pub struct Args {
     /// Captured motion to learn from (body): .bvh or .npz files, or folders of them; may be given several times.
     #[arg(long, value_name = "PATH", num_args = 1..)]
     mocap: Vec<PathBuf>,
-    /// Captured motion that is only measured on, never learnt from.
-    #[arg(long, value_name = "PATH", num_args = 1..)]
-    measure: Vec<PathBuf>,
+    /// Takes to measure the errors on and not to learn from, by their names: patterns like 'test_*' or 'walk#1' (a
+    /// file's second take).
+    #[arg(long, value_name = "PATTERN", num_args = 1..)]
+    hold_out: Vec<String>,
     /// The weights file to write (safetensors).
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -39,7 +41,10 @@ pub struct Args {
     /// The highest learning rate.
     #[arg(long, default_value_t = 2e-3)]
     learning_rate: f64,
-    /// Width of the network [default: 256 body, 768 hands]
+    /// Kernel widths of the body lifter, odd; their product is the frames it looks at (at 15 a second).
+    #[arg(long, value_name = "N", num_args = 1.., default_values_t = [3, 3, 3])]
+    widths: Vec<usize>,
+    /// Channels of the network [default: 256 body, 768 hands]
     #[arg(long, hide_default_value = true)]
     width: Option<usize>,
     /// The same seed gives the same weights.
@@ -59,22 +64,22 @@ enum Part {
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
     ensure!(args.learning_rate > 0.0 && args.learning_rate < 1.0, "--learning-rate must lie between 0 and 1");
     ensure!((1..=4096).contains(&args.width.unwrap_or(256)), "--width must lie between 1 and 4096");
-    let read = |paths: &[PathBuf], option: &str| {
-        if paths.is_empty() {
-            Ok(Vec::new())
-        } else {
-            mocap::read_all(paths).with_context(|| format!("reading {option}"))
-        }
-    };
     let (mut lesson, steps): (Box<dyn Lesson>, usize) = match args.part {
         Part::Body => {
             ensure!(!args.mocap.is_empty(), "the body lifter learns from captured motion: give --mocap PATH");
-            let lesson = BodyLesson::new(read(&args.mocap, "--mocap")?, args.width.unwrap_or(256), args.seed)?;
-            (Box::new(lesson.with_strangers(read(&args.measure, "--measure")?)), 9000)
+            ensure!(
+                args.widths.iter().all(|w| w % 2 == 1) && args.widths.iter().product::<usize>() <= 729,
+                "--widths are odd, and their product is at most 729 frames"
+            );
+            let takes = mocap::read_all(&args.mocap).context("reading --mocap")?;
+            let (held_out, takes) = mocap::divide(takes, &args.hold_out)?;
+            ensure!(!takes.is_empty(), "--hold-out leaves nothing to learn from");
+            let config = BodyLifter::config(args.width.unwrap_or(256), &args.widths);
+            (Box::new(BodyLesson::new(takes, held_out, &config, args.seed)?), 9000)
         }
         Part::Hands => {
             ensure!(
-                args.mocap.is_empty() && args.measure.is_empty(),
+                args.mocap.is_empty() && args.hold_out.is_empty(),
                 "the hand lifter learns from hands made by rule: no --mocap"
             );
             (Box::new(HandLesson::new(args.width.unwrap_or(768), args.seed)?), 5000)
