@@ -1,8 +1,11 @@
-//! Captured motion as the body lifter needs it: nine points of the upper body in camera-like axes, from BVH files and
-//! from `.npz` files of joint positions (CMU, 38 joints, millimetres). What is cut away: the T-pose a file begins
-//! with, and stretches are divided where the body jumps.
+//! Captured motion as the body lifter needs it: nine points of the upper body in camera-like axes (a person at rest
+//! faces -z, y down), in metres. Read are BVH files of any skeleton whose names are understood (`joint_names`), y or z
+//! up, in any unit; `.npz` files of CMU joints ([T, 38, 3] a clip, millimetres, y up, `fps`); and those of TED Expressive
+//! (`human_joints`). A take is one continuous stretch: files are divided where the body jumps, as behind a T-pose at
+//! the beginning.
 
 use super::bvh_read::{Bvh, Positions};
+use super::joint_names;
 use super::npz::Npz;
 use super::upper_body::{N_POINTS, Pose};
 use super::vec3::{self, Vec3};
@@ -24,42 +27,15 @@ impl Take {
     }
 }
 
-/// Joint names of the kinds of BVH known, in the order neck, head, right upper arm, forearm, hand, left the same,
-/// right thigh, left thigh.
-const BVH_NAMES: [[&str; 10]; 2] = [
-    [
-        "CC_Base_NeckTwist01",
-        "CC_Base_Head",
-        "CC_Base_R_Upperarm",
-        "CC_Base_R_Forearm",
-        "CC_Base_R_Hand",
-        "CC_Base_L_Upperarm",
-        "CC_Base_L_Forearm",
-        "CC_Base_L_Hand",
-        "CC_Base_R_Thigh",
-        "CC_Base_L_Thigh",
-    ],
-    [
-        "Neck",
-        "Head",
-        "UpperArm_R",
-        "LowerArm_R",
-        "Hand_R",
-        "UpperArm_L",
-        "LowerArm_L",
-        "Hand_L",
-        "UpperLeg_R",
-        "UpperLeg_L",
-    ],
-];
-
-/// The same ten joints among the 38 of the CMU `.npz`.
+/// The ten joints (`joint_names::ROLES`) among the 38 of the CMU `.npz`.
 const CMU_38: [usize; 10] = [17, 18, 30, 31, 32, 21, 22, 23, 8, 2];
 
 /// Frames at the start of a `.npz` take that are a T-pose, not motion.
 const T_POSE_FRAMES: usize = 1;
 /// The points move less than this on average between two frames at 60 fps, in metres; else the take is divided.
 const LARGEST_JUMP: f64 = 0.1;
+/// Upper arm and forearm of the common adult.
+const ARM_METRES: f64 = 0.54;
 /// Shorter stretches hold no motion to learn from, in seconds.
 const SHORTEST_SECS: f64 = 1.0;
 
@@ -124,17 +100,41 @@ fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
 
 fn read_bvh(path: &Path) -> Result<Vec<Take>> {
     let bvh = Bvh::read(path)?;
-    let named = |names: &[&str; 10]| names.iter().map(|n| bvh.find(n)).collect::<Option<Vec<usize>>>();
-    let Some(joints) = BVH_NAMES.iter().find_map(named) else {
-        let known: Vec<String> = BVH_NAMES.iter().map(|n| n.join(" ")).collect();
-        bail!("{}: unknown joint names; known are: {}", path.display(), known.join("; or: "));
-    };
+    let names: Vec<&str> = bvh.joints.iter().map(|joint| joint.name.as_str()).collect();
+    let joints = joint_names::upper_body(&names).with_context(|| path.display().to_string())?;
+    let placed = bvh.positions(Positions::Auto);
+    let mut bodies: Vec<[Vec3; 10]> = placed.iter().map(|p| joints.map(|j| p[j])).collect();
+    ensure!(
+        bodies.iter().flatten().flatten().all(|v| v.is_finite()),
+        "{}: it holds numbers that are not finite",
+        path.display()
+    );
+    y_up(&mut bodies);
+    in_metres(&mut bodies).with_context(|| path.display().to_string())?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
-    let poses = bvh
-        .positions(Positions::Auto)
-        .into_iter()
-        .map(|p| joints.iter().map(|&j| vec3::scale(p[j], 0.01)).collect::<Vec<_>>());
-    Ok(divided(&name, 1.0 / bvh.frame_secs, poses.map(|p| upper_body(&p)).collect()))
+    Ok(divided(&name, 1.0 / bvh.frame_secs, bodies.iter().map(|p| upper_body(p)).collect()))
+}
+
+/// Turns bodies whose heads are along z upright: y up.
+fn y_up(bodies: &mut [[Vec3; 10]]) {
+    let hips = |p: &[Vec3; 10]| vec3::scale(vec3::add(p[8], p[9]), 0.5);
+    let up = bodies.iter().fold([0.0; 3], |sum, p| vec3::add(sum, vec3::sub(p[0], hips(p))));
+    if up[2].abs() > up[1].abs() {
+        bodies.iter_mut().for_each(|p| *p = p.map(|[x, y, z]| if up[2] > 0.0 { [x, z, -y] } else { [x, -z, y] }));
+    }
+}
+
+/// Files do not tell their unit: the arm of the common adult does.
+fn in_metres(bodies: &mut [[Vec3; 10]]) -> Result<()> {
+    let bone = |p: &[Vec3; 10], a: usize, b: usize| vec3::norm(vec3::sub(p[a], p[b]));
+    let arm = |p: &[Vec3; 10]| (bone(p, 2, 3) + bone(p, 3, 4) + bone(p, 5, 6) + bone(p, 6, 7)) / 2.0;
+    let mut arms: Vec<f64> = bodies.iter().map(arm).collect();
+    arms.sort_by(f64::total_cmp);
+    let Some(arm) = arms.get(arms.len() / 2) else { return Ok(()) };
+    ensure!(*arm > 1e-6, "its arms have no length");
+    let grow = ARM_METRES / arm;
+    bodies.iter_mut().for_each(|p| *p = p.map(|q| vec3::scale(q, grow)));
+    Ok(())
 }
 
 fn read_npz(path: &Path) -> Result<Vec<Take>> {
@@ -176,7 +176,7 @@ fn read_cmu(mut npz: Npz) -> Result<Vec<Take>> {
     Ok(takes)
 }
 
-/// Ten joints (order of `BVH_NAMES`), y up and a person at rest facing +z, to a pose. The nose is put 6 cm above and
+/// Ten joints (order of `joint_names::ROLES`), y up and a person at rest facing +z, to a pose. The nose is put 6 cm above and
 /// 11 cm before the head joint, ahead being across the shoulders: no source says how the head is turned.
 fn upper_body(joints: &[Vec3]) -> Pose {
     let neck = vec3::scale(vec3::add(joints[2], joints[5]), 0.5);
@@ -259,7 +259,7 @@ mod tests {
         let path = dir.path().join("a.bvh");
         std::fs::write(&path, "HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 0 } MOTION Frames: 0 Frame Time: 0.1").unwrap();
         let text = format!("{:#}", read_all(&[path]).unwrap_err());
-        assert!(text.contains("a.bvh") && text.contains("UpperArm_R"), "{text}");
+        assert!(text.contains("a.bvh") && text.contains("LeftForeArm"), "{text}");
         assert!(read(Path::new("motion.fbx")).is_err());
     }
 }

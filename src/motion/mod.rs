@@ -14,6 +14,7 @@ pub mod finger_take;
 pub mod fk;
 pub mod hand_bones;
 pub mod hand_view;
+pub mod joint_names;
 pub mod joints_npz;
 pub mod keypoints_npz;
 pub mod mocap;

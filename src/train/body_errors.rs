@@ -9,63 +9,85 @@ use crate::motion::upper_body::{
     L_ELBOW, L_SHOULDER, L_WRIST, N_POINTS, NOSE, Pose, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, metres_per_unit,
 };
 use crate::motion::vec3::{self, Vec3};
+use serde::Serialize;
 use std::fmt;
 
 /// Points that count.
 const COUNTED: std::ops::Range<usize> = NOSE..R_HIP;
 
 /// Mean errors in mm.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Errors {
     pub mpjpe: f64,
     pub p_mpjpe: f64,
     pub wrist: f64,
     /// Share of `wrist` along the line of sight: |dz|.
     pub wrist_depth: f64,
+    /// Of the wrists' steps from frame to frame.
+    pub wrist_velocity: f64,
+    /// Frames that count: those of which a method gives all points.
+    pub n_frames: usize,
 }
 
 impl fmt::Display for Errors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { mpjpe, p_mpjpe, wrist, wrist_depth } = self;
-        write!(f, "MPJPE {mpjpe:.0}  P-MPJPE {p_mpjpe:.0}  wrist {wrist:.0} (depth {wrist_depth:.0}) mm")
+        let Self { mpjpe, p_mpjpe, wrist, wrist_depth, wrist_velocity, .. } = self;
+        write!(
+            f,
+            "MPJPE {mpjpe:3.0}  P-MPJPE {p_mpjpe:3.0}  wrist {wrist:3.0}  (its depth {wrist_depth:3.0}, velocity {wrist_velocity:3.0})"
+        )
     }
 }
 
-/// A method's errors over scenes: `lift` gives a scene's poses in any one unit, the neck anywhere.
-pub fn of_method(
-    scenes: &[Scene],
-    mut lift: impl FnMut(&Scene) -> anyhow::Result<Vec<Pose>>,
+/// A method's errors over scenes: `lift` gives a scene's poses in any one unit, the neck anywhere; a frame of `None` or
+/// with a point that is not finite does not count.
+pub fn of_method<'a>(
+    scenes: impl IntoIterator<Item = &'a Scene>,
+    mut lift: impl FnMut(&Scene) -> anyhow::Result<Vec<Option<Pose>>>,
 ) -> anyhow::Result<Errors> {
-    let mut sum = Errors::default();
-    let mut n_frames = 0;
+    let (mut sum, mut n_steps) = (Errors::default(), 0);
     for scene in scenes {
-        let lifted = to_reference(&lift(scene)?);
-        for (p, q) in lifted.iter().zip(&to_reference(&scene.truth)) {
-            let e = of_frame(p, q);
+        let finite = |pose: &Pose| pose[COUNTED].iter().flatten().all(|v| v.is_finite());
+        let lifted: Vec<Option<Pose>> = lift(scene)?.into_iter().map(|pose| pose.filter(finite)).collect();
+        let told: Vec<Pose> = lifted.iter().flatten().copied().collect();
+        let (grow, true_grow) = (metres_per_unit(&told), metres_per_unit(&scene.truth));
+        let mut before: Option<(Pose, Pose)> = None;
+        for (pose, truth) in lifted.iter().zip(&scene.truth) {
+            let Some(pose) = pose else {
+                before = None;
+                continue;
+            };
+            let (p, q) = (to_reference(pose, grow), to_reference(truth, true_grow));
+            let e = of_frame(&p, &q);
             sum.mpjpe += e.mpjpe;
             sum.p_mpjpe += e.p_mpjpe;
             sum.wrist += e.wrist;
             sum.wrist_depth += e.wrist_depth;
-            n_frames += 1;
+            sum.n_frames += 1;
+            if let Some((p0, q0)) = before {
+                let off = |j: usize| vec3::norm(vec3::sub(vec3::sub(p[j], p0[j]), vec3::sub(q[j], q0[j])));
+                sum.wrist_velocity += (off(R_WRIST) + off(L_WRIST)) / 2.0;
+                n_steps += 1;
+            }
+            before = Some((p, q));
         }
     }
-    let mean = |v: f64| 1000.0 * v / f64::from(n_frames.max(1));
+    let mean = |v: f64, n: usize| 1000.0 * v / n.max(1) as f64;
+    let n_frames = sum.n_frames;
     Ok(Errors {
-        mpjpe: mean(sum.mpjpe),
-        p_mpjpe: mean(sum.p_mpjpe),
-        wrist: mean(sum.wrist),
-        wrist_depth: mean(sum.wrist_depth),
+        mpjpe: mean(sum.mpjpe, n_frames),
+        p_mpjpe: mean(sum.p_mpjpe, n_frames),
+        wrist: mean(sum.wrist, n_frames),
+        wrist_depth: mean(sum.wrist_depth, n_frames),
+        wrist_velocity: mean(sum.wrist_velocity, n_steps),
+        n_frames,
     })
 }
 
-/// Root-relative, in metres of the reference body.
-fn to_reference(poses: &[Pose]) -> Vec<Pose> {
-    let grow = metres_per_unit(poses);
-    let centred = |pose: &Pose| {
-        let neck = vec3::scale(vec3::add(pose[R_SHOULDER], pose[L_SHOULDER]), 0.5);
-        pose.map(|p| vec3::scale(vec3::sub(p, neck), grow))
-    };
-    poses.iter().map(centred).collect()
+/// Relative to the neck, in metres of the reference body.
+fn to_reference(pose: &Pose, grow: f64) -> Pose {
+    let neck = vec3::scale(vec3::add(pose[R_SHOULDER], pose[L_SHOULDER]), 0.5);
+    pose.map(|p| vec3::scale(vec3::sub(p, neck), grow))
 }
 
 fn of_frame(p: &Pose, q: &Pose) -> Errors {
@@ -80,6 +102,7 @@ fn of_frame(p: &Pose, q: &Pose) -> Errors {
         p_mpjpe: (0..COUNTED.len()).map(after).sum::<f64>() / n,
         wrist: (apart(R_WRIST) + apart(L_WRIST)) / 2.0,
         wrist_depth: [R_WRIST, L_WRIST].map(|j| (p[j][2] - q[j][2]).abs()).iter().sum::<f64>() / 2.0,
+        ..Errors::default()
     }
 }
 
@@ -87,7 +110,11 @@ fn of_frame(p: &Pose, q: &Pose) -> Errors {
 pub fn mean_pose(scenes: &[Scene]) -> Pose {
     let mut mean: Pose = [[0.0; 3]; N_POINTS];
     let mut n = 0.0;
-    for pose in scenes.iter().flat_map(|s| to_reference(&s.truth)) {
+    let of_scene = |scene: &Scene| {
+        let grow = metres_per_unit(&scene.truth);
+        scene.truth.iter().map(|pose| to_reference(pose, grow)).collect::<Vec<Pose>>()
+    };
+    for pose in scenes.iter().flat_map(of_scene) {
         n += 1.0;
         for (m, p) in mean.iter_mut().zip(&pose) {
             *m = vec3::add(*m, vec3::scale(vec3::sub(*p, *m), 1.0 / n));
@@ -110,14 +137,14 @@ fn flat(scene: &Scene) -> Vec<Pose> {
 }
 
 /// Every point at its mean depth (of `mean`), x and y as seen. Needs a clean scene and is told its scale.
-pub fn with_mean_depth(scene: &Scene, mean: &Pose) -> Vec<Pose> {
-    let deep = |pose: Pose| std::array::from_fn(|j| [pose[j][0], pose[j][1], mean[j][2]]);
+pub fn with_mean_depth(scene: &Scene, mean: &Pose) -> Vec<Option<Pose>> {
+    let deep = |pose: Pose| Some(std::array::from_fn(|j| [pose[j][0], pose[j][1], mean[j][2]]));
     flat(scene).into_iter().map(deep).collect()
 }
 
 /// Depth solved from the bone lengths of the common adult: arms towards the camera, and the shoulders turned to the side
 /// that the nose points to. Needs a clean scene and is told its scale.
-pub fn with_bone_depth(scene: &Scene) -> Vec<Pose> {
+pub fn with_bone_depth(scene: &Scene) -> Vec<Option<Pose>> {
     let bones = Proportions::MEAN;
     let depth = |p: Vec3, from: Vec3, length: f64| {
         let across = (p[0] - from[0]).hypot(p[1] - from[1]);
@@ -132,7 +159,7 @@ pub fn with_bone_depth(scene: &Scene) -> Vec<Pose> {
             pose[elbow][2] = pose[shoulder][2] - depth(pose[elbow], pose[shoulder], bones.upper_arm);
             pose[wrist][2] = pose[elbow][2] - depth(pose[wrist], pose[elbow], bones.forearm);
         }
-        pose
+        Some(pose)
     };
     flat(scene).into_iter().map(solve).collect()
 }
@@ -149,11 +176,11 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let scenes: Vec<Scene> = (0..8).map(|_| Scene::of_rule(Filming::Clean, 20, &mut rng)).collect();
         let larger =
-            |s: &Scene| Ok(s.truth.iter().map(|p| p.map(|q| vec3::add(vec3::scale(q, 7.0), [1.0; 3]))).collect());
+            |s: &Scene| Ok(s.truth.iter().map(|p| Some(p.map(|q| vec3::add(vec3::scale(q, 7.0), [1.0; 3])))).collect());
         let none = of_method(&scenes, larger)?;
         assert!(none.mpjpe < 1e-6 && none.p_mpjpe < 1e-6, "{none}");
         let mean = mean_pose(&scenes);
-        let constant = of_method(&scenes, |s| Ok(vec![mean; s.truth.len()]))?;
+        let constant = of_method(&scenes, |s| Ok(vec![Some(mean); s.truth.len()]))?;
         let depth = of_method(&scenes, |s| Ok(with_mean_depth(s, &mean)))?;
         let bones = of_method(&scenes, |s| Ok(with_bone_depth(s)))?;
         assert!(depth.mpjpe < constant.mpjpe && bones.mpjpe < constant.mpjpe, "{depth} {bones} {constant}");
