@@ -25,7 +25,10 @@ pub fn body(path: &Path) -> Result<BodyLifter> {
         let config: temporal_lifter::Config = serde_json::from_value(config)?;
         let own = BodyLifter::config(config.channels.clamp(1, MOST_WIDTH), &config.widths);
         let window = config.receptive_field();
-        ensure!((1..=MOST_FRAMES).contains(&window), "its network looks at {window} frames, expected 1 to {MOST_FRAMES}");
+        ensure!(
+            (1..=MOST_FRAMES).contains(&window),
+            "its network looks at {window} frames, expected 1 to {MOST_FRAMES}"
+        );
         ensure!(config == own, "its network is {config:?}, expected {own:?}");
         Ok(BodyLifter::new(params, &config)?)
     })

@@ -3,9 +3,7 @@
 //! largest apparent bone of the stretch (a shoulder width would collapse where the speaker turns); the longest
 //! appearance of each kind of bone tells the body's proportions, and with them how far a bone points at the camera.
 
-use super::upper_body::{
-    BONES, L_HIP, L_SHOULDER, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, Seen,
-};
+use super::upper_body::{BONES, L_HIP, L_SHOULDER, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, Seen};
 use super::vec3;
 
 /// Frames of the stretch before and after the middle one.

@@ -49,8 +49,7 @@ mod tests {
 
     #[test]
     fn metres_give_the_reference_size() {
-        let pose: Pose =
-            std::array::from_fn(|j| [j as f64, (j * j) as f64, 1.0]);
+        let pose: Pose = std::array::from_fn(|j| [j as f64, (j * j) as f64, 1.0]);
         let grow = metres_per_unit(&[pose]);
         assert!((size(&pose.map(|p| vec3::scale(p, grow))) - REFERENCE_SIZE).abs() < 1e-12);
         assert_eq!(metres_per_unit(&[]), 1.0);

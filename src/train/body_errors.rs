@@ -6,7 +6,7 @@ use super::body_motion::Proportions;
 use super::body_scene::Scene;
 use crate::motion::procrustes;
 use crate::motion::upper_body::{
-    L_ELBOW, L_SHOULDER, L_WRIST, N_POINTS, NOSE, Pose, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, metres_per_unit,
+    L_ELBOW, L_SHOULDER, L_WRIST, N_POINTS, NOSE, Pose, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, Seen, metres_per_unit,
 };
 use crate::motion::vec3::{self, Vec3};
 use serde::Serialize;
@@ -125,7 +125,7 @@ pub fn mean_pose(scenes: &[Scene]) -> Pose {
 
 /// x and y of a clean scene in metres at the neck's distance, the neck at 0.
 fn flat(scene: &Scene) -> Vec<Pose> {
-    let frame = |seen: &crate::motion::upper_body::Seen| {
+    let frame = |seen: &Seen| {
         let points: Pose = seen.map(|p| {
             let [x, y] = p.unwrap_or_default();
             [f64::from(x) / scene.px_per_metre, f64::from(y) / scene.px_per_metre, 0.0]
@@ -142,26 +142,38 @@ pub fn with_mean_depth(scene: &Scene, mean: &Pose) -> Vec<Option<Pose>> {
     flat(scene).into_iter().map(deep).collect()
 }
 
-/// Depth solved from the bone lengths of the common adult: arms towards the camera, and the shoulders turned to the side
-/// that the nose points to. Needs a clean scene and is told its scale.
+/// Depth solved from the bone lengths of the common adult: each joint lies where its line of sight meets the sphere
+/// around its parent, arms on the side of the camera; the shoulders turn to the side that the nose points to. Needs a
+/// clean scene and is told the camera and where the neck is.
 pub fn with_bone_depth(scene: &Scene) -> Vec<Option<Pose>> {
     let bones = Proportions::MEAN;
-    let depth = |p: Vec3, from: Vec3, length: f64| {
-        let across = (p[0] - from[0]).hypot(p[1] - from[1]);
-        (length * length - across * across).max(0.0).sqrt()
-    };
-    let solve = |mut pose: Pose| {
-        // whose nose points to the image's right has turned the left shoulder away
-        let away = depth(pose[L_SHOULDER], [0.0; 3], bones.shoulders / 2.0) * pose[NOSE][0].signum();
-        (pose[L_SHOULDER][2], pose[R_SHOULDER][2]) = (away, -away);
-        pose[NOSE][2] = -depth(pose[NOSE], [0.0; 3], bones.nose);
+    let solve = |seen: &Seen| {
+        let rays = seen.map(|p| p.map(|[x, y]| [f64::from(x) / scene.focal_px, f64::from(y) / scene.focal_px, 1.0]));
+        let mut pose: Pose = [[0.0; 3]; N_POINTS];
+        let middle = vec3::scale(vec3::add(rays[R_SHOULDER]?, rays[L_SHOULDER]?), 0.5);
+        let neck = vec3::scale(middle, scene.neck[2]);
+        // whose nose is to the image's right of the neck has turned the left shoulder away
+        let left_is_away = rays[NOSE]?[0] > middle[0];
+        pose[L_SHOULDER] = on_sphere(rays[L_SHOULDER]?, neck, bones.shoulders / 2.0, !left_is_away);
+        pose[R_SHOULDER] = on_sphere(rays[R_SHOULDER]?, neck, bones.shoulders / 2.0, left_is_away);
+        pose[NOSE] = on_sphere(rays[NOSE]?, neck, bones.nose, true);
         for (shoulder, elbow, wrist) in [(R_SHOULDER, R_ELBOW, R_WRIST), (L_SHOULDER, L_ELBOW, L_WRIST)] {
-            pose[elbow][2] = pose[shoulder][2] - depth(pose[elbow], pose[shoulder], bones.upper_arm);
-            pose[wrist][2] = pose[elbow][2] - depth(pose[wrist], pose[elbow], bones.forearm);
+            pose[elbow] = on_sphere(rays[elbow]?, pose[shoulder], bones.upper_arm, true);
+            pose[wrist] = on_sphere(rays[wrist]?, pose[elbow], bones.forearm, true);
         }
         Some(pose)
     };
-    flat(scene).into_iter().map(solve).collect()
+    scene.seen.iter().map(solve).collect()
+}
+
+/// Where the line of sight along `ray` (z = 1) meets a sphere, the nearer or the farther place; where it misses, its
+/// place nearest to the centre.
+fn on_sphere(ray: Vec3, centre: Vec3, radius: f64, nearer: bool) -> Vec3 {
+    let square = vec3::dot(ray, ray);
+    let closest = vec3::dot(ray, centre) / square;
+    let off = vec3::sub(vec3::scale(ray, closest), centre);
+    let half = ((radius * radius - vec3::dot(off, off)).max(0.0) / square).sqrt();
+    vec3::scale(ray, if nearer { closest - half } else { closest + half })
 }
 
 #[cfg(test)]

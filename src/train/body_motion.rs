@@ -52,6 +52,8 @@ const FRONT: Place = [(-0.14, 0.42), (-0.04, 0.38), (-0.42, -0.05)];
 const RAISED: Place = [(-0.02, 0.48), (-0.48, 0.02), (-0.45, 0.0)];
 const WIDE: Place = [(0.28, 0.66), (-0.12, 0.42), (-0.36, 0.08)];
 const HANGING: Place = [(0.16, 0.34), (0.44, 0.58), (-0.14, 0.12)];
+/// Pointing and stretching: most of it lies out of reach, so that the arm is straight.
+const REACH: Place = [(-0.05, 0.75), (-0.50, 0.42), (-0.62, 0.05)];
 const FACE: Place = [(-0.10, 0.14), (-0.24, 0.02), (-0.26, -0.08)];
 const HIP: Place = [(0.16, 0.30), (0.36, 0.52), (-0.10, 0.10)];
 const CROSSED: Place = [(-0.22, -0.04), (0.18, 0.36), (-0.28, -0.10)];
@@ -63,13 +65,14 @@ struct Habit {
     rests: f64,
 }
 
-const HABITS: [Habit; 6] = [
+const HABITS: [Habit; 7] = [
     Habit { rest: LAP, gestures: &[FRONT, FRONT, FRONT, DESK, LAP, WIDE, FACE], rests: 0.5 },
     Habit { rest: DESK, gestures: &[DESK, FRONT, FRONT, FRONT, WIDE, FACE, RAISED], rests: 0.45 },
     Habit { rest: FRONT, gestures: &[FRONT, FRONT, WIDE, RAISED, DESK], rests: 0.3 },
     Habit { rest: HANGING, gestures: &[FRONT, FRONT, WIDE, RAISED, HIP, FACE], rests: 0.4 },
     Habit { rest: CROSSED, gestures: &[FRONT, CROSSED, FACE, LAP], rests: 0.6 },
     Habit { rest: WIDE, gestures: &[RAISED, WIDE, FRONT, RAISED], rests: 0.2 },
+    Habit { rest: HANGING, gestures: &[REACH, REACH, RAISED, FRONT, REACH], rests: 0.3 },
 ];
 
 /// `n_frames` poses, `frame_secs` apart, metres, camera axes, the speaker facing a camera in front (-z).

@@ -22,6 +22,9 @@ pub struct Scene {
     pub seen: Vec<Seen>,
     /// Which side the body is seen from on average, radians; 0: from ahead.
     pub yaw: f64,
+    /// The neck in metres before the camera, and the camera's focal length in px; the axis meets the picture at 0, 0.
+    pub neck: Vec3,
+    pub focal_px: f64,
     /// px of a metre at the neck's distance.
     pub px_per_metre: f64,
 }
@@ -98,7 +101,7 @@ impl Scene {
         if filming != Filming::Clean {
             spoil(&mut seen, 0.35 * px_per_metre, training, rng);
         }
-        Self { truth, seen, yaw, px_per_metre }
+        Self { truth, seen, yaw, neck, focal_px, px_per_metre }
     }
 }
 

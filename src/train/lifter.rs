@@ -248,7 +248,9 @@ mod tests {
 
     #[test]
     fn an_interrupted_body_training_ends_in_the_same_bytes() {
-        resumed_equals_straight(|| Box::new(BodyLesson::new(Vec::new(), Vec::new(), &BodyLifter::config(8, &[3, 3, 3]), 3).unwrap()));
+        resumed_equals_straight(|| {
+            Box::new(BodyLesson::new(Vec::new(), Vec::new(), &BodyLifter::config(8, &[3, 3, 3]), 3).unwrap())
+        });
     }
 
     #[test]

@@ -90,6 +90,7 @@ impl Lesson for BodyLesson {
         json!({
             "config": self.lifter.net().config(),
             "takes": self.takes.len(), "frames": self.takes.iter().map(|t| t.poses.len()).sum::<usize>(),
+            "held_out": self.held_out.iter().map(|(set, _)| set).collect::<Vec<_>>(),
             "motion": hash.finalize().to_hex().as_str(),
         })
     }
@@ -152,7 +153,10 @@ impl Lesson for BodyLesson {
                 if scenes.is_empty() {
                     continue;
                 }
-                lines.push(format!("{set:30} {input}  {}", of_method(&scenes, |scene| Ok(self.lifter.poses(&scene.seen, 1.0)?))?));
+                lines.push(format!(
+                    "{set:30} {input}  {}",
+                    of_method(&scenes, |scene| Ok(self.lifter.poses(&scene.seen, 1.0)?))?
+                ));
                 if brief {
                     break;
                 }
