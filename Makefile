@@ -69,11 +69,13 @@ test: build
 	@echo 'make test: all passed'
 
 # The long proofs, each printing its figures: 20 kills, a 10-minute video, speed on a real clip (CLIP, MODELS), alone and
-# against the Python REFERENCE. ORATOR_REFERENCE_PYTHON names a Python with onnxruntime, cv2 and numpy.
+# against the Python REFERENCE. ORATOR_REFERENCE_PYTHON names a Python with onnxruntime, cv2 and numpy (and torch: the
+# lifter's training beside PyTorch's).
 SHARED := ../shared
 CLIP := $(SHARED)/data/videos/talk_tyson_2cam_17s_720p.mp4
 MODELS := $(SHARED)/models
 REFERENCE := $(SHARED)/reference/pose_chain_reference.py
+LIFTER_REFERENCE := fixtures/reference/lifter_reference.py
 export ORATOR_REFERENCE_PYTHON ?= python3
 
 prove: build
@@ -84,6 +86,8 @@ prove: build
 	elif ! "$$ORATOR_REFERENCE_PYTHON" -c 'import onnxruntime, cv2, numpy' 2>/dev/null; then \
 		echo "SKIPPED: $$ORATOR_REFERENCE_PYTHON has no onnxruntime, cv2 and numpy (ORATOR_REFERENCE_PYTHON names another)"; \
 	else $(ORATOR) bench pose2d $(CLIP) --models-dir $(MODELS) --person person-yolox-nano --python $(REFERENCE); fi
+	if "$$ORATOR_REFERENCE_PYTHON" -c 'import torch, numpy' 2>/dev/null; then $(ORATOR) bench lifter --python $(LIFTER_REFERENCE); \
+	else echo "SKIPPED: $$ORATOR_REFERENCE_PYTHON has no torch and numpy: no training step beside PyTorch's"; $(ORATOR) bench lifter; fi
 
 # The whole road on the synthetic speaker. DEMO: its folder; DRAW and STEPS: how much of it.
 DEMO := $(TARGET)/demo
