@@ -158,7 +158,9 @@ fn numbered(path: &Path, number: usize) -> PathBuf {
 type Row = (&'static str, &'static str, fn(&ArmFigures) -> f64);
 
 /// Name in the table, name in JSON, value.
-const ROWS: [Row; 15] = [
+const ROWS: [Row; 17] = [
+    ("upper arm, m", "upper_arm_metres", |a| a.upper_arm_metres),
+    ("forearm, m", "forearm_metres", |a| a.forearm_metres),
     ("upper arm, std of its length, %", "upper_arm_spread_percent", |a| a.upper_arm_spread),
     ("forearm, std of its length, %", "forearm_spread_percent", |a| a.forearm_spread),
     ("wrist shake, mm", "jitter_mm", |a| a.jitter_mm),
@@ -177,9 +179,13 @@ const ROWS: [Row; 15] = [
 ];
 
 fn table(figures: &ClipFigures) -> String {
+    if figures.left.missing + figures.right.missing >= 2.0 {
+        return "  no frame is lifted (`orator status --why` says why; `orator lift` takes any keypoints)\n".to_owned();
+    }
+    let number = |v: f64| if v.is_finite() { format!("{v:.2}") } else { "-".to_owned() };
     let head = format!("  {:40}{:>9}{:>9}\n", "", "left", "right");
     ROWS.iter().fold(head, |text, (name, _, of)| {
-        text + &format!("  {name:40}{:>9.2}{:>9.2}\n", of(&figures.left), of(&figures.right))
+        text + &format!("  {name:40}{:>9}{:>9}\n", number(of(&figures.left)), number(of(&figures.right)))
     })
 }
 

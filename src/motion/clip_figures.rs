@@ -14,6 +14,9 @@ const MM: f64 = 1000.0;
 /// Figures of one arm; NaN where the clip shows nothing to measure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmFigures {
+    /// Median lengths in 3D.
+    pub upper_arm_metres: f64,
+    pub forearm_metres: f64,
     /// Standard deviation over mean of the bone's length, percent.
     pub upper_arm_spread: f64,
     pub forearm_spread: f64,
@@ -108,6 +111,8 @@ fn arm(chain: &Chain, motion: &Motion, keypoints: &Keypoints, fits: &[Option<Fit
         .collect();
     let n_hand = n_frames * (N_HAND_JOINTS - 1);
     ArmFigures {
+        upper_arm_metres: median(all(&|t| length(shoulder, elbow, t))),
+        forearm_metres: median(all(&|t| length(elbow, wrist, t))),
         upper_arm_spread: spread(&all(&|t| length(shoulder, elbow, t))),
         forearm_spread: spread(&all(&|t| length(elbow, wrist, t))),
         jitter_mm: median((0..n_frames).filter_map(|t| second_difference(motion, wrist, t)).collect()),
@@ -257,6 +262,7 @@ mod tests {
         near(figures.right.elbow_z_mm, -50.0, 0.1);
         near(figures.left.wrist_z_mm, -200.0, 0.1);
         near(figures.right.forearm_ratio[0], 1.25, 0.02);
+        near(figures.left.forearm_metres, 0.25, 1e-4);
         near(figures.left.wrist_off_mm, 0.0, 0.1);
         near(figures.right.forearm_spread, 0.0, 0.01);
         assert_eq!((figures.left.missing, figures.left.masked, figures.left.hand_there), (0.0, 0.0, 1.0));

@@ -4,6 +4,7 @@
 use crate::cli::{Outcome, ui::Ui};
 use anyhow::{Context, Result, bail, ensure};
 use candle_core::{Device, Tensor};
+use orator::motion::body_view::{N_IN, N_OUT};
 use orator::nn::Mode;
 use orator::nn::params::Params;
 use orator::nn::temporal_lifter::{Config, TemporalLifter};
@@ -18,9 +19,6 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Instant;
-
-/// Numbers of a frame that go in and come out: nine points of x, y and score or z.
-const NUMBERS: usize = 27;
 
 /// Training of the temporal lifter on one thread: seconds a step and, with `--python`, against PyTorch. Both train the
 /// same network on the same batch: forward, backward, clipping, Adam with AMSGrad.
@@ -76,7 +74,7 @@ impl Fixed {
     /// The batch as tensors: `x` [B, n_in, window], `y` [B, points, 3].
     fn tensors(&self) -> Result<(Tensor, Tensor)> {
         let x = Tensor::from_slice(&self.x, [vec![self.batch()], self.shape_in()].concat(), &Device::Cpu)?;
-        let y = Tensor::from_slice(&self.y, (self.batch(), NUMBERS / 3, 3), &Device::Cpu)?;
+        let y = Tensor::from_slice(&self.y, (self.batch(), N_OUT / 3, 3), &Device::Cpu)?;
         Ok((x, y))
     }
 
@@ -113,7 +111,7 @@ impl Lesson for Fixed {
         vec![self.net.config().n_in, self.net.config().receptive_field()]
     }
     fn weights(&self) -> Vec<f32> {
-        vec![1.0; NUMBERS / 3]
+        vec![1.0; N_OUT / 3]
     }
     fn draw(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
         // a sample of the trainer has its number in its stream of random numbers
@@ -143,7 +141,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     );
     ensure!(args.widths.iter().product::<usize>() <= 10_000, "a window of more than 10000 frames");
     let config =
-        Config { n_in: NUMBERS, n_out: NUMBERS, channels: args.channels, widths: args.widths.clone(), dropout: 0.0 };
+        Config { n_in: N_IN, n_out: N_OUT, channels: args.channels, widths: args.widths.clone(), dropout: 0.0 };
     let folder = std::env::temp_dir().join(format!("orator-bench-{}", std::process::id()));
     std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
@@ -224,7 +222,7 @@ impl Reference {
         let mut contents = Contents { facts: json!({ "kind": "benchmark" }), tensors: BTreeMap::new() };
         contents.add("", lesson.params.tensors()?);
         let (x, y) = lesson.tensors()?;
-        let weights = Tensor::from_vec(lesson.weights(), NUMBERS / 3, &Device::Cpu)?;
+        let weights = Tensor::from_vec(lesson.weights(), N_OUT / 3, &Device::Cpu)?;
         contents.add("", [("x", x), ("y", y), ("weights", weights)].map(|(name, t)| (name.to_owned(), t)).into());
         contents.write(given)?;
         let python = std::env::var("ORATOR_REFERENCE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
