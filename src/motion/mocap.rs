@@ -252,6 +252,61 @@ mod tests {
         assert!(pose[R_HIP][1] > 0.4 && pose[L_HIP][0] > 0.0);
     }
 
+    /// A person at rest as BVH, 70 frames, axes and unit as `place` says.
+    fn bvh(place: impl Fn([f64; 3]) -> [f64; 3]) -> String {
+        let offset = |p: [f64; 3]| place(p).map(|v| format!("{v:.4}")).join(" ");
+        let joint = |name: &str, p: [f64; 3], inner: &str| {
+            format!("JOINT {name} {{ OFFSET {} CHANNELS 3 Zrotation Xrotation Yrotation {inner} }}\n", offset(p))
+        };
+        let arm = |side: &str, x: f64| {
+            let hand = joint(&format!("{side}Hand"), [x * 0.25, 0.0, 0.0], "");
+            let fore = joint(&format!("{side}ForeArm"), [x * 0.29, 0.0, 0.0], &hand);
+            joint(&format!("{side}Arm"), [x * 0.18, -0.05, 0.0], &fore)
+        };
+        let head = joint("Neck", [0.0, 0.5, 0.0], &joint("Head", [0.0, 0.12, 0.0], ""));
+        let legs = joint("LeftUpLeg", [0.1, 0.0, 0.0], "") + &joint("RightUpLeg", [-0.1, 0.0, 0.0], "");
+        let chest = joint("Spine", [0.0, 0.45, 0.0], &(arm("Left", 1.0) + &arm("Right", -1.0)));
+        let n_channels = 6 + 3 * 11;
+        let frames = format!("{}\n", vec!["0"; n_channels].join(" ")).repeat(70);
+        format!(
+            "HIERARCHY ROOT Hips {{ OFFSET 0 0 0 CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n\
+             {head}{legs}{chest} }}\nMOTION Frames: 70 Frame Time: 0.0333333\n{frames}"
+        )
+    }
+
+    #[test]
+    fn a_bvh_of_any_unit_and_upright_axis_is_the_same_person() {
+        let dir = tempfile::tempdir().unwrap();
+        let read_as = |name: &str, text: String| {
+            let path = dir.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            read(&path).unwrap()[0].poses[3]
+        };
+        let metres = read_as("metres.bvh", bvh(|p| p));
+        let z_up_inches = read_as("inches.bvh", bvh(|[x, y, z]| [x, -z, y].map(|v| v / 0.0254)));
+        for (a, b) in metres.iter().zip(&z_up_inches) {
+            assert!((0..3).all(|k| (a[k] - b[k]).abs() < 1e-4), "{a:?} {b:?}");
+        }
+        assert!(metres[R_WRIST][0] < -0.6 && metres[NOSE][1] < -0.1 && metres[NOSE][2] < -0.05, "{metres:?}");
+        assert!(metres[R_HIP][1] > 0.3, "{metres:?}");
+        let cut = &bvh(|p| p)[..5000];
+        let path = dir.path().join("cut.bvh");
+        std::fs::write(&path, cut).unwrap();
+        let text = format!("{:#}", read(&path).unwrap_err());
+        assert!(text.contains("cut.bvh") && text.contains("70 frames x 39"), "{text}");
+    }
+
+    #[test]
+    fn takes_are_divided_by_their_names() {
+        let take = |name: &str| Take { name: name.into(), fps: 30.0, poses: Vec::new() };
+        let takes = || ["walk#0", "walk#1", "wave#0"].map(take).to_vec();
+        let (sets, others) = divide(takes(), &["*#1".into(), "wave*".into()]).unwrap();
+        let names: Vec<&str> = sets.iter().flat_map(|(_, set)| set).map(|t| t.name.as_str()).collect();
+        assert_eq!((names, others.len()), (vec!["walk#1", "wave#0"], 1));
+        let text = divide(takes(), &["run*".into()]).unwrap_err().to_string();
+        assert!(text.contains("run*") && text.contains("walk#0"), "{text}");
+    }
+
     #[test]
     fn unknown_files_say_what_is_known() {
         let dir = tempfile::tempdir().unwrap();

@@ -58,21 +58,26 @@ const FACE: Place = [(-0.10, 0.14), (-0.24, 0.02), (-0.26, -0.08)];
 const HIP: Place = [(0.16, 0.30), (0.36, 0.52), (-0.10, 0.10)];
 const CROSSED: Place = [(-0.22, -0.04), (0.18, 0.36), (-0.28, -0.10)];
 
-/// What a speaker does: where the hands rest, where they go, and how often they rest.
+/// What a speaker does: where the hands rest, where they go, how often they rest, and how far back (+z) elbows are
+/// carried: seated speakers carry them forward, over desk or lap.
 struct Habit {
     rest: Place,
     gestures: &'static [Place],
     rests: f64,
+    back: (f64, f64),
 }
 
+const SEATED: (f64, f64) = (-0.9, 0.15);
+const STANDING: (f64, f64) = (-0.5, 0.45);
+
 const HABITS: [Habit; 7] = [
-    Habit { rest: LAP, gestures: &[FRONT, FRONT, FRONT, DESK, LAP, WIDE, FACE], rests: 0.5 },
-    Habit { rest: DESK, gestures: &[DESK, FRONT, FRONT, FRONT, WIDE, FACE, RAISED], rests: 0.45 },
-    Habit { rest: FRONT, gestures: &[FRONT, FRONT, WIDE, RAISED, DESK], rests: 0.3 },
-    Habit { rest: HANGING, gestures: &[FRONT, FRONT, WIDE, RAISED, HIP, FACE], rests: 0.4 },
-    Habit { rest: CROSSED, gestures: &[FRONT, CROSSED, FACE, LAP], rests: 0.6 },
-    Habit { rest: WIDE, gestures: &[RAISED, WIDE, FRONT, RAISED], rests: 0.2 },
-    Habit { rest: HANGING, gestures: &[REACH, REACH, RAISED, FRONT, REACH], rests: 0.3 },
+    Habit { rest: LAP, gestures: &[FRONT, FRONT, FRONT, DESK, LAP, WIDE, FACE], rests: 0.5, back: SEATED },
+    Habit { rest: DESK, gestures: &[DESK, FRONT, FRONT, FRONT, WIDE, FACE, RAISED], rests: 0.45, back: SEATED },
+    Habit { rest: FRONT, gestures: &[FRONT, FRONT, WIDE, RAISED, DESK], rests: 0.3, back: SEATED },
+    Habit { rest: HANGING, gestures: &[FRONT, FRONT, WIDE, RAISED, HIP, FACE], rests: 0.4, back: STANDING },
+    Habit { rest: CROSSED, gestures: &[FRONT, CROSSED, FACE, LAP], rests: 0.6, back: STANDING },
+    Habit { rest: WIDE, gestures: &[RAISED, WIDE, FRONT, RAISED], rests: 0.2, back: STANDING },
+    Habit { rest: HANGING, gestures: &[REACH, REACH, RAISED, FRONT, REACH], rests: 0.3, back: STANDING },
 ];
 
 /// `n_frames` poses, `frame_secs` apart, metres, camera axes, the speaker facing a camera in front (-z).
@@ -86,7 +91,7 @@ pub fn gesture(rng: &mut ChaCha8Rng, n_frames: usize, frame_secs: f64) -> Vec<Po
         _ => Track::draw(rng, habit, secs),
     };
     let joined = rng.random_bool(0.12);
-    let swivel = Swivel::draw(rng);
+    let swivel = Swivel::draw(rng, habit.back);
     let sway: [Sway; 9] = [
         Sway::draw(rng, 0.14),
         Sway::draw(rng, 0.10),
@@ -204,9 +209,10 @@ struct Swivel {
 }
 
 impl Swivel {
-    fn draw(rng: &mut ChaCha8Rng) -> Self {
+    fn draw(rng: &mut ChaCha8Rng, mean_back: (f64, f64)) -> Self {
         let (out, back) = (Sway::draw(rng, 0.25), Sway::draw(rng, 0.25));
-        Self { out, back, mean_out: rng.random_range(0.0..1.1), mean_back: rng.random_range(-0.35..0.6) }
+        let (least, most) = mean_back;
+        Self { out, back, mean_out: rng.random_range(0.0..1.1), mean_back: rng.random_range(least..most) }
     }
 
     fn pole(&self, t: f64, side: f64) -> Vec3 {
@@ -277,12 +283,17 @@ mod tests {
 
     #[test]
     fn a_speaker_faces_the_camera_with_elbows_below() {
-        let mut below = 0;
-        for seed in 0..100 {
+        let (mut below, mut behind, mut forward) = (0, 0, 0);
+        for seed in 0..500 {
             let pose = gesture(&mut ChaCha8Rng::seed_from_u64(seed), 1, 0.1)[0];
             assert!(pose[NOSE][1] < -0.05 && pose[NOSE][2] < 0.03 && pose[R_SHOULDER][0] < -0.1, "{pose:?}");
             below += usize::from(pose[R_ELBOW][1] > pose[R_SHOULDER][1]);
+            if pose[R_WRIST][2] < pose[R_SHOULDER][2] - 0.1 {
+                behind += usize::from(pose[R_ELBOW][2] > pose[R_SHOULDER][2] + 0.05);
+                forward += usize::from(pose[R_ELBOW][2] < pose[R_SHOULDER][2] - 0.03);
+            }
         }
-        assert!(below > 90, "{below}");
+        eprintln!("of 500: {below} elbows below, {behind} behind, {forward} before the shoulder");
+        assert!(below > 400 && forward > 200 && behind < 60, "{below} {behind} {forward}");
     }
 }
