@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// What a lifter learns: where samples come from and the network they go through.
-pub trait Lesson: Sync {
+pub trait Lesson: Send + Sync {
     /// Kind of the weights file.
     fn kind(&self) -> &'static str;
     /// The network's shape, and everything else the samples depend on.
@@ -100,7 +100,8 @@ pub fn train(lesson: &mut dyn Lesson, schedule: &Schedule, out: &Path, progress:
     if schedule.steps == 0 {
         return lesson.errors(false);
     }
-    train_until(lesson, schedule, out, schedule.steps, progress)?;
+    // inside the pool: its own thread does not sleep and wake for every small piece of work
+    rayon::scope(|_| train_until(lesson, schedule, out, schedule.steps, progress))?;
     let errors = lesson.errors(false)?;
     let facts = json!({ "kind": lesson.kind(), "lesson": lesson.facts(), "schedule": schedule.facts() });
     let mut contents = Contents { facts, tensors: BTreeMap::new() };

@@ -6,6 +6,7 @@ mod bvh;
 mod clips;
 mod dataset;
 mod demo;
+mod evaluate;
 mod extract;
 mod figures;
 mod film;
