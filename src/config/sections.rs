@@ -175,7 +175,7 @@ pub struct Lift {
 impl Default for Lift {
     fn default() -> Self {
         let none = PathBuf::new();
-        Self { body_weights: none.clone(), hand_weights: none, smooth_arms: 1.0, smooth_hands: 1.5, level: false }
+        Self { body_weights: none.clone(), hand_weights: none, smooth_arms: 0.8, smooth_hands: 1.5, level: false }
     }
 }
 

@@ -148,3 +148,87 @@ fn mean_median(values: impl Iterator<Item = f32>) -> f32 {
     let (n, half) = (values.len(), values.len() / 2);
     if n % 2 == 1 { values[half] } else { (values[half - 1] + values[half]) / 2.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::time::FrameRate;
+
+    /// A speaker whose right wrist swings 120 px wide at `hertz`, 15 frames a second.
+    fn beating(n_frames: usize, hertz: f32) -> Keypoints {
+        let mut body = Array3::zeros((n_frames, 17, 3));
+        for t in 0..n_frames {
+            let swing = 60.0 * (std::f32::consts::TAU * hertz * t as f32 / 15.0).sin();
+            let points = [
+                (coco::NOSE, 640.0, 180.0),
+                (coco::R_SHOULDER, 560.0, 260.0),
+                (coco::R_ELBOW, 540.0, 380.0),
+                (coco::R_WRIST, 600.0 + swing, 440.0),
+                (coco::L_SHOULDER, 720.0, 260.0),
+                (coco::L_ELBOW, 750.0, 380.0),
+                (coco::L_WRIST, 700.0, 440.0),
+                (coco::L_EYE, 660.0, 160.0),
+                (coco::R_EYE, 620.0, 160.0),
+            ];
+            for (j, x, y) in points {
+                body.slice_mut(s![t, j, ..]).assign(&ndarray::arr1(&[x, y, 0.9]));
+            }
+        }
+        let hand = Array3::zeros((n_frames, 21, 3));
+        let fps = FrameRate::new(15, 1);
+        Keypoints { fps, image_size: [1280, 720], body, left_hand: hand.clone(), right_hand: hand }
+    }
+
+    fn sight(keypoints: &Keypoints) -> Sight {
+        Sight::of(keypoints, Interval { start: 0, end: keypoints.n_frames() }, 2, 15)
+    }
+
+    #[test]
+    fn strays_go_and_fast_gestures_stay() {
+        for hertz in [0.5, 1.0, 2.0, 3.0, 4.0, 5.0] {
+            let keypoints = beating(60, hertz);
+            assert!(sight(&keypoints).seen.slice(s![.., ..7]).iter().all(|seen| *seen), "{hertz} beats a second");
+        }
+        let mut keypoints = beating(60, 0.5);
+        keypoints.body[[20, coco::R_WRIST, 0]] += 200.0;
+        keypoints.body[[21, coco::L_SHOULDER, 1]] -= 90.0;
+        keypoints.body.slice_mut(s![40.., .., 0]).mapv_inplace(|x| x + 300.0); // the picture jumps: no stray
+        let sight = sight(&keypoints);
+        let gone: Vec<(usize, usize)> =
+            sight.seen.slice(s![.., ..7]).indexed_iter().filter(|(_, seen)| !**seen).map(|(at, _)| at).collect();
+        assert_eq!(gone, [(20, R_WRIST), (21, L_SHOULDER)]);
+        let [x, y] = sight.frame(21)[L_SHOULDER].unwrap();
+        assert!((x - 720.0).abs() < 1e-3 && (y - 260.0).abs() < 1e-3, "bridged from the frames beside");
+    }
+
+    #[test]
+    fn time_has_no_direction() {
+        let mut forth = beating(50, 1.3);
+        forth.body[[20, coco::R_WRIST, 1]] += 150.0;
+        forth.body.slice_mut(s![30..35, coco::L_ELBOW, ..]).fill(0.0);
+        let mut back = forth.clone();
+        back.body.invert_axis(ndarray::Axis(0));
+        let (forth, back) = (sight(&forth), sight(&back));
+        for t in 0..50 {
+            assert_eq!(forth.seen.row(t), back.seen.row(49 - t));
+            for (a, b) in forth.frame(t).iter().flatten().zip(back.frame(49 - t).iter().flatten()) {
+                assert!((a[0] - b[0]).abs() < 1e-3 && (a[1] - b[1]).abs() < 1e-3);
+            }
+        }
+    }
+
+    #[test]
+    fn what_stands_in_for_what() {
+        let mut keypoints = beating(30, 1.0);
+        keypoints.body.slice_mut(s![.., coco::NOSE, ..]).fill(0.0);
+        keypoints.body.slice_mut(s![.., coco::L_WRIST, ..]).fill(0.0);
+        keypoints.left_hand.slice_mut(s![.., 0, ..]).assign(&ndarray::arr1(&[690.0, 450.0, 0.9]));
+        keypoints.body.slice_mut(s![5..25, coco::R_ELBOW, 2]).fill(0.0);
+        keypoints.body[[3, coco::R_WRIST, 0]] = 1e20;
+        let sight = sight(&keypoints);
+        assert_eq!(sight.frame(7)[NOSE], Some([640.0, 175.0]));
+        assert_eq!(sight.frame(7)[L_WRIST], Some([690.0, 450.0]));
+        assert!(sight.frame(7)[R_ELBOW].is_none() && sight.frame(3)[R_ELBOW].is_some(), "a long gap stays open");
+        assert!(!sight.seen[[3, R_WRIST]] && sight.frame(3)[R_WRIST].is_some());
+    }
+}

@@ -25,7 +25,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 /// Of the nine points: COCO's index and the arm joint, if it is one.
-const POINTS: [(usize, usize, Option<usize>); 9] = [
+pub const POINTS: [(usize, usize, Option<usize>); 9] = [
     (NOSE, 0, None),
     (R_SHOULDER, 6, Some(skeleton::R_SHOULDER)),
     (R_ELBOW, 8, Some(skeleton::R_ELBOW)),
@@ -37,12 +37,12 @@ const POINTS: [(usize, usize, Option<usize>); 9] = [
     (L_HIP, 11, None),
 ];
 
-fn lifter() -> Lifter {
+pub fn lifter() -> Lifter {
     Lifter::new(&config::Lift::default()).unwrap()
 }
 
 /// The scene's keypoints, and hands of one shape turned slowly at both wrists.
-fn keypoints(scene: &Scene, rng: &mut ChaCha8Rng) -> Keypoints {
+pub fn keypoints(scene: &Scene, rng: &mut ChaCha8Rng) -> Keypoints {
     let n = scene.seen.len();
     let mut k = Keypoints {
         fps: FrameRate::new(15, 1),

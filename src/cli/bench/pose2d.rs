@@ -1,9 +1,7 @@
-//! `orator bench`: how fast a part of the road is, measured so that a noisy machine cannot flatter it: the variants take
-//! turns, round after round, and the median round counts.
+//! `orator bench pose2d`.
 
-mod lifter;
-
-use super::{Outcome, ui::Ui};
+use super::median;
+use crate::cli::{Outcome, ui::Ui};
 use anyhow::{Context, Result, bail, ensure};
 use orator::config::Settings;
 use orator::media::frames::FrameReader;
@@ -17,23 +15,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-/// Measure the speed of a part of the road.
-#[derive(clap::Args)]
-pub struct Args {
-    #[command(subcommand)]
-    part: Part,
-}
-
-#[derive(clap::Subcommand)]
-enum Part {
-    Pose2d(Pose2d),
-    Lifter(lifter::Args),
-}
-
 /// Frames to keypoints: time a frame, the share of it inside ONNX Runtime, one worker against two, and (with
 /// `--python`) against the Python reference of the same chain. Every worker is one thread.
 #[derive(clap::Args)]
-struct Pose2d {
+pub struct Args {
     /// A video of a speaker.
     video: PathBuf,
     /// The folder of the models.
@@ -51,13 +36,6 @@ struct Pose2d {
     /// The Python reference, run on the whole video in each round: `REFERENCE.py VIDEO OUT.npz`.
     #[arg(long, value_name = "FILE")]
     python: Option<PathBuf>,
-}
-
-pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    match args.part {
-        Part::Pose2d(args) => pose2d(&args, ui),
-        Part::Lifter(args) => lifter::run(&args, ui),
-    }
 }
 
 /// What every variant needs.
@@ -119,7 +97,7 @@ fn rate(settings: &Settings) -> FrameRate {
     settings.extract.rate()
 }
 
-fn pose2d(args: &Pose2d, ui: &Ui) -> Result<Outcome> {
+pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let mut settings = Settings::default();
     if let Some(person) = &args.person {
         settings.pose2d.person.clone_from(person);
@@ -218,9 +196,4 @@ fn reference(script: &Path, video: &Path, models_dir: &Path) -> Result<f64> {
     milliseconds.and_then(|text| text.parse().ok()).with_context(|| {
         format!("{} gave no time: {}", script.display(), error.lines().last().unwrap_or("it said nothing"))
     })
-}
-
-fn median(mut numbers: Vec<f64>) -> f64 {
-    numbers.sort_by(f64::total_cmp);
-    numbers.get(numbers.len() / 2).copied().unwrap_or(f64::NAN)
 }

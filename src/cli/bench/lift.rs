@@ -1,0 +1,148 @@
+//! `orator bench lift`.
+
+use super::median;
+use crate::cli::{Outcome, ui::Ui};
+use anyhow::{Result, ensure};
+use candle_core::{DType, Device, Tensor};
+use ndarray::{Array3, s};
+use orator::config;
+use orator::lift::{Lifter, weights};
+use orator::motion::upper_body::{L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, NOSE, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST};
+use orator::nn::{Mode, body_lifter::BodyLifter, hand_lifter::HandLifter};
+use orator::stage::progress::Progress;
+use orator::train::body_scene::Scene;
+use orator::train::hand_shape;
+use orator::types::pose2d::{Keypoints, coco};
+use orator::types::time::FrameRate;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::json;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Keypoints to joints, body and both hands: frames a second on one processor core, and how many times as long it takes
+/// as its networks alone take for as many frames. The keypoints are made by rule. Everything runs in a pool of one
+/// thread.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Frames lifted in each round, at 15 a second.
+    #[arg(long, default_value_t = 1800, value_name = "N")]
+    frames: usize,
+    /// Rounds; each measures every variant once.
+    #[arg(long, default_value_t = 7, value_name = "N")]
+    rounds: usize,
+    /// Weights of `orator train lifter --part body`; without: the built-in ones.
+    #[arg(long, value_name = "FILE")]
+    body_weights: Option<PathBuf>,
+    /// Weights of `orator train lifter --part hands`; without: the built-in ones.
+    #[arg(long, value_name = "FILE")]
+    hand_weights: Option<PathBuf>,
+}
+
+/// The nine points and their COCO indices.
+const POINTS: [(usize, usize); 9] = [
+    (NOSE, coco::NOSE),
+    (R_SHOULDER, coco::R_SHOULDER),
+    (R_ELBOW, coco::R_ELBOW),
+    (R_WRIST, coco::R_WRIST),
+    (L_SHOULDER, coco::L_SHOULDER),
+    (L_ELBOW, coco::L_ELBOW),
+    (L_WRIST, coco::L_WRIST),
+    (R_HIP, coco::R_HIP),
+    (L_HIP, coco::L_HIP),
+];
+/// Windows and hands that go through the networks together, as the lifters do it.
+const BATCH: (usize, usize) = (512, 1024);
+
+pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+    ensure!(args.frames > 0 && args.rounds > 0, "nothing to measure: there must be frames and rounds");
+    let settings = config::Lift {
+        body_weights: args.body_weights.clone().unwrap_or_default(),
+        hand_weights: args.hand_weights.clone().unwrap_or_default(),
+        ..Default::default()
+    };
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let task = ui.begin("bench lift", args.rounds as u64);
+    let (mut whole, mut inside) = (Vec::new(), Vec::new());
+    one_thread.install(|| -> Result<()> {
+        let lifter = Lifter::new(&settings)?;
+        let (body, hands) = (weights::body(&settings.body_weights)?, weights::hands(&settings.hand_weights)?);
+        let keypoints = made_by_rule(args.frames);
+        lifter.lift(&keypoints)?;
+        networks(&body, &hands, args.frames)?;
+        for _ in 0..args.rounds {
+            let start = Instant::now();
+            lifter.lift(&keypoints)?;
+            whole.push(start.elapsed().as_secs_f64());
+            let start = Instant::now();
+            networks(&body, &hands, args.frames)?;
+            inside.push(start.elapsed().as_secs_f64());
+            task.advance(1);
+        }
+        Ok(())
+    })?;
+    drop(task);
+
+    let n_frames = args.frames as f64;
+    let ratio = median(whole.iter().zip(&inside).map(|(whole, inside)| whole / inside).collect());
+    let [frames_a_second, of_networks] = [&whole, &inside].map(|secs| n_frames / median(secs.clone()));
+    let text = format!(
+        "{n_frames} frames, body and both hands, median of {} rounds, one thread\n\
+         lifting         {frames_a_second:8.0} frames a second\n\
+         networks alone  {of_networks:8.0} frames a second: ratio {ratio:.3}",
+        args.rounds
+    );
+    let facts = json!({
+        "n_frames": args.frames, "frames_a_second": frames_a_second, "frames_a_second_networks": of_networks,
+        "ratio": ratio,
+    });
+    ui.summary(&text, None, facts);
+    Ok(Outcome::Done)
+}
+
+/// What the networks do for so many frames: a window and its mirror image, and two hands.
+fn networks(body: &BodyLifter, hands: &HandLifter, n_frames: usize) -> Result<()> {
+    let config = body.net().config();
+    let batches = |batch: usize| (0..2 * n_frames).step_by(batch).map(move |first| batch.min(2 * n_frames - first));
+    for n in batches(BATCH.0) {
+        let x = Tensor::ones((n, config.n_in, config.receptive_field()), DType::F32, &Device::Cpu)?;
+        body.net().forward_windows(&x, &mut Mode::Eval)?;
+    }
+    for n in batches(BATCH.1) {
+        let x = Tensor::ones((n, hands.config().n_in), DType::F32, &Device::Cpu)?;
+        hands.forward(&x, &mut Mode::Eval)?;
+    }
+    Ok(())
+}
+
+/// A speaker made by rule, filmed with noise and gaps, a hand of one shape at each wrist.
+fn made_by_rule(n_frames: usize) -> Keypoints {
+    let mut rng = ChaCha8Rng::seed_from_u64(1337);
+    let scene = Scene::of_rule(n_frames, false, &mut rng);
+    let shape = hand_shape::draw(&mut rng);
+    let none = Array3::zeros((n_frames, 21, 3));
+    let mut keypoints = Keypoints {
+        fps: FrameRate::new(15, 1),
+        image_size: [1280, 720],
+        body: Array3::zeros((n_frames, 17, 3)),
+        left_hand: none.clone(),
+        right_hand: none,
+    };
+    for (t, seen) in scene.seen.iter().enumerate() {
+        for (point, coco) in POINTS {
+            if let Some([x, y]) = seen[point] {
+                keypoints.body.slice_mut(s![t, coco, ..]).assign(&ndarray::arr1(&[x, y, 0.9]));
+            }
+        }
+        for (hand, wrist, flip) in
+            [(&mut keypoints.right_hand, R_WRIST, 1.0), (&mut keypoints.left_hand, L_WRIST, -1.0)]
+        {
+            let Some([x, y]) = seen[wrist] else { continue };
+            for (j, p) in shape.iter().enumerate() {
+                let (dx, dy) = (flip * p[0] * scene.px_per_metre, p[1] * scene.px_per_metre);
+                hand.slice_mut(s![t, j, ..]).assign(&ndarray::arr1(&[x + dx as f32, y + dy as f32, 0.9]));
+            }
+        }
+    }
+    keypoints
+}

@@ -1,0 +1,36 @@
+//! `orator bench`: how fast a part of the road is, measured so that a noisy machine cannot flatter it: the variants take
+//! turns, round after round, and the median round counts. One file a part.
+
+mod lift;
+mod lifter;
+mod pose2d;
+
+use super::{Outcome, ui::Ui};
+use anyhow::Result;
+
+/// Measure the speed of a part of the road.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    part: Part,
+}
+
+#[derive(clap::Subcommand)]
+enum Part {
+    Pose2d(pose2d::Args),
+    Lift(lift::Args),
+    Lifter(lifter::Args),
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    match args.part {
+        Part::Pose2d(args) => pose2d::run(&args, ui),
+        Part::Lift(args) => lift::run(&args, ui),
+        Part::Lifter(args) => lifter::run(&args, ui),
+    }
+}
+
+fn median(mut numbers: Vec<f64>) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    numbers.get(numbers.len() / 2).copied().unwrap_or(f64::NAN)
+}
