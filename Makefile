@@ -81,6 +81,7 @@ export ORATOR_REFERENCE_PYTHON ?= python3
 prove: build
 	ORATOR_KILLS=20 ORATOR_LONG=1 cargo test --release --locked --test it -- --nocapture --test-threads 1 kill:: memory::
 	cargo test --release --locked --test it -- --nocapture --test-threads 1 golden:: pose_parity:: real::
+	$(ORATOR) bench lift
 	if [ -e $(CLIP) ]; then $(ORATOR) bench pose2d $(CLIP) --models-dir $(MODELS); else echo 'SKIPPED: $(CLIP) is not there'; fi
 	if [ ! -e $(CLIP) ] || [ ! -e $(REFERENCE) ]; then echo 'SKIPPED: $(CLIP) or $(REFERENCE) is not there'; \
 	elif ! "$$ORATOR_REFERENCE_PYTHON" -c 'import onnxruntime, cv2, numpy' 2>/dev/null; then \

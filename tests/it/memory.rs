@@ -79,5 +79,5 @@ fn lifting_holds_its_arrays_and_little_more() {
     eprintln!(
         "900 frames {short:.0} MiB, {n_frames} frames {long:.0} MiB: {grown:.0} MiB more, the arrays {arrays:.0}"
     );
-    assert!(short > 10.0 && grown <= 1.4 * arrays + 16.0, "{grown:.0} MiB more for {arrays:.0} MiB of arrays");
+    assert!(short > 10.0 && grown <= 1.4 * arrays + 32.0, "{grown:.0} MiB more for {arrays:.0} MiB of arrays");
 }
