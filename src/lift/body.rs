@@ -22,6 +22,8 @@ const SIZE_FRAMES: f64 = 15.0;
 const STRAY_FRAMES: f64 = 2.0;
 /// Frames at that rate that are lifted in one go, so that no more poses are held at a time.
 const GO: f64 = 4096.0;
+/// Frames at that rate, before and after, that the lifter may look at beyond its window.
+const MARGIN: f64 = 128.0;
 
 /// Which of the nine points each arm joint is.
 const ARM_JOINTS: [(usize, usize); 6] = [
@@ -49,8 +51,8 @@ pub fn lift(
     let sight = Sight::of(keypoints, interval, frames(STRAY_FRAMES).max(2), max_gap);
     let n_frames = interval.n_frames();
     let mut sizes = vec![f32::NAN; n_frames];
-    // a frame is placed by the frames of its window, which lie within this many
-    let margin = (lifter.net().config().receptive_field() as f64 * step.max(1.0)).ceil() as usize;
+    // a frame is placed by frames that lie within this many
+    let margin = frames(MARGIN.max(lifter.net().config().receptive_field() as f64)).max(1);
     for first in (0..n_frames).step_by(frames(GO).max(1)) {
         let end = n_frames.min(first + frames(GO).max(1));
         let from = first.saturating_sub(margin);

@@ -19,6 +19,10 @@ const COMMON: [f64; 3] = [0.354, 0.293, 0.253];
 const BELIEVED: (f64, f64) = (0.75, 1.3);
 /// The middle finger's first phalanx in forearms (house measure: 48 mm for a forearm of 0.24 m).
 const PHALANX_OF_FOREARM: f64 = 0.20;
+/// That phalanx in bones of the hand together (the means that `train::hand_shape` cites), and how far from it the lifted
+/// one is believed, as a ratio: a finger that points at the camera throughout must not make the hand large.
+const PHALANX_OF_HAND: f64 = 1.0 / 18.0;
+const PHALANX_BELIEVED: (f64, f64) = (0.85, 1.2);
 
 /// The lengths in metres of bones 1..=48 of a lifted motion (hands of any one size, each in its own frame with the
 /// root at 0); 0: a hand never seen, and the hand roots.
@@ -65,7 +69,8 @@ fn hands(motion: &Motion, forearm: f64) -> Option<[f64; N_HAND]> {
         // A bone that is never seen (a detector may leave points out) is as long as it was lifted.
         *length = median(of_roots(seen_lengths)).or_else(|| median(of_roots(lifted_lengths)))?.into();
     }
-    let phalanx = lengths[10];
+    let usual = PHALANX_OF_HAND * lengths.iter().sum::<f64>();
+    let phalanx = lengths[10].clamp(PHALANX_BELIEVED.0 * usual, PHALANX_BELIEVED.1 * usual);
     (phalanx > 1e-9).then(|| lengths.map(|length| length * PHALANX_OF_FOREARM * forearm / phalanx))
 }
 

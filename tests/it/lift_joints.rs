@@ -3,7 +3,7 @@
 use crate::lift::{keypoints, lifter};
 use ndarray::{Array3, s};
 use orator::motion::upper_body::{L_WRIST, R_WRIST, metres_per_unit};
-use orator::train::body_scene::Scene;
+use orator::train::body_scene::{Filming, Scene};
 use orator::train::hand_shape;
 use orator::types::interval::Interval;
 use orator::types::pose2d::Keypoints;
@@ -46,7 +46,7 @@ fn every_bone_has_one_length_to_the_last_digit() {
     let lifter = lifter();
     let mut worst = 0.0f64;
     for _ in 0..3 {
-        let mut keypoints = keypoints(&Scene::of_rule(120, false, &mut rng), &mut rng);
+        let mut keypoints = keypoints(&Scene::of_rule(Filming::Training, 120, &mut rng), &mut rng);
         with_moving_hands(&mut keypoints, &mut rng);
         let intervals = [Interval { start: 0, end: 70 }, Interval { start: 70, end: 120 }];
         let lifted = lifter.lift_intervals(&keypoints, &intervals).unwrap();
@@ -69,7 +69,7 @@ fn every_bone_has_one_length_to_the_last_digit() {
 fn hands_that_go_and_come_back() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let lifter = lifter();
-    let mut keypoints = keypoints(&Scene::of_rule(150, true, &mut rng), &mut rng);
+    let mut keypoints = keypoints(&Scene::of_rule(Filming::Clean, 150, &mut rng), &mut rng);
     with_moving_hands(&mut keypoints, &mut rng);
     let whole = lifter.lift(&keypoints).unwrap();
     let told = |motion: &Motion, root: usize| -> Vec<bool> {
@@ -117,7 +117,7 @@ fn wrists_move_as_they_did_and_rest_when_they_rest() {
     let (mut error, mut true_speed, mut n) = (0.0, 0.0, 0);
     let mut still = Vec::new();
     for _ in 0..20 {
-        let scene = Scene::of_rule(60, false, &mut rng);
+        let scene = Scene::of_rule(Filming::Training, 60, &mut rng);
         let joints = lifter.lift(&keypoints(&scene, &mut rng)).unwrap().joints;
         let grow = metres_per_unit(&scene.truth);
         for (joint, point) in [(skeleton::R_WRIST, R_WRIST), (skeleton::L_WRIST, L_WRIST)] {

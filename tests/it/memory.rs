@@ -7,7 +7,7 @@ use crate::lift::keypoints;
 use crate::support::Project;
 use ndarray::{Array3, s};
 use ndarray_npy::NpzWriter;
-use orator::train::body_scene::Scene;
+use orator::train::body_scene::{Filming, Scene};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::process::{Child, Command, Stdio};
@@ -53,7 +53,7 @@ fn peak_memory_stays_with_a_longer_video() {
 /// Peak resident memory in MiB of `orator lift` of so many frames, and of the arrays that it reads and writes.
 fn peak_of_lift(n_frames: usize) -> (f64, f64) {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let minute = keypoints(&Scene::of_rule(900, false, &mut rng), &mut rng);
+    let minute = keypoints(&Scene::of_rule(Filming::Training, 900, &mut rng), &mut rng);
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("k.npz");
     let mut npz = NpzWriter::new(std::fs::File::create(&path).unwrap());

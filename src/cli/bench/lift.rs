@@ -10,7 +10,7 @@ use orator::lift::{Lifter, weights};
 use orator::motion::upper_body::{L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, NOSE, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST};
 use orator::nn::{Mode, body_lifter::BodyLifter, hand_lifter::HandLifter};
 use orator::stage::progress::Progress;
-use orator::train::body_scene::Scene;
+use orator::train::body_scene::{Filming, Scene};
 use orator::train::hand_shape;
 use orator::types::pose2d::{Keypoints, coco};
 use orator::types::time::FrameRate;
@@ -118,7 +118,7 @@ fn networks(body: &BodyLifter, hands: &HandLifter, n_frames: usize) -> Result<()
 /// A speaker made by rule, filmed with noise and gaps, a hand of one shape at each wrist.
 fn made_by_rule(n_frames: usize) -> Keypoints {
     let mut rng = ChaCha8Rng::seed_from_u64(1337);
-    let scene = Scene::of_rule(n_frames, false, &mut rng);
+    let scene = Scene::of_rule(Filming::Training, n_frames, &mut rng);
     let shape = hand_shape::draw(&mut rng);
     let none = Array3::zeros((n_frames, 21, 3));
     let mut keypoints = Keypoints {
