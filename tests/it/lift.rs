@@ -94,7 +94,7 @@ fn known_motion_is_found_again() {
     let lifter = lifter();
     let (mut sum, mut mean_sum, n) = (0.0, 0.0, 20);
     for _ in 0..n {
-        let scene = Scene::of_rule(Filming::Training, 90, &mut rng);
+        let scene = Scene::of_rule(Filming::Drop, 90, &mut rng);
         let motion = lifter.lift(&keypoints(&scene, &mut rng)).unwrap();
         sum += error_mm(&motion, &scene.truth);
         // a constant pose for comparison: the truth's first frame, better than any mean of strangers
@@ -177,7 +177,8 @@ fn a_finger_tip_never_seen_is_lifted_all_the_same() {
     let lifted = lifter().lift_intervals(&k, &[Interval { start: 0, end: 40 }]).unwrap();
     for root in [L_HAND, R_HAND] {
         for joint in root + 1..root + 21 {
-            assert!((0.005..0.15).contains(&lifted.lengths[joint - 1]), "{}", skeleton::name(joint));
+            let length = lifted.lengths[joint - 1];
+            assert!((0.003..0.18).contains(&length), "{} is {length} m", skeleton::name(joint));
         }
         assert!(!lifted.motion.mask[[20, root + 20]] && lifted.motion.mask[[20, root + 19]]);
     }
