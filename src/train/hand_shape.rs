@@ -3,7 +3,7 @@
 use crate::motion::hand_bones::{BONES, FAN, direction};
 use crate::motion::hand_view::Hand;
 use crate::motion::rotation::Rotation;
-use crate::motion::vec3;
+use crate::motion::vec3::{self, Vec3};
 use crate::types::pose2d::N_HAND;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -12,42 +12,77 @@ use rand_distr::StandardNormal;
 /// A right hand, metres, the wrist at 0, upright: fingers along -y, thumb towards +x, the palm facing -z.
 pub fn draw(rng: &mut ChaCha8Rng) -> Hand {
     let size = 1.08e-3 * about(rng, 0.08);
-    let palm = about(rng, 0.10);
+    let palm = about(rng, 0.12);
     let mut hand: Hand = [[0.0; 3]; N_HAND];
-    // open hands, fists and everything between; each finger goes its own way now and then
-    let curl: f64 = rng.random_range(-0.1f64..1.0).max(0.0).powf(1.8);
-    let spread: f64 = rng.random_range(-0.4..1.2);
-    let own = if rng.random_bool(0.35) { 0.45 } else { 0.12 };
+    let manner = Manner::draw(rng);
+    // the palm is hollow: its edges lie nearer to the viewer it faces
+    let hollow = rng.random_range(0.0..0.07);
     for finger in 1..5 {
         let mut length = BONES[finger].map(|mm| mm * size * about(rng, 0.07));
         length[0] *= palm;
         let fan = (FAN[finger] + 3.0 * normal(rng)).to_radians();
-        // the palm is hollow: its edges lie nearer to the viewer it faces
-        let hollow = (0.02 + 0.05 * rng.random_range(0.0..1.0)) * ((finger as f64 - 2.3).abs() - 0.7).max(0.0);
-        let base = direction(fan, hollow.asin());
-        let curl = (curl + own * normal(rng)).clamp(-0.15, 1.1);
-        let abduction = fan * (0.3 + 0.7 * spread * (1.0 - 0.6 * curl.max(0.0))) + 0.07 * normal(rng);
-        let first = (80.0 * curl + 12.0 * normal(rng) + rng.random_range(-15.0..15.0)).clamp(-25.0, 92.0);
-        let second = (100.0 * curl + 15.0 * normal(rng) + 8.0).clamp(-5.0, 112.0);
-        let third = (second * rng.random_range(0.35..0.85)).clamp(-5.0, 80.0);
+        let edge = ((finger as f64 - 2.3).abs() - 0.7).max(0.0);
         let root = 1 + 4 * finger;
-        hand[root] = vec3::scale(base, length[0]);
+        hand[root] = vec3::scale(direction(fan, (hollow * edge + 0.015 * normal(rng)).asin()), length[0]);
+        let (abduction, bends) = manner.finger(finger, fan, rng);
         let mut flexion = 0.0;
-        for (k, bend) in [first, second, third].into_iter().enumerate() {
+        for (k, bend) in bends.into_iter().enumerate() {
             flexion += bend.to_radians();
             hand[root + k + 1] = vec3::add(hand[root + k], vec3::scale(direction(abduction, flexion), length[k + 1]));
         }
     }
     thumb(&mut hand, size, rng);
+    // what people and detectors call the wrist is not one point
+    let wrist: Vec3 = [4.0, 6.0, 3.0].map(|mm| 1e-3 * mm * normal(rng));
+    hand.iter_mut().skip(1).for_each(|p| *p = vec3::sub(*p, wrist));
     hand
+}
+
+/// What the four fingers have in common: they go together, as the muscles of the forearm move them.
+struct Manner {
+    /// 0 straight, 1 a fist.
+    curl: f64,
+    /// How much more curled each finger is than its neighbour on the thumb's side.
+    slope: f64,
+    /// How much each finger goes its own way.
+    own: f64,
+    /// Degrees that all first, and all second joints bend more than the curl says: flat hands bent at the knuckles,
+    /// hooks.
+    more: [f64; 2],
+    /// Shares of the palm's fan that the fingers keep: below 0 crossed, 1 spread.
+    spread: f64,
+}
+
+impl Manner {
+    fn draw(rng: &mut ChaCha8Rng) -> Self {
+        Self {
+            curl: rng.random_range(-0.1f64..1.0).max(0.0).powf(1.8),
+            slope: 0.04 + 0.08 * normal(rng),
+            own: if rng.random_bool(0.3) { 0.4 } else { 0.08 },
+            more: [15.0 * normal(rng), 12.0 * normal(rng)],
+            spread: rng.random_range(-0.4..1.2),
+        }
+    }
+
+    /// Abduction in radians and the three bends in degrees.
+    fn finger(&self, finger: usize, fan: f64, rng: &mut ChaCha8Rng) -> (f64, [f64; 3]) {
+        let curl = self.curl + self.slope * (finger as f64 - 2.5) + self.own * normal(rng);
+        let curl = curl.clamp(-0.15, 1.1);
+        let abduction = fan * (0.3 + 0.7 * self.spread * (1.0 - 0.6 * curl.max(0.0))) + 0.07 * normal(rng);
+        let first = (80.0 * curl + self.more[0] + 9.0 * normal(rng)).clamp(-30.0, 95.0);
+        let second = (100.0 * curl + self.more[1] + 12.0 * normal(rng) + 8.0).clamp(-8.0, 112.0);
+        let third = (second * rng.random_range(0.25..0.85) + 6.0 * normal(rng)).clamp(-15.0, 80.0);
+        (abduction, [first, second, third])
+    }
 }
 
 /// The thumb roams widely: its saddle joint opens it sideways and lays it before the palm.
 fn thumb(hand: &mut Hand, size: f64, rng: &mut ChaCha8Rng) {
-    let length = BONES[0].map(|mm| mm * size * about(rng, 0.09));
-    let base = direction((FAN[0] + 8.0 * normal(rng)).to_radians(), 0.25 + 0.15 * normal(rng));
-    let aside = (38.0 + 20.0 * normal(rng)).clamp(-20.0, 85.0);
-    let before = (28.0 + 22.0 * normal(rng)).clamp(-20.0, 80.0);
+    let mut length = BONES[0].map(|mm| mm * size * about(rng, 0.10));
+    length[0] *= about(rng, 0.15);
+    let base = direction((FAN[0] + 12.0 * normal(rng)).to_radians(), 0.28 + 0.2 * normal(rng));
+    let aside = (36.0 + 20.0 * normal(rng)).clamp(-20.0, 85.0);
+    let before = (26.0 + 22.0 * normal(rng)).clamp(-20.0, 80.0);
     let mut along = direction(aside.to_radians(), before.to_radians());
     // it bends across the palm, about an axis that is its own
     let across = vec3::unit([-1.0 + 0.4 * normal(rng), -0.1 + 0.4 * normal(rng), -0.5 + 0.4 * normal(rng)], 1e-6);
@@ -55,7 +90,7 @@ fn thumb(hand: &mut Hand, size: f64, rng: &mut ChaCha8Rng) {
     hand[1] = vec3::scale(base, length[0]);
     for k in 0..3 {
         hand[k + 2] = vec3::add(hand[k + 1], vec3::scale(along, length[k + 1]));
-        let bend: f64 = if k == 0 { rng.random_range(-12.0..60.0) } else { rng.random_range(-20.0..80.0) };
+        let bend: f64 = if k == 0 { rng.random_range(-12.0..55.0) } else { rng.random_range(-25.0..75.0) };
         along = Rotation::about(axis, bend.to_radians()).turn(along);
     }
 }

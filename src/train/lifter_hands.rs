@@ -53,8 +53,8 @@ impl HandLesson {
     }
 }
 
-/// A hand from any side at 5 to 20 of its lengths, in px; noise 2 % of the palm more or less, sometimes a finger that
-/// the detector can only guess, sometimes points missing.
+/// A hand from any side at 5 to 20 of its lengths, in px; noise 2 % of the palm more or less, a part of it common to
+/// a finger; sometimes a finger that the detector can only guess, sometimes points missing.
 fn sample(rng: &mut ChaCha8Rng) -> Sample {
     let (shape, turn) = (draw(rng), any_turn(rng));
     let turned = shape.map(|p| turn.turn(p));
@@ -62,17 +62,42 @@ fn sample(rng: &mut ChaCha8Rng) -> Sample {
     let px_per_metre: f64 = 1000.0;
     let palm_px = px_per_metre * vec3::norm(shape[9]);
     let much = 0.02 * palm_px * rng.random_range(-1.1f64..0.6).exp();
-    let guessed = if rng.random_bool(0.25) { rng.random_range(0..5) } else { 5 };
-    let missing = if rng.random_bool(0.05) { rng.random_range(0.0..0.3) } else { 0.0 };
+    let guessed = if rng.random_bool(0.2) { rng.random_range(0..5) } else { 5 };
+    let fingers: [[f64; 2]; 5] = std::array::from_fn(|f| {
+        let common = if f == guessed { 2.0 } else { 0.4 };
+        [common * much * normal(rng), common * much * normal(rng)]
+    });
+    let gone = missing(rng);
     let mut seen = [None; N_HAND];
     for (j, point) in seen.iter_mut().enumerate() {
-        let noise = if j > 0 && (j - 1) / 4 == guessed { 3.0 * much } else { much };
+        let finger = j.checked_sub(1).map(|k| k / 4);
+        let noise = if finger == Some(guessed) { 2.0 * much } else { 0.92 * much };
+        let moved = finger.map_or([0.0; 2], |f| fingers[f]);
         let grow = px_per_metre * distance / (distance + turned[j][2]);
-        let at = [turned[j][0] * grow + noise * normal(rng), turned[j][1] * grow + noise * normal(rng)];
-        *point = (j == 0 || j == 9 || !rng.random_bool(missing)).then_some(at.map(|v| v as f32));
+        let at = [0, 1].map(|k| turned[j][k] * grow + moved[k] + noise * normal(rng));
+        *point = (!gone[j]).then_some(at.map(|v| v as f32));
     }
     // the view hangs on the wrist that is seen, the truth on the true one: the same within the noise
     Sample { truth: turned.map(|p| vec3::scale(p, px_per_metre)), seen }
+}
+
+/// Points that a detector does not give: mostly none, else some anywhere, a finger, all tips, or all knuckles but the
+/// middle finger's (the view needs one).
+fn missing(rng: &mut ChaCha8Rng) -> [bool; N_HAND] {
+    let gone: [bool; N_HAND] = match rng.random_range(0..50) {
+        0 | 1 => {
+            let share = rng.random_range(0.0..0.3);
+            std::array::from_fn(|_| rng.random_bool(share))
+        }
+        2 => {
+            let finger = rng.random_range(0..5);
+            std::array::from_fn(|j| (j + 3) / 4 == finger + 1)
+        }
+        3 => std::array::from_fn(|j| j > 0 && j % 4 == 0),
+        4 => std::array::from_fn(|j| j % 4 == 1),
+        _ => [false; N_HAND],
+    };
+    std::array::from_fn(|j| gone[j] && j != 0 && j != 9)
 }
 
 impl Lesson for HandLesson {
