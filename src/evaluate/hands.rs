@@ -15,7 +15,10 @@ use crate::motion::hand_view::{Hand, SeenHand, parent};
 use crate::motion::procrustes;
 use crate::motion::vec3;
 use crate::nn::hand_lifter::HandLifter;
+use crate::train::checkpoint::Contents;
 use crate::train::hand_shape::{any_turn, normal};
+use crate::train::lifter::start_from;
+use crate::train::lifter_heatmaps::{self, HeatmapLesson};
 use crate::types::pose2d::N_HAND;
 use crate::types::skeleton::Side;
 use anyhow::{Result, ensure};
@@ -74,8 +77,13 @@ pub fn evaluate(lift: &Lift, sets: &[FingerSet], n_hands: usize, seed: u64) -> R
     sets.iter().map(|set| row(lift, set, n_hands, seed)).collect()
 }
 
-/// What the weights of a file (the built-in ones where `path` is empty) lift.
+/// What the weights of a file (the built-in ones where `path` is empty) lift, of either network.
 pub fn lifter_of(path: &Path) -> Result<Box<Lift<'static>>> {
+    if !path.as_os_str().is_empty() && Contents::read(path)?.facts["kind"] == lifter_heatmaps::KIND {
+        let lesson = HeatmapLesson::new(0)?;
+        start_from(&lesson, path)?;
+        return Ok(Box::new(move |seen| Ok(lesson.lifter().lift(seen, Side::Right)?)));
+    }
     let lifter: HandLifter = weights::hands(path)?;
     Ok(Box::new(move |seen| Ok(lifter.lift(seen, Side::Right)?)))
 }

@@ -13,6 +13,7 @@ pub mod finger_npz;
 pub mod finger_take;
 pub mod fk;
 pub mod hand_bones;
+pub mod hand_maps;
 pub mod hand_view;
 pub mod joint_names;
 pub mod joints_npz;

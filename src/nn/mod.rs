@@ -6,12 +6,14 @@
 pub mod batch_norm;
 pub mod body_lifter;
 pub mod conv1d;
+pub mod conv3x3;
 pub mod conv_block;
 pub mod cpu;
 pub mod discriminator;
 pub mod dropout;
 pub mod finite_difference;
 pub mod hand_lifter;
+pub mod heatmap_lifter;
 pub mod linear;
 pub mod params;
 pub mod resize;

@@ -34,6 +34,12 @@ pub trait Lesson: Send + Sync {
     fn draw(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]);
     /// [B, shape in] to [B, 3 x points].
     fn forward(&self, x: &Tensor, mode: &mut Mode) -> candle_core::Result<Tensor>;
+    /// The loss of what came out, [B, points, 3], against what should have; `weights` [1, points] of mean 1. The mean
+    /// distance of the points unless the lesson knows better.
+    fn loss(&self, out: &Tensor, wanted: &Tensor, weights: &Tensor) -> candle_core::Result<Tensor> {
+        let distance = ((out - wanted)?.sqr()?.sum(2)? + 1e-8)?.sqrt()?;
+        distance.broadcast_mul(weights)?.mean_all()
+    }
     /// How much a batch counts in running statistics, if the network has such.
     fn set_momentum(&mut self, momentum: f64);
     /// Errors on held-out samples, a line each; `brief`: of the network alone, on fewer.
@@ -142,9 +148,8 @@ fn train_until(
         // the running statistics settle as the training does: 0.1 falls to 0.001
         lesson.set_momentum(0.1 * (-(step as f64 / schedule.steps as f64) * 100f64.ln()).exp());
         let mut rng = stream(schedule.seed, step, schedule.batch, schedule.batch);
-        let off = (lesson.forward(&x, &mut Mode::Train(&mut rng))?.reshape(y.shape())? - y)?;
-        let distance = (off.sqr()?.sum(2)? + 1e-8)?.sqrt()?;
-        let loss = distance.broadcast_mul(&weights)?.mean_all()?;
+        let lifted = lesson.forward(&x, &mut Mode::Train(&mut rng))?.reshape(y.shape())?;
+        let loss = lesson.loss(&lifted, &y, &weights)?;
         let norm = adam.step(&loss.backward()?, schedule.learning_rate(step))?;
         ensure!(norm.is_finite(), "step {step}: the gradient is not finite; try a smaller --learning-rate");
         sum += f64::from(loss.to_scalar::<f32>()?);
@@ -227,6 +232,7 @@ mod tests {
     use crate::stage::progress::Silent;
     use crate::train::lifter_body::BodyLesson;
     use crate::train::lifter_hands::HandLesson;
+    use crate::train::lifter_heatmaps::HeatmapLesson;
 
     const SCHEDULE: Schedule =
         Schedule { steps: 6, batch: 8, learning_rate: 1e-3, seed: 3, checkpoint_every: 2, started_from: None };
@@ -257,6 +263,11 @@ mod tests {
     #[test]
     fn an_interrupted_hand_training_ends_in_the_same_bytes() {
         resumed_equals_straight(|| Box::new(HandLesson::new(16, 3).unwrap()));
+    }
+
+    #[test]
+    fn an_interrupted_heatmap_training_ends_in_the_same_bytes() {
+        resumed_equals_straight(|| Box::new(HeatmapLesson::new(3).unwrap()));
     }
 
     #[test]

@@ -7,6 +7,7 @@ use orator::nn::body_lifter::BodyLifter;
 use orator::train::lifter::{Lesson, Schedule, start_from, train};
 use orator::train::lifter_body::BodyLesson;
 use orator::train::lifter_hands::HandLesson;
+use orator::train::lifter_heatmaps::HeatmapLesson;
 use std::path::PathBuf;
 
 /// Train the networks that lift 2D keypoints to 3D joints.
@@ -19,6 +20,9 @@ pub struct Args {
     /// body or hands.
     #[arg(long, value_enum)]
     part: Part,
+    /// hands: the network.
+    #[arg(long, value_enum, default_value = "coordinates")]
+    network: HandNetwork,
     /// Captured motion to learn from (body): .bvh or .npz files, or folders of them; may be given several times.
     #[arg(long, value_name = "PATH", num_args = 1..)]
     mocap: Vec<PathBuf>,
@@ -32,7 +36,7 @@ pub struct Args {
     /// Start from these weights instead of the seed's; with `--steps 0` their errors are measured, nothing is written.
     #[arg(long, value_name = "FILE")]
     start: Option<PathBuf>,
-    /// Training steps [default: 9000 body, 5000 hands]
+    /// Training steps [default: 9000]
     #[arg(long, hide_default_value = true)]
     steps: Option<usize>,
     /// Samples a step.
@@ -44,7 +48,7 @@ pub struct Args {
     /// Kernel widths of the body lifter, odd; their product is the frames it looks at (at 15 a second).
     #[arg(long, value_name = "N", num_args = 1.., default_values_t = [3, 3, 3])]
     widths: Vec<usize>,
-    /// Channels of the network [default: 256 body, 768 hands]
+    /// Channels of the network [default: 256 body, 896 hands]
     #[arg(long, hide_default_value = true)]
     width: Option<usize>,
     /// The same seed gives the same weights.
@@ -59,6 +63,14 @@ pub struct Args {
 enum Part {
     Body,
     Hands,
+}
+
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum HandNetwork {
+    /// A perceptron on the points' coordinates; what `lift` uses.
+    Coordinates,
+    /// Convolutions over score maps (Zimmermann & Brox 2017), for comparison; slow.
+    Heatmap,
 }
 
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
@@ -82,7 +94,10 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
                 args.mocap.is_empty() && args.hold_out.is_empty(),
                 "the hand lifter learns from hands made by rule: no --mocap"
             );
-            (Box::new(HandLesson::new(args.width.unwrap_or(768), args.seed)?), 5000)
+            match args.network {
+                HandNetwork::Coordinates => (Box::new(HandLesson::new(args.width.unwrap_or(896), args.seed)?), 9000),
+                HandNetwork::Heatmap => (Box::new(HeatmapLesson::new(args.seed)?), 9000),
+            }
         }
     };
     let started_from = args.start.as_deref().map(|path| start_from(&*lesson, path)).transpose()?;
