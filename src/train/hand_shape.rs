@@ -124,7 +124,7 @@ mod tests {
         for _ in 0..n {
             let hand = draw(&mut rng);
             assert!(hand[5][0] > hand[17][0], "the index is on the thumb's side");
-            assert!(hand[9][1] < -0.05 && hand[9][1] > -0.16);
+            assert!(hand[9][1] < -0.035 && hand[9][1] > -0.18);
             thumb += usize::from(hand[2][0] > hand[17][0]);
             towards += usize::from((5..21).map(|j| hand[j][2]).sum::<f64>() < 0.0);
         }

@@ -232,7 +232,6 @@ mod tests {
     use crate::stage::progress::Silent;
     use crate::train::lifter_body::BodyLesson;
     use crate::train::lifter_hands::HandLesson;
-    use crate::train::lifter_heatmaps::HeatmapLesson;
 
     const SCHEDULE: Schedule =
         Schedule { steps: 6, batch: 8, learning_rate: 1e-3, seed: 3, checkpoint_every: 2, started_from: None };
@@ -263,11 +262,6 @@ mod tests {
     #[test]
     fn an_interrupted_hand_training_ends_in_the_same_bytes() {
         resumed_equals_straight(|| Box::new(HandLesson::new(16, 3).unwrap()));
-    }
-
-    #[test]
-    fn an_interrupted_heatmap_training_ends_in_the_same_bytes() {
-        resumed_equals_straight(|| Box::new(HeatmapLesson::new(3).unwrap()));
     }
 
     #[test]

@@ -14,6 +14,7 @@ mod footage;
 mod gan;
 mod generate;
 mod golden;
+mod heatmap_parity;
 mod house;
 mod kill;
 mod lift;
