@@ -128,7 +128,7 @@ mod tests {
             thumb += usize::from(hand[2][0] > hand[17][0]);
             towards += usize::from((5..21).map(|j| hand[j][2]).sum::<f64>() < 0.0);
         }
-        assert!(thumb > n * 19 / 20 && towards > n * 9 / 10, "{thumb} {towards}");
+        assert!(thumb > n * 19 / 20 && towards > n * 17 / 20, "{thumb} {towards}");
     }
 
     #[test]
