@@ -29,7 +29,8 @@ const ELBOW: &[&str] = &["forearm", "lowerarm", "lowarm", "radius", "elbow"];
 const WRIST: &[&str] = &["wrist", "hand"];
 const HIP: &[&str] = &["upleg", "upperleg", "thigh", "femur", "hip", "leg"];
 
-/// Which of `names` plays each of the ten roles. Errors: the roles nobody plays, and the names there are.
+/// Which of `names`, the root first, plays each of the ten roles; the root stands for both hips where a skeleton has
+/// none. Errors: the roles nobody plays, and the names there are.
 pub fn upper_body(names: &[&str]) -> Result<[usize; 10]> {
     let plain: Vec<String> = names.iter().map(|name| plain(name)).collect();
     let find = |stems: &[&str], side: Option<[&str; 2]>| {
@@ -54,7 +55,8 @@ pub fn upper_body(names: &[&str]) -> Result<[usize; 10]> {
         find(HIP, right),
         find(HIP, left),
     ];
-    let missing: Vec<&str> = ROLES.iter().zip(found).filter_map(|(role, f)| f.is_none().then_some(*role)).collect();
+    let found = if found[8..] == [None, None] { [&found[..8], &[Some(0); 2]].concat() } else { found.to_vec() };
+    let missing: Vec<&str> = ROLES.iter().zip(&found).filter_map(|(role, f)| f.is_none().then_some(*role)).collect();
     if !missing.is_empty() {
         let there: Vec<&str> = names.iter().copied().take(40).collect();
         bail!(
@@ -64,7 +66,7 @@ pub fn upper_body(names: &[&str]) -> Result<[usize; 10]> {
             there.join(" ")
         );
     }
-    Ok(found.map(|f| f.unwrap_or_default()))
+    Ok(std::array::from_fn(|role| found[role].unwrap_or_default()))
 }
 
 /// Without the skeleton's prefix, case and separators.
@@ -118,9 +120,12 @@ mod tests {
             }
             assert!(found[2..5].iter().all(|n| !plain(n).starts_with("left")), "{found:?}");
         }
-        let names = ["Neck", "Head", "LeftShoulder", "LeftArm", "RightArm", "Tail"];
+        let legless = "Pelvis Neck Head LeftArm LeftForeArm LeftHand RightArm RightForeArm RightHand";
+        let names: Vec<&str> = legless.split_whitespace().collect();
+        assert_eq!(upper_body(&names).unwrap()[8..], [0, 0]);
+        let names = ["Neck", "Head", "LeftShoulder", "LeftArm", "RightArm", "LeftLeg", "Tail"];
         let text = upper_body(&names).unwrap_err().to_string();
-        assert!(text.contains("right elbow") && text.contains("left hip") && text.contains("Tail"), "{text}");
+        assert!(text.contains("right elbow") && text.contains("right hip") && text.contains("Tail"), "{text}");
         assert!(!text.contains("left shoulder,"), "{text}");
     }
 }

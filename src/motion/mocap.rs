@@ -185,7 +185,10 @@ fn upper_body(joints: &[Vec3]) -> Pose {
     let ahead = vec3::unit(vec3::cross(across, up), 1e-9).unwrap_or([0.0, 0.0, 1.0]);
     let up = vec3::unit(up, 1e-9).unwrap_or([0.0, 1.0, 0.0]);
     let nose = vec3::add(vec3::add(joints[1], vec3::scale(up, 0.06)), vec3::scale(ahead, 0.11));
-    let order = [nose, joints[2], joints[3], joints[4], joints[5], joints[6], joints[7], joints[8], joints[9]];
+    // a skeleton without legs has its root for both hips
+    let spread = if joints[8] == joints[9] { vec3::scale(across, 0.3) } else { [0.0; 3] };
+    let hips = [vec3::sub(joints[8], spread), vec3::add(joints[9], spread)];
+    let order = [nose, joints[2], joints[3], joints[4], joints[5], joints[6], joints[7], hips[0], hips[1]];
     order.map(|p| {
         let [x, y, z] = vec3::sub(p, neck);
         [x, -y, -z]
