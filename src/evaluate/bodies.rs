@@ -26,6 +26,9 @@ pub const SCENES: usize = 240;
 /// Bands of |yaw| that errors are given apart for, in degrees.
 const BANDS: [(f64, f64); 3] = [(0.0, 20.0), (20.0, 40.0), (40.0, 60.0)];
 
+/// The middle of the picture in px.
+const MIDDLE: [f32; 2] = [640.0, 360.0];
+
 /// COCO index of each of the nine points.
 const COCO: [usize; N_POINTS] = [
     coco::NOSE,
@@ -121,7 +124,7 @@ fn whole(lifter: &Lifter, scene: &Scene) -> Result<Vec<Option<Pose>>> {
     for (t, seen) in scene.seen.iter().enumerate() {
         for (joint, point) in COCO.into_iter().zip(seen) {
             if let Some([x, y]) = *point {
-                body.slice_mut(s![t, joint, ..]).assign(&ndarray::arr1(&[x, y, 1.0]));
+                body.slice_mut(s![t, joint, ..]).assign(&ndarray::arr1(&[x + MIDDLE[0], y + MIDDLE[1], 1.0]));
             }
         }
     }

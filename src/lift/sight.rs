@@ -3,7 +3,9 @@
 
 use super::gaps;
 use super::lengths::median;
-use crate::motion::upper_body::{L_ELBOW, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_ELBOW, R_SHOULDER, R_WRIST, Seen};
+use crate::motion::upper_body::{
+    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, Seen,
+};
 use crate::types::interval::Interval;
 use crate::types::pose2d::{Keypoints, coco};
 use ndarray::{Array2, Array3, s};
@@ -82,6 +84,11 @@ fn shown(keypoints: &Keypoints, t: usize) -> Seen {
     };
     let body = |j: usize| point(&keypoints.body, j);
     let mut shown = COCO.map(body);
+    // detectors put hips that the picture does not show somewhere below it
+    let [width, height] = keypoints.image_size.map(|px| px as f32);
+    for hip in [R_HIP, L_HIP] {
+        shown[hip] = shown[hip].filter(|[x, y]| (0.0..=width).contains(x) && (0.0..=height).contains(y));
+    }
     shown[R_WRIST] = shown[R_WRIST].or_else(|| point(&keypoints.right_hand, 0));
     shown[L_WRIST] = shown[L_WRIST].or_else(|| point(&keypoints.left_hand, 0));
     let nose_from_eyes = || {

@@ -46,13 +46,14 @@ pub fn keypoints(scene: &Scene, rng: &mut ChaCha8Rng) -> Keypoints {
     let n = scene.seen.len();
     let mut k = Keypoints {
         fps: FrameRate::new(15, 1),
-        image_size: [1280, 720],
+        image_size: [4000, 3000],
         body: Array3::zeros((n, 17, 3)),
         left_hand: Array3::zeros((n, 21, 3)),
         right_hand: Array3::zeros((n, 21, 3)),
     };
     let shape = hand_shape::draw(rng);
     for (t, seen) in scene.seen.iter().enumerate() {
+        let seen = seen.map(|p| p.map(|[x, y]| [x + 2000.0, y + 1500.0]));
         for (point, coco, _) in POINTS {
             if let Some([x, y]) = seen[point] {
                 k.body.slice_mut(s![t, coco, ..]).assign(&ndarray::arr1(&[x, y, 0.9]));

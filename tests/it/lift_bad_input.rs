@@ -66,7 +66,7 @@ impl Bench {
     }
 
     fn lifts(&self, k: &Keypoints, fps: &[f64]) -> (Array3<f32>, Array3<f32>, String) {
-        let answer = self.lift(k, fps, &[1280, 720]);
+        let answer = self.lift(k, fps, &[4000, 3000]);
         assert_eq!(answer.code, Some(0), "{}", answer.said);
         let (joints, extra) = (answer.joints.unwrap(), answer.extra.unwrap());
         assert_eq!((joints.dim().0, extra.dim()), (k.n_frames(), (k.n_frames(), 3, 3)));
@@ -87,7 +87,7 @@ fn what_cannot_be_lifted_says_so() {
         let body = Array3::from_shape_fn((n, joints, 3), |(t, j, c)| k.body[[t, j % 17, c]]);
         Keypoints { body, left_hand: piece(&k.left_hand), right_hand: piece(&k.right_hand), ..k.clone() }
     };
-    let (fps, size) = ([15.0, 1.0], [1280, 720]);
+    let (fps, size) = ([15.0, 1.0], [4000, 3000]);
     bench.fails(&cut(0, 17), &fps, &size, &["no frames", "at least 1"]);
     bench.fails(&cut(20, 18), &fps, &size, &["[20, 18, 3]", "[T, 17, 3]"]);
     bench.fails(&cut(20, 16), &fps, &size, &["[20, 16, 3]", "[T, 17, 3]"]);
