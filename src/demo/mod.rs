@@ -8,7 +8,7 @@
 /// Version of the generator. Version 2 fixed the figure's posture (commit 93b1773); the lifter trained afterwards, but
 /// its training was changed once when this figure's error was known, so the error is no blind test.
 pub const GENERATOR: &str = "synthetic speaker, version 2 (commit 93b1773); the lifter's training was changed once after \
-     its error here was seen (models/LIFTERS.md)";
+     its error here was seen (models/body_lifter.md)";
 
 pub mod camera;
 pub mod figure;

@@ -7,14 +7,11 @@
 
 use crate::lift::{Lifter, weights};
 use crate::motion::mocap::Set;
-use crate::motion::upper_body::{
-    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, Pose, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST,
-};
+use crate::motion::upper_body::{ARMS, COCO, L_HIP, N_POINTS, NOSE, Pose, R_HIP};
 use crate::train::body_errors::{Errors, mean_pose, of_method, with_bone_depth, with_mean_depth};
 use crate::train::body_scene::{FPS, Filming, Scene, scenes};
 use crate::types::interval::Interval;
-use crate::types::pose2d::{Keypoints, N_BODY, N_HAND, coco};
-use crate::types::skeleton;
+use crate::types::pose2d::{Keypoints, N_BODY, N_HAND};
 use crate::types::time::FrameRate;
 use crate::{config, nn::body_lifter::BodyLifter};
 use anyhow::{Result, ensure};
@@ -28,28 +25,6 @@ const BANDS: [(f64, f64); 3] = [(0.0, 20.0), (20.0, 40.0), (40.0, 60.0)];
 
 /// The middle of the picture in px.
 const MIDDLE: [f32; 2] = [640.0, 360.0];
-
-/// COCO index of each of the nine points.
-const COCO: [usize; N_POINTS] = [
-    coco::NOSE,
-    coco::R_SHOULDER,
-    coco::R_ELBOW,
-    coco::R_WRIST,
-    coco::L_SHOULDER,
-    coco::L_ELBOW,
-    coco::L_WRIST,
-    coco::R_HIP,
-    coco::L_HIP,
-];
-/// The skeleton's joint of the six points of the arms.
-const ARMS: [(usize, usize); 6] = [
-    (R_SHOULDER, skeleton::R_SHOULDER),
-    (R_ELBOW, skeleton::R_ELBOW),
-    (R_WRIST, skeleton::R_WRIST),
-    (L_SHOULDER, skeleton::L_SHOULDER),
-    (L_ELBOW, skeleton::L_ELBOW),
-    (L_WRIST, skeleton::L_WRIST),
-];
 
 /// The lifter as a user meets it, and its network alone.
 pub struct Lifters {
@@ -134,8 +109,8 @@ fn whole(lifter: &Lifter, scene: &Scene) -> Result<Vec<Option<Pose>>> {
     let point = |array: &Array3<f32>, t: usize, j: usize| std::array::from_fn(|k| f64::from(array[[t, j, k]]));
     let pose = |t: usize| {
         let mut pose: Pose = [[f64::NAN; 3]; N_POINTS];
-        for (j, joint) in ARMS {
-            pose[j] = point(&lifted.motion.joints, t, joint);
+        for joint in ARMS {
+            pose[joint] = point(&lifted.motion.joints, t, joint);
         }
         for (i, j) in [NOSE, R_HIP, L_HIP].into_iter().enumerate() {
             pose[j] = point(&lifted.extra, t, i);

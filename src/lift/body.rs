@@ -4,13 +4,11 @@ use super::Stretch;
 use super::gaps::long_gaps;
 use super::lengths::median;
 use super::sight::Sight;
-use crate::motion::upper_body::{
-    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, NOSE, Pose, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, REFERENCE_SIZE, Seen, size,
-};
+use crate::motion::upper_body::{ARMS, L_HIP, L_SHOULDER, NOSE, Pose, R_HIP, R_SHOULDER, REFERENCE_SIZE, Seen, size};
 use crate::nn::body_lifter::BodyLifter;
 use crate::types::interval::Interval;
 use crate::types::pose2d::Keypoints;
-use crate::types::skeleton::{self, NECK};
+use crate::types::skeleton::NECK;
 use anyhow::Result;
 use ndarray::s;
 
@@ -25,15 +23,6 @@ const GO: f64 = 4096.0;
 /// Frames at that rate, before and after, that the lifter may look at beyond its window.
 const MARGIN: f64 = 128.0;
 
-/// Which of the nine points each arm joint is.
-const ARM_JOINTS: [(usize, usize); 6] = [
-    (skeleton::R_SHOULDER, R_SHOULDER),
-    (skeleton::R_ELBOW, R_ELBOW),
-    (skeleton::R_WRIST, R_WRIST),
-    (skeleton::L_SHOULDER, L_SHOULDER),
-    (skeleton::L_ELBOW, L_ELBOW),
-    (skeleton::L_WRIST, L_WRIST),
-];
 /// Which of the nine points are lifted beside the joints.
 const EXTRA: [usize; 3] = [NOSE, R_HIP, L_HIP];
 
@@ -66,8 +55,8 @@ pub fn lift(
         }
     }
     to_reference(&sizes, frames(SIZE_FRAMES), into);
-    for (joint, point) in ARM_JOINTS {
-        into.mask.slice_mut(s![.., joint]).assign(&sight.seen.slice(s![.., point]));
+    for joint in ARMS {
+        into.mask.slice_mut(s![.., joint]).assign(&sight.seen.slice(s![.., joint]));
     }
     for t in 0..n_frames {
         into.mask[[t, NECK]] = sight.seen[[t, R_SHOULDER]] && sight.seen[[t, L_SHOULDER]];
@@ -78,8 +67,8 @@ pub fn lift(
 
 fn place(pose: &Pose, t: usize, into: &mut Stretch) {
     into.joints.slice_mut(s![t, NECK, ..]).fill(0.0);
-    for (joint, point) in ARM_JOINTS {
-        (0..3).for_each(|k| into.joints[[t, joint, k]] = pose[point][k] as f32);
+    for joint in ARMS {
+        (0..3).for_each(|k| into.joints[[t, joint, k]] = pose[joint][k] as f32);
     }
     for (i, point) in EXTRA.into_iter().enumerate() {
         (0..3).for_each(|k| into.extra[[t, i, k]] = pose[point][k] as f32);
@@ -102,8 +91,8 @@ fn forget_long_gaps(sight: &Sight, max_gap: usize, into: &mut Stretch) {
         let long = long_gaps(&sight.seen.column(point).to_vec(), max_gap);
         (0..long.len()).filter(move |&t| long[t])
     };
-    for (joint, point) in ARM_JOINTS {
-        frames(point).for_each(|t| into.joints.slice_mut(s![t, joint, ..]).fill(f32::NAN));
+    for joint in ARMS {
+        frames(joint).for_each(|t| into.joints.slice_mut(s![t, joint, ..]).fill(f32::NAN));
     }
     for (i, point) in EXTRA.into_iter().enumerate() {
         frames(point).for_each(|t| into.extra.slice_mut(s![t, i, ..]).fill(f32::NAN));

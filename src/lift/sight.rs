@@ -4,7 +4,7 @@
 use super::gaps;
 use super::lengths::median;
 use crate::motion::upper_body::{
-    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, Seen,
+    COCO, L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, Seen,
 };
 use crate::types::interval::Interval;
 use crate::types::pose2d::{Keypoints, coco};
@@ -23,19 +23,6 @@ const STRAY: f32 = 0.15;
 /// second pass untouched; on captured motion with strays of about an eighth of the shoulders the wrists' speed is 0.2 to 0.3 mm
 /// a frame less wrong.
 const STRAY_SPREAD: f32 = 2.0;
-
-/// COCO index of each of the nine points.
-const COCO: [usize; N_POINTS] = [
-    coco::NOSE,
-    coco::R_SHOULDER,
-    coco::R_ELBOW,
-    coco::R_WRIST,
-    coco::L_SHOULDER,
-    coco::L_ELBOW,
-    coco::L_WRIST,
-    coco::R_HIP,
-    coco::L_HIP,
-];
 
 /// Bones that tell how large the body appears.
 const BONES: [(usize, usize); 5] =

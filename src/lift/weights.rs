@@ -11,7 +11,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The built-in weights; `models/LIFTERS.md` says how they were made.
+/// The built-in weights; `models/body_lifter.md` says how they were made.
 pub const BODY: &[u8] = include_bytes!("../../models/body_lifter.safetensors");
 pub const HANDS: &[u8] = include_bytes!("../../models/hand_lifter.safetensors");
 /// Widest layer that is believed; the published ones have 1024 channels.

@@ -1,6 +1,8 @@
 //! The nine points of the upper body that the body lifter sees, and the size they are given.
 
 use super::vec3::{self, Vec3};
+use crate::types::pose2d::coco;
+use crate::types::skeleton;
 
 /// Nose, right shoulder, elbow, wrist, left the same, right hip, left hip.
 pub const N_POINTS: usize = 9;
@@ -13,6 +15,28 @@ pub const L_ELBOW: usize = 5;
 pub const L_WRIST: usize = 6;
 pub const R_HIP: usize = 7;
 pub const L_HIP: usize = 8;
+
+/// COCO index of each point.
+pub const COCO: [usize; N_POINTS] = [
+    coco::NOSE,
+    coco::R_SHOULDER,
+    coco::R_ELBOW,
+    coco::R_WRIST,
+    coco::L_SHOULDER,
+    coco::L_ELBOW,
+    coco::L_WRIST,
+    coco::R_HIP,
+    coco::L_HIP,
+];
+
+/// The points of the arms, which have the numbers of the skeleton's joints.
+pub const ARMS: std::ops::RangeInclusive<usize> = R_SHOULDER..=L_WRIST;
+const _: () = assert!(
+    R_SHOULDER == skeleton::R_SHOULDER
+        && R_WRIST == skeleton::R_WRIST
+        && L_SHOULDER == skeleton::L_SHOULDER
+        && L_WRIST == skeleton::L_WRIST
+);
 
 /// The same point of the other side.
 pub const MIRROR: [usize; N_POINTS] = [NOSE, L_SHOULDER, L_ELBOW, L_WRIST, R_SHOULDER, R_ELBOW, R_WRIST, L_HIP, R_HIP];

@@ -46,7 +46,7 @@ impl Proportions {
 /// Where a wrist may rest, relative to the neck, for the arm on the +x side: ranges of x, y, z in metres. The speaker
 /// faces -z. On measured talkers the mean wrist is 0.10 to 0.19 m before the neck, so the ranges begin near the body.
 type Place = [(f64, f64); 3];
-const LAP: Place = [(-0.08, 0.24), (0.36, 0.56), (-0.32, -0.04)];
+const LAP: Place = [(-0.08, 0.24), (0.36, 0.56), (-0.38, -0.08)];
 const DESK: Place = [(-0.10, 0.32), (0.20, 0.42), (-0.44, -0.12)];
 const FRONT: Place = [(-0.14, 0.42), (-0.04, 0.38), (-0.42, -0.05)];
 const RAISED: Place = [(-0.02, 0.48), (-0.48, 0.02), (-0.45, 0.0)];
@@ -67,7 +67,7 @@ struct Habit {
     back: (f64, f64),
 }
 
-const SEATED: (f64, f64) = (-0.9, 0.15);
+const SEATED: (f64, f64) = (-1.1, 0.0);
 const STANDING: (f64, f64) = (-0.5, 0.45);
 
 const HABITS: [Habit; 7] = [

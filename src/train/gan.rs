@@ -85,7 +85,7 @@ pub fn train(dataset: &Dataset, settings: &Gan, folder: &Path, progress: &dyn Pr
         progress.say(&format!("going on from {} (step {})", newest.display(), training.step));
     }
     let began_at = training.step;
-    let mut log = Log::open(folder, began_at)?;
+    let mut log = Log::open(&folder.join("metrics.jsonl"), began_at)?;
     let task = progress.begin(&format!("train {}", dataset.info().speaker), settings.steps as u64);
     task.advance(began_at.min(settings.steps) as u64);
 

@@ -3,6 +3,7 @@
 
 use super::adam::{self, Adam};
 use super::checkpoint::{Contents, expect_same};
+use super::log::Log;
 use crate::nn::Mode;
 use crate::nn::params::Params;
 use crate::stage::progress::Progress;
@@ -62,6 +63,8 @@ pub struct Schedule {
 
 /// Share of the steps over which the learning rate rises.
 const WARM_UP: f64 = 0.05;
+/// Steps between two lines of the log.
+const LOG_EVERY: usize = 20;
 /// Times the errors are measured on the way.
 const MEASURES: usize = 10;
 
@@ -100,20 +103,23 @@ pub fn start_from(lesson: &dyn Lesson, path: &Path) -> Result<String> {
 }
 
 /// Trains and writes the weights to `out`. A checkpoint beside it (`<out>.checkpoint`) lets an interrupted training
-/// go on, to the same bytes, when called again with the same schedule and data; it is removed at the end. Gives the
-/// errors on held-out samples; with no steps that is all it does.
+/// go on, to the same bytes, when called again with the same schedule and data; it is removed at the end. The log is
+/// `<out>.jsonl`. Gives the errors on held-out samples; with no steps that is all it does.
 pub fn train(lesson: &mut dyn Lesson, schedule: &Schedule, out: &Path, progress: &dyn Progress) -> Result<Vec<String>> {
     if schedule.steps == 0 {
         return lesson.errors(false);
     }
     // inside the pool: its own thread does not sleep and wake for every small piece of work
     rayon::scope(|_| train_until(lesson, schedule, out, schedule.steps, progress))?;
-    let errors = lesson.errors(false)?;
     let facts = json!({ "kind": lesson.kind(), "lesson": lesson.facts(), "schedule": schedule.facts() });
+    let weights = halved(lesson.params().tensors()?)?;
+    // the errors are those of the weights as they are kept
+    lesson.params().load(&weights)?;
+    let errors = lesson.errors(false)?;
     let mut contents = Contents { facts, tensors: BTreeMap::new() };
-    contents.add("", halved(lesson.params().tensors()?)?);
+    contents.add("", weights);
     contents.write(out)?;
-    let checkpoint = checkpoint_path(out);
+    let checkpoint = beside(out, ".checkpoint");
     if checkpoint.exists() {
         std::fs::remove_file(&checkpoint).with_context(|| format!("cannot remove {}", checkpoint.display()))?;
     }
@@ -135,6 +141,7 @@ fn train_until(
     if start > 0 {
         progress.say(&format!("going on at step {start} of {}", schedule.steps));
     }
+    let mut log = Log::open(&beside(out, ".jsonl"), start)?;
     let weights = lesson.weights();
     let n_points = weights.len();
     let mean_weight = weights.iter().sum::<f32>() / n_points as f32;
@@ -152,15 +159,20 @@ fn train_until(
         let loss = lesson.loss(&lifted, &y, &weights)?;
         let norm = adam.step(&loss.backward()?, schedule.learning_rate(step))?;
         ensure!(norm.is_finite(), "step {step}: the gradient is not finite; try a smaller --learning-rate");
-        sum += f64::from(loss.to_scalar::<f32>()?);
+        let loss = f64::from(loss.to_scalar::<f32>()?);
+        sum += loss;
         n_summed += 1;
         task.advance(1);
-        if (step + 1) % 20 == 0 {
+        if (step + 1) % LOG_EVERY == 0 || step + 1 == schedule.steps {
             task.detail(&format!("loss {:.4}", sum / f64::from(n_summed)));
+            let rate = schedule.learning_rate(step);
+            log.write(&json!({ "step": step + 1, "loss": loss, "gradient_norm": norm, "learning_rate": rate }))?;
         }
         if (step + 1) % measure_every == 0 {
             progress.say(&format!("step {} of {}: loss {:.4}", step + 1, schedule.steps, sum / f64::from(n_summed)));
-            lesson.errors(true)?.iter().for_each(|line| progress.say(&format!("  {line}")));
+            let errors = lesson.errors(true)?;
+            errors.iter().for_each(|line| progress.say(&format!("  {line}")));
+            log.write(&json!({ "step": step + 1, "errors": errors }))?;
             (sum, n_summed) = (0.0, 0);
         }
         if (step + 1) % schedule.checkpoint_every.max(1) == 0 || step + 1 == end {
@@ -168,7 +180,7 @@ fn train_until(
             let mut contents = Contents { facts, tensors: BTreeMap::new() };
             contents.add("net.", lesson.params().tensors()?);
             contents.add("", adam.tensors("adam.")?);
-            contents.write(&checkpoint_path(out))?;
+            contents.write(&beside(out, ".checkpoint"))?;
         }
     }
     Ok(())
@@ -176,7 +188,7 @@ fn train_until(
 
 /// Takes up the checkpoint beside `out`, if there is one; gives the step to go on at.
 fn resume(lesson: &dyn Lesson, schedule: &Schedule, out: &Path, adam: &mut Adam) -> Result<usize> {
-    let path = checkpoint_path(out);
+    let path = beside(out, ".checkpoint");
     if !path.exists() {
         return Ok(0);
     }
@@ -193,9 +205,10 @@ fn resume(lesson: &dyn Lesson, schedule: &Schedule, out: &Path, adam: &mut Adam)
     Ok(step)
 }
 
-fn checkpoint_path(out: &Path) -> PathBuf {
+/// A file of the training beside the weights.
+fn beside(out: &Path, ending: &str) -> PathBuf {
     let mut name = out.file_name().unwrap_or_default().to_owned();
-    name.push(".checkpoint");
+    name.push(ending);
     out.with_file_name(name)
 }
 
@@ -249,7 +262,10 @@ mod tests {
         let measured =
             Schedule { steps: 0, started_from: Some(start_from(&*lesson(), &straight).unwrap()), ..SCHEDULE };
         assert!(!train(&mut *lesson(), &measured, &straight, &Silent).unwrap().is_empty());
-        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2, "checkpoints are removed");
+        let log = |weights: &Path| std::fs::read_to_string(beside(weights, ".jsonl")).unwrap();
+        assert_eq!(log(&straight), log(&dir.path().join("b.safetensors")));
+        assert!(log(&straight).lines().count() >= 6, "{}", log(&straight));
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 4, "weights and logs; checkpoints are removed");
     }
 
     #[test]

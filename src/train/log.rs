@@ -1,4 +1,4 @@
-//! `metrics.jsonl`: one JSON object a line, each with its `step`. A resumed training drops the lines that its
+//! The log of a training: one JSON object a line, each with its `step`. A resumed training drops the lines that its
 //! checkpoint has not seen, so that the file is the one of an undisturbed training.
 
 use crate::stage::workdir;
@@ -15,9 +15,9 @@ pub struct Log {
 }
 
 impl Log {
-    /// Opens `metrics.jsonl` in `folder`, which is made if missing, with the lines up to `step`.
-    pub fn open(folder: &Path, step: usize) -> Result<Self> {
-        let path = folder.join("metrics.jsonl");
+    /// Opens the file `path`, made if missing, with the lines up to `step`.
+    pub fn open(path: &Path, step: usize) -> Result<Self> {
+        let path = path.to_owned();
         let old = match std::fs::read_to_string(&path) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
@@ -47,13 +47,14 @@ mod tests {
     #[test]
     fn resuming_drops_what_the_checkpoint_has_not_seen() -> Result<()> {
         let folder = tempfile::tempdir()?;
-        let mut log = Log::open(folder.path(), 0)?;
+        let path = folder.path().join("metrics.jsonl");
+        let mut log = Log::open(&path, 0)?;
         for step in [10, 20, 30] {
             log.write(&json!({"step": step, "l1": 0.5}))?;
         }
         log.file.write_all(b"{\"step\": 40, \"l")?;
-        Log::open(folder.path(), 20)?.write(&json!({"step": 30, "l1": 0.25}))?;
-        let text = std::fs::read_to_string(folder.path().join("metrics.jsonl"))?;
+        Log::open(&path, 20)?.write(&json!({"step": 30, "l1": 0.25}))?;
+        let text = std::fs::read_to_string(path)?;
         assert_eq!(text, "{\"step\":10,\"l1\":0.5}\n{\"step\":20,\"l1\":0.5}\n{\"step\":30,\"l1\":0.25}\n");
         Ok(())
     }

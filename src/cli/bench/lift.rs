@@ -7,12 +7,12 @@ use candle_core::{DType, Device, Tensor};
 use ndarray::{Array3, s};
 use orator::config;
 use orator::lift::{Lifter, weights};
-use orator::motion::upper_body::{L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, NOSE, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST};
+use orator::motion::upper_body::{COCO, L_WRIST, R_WRIST};
 use orator::nn::{Mode, body_lifter::BodyLifter, hand_lifter::HandLifter};
 use orator::stage::progress::Progress;
 use orator::train::body_scene::{Filming, Scene};
 use orator::train::hand_shape;
-use orator::types::pose2d::{Keypoints, coco};
+use orator::types::pose2d::Keypoints;
 use orator::types::time::FrameRate;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -39,18 +39,6 @@ pub struct Args {
     hand_weights: Option<PathBuf>,
 }
 
-/// The nine points and their COCO indices.
-const POINTS: [(usize, usize); 9] = [
-    (NOSE, coco::NOSE),
-    (R_SHOULDER, coco::R_SHOULDER),
-    (R_ELBOW, coco::R_ELBOW),
-    (R_WRIST, coco::R_WRIST),
-    (L_SHOULDER, coco::L_SHOULDER),
-    (L_ELBOW, coco::L_ELBOW),
-    (L_WRIST, coco::L_WRIST),
-    (R_HIP, coco::R_HIP),
-    (L_HIP, coco::L_HIP),
-];
 /// Windows and hands that go through the networks together, as the lifters do it.
 const BATCH: (usize, usize) = (512, 1024);
 
@@ -129,7 +117,7 @@ fn made_by_rule(n_frames: usize) -> Keypoints {
         right_hand: none,
     };
     for (t, seen) in scene.seen.iter().enumerate() {
-        for (point, coco) in POINTS {
+        for (point, coco) in COCO.into_iter().enumerate() {
             if let Some([x, y]) = seen[point] {
                 keypoints.body.slice_mut(s![t, coco, ..]).assign(&ndarray::arr1(&[x, y, 0.9]));
             }
