@@ -40,3 +40,19 @@ fn a_run_finds_every_joint_through_the_chain_of_real_models() {
     let picture = orator::vision::png::read(std::path::Path::new(&sheet)).unwrap();
     assert!(picture.data.iter().any(|&value| value < 100));
 }
+
+/// Memory that nothing was written to holds something else in each run; no encoder may let it into a video.
+#[test]
+fn a_video_does_not_depend_on_what_memory_held_before() {
+    let dir = tempfile::tempdir().unwrap();
+    let video = |fill: &str| {
+        let folder = dir.path().join(fill);
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_orator"));
+        command.args(["demo", "draw", "--videos", "1", "--secs", "2"]).arg(&folder).env("MALLOC_PERTURB_", fill);
+        assert!(command.output().unwrap().status.success());
+        let videos = std::fs::read_dir(folder.join("videos/host")).unwrap();
+        videos.map(|video| std::fs::read(video.unwrap().path()).unwrap()).collect::<Vec<_>>()
+    };
+    let first = video("1");
+    assert!(!first.is_empty() && ["2", "85"].iter().all(|fill| video(fill) == first));
+}
