@@ -8,7 +8,7 @@
 use crate::lift::{Lifter, weights};
 use crate::motion::mocap::Set;
 use crate::motion::upper_body::{ARMS, COCO, L_HIP, N_POINTS, NOSE, Pose, R_HIP};
-use crate::train::body_errors::{Errors, mean_pose, of_method, with_bone_depth, with_mean_depth};
+use crate::train::body_errors::{Errors, mean_pose, of_lifted, with_bone_depth, with_mean_depth};
 use crate::train::body_scene::{FPS, Filming, Scene, scenes};
 use crate::types::interval::Interval;
 use crate::types::pose2d::{Keypoints, N_BODY, N_HAND};
@@ -78,14 +78,15 @@ fn row(
     set: &str,
     method: &'static str,
     scenes: &[Scene],
-    mut lift: impl FnMut(&Scene) -> Result<Vec<Option<Pose>>>,
+    lift: impl Fn(&Scene) -> Result<Vec<Option<Pose>>>,
 ) -> Result<Row> {
-    let errors = of_method(scenes, &mut lift)?;
+    let lifted = scenes.iter().map(|scene| Ok((scene, lift(scene)?))).collect::<Result<Vec<_>>>()?;
+    let errors = of_lifted(lifted.iter().map(|(scene, poses)| (*scene, &poses[..])));
     let band = |&(low, high): &(f64, f64)| {
-        let inside = |s: &&Scene| (low..=high).contains(&s.yaw.to_degrees().abs());
-        of_method(scenes.iter().filter(inside), &mut lift)
+        let inside = lifted.iter().filter(|(s, _)| (low..=high).contains(&s.yaw.to_degrees().abs()));
+        of_lifted(inside.map(|(scene, poses)| (*scene, &poses[..])))
     };
-    let by_yaw = BANDS.iter().map(band).collect::<Result<_>>()?;
+    let by_yaw = BANDS.iter().map(band).collect();
     let n_frames: usize = scenes.iter().map(|s| s.truth.len()).sum();
     let told = errors.n_frames as f64 / n_frames.max(1) as f64;
     Ok(Row { set: set.to_owned(), method, input: "drop", errors, by_yaw, told })

@@ -14,14 +14,12 @@ use ndarray::{Array2, Array3, s};
 pub const SEEN_SCORE: f32 = 0.3;
 /// A coordinate beyond this many px is none.
 pub const FARTHEST_PX: f32 = 1e6;
-/// The nose lies this share of the way from the eyes to the neck. On six clips (1100 frames) lifted joints moved 1 to
-/// 6 mm when it stood in for the nose, 12 to 32 mm when the nose was left out.
+/// The nose lies this share of the way from the eyes to the neck; a guess that moves lifted joints less than no nose.
 const NOSE_BELOW_EYES: f32 = 0.15;
 /// A point is a stray when it lies this share of the body's largest bone away from where it is in the frames around...
 const STRAY: f32 = 0.15;
 /// ...and this many times as far as the farthest of those: a fast gesture moves in them as well. Beats of up to 3.5 a
-/// second pass untouched; on captured motion with strays of about an eighth of the shoulders the wrists' speed is 0.2 to 0.3 mm
-/// a frame less wrong.
+/// second pass untouched.
 const STRAY_SPREAD: f32 = 2.0;
 
 /// Bones that tell how large the body appears.

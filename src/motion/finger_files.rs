@@ -9,8 +9,8 @@
 //! | `.txt` of 42 numbers a line | NYU labels, no knuckles: errors after alignment only | middle finger's last two bones 51.3 mm |
 
 use super::finger_take::FingerTake;
-use super::{finger_bvh, finger_labels, finger_npz};
-use anyhow::{Context, Result, bail, ensure};
+use super::{file_search, finger_bvh, finger_labels, finger_npz};
+use anyhow::{Result, bail, ensure};
 use std::path::{Path, PathBuf};
 
 /// The fingers of one file or folder.
@@ -31,8 +31,7 @@ fn read_set(path: &Path) -> Result<FingerSet> {
     if !path.is_dir() {
         return Ok(FingerSet { name, takes: read(path)? });
     }
-    let mut files = Vec::new();
-    find(path, &mut files)?;
+    let files = file_search::below(path, &["bvh", "npz", "txt"])?;
     ensure!(!files.is_empty(), "no .bvh, .npz or .txt file in {}", path.display());
     let (mut takes, mut first_error) = (Vec::new(), None);
     for file in files {
@@ -55,20 +54,6 @@ pub fn read(path: &Path) -> Result<Vec<FingerTake>> {
         Some("txt") => Ok(vec![finger_labels::read(path)?]),
         _ => bail!("{}: fingers are read from .bvh, .npz and .txt files", path.display()),
     }
-}
-
-fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
-    let entries = std::fs::read_dir(folder).with_context(|| format!("cannot list {}", folder.display()))?;
-    let mut entries = entries.map(|e| Ok(e?.path())).collect::<Result<Vec<_>>>()?;
-    entries.sort();
-    for path in entries {
-        if path.is_dir() {
-            find(&path, files)?;
-        } else if path.extension().is_some_and(|e| e == "bvh" || e == "npz" || e == "txt") {
-            files.push(path);
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

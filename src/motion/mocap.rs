@@ -5,6 +5,7 @@
 //! the beginning.
 
 use super::bvh_read::{Bvh, Positions};
+use super::file_search;
 use super::joint_names;
 use super::npz::Npz;
 use super::upper_body::{N_POINTS, Pose};
@@ -44,7 +45,7 @@ const SHORTEST_SECS: f64 = 1.0;
 pub fn read_all(paths: &[PathBuf]) -> Result<Vec<Take>> {
     let mut files = Vec::new();
     for path in paths {
-        if path.is_dir() { find(path, &mut files)? } else { files.push(path.clone()) }
+        if path.is_dir() { files.extend(file_search::below(path, &["bvh", "npz"])?) } else { files.push(path.clone()) }
     }
     ensure!(!files.is_empty(), "no .bvh or .npz file in {paths:?}");
     let mut takes = Vec::new();
@@ -82,20 +83,6 @@ pub fn divide(mut takes: Vec<Take>, patterns: &[String]) -> Result<(Vec<Set>, Ve
         takes = others;
     }
     Ok((sets, takes))
-}
-
-fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
-    let entries = std::fs::read_dir(folder).with_context(|| format!("cannot list {}", folder.display()))?;
-    let mut entries = entries.map(|e| Ok(e?.path())).collect::<Result<Vec<_>>>()?;
-    entries.sort();
-    for path in entries {
-        if path.is_dir() {
-            find(&path, files)?;
-        } else if path.extension().is_some_and(|e| e == "bvh" || e == "npz") {
-            files.push(path);
-        }
-    }
-    Ok(())
 }
 
 fn read_bvh(path: &Path) -> Result<Vec<Take>> {

@@ -6,6 +6,7 @@ pub mod bones;
 pub mod bvh_read;
 pub mod bvh_write;
 pub mod clip_figures;
+pub mod file_search;
 pub mod finger_bvh;
 pub mod finger_files;
 pub mod finger_labels;

@@ -39,16 +39,22 @@ impl fmt::Display for Errors {
     }
 }
 
-/// A method's errors over scenes: `lift` gives a scene's poses in any one unit, the neck anywhere; a frame of `None` or
-/// with a point that is not finite does not count.
-pub fn of_method<'a>(
-    scenes: impl IntoIterator<Item = &'a Scene>,
-    mut lift: impl FnMut(&Scene) -> anyhow::Result<Vec<Option<Pose>>>,
+/// A method's errors over scenes: `lift` gives a scene's poses (see `of_lifted`).
+pub fn of_method(
+    scenes: &[Scene],
+    lift: impl Fn(&Scene) -> anyhow::Result<Vec<Option<Pose>>>,
 ) -> anyhow::Result<Errors> {
+    let lifted = scenes.iter().map(&lift).collect::<anyhow::Result<Vec<_>>>()?;
+    Ok(of_lifted(scenes.iter().zip(lifted.iter().map(Vec::as_slice))))
+}
+
+/// The errors of poses lifted from scenes, a scene's in any one unit, the neck anywhere; a frame of `None` or with a
+/// point that is not finite does not count.
+pub fn of_lifted<'a>(scenes: impl Iterator<Item = (&'a Scene, &'a [Option<Pose>])>) -> Errors {
     let (mut sum, mut n_steps) = (Errors::default(), 0);
-    for scene in scenes {
+    for (scene, poses) in scenes {
         let finite = |pose: &Pose| pose[COUNTED].iter().flatten().all(|v| v.is_finite());
-        let lifted: Vec<Option<Pose>> = lift(scene)?.into_iter().map(|pose| pose.filter(finite)).collect();
+        let lifted: Vec<Option<Pose>> = poses.iter().map(|pose| pose.filter(finite)).collect();
         let told: Vec<Pose> = lifted.iter().flatten().copied().collect();
         let (grow, true_grow) = (metres_per_unit(&told), metres_per_unit(&scene.truth));
         let mut before: Option<(Pose, Pose)> = None;
@@ -74,14 +80,14 @@ pub fn of_method<'a>(
     }
     let mean = |v: f64, n: usize| 1000.0 * v / n.max(1) as f64;
     let n_frames = sum.n_frames;
-    Ok(Errors {
+    Errors {
         mpjpe: mean(sum.mpjpe, n_frames),
         p_mpjpe: mean(sum.p_mpjpe, n_frames),
         wrist: mean(sum.wrist, n_frames),
         wrist_depth: mean(sum.wrist_depth, n_frames),
         wrist_velocity: mean(sum.wrist_velocity, n_steps),
         n_frames,
-    })
+    }
 }
 
 /// Relative to the neck, in metres of the reference body.
