@@ -36,7 +36,7 @@ impl Step {
             Self::Extract => Box::new(Extract::new(&settings.extract)),
             Self::Pose2d => Box::new(Pose2dStage::new(settings)?),
             Self::Segment => Box::new(SegmentStage::new(&settings.segment, &settings.work.dir)),
-            Self::Lift => Box::new(LiftStage::new(&settings.lift, &settings.work.dir)?),
+            Self::Lift => Box::new(LiftStage::new(&settings.lift, &settings.segment, &settings.work.dir)?),
             Self::Shard => Box::new(ShardStage::new(settings, videos).with_models(models_used(settings)?)),
         })
     }

@@ -1,15 +1,17 @@
 //! The stage: reads the keypoints of a video and the intervals worth keeping, writes `joints.npz`,
-//! `bones.json` and `camera.json` (roll and pitch of each interval).
+//! `bones.json` and `camera.json` (roll and pitch of each interval), and the final `intervals.json` and `ledger.json`.
 
 use super::Lifter;
 use crate::config;
 use crate::motion::npz::Npz;
 use crate::motion::{joints_npz, keypoints_npz};
+use crate::stage::ledger::Ledger;
 use crate::stage::{Input, Report, Stage, Unit, progress::Progress, runner::place};
 use crate::types::interval::Intervals;
 use crate::types::pose2d::Keypoints;
 use anyhow::{Context, Result, ensure};
 use ndarray::s;
+use serde::Serialize;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -17,14 +19,16 @@ use std::path::{Path, PathBuf};
 pub struct LiftStage {
     lifter: Lifter,
     settings: config::Lift,
+    rules: config::Segment,
     work: PathBuf,
 }
 
 impl LiftStage {
-    /// Lifts as `settings` say; reads the earlier stages' files under the folder `work`. Errors: weights that cannot
-    /// be loaded.
-    pub fn new(settings: &config::Lift, work: &Path) -> Result<Self> {
-        Ok(Self { lifter: Lifter::new(settings)?, settings: settings.clone(), work: work.to_owned() })
+    /// Lifts as `settings` say and judges the bones by `rules`; reads the earlier stages' files under the folder `work`.
+    /// Errors: weights that cannot be loaded.
+    pub fn new(settings: &config::Lift, rules: &config::Segment, work: &Path) -> Result<Self> {
+        let lifter = Lifter::new(settings)?;
+        Ok(Self { lifter, settings: settings.clone(), rules: rules.clone(), work: work.to_owned() })
     }
 
     fn keypoints(&self, unit: &Unit) -> PathBuf {
@@ -35,8 +39,8 @@ impl LiftStage {
         place(&self.work, "extract", unit).join("timeline.npz")
     }
 
-    fn intervals(&self, unit: &Unit) -> PathBuf {
-        place(&self.work, "segment", unit).join("intervals.json")
+    fn segmented(&self, unit: &Unit, name: &str) -> PathBuf {
+        place(&self.work, "segment", unit).join(name)
     }
 }
 
@@ -46,7 +50,7 @@ impl Stage for LiftStage {
     }
 
     fn version(&self) -> u32 {
-        3
+        4
     }
 
     fn settings(&self) -> serde_json::Value {
@@ -56,11 +60,14 @@ impl Stage for LiftStage {
             false => json!("file"),
         };
         json!({
-            "body_weights": hash(&self.settings.body_weights, super::weights::BODY),
-            "hand_weights": hash(&self.settings.hand_weights, super::weights::HANDS),
-            "smooth_arms": self.settings.smooth_arms,
-            "smooth_hands": self.settings.smooth_hands,
-            "level": self.settings.level,
+            "lift": {
+                "body_weights": hash(&self.settings.body_weights, super::weights::BODY),
+                "hand_weights": hash(&self.settings.hand_weights, super::weights::HANDS),
+                "smooth_arms": self.settings.smooth_arms,
+                "smooth_hands": self.settings.smooth_hands,
+                "level": self.settings.level,
+            },
+            "segment": { "min_frames": self.rules.min_frames },
         })
     }
 
@@ -69,7 +76,8 @@ impl Stage for LiftStage {
         let mut inputs = vec![
             input("timeline", self.timeline(unit)),
             input("keypoints", self.keypoints(unit)),
-            input("intervals", self.intervals(unit)),
+            input("intervals", self.segmented(unit, "intervals.json")),
+            input("ledger", self.segmented(unit, "ledger.json")),
         ];
         for (role, path) in
             [("body weights", &self.settings.body_weights), ("hand weights", &self.settings.hand_weights)]
@@ -93,7 +101,7 @@ impl Stage for LiftStage {
             repeated.len()
         );
         unsee(&mut keypoints, &repeated);
-        let path = self.intervals(unit);
+        let path = self.segmented(unit, "intervals.json");
         let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
         let intervals: Intervals =
             serde_json::from_slice(&bytes).with_context(|| format!("{} holds no intervals", path.display()))?;
@@ -104,12 +112,15 @@ impl Stage for LiftStage {
             path.display(),
             intervals.n_frames
         );
+        let ledger = Ledger::read(&self.segmented(unit, "ledger.json"))?;
         let lifted = self.lifter.lift_intervals(&keypoints, &intervals.intervals)?;
         joints_npz::write(&out.join("joints.npz"), &lifted.motion)?;
         let bones = json!({ "lengths_metres": lifted.lengths.to_vec(), "n_frames": lifted.n_frames });
         write_json(&out.join("bones.json"), &bones)?;
         let camera = json!({ "levelled": self.settings.level, "intervals": lifted.cameras });
         write_json(&out.join("camera.json"), &camera)?;
+        write_json(&out.join("intervals.json"), &intervals)?;
+        write_json(&out.join("ledger.json"), &ledger)?;
         let seen = lifted.motion.mask.iter().filter(|m| **m).count();
         let told = lifted.motion.joints.iter().filter(|v| v.is_finite()).count() / 3;
         let filled = 100.0 * (1.0 - seen as f64 / told.max(1) as f64);
@@ -122,7 +133,7 @@ impl Stage for LiftStage {
     }
 }
 
-fn write_json(path: &Path, value: &serde_json::Value) -> Result<()> {
+fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     let mut bytes = serde_json::to_vec_pretty(value)?;
     bytes.push(b'\n');
     std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))

@@ -59,6 +59,17 @@ impl Refusal {
         }
     }
 
+    /// What `measured` and `threshold` are given in; empty: scores and shares, 0 to 1.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Refusal::NoSound | Refusal::HandGap | Refusal::Cut | Refusal::TooShort => "s",
+            Refusal::Silent => "dB",
+            Refusal::Small => "px",
+            Refusal::Jump => "shoulder widths",
+            Refusal::NoPerson | Refusal::Face | Refusal::Arms | Refusal::HandShare => "",
+        }
+    }
+
     /// The sentence, with what was measured and the threshold.
     pub fn says(self, measured: f64, threshold: f64) -> String {
         let (m, t) = (measured, threshold);

@@ -167,6 +167,7 @@ fn ledger(pieces: &[(Interval, Option<Mark>)], n_frames: usize, video: &Video) -
                 reason: refusal.reason().to_owned(),
                 measured,
                 threshold,
+                unit: refusal.unit().to_owned(),
                 says: refusal.says(measured, threshold),
             }),
         }

@@ -1,5 +1,5 @@
-//! The account of a video's seconds: every one of them is kept, or refused for a reason with what was measured. The
-//! stage that judges writes it (`ledger.json`); later ones only add up.
+//! The account of a video's seconds: every one of them is kept, refused for a reason with what was measured, or lost to a
+//! stage that failed. The stage that judges writes it (`ledger.json`), lifting amends it; later ones only add up.
 
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
@@ -12,6 +12,8 @@ pub struct Ledger {
     pub duration_secs: f64,
     pub kept: Vec<Kept>,
     pub refused: Vec<Refused>,
+    #[serde(default)]
+    pub failed: Vec<Failed>,
 }
 
 /// A stretch worth keeping.
@@ -28,14 +30,31 @@ pub struct Refused {
     pub end_secs: f64,
     /// One word, for programs.
     pub reason: String,
-    /// What was measured, and what it had to reach or stay below: in the unit that `says` names.
+    /// What was measured, and what it had to reach or stay below, both in `unit`.
     pub measured: f64,
     pub threshold: f64,
+    #[serde(default)]
+    pub unit: String,
     /// The same as a sentence, for people.
     pub says: String,
 }
 
+/// A stretch that no verdict was reached on: its stage failed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Failed {
+    pub start_secs: f64,
+    pub end_secs: f64,
+    pub stage: String,
+    pub error: String,
+}
+
 impl Ledger {
+    /// The account of a video whose stage failed: all of its `duration_secs`.
+    pub fn of_failure(duration_secs: f64, stage: &str, error: &str) -> Self {
+        let failed = Failed { start_secs: 0.0, end_secs: duration_secs, stage: stage.into(), error: error.into() };
+        Self { duration_secs, failed: vec![failed], ..Self::default() }
+    }
+
     /// Reads `ledger.json` and checks that the stretches lie end to end and fill the duration.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
@@ -64,10 +83,17 @@ impl Ledger {
         secs
     }
 
+    /// Seconds of failed stages.
+    pub fn failed_secs(&self) -> f64 {
+        self.failed.iter().map(|failed| failed.end_secs - failed.start_secs).sum()
+    }
+
     /// Whether every second from 0 to the end belongs to exactly one stretch.
     pub fn is_whole(&self) -> bool {
         let kept = self.kept.iter().map(|kept| (kept.start_secs, kept.end_secs));
-        let mut stretches: Vec<_> = kept.chain(self.refused.iter().map(|r| (r.start_secs, r.end_secs))).collect();
+        let refused = self.refused.iter().map(|refused| (refused.start_secs, refused.end_secs));
+        let failed = self.failed.iter().map(|failed| (failed.start_secs, failed.end_secs));
+        let mut stretches: Vec<_> = kept.chain(refused).chain(failed).collect();
         stretches.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let mut at = 0.0;
         for (start, end) in stretches {

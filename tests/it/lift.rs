@@ -9,6 +9,7 @@ use orator::motion::upper_body::{
     L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, NOSE, Pose, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, metres_per_unit,
 };
 use orator::motion::{joints_npz, keypoints_npz, mocap};
+use orator::stage::ledger::{Kept, Ledger};
 use orator::stage::progress::Silent;
 use orator::stage::runner::place;
 use orator::stage::{Stage, Unit};
@@ -312,8 +313,11 @@ fn the_stage_writes_joints_and_bones() {
     keypoints_npz::write(&pose2d.join("keypoints.npz"), &keypoints, &extras).unwrap();
     let intervals = |n_frames| Intervals::new(keypoints.fps, n_frames, vec![Interval { start: 2, end: 68 }]);
     std::fs::write(segment.join("intervals.json"), serde_json::to_vec(&intervals(70)).unwrap()).unwrap();
+    let kept = Kept { start_secs: 0.0, end_secs: 4.4 };
+    let ledger = Ledger { duration_secs: 4.4, kept: vec![kept], ..Ledger::default() };
+    std::fs::write(segment.join("ledger.json"), serde_json::to_vec(&ledger).unwrap()).unwrap();
 
-    let stage = LiftStage::new(&config::Lift::default(), dir.path()).unwrap();
+    let stage = LiftStage::new(&config::Lift::default(), &config::Segment::default(), dir.path()).unwrap();
     assert!(stage.inputs(&unit).unwrap().iter().all(|input| input.path.exists()));
     let report = stage.run(&unit, dir.path(), &Silent).unwrap();
     assert!(report.line.starts_with("66 frames in 1 interval"), "{}", report.line);
@@ -323,6 +327,7 @@ fn the_stage_writes_joints_and_bones() {
         let known = motion.mask.slice(s![t, ..]).iter().any(|m| *m);
         assert_eq!(known, t % 3 != 2, "a repeated frame is masked: {t}");
     }
+    assert_eq!(Ledger::read(&dir.path().join("ledger.json")).unwrap(), ledger);
     let bones: serde_json::Value =
         serde_json::from_slice(&std::fs::read(dir.path().join("bones.json")).unwrap()).unwrap();
     let lengths: Vec<f64> = serde_json::from_value(bones["lengths_metres"].clone()).unwrap();
