@@ -137,15 +137,16 @@ mod tests {
 
     #[test]
     fn all_problems_are_reported_at_once_with_key_and_line() {
-        let text = "[extract]\nfsp = 15\nshot_threshold = 7\n[work]\njobs = \"two\"\n[[speaker]]\nname = \"a b\"\n";
+        let text =
+            "[segment]\nshot_threshold = 7\n[extract]\nfsp = 15\n[work]\njobs = \"two\"\n[[speaker]]\nname = \"a b\"\n";
         assert_eq!(
             problems(text, &["gan.batch=0", "nothing=1", "lift.smooth_arms"]),
             [
-                "line 2: extract.fsp: unknown key (did you mean fps?)",
-                "line 3: extract.shot_threshold: 7 is out of range: expected 0 to 1",
-                "line 5: work.jobs: expected a whole number, found string",
-                "line 6: speaker[0]: the key videos is missing",
-                "line 7: speaker[0].name: \"a b\": expected letters, digits, - and _ (it names folders)",
+                "line 2: segment.shot_threshold: 7 is out of range: expected 0 to 1",
+                "line 4: extract.fsp: unknown key (did you mean fps?)",
+                "line 6: work.jobs: expected a whole number, found string",
+                "line 7: speaker[0]: the key videos is missing",
+                "line 8: speaker[0].name: \"a b\": expected letters, digits, - and _ (it names folders)",
                 "--set: lift.smooth_arms: expected KEY=VALUE, like extract.fps=15",
                 "--set: gan.batch: 0 is out of range: expected 2 to 4096 windows",
                 "--set: nothing: unknown key",

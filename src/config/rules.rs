@@ -9,12 +9,12 @@ pub fn check(settings: &Settings, places: &BTreeMap<String, Place>) -> Vec<Probl
     let mut rules = Rules { places, problems: Vec::new() };
     let s = settings;
     rules.within("extract.fps", f64::from(s.extract.fps), 1.0, 120.0, "frames a second");
-    rules.within("extract.shot_threshold", s.extract.shot_threshold, 0.0, 1.0, "");
     rules.within("pose2d.person_every", s.pose2d.person_every as f64, 1.0, 10_000.0, "frames");
     rules.within("pose2d.palm_every", s.pose2d.palm_every as f64, 1.0, 10_000.0, "frames");
     rules.within("pose2d.person_follow", s.pose2d.person_follow, 0.0, 1.0, "");
     rules.within("pose2d.hand_score", s.pose2d.hand_score, 0.0, 1.0, "");
     rules.within("pose2d.joint_score", s.pose2d.joint_score, 0.0, 1.0, "");
+    rules.within("segment.shot_threshold", s.segment.shot_threshold, 0.0, 1.0, "");
     rules.within("segment.min_frames", s.segment.min_frames as f64, 1.0, 1e6, "frames");
     rules.within("segment.joint_score", s.segment.joint_score, 0.0, 1.0, "");
     rules.within("segment.max_body_gap_secs", s.segment.max_body_gap_secs, 0.0, 1.0, "seconds, all that lift fills");

@@ -66,8 +66,6 @@ impl Default for Models {
 pub struct Extract {
     /// Dataset frames a second.
     pub fps: u32,
-    /// Scene change score, 0..1, from which a frame begins a new shot.
-    pub shot_threshold: f64,
     /// Write every dataset frame as PNG as well.
     pub keep_frames: bool,
 }
@@ -81,7 +79,7 @@ impl Extract {
 
 impl Default for Extract {
     fn default() -> Self {
-        Self { fps: 15, shot_threshold: 0.2, keep_frames: false }
+        Self { fps: 15, keep_frames: false }
     }
 }
 
@@ -126,6 +124,8 @@ impl Default for Pose2d {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Segment {
+    /// Shot score, 0..1, from which a frame begins a new shot.
+    pub shot_threshold: f64,
     /// Shortest interval, in frames (a window of the paper: 64).
     pub min_frames: usize,
     /// A face or arm joint is visible from this score on, 0..1.
@@ -145,6 +145,7 @@ pub struct Segment {
 impl Default for Segment {
     fn default() -> Self {
         Self {
+            shot_threshold: 0.2,
             min_frames: 64,
             joint_score: 0.3,
             max_body_gap_secs: 0.34,

@@ -1,8 +1,11 @@
 //! The stage's files. `audio.wav`: 16 kHz mono s16, its first sample at the first picture (absent without sound).
-//! `timeline.npz`: `source_secs` f64 [T], `repeated` bool [T], `shot` i64 [T], `shot_score` f64 [T] at the dataset
-//! rate. `media.json`: what the video is. `frames/`, only if asked: the pictures as PNG.
+//! `timeline.npz`, at the dataset rate: `source_secs` f64 [T], `repeated` bool [T], `shot_score` f64 [T] (0..1; the
+//! frame with the score would begin a shot), `restart` bool [T] (the score is high enough that following begins anew),
+//! `still` f32 [T] (mean change of the picture since the frame before, 8-bit steps; 0 where it is repeated).
+//! `media.json`: what the video is. `frames/`, only if asked: the pictures as PNG.
 
-use super::shots::{ShotFinder, Shots, THUMBNAIL};
+use super::shots::{RESTART, ShotFinder};
+use super::still::{self, THUMBNAIL};
 use crate::config;
 use crate::media::frames::FrameReader;
 use crate::media::{self, audio};
@@ -18,7 +21,7 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// Video to sound, timeline and shots.
+/// Video to sound and timeline.
 pub struct Extract {
     settings: config::Extract,
 }
@@ -33,7 +36,8 @@ impl Extract {
 struct Timeline {
     source_secs: Vec<f64>,
     repeated: Vec<bool>,
-    shots: Shots,
+    shot_scores: Vec<f64>,
+    still: Vec<f32>,
 }
 
 impl Stage for Extract {
@@ -42,7 +46,7 @@ impl Stage for Extract {
     }
 
     fn version(&self) -> u32 {
-        1
+        2
     }
 
     fn settings(&self) -> serde_json::Value {
@@ -62,7 +66,7 @@ impl Stage for Extract {
         let audio_secs = sound.as_ref().map(|sound| sound.secs);
 
         let n_frames = timeline.source_secs.len();
-        let n_shots = timeline.shots.numbers.last().map_or(0, |number| number + 1);
+        let n_cuts = timeline.shot_scores.iter().filter(|score| **score >= RESTART).count();
         let damage: Vec<String> = reader.damage().into_iter().chain(sound.and_then(|sound| sound.damage)).collect();
         let damage = (!damage.is_empty()).then(|| damage.join(", "));
         let video = reader.info().video.as_ref();
@@ -82,19 +86,24 @@ impl Stage for Extract {
         fs::write(&path, serde_json::to_vec_pretty(&media)?).with_context(|| path.display().to_string())?;
 
         let sound = audio_secs.map_or("no sound".to_owned(), |secs| format!("{secs:.1} s of sound"));
-        let shots = if n_shots == 1 { "1 shot".to_owned() } else { format!("{n_shots} shots") };
+        let cuts = match n_cuts {
+            0 => "no cut".to_owned(),
+            1 => "1 cut".to_owned(),
+            n => format!("{n} cuts"),
+        };
         let mut facts = media.as_object().cloned().unwrap_or_default();
-        facts.insert("n_shots".into(), n_shots.into());
+        facts.insert("n_cuts".into(), n_cuts.into());
         let kept = |damage: &String| format!("; damaged, what could be read is kept: {damage}");
         let damage = damage.as_ref().map(kept).unwrap_or_default();
-        Ok(Report { line: format!("{n_frames} frames at {rate}, {shots}, {sound}{damage}"), facts })
+        Ok(Report { line: format!("{n_frames} frames at {rate}, {cuts}, {sound}{damage}"), facts })
     }
 }
 
 impl Extract {
     /// Reads the pictures once; of each only a thumbnail is converted, unless the frames are kept.
     fn timeline(&self, reader: &mut FrameReader, out: &Path, progress: &dyn Progress) -> Result<Timeline> {
-        let (mut source_secs, mut repeated, mut shots) = (Vec::new(), Vec::new(), ShotFinder::default());
+        let (mut source_secs, mut repeated, mut still) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut shots, mut before) = (ShotFinder::default(), None);
         let frames = out.join("frames");
         if self.settings.keep_frames {
             fs::create_dir(&frames).with_context(|| format!("cannot make the folder {}", frames.display()))?;
@@ -103,13 +112,16 @@ impl Extract {
         while let Some(time) = reader.advance()? {
             source_secs.push(time.source_secs);
             repeated.push(time.repeated);
-            shots.push(if time.repeated { None } else { Some(reader.picture(Some(THUMBNAIL))?) });
+            let seen = if time.repeated { None } else { Some(reader.picture(Some(THUMBNAIL))?) };
+            shots.push(seen.as_ref());
+            still.push(before.as_ref().zip(seen.as_ref()).map_or(0.0, |(a, b)| still::difference(a, b)));
+            before = seen.or(before);
             if self.settings.keep_frames {
                 png::write(&frames.join(format!("{:06}.png", time.frame_idx)), &reader.picture(None)?)?;
             }
             task.advance(1);
         }
-        Ok(Timeline { source_secs, repeated, shots: shots.finish(self.settings.shot_threshold) })
+        Ok(Timeline { source_secs, repeated, shot_scores: shots.finish(), still })
     }
 }
 
@@ -118,8 +130,10 @@ fn write_timeline(path: &Path, timeline: &Timeline) -> Result<()> {
         let mut npz = NpzWriter::new(BufWriter::new(File::create(path)?));
         npz.add_array("source_secs", &Array1::from_vec(timeline.source_secs.clone()))?;
         npz.add_array("repeated", &Array1::from_vec(timeline.repeated.clone()))?;
-        npz.add_array("shot", &Array1::from_vec(timeline.shots.numbers.clone()))?;
-        npz.add_array("shot_score", &Array1::from_vec(timeline.shots.scores.clone()))?;
+        let restart = timeline.shot_scores.iter().map(|score| *score >= RESTART).collect();
+        npz.add_array("shot_score", &Array1::from_vec(timeline.shot_scores.clone()))?;
+        npz.add_array("restart", &Array1::from_vec(restart))?;
+        npz.add_array("still", &Array1::from_vec(timeline.still.clone()))?;
         Ok(npz.finish()?.flush()?)
     };
     write().with_context(|| format!("cannot write {}", path.display()))

@@ -1,7 +1,7 @@
 //! The keypoints file `keypoints.npz`: the 2D keypoints of a video at the dataset rate. Arrays: `body` f32 [T,17,3]
 //! (COCO-17; x px, y px, score), `left_hand` and `right_hand` f32 [T,21,3], `image_size` i64 [2] (width, height),
 //! `fps` f64 [2] (numerator, denominator; one number is read too), `time_secs` f64 [T], `person` f32 [T,5]
-//! (x, y, width, height, score), `n_people` i64 [T].
+//! (x, y, width, height, score), `n_people` i64 [T], `identity` i64 [T].
 
 use super::npz::Npz;
 use crate::types::pose2d::{Keypoints, N_BODY, N_HAND};
@@ -22,6 +22,8 @@ pub struct Extras {
     pub person: Array2<f32>,
     /// People seen in each frame, [T].
     pub n_people: Array1<i64>,
+    /// Which person is followed in each frame, [T]: goes up by one where another is taken, or the follower begins anew.
+    pub identity: Array1<i64>,
 }
 
 /// Reads the keypoints. A point with a number that is not finite is a missing one (all zeros). Errors: unreadable,
@@ -77,7 +79,8 @@ pub fn read_extras(path: &Path) -> Result<Extras> {
     let n_frames = Some(time_secs.len());
     let person = npz.floats("person", &[n_frames, Some(5)])?.into_dimensionality::<Ix2>()?;
     let n_people = npz.numbers("n_people", &[n_frames])?.mapv(|v| v as i64).into_dimensionality::<Ix1>()?;
-    Ok(Extras { time_secs, person, n_people })
+    let identity = npz.numbers("identity", &[n_frames])?.mapv(|v| v as i64).into_dimensionality::<Ix1>()?;
+    Ok(Extras { time_secs, person, n_people, identity })
 }
 
 /// Writes the file at `path`; the same keypoints give the same bytes.
@@ -92,6 +95,7 @@ pub fn write(path: &Path, keypoints: &Keypoints, extras: &Extras) -> Result<()> 
         npz.add_array("time_secs", &extras.time_secs)?;
         npz.add_array("person", &extras.person)?;
         npz.add_array("n_people", &extras.n_people)?;
+        npz.add_array("identity", &extras.identity)?;
         npz.finish()?;
         Ok(())
     };
@@ -128,6 +132,7 @@ mod tests {
             time_secs: Array1::linspace(0.0, 1.0, 4),
             person: Array2::ones((4, 5)),
             n_people: Array1::from(vec![1, 2, 1, 0]),
+            identity: Array1::from(vec![0, 0, 1, 1]),
         };
         (keypoints, extras)
     }

@@ -72,7 +72,7 @@ impl Chain {
 
     /// A new shot begins: nothing of the one before is followed.
     pub fn begin_shot(&mut self) {
-        self.followed = Followed::default();
+        self.followed.begin_anew();
         self.body_seen = false;
         self.hand_regions = [None; 2];
         self.n_frames = 0;
@@ -91,7 +91,12 @@ impl Chain {
         let idx = self.n_frames;
         self.n_frames += 1;
         self.look_for_person(image, idx)?;
-        let mut pose = Pose2d { person: self.followed.person(), n_people: self.followed.n_people, ..Pose2d::default() };
+        let mut pose = Pose2d {
+            person: self.followed.person(),
+            n_people: self.followed.n_people,
+            identity: self.followed.identity(),
+            ..Pose2d::default()
+        };
         let found = match self.followed.place {
             Some(place) => self.body.find(image, place)?,
             None => None,

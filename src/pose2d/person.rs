@@ -68,6 +68,8 @@ pub struct Followed {
     /// People seen at the last look.
     pub n_people: u8,
     n_missed: usize,
+    /// People taken so far; the one followed is the last of them.
+    n_taken: i64,
 }
 
 impl Followed {
@@ -106,8 +108,19 @@ impl Followed {
         };
         let best = found.iter().max_by(|a, b| weight(a).total_cmp(&weight(b)));
         self.place = best.map(numbers);
+        self.n_taken += i64::from(best.is_some());
         self.score = best.map_or(0.0, |one| one.score);
         self.n_missed = 0;
+    }
+
+    /// Follows nobody; whoever is taken next is another person.
+    pub fn begin_anew(&mut self) {
+        *self = Self { n_taken: self.n_taken, ..Self::default() };
+    }
+
+    /// The number of the person followed, from 0.
+    pub fn identity(&self) -> i64 {
+        (self.n_taken - 1).max(0)
     }
 
     /// The box as it is written down; zeros if nobody is followed.

@@ -66,7 +66,7 @@ impl Stage for Pose2dStage {
     }
 
     fn version(&self) -> u32 {
-        1
+        2
     }
 
     fn settings(&self) -> Value {
@@ -105,39 +105,38 @@ impl Stage for Pose2dStage {
     }
 
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
-        let shots = shots(&place(&self.work, "extract", unit).join(TIMELINE_FILE))?;
+        let restarts = restarts(&place(&self.work, "extract", unit).join(TIMELINE_FILE))?;
         let mut chain = Chain::new(&self.runtime()?, &self.manifest, &self.models.dir, &self.settings)?;
         let mut reader = FrameReader::open(&unit.source, self.fps)?;
         let [width, height] = reader.image_size();
         let image_size = [u32::try_from(width)?, u32::try_from(height)?];
-        let task = progress.begin(&unit.to_string(), shots.len() as u64);
+        let task = progress.begin(&unit.to_string(), restarts.len() as u64);
         let mut gathered = Gathered::default();
         let mut seen = Seen::default();
         let mut pose = Pose2d::default();
         while let Some(time) = reader.advance()? {
             let idx = time.frame_idx;
-            let shot = shots.get(idx).with_context(|| unlike(&unit.source, idx + 1, shots.len()))?;
-            let new_shot = idx == 0 || shots.get(idx - 1) != Some(shot);
-            if new_shot {
+            let restart = *restarts.get(idx).with_context(|| unlike(&unit.source, idx + 1, restarts.len()))?;
+            if restart {
                 chain.begin_shot();
             }
-            if new_shot || !time.repeated {
+            if idx == 0 || restart || !time.repeated {
                 pose = chain.frame(&reader.picture(None)?).with_context(|| format!("frame {idx}"))?;
             }
             seen.count(&pose);
             gathered.push(&pose, time.source_secs);
             task.advance(1);
         }
-        ensure!(gathered.n_frames() == shots.len(), unlike(&unit.source, gathered.n_frames(), shots.len()));
+        ensure!(gathered.n_frames() == restarts.len(), unlike(&unit.source, gathered.n_frames(), restarts.len()));
         let (keypoints, extras) = gathered.finish(self.fps, image_size)?;
         store::write(&out.join(KEYPOINTS_FILE), &keypoints, &extras)?;
         Ok(seen.report())
     }
 }
 
-/// Shot number of every frame.
-fn shots(timeline: &Path) -> Result<Vec<i64>> {
-    Ok(Npz::open(timeline)?.numbers("shot", &[None])?.iter().map(|number| *number as i64).collect())
+/// The frames at which following begins anew.
+fn restarts(timeline: &Path) -> Result<Vec<bool>> {
+    Ok(Npz::open(timeline)?.bools("restart", &[None])?.into_iter().collect())
 }
 
 fn unlike(video: &Path, found: usize, expected: usize) -> String {

@@ -15,6 +15,7 @@ pub struct Gathered {
     right_hand: Vec<f32>,
     person: Vec<f32>,
     n_people: Vec<i64>,
+    identity: Vec<i64>,
     time_secs: Vec<f64>,
 }
 
@@ -28,6 +29,7 @@ impl Gathered {
         let PersonBox { x, y, width, height, score } = pose.person;
         self.person.extend([x, y, width, height, score]);
         self.n_people.push(i64::from(pose.n_people));
+        self.identity.push(pose.identity);
         self.time_secs.push(source_secs);
     }
 
@@ -51,6 +53,7 @@ impl Gathered {
             time_secs: Array1::from(self.time_secs),
             person: Array2::from_shape_vec((n_frames, 5), self.person)?,
             n_people: Array1::from(self.n_people),
+            identity: Array1::from(self.identity),
         };
         Ok((keypoints, extras))
     }
@@ -68,7 +71,7 @@ mod tests {
     #[test]
     fn frames_become_arrays() {
         let mut gathered = Gathered::default();
-        let mut pose = Pose2d { n_people: 2, ..Pose2d::default() };
+        let mut pose = Pose2d { n_people: 2, identity: 3, ..Pose2d::default() };
         gathered.push(&pose, 0.0);
         pose.right_hand[20] = Keypoint { x: 5.0, y: 6.0, score: 0.5 };
         pose.person.height = 9.0;
@@ -76,5 +79,6 @@ mod tests {
         let (keypoints, extras) = gathered.finish(FrameRate::new(15, 1), [64, 48]).unwrap();
         assert_eq!((keypoints.n_frames(), keypoints.right_hand[[1, 20, 1]], keypoints.body[[1, 0, 0]]), (2, 6.0, 0.0));
         assert_eq!((extras.person[[1, 3]], extras.n_people[0], extras.time_secs[1]), (9.0, 2, 0.07));
+        assert_eq!(extras.identity[1], 3);
     }
 }

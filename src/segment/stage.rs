@@ -1,7 +1,7 @@
 //! The stage: reads what `extract` and `pose2d` wrote of a video, judges it, writes `intervals.json`, `ledger.json`
 //! and `measures.npz`.
 
-use super::measure::Measures;
+use super::measure::{Measures, shot_numbers};
 use super::rules::{Loudness, Video, judge};
 use crate::config;
 use crate::motion::keypoints_npz;
@@ -47,7 +47,7 @@ impl Stage for SegmentStage {
     }
 
     fn version(&self) -> u32 {
-        1
+        2
     }
 
     fn settings(&self) -> serde_json::Value {
@@ -79,7 +79,8 @@ impl Stage for SegmentStage {
             media_path.display(),
             media.duration_secs
         );
-        let shot = Npz::open(&self.file("extract", unit, "timeline.npz"))?.numbers("shot", &[Some(media.n_frames)])?;
+        let mut timeline = Npz::open(&self.file("extract", unit, "timeline.npz"))?;
+        let shot_scores = timeline.numbers("shot_score", &[Some(media.n_frames)])?;
         let keypoints = keypoints_npz::read(&self.file("pose2d", unit, "keypoints.npz"))?;
         ensure!(
             keypoints.n_frames() == media.n_frames && keypoints.fps == media.fps,
@@ -89,7 +90,7 @@ impl Stage for SegmentStage {
             media.n_frames,
             media.fps
         );
-        let measures = Measures::of(&keypoints, shot.iter().map(|&number| number as i64).collect());
+        let measures = Measures::of(&keypoints, shot_numbers(shot_scores.iter().copied(), self.rules.shot_threshold));
         let sound = loudness(&self.file("extract", unit, "audio.wav"))?;
         let video = Video { fps: media.fps, duration_secs: media.duration_secs, sound };
         let (intervals, ledger) = judge(&measures, &video, &self.rules);

@@ -49,6 +49,8 @@ pub struct PersonBox {
 pub struct Pose2d {
     pub person: PersonBox,
     pub n_people: u8,
+    /// Which person is followed: another number, another person.
+    pub identity: i64,
     pub body: [Keypoint; N_BODY],
     pub left_hand: [Keypoint; N_HAND],
     pub right_hand: [Keypoint; N_HAND],
@@ -59,6 +61,7 @@ impl Default for Pose2d {
         Self {
             person: PersonBox::default(),
             n_people: 0,
+            identity: 0,
             body: [Keypoint::default(); N_BODY],
             left_hand: [Keypoint::default(); N_HAND],
             right_hand: [Keypoint::default(); N_HAND],

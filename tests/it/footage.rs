@@ -75,7 +75,9 @@ pub fn write(work: &Path, unit: &Unit, footage: &Footage, content: &str) {
     });
     fs::write(extract.join("media.json"), media.to_string()).unwrap();
     let mut timeline = NpzWriter::new(File::create(extract.join("timeline.npz")).unwrap());
-    timeline.add_array("shot", &Array1::from_vec(footage.shot.clone())).unwrap();
+    let begins = |t: usize| f64::from(u8::from(t > 0 && footage.shot[t] != footage.shot[t - 1]));
+    timeline.add_array("shot_score", &Array1::from_shape_fn(n_frames, begins)).unwrap();
+    timeline.add_array("still", &Array1::<f32>::from_elem(n_frames, 2.0)).unwrap();
     timeline.finish().unwrap();
     let _ = fs::remove_file(extract.join("audio.wav"));
     if let Some(sound) = &footage.sound {
@@ -93,6 +95,7 @@ pub fn write(work: &Path, unit: &Unit, footage: &Footage, content: &str) {
         time_secs: Array1::zeros(n_frames),
         person: Array2::zeros((n_frames, 5)),
         n_people: Array1::from_elem(n_frames, 1),
+        identity: Array1::zeros(n_frames),
     };
     keypoints_npz::write(&pose2d.join("keypoints.npz"), &footage.keypoints, &extras).unwrap();
 }

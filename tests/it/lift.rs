@@ -304,6 +304,7 @@ fn the_stage_writes_joints_and_bones() {
         time_secs: ndarray::Array1::linspace(0.0, 4.6, 70),
         person: ndarray::Array2::zeros((70, 5)),
         n_people: ndarray::Array1::ones(70),
+        identity: ndarray::Array1::zeros(70),
     };
     let [extract, pose2d, segment] = ["extract", "pose2d", "segment"].map(|stage| place(dir.path(), stage, &unit));
     [&extract, &pose2d, &segment].into_iter().for_each(|folder| std::fs::create_dir_all(folder).unwrap());

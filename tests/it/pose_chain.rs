@@ -70,11 +70,11 @@ fn unit(dir: &Path, n: usize, models: &Path) -> (Unit, Settings) {
     (unit, settings)
 }
 
-fn write_timeline(settings: &Settings, unit: &Unit, shot: Vec<i64>) {
+fn write_timeline(settings: &Settings, unit: &Unit, restart: Vec<bool>) {
     let folder = settings.work.dir.join("extract").join(&unit.speaker).join(&unit.video);
     std::fs::create_dir_all(&folder).unwrap();
     let mut npz = NpzWriter::new(File::create(folder.join("timeline.npz")).unwrap());
-    npz.add_array("shot", &Array1::from(shot)).unwrap();
+    npz.add_array("restart", &Array1::from(restart)).unwrap();
     npz.finish().unwrap();
 }
 
@@ -83,7 +83,7 @@ fn a_video_without_a_person_is_zeros_and_no_failure() {
     let Some((models, _)) = golden::models() else { return };
     let dir = tempfile::tempdir().unwrap();
     let (unit, settings) = unit(dir.path(), 20, &models);
-    write_timeline(&settings, &unit, vec![0, 0, 0, 0, 0, 0, 1, 1, 1, 1]);
+    write_timeline(&settings, &unit, (0..10).map(|t| t == 6).collect());
     let stage = Pose2dStage::new(&settings).unwrap();
     let roles: Vec<_> = stage.inputs(&unit).unwrap().into_iter().map(|input| input.role).collect();
     assert_eq!(roles, ["video", "timeline", "model:person", "model:body", "model:hand", "model:palm"]);
@@ -111,7 +111,7 @@ fn a_timeline_of_another_video_and_a_missing_model_are_errors() {
     let dir = tempfile::tempdir().unwrap();
     let (unit, mut settings) = unit(dir.path(), 20, &models);
     for n_frames in [3, 12] {
-        write_timeline(&settings, &unit, vec![0; n_frames]);
+        write_timeline(&settings, &unit, vec![false; n_frames]);
         let said = Pose2dStage::new(&settings).unwrap().run(&unit, dir.path(), &Silent).unwrap_err().to_string();
         assert!(said.contains(&format!("its timeline has {n_frames}")), "{said}");
     }

@@ -98,7 +98,12 @@ fn the_verb_draws_loose_files_and_says_what_is_missing() {
     let dir = project.dir();
     let video = write_sized(dir, "loose.mp4", 30, FPS, SIZE, None);
     let motion = swinging(2, 30);
-    let extras = Extras { time_secs: Array1::zeros(30), person: Array2::zeros((30, 5)), n_people: Array1::ones(30) };
+    let extras = Extras {
+        time_secs: Array1::zeros(30),
+        person: Array2::zeros((30, 5)),
+        n_people: Array1::ones(30),
+        identity: Array1::zeros(30),
+    };
     keypoints_npz::write(&dir.join("k.npz"), &keypoints(&motion), &extras).unwrap();
     npy::write(&dir.join("j.npy"), &motion).unwrap();
     joints_npz::write(&dir.join("j.npz"), &motion).unwrap();
