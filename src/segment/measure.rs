@@ -2,37 +2,52 @@
 //! thresholds can be judged anew without looking at the video or the keypoints again.
 
 use crate::types::pose2d::{Keypoints, coco};
-use anyhow::{Context, Result};
-use ndarray::{Array1, ArrayView2, ArrayView3};
-use ndarray_npy::NpzWriter;
-use std::fs::File;
-use std::io::BufWriter;
-use std::path::Path;
+use ndarray::{ArrayView2, ArrayView3};
 
-/// Per frame, all of the same length T.
+/// A point that scores less lies anywhere: what is measured between points is then not known (NaN).
+const KNOWN_SCORE: f32 = 0.3;
+/// `facing` and `nose_off` are cut off here; they divide by lengths that may vanish.
+const FARTHEST: f32 = 10.0;
+
+/// Per frame, all of the same length T. NaN: not known, and no reason to refuse the frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measures {
+    /// 1 where there is sound, 0 where there is no track or it has ended.
+    pub sound: Vec<f32>,
+    /// Loudness of the second around the frame, dB of full scale.
+    pub sound_db: Vec<f32>,
+    /// Change of the picture since the frame before, in steps of 8-bit colour.
+    pub still: Vec<f32>,
     /// Best score of a face or arm point: whether somebody is there.
     pub person: Vec<f32>,
     /// Distance between the shoulders, px.
     pub shoulder_px: Vec<f32>,
     /// Score of the nose or of the better eye, whichever is lower.
     pub face: Vec<f32>,
+    /// How far the left shoulder is to the right of the right one in the picture, in distances from neck to nose: about 2
+    /// from the front, 0 from the side, negative from behind.
+    pub facing: Vec<f32>,
+    /// How far the nose is beside the neck, in half shoulder widths: beyond 1 it is outside the shoulders.
+    pub nose_off: Vec<f32>,
     /// Lowest score of shoulders and elbows. A wrist belongs to its hand: both leave the picture together.
     pub arms: Vec<f32>,
     /// Mean score of a hand's points.
     pub left_hand: Vec<f32>,
     pub right_hand: Vec<f32>,
+    /// People in view.
+    pub n_people: Vec<f32>,
     /// Way of the neck since the frame before, in shoulder widths (the wider of the two frames); 0 in frame 0.
     pub jump: Vec<f32>,
-    /// Number of the shot.
-    pub shot: Vec<i64>,
+    /// 1 where another person is followed than in the frame before, 0 elsewhere.
+    pub identity: Vec<f32>,
+    /// Shot score, 0..1: how much the frame looks like the first one of a shot.
+    pub shot_score: Vec<f32>,
 }
 
 impl Measures {
-    /// Measures keypoints; `shot` has one number a frame.
-    pub fn of(keypoints: &Keypoints, shot: Vec<i64>) -> Self {
-        let mut measures = Self { shot, ..Self::default() };
+    /// Measures keypoints; the rest is left as in one shot of one person who moves and speaks.
+    pub fn of(keypoints: &Keypoints) -> Self {
+        let mut measures = Self::default();
         let mut before: Option<([f32; 2], f32)> = None;
         for body in keypoints.body.outer_iter() {
             let score = |joint: usize| body[[joint, 2]];
@@ -42,46 +57,40 @@ impl Measures {
             measures.face.push(face);
             measures.arms.push(arms.into_iter().fold(f32::INFINITY, f32::min));
             let (neck, width) = shoulders(body);
-            let way = before.map_or(0.0, |(old, old_width)| {
-                let way = (neck[0] - old[0]).hypot(neck[1] - old[1]);
-                if way == 0.0 { 0.0 } else { way / width.max(old_width).max(1.0) }
-            });
+            let known = arms[0].min(arms[1]) >= KNOWN_SCORE;
+            let [facing, nose_off] = if known { turn(body, neck) } else { [f32::NAN; 2] };
+            measures.facing.push(facing);
+            measures.nose_off.push(nose_off);
+            let now = known.then_some((neck, width));
+            measures.jump.push(if measures.jump.is_empty() { 0.0 } else { way(before, now) });
             measures.shoulder_px.push(width);
-            measures.jump.push(way);
-            before = Some((neck, width));
+            before = now;
         }
-        measures.left_hand = mean_scores(keypoints.left_hand.view());
-        measures.right_hand = mean_scores(keypoints.right_hand.view());
-        measures
+        let n_frames = keypoints.n_frames();
+        Self {
+            sound: vec![1.0; n_frames],
+            sound_db: vec![0.0; n_frames],
+            still: vec![255.0; n_frames],
+            left_hand: mean_scores(keypoints.left_hand.view()),
+            right_hand: mean_scores(keypoints.right_hand.view()),
+            n_people: vec![1.0; n_frames],
+            identity: vec![0.0; n_frames],
+            shot_score: vec![0.0; n_frames],
+            ..measures
+        }
     }
 
     /// Number of frames T.
     pub fn n_frames(&self) -> usize {
-        self.shot.len()
+        self.person.len()
     }
+}
 
-    /// Writes `measures.npz`: the arrays by their names.
-    pub fn write(&self, path: &Path) -> Result<()> {
-        let written = || -> Result<()> {
-            let mut npz = NpzWriter::new(BufWriter::new(File::create(path)?));
-            let arrays = [
-                ("person", &self.person),
-                ("shoulder_px", &self.shoulder_px),
-                ("face", &self.face),
-                ("arms", &self.arms),
-                ("left_hand", &self.left_hand),
-                ("right_hand", &self.right_hand),
-                ("jump", &self.jump),
-            ];
-            for (name, values) in arrays {
-                npz.add_array(name, &Array1::from_vec(values.clone()))?;
-            }
-            npz.add_array("shot", &Array1::from_vec(self.shot.clone()))?;
-            npz.finish()?;
-            Ok(())
-        };
-        written().with_context(|| format!("cannot write {}", path.display()))
-    }
+/// The frames at which the number of the followed person goes up, except where the search began anew because the
+/// picture changed: whether that is another shot is the shot rule's to say.
+pub fn identity(numbers: &[i64], restart: &[bool]) -> Vec<f32> {
+    let changed = |t: usize| t > 0 && numbers[t] != numbers[t - 1] && !restart.get(t).copied().unwrap_or(false);
+    (0..numbers.len()).map(|t| f32::from(u8::from(changed(t)))).collect()
 }
 
 /// The number of each frame's shot, from 0: a frame whose score reaches `threshold` begins a new one.
@@ -97,13 +106,68 @@ pub fn shot_numbers(scores: impl IntoIterator<Item = f64>, threshold: f64) -> Ve
 
 /// The point between the shoulders, and the distance between them, in px.
 fn shoulders(body: ArrayView2<f32>) -> ([f32; 2], f32) {
-    let at = |joint: usize| [body[[joint, 0]], body[[joint, 1]]];
-    let (left, right) = (at(coco::L_SHOULDER), at(coco::R_SHOULDER));
+    let (left, right) = (at(body, coco::L_SHOULDER), at(body, coco::R_SHOULDER));
     let neck = [(left[0] + right[0]) / 2.0, (left[1] + right[1]) / 2.0];
     (neck, (left[0] - right[0]).hypot(left[1] - right[1]))
+}
+
+/// `facing` and `nose_off` of a frame whose shoulders are seen.
+fn turn(body: ArrayView2<f32>, neck: [f32; 2]) -> [f32; 2] {
+    if body[[coco::NOSE, 2]] < KNOWN_SCORE {
+        return [f32::NAN; 2];
+    }
+    let nose = at(body, coco::NOSE);
+    let width = at(body, coco::L_SHOULDER)[0] - at(body, coco::R_SHOULDER)[0];
+    let height = (nose[0] - neck[0]).hypot(nose[1] - neck[1]);
+    let ratio = |a: f32, b: f32| (a / b.max(1e-3)).clamp(-FARTHEST, FARTHEST);
+    [ratio(width, height), ratio((nose[0] - neck[0]).abs(), width.abs() / 2.0)]
+}
+
+/// From neck to neck, in shoulder widths.
+fn way(before: Option<([f32; 2], f32)>, now: Option<([f32; 2], f32)>) -> f32 {
+    let (Some((old, old_width)), Some((new, new_width))) = (before, now) else { return f32::NAN };
+    (new[0] - old[0]).hypot(new[1] - old[1]) / new_width.max(old_width).max(1.0)
+}
+
+fn at(body: ArrayView2<f32>, joint: usize) -> [f32; 2] {
+    [body[[joint, 0]], body[[joint, 1]]]
 }
 
 fn mean_scores(hand: ArrayView3<f32>) -> Vec<f32> {
     let n_points = hand.shape()[1].max(1) as f32;
     hand.outer_iter().map(|points| points.column(2).sum() / n_points).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+
+    /// Shoulders `width` px apart (negative: the left one on the left), the nose 50 px above the neck, `aside` px off.
+    fn turned(width: f32, aside: f32) -> [f32; 2] {
+        let mut body = Array2::from_elem((17, 3), 0.9_f32);
+        for (joint, x, y) in [
+            (coco::NOSE, 200.0 + aside, 50.0),
+            (coco::L_SHOULDER, 200.0 + width / 2.0, 100.0),
+            (coco::R_SHOULDER, 200.0 - width / 2.0, 100.0),
+        ] {
+            (body[[joint, 0]], body[[joint, 1]]) = (x, y);
+        }
+        turn(body.view(), [200.0, 100.0])
+    }
+
+    #[test]
+    fn a_body_is_seen_from_the_front_the_side_or_behind() {
+        assert_eq!(turned(100.0, 0.0), [2.0, 0.0]);
+        assert_eq!(turned(-100.0, 0.0), [-2.0, 0.0]);
+        let [facing, nose_off] = turned(20.0, 30.0);
+        assert!(facing < 0.4 && nose_off == 3.0);
+        assert_eq!(turned(0.0, 10.0)[1], FARTHEST);
+    }
+
+    #[test]
+    fn another_person_counts_but_not_a_search_begun_anew() {
+        assert_eq!(identity(&[3, 3, 4, 4, 5], &[true, false, false, false, true]), [0.0, 0.0, 1.0, 0.0, 0.0]);
+        assert_eq!(identity(&[], &[]), [0.0; 0]);
+    }
 }

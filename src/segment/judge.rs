@@ -1,0 +1,186 @@
+//! The verdict: measures of a video to intervals and a ledger, by the rows of `table`. A frame is refused for the first
+//! rule that it breaks for longer than a gap may be; what is left is divided where a shot or another person begins, and
+//! pieces that are too short, or that break a rule on pieces, are refused whole.
+
+use super::measure::Measures;
+use super::refusal::Refusal;
+use super::table::{FrameRule, Gap, frame_rules, piece_rules};
+use crate::config;
+use crate::stage::ledger::{Kept, Ledger, Refused};
+use crate::types::interval::{Interval, Intervals};
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, ensure};
+use serde::Deserialize;
+use std::path::Path;
+
+/// What the verdict needs of a video beside the measures.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+pub struct Video {
+    pub duration_secs: f64,
+    pub n_frames: usize,
+    pub fps: FrameRate,
+}
+
+/// A refusal with what was measured and the threshold.
+type Mark = (Refusal, f64, f64);
+
+impl Video {
+    /// Reads `media.json` as the extract stage writes it.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let video: Self =
+            serde_json::from_slice(&bytes).with_context(|| format!("{} is incomplete", path.display()))?;
+        let secs = video.duration_secs;
+        ensure!(secs.is_finite() && secs >= 0.0, "{}: a duration of {secs} s", path.display());
+        Ok(video)
+    }
+}
+
+/// Judges a whole video.
+pub fn judge(measures: &Measures, video: &Video, rules: &config::Segment) -> (Intervals, Ledger) {
+    let n_frames = measures.n_frames();
+    let begins_shot = |t: usize| {
+        let score = f64::from(measures.shot_score[t]);
+        t > 0 && score > 0.0 && score >= rules.shot_threshold
+    };
+    let begins_shot: Vec<bool> = (0..n_frames).map(begins_shot).collect();
+    let mut marks = vec![None; n_frames];
+    for rule in frame_rules(rules) {
+        apply(&rule, &mut marks, measures, &begins_shot, video.fps);
+    }
+    let pieces = pieces(&marks, measures, &begins_shot, video.fps, rules);
+    let intervals = pieces.iter().filter(|(_, mark)| mark.is_none()).map(|(interval, _)| *interval).collect();
+    (Intervals::new(video.fps, n_frames, intervals), ledger(&pieces, n_frames, video))
+}
+
+/// Marks the frames that break `rule` for too long, where no earlier rule has.
+fn apply(rule: &FrameRule, marks: &mut [Option<Mark>], measures: &Measures, begins_shot: &[bool], fps: FrameRate) {
+    let (values, n_frames) = ((rule.values)(measures), marks.len());
+    let fails = |t: usize| !rule.bound.holds(f64::from(values[t])) && !(rule.compares && begins_shot[t]);
+    for run in runs(n_frames, fails, |t| begins_shot[t]) {
+        let inside = run.start > 0 && run.end < n_frames && !begins_shot[run.start] && !begins_shot[run.end];
+        let (longest, threshold) = match rule.gap {
+            Gap::Anywhere(secs) => (frames_within(secs, fps), secs),
+            Gap::Inside(secs) => (if inside { frames_within(secs, fps) } else { 0 }, secs),
+        };
+        if run.n_frames() <= longest {
+            continue;
+        }
+        for t in run.start..run.end {
+            let mark = if rule.says_secs {
+                (rule.refusal, fps.secs(run.n_frames()), threshold)
+            } else {
+                (rule.refusal, f64::from(values[t]), rule.bound.threshold())
+            };
+            marks[t] = marks[t].or(Some(mark));
+        }
+    }
+}
+
+/// Stretches end to end over all frames: kept (no mark) or refused.
+fn pieces(
+    marks: &[Option<Mark>],
+    measures: &Measures,
+    begins_shot: &[bool],
+    fps: FrameRate,
+    rules: &config::Segment,
+) -> Vec<(Interval, Option<Mark>)> {
+    let reason = |t: usize| marks[t].map(|(refusal, _, _)| refusal);
+    let begins = |t: usize| begins_shot[t] || measures.identity[t] > 0.0;
+    let divides = |t: usize| reason(t) != reason(t - 1) || (reason(t).is_none() && begins(t));
+    let judged = runs(marks.len(), |_| true, divides).into_iter().map(|piece| {
+        let mark = match marks[piece.start] {
+            Some((refusal, _, threshold)) => Some((refusal, mean(&marks[piece.start..piece.end]), threshold)),
+            None => too_short(piece, measures, begins_shot, fps, rules)
+                .or_else(|| broken_by_piece(piece, measures, rules)),
+        };
+        (piece, mark)
+    });
+    judged.collect()
+}
+
+/// Whether a piece of good frames is shorter than an interval, with what made it so.
+fn too_short(
+    piece: Interval,
+    measures: &Measures,
+    begins_shot: &[bool],
+    fps: FrameRate,
+    rules: &config::Segment,
+) -> Option<Mark> {
+    if piece.n_frames() >= rules.min_frames {
+        return None;
+    }
+    let at_end = |begins: &dyn Fn(usize) -> bool| {
+        [piece.start, piece.end].into_iter().any(|t| t > 0 && t < begins_shot.len() && begins(t))
+    };
+    let refusal = if at_end(&|t| begins_shot[t]) {
+        Refusal::Cut
+    } else if at_end(&|t| measures.identity[t] > 0.0) {
+        Refusal::Identity
+    } else {
+        Refusal::TooShort
+    };
+    Some((refusal, fps.secs(piece.n_frames()), fps.secs(rules.min_frames)))
+}
+
+/// The first rule on pieces that a piece of good frames breaks.
+fn broken_by_piece(piece: Interval, measures: &Measures, rules: &config::Segment) -> Option<Mark> {
+    piece_rules(rules).into_iter().find_map(|rule| {
+        let values = &(rule.values)(measures)[piece.start..piece.end];
+        let n = values.iter().filter(|&&value| rule.counted.holds(f64::from(value))).count();
+        let share = n as f64 / piece.n_frames().max(1) as f64;
+        (!rule.share.holds(share)).then(|| (rule.refusal, share, rule.share.threshold()))
+    })
+}
+
+/// The pieces as seconds. The last one ends with the video, so that a partly filled last frame is not lost.
+fn ledger(pieces: &[(Interval, Option<Mark>)], n_frames: usize, video: &Video) -> Ledger {
+    let mut ledger = Ledger { duration_secs: video.duration_secs, ..Ledger::default() };
+    let nothing = [(Interval { start: 0, end: 0 }, Some((Refusal::NoPerson, 0.0, 0.0)))];
+    let pieces = if pieces.is_empty() { &nothing[..] } else { pieces };
+    for (piece, mark) in pieces {
+        let start_secs = video.fps.secs(piece.start).min(video.duration_secs);
+        let end_secs = if piece.end == n_frames {
+            video.duration_secs
+        } else {
+            video.fps.secs(piece.end).min(video.duration_secs)
+        };
+        if end_secs <= start_secs {
+            continue;
+        }
+        match *mark {
+            None => ledger.kept.push(Kept { start_secs, end_secs }),
+            Some((refusal, measured, threshold)) => ledger.refused.push(Refused {
+                start_secs,
+                end_secs,
+                reason: refusal.reason().to_owned(),
+                measured,
+                threshold,
+                unit: refusal.unit().to_owned(),
+                says: refusal.says(measured, threshold),
+            }),
+        }
+    }
+    ledger
+}
+
+/// Longest runs of frames for which `holds`, divided before each frame that `divides`.
+fn runs(n_frames: usize, holds: impl Fn(usize) -> bool, divides: impl Fn(usize) -> bool) -> Vec<Interval> {
+    let mut runs: Vec<Interval> = Vec::new();
+    for frame in (0..n_frames).filter(|&frame| holds(frame)) {
+        match runs.last_mut() {
+            Some(run) if run.end == frame && !divides(frame) => run.end = frame + 1,
+            _ => runs.push(Interval { start: frame, end: frame + 1 }),
+        }
+    }
+    runs
+}
+
+/// Whole frames within `secs`.
+fn frames_within(secs: f64, fps: FrameRate) -> usize {
+    (secs * fps.per_sec() + 1e-6) as usize
+}
+
+fn mean(marks: &[Option<Mark>]) -> f64 {
+    marks.iter().flatten().map(|(_, measured, _)| measured).sum::<f64>() / marks.len().max(1) as f64
+}
