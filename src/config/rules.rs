@@ -21,6 +21,14 @@ pub fn check(settings: &Settings, places: &BTreeMap<String, Place>) -> Vec<Probl
     rules.within("segment.max_hand_gap_secs", s.segment.max_hand_gap_secs, 0.0, 1.0, "seconds, all that lift fills");
     rules.within("segment.min_hand_share", s.segment.min_hand_share, 0.0, 1.0, "");
     rules.within("segment.min_shoulder_px", s.segment.min_shoulder_px, 1.0, 1e5, "pixels");
+    rules.within("segment.min_sound_db", s.segment.min_sound_db, -120.0, 0.0, "dB of full scale");
+    rules.within("segment.max_quiet_secs", s.segment.max_quiet_secs, 0.0, 60.0, "seconds");
+    rules.within("segment.min_change", s.segment.min_change, 0.0, 255.0, "steps of 8-bit colour");
+    rules.within("segment.max_still_secs", s.segment.max_still_secs, 0.0, 1.0, "seconds, all that lift fills");
+    rules.within("segment.min_facing", s.segment.min_facing, -10.0, 10.0, "neck-nose distances");
+    rules.within("segment.max_nose_off", s.segment.max_nose_off, 0.0, 10.0, "half shoulder widths");
+    rules.within("segment.max_people", f64::from(s.segment.max_people), 1.0, 255.0, "people");
+    rules.within("segment.max_crowd_share", s.segment.max_crowd_share, 0.0, 1.0, "");
     rules.within("segment.max_jump", s.segment.max_jump, 0.01, 100.0, "shoulder widths");
     rules.within("lift.smooth_arms", s.lift.smooth_arms, 0.0, 30.0, "frames");
     rules.within("lift.smooth_hands", s.lift.smooth_hands, 0.0, 30.0, "frames");

@@ -138,6 +138,22 @@ pub struct Segment {
     pub min_hand_share: f64,
     /// Least distance between the shoulders, pixels.
     pub min_shoulder_px: f64,
+    /// Least loudness of the second around a frame, dB of full scale.
+    pub min_sound_db: f64,
+    /// Longest quiet stretch that is a pause of speech, seconds.
+    pub max_quiet_secs: f64,
+    /// Least change of a moving picture from frame to frame, steps of 8-bit colour.
+    pub min_change: f64,
+    /// Longest stretch in which the picture may stand still, seconds; at most what lift fills, 1.
+    pub max_still_secs: f64,
+    /// Least width of the shoulders, in distances from neck to nose; from behind it is negative.
+    pub min_facing: f64,
+    /// Farthest the nose may be beside the neck, in half shoulder widths.
+    pub max_nose_off: f64,
+    /// People in view that are not too many.
+    pub max_people: u32,
+    /// Largest share of an interval's frames with more people, 0..1.
+    pub max_crowd_share: f64,
     /// Largest step of the neck between two frames, in shoulder widths.
     pub max_jump: f64,
 }
@@ -152,6 +168,14 @@ impl Default for Segment {
             max_hand_gap_secs: 1.0,
             min_hand_share: 0.5,
             min_shoulder_px: 40.0,
+            min_sound_db: -50.0,
+            max_quiet_secs: 3.0,
+            min_change: 0.05,
+            max_still_secs: 1.0,
+            min_facing: 1.0,
+            max_nose_off: 1.0,
+            max_people: 5,
+            max_crowd_share: 0.3,
             max_jump: 0.5,
         }
     }

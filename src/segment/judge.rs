@@ -56,8 +56,8 @@ pub fn judge(measures: &Measures, video: &Video, rules: &config::Segment) -> (In
 /// Marks the frames that break `rule` for too long, where no earlier rule has.
 fn apply(rule: &FrameRule, marks: &mut [Option<Mark>], measures: &Measures, begins_shot: &[bool], fps: FrameRate) {
     let (values, n_frames) = ((rule.values)(measures), marks.len());
-    let fails = |t: usize| !rule.bound.holds(f64::from(values[t])) && !(rule.compares && begins_shot[t]);
-    for run in runs(n_frames, fails, |t| begins_shot[t]) {
+    let passes = |t: usize| rule.bound.holds(f64::from(values[t])) || (rule.compares && begins_shot[t]);
+    for run in runs(n_frames, |t| !passes(t), |t| begins_shot[t]) {
         let inside = run.start > 0 && run.end < n_frames && !begins_shot[run.start] && !begins_shot[run.end];
         let (longest, threshold) = match rule.gap {
             Gap::Anywhere(secs) => (frames_within(secs, fps), secs),
@@ -91,8 +91,9 @@ fn pieces(
     let judged = runs(marks.len(), |_| true, divides).into_iter().map(|piece| {
         let mark = match marks[piece.start] {
             Some((refusal, _, threshold)) => Some((refusal, mean(&marks[piece.start..piece.end]), threshold)),
-            None => too_short(piece, measures, begins_shot, fps, rules)
-                .or_else(|| broken_by_piece(piece, measures, rules)),
+            None => {
+                too_short(piece, measures, begins_shot, fps, rules).or_else(|| broken_by_piece(piece, measures, rules))
+            }
         };
         (piece, mark)
     });

@@ -93,17 +93,6 @@ pub fn identity(numbers: &[i64], restart: &[bool]) -> Vec<f32> {
     (0..numbers.len()).map(|t| f32::from(u8::from(changed(t)))).collect()
 }
 
-/// The number of each frame's shot, from 0: a frame whose score reaches `threshold` begins a new one.
-pub fn shot_numbers(scores: impl IntoIterator<Item = f64>, threshold: f64) -> Vec<i64> {
-    let begins = |score: f64| i64::from(score > 0.0 && score >= threshold);
-    let mut number = 0;
-    let next = |score| {
-        number += begins(score);
-        number
-    };
-    scores.into_iter().map(next).collect()
-}
-
 /// The point between the shoulders, and the distance between them, in px.
 fn shoulders(body: ArrayView2<f32>) -> ([f32; 2], f32) {
     let (left, right) = (at(body, coco::L_SHOULDER), at(body, coco::R_SHOULDER));

@@ -45,8 +45,12 @@ mod tests {
     #[test]
     fn a_tone_then_quiet_then_the_end() {
         let path = tempfile::tempdir().unwrap().keep().join("tone.wav");
-        let spec =
-            hound::WavSpec { channels: 1, sample_rate: 16_000, bits_per_sample: 16, sample_format: hound::SampleFormat::Int };
+        let spec = hound::WavSpec {
+            channels: 1,
+            sample_rate: 16_000,
+            bits_per_sample: 16,
+            sample_format: hound::SampleFormat::Int,
+        };
         let mut wav = hound::WavWriter::create(&path, spec).unwrap();
         for n in 0..16_000 * 6 {
             let amplitude = if n < 48_000 { 0.1 } else { 0.0001 };

@@ -1,8 +1,9 @@
 //! The stage: reads what `extract` and `pose2d` wrote of a video, judges it, writes `intervals.json`, `ledger.json`
 //! and `measures.npz`.
 
-use super::measure::{Measures, shot_numbers};
-use super::rules::{Loudness, Video, judge};
+use super::judge::{Video, judge};
+use super::measure::{self, Measures};
+use super::sound;
 use crate::config;
 use crate::motion::keypoints_npz;
 use crate::motion::npz::Npz;
@@ -11,9 +12,8 @@ use crate::stage::progress::Progress;
 use crate::stage::runner::place;
 use crate::stage::{Input, Report, Stage, Unit};
 use crate::types::interval::Intervals;
-use crate::types::time::FrameRate;
 use anyhow::{Context, Result, ensure};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Keypoints to intervals worth keeping.
@@ -33,21 +33,13 @@ impl SegmentStage {
     }
 }
 
-/// What is needed of `media.json`.
-#[derive(Deserialize)]
-struct Media {
-    duration_secs: f64,
-    n_frames: usize,
-    fps: FrameRate,
-}
-
 impl Stage for SegmentStage {
     fn name(&self) -> &'static str {
         "segment"
     }
 
     fn version(&self) -> u32 {
-        2
+        3
     }
 
     fn settings(&self) -> serde_json::Value {
@@ -69,30 +61,8 @@ impl Stage for SegmentStage {
     }
 
     fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
-        let media_path = self.file("extract", unit, "media.json");
-        let media = std::fs::read(&media_path).with_context(|| format!("cannot read {}", media_path.display()))?;
-        let media: Media =
-            serde_json::from_slice(&media).with_context(|| format!("{} is incomplete", media_path.display()))?;
-        ensure!(
-            media.duration_secs.is_finite() && media.duration_secs >= 0.0,
-            "{}: a duration of {} s",
-            media_path.display(),
-            media.duration_secs
-        );
-        let mut timeline = Npz::open(&self.file("extract", unit, "timeline.npz"))?;
-        let shot_scores = timeline.numbers("shot_score", &[Some(media.n_frames)])?;
-        let keypoints = keypoints_npz::read(&self.file("pose2d", unit, "keypoints.npz"))?;
-        ensure!(
-            keypoints.n_frames() == media.n_frames && keypoints.fps == media.fps,
-            "the keypoints have {} frames at {}, the video {} at {}: run the stage pose2d again",
-            keypoints.n_frames(),
-            keypoints.fps,
-            media.n_frames,
-            media.fps
-        );
-        let measures = Measures::of(&keypoints, shot_numbers(shot_scores.iter().copied(), self.rules.shot_threshold));
-        let sound = loudness(&self.file("extract", unit, "audio.wav"))?;
-        let video = Video { fps: media.fps, duration_secs: media.duration_secs, sound };
+        let video = Video::read(&self.file("extract", unit, "media.json"))?;
+        let measures = self.measures(unit, &video)?;
         let (intervals, ledger) = judge(&measures, &video, &self.rules);
         write_json(&out.join("intervals.json"), &intervals)?;
         write_json(&out.join("ledger.json"), &ledger)?;
@@ -101,21 +71,33 @@ impl Stage for SegmentStage {
     }
 }
 
-/// Length and loudest sample of a wav file, read as a stream; `None`: there is no file, the video has no sound.
-fn loudness(path: &Path) -> Result<Option<Loudness>> {
-    if !path.exists() {
-        return Ok(None);
+impl SegmentStage {
+    fn measures(&self, unit: &Unit, video: &Video) -> Result<Measures> {
+        let path = self.file("pose2d", unit, "keypoints.npz");
+        let (keypoints, extras) = (keypoints_npz::read(&path)?, keypoints_npz::read_extras(&path)?);
+        let n_frames = video.n_frames;
+        ensure!(
+            keypoints.n_frames() == n_frames && extras.identity.len() == n_frames && keypoints.fps == video.fps,
+            "the keypoints have {} frames at {}, the video {n_frames} at {}: run the stage pose2d again",
+            keypoints.n_frames(),
+            keypoints.fps,
+            video.fps
+        );
+        let mut timeline = Npz::open(&self.file("extract", unit, "timeline.npz"))?;
+        let shot_score = timeline.floats("shot_score", &[Some(n_frames)])?.into_iter().collect();
+        let still = timeline.floats("still", &[Some(n_frames)])?.into_iter().collect();
+        let restart: Vec<bool> = timeline.bools("restart", &[Some(n_frames)])?.into_iter().collect();
+        let (sound, sound_db) = sound::levels(&self.file("extract", unit, "audio.wav"), video.fps, n_frames)?;
+        Ok(Measures {
+            sound,
+            sound_db,
+            still,
+            n_people: extras.n_people.iter().map(|&n| n as f32).collect(),
+            identity: measure::identity(&extras.identity.to_vec(), &restart),
+            shot_score,
+            ..Measures::of(&keypoints)
+        })
     }
-    let reading = || format!("cannot read {}", path.display());
-    let mut wav = hound::WavReader::open(path).with_context(reading)?;
-    let rate = f64::from(wav.spec().sample_rate.max(1));
-    let (mut peak, mut n_samples) = (0, 0u64);
-    for sample in wav.samples::<i16>() {
-        peak = peak.max(sample.with_context(reading)?.unsigned_abs());
-        n_samples += 1;
-    }
-    let peak_db = if peak == 0 { -120.0 } else { 20.0 * (f64::from(peak) / 32_768.0).log10() };
-    Ok(Some(Loudness { secs: n_samples as f64 / rate, peak_db }))
 }
 
 fn report(intervals: &Intervals, ledger: &Ledger) -> Report {

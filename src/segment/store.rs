@@ -47,9 +47,8 @@ impl Measures {
     pub fn read(path: &Path) -> Result<Self> {
         let mut npz = Npz::open(path)?;
         let person = npz.floats("person", &[None])?.into_iter().collect::<Vec<f32>>();
-        let mut read = |name: &str| -> Result<Vec<f32>> {
-            Ok(npz.floats(name, &[Some(person.len())])?.into_iter().collect())
-        };
+        let mut read =
+            |name: &str| -> Result<Vec<f32>> { Ok(npz.floats(name, &[Some(person.len())])?.into_iter().collect()) };
         Ok(Self {
             sound: read("sound")?,
             sound_db: read("sound_db")?,

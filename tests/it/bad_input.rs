@@ -122,7 +122,7 @@ fn bad_videos_are_reported_and_the_others_go_on() {
         assert!(error.starts_with("failed: ") && error.contains(says), "{name}: {error:?}");
     }
     assert!(line(&answer, "extract", "damaged").contains("damaged, what could be read is kept"));
-    for (name, says) in [("silent", "sound"), ("nobody", "person"), ("oneframe", "nothing kept")] {
+    for (name, says) in [("silent", "sound"), ("nobody", "still"), ("oneframe", "nothing kept")] {
         let refusal = line(&answer, "segment", name);
         assert!(!refusal.starts_with("failed") && refusal.contains(says), "{name}: {refusal:?}");
     }
@@ -147,7 +147,7 @@ fn a_speaker_without_an_interval_is_exit_code_2_with_the_reasons() {
     gray(&project, "320x240", 5);
     let answer = project.run(&[]);
     assert_eq!(answer.code, 2);
-    assert!(answer.errors.contains("no interval") && answer.errors.contains("person"), "{}", answer.errors);
+    assert!(answer.errors.contains("no interval") && answer.errors.contains("still"), "{}", answer.errors);
 }
 
 #[test]

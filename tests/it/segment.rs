@@ -3,9 +3,7 @@
 use crate::footage::{FPS, Footage, good, write};
 use ndarray::s;
 use orator::config;
-use orator::segment::measure::Measures;
-use orator::segment::rules::{Loudness, Video, judge};
-use orator::segment::{Refusal, SegmentStage};
+use orator::segment::{Measures, Refusal, SegmentStage, Video, judge};
 use orator::stage::ledger::Ledger;
 use orator::stage::progress::Silent;
 use orator::stage::{Stage, Unit};
@@ -14,13 +12,28 @@ use orator::types::pose2d::{Keypoints, coco};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+/// The measures as the stage takes them, only that the sound is as loud everywhere.
+fn measures(footage: &Footage) -> Measures {
+    let mut measures = Measures::of(&footage.keypoints);
+    let n_frames = footage.shot.len();
+    let sound = footage.sound.clone().unwrap_or_default();
+    let secs = sound.len() as f64 / 16_000.0;
+    let peak = sound.iter().map(|s| s.unsigned_abs()).max().unwrap_or(0);
+    measures.sound = (0..n_frames).map(|t| f32::from(u8::from(FPS.secs(t) < secs))).collect();
+    measures.sound_db = vec![20.0 * f32::from(peak.max(1)).log10() - 90.3; n_frames];
+    for t in 1..n_frames {
+        measures.shot_score[t] = f32::from(u8::from(footage.shot[t] != footage.shot[t - 1]));
+    }
+    measures
+}
+
+fn judged_measures(measures: &Measures, duration_secs: f64) -> (Intervals, Ledger) {
+    let video = Video { fps: FPS, duration_secs, n_frames: measures.n_frames() };
+    judge(measures, &video, &config::Segment::default())
+}
+
 fn judged(footage: &Footage) -> (Intervals, Ledger) {
-    let sound = footage.sound.as_ref().map(|samples| {
-        let peak = samples.iter().map(|s| s.unsigned_abs()).max().unwrap_or(0);
-        Loudness { secs: samples.len() as f64 / 16_000.0, peak_db: 20.0 * f64::from(peak.max(1)).log10() - 90.3 }
-    });
-    let measures = Measures::of(&footage.keypoints, footage.shot.clone());
-    judge(&measures, &Video { fps: FPS, duration_secs: footage.duration_secs, sound }, &config::Segment::default())
+    judged_measures(&measures(footage), footage.duration_secs)
 }
 
 /// The intervals, and the reasons in the order of time.
@@ -50,6 +63,10 @@ fn a_good_video_is_kept_whole_with_its_windows_counted() {
     let (intervals, ledger) = judged(&good(200));
     assert_eq!((intervals.windows_64.stride_5, intervals.windows_64.apart), (28, 3));
     assert_eq!(ledger.kept_secs(), 200.0 / 15.0);
+    let (read, path) = (measures(&good(200)), tempfile::tempdir().unwrap().keep().join("measures.npz"));
+    read.write(&path).unwrap();
+    assert_eq!(Measures::read(&path).unwrap(), read);
+    std::fs::remove_dir_all(path.parent().unwrap()).unwrap();
 }
 
 #[test]
@@ -82,7 +99,7 @@ fn every_reason_is_found() {
     };
     assert_eq!(whole(&|f| f.sound = None), "no sound");
     assert_eq!(whole(&|f| f.sound = Some(vec![])), "no sound");
-    assert_eq!(whole(&|f| f.sound = Some(vec![3; 106_667])), "silent");
+    assert_eq!(whole(&|f| f.sound = Some(vec![3; 106_667])), "quiet");
     assert_eq!(whole(&|f| f.keypoints.body.fill(0.0)), "no person");
     assert_eq!(whole(&|f| f.keypoints.body.slice_mut(s![.., .., ..2]).mapv_inplace(|v| v * 0.3)), "too small");
     assert_eq!(whole(&|f| spoil(&mut f.keypoints, &[coco::L_EYE, coco::R_EYE], 0..100)), "face");
@@ -104,6 +121,43 @@ fn every_reason_is_found() {
     let jump = |f: &mut Footage| f.keypoints.body.slice_mut(s![50.., .., 0]).mapv_inplace(|x| x + 70.0);
     assert_eq!(whole(&jump), "too short jump too short");
     assert_eq!(whole(&|f| *f = good(0)), "");
+}
+
+/// Measures of 200 good frames, spoilt by `change`: what is kept, and the reasons in the order of time.
+fn spoilt(change: impl Fn(&mut Measures)) -> (Vec<(usize, usize)>, Vec<String>) {
+    let mut measures = measures(&good(200));
+    change(&mut measures);
+    let (intervals, ledger) = judged_measures(&measures, 200.0 / 15.0);
+    assert!(ledger.is_whole());
+    let kept = intervals.intervals.iter().map(|i| (i.start, i.end)).collect();
+    (kept, ledger.refused.into_iter().map(|r| r.reason).collect())
+}
+
+#[test]
+fn pauses_and_short_stands_are_kept_and_longer_ones_are_not() {
+    assert_eq!(spoilt(|m| m.sound_db[80..125].fill(-60.0)), (vec![(0, 200)], vec![]));
+    assert_eq!(spoilt(|m| m.sound_db[80..126].fill(-60.0)), (vec![(0, 80), (126, 200)], vec!["quiet".into()]));
+    assert_eq!(spoilt(|m| m.still[90..105].fill(0.0)), (vec![(0, 200)], vec![]));
+    assert_eq!(spoilt(|m| m.still[90..106].fill(0.0)), (vec![(0, 90), (106, 200)], vec!["still".into()]));
+    // 10 frames a second shown at 15
+    assert_eq!(spoilt(|m| (0..200).filter(|t| t % 3 == 1).for_each(|t| m.still[t] = 0.0)), (vec![(0, 200)], vec![]));
+}
+
+#[test]
+fn a_body_turned_away_is_refused() {
+    assert_eq!(spoilt(|m| m.facing[80..85].fill(0.2)), (vec![(0, 200)], vec![]));
+    assert_eq!(spoilt(|m| m.facing[80..86].fill(0.2)), (vec![(0, 80), (86, 200)], vec!["turned".into()]));
+    assert_eq!(spoilt(|m| m.facing[80..].fill(-2.0)), (vec![(0, 80)], vec!["turned".into()]));
+    assert_eq!(spoilt(|m| m.nose_off[..120].fill(1.4)), (vec![(120, 200)], vec!["turned".into()]));
+    assert_eq!(spoilt(|m| m.nose_off.fill(f32::NAN)), (vec![(0, 200)], vec![]));
+}
+
+#[test]
+fn another_person_ends_the_interval_and_a_crowd_is_refused() {
+    assert_eq!(spoilt(|m| m.identity[90] = 1.0), (vec![(0, 90), (90, 200)], vec![]));
+    assert_eq!(spoilt(|m| m.identity[30] = 1.0), (vec![(30, 200)], vec!["other person".into()]));
+    assert_eq!(spoilt(|m| m.n_people[..60].fill(9.0)), (vec![(0, 200)], vec![]));
+    assert_eq!(spoilt(|m| m.n_people[..61].fill(9.0)), (vec![], vec!["crowd".into()]));
 }
 
 #[test]
