@@ -40,8 +40,9 @@ pub fn read(path: &Path) -> Result<Vec<FingerTake>> {
         .collect())
 }
 
-/// The joints of a side's hand; `None` where there are no two fingers to hang on one wrist.
-fn hand(bvh: &Bvh, side: Side) -> Option<[Option<usize>; N_HAND]> {
+/// The joints of a side's hand, wrist first, then thumb to little finger, each base to tip; `None` where there are no
+/// two fingers to hang on one wrist.
+pub fn hand(bvh: &Bvh, side: Side) -> Option<[Option<usize>; N_HAND]> {
     let chains: Vec<Vec<usize>> = (0..5).map(|finger| chain(bvh, side, finger)).collect();
     let firsts: Vec<usize> = chains.iter().filter_map(|c| c.first().copied()).collect();
     let wrist = common_parent(bvh, &firsts)?;

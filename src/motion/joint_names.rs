@@ -29,9 +29,8 @@ const ELBOW: &[&str] = &["forearm", "lowerarm", "lowarm", "radius", "elbow"];
 const WRIST: &[&str] = &["wrist", "hand"];
 const HIP: &[&str] = &["upleg", "upperleg", "thigh", "femur", "hip", "leg"];
 
-/// Which of `names`, the root first, plays each of the ten roles; the root stands for both hips where a skeleton has
-/// none. Errors: the roles nobody plays, and the names there are.
-pub fn upper_body(names: &[&str]) -> Result<[usize; 10]> {
+/// Which of `names` plays each of the ten roles; `None`: nobody.
+pub fn find(names: &[&str]) -> [Option<usize>; 10] {
     let plain: Vec<String> = names.iter().map(|name| plain(name)).collect();
     let find = |stems: &[&str], side: Option<[&str; 2]>| {
         stems.iter().find_map(|stem| {
@@ -43,7 +42,7 @@ pub fn upper_body(names: &[&str]) -> Result<[usize; 10]> {
         })
     };
     let (right, left) = (Some(["right", "r"]), Some(["left", "l"]));
-    let found = [
+    [
         find(NECK, None),
         find(HEAD, None),
         find(SHOULDER, right),
@@ -54,8 +53,16 @@ pub fn upper_body(names: &[&str]) -> Result<[usize; 10]> {
         find(WRIST, left),
         find(HIP, right),
         find(HIP, left),
-    ];
-    let found = if found[8..] == [None, None] { [&found[..8], &[Some(0); 2]].concat() } else { found.to_vec() };
+    ]
+}
+
+/// Which of `names`, the root first, plays each of the ten roles; the root stands for both hips where a skeleton has
+/// none. Errors: the roles nobody plays, and the names there are.
+pub fn upper_body(names: &[&str]) -> Result<[usize; 10]> {
+    let mut found = find(names);
+    if found[8..] == [None, None] {
+        found[8..].fill(Some(0));
+    }
     let missing: Vec<&str> = ROLES.iter().zip(&found).filter_map(|(role, f)| f.is_none().then_some(*role)).collect();
     if !missing.is_empty() {
         let there: Vec<&str> = names.iter().copied().take(40).collect();

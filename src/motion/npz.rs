@@ -103,6 +103,18 @@ impl Npz {
         })
     }
 
+    /// A single text (`<U`, four bytes a letter); `None` where there is no such array, or it holds something else.
+    pub fn text(&mut self, name: &str) -> Option<String> {
+        let bytes = self.has(name).then(|| self.bytes(name).ok()).flatten()?;
+        let data_at = bytes.iter().position(|&byte| byte == b'\n')? + 1;
+        let header = std::str::from_utf8(bytes.get(10..data_at)?).ok()?;
+        let one_text =
+            header.contains("'descr': '<U") && ["()", "(1,)"].iter().any(|s| header.contains(&format!("'shape': {s}")));
+        let letters = bytes.get(data_at..)?.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        let letters = letters.take_while(|&letter| letter != 0).map(|l| char::from_u32(l).unwrap_or('\u{fffd}'));
+        one_text.then(|| letters.collect())
+    }
+
     /// The array as it lies in the file.
     fn bytes(&mut self, name: &str) -> Result<Vec<u8>> {
         let Some(at) = self.names.iter().position(|n| n == name) else {
@@ -137,7 +149,7 @@ impl Npz {
 }
 
 /// The simplest fraction within one part in 100 000 of `rate`: whole, NTSC (over 1001), or thousandths.
-fn rate_near(rate: f64) -> Option<FrameRate> {
+pub fn rate_near(rate: f64) -> Option<FrameRate> {
     if !rate.is_finite() || !(0.01..=100_000.0).contains(&rate) {
         return None;
     }

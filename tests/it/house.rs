@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A room and the rooms it may import.
-const MAY_IMPORT: [(&str, &str); 19] = [
+const MAY_IMPORT: [(&str, &str); 20] = [
     ("types", ""),
     ("stage", "types"),
     ("config", "types stage"),
@@ -23,6 +23,7 @@ const MAY_IMPORT: [(&str, &str); 19] = [
     ("evaluate", "types stage config motion nn train lift"),
     ("generate", "types stage config motion nn audio dataset train"),
     ("animate", "types stage config motion media vision"),
+    ("import", "types stage config motion media dataset"),
     ("demo", "types stage config motion media vision dataset animate"),
 ];
 

@@ -16,6 +16,7 @@ mod generate;
 mod golden;
 mod heatmap_parity;
 mod house;
+mod import_readers;
 mod kill;
 mod lift;
 mod lift_bad_input;
