@@ -30,6 +30,7 @@ pub fn check(settings: &Settings, places: &BTreeMap<String, Place>) -> Vec<Probl
     rules.within("segment.max_people", f64::from(s.segment.max_people), 1.0, 255.0, "people");
     rules.within("segment.max_crowd_share", s.segment.max_crowd_share, 0.0, 1.0, "");
     rules.within("segment.max_jump", s.segment.max_jump, 0.01, 100.0, "shoulder widths");
+    rules.within("segment.max_bone_change", s.segment.max_bone_change, 0.01, 100.0, "bone lengths");
     rules.within("lift.smooth_arms", s.lift.smooth_arms, 0.0, 30.0, "frames");
     rules.within("lift.smooth_hands", s.lift.smooth_hands, 0.0, 30.0, "frames");
     rules.within("shard.max_mb", f64::from(s.shard.max_mb), 1.0, 100_000.0, "megabytes");

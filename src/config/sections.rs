@@ -156,6 +156,8 @@ pub struct Segment {
     pub max_crowd_share: f64,
     /// Largest step of the neck between two frames, in shoulder widths.
     pub max_jump: f64,
+    /// Farthest a lifted bone may be from its length in the video, as a share of it.
+    pub max_bone_change: f64,
 }
 
 impl Default for Segment {
@@ -177,6 +179,7 @@ impl Default for Segment {
             max_people: 5,
             max_crowd_share: 0.3,
             max_jump: 0.5,
+            max_bone_change: 0.4,
         }
     }
 }

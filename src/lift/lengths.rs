@@ -84,7 +84,8 @@ fn lifted_lengths(motion: &Motion, from: usize, to: usize) -> Vec<f32> {
     (0..motion.n_frames()).map(|t| bone(motion, t, from, to)).filter(|l| l.is_finite()).collect()
 }
 
-fn bone(motion: &Motion, t: usize, from: usize, to: usize) -> f32 {
+/// Metres between two joints of a frame.
+pub fn bone(motion: &Motion, t: usize, from: usize, to: usize) -> f32 {
     let square = |k: usize| (motion.joints[[t, to, k]] - motion.joints[[t, from, k]]).powi(2);
     (0..3).map(square).sum::<f32>().sqrt()
 }

@@ -6,6 +6,7 @@
 //! What is known and what is not: a joint not seen for up to a second is filled and masked; one missing for longer is
 //! NaN, with all that hangs on it. Size is a convention (`upper_body::REFERENCE_SIZE`), as no picture tells it.
 
+mod amend;
 mod body;
 mod camera;
 mod gaps;
@@ -13,6 +14,7 @@ mod hand_depth;
 mod hands;
 mod lengths;
 mod notes;
+mod outliers;
 mod sight;
 mod stage;
 pub mod weights;
@@ -91,6 +93,12 @@ impl Lifter {
     /// The motion inside each interval, each lifted and smoothed by itself, all with the same bone lengths.
     /// Errors: an interval outside the video, keypoints of unequal lengths.
     pub fn lift_intervals(&self, keypoints: &Keypoints, intervals: &[Interval]) -> Result<Lifted> {
+        let raw = self.raw(keypoints, intervals)?;
+        Ok(self.finish(raw, intervals))
+    }
+
+    /// Each interval lifted and smoothed by itself; bones as long as they came out, hands each in its own frame.
+    fn raw(&self, keypoints: &Keypoints, intervals: &[Interval]) -> Result<Lifted> {
         let n_frames = keypoints.n_frames();
         for hand in [&keypoints.left_hand, &keypoints.right_hand] {
             ensure!(hand.shape()[0] == n_frames, "{n_frames} frames of body keypoints, {} of a hand", hand.shape()[0]);
@@ -101,6 +109,13 @@ impl Lifter {
             ensure!(start <= end && end <= n_frames, "interval {start}..{end} of a video of {n_frames} frames");
             self.lift_stretch(keypoints, interval, lifted.stretch(interval))?;
         }
+        Ok(lifted)
+    }
+
+    /// One length a bone over all `intervals` (parts of those that `lifted` was lifted for), hands joined at the wrists;
+    /// frames in none of them are NaN.
+    fn finish(&self, mut lifted: Lifted, intervals: &[Interval]) -> Lifted {
+        lifted.keep_only(intervals);
         lifted.lengths = lengths::measure(&lifted.motion);
         for &interval in intervals {
             let mut stretch = lifted.stretch(interval);
@@ -118,7 +133,7 @@ impl Lifter {
         }
         let shoulder = lifted.motion.joints.slice(s![.., skeleton::R_SHOULDER, 0]);
         lifted.n_frames = shoulder.iter().filter(|x| x.is_finite()).count();
-        Ok(lifted)
+        lifted
     }
 
     /// One interval, smoothed, of about the reference size; each hand in its own frame, the root at 0.
@@ -153,6 +168,22 @@ impl Lifted {
             lengths: [0.0; N_BONES],
             cameras: Vec::new(),
             n_frames: 0,
+        }
+    }
+
+    /// Forgets the frames that are in none of `intervals`.
+    fn keep_only(&mut self, intervals: &[Interval]) {
+        let mut end = 0;
+        let after_all = self.motion.n_frames();
+        for next in intervals.iter().copied().chain([Interval { start: after_all, end: after_all }]) {
+            if end < next.start {
+                let stretch = self.stretch(Interval { start: end, end: next.start });
+                let Stretch { mut joints, mut extra, mut mask } = stretch;
+                joints.fill(f32::NAN);
+                extra.fill(f32::NAN);
+                mask.fill(false);
+            }
+            end = end.max(next.end);
         }
     }
 

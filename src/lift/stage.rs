@@ -1,7 +1,10 @@
 //! The stage: reads the keypoints of a video and the intervals worth keeping, writes `joints.npz`,
-//! `bones.json` and `camera.json` (roll and pitch of each interval), and the final `intervals.json` and `ledger.json`.
+//! `bones.json` and `camera.json` (roll and pitch of each interval), what `outliers` looked at
+//! (`measures.npz`), and the final `intervals.json` and `ledger.json`.
 
-use super::Lifter;
+use super::amend::amend;
+use super::outliers::{self, BoneChange};
+use super::{Lifted, Lifter};
 use crate::config;
 use crate::motion::npz::Npz;
 use crate::motion::{joints_npz, keypoints_npz};
@@ -10,9 +13,12 @@ use crate::stage::{Input, Report, Stage, Unit, progress::Progress, runner::place
 use crate::types::interval::Intervals;
 use crate::types::pose2d::Keypoints;
 use anyhow::{Context, Result, ensure};
-use ndarray::s;
+use ndarray::{Array1, s};
+use ndarray_npy::NpzWriter;
 use serde::Serialize;
 use serde_json::json;
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 /// Lifts videos.
@@ -50,7 +56,7 @@ impl Stage for LiftStage {
     }
 
     fn version(&self) -> u32 {
-        4
+        5
     }
 
     fn settings(&self) -> serde_json::Value {
@@ -67,7 +73,11 @@ impl Stage for LiftStage {
                 "smooth_hands": self.settings.smooth_hands,
                 "level": self.settings.level,
             },
-            "segment": { "min_frames": self.rules.min_frames },
+            "segment": {
+                "min_frames": self.rules.min_frames,
+                "max_body_gap_secs": self.rules.max_body_gap_secs,
+                "max_bone_change": self.rules.max_bone_change,
+            },
         })
     }
 
@@ -113,7 +123,7 @@ impl Stage for LiftStage {
             intervals.n_frames
         );
         let ledger = Ledger::read(&self.segmented(unit, "ledger.json"))?;
-        let lifted = self.lifter.lift_intervals(&keypoints, &intervals.intervals)?;
+        let (lifted, intervals, ledger) = self.lift(&mut keypoints, intervals, ledger, out)?;
         joints_npz::write(&out.join("joints.npz"), &lifted.motion)?;
         let bones = json!({ "lengths_metres": lifted.lengths.to_vec(), "n_frames": lifted.n_frames });
         write_json(&out.join("bones.json"), &bones)?;
@@ -131,6 +141,41 @@ impl Stage for LiftStage {
         let facts = json!({ "n_frames": lifted.n_frames, "filled_percent": filled });
         Ok(Report { line, facts: facts.as_object().cloned().unwrap_or_default() })
     }
+}
+
+impl LiftStage {
+    /// Lifts, and takes out of intervals and ledger what lifting shows to be wrong; writes `measures.npz`.
+    fn lift(
+        &self,
+        keypoints: &mut Keypoints,
+        mut intervals: Intervals,
+        mut ledger: Ledger,
+        out: &Path,
+    ) -> Result<(Lifted, Intervals, Ledger)> {
+        let (most, min_frames) = (self.rules.max_bone_change, self.rules.min_frames);
+        let mut raw = self.lifter.raw(keypoints, &intervals.intervals)?;
+        let change = BoneChange::of(&raw.motion);
+        if change.exceeds(most) {
+            let max_gap = (self.rules.max_body_gap_secs * keypoints.fps.per_sec() + 1e-6) as usize;
+            let marks = change.judge(most, max_gap, keypoints);
+            (intervals, ledger) = amend(&intervals, &ledger, &marks, min_frames)?;
+            raw = self.lifter.raw(keypoints, &intervals.intervals)?;
+        }
+        let open = outliers::open(&raw.motion, &intervals.intervals);
+        (intervals, ledger) = amend(&intervals, &ledger, &open, min_frames)?;
+        write_measures(&out.join("measures.npz"), change.farthest())?;
+        Ok((self.lifter.finish(raw, &intervals.intervals), intervals, ledger))
+    }
+}
+
+/// `bone_change` f32 [T]: the farthest that a bone of the frame is from its length in the video, as a share of it.
+fn write_measures(path: &Path, bone_change: Vec<f32>) -> Result<()> {
+    let written = || -> Result<()> {
+        let mut npz = NpzWriter::new(BufWriter::new(File::create(path)?));
+        npz.add_array("bone_change", &Array1::from_vec(bone_change))?;
+        Ok(npz.finish()?.flush()?)
+    };
+    written().with_context(|| format!("cannot write {}", path.display()))
 }
 
 fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {

@@ -77,6 +77,7 @@ pub fn write(work: &Path, unit: &Unit, footage: &Footage, content: &str) {
     let mut timeline = NpzWriter::new(File::create(extract.join("timeline.npz")).unwrap());
     let begins = |t: usize| f64::from(u8::from(t > 0 && footage.shot[t] != footage.shot[t - 1]));
     timeline.add_array("shot_score", &Array1::from_shape_fn(n_frames, begins)).unwrap();
+    timeline.add_array("repeated", &Array1::from_elem(n_frames, false)).unwrap();
     timeline.add_array("restart", &Array1::from_shape_fn(n_frames, |t| begins(t) > 0.0)).unwrap();
     timeline.add_array("still", &Array1::<f32>::from_elem(n_frames, 2.0)).unwrap();
     timeline.finish().unwrap();

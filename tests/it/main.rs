@@ -22,6 +22,7 @@ mod lift;
 mod lift_bad_input;
 mod lift_camera;
 mod lift_joints;
+mod lift_outliers;
 mod lifter_parity;
 mod media_frames;
 mod media_sound;
