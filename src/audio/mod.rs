@@ -1,3 +1,4 @@
 //! Waveforms to features. Pure: samples in, arrays out.
 
+pub mod fingerprint;
 pub mod mel;

@@ -54,7 +54,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         _ => format!("orator run{}", args.config.flags()),
     };
     ui.summary(&lines.join("\n"), Some(&next), json!({ "checks": facts, "missing": missing.len(), "next": next }));
-    Ok(if missing.is_empty() { Outcome::Done } else { Outcome::SetUpWrong })
+    Ok(if missing.is_empty() { Outcome::Done } else { Outcome::Wrong })
 }
 
 fn defaults() -> Result<Config> {

@@ -1,8 +1,9 @@
 //! The command line: the one place with clap, indicatif and println. One file a verb; a verb's doc comment is its
-//! `--help`. Exit codes: 0 all done; 1 usage or configuration; 2 some units failed, the others are done.
+//! `--help`. Exit codes: 0 all done; 1 usage, configuration, or a check that did not pass; 2 some units failed, the others are done.
 
 mod bench;
 mod config_args;
+mod dataset;
 mod demo;
 mod doctor;
 mod evaluate;
@@ -40,6 +41,7 @@ enum Verb {
     Doctor(doctor::Args),
     Lift(lift::Args),
     Sheet(sheet::Args),
+    Dataset(dataset::Args),
     Train(train::Args),
     Evaluate(evaluate::Args),
     Generate(generate::Args),
@@ -54,8 +56,8 @@ pub enum Outcome {
     Done,
     /// Some units failed (each was reported); the others are done.
     SomeFailed,
-    /// The set-up is not as it must be; what is missing was said.
-    SetUpWrong,
+    /// What was looked at (the set-up, a dataset) is not as it must be; what is wrong was said.
+    Wrong,
 }
 
 /// Parses the command line, runs the verb, reports an error, and gives the exit code.
@@ -76,6 +78,7 @@ pub fn main() -> ExitCode {
         Verb::Doctor(args) => doctor::run(args, &ui),
         Verb::Lift(args) => lift::run(args, &ui),
         Verb::Sheet(args) => sheet::run(args, &ui),
+        Verb::Dataset(args) => dataset::run(args, &ui),
         Verb::Train(args) => train::run(args, &ui),
         Verb::Evaluate(args) => evaluate::run(args, &ui),
         Verb::Generate(args) => generate::run(args, &ui),
@@ -85,7 +88,7 @@ pub fn main() -> ExitCode {
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::SomeFailed) => ExitCode::from(2),
-        Ok(Outcome::SetUpWrong) => ExitCode::from(1),
+        Ok(Outcome::Wrong) => ExitCode::from(1),
         Err(error) => {
             ui.error(&error);
             ExitCode::from(1)

@@ -37,7 +37,11 @@ impl Step {
             Self::Pose2d => Box::new(Pose2dStage::new(settings)?),
             Self::Segment => Box::new(SegmentStage::new(&settings.segment, &settings.work.dir)),
             Self::Lift => Box::new(LiftStage::new(&settings.lift, &settings.segment, &settings.work.dir)?),
-            Self::Shard => Box::new(ShardStage::new(settings, videos).with_models(models_used(settings)?)),
+            Self::Shard => Box::new(
+                ShardStage::new(settings, videos)
+                    .with_videos(orator::config::videos::of(config))
+                    .with_models(models_used(settings)?),
+            ),
         })
     }
 

@@ -68,10 +68,13 @@ fn defaults() -> Table {
     Table::try_from(Settings::default()).unwrap_or_default()
 }
 
-/// What a `[[speaker]]` may hold.
+/// What a `[[speaker]]` may hold: the lists with an entry that shows its type.
 fn speaker_schema() -> Table {
-    let videos = Value::Array(vec![Value::String(String::new())]);
-    Table::from_iter([("name".to_owned(), Value::String(String::new())), ("videos".to_owned(), videos)])
+    let text = || Value::String(String::new());
+    let words = ["name", "licence", "consent", "source"].map(|key| (key.to_owned(), text()));
+    let lists = ["videos", "exclude", "train", "validation", "test"];
+    let lists = lists.map(|key| (key.to_owned(), Value::Array(vec![text()])));
+    words.into_iter().chain(lists).collect()
 }
 
 struct Reader {
@@ -133,9 +136,11 @@ impl Reader {
             let mut speaker = speaker_schema();
             self.places.insert(key.clone(), place);
             self.lay(written, &mut speaker, &format!("{key}."), place_at);
-            for name in ["name", "videos"].iter().filter(|name| !written.keys().any(|key| key.get_ref() == **name)) {
+            let is_written = |name: &str| written.keys().any(|key| key.get_ref() == name);
+            for name in ["name", "videos"].iter().filter(|name| !is_written(name)) {
                 self.problem(&key, place, format!("the key {name} is missing"));
             }
+            speaker.retain(|name, _| is_written(name) || ["name", "videos"].contains(&name));
             speakers.push(Value::Table(speaker));
         }
         table.insert("speaker".to_owned(), Value::Array(speakers));

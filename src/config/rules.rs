@@ -36,6 +36,7 @@ pub fn check(settings: &Settings, places: &BTreeMap<String, Place>) -> Vec<Probl
     rules.within("shard.max_mb", f64::from(s.shard.max_mb), 1.0, 100_000.0, "megabytes");
     rules.within("shard.validation", s.shard.validation, 0.0, 0.9, "");
     rules.within("shard.test", s.shard.test, 0.0, 0.9, "");
+    rules.within("shard.duplicate_secs", s.shard.duplicate_secs, 0.0, 3600.0, "seconds");
     if s.shard.validation + s.shard.test > 0.95 {
         rules.problem("shard.test", "validation and test together leave less than 5 % to train on".to_owned());
     }

@@ -28,6 +28,23 @@ pub struct Speaker {
     pub name: String,
     /// Paths or glob patterns.
     pub videos: Vec<String>,
+    /// Videos to leave out, though `videos` names them: paths, file names or patterns. So are the next three.
+    #[serde(default)]
+    pub exclude: Vec<String>,
+    /// Videos whose split is not left to chance.
+    #[serde(default)]
+    pub train: Vec<String>,
+    #[serde(default)]
+    pub validation: Vec<String>,
+    #[serde(default)]
+    pub test: Vec<String>,
+    /// For the dataset's card: the licence's identifier, how the speaker agreed, where the videos come from.
+    #[serde(default)]
+    pub licence: String,
+    #[serde(default)]
+    pub consent: String,
+    #[serde(default)]
+    pub source: String,
 }
 
 /// `[work]`: where the stages write.
@@ -216,11 +233,13 @@ pub struct Shard {
     /// Shares of the videos for validation and test, 0..1; the rest trains.
     pub validation: f64,
     pub test: f64,
+    /// Seconds of equal sound from which two videos belong to one split; 0: sound is not compared.
+    pub duplicate_secs: f64,
 }
 
 impl Default for Shard {
     fn default() -> Self {
-        Self { max_mb: 256, validation: 0.15, test: 0.15 }
+        Self { max_mb: 256, validation: 0.15, test: 0.15, duplicate_secs: 5.0 }
     }
 }
 

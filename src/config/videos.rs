@@ -3,6 +3,7 @@
 
 use super::{Config, Speaker};
 use crate::stage::Unit;
+use crate::types::split::Split;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -15,6 +16,8 @@ pub struct Videos {
     pub speaker: String,
     /// Sorted by their work names, each once.
     pub units: Vec<Unit>,
+    /// The split of each video that the configuration puts into one, by its work name.
+    pub splits: BTreeMap<String, Split>,
     /// Entries of the configuration that lead to no video, each with what to do.
     pub missing: Vec<String>,
 }
@@ -38,7 +41,36 @@ fn of_speaker(speaker: &Speaker, folder: &Path) -> Videos {
             found.insert(video.clone(), Unit { speaker: speaker.name.clone(), video, source: path });
         }
     }
-    Videos { speaker: speaker.name.clone(), units: found.into_values().collect(), missing }
+    found.retain(|_, unit: &mut Unit| !speaker.exclude.iter().any(|entry| names(entry, &unit.source, folder)));
+    let mut splits = BTreeMap::new();
+    let lists = [&speaker.train, &speaker.validation, &speaker.test];
+    for (split, entries) in Split::ALL.into_iter().zip(lists) {
+        for entry in entries {
+            let named = found.values().filter(|unit| names(entry, &unit.source, folder));
+            let before: Vec<(String, Option<Split>)> =
+                named.map(|unit| (unit.video.clone(), splits.insert(unit.video.clone(), split))).collect();
+            let list = split.name();
+            if before.is_empty() {
+                missing.push(format!(
+                    "{list} = [{entry:?}]: none of the videos is called so; correct or remove the entry"
+                ));
+            }
+            for other in before.iter().filter_map(|(_, was)| was.filter(|was| *was != split)) {
+                missing.push(format!("{entry:?} is named in {} and in {list}; take it out of one", other.name()));
+            }
+        }
+    }
+    Videos { speaker: speaker.name.clone(), units: found.into_values().collect(), splits, missing }
+}
+
+/// Whether an entry means the video: its path, its file name, or a pattern of one of them.
+pub fn names(entry: &str, video: &Path, folder: &Path) -> bool {
+    let file_name = video.file_name().unwrap_or_default().to_string_lossy();
+    if folder.join(entry) == video || *entry == *file_name {
+        return true;
+    }
+    let relative = video.strip_prefix(folder).unwrap_or(video).to_string_lossy();
+    glob::Pattern::new(entry).is_ok_and(|pattern| pattern.matches(&relative) || pattern.matches(&file_name))
 }
 
 /// The files an entry names: itself, the videos of the folder it is, or what its pattern matches. A plain path is
@@ -123,7 +155,7 @@ mod tests {
         }
         std::fs::create_dir(dir.path().join("empty")).unwrap();
         let videos = ["*.mp4", ".", "empty", "none-*.mp4", "gone.mp4"].map(str::to_owned).to_vec();
-        let videos = of_speaker(&Speaker { name: "host".into(), videos }, dir.path());
+        let videos = of_speaker(&Speaker { name: "host".into(), videos, ..Speaker::default() }, dir.path());
         let names: Vec<&str> = videos.units.iter().map(|unit| unit.video.split('-').next().unwrap()).collect();
         assert_eq!(names, ["a", "b", "gone"]);
         assert_eq!(videos.missing.len(), 2);
@@ -135,7 +167,29 @@ mod tests {
         let folder = dir.path().join("talks [2024] *");
         std::fs::create_dir(&folder).unwrap();
         std::fs::write(folder.join("a.mp4"), "").unwrap();
-        let videos = of_speaker(&Speaker { name: "host".into(), videos: vec!["*.mp4".into()] }, &folder);
+        let videos = of_speaker(&host(&["*.mp4"]), &folder);
         assert_eq!((videos.units.len(), videos.missing.len()), (1, 0));
+    }
+
+    fn host(videos: &[&str]) -> Speaker {
+        Speaker { name: "host".into(), videos: videos.iter().map(|v| (*v).to_owned()).collect(), ..Speaker::default() }
+    }
+
+    #[test]
+    fn videos_are_left_out_and_put_into_splits_by_name() {
+        let dir = tempfile::tempdir().unwrap();
+        for name in ["a.mp4", "b [1].mp4", "c.mp4", "d.mp4"] {
+            std::fs::write(dir.path().join(name), "").unwrap();
+        }
+        let list = |entries: &[&str]| entries.iter().map(|e| (*e).to_owned()).collect::<Vec<_>>();
+        let mut speaker = Speaker { exclude: list(&["c.*", "gone.mp4"]), ..host(&["*.mp4"]) };
+        (speaker.test, speaker.train) = (list(&["b [1].mp4"]), list(&[&dir.path().join("a.mp4").to_string_lossy()]));
+        let videos = of_speaker(&speaker, dir.path());
+        let split = |name: &str| videos.splits.iter().find(|(video, _)| video.starts_with(name)).map(|(_, s)| *s);
+        assert_eq!((videos.units.len(), videos.missing.len()), (3, 0));
+        assert_eq!((split("a-"), split("b-1-"), split("d-")), (Some(Split::Train), Some(Split::Test), None));
+        (speaker.validation, speaker.test) = (list(&["a.mp4", "none.mp4"]), list(&[]));
+        let said = of_speaker(&speaker, dir.path()).missing;
+        assert!(said[0].contains("in train and in validation") && said[1].contains("none.mp4"), "{said:?}");
     }
 }

@@ -1,13 +1,13 @@
-//! The speaker's one set of bone lengths: of the videos' own sets (`bones.json`, written by the lift stage) the median,
-//! each video weighing as many frames as it was measured on.
+//! Bone lengths: constant in the shards of a video (`bones.json`, written by the lift stage), and the speaker's one set
+//! for readers: the median of the videos' sets, each weighing as many frames as it was measured on.
 
 use crate::types::skeleton::N_BONES;
 use anyhow::{Context, Result, ensure};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// The bone lengths of one video.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct VideoBones {
     /// Of joints 1..=48 to their parents, metres; 0: not measured.
     pub lengths_metres: Vec<f64>,

@@ -1,22 +1,13 @@
-//! `index.json`: where each sample lies in which shard, and the BLAKE3 hash of both, for random access and checks.
+//! `index.jsonl`: where each sample lies in which shard, and its BLAKE3 hash, a line a sample, for random access and
+//! checks. The shards themselves stand in `info.json`.
 
-use super::split::Split;
+use crate::types::split::Split;
 use serde::{Deserialize, Serialize};
-
-/// The whole file.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Index {
-    pub schema: u32,
-    pub shards: Vec<Shard>,
-    /// In the order of the shards.
-    pub samples: Vec<SampleRef>,
-}
 
 /// One tar file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Shard {
     pub file: String,
-    pub split: Split,
     pub bytes: u64,
     pub n_samples: usize,
     pub blake3: String,

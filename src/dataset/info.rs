@@ -1,5 +1,7 @@
 //! `info.json`: what the numbers mean. Everything a reader needs who has never seen this project.
 
+use super::index::Shard;
+use super::part::SplitBy;
 use super::sample::N_KEYPOINTS;
 use super::split::Split;
 use crate::types::skeleton::{self, N_JOINTS, Side};
@@ -22,13 +24,36 @@ pub struct Info {
     /// What the coordinates of `pose3d.npy` are.
     pub axes: Axes,
     pub joints: Vec<Joint>,
-    /// Length of the bone from joint `n + 1` to its parent, metres: constant over the whole dataset.
+    /// Length of the bone from joint `n + 1` to its parent, metres: the median of the videos. In a video's samples the
+    /// bones have the constant lengths of that video, see `videos/<name>.json`.
     pub bone_lengths_metres: Vec<f64>,
     /// The 59 points of `pose2d.npy`.
     pub keypoints: Vec<String>,
     /// The models that looked at the videos.
     pub models: Vec<ModelUsed>,
+    /// Identifier of the licence, how the speaker agreed, where the videos come from; empty: not said.
+    pub licence: String,
+    pub consent: String,
+    pub source: String,
+    /// What else a reader must know, a sentence each.
+    pub notes: Vec<String>,
     pub splits: BTreeMap<String, SplitInfo>,
+    /// Sorted by name; those without a sample too.
+    pub videos: Vec<VideoInfo>,
+}
+
+/// A video of the dataset.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct VideoInfo {
+    pub name: String,
+    pub file: String,
+    /// BLAKE3 of the file.
+    pub content: String,
+    /// `None`: nothing of it was kept.
+    pub split: Option<Split>,
+    pub split_by: SplitBy,
+    pub samples: usize,
+    pub secs: f64,
 }
 
 /// An array or file of a sample.
@@ -68,33 +93,52 @@ pub struct ModelUsed {
 /// How much a split holds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SplitInfo {
-    pub shards: Vec<String>,
+    pub shards: Vec<Shard>,
     pub videos: Vec<String>,
     pub samples: usize,
     pub frames: usize,
     pub secs: f64,
 }
 
-/// What the writer of a dataset must know beforehand.
+/// What a dataset is beside its videos.
 #[derive(Clone, Debug, PartialEq)]
 pub struct About {
     pub speaker: String,
+    pub tool: String,
     pub fps: FrameRate,
-    /// 48 lengths, metres.
-    pub bone_lengths_metres: Vec<f64>,
     pub models: Vec<ModelUsed>,
-    /// A shard is closed before it would grow past this.
-    pub max_shard_bytes: u64,
+    pub licence: String,
+    pub consent: String,
+    pub source: String,
+    pub notes: Vec<String>,
+}
+
+impl About {
+    /// Of `speaker` at `fps`, made by this program; nothing else is said.
+    pub fn new(speaker: &str, fps: FrameRate) -> Self {
+        let nothing = String::new;
+        Self {
+            speaker: speaker.to_owned(),
+            tool: concat!("orator ", env!("CARGO_PKG_VERSION")).to_owned(),
+            fps,
+            models: Vec::new(),
+            licence: nothing(),
+            consent: nothing(),
+            source: nothing(),
+            notes: Vec::new(),
+        }
+    }
 }
 
 impl Info {
-    /// The description of a dataset `about` with these splits.
-    pub fn new(about: About, splits: BTreeMap<Split, SplitInfo>) -> Self {
+    /// The description of a dataset `about` with these videos and bones (48 lengths, metres).
+    pub fn new(about: &About, bones: &[f32], splits: BTreeMap<Split, SplitInfo>, videos: Vec<VideoInfo>) -> Self {
+        let About { speaker, tool, fps, models, licence, consent, source, notes } = about.clone();
         Self {
             schema: super::SCHEMA,
-            speaker: about.speaker,
-            tool: concat!("orator ", env!("CARGO_PKG_VERSION")).to_owned(),
-            fps: about.fps,
+            speaker,
+            tool,
+            fps,
             sound_rate: crate::types::sound::SAMPLE_RATE,
             members: members(),
             axes: Axes {
@@ -105,17 +149,38 @@ impl Info {
                 origin: "the neck, in every frame".into(),
             },
             joints: (0..N_JOINTS).map(joint).collect(),
-            bone_lengths_metres: about.bone_lengths_metres,
+            bone_lengths_metres: bones.iter().map(|&length| f64::from(length)).collect(),
             keypoints: keypoint_names(),
-            models: about.models,
+            models,
+            licence,
+            consent,
+            source,
+            notes,
             splits: splits.into_iter().map(|(split, info)| (split.name().to_owned(), info)).collect(),
+            videos,
         }
+    }
+
+    /// What it was made from, beside the videos.
+    pub fn about(&self) -> About {
+        let Info { speaker, tool, fps, models, licence, consent, source, notes, .. } = self.clone();
+        About { speaker, tool, fps, models, licence, consent, source, notes }
+    }
+
+    /// The shards of all splits.
+    pub fn shards(&self) -> impl Iterator<Item = &Shard> {
+        self.splits.values().flat_map(|split| &split.shards)
     }
 }
 
 fn members() -> BTreeMap<String, Member> {
     let rows = [
-        ("pose3d.npy", "T, 49, 3", "float32", "joints, see `joints` and `axes`; NaN where missing"),
+        (
+            "pose3d.npy",
+            "T, 49, 3",
+            "float32",
+            "joints, see `joints` and `axes`; NaN where missing; bones constant over a video",
+        ),
         ("pose2d.npy", "T, 59, 3", "float32", "keypoints, see `keypoints`: x px, y px, score 0..1; 0 is missing"),
         ("mask.npy", "T, 49", "bool", "whether the joint was seen; false where it is missing or was filled in"),
         (

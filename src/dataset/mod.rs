@@ -1,22 +1,33 @@
 //! The dataset of one speaker on disk: written by the shard stage, read back by training. A folder holds WebDataset
-//! tar shards (`train-000000.tar`, ...), `info.json` (what the numbers mean), `stats.json` (what they are like) and
-//! `index.json` (where each sample lies, and its hash).
+//! tar shards of each video (`train-<video>-0000.tar`, ...), `videos/` (what is known of each video), and the files put
+//! together from these: `info.json` (what the numbers mean), `stats.json` (what they are like), `index.jsonl` (where each
+//! sample lies), `ledger.jsonl` (what became of every second), `leakage.json`, the card `README.md`, `checksums.b3`.
 //!
 //! A sample is an interval, continuous motion with its sound; windows are drawn when reading (`windows`). The way of
-//! a sample: `sample` (members) -> `shard` (tar) -> `write` (splits, statistics, index); back: `read` -> `windows`.
-//! Sound and motion meet by time in `sync`, nowhere else.
+//! a sample: `video` (cut) -> `sample` (members) -> `shard` (tar) -> `part` (a video) -> `assemble`; back: `read` ->
+//! `windows`. `split` and `shared_sound` decide where a video goes, `verify` checks all of it. Sound and motion meet by
+//! time in `sync`, nowhere else.
 
+pub mod assemble;
 pub mod bones;
+mod card;
 pub mod index;
 pub mod info;
+pub mod leakage;
+pub mod moments;
 pub mod npy;
+mod outcome;
+pub mod part;
 pub mod read;
 pub mod sample;
 pub mod shard;
+pub mod shared_sound;
 pub mod split;
 mod stage;
 pub mod stats;
 pub mod sync;
+pub mod verify;
+mod verify_sample;
 mod video;
 pub mod wav;
 pub mod windows;
@@ -30,7 +41,16 @@ pub use windows::Windows;
 pub use write::write_dataset;
 
 /// Version of the folder's layout; a reader refuses any other.
-pub const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 2;
 /// The window of the paper, in frames, and the stride of training windows: what statistics count.
 pub const WINDOW_FRAMES: usize = 64;
 pub const STRIDE_FRAMES: usize = 5;
+
+/// Names of the files that speak of all videos.
+pub const INFO: &str = "info.json";
+pub const STATS: &str = "stats.json";
+pub const INDEX: &str = "index.jsonl";
+pub const LEDGER: &str = "ledger.jsonl";
+pub const LEAKAGE: &str = "leakage.json";
+pub const README: &str = "README.md";
+pub const CHECKSUMS: &str = "checksums.b3";

@@ -1,13 +1,13 @@
 //! Reading a dataset's folder: opened once, then any sample or any stretch of one by its place. Damaged, missing or
 //! foreign files are errors that name the file and what to do; nothing here panics on what is in a file.
 
-use super::index::{Index, SampleRef, Span};
+use super::index::{SampleRef, Span};
 use super::info::Info;
 use super::npy::{self, Element, Layout};
 use super::sample::{N_KEYPOINTS, Sample};
 use super::split::Split;
 use super::stats::Stats;
-use super::{sync, wav, write};
+use super::{INDEX, INFO, STATS, sync, wav};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::{SAMPLE_RATE, Sound};
@@ -15,6 +15,7 @@ use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3};
 use std::collections::BTreeMap;
 use std::fs::File;
+use std::io::BufRead;
 use std::ops::Range;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
@@ -24,22 +25,22 @@ pub struct Dataset {
     dir: PathBuf,
     info: Info,
     stats: Stats,
-    index: Index,
+    samples: Vec<SampleRef>,
     shards: BTreeMap<String, File>,
 }
 
 impl Dataset {
     /// Opens the folder of one speaker (`work/dataset/<speaker>`): reads its JSON files, and checks that every shard
-    /// is there with the size it should have. Contents are checked by `read` and `verify`.
+    /// is there with the size it should have. Contents are checked by `read` and by `verify`.
     pub fn open(dir: impl AsRef<Path>) -> Result<Dataset> {
         let dir = dir.as_ref().to_owned();
         ensure!(
-            dir.join(write::INFO).is_file(),
+            dir.join(INFO).is_file(),
             "{} is no dataset: it has no {}; the shard stage of `orator run` writes one to work/dataset/<speaker>",
             dir.display(),
-            write::INFO
+            INFO
         );
-        let schema: Schema = read_json(&dir.join(write::INFO))?;
+        let schema: Schema = read_json(&dir.join(INFO))?;
         ensure!(
             schema.schema == super::SCHEMA,
             "{} has layout version {}, this program reads {}: run the shard stage again",
@@ -47,17 +48,16 @@ impl Dataset {
             schema.schema,
             super::SCHEMA
         );
-        let info: Info = read_json(&dir.join(write::INFO))?;
+        let info: Info = read_json(&dir.join(INFO))?;
         ensure!(
             info.sound_rate == SAMPLE_RATE && info.fps.num > 0 && info.fps.den > 0 && info.joints.len() == N_JOINTS,
             "{}: expected sound at {SAMPLE_RATE} Hz, a frame rate and {N_JOINTS} joints",
-            dir.join(write::INFO).display()
+            dir.join(INFO).display()
         );
-        let stats: Stats = read_json(&dir.join(write::STATS))?;
-        ensure!(stats.is_whole(), "{}: its tables do not have 49 rows", dir.join(write::STATS).display());
-        let index: Index = read_json(&dir.join(write::INDEX))?;
+        let stats: Stats = read_json(&dir.join(STATS))?;
+        ensure!(stats.is_whole(), "{}: its tables do not have 49 rows", dir.join(STATS).display());
         let mut shards = BTreeMap::new();
-        for shard in &index.shards {
+        for shard in info.shards() {
             let path = dir.join(&shard.file);
             let file = File::open(&path).with_context(|| format!("opening the shard {}", path.display()))?;
             let bytes = file.metadata().with_context(|| format!("looking at {}", path.display()))?.len();
@@ -69,12 +69,21 @@ impl Dataset {
             );
             shards.insert(shard.file.clone(), (file, bytes));
         }
-        for sample in &index.samples {
+        let samples = read_index(&dir.join(INDEX))?;
+        for sample in &samples {
             let fits = shards.get(&sample.shard).is_some_and(|(_, bytes)| sample.fits(*bytes));
-            ensure!(fits, "{}: {} lies outside its shard", dir.join(write::INDEX).display(), sample.key);
+            ensure!(fits, "{}: {} lies outside its shard", dir.join(INDEX).display(), sample.key);
         }
+        let n_samples: usize = info.splits.values().map(|split| split.samples).sum();
+        ensure!(
+            samples.len() == n_samples,
+            "{} has {} samples, {} says {n_samples}: the file is damaged; run the shard stage again with --force",
+            dir.join(INDEX).display(),
+            samples.len(),
+            dir.join(INFO).display()
+        );
         let shards = shards.into_iter().map(|(name, (file, _))| (name, file)).collect();
-        Ok(Dataset { dir, info, stats, index, shards })
+        Ok(Dataset { dir, info, stats, samples, shards })
     }
 
     /// The folder.
@@ -94,23 +103,7 @@ impl Dataset {
 
     /// The samples of a split, in the order of the shards.
     pub fn samples(&self, split: Split) -> Vec<SampleRef> {
-        self.index.samples.iter().filter(|sample| sample.split == split).cloned().collect()
-    }
-
-    /// Reads every shard and compares its hash with the index.
-    pub fn verify(&self) -> Result<()> {
-        for shard in &self.index.shards {
-            let path = self.dir.join(&shard.file);
-            let mut hasher = blake3::Hasher::new();
-            let file = File::open(&path).with_context(|| format!("opening the shard {}", path.display()))?;
-            hasher.update_reader(file).with_context(|| format!("reading {}", path.display()))?;
-            ensure!(
-                hasher.finalize().to_hex().as_str() == shard.blake3,
-                "{} is damaged (its hash is not the one written): run the shard stage again with --force",
-                path.display()
-            );
-        }
-        Ok(())
+        self.samples.iter().filter(|sample| sample.split == split).cloned().collect()
     }
 
     /// Reads a whole sample and checks its hash.
@@ -199,6 +192,17 @@ impl Dataset {
         file.read_exact_at(&mut bytes, span.offset).with_context(place)?;
         Ok(bytes)
     }
+}
+
+fn read_index(path: &Path) -> Result<Vec<SampleRef>> {
+    let reading = || format!("reading {}", path.display());
+    let lines = std::io::BufReader::new(File::open(path).with_context(reading)?).lines();
+    let parse = |(n, line): (usize, std::io::Result<String>)| {
+        let wrong =
+            || format!("{}, line {}: not as the shard stage writes it; run the stage again", path.display(), n + 1);
+        serde_json::from_str(&line.with_context(reading)?).with_context(wrong)
+    };
+    lines.enumerate().map(parse).collect()
 }
 
 #[derive(serde::Deserialize)]

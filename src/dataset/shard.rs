@@ -11,9 +11,10 @@ use std::path::{Path, PathBuf};
 
 const BLOCK: usize = 512;
 
-/// Writes the samples of one split into `<split>-000000.tar`, `<split>-000001.tar`, ... of a folder.
+/// Writes the samples of one video into `<split>-<video>-0000.tar`, `<split>-<video>-0001.tar`, ... of a folder.
 pub struct Writer {
     dir: PathBuf,
+    video: String,
     split: Split,
     max_bytes: u64,
     open: Option<OpenShard>,
@@ -30,12 +31,13 @@ struct OpenShard {
 
 impl Writer {
     /// A shard is closed before it would grow past `max_bytes`; a longer sample is a shard by itself.
-    pub fn new(dir: &Path, split: Split, max_bytes: u64) -> Self {
-        Self { dir: dir.to_owned(), split, max_bytes, open: None, shards: Vec::new(), samples: Vec::new() }
+    pub fn new(dir: &Path, video: &str, split: Split, max_bytes: u64) -> Self {
+        let (dir, video) = (dir.to_owned(), video.to_owned());
+        Self { dir, video, split, max_bytes, open: None, shards: Vec::new(), samples: Vec::new() }
     }
 
     fn file_name(&self) -> String {
-        format!("{}-{:06}.tar", self.split.name(), self.shards.len())
+        format!("{}-{}-{:04}.tar", self.split.name(), self.video, self.shards.len())
     }
 
     /// Appends a sample.
@@ -94,7 +96,6 @@ impl Writer {
             .with_context(|| format!("writing {}", self.dir.join(&file).display()))?;
         self.shards.push(Shard {
             file,
-            split: self.split,
             bytes: open.bytes,
             n_samples: open.n_samples,
             blake3: open.hasher.finalize().to_hex().to_string(),
@@ -102,7 +103,7 @@ impl Writer {
         Ok(())
     }
 
-    /// Closes the last shard; what was written, in order.
+    /// Closes and flushes the last shard; what was written, in order.
     pub fn finish(mut self) -> Result<(Vec<Shard>, Vec<SampleRef>)> {
         self.close()?;
         Ok((self.shards, self.samples))

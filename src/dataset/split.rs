@@ -1,49 +1,84 @@
-//! Which split a video belongs to. A video is never divided, and its split follows from its content alone, so that
-//! adding videos moves none of the others. The one exception keeps small speakers trainable: when no video would
-//! train, all of them do.
+//! Which split a video belongs to. A video is never divided, and its split follows from its content alone, or from a
+//! name in the configuration, so that adding videos moves none of the others. Videos that share sound (a re-upload, the
+//! same intro) are kept together: the later one goes where the earlier one is.
 
-use serde::{Deserialize, Serialize};
+use super::part::SplitBy;
+use super::shared_sound::Shared;
+pub use crate::types::split::Split;
+use std::collections::BTreeMap;
 
-/// A part of the dataset.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Split {
-    Train,
-    Validation,
-    Test,
+/// The split of a video whose content has this hash: the hash is a place in 0..1, of which the first `test`
+/// share tests, the next `validation` share validates, and the rest trains.
+pub fn of_content(content_hash: &str, validation: f64, test: f64) -> Split {
+    let digest = blake3::hash(format!("split {content_hash}").as_bytes());
+    let place = digest.as_bytes().iter().take(8).rev().fold(0.0, |sum, &byte| (sum + f64::from(byte)) / 256.0);
+    if place < test {
+        Split::Test
+    } else if place < test + validation {
+        Split::Validation
+    } else {
+        Split::Train
+    }
 }
 
-impl Split {
-    pub const ALL: [Split; 3] = [Split::Train, Split::Validation, Split::Test];
+/// A video that waits for its split.
+#[derive(Clone, Debug)]
+pub struct Waiting<'a> {
+    pub name: &'a str,
+    pub content: &'a str,
+    /// The split the configuration names.
+    pub named: Option<Split>,
+    /// Why it was in its split in the dataset before this one; `None`: it is new.
+    pub before: Option<&'a SplitBy>,
+}
 
-    /// Its name in file names and JSON.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Split::Train => "train",
-            Split::Validation => "validation",
-            Split::Test => "test",
+/// Where a video goes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Placed {
+    In(Split, SplitBy),
+    /// It shares sound with these videos of different splits, so that it would leak in any: the longest first.
+    Nowhere(Vec<Shared>),
+}
+
+/// The places of the videos, in their order. Those named come first, then those that were there before, then the new
+/// ones in the order of their content's hash: the order in which they are given has no say.
+pub fn place(videos: &[Waiting], shared: &[Shared], validation: f64, test: f64) -> Vec<Placed> {
+    let rank = |video: &Waiting| match (video.named, video.before) {
+        (Some(_), _) => 0,
+        (None, Some(SplitBy::Content)) => 1,
+        (None, Some(SplitBy::SoundOf(_))) => 2,
+        (None, Some(SplitBy::Name) | None) => 3,
+    };
+    let mut order: Vec<usize> = (0..videos.len()).collect();
+    order.sort_by_key(|&at| (rank(&videos[at]), videos[at].content));
+    let mut splits: BTreeMap<&str, Split> = BTreeMap::new();
+    let mut placed: Vec<Option<Placed>> = vec![None; videos.len()];
+    for at in order {
+        let video = &videos[at];
+        let partners = || -> Vec<(&Shared, Split)> {
+            let mut partners: Vec<_> =
+                shared.iter().filter_map(|s| Some((s, *splits.get(s.other(video.name)?)?))).collect();
+            partners.sort_by(|a, b| b.0.secs.total_cmp(&a.0.secs).then(a.0.cmp_names(b.0)));
+            partners
+        };
+        let by_content = || Placed::In(of_content(video.content, validation, test), SplitBy::Content);
+        let answer = match (rank(video), video.named) {
+            (_, Some(split)) => Placed::In(split, SplitBy::Name),
+            (1, _) => by_content(),
+            _ => match partners().as_slice() {
+                [] => by_content(),
+                [(first, split), rest @ ..] if rest.iter().all(|(_, other)| other == split) => {
+                    Placed::In(*split, SplitBy::SoundOf(first.other(video.name).unwrap_or_default().to_owned()))
+                }
+                several => Placed::Nowhere(several.iter().map(|(shared, _)| (*shared).clone()).collect()),
+            },
+        };
+        if let Placed::In(split, _) = &answer {
+            splits.insert(video.name, *split);
         }
+        placed[at] = Some(answer);
     }
-
-    /// The split of a video whose content has this hash: the hash is a place in 0..1, of which the first `test`
-    /// share tests, the next `validation` share validates, and the rest trains.
-    pub fn of(content_hash: &str, validation: f64, test: f64) -> Split {
-        let digest = blake3::hash(format!("split {content_hash}").as_bytes());
-        let place = digest.as_bytes().iter().take(8).rev().fold(0.0, |sum, &byte| (sum + f64::from(byte)) / 256.0);
-        if place < test {
-            Split::Test
-        } else if place < test + validation {
-            Split::Validation
-        } else {
-            Split::Train
-        }
-    }
-
-    /// The splits of a speaker's videos, in their order. When none would train, all do (see the module).
-    pub fn of_all(content_hashes: &[&str], validation: f64, test: f64) -> Vec<Split> {
-        let splits: Vec<Split> = content_hashes.iter().map(|hash| Split::of(hash, validation, test)).collect();
-        if splits.contains(&Split::Train) { splits } else { vec![Split::Train; splits.len()] }
-    }
+    placed.into_iter().map(|answer| answer.unwrap_or(Placed::Nowhere(Vec::new()))).collect()
 }
 
 #[cfg(test)]
@@ -53,23 +88,60 @@ mod tests {
     #[test]
     fn a_split_depends_on_the_video_alone_and_keeps_the_shares() {
         let hashes: Vec<String> = (0..4_000).map(|n| format!("video {n}")).collect();
-        let all: Vec<&str> = hashes.iter().map(String::as_str).collect();
-        let splits = Split::of_all(&all, 0.15, 0.1);
+        let splits: Vec<Split> = hashes.iter().map(|hash| of_content(hash, 0.15, 0.1)).collect();
         let share = |split| splits.iter().filter(|&&s| s == split).count() as f64 / splits.len() as f64;
         assert!((share(Split::Validation) - 0.15).abs() < 0.02);
         assert!((share(Split::Test) - 0.1).abs() < 0.02);
-        let some: Vec<&str> = all.iter().copied().skip(100).step_by(7).collect();
-        let of_some = Split::of_all(&some, 0.15, 0.1);
-        let of_all: Vec<Split> = splits.iter().copied().skip(100).step_by(7).collect();
-        assert_eq!(of_some, of_all);
+    }
+
+    fn new<'a>(name: &'a str) -> Waiting<'a> {
+        Waiting { name, content: name, named: None, before: None }
+    }
+
+    fn shared(a: &str, b: &str, secs: f64) -> Shared {
+        Shared { a: a.into(), b: b.into(), a_secs: 0.0, b_secs: 0.0, secs }
+    }
+
+    /// Names whose content gives these splits, sorted by content.
+    fn named(n: usize, split: Split) -> Vec<String> {
+        (0..500).map(|k| format!("v{k:03}")).filter(|name| of_content(name, 0.3, 0.3) == split).take(n).collect()
     }
 
     #[test]
-    fn a_speaker_always_trains_on_something() {
-        for n in 0..200 {
-            let hash = format!("only video {n}");
-            assert_eq!(Split::of_all(&[&hash], 0.15, 0.15), [Split::Train]);
-        }
-        assert_eq!(Split::of_all(&["a", "b"], 1.0, 0.0), [Split::Train, Split::Train]);
+    fn shared_sound_keeps_videos_together_and_moves_none_that_was_there() {
+        let (test, train) = (named(3, Split::Test), named(3, Split::Train));
+        let content = SplitBy::Content;
+        // the new video would train by itself; it goes to the one that was there
+        let old = Waiting { before: Some(&content), ..new(&test[1]) };
+        let both = [new(&train[0]), old.clone(), new(&train[1])];
+        let pairs = [shared(&train[0], &test[1], 9.0)];
+        let answer = place(&both, &pairs, 0.3, 0.3);
+        assert_eq!(answer[0], Placed::In(Split::Test, SplitBy::SoundOf(test[1].clone())));
+        assert_eq!(answer[1..], [Placed::In(Split::Test, content.clone()), Placed::In(Split::Train, content.clone())]);
+        // from then on it stays there
+        let follows = SplitBy::SoundOf(test[1].clone());
+        let again = [Waiting { before: Some(&follows), ..new(&train[0]) }, old.clone()];
+        assert_eq!(place(&again, &pairs, 0.3, 0.3)[0], answer[0]);
+        // one that shares sound with two splits would leak in any of them
+        let old_train = Waiting { before: Some(&content), ..new(&train[2]) };
+        let bridge = [old, old_train, new(&train[1])];
+        let pairs = [shared(&train[1], &test[1], 6.0), shared(&train[2], &train[1], 20.0)];
+        let answer = place(&bridge, &pairs, 0.3, 0.3);
+        assert_eq!(answer[2], Placed::Nowhere(vec![pairs[1].clone(), pairs[0].clone()]));
+        assert_eq!(answer[1], Placed::In(Split::Train, content));
+    }
+
+    #[test]
+    fn a_name_in_the_configuration_wins_and_the_order_has_no_say() {
+        let (test, train) = (named(2, Split::Test), named(2, Split::Train));
+        let pairs = [shared(&train[0], &test[0], 9.0), shared(&train[0], &train[1], 7.0)];
+        let mut videos = vec![new(&train[0]), new(&train[1]), Waiting { named: Some(Split::Train), ..new(&test[0]) }];
+        let first = place(&videos, &pairs, 0.3, 0.3);
+        assert_eq!(first[2], Placed::In(Split::Train, SplitBy::Name));
+        assert!(first.iter().all(|answer| matches!(answer, Placed::In(Split::Train, _))));
+        videos.reverse();
+        let mut second = place(&videos, &pairs, 0.3, 0.3);
+        second.reverse();
+        assert_eq!(first, second);
     }
 }

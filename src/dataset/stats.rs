@@ -1,10 +1,12 @@
 //! `stats.json`: what the numbers are like. Means and deviations come from the training split alone, from joints that
 //! were seen; hours, windows and refused seconds are of everything.
 
+use super::moments::Moments;
+use super::part::Part;
 use super::{STRIDE_FRAMES, WINDOW_FRAMES};
 use crate::types::interval::Interval;
-use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
+use crate::types::split::Split;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -32,7 +34,7 @@ pub struct WindowCount {
     pub apart: BTreeMap<String, usize>,
 }
 
-/// What became of the speaker's footage, in seconds; `kept_secs` and `refused_secs` add up to `secs`.
+/// What became of the speaker's footage, in seconds; `kept_secs`, `refused_secs` and `failed_secs` add up to `secs`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Footage {
     pub n_videos: usize,
@@ -41,6 +43,9 @@ pub struct Footage {
     pub kept_secs: f64,
     /// By reason.
     pub refused_secs: BTreeMap<String, f64>,
+    pub failed_secs: f64,
+    /// Videos that failed before their length was known.
+    pub n_of_unknown_length: usize,
     /// Silence appended where the sound ended before the motion.
     pub padded_sound_secs: f64,
 }
@@ -67,106 +72,53 @@ fn table(rows: &[[f64; 3]]) -> Array2<f32> {
     Array2::from_shape_fn((N_JOINTS, 3), |(joint, k)| rows.get(joint).map_or(0.0, |row| row[k] as f32))
 }
 
-/// Gathers the statistics sample by sample (Welford's running mean and variance).
+/// Adds up the videos of a dataset.
 pub struct Gatherer {
-    n_seen: Vec<u64>,
-    mean: Vec<[f64; 3]>,
-    squares: Vec<[f64; 3]>,
-    min: Vec<[f64; 3]>,
-    max: Vec<[f64; 3]>,
+    moments: Moments,
     windows: WindowCount,
+    footage: Footage,
 }
 
 impl Default for Gatherer {
     fn default() -> Self {
-        let rows = |value: f64| vec![[value; 3]; N_JOINTS];
-        let windows = WindowCount { n_frames: WINDOW_FRAMES, stride: STRIDE_FRAMES, ..Default::default() };
-        Self {
-            n_seen: vec![0; N_JOINTS],
-            mean: rows(0.0),
-            squares: rows(0.0),
-            min: rows(f64::INFINITY),
-            max: rows(f64::NEG_INFINITY),
-            windows,
-        }
+        let nothing = || Split::ALL.map(|split| (split.name().to_owned(), 0)).into();
+        let (strided, apart) = (nothing(), nothing());
+        let windows = WindowCount { n_frames: WINDOW_FRAMES, stride: STRIDE_FRAMES, strided, apart };
+        Self { moments: Moments::default(), windows, footage: Footage::default() }
     }
 }
 
 impl Gatherer {
-    /// Counts the windows of a sample of `n_frames` frames.
-    pub fn count(&mut self, split: &str, n_frames: usize) {
-        let add = |counts: &mut BTreeMap<String, usize>, n| *counts.entry(split.to_owned()).or_default() += n;
-        let interval = Interval { start: 0, end: n_frames };
-        add(&mut self.windows.strided, interval.n_windows(WINDOW_FRAMES, STRIDE_FRAMES));
-        add(&mut self.windows.apart, interval.n_windows(WINDOW_FRAMES, WINDOW_FRAMES));
-    }
-
-    /// Takes in the joints that were seen in a training sample.
-    pub fn learn(&mut self, motion: &Motion) {
-        for (frame, seen) in motion.joints.outer_iter().zip(motion.mask.outer_iter()) {
-            for (joint, row) in frame.outer_iter().enumerate() {
-                if !seen[joint] || row.iter().any(|v| !v.is_finite()) {
-                    continue;
-                }
-                self.n_seen[joint] += 1;
-                for (k, &value) in row.iter().enumerate() {
-                    let (value, mean) = (f64::from(value), &mut self.mean[joint][k]);
-                    let delta = value - *mean;
-                    *mean += delta / self.n_seen[joint] as f64;
-                    self.squares[joint][k] += delta * (value - *mean);
-                    self.min[joint][k] = self.min[joint][k].min(value);
-                    self.max[joint][k] = self.max[joint][k].max(value);
-                }
-            }
+    /// Takes in a video.
+    pub fn push(&mut self, part: &Part) {
+        if part.split == Some(Split::Train) {
+            self.moments.merge(&part.moments);
+        }
+        for sample in &part.samples {
+            let interval = Interval { start: 0, end: sample.n_frames };
+            let add = |counts: &mut BTreeMap<String, usize>, n| {
+                *counts.entry(sample.split.name().to_owned()).or_default() += n;
+            };
+            add(&mut self.windows.strided, interval.n_windows(WINDOW_FRAMES, STRIDE_FRAMES));
+            add(&mut self.windows.apart, interval.n_windows(WINDOW_FRAMES, WINDOW_FRAMES));
+        }
+        let footage = &mut self.footage;
+        footage.n_videos += 1;
+        footage.n_intervals += part.samples.len();
+        footage.secs += part.ledger.duration_secs;
+        footage.kept_secs += part.ledger.kept_secs();
+        footage.failed_secs += part.ledger.failed_secs();
+        footage.n_of_unknown_length += usize::from(part.ledger.duration_secs == 0.0 && part.failure.is_some());
+        footage.padded_sound_secs += part.padded_sound_secs;
+        for (reason, secs) in part.ledger.refused_secs() {
+            *footage.refused_secs.entry(reason).or_default() += secs;
         }
     }
 
     /// The finished statistics.
-    pub fn finish(mut self, footage: Footage) -> Stats {
-        for joint in 0..N_JOINTS {
-            let n = self.n_seen[joint];
-            for k in 0..3 {
-                self.squares[joint][k] = (self.squares[joint][k] / n.max(1) as f64).sqrt();
-                if n == 0 {
-                    (self.min[joint][k], self.max[joint][k]) = (0.0, 0.0);
-                }
-            }
-        }
-        Stats {
-            n_seen: self.n_seen,
-            mean: self.mean,
-            std: self.squares,
-            min: self.min,
-            max: self.max,
-            windows: self.windows,
-            footage,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::types::time::FrameRate;
-    use ndarray::{Array3, s};
-
-    #[test]
-    fn masked_and_missing_joints_have_no_say() {
-        let mut joints = Array3::<f32>::zeros((4, N_JOINTS, 3));
-        joints.slice_mut(s![.., 1, 0]).assign(&ndarray::arr1(&[1.0, 2.0, 6.0, 1000.0]));
-        joints.slice_mut(s![.., 2, ..]).fill(f32::NAN);
-        let mut mask = Array2::from_elem((4, N_JOINTS), true);
-        mask[[3, 1]] = false;
-        let mut gatherer = Gatherer::default();
-        gatherer.learn(&Motion { fps: FrameRate::new(15, 1), joints, mask });
-        gatherer.count("train", 69);
-        let stats = gatherer.finish(Footage::default());
-        assert_eq!((stats.n_seen[1], stats.n_seen[2], stats.n_seen[0]), (3, 0, 4));
-        assert!((stats.mean[1][0] - 3.0).abs() < 1e-12);
-        assert!((stats.std[1][0] - (14.0f64 / 3.0).sqrt()).abs() < 1e-12);
-        assert_eq!((stats.min[1][0], stats.max[1][0]), (1.0, 6.0));
-        assert_eq!((stats.mean[2], stats.std[2], stats.min[2]), ([0.0; 3], [0.0; 3], [0.0; 3]));
-        assert_eq!((stats.windows.strided["train"], stats.windows.apart["train"]), (2, 1));
-        assert!(stats.is_whole());
+    pub fn finish(self) -> Stats {
+        let std = self.moments.std();
+        let Moments { n_seen, mean, min, max, .. } = self.moments;
+        Stats { n_seen, mean, std, min, max, windows: self.windows, footage: self.footage }
     }
 }

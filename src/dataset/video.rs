@@ -3,16 +3,18 @@
 use super::bones::VideoBones;
 use super::sample::Sample;
 use super::sync;
+use crate::audio::fingerprint::Fingerprinter;
 use crate::config::videos::slug;
-use crate::motion::{bones, joints_npz, keypoints_npz};
+use crate::motion::{joints_npz, keypoints_npz};
 use crate::stage::Unit;
 use crate::stage::fingerprint::hash_file;
 use crate::stage::ledger::Ledger;
+use crate::stage::record::Record;
 use crate::stage::runner::place;
 use crate::types::interval::{Interval, Intervals};
 use crate::types::pose2d::Keypoints;
 use crate::types::pose3d::Motion;
-use crate::types::skeleton::{L_HAND, N_BONES, N_HAND_JOINTS, R_HAND};
+use crate::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
 use crate::types::sound::{SAMPLE_RATE, Sound};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Axis, concatenate, s};
@@ -24,15 +26,31 @@ use std::path::{Path, PathBuf};
 pub struct Video {
     /// `<slug of the file's name>-<8 hex of its content>`: the beginning of its samples' keys.
     pub name: String,
+    /// File name of the video.
+    pub file: String,
     /// BLAKE3 of the video file.
     pub content: String,
+    /// BLAKE3 of the hashes of all files its samples are made of.
+    pub files_hash: String,
     pub intervals: Intervals,
     pub ledger: Ledger,
     pub bones: VideoBones,
+    /// What the stages call it.
+    pub unit: Unit,
     sound: PathBuf,
     keypoints: PathBuf,
     joints: PathBuf,
 }
+
+/// The files read of each video: stage, name, whether it may be missing.
+pub const FILES: [(&str, &str, bool); 6] = [
+    ("extract", "audio.wav", true),
+    ("pose2d", "keypoints.npz", false),
+    ("lift", "intervals.json", false),
+    ("lift", "ledger.json", false),
+    ("lift", "joints.npz", false),
+    ("lift", "bones.json", false),
+];
 
 /// A sample, and how much silence was appended to its sound.
 pub struct Cut {
@@ -40,16 +58,37 @@ pub struct Cut {
     pub padded_secs: f64,
 }
 
+/// Samples of sound read at a time.
+const PIECE: usize = 1 << 15;
+
+/// BLAKE3 of a file that a stage made of the video.
+fn made(work: &Path, stage: &str, unit: &Unit, name: &str) -> Result<String> {
+    let place = place(work, stage, unit);
+    let recorded =
+        Record::read(&place).and_then(|record| record.outputs.into_iter().find(|output| output.file == name));
+    recorded.map_or_else(|| hash_file(&place.join(name)), |output| Ok(output.hash))
+}
+
 impl Video {
-    /// Reads the small files and hashes the video.
+    /// Reads the small files. Hashes are taken from the records of the stages, where there are any.
     pub fn open(work: &Path, unit: &Unit) -> Result<Video> {
         let file = |stage: &str, name: &str| place(work, stage, unit).join(name);
-        let content = hash_file(&unit.source)?;
+        let extracted = Record::read(&place(work, "extract", unit));
+        let content = match extracted.and_then(|record| record.fingerprint.inputs.get("video").cloned()) {
+            Some(content) => content,
+            None => hash_file(&unit.source)?,
+        };
+        let mut hasher = blake3::Hasher::new();
+        for (stage, name, optional) in FILES {
+            if !optional || file(stage, name).exists() {
+                hasher.update(format!("{stage} {name} {}\n", made(work, stage, unit, name)?).as_bytes());
+            }
+        }
         let stem = unit.source.file_stem().unwrap_or_default().to_string_lossy();
-        let path = file("segment", "intervals.json");
+        let path = file("lift", "intervals.json");
         let intervals = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
         let intervals: Intervals = serde_json::from_slice(&intervals)
-            .with_context(|| format!("{} is not as the segment stage writes it", path.display()))?;
+            .with_context(|| format!("{} is not as the lift stage writes it", path.display()))?;
         for pair in intervals.intervals.windows(2) {
             ensure!(pair[0].end <= pair[1].start, "{}: its intervals are out of order", path.display());
         }
@@ -57,7 +96,10 @@ impl Video {
         ensure!(intervals.intervals.iter().all(inside), "{}: an interval outside the video", path.display());
         Ok(Video {
             name: format!("{}-{}", slug(&stem), content.get(..8).unwrap_or(&content)),
-            ledger: Ledger::read(&file("segment", "ledger.json"))?,
+            file: unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            files_hash: hasher.finalize().to_hex().to_string(),
+            ledger: Ledger::read(&file("lift", "ledger.json"))?,
+            unit: unit.clone(),
             bones: VideoBones::read(&file("lift", "bones.json"))?,
             sound: file("extract", "audio.wav"),
             keypoints: file("pose2d", "keypoints.npz"),
@@ -67,8 +109,28 @@ impl Video {
         })
     }
 
-    /// Opens the large files, to cut samples whose bones have `lengths` (metres).
-    pub fn samples<'a>(&'a self, lengths: &'a [f32; N_BONES]) -> Result<Samples<'a>> {
+    /// The codes of its sound (`audio::fingerprint`); `None` without sound. Memory: the codes, 0.45 MB an hour.
+    pub fn sound_codes(&self) -> Result<Option<Vec<u32>>> {
+        if !self.sound.exists() {
+            return Ok(None);
+        }
+        let reading = || format!("cannot read {}", self.sound.display());
+        let mut wav = hound::WavReader::open(&self.sound).with_context(reading)?;
+        let mut fingerprinter = Fingerprinter::default();
+        let mut piece = Vec::with_capacity(PIECE);
+        for sample in wav.samples::<i16>() {
+            piece.push(f32::from(sample.with_context(reading)?) / 32_768.0);
+            if piece.len() == PIECE {
+                fingerprinter.push(&piece);
+                piece.clear();
+            }
+        }
+        fingerprinter.push(&piece);
+        Ok(Some(fingerprinter.finish()))
+    }
+
+    /// Opens the large files, to cut samples.
+    pub fn samples(&self) -> Result<Samples<'_>> {
         let keypoints = keypoints_npz::read(&self.keypoints)?;
         let motion = joints_npz::read(&self.joints)?;
         let n_frames = self.intervals.n_frames;
@@ -83,14 +145,13 @@ impl Video {
             "{} is not 16-bit mono at {SAMPLE_RATE} Hz: run the extract stage again",
             self.sound.display()
         );
-        Ok(Samples { video: self, lengths, keypoints, motion, sound, next: 0 })
+        Ok(Samples { video: self, keypoints, motion, sound, next: 0 })
     }
 }
 
 /// The samples of a video one after the other.
 pub struct Samples<'a> {
     video: &'a Video,
-    lengths: &'a [f32; N_BONES],
     keypoints: Keypoints,
     motion: Motion,
     sound: hound::WavReader<BufReader<File>>,
@@ -107,12 +168,11 @@ impl Samples<'_> {
 
     fn cut(&mut self, interval: Interval) -> Result<Cut> {
         let (fps, frames) = (self.video.intervals.fps, s![interval.start..interval.end, .., ..]);
-        let mut motion = Motion {
+        let motion = Motion {
             fps,
             joints: self.motion.joints.slice(frames).to_owned(),
             mask: self.motion.mask.slice(s![interval.start..interval.end, ..]).to_owned(),
         };
-        bones::with_lengths(&mut motion, self.lengths);
         let points = [&self.keypoints.body, &self.keypoints.left_hand, &self.keypoints.right_hand];
         let points = points.map(|part| part.slice(frames));
         let pose2d = concatenate(Axis(1), &points).context("joining the keypoints")?;

@@ -4,6 +4,7 @@
 use super::poses::{N_NUMBERS, Normalisation};
 use crate::audio::mel;
 use crate::dataset::{Dataset, Split, sync};
+use crate::motion::bones;
 use crate::types::interval::Interval as Span;
 use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
@@ -58,8 +59,11 @@ impl Examples {
         ensure!(n_frames > 0 && stride > 0, "a window needs at least one frame, and a stride of at least one");
         let fps = dataset.info().fps;
         let long: Vec<_> = dataset.samples(split).into_iter().filter(|sample| sample.n_frames >= n_frames).collect();
+        let lengths = std::array::from_fn(|bone| normal.bone_lengths.get(bone).copied().unwrap_or(0.0));
         let read = |sample| -> Result<Interval> {
-            let sample = dataset.read(sample)?;
+            let mut sample = dataset.read(sample)?;
+            // Every video has its own constant lengths; the generator learns one body.
+            bones::with_lengths(&mut sample.motion, &lengths);
             let (numbers, mask) = normal.numbers(&sample.motion);
             // Rounding may ask for one spectrogram frame more than the sound has windows for.
             let enough = mel::n_samples(mel_frames(fps, sample.motion.n_frames()) + 1);

@@ -12,7 +12,7 @@ use super::poses::{N_NUMBERS, Normalisation};
 use super::speaker::{Facts, GENERATOR};
 use super::validate::HeldOut;
 use crate::config::Gan;
-use crate::dataset::{Dataset, Split};
+use crate::dataset::{CHECKSUMS, Dataset, Split};
 use crate::motion::bones;
 use crate::nn::discriminator::{Discriminator, motion};
 use crate::nn::params::Params;
@@ -186,7 +186,7 @@ impl<'a> Training<'a> {
         let mut discriminator_params = Params::new(!settings.seed);
         let discriminator = Discriminator::new(&mut discriminator_params, N_NUMBERS)?;
         let adam = adam::Config { max_norm: Some(MAX_NORM), ..adam::Config::default() };
-        let index = dataset.dir().join("index.json");
+        let index = dataset.dir().join(CHECKSUMS);
         let index = std::fs::read(&index).with_context(|| format!("reading {}", index.display()))?;
         let mut origin = serde_json::to_value(settings)?;
         for later in ["steps", "checkpoint_every", "keep_checkpoints"] {

@@ -7,4 +7,5 @@ pub mod pose2d;
 pub mod pose3d;
 pub mod skeleton;
 pub mod sound;
+pub mod split;
 pub mod time;

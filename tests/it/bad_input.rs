@@ -134,7 +134,7 @@ fn bad_videos_are_reported_and_the_others_go_on() {
     for message in ["none-*.mp4", "empty"] {
         assert!(answer.errors.contains(message), "{message}: {}", answer.errors);
     }
-    let shard = project.work().join("dataset/host/index.json");
+    let shard = project.work().join("dataset/host/index.jsonl");
     let made = fs::read(&shard).unwrap();
     let again = project.run(&[]);
     assert_eq!((again.code, fs::read(&shard).unwrap()), (2, made));

@@ -5,6 +5,8 @@ mod blender;
 mod bvh;
 mod clips;
 mod dataset;
+mod dataset_readers;
+mod dataset_verify;
 mod demo;
 mod evaluate;
 mod extract;

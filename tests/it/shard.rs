@@ -1,9 +1,15 @@
 //! The shard stage over a made-up work folder: what is in the dataset, and what has no say in its bytes.
 
 use crate::footage::{FPS, good, write};
+use crate::support::files_under;
 use ndarray::{Array2, Array3, s};
+use orator::config::videos::Videos;
 use orator::config::{self, Settings};
+use orator::dataset::part::SplitBy;
+use orator::dataset::split::of_content;
+use orator::dataset::verify::{accounts, verify};
 use orator::dataset::{Dataset, ShardStage, Split, sync};
+use orator::motion::bones::with_lengths;
 use orator::motion::joints_npz;
 use orator::segment::SegmentStage;
 use orator::stage::progress::Silent;
@@ -23,12 +29,18 @@ fn unit(root: &Path, name: &str) -> Unit {
 
 /// What the stages before shard leave of a video of `n_frames`: a cut in the middle, random motion.
 fn video(root: &Path, name: &str, n_frames: usize, seed: u64) -> Unit {
+    video_with(root, name, n_frames, seed, seed)
+}
+
+/// The same, with noise of another seed as its sound.
+fn video_with(root: &Path, name: &str, n_frames: usize, seed: u64, sound_seed: u64) -> Unit {
     let (work, unit) = (root.join("work"), unit(root, name));
     let mut footage = good(n_frames);
     footage.shot[n_frames / 2..].fill(1);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     if let Some(sound) = &mut footage.sound {
-        sound.iter_mut().for_each(|sample| *sample = rng.random());
+        let mut noise = ChaCha8Rng::seed_from_u64(1000 + sound_seed);
+        sound.iter_mut().for_each(|sample| *sample = noise.random());
         sound.pop();
     }
     write(&work, &unit, &footage, &format!("film {seed}"));
@@ -38,12 +50,17 @@ fn video(root: &Path, name: &str, n_frames: usize, seed: u64) -> Unit {
 
     let lift = place(&work, "lift", &unit);
     fs::create_dir_all(&lift).unwrap();
+    for file in ["intervals.json", "ledger.json"] {
+        fs::copy(segment.join(file), lift.join(file)).unwrap();
+    }
     let mut joints = Array3::from_shape_fn((n_frames, 49, 3), |_| rng.random_range(-0.5f32..0.5));
     joints.slice_mut(s![.., 0, ..]).fill(0.0);
     let mask = Array2::from_elem((n_frames, 49), true);
-    joints_npz::write(&lift.join("joints.npz"), &Motion { fps: FPS, joints, mask }).unwrap();
     let mut lengths = vec![0.1 + seed as f64 / 100.0; N_BONES];
     (lengths[L_HAND - 1], lengths[R_HAND - 1]) = (0.0, 0.0);
+    let mut motion = Motion { fps: FPS, joints, mask };
+    with_lengths(&mut motion, &std::array::from_fn(|bone| lengths[bone] as f32));
+    joints_npz::write(&lift.join("joints.npz"), &motion).unwrap();
     let bones = serde_json::json!({ "lengths_metres": lengths, "n_frames": n_frames });
     fs::write(lift.join("bones.json"), bones.to_string()).unwrap();
     unit
@@ -57,18 +74,28 @@ fn settings(root: &Path) -> Settings {
 }
 
 fn shard(root: &Path, videos: &[Unit], out: &str) -> (anyhow::Result<Report>, PathBuf) {
+    shard_with(root, videos, &[], out)
+}
+
+/// The same; `named` puts videos into splits.
+fn shard_with(root: &Path, videos: &[Unit], named: &[(&Unit, Split)], out: &str) -> (anyhow::Result<Report>, PathBuf) {
     let speaker = Unit { speaker: "host".into(), video: String::new(), source: root.join("pipeline.toml") };
-    let stage = ShardStage::new(&settings(root), videos);
+    let splits = named.iter().map(|(unit, split)| (unit.video.clone(), *split)).collect();
+    let all = Videos { speaker: "host".into(), units: videos.to_vec(), splits, missing: Vec::new() };
+    let stage = ShardStage::new(&settings(root), videos).with_videos(vec![all]);
     let out = root.join(out);
     fs::create_dir_all(&out).unwrap();
     assert!(stage.inputs(&speaker).unwrap().iter().all(|input| input.path.exists()));
     (stage.run(&speaker, &out, &Silent), out)
 }
 
-fn bytes(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    let mut files: Vec<_> = fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().path()).collect();
-    files.sort();
-    files.into_iter().map(|file| (file.file_name().unwrap().into(), fs::read(&file).unwrap())).collect()
+fn bytes(dir: &Path) -> Vec<(String, Vec<u8>)> {
+    files_under(dir).into_iter().map(|(name, file)| (name, fs::read(file).unwrap())).collect()
+}
+
+fn sound(dir: &Path) {
+    let found = verify(dir, true, &Silent).unwrap();
+    assert!(found.problems.is_empty() && found.n_samples > 0, "{found:?}");
 }
 
 #[test]
@@ -96,9 +123,10 @@ fn samples_hold_the_frames_and_the_sound_of_their_interval() {
     let units = [video(dir.path(), "long", 200, 3), video(dir.path(), "short", 140, 9)];
     let (report, out) = shard(dir.path(), &units, "out");
     let dataset = Dataset::open(&out).unwrap();
-    dataset.verify().unwrap();
+    sound(&out);
     // the longer video's bones are the weighted median
     let lengths = &dataset.info().bone_lengths_metres;
+    assert!(!out.join("videos/none.json").exists());
     assert!((lengths[0] - 0.13).abs() < 1e-6 && lengths[L_HAND - 1] == 0.0, "{lengths:?}");
     let refs: Vec<_> = Split::ALL.iter().flat_map(|&split| dataset.samples(split)).collect();
     assert_eq!(refs.len(), 4);
@@ -120,7 +148,9 @@ fn samples_hold_the_frames_and_the_sound_of_their_interval() {
         for joint in 1..49 {
             let (a, b) = (parent(joint).unwrap(), joint);
             let bone = &sample.motion.joints.slice(s![0, b, ..]) - &sample.motion.joints.slice(s![0, a, ..]);
-            assert!((f64::from(bone.mapv(|v| v * v).sum().sqrt()) - lengths[joint - 1]).abs() < 1e-5);
+            let own = if name == "long" { 0.13 } else { 0.19 };
+            let wanted = if lengths[joint - 1] == 0.0 { 0.0 } else { own };
+            assert!((f64::from(bone.mapv(|v| v * v).sum().sqrt()) - wanted).abs() < 1e-5);
         }
     }
     let footage = &dataset.stats().footage;
@@ -128,6 +158,7 @@ fn samples_hold_the_frames_and_the_sound_of_their_interval() {
     // each wav lacks its last sample, and frames are rounded to samples
     assert!(footage.padded_sound_secs > 0.0 && footage.padded_sound_secs < 5.0 / 16_000.0);
     assert_eq!(dataset.stats().n_seen[5], dataset.info().splits["train"].frames as u64);
+    assert_eq!((footage.kept_secs, footage.failed_secs), (340.0 / 15.0, 0.0));
     assert!(report.unwrap().facts.contains_key("windows"));
 }
 
@@ -149,18 +180,88 @@ fn a_new_video_moves_no_other_to_another_split() {
     assert!(many.values().collect::<std::collections::BTreeSet<_>>().len() > 1);
 }
 
+/// A name whose content ("film SEED") goes to this split.
+fn seed_of(split: Split, from: u64) -> u64 {
+    let content = |seed: u64| blake3::hash(format!("film {seed}").as_bytes()).to_hex().to_string();
+    (from..).find(|&seed| of_content(&content(seed), 0.15, 0.15) == split).unwrap()
+}
+
+#[test]
+fn a_new_video_costs_itself_and_changes_no_shard() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut units: Vec<Unit> = (0..3).map(|n| video(dir.path(), &format!("talk{n}"), 130, n)).collect();
+    let (_, first) = shard(dir.path(), &units, "first");
+    let place = dir.path().join("work/dataset/host");
+    fs::create_dir_all(place.parent().unwrap()).unwrap();
+    fs::rename(&first, &place).unwrap();
+    let before = bytes(&place);
+    units.push(video(dir.path(), "another", 140, 77));
+    let (report, grown) = shard(dir.path(), &units, "grown");
+    let line = report.unwrap().line;
+    assert!(line.contains("3 videos taken over as they were"), "{line}");
+    sound(&grown);
+    let after = bytes(&grown);
+    let of_video = |name: &str| name.ends_with(".tar") || name.starts_with("videos/");
+    let same = before.iter().filter(|(name, _)| of_video(name)).filter(|file| after.contains(file)).count();
+    assert_eq!(same, before.iter().filter(|(name, _)| of_video(name)).count());
+    // all at once gives the same bytes
+    fs::remove_dir_all(&place).unwrap();
+    assert_eq!(bytes(&shard(dir.path(), &units, "at-once").1), after);
+}
+
+#[test]
+fn shared_sound_keeps_videos_in_one_split() {
+    let dir = tempfile::tempdir().unwrap();
+    let (train, test) = (seed_of(Split::Train, 0), seed_of(Split::Test, 0));
+    let old = video(dir.path(), "old", 150, test);
+    let lone = video(dir.path(), "lone", 150, train);
+    let (_, first) = shard(dir.path(), &[old.clone(), lone.clone()], "first");
+    let place = dir.path().join("work/dataset/host");
+    fs::create_dir_all(place.parent().unwrap()).unwrap();
+    fs::rename(&first, &place).unwrap();
+    let copy_seed = seed_of(Split::Train, train + 1);
+    let copy = video_with(dir.path(), "copy", 140, copy_seed, test);
+    let videos = [old.clone(), lone.clone(), copy.clone()];
+    let (_, out) = shard(dir.path(), &videos, "second");
+    let info = Dataset::open(&out).unwrap().info().clone();
+    let of = |name: &str| info.videos.iter().find(|video| video.file == format!("{name}.mp4")).unwrap();
+    assert_eq!((of("old").split, of("lone").split), (Some(Split::Test), Some(Split::Train)));
+    assert_eq!(
+        (of("copy").split, &of("copy").split_by),
+        (Some(Split::Test), &SplitBy::SoundOf(of("old").name.clone()))
+    );
+    sound(&out);
+    // a name in the configuration wins, and the leak is said
+    let (report, out) = shard_with(dir.path(), &videos, &[(&copy, Split::Train)], "named");
+    let line = report.unwrap().line;
+    assert!(line.contains("s of sound: put them into one split"), "{line}");
+    let leakage = fs::read_to_string(out.join("leakage.json")).unwrap();
+    let leakage: serde_json::Value = serde_json::from_str(&leakage).unwrap();
+    assert_eq!(leakage["leaks"].as_array().unwrap().len(), 1, "{leakage}");
+    assert!(leakage["shared"][0]["secs"].as_f64().unwrap() > 8.0);
+    sound(&out);
+}
+
 #[test]
 fn what_is_not_there_is_said() {
     let dir = tempfile::tempdir().unwrap();
     let good = video(dir.path(), "good", 150, 1);
     let twin = video(dir.path(), "twin", 150, 2);
     fs::write(&twin.source, "film 1").unwrap();
-    let (report, out) = shard(dir.path(), &[twin.clone(), unit(dir.path(), "never"), good.clone()], "out");
+    let named = [(&good, Split::Train), (&twin, Split::Train)];
+    let (report, out) = shard_with(dir.path(), &[twin.clone(), unit(dir.path(), "never"), good.clone()], &named, "out");
     let line = report.unwrap().line;
-    assert!(line.contains("no video for validation and test"), "{line}");
+    let add = "no video for validation (a video's content chooses its split): add under [[speaker]] the line  validation = [\"";
+    assert!(line.contains(add), "{line}");
     assert!(line.contains("1 video left out, a stage before failed"), "{line}");
     assert!(line.contains("1 video left out, the same content is there already"), "{line}");
     assert_eq!(Dataset::open(&out).unwrap().info().splits["train"].videos.len(), 1);
+    let accounts = accounts(&out).unwrap();
+    let of = |name: &str| accounts.iter().find(|account| account.file == format!("{name}.mp4")).unwrap();
+    assert_eq!(of("never").failure.as_deref(), Some("run: not every stage is done"));
+    let twice = if of("twin").split.is_none() { of("twin") } else { of("good") };
+    assert_eq!(twice.ledger.refused_secs()["duplicate"], 10.0);
+    sound(&out);
 
     let short = video(dir.path(), "short", 100, 5);
     let error = shard(dir.path(), &[short], "none").0.unwrap_err().to_string();

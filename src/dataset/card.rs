@@ -1,0 +1,125 @@
+//! The dataset card `README.md`: a YAML header as the hubs read it, and what a stranger needs to use the numbers.
+
+use super::info::Info;
+use super::leakage::Leakage;
+use super::split::Split;
+use super::stats::Stats;
+use std::fmt::Write;
+
+/// The card.
+pub fn text(info: &Info, stats: &Stats, leakage: &Leakage) -> String {
+    let mut text = header(info);
+    let speaker = &info.speaker;
+    let _ = write!(
+        text,
+        "# Speech and gestures of {speaker}\n\n\
+         3D upper-body and finger motion with its speech: one speaker, {:.2} h of motion kept of {:.2} h of video, at {}.\n\n\
+         | split | videos | intervals | hours |\n|---|---|---|---|\n",
+        stats.footage.kept_secs / 3600.0,
+        stats.footage.secs / 3600.0,
+        info.fps
+    );
+    for split in Split::ALL {
+        if let Some(part) = info.splits.get(split.name()) {
+            let (videos, hours) = (part.videos.len(), part.secs / 3600.0);
+            let _ = writeln!(text, "| {} | {videos} | {} | {hours:.3} |", split.name(), part.samples);
+        }
+    }
+    let _ = write!(
+        text,
+        "\n## A sample\n\nA sample is an interval: continuous motion with its sound. Its files in a shard are\n\n| file | shape | element | meaning |\n|---|---|---|---|\n"
+    );
+    for (name, member) in &info.members {
+        let _ = writeln!(text, "| `{name}` | {} | {} | {} |", member.shape, member.element, member.meaning);
+    }
+    let axes = &info.axes;
+    let _ = write!(
+        text,
+        "\nAxes: x {}, y {}, z {}; {}; the origin is {}. `info.json` names joints, parents and sides. Size is a convention: \
+         no picture tells it. Hands that a shoulder, elbow and wrist lead to are as long as the forearm suggests.\n",
+        axes.x, axes.y, axes.z, axes.unit, axes.origin
+    );
+    let _ = write!(
+        text,
+        "\n## Reading it\n\n```python\nfrom datasets import load_dataset\n\
+         motion = load_dataset(\"webdataset\", data_files={{\"train\": \"train-*.tar\"}}, split=\"train\")\n```\n\n\
+         ```python\nimport glob, webdataset\n\
+         motion = webdataset.WebDataset(sorted(glob.glob(\"train-*.tar\")), shardshuffle=False).decode()\n```\n\n\
+         `orator dataset verify --deep .` checks every byte; so does `b3sum --check checksums.b3`.\n\n\
+         ## What became of the footage\n\n| | hours |\n|---|---|\n| kept | {:.3} |\n",
+        stats.footage.kept_secs / 3600.0
+    );
+    for (reason, secs) in &stats.footage.refused_secs {
+        let _ = writeln!(text, "| refused: {reason} | {:.3} |", secs / 3600.0);
+    }
+    let _ = writeln!(text, "| failed | {:.3} |", stats.footage.failed_secs / 3600.0);
+    let _ = write!(
+        text,
+        "\n`ledger.jsonl` says of every second of every video which it was, with what was measured.\n\n## Splits\n\n\
+         A video is in one split as a whole; its content's hash, or the maker, chooses which. {}\n",
+        leaks(leakage)
+    );
+    let said = |text: &str| if text.is_empty() { "not said".to_owned() } else { text.to_owned() };
+    let _ = write!(
+        text,
+        "\n## Terms\n\nLicence: {}. Consent of the speaker: {}. Source: {}.\n",
+        said(&info.licence),
+        said(&info.consent),
+        said(&info.source)
+    );
+    let models: Vec<String> = info.models.iter().map(|model| format!("{} ({})", model.id, model.role)).collect();
+    let models = if models.is_empty() { String::new() } else { format!(" with the models {}", models.join(", ")) };
+    let _ = write!(text, "\nMade by {}{models}.", info.tool);
+    info.notes.iter().for_each(|note| text += &format!(" {note}"));
+    text.push('\n');
+    text
+}
+
+/// The YAML header. Values are quoted as JSON, which YAML reads.
+fn header(info: &Info) -> String {
+    let quoted = |text: &str| serde_json::Value::from(text).to_string();
+    let licence = if info.licence.is_empty() { "unknown" } else { &info.licence };
+    let samples: usize = info.splits.values().map(|split| split.samples).sum();
+    let mut text = format!(
+        "---\npretty_name: {}\nlicense: {}\ntags:\n- gesture\n- speech\n- motion\n- 3d-pose\n- webdataset\n\
+         task_categories:\n- other\nsize_categories:\n- {}\n",
+        quoted(&format!("Speech and gestures of {}", info.speaker)),
+        quoted(licence),
+        size_category(samples)
+    );
+    let filled: Vec<&str> = Split::ALL
+        .iter()
+        .map(|split| split.name())
+        .filter(|name| info.splits.get(*name).is_some_and(|s| s.samples > 0))
+        .collect();
+    if !filled.is_empty() {
+        text += "configs:\n- config_name: default\n  data_files:\n";
+        filled.iter().for_each(|name| text += &format!("  - split: {name}\n    path: \"{name}-*.tar\"\n"));
+    }
+    text + "---\n\n"
+}
+
+fn size_category(samples: usize) -> &'static str {
+    match samples {
+        0..1_000 => "n<1K",
+        1_000..10_000 => "1K<n<10K",
+        10_000..100_000 => "10K<n<100K",
+        _ => "100K<n<1M",
+    }
+}
+
+fn leaks(leakage: &Leakage) -> String {
+    if leakage.duplicate_secs <= 0.0 {
+        return "Whether videos share sound was not looked at.".to_owned();
+    }
+    let same = match leakage.shared.len() {
+        0 => "none do".to_owned(),
+        1 => "two do".to_owned(),
+        n => format!("{n} pairs do"),
+    };
+    let leaks = match leakage.leaks.len() {
+        0 => "none across splits".to_owned(),
+        n => format!("{n} ACROSS SPLITS, see `leakage.json`"),
+    };
+    format!("Videos that share {} s of sound or more belong together: {same}, {leaks}.", leakage.duplicate_secs)
+}

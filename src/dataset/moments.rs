@@ -1,0 +1,117 @@
+//! Mean, deviation and range of the joints of a video, such that those of several videos can be put together without
+//! looking at the joints again (Chan, Golub, LeVeque 1979).
+
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::N_JOINTS;
+use serde::{Deserialize, Serialize};
+
+/// Sums over the frames in which a joint was seen; rows are joints, columns x, y, z in metres.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Moments {
+    pub n_seen: Vec<u64>,
+    pub mean: Vec<[f64; 3]>,
+    /// Sums of the squared distances from the mean.
+    pub squares: Vec<[f64; 3]>,
+    /// 0 where a joint was never seen.
+    pub min: Vec<[f64; 3]>,
+    pub max: Vec<[f64; 3]>,
+}
+
+impl Default for Moments {
+    fn default() -> Self {
+        let rows = || vec![[0.0; 3]; N_JOINTS];
+        Self { n_seen: vec![0; N_JOINTS], mean: rows(), squares: rows(), min: rows(), max: rows() }
+    }
+}
+
+impl Moments {
+    /// Takes in the joints that were seen.
+    pub fn learn(&mut self, motion: &Motion) {
+        for (frame, seen) in motion.joints.outer_iter().zip(motion.mask.outer_iter()) {
+            for (joint, row) in frame.outer_iter().enumerate() {
+                if !seen[joint] || row.iter().any(|v| !v.is_finite()) {
+                    continue;
+                }
+                let first = self.n_seen[joint] == 0;
+                self.n_seen[joint] += 1;
+                for (k, &value) in row.iter().enumerate() {
+                    let (value, mean) = (f64::from(value), &mut self.mean[joint][k]);
+                    let delta = value - *mean;
+                    *mean += delta / self.n_seen[joint] as f64;
+                    self.squares[joint][k] += delta * (value - *mean);
+                    let (min, max) = (&mut self.min[joint][k], &mut self.max[joint][k]);
+                    *min = if first { value } else { min.min(value) };
+                    *max = if first { value } else { max.max(value) };
+                }
+            }
+        }
+    }
+
+    /// Takes in what was learnt from other frames. Rows that `other` lacks count as never seen.
+    pub fn merge(&mut self, other: &Moments) {
+        let rows = other.mean.iter().zip(&other.squares).zip(other.min.iter().zip(&other.max));
+        for (joint, ((mean, squares), (min, max))) in rows.enumerate().take(N_JOINTS) {
+            let (n, m) = (self.n_seen[joint] as f64, other.n_seen.get(joint).copied().unwrap_or(0) as f64);
+            if m == 0.0 {
+                continue;
+            }
+            for k in 0..3 {
+                let delta = mean[k] - self.mean[joint][k];
+                self.mean[joint][k] += delta * m / (n + m);
+                self.squares[joint][k] += squares[k] + delta * delta * n * m / (n + m);
+                self.min[joint][k] = if n == 0.0 { min[k] } else { self.min[joint][k].min(min[k]) };
+                self.max[joint][k] = if n == 0.0 { max[k] } else { self.max[joint][k].max(max[k]) };
+            }
+            self.n_seen[joint] += m as u64;
+        }
+    }
+
+    /// Standard deviations (of the population).
+    pub fn std(&self) -> Vec<[f64; 3]> {
+        let of = |(squares, n): (&[f64; 3], &u64)| squares.map(|square| (square / (*n).max(1) as f64).sqrt());
+        self.squares.iter().zip(&self.n_seen).map(of).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::time::FrameRate;
+    use ndarray::{Array2, Array3, s};
+
+    fn motion(xs: &[f32], masked: &[usize]) -> Motion {
+        let mut joints = Array3::<f32>::zeros((xs.len(), N_JOINTS, 3));
+        joints.slice_mut(s![.., 1, 0]).assign(&ndarray::arr1(xs));
+        joints.slice_mut(s![.., 2, ..]).fill(f32::NAN);
+        let mut mask = Array2::from_elem((xs.len(), N_JOINTS), true);
+        masked.iter().for_each(|t| mask[[*t, 1]] = false);
+        Motion { fps: FrameRate::new(15, 1), joints, mask }
+    }
+
+    #[test]
+    fn masked_and_missing_joints_have_no_say() {
+        let mut moments = Moments::default();
+        moments.learn(&motion(&[1.0, 2.0, 6.0, 1000.0], &[3]));
+        assert_eq!((moments.n_seen[1], moments.n_seen[2], moments.n_seen[0]), (3, 0, 4));
+        assert!((moments.mean[1][0] - 3.0).abs() < 1e-12);
+        assert!((moments.std()[1][0] - (14.0f64 / 3.0).sqrt()).abs() < 1e-12);
+        assert_eq!((moments.min[1][0], moments.max[1][0]), (1.0, 6.0));
+        assert_eq!((moments.mean[2], moments.std()[2], moments.max[2]), ([0.0; 3], [0.0; 3], [0.0; 3]));
+    }
+
+    #[test]
+    fn parts_together_are_the_whole() {
+        let xs = [0.5, -1.0, 7.0, 7.5, 8.0, -30.0, 2.0];
+        let mut whole = Moments::default();
+        whole.learn(&motion(&xs, &[]));
+        let mut merged = Moments::default();
+        for part in [&xs[..2], &[], &xs[2..3], &xs[3..]] {
+            let mut moments = Moments::default();
+            moments.learn(&motion(part, &[]));
+            merged.merge(&moments);
+        }
+        assert_eq!((&merged.n_seen, &merged.min, &merged.max), (&whole.n_seen, &whole.min, &whole.max));
+        assert!((merged.mean[1][0] - whole.mean[1][0]).abs() < 1e-12);
+        assert!((merged.std()[1][0] - whole.std()[1][0]).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,198 @@
+//! Which videos share sound: a re-upload, a cut-down version, the same intro. Codes of the sound (`audio::fingerprint`)
+//! that are equal in two videos vote for an offset in time; along an offset with votes the codes are compared bit by bit.
+//!
+//! Memory: one code in four of every video, 12 bytes each (0.3 MB an hour), and the codes of two videos.
+
+use crate::audio::fingerprint::PER_SEC;
+use anyhow::Result;
+use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
+
+/// Share of bits that may differ along a stretch that is the same: unlike sounds differ in a half, with little spread.
+const MAX_WRONG: f64 = 0.33;
+/// Stretch over which that share is taken, seconds.
+const WINDOW_SECS: f64 = 3.0;
+/// Codes that tell where the stretch begins and ends.
+const EDGE: usize = 16;
+/// Equal codes that an offset needs to be looked at.
+const MIN_VOTES: usize = 2;
+/// A code in more places than this (a hum, a beep) tells nothing.
+const MAX_PLACES: usize = 64;
+
+/// A stretch of sound that two videos share.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Shared {
+    /// Names of the videos, in alphabetical order.
+    pub a: String,
+    pub b: String,
+    /// Where it begins in each, seconds.
+    pub a_secs: f64,
+    pub b_secs: f64,
+    /// How long it is.
+    pub secs: f64,
+}
+
+impl Shared {
+    /// The other video of the pair, if `name` is one of them.
+    pub fn other(&self, name: &str) -> Option<&str> {
+        if self.a == name {
+            Some(&self.b)
+        } else if self.b == name {
+            Some(&self.a)
+        } else {
+            None
+        }
+    }
+
+    /// The order of pairs.
+    pub fn cmp_names(&self, other: &Self) -> Ordering {
+        (&self.a, &self.b).cmp(&(&other.a, &other.b))
+    }
+}
+
+/// A code that stands for its surroundings.
+type Landmark = (u32, u32, u32);
+
+/// The stretches of at least `min_secs` that two of the videos share, the longest of each pair, in the order of the names.
+/// `names` are sorted; `codes` gives those of the n-th video.
+pub fn find(names: &[String], codes: impl Fn(usize) -> Result<Vec<u32>>, min_secs: f64) -> Result<Vec<Shared>> {
+    let mut landmarks: Vec<Landmark> = Vec::new();
+    for video in 0..names.len() {
+        let chosen = |code: u32| code != 0 && code.wrapping_mul(0x9E37_79B1) >> 30 == 0;
+        let places = codes(video)?.into_iter().zip(0u32..).filter(|(code, _)| chosen(*code));
+        landmarks.extend(places.map(|(code, place)| (code, video as u32, place)));
+    }
+    landmarks.sort_unstable();
+    let mut found = Vec::new();
+    let mut at_hand: Option<(usize, Vec<u32>)> = None;
+    for ((a, b), offsets) in votes(&landmarks) {
+        let (a, b) = (a as usize, b as usize);
+        let first = match at_hand.take() {
+            Some((video, codes)) if video == a => codes,
+            _ => codes(a)?,
+        };
+        let second = codes(b)?;
+        let stretches = offsets.into_iter().filter_map(|offset| longest_equal(&first, &second, offset));
+        if let Some((start, offset, n)) = stretches.max_by_key(|(_, _, n)| *n) {
+            let secs = n as f64 / PER_SEC;
+            if secs >= min_secs {
+                let at = |place: i64| place as f64 / PER_SEC;
+                let (a_secs, b_secs) = (at(start), at(start + offset));
+                found.push(Shared { a: names[a].clone(), b: names[b].clone(), a_secs, b_secs, secs });
+            }
+        }
+        at_hand = Some((a, first));
+    }
+    Ok(found)
+}
+
+/// For every two videos with equal codes the offsets in time (second less first, in codes) that enough of them agree on.
+fn votes(landmarks: &[Landmark]) -> Vec<((u32, u32), Vec<i64>)> {
+    let mut votes: Vec<((u32, u32), i64)> = Vec::new();
+    for same in landmarks.chunk_by(|x, y| x.0 == y.0).filter(|same| same.len() <= MAX_PLACES) {
+        for (n, x) in same.iter().enumerate() {
+            let others = same[n + 1..].iter().filter(|y| y.1 != x.1);
+            votes.extend(others.map(|y| ((x.1, y.1), i64::from(y.2) - i64::from(x.2))));
+        }
+    }
+    votes.sort_unstable();
+    let mut pairs = Vec::new();
+    for of_pair in votes.chunk_by(|x, y| x.0 == y.0) {
+        let mut offsets: Vec<i64> = Vec::new();
+        for (n, (_, offset)) in of_pair.iter().enumerate() {
+            let near = of_pair[n..].iter().take_while(|(_, other)| other - offset <= 2).count();
+            if near >= MIN_VOTES && offsets.last().is_none_or(|last| offset - last > 1) {
+                offsets.push(*offset);
+            }
+        }
+        if !offsets.is_empty() {
+            pairs.push((of_pair[0].0, offsets));
+        }
+    }
+    pairs
+}
+
+/// The longest stretch that is the same at about this offset: its start in `a`, the offset, its length, in codes.
+fn longest_equal(a: &[u32], b: &[u32], offset: i64) -> Option<(i64, i64, usize)> {
+    (offset - 1..=offset + 2).filter_map(|offset| longest_at(a, b, offset)).max_by_key(|(_, _, n)| *n)
+}
+
+fn longest_at(a: &[u32], b: &[u32], offset: i64) -> Option<(i64, i64, usize)> {
+    let window = (WINDOW_SECS * PER_SEC) as usize;
+    let (a_start, b_start) = ((-offset).max(0) as usize, offset.max(0) as usize);
+    let pairs: Vec<(u32, u32)> =
+        a.iter().skip(a_start).zip(b.iter().skip(b_start)).map(|(x, y)| wrong_bits(*x, *y)).collect();
+    let (mut bits, mut wrong, mut run, mut best) = (0, 0, 0, None);
+    for end in 0..pairs.len() {
+        bits += pairs[end].0;
+        wrong += pairs[end].1;
+        if end >= window {
+            bits -= pairs[end - window].0;
+            wrong -= pairs[end - window].1;
+        }
+        let same = end + 1 >= window && bits as usize >= 16 * window && f64::from(wrong) <= MAX_WRONG * f64::from(bits);
+        run = if same { run + 1 } else { 0 };
+        let n = run + window - 1;
+        if same && best.is_none_or(|(_, _, longest)| n > longest) {
+            best = Some(((a_start + end + 1 - n) as i64, offset, n));
+        }
+    }
+    best.map(|(start, offset, n)| {
+        // A window goes over the edges of what is the same; there, short pieces tell.
+        let place = (start as usize).saturating_sub(a_start);
+        let unlike = |piece: &[(u32, u32)]| {
+            let (bits, wrong) = piece.iter().fold((0, 0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
+            f64::from(wrong) > MAX_WRONG * f64::from(bits)
+        };
+        let same = &pairs[place..place + n];
+        let skip = same.windows(EDGE).take_while(|piece| unlike(piece)).count();
+        let cut = same[skip.min(n)..].windows(EDGE).rev().take_while(|piece| unlike(piece)).count();
+        (start + skip as i64, offset, n.saturating_sub(skip + cut))
+    })
+}
+
+/// Bits compared, and of them unlike; silence is not compared.
+fn wrong_bits(x: u32, y: u32) -> (u32, u32) {
+    if x == 0 || y == 0 { (0, 0) } else { (32, (x ^ y).count_ones()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// Codes of `n` windows in which a bit in eight changes from one to the next, as sound has.
+    fn sound(n: usize, seed: u64) -> Vec<u32> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut code: u32 = rng.random();
+        (0..n)
+            .map(|_| {
+                code ^= rng.random::<u32>() & rng.random::<u32>() & rng.random::<u32>();
+                code.max(1)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_stretch_that_two_share_is_found_where_it_is() {
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        let mut videos: Vec<Vec<u32>> = (0..6).map(|seed| sound(3_000, seed)).collect();
+        let intro: Vec<u32> = videos[1][500..800].to_vec();
+        // a bit in fifteen is wrong
+        let spoilt =
+            intro.iter().map(|code| code ^ (0..32).fold(0, |m, b| m | u32::from(rng.random_bool(1.0 / 15.0)) << b));
+        videos[4].splice(100..400, spoilt);
+        videos[5][..1500].fill(0);
+        videos[0][..1500].fill(0);
+        let names: Vec<String> = (0..6).map(|n| format!("v{n}")).collect();
+        let found = find(&names, |n| Ok(videos[n].clone()), 5.0).unwrap();
+        assert_eq!(found.len(), 1, "{found:?}");
+        let one = &found[0];
+        assert_eq!((one.a.as_str(), one.b.as_str()), ("v1", "v4"));
+        assert!((one.a_secs - 500.0 / PER_SEC).abs() < 0.6, "{one:?}");
+        assert!((one.a_secs - one.b_secs - 400.0 / PER_SEC).abs() < 1e-9, "{one:?}");
+        assert!((one.secs - 300.0 / PER_SEC).abs() < 1.0, "{one:?}");
+        assert!(find(&names, |n| Ok(videos[n].clone()), 15.0).unwrap().is_empty());
+    }
+}
