@@ -4,7 +4,7 @@
 //! left out as damage.
 
 use super::decode::Decode;
-use super::frames;
+use super::origin;
 use super::resample::{Resampler, format_of};
 use super::source::{self, LONGEST_GAP_SECS, LONGEST_SECS};
 use crate::types::sound::Sound;
@@ -12,9 +12,14 @@ use anyhow::{Context, Result, bail};
 use ffmpeg_next::frame;
 use std::path::Path;
 
-/// Timestamps may wander this far from the count of samples before it is taken for a gap, seconds: less than a frame,
-/// more than the rounding of any container.
-const JITTER_SECS: f64 = 0.04;
+/// Timestamps this far from the count of samples are a gap, seconds: less than a lost frame of any codec, more than the
+/// rounding of any container.
+const GAP_SECS: f64 = 0.015;
+/// Timestamps that wander away from the count of samples, as where a clock ran slow, are followed: where their mean
+/// distance over `MEAN_SECS` is more than the rounding of a container, the next `STRETCH_SECS` are stretched by it.
+const MEAN_SECS: f64 = 1.0;
+const ROUNDING_SECS: f64 = 0.0005;
+const STRETCH_SECS: f64 = 1.0;
 
 /// The whole sound of `path` (wav, flac, mp3, a video, ...) as mono at `rate` samples a second; `None` when it has no
 /// sound.
@@ -103,10 +108,11 @@ fn stream_mono(path: &Path, rate: u32, sink: &mut dyn FnMut(&[f32]) -> Result<()
     let Some(stream) = source::audio_stream(&input) else { return Ok(None) };
     let stream_idx = stream.index();
     let latest_secs = source::latest_secs(&input, &stream);
-    let mut zero_secs = frames::first_picture_secs(path)?;
+    let mut zero_secs = origin::first_picture_secs(path)?;
     let mut decode = Decode::new(path, input, stream_idx, 1)?;
     let secs_per_tick = f64::from(decode.time_base());
-    let mut timeline = Timeline { rate, n_written: 0, n_skip: 0, run: None, ready: Vec::new(), sink };
+    let mut timeline =
+        Timeline { rate, n_written: 0, n_skip: 0, run: None, ahead: Ahead::default(), ready: Vec::new(), sink };
     let mut frame = frame::Audio::empty();
     let (mut n_frames, mut n_misplaced) = (0u64, 0u64);
     while decode.next(&mut frame)? {
@@ -133,6 +139,26 @@ fn stream_mono(path: &Path, rate: u32, sink: &mut dyn FnMut(&[f32]) -> Result<()
     Ok(Some(Heard { n_samples: timeline.n_written, n_misplaced }))
 }
 
+/// How far timestamps are ahead of the count of samples.
+#[derive(Default)]
+struct Ahead {
+    sum: f64,
+    secs: f64,
+}
+
+impl Ahead {
+    /// Takes in a frame of `secs` whose timestamp is `ahead` seconds late; the mean at the end of each `MEAN_SECS`.
+    fn mean(&mut self, ahead: f64, secs: f64) -> Option<f64> {
+        self.sum += ahead * secs;
+        self.secs += secs;
+        let mean = (self.secs >= MEAN_SECS).then(|| self.sum / self.secs);
+        if mean.is_some() {
+            *self = Self::default();
+        }
+        mean
+    }
+}
+
 /// Lays runs of continuous sound at their places in time.
 struct Timeline<'a> {
     rate: u32,
@@ -141,6 +167,7 @@ struct Timeline<'a> {
     n_skip: u64,
     /// The run at hand, and its start in seconds.
     run: Option<(Resampler, f64)>,
+    ahead: Ahead,
     ready: Vec<f32>,
     sink: &'a mut dyn FnMut(&[f32]) -> Result<()>,
 }
@@ -149,7 +176,7 @@ impl Timeline<'_> {
     /// Second at which the sound so far ends.
     fn end_secs(&self) -> f64 {
         let written = self.n_written as f64 / f64::from(self.rate);
-        self.run.as_ref().map_or(written, |(run, start)| start + run.secs_in())
+        self.run.as_ref().map_or(written, |(run, start)| start + run.secs())
     }
 
     /// Whether sound at second `at` is near enough to what came before, and before the last second believed.
@@ -164,12 +191,19 @@ impl Timeline<'_> {
         let format = format_of(frame);
         let end = self.end_secs();
         let at = at.unwrap_or(end);
-        let goes_on = self.run.is_some() && (at - end).abs() <= JITTER_SECS;
+        let goes_on = self.run.is_some() && (at - end).abs() <= GAP_SECS;
         if !goes_on || self.run.as_ref().is_none_or(|(run, _)| run.format() != format) {
             self.end_run()?;
             self.begin_run(Resampler::new(format, self.rate)?, at)?;
         }
         if let Some((run, _)) = &mut self.run {
+            if goes_on
+                && run.is_even()
+                && let Some(mean) = self.ahead.mean(at - end, frame.samples() as f64 / f64::from(frame.rate()))
+                && mean.abs() > ROUNDING_SECS
+            {
+                run.stretch(mean, STRETCH_SECS)?;
+            }
             run.push(frame, &mut self.ready)?;
         }
         self.deliver()
@@ -180,6 +214,7 @@ impl Timeline<'_> {
         let late = place.saturating_sub(i64::try_from(self.n_written)?);
         self.n_skip = late.min(0).unsigned_abs();
         self.run = Some((run, at));
+        self.ahead = Ahead::default();
         const SILENCE: [f32; 4096] = [0.0; 4096];
         let mut n_silent = late.max(0) as u64;
         while n_silent > 0 {
@@ -218,8 +253,15 @@ mod tests {
     #[test]
     fn a_jump_in_time_is_believed_up_to_ten_minutes_and_a_day() {
         let mut sink = |_: &[f32]| Ok(());
-        let mut timeline =
-            Timeline { rate: 10, n_written: 50, n_skip: 0, run: None, ready: Vec::new(), sink: &mut sink };
+        let mut timeline = Timeline {
+            rate: 10,
+            n_written: 50,
+            n_skip: 0,
+            run: None,
+            ahead: Ahead::default(),
+            ready: Vec::new(),
+            sink: &mut sink,
+        };
         let reaches =
             |timeline: &Timeline| [None, Some(-1e12), Some(604.0), Some(606.0)].map(|at| timeline.reaches(at));
         assert_eq!(reaches(&timeline), [true, true, true, false]);

@@ -231,13 +231,3 @@ impl Iterator for FrameReader {
         frame.transpose()
     }
 }
-
-/// Time in seconds, on the container's own clock, of the first picture that decodes; `None` without pictures.
-pub(super) fn first_picture_secs(path: &Path) -> Result<Option<f64>> {
-    let input = source::open(path)?;
-    let Some(stream_idx) = source::video_stream(&input).map(|stream| stream.index()) else { return Ok(None) };
-    let mut decode = Decode::new(path, input, stream_idx, 1)?;
-    let mut first = frame::Video::empty();
-    let found = decode.next(&mut first)?;
-    Ok(found.then(|| first.timestamp().unwrap_or(0) as f64 * f64::from(decode.time_base())))
-}

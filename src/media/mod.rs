@@ -2,12 +2,14 @@
 //! presentation time, `audio` its sound on the same clock, `encode` writes mp4. Beneath them: `source` opens files and
 //! names what is wrong with them, `decode` turns one stream into decoded frames, `picture` makes those upright RGB.
 //!
-//! One clock for all: time 0 is the first picture that decodes; a file without pictures starts with its first sample.
+//! One clock for all: time 0 is the first picture that decodes (`origin`); a file without pictures starts with its first
+//! sample.
 
 pub mod audio;
 mod decode;
 pub mod encode;
 pub mod frames;
+mod origin;
 mod picture;
 pub mod probe;
 mod resample;

@@ -24,6 +24,9 @@ pub(super) struct Resampler {
     rate: u32,
     n_in: u64,
     n_out: u64,
+    /// Samples added (or left out) by stretching, and the count of samples in at which the last stretch is done.
+    n_stretched: i64,
+    even_at: u64,
 }
 
 impl Resampler {
@@ -38,16 +41,33 @@ impl Resampler {
         let context = context.with_context(|| {
             format!("cannot bring {sample:?} sound of {} channels at {source_rate} Hz to mono", layout.channels())
         })?;
-        Ok(Self { context, format, rate, n_in: 0, n_out: 0 })
+        Ok(Self { context, format, rate, n_in: 0, n_out: 0, n_stretched: 0, even_at: 0 })
     }
 
     pub fn format(&self) -> Format {
         self.format
     }
 
-    /// Seconds of sound taken in.
-    pub fn secs_in(&self) -> f64 {
-        self.n_in as f64 / f64::from(self.format.2)
+    /// Seconds of sound taken in, stretched as it was.
+    pub fn secs(&self) -> f64 {
+        self.n_in as f64 / f64::from(self.format.2) + self.n_stretched as f64 / f64::from(self.rate)
+    }
+
+    /// Whether no stretch is under way.
+    pub fn is_even(&self) -> bool {
+        self.n_in >= self.even_at
+    }
+
+    /// Makes the next `over_secs` seconds `secs` longer (shorter, if negative).
+    pub fn stretch(&mut self, secs: f64, over_secs: f64) -> Result<()> {
+        let n = (secs * f64::from(self.rate)).round() as i32;
+        let over = (over_secs * f64::from(self.rate)) as i32;
+        // SAFETY: the context is live and ours.
+        let done = unsafe { ffmpeg::ffi::swr_set_compensation(self.context.as_mut_ptr(), n, over) };
+        ensure!(done >= 0, "swresample cannot stretch ({})", ffmpeg::Error::from(done));
+        self.n_stretched += i64::from(n);
+        self.even_at = self.n_in + (over_secs * f64::from(self.format.2)) as u64;
+        Ok(())
     }
 
     /// Takes a frame of this resampler's format; the samples that are ready are appended to `out`.
@@ -64,6 +84,7 @@ impl Resampler {
         // SAFETY: null input means flush.
         unsafe { self.convert(std::ptr::null_mut(), 0, out)? };
         let n_all = (self.n_in * u64::from(self.rate) + u64::from(self.format.2) / 2) / u64::from(self.format.2);
+        let n_all = n_all.saturating_add_signed(self.n_stretched);
         let n_extra = usize::try_from(self.n_out.saturating_sub(n_all)).unwrap_or(usize::MAX);
         out.truncate(out.len().saturating_sub(n_extra).max(start));
         Ok(())

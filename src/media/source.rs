@@ -17,6 +17,11 @@ pub(super) const LONGEST_SECS: f64 = 86_400.0;
 
 /// Opens `path` and reads its headers.
 pub(super) fn open(path: &Path) -> Result<Input> {
+    open_with(path, &[])
+}
+
+/// The same with options for the container's reader.
+pub(super) fn open_with(path: &Path, options: &[(&str, &str)]) -> Result<Input> {
     super::init();
     let mut file = std::fs::File::open(path).with_context(|| format!("cannot read {}: {EXPECTED}", path.display()))?;
     let size = file.metadata().with_context(|| format!("cannot read {}", path.display()))?;
@@ -35,7 +40,7 @@ pub(super) fn open(path: &Path) -> Result<Input> {
             path.display()
         )
     };
-    let input = match ffmpeg::format::input(&url(path)?) {
+    let input = match ffmpeg::format::input_with_dictionary(&url(path)?, options.iter().copied().collect()) {
         Ok(input) => input,
         Err(ffmpeg::Error::InvalidData) if is_mp4 => bail!(cut_short()),
         Err(ffmpeg::Error::InvalidData) => bail!("{} is not a media file: {EXPECTED}", path.display()),

@@ -40,3 +40,5 @@ mod segment;
 mod shard;
 mod sheet;
 mod support;
+mod sync;
+mod sync_clips;
