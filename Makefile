@@ -68,7 +68,7 @@ test: build
 	$(MAKE) demo DEMO=$(TARGET)/demo-test STEPS=30
 	@echo 'make test: all passed'
 
-# The long proofs, each printing its figures: 20 kills, a 10-minute video, speed on a real clip (CLIP, MODELS), alone and
+# The long proofs, each printing its figures: 20 kills, a 10-minute video, ten minutes of sound in step with their pictures, speed on a real clip (CLIP, MODELS), alone and
 # against the Python REFERENCE. ORATOR_REFERENCE_PYTHON names a Python with onnxruntime, cv2 and numpy (and torch: the
 # lifter's training beside PyTorch's).
 SHARED := ../shared
@@ -79,7 +79,7 @@ LIFTER_REFERENCE := fixtures/reference/lifter_reference.py
 export ORATOR_REFERENCE_PYTHON ?= python3
 
 prove: build
-	ORATOR_KILLS=20 ORATOR_LONG=1 cargo test --release --locked --test it -- --nocapture --test-threads 1 kill:: memory::
+	ORATOR_KILLS=20 ORATOR_LONG=1 cargo test --release --locked --test it -- --nocapture --test-threads 1 kill:: memory:: sync::
 	cargo test --release --locked --test it -- --nocapture --test-threads 1 golden:: pose_parity:: real::
 	$(ORATOR) bench lift
 	if [ -e $(CLIP) ]; then $(ORATOR) bench pose2d $(CLIP) --models-dir $(MODELS); else echo 'SKIPPED: $(CLIP) is not there'; fi

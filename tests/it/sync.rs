@@ -208,7 +208,13 @@ fn offsets_and_edit_lists() {
 #[test]
 fn gaps_and_clocks_that_run_apart() {
     let lossy = Kind { then: ["", "-c copy -bsf:a noise=amount=-1:drop=eq(mod(n\\,113)\\,60)"], secs: 40.0, ..PLAIN };
-    let pcm = Kind { sound: "-c:a pcm_s16le -af asetpts=PTS*1.0005", secs: 40.0, sound_pace: 1.0005, ..PLAIN };
+    let pcm = Kind {
+        sound: "-c:a pcm_s16le -af asetpts=PTS*1.0005",
+        secs: 40.0,
+        sound_pace: 1.0005,
+        jitter_secs: 0.0005,
+        ..PLAIN
+    };
     let fast = Kind { sound: "-c:a flac -af asetpts=PTS*0.9999", sound_pace: 0.9999, sound_rate: 44_100, ..pcm };
     let jitter = "-c:a pcm_s16le -af asetpts=PTS+(random(0)-0.5)*0.01/TB";
     in_step(&[

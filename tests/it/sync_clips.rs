@@ -67,7 +67,7 @@ pub struct Kind {
     pub sound_at: f64,
     /// Seconds that a second of the wav lasts, by the options.
     pub sound_pace: f64,
-    /// What the container does to times beyond rounding to a millisecond, seconds.
+    /// How far the sound's times are off beyond the rounding of the container, seconds.
     pub jitter_secs: f64,
     /// Options before the pictures and before the sound.
     pub before: [&'static str; 2],
