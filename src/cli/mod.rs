@@ -1,6 +1,7 @@
 //! The command line: the one place with clap, indicatif and println. One file a verb; a verb's doc comment is its
 //! `--help`. Exit codes: 0 all done; 1 usage, configuration, or a check that did not pass; 2 some units failed, the others are done.
 
+mod account;
 mod bench;
 mod config_args;
 mod dataset;

@@ -43,7 +43,10 @@ impl Stage for SegmentStage {
     }
 
     fn settings(&self) -> serde_json::Value {
-        serde_json::json!({ "segment": self.rules })
+        let mut rules = serde_json::json!(self.rules);
+        // `lift` judges by this one
+        rules.as_object_mut().map(|keys| keys.remove("max_bone_change"));
+        serde_json::json!({ "segment": rules })
     }
 
     fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {

@@ -35,6 +35,7 @@ mod operators;
 mod pose_chain;
 mod pose_parity;
 mod real;
+mod redecide;
 mod runner;
 mod segment;
 mod shard;
