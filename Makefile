@@ -6,7 +6,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: setup runtime build test demo prove clean-demo
+.PHONY: setup runtime readers browser build test demo prove clean-demo
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -58,10 +58,25 @@ $(RUNTIME):
 	echo "$(RUNTIME_SHA256)  $$library" | sha256sum --check --quiet; \
 	mv $$library $@; touch $@; rm -rf $$attempt; echo "runtime: $@"
 
+# Programs of others that the tests open our files with: Python readers of datasets, and a browser for pages.
+export ORATOR_READERS ?= $(abspath $(TARGET)/readers)
+READERS := $(ORATOR_READERS)
+READERS_WANTED := webdataset==1.0.2 datasets==5.2.0 numpy==2.4.6
+
+readers: $(READERS)/.there
+
+$(READERS)/.there: Makefile
+	@$(INSTALL); command -v python3 >/dev/null && python3 -m pip --version >/dev/null 2>&1 || install python3 python3-pip; \
+	rm -rf $(READERS); python3 -m pip install --quiet --disable-pip-version-check --no-input --root-user-action ignore \
+		--no-warn-conflicts --target $(READERS) $(READERS_WANTED); touch $@; echo "readers: $(READERS_WANTED)"
+
+browser:
+	@$(INSTALL); command -v chromium >/dev/null || install chromium; echo "browser: $$(command -v chromium)"
+
 build: setup runtime
 	cargo build --release --locked
 
-test: build
+test: build readers browser
 	cargo fmt --check
 	cargo clippy --locked --all-targets -- -D warnings
 	cargo test --locked

@@ -142,7 +142,7 @@ fn longest_at(a: &[u32], b: &[u32], offset: i64) -> Option<(i64, i64, usize)> {
         let place = (start as usize).saturating_sub(a_start);
         let unlike = |piece: &[(u32, u32)]| {
             let (bits, wrong) = piece.iter().fold((0, 0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
-            f64::from(wrong) > MAX_WRONG * f64::from(bits)
+            (bits as usize) < 16 * EDGE || f64::from(wrong) > MAX_WRONG * f64::from(bits)
         };
         let same = &pairs[place..place + n];
         let skip = same.windows(EDGE).take_while(|piece| unlike(piece)).count();

@@ -25,6 +25,10 @@ const PIPELINE: &str = r#"# The synthetic speaker of `orator demo`: the marker m
 [[speaker]]
 name = "host"
 videos = ["videos/host/*.mp4"]
+SPLITS
+licence = "cc0-1.0"
+consent = "none needed: nobody is shown"
+source = "drawn by orator demo"
 
 [pose2d]
 person = "person-marker"
@@ -70,6 +74,19 @@ pub fn draw(dir: &Path, plan: &Plan, progress: &dyn Progress) -> anyhow::Result<
     }
     let unheard = Scene::new(plan.seed.wrapping_mul(1000), UNHEARD_SECS, plan.size).sound();
     workdir::replace(&dir.join("speech.wav"), |attempt| audio::write_wav(attempt, &unheard))?;
-    workdir::write_file(&dir.join("pipeline.toml"), PIPELINE.as_bytes())?;
+    workdir::write_file(&dir.join("pipeline.toml"), PIPELINE.replace("SPLITS", &splits(plan.n_videos)).as_bytes())?;
     Ok(videos)
+}
+
+/// The lines that put the videos into splits: the last two validate and test; fewer than three all train.
+fn splits(n_videos: usize) -> String {
+    if n_videos < 3 {
+        return "train = [\"*.mp4\"]".to_owned();
+    }
+    let list = |numbers: std::ops::RangeInclusive<usize>| {
+        numbers.map(|number| format!("\"clip-{number}.mp4\"")).collect::<Vec<_>>().join(", ")
+    };
+    let (train, validation, test) =
+        (list(1..=n_videos - 2), list(n_videos - 1..=n_videos - 1), list(n_videos..=n_videos));
+    format!("train = [{train}]\nvalidation = [{validation}]\ntest = [{test}]")
 }

@@ -39,6 +39,7 @@ mod redecide;
 mod runner;
 mod segment;
 mod shard;
+mod shared_sound;
 mod sheet;
 mod support;
 mod sync;
