@@ -28,7 +28,7 @@
 //! | `evaluate` | errors of the lifters on captured motion | `motion nn train lift` |
 //! | `generate` | speech to motion with a trained speaker | `motion nn audio train` |
 //! | `animate` | joints to rotations; BVH and drawn video | `motion media vision` |
-//! | `import` | motion that others captured, with its sound, becomes a dataset | `motion media dataset` |
+//! | `import` | motion that others captured, with its sound, becomes a dataset | `motion media audio dataset` |
 //! | `demo` | the synthetic speaker: videos with known truth, and the comparison with it | `motion media vision dataset animate` |
 //!
 //! Stages meet in files, never in code; all of them may use `types`, `stage` and `config`. `cli` (in the program

@@ -1,6 +1,7 @@
 //! Which files belong together: every motion file below the sources by what is in it, with the sound and the
 //! transcript that have its name, beside it or in a folder beside its own (`bvh/`, `wav/`, `tsv/`).
 
+use crate::dataset::{INFO, part};
 use crate::motion::npz::Npz;
 use anyhow::{Context, Result, ensure};
 use std::fs::File;
@@ -45,7 +46,9 @@ pub struct Found {
 pub struct Sources {
     /// In the order of their paths.
     pub takes: Vec<Found>,
-    /// Tar files, and why each of the other files that look like motion was left out.
+    /// Folders of datasets of ours.
+    pub datasets: Vec<PathBuf>,
+    /// Tar files elsewhere, and why each of the other files that look like motion was left out.
     pub tars: Vec<PathBuf>,
     pub unknown: Vec<(PathBuf, String)>,
 }
@@ -61,24 +64,29 @@ const TRANSCRIPT_FOLDERS: [&str; 8] = ["tsv", "transcript", "transcripts", "text
 /// # Errors
 /// A source that is not there, or sources in which nothing is motion.
 pub fn find(sources: &[PathBuf], only: Option<Kind>) -> Result<Sources> {
-    let mut files = Vec::new();
+    let (mut files, mut found) = (Vec::new(), Sources::default());
     for source in sources {
         ensure!(source.exists(), "{} is not there", source.display());
-        walk(source, &mut files).with_context(|| format!("cannot look into {}", source.display()))?;
+        walk(source, &mut files, &mut found.datasets).with_context(|| format!("cannot look into {}", source.display()))?;
     }
     files.sort();
     files.dedup();
-    let mut found = Sources::default();
+    found.datasets.sort();
+    found.datasets.dedup();
+    if only.is_some_and(|only| only != Kind::Shards) {
+        found.datasets.clear();
+    }
     for path in files {
         match kind(&path) {
             Ok(None) => {}
             Ok(Some(kind)) if only.is_some_and(|only| only != kind) => {}
             Ok(Some(Kind::Shards)) => found.tars.push(path),
             Ok(Some(kind)) => found.takes.push(with_company(kind, path)),
+            Err(_) if only.is_some_and(|only| only != Kind::Ted) => {}
             Err(why) => found.unknown.push((path, why)),
         }
     }
-    let nothing = found.takes.is_empty() && found.tars.is_empty() && found.unknown.is_empty();
+    let nothing = found.takes.is_empty() && found.datasets.is_empty() && found.tars.is_empty() && found.unknown.is_empty();
     ensure!(
         !nothing,
         "nothing to import in {sources:?}{}: expected text clips of 147 numbers a line, .npz with `human_joints`, .bvh, \
@@ -88,16 +96,21 @@ pub fn find(sources: &[PathBuf], only: Option<Kind>) -> Result<Sources> {
     Ok(found)
 }
 
-fn walk(path: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
+/// The files below `path`; a dataset's folder is not looked into.
+fn walk(path: &Path, files: &mut Vec<PathBuf>, datasets: &mut Vec<PathBuf>) -> Result<()> {
     if !path.is_dir() {
         files.push(path.to_owned());
+        return Ok(());
+    }
+    if path.join(INFO).is_file() && path.join(part::FOLDER).is_dir() {
+        datasets.push(path.to_owned());
         return Ok(());
     }
     for entry in std::fs::read_dir(path)? {
         let path = entry?.path();
         let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
         if !hidden {
-            walk(&path, files)?;
+            walk(&path, files, datasets)?;
         }
     }
     Ok(())

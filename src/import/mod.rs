@@ -10,9 +10,13 @@ pub mod captured;
 pub mod facing;
 pub mod find;
 pub mod in_time;
+pub mod loose;
+pub mod origin;
 pub mod take;
 pub mod ted;
 pub mod transcript;
+pub mod write;
 
 pub use captured::Captured;
 pub use take::Take;
+pub use write::{Imported, Plan, import};

@@ -23,7 +23,7 @@ const MAY_IMPORT: [(&str, &str); 20] = [
     ("evaluate", "types stage config motion nn train lift"),
     ("generate", "types stage config motion nn audio dataset train"),
     ("animate", "types stage config motion media vision"),
-    ("import", "types stage config motion media dataset"),
+    ("import", "types stage config motion media audio dataset"),
     ("demo", "types stage config motion media vision dataset animate"),
 ];
 
