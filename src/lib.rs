@@ -29,6 +29,7 @@
 //! | `generate` | speech to motion with a trained speaker | `motion nn audio train` |
 //! | `animate` | joints to rotations; BVH and drawn video | `motion media vision` |
 //! | `import` | motion that others captured, with its sound, becomes a dataset | `motion media audio dataset` |
+//! | `forget` | a video and all that was derived from it goes, and a search proves it | `dataset` |
 //! | `demo` | the synthetic speaker: videos with known truth, and the comparison with it | `motion media vision dataset animate` |
 //!
 //! Stages meet in files, never in code; all of them may use `types`, `stage` and `config`. `cli` (in the program
@@ -46,6 +47,7 @@ pub mod dataset;
 pub mod demo;
 pub mod evaluate;
 pub mod extract;
+pub mod forget;
 pub mod generate;
 pub mod import;
 pub mod lift;

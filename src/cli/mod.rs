@@ -8,7 +8,9 @@ mod dataset;
 mod demo;
 mod doctor;
 mod evaluate;
+mod forget;
 mod generate;
+mod import;
 mod init;
 mod lift;
 mod models;
@@ -42,6 +44,8 @@ enum Verb {
     Doctor(doctor::Args),
     Lift(lift::Args),
     Sheet(sheet::Args),
+    Import(import::Args),
+    Forget(forget::Args),
     Dataset(dataset::Args),
     Train(train::Args),
     Evaluate(evaluate::Args),
@@ -80,6 +84,8 @@ pub fn main() -> ExitCode {
         Verb::Lift(args) => lift::run(args, &ui),
         Verb::Sheet(args) => sheet::run(args, &ui),
         Verb::Dataset(args) => dataset::run(args, &ui),
+        Verb::Import(args) => import::run(args, &ui),
+        Verb::Forget(args) => forget::run(args, &ui),
         Verb::Train(args) => train::run(args, &ui),
         Verb::Evaluate(args) => evaluate::run(args, &ui),
         Verb::Generate(args) => generate::run(args, &ui),

@@ -113,11 +113,22 @@ impl PartWriter {
     /// Adds an interval; the order of intervals is the order in the shards. `padded_secs` of its sound are silence that
     /// the video does not have.
     pub fn push(&mut self, sample: &Sample, padded_secs: f64) -> Result<()> {
+        self.part.padded_sound_secs += padded_secs;
+        self.push_members(sample, &sample.members()?)
+    }
+
+    /// Adds an interval that comes from another dataset: its JSON stays byte for byte what it was.
+    pub fn push_as_it_was(&mut self, sample: &Sample, json: Vec<u8>) -> Result<()> {
+        let mut members = sample.members()?;
+        members[0] = json;
+        self.push_members(sample, &members)
+    }
+
+    fn push_members(&mut self, sample: &Sample, members: &[Vec<u8>; 5]) -> Result<()> {
         let name = &self.part.name;
         ensure!(sample.key.starts_with(name), "the key {} does not begin with its video's name {name}", sample.key);
-        self.shards.push(sample)?;
+        self.shards.push_members(sample, members)?;
         self.part.moments.learn(&sample.motion);
-        self.part.padded_sound_secs += padded_secs;
         Ok(())
     }
 

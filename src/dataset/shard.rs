@@ -42,7 +42,11 @@ impl Writer {
 
     /// Appends a sample.
     pub fn push(&mut self, sample: &Sample) -> Result<()> {
-        let members = sample.members()?;
+        self.push_members(sample, &sample.members()?)
+    }
+
+    /// Appends a sample whose members are these bytes.
+    pub fn push_members(&mut self, sample: &Sample, members: &[Vec<u8>; 5]) -> Result<()> {
         let bytes: usize = members.iter().map(|m| BLOCK + m.len().next_multiple_of(BLOCK)).sum();
         if self.open.as_ref().is_some_and(|open| open.bytes + (bytes + 2 * BLOCK) as u64 > self.max_bytes) {
             self.close()?;
@@ -59,7 +63,7 @@ impl Writer {
         let offset = open.bytes;
         let mut hasher = blake3::Hasher::new();
         let mut spans = Vec::with_capacity(EXTENSIONS.len());
-        for (extension, member) in EXTENSIONS.iter().zip(&members) {
+        for (extension, member) in EXTENSIONS.iter().zip(members) {
             let header = header(&format!("{}.{extension}", sample.key), member.len())?;
             let padding = [0; BLOCK];
             let padding = &padding[..member.len().next_multiple_of(BLOCK) - member.len()];

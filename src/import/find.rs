@@ -67,7 +67,8 @@ pub fn find(sources: &[PathBuf], only: Option<Kind>) -> Result<Sources> {
     let (mut files, mut found) = (Vec::new(), Sources::default());
     for source in sources {
         ensure!(source.exists(), "{} is not there", source.display());
-        walk(source, &mut files, &mut found.datasets).with_context(|| format!("cannot look into {}", source.display()))?;
+        walk(source, &mut files, &mut found.datasets)
+            .with_context(|| format!("cannot look into {}", source.display()))?;
     }
     files.sort();
     files.dedup();
@@ -86,7 +87,8 @@ pub fn find(sources: &[PathBuf], only: Option<Kind>) -> Result<Sources> {
             Err(why) => found.unknown.push((path, why)),
         }
     }
-    let nothing = found.takes.is_empty() && found.datasets.is_empty() && found.tars.is_empty() && found.unknown.is_empty();
+    let nothing =
+        found.takes.is_empty() && found.datasets.is_empty() && found.tars.is_empty() && found.unknown.is_empty();
     ensure!(
         !nothing,
         "nothing to import in {sources:?}{}: expected text clips of 147 numbers a line, .npz with `human_joints`, .bvh, \

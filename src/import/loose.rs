@@ -62,7 +62,8 @@ pub fn open(tars: &[PathBuf]) -> Loose {
             loose.failed.push((tar.clone(), format!("{error:#}")));
         }
         let name = tar.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let left_out = |(ending, n): (String, usize)| format!("{name}: {n} x .{ending} left out, no member of a sample");
+        let left_out =
+            |(ending, n): (String, usize)| format!("{name}: {n} x .{ending} left out, no member of a sample");
         loose.notes.extend(unknown.into_iter().map(left_out));
     }
     let mut videos: BTreeMap<String, LooseVideo> = BTreeMap::new();
@@ -150,11 +151,13 @@ impl Waiting {
             Ok((layout.n_rows, layout.data_at))
         };
         let (n_frames, at) = rows(pose3d, Element::F32, &[N_JOINTS, 3]).context("pose3d.npy")?;
-        let joints = Array3::from_shape_vec((n_frames, N_JOINTS, 3), npy::floats(&pose3d[at..])).context("pose3d.npy")?;
+        let joints =
+            Array3::from_shape_vec((n_frames, N_JOINTS, 3), npy::floats(&pose3d[at..])).context("pose3d.npy")?;
         let (n_rows, at) = rows(mask, Element::Bool, &[N_JOINTS]).context("mask.npy")?;
         let mask = Array2::from_shape_vec((n_rows, N_JOINTS), npy::bools(&mask[at..])).context("mask.npy")?;
         let (n_rows, at) = rows(pose2d, Element::F32, &[N_KEYPOINTS, 3]).context("pose2d.npy")?;
-        let pose2d = Array3::from_shape_vec((n_rows, N_KEYPOINTS, 3), npy::floats(&pose2d[at..])).context("pose2d.npy")?;
+        let pose2d =
+            Array3::from_shape_vec((n_rows, N_KEYPOINTS, 3), npy::floats(&pose2d[at..])).context("pose2d.npy")?;
         let sound = read_wav(sound).context("wav")?;
         let sample = Sample { key: self.key.clone(), motion: Motion { fps, joints, mask }, pose2d, sound, meta };
         sample.members()?;

@@ -20,6 +20,9 @@ use crate::types::sound::Sound;
 use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
 
+/// Joints moved by more than this, in the median of a take, are worth a remark.
+const MUCH_MOVED_MM: f64 = 5.0;
+
 /// Something to import.
 #[derive(Clone, Debug)]
 pub enum Origin {
@@ -38,6 +41,8 @@ pub struct Look {
     /// The split it comes with, then the one it is given.
     pub split: Option<(Split, SplitBy)>,
     pub codes: Option<Vec<u32>>,
+    /// What a user should know of a take that is kept.
+    pub remark: String,
     /// Hash of the codes, once written.
     pub sound: Option<String>,
 }
@@ -87,7 +92,8 @@ impl Origin {
         };
         let content = hash_file(&path).unwrap_or_default();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let marks = if content.is_empty() { blake3::hash(stem.as_bytes()).to_hex().to_string() } else { content.clone() };
+        let marks =
+            if content.is_empty() { blake3::hash(stem.as_bytes()).to_hex().to_string() } else { content.clone() };
         let source = Source {
             name: name.unwrap_or_else(|| format!("{}-{}", slug(&stem), marks.get(..8).unwrap_or_default())),
             file: file_name(&path),
@@ -154,7 +160,13 @@ fn look_at_take(found: &Found, plan: &Plan) -> Result<Look> {
                 source.ledger.refused.push(refused(end_secs, duration_secs, &refusal));
             }
             source.bones = VideoBones { lengths_metres: kept.lengths.map(f64::from).to_vec(), n_frames };
-            Ok(Look { source, codes: Some(codes([&kept.sample.sound])), ..Look::default() })
+            let remark = match kept.moved_mm {
+                moved if moved > MUCH_MOVED_MM => {
+                    format!("its bones vary: one length each moved its joints by {moved} mm (median)")
+                }
+                _ => String::new(),
+            };
+            Ok(Look { source, remark, codes: Some(codes([&kept.sample.sound])), ..Look::default() })
         }
     }
 }
@@ -174,16 +186,22 @@ fn refused(start_secs: f64, end_secs: f64, refusal: &Refusal) -> Refused {
 
 fn look_at_part(dir: &Path, name: &str, plan: &Plan) -> Result<Look> {
     let info = std::fs::read(dir.join(INFO)).with_context(|| format!("cannot read {}", dir.join(INFO).display()))?;
-    let info: Info = serde_json::from_slice(&info).with_context(|| format!("{} is damaged", dir.join(INFO).display()))?;
+    let info: Info =
+        serde_json::from_slice(&info).with_context(|| format!("{} is damaged", dir.join(INFO).display()))?;
     let fps = plan.limits.fps;
-    ensure!(info.fps == fps, "{} runs at {}, the dataset at {fps}: import it with the same --fps", dir.display(), info.fps);
+    ensure!(
+        info.fps == fps,
+        "{} runs at {}, the dataset at {fps}: import it with the same --fps",
+        dir.display(),
+        info.fps
+    );
     let part = Part::read(&Part::path(dir, name))?;
     ensure!(part.is_there(dir), "{name}: its shards are not all there; orator dataset verify says what is wrong");
     let codes = part.codes(dir)?;
     let split = part.split.map(|split| (split, part.split_by.clone()));
     let Part { name, file, content, made_from, ledger, bones, failure, .. } = part;
     let source = Source { name, file, content, made_from, ledger, bones, failure };
-    Ok(Look { source, split, codes: Some(codes).filter(|codes| !codes.is_empty()), sound: None })
+    Ok(Look { source, split, codes: Some(codes).filter(|codes| !codes.is_empty()), ..Look::default() })
 }
 
 fn look_at_loose(video: &LooseVideo, plan: &Plan) -> Result<Look> {
@@ -214,7 +232,12 @@ fn look_at_loose(video: &LooseVideo, plan: &Plan) -> Result<Look> {
         },
         ..Source::default()
     };
-    Ok(Look { source, split: video.split.map(|split| (split, SplitBy::Name)), codes: Some(fingerprinter.finish()), sound: None })
+    Ok(Look {
+        source,
+        split: video.split.map(|split| (split, SplitBy::Name)),
+        codes: Some(fingerprinter.finish()),
+        ..Look::default()
+    })
 }
 
 fn codes<'a>(sounds: impl IntoIterator<Item = &'a Sound>) -> Vec<u32> {
@@ -245,7 +268,8 @@ impl Look {
         let name = self.source.name.clone();
         let others: Vec<&str> = with.iter().filter_map(|shared| shared.other(&name)).collect();
         let secs = with.first().map_or(0.0, |shared| shared.secs);
-        let says = format!("the same {secs:.1} s of sound are in {}, which are in different splits", others.join(" and "));
+        let says =
+            format!("the same {secs:.1} s of sound are in {}, which are in different splits", others.join(" and "));
         self.refuse("duplicate", secs, threshold, &says);
         (self.sound, self.split) = (None, None);
     }
@@ -271,7 +295,7 @@ impl Look {
     pub fn line(&self, file: &str) -> Line {
         let (ended, reason, says) = match (&self.source.failure, self.source.ledger.refused.first()) {
             (Some(error), _) => ("failed", "error".to_owned(), error.clone()),
-            (None, _) if self.is_kept() => ("kept", String::new(), String::new()),
+            (None, _) if self.is_kept() => ("kept", String::new(), self.remark.clone()),
             (None, Some(refused)) => ("refused", refused.reason.clone(), refused.says.clone()),
             (None, None) => ("refused", "empty".to_owned(), "it holds nothing".to_owned()),
         };

@@ -1,7 +1,7 @@
 //! One take on its way to a sample: its motion at the dataset's rate with constant bones, its sound, and the cut to
 //! what both have; or the reason why it is refused. A take is one continuous interval.
 
-use super::find::Found;
+use super::find::{Found, Kind};
 use super::transcript::Transcript;
 use super::{Captured, in_time};
 use crate::config::videos::slug;
@@ -52,6 +52,8 @@ pub enum Ended {
 /// A sample, and the bones its motion was given (metres; 0: not there).
 #[derive(Clone, Debug)]
 pub struct Kept {
+    /// By how much the joints moved when every bone was given one length: the median, mm.
+    pub moved_mm: f64,
     pub sample: Sample,
     pub lengths: [f32; N_BONES],
 }
@@ -90,6 +92,11 @@ impl Take {
 }
 
 fn refusal(n_frames: usize, sound: Option<&Sound>, found: &Found, limits: &Limits) -> Option<Refusal> {
+    let stem = found.motion.file_stem().unwrap_or_default().to_string_lossy();
+    if found.kind == Kind::Authors && stem.starts_with("prediction") {
+        let says = "it is what a model predicted, not how a person moved".to_owned();
+        return Some(Refusal { reason: "prediction", measured: 0.0, threshold: 0.0, unit: "", says });
+    }
     let Some(sound) = sound else { return Some(no_sound(found)) };
     let (motion_secs, sound_secs) = (limits.fps.secs(n_frames), sound.secs());
     let apart = sound_secs - motion_secs;
@@ -181,7 +188,7 @@ fn keep(name: &str, found: &Found, captured: &Captured, mut motion: Motion, mut 
     let key = format!("{name}-{:06}", 0);
     let sample = Sample { key, motion, pose2d, sound, meta };
     sample.members().with_context(|| format!("{} makes no sample", found.motion.display()))?;
-    Ok(Kept { sample, lengths })
+    Ok(Kept { moved_mm: moved[0], sample, lengths })
 }
 
 /// By how much the joints were moved to give every bone one length: the median and the largest, mm to a hundredth.

@@ -145,8 +145,12 @@ fn notes(takes: &[Found]) -> Vec<String> {
     let mut notes: Vec<String> = there
         .into_iter()
         .map(|kind| match kind {
-            Kind::Authors => "Joints of the authors' text clips: fingers turned to base first, camera axes as they were.",
-            Kind::Ted => "Joints of TED Expressive, of a monocular regressor: camera axes as they were, no finger tips.",
+            Kind::Authors => {
+                "Joints of the authors' text clips: fingers turned to base first, camera axes as they were."
+            }
+            Kind::Ted => {
+                "Joints of TED Expressive, of a monocular regressor: camera axes as they were, no finger tips."
+            }
             Kind::Bvh => {
                 "Joints of BVH takes: metres, and each take turned about the vertical as a whole so that over it the \
                  speaker faces the camera (`turned_degrees` in a sample's json)."

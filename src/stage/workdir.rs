@@ -55,6 +55,21 @@ pub fn replace_folder(attempt: &Path, place: &Path) -> Result<()> {
     moved().with_context(|| format!("cannot put {} in its place", place.display()))
 }
 
+/// Puts back what `replace_folder` had moved aside when it was killed between its two renames.
+pub fn restore_folder(place: &Path) -> Result<()> {
+    let old = attempt_beside(place).with_extension("old");
+    if place.exists() || !old.is_dir() {
+        return Ok(());
+    }
+    fs::rename(&old, place).with_context(|| format!("cannot put {} back", place.display()))
+}
+
+/// What a killed attempt left beside `place`.
+pub fn left_over(place: &Path) -> Vec<PathBuf> {
+    let attempt = attempt_beside(place);
+    [attempt.with_extension("old"), attempt].into_iter().filter(|path| path.exists()).collect()
+}
+
 /// An empty folder beside `place` to work in; what an earlier killed attempt left there is removed.
 pub fn attempt_folder(place: &Path) -> Result<PathBuf> {
     let attempt = attempt_beside(place);

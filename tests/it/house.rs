@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A room and the rooms it may import.
-const MAY_IMPORT: [(&str, &str); 20] = [
+const MAY_IMPORT: [(&str, &str); 21] = [
     ("types", ""),
     ("stage", "types"),
     ("config", "types stage"),
@@ -24,6 +24,7 @@ const MAY_IMPORT: [(&str, &str); 20] = [
     ("generate", "types stage config motion nn audio dataset train"),
     ("animate", "types stage config motion media vision"),
     ("import", "types stage config motion media audio dataset"),
+    ("forget", "types stage config dataset"),
     ("demo", "types stage config motion media vision dataset animate"),
 ];
 

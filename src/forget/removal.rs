@@ -1,0 +1,184 @@
+//! What goes when a video is forgotten, and the going. First a mark is laid into the dataset, so that `dataset verify`
+//! calls it unsound until all is done; then the stages' files go; last the dataset is replaced by one without the video,
+//! in one step. A kill anywhere leaves something that a second run finishes.
+
+use super::dataset;
+use super::known::{Known, STAGES};
+use super::search::Mark;
+use crate::stage::{record, workdir};
+use anyhow::{Context, Result};
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The file that lies in a dataset while a video of it is being forgotten.
+pub const PENDING: &str = "FORGETTING.txt";
+
+/// Everything that goes with some videos of one speaker, or with the speaker.
+#[derive(Clone, Debug, Default)]
+pub struct Removal {
+    pub speaker: String,
+    /// Files and folders of the stages, records, failures, attempts, pictures.
+    pub paths: Vec<PathBuf>,
+    /// Folders of trained models that have seen the videos.
+    pub models: Vec<PathBuf>,
+    /// The dataset, and the names in it that go.
+    pub dataset: Option<(PathBuf, BTreeSet<String>)>,
+    /// The table of known hashes, and how many of its entries go.
+    pub hashes: Option<(PathBuf, usize)>,
+    /// What the videos are known by.
+    pub marks: Vec<Mark>,
+}
+
+impl Removal {
+    /// What is there of `videos` in the work folder; `others` are the videos that stay.
+    ///
+    /// # Errors
+    /// A folder that cannot be listed.
+    pub fn of_work(work: &Path, speaker: &str, videos: &[&Known], others: &[&Known], whole: bool) -> Result<Self> {
+        let mut removal = Self { speaker: speaker.to_owned(), marks: marks(videos, others), ..Self::default() };
+        for stage in STAGES.into_iter().chain(["sheets"]) {
+            let folder = work.join(stage).join(speaker);
+            if whole {
+                removal.paths.extend(Some(folder).filter(|folder| folder.exists()));
+                continue;
+            }
+            let own: Vec<&String> = videos.iter().filter_map(|video| video.work.as_ref()).collect();
+            for path in listed(&folder)? {
+                let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                let name = name.trim_start_matches('.');
+                let is_of = |work: &&String| {
+                    name.strip_prefix(work.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '_']))
+                };
+                removal.paths.extend(own.iter().any(|work| is_of(&work)).then_some(path));
+            }
+        }
+        let (models, dir) = (work.join("gan").join(speaker), work.join("dataset").join(speaker));
+        let names: BTreeSet<String> = videos.iter().flat_map(|video| video.parts.iter().cloned()).collect();
+        let has_samples = names.iter().any(|name| dataset::has_samples(&dir, name));
+        removal.models.extend(Some(models).filter(|models| models.exists() && (whole || has_samples)));
+        let left_over = workdir::left_over(&dir);
+        if !names.is_empty() || (whole && dir.exists()) || dir.join(PENDING).exists() {
+            removal.dataset = Some((dir.clone(), names));
+            // it names the videos among its inputs, and their files in its report
+            removal
+                .paths
+                .extend([record::record_path(&dir), record::failure_path(&dir)].into_iter().filter(|p| p.exists()));
+        }
+        removal.paths.extend(left_over);
+        removal.hashes = hashes(&work.join("hashes.json"), &removal);
+        Ok(removal)
+    }
+
+    /// What is there of `videos` in a dataset's folder without a work folder.
+    pub fn of_dataset(dir: &Path, videos: &[&Known], others: &[&Known]) -> Self {
+        let names = videos.iter().flat_map(|video| video.parts.iter().cloned()).collect();
+        let paths = workdir::left_over(dir);
+        Self { dataset: Some((dir.to_owned(), names)), marks: marks(videos, others), paths, ..Self::default() }
+    }
+
+    /// Whether nothing is there.
+    pub fn is_empty(&self) -> bool {
+        self.paths.is_empty() && self.models.is_empty() && self.dataset.is_none() && self.hashes.is_none()
+    }
+
+    /// What goes, a line each.
+    pub fn lines(&self, keep_models: bool) -> Vec<String> {
+        let mut lines: Vec<String> = self.paths.iter().map(|path| path.display().to_string()).collect();
+        if let Some((path, n)) = &self.hashes {
+            lines.push(format!("{n} entries of {}", path.display()));
+        }
+        if let Some((dir, names)) = &self.dataset {
+            lines.extend(names.iter().map(|name| format!("{name} of the dataset {}", dir.display())));
+        }
+        if !keep_models {
+            lines.extend(self.models.iter().map(|path| format!("{} (trained with it)", path.display())));
+        }
+        lines
+    }
+
+    /// Does it, with the trained models unless they are kept.
+    pub fn carry_out(&self, keep_models: bool) -> Result<()> {
+        if let Some((dir, _)) = self.dataset.as_ref().filter(|(dir, _)| dir.exists()) {
+            let text = "A video of this dataset is being forgotten. Run the same `orator forget` again to finish.\n";
+            workdir::write_file(&dir.join(PENDING), text.as_bytes())?;
+        }
+        let models = self.models.iter().filter(|_| !keep_models);
+        for path in self.paths.iter().chain(models) {
+            remove(path)?;
+        }
+        if let Some((path, _)) = &self.hashes {
+            self.clean_hashes(path)?;
+        }
+        if let Some((dir, names)) = &self.dataset {
+            dataset::without(dir, names)?;
+        }
+        Ok(())
+    }
+
+    fn clean_hashes(&self, path: &Path) -> Result<()> {
+        let mut table = read_table(path);
+        table.retain(|file, known| !self.is_own_hash(file, known));
+        workdir::write_file(path, &serde_json::to_vec(&table)?)
+    }
+
+    /// Whether an entry of the table speaks of one of the videos.
+    fn is_own_hash(&self, file: &str, known: &serde_json::Value) -> bool {
+        let entry = format!("{file}\n{known}");
+        let gone = self.paths.iter().any(|path| Path::new(file).starts_with(path));
+        let in_dataset = self.dataset.as_ref().is_some_and(|(dir, _)| Path::new(file).starts_with(dir));
+        gone || in_dataset || super::search::is_in(entry.as_bytes(), &self.marks)
+    }
+}
+
+type Table = serde_json::Map<String, serde_json::Value>;
+
+fn read_table(path: &Path) -> Table {
+    fs::read(path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default()
+}
+
+fn hashes(path: &Path, removal: &Removal) -> Option<(PathBuf, usize)> {
+    let n = read_table(path).iter().filter(|(file, known)| removal.is_own_hash(file, known)).count();
+    (n > 0).then(|| (path.to_owned(), n))
+}
+
+fn listed(folder: &Path) -> Result<Vec<PathBuf>> {
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    let listing = || format!("cannot list {}", folder.display());
+    let entries = fs::read_dir(folder).with_context(listing)?;
+    let mut paths = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>().with_context(listing)?;
+    paths.sort();
+    Ok(paths)
+}
+
+fn remove(path: &Path) -> Result<()> {
+    let removed = if path.is_dir() && !path.is_symlink() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+    match removed {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(error).with_context(|| format!("cannot remove {}", path.display()))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The names and hashes of `videos` that no other video shares.
+fn marks(videos: &[&Known], others: &[&Known]) -> Vec<Mark> {
+    let mut marks: Vec<Mark> = Vec::new();
+    for video in videos {
+        marks.extend(video.work.iter().map(|name| Mark::name("work name", name)));
+        marks.extend(video.parts.iter().map(|name| Mark::name("dataset name", name)));
+        if !video.file.is_empty() && others.iter().all(|other| other.file != video.file) {
+            marks.push(Mark::name("file name", &video.file));
+        }
+        let source = video.source.as_ref().map(|source| source.to_string_lossy().into_owned());
+        marks.extend(source.iter().map(|path| Mark::name("path", path)));
+        if let Some(content) = video.content.as_ref().filter(|c| others.iter().all(|o| o.content.as_ref() != Some(*c)))
+        {
+            marks.extend(Mark::hash("content hash", content));
+            marks.extend(content.get(..8).map(|key| Mark::hash("key", key)).into_iter().flatten());
+        }
+    }
+    marks
+}

@@ -1,0 +1,238 @@
+//! The proof: every byte of every file is searched for a video's names and hashes, as text, as raw bytes, and inside
+//! `.npz` archives (a tar file's members lie in it as they are). Names of files and folders are searched too.
+
+use anyhow::{Context, Result};
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// Something that must not be found.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mark {
+    /// What it is, for people.
+    pub what: String,
+    pub bytes: Vec<u8>,
+    /// Only where no letter, digit, `-` or `_` stands before it: `a.mp4` is not in `extra.mp4`.
+    pub whole: bool,
+}
+
+impl Mark {
+    /// A name, found only as a whole.
+    pub fn name(what: &str, name: &str) -> Self {
+        Self { what: format!("{what} {name}"), bytes: name.as_bytes().to_vec(), whole: true }
+    }
+
+    /// Hexadecimal digits, as text and as the bytes they stand for.
+    pub fn hash(what: &str, hex: &str) -> Vec<Self> {
+        let text = Self { what: format!("{what} {hex}"), bytes: hex.as_bytes().to_vec(), whole: false };
+        let digit = |byte: u8| char::from(byte).to_digit(16);
+        let pairs = hex.as_bytes().as_chunks::<2>().0.iter();
+        let raw: Option<Vec<u8>> = pairs.map(|[a, b]| Some((16 * digit(*a)? + digit(*b)?) as u8)).collect();
+        // four bytes turn up by chance in any gigabyte
+        let raw = raw.filter(|raw| raw.len() >= 16);
+        let raw = raw.map(|bytes| Self { what: format!("{what} {hex}, as bytes"), bytes, whole: false });
+        [text].into_iter().chain(raw).collect()
+    }
+}
+
+/// A place where a mark was found.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// The file, with the archive's entry behind a `!`.
+    pub file: String,
+    /// `None`: in the name.
+    pub at: Option<u64>,
+    pub what: String,
+}
+
+/// What was searched, and found.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Searched {
+    pub n_files: usize,
+    /// Of the files, and of what was inside archives.
+    pub bytes: u64,
+    pub inside_bytes: u64,
+    pub places: Vec<Place>,
+}
+
+/// Bytes read at a time.
+const PIECE: usize = 1 << 20;
+
+/// Searches everything below `folders`.
+///
+/// # Errors
+/// A file that cannot be read: what was not searched proves nothing.
+pub fn search(folders: &[PathBuf], marks: &[Mark]) -> Result<Searched> {
+    let mut searched = Searched::default();
+    let marks: Vec<&Mark> = marks.iter().filter(|mark| mark.bytes.len() >= 2).collect();
+    for folder in folders {
+        walk(folder, folder, &marks, &mut searched)?;
+    }
+    Ok(searched)
+}
+
+/// Whether one of the marks is in the bytes.
+pub fn is_in(bytes: &[u8], marks: &[Mark]) -> bool {
+    let marks: Vec<&Mark> = marks.iter().filter(|mark| mark.bytes.len() >= 2).collect();
+    let mut scan = Scan::new(&marks);
+    scan.piece(bytes);
+    !scan.found.is_empty()
+}
+
+fn walk(root: &Path, path: &Path, marks: &[&Mark], searched: &mut Searched) -> Result<()> {
+    let reading = || format!("cannot search {}", path.display());
+    if !path.exists() && !path.is_symlink() {
+        return Ok(());
+    }
+    if path != root {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let mut scan = Scan::new(marks);
+        scan.piece(name.as_bytes());
+        let found = scan.found.into_iter().map(|(_, what)| Place { file: path.display().to_string(), at: None, what });
+        searched.places.extend(found);
+    }
+    if path.is_dir() && !path.is_symlink() {
+        let entries = std::fs::read_dir(path).with_context(reading)?;
+        let mut entries = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>().with_context(reading)?;
+        entries.sort();
+        return entries.iter().try_for_each(|entry| walk(root, entry, marks, searched));
+    }
+    searched.n_files += 1;
+    let (bytes, found) = scan(File::open(path).with_context(reading)?, marks).with_context(reading)?;
+    searched.bytes += bytes;
+    let place = |file: &str, (at, what)| Place { file: file.to_owned(), at: Some(at), what };
+    let file = path.display().to_string();
+    searched.places.extend(found.into_iter().map(|found| place(&file, found)));
+    if path.extension().is_some_and(|ending| ending == "npz" || ending == "zip") {
+        // one that is no archive has been searched as it is
+        let Ok(mut archive) = zip::ZipArchive::new(File::open(path).with_context(reading)?) else { return Ok(()) };
+        for n in 0..archive.len() {
+            let entry = archive.by_index(n).with_context(reading)?;
+            let inside = format!("{file}!{}", entry.name());
+            let (bytes, found) = scan(entry, marks).with_context(reading)?;
+            searched.inside_bytes += bytes;
+            searched.places.extend(found.into_iter().map(|found| place(&inside, found)));
+        }
+    }
+    Ok(())
+}
+
+/// The bytes read, and the offset and description of each mark found.
+fn scan(mut from: impl Read, marks: &[&Mark]) -> Result<(u64, Vec<(u64, String)>)> {
+    let mut scan = Scan::new(marks);
+    let mut piece = vec![0; PIECE];
+    loop {
+        let n = match from.read(&mut piece) {
+            Ok(0) => break,
+            Ok(n) => n,
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
+            Err(error) => return Err(error.into()),
+        };
+        scan.piece(&piece[..n]);
+    }
+    Ok((scan.at, scan.found))
+}
+
+/// A search through bytes that come in pieces.
+struct Scan<'a> {
+    marks: &'a [&'a Mark],
+    /// Whether a mark begins with these two bytes.
+    begins: Vec<bool>,
+    longest: usize,
+    /// The end of the bytes before: a mark may lie across two pieces.
+    tail: Vec<u8>,
+    /// Bytes seen before the tail ends.
+    at: u64,
+    found: Vec<(u64, String)>,
+}
+
+impl<'a> Scan<'a> {
+    fn new(marks: &'a [&'a Mark]) -> Self {
+        let mut begins = vec![false; 1 << 16];
+        marks.iter().for_each(|mark| begins[pair(&mark.bytes)] = true);
+        let longest = marks.iter().map(|mark| mark.bytes.len()).max().unwrap_or(0);
+        Self { marks, begins, longest, tail: Vec::new(), at: 0, found: Vec::new() }
+    }
+
+    fn piece(&mut self, piece: &[u8]) {
+        let n_tail = self.tail.len();
+        let mut bytes = std::mem::take(&mut self.tail);
+        bytes.extend_from_slice(piece);
+        let start = self.at - n_tail as u64;
+        for at in 0..bytes.len().saturating_sub(1) {
+            if !self.begins[pair(&bytes[at..])] {
+                continue;
+            }
+            for mark in self.marks {
+                let end = at + mark.bytes.len();
+                // what ends in the tail was found before
+                let new = end > n_tail && bytes.get(at..end) == Some(mark.bytes.as_slice());
+                let before = at.checked_sub(1).map(|before| bytes[before]);
+                let joined = before.is_some_and(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_');
+                if new && !(mark.whole && joined) {
+                    self.found.push((start + at as u64, mark.what.clone()));
+                }
+            }
+        }
+        self.at += piece.len() as u64;
+        // one byte more than a mark is long: it decides whether a name is whole
+        let keep = bytes.len().saturating_sub(self.longest);
+        self.tail = bytes.split_off(keep);
+    }
+}
+
+fn pair(bytes: &[u8]) -> usize {
+    match bytes {
+        [a, b, ..] => usize::from(*a) << 8 | usize::from(*b),
+        _ => 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write as _;
+
+    fn marks() -> Vec<Mark> {
+        let hash = blake3::hash(b"a").to_hex().to_string();
+        [vec![Mark::name("file", "a.mp4")], Mark::hash("content", &hash)].concat()
+    }
+
+    #[test]
+    fn a_mark_is_found_wherever_it_hides_and_whole_names_only() {
+        let dir = tempfile::tempdir().unwrap();
+        let write = |name: &str, bytes: &[u8]| std::fs::write(dir.path().join(name), bytes).unwrap();
+        let hash = blake3::hash(b"a");
+        write("text.json", b"{\"file\": \"a.mp4\", \"other\": \"extra.mp4\"}");
+        write("binary.bin", &[&[7; 100], hash.as_bytes().as_slice(), &[9; 50]].concat());
+        write("hex.txt", format!("b3:{}", hash.to_hex()).as_bytes());
+        write("clean.txt", b"extra.mp4 b-a.mp4");
+        let mut npz = zip::ZipWriter::new(File::create(dir.path().join("x.npz")).unwrap());
+        npz.start_file("y.npy", zip::write::SimpleFileOptions::default()).unwrap();
+        npz.write_all(b"header a.mp4").unwrap();
+        npz.finish().unwrap();
+        std::fs::create_dir(dir.path().join("a.mp4")).unwrap();
+        let searched = search(&[dir.path().to_owned()], &marks()).unwrap();
+        let mut files: Vec<String> =
+            searched.places.iter().map(|p| p.file.rsplit('/').next().unwrap().to_owned()).collect();
+        files.dedup();
+        assert!(files.contains(&"x.npz!y.npy".to_owned()) && files.contains(&"a.mp4".to_owned()), "{files:?}");
+        let count = |name: &str| searched.places.iter().filter(|p| p.file.ends_with(name)).count();
+        assert_eq!([count("text.json"), count("binary.bin"), count("hex.txt"), count("clean.txt")], [1, 1, 1, 0]);
+        assert_eq!(searched.places.iter().find(|p| p.file.ends_with("binary.bin")).unwrap().at, Some(100));
+        assert_eq!(searched.n_files, 5);
+    }
+
+    #[test]
+    fn a_mark_across_two_pieces_is_found_once() {
+        let marks = marks();
+        let marks: Vec<&Mark> = marks.iter().collect();
+        let text: Vec<u8> = [&[b' '; 300][..], b"a.mp4", &[b' '; 300]].concat();
+        for step in [1, 2, 3, 7, 64, 305, 1000] {
+            let mut scan = Scan::new(&marks);
+            text.chunks(step).for_each(|piece| scan.piece(piece));
+            assert_eq!(scan.found, [(300, "file a.mp4".to_owned())], "pieces of {step}");
+            assert_eq!(scan.at, 605);
+        }
+    }
+}
