@@ -85,6 +85,10 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         out.display()
     );
     ensure!(!taken || out.join(INFO).is_file(), "{} holds no dataset, so --force does not replace it", out.display());
+    for source in &args.sources {
+        let inside = out.exists() && out.starts_with(std::path::absolute(source)?);
+        ensure!(!inside, "{} lies in {}, which is imported; choose another folder", out.display(), source.display());
+    }
     let attempt = workdir::attempt_folder(&out)?;
     let imported = import(&plan, &attempt, ui).and_then(|imported| {
         workdir::replace_folder(&attempt, &out)?;

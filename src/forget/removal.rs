@@ -18,7 +18,7 @@ pub const PENDING: &str = "FORGETTING.txt";
 #[derive(Clone, Debug, Default)]
 pub struct Removal {
     pub speaker: String,
-    /// Files and folders of the stages, records, failures, attempts, pictures.
+    /// Files and folders of the stages, records, failures, attempts, pictures, reports that name one of them.
     pub paths: Vec<PathBuf>,
     /// Folders of trained models that have seen the videos.
     pub models: Vec<PathBuf>,
@@ -50,9 +50,12 @@ impl Removal {
                 let is_of = |work: &&String| {
                     name.strip_prefix(work.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '_']))
                 };
-                removal.paths.extend(own.iter().any(|work| is_of(&work)).then_some(path));
+                removal.paths.extend(own.iter().any(is_of).then_some(path));
             }
         }
+        let names_one = |path: &PathBuf| fs::read(path).is_ok_and(|bytes| super::search::is_in(&bytes, &removal.marks));
+        let reports: Vec<PathBuf> = pages(work)?.into_iter().filter(names_one).collect();
+        removal.paths.extend(reports);
         let (models, dir) = (work.join("gan").join(speaker), work.join("dataset").join(speaker));
         let names: BTreeSet<String> = videos.iter().flat_map(|video| video.parts.iter().cloned()).collect();
         let has_samples = names.iter().any(|name| dataset::has_samples(&dir, name));
@@ -140,6 +143,22 @@ fn read_table(path: &Path) -> Table {
 fn hashes(path: &Path, removal: &Removal) -> Option<(PathBuf, usize)> {
     let n = read_table(path).iter().filter(|(file, known)| removal.is_own_hash(file, known)).count();
     (n > 0).then(|| (path.to_owned(), n))
+}
+
+/// The reports in the work folder: pages that anybody can have made again.
+fn pages(work: &Path) -> Result<Vec<PathBuf>> {
+    let (mut pages, mut folders) = (Vec::new(), vec![work.to_owned()]);
+    while let Some(folder) = folders.pop() {
+        for path in listed(&folder)? {
+            if path.is_dir() && !path.is_symlink() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|ending| ending == "html") {
+                pages.push(path);
+            }
+        }
+    }
+    pages.sort();
+    Ok(pages)
 }
 
 fn listed(folder: &Path) -> Result<Vec<PathBuf>> {

@@ -52,6 +52,13 @@ pub struct Loose {
     pub failed: Vec<(PathBuf, String)>,
 }
 
+impl LooseVideo {
+    /// The tars its samples lie in.
+    pub fn tars(&self) -> Vec<&PathBuf> {
+        self.samples.iter().flat_map(|sample| sample.members.iter().flatten().map(|place| &place.tar)).collect()
+    }
+}
+
 /// Looks through the tars; no member is read yet.
 pub fn open(tars: &[PathBuf]) -> Loose {
     let mut loose = Loose::default();

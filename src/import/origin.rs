@@ -73,6 +73,22 @@ impl Origin {
         }
     }
 
+    /// The folders its files lie in.
+    fn folders(&self) -> Vec<String> {
+        let files: Vec<&PathBuf> = match self {
+            Self::Take(found) => {
+                [Some(&found.motion), found.sound.as_ref(), found.transcript.as_ref()].into_iter().flatten().collect()
+            }
+            Self::Part(path, _) | Self::Unknown(path, _) => vec![path],
+            Self::Loose(video) => video.tars(),
+        };
+        let folders = files.into_iter().filter_map(|path| path.parent()).map(|dir| dir.display().to_string());
+        let mut folders: Vec<String> = folders.filter(|dir| !dir.is_empty()).collect();
+        folders.sort();
+        folders.dedup();
+        folders
+    }
+
     /// Looks at it; what cannot be read is a failure.
     pub fn look(&self, plan: &Plan) -> Look {
         let look = match self {
@@ -90,6 +106,8 @@ impl Origin {
             Self::Part(dir, name) => (dir.clone(), Some(name.clone())),
             Self::Loose(video) => (PathBuf::from(&video.name), Some(video.name.clone())),
         };
+        // where the files lay has no say in the dataset
+        let error = self.folders().iter().fold(error.to_owned(), |error, dir| error.replace(&format!("{dir}/"), ""));
         let content = hash_file(&path).unwrap_or_default();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let marks =

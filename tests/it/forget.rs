@@ -30,6 +30,8 @@ fn a_forgotten_video_leaves_nothing_and_the_others_are_untouched() {
     fs::create_dir_all(project.work().join("gan/host")).unwrap();
     fs::write(project.work().join("gan/host/step-0000001.safetensors"), "weights").unwrap();
 
+    let report = project.work().join("report.html");
+    fs::write(&report, format!("<p>{name}</p>")).unwrap();
     let plan = project.answer(&["forget", "--video", name, "--dry-run"]);
     assert_eq!(plan.code, 0, "{}", plan.errors);
     assert!(plan.json["would_remove"].as_array().unwrap().len() > 8, "{}", plan.json);
@@ -46,6 +48,7 @@ fn a_forgotten_video_leaves_nothing_and_the_others_are_untouched() {
     let advice = answer.json["advice"].to_string();
     assert!(advice.contains("exclude = ["), "{advice}");
     assert!(!project.work().join("gan/host").exists(), "a model cannot unlearn");
+    assert!(!report.exists(), "a report that shows it");
     assert_eq!(problems(&project), 0);
     // no name of it is left, and what was made of the other is what it was
     let after = bytes_under(&project.work());

@@ -26,7 +26,7 @@ fn bvh(n_frames: usize) -> String {
     let text = fs::read_to_string(path).unwrap();
     let (head, frames) = text.split_once("Frames: 9\nFrame Time: 0.0333333\n").unwrap();
     let frames: Vec<&str> = frames.lines().collect();
-    let swing = |t: usize| frames[if t / 8 % 2 == 0 { t % 8 } else { 8 - t % 8 }];
+    let swing = |t: usize| frames[if t % 16 < 8 { t % 8 } else { 8 - t % 8 }];
     let frames: String = (0..n_frames).map(|t| format!("{}\n", swing(t))).collect();
     format!("{head}Frames: {n_frames}\nFrame Time: 0.0333333\n{frames}")
 }
@@ -64,13 +64,13 @@ fn imported(sources: &[&Path], out: &Path) -> Imported {
 
 /// The samples as they lie in a dataset's shards, and their JSON.
 fn samples(dir: &Path) -> BTreeMap<String, (Sample, Vec<u8>)> {
-    let tars: Vec<PathBuf> = files_under(dir).into_iter().map(|(_, path)| path).filter(is_tar).collect();
+    let tars: Vec<PathBuf> = files_under(dir).into_iter().map(|(_, path)| path).filter(|path| is_tar(path)).collect();
     let loose = loose::open(&tars);
     let waiting = loose.videos.into_iter().flat_map(|video| video.samples);
     waiting.map(|waiting| (waiting.key.clone(), waiting.read().unwrap())).collect()
 }
 
-fn is_tar(path: &PathBuf) -> bool {
+fn is_tar(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending == "tar")
 }
 
@@ -267,7 +267,10 @@ fn the_verb_says_what_failed_and_replaces_only_datasets() {
     let (code, json) = run(&["in", "--out", "out"]);
     assert_eq!((code, json["kept"].as_u64(), json["failed"].as_u64()), (Some(2), Some(1), Some(1)));
     assert_eq!(run(&["in", "--out", "out"]).0, Some(1), "it is not empty");
+    let ledger = fs::read_to_string(dir.path().join("out/ledger.jsonl")).unwrap();
+    assert!(ledger.contains("bad.bvh is no readable") && !ledger.contains("in/"), "{ledger}");
     assert_eq!(run(&["in/good.bvh", "--out", "out", "--force"]).0, Some(0));
+    assert_eq!(run(&["in", "out", "--out", "out", "--force"]).0, Some(1), "it would be read while it is replaced");
     let (code, json) = run(&["in", "--out", "in", "--force"]);
     assert!(code == Some(1) && json["error"].as_str().unwrap().contains("no dataset"), "{json}");
     let (code, json) = run(&["in/bad.bvh", "--out", "none"]);
