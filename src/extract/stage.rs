@@ -103,7 +103,7 @@ impl Extract {
     /// Reads the pictures once; of each only a thumbnail is converted, unless the frames are kept.
     fn timeline(&self, reader: &mut FrameReader, out: &Path, progress: &dyn Progress) -> Result<Timeline> {
         let (mut source_secs, mut repeated, mut still) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut shots, mut before) = (ShotFinder::default(), None);
+        let (mut shots, mut before) = (ShotFinder::new(self.settings.rate()), None);
         let frames = out.join("frames");
         if self.settings.keep_frames {
             fs::create_dir(&frames).with_context(|| format!("cannot make the folder {}", frames.display()))?;
@@ -113,7 +113,7 @@ impl Extract {
             source_secs.push(time.source_secs);
             repeated.push(time.repeated);
             let seen = if time.repeated { None } else { Some(reader.picture(Some(THUMBNAIL))?) };
-            shots.push(seen.as_ref());
+            shots.push(seen.clone());
             still.push(before.as_ref().zip(seen.as_ref()).map_or(0.0, |(a, b)| still::difference(a, b)));
             before = seen.or(before);
             if self.settings.keep_frames {

@@ -1,12 +1,13 @@
 //! The way of one frame: person box (every n-th frame, followed between), body, and each hand from where it was, else
 //! from the arm, else from a detected palm; then guards against the other hand and against one hand taken twice.
 
-use super::body::BodyModel;
+use super::body::{Body, BodyModel};
 use super::decode::Point;
 use super::hand::{Hand, HandModel};
 use super::palm::PalmDetector;
-use super::person::{Detector, Followed};
+use super::person::Detector;
 use super::region;
+use super::speaker::Speaker;
 use crate::config;
 use crate::onnx::{Manifest, Role, Runtime};
 use crate::types::image::Image;
@@ -25,11 +26,10 @@ const SAME_HAND: f64 = 0.08;
 /// The models that look at a frame, and what is followed from frame to frame. One a worker: it runs on one thread.
 pub struct Chain {
     settings: config::Pose2d,
-    person: Option<Detector>,
+    speaker: Speaker,
     body: BodyModel,
     hand: Option<HandModel>,
     palm: Option<PalmDetector>,
-    followed: Followed,
     body_seen: bool,
     hand_regions: [Option<Region>; 2],
     /// Frames since the shot began.
@@ -59,20 +59,25 @@ impl Chain {
         );
         Ok(Self {
             settings: settings.clone(),
-            person: person.transpose()?,
+            speaker: Speaker::new(person.transpose()?),
             body,
             hand: hand.transpose()?,
             palm: palm.transpose()?,
-            followed: Followed::default(),
             body_seen: false,
             hand_regions: [None; 2],
             n_frames: 0,
         })
     }
 
+    /// A picture that shows the speaker, as its largest person: who looks like that is preferred. Errors: nobody is
+    /// found in it.
+    pub fn set_reference(&mut self, image: &Image) -> Result<()> {
+        self.speaker.set_reference(image, &mut self.body, self.settings.joint_score)
+    }
+
     /// A new shot begins: nothing of the one before is followed.
     pub fn begin_shot(&mut self) {
-        self.followed.begin_anew();
+        self.speaker.begin_anew();
         self.body_seen = false;
         self.hand_regions = [None; 2];
         self.n_frames = 0;
@@ -81,7 +86,7 @@ impl Chain {
     /// Seconds inside ONNX Runtime so far, over all models.
     pub fn secs_inside(&self) -> f64 {
         self.body.secs_inside()
-            + self.person.as_ref().map_or(0.0, Detector::secs_inside)
+            + self.speaker.secs_inside()
             + self.hand.as_ref().map_or(0.0, HandModel::secs_inside)
             + self.palm.as_ref().map_or(0.0, PalmDetector::secs_inside)
     }
@@ -90,16 +95,20 @@ impl Chain {
     pub fn frame(&mut self, image: &Image) -> Result<Pose2d> {
         let idx = self.n_frames;
         self.n_frames += 1;
-        self.look_for_person(image, idx)?;
+        self.speaker.look(image, idx, &mut self.body, self.body_seen, &self.settings)?;
+        let mut found = self.look_for_body(image)?;
+        if let Some(body) = &found
+            && self.speaker.recognise(image, &body.points, &mut self.body, &self.settings)?
+        {
+            self.hand_regions = [None; 2];
+            found = self.look_for_body(image)?;
+        }
+        let followed = &self.speaker.followed;
         let mut pose = Pose2d {
-            person: self.followed.person(),
-            n_people: self.followed.n_people,
-            identity: self.followed.identity(),
+            person: followed.person(),
+            n_people: followed.n_people,
+            identity: followed.identity(),
             ..Pose2d::default()
-        };
-        let found = match self.followed.place {
-            Some(place) => self.body.find(image, place)?,
-            None => None,
         };
         let Some(body) = found else {
             self.hand_regions = [None; 2];
@@ -121,17 +130,8 @@ impl Chain {
         Ok(pose)
     }
 
-    fn look_for_person(&mut self, image: &Image, idx: usize) -> Result<()> {
-        let Some(detector) = self.person.as_mut() else {
-            self.followed.place = Some([0.0, 0.0, image.width as f64, image.height as f64]);
-            (self.followed.score, self.followed.n_people) = (1.0, 1);
-            return Ok(());
-        };
-        if self.followed.place.is_none() || idx.is_multiple_of(self.settings.person_every.max(1)) {
-            let found = detector.find(image)?;
-            self.followed.look(&found, image.width, self.settings.person_follow, self.body_seen);
-        }
-        Ok(())
+    fn look_for_body(&mut self, image: &Image) -> Result<Option<Body>> {
+        self.speaker.followed.place.map_or(Ok(None), |place| self.body.find(image, place))
     }
 
     fn look_for_hands(&mut self, image: &Image, body: &[Point; 17], idx: usize) -> Result<[Option<Hand>; 2]> {

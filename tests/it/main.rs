@@ -43,6 +43,7 @@ mod segment;
 mod shard;
 mod shared_sound;
 mod sheet;
+mod shots;
 mod support;
 mod sync;
 mod sync_clips;

@@ -1,0 +1,177 @@
+//! The one speaker in frame after frame: when to look for people, whom of them to follow (`followed`), and whether it
+//! still is the same person, which his or her colours tell (`appearance`) where two people cross.
+
+use super::appearance::Appearance;
+use super::body::BodyModel;
+use super::decode::{Point, boxes};
+use super::followed::{Candidate, Followed, Look};
+use super::liveness::Tracks;
+use super::person::Detector;
+use crate::config;
+use crate::types::image::Image;
+use crate::types::pose2d::PersonBox;
+use anyhow::{Context, Result};
+
+/// Frames of a shot at which people are looked for beside the regular ones, so that a wrong choice is soon mended.
+const EARLY: [usize; 3] = [2, 5, 10];
+/// With several people in view, looks come so many times as often.
+const CROWD_LOOKS: usize = 3;
+/// A body whose colours are this far from the speaker's, in 8-bit steps, for so many frames, is another person.
+const STRANGER: f32 = 14.0;
+const STRANGE_FRAMES: usize = 2;
+/// Colours and box after a restart that are no further from those before are the same person's.
+const SAME_COLOURS: f32 = 7.0;
+const SAME_BOX: f32 = 0.5;
+/// Weight of a frame's colours in the speaker's.
+const FOLLOW_COLOURS: f32 = 0.05;
+
+/// Follows one person.
+pub struct Speaker {
+    detector: Option<Detector>,
+    pub followed: Followed,
+    tracks: Tracks,
+    reference: Option<Appearance>,
+    /// What the one followed looks like.
+    colours: Option<Appearance>,
+    n_strange: usize,
+    /// Whom the shot before showed, and where.
+    before: Option<(PersonBox, Appearance)>,
+}
+
+impl Speaker {
+    /// Without a detector the whole picture is the speaker's.
+    pub fn new(detector: Option<Detector>) -> Self {
+        Self {
+            detector,
+            followed: Followed::default(),
+            tracks: Tracks::default(),
+            reference: None,
+            colours: None,
+            n_strange: 0,
+            before: None,
+        }
+    }
+
+    pub fn secs_inside(&self) -> f64 {
+        self.detector.as_ref().map_or(0.0, Detector::secs_inside)
+    }
+
+    /// A picture that shows the speaker, as its largest person. Errors: nobody is found in it.
+    pub fn set_reference(&mut self, image: &Image, body: &mut BodyModel, least: f64) -> Result<()> {
+        let found = self.detector.as_mut().map(|detector| detector.find(image)).transpose()?.unwrap_or_default();
+        let area = |one: &PersonBox| one.width * one.height;
+        let largest = found.iter().max_by(|a, b| area(a).total_cmp(&area(b)));
+        let colours = largest.map(|one| colours_of(image, one, body, least)).transpose()?.flatten();
+        self.reference = Some(colours.context("nobody with visible shoulders is found in the reference picture")?);
+        Ok(())
+    }
+
+    /// Nobody is followed any more.
+    pub fn begin_anew(&mut self) {
+        let place = self.followed.place.map(|_| self.followed.person());
+        self.before = place.zip(self.colours.take());
+        self.followed.begin_anew();
+        self.tracks = Tracks::default();
+        self.n_strange = 0;
+    }
+
+    /// Looks for people in frame `idx` of a shot, if it is time to.
+    pub fn look(
+        &mut self,
+        image: &Image,
+        idx: usize,
+        body: &mut BodyModel,
+        body_seen: bool,
+        settings: &config::Pose2d,
+    ) -> Result<()> {
+        let every = settings.person_every.max(1);
+        let crowd = self.followed.n_people > 1 && idx.is_multiple_of((every / CROWD_LOOKS).max(1));
+        let follows = idx.is_multiple_of(every) || crowd;
+        if !follows && self.followed.place.is_some() && !EARLY.contains(&idx) {
+            return Ok(());
+        }
+        let Some(found) = self.find(image)? else { return Ok(()) };
+        let mut found = found;
+        if let Some(reference) = self.reference.as_ref().filter(|_| found.len() > 1) {
+            measure(&mut found, reference, image, body, settings.joint_score)?;
+        }
+        let follow = follows.then_some(settings.person_follow);
+        let was = self.followed.identity();
+        self.followed.look(&found, Look { image_width: image.width, follow, body_seen });
+        if self.followed.identity() != was {
+            self.colours = None;
+        }
+        Ok(())
+    }
+
+    /// Takes in the body found in the followed box; true if it is another person's, who is followed from now on, so
+    /// that the body must be found again.
+    pub fn recognise(
+        &mut self,
+        image: &Image,
+        points: &[Point; 17],
+        body: &mut BodyModel,
+        settings: &config::Pose2d,
+    ) -> Result<bool> {
+        let Some(seen) = Appearance::of(image, points, settings.joint_score) else { return Ok(false) };
+        if let Some((place, colours)) = self.before.take()
+            && boxes::overlap(&place, &self.followed.person()) >= SAME_BOX
+            && colours.distance(&seen) <= SAME_COLOURS
+        {
+            self.followed.is_the_same();
+        }
+        let Some(colours) = self.colours.as_mut() else {
+            self.colours = Some(seen);
+            return Ok(false);
+        };
+        if self.followed.n_people < 2 || colours.distance(&seen) <= STRANGER {
+            colours.follow(&seen, FOLLOW_COLOURS);
+            self.n_strange = 0;
+            return Ok(false);
+        }
+        self.n_strange += 1;
+        if self.n_strange < STRANGE_FRAMES {
+            return Ok(false);
+        }
+        self.n_strange = 0;
+        let Some(mut found) = self.find(image)? else { return Ok(false) };
+        let Some(colours) = self.colours.take() else { return Ok(false) };
+        measure(&mut found, &colours, image, body, settings.joint_score)?;
+        self.followed.choose(&found, image.width);
+        Ok(true)
+    }
+
+    /// Everybody in the picture; `None` without a detector.
+    fn find(&mut self, image: &Image) -> Result<Option<Vec<Candidate>>> {
+        let Some(detector) = self.detector.as_mut() else {
+            self.followed.place = Some([0.0, 0.0, image.width as f64, image.height as f64]);
+            (self.followed.score, self.followed.n_people) = (1.0, 1);
+            return Ok(None);
+        };
+        let found = detector.find(image)?;
+        let movements = self.tracks.look(image, &found);
+        let candidate = |(person, movement)| Candidate { person, movement, unlike: None };
+        Ok(Some(found.into_iter().zip(movements).map(candidate).collect()))
+    }
+}
+
+/// How far the colours of everybody found are from those given.
+fn measure(
+    found: &mut [Candidate],
+    colours: &Appearance,
+    image: &Image,
+    body: &mut BodyModel,
+    least: f64,
+) -> Result<()> {
+    for one in found {
+        // A box without a body is nobody.
+        let seen = colours_of(image, &one.person, body, least)?;
+        one.unlike = Some(seen.map_or(f32::from(u8::MAX), |seen| seen.distance(colours)));
+    }
+    Ok(())
+}
+
+fn colours_of(image: &Image, one: &PersonBox, body: &mut BodyModel, least: f64) -> Result<Option<Appearance>> {
+    let found = body.find(image, [one.x, one.y, one.width, one.height].map(f64::from))?;
+    Ok(found.and_then(|found| Appearance::of(image, &found.points, least)))
+}
