@@ -71,7 +71,7 @@ fn defaults() -> Table {
 /// What a `[[speaker]]` may hold: the lists with an entry that shows its type.
 fn speaker_schema() -> Table {
     let text = || Value::String(String::new());
-    let words = ["name", "licence", "consent", "source"].map(|key| (key.to_owned(), text()));
+    let words = ["name", "reference", "licence", "consent", "source"].map(|key| (key.to_owned(), text()));
     let lists = ["videos", "exclude", "train", "validation", "test"];
     let lists = lists.map(|key| (key.to_owned(), Value::Array(vec![text()])));
     words.into_iter().chain(lists).collect()

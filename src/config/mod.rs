@@ -67,6 +67,9 @@ pub fn load(file: &Path, sets: &[String]) -> Result<Config> {
             *path = if on_command_line(key) { here.join(&*path) } else { folder.join(&*path) };
         }
     }
+    for speaker in settings.speaker.iter_mut().filter(|speaker| !speaker.reference.as_os_str().is_empty()) {
+        speaker.reference = folder.join(&speaker.reference);
+    }
     Ok(Config { settings, file })
 }
 

@@ -28,6 +28,9 @@ pub struct Speaker {
     pub name: String,
     /// Paths or glob patterns.
     pub videos: Vec<String>,
+    /// A picture that shows the speaker as its largest person; empty: none.
+    #[serde(default)]
+    pub reference: PathBuf,
     /// Videos to leave out, though `videos` names them: paths, file names or patterns. So are the next three.
     #[serde(default)]
     pub exclude: Vec<String>,

@@ -14,10 +14,10 @@ const MAX_MISSED: usize = 2;
 const STILL: f32 = 4.0;
 const STILL_LOOKS: usize = 3;
 /// A living person changes by so much at least, and by so many times what a picture does.
-const ALIVE: f32 = 8.0;
-const TIMES_ALIVE: f32 = 3.0;
+const ALIVE: f32 = 6.0;
+const TIMES_ALIVE: f32 = 2.0;
 /// Unlikeness at which a person's weight is half (`appearance`, 8-bit steps).
-const UNLIKE: f32 = 10.0;
+const UNLIKE: f32 = 5.0;
 /// People smaller than this share of the speaker's box are not counted.
 const RELEVANT: f32 = 0.2;
 
@@ -51,7 +51,7 @@ impl Candidate {
 
     /// Whether this one is so much more like the reference that it was the wrong choice.
     fn gives_way_to(&self, other: &Self) -> bool {
-        matches!((self.unlike, other.unlike), (Some(mine), Some(other)) if other < UNLIKE && mine > 2.0 * other.max(4.0))
+        matches!((self.unlike, other.unlike), (Some(mine), Some(other)) if other < UNLIKE && mine > 2.0 * other.max(2.5))
     }
 }
 

@@ -17,10 +17,10 @@ const EARLY: [usize; 3] = [2, 5, 10];
 /// With several people in view, looks come so many times as often.
 const CROWD_LOOKS: usize = 3;
 /// A body whose colours are this far from the speaker's, in 8-bit steps, for so many frames, is another person.
-const STRANGER: f32 = 14.0;
+const STRANGER: f32 = 7.0;
 const STRANGE_FRAMES: usize = 2;
 /// Colours and box after a restart that are no further from those before are the same person's.
-const SAME_COLOURS: f32 = 7.0;
+const SAME_COLOURS: f32 = 5.0;
 const SAME_BOX: f32 = 0.5;
 /// Weight of a frame's colours in the speaker's.
 const FOLLOW_COLOURS: f32 = 0.05;
@@ -34,6 +34,8 @@ pub struct Speaker {
     /// What the one followed looks like.
     colours: Option<Appearance>,
     n_strange: usize,
+    /// More than one person was in view in this shot.
+    several: bool,
     /// Whom the shot before showed, and where.
     before: Option<(PersonBox, Appearance)>,
 }
@@ -48,6 +50,7 @@ impl Speaker {
             reference: None,
             colours: None,
             n_strange: 0,
+            several: false,
             before: None,
         }
     }
@@ -72,7 +75,7 @@ impl Speaker {
         self.before = place.zip(self.colours.take());
         self.followed.begin_anew();
         self.tracks = Tracks::default();
-        self.n_strange = 0;
+        (self.n_strange, self.several) = (0, false);
     }
 
     /// Looks for people in frame `idx` of a shot, if it is time to.
@@ -86,18 +89,18 @@ impl Speaker {
     ) -> Result<()> {
         let every = settings.person_every.max(1);
         let crowd = self.followed.n_people > 1 && idx.is_multiple_of((every / CROWD_LOOKS).max(1));
-        let follows = idx.is_multiple_of(every) || crowd;
-        if !follows && self.followed.place.is_some() && !EARLY.contains(&idx) {
+        let regular = idx.is_multiple_of(every);
+        if !regular && !crowd && self.followed.place.is_some() && !EARLY.contains(&idx) {
             return Ok(());
         }
-        let Some(found) = self.find(image)? else { return Ok(()) };
-        let mut found = found;
+        let Some(mut found) = self.find(image)? else { return Ok(()) };
         if let Some(reference) = self.reference.as_ref().filter(|_| found.len() > 1) {
             measure(&mut found, reference, image, body, settings.joint_score)?;
         }
-        let follow = follows.then_some(settings.person_follow);
+        let follow = regular.then_some(settings.person_follow);
         let was = self.followed.identity();
         self.followed.look(&found, Look { image_width: image.width, follow, body_seen });
+        self.several |= self.followed.n_people > 1;
         if self.followed.identity() != was {
             self.colours = None;
         }
@@ -124,7 +127,7 @@ impl Speaker {
             self.colours = Some(seen);
             return Ok(false);
         };
-        if self.followed.n_people < 2 || colours.distance(&seen) <= STRANGER {
+        if !self.several || colours.distance(&seen) <= STRANGER {
             colours.follow(&seen, FOLLOW_COLOURS);
             self.n_strange = 0;
             return Ok(false);

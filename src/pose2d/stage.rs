@@ -15,6 +15,7 @@ use crate::types::time::FrameRate;
 use crate::vision;
 use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The file this stage writes.
@@ -28,6 +29,8 @@ pub struct Pose2dStage {
     fps: FrameRate,
     work: PathBuf,
     manifest: Manifest,
+    /// The picture that shows a speaker, by the speaker's name.
+    references: BTreeMap<String, PathBuf>,
 }
 
 impl Pose2dStage {
@@ -36,12 +39,15 @@ impl Pose2dStage {
     /// # Errors
     /// A manifest that is not sound; a model that is not in it.
     pub fn new(settings: &Settings) -> Result<Self> {
+        let named = settings.speaker.iter().filter(|speaker| !speaker.reference.as_os_str().is_empty());
+        let references = named.map(|speaker| (speaker.name.clone(), speaker.reference.clone()));
         let stage = Self {
             settings: settings.pose2d.clone(),
             models: settings.models.clone(),
             fps: settings.extract.rate(),
             work: settings.work.dir.clone(),
             manifest: Manifest::load(&settings.models.dir)?,
+            references: references.collect(),
         };
         stage.used()?;
         Ok(stage)
@@ -94,6 +100,9 @@ impl Stage for Pose2dStage {
             input("video".into(), unit.source.clone()),
             input("timeline".into(), place(&self.work, "extract", unit).join(TIMELINE_FILE)),
         ];
+        if let Some(path) = self.references.get(&unit.speaker) {
+            inputs.push(input("reference".into(), path.clone()));
+        }
         for (key, entry) in self.used()? {
             let path = self.models.dir.join(&entry.file);
             if !path.exists() {
@@ -107,6 +116,13 @@ impl Stage for Pose2dStage {
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let restarts = restarts(&place(&self.work, "extract", unit).join(TIMELINE_FILE))?;
         let mut chain = Chain::new(&self.runtime()?, &self.manifest, &self.models.dir, &self.settings)?;
+        if let Some(path) = self.references.get(&unit.speaker) {
+            let mut reference = FrameReader::open(path, FrameRate::new(1, 1))?;
+            let picture = reference.next().with_context(|| format!("{} holds no picture", path.display()))??;
+            chain
+                .set_reference(&picture.image)
+                .with_context(|| format!("the speaker's reference {}", path.display()))?;
+        }
         let mut reader = FrameReader::open(&unit.source, self.fps)?;
         let [width, height] = reader.image_size();
         let image_size = [u32::try_from(width)?, u32::try_from(height)?];

@@ -3,7 +3,7 @@
 
 use crate::clips::ffmpeg;
 use crate::support::{Project, files_under, shared};
-use orator::motion::keypoints_npz;
+use orator::motion::keypoints_npz::{self, Extras};
 use std::path::Path;
 
 /// A project on the real models with the clips given.
@@ -73,4 +73,64 @@ fn one_of_two_people_is_followed() {
     let n_left = extras.person.outer_iter().filter(|person| person[0] + person[2] / 2.0 < 853.5).count();
     eprintln!("the followed person is on the left in {n_left} of {n_frames} frames; {}", kept("two-"));
     assert!(n_frames >= 70 && (n_left == 0 || n_left == n_frames), "{n_left} of {n_frames} frames on the left");
+}
+
+/// What pose2d says of a film put together of real clips: two inputs through a filter graph that ends in `[v]`.
+fn followed(name: &str, inputs: &str, graph: &str) -> Option<Extras> {
+    let (videos, models) = (shared("data/videos")?, shared("models")?);
+    let project = project(name, &models, &[Path::new("videos/host/film.mp4")]);
+    let out = project.video("film.mp4");
+    let coding = "-c:v libx264 -preset veryfast -crf 20 -pix_fmt yuv420p -an";
+    if !ffmpeg(&videos, &format!("{inputs} -filter_complex {graph} -map [v] {coding} {}", out.display())) {
+        return None;
+    }
+    let answer = project.run(&["--to", "pose2d"]);
+    assert_eq!(answer.code, 0, "{}", answer.errors);
+    let files = files_under(&project.work().join("pose2d"));
+    let (_, path) = files.into_iter().find(|(name, _)| name.ends_with("keypoints.npz")).unwrap();
+    Some(keypoints_npz::read_extras(&path).unwrap())
+}
+
+/// Middle of the followed box in each frame, px from the left.
+fn middles(extras: &Extras) -> Vec<f32> {
+    extras.person.outer_iter().map(|person| person[0] + person[2] / 2.0).collect()
+}
+
+const TYSON: &str = "-ss 1 -t 4 -i talk_tyson_2cam_17s_720p.mp4";
+const LARGE: &str = "-ss 2 -t 4 -i talk_latentsync_demo1_1080x1920_hevc.mp4";
+
+#[test]
+fn a_larger_still_picture_of_a_person_gives_way_to_the_living_one() {
+    let graph = "[0:v]fps=15,scale=640:360,pad=640:720:0:180[a];\
+                 [1:v]fps=15,select=eq(n\\,0),loop=-1:1,setpts=N/15/TB,scale=-2:720,crop=400:720,trim=0:4[b];\
+                 [a][b]hstack,noise=alls=6:allf=t[v]";
+    let Some(extras) = followed("still", &format!("{TYSON} {LARGE}"), graph) else { return };
+    let middles = middles(&extras);
+    let changes = (1..middles.len()).filter(|&t| extras.identity[t] != extras.identity[t - 1]).collect::<Vec<_>>();
+    eprintln!("the living one is taken at frame {changes:?}");
+    assert!(changes.len() == 1 && changes[0] <= 30, "{changes:?}");
+    assert!(middles[changes[0]..].iter().all(|x| *x < 640.0), "{middles:?}");
+}
+
+#[test]
+fn a_small_film_in_the_picture_is_not_followed() {
+    let graph = "[0:v]fps=15,scale=1280:720[a];[1:v]fps=15,scale=200:-2[b];[a][b]overlay=1040:20[v]";
+    let Some(extras) = followed("inset", &format!("{TYSON} {LARGE}"), graph) else { return };
+    assert!(middles(&extras).iter().all(|x| (400.0..900.0).contains(x)));
+    assert!(extras.identity.iter().all(|identity| *identity == 0), "{}", extras.identity);
+}
+
+#[test]
+fn two_who_change_places_are_told_apart() {
+    let graph = "[0:v]fps=15,scale=-2:720,crop=560:720[a];[1:v]fps=15,scale=560:-2,crop=560:720:0:200[b];\
+                 color=0x808080:s=1280x720:r=15:d=4[c];\
+                 [c][a]overlay=x=min(700\\,max(20\\,20+(t-1.5)*600)):y=0[d];\
+                 [d][b]overlay=x=max(20\\,min(700\\,700-(t-1.5)*600)):y=0[v]";
+    let Some(extras) = followed("swap", &format!("{TYSON} {LARGE}"), graph) else { return };
+    let middles = middles(&extras);
+    let last = middles.len() - 1;
+    // The first is on the left before the change, on the right after it.
+    let swapped = (middles[0] < 640.0) == (middles[last] < 640.0);
+    eprintln!("from {} to {}: {:?}", middles[0], middles[last], extras.identity);
+    assert!(!swapped || extras.identity[last] > extras.identity[0], "another person under the same number");
 }
