@@ -101,7 +101,7 @@ const LARGE: &str = "-ss 2 -t 4 -i talk_latentsync_demo1_1080x1920_hevc.mp4";
 
 #[test]
 fn a_larger_still_picture_of_a_person_gives_way_to_the_living_one() {
-    let graph = "[0:v]fps=15,scale=640:360,pad=640:720:0:180[a];\
+    let graph = "[0:v]fps=15,scale=480:270,pad=640:720:80:225[a];\
                  [1:v]fps=15,select=eq(n\\,0),loop=-1:1,setpts=N/15/TB,scale=-2:720,crop=400:720,trim=0:4[b];\
                  [a][b]hstack,noise=alls=6:allf=t[v]";
     let Some(extras) = followed("still", &format!("{TYSON} {LARGE}"), graph) else { return };
