@@ -5,6 +5,7 @@
 use super::dataset;
 use super::known::{Known, STAGES};
 use super::search::Mark;
+use crate::stage::fingerprint::hash_file;
 use crate::stage::{record, workdir};
 use anyhow::{Context, Result};
 use std::collections::BTreeSet;
@@ -193,9 +194,10 @@ fn marks(videos: &[&Known], others: &[&Known]) -> Vec<Mark> {
         }
         let source = video.source.as_ref().map(|source| source.to_string_lossy().into_owned());
         marks.extend(source.iter().map(|path| Mark::name("path", path)));
-        if let Some(content) = video.content.as_ref().filter(|c| others.iter().all(|o| o.content.as_ref() != Some(*c)))
-        {
-            marks.extend(Mark::hash("content hash", content));
+        let hashed = || video.source.as_ref().and_then(|source| hash_file(source).ok());
+        let content = video.content.clone().or_else(hashed);
+        if let Some(content) = content.filter(|c| others.iter().all(|other| other.content.as_ref() != Some(c))) {
+            marks.extend(Mark::hash("content hash", &content));
             marks.extend(content.get(..8).map(|key| Mark::hash("key", key)).into_iter().flatten());
         }
     }

@@ -63,6 +63,11 @@ fn a_forgotten_video_leaves_nothing_and_the_others_are_untouched() {
 
     let again = project.answer(&["forget", "--video", name]);
     assert_eq!((again.code, again.json["removed"].as_array().unwrap().len()), (0, 0), "{}", again.json);
+    assert!(
+        again.json["searched"]["marks"].as_u64().unwrap() >= 6,
+        "the proof knows its content still: {}",
+        again.json
+    );
 
     // the line it printed keeps the video away
     let config = project.dir().join("pipeline.toml");
