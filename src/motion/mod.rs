@@ -22,6 +22,7 @@ pub mod keypoints_npz;
 pub mod mocap;
 pub mod npy;
 pub mod npz;
+pub mod own_hands;
 pub mod procrustes;
 pub mod rotation;
 pub mod smooth;
