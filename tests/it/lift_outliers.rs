@@ -42,9 +42,10 @@ fn lifted(footage: &Footage) -> (Vec<(usize, usize)>, Ledger, Motion) {
     (intervals.intervals.iter().map(|i| (i.start, i.end)).collect(), ledger, motion)
 }
 
-/// The left forearm grows far out of the picture.
+/// The left forearm grows far out of the picture, its hand with it.
 fn stretch_arm(footage: &mut Footage, frames: std::ops::Range<usize>) {
-    footage.keypoints.body.slice_mut(s![frames, coco::L_WRIST, 0]).mapv_inplace(|x| x + 400.0);
+    footage.keypoints.body.slice_mut(s![frames.clone(), coco::L_WRIST, 0]).mapv_inplace(|x| x + 400.0);
+    footage.keypoints.left_hand.slice_mut(s![frames, .., 0]).mapv_inplace(|x| x + 400.0);
 }
 
 #[test]
