@@ -18,7 +18,12 @@ const EARLY: [usize; 3] = [2, 5, 10];
 const CROWD_LOOKS: usize = 3;
 /// A body whose colours are this far from the speaker's, in 8-bit steps, for so many frames, is another person.
 const STRANGER: f32 = 7.0;
-const STRANGE_FRAMES: usize = 2;
+const STRANGE_FRAMES: i32 = 2;
+/// Frames for which a body found to be the speaker's after all is not doubted again.
+const TRUSTED_FRAMES: i32 = 6;
+/// A box that overlaps the followed one so much is whom is followed, unless another is so much more like the speaker.
+const HERE: f32 = 0.6;
+const LIKER: f32 = 0.6;
 /// Colours and box after a restart that are no further from those before are the same person's.
 const SAME_COLOURS: f32 = 5.0;
 const SAME_BOX: f32 = 0.5;
@@ -33,7 +38,8 @@ pub struct Speaker {
     reference: Option<Appearance>,
     /// What the one followed looks like.
     colours: Option<Appearance>,
-    n_strange: usize,
+    /// Frames in a row that showed a stranger; below 0: frames for which that is not believed.
+    n_strange: i32,
     /// More than one person was in view in this shot.
     several: bool,
     /// Whom the shot before showed, and where.
@@ -129,17 +135,21 @@ impl Speaker {
         };
         if !self.several || colours.distance(&seen) <= STRANGER {
             colours.follow(&seen, FOLLOW_COLOURS);
-            self.n_strange = 0;
+            self.n_strange = self.n_strange.min(0);
             return Ok(false);
         }
         self.n_strange += 1;
         if self.n_strange < STRANGE_FRAMES {
             return Ok(false);
         }
-        self.n_strange = 0;
+        let colours = colours.clone();
         let Some(mut found) = self.find(image)? else { return Ok(false) };
-        let Some(colours) = self.colours.take() else { return Ok(false) };
         measure(&mut found, &colours, image, body, settings.joint_score)?;
+        if is_here(&found, &self.followed.person()) {
+            self.n_strange = -TRUSTED_FRAMES;
+            return Ok(false);
+        }
+        (self.n_strange, self.colours) = (0, None);
         self.followed.choose(&found, image.width);
         Ok(true)
     }
@@ -156,6 +166,14 @@ impl Speaker {
         let candidate = |(person, movement)| Candidate { person, movement, unlike: None };
         Ok(Some(found.into_iter().zip(movements).map(candidate).collect()))
     }
+}
+
+/// Whether the one in the followed box still is the speaker: nobody else found is much more like the speaker.
+fn is_here(found: &[Candidate], followed: &PersonBox) -> bool {
+    let overlap = |one: &Candidate| boxes::overlap(&one.person, followed);
+    let Some(here) = found.iter().max_by(|a, b| overlap(a).total_cmp(&overlap(b))) else { return false };
+    let unlike = |one: &Candidate| one.unlike.unwrap_or(f32::INFINITY);
+    overlap(here) >= HERE && found.iter().all(|one| unlike(one) >= LIKER * unlike(here))
 }
 
 /// How far the colours of everybody found are from those given.
