@@ -79,6 +79,13 @@ fn one_of_two_people_is_followed() {
 fn followed(name: &str, inputs: &str, graph: &str) -> Option<Extras> {
     let (videos, models) = (shared("data/videos")?, shared("models")?);
     let project = project(name, &models, &[Path::new("videos/host/film.mp4")]);
+    if name == "reference" {
+        let picture = project.dir().join("speaker.png");
+        assert!(ffmpeg(&videos, &format!("{LARGE} -frames:v 1 {}", picture.display())));
+        let file = project.dir().join("pipeline.toml");
+        let text = std::fs::read_to_string(&file).unwrap() + "reference = \"speaker.png\"\n";
+        std::fs::write(&file, text).unwrap();
+    }
     let out = project.video("film.mp4");
     let coding = "-c:v libx264 -preset veryfast -crf 20 -pix_fmt yuv420p -an";
     if !ffmpeg(&videos, &format!("{inputs} -filter_complex {graph} -map [v] {coding} {}", out.display())) {
@@ -133,4 +140,16 @@ fn two_who_change_places_are_told_apart() {
     let swapped = (middles[0] < 640.0) == (middles[last] < 640.0);
     eprintln!("from {} to {}: {:?}", middles[0], middles[last], extras.identity);
     assert!(!swapped || extras.identity[last] > extras.identity[0], "another person under the same number");
+}
+
+#[test]
+fn the_one_like_the_reference_is_followed_though_smaller() {
+    let graph = "[0:v]fps=15,scale=-2:720,crop=560:720[a];[1:v]fps=15,scale=400:-2,crop=400:720:0:0[b];[a][b]hstack[v]";
+    let inputs = format!("{TYSON} {LARGE}");
+    let (Some(without), Some(with)) = (followed("choice", &inputs, graph), followed("reference", &inputs, graph))
+    else {
+        return;
+    };
+    assert!(middles(&without).iter().all(|x| *x < 560.0), "{:?}", middles(&without));
+    assert!(middles(&with).iter().all(|x| *x > 560.0), "{:?}", middles(&with));
 }
