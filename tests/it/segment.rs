@@ -137,8 +137,8 @@ fn spoilt(change: impl Fn(&mut Measures)) -> (Vec<(usize, usize)>, Vec<String>) 
 fn pauses_and_short_stands_are_kept_and_longer_ones_are_not() {
     assert_eq!(spoilt(|m| m.sound_db[80..125].fill(-60.0)), (vec![(0, 200)], vec![]));
     assert_eq!(spoilt(|m| m.sound_db[80..126].fill(-60.0)), (vec![(0, 80), (126, 200)], vec!["quiet".into()]));
-    assert_eq!(spoilt(|m| m.still[90..105].fill(0.0)), (vec![(0, 200)], vec![]));
-    assert_eq!(spoilt(|m| m.still[90..106].fill(0.0)), (vec![(0, 90), (106, 200)], vec!["still".into()]));
+    assert_eq!(spoilt(|m| m.still[90..97].fill(0.0)), (vec![(0, 200)], vec![]));
+    assert_eq!(spoilt(|m| m.still[90..98].fill(0.0)), (vec![(0, 90), (98, 200)], vec!["still".into()]));
     // 10 frames a second shown at 15
     assert_eq!(spoilt(|m| (0..200).filter(|t| t % 3 == 1).for_each(|t| m.still[t] = 0.0)), (vec![(0, 200)], vec![]));
 }
