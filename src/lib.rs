@@ -28,6 +28,8 @@
 //! | `evaluate` | errors of the lifters on captured motion | `motion nn train lift` |
 //! | `generate` | speech to motion with a trained speaker | `motion nn audio train` |
 //! | `animate` | joints to rotations; BVH and drawn video | `motion media vision` |
+//! | `page` | HTML pages for people: elements, plots, one file | nothing |
+//! | `report` | what became of every second, on one page; no stage, so it may know `segment` | `motion media vision segment animate page` |
 //! | `import` | motion that others captured, with its sound, becomes a dataset | `motion media audio dataset` |
 //! | `forget` | a video and all that was derived from it goes, and a search proves it | `dataset` |
 //! | `demo` | the synthetic speaker: videos with known truth, and the comparison with it | `motion media vision dataset animate` |
@@ -55,7 +57,9 @@ pub mod media;
 pub mod motion;
 pub mod nn;
 pub mod onnx;
+pub mod page;
 pub mod pose2d;
+pub mod report;
 pub mod segment;
 pub mod stage;
 pub mod train;

@@ -14,6 +14,7 @@ mod import;
 mod init;
 mod lift;
 mod models;
+mod report;
 mod road;
 mod run;
 mod sheet;
@@ -44,6 +45,7 @@ enum Verb {
     Doctor(doctor::Args),
     Lift(lift::Args),
     Sheet(sheet::Args),
+    Report(report::Args),
     Import(import::Args),
     Forget(forget::Args),
     Dataset(dataset::Args),
@@ -83,6 +85,7 @@ pub fn main() -> ExitCode {
         Verb::Doctor(args) => doctor::run(args, &ui),
         Verb::Lift(args) => lift::run(args, &ui),
         Verb::Sheet(args) => sheet::run(args, &ui),
+        Verb::Report(args) => report::run(args, &ui),
         Verb::Dataset(args) => dataset::run(args, &ui),
         Verb::Import(args) => import::run(args, &ui),
         Verb::Forget(args) => forget::run(args, &ui),

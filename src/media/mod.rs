@@ -9,6 +9,7 @@ pub mod audio;
 mod decode;
 pub mod encode;
 pub mod frames;
+pub mod jpeg;
 mod origin;
 mod picture;
 pub mod probe;

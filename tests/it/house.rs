@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A room and the rooms it may import.
-const MAY_IMPORT: [(&str, &str); 21] = [
+const MAY_IMPORT: [(&str, &str); 23] = [
     ("types", ""),
     ("stage", "types"),
     ("config", "types stage"),
@@ -23,6 +23,8 @@ const MAY_IMPORT: [(&str, &str); 21] = [
     ("evaluate", "types stage config motion nn train lift"),
     ("generate", "types stage config motion nn audio dataset train"),
     ("animate", "types stage config motion media vision"),
+    ("page", ""),
+    ("report", "types stage config motion media vision segment animate page"),
     ("import", "types stage config motion media audio dataset"),
     ("forget", "types stage config dataset"),
     ("demo", "types stage config motion media vision dataset animate"),

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod blender;
+mod browser;
 mod bvh;
 mod clips;
 mod dataset;
@@ -38,6 +39,7 @@ mod pose_chain;
 mod pose_parity;
 mod real;
 mod redecide;
+mod report;
 mod runner;
 mod segment;
 mod shard;

@@ -1,0 +1,58 @@
+//! Numbers as people read them.
+
+/// A length of time: `41.2 s`, `12.4 min`, `3.27 h`. The page's script has the same.
+pub fn length(secs: f64) -> String {
+    match secs.abs() {
+        n if n < 120.0 => format!("{secs:.1} s"),
+        n if n < 7200.0 => format!("{:.1} min", secs / 60.0),
+        _ => format!("{:.2} h", secs / 3600.0),
+    }
+}
+
+/// A moment of a video: `0:04.8`, `1:02:03.0`.
+pub fn clock(secs: f64) -> String {
+    let tenths = (secs.max(0.0) * 10.0).round() as u64;
+    let (hours, minutes, rest) = (tenths / 36_000, tenths / 600 % 60, tenths % 600);
+    let seconds = format!("{:02}.{}", rest / 10, rest % 10);
+    if hours > 0 { format!("{hours}:{minutes:02}:{seconds}") } else { format!("{minutes}:{seconds}") }
+}
+
+/// Up to three digits after the point, none of them an idle zero.
+pub fn number(value: f64) -> String {
+    if !value.is_finite() {
+        return "unknown".to_owned();
+    }
+    let digits = if value.abs() >= 100.0 { 0 } else { 3 };
+    let text = format!("{value:.digits$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+/// With its unit, which may be empty.
+pub fn with_unit(value: f64, unit: &str) -> String {
+    format!("{} {unit}", number(value)).trim_end().to_owned()
+}
+
+/// A share of a whole in percent; of nothing, a dash.
+pub fn percent(part: f64, whole: f64) -> String {
+    if whole > 0.0 { format!("{:.1} %", 100.0 * part / whole) } else { "\u{2013}".to_owned() }
+}
+
+/// `1 video`, `2 videos`.
+pub fn counted(n: usize, what: &str) -> String {
+    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_well() {
+        assert_eq!([41.24, 744.0, 11_772.0].map(length), ["41.2 s", "12.4 min", "3.27 h"]);
+        assert_eq!([4.8, 59.96, 3723.0].map(clock), ["0:04.8", "1:00.0", "1:02:03.0"]);
+        assert_eq!([0.34, 1.0, -50.0, 1234.5, -0.0001].map(number), ["0.34", "1", "-50", "1234", "0"]);
+        assert_eq!((with_unit(0.5, ""), with_unit(3.0, "s")), ("0.5".to_owned(), "3 s".to_owned()));
+        assert_eq!((percent(1.0, 8.0), percent(0.0, 0.0)), ("12.5 %".to_owned(), "\u{2013}".to_owned()));
+    }
+}

@@ -1,0 +1,24 @@
+//! What stands on the report of a speaker's videos. Gathered, a file an idea: `video` (the verdict on each), `what_if` (what
+//! other `thresholds` would keep), `spread` (how often each value was measured), `movement` (where joints are and how fast),
+//! `worst` and `pictures` (frames that show what a rule refuses); `gather` goes through the videos once and fills them all.
+//! Shown, a file a section: `summary`, `lines`, `gallery`, `distributions`, `sliders`, `motion`; `whole` puts them on a page.
+
+mod distributions;
+mod gallery;
+mod gather;
+mod lines;
+mod motion;
+mod movement;
+mod pictures;
+mod reasons;
+mod sliders;
+mod spread;
+mod summary;
+mod thresholds;
+mod video;
+mod what_if;
+mod whole;
+mod worst;
+
+pub use summary::Sums;
+pub use whole::{Made, Wanted, make};

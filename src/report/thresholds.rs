@@ -1,0 +1,139 @@
+//! The thresholds of `[segment]` that can be tried out: what each means, and the values it is tried at.
+
+use crate::config::Segment;
+
+/// Steps between the ends of a grid.
+const N_STEPS: u32 = 20;
+
+/// One of them.
+pub struct Threshold {
+    /// Its key in `[segment]`.
+    pub key: &'static str,
+    pub says: &'static str,
+    /// Empty: a score or a share, 0 to 1.
+    pub unit: &'static str,
+    /// Ends of what is tried.
+    pub low: f64,
+    pub high: f64,
+    pub get: fn(&Segment) -> f64,
+    pub set: fn(&mut Segment, f64),
+}
+
+/// A row: key, sentence, unit, ends, and the field.
+macro_rules! row {
+    ($key:ident, $says:literal, $unit:literal, $low:literal, $high:literal) => {
+        Threshold {
+            key: stringify!($key),
+            says: $says,
+            unit: $unit,
+            low: $low,
+            high: $high,
+            get: |rules| rules.$key,
+            set: |rules, value| rules.$key = value,
+        }
+    };
+}
+
+/// All but `max_bone_change`, whose rule is lifting's.
+pub const THRESHOLDS: [Threshold; 16] = [
+    row!(min_sound_db, "least loudness of the second around a frame", "dB of full scale", -90.0, -10.0),
+    row!(max_quiet_secs, "longest pause of speech that is kept", "s", 0.0, 10.0),
+    row!(min_change, "a picture that changes less stands still", "steps of 8-bit colour", 0.0, 1.0),
+    row!(max_still_secs, "longest time the picture may stand still", "s", 0.0, 1.0),
+    row!(joint_score, "from here on a face, arm or hand point is visible", "", 0.0, 1.0),
+    row!(min_shoulder_px, "least distance between the shoulders", "px", 10.0, 210.0),
+    row!(
+        min_facing,
+        "least width of the shoulders: 2 from the front, 0 from the side",
+        "neck-nose distances",
+        -1.0,
+        3.0
+    ),
+    row!(max_nose_off, "farthest the nose may be beside the neck", "half shoulder widths", 0.0, 4.0),
+    row!(max_body_gap_secs, "longest gap of face or arms that is filled", "s", 0.0, 1.0),
+    row!(max_hand_gap_secs, "longest gap of a hand that is masked", "s", 0.0, 1.0),
+    row!(min_hand_share, "share of a stretch in which each hand is seen", "", 0.0, 1.0),
+    row!(max_jump, "farthest the neck may move between two frames", "shoulder widths", 0.1, 2.1),
+    row!(shot_threshold, "shot score from which a frame begins a new shot", "", 0.0, 1.0),
+    Threshold {
+        key: "max_people",
+        says: "people in view that are not too many",
+        unit: "people",
+        low: 1.0,
+        high: 21.0,
+        get: |rules| f64::from(rules.max_people),
+        set: |rules, value| rules.max_people = value as u32,
+    },
+    row!(max_crowd_share, "share of a stretch that may show more people", "", 0.0, 1.0),
+    Threshold {
+        key: "min_frames",
+        says: "shortest stretch that is kept",
+        unit: "frames",
+        low: 16.0,
+        high: 176.0,
+        get: |rules| rules.min_frames as f64,
+        set: |rules, value| rules.min_frames = value as usize,
+    },
+];
+
+impl Threshold {
+    /// The values it is tried at, rising, and which of them is the configured one.
+    pub fn grid(&self, rules: &Segment) -> (Vec<f64>, usize) {
+        let configured = (self.get)(rules);
+        let step = (self.high - self.low) / f64::from(N_STEPS);
+        let round = |value: f64| (value * 1000.0).round() / 1000.0;
+        let mut grid: Vec<f64> = (0..=N_STEPS).map(|i| round(self.low + f64::from(i) * step)).collect();
+        grid.retain(|value| (value - configured).abs() > 1e-9);
+        let at = grid.iter().filter(|value| **value < configured).count();
+        grid.insert(at, configured);
+        (grid, at)
+    }
+
+    /// `rules` with this one at `value`.
+    pub fn with(&self, rules: &Segment, value: f64) -> Segment {
+        let mut other = rules.clone();
+        (self.set)(&mut other, value);
+        other
+    }
+
+    /// The value as it is written in `pipeline.toml`.
+    pub fn written(&self, value: f64) -> String {
+        match self.key {
+            "max_people" | "min_frames" => format!("{value:.0}"),
+            _ => format!("{value:?}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config;
+
+    #[test]
+    fn every_threshold_can_be_tried_and_every_value_can_be_written() {
+        let rules = Segment::default();
+        let fields = serde_json::to_value(&rules).unwrap();
+        let mut keys: Vec<&str> = fields.as_object().unwrap().keys().map(String::as_str).collect();
+        keys.retain(|key| *key != "max_bone_change");
+        let mut tried = THRESHOLDS.map(|threshold| threshold.key);
+        keys.sort_unstable();
+        tried.sort_unstable();
+        assert_eq!(keys, tried);
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("pipeline.toml");
+        for threshold in THRESHOLDS {
+            let (grid, at) = threshold.grid(&rules);
+            assert!((21..=22).contains(&grid.len()) && grid.is_sorted() && grid[at] == (threshold.get)(&rules));
+            for value in grid {
+                let line = format!("[segment]\n{} = {}\n", threshold.key, threshold.written(value));
+                std::fs::write(&file, line).unwrap();
+                let read = config::load(&file, &[]).unwrap().settings.segment;
+                assert_eq!(read, threshold.with(&rules, value));
+            }
+        }
+        let odd = Segment { max_jump: 7.25, ..rules };
+        let jump = THRESHOLDS.iter().find(|threshold| threshold.key == "max_jump").unwrap();
+        assert_eq!(jump.grid(&odd).0.last(), Some(&7.25));
+    }
+}

@@ -1,0 +1,102 @@
+//! What became of a video: its ledger as the last stage left it, or the reason why there is none.
+
+use super::reasons::WAITING;
+use crate::stage::Unit;
+use crate::stage::ledger::Ledger;
+use crate::stage::record::Failure;
+use crate::stage::runner::place;
+use std::path::Path;
+
+/// A video of the report.
+#[derive(Clone, Debug)]
+pub struct Video {
+    pub unit: Unit,
+    /// The file's name, as the user knows it.
+    pub file: String,
+    /// Every second of it; empty where not even its length is known.
+    pub ledger: Ledger,
+    /// Whether lifting has had its say.
+    pub is_lifted: bool,
+    /// Whether a stage lost it.
+    pub has_failed: bool,
+    /// What is missing of it, in sentences.
+    pub notes: Vec<String>,
+    /// Folders of this machine, and what stands for them on a page.
+    folders: [(String, &'static str); 2],
+}
+
+impl Video {
+    /// Reads the verdict on `unit` from the folder `work`. What cannot be read is a note.
+    pub fn read(work: &Path, unit: &Unit) -> Self {
+        let file = unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let folders = [(work, "work"), (unit.source.parent().unwrap_or(work), "")];
+        let folders = folders.map(|(folder, name)| (folder.display().to_string(), name));
+        let mut video = Self {
+            unit: unit.clone(),
+            file,
+            ledger: Ledger::default(),
+            is_lifted: false,
+            has_failed: false,
+            notes: Vec::new(),
+            folders,
+        };
+        if !unit.source.exists() {
+            video.note("The file is gone: there are no pictures of it.");
+        }
+        let failure = ["extract", "pose2d", "segment", "lift"]
+            .into_iter()
+            .find_map(|stage| Some((stage, Failure::read(&place(work, stage, unit))?.error)));
+        if let Some((stage, error)) = failure {
+            video.lose(work, stage, &error);
+            return video;
+        }
+        for stage in ["lift", "segment"] {
+            let path = place(work, stage, unit).join("ledger.json");
+            if !path.exists() {
+                continue;
+            }
+            match Ledger::read(&path) {
+                Ok(ledger) => {
+                    (video.ledger, video.is_lifted) = (ledger, stage == "lift");
+                    if !video.is_lifted {
+                        video.note("It is not lifted yet: rules on bones have not had their say.");
+                    }
+                    return video;
+                }
+                Err(error) => video.note(&format!("{error:#}")),
+            }
+        }
+        video.lose(work, WAITING, "no verdict yet: orator run");
+        video
+    }
+
+    /// The account of a video without a verdict.
+    fn lose(&mut self, work: &Path, stage: &str, error: &str) {
+        let media = std::fs::read(place(work, "extract", &self.unit).join("media.json")).unwrap_or_default();
+        let media: serde_json::Value = serde_json::from_slice(&media).unwrap_or_default();
+        let secs = media["duration_secs"].as_f64().filter(|secs| secs.is_finite() && *secs > 0.0);
+        self.ledger = secs.map_or_else(Ledger::default, |secs| Ledger::of_failure(secs, stage, error));
+        self.has_failed = stage != WAITING;
+        match stage {
+            WAITING => self.note("No verdict yet: orator run."),
+            _ => self.note(&format!("The stage {stage} failed: {error}")),
+        }
+        if secs.is_none() {
+            self.note("Its length is not known, so it is in no sum.");
+        }
+    }
+
+    /// Adds a note; folders of this machine are not told.
+    pub fn note(&mut self, text: &str) {
+        let text = self.folders.iter().fold(text.to_owned(), |text, (folder, name)| match name.is_empty() {
+            true => text.replace(&format!("{folder}/"), ""),
+            false => text.replace(folder, name),
+        });
+        self.notes.push(text);
+    }
+
+    /// Where links to it point.
+    pub fn anchor(&self) -> String {
+        format!("video-{}-{}", self.unit.speaker, self.unit.video)
+    }
+}
