@@ -2,6 +2,8 @@
 
 /// A length of time: `41.2 s`, `12.4 min`, `3.27 h`. The page's script has the same.
 pub fn length(secs: f64) -> String {
+    // A sum of nothing is -0.
+    let secs = secs + 0.0;
     match secs.abs() {
         n if n < 120.0 => format!("{secs:.1} s"),
         n if n < 7200.0 => format!("{:.1} min", secs / 60.0),
@@ -35,12 +37,13 @@ pub fn with_unit(value: f64, unit: &str) -> String {
 
 /// A share of a whole in percent; of nothing, a dash.
 pub fn percent(part: f64, whole: f64) -> String {
-    if whole > 0.0 { format!("{:.1} %", 100.0 * part / whole) } else { "\u{2013}".to_owned() }
+    if whole > 0.0 { format!("{:.1} %", 100.0 * part / whole + 0.0) } else { "\u{2013}".to_owned() }
 }
 
-/// `1 video`, `2 videos`.
+/// `1 video`, `2 videos`, `3 stretches`.
 pub fn counted(n: usize, what: &str) -> String {
-    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
+    let ending = if what.ends_with("ch") { "es" } else { "s" };
+    if n == 1 { format!("1 {what}") } else { format!("{n} {what}{ending}") }
 }
 
 #[cfg(test)]
@@ -49,7 +52,8 @@ mod tests {
 
     #[test]
     fn numbers_read_well() {
-        assert_eq!([41.24, 744.0, 11_772.0].map(length), ["41.2 s", "12.4 min", "3.27 h"]);
+        assert_eq!([41.24, 744.0, 11_772.0, -0.0].map(length), ["41.2 s", "12.4 min", "3.27 h", "0.0 s"]);
+        assert_eq!([1, 2].map(|n| counted(n, "stretch")), ["1 stretch", "2 stretches"]);
         assert_eq!([4.8, 59.96, 3723.0].map(clock), ["0:04.8", "1:00.0", "1:02:03.0"]);
         assert_eq!([0.34, 1.0, -50.0, 1234.5, -0.0001].map(number), ["0.34", "1", "-50", "1234", "0"]);
         assert_eq!((with_unit(0.5, ""), with_unit(3.0, "s")), ("0.5".to_owned(), "3 s".to_owned()));
