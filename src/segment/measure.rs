@@ -9,6 +9,9 @@ const KNOWN_SCORE: f32 = 0.3;
 /// `facing` and `nose_off` are cut off here; they divide by lengths that may vanish.
 const FARTHEST: f32 = 10.0;
 
+/// A neck that has moved by less since the frame before, in shoulder widths, is the same person's.
+const SAME_PLACE: f32 = 0.2;
+
 /// Per frame, all of the same length T. NaN: not known, and no reason to refuse the frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measures {
@@ -86,10 +89,11 @@ impl Measures {
     }
 }
 
-/// The frames at which the number of the followed person goes up, except where the search began anew because the
-/// picture changed: whether that is another shot is the shot rule's to say.
-pub fn identity(numbers: &[i64], restart: &[bool]) -> Vec<f32> {
-    let changed = |t: usize| t > 0 && numbers[t] != numbers[t - 1] && !restart.get(t).copied().unwrap_or(false);
+/// The frames at which the number of the followed person goes up and the neck is elsewhere (`jump`): nobody else sits
+/// where the one sat a frame ago. Where the search began anew because the picture changed it is the shot rule's to say.
+pub fn identity(numbers: &[i64], restart: &[bool], jump: &[f32]) -> Vec<f32> {
+    let stays = |t: usize| restart.get(t).copied().unwrap_or(false) || jump.get(t).is_some_and(|&way| way < SAME_PLACE);
+    let changed = |t: usize| t > 0 && numbers[t] != numbers[t - 1] && !stays(t);
     (0..numbers.len()).map(|t| f32::from(u8::from(changed(t)))).collect()
 }
 
@@ -156,7 +160,9 @@ mod tests {
 
     #[test]
     fn another_person_counts_but_not_a_search_begun_anew() {
-        assert_eq!(identity(&[3, 3, 4, 4, 5], &[true, false, false, false, true]), [0.0, 0.0, 1.0, 0.0, 0.0]);
-        assert_eq!(identity(&[], &[]), [0.0; 0]);
+        let restart = [true, false, false, false, true, false, false];
+        let jump = [0.0, 0.0, 1.4, 0.0, 1.0, 0.01, f32::NAN];
+        assert_eq!(identity(&[3, 3, 4, 4, 5, 6, 7], &restart, &jump), [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(identity(&[], &[], &[]), [0.0; 0]);
     }
 }

@@ -39,7 +39,7 @@ impl Stage for SegmentStage {
     }
 
     fn version(&self) -> u32 {
-        4
+        5
     }
 
     fn settings(&self) -> serde_json::Value {
@@ -92,14 +92,15 @@ impl SegmentStage {
         let still = timeline.floats("still", &[Some(n_frames)])?.into_iter().collect();
         let restart: Vec<bool> = timeline.bools("restart", &[Some(n_frames)])?.into_iter().collect();
         let (sound, sound_db) = sound::levels(&self.file("extract", unit, "audio.wav"), video.fps, n_frames)?;
+        let of_body = Measures::of(&keypoints);
         Ok(Measures {
             sound,
             sound_db,
             still,
             n_people: extras.n_people.iter().map(|&n| n as f32).collect(),
-            identity: measure::identity(&extras.identity.to_vec(), &restart),
+            identity: measure::identity(&extras.identity.to_vec(), &restart, &of_body.jump),
             shot_score,
-            ..Measures::of(&keypoints)
+            ..of_body
         })
     }
 }
