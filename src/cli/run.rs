@@ -5,10 +5,10 @@ use super::road::{self, STEPS, Step};
 use super::{Outcome, ui::Ui};
 use anyhow::{Context, Result};
 use orator::config::{Config, videos::Videos};
-use orator::stage::Unit;
 use orator::stage::fingerprint::HashCache;
 use orator::stage::progress::Progress;
 use orator::stage::runner::{self, Ended};
+use orator::stage::{Stage, Unit};
 use serde_json::{Value, json};
 use std::fs::File;
 use std::path::Path;
@@ -75,10 +75,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         }
     }
     let mut alive = speakers.clone();
-    for step in STEPS.into_iter().filter(|step| (from..=to).contains(step)) {
-        run.step(step, &mut alive)?;
-        hashes.save()?;
-    }
+    let steps = || STEPS.into_iter().filter(|step| (from..=to).contains(step));
+    run.steps(&steps().filter(|step| *step != Step::Shard).collect::<Vec<_>>(), &mut alive)?;
+    run.steps(&steps().filter(|step| *step == Step::Shard).collect::<Vec<_>>(), &mut alive)?;
     run.close(speakers.len())
 }
 
@@ -123,46 +122,53 @@ struct Log {
 }
 
 impl Run<'_> {
-    /// Runs one stage for everything alive; what fails is not alive for the stages after it.
-    fn step(&mut self, step: Step, alive: &mut [Videos]) -> Result<()> {
-        let (mut done, mut skipped, mut failed, mut failed_units) = (0, 0, 0, Vec::new());
-        let units: Vec<Unit> = alive.iter().flat_map(|videos| step.units(self.config, videos)).collect();
-        let stage = step.stage(self.config, &self.dataset_videos(step, alive)?)?;
+    /// Runs these stages, which have the same units, for everything alive; what fails is not alive for later ones.
+    fn steps(&mut self, steps: &[Step], alive: &mut [Videos]) -> Result<()> {
+        let Some(&first) = steps.first() else { return Ok(()) };
+        let units: Vec<Unit> = alive.iter().flat_map(|videos| first.units(self.config, videos)).collect();
+        let videos = self.dataset_videos(first, alive)?;
+        let stages = steps.iter().map(|step| step.stage(self.config, &videos)).collect::<Result<Vec<_>>>()?;
+        let stages: Vec<&dyn Stage> = stages.iter().map(|stage| &**stage).collect();
         let work = &self.config.settings.work.dir;
-        let ended = runner::run(&*stage, &units, work, self.hashes, (self.jobs, self.force), self.ui);
-        for (unit, ended) in units.iter().zip(ended) {
-            let mut report = |state: &str, report: &orator::stage::Report| {
-                let facts = json!({ "unit": unit.to_string(), "stage": step.name(), "state": state, "line": report.line, "facts": report.facts });
-                self.log.reports.push(facts);
-            };
-            match ended {
-                Ended::Done(made) => {
-                    done += 1;
-                    report("done", &made);
-                }
-                Ended::Skipped(made) => {
-                    skipped += 1;
-                    report("fresh", &made);
-                }
-                Ended::Failed(error) => {
-                    failed += 1;
-                    failed_units.push(unit.speaker.clone());
-                    self.log.failures.push(json!({ "unit": unit.to_string(), "stage": step.name(), "error": error }));
-                    for videos in alive.iter_mut().filter(|videos| videos.speaker == unit.speaker) {
-                        videos.units.retain(|alive| alive != unit);
+        let ended = runner::run_road(&stages, &units, work, self.hashes, (self.jobs, self.force), self.ui);
+        self.hashes.save()?;
+        let mut counts = vec![[0usize; 3]; steps.len()];
+        let mut failed_units = Vec::new();
+        for (unit, answers) in units.iter().zip(ended) {
+            for ((step, counts), answer) in steps.iter().zip(&mut counts).zip(answers) {
+                let (state, word) = match &answer {
+                    Ended::Done(_) => (0, "done"),
+                    Ended::Skipped(_) => (1, "fresh"),
+                    Ended::Failed(_) => (2, "failed"),
+                };
+                counts[state] += 1;
+                match answer {
+                    Ended::Done(made) | Ended::Skipped(made) => self.log.reports.push(json!({
+                        "unit": unit.to_string(), "stage": step.name(), "state": word,
+                        "line": made.line, "facts": made.facts,
+                    })),
+                    Ended::Failed(error) => {
+                        failed_units.push(unit.speaker.clone());
+                        let unit_name = unit.to_string();
+                        self.log.failures.push(json!({ "unit": unit_name, "stage": step.name(), "error": error }));
+                        for videos in alive.iter_mut().filter(|videos| videos.speaker == unit.speaker) {
+                            videos.units.retain(|alive| alive != unit);
+                        }
                     }
                 }
             }
         }
-        if step == Step::Shard {
+        if first == Step::Shard {
             self.log.datasets = alive
                 .iter()
                 .filter(|videos| !failed_units.contains(&videos.speaker))
                 .map(|videos| videos.speaker.clone())
                 .collect();
         }
-        self.log.lines.push(format!("{:8} {done} done, {skipped} fresh already, {failed} failed", step.name()));
-        self.log.stages.insert(step.name().to_owned(), json!({ "done": done, "fresh": skipped, "failed": failed }));
+        for (step, [done, fresh, failed]) in steps.iter().zip(counts) {
+            self.log.lines.push(format!("{:8} {done} done, {fresh} fresh already, {failed} failed", step.name()));
+            self.log.stages.insert(step.name().to_owned(), json!({ "done": done, "fresh": fresh, "failed": failed }));
+        }
         Ok(())
     }
 

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::time::UNIX_EPOCH;
+use std::time::{Instant, UNIX_EPOCH};
 
 /// The key of one unit at one stage, in its parts so that a difference can be named.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,6 +44,7 @@ impl Fingerprint {
 pub struct HashCache {
     file: PathBuf,
     known: Mutex<BTreeMap<String, Known>>,
+    saved: Mutex<Instant>,
 }
 
 #[derive(Clone, Serialize, Deserialize)]
@@ -57,7 +58,7 @@ impl HashCache {
     /// Reads what is known from `file`; a missing or damaged file knows nothing.
     pub fn open(file: &Path) -> Self {
         let known = fs::read(file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default();
-        Self { file: file.to_owned(), known: Mutex::new(known) }
+        Self { file: file.to_owned(), known: Mutex::new(known), saved: Mutex::new(Instant::now()) }
     }
 
     /// BLAKE3 of the content of `path`, in hex.
@@ -82,6 +83,16 @@ impl HashCache {
     pub fn save(&self) -> Result<()> {
         let bytes = serde_json::to_vec(&*self.known())?;
         workdir::write_file(&self.file, &bytes)
+    }
+
+    /// The same once a minute at most, so that a long run that is killed has not hashed for nothing.
+    pub fn save_now_and_then(&self) {
+        let Ok(mut saved) = self.saved.try_lock() else { return };
+        if saved.elapsed().as_secs() >= 60 {
+            *saved = Instant::now();
+            // What cannot be kept is hashed again.
+            let _ = self.save();
+        }
     }
 
     fn known(&self) -> std::sync::MutexGuard<'_, BTreeMap<String, Known>> {

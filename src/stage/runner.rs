@@ -1,8 +1,8 @@
-//! Runs a stage over its units: fresh ones are skipped, the rest is worked on by several workers, a failed unit does
-//! not stop the others. What a unit makes does not depend on who made it.
+//! Runs stages over units: what is fresh is skipped, the rest is worked on by several workers, a failed unit does not
+//! stop the others. What a unit makes does not depend on who made it.
 
 use super::fingerprint::{Fingerprint, HashCache};
-use super::progress::{Progress, Task};
+use super::progress::Progress;
 use super::record::{DirtyReason, Failure, Output, Record};
 use super::{Report, Stage, Unit, workdir};
 use anyhow::{Context, Result};
@@ -62,33 +62,68 @@ pub fn run(
     units: &[Unit],
     work: &Path,
     hashes: &HashCache,
-    (jobs, force): (usize, bool),
+    limits: (usize, bool),
     progress: &dyn Progress,
 ) -> Vec<Ended> {
+    run_road(&[stage], units, work, hashes, limits, progress).into_iter().flatten().collect()
+}
+
+/// Runs `stages`, one after the other, for every unit on `jobs` workers (at least one). No unit waits for another at any
+/// stage, and the largest begin first, so that the workers end together. A unit that fails goes no further: its answers,
+/// one a stage, end with the failure. They stand in the order of `units`.
+pub fn run_road(
+    stages: &[&dyn Stage],
+    units: &[Unit],
+    work: &Path,
+    hashes: &HashCache,
+    (jobs, force): (usize, bool),
+    progress: &dyn Progress,
+) -> Vec<Vec<Ended>> {
     let next = AtomicUsize::new(0);
-    let ended: Vec<Mutex<Option<Ended>>> = units.iter().map(|_| Mutex::new(None)).collect();
-    let bar = progress.begin(stage.name(), units.len() as u64);
+    let ended: Vec<Mutex<Vec<Ended>>> = units.iter().map(|_| Mutex::new(Vec::new())).collect();
+    let names: Vec<&str> = stages.iter().map(|stage| stage.name()).collect();
+    let bar = progress.begin(&names.join(" "), units.len() as u64);
+    let order = largest_first(units);
     std::thread::scope(|scope| {
         for _ in 0..jobs.clamp(1, units.len().max(1)) {
             scope.spawn(|| {
-                loop {
-                    let at = next.fetch_add(1, Ordering::SeqCst);
-                    let Some(unit) = units.get(at) else { break };
-                    let answer = run_unit(stage, unit, work, hashes, force, progress);
-                    report(&answer, stage, unit, &*bar, progress);
-                    if let Ok(mut slot) = ended[at].lock() {
-                        *slot = Some(answer);
+                while let Some(&at) = order.get(next.fetch_add(1, Ordering::SeqCst)) {
+                    for stage in stages {
+                        let answer = run_unit(*stage, &units[at], work, hashes, force, progress);
+                        report(&answer, *stage, &units[at], progress);
+                        let has_failed = matches!(answer, Ended::Failed(_));
+                        if let Ok(mut answers) = ended[at].lock() {
+                            answers.push(answer);
+                        }
+                        if has_failed {
+                            break;
+                        }
                     }
+                    bar.advance(1);
+                    hashes.save_now_and_then();
                 }
             });
         }
     });
-    let unknown = || Ended::Failed("the worker was lost".to_owned());
-    ended.into_iter().map(|slot| slot.into_inner().ok().flatten().unwrap_or_else(unknown)).collect()
+    let answers = ended.into_iter().map(|answers| answers.into_inner().unwrap_or_default());
+    let whole = |mut answers: Vec<Ended>| {
+        if answers.len() < stages.len() && !matches!(answers.last(), Some(Ended::Failed(_))) {
+            answers.push(Ended::Failed("the worker was lost".to_owned()));
+        }
+        answers
+    };
+    answers.map(whole).collect()
 }
 
-fn report(answer: &Ended, stage: &dyn Stage, unit: &Unit, bar: &dyn Task, progress: &dyn Progress) {
-    bar.advance(1);
+/// Places of the units, those of large files first.
+fn largest_first(units: &[Unit]) -> Vec<usize> {
+    let bytes = |unit: &Unit| std::fs::metadata(&unit.source).map_or(0, |meta| meta.len());
+    let mut order: Vec<usize> = (0..units.len()).collect();
+    order.sort_by_cached_key(|at| std::cmp::Reverse(bytes(&units[*at])));
+    order
+}
+
+fn report(answer: &Ended, stage: &dyn Stage, unit: &Unit, progress: &dyn Progress) {
     match answer {
         Ended::Failed(error) => progress.say(&format!("failed  {} {unit}: {error}", stage.name())),
         Ended::Done(report) if !report.line.is_empty() => {

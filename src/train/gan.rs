@@ -140,7 +140,7 @@ fn check(settings: &Gan) -> Result<()> {
 }
 
 /// Statistics of the training split; bone lengths where the dataset does not state them are measured.
-fn normalisation(dataset: &Dataset) -> Result<Normalisation> {
+pub fn normalisation(dataset: &Dataset) -> Result<Normalisation> {
     let stated = &dataset.info().bone_lengths_metres;
     let mut lengths: Vec<f32> = (0..N_BONES).map(|bone| stated.get(bone).map_or(0.0, |v| *v as f32)).collect();
     if lengths.iter().all(|length| *length == 0.0) {

@@ -1,9 +1,13 @@
 //! `orator bench`: how fast a part of the road is, measured so that a noisy machine cannot flatter it: the variants take
 //! turns, round after round, and the median round counts. One file a part.
 
+mod child;
+mod dataset;
 mod lift;
 mod lifter;
 mod pose2d;
+mod run;
+mod scale;
 
 use super::{Outcome, ui::Ui};
 use anyhow::Result;
@@ -18,15 +22,21 @@ pub struct Args {
 #[derive(clap::Subcommand)]
 enum Part {
     Pose2d(pose2d::Args),
+    Dataset(dataset::Args),
     Lift(lift::Args),
     Lifter(lifter::Args),
+    Run(run::Args),
+    Scale(scale::Args),
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.part {
         Part::Pose2d(args) => pose2d::run(&args, ui),
+        Part::Dataset(args) => dataset::run(&args, ui),
         Part::Lift(args) => lift::run(&args, ui),
         Part::Lifter(args) => lifter::run(&args, ui),
+        Part::Run(args) => run::run(&args, ui),
+        Part::Scale(args) => scale::run(&args, ui),
     }
 }
 

@@ -1,0 +1,87 @@
+//! This program once more, as a program of its own that is watched while it runs: how long it took, how much memory it
+//! had at most, how busy it kept the processor.
+
+use anyhow::{Result, ensure};
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Between two looks.
+const LOOK: Duration = Duration::from_millis(5);
+/// Clock ticks a second in /proc, on every Linux.
+const TICKS: f64 = 100.0;
+
+/// How a run went.
+#[derive(Clone, Copy, Debug)]
+pub struct Child {
+    pub secs: f64,
+    /// Peak resident memory.
+    pub peak_mib: f64,
+    /// Processor time, in and for the program, seconds.
+    pub cpu_secs: f64,
+    /// Mean number of threads that ran or could have run, counted up to the number of cores: what would have been busy
+    /// had nothing else been at work on the machine.
+    pub busy: f64,
+}
+
+/// Runs `orator ARGS` in the folder `dir`.
+///
+/// # Errors
+/// It cannot be started, or fails: with its own words.
+pub fn measure(dir: &Path, args: &[&str]) -> Result<Child> {
+    let n_cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let mut command = Command::new(std::env::current_exe()?);
+    let log = fs::File::create(dir.join("bench.log"))?;
+    command.current_dir(dir).args(args).stdin(Stdio::null()).stdout(Stdio::null()).stderr(log);
+    let (start, mut child) = (Instant::now(), command.spawn()?);
+    let folder = format!("/proc/{}", child.id());
+    let (mut peak_mib, mut cpu_secs, mut n_looks, mut n_busy) = (0.0f64, 0.0f64, 0usize, 0usize);
+    let status = loop {
+        if let Some(status) = child.try_wait()? {
+            break status;
+        }
+        let text = |name: &str| fs::read_to_string(format!("{folder}/{name}")).unwrap_or_default();
+        peak_mib = peak_mib.max(high_water_mib(&text("status")).unwrap_or(0.0));
+        cpu_secs = cpu_secs.max(ticks(&text("stat")).unwrap_or(0.0) / TICKS);
+        n_busy += n_running(&folder).min(n_cores);
+        n_looks += 1;
+        std::thread::sleep(LOOK);
+    };
+    let secs = start.elapsed().as_secs_f64();
+    let said = fs::read_to_string(dir.join("bench.log")).unwrap_or_default();
+    ensure!(status.success(), "`orator {}` failed: {}", args.join(" "), said.trim());
+    Ok(Child { secs, peak_mib, cpu_secs, busy: n_busy as f64 / n_looks.max(1) as f64 })
+}
+
+fn high_water_mib(status: &str) -> Option<f64> {
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(line.split_whitespace().next()?.parse::<f64>().ok()? / 1024.0)
+}
+
+/// Fields 14 and 15 of `stat`, counted behind the name in brackets.
+fn ticks(stat: &str) -> Option<f64> {
+    let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
+    Some(fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?)
+}
+
+/// Threads that run or wait for a core.
+fn n_running(folder: &str) -> usize {
+    let threads = fs::read_dir(Path::new(folder).join("task")).into_iter().flatten().flatten();
+    let state = |stat: String| stat.rsplit_once(')').and_then(|(_, rest)| rest.trim_start().chars().next());
+    let states = threads.filter_map(|thread| fs::read_to_string(thread.path().join("stat")).ok().and_then(state));
+    states.filter(|state| *state == 'R').count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn proc_is_read() {
+        assert_eq!(high_water_mib("VmPeak:\t9 kB\nVmHWM:\t  2048 kB\n"), Some(2.0));
+        let stat = "7 (a (b) c) R 1 7 7 0 -1 4194304 100 0 0 0 12 30 0 0 20 0 1 0 5 6 7";
+        assert_eq!(ticks(stat), Some(42.0));
+        assert!(n_running("/proc/self") >= 1);
+    }
+}

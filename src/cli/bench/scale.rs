@@ -1,0 +1,151 @@
+//! `orator bench scale`.
+
+use super::child::{Child, measure};
+use crate::cli::road::Step;
+use crate::cli::{Outcome, ui::Ui};
+use anyhow::{Context, Result, ensure};
+use orator::config;
+use orator::demo::folder::{self, Plan};
+use orator::media::audio;
+use orator::stage::Unit;
+use orator::stage::fingerprint::{Fingerprint, HashCache};
+use orator::stage::progress::{Progress, Silent};
+use orator::stage::record::{Output, Record};
+use orator::stage::runner::place;
+use orator::types::sound::{SAMPLE_RATE, Sound};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde_json::json;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// How time and memory of the verbs that look at all videos grow with the hours of video. A synthetic work folder stands
+/// for the hours, a video of every ten minutes, each with the records and files of `extract` and `pose2d`, whose arrays are
+/// those of a six-second clip with another sound. Each verb runs as a program of its own.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Hours of video, two numbers.
+    #[arg(long, num_args = 2, default_values_t = [10, 100], value_name = "HOURS")]
+    hours: Vec<usize>,
+    /// A folder with some gigabytes of room, which gets a temporary one.
+    #[arg(long, default_value = ".", value_name = "DIR")]
+    dir: PathBuf,
+}
+
+const CLIP_SECS: f64 = 6.0;
+const VIDEOS_AN_HOUR: usize = 6;
+
+/// What is measured, in the order in which it can be.
+const VERBS: [(&str, &[&str]); 6] = [
+    ("segment", &["run", "--only", "segment"]),
+    ("lift", &["run", "--only", "lift"]),
+    ("shard", &["run", "--only", "shard"]),
+    ("segment again", &["run", "--only", "segment", "--force"]),
+    ("run, all fresh", &["run"]),
+    ("status", &["status", "--why"]),
+];
+
+pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+    let (few, many) = (args.hours[0], args.hours[1]);
+    ensure!(few > 0 && many > few, "--hours takes two numbers, the second one larger, not {few} and {many}");
+    let root = std::path::absolute(args.dir.join(format!("bench-{}", std::process::id())))?;
+    let measured = both(&root, few, many, ui);
+    fs::remove_dir_all(&root).with_context(|| format!("removing {}", root.display()))?;
+    let measured = measured?;
+
+    let mut lines = vec![format!(
+        "{:15} {:>10} {:>10} {:>16}   memory",
+        "",
+        format!("{few} h"),
+        format!("{many} h"),
+        "time an hour"
+    )];
+    let mut facts = serde_json::Map::new();
+    for ((name, _), [of_few, of_many]) in VERBS.iter().zip(&measured) {
+        let per_hour = (of_many.secs / many as f64) / (of_few.secs / few as f64);
+        lines.push(format!(
+            "{name:15} {:8.2} s {:8.2} s {per_hour:12.2} times   {:.0} MiB, then {:.0} MiB",
+            of_few.secs, of_many.secs, of_few.peak_mib, of_many.peak_mib
+        ));
+        facts.insert(
+            (*name).to_owned(),
+            json!({
+                "secs": [of_few.secs, of_many.secs], "peak_mib": [of_few.peak_mib, of_many.peak_mib],
+                "time_an_hour_ratio": per_hour,
+            }),
+        );
+    }
+    ui.summary(&lines.join("\n"), None, json!({ "hours": [few, many], "verbs": facts }));
+    Ok(Outcome::Done)
+}
+
+/// Every verb of `VERBS`, for the few hours and for the many.
+fn both(root: &Path, few: usize, many: usize, ui: &Ui) -> Result<Vec<[Child; 2]>> {
+    let clip = root.join("clip");
+    let plan = Plan { n_videos: 1, secs: CLIP_SECS, ..Plan::default() };
+    folder::draw(&clip, &plan, &Silent)?;
+    measure(&clip, &["run", "--to", "pose2d"])?;
+    let task = ui.begin("bench scale", 2 * VERBS.len() as u64);
+    let of_hours = |hours: usize| -> Result<Vec<Child>> {
+        let dir = root.join(format!("{hours}-hours"));
+        task.detail(&format!("{hours} h"));
+        make(&clip, &dir, hours * VIDEOS_AN_HOUR)?;
+        let children = VERBS.iter().map(|(_, args)| {
+            task.advance(1);
+            measure(&dir, args)
+        });
+        children.collect()
+    };
+    let (of_few, of_many) = (of_hours(few)?, of_hours(many)?);
+    Ok(of_few.into_iter().zip(of_many).map(|(few, many)| [few, many]).collect())
+}
+
+/// A project folder of `n_videos` whose `extract` and `pose2d` are done, after the pattern of the one video of `clip`.
+fn make(clip: &Path, dir: &Path, n_videos: usize) -> Result<()> {
+    let videos = dir.join("videos/host");
+    fs::create_dir_all(&videos)?;
+    copy_all(&clip.join("models"), &dir.join("models"))?;
+    fs::copy(clip.join("pipeline.toml"), dir.join("pipeline.toml"))?;
+    for n in 0..n_videos {
+        fs::write(videos.join(format!("talk-{n:05}.mp4")), format!("stands for video {n}"))?;
+    }
+    let units = |dir: &Path| -> Result<(config::Config, Vec<Unit>)> {
+        let config = config::load(&dir.join("pipeline.toml"), &[])?;
+        let units = config::videos::of(&config).into_iter().flat_map(|videos| videos.units).collect();
+        Ok((config, units))
+    };
+    let (pattern, (config, units)) = (units(clip)?.1, units(dir)?);
+    let [pattern] = &pattern[..] else { anyhow::bail!("the pattern has {} videos", pattern.len()) };
+    let hashes = HashCache::open(&config.settings.work.dir.join("hashes.json"));
+    for step in [Step::Extract, Step::Pose2d] {
+        let stage = step.stage(&config, &[])?;
+        let from = place(&clip.join("work"), stage.folder(), pattern);
+        let record = Record::read(&from).with_context(|| format!("{} was not made", from.display()))?;
+        for (n, unit) in units.iter().enumerate() {
+            let to = place(&config.settings.work.dir, stage.folder(), unit);
+            copy_all(&from, &to)?;
+            if step == Step::Extract {
+                audio::write_wav(&to.join("audio.wav"), &noise(n as u64))?;
+            }
+            let fingerprint = Fingerprint::now(&*stage, unit, &hashes)?;
+            Record { fingerprint, outputs: Output::list(&to)?, ..record.clone() }.write(&to)?;
+        }
+    }
+    hashes.save()
+}
+
+/// A sound that no other video has.
+fn noise(seed: u64) -> Sound {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let n = (CLIP_SECS * f64::from(SAMPLE_RATE)) as usize;
+    Sound { rate: SAMPLE_RATE, samples: (0..n).map(|_| rng.random_range(-0.3f32..0.3)).collect() }
+}
+
+fn copy_all(from: &Path, to: &Path) -> Result<()> {
+    fs::create_dir_all(to)?;
+    for entry in fs::read_dir(from).with_context(|| format!("reading {}", from.display()))? {
+        let path = entry?.path();
+        fs::copy(&path, to.join(path.file_name().unwrap_or_default()))?;
+    }
+    Ok(())
+}
