@@ -1,10 +1,12 @@
 //! The only room that knows ffmpeg. `probe` says what a file holds, `frames` streams its pictures at a chosen rate by
-//! presentation time, `audio` its sound on the same clock, `encode` writes mp4. Beneath them: `source` opens files and
-//! names what is wrong with them, `decode` turns one stream into decoded frames, `picture` makes those upright RGB.
+//! presentation time (`ahead`: beside other work), `audio` its sound on the same clock, `encode` writes mp4. Beneath
+//! them: `source` opens files and names what is wrong with them, `decode` turns one stream into decoded frames, `picture`
+//! makes those upright RGB.
 //!
 //! One clock for all: time 0 is the first picture that decodes (`origin`); a file without pictures starts with its first
 //! sample.
 
+pub mod ahead;
 pub mod audio;
 mod decode;
 pub mod encode;

@@ -4,7 +4,8 @@
 use super::chain::Chain;
 use super::store::{self, Gathered};
 use crate::config::{self, Settings};
-use crate::media::{self, frames::FrameReader};
+use crate::media::frames::{FrameReader, FrameTime};
+use crate::media::{self, ahead};
 use crate::motion::npz::Npz;
 use crate::onnx::{Manifest, ModelEntry, OpenError, Runtime};
 use crate::stage::progress::Progress;
@@ -123,26 +124,32 @@ impl Stage for Pose2dStage {
                 .set_reference(&picture.image)
                 .with_context(|| format!("the speaker's reference {}", path.display()))?;
         }
-        let mut reader = FrameReader::open(&unit.source, self.fps)?;
+        let reader = FrameReader::open(&unit.source, self.fps)?;
         let [width, height] = reader.image_size();
         let image_size = [u32::try_from(width)?, u32::try_from(height)?];
         let task = progress.begin(&unit.to_string(), restarts.len() as u64);
         let mut gathered = Gathered::default();
         let mut seen = Seen::default();
         let mut pose = Pose2d::default();
-        while let Some(time) = reader.advance()? {
+        let restart_at =
+            |idx: usize| restarts.get(idx).copied().with_context(|| unlike(&unit.source, idx + 1, restarts.len()));
+        let pick = |reader: &mut FrameReader, time: FrameTime| {
+            let is_new = time.frame_idx == 0 || restart_at(time.frame_idx)? || !time.repeated;
+            is_new.then(|| reader.picture(None)).transpose()
+        };
+        ahead::for_each(reader, pick, |time, picture| {
             let idx = time.frame_idx;
-            let restart = *restarts.get(idx).with_context(|| unlike(&unit.source, idx + 1, restarts.len()))?;
-            if restart {
+            if restart_at(idx)? {
                 chain.begin_shot();
             }
-            if idx == 0 || restart || !time.repeated {
-                pose = chain.frame(&reader.picture(None)?).with_context(|| format!("frame {idx}"))?;
+            if let Some(picture) = picture {
+                pose = chain.frame(&picture).with_context(|| format!("frame {idx}"))?;
             }
             seen.count(&pose);
             gathered.push(&pose, time.source_secs);
             task.advance(1);
-        }
+            Ok(())
+        })?;
         ensure!(gathered.n_frames() == restarts.len(), unlike(&unit.source, gathered.n_frames(), restarts.len()));
         let (keypoints, extras) = gathered.finish(self.fps, image_size)?;
         store::write(&out.join(KEYPOINTS_FILE), &keypoints, &extras)?;
