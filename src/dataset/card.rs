@@ -13,16 +13,16 @@ pub fn text(info: &Info, stats: &Stats, leakage: &Leakage) -> String {
     let _ = write!(
         text,
         "# Speech and gestures of {speaker}\n\n\
-         3D upper-body and finger motion with its speech: one speaker, {:.2} h of motion kept of {:.2} h of video, at {}.\n\n\
-         | split | videos | intervals | hours |\n|---|---|---|---|\n",
-        stats.footage.kept_secs / 3600.0,
-        stats.footage.secs / 3600.0,
+         3D upper-body and finger motion with its speech: one speaker, {} of motion kept of {} of video, at {}.\n\n\
+         | split | videos | intervals | length |\n|---|---|---|---|\n",
+        length(stats.footage.kept_secs),
+        length(stats.footage.secs),
         info.fps
     );
     for split in Split::ALL {
         if let Some(part) = info.splits.get(split.name()) {
-            let (videos, hours) = (part.videos.len(), part.secs / 3600.0);
-            let _ = writeln!(text, "| {} | {videos} | {} | {hours:.3} |", split.name(), part.samples);
+            let (videos, length) = (part.videos.len(), length(part.secs));
+            let _ = writeln!(text, "| {} | {videos} | {} | {length} |", split.name(), part.samples);
         }
     }
     let _ = write!(
@@ -35,24 +35,24 @@ pub fn text(info: &Info, stats: &Stats, leakage: &Leakage) -> String {
     let axes = &info.axes;
     let _ = write!(
         text,
-        "\nAxes: x {}, y {}, z {}; {}; the origin is {}. `info.json` names joints, parents and sides. Size is a convention: \
-         no picture tells it. Hands that a shoulder, elbow and wrist lead to are as long as the forearm suggests.\n",
+        "\nAxes: x {}, y {}, z {}; {}; the origin is {}. `info.json` names joints, parents and sides. Sizes are a convention, \
+         as no picture tells them: arms and shoulders of a common adult, hands in proportion to the forearm.\n",
         axes.x, axes.y, axes.z, axes.unit, axes.origin
     );
     let _ = write!(
         text,
         "\n## Reading it\n\n```python\nfrom datasets import load_dataset\n\
-         motion = load_dataset(\"webdataset\", data_files={{\"train\": \"train-*.tar\"}}, split=\"train\")\n```\n\n\
+         # sound is decoded by torchcodec\nmotion = load_dataset(\"webdataset\", data_files={{\"train\": \"train-*.tar\"}}, split=\"train\")\n```\n\n\
          ```python\nimport glob, webdataset\n\
          motion = webdataset.WebDataset(sorted(glob.glob(\"train-*.tar\")), shardshuffle=False).decode()\n```\n\n\
          `orator dataset verify --deep .` checks every byte; so does `b3sum --check checksums.b3`.\n\n\
-         ## What became of the footage\n\n| | hours |\n|---|---|\n| kept | {:.3} |\n",
-        stats.footage.kept_secs / 3600.0
+         ## What became of the footage\n\n| | length |\n|---|---|\n| kept | {} |\n",
+        length(stats.footage.kept_secs)
     );
     for (reason, secs) in &stats.footage.refused_secs {
-        let _ = writeln!(text, "| refused: {reason} | {:.3} |", secs / 3600.0);
+        let _ = writeln!(text, "| refused: {reason} | {} |", length(*secs));
     }
-    let _ = writeln!(text, "| failed | {:.3} |", stats.footage.failed_secs / 3600.0);
+    let _ = writeln!(text, "| failed | {} |", length(stats.footage.failed_secs));
     let _ = write!(
         text,
         "\n`ledger.jsonl` says of every second of every video which it was, with what was measured.\n\n## Splits\n\n\
@@ -97,6 +97,15 @@ fn header(info: &Info) -> String {
         filled.iter().for_each(|name| text += &format!("  - split: {name}\n    path: \"{name}-*.tar\"\n"));
     }
     text + "---\n\n"
+}
+
+/// Seconds as people say them.
+fn length(secs: f64) -> String {
+    match secs {
+        ..120.0 => format!("{secs:.1} s"),
+        ..7200.0 => format!("{:.1} min", secs / 60.0),
+        _ => format!("{:.2} h", secs / 3600.0),
+    }
 }
 
 fn size_category(samples: usize) -> &'static str {

@@ -48,16 +48,16 @@ impl Outcome<'_> {
     fn warnings(&self, leakage: &Leakage) -> Vec<String> {
         let Self { videos, stats, n_failed, n_left_out, .. } = *self;
         let mut warnings = Vec::new();
-        let longest = videos.iter().max_by(|a, b| a.ledger.kept_secs().total_cmp(&b.ledger.kept_secs()));
+        // The longest is the one to train on; each of the others is proposed once.
+        let mut by_length: Vec<&Video> = videos.iter().filter(|video| video.ledger.kept_secs() > 0.0).collect();
+        by_length.sort_by(|a, b| b.ledger.kept_secs().total_cmp(&a.ledger.kept_secs()));
+        let mut others = by_length.iter().skip(1);
         let shares = [(Split::Train, 1.0), (Split::Validation, self.shard.validation), (Split::Test, self.shard.test)];
         for (split, _) in shares.into_iter().filter(|(split, share)| *share > 0.0 && windows(stats, *split) == 0) {
             let name = split.name();
             let file = match split {
-                Split::Train => longest,
-                _ => videos
-                    .iter()
-                    .filter(|video| video.ledger.kept_secs() > 0.0)
-                    .find(|v| longest.is_none_or(|l| l.name != v.name)),
+                Split::Train => by_length.first(),
+                _ => others.next(),
             };
             warnings.push(match file {
                 Some(video) => format!(

@@ -211,5 +211,6 @@ fn distance(a: Point, b: Point) -> f64 {
 }
 
 fn keypoint([x, y, score]: Point) -> Keypoint {
-    Keypoint { x: x as f32, y: y as f32, score: score as f32 }
+    // The peak of a heat-map may reach a little over 1.
+    Keypoint { x: x as f32, y: y as f32, score: score.clamp(0.0, 1.0) as f32 }
 }
