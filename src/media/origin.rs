@@ -20,7 +20,7 @@ pub(super) fn first_picture_secs(path: &Path) -> Result<Option<f64>> {
     if !decode.next(&mut first)? {
         return Ok(None);
     }
-    let (tick, position) = (decode.time_base(), first.packet().position as i64);
+    let (tick, position) = (decode.time_base(), first.packet().position);
     let mut ticks = first.timestamp().unwrap_or(0);
     drop(decode);
     if has_edits && let Some(unmoved) = unmoved_ticks(path, stream_idx, position)? {

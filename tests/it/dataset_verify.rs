@@ -77,10 +77,13 @@ fn missing_and_strange_files_are_named() {
     assert!(verify(&dir.path().join("nothing"), false, &Silent).unwrap_err().to_string().contains("is no dataset"));
 }
 
+/// What it says, and how to bring it about.
+type Spoilt = (&'static str, fn(&mut Sample));
+
 /// Numbers that cannot be, in files whose hashes are right.
 #[test]
 fn numbers_that_cannot_be_are_found() {
-    let spoilt: [(&str, fn(&mut Sample)); 4] = [
+    let spoilt: [Spoilt; 4] = [
         ("the bone to joint 5", |sample| sample.motion.joints[[2, 5, 1]] += 0.01),
         ("the mask says it was seen", |sample| {
             sample.motion.joints.slice_mut(ndarray::s![1, 20, ..]).fill(f32::NAN);
