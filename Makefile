@@ -97,6 +97,9 @@ prove: build
 	ORATOR_KILLS=20 ORATOR_LONG=1 cargo test --release --locked --test it -- --nocapture --test-threads 1 kill:: memory:: sync::
 	cargo test --release --locked --test it -- --nocapture --test-threads 1 golden:: pose_parity:: real::
 	$(ORATOR) bench lift
+	$(ORATOR) bench dataset --dir $(TARGET)
+	$(ORATOR) bench scale --dir $(TARGET)
+	$(ORATOR) demo draw $(TARGET)/bench-run --videos 2 --secs 20 && $(ORATOR) bench run -c $(TARGET)/bench-run/pipeline.toml
 	if [ -e $(CLIP) ]; then $(ORATOR) bench pose2d $(CLIP) --models-dir $(MODELS); else echo 'SKIPPED: $(CLIP) is not there'; fi
 	if [ ! -e $(CLIP) ] || [ ! -e $(REFERENCE) ]; then echo 'SKIPPED: $(CLIP) or $(REFERENCE) is not there'; \
 	elif ! "$$ORATOR_REFERENCE_PYTHON" -c 'import onnxruntime, cv2, numpy' 2>/dev/null; then \

@@ -19,9 +19,12 @@ fn header(rate: u32, n_samples: usize) -> [u8; HEADER_BYTES] {
 /// The sound as a WAV file; samples outside -1..1 are clipped. `sound` of another wav comes back bit for bit.
 pub fn write(sound: &Sound) -> Vec<u8> {
     let mut bytes = header(sound.rate, sound.samples.len()).to_vec();
-    bytes.reserve(2 * sound.samples.len());
-    for sample in &sound.samples {
-        bytes.extend(((sample * 32_768.0).round() as i16).to_le_bytes());
+    bytes.resize(HEADER_BYTES + 2 * sound.samples.len(), 0);
+    let places = bytes[HEADER_BYTES..].as_chunks_mut::<2>().0;
+    for (place, sample) in places.iter_mut().zip(&sound.samples) {
+        let value = f64::from(sample * 32_768.0);
+        // Halves away from zero, as `round` has it, exactly; `round` itself is a slow call.
+        *place = ((value + 0.5f64.copysign(value)) as i16).to_le_bytes();
     }
     bytes
 }

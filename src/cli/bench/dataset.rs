@@ -59,7 +59,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
 }
 
 fn measure(args: &Args, n_intervals: usize, place: &Path, ui: &Ui) -> Result<Outcome> {
-    let samples: Vec<Sample> = (0..16).map(random_interval).collect();
+    let mut samples: Vec<Sample> = (0..16).map(random_interval).collect();
     let (written, copied) = (place.join("written"), place.join("copied"));
     let (mut write, mut copy, mut read, mut plain) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut bytes = 0;
@@ -70,7 +70,7 @@ fn measure(args: &Args, n_intervals: usize, place: &Path, ui: &Ui) -> Result<Out
             fs::create_dir(folder).with_context(|| format!("making {}", folder.display()))?;
         }
         write.push(secs_of(|| {
-            write_all(&written, &samples, n_intervals)?;
+            write_all(&written, &mut samples, n_intervals)?;
             files(&written)?.iter().try_for_each(|path| Ok(File::open(path)?.sync_all()?))
         })?);
         let all = files(&written)?;
@@ -131,7 +131,7 @@ fn random_interval(seed: u64) -> Sample {
 }
 
 /// Writes a dataset of intervals drawn from `samples` in turn; the second video is for validation.
-fn write_all(dir: &Path, samples: &[Sample], n_intervals: usize) -> Result<()> {
+fn write_all(dir: &Path, samples: &mut [Sample], n_intervals: usize) -> Result<()> {
     let writer = DatasetWriter::new(dir, About::new("bench", FPS), 256 << 20);
     for first in (0..n_intervals).step_by(PER_VIDEO) {
         let name = format!("video-{first:08x}");
@@ -139,8 +139,9 @@ fn write_all(dir: &Path, samples: &[Sample], n_intervals: usize) -> Result<()> {
         let source = Source { name: name.clone(), ..Source::default() };
         let mut video = writer.video(source, split, SplitBy::Name)?;
         for n in first..n_intervals.min(first + PER_VIDEO) {
-            let sample = &samples[n % samples.len()];
-            video.push(&Sample { key: format!("{name}-{n:06}"), ..sample.clone() }, 0.0)?;
+            let at = n % samples.len();
+            samples[at].key = format!("{name}-{n:06}");
+            video.push(&samples[at], 0.0)?;
         }
         video.finish(None)?;
     }
