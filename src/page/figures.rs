@@ -19,12 +19,17 @@ pub fn clock(secs: f64) -> String {
     if hours > 0 { format!("{hours}:{minutes:02}:{seconds}") } else { format!("{minutes}:{seconds}") }
 }
 
-/// Up to three digits after the point, none of them an idle zero.
+/// At least three digits that say something, no idle zero among them.
 pub fn number(value: f64) -> String {
     if !value.is_finite() {
         return "unknown".to_owned();
     }
-    let digits = if value.abs() >= 100.0 { 0 } else { 3 };
+    let digits = match value.abs() {
+        n if n >= 100.0 => 0,
+        n if n >= 10.0 => 1,
+        n if n >= 1.0 => 2,
+        _ => 3,
+    };
     let text = format!("{value:.digits$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
@@ -55,7 +60,10 @@ mod tests {
         assert_eq!([41.24, 744.0, 11_772.0, -0.0].map(length), ["41.2 s", "12.4 min", "3.27 h", "0.0 s"]);
         assert_eq!([1, 2].map(|n| counted(n, "stretch")), ["1 stretch", "2 stretches"]);
         assert_eq!([4.8, 59.96, 3723.0].map(clock), ["0:04.8", "1:00.0", "1:02:03.0"]);
-        assert_eq!([0.34, 1.0, -50.0, 1234.5, -0.0001].map(number), ["0.34", "1", "-50", "1234", "0"]);
+        assert_eq!(
+            [0.34, 1.0, 98.712, 4.267, -50.0, 1234.5, -0.0001].map(number),
+            ["0.34", "1", "98.7", "4.27", "-50", "1234", "0"]
+        );
         assert_eq!((with_unit(0.5, ""), with_unit(3.0, "s")), ("0.5".to_owned(), "3 s".to_owned()));
         assert_eq!((percent(1.0, 8.0), percent(0.0, 0.0)), ("12.5 %".to_owned(), "\u{2013}".to_owned()));
     }

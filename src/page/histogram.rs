@@ -40,15 +40,19 @@ impl Counts {
         self.low + (self.high - self.low) * bin as f64 / self.bins.len() as f64
     }
 
-    /// The value below which `share` of all lie, to the middle of its bin; NaN of nothing.
+    /// The value below which `share` of all lie, as if those of a bin were spread evenly over it; NaN of nothing.
     pub fn quantile(&self, share: f64) -> f64 {
-        let (total, mut sum) = (self.total(), 0);
-        let target = (share * total as f64).ceil().max(1.0) as u64;
-        let bin = self.bins.iter().position(|count| {
-            sum += count;
-            sum >= target
-        });
-        bin.filter(|_| total > 0).map_or(f64::NAN, |bin| (self.edge(bin) + self.edge(bin + 1)) / 2.0)
+        let wanted = share * self.total() as f64;
+        let mut before = 0.0;
+        for (bin, count) in self.bins.iter().enumerate().filter(|(_, count)| **count > 0) {
+            let count = *count as f64;
+            if before + count >= wanted {
+                let inside = ((wanted - before) / count).clamp(0.0, 1.0);
+                return self.edge(bin) + inside * (self.edge(bin + 1) - self.edge(bin));
+            }
+            before += count;
+        }
+        f64::NAN
     }
 }
 

@@ -17,16 +17,14 @@ pub fn gallery(worst: &Worst, pictures: &Pictures, videos: &[Video]) -> Vec<Node
         return vec![node("p").class("empty").text("Nothing was refused, or no pictures were asked for.")];
     }
     let about = "Of each rule the refused stretches that break it most, each at its worst frame, with the keypoints that were \
-                 found. Two pictures side by side are a frame and the one after it.";
+                 found. Two pictures side by side are a frame and the next.";
     let mut shown = vec![node("p").text(about)];
     for ((_, reason, unit), moments) in &worst.rules {
         let swatch = node("span").class(format!("swatch {}", reasons::class(reason)));
-        let words = if unit.is_empty() { reason.clone() } else { format!("{reason} ({unit})") };
-        let title = node("h3")
-            .class("rule")
-            .child(swatch)
-            .child(node("span").text(words))
-            .child(node("small").text(counted(moments.len(), "stretch")));
+        let measured = if unit.is_empty() { String::new() } else { format!(", measured in {unit}") };
+        let about = format!("{}{measured}", counted(moments.len(), "stretch"));
+        let title =
+            node("h3").class("rule").child(swatch).child(node("span").text(reason)).child(node("small").text(about));
         let cards = moments.iter().filter_map(|moment| Some(card(moment, videos.get(moment.video)?, pictures)));
         shown.push(node("div").class("gallery").child(title).child(node("div").class("shots").children(cards)));
     }
@@ -41,5 +39,8 @@ fn card(moment: &Moment, video: &Video, pictures: &Pictures) -> Node {
     };
     let link = node("a").attr("href", format!("#{}", video.anchor())).text(at);
     let says = if moment.here.is_empty() { moment.says.clone() } else { format!("{}; {}", moment.says, moment.here) };
-    node("figure").class("card shot").child(shown).child(node("figcaption").child(link).child(node("small").text(says)))
+    node("figure")
+        .class(if moment.frames.len() > 1 { "card shot pair" } else { "card shot" })
+        .child(shown)
+        .child(node("figcaption").child(link).child(node("small").text(says)))
 }

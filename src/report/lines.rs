@@ -7,12 +7,16 @@ use crate::page::timeline::{Stretch, timeline};
 use crate::page::{Node, node};
 use std::collections::BTreeSet;
 
+/// Stretches that are drawn of all videos together, and the least of each: the page must not grow too large.
+const MOST: usize = 40_000;
+const LEAST: usize = 50;
 /// No line is narrower than this share of the longest one's.
 const NARROWEST: f64 = 0.05;
 
 /// The lines of all videos under their legend.
 pub fn lines(videos: &[Video]) -> Vec<Node> {
     let longest = videos.iter().map(|video| video.ledger.duration_secs).fold(0.0, f64::max).max(1e-9);
+    let most = (MOST / videos.len().max(1)).max(LEAST);
     let wide = node("label")
         .class("wide small")
         .child(node("input").attr("type", "checkbox").id("wide"))
@@ -36,7 +40,7 @@ pub fn lines(videos: &[Video]) -> Vec<Node> {
         let share = (ledger.duration_secs / longest).max(NARROWEST);
         let title = node("h3").child(node("span").text(&video.file)).child(node("small").text(about));
         let line = if ledger.duration_secs > 0.0 {
-            timeline(&format!("Timeline of {}", video.file), ledger.duration_secs, &stretches(video))
+            timeline(&format!("Timeline of {}", video.file), ledger.duration_secs, &stretches(video), most)
         } else {
             node("p").class("empty").text("Nothing is known of its seconds.")
         };

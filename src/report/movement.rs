@@ -8,7 +8,7 @@ use crate::types::skeleton::{L_ELBOW, L_HAND, L_WRIST, NECK, R_ELBOW, R_HAND, R_
 /// Farther than this no joint is from what it hangs on, metres.
 const REACH: f64 = 1.2;
 /// Faster ones are counted as this fast, metres a second.
-const FASTEST: f64 = 4.0;
+const FASTEST: f64 = 3.0;
 
 /// A joint of each side (left, right) and what each is measured from.
 #[derive(Clone, Copy)]

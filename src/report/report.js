@@ -53,7 +53,7 @@
     at("change").textContent = i === threshold.now ? "as configured" : sign ? `${words} against now` : words;
     at("change").className = sign;
     at("toml").textContent = i === threshold.now
-      ? "# the thresholds as they are configured"
+      ? "# as configured"
       : `[segment]\n${threshold.key} = ${threshold.values[i]}`;
     videos.forEach((video, v) => {
       const tenths = video.tenths[which], [cell, difference] = rows[v];

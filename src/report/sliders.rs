@@ -55,7 +55,7 @@ pub fn sliders(kept: &[Option<Kept>], rules: &Segment) -> Vec<Node> {
     let cards =
         THRESHOLDS.iter().zip(&sums).enumerate().map(|(i, (threshold, sums))| card(i, threshold, sums, most, rules));
     let now = sums.first().map_or(0.0, |row| row[THRESHOLDS[0].grid(rules).1]);
-    let toml = node("pre").child(node("code").id("toml").text("# the thresholds as they are configured"));
+    let toml = node("pre").child(node("code").id("toml").text("# as configured"));
     let result = node("div")
         .class("result")
         .attr("role", "status")
