@@ -3,10 +3,10 @@
 //! together from these: `info.json` (what the numbers mean), `stats.json` (what they are like), `index.jsonl` (where each
 //! sample lies), `ledger.jsonl` (what became of every second), `leakage.json`, the card `README.md`, `checksums.b3`.
 //!
-//! A sample is an interval, continuous motion with its sound; windows are drawn when reading (`windows`). The way of
-//! a sample: `video` (cut) -> `sample` (members) -> `shard` (tar) -> `part` (a video) -> `assemble`; back: `read` ->
-//! `windows`. `split` and `shared_sound` decide where a video goes, `verify` checks all of it. Sound and motion meet by
-//! time in `sync`, nowhere else.
+//! A sample is an interval, continuous motion with its sound; windows are drawn when training (`train::examples`). The
+//! way of a sample: `video` (cut) -> `sample` (members) -> `shard` (tar) -> `part` (a video) -> `assemble`; back: `read`.
+//! `split` and `shared_sound` decide where a video goes, `verify` checks all of it. Sound and motion meet by time in
+//! `sync`, nowhere else.
 
 pub mod assemble;
 pub mod bones;
@@ -30,14 +30,12 @@ pub mod verify;
 mod verify_sample;
 mod video;
 pub mod wav;
-pub mod windows;
 pub mod write;
 
 pub use read::Dataset;
 pub use sample::Sample;
 pub use split::Split;
 pub use stage::ShardStage;
-pub use windows::Windows;
 pub use write::write_dataset;
 
 /// Version of the folder's layout; a reader refuses any other.

@@ -48,15 +48,18 @@ fn header(element: Element, shape: &[usize]) -> Vec<u8> {
 /// The file of a float32 array of `shape`; `values` in C order.
 pub fn write_f32<'a>(shape: &[usize], values: impl Iterator<Item = &'a f32>) -> Vec<u8> {
     let mut bytes = header(Element::F32, shape);
-    bytes.reserve(4 * shape.iter().product::<usize>());
-    values.for_each(|value| bytes.extend(value.to_le_bytes()));
+    let data_at = bytes.len();
+    bytes.resize(data_at + 4 * shape.iter().product::<usize>(), 0);
+    bytes[data_at..].as_chunks_mut::<4>().0.iter_mut().zip(values).for_each(|(place, v)| *place = v.to_le_bytes());
     bytes
 }
 
 /// The file of a bool array of `shape`; `values` in C order.
 pub fn write_bool<'a>(shape: &[usize], values: impl Iterator<Item = &'a bool>) -> Vec<u8> {
     let mut bytes = header(Element::Bool, shape);
-    bytes.extend(values.map(|&value| u8::from(value)));
+    let data_at = bytes.len();
+    bytes.resize(data_at + shape.iter().product::<usize>(), 0);
+    bytes[data_at..].iter_mut().zip(values).for_each(|(place, &value)| *place = u8::from(value));
     bytes
 }
 

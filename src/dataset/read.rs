@@ -7,7 +7,7 @@ use super::npy::{self, Element, Layout};
 use super::sample::{N_KEYPOINTS, Sample};
 use super::split::Split;
 use super::stats::Stats;
-use super::{INDEX, INFO, STATS, sync, wav};
+use super::{INDEX, INFO, STATS, wav};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::{SAMPLE_RATE, Sound};
@@ -126,7 +126,7 @@ impl Dataset {
     }
 
     /// The motion of the frames `frames` of a sample; only these are read, no hash is checked.
-    pub fn motion(&self, sample: &SampleRef, frames: Range<usize>) -> Result<Motion> {
+    fn motion(&self, sample: &SampleRef, frames: Range<usize>) -> Result<Motion> {
         let n_frames = frames.len();
         let joints = npy::floats(&self.rows(sample, sample.pose3d, Element::F32, &[N_JOINTS, 3], frames.clone())?);
         let mask = npy::bools(&self.rows(sample, sample.mask, Element::Bool, &[N_JOINTS], frames)?);
@@ -135,18 +135,6 @@ impl Dataset {
             joints: Array3::from_shape_vec((n_frames, N_JOINTS, 3), joints).context("shaping joints")?,
             mask: Array2::from_shape_vec((n_frames, N_JOINTS), mask).context("shaping the mask")?,
         })
-    }
-
-    /// The sound under the frames `start..start + n_frames` of a sample: always `round(n_frames / fps * rate)`
-    /// samples, whatever `start` is, silence where the interval's sound ends earlier.
-    pub fn sound_of_frames(&self, sample: &SampleRef, start: usize, n_frames: usize) -> Result<Sound> {
-        let (fps, rate) = (self.info.fps, self.info.sound_rate);
-        let begin = sync::sample_at(fps, rate, start);
-        let length = sync::sample_at(fps, rate, n_frames);
-        let held = (sample.wav.size.saturating_sub(wav::HEADER_BYTES as u64) / 2) as usize;
-        let mut sound = self.sound(sample, begin.min(held)..(begin + length).min(held))?;
-        sound.samples.resize(length, 0.0);
-        Ok(sound)
     }
 
     fn sound(&self, sample: &SampleRef, range: Range<usize>) -> Result<Sound> {

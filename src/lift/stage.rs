@@ -7,7 +7,7 @@ use super::outliers::{self, BoneChange};
 use super::{Lifted, Lifter};
 use crate::config;
 use crate::motion::npz::Npz;
-use crate::motion::{joints_npz, keypoints_npz, own_hands};
+use crate::motion::{joints_npz, keypoints_npz};
 use crate::stage::ledger::Ledger;
 use crate::stage::{Input, Report, Stage, Unit, progress::Progress, runner::place};
 use crate::types::interval::Intervals;
@@ -111,7 +111,6 @@ impl Stage for LiftStage {
             repeated.len()
         );
         unsee(&mut keypoints, &repeated);
-        own_hands::unsee_others(&mut keypoints);
         let path = self.segmented(unit, "intervals.json");
         let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
         let intervals: Intervals =

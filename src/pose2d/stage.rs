@@ -6,7 +6,7 @@ use super::store::{self, Gathered};
 use crate::config::{self, Settings};
 use crate::media::frames::{FrameReader, FrameTime};
 use crate::media::{self, ahead};
-use crate::motion::npz::Npz;
+use crate::motion::{npz::Npz, own_hands};
 use crate::onnx::{Manifest, ModelEntry, OpenError, Runtime};
 use crate::stage::progress::Progress;
 use crate::stage::runner::place;
@@ -73,7 +73,7 @@ impl Stage for Pose2dStage {
     }
 
     fn version(&self) -> u32 {
-        2
+        3
     }
 
     fn settings(&self) -> Value {
@@ -151,7 +151,8 @@ impl Stage for Pose2dStage {
             Ok(())
         })?;
         ensure!(gathered.n_frames() == restarts.len(), unlike(&unit.source, gathered.n_frames(), restarts.len()));
-        let (keypoints, extras) = gathered.finish(self.fps, image_size)?;
+        let (mut keypoints, extras) = gathered.finish(self.fps, image_size)?;
+        own_hands::take_out_others(&mut keypoints);
         store::write(&out.join(KEYPOINTS_FILE), &keypoints, &extras)?;
         Ok(seen.report())
     }

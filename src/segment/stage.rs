@@ -5,8 +5,8 @@ use super::judge::{Video, judge};
 use super::measure::{self, Measures};
 use super::sound;
 use crate::config;
+use crate::motion::keypoints_npz;
 use crate::motion::npz::Npz;
-use crate::motion::{keypoints_npz, own_hands};
 use crate::stage::ledger::{Ledger, longest_first};
 use crate::stage::progress::Progress;
 use crate::stage::runner::place;
@@ -77,8 +77,7 @@ impl Stage for SegmentStage {
 impl SegmentStage {
     fn measures(&self, unit: &Unit, video: &Video) -> Result<Measures> {
         let path = self.file("pose2d", unit, "keypoints.npz");
-        let (mut keypoints, extras) = (keypoints_npz::read(&path)?, keypoints_npz::read_extras(&path)?);
-        own_hands::unsee_others(&mut keypoints);
+        let (keypoints, extras) = (keypoints_npz::read(&path)?, keypoints_npz::read_extras(&path)?);
         let n_frames = video.n_frames;
         ensure!(
             keypoints.n_frames() == n_frames && extras.identity.len() == n_frames && keypoints.fps == video.fps,

@@ -1,7 +1,7 @@
-//! The dataset's folder: round trip, the same bytes twice, damage is an error, windows, and what others read in it.
+//! The dataset's folder: round trip, the same bytes twice, damage is an error, and what others read in it.
 
 use ndarray::{Array2, Array3, s};
-use orator::dataset::{Dataset, Sample, Split, Windows, sync, write_dataset};
+use orator::dataset::{Dataset, Sample, Split, sync, write_dataset};
 use orator::types::pose3d::Motion;
 use orator::types::sound::Sound;
 use orator::types::time::FrameRate;
@@ -64,32 +64,6 @@ fn what_is_written_comes_back() {
     assert!(dataset.stats().n_seen[30] < 134);
 }
 
-#[test]
-fn windows_never_cross_intervals() {
-    let dir = tempfile::tempdir().unwrap();
-    let written = three();
-    write_dataset(dir.path(), "host", FPS, &written).unwrap();
-    let dataset = Dataset::open(dir.path()).unwrap();
-    let windows = Windows::new(&dataset, Split::Train, 64, 5).unwrap();
-    assert_eq!((windows.len(), dataset.stats().windows.strided["train"]), (3, 3));
-    assert_eq!((dataset.stats().windows.apart["train"], dataset.stats().windows.apart["test"]), (2, 1));
-    let starts: Vec<_> = (0..3).map(|i| windows.get(i).unwrap()).collect();
-    let expected = [(0, 0), (0, 5), (1, 0)];
-    for (window, (sample, start)) in starts.iter().zip(expected) {
-        let (_, sample) = &written[sample];
-        assert_eq!((&window.key, window.start), (&sample.key, start));
-        assert_eq!(window.mask, sample.motion.mask.slice(s![start..start + 64, ..]));
-        assert_eq!(window.pose3d[[3, 5, 1]], sample.motion.joints[[start + 3, 5, 1]]);
-        assert_eq!(window.sound.samples.len(), 68_267);
-        let begin = sync::sample_at(FPS, 16_000, start);
-        let held = (sample.sound.samples.len() - begin).min(68_267);
-        assert_eq!(window.sound.samples[..held], sample.sound.samples[begin..begin + held]);
-        assert!(68_267 - held <= 1);
-    }
-    assert!(windows.get(3).is_err());
-    assert!(Windows::new(&dataset, Split::Validation, 64, 5).unwrap().is_empty());
-}
-
 fn folder_bytes(dir: &Path) -> Vec<(String, Vec<u8>)> {
     let mut files: Vec<_> = std::fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
@@ -140,8 +114,6 @@ fn damage_is_an_error_and_never_a_panic() {
         let dataset = Dataset::open(dir.path()).unwrap();
         let sample = &dataset.samples(Split::Train)[0];
         assert!(dataset.read(sample).is_err() || at >= (sample.offset + sample.size) as usize);
-        let windows = Windows::new(&dataset, Split::Train, 4, 1).unwrap();
-        let _ = (0..windows.len()).map(|i| windows.get(i)).collect::<Vec<_>>();
     }
     for length in [0, 511, 512, whole.len() / 2, whole.len() - 1] {
         std::fs::write(&shard, &whole[..length]).unwrap();
@@ -167,8 +139,6 @@ fn damage_is_an_error_and_never_a_panic() {
             let Ok(dataset) = Dataset::open(dir.path()) else { continue };
             for sample in dataset.samples(Split::Train) {
                 let _ = dataset.read(&sample);
-                let _ = dataset.sound_of_frames(&sample, 1, 3);
-                let _ = dataset.motion(&sample, 1..4);
             }
         }
         std::fs::write(&path, &text).unwrap();
