@@ -95,9 +95,11 @@ impl Writer {
     fn close(&mut self) -> Result<()> {
         let file = self.file_name();
         let Some(mut open) = self.open.take() else { return Ok(()) };
-        open.push(&[0; 2 * BLOCK])
-            .and_then(|()| open.file.flush())
-            .with_context(|| format!("writing {}", self.dir.join(&file).display()))?;
+        let written =
+            open.push(&[0; 2 * BLOCK]).and_then(|()| open.file.into_inner().map_err(|error| error.into_error()));
+        let shard = written.with_context(|| format!("writing {}", self.dir.join(&file).display()))?;
+        // Whoever puts the folder in place flushes every file; this only lets the disk begin while the next is made.
+        drop(std::thread::spawn(move || shard.sync_all()));
         self.shards.push(Shard {
             file,
             bytes: open.bytes,
