@@ -111,17 +111,16 @@ impl Stage for ShardStage {
         2
     }
 
-    fn settings(&self) -> serde_json::Value {
-        let speakers = self.speakers.iter().map(|s| (s.name.clone(), [&s.licence, &s.consent, &s.source]));
-        // What became of the other videos stands in the ledger.
-        let mut others = BTreeMap::new();
-        for unit in self.all.iter().flat_map(|videos| &videos.units).filter(|unit| !self.ready.contains(unit)) {
-            others.insert(unit.to_string(), failure(&self.work, unit).failure);
-        }
-        let splits = self.all.iter().map(|videos| (videos.speaker.clone(), &videos.splits));
+    fn settings(&self, unit: &Unit) -> serde_json::Value {
+        let said = self.speakers.iter().find(|said| said.name == unit.speaker).cloned().unwrap_or_default();
+        let videos = self.videos(unit);
+        // What became of the videos that are not ready stands in the ledger.
+        let others = self.failures(unit, &self.ready(unit));
+        let others: BTreeMap<String, Option<String>> = others.into_iter().map(|s| (s.name, s.failure)).collect();
         serde_json::json!({
             "shard": self.shard, "models": self.models, "tool": env!("CARGO_PKG_VERSION"),
-            "speaker": speakers.collect::<BTreeMap<_, _>>(), "splits": splits.collect::<BTreeMap<_, _>>(), "others": others,
+            "speaker": { "licence": said.licence, "consent": said.consent, "source": said.source },
+            "splits": videos.map(|videos| &videos.splits), "others": others,
         })
     }
 

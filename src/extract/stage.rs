@@ -49,7 +49,7 @@ impl Stage for Extract {
         2
     }
 
-    fn settings(&self) -> serde_json::Value {
+    fn settings(&self, _unit: &Unit) -> serde_json::Value {
         json!({ "extract": self.settings, "sample_rate": SAMPLE_RATE, "ffmpeg": media::version() })
     }
 

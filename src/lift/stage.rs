@@ -59,7 +59,7 @@ impl Stage for LiftStage {
         6
     }
 
-    fn settings(&self) -> serde_json::Value {
+    fn settings(&self, _unit: &Unit) -> serde_json::Value {
         // the weights of a file are an input; of the built-in ones the hash stands here
         let hash = |file: &Path, builtin: &[u8]| match file.as_os_str().is_empty() {
             true => json!(blake3::hash(builtin).to_hex().as_str()),

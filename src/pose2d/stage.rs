@@ -76,7 +76,7 @@ impl Stage for Pose2dStage {
         3
     }
 
-    fn settings(&self) -> Value {
+    fn settings(&self, _unit: &Unit) -> Value {
         let read = |entry: &ModelEntry| {
             json!({
                 "id": entry.id, "picture": entry.picture, "fit": entry.fit,

@@ -42,7 +42,7 @@ impl Stage for SegmentStage {
         5
     }
 
-    fn settings(&self) -> serde_json::Value {
+    fn settings(&self, _unit: &Unit) -> serde_json::Value {
         let mut rules = serde_json::json!(self.rules);
         // `lift` judges by this one
         rules.as_object_mut().map(|keys| keys.remove("max_bone_change"));

@@ -36,7 +36,7 @@ impl Fingerprint {
             let hash = hashes.hash(&input.path).with_context(|| format!("the {} of this stage", input.role))?;
             inputs.insert(input.role, hash);
         }
-        Ok(Self { stage: stage.name().to_owned(), version: stage.version(), settings: stage.settings(), inputs })
+        Ok(Self { stage: stage.name().to_owned(), version: stage.version(), settings: stage.settings(unit), inputs })
     }
 }
 

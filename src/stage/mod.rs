@@ -52,8 +52,8 @@ pub trait Stage: Sync {
     }
     /// Goes up when the bytes it writes change their meaning.
     fn version(&self) -> u32;
-    /// Every setting that has a say in the bytes, and the versions of the tools that have.
-    fn settings(&self) -> serde_json::Value;
+    /// Every setting that has a say in the bytes made of `unit`, and the versions of the tools that have.
+    fn settings(&self, unit: &Unit) -> serde_json::Value;
     /// The files it reads for `unit`; their contents are part of the fingerprint.
     fn inputs(&self, unit: &Unit) -> anyhow::Result<Vec<Input>>;
     /// Does the work: writes its files into the empty folder `out` and nowhere else.

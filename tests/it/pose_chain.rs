@@ -87,7 +87,7 @@ fn a_video_without_a_person_is_zeros_and_no_failure() {
     let stage = Pose2dStage::new(&settings).unwrap();
     let roles: Vec<_> = stage.inputs(&unit).unwrap().into_iter().map(|input| input.role).collect();
     assert_eq!(roles, ["video", "timeline", "model:person", "model:body", "model:hand", "model:palm"]);
-    assert!(stage.settings()["models"]["body"]["sha256"].is_string());
+    assert!(stage.settings(&unit)["models"]["body"]["sha256"].is_string());
     let written: Vec<_> = ["a", "b"]
         .iter()
         .map(|name| {

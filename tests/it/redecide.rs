@@ -88,3 +88,20 @@ fn every_second_is_in_the_account() {
     assert!(secs(&failed, "failed_secs") + secs(&failed, "waiting_secs") > 5.8, "{failed}");
     assert!((secs(&failed, "sum_secs") - 12.0).abs() < 0.2 && clips.len() == 2, "{failed}");
 }
+
+#[test]
+fn after_a_run_of_two_speakers_nothing_is_stale() {
+    let project = Project::with_clips("speakers", 1, 5.0);
+    let other = project.dir().join("videos/guest.mp4");
+    fs::copy(&project.clips()[0], other).unwrap();
+    let file = project.dir().join("pipeline.toml");
+    let text = fs::read_to_string(&file).unwrap();
+    let guest = "[[speaker]]\nname = \"guest\"\nvideos = [\"videos/guest.mp4\"]\ntrain = [\"*.mp4\"]\n";
+    fs::write(&file, text + "\n" + guest).unwrap();
+    let answer = project.run(&[]);
+    assert_eq!(answer.code, 0, "{}", answer.errors);
+    let status = project.answer(&["status"]).json;
+    let states: Vec<&str> =
+        status["units"].as_array().unwrap().iter().filter_map(|unit| unit["state"].as_str()).collect();
+    assert!(states.len() == 10 && states.iter().all(|state| *state == "fresh"), "{status}");
+}

@@ -19,7 +19,7 @@ impl Stage for Shout {
     fn version(&self) -> u32 {
         self.version
     }
-    fn settings(&self) -> serde_json::Value {
+    fn settings(&self, _unit: &Unit) -> serde_json::Value {
         serde_json::json!({ "shout": { "mark": self.mark } })
     }
     fn inputs(&self, unit: &Unit) -> anyhow::Result<Vec<Input>> {
