@@ -83,8 +83,9 @@ test: build readers browser
 	$(MAKE) demo DEMO=$(TARGET)/demo-test STEPS=30
 	@echo 'make test: all passed'
 
-# The long proofs, each printing its figures: 20 kills, a 10-minute video, ten minutes of sound in step with their pictures, speed on a real clip (CLIP, MODELS), alone and
-# against the Python REFERENCE. ORATOR_REFERENCE_PYTHON names a Python with onnxruntime, cv2 and numpy (and torch: the
+# The long proofs, each printing its figures: 20 kills, a 10-minute video, ten minutes of sound in step with their
+# pictures, the dataset beside plain copy, 10 and 100 hours, both cores at work, speed on a real clip (CLIP, MODELS), alone
+# and against the Python REFERENCE. ORATOR_REFERENCE_PYTHON names a Python with onnxruntime, cv2 and numpy (and torch: the
 # lifter's training beside PyTorch's).
 SHARED := ../shared
 CLIP := $(SHARED)/data/videos/talk_tyson_2cam_17s_720p.mp4
