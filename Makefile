@@ -61,14 +61,13 @@ $(RUNTIME):
 # Programs of others that the tests open our files with: Python readers of datasets, and a browser for pages.
 export ORATOR_READERS ?= $(abspath $(TARGET)/readers)
 READERS := $(ORATOR_READERS)
-READERS_WANTED := webdataset==1.0.2 datasets==5.2.0 numpy==2.4.6
 
 readers: $(READERS)/.there
 
-$(READERS)/.there: Makefile
+$(READERS)/.there: tests/readers.txt
 	@$(INSTALL); command -v python3 >/dev/null && python3 -m pip --version >/dev/null 2>&1 || install python3 python3-pip; \
 	rm -rf $(READERS); python3 -m pip install --quiet --disable-pip-version-check --no-input --root-user-action ignore \
-		--no-warn-conflicts --target $(READERS) $(READERS_WANTED); touch $@; echo "readers: $(READERS_WANTED)"
+		--no-warn-conflicts --no-deps --target $(READERS) -r tests/readers.txt; touch $@; echo "readers: $(READERS)"
 
 browser:
 	@$(INSTALL); command -v chromium >/dev/null || install chromium; echo "browser: $$(command -v chromium)"
