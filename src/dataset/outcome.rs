@@ -7,7 +7,7 @@ use super::stats::Stats;
 use super::video::Video;
 use super::{INFO, LEAKAGE};
 use crate::config;
-use crate::stage::Report;
+use crate::stage::{Report, counted};
 use anyhow::{Context, Result};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -86,9 +86,4 @@ impl Outcome<'_> {
 
 fn windows(stats: &Stats, split: Split) -> usize {
     stats.windows.strided.get(split.name()).copied().unwrap_or(0)
-}
-
-/// `1 video`, `2 videos`.
-pub fn counted(n: usize, what: &str) -> String {
-    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
 }

@@ -7,10 +7,12 @@ use super::index::{SampleRef, Shard};
 use super::moments::Moments;
 use super::sample::Sample;
 use super::shard::Writer;
+use crate::stage::fingerprint::hash_file;
 use crate::stage::ledger::Ledger;
 use crate::types::split::Split;
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -199,12 +201,19 @@ impl Part {
         Ok(())
     }
 
-    /// Whether its files are in the dataset in `dir`, shards with the sizes they had.
-    pub fn is_there(&self, dir: &Path) -> bool {
-        let bytes = |file: &str| fs::metadata(dir.join(file)).map(|meta| meta.len()).ok();
-        self.shards.iter().all(|shard| bytes(&shard.file) == Some(shard.bytes))
-            && self.files().iter().all(|(file, _)| bytes(file).is_some())
+    /// Whether every file of it in the dataset in `dir` is what `stated` says (hashes by path, as in `checksums.b3`).
+    pub fn is_sound(&self, dir: &Path, stated: &BTreeMap<String, String>) -> bool {
+        let json = format!("{FOLDER}/{}.json", self.name);
+        let as_stated =
+            |file: &str| stated.get(file).is_some_and(|hash| hash_file(&dir.join(file)).is_ok_and(|now| now == *hash));
+        as_stated(&json) && self.files().iter().all(|(file, hash)| stated.get(file) == Some(hash) && as_stated(file))
     }
+}
+
+/// The hashes that `checksums.b3` of the dataset in `dir` states, by path; none where it cannot be read.
+pub fn stated_hashes(dir: &Path) -> BTreeMap<String, String> {
+    let text = fs::read_to_string(dir.join(super::CHECKSUMS)).unwrap_or_default();
+    text.lines().filter_map(|line| line.split_once("  ")).map(|(hash, file)| (file.into(), hash.into())).collect()
 }
 
 /// The names of the videos of the dataset in `dir`, sorted.

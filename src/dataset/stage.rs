@@ -3,7 +3,7 @@
 
 use super::info::{About, ModelUsed};
 use super::leakage::Compared;
-use super::outcome::{Outcome, counted};
+use super::outcome::Outcome;
 use super::part::{self, Part, Source, SplitBy};
 use super::shared_sound;
 use super::split::{Placed, Split, Waiting, place as place_in_splits};
@@ -14,7 +14,7 @@ use crate::stage::ledger::{Ledger, Refused, longest_first};
 use crate::stage::progress::Progress;
 use crate::stage::record::Failure;
 use crate::stage::runner::place;
-use crate::stage::{Input, Report, Stage, Unit};
+use crate::stage::{Input, Report, Stage, Unit, counted};
 use anyhow::{Result, ensure};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -218,10 +218,12 @@ fn check(unit: &Unit, work: &Path, videos: &[Video]) -> Result<()> {
     Ok(())
 }
 
-/// The videos of the dataset that is there; one that cannot be read is as good as not there.
+/// The videos of the dataset that is there; one with a damaged file is as good as not there.
 fn parts_of(dir: &Path) -> BTreeMap<String, Part> {
-    let names = part::names(dir).unwrap_or_default().into_iter();
-    names.filter_map(|name| Part::read(&Part::path(dir, &name)).ok().map(|part| (name, part))).collect()
+    let stated = part::stated_hashes(dir);
+    let parts = part::names(dir).unwrap_or_default().into_iter();
+    let parts = parts.filter_map(|name| Part::read(&Part::path(dir, &name)).ok().map(|part| (name, part)));
+    parts.filter(|(_, part)| part.is_sound(dir, &stated)).collect()
 }
 
 /// Hashes of the codes of the videos that have sound.
@@ -297,7 +299,7 @@ impl Run<'_> {
         let made_from =
             serde_json::json!([super::SCHEMA, video.file, video.files_hash, split, by, self.stage.shard.max_mb]);
         let made_from = blake3::hash(made_from.to_string().as_bytes()).to_hex().to_string();
-        let same = self.before.get(&video.name).filter(|part| part.made_from == made_from && part.is_there(self.old));
+        let same = self.before.get(&video.name).filter(|part| part.made_from == made_from);
         if let Some(part) = same {
             self.n_taken_over += 1;
             return part.take_over(self.old, self.out);

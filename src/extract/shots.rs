@@ -148,7 +148,9 @@ impl ShotFinder {
             let way = way.map(|(a, b)| std::array::from_fn(|channel| b[channel].wrapping_sub(a[channel])));
             Some(gradual::turned(&first.thumbnail, &last.thumbnail, way))
         };
-        let cut = (0..=end).rev().find(|at| self.cuts.get(*at).is_some_and(|cut| *cut >= RESTART));
+        let longest = WINDOWS.last().map_or(0, |(length, _)| length * self.pace);
+        let near = (end.saturating_sub(longest)..=end).rev();
+        let cut = near.into_iter().find(|at| self.cuts.get(*at).is_some_and(|cut| *cut >= RESTART));
         let windows = WINDOWS.iter().map(|(length, least)| (length * self.pace, *least));
         let open = windows.filter(|(length, _)| cut.is_none_or(|cut| end.saturating_sub(*length) >= cut));
         let open: Vec<_> =

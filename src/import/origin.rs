@@ -214,7 +214,10 @@ fn look_at_part(dir: &Path, name: &str, plan: &Plan) -> Result<Look> {
         info.fps
     );
     let part = Part::read(&Part::path(dir, name))?;
-    ensure!(part.is_there(dir), "{name}: its shards are not all there; orator dataset verify says what is wrong");
+    ensure!(
+        part.is_sound(dir, &part::stated_hashes(dir)),
+        "{name}: its files are not what was written; orator dataset verify says what is wrong"
+    );
     let codes = part.codes(dir)?;
     let split = part.split.map(|split| (split, part.split_by.clone()));
     let Part { name, file, content, made_from, ledger, bones, failure, .. } = part;

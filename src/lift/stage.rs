@@ -9,13 +9,12 @@ use crate::config;
 use crate::motion::npz::Npz;
 use crate::motion::{joints_npz, keypoints_npz};
 use crate::stage::ledger::Ledger;
-use crate::stage::{Input, Report, Stage, Unit, progress::Progress, runner::place};
+use crate::stage::{Input, Report, Stage, Unit, progress::Progress, runner::place, write_json};
 use crate::types::interval::Intervals;
 use crate::types::pose2d::Keypoints;
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array1, s};
 use ndarray_npy::NpzWriter;
-use serde::Serialize;
 use serde_json::json;
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
@@ -176,12 +175,6 @@ fn write_measures(path: &Path, bone_change: Vec<f32>) -> Result<()> {
         Ok(npz.finish()?.flush()?)
     };
     written().with_context(|| format!("cannot write {}", path.display()))
-}
-
-fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let mut bytes = serde_json::to_vec_pretty(value)?;
-    bytes.push(b'\n');
-    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// A frame that only repeats the one before shows nothing new: its points count as not seen, so that the motion between

@@ -10,10 +10,9 @@ use crate::motion::npz::Npz;
 use crate::stage::ledger::{Ledger, longest_first};
 use crate::stage::progress::Progress;
 use crate::stage::runner::place;
-use crate::stage::{Input, Report, Stage, Unit};
+use crate::stage::{Input, Report, Stage, Unit, counted, write_json};
 use crate::types::interval::Intervals;
-use anyhow::{Context, Result, ensure};
-use serde::Serialize;
+use anyhow::{Result, ensure};
 use std::path::{Path, PathBuf};
 
 /// Keypoints to intervals worth keeping.
@@ -134,14 +133,4 @@ fn report(intervals: &Intervals, ledger: &Ledger) -> Report {
         "windows_64": windows,
     });
     Report { line, facts: facts.as_object().cloned().unwrap_or_default() }
-}
-
-fn counted(n: usize, what: &str) -> String {
-    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
-}
-
-fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let mut bytes = serde_json::to_vec_pretty(value)?;
-    bytes.push(b'\n');
-    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }

@@ -8,6 +8,7 @@ pub mod record;
 pub mod runner;
 pub mod workdir;
 
+use anyhow::Context;
 use progress::Progress;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -58,4 +59,16 @@ pub trait Stage: Sync {
     fn inputs(&self, unit: &Unit) -> anyhow::Result<Vec<Input>>;
     /// Does the work: writes its files into the empty folder `out` and nowhere else.
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> anyhow::Result<Report>;
+}
+
+/// Writes a file of a stage into its `out` folder as JSON for people.
+pub fn write_json(path: &Path, value: &impl serde::Serialize) -> anyhow::Result<()> {
+    let mut bytes = serde_json::to_vec_pretty(value)?;
+    bytes.push(b'\n');
+    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// `1 video`, `2 videos`.
+pub fn counted(n: usize, what: &str) -> String {
+    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
 }

@@ -204,6 +204,19 @@ fn a_new_video_costs_itself_and_changes_no_shard() {
     let of_video = |name: &str| name.ends_with(".tar") || name.starts_with("videos/");
     let same = before.iter().filter(|(name, _)| of_video(name)).filter(|file| after.contains(file)).count();
     assert_eq!(same, before.iter().filter(|(name, _)| of_video(name)).count());
+    // a damaged shard is not taken over but written anew
+    let tar = fs::read_dir(&place)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .find(|path| path.extension().is_some_and(|e| e == "tar"));
+    let tar = tar.unwrap();
+    let mut damaged = fs::read(&tar).unwrap();
+    damaged[5_000] ^= 1;
+    fs::remove_file(&tar).unwrap();
+    fs::write(&tar, damaged).unwrap();
+    let (report, mended) = shard(dir.path(), &units, "mended");
+    assert!(report.unwrap().line.contains("2 videos taken over as they were"));
+    assert_eq!(bytes(&mended), after);
     // all at once gives the same bytes
     fs::remove_dir_all(&place).unwrap();
     assert_eq!(bytes(&shard(dir.path(), &units, "at-once").1), after);
