@@ -18,21 +18,22 @@
 //! | `onnx` | the only room that knows ONNX Runtime; the model manifest | `types stage config` |
 //! | `audio` | sound to features | `types` |
 //! | `motion` | motion as numbers: bones, rotations, smoothing; motion files | `types` |
+//! | `metrics` | how good made motion is beside the real one, as pure sums | `types motion` |
 //! | `nn` | network architectures | `types motion` |
 //! | `extract` | stage 1: sound, timeline, shots | `media vision` |
 //! | `pose2d` | stage 2: 2D keypoints of the one speaker | `media vision onnx motion` |
 //! | `segment` | stage 3: intervals worth keeping, refusals with reasons | `motion media` |
 //! | `lift` | stage 4: 2D to 3D | `motion nn` |
 //! | `dataset` | stage 5: shards; and reading them back | `motion media audio` |
-//! | `train` | losses, optimiser, checkpoints, the two training loops | `motion nn audio dataset` |
-//! | `evaluate` | errors of the lifters on captured motion | `motion nn train lift` |
-//! | `generate` | speech to motion with a trained speaker | `motion nn audio train` |
+//! | `train` | losses, optimiser, checkpoints, the two training loops | `motion nn audio dataset metrics` |
+//! | `evaluate` | errors of the lifters on captured motion | `motion nn train lift metrics` |
+//! | `generate` | speech to motion with a trained speaker | `motion nn audio train metrics` |
 //! | `animate` | joints to rotations; BVH and drawn video | `motion media vision` |
 //! | `page` | HTML pages for people: elements, plots, one file | nothing |
 //! | `report` | what became of every second, on one page; no stage, so it may know `segment` | `motion media vision segment animate page` |
 //! | `import` | motion that others captured, with its sound, becomes a dataset | `motion media audio dataset` |
 //! | `forget` | a video and all that was derived from it goes, and a search proves it | `dataset` |
-//! | `demo` | the synthetic speaker: videos with known truth, and the comparison with it | `motion media vision dataset animate` |
+//! | `demo` | the synthetic speaker: videos with known truth, and the comparison with it | `motion media vision dataset animate metrics` |
 //!
 //! Stages meet in files, never in code; all of them may use `types`, `stage` and `config`. `cli` (in the program
 //! only) imports everything and is the one place that prints. `tests/it/house.rs` holds the code to this table.
@@ -54,6 +55,7 @@ pub mod generate;
 pub mod import;
 pub mod lift;
 pub mod media;
+pub mod metrics;
 pub mod motion;
 pub mod nn;
 pub mod onnx;

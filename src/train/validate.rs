@@ -2,10 +2,11 @@
 
 use super::examples::{Batch, Examples};
 use super::losses;
-use super::metrics::{Correct, Figures, Validation};
+use super::metrics::{Figures, Validation};
 use super::poses::{N_NUMBERS, Normalisation};
 use crate::config::Gan;
 use crate::dataset::{Dataset, Split};
+use crate::metrics::pck::Correct;
 use crate::nn::unet::Generator;
 use crate::stage::progress::Progress;
 use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WRIST};

@@ -57,6 +57,11 @@ pub const fn side(joint: usize) -> Side {
     }
 }
 
+/// Whether the joint is a hand's root, which is the wrist again.
+pub const fn is_duplicate(joint: usize) -> bool {
+    joint == L_HAND || joint == R_HAND
+}
+
 /// Name of a joint, for instance `RWrist`, `LIndexTip`.
 pub fn name(joint: usize) -> String {
     const BODY: [&str; 7] = ["Neck", "RShoulder", "RElbow", "RWrist", "LShoulder", "LElbow", "LWrist"];

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A room and the rooms it may import.
-const MAY_IMPORT: [(&str, &str); 23] = [
+const MAY_IMPORT: [(&str, &str); 24] = [
     ("types", ""),
     ("stage", "types"),
     ("config", "types stage"),
@@ -13,21 +13,22 @@ const MAY_IMPORT: [(&str, &str); 23] = [
     ("onnx", "types stage config"),
     ("audio", "types"),
     ("motion", "types"),
+    ("metrics", "types motion"),
     ("nn", "types motion"),
     ("dataset", "types stage config motion media audio"),
     ("extract", "types stage config media vision"),
     ("pose2d", "types stage config media vision onnx motion"),
     ("segment", "types stage config motion media"),
     ("lift", "types stage config motion nn"),
-    ("train", "types stage config motion nn audio dataset"),
-    ("evaluate", "types stage config motion nn train lift"),
-    ("generate", "types stage config motion nn audio dataset train"),
+    ("train", "types stage config motion nn audio dataset metrics"),
+    ("evaluate", "types stage config motion nn train lift metrics"),
+    ("generate", "types stage config motion nn audio dataset train metrics"),
     ("animate", "types stage config motion media vision"),
     ("page", ""),
     ("report", "types stage config motion media vision segment animate page"),
     ("import", "types stage config motion media audio dataset"),
     ("forget", "types stage config dataset"),
-    ("demo", "types stage config motion media vision dataset animate"),
+    ("demo", "types stage config motion media vision dataset animate metrics"),
 ];
 
 fn root() -> PathBuf {

@@ -1,0 +1,137 @@
+//! Share of correct keypoints (rebol.md section 12, after Ginosar et al. 2019): a joint is correct when it lies within
+//! a fifth of the real pose's largest extent from the real one.
+
+use crate::types::skeleton::{L_WRIST, N_JOINTS, NECK, R_SHOULDER, is_duplicate};
+use ndarray::{ArrayView2, ArrayView3};
+use serde::{Deserialize, Serialize};
+use std::ops::AddAssign;
+
+/// A joint is correct up to this share of the pose's largest extent.
+pub const ALPHA: f32 = 0.2;
+
+/// Correct and counted keypoints of one part of the body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Count {
+    pub n_correct: usize,
+    pub n: usize,
+}
+
+/// Correct and counted keypoints.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Correct {
+    /// The published figure: every joint but the neck, the two hand roots (the wrists again) included.
+    pub all: Count,
+    /// Shoulders, elbows and wrists.
+    pub body: Count,
+    /// The joints of both hands but their roots.
+    pub hands: Count,
+}
+
+/// In how many of the axes x, y, z distances and extents are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axes {
+    /// The picture's: as in the first publication.
+    Xy,
+    /// Space.
+    Xyz,
+}
+
+impl Count {
+    /// Share of correct keypoints, 0..1; 0 of none.
+    pub fn share(&self) -> f64 {
+        self.n_correct as f64 / self.n.max(1) as f64
+    }
+
+    fn add(&mut self, correct: bool) {
+        self.n_correct += usize::from(correct);
+        self.n += 1;
+    }
+}
+
+impl Correct {
+    /// The published figure, 0..1.
+    pub fn share(&self) -> f64 {
+        self.all.share()
+    }
+
+    /// Counts the joints of `made` [T, 49, 3] beside `real` [T, 49, 3], both metres, in space, where `mask` [T, 49] is
+    /// true: correct when the distance is at most `ALPHA` of the largest side of the box around all real joints of
+    /// the frame that are seen, the neck left out. The radius is the same for every part. A made joint that is not
+    /// finite is wrong.
+    pub fn count(&mut self, made: ArrayView3<f32>, real: ArrayView3<f32>, mask: ArrayView2<bool>) {
+        self.count_in(Axes::Xyz, made, real, mask);
+    }
+
+    /// As `count`, with distance and box in these axes.
+    pub fn count_in(&mut self, axes: Axes, made: ArrayView3<f32>, real: ArrayView3<f32>, mask: ArrayView2<bool>) {
+        let n_axes = match axes {
+            Axes::Xy => 2,
+            Axes::Xyz => 3,
+        };
+        for ((made, real), mask) in made.outer_iter().zip(real.outer_iter()).zip(mask.outer_iter()) {
+            let seen: Vec<usize> = (NECK + 1..N_JOINTS).filter(|joint| mask[*joint]).collect();
+            let extent = |k: usize| {
+                let values = seen.iter().map(|joint| real[[*joint, k]]);
+                let (low, high) =
+                    values.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+                high - low
+            };
+            let radius = ALPHA * (0..n_axes).map(extent).fold(0.0, f32::max);
+            for joint in seen {
+                let square: f32 = (0..n_axes).map(|k| (made[[joint, k]] - real[[joint, k]]).powi(2)).sum();
+                let correct = square.sqrt() <= radius;
+                self.all.add(correct);
+                match joint {
+                    R_SHOULDER..=L_WRIST => self.body.add(correct),
+                    _ if !is_duplicate(joint) => self.hands.add(correct),
+                    _ => {}
+                }
+            }
+        }
+    }
+}
+
+impl AddAssign for Count {
+    fn add_assign(&mut self, other: Self) {
+        self.n_correct += other.n_correct;
+        self.n += other.n;
+    }
+}
+
+impl AddAssign for Correct {
+    fn add_assign(&mut self, other: Self) {
+        self.all += other.all;
+        self.body += other.body;
+        self.hands += other.hands;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::{Array2, Array3};
+
+    #[test]
+    fn the_radius_is_a_fifth_of_the_largest_extent() {
+        let mut real = Array3::<f32>::zeros((1, N_JOINTS, 3));
+        real[[0, 1, 2]] = 1.0;
+        let mut made = real.clone();
+        made[[0, 2, 0]] = 0.19;
+        made[[0, 3, 0]] = 0.21;
+        made[[0, 4, 0]] = 9.0;
+        made[[0, 20, 1]] = f32::NAN;
+        let mut mask = Array2::from_elem((1, N_JOINTS), true);
+        mask[[0, 4]] = false;
+        let mut correct = Correct::default();
+        correct.count(made.view(), real.view(), mask.view());
+        let count = |n_correct, n| Count { n_correct, n };
+        assert_eq!(correct, Correct { all: count(45, 47), body: count(4, 5), hands: count(39, 40) });
+        // without z, the box is a point
+        let mut flat = Correct::default();
+        flat.count_in(Axes::Xy, made.view(), real.view(), mask.view());
+        assert_eq!(flat.body, count(3, 5));
+        let mut twice = correct;
+        twice += correct;
+        assert_eq!((twice.all, twice.share()), (count(90, 94), correct.share()));
+    }
+}
