@@ -8,9 +8,8 @@ use orator::config::{Config, videos::Videos};
 use orator::stage::fingerprint::HashCache;
 use orator::stage::progress::Progress;
 use orator::stage::runner::{self, Ended};
-use orator::stage::{Stage, Unit};
+use orator::stage::{Stage, Unit, workdir};
 use serde_json::{Value, json};
-use std::fs::File;
 use std::path::Path;
 
 /// Run the stages extract, pose2d, segment, lift, shard for every video of every speaker.
@@ -57,7 +56,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         step.stage(&config, &[])?;
     }
     let work = &config.settings.work.dir;
-    let _lock = lock(work)?;
+    let _lock = workdir::lock(work).context("no run now; another folder is chosen with --set work.dir=FOLDER")?;
     let hashes = HashCache::open(&work.join("hashes.json"));
     let mut run = Run {
         config: &config,
@@ -86,17 +85,6 @@ fn jobs(args: &Args, config: &Config) -> usize {
         0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
         n => n,
     }
-}
-
-/// One run at a time in a work folder: the lock goes with the process, however it ends.
-fn lock(work: &Path) -> Result<File> {
-    let made =
-        std::fs::create_dir_all(work).map_err(anyhow::Error::from).and_then(|()| Ok(File::create(work.join(".lock"))?));
-    let file = made.with_context(|| {
-        format!("cannot write in the work folder {}; choose another with --set work.dir=FOLDER", work.display())
-    })?;
-    file.try_lock().map_err(|_| anyhow::anyhow!("another run is at work in {}; wait for it to end", work.display()))?;
-    Ok(file)
 }
 
 struct Run<'a> {

@@ -40,8 +40,15 @@ pub fn check(settings: &Settings, places: &BTreeMap<String, Place>) -> Vec<Probl
     if s.shard.validation + s.shard.test > 0.95 {
         rules.problem("shard.test", "validation and test together leave less than 5 % to train on".to_owned());
     }
-    if !["light", "paper"].contains(&s.gan.preset.as_str()) {
-        rules.problem("gan.preset", format!("{:?} is not known: expected \"light\" or \"paper\"", s.gan.preset));
+    for (key, value, [one, other]) in [
+        ("gan.preset", &s.gan.preset, ["light", "paper"]),
+        ("gan.representation", &s.gan.representation, ["bones", "positions"]),
+        ("gan.adversarial", &s.gan.adversarial, ["least-squares", "log"]),
+        ("gan.device", &s.gan.device, ["cpu", "cuda"]),
+    ] {
+        if value != one && value != other {
+            rules.problem(key, format!("{value:?} is not known: expected {one:?} or {other:?}"));
+        }
     }
     rules.within("gan.window_frames", s.gan.window_frames as f64, 32.0, 4096.0, "frames");
     if !s.gan.window_frames.is_multiple_of(32) {
@@ -52,6 +59,8 @@ pub fn check(settings: &Settings, places: &BTreeMap<String, Place>) -> Vec<Probl
     rules.within("gan.steps", s.gan.steps as f64, 1.0, 1e9, "steps");
     rules.within("gan.learning_rate", s.gan.learning_rate, 1e-9, 1.0, "");
     rules.within("gan.lambda_l1", s.gan.lambda_l1, 0.0, 1e4, "");
+    rules.within("gan.lambda_velocity", s.gan.lambda_velocity, 0.0, 1e4, "");
+    rules.within("gan.epoch_steps", s.gan.epoch_steps as f64, 1.0, 1e9, "steps");
     rules.within("gan.lambda_gan", s.gan.lambda_gan, 0.0, 1e4, "");
     rules.within("gan.lambda_bone", s.gan.lambda_bone, 0.0, 1e4, "");
     rules.within("gan.checkpoint_every", s.gan.checkpoint_every as f64, 1.0, 1e9, "steps");

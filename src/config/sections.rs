@@ -252,6 +252,8 @@ impl Default for Shard {
 pub struct Gan {
     /// Network preset: `light` (CPU) or `paper`.
     pub preset: String,
+    /// What the generator's numbers are: `bones` (directions, lengths constant by construction) or `positions`.
+    pub representation: String,
     /// Window length in frames.
     pub window_frames: usize,
     /// Frames between the starts of two windows of an interval.
@@ -259,32 +261,47 @@ pub struct Gan {
     pub batch: usize,
     pub steps: usize,
     pub learning_rate: f64,
+    /// The adversarial loss: `least-squares` or `log`.
+    pub adversarial: String,
     /// Weights of the losses.
     pub lambda_l1: f64,
+    pub lambda_velocity: f64,
     pub lambda_gan: f64,
     pub lambda_bone: f64,
     pub seed: u64,
-    /// Steps between checkpoints.
+    /// Steps of an epoch: at its end comes a validation.
+    pub epoch_steps: usize,
+    /// Epochs without a better score after which the training ends; 0: never.
+    pub patience: usize,
+    /// Steps between checkpoints; one comes with each validation too.
     pub checkpoint_every: usize,
     /// Checkpoints kept.
     pub keep_checkpoints: usize,
+    /// Where the tensors are: `cpu` or `cuda`.
+    pub device: String,
 }
 
 impl Default for Gan {
     fn default() -> Self {
         Self {
             preset: "light".into(),
+            representation: "bones".into(),
             window_frames: 64,
             stride_frames: 5,
-            batch: 16,
-            steps: 3000,
+            batch: 32,
+            steps: 6000,
             learning_rate: 1e-4,
+            adversarial: "least-squares".into(),
             lambda_l1: 1.0,
+            lambda_velocity: 0.0,
             lambda_gan: 1.0,
             lambda_bone: 0.1,
             seed: 1337,
-            checkpoint_every: 250,
+            epoch_steps: 300,
+            patience: 0,
+            checkpoint_every: 100,
             keep_checkpoints: 3,
+            device: "cpu".into(),
         }
     }
 }

@@ -7,14 +7,14 @@ use super::npy::{self, Element, Layout};
 use super::sample::{N_KEYPOINTS, Sample};
 use super::split::Split;
 use super::stats::Stats;
-use super::{INDEX, INFO, STATS, wav};
+use super::{CHECKSUMS, INDEX, INFO, STATS, wav};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::{SAMPLE_RATE, Sound};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3};
 use std::collections::BTreeMap;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::BufRead;
 use std::ops::Range;
 use std::os::unix::fs::FileExt;
@@ -89,6 +89,13 @@ impl Dataset {
     /// The folder.
     pub fn dir(&self) -> &Path {
         &self.dir
+    }
+
+    /// Hash (BLAKE3, hex) of the dataset's checksums, and so of everything in it.
+    pub fn hash(&self) -> Result<String> {
+        let path = self.dir.join(CHECKSUMS);
+        let checksums = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        Ok(blake3::hash(&checksums).to_hex().to_string())
     }
 
     /// What the numbers mean.

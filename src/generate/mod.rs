@@ -61,7 +61,7 @@ impl Speaker {
         let mels = Tensor::from_vec(mels.into_raw_vec_and_offset().0, shape, &Device::Cpu)?;
         let poses = self.trained.generator.forward(&mels, padded, false)?.narrow(2, 0, n_frames)?;
         let poses = poses.flatten_all()?.to_vec1::<f32>()?;
-        Ok(facts.normalisation.motion(ArrayView2::from_shape((N_NUMBERS, n_frames), &poses)?, facts.fps))
+        Ok(facts.motion(ArrayView2::from_shape((N_NUMBERS, n_frames), &poses)?))
     }
 }
 

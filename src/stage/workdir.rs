@@ -27,6 +27,16 @@ pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<(
     written.with_context(|| format!("cannot write {}", path.display()))
 }
 
+/// One program at a time writes in `folder`, made if missing: the lock goes with the process, however it ends. Errors
+/// when another has it, or the folder cannot be written in.
+pub fn lock(folder: &Path) -> Result<File> {
+    let made = fs::create_dir_all(folder).and_then(|()| File::create(folder.join(".lock")));
+    let file = made.with_context(|| format!("cannot write in {}", folder.display()))?;
+    file.try_lock()
+        .map_err(|_| anyhow::anyhow!("another run is at work in {}; wait for it to end", folder.display()))?;
+    Ok(file)
+}
+
 /// Removes the file at `path`, if there is one, and flushes its folder.
 pub fn remove_file(path: &Path) -> Result<()> {
     match fs::remove_file(path) {

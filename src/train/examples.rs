@@ -9,7 +9,7 @@ use crate::types::interval::Interval as Span;
 use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
 use candle_core::{Device, Tensor};
-use ndarray::{Array2, Axis, Slice};
+use ndarray::{Array2, ArrayView2, Axis, Slice};
 use rayon::prelude::*;
 
 /// Spectrogram frames that span `n_frames` frames of motion: the nearest whole number of 10 ms hops.
@@ -79,6 +79,11 @@ impl Examples {
         };
         let starts = intervals.iter().enumerate().flat_map(of_interval).collect();
         Ok(Self { fps, n_frames, intervals, starts })
+    }
+
+    /// All poses as normalised numbers [144, T] with their masks, interval by interval.
+    pub fn poses(&self) -> impl Iterator<Item = (ArrayView2<'_, f32>, ArrayView2<'_, f32>)> {
+        self.intervals.iter().map(|interval| (interval.numbers.view(), interval.mask.view()))
     }
 
     /// Number of windows.

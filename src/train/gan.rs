@@ -1,42 +1,33 @@
 //! Training a speaker's generator against the motion discriminator: one straight loop. The same dataset, settings and
 //! seed give the same checkpoints, also when the training was interrupted: the windows of a step depend on the seed
-//! and the step alone, everything else is in the checkpoint.
+//! and the step alone (the place of the loader is the step), everything else is in the checkpoint.
 
-use super::adam::{self, Adam};
 use super::checkpoint::{self, Contents};
-use super::examples::{Batch, Examples};
+use super::examples::Examples;
 use super::log::Log;
-use super::losses::{self, BoneConstancy};
-use super::metrics::Validation;
 use super::poses::{N_NUMBERS, Normalisation};
-use super::speaker::{Facts, GENERATOR};
+use super::representation::Representation;
+use super::score::Validation;
+use super::speaker::Facts;
+pub use super::training::BEST;
+use super::training::{Losses, Stored, Training};
 use super::validate::HeldOut;
 use crate::config::Gan;
-use crate::dataset::{CHECKSUMS, Dataset, Split};
+use crate::dataset::{Dataset, Split};
 use crate::motion::bones;
-use crate::nn::discriminator::{Discriminator, motion};
-use crate::nn::params::Params;
-use crate::nn::unet::{Config, FRAMES_MULTIPLE, Generator};
-use crate::stage::progress::Progress;
+use crate::nn::unet::{Config, FRAMES_MULTIPLE};
+use crate::stage::progress::{Progress, Task};
+use crate::stage::workdir;
 use crate::types::skeleton::N_BONES;
 use anyhow::{Context, Result, bail, ensure};
-use candle_core::{DType, Tensor};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde_json::{Value, json};
-use std::collections::BTreeMap;
+use serde_json::json;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
-const DISCRIMINATOR: &str = "discriminator.";
-const ADAM_G: &str = "adam.generator.";
-const ADAM_D: &str = "adam.discriminator.";
 /// Steps between two lines of the log.
 const LOG_EVERY: usize = 10;
-/// Gradients are clipped to this norm; a loss beyond the limit is a training that has exploded.
-const MAX_NORM: f64 = 10.0;
-const LOSS_LIMIT: f64 = 1e4;
-/// The best checkpoint by validation L1.
-pub const BEST: &str = "best.safetensors";
 
 /// How a training ended.
 #[derive(Clone, Debug)]
@@ -44,32 +35,34 @@ pub struct Outcome {
     /// Steps of this training altogether, and the step this run began at.
     pub steps: usize,
     pub began_at: usize,
+    /// Whether it ended before its last step since the score had not become better for `gan.patience` epochs.
+    pub stopped_early: bool,
     pub n_windows: usize,
     pub n_parameters: usize,
     /// Of the newest checkpoint.
     pub validation: Validation,
     pub newest: PathBuf,
-    /// Best by validation L1.
+    /// Best by the validation's score.
     pub best: PathBuf,
     pub best_step: usize,
+    /// Share of the steps' time spent on putting batches together, 0..1.
+    pub waiting: f64,
 }
 
-/// Losses of one step, in the order of the log.
-struct Losses {
-    l1: f64,
-    bone: f64,
-    adversarial: f64,
-    discriminator: f64,
-}
-
-/// Trains on `dataset` until `settings.steps`, going on from the newest checkpoint in `folder`.
+/// Trains on `dataset` until `wanted.steps`, going on from the newest checkpoint in `folder`; what the settings of that
+/// checkpoint say counts, and is told where it differs.
 ///
 /// # Errors
-/// No window to train on; a checkpoint of other settings or data; a loss that is not finite or explodes (the last good
-/// checkpoint stays).
-pub fn train(dataset: &Dataset, settings: &Gan, folder: &Path, progress: &dyn Progress) -> Result<Outcome> {
-    check(settings)?;
-    let normal = normalisation(dataset)?;
+/// No window to train on; a checkpoint of another speaker or version; another training at work in `folder`; a loss that
+/// is not finite or explodes (the last good checkpoint stays).
+pub fn train(dataset: &Dataset, wanted: &Gan, folder: &Path, progress: &dyn Progress) -> Result<Outcome> {
+    check(wanted)?;
+    let _lock = workdir::lock(folder)?;
+    let resumed = resume(dataset, wanted, folder, progress)?;
+    let (settings, normal) = match &resumed {
+        Some((stored, _)) => (stored.settings.clone(), stored.speaker.normalisation.clone()),
+        None => (wanted.clone(), normalisation(dataset)?),
+    };
     let examples = Examples::load(dataset, Split::Train, &normal, settings.window_frames, settings.stride_frames)?;
     ensure!(
         !examples.is_empty(),
@@ -78,51 +71,156 @@ pub fn train(dataset: &Dataset, settings: &Gan, folder: &Path, progress: &dyn Pr
         dataset.dir().display(),
         settings.window_frames
     );
-    let held_out = HeldOut::load(dataset, settings, &normal, progress)?;
-    let mut training = Training::new(dataset, settings, normal)?;
-    if let Some((_, newest)) = checkpoint::list(folder)?.pop() {
-        training.resume(&newest)?;
-        progress.say(&format!("going on from {} (step {})", newest.display(), training.step));
+    let held_out = HeldOut::load(dataset, &settings, &normal, progress)?;
+    let mut training = match &resumed {
+        Some((stored, _)) => Training::new(stored.speaker.clone(), settings)?,
+        None => {
+            let representation = match settings.representation.as_str() {
+                "positions" => Representation::Positions,
+                _ => Representation::bones(&normal, examples.poses()),
+            };
+            let network = Config::of(settings.preset.parse()?, N_NUMBERS);
+            let (info, hash) = (dataset.info(), dataset.hash()?);
+            let facts = Facts::new(&info.speaker, info.fps, &hash, network, normal, representation);
+            Training::new(facts, settings)?
+        }
+    };
+    if let Some((stored, contents)) = &resumed {
+        training.load(stored, contents)?;
     }
+    run(&mut training, &examples, &held_out, folder, progress)
+}
+
+/// The loop: steps, and at the end of each epoch a validation.
+fn run(
+    training: &mut Training,
+    examples: &Examples,
+    held_out: &HeldOut,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<Outcome> {
+    let settings = training.settings.clone();
     let began_at = training.step;
     let mut log = Log::open(&folder.join("metrics.jsonl"), began_at)?;
-    let task = progress.begin(&format!("train {}", dataset.info().speaker), settings.steps as u64);
+    let task = progress.begin(&format!("train {}", training.facts.name), settings.steps as u64);
     task.advance(began_at.min(settings.steps) as u64);
-
-    let mut last_validation = None;
-    while training.step < settings.steps {
+    let (start, mut waiting) = (Instant::now(), Duration::ZERO);
+    let mut last = None;
+    while training.step < settings.steps && !is_over(training) {
+        let before = Instant::now();
         let batch = examples.batch(&draw(settings.seed, training.step, settings.batch, examples.len()))?;
+        waiting += before.elapsed();
         let losses = training.step(&batch)?;
-        training.stop_if_broken(&losses, folder)?;
+        let step = training.step;
+        losses.check(step).with_context(|| kept(folder))?;
         task.advance(1);
-        if training.step % LOG_EVERY == 0 {
-            task.detail(&format!("L1 {:.3} adv {:.3} D {:.3}", losses.l1, losses.adversarial, losses.discriminator));
-            log.write(&losses.line(training.step))?;
+        if step % LOG_EVERY == 0 {
+            show(&*task, &losses, (step - began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9));
+            log.write(&losses.line(step))?;
         }
-        if training.step % settings.checkpoint_every == 0 || training.step == settings.steps {
-            let validation = held_out.validate(&training.generator, &training.facts.normalisation)?;
-            log.write(&json!({ "step": training.step, "validation": validation }))?;
-            training.save(folder, &validation)?;
-            last_validation = Some(validation);
+        let is_last = step == settings.steps;
+        let ends_epoch = step % settings.epoch_steps == 0;
+        if ends_epoch || is_last {
+            let validation =
+                held_out.validate(&training.generator, &training.decoder, &training.facts.normalisation)?;
+            log.write(
+                &json!({ "step": step, "epoch": step.div_ceil(settings.epoch_steps), "validation": validation }),
+            )?;
+            if let (Some(alarm), true) = (&validation.alarm, step > settings.epoch_steps) {
+                progress.say(&format!("step {step}: {alarm}"));
+            }
+            // In f32, whose decimals come back exactly from JSON.
+            let score = validation.score as f32;
+            if training.best.is_none_or(|(_, best)| score < best) {
+                training.best = Some((step, score));
+                training.save_best(folder, &validation)?;
+            }
+            last = Some(validation);
+        }
+        if ends_epoch || is_last || step % settings.checkpoint_every == 0 {
+            training.save(folder)?;
         }
     }
+    let elapsed = start.elapsed().as_secs_f64().max(1e-9);
     let Some((_, newest)) = checkpoint::list(folder)?.pop() else {
         bail!("gan.steps is 0: nothing to train");
     };
-    let validation = match last_validation {
+    let validation = match last {
         Some(validation) => validation,
-        None => held_out.validate(&training.generator, &training.facts.normalisation)?,
+        None => held_out.validate(&training.generator, &training.decoder, &training.facts.normalisation)?,
     };
     Ok(Outcome {
         steps: training.step,
         began_at,
+        stopped_early: training.step < settings.steps,
         n_windows: examples.len(),
-        n_parameters: training.generator_params.n_parameters(),
+        n_parameters: training.n_parameters(),
         validation,
         newest,
         best: folder.join(BEST),
         best_step: training.best.map_or(training.step, |(step, _)| step),
+        waiting: waiting.as_secs_f64() / elapsed,
     })
+}
+
+/// The newest checkpoint, and what it says with the settings that count now. Tells where these differ from `wanted`.
+fn resume(
+    dataset: &Dataset,
+    wanted: &Gan,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<Option<(Stored, Contents)>> {
+    let Some((step, newest)) = checkpoint::list(folder)?.pop() else { return Ok(None) };
+    let contents = Contents::read(&newest)?;
+    let read = || -> Result<(Stored, Vec<String>)> {
+        let mut stored = Stored::of(&contents)?;
+        let (settings, mut differences) = stored.settings(wanted)?;
+        stored.settings = settings;
+        let (info, facts) = (dataset.info(), &mut stored.speaker);
+        ensure!(
+            facts.name == info.speaker && facts.fps == info.fps,
+            "it is of {} at {}, the dataset of {} at {}; choose another --out",
+            facts.name,
+            facts.fps,
+            info.speaker,
+            info.fps
+        );
+        let hash = dataset.hash()?;
+        if facts.dataset != hash {
+            differences.push(
+                "the dataset is another now: its windows are trained on, with the checkpoint's mean, deviation and bones"
+                    .to_owned(),
+            );
+            facts.dataset = hash;
+        }
+        Ok((stored, differences))
+    };
+    let (stored, differences) = read().with_context(|| format!("cannot go on from {}", newest.display()))?;
+    progress.say(&format!("going on from {} (step {step})", newest.display()));
+    differences.iter().for_each(|line| progress.say(line));
+    Ok(Some((stored, contents)))
+}
+
+/// Whether the score has not become better for as many epochs as `gan.patience` allows.
+fn is_over(training: &Training) -> bool {
+    let Gan { patience, epoch_steps, .. } = training.settings;
+    let since = training.step - training.best.map_or(training.step, |(step, _)| step.min(training.step));
+    patience > 0 && since >= patience * epoch_steps
+}
+
+fn kept(folder: &Path) -> String {
+    let advice = "a smaller gan.learning_rate may help";
+    match checkpoint::list(folder).ok().and_then(|mut all| all.pop()) {
+        Some((step, path)) => format!("the checkpoint of step {step} is kept: {}; {advice}", path.display()),
+        None => format!("there is no checkpoint yet; {advice}"),
+    }
+}
+
+fn show(task: &dyn Task, losses: &Losses, steps_per_sec: f64) {
+    task.detail(&format!(
+        "L1 {:.3} adv {:.3} D {:.3}  {steps_per_sec:.2} steps/s",
+        losses.l1, losses.adversarial, losses.discriminator
+    ));
 }
 
 fn check(settings: &Gan) -> Result<()> {
@@ -133,9 +231,10 @@ fn check(settings: &Gan) -> Result<()> {
     );
     ensure!(settings.batch > 1, "gan.batch is {}: batch norm needs at least 2 windows", settings.batch);
     ensure!(
-        settings.checkpoint_every > 0 && settings.stride_frames > 0,
-        "gan.checkpoint_every and gan.stride_frames must be at least 1"
+        settings.checkpoint_every > 0 && settings.epoch_steps > 0 && settings.stride_frames > 0,
+        "gan.checkpoint_every, gan.epoch_steps and gan.stride_frames must be at least 1"
     );
+    ensure!(settings.device == "cpu", "gan.device is {:?}, and this build knows the processor only", settings.device);
     Ok(())
 }
 
@@ -156,171 +255,4 @@ fn draw(seed: u64, step: usize, n: usize, n_windows: usize) -> Vec<usize> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(step as u64 + 1);
     (0..n).map(|_| rng.random_range(0..n_windows as u64) as usize).collect()
-}
-
-/// Networks, optimisers and where they are.
-struct Training<'a> {
-    settings: &'a Gan,
-    facts: Facts,
-    /// What a checkpoint must agree with to be gone on from.
-    origin: Value,
-    generator_params: Params,
-    generator: Generator,
-    discriminator_params: Params,
-    discriminator: Discriminator,
-    adam_g: Adam,
-    adam_d: Adam,
-    bones: BoneConstancy,
-    /// Steps done.
-    step: usize,
-    /// Step and validation L1 of the best checkpoint.
-    best: Option<(usize, f32)>,
-}
-
-impl<'a> Training<'a> {
-    fn new(dataset: &Dataset, settings: &'a Gan, normal: Normalisation) -> Result<Self> {
-        let config = Config::of(settings.preset.parse()?, N_NUMBERS);
-        let mut generator_params = Params::new(settings.seed);
-        let generator = Generator::new(&mut generator_params, &config)?;
-        // Another seed, or tensors of the same name would begin alike.
-        let mut discriminator_params = Params::new(!settings.seed);
-        let discriminator = Discriminator::new(&mut discriminator_params, N_NUMBERS)?;
-        let adam = adam::Config { max_norm: Some(MAX_NORM), ..adam::Config::default() };
-        let index = dataset.dir().join(CHECKSUMS);
-        let index = std::fs::read(&index).with_context(|| format!("reading {}", index.display()))?;
-        let mut origin = serde_json::to_value(settings)?;
-        for later in ["steps", "checkpoint_every", "keep_checkpoints"] {
-            origin.as_object_mut().and_then(|origin| origin.shift_remove(later));
-        }
-        Ok(Self {
-            settings,
-            origin: json!({ "settings": origin, "dataset": blake3::hash(&index).to_hex().as_str() }),
-            bones: BoneConstancy::new(&normal, DType::F32)?,
-            facts: Facts::new(&dataset.info().speaker, dataset.info().fps, config, normal),
-            adam_g: Adam::new(&generator_params, adam),
-            adam_d: Adam::new(&discriminator_params, adam),
-            generator_params,
-            generator,
-            discriminator_params,
-            discriminator,
-            step: 0,
-            best: None,
-        })
-    }
-
-    /// One step of the discriminator, then one of the generator, on the same windows.
-    fn step(&mut self, batch: &Batch) -> Result<Losses> {
-        let Gan { lambda_l1, lambda_gan, lambda_bone, learning_rate, .. } = *self.settings;
-        let made = self.generator.forward(&batch.mels, self.settings.window_frames, true)?;
-        // Differences count where both frames do, so that a missing joint looks the same in both.
-        let n = self.settings.window_frames - 1;
-        let mask = (batch.mask.narrow(2, 1, n)? * batch.mask.narrow(2, 0, n)?)?;
-        let made_motion = (motion(&made)? * &mask)?;
-
-        let mut of_discriminator = 0.0;
-        if lambda_gan > 0.0 {
-            let real = self.discriminator.forward(&(motion(&batch.poses)? * &mask)?, true)?;
-            let fake = self.discriminator.forward(&made_motion.detach(), true)?;
-            let loss = losses::discriminator(&real, &fake)?;
-            of_discriminator = number(&loss)?;
-            self.adam_d.step(&loss.backward()?, learning_rate)?;
-        }
-
-        let l1 = losses::l1(&made, &batch.poses, &batch.mask)?;
-        let bone = self.bones.loss(&made)?;
-        let mut total = ((&l1 * lambda_l1)? + (&bone * lambda_bone)?)?;
-        let mut adversarial = 0.0;
-        if lambda_gan > 0.0 {
-            let loss = losses::generator(&self.discriminator.forward(&made_motion, true)?)?;
-            adversarial = number(&loss)?;
-            total = (total + (loss * lambda_gan)?)?;
-        }
-        let norm = self.adam_g.step(&total.backward()?, learning_rate)?;
-        self.step += 1;
-        // A norm that is not finite has left the weights alone, but the training cannot go on.
-        let l1 = if norm.is_finite() { number(&l1)? } else { norm };
-        Ok(Losses { l1, bone: number(&bone)?, adversarial, discriminator: of_discriminator })
-    }
-
-    fn stop_if_broken(&self, losses: &Losses, folder: &Path) -> Result<()> {
-        let all = [losses.l1, losses.bone, losses.adversarial, losses.discriminator];
-        if all.iter().all(|loss| loss.is_finite() && loss.abs() < LOSS_LIMIT) {
-            return Ok(());
-        }
-        let kept = match checkpoint::list(folder)?.pop() {
-            Some((step, path)) => format!("the checkpoint of step {step} is kept: {}", path.display()),
-            None => "there is no checkpoint yet".to_owned(),
-        };
-        bail!(
-            "the training broke at step {}: L1 {}, bone {}, adversarial {}, discriminator {}; {kept}. Try a smaller \
-             gan.learning_rate",
-            self.step,
-            losses.l1,
-            losses.bone,
-            losses.adversarial,
-            losses.discriminator
-        )
-    }
-
-    /// Writes the checkpoint of this step, and the best one when it is; old ones go.
-    fn save(&mut self, folder: &Path, validation: &Validation) -> Result<()> {
-        // In f32, whose decimals come back exactly from JSON.
-        let l1 = validation.generator.l1 as f32;
-        let is_best = self.best.is_none_or(|(_, best)| l1 < best);
-        if is_best {
-            self.best = Some((self.step, l1));
-        }
-        let facts = json!({
-            "speaker": self.facts,
-            "step": self.step,
-            "origin": self.origin,
-            "validation": validation,
-            "best": self.best,
-        });
-        let mut contents = Contents { facts, tensors: BTreeMap::new() };
-        contents.add(GENERATOR, self.generator_params.tensors()?);
-        contents.add(DISCRIMINATOR, self.discriminator_params.tensors()?);
-        contents.add("", self.adam_g.tensors(ADAM_G)?);
-        contents.add("", self.adam_d.tensors(ADAM_D)?);
-        if is_best {
-            // To generate with: the generator alone.
-            let tensors = contents.tensors.iter().filter(|(name, _)| name.starts_with(GENERATOR));
-            let tensors = tensors.map(|(name, tensor)| (name.clone(), tensor.clone())).collect();
-            Contents { facts: contents.facts.clone(), tensors }.write(&folder.join(BEST))?;
-        }
-        contents.write(&checkpoint::path(folder, self.step))?;
-        checkpoint::prune(folder, self.settings.keep_checkpoints)
-    }
-
-    fn resume(&mut self, path: &Path) -> Result<()> {
-        let contents = Contents::read(path)?;
-        let mut load = || -> Result<()> {
-            checkpoint::expect_same(&contents.facts["origin"], "settings", &self.origin["settings"])?;
-            checkpoint::expect_same(&contents.facts["origin"], "dataset", &self.origin["dataset"])?;
-            self.generator_params.load(&contents.part(GENERATOR))?;
-            self.discriminator_params.load(&contents.part(DISCRIMINATOR))?;
-            self.adam_g.load(ADAM_G, &contents.tensors)?;
-            self.adam_d.load(ADAM_D, &contents.tensors)?;
-            self.best = serde_json::from_value(contents.facts["best"].clone())?;
-            self.step = contents.facts["step"].as_u64().context("it has no step")? as usize;
-            Ok(())
-        };
-        load().with_context(|| format!("cannot go on from {}", path.display()))
-    }
-}
-
-impl Losses {
-    fn line(&self, step: usize) -> Value {
-        json!({
-            "step": step,
-            "l1": self.l1,
-            "bone": self.bone,
-            "adversarial": self.adversarial,
-            "discriminator": self.discriminator,
-        })
-    }
-}
-
-fn number(scalar: &Tensor) -> Result<f64> {
-    Ok(f64::from(scalar.to_scalar::<f32>()?))
 }

@@ -1,7 +1,8 @@
 //! What the networks are trained to make small: pure functions of tensors.
 
-use super::poses::{N_NUMBERS, Normalisation, is_duplicate};
-use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WRIST, parent};
+use super::poses::{N_NUMBERS, Normalisation};
+use crate::nn::discriminator::motion;
+use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WRIST, is_duplicate, parent};
 use candle_core::{DType, Device, Result, Tensor};
 
 /// Mean absolute difference over the numbers whose mask is 1; all three of one shape.
@@ -10,14 +11,61 @@ pub fn l1(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
     ((made - real)?.abs()? * mask)?.sum_all()? / n
 }
 
-/// The discriminator's least-squares loss (Mao et al. 2017): real scores towards 1, made ones towards 0.
-pub fn discriminator(real_scores: &Tensor, made_scores: &Tensor) -> Result<Tensor> {
-    (real_scores - 1.0)?.sqr()?.mean_all()? + made_scores.sqr()?.mean_all()?
+/// Mean absolute difference of the frame-to-frame differences, over the numbers whose mask is 1 in both frames; all
+/// three [B, C, T].
+pub fn velocity(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
+    l1(&motion(made)?, &motion(real)?, &both_seen(mask)?)
 }
 
-/// The generator's adversarial loss: the scores of what it made towards 1.
-pub fn generator(made_scores: &Tensor) -> Result<Tensor> {
-    (made_scores - 1.0)?.sqr()?.mean_all()
+/// 1 where the mask is 1 in a frame and in the one before: [B, C, T] to [B, C, T - 1].
+pub fn both_seen(mask: &Tensor) -> Result<Tensor> {
+    let n = mask.dim(2)?.saturating_sub(1);
+    mask.narrow(2, 1, n)? * mask.narrow(2, 0, n)?
+}
+
+/// The game between generator and discriminator, on the discriminator's scores of any shape.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Adversarial {
+    /// Least squares (Mao et al. 2017), as in the code the paper descends from: real scores towards 1, made ones towards 0.
+    LeastSquares,
+    /// Cross entropy of the scores as logits (Goodfellow et al. 2014, the paper's equation); the generator's in its
+    /// non-saturating form, -log D(made) instead of log(1 - D(made)).
+    Log,
+}
+
+impl std::str::FromStr for Adversarial {
+    type Err = anyhow::Error;
+
+    fn from_str(name: &str) -> anyhow::Result<Self> {
+        match name {
+            "least-squares" => Ok(Self::LeastSquares),
+            "log" => Ok(Self::Log),
+            _ => anyhow::bail!("the adversarial loss is `least-squares` or `log`, not `{name}`"),
+        }
+    }
+}
+
+impl Adversarial {
+    /// What the discriminator makes small.
+    pub fn discriminator(self, real_scores: &Tensor, made_scores: &Tensor) -> Result<Tensor> {
+        match self {
+            Self::LeastSquares => (real_scores - 1.0)?.sqr()?.mean_all()? + made_scores.sqr()?.mean_all()?,
+            Self::Log => softplus(&real_scores.neg()?)?.mean_all()? + softplus(made_scores)?.mean_all()?,
+        }
+    }
+
+    /// What the generator makes small.
+    pub fn generator(self, made_scores: &Tensor) -> Result<Tensor> {
+        match self {
+            Self::LeastSquares => (made_scores - 1.0)?.sqr()?.mean_all(),
+            Self::Log => softplus(&made_scores.neg()?)?.mean_all(),
+        }
+    }
+}
+
+/// log(1 + e^x), without overflow.
+fn softplus(x: &Tensor) -> Result<Tensor> {
+    x.relu()? + (x.abs()?.neg()?.exp()? + 1.0)?.log()?
 }
 
 /// Constancy of bone lengths (Rebol et al. 2021, eq. 1): how much each bone changes its length from frame to frame,
@@ -97,8 +145,11 @@ mod tests {
         let (made, real) = (pattern(&shape, 0.0)?, pattern(&shape, 3.0)?);
         let mask = pattern(&shape, 9.0)?.gt(0.0)?.to_dtype(DType::F64)?;
         assert!(worst(std::slice::from_ref(&made), |v| l1(&v[0], &real, &mask))? < 1e-7);
-        assert!(worst(&[made.clone(), real], |v| discriminator(&v[0], &v[1]))? < 1e-7);
-        assert!(worst(&[made], |v| generator(&v[0]))? < 1e-7);
+        assert!(worst(std::slice::from_ref(&made), |v| velocity(&v[0], &real, &mask))? < 1e-7);
+        for game in [Adversarial::LeastSquares, Adversarial::Log] {
+            assert!(worst(&[made.clone(), real.clone()], |v| game.discriminator(&v[0], &v[1]))? < 1e-7);
+            assert!(worst(std::slice::from_ref(&made), |v| game.generator(&v[0]))? < 1e-7);
+        }
         let bones = BoneConstancy::new(&normal(), DType::F64)?;
         assert!(worst(&[pattern(&[2, N_NUMBERS, 3], 0.0)?], |v| bones.loss(&v[0]))? < 1e-6);
         Ok(())
@@ -111,6 +162,22 @@ mod tests {
         let loss = |mask| -> Result<f64> { l1(&made, &real, &row(mask)?)?.to_scalar() };
         assert_eq!(loss([1.0, 1.0, 0.0, 1.0])?, 1.0);
         assert_eq!(loss([0.0; 4])?, 0.0);
+        Ok(())
+    }
+
+    #[test]
+    fn losses_are_what_their_formulas_say() -> Result<()> {
+        let row = |values: [f64; 3]| Tensor::new(&[[values]], &Device::Cpu);
+        let number = |loss: Result<Tensor>| loss?.to_scalar::<f64>();
+        let (real, made) = (row([0.5, -1.0, 90.0])?, row([2.0, 0.0, -90.0])?);
+        let log = |x: f64| -(1.0 / (1.0 + (-x).exp())).ln();
+        let expected = (log(0.5) + log(-1.0)) / 3.0 + (log(-2.0) + log(0.0)) / 3.0;
+        assert!((number(Adversarial::Log.discriminator(&real, &made))? - expected).abs() < 1e-12);
+        assert!((number(Adversarial::Log.generator(&made))? - (log(2.0) + log(0.0) + 90.0) / 3.0).abs() < 1e-12);
+        assert_eq!(number(Adversarial::LeastSquares.generator(&row([2.0, 0.0, 1.0])?))?, 2.0 / 3.0);
+        // Speeds 1, -2 against 0, 3, of which the second is not seen.
+        let loss = velocity(&row([1.0, 2.0, 0.0])?, &row([1.0, 1.0, 4.0])?, &row([1.0, 1.0, 0.0])?);
+        assert_eq!(number(loss)?, 1.0);
         Ok(())
     }
 

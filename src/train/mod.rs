@@ -1,7 +1,8 @@
 //! Losses, optimiser, checkpoints, logs, and the training loops.
 //!
-//! The way of a window: `examples` (dataset to normalised poses and log-mels) -> `gan` (the loop) -> `checkpoint`.
-//! `speaker` is what a checkpoint of the generator means.
+//! The way of a window: `examples` (dataset to normalised poses and log-mels) -> `training` (a step: networks,
+//! `representation`, `losses`, `adam`) -> `checkpoint`; `gan` is the loop around it, `validate` and `score` choose the
+//! best. `speaker` is what a checkpoint of the generator means.
 
 pub mod adam;
 pub mod body_errors;
@@ -18,7 +19,9 @@ pub mod lifter_hands;
 pub mod lifter_heatmaps;
 pub mod log;
 pub mod losses;
-pub mod metrics;
 pub mod poses;
+pub mod representation;
+pub mod score;
 pub mod speaker;
+pub mod training;
 pub mod validate;

@@ -1,10 +1,8 @@
 //! The numbers the generator and the discriminator see: 48 joints (all but the neck) x 3, each coordinate with mean 0
 //! and deviation 1 over the training split; and the way back to joints in metres.
 
-use crate::motion::bones;
 use crate::types::pose3d::Motion;
-use crate::types::skeleton::{L_HAND, L_WRIST, N_BONES, N_JOINTS, NECK, R_HAND, R_WRIST};
-use crate::types::time::FrameRate;
+use crate::types::skeleton::{L_HAND, L_WRIST, N_BONES, N_JOINTS, NECK, R_HAND, R_WRIST, is_duplicate};
 use anyhow::ensure;
 use ndarray::{Array2, Array3, ArrayView2};
 use serde::{Deserialize, Serialize};
@@ -13,11 +11,6 @@ use serde::{Deserialize, Serialize};
 pub const N_NUMBERS: usize = 3 * N_BONES;
 /// Least deviation a coordinate is divided by, metres: what hardly moves is not blown up.
 const LEAST_STD: f32 = 0.01;
-
-/// Whether the joint is a hand's root: the wrist again, so the networks do not learn it.
-pub const fn is_duplicate(joint: usize) -> bool {
-    joint == L_HAND || joint == R_HAND
-}
 
 /// Mean and deviation of every number, metres, and the speaker's bone lengths.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,19 +68,12 @@ impl Normalisation {
             numbers[[i, t]] * self.std[i] + self.mean[i]
         })
     }
-
-    /// Numbers [144, T] to motion whose bones have the speaker's lengths.
-    pub fn motion(&self, numbers: ArrayView2<f32>, fps: FrameRate) -> Motion {
-        let mut motion = Motion::from_joints(fps, self.joints(numbers));
-        let lengths = std::array::from_fn(|bone| self.bone_lengths.get(bone).copied().unwrap_or(0.0));
-        bones::with_lengths(&mut motion, &lengths);
-        motion
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::types::time::FrameRate;
 
     #[test]
     fn there_and_back() {

@@ -2,19 +2,23 @@
 
 use super::checkpoint::Contents;
 use super::poses::{N_NUMBERS, Normalisation};
+use super::representation::Representation;
 use crate::audio::mel;
+use crate::motion::bones;
 use crate::nn::params::Params;
 use crate::nn::unet::{Config, Generator};
+use crate::types::pose3d::Motion;
 use crate::types::sound::SAMPLE_RATE;
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result, ensure};
+use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Tensors of the generator in a checkpoint begin with this.
 pub const GENERATOR: &str = "generator.";
 /// Name and version of the layout; another is refused.
-const KIND: &str = "orator speaker 1";
+const KIND: &str = "orator speaker 2";
 const SKELETON: &str = "49 joints, house order";
 /// Most channels of a network that is believed; the published one has 256.
 const MOST_WIDTH: usize = 1024;
@@ -32,6 +36,9 @@ pub struct Facts {
     pub network: Config,
     pub audio: Audio,
     pub normalisation: Normalisation,
+    pub representation: Representation,
+    /// Hash of the dataset it learnt from.
+    pub dataset: String,
 }
 
 /// How the spectrogram was made.
@@ -62,7 +69,15 @@ impl Audio {
 }
 
 impl Facts {
-    pub fn new(name: &str, fps: FrameRate, network: Config, normalisation: Normalisation) -> Self {
+    /// This program's skeleton and audio; `name` and `fps` of the speaker, `dataset` as its hash.
+    pub fn new(
+        name: &str,
+        fps: FrameRate,
+        dataset: &str,
+        network: Config,
+        normalisation: Normalisation,
+        representation: Representation,
+    ) -> Self {
         Self {
             kind: KIND.to_owned(),
             name: name.to_owned(),
@@ -71,7 +86,17 @@ impl Facts {
             network,
             audio: Audio::present(),
             normalisation,
+            representation,
+            dataset: dataset.to_owned(),
         }
+    }
+
+    /// The generator's numbers [144, T] as motion whose bones have the speaker's lengths in every frame.
+    pub fn motion(&self, raw: ArrayView2<f32>) -> Motion {
+        let mut motion = Motion::from_joints(self.fps, self.representation.joints(raw, &self.normalisation));
+        let lengths = &self.normalisation.bone_lengths;
+        bones::with_lengths(&mut motion, &std::array::from_fn(|bone| lengths.get(bone).copied().unwrap_or(0.0)));
+        motion
     }
 }
 
@@ -99,6 +124,7 @@ fn build(contents: &Contents) -> Result<TrainedSpeaker> {
     ensure!((4..=MOST_WIDTH).contains(&network.width), "its width is {}, expected 4 to {MOST_WIDTH}", network.width);
     ensure!(fps.per_sec() <= MOST_FPS, "it moves at {fps}, expected {MOST_FPS} at most");
     facts.normalisation.check()?;
+    facts.representation.check()?;
     let mut params = Params::frozen();
     let generator = Generator::new(&mut params, &facts.network)?;
     params.load(&contents.part(GENERATOR))?;
@@ -117,7 +143,7 @@ mod tests {
         let table = vec![1.0; N_NUMBERS];
         let normal = Normalisation { mean: table.clone(), std: table, bone_lengths: vec![0.1; N_BONES] };
         let network = Config { width: 8, ..Config::of(Preset::Light, N_NUMBERS) };
-        let facts = Facts::new("host", FrameRate::new(15, 1), network.clone(), normal);
+        let facts = Facts::new("host", FrameRate::new(15, 1), "", network.clone(), normal, Representation::Positions);
         let mut params = Params::new(0);
         Generator::new(&mut params, &network).unwrap();
         let mut contents = Contents { facts: serde_json::json!({ "speaker": facts }), tensors: BTreeMap::new() };
@@ -128,6 +154,7 @@ mod tests {
             ("/speaker/network/width", 0),
             ("/speaker/network/n_mels", 1_000_000),
             ("/speaker/fps/num", 4_000_000_000u32),
+            ("/speaker/representation", 7),
         ] {
             let mut facts = contents.facts.clone();
             *facts.pointer_mut(place).unwrap() = value.into();

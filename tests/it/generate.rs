@@ -12,6 +12,7 @@ use orator::nn::params::Params;
 use orator::nn::unet::{Config, Generator, Preset};
 use orator::train::checkpoint::{self, Contents};
 use orator::train::poses::{N_NUMBERS, Normalisation};
+use orator::train::representation::Representation;
 use orator::train::speaker::{Facts, GENERATOR};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -25,8 +26,8 @@ fn write_untrained_speaker(file: &Path) {
     let network = Config { width: 16, ..Config::of(Preset::Light, N_NUMBERS) };
     let mut params = Params::new(7);
     Generator::new(&mut params, &network).unwrap();
-    let facts =
-        Facts::new("host", FPS, network, Normalisation::new(&mean, &motion.joints.std_axis(Axis(0), 0.0), lengths));
+    let normal = Normalisation::new(&mean, &motion.joints.std_axis(Axis(0), 0.0), lengths);
+    let facts = Facts::new("host", FPS, "", network, normal, Representation::Positions);
     let mut contents = Contents { facts: serde_json::json!({ "speaker": facts }), tensors: BTreeMap::new() };
     contents.add(GENERATOR, params.tensors().unwrap());
     contents.write(file).unwrap();

@@ -6,15 +6,17 @@ use anyhow::{Context, Result, bail};
 use orator::config::Config;
 use orator::dataset::Dataset;
 use orator::train::gan;
+use orator::train::score::{Figures, Validation};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
 
 /// Train a speaker's speech-to-gesture generator.
 ///
-/// Reads the dataset that `orator run` made and trains with the settings of `[gan]`. Checkpoints and `metrics.jsonl`
-/// go to the output folder; started again, it goes on from the newest checkpoint there, and ends with the same bytes
-/// as a training that was never interrupted.
+/// Reads the dataset that `orator run` made and trains with the settings of `[gan]`, one model a speaker. Checkpoints,
+/// `metrics.jsonl`, TensorBoard events and a page of curves go to the output folder; started again, it goes on from the
+/// newest checkpoint there, with that checkpoint's settings, and ends with the same bytes as a training that was never
+/// interrupted.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -49,24 +51,16 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let start = Instant::now();
     let outcome = gan::train(&dataset, &settings, &out, ui)?;
     let steps_per_sec = (outcome.steps - outcome.began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
-    let (made, still) = (outcome.validation.generator, outcome.validation.mean_pose);
     let text = format!(
-        "{}: {} steps ({steps_per_sec:.2} a second) on {} windows, {} parameters\n\
-         on {} {} windows   generator   mean pose\n\
-         L1 (normalised)    {:9.3}   {:9.3}\n\
-         PCK 0.2            {:9.3}   {:9.3}\n\
-         newest checkpoint  {}\n\
-         best (step {})  {}",
+        "{}: {} steps{} ({steps_per_sec:.2} a second, {:.1} % of it waiting for data) on {} windows, {} parameters\n\
+         {}\nnewest checkpoint  {}\nbest (step {})  {}",
         dataset.info().speaker,
         outcome.steps,
+        if outcome.stopped_early { ", ended early: the score had stopped falling" } else { "" },
+        100.0 * outcome.waiting,
         outcome.n_windows,
         outcome.n_parameters,
-        outcome.validation.n_windows,
-        outcome.validation.split,
-        made.l1,
-        still.l1,
-        made.pck,
-        still.pck,
+        figures(&outcome.validation),
         outcome.newest.display(),
         outcome.best_step,
         outcome.best.display(),
@@ -75,7 +69,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let facts = json!({
         "speaker": dataset.info().speaker,
         "steps": outcome.steps,
+        "stopped_early": outcome.stopped_early,
         "steps_per_sec": steps_per_sec,
+        "waiting": outcome.waiting,
         "windows": outcome.n_windows,
         "parameters": outcome.n_parameters,
         "validation": outcome.validation,
@@ -85,6 +81,28 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     });
     ui.summary(&text, Some(&next), facts);
     Ok(Outcome::Done)
+}
+
+/// The last validation as a table, and the alarm where there is one.
+fn figures(validation: &Validation) -> String {
+    let (made, still) = (&validation.generator, &validation.mean_pose);
+    let row = |name: &str, made: f64, still: f64| format!("{name:24}{made:9.3}   {still:9.3}\n");
+    let distance = |figures: &Figures| figures.frechet.unwrap_or(f64::NAN);
+    let mut text = format!("on {} {} windows    generator   mean pose\n", validation.n_windows, validation.split);
+    text += &row("L1 (normalised)", made.l1, still.l1);
+    text += &row("PCK 0.2", made.pck, still.pck);
+    text += &row("PCK 0.2, arms", made.pck_body, still.pck_body);
+    text += &row("PCK 0.2, fingers", made.pck_hands, still.pck_hands);
+    text += &row(&format!("Frechet cm2 ({})", validation.n_poses), distance(made), distance(still));
+    text += &row("motion energy / data's", made.energy, still.energy);
+    text += &format!(
+        "bones change by {:.4} mm a frame in the network's own output (the paper's released predictions: 2 to 5 mm)",
+        validation.bone_change_mm
+    );
+    if let Some(alarm) = &validation.alarm {
+        text += &format!("\nALARM: {alarm}");
+    }
+    text
 }
 
 /// The speaker's name: given, or the only one configured.

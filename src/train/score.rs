@@ -1,0 +1,98 @@
+//! What a validation says of a generator: figures beside those of the pose that never moves from the mean, the one
+//! score that chooses the best checkpoint, and the alarm of a collapse.
+
+use serde::{Deserialize, Serialize};
+
+/// Made motion with less than this share of the data's energy hardly moves.
+const LEAST_ENERGY: f64 = 0.3;
+/// Windows of made motion that differ by less than this share of what real windows differ by are alike.
+const LEAST_SPREAD: f64 = 0.1;
+
+/// A predictor's figures on the held-out windows.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Figures {
+    /// Mean absolute error of normalised coordinates.
+    pub l1: f64,
+    /// Share of correct keypoints, 0..1: all, of shoulders, elbows and wrists, of the fingers.
+    pub pck: f64,
+    pub pck_body: f64,
+    pub pck_hands: f64,
+    /// Frechet distance of single poses to the real ones, square centimetres; too few poses make it too large.
+    pub frechet: Option<f64>,
+    /// Mean squared speed of the joints as a share of the data's.
+    pub energy: f64,
+}
+
+/// The generator beside the mean pose, on the same windows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Validation {
+    /// The split they were measured on.
+    pub split: String,
+    pub n_windows: usize,
+    /// Poses behind the Frechet distance.
+    pub n_poses: usize,
+    pub generator: Figures,
+    pub mean_pose: Figures,
+    /// Mean change of a bone's length from frame to frame in the network's own output, mm.
+    pub bone_change_mm: f64,
+    /// How much windows of different sound differ from each other, as a share of what real windows differ by.
+    pub spread: f64,
+    /// What chooses the best checkpoint, see [`score`].
+    pub score: f64,
+    /// Why this generator has collapsed, if it has.
+    pub alarm: Option<String>,
+}
+
+/// The score, lower is better, 0 for perfect motion: the L1 error and the Frechet distance, each as a share of the mean
+/// pose's, and half the distance of the motion energy from the data's, |ln(energy)| / 2. The first asks for the right
+/// pose at the right time, the second for poses like the speaker's, the third for as much motion. The adversarial loss
+/// has no part in it: it measures the two networks against each other. Without a Frechet distance its share is 1.
+pub fn score(generator: &Figures, mean_pose: &Figures) -> f64 {
+    let frechet = match (generator.frechet, mean_pose.frechet) {
+        (Some(own), Some(still)) if still > 0.0 => own / still,
+        _ => 1.0,
+    };
+    generator.l1 / mean_pose.l1.max(1e-9) + frechet + 0.5 * generator.energy.max(1e-6).ln().abs()
+}
+
+/// Says what is wrong with a generator that hardly moves, or moves alike whatever it hears.
+pub fn alarm(energy: f64, spread: f64) -> Option<String> {
+    if energy < LEAST_ENERGY {
+        let percent = 100.0 * energy;
+        Some(format!("the motion has collapsed towards the mean pose: it has {percent:.0} % of the data's energy"))
+    } else if spread < LEAST_SPREAD {
+        let percent = 100.0 * spread;
+        Some(format!("the motion is alike whatever the sound: windows differ by {percent:.0} % of what real ones do"))
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_score_wants_all_three() {
+        let still = Figures { l1: 0.8, pck: 0.3, pck_body: 0.3, pck_hands: 0.3, frechet: Some(200.0), energy: 0.0 };
+        let good = Figures { l1: 0.4, frechet: Some(50.0), energy: 1.0, ..still };
+        assert!((score(&good, &still) - 0.75).abs() < 1e-12);
+        for worse in [
+            Figures { l1: 0.5, ..good },
+            Figures { frechet: Some(90.0), ..good },
+            Figures { energy: 0.5, ..good },
+            Figures { energy: 2.0, ..good },
+            Figures { frechet: None, ..good },
+            still,
+        ] {
+            assert!(score(&worse, &still) > score(&good, &still), "{worse:?}");
+        }
+    }
+
+    #[test]
+    fn collapses_are_named() {
+        assert!(alarm(0.29, 1.0).is_some_and(|text| text.contains("29 %")));
+        assert!(alarm(1.0, 0.05).is_some_and(|text| text.contains("alike")));
+        assert_eq!(alarm(0.7, 0.5), None);
+    }
+}
