@@ -10,7 +10,6 @@ use orator::stage::progress::Progress;
 use orator::stage::runner::{self, Ended};
 use orator::stage::{Stage, Unit, workdir};
 use serde_json::{Value, json};
-use std::path::Path;
 
 /// Run the stages extract, pose2d, segment, lift, shard for every video of every speaker.
 ///
