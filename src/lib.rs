@@ -33,7 +33,7 @@
 //! | `report` | what became of every second, on one page; no stage, so it may know `segment` | `motion media vision segment animate page` |
 //! | `import` | motion that others captured, with its sound, becomes a dataset | `motion media audio dataset` |
 //! | `forget` | a video and all that was derived from it goes, and a search proves it | `dataset` |
-//! | `demo` | the synthetic speaker: videos with known truth, and the comparison with it | `motion media vision dataset animate metrics` |
+//! | `demo` | the synthetic speaker: videos with known truth, hours by a known rule, and the comparison with both | `motion media vision audio dataset animate train generate metrics` |
 //!
 //! Stages meet in files, never in code; all of them may use `types`, `stage` and `config`. `cli` (in the program
 //! only) imports everything and is the one place that prints. `tests/it/house.rs` holds the code to this table.

@@ -1,12 +1,14 @@
 //! `orator demo`.
 
 use super::{Outcome, ui::Ui};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use orator::config;
+use orator::dataset::Dataset;
 use orator::demo::GENERATOR;
 use orator::demo::folder::{self, Plan};
 use orator::demo::measure::{self, LEAST_FOUND, LEAST_FRAMES, LEAST_JOINTS, MOST_MM, MOST_PX, Millimetres};
-use orator::demo::sheet;
+use orator::demo::{learned, sheet, speaker};
+use orator::generate::Speaker;
 use orator::motion::npy;
 use orator::stage::workdir;
 use orator::types::pose3d::Motion;
@@ -46,6 +48,26 @@ enum Part {
         /// The demo's folder.
         dir: PathBuf,
     },
+    /// Write hours of a synthetic speaker that gestures by a known rule, as a dataset into DIR: sound and motion, no video.
+    Speaker {
+        /// The dataset's folder; must not be there, or be empty.
+        dir: PathBuf,
+        /// Hours of the training split; validation and test have ten minutes each.
+        #[arg(long, default_value_t = 2.0)]
+        hours: f64,
+        /// Another seed is another speech with other whims.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+    },
+    /// Measure on the test split of `orator demo speaker` how much of the rule a trained speaker has learnt.
+    Learned {
+        /// The dataset.
+        #[arg(long, value_name = "DIR")]
+        dataset: PathBuf,
+        /// A checkpoint of `orator train gan` or its folder; without it the simple predictors alone are measured.
+        #[arg(long, value_name = "FILE|FOLDER")]
+        checkpoint: Option<PathBuf>,
+    },
     /// Draw a contact sheet of a run in DIR: video, keypoints, 3D figure, generated motion.
     Sheet {
         /// The demo's folder.
@@ -67,6 +89,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             draw(&dir, &plan, ui)
         }
         Part::Measure { dir } => measure(&dir, ui),
+        Part::Speaker { dir, hours, seed } => speak(&dir, hours, seed, ui),
+        Part::Learned { dataset, checkpoint } => learned(&dataset, checkpoint.as_deref(), ui),
         Part::Sheet { dir, out, motion } => draw_sheet(&dir, &out, motion.as_deref(), ui),
     }
 }
@@ -124,6 +148,61 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
     });
     ui.summary(&text, None, facts);
     Ok(if good { Outcome::Done } else { Outcome::SomeFailed })
+}
+
+fn speak(dir: &Path, hours: f64, seed: u64, ui: &Ui) -> Result<Outcome> {
+    let clips = speaker::clips(hours, seed)?;
+    let out = std::path::absolute(dir)?;
+    let taken = out.exists() && std::fs::read_dir(&out).map_or(true, |mut entries| entries.next().is_some());
+    ensure!(!taken, "{} is not empty; choose another folder", dir.display());
+    let attempt = workdir::attempt_folder(&out)?;
+    let written = speaker::write(&attempt, &clips, ui).and_then(|info| {
+        workdir::replace_folder(&attempt, &out)?;
+        Ok(info)
+    });
+    if written.is_err() {
+        let _ = std::fs::remove_dir_all(&attempt);
+    }
+    let secs: Vec<String> = written?.splits.iter().map(|(name, split)| format!("{name} {:.0} s", split.secs)).collect();
+    let text = format!("{} clips by version {} of the rule: {}", clips.len(), speaker::RULE, secs.join(", "));
+    let next = format!("orator demo learned --dataset {}", dir.display());
+    ui.summary(&text, Some(&next), json!({ "dataset": dir, "clips": clips.len(), "next": next }));
+    Ok(Outcome::Done)
+}
+
+fn learned(dataset: &Path, checkpoint: Option<&Path>, ui: &Ui) -> Result<Outcome> {
+    let dataset = Dataset::open(dataset)?;
+    let speaker = checkpoint.map(Speaker::open).transpose()?;
+    let learned = learned::measure(&dataset, speaker.as_ref(), ui)?;
+    let mut text = format!(
+        "test split: {} clips, {:.0} s\n{:34}{:>9}{:>9}{:>9}{:>9}{:>9}\n{:34}{:>9}{:>9}{:>9}{:>9}{:>9}\n",
+        learned.n_clips,
+        learned.secs,
+        "",
+        "speed",
+        "speed",
+        "",
+        "",
+        "",
+        "predictor",
+        "left",
+        "right",
+        "PCK 0.2",
+        "energy",
+        "L1"
+    );
+    for row in &learned.rows {
+        let [left, right] = row.speed_correlation;
+        text += &format!("{:34}{left:>9.3}{right:>9.3}", row.predictor);
+        text += &row
+            .poses
+            .map_or(String::new(), |p| format!("{:>7.1} %{:>7.1} %{:>9.3}", 100.0 * p.pck, 100.0 * p.energy, p.l1));
+        text += "\n";
+    }
+    text += "speed: correlation of a wrist's speed (m/s, frame by frame, not smoothed, all clips in a row) with that of the\n\
+             rule without whims; PCK, energy (mean squared joint speed, share of the data's) and L1 (normalised): against the data.";
+    ui.summary(&text, None, serde_json::to_value(&learned)?);
+    Ok(Outcome::Done)
 }
 
 fn draw_sheet(dir: &Path, out: &Path, generated: Option<&Path>, ui: &Ui) -> Result<Outcome> {

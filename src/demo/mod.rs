@@ -4,6 +4,9 @@
 //!
 //! `speech` decides when syllables fall and sounds them -> `gesture` moves the body to them -> `figure` turns the
 //! body's controls into joints -> `camera` sees them -> `paint` draws them, one colour a joint (`palette`).
+//!
+//! Without a picture: `speech` -> `rule` (a known rule, instead of `gesture`) -> `figure` -> `speaker` (hours of it, as a
+//! dataset) -> `train::gan` -> `learned`, which holds a trained speaker against the rule and against `listener`.
 
 /// Version of the generator. Version 2 fixed the figure's posture (commit 93b1773); the lifter trained afterwards, but
 /// its training was changed once when this figure's error was known, so the error is no blind test.
@@ -14,10 +17,15 @@ pub mod camera;
 pub mod figure;
 pub mod folder;
 pub mod gesture;
+pub mod learned;
+pub mod listener;
 pub mod measure;
 pub mod paint;
 pub mod palette;
+pub mod ridge;
+pub mod rule;
 pub mod scene;
 pub mod sheet;
+pub mod speaker;
 pub mod speech;
 pub mod truth;

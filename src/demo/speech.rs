@@ -25,6 +25,8 @@ pub struct Syllable {
     pub vowel: usize,
     /// Pitch, Hz.
     pub pitch: f64,
+    /// How loud its phrase is said, 0..1.
+    pub volume: f64,
 }
 
 /// Syllables `first..last` said in one breath.
@@ -59,11 +61,41 @@ impl Speech {
                 let fall = 1.0 - 0.2 * f64::from(k) / f64::from(count);
                 let pitch = base * fall * (1.0 + 0.18 * stress);
                 let vowel = dice.random_range(0..VOWELS.len());
-                speech.syllables.push(Syllable { start: now, end: now + length, stress, vowel, pitch });
+                speech.syllables.push(Syllable { start: now, end: now + length, stress, vowel, pitch, volume: 1.0 });
                 now += length + 0.02;
             }
             speech.phrases.push(Phrase { first, last: speech.syllables.len() });
             now += dice.random_range(0.3..0.9);
+        }
+        speech
+    }
+
+    /// Free speech for `secs` seconds: phrases of any length, soft and loud, with accents (stress of at least 0.7, all
+    /// other syllables have at most 0.2) at no regular distance, half a second apart or more.
+    pub fn free(secs: f64, dice: &mut ChaCha8Rng) -> Self {
+        let mut speech = Self::default();
+        let (mut now, mut last_accent) = (dice.random_range(0.2..0.8), f64::NEG_INFINITY);
+        while now < secs - 0.5 {
+            let first = speech.syllables.len();
+            let (count, volume) = (dice.random_range(5..22), dice.random_range(0.7..1.0));
+            let base = dice.random_range(105.0..125.0);
+            for k in 0..count {
+                let accent = now - last_accent > 0.5 && dice.random_bool(0.4);
+                let stress = if accent { dice.random_range(0.7..1.0) } else { dice.random_range(0.0..0.2) };
+                let length = dice.random_range(0.13..0.2) + 0.08 * stress;
+                if now + length > secs - 0.1 {
+                    break;
+                }
+                let pitch = base * (1.0 - 0.2 * f64::from(k) / f64::from(count)) * (1.0 + 0.18 * stress);
+                let vowel = dice.random_range(0..VOWELS.len());
+                speech.syllables.push(Syllable { start: now, end: now + length, stress, vowel, pitch, volume });
+                if accent {
+                    last_accent = now;
+                }
+                now += length + 0.02;
+            }
+            speech.phrases.push(Phrase { first, last: speech.syllables.len() });
+            now += dice.random_range(0.3..1.5);
         }
         speech
     }
@@ -95,9 +127,14 @@ impl Speech {
 }
 
 impl Syllable {
+    /// Its greatest loudness, 0..1.
+    pub fn peak(&self) -> f64 {
+        (0.45 + 0.55 * self.stress) * self.volume
+    }
+
     fn loudness(&self, secs: f64) -> f64 {
         let along = ((secs - self.start) / (self.end - self.start)).clamp(0.0, 1.0);
-        (0.45 + 0.55 * self.stress) * (PI * along).sin().powf(0.6)
+        self.peak() * (PI * along).sin().powf(0.6)
     }
 }
 

@@ -28,7 +28,7 @@ const MAY_IMPORT: [(&str, &str); 24] = [
     ("report", "types stage config motion media vision segment animate page"),
     ("import", "types stage config motion media audio dataset"),
     ("forget", "types stage config dataset"),
-    ("demo", "types stage config motion media vision dataset animate metrics"),
+    ("demo", "types stage config motion media vision audio dataset animate train generate metrics"),
 ];
 
 fn root() -> PathBuf {

@@ -16,7 +16,6 @@ mod film;
 mod footage;
 mod forget;
 mod gan;
-mod gan_program;
 mod generate;
 mod golden;
 mod heatmap_parity;
