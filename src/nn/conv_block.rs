@@ -7,8 +7,7 @@ use super::params::{Init, Params};
 use candle_core::{Result, Tensor};
 
 const EPS: f64 = 1e-3;
-/// Weight of a new batch in the running statistics. The code this descends from takes 0.01, which a training of some
-/// hundred steps on a CPU never catches up with: evaluation is then far off.
+/// Weight of a new batch in the running statistics, where nothing else is said.
 const MOMENTUM: f64 = 0.1;
 /// Slope of the leaky ReLU.
 pub const SLOPE: f64 = 0.2;
@@ -42,6 +41,12 @@ impl Block1d {
             conv: Conv1d::new(params, &format!("{name}.conv"), n_in, n_out, kernel)?.with_stride(stride),
             norm: BatchNorm::new(params, &format!("{name}.norm"), n_out, EPS, MOMENTUM, SLOPE)?,
         })
+    }
+
+    /// With this weight of a new batch in the running statistics.
+    pub fn with_momentum(mut self, momentum: f64) -> Self {
+        self.norm.set_momentum(momentum);
+        self
     }
 
     pub fn forward(&self, x: &Tensor, train: bool) -> Result<Tensor> {
@@ -82,6 +87,12 @@ impl Block2d {
             stride,
             same,
         })
+    }
+
+    /// With this weight of a new batch in the running statistics.
+    pub fn with_momentum(mut self, momentum: f64) -> Self {
+        self.norm.set_momentum(momentum);
+        self
     }
 
     pub fn forward(&self, x: &Tensor, train: bool) -> Result<Tensor> {

@@ -22,8 +22,8 @@ pub fn mel_frames(fps: FrameRate, n_frames: usize) -> usize {
 struct Interval {
     /// [144, T]
     numbers: Array2<f32>,
-    /// [144, T], 1 or 0.
-    mask: Array2<f32>,
+    /// [48, T]: whether the joint (all but the neck) is to be learnt there.
+    mask: Array2<bool>,
     /// [64, at least the mel frames of T]
     mels: Array2<f32>,
 }
@@ -81,8 +81,8 @@ impl Examples {
         Ok(Self { fps, n_frames, intervals, starts })
     }
 
-    /// All poses as normalised numbers [144, T] with their masks, interval by interval.
-    pub fn poses(&self) -> impl Iterator<Item = (ArrayView2<'_, f32>, ArrayView2<'_, f32>)> {
+    /// All poses as normalised numbers [144, T] with the joints seen [48, T], interval by interval.
+    pub fn poses(&self) -> impl Iterator<Item = (ArrayView2<'_, f32>, ArrayView2<'_, bool>)> {
         self.intervals.iter().map(|interval| (interval.numbers.view(), interval.mask.view()))
     }
 
@@ -105,7 +105,9 @@ impl Examples {
             let first_mel = mel_frames(self.fps, start);
             take(&mut mels, &interval.mels, first_mel, n_mels);
             take(&mut poses, &interval.numbers, start, self.n_frames);
-            take(&mut mask, &interval.mask, start, self.n_frames);
+            for seen in interval.mask.slice_axis(Axis(1), Slice::from(start..start + self.n_frames)).rows() {
+                (0..3).for_each(|_| mask.extend(seen.iter().map(|seen| f32::from(*seen))));
+            }
         }
         let tensor = |values, rows, columns| Tensor::from_vec(values, (which.len(), rows, columns), &Device::Cpu);
         Ok(Batch {

@@ -36,20 +36,21 @@ impl Normalisation {
         Ok(())
     }
 
-    /// Motion [T, 49, 3] to numbers [144, T] and which of them to learn from, 1 or 0. A number that is missing is 0.
-    pub fn numbers(&self, motion: &Motion) -> (Array2<f32>, Array2<f32>) {
+    /// Motion [T, 49, 3] to numbers [144, T], and which joints but the neck to learn from [48, T]: those that are seen,
+    /// without the hand roots. A number that is missing is 0.
+    pub fn numbers(&self, motion: &Motion) -> (Array2<f32>, Array2<bool>) {
         let n_frames = motion.n_frames();
-        let (mut numbers, mut mask) = (Array2::zeros((N_NUMBERS, n_frames)), Array2::zeros((N_NUMBERS, n_frames)));
-        for joint in 1..N_JOINTS {
-            for k in 0..3 {
+        let mut numbers = Array2::zeros((N_NUMBERS, n_frames));
+        let mut mask = Array2::from_elem((N_BONES, n_frames), false);
+        for (joint, t) in (1..N_JOINTS).flat_map(|joint| (0..n_frames).map(move |t| (joint, t))) {
+            let value = |k: usize| {
                 let i = 3 * (joint - 1) + k;
-                for t in 0..n_frames {
-                    let value = (motion.joints[[t, joint, k]] - self.mean[i]) / self.std[i];
-                    if value.is_finite() {
-                        numbers[[i, t]] = value;
-                        mask[[i, t]] = f32::from(motion.mask[[t, joint]] && !is_duplicate(joint));
-                    }
-                }
+                (motion.joints[[t, joint, k]] - self.mean[i]) / self.std[i]
+            };
+            let values = [value(0), value(1), value(2)];
+            if values.iter().all(|v| v.is_finite()) {
+                (0..3).for_each(|k| numbers[[3 * (joint - 1) + k, t]] = values[k]);
+                mask[[joint - 1, t]] = motion.mask[[t, joint]] && !is_duplicate(joint);
             }
         }
         (numbers, mask)
@@ -94,11 +95,11 @@ mod tests {
         let normal = Normalisation::new(&table(0.1), &table(0.0), vec![0.0; N_BONES]);
         normal.check().unwrap();
         let (numbers, mask) = normal.numbers(&motion);
-        assert_eq!((numbers[[13, 2]], mask[[13, 2]], mask[[24, 3]], mask[[24, 2]]), (0.0, 0.0, 0.0, 1.0));
-        assert_eq!(mask[[3 * (L_HAND - 1), 0]], 0.0);
+        assert_eq!((numbers[[12, 2]], numbers[[13, 2]]), (0.0, 0.0));
+        assert_eq!((mask[[4, 2]], mask[[8, 3]], mask[[8, 2]], mask[[L_HAND - 1, 0]]), (false, false, true, false));
         let back = normal.joints(numbers.view());
         for ((t, joint, k), expected) in whole.indexed_iter() {
-            if (t, joint, k) != (2, 5, 1) {
+            if (t, joint) != (2, 5) {
                 assert!((back[[t, joint, k]] - expected).abs() < 1e-5);
             }
         }

@@ -29,13 +29,13 @@ impl Representation {
     /// over the frames where both ends of the bone are seen.
     pub fn bones<'a>(
         normal: &Normalisation,
-        poses: impl Iterator<Item = (ArrayView2<'a, f32>, ArrayView2<'a, f32>)>,
+        poses: impl Iterator<Item = (ArrayView2<'a, f32>, ArrayView2<'a, bool>)>,
     ) -> Self {
         let (mut n, mut sum, mut squares) = ([0.0f64; N_BONES], [0.0f64; N_NUMBERS], [0.0f64; N_NUMBERS]);
         for (numbers, mask) in poses {
             let joints = normal.joints(numbers);
             for (t, joints) in joints.outer_iter().enumerate() {
-                let seen = |joint: usize| joint == NECK || mask[[3 * (joint - 1), t]] > 0.0;
+                let seen = |joint: usize| joint == NECK || mask[[joint - 1, t]];
                 for joint in (1..N_JOINTS).filter(|joint| !is_duplicate(*joint) && seen(*joint)) {
                     let from = real_parent(joint);
                     let bone: [f64; 3] = std::array::from_fn(|k| f64::from(joints[[joint, k]] - joints[[from, k]]));
@@ -194,7 +194,7 @@ mod tests {
     }
 
     /// Numbers of a pose in motion, seen but for a few.
-    fn poses(normal: &Normalisation) -> (Array2<f32>, Array2<f32>) {
+    fn poses(normal: &Normalisation) -> (Array2<f32>, Array2<bool>) {
         let value = |i: usize, t: usize| (i as f32 * 1.7 + t as f32 * 0.3).sin();
         let mut motion = Motion::from_joints(
             FrameRate::new(15, 1),

@@ -17,10 +17,10 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
-const FPS: FrameRate = FrameRate::new(15, 1);
+pub const FPS: FrameRate = FrameRate::new(15, 1);
 
 /// An interval whose tone and pose follow one slow curve.
-fn sample(key: &str, n_frames: usize, phase: f64) -> Sample {
+pub fn sample(key: &str, n_frames: usize, phase: f64) -> Sample {
     let curve = |secs: f64| (TAU * 0.23 * secs + phase).sin() + 0.5 * (TAU * 0.61 * secs + 2.0 * phase).sin();
     let mut joints = Array3::<f32>::zeros((n_frames, N_JOINTS, 3));
     for t in 0..n_frames {

@@ -16,6 +16,7 @@ mod film;
 mod footage;
 mod forget;
 mod gan;
+mod gan_program;
 mod generate;
 mod golden;
 mod heatmap_parity;
