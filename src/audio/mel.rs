@@ -4,6 +4,7 @@
 use crate::types::sound::SAMPLE_RATE;
 use ndarray::Array2;
 use realfft::RealFftPlanner;
+use std::sync::LazyLock;
 
 /// Samples of a window, between the starts of two windows, and of the Fourier transform: 25 ms, 10 ms, 32 ms.
 pub const WINDOW: usize = 400;
@@ -28,7 +29,6 @@ pub const fn n_samples(n_frames: usize) -> usize {
 
 /// ln(mel + 1e-6) of mono sound at 16 kHz, samples in -1..1: [`n_frames`, 64]. Frame k is the sound from k * 10 ms on.
 pub fn log_mel(samples: &[f32]) -> Array2<f32> {
-    let bands = bands();
     let window: Vec<f32> =
         (0..WINDOW).map(|i| (0.5 - 0.5 * (std::f64::consts::TAU * i as f64 / WINDOW as f64).cos()) as f32).collect();
     let fft = RealFftPlanner::<f32>::new().plan_fft_forward(FFT);
@@ -41,13 +41,15 @@ pub fn log_mel(samples: &[f32]) -> Array2<f32> {
         frame.iter_mut().zip(sound).zip(&window).for_each(|((y, x), w)| *y = x * w);
         // The lengths are the transform's own, so it cannot refuse.
         let _ = fft.process_with_scratch(&mut frame, &mut spectrum, &mut work);
-        for (mel, band) in row.iter_mut().zip(&bands) {
+        for (mel, band) in row.iter_mut().zip(BANDS.iter()) {
             let sum: f32 = band.weights.iter().zip(&spectrum[band.first..]).map(|(w, bin)| w * bin.norm()).sum();
             *mel = (sum + FLOOR).ln();
         }
     }
     mels
 }
+
+static BANDS: LazyLock<Vec<Band>> = LazyLock::new(bands);
 
 /// The bins of one band that have a weight.
 struct Band {

@@ -1,7 +1,8 @@
-//! Speech to motion with a trained speaker, the whole sound in one pass.
+//! Speech to motion with a trained speaker, chunk by chunk: memory does not grow with the sound.
 
 use crate::audio::mel;
-use crate::nn::unet::{Config, FRAMES_MULTIPLE, Preset};
+use crate::nn::chunks::Chunks;
+use crate::nn::unet::FRAMES_MULTIPLE;
 use crate::train::examples::mel_frames;
 use crate::train::gan::BEST;
 use crate::train::poses::N_NUMBERS;
@@ -11,18 +12,22 @@ use crate::types::sound::{SAMPLE_RATE, Sound};
 use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
 use candle_core::{Device, Tensor};
-use ndarray::ArrayView2;
+use ndarray::{Array2, s};
+use std::ops::Range;
 use std::path::Path;
 
-/// Memory the preset `paper` takes for a second of sound at its full width of 256, bytes, as measured: its first
-/// layers keep 64 channels of every band of the spectrogram.
-const PAPER_BYTES_A_SEC: f64 = 5.5e6;
-/// Sound that would take more memory is refused, bytes.
-const MOST_BYTES: f64 = 8e9;
+/// Frames made at once: with 256 more beside them that are thrown away, a small part.
+const CHUNK: usize = 2048;
 
 /// A trained speaker.
 pub struct Speaker {
     trained: TrainedSpeaker,
+}
+
+impl From<TrainedSpeaker> for Speaker {
+    fn from(trained: TrainedSpeaker) -> Self {
+        Self { trained }
+    }
 }
 
 impl Speaker {
@@ -43,50 +48,68 @@ impl Speaker {
         self.trained.facts.fps
     }
 
-    /// Motion for `sound` (16 kHz): as many whole frames as fit into it, bones of the speaker's lengths. The sound is
-    /// continued by its mirror image up to a multiple of 32 frames (rebol.md section 6). Memory grows with the sound:
-    /// for an hour about 1.5 GB with the preset `light`, 20 GB with `paper`. Errors on another rate, on sound shorter
-    /// than a frame, and on sound too long for `paper`.
+    /// Motion for `sound` (16 kHz): as many whole frames as fit into it, bones of the speaker's lengths. Sound of any
+    /// length takes the same memory, but for itself and the motion. Errors on another rate, and on sound shorter than
+    /// a frame.
     pub fn motion(&self, sound: &Sound) -> Result<Motion> {
+        self.motion_with_chunk(sound, CHUNK)
+    }
+
+    /// The same in chunks of `chunk` frames, a multiple of 32.
+    pub fn motion_with_chunk(&self, sound: &Sound, chunk: usize) -> Result<Motion> {
         let facts = &self.trained.facts;
-        ensure!(sound.rate == SAMPLE_RATE, "the sound has {} Hz, expected {SAMPLE_RATE}", sound.rate);
-        let n_frames = (sound.secs() * facts.fps.per_sec() + 1e-6) as usize;
-        ensure!(n_frames > 0, "the sound is {:.3} s long: too short for one frame of motion", sound.secs());
-        check_length(&facts.network, sound.secs())?;
+        let mut numbers = Array2::zeros((N_NUMBERS, self.n_frames(sound)?));
+        let mut first = 0;
+        for poses in self.numbers(sound, chunk)? {
+            let poses = poses?;
+            numbers.slice_mut(s![.., first..first + poses.ncols()]).assign(&poses);
+            first += poses.ncols();
+        }
+        Ok(facts.motion(numbers.view()))
+    }
+
+    /// What the network says for `sound`, [144, T] of one chunk after another, `chunk` frames or less each: raw numbers
+    /// that the checkpoint's facts make into motion. The sound is continued by its mirror image up to a multiple of 32
+    /// frames (rebol.md section 6).
+    pub fn numbers<'a>(
+        &'a self,
+        sound: &'a Sound,
+        chunk: usize,
+    ) -> Result<impl Iterator<Item = Result<Array2<f32>>> + 'a> {
+        let facts = &self.trained.facts;
+        let n_frames = self.n_frames(sound)?;
         let padded = (n_frames / FRAMES_MULTIPLE + 1) * FRAMES_MULTIPLE;
-        let samples = mirrored(&sound.samples, mel::n_samples(mel_frames(facts.fps, padded)));
-        let mels = mel::log_mel(&samples).reversed_axes().as_standard_layout().into_owned();
-        drop(samples);
-        let shape = (1, mels.nrows(), mels.ncols());
-        let mels = Tensor::from_vec(mels.into_raw_vec_and_offset().0, shape, &Device::Cpu)?;
-        let poses = self.trained.generator.forward(&mels, padded, false)?.narrow(2, 0, n_frames)?;
-        let poses = poses.flatten_all()?.to_vec1::<f32>()?;
-        Ok(facts.motion(ArrayView2::from_shape((N_NUMBERS, n_frames), &poses)?))
+        let n_mel_frames = mel_frames(facts.fps, padded);
+        let mels = |frames| log_mels(&sound.samples, frames);
+        let chunks = Chunks::new(&self.trained.generator, facts.network.preset, n_mel_frames, padded, chunk, mels)?;
+        Ok(chunks.zip((0..n_frames).step_by(chunk)).map(move |(poses, first)| {
+            let n = chunk.min(n_frames - first);
+            let poses = poses?.narrow(2, 0, n)?.flatten_all()?.to_vec1()?;
+            Ok(Array2::from_shape_vec((N_NUMBERS, n), poses)?)
+        }))
+    }
+
+    fn n_frames(&self, sound: &Sound) -> Result<usize> {
+        ensure!(sound.rate == SAMPLE_RATE, "the sound has {} Hz, expected {SAMPLE_RATE}", sound.rate);
+        let n_frames = (sound.secs() * self.fps().per_sec() + 1e-6) as usize;
+        ensure!(n_frames > 0, "the sound is {:.3} s long: too short for one frame of motion", sound.secs());
+        Ok(n_frames)
     }
 }
 
-/// Errors where the network would need more memory than is sane for so many seconds.
-fn check_length(network: &Config, secs: f64) -> Result<()> {
-    if network.preset == Preset::Light {
-        return Ok(());
-    }
-    let bytes_a_sec = PAPER_BYTES_A_SEC * network.width as f64 / 256.0;
-    ensure!(
-        secs * bytes_a_sec <= MOST_BYTES,
-        "{:.0} minutes of sound would take about {:.0} GB of memory with this speaker (preset `paper`): cut the sound \
-         into pieces of at most {:.0} minutes, or train a speaker with gan.preset = \"light\"",
-        secs / 60.0,
-        secs * bytes_a_sec / 1e9,
-        (MOST_BYTES / bytes_a_sec / 60.0).floor()
-    );
-    Ok(())
+/// Spectrogram frames of the sound and its mirror images, [1, 64, T].
+fn log_mels(samples: &[f32], frames: Range<usize>) -> candle_core::Result<Tensor> {
+    let first = frames.start * mel::HOP;
+    let mels = mel::log_mel(&mirrored(samples, first..first + mel::n_samples(frames.len())));
+    let shape = (1, mel::N_MELS, frames.len());
+    Tensor::from_iter(mels.t().iter().copied(), &Device::Cpu)?.reshape(shape)
 }
 
-/// `n` samples: the sound, then its mirror image, then the sound again, as long as needed.
-fn mirrored(samples: &[f32], n: usize) -> Vec<f32> {
+/// These samples of the sound, then its mirror image, then the sound again, as long as needed.
+fn mirrored(samples: &[f32], range: Range<usize>) -> Vec<f32> {
     let period = (2 * samples.len()).saturating_sub(2).max(1);
     let at = |i: usize| if i < samples.len() { i } else { period - i };
-    (0..n).map(|i| samples[at(i % period)]).collect()
+    range.map(|i| samples[at(i % period)]).collect()
 }
 
 #[cfg(test)]
@@ -94,18 +117,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_hour_is_too_long_for_the_published_network_only() {
-        let of = |preset| Config::of(preset, N_NUMBERS);
-        check_length(&of(Preset::Light), 36_000.0).unwrap();
-        check_length(&of(Preset::Paper), 600.0).unwrap();
-        let text = check_length(&of(Preset::Paper), 3_600.0).unwrap_err().to_string();
-        assert!(text.contains("20 GB") && text.contains("24 minutes") && text.contains("light"), "{text}");
-    }
-
-    #[test]
     fn sound_is_mirrored_as_long_as_needed() {
-        assert_eq!(mirrored(&[1.0, 2.0, 3.0], 8), [1.0, 2.0, 3.0, 2.0, 1.0, 2.0, 3.0, 2.0]);
-        assert_eq!(mirrored(&[1.0], 3), [1.0, 1.0, 1.0]);
-        assert_eq!(mirrored(&[1.0, 2.0, 3.0], 2), [1.0, 2.0]);
+        assert_eq!(mirrored(&[1.0, 2.0, 3.0], 0..8), [1.0, 2.0, 3.0, 2.0, 1.0, 2.0, 3.0, 2.0]);
+        assert_eq!(mirrored(&[1.0], 0..3), [1.0, 1.0, 1.0]);
+        assert_eq!(mirrored(&[1.0, 2.0, 3.0], 3..5), [2.0, 1.0]);
     }
 }

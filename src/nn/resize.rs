@@ -2,7 +2,8 @@
 
 use super::cpu::{Real, is_f64, read, slice};
 use candle_core::backend::BackendStorage;
-use candle_core::{CpuStorage, CustomOp1, Device, Layout, Result, Shape, Tensor};
+use candle_core::{CpuStorage, CustomOp1, Layout, Result, Shape, Tensor};
+use std::ops::Range;
 
 /// Every frame twice: [B, C, T] to [B, C, 2T]. An own operator: the stock one overwrites the gradient where `x` is
 /// used again.
@@ -49,26 +50,53 @@ pub fn linear(x: &Tensor, n_out: usize) -> Result<Tensor> {
     if n_in == n_out {
         return Ok(x.clone());
     }
-    if n_in == 0 {
-        candle_core::bail!("nothing to interpolate: a sequence of no frames");
+    let part = Part { frames: 0..n_out, n_in, n_out };
+    linear_part(&x.narrow(2, 0, part.needed().end)?, &part)
+}
+
+/// Some frames of a linear interpolation of `n_in` frames to `n_out`.
+pub struct Part {
+    pub frames: Range<usize>,
+    pub n_in: usize,
+    pub n_out: usize,
+}
+
+impl Part {
+    /// The frame at or before the place of frame `i` of the result, and the way from it to the next.
+    fn place(&self, i: usize) -> (usize, f64) {
+        let at = i as f64 * self.n_in as f64 / self.n_out as f64;
+        let before = (at as usize).min(self.n_in.saturating_sub(1));
+        (before, at - before as f64)
     }
-    let at = |i: usize| i as f64 * n_in as f64 / n_out as f64;
-    let (mut before, mut after, mut share) = (Vec::new(), Vec::new(), Vec::new());
-    for i in 0..n_out {
-        let floor = (at(i) as usize).min(n_in - 1);
-        before.push(floor as u32);
-        after.push((floor + 1).min(n_in - 1) as u32);
-        share.push(at(i) - floor as f64);
+
+    /// The frames that go in.
+    pub fn needed(&self) -> Range<usize> {
+        let last = self.place(self.frames.end.saturating_sub(1)).0;
+        self.place(self.frames.start).0..(last + 2).min(self.n_in)
     }
-    let indices = |values: Vec<u32>| Tensor::new(values, &Device::Cpu);
-    let (before, after) = (x.index_select(&indices(before)?, 2)?, x.index_select(&indices(after)?, 2)?);
-    let share = Tensor::new(share, &Device::Cpu)?.to_dtype(x.dtype())?;
+}
+
+/// A part of what [`linear`] makes, from the frames that it needs, [B, C, `part.needed()`].
+pub fn linear_part(x: &Tensor, part: &Part) -> Result<Tensor> {
+    let needed = part.needed();
+    if x.dim(2)? != needed.len() || needed.is_empty() || part.frames.is_empty() {
+        candle_core::bail!("cannot interpolate frames {:?} from {} of {needed:?}", part.frames, x.dim(2)?);
+    }
+    let places = part.frames.clone().map(|i| part.place(i));
+    let before: Vec<u32> = places.clone().map(|(before, _)| (before - needed.start) as u32).collect();
+    let after: Vec<u32> = before.iter().map(|before| (before + 1).min(needed.len() as u32 - 1)).collect();
+    let share: Vec<f64> = places.map(|(_, share)| share).collect();
+    let x = x.contiguous()?;
+    let select = |indices: Vec<u32>| x.index_select(&Tensor::new(indices, x.device())?, 2);
+    let (before, after) = (select(before)?, select(after)?);
+    let share = Tensor::new(share, x.device())?.to_dtype(x.dtype())?;
     &before + (after - &before)?.broadcast_mul(&share)?
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use candle_core::Device;
     use crate::nn::finite_difference::{pattern, worst};
 
     #[test]
@@ -91,6 +119,11 @@ mod tests {
         let at = |n_out| linear(&x, n_out)?.flatten_all()?.to_vec1::<f64>();
         assert_eq!(at(8)?, [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.0]);
         assert_eq!(at(2)?, [0.0, 2.0]);
+        let part = Part { frames: 3..6, n_in: 4, n_out: 8 };
+        assert_eq!(part.needed(), 1..4);
+        let some = linear_part(&x.narrow(2, 1, 3)?, &part)?.flatten_all()?.to_vec1::<f64>()?;
+        assert_eq!(some, [1.5, 2.0, 2.5]);
+        assert!(linear_part(&x, &part).is_err());
         assert_eq!(twice(&x)?.flatten_all()?.to_vec1::<f64>()?, [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
         Ok(())
     }

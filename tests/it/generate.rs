@@ -4,16 +4,22 @@
 use crate::bvh::{Bvh, worst_mm};
 use crate::clips;
 use crate::figures::{FPS, swinging};
-use ndarray::Axis;
+use candle_core::{Device, Tensor};
+use ndarray::{Axis, s};
 use orator::animate::figure::bone_metres;
+use orator::audio::mel;
+use orator::generate::Speaker;
 use orator::media::{audio, probe};
+use orator::nn::finite_difference::pattern;
 use orator::motion::{authors_txt, npy};
 use orator::nn::params::Params;
 use orator::nn::unet::{Config, Generator, Preset};
 use orator::train::checkpoint::{self, Contents};
+use orator::train::examples::mel_frames;
 use orator::train::poses::{N_NUMBERS, Normalisation};
 use orator::train::representation::Representation;
-use orator::train::speaker::{Facts, GENERATOR};
+use orator::train::speaker::{Facts, GENERATOR, TrainedSpeaker};
+use orator::types::sound::Sound;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -122,4 +128,84 @@ fn wrong_input_is_named_and_nothing_is_written() {
     let output = generate(dir, "--json --checkpoint host.safetensors --audio gone.wav --out a.bvh");
     let said: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(said["error"].as_str().unwrap().contains("gone.wav"));
+}
+
+#[test]
+fn a_checkpoint_alone_generates_wherever_it_lies() {
+    let folder = tempfile::tempdir().unwrap();
+    let (training, elsewhere) = (folder.path().join("training"), folder.path().join("elsewhere"));
+    std::fs::create_dir(&training).unwrap();
+    std::fs::create_dir(&elsewhere).unwrap();
+    write_untrained_speaker(&checkpoint::path(&training, 20));
+    audio::write_wav(&training.join("speech.wav"), &clips::tone(16_000, 1.0, 220.0)).unwrap();
+    let output = generate(&training, "--checkpoint step-0000020.safetensors --audio speech.wav --out made.npy");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let made = std::fs::read(training.join("made.npy")).unwrap();
+
+    std::fs::rename(checkpoint::path(&training, 20), elsewhere.join("host.safetensors")).unwrap();
+    std::fs::rename(training.join("speech.wav"), elsewhere.join("speech.wav")).unwrap();
+    std::fs::remove_dir_all(&training).unwrap();
+    let output = generate(&elsewhere, "--checkpoint host.safetensors --audio speech.wav --out again.npy");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(std::fs::read(elsewhere.join("again.npy")).unwrap(), made);
+}
+
+/// A speaker of a preset's full size with random weights and running statistics.
+fn random_speaker(preset: Preset) -> anyhow::Result<TrainedSpeaker> {
+    let network = Config::of(preset, N_NUMBERS);
+    let mut params = Params::new(11);
+    Generator::new(&mut params, &network)?;
+    let mut tensors = params.tensors()?;
+    for (i, (name, tensor)) in tensors.iter_mut().enumerate().filter(|(_, (_, t))| t.rank() == 1) {
+        let around = if name.ends_with("running_var") || name.ends_with("norm.weight") { 1.0 } else { 0.0 };
+        *tensor = pattern(tensor.dims(), 17.0 * i as f64)?.affine(0.5, around)?;
+    }
+    let mut params = Params::frozen();
+    let generator = Generator::new(&mut params, &network)?;
+    params.load(&tensors)?;
+    let motion = swinging(1, 40);
+    let mean = motion.joints.mean_axis(Axis(0)).unwrap();
+    let normal = Normalisation::new(&mean, &mean, vec![0.1; N_NUMBERS / 3]);
+    Ok(TrainedSpeaker { facts: Facts::new("host", FPS, "", network, normal, Representation::Positions), generator })
+}
+
+/// What the network makes of a whole sound at once, [144, T].
+fn one_pass(speaker: &TrainedSpeaker, sound: &Sound, n_frames: usize) -> anyhow::Result<ndarray::Array2<f32>> {
+    let padded = (n_frames / 32 + 1) * 32;
+    let n_samples = mel::n_samples(mel_frames(FPS, padded));
+    // Continued by its mirror image, back and forth.
+    let there_and_back = sound.samples.iter().chain(sound.samples.iter().rev().skip(1).take(sound.samples.len() - 2));
+    let samples: Vec<f32> = there_and_back.cycle().take(n_samples).copied().collect();
+    let mels = mel::log_mel(&samples);
+    let (n, bands) = mels.dim();
+    let mels = Tensor::from_vec(mels.iter().copied().collect(), (1, n, bands), &Device::Cpu)?.t()?.contiguous()?;
+    let poses = speaker.generator.forward(&mels, padded, false)?.flatten_all()?.to_vec1()?;
+    Ok(ndarray::Array2::from_shape_vec((N_NUMBERS, padded), poses)?.slice_move(s![.., ..n_frames]))
+}
+
+#[test]
+fn long_and_short_sound_in_chunks_is_one_pass_at_full_size() -> anyhow::Result<()> {
+    for (preset, lengths) in [(Preset::Light, &[0.2, 5.03, 21.7][..]), (Preset::Paper, &[0.1, 7.9])] {
+        let trained = random_speaker(preset)?;
+        for secs in lengths {
+            let sound = clips::tone(16_000, *secs, 220.0);
+            let n_frames = (secs * 15.0 + 1e-6) as usize;
+            let whole = one_pass(&trained, &sound, n_frames)?;
+            let most = whole.iter().fold(0.0f32, |most, v| most.max(v.abs()));
+            let speaker = Speaker::from(random_speaker(preset)?);
+            let mut first = 0;
+            for part in speaker.numbers(&sound, 64)? {
+                let part = part?;
+                let off = &part - &whole.slice(s![.., first..first + part.ncols()]);
+                let off = off.iter().fold(0.0f32, |most, v| most.max(v.abs()));
+                assert!(off < 1e-5 * most.max(1.0), "{preset:?}, {secs} s, from frame {first}: {off:e} of {most}");
+                first += part.ncols();
+            }
+            assert_eq!(first, n_frames);
+            assert_eq!(speaker.motion(&sound)?.n_frames(), n_frames);
+        }
+        let speaker = Speaker::from(trained);
+        assert!(speaker.motion_with_chunk(&clips::tone(16_000, 1.0, 220.0), 33).is_err());
+    }
+    Ok(())
 }

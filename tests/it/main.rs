@@ -18,6 +18,7 @@ mod forget;
 mod gan;
 mod gan_program;
 mod generate;
+mod generator_parity;
 mod golden;
 mod heatmap_parity;
 mod house;

@@ -22,10 +22,14 @@ fn golden(name: &str) -> Golden {
     all.remove(name).unwrap()
 }
 
+/// The formula's number of a name.
+pub fn phase(name: &str) -> f64 {
+    (name.bytes().enumerate().map(|(k, c)| (k + 1) * usize::from(c)).sum::<usize>() % 1009) as f64
+}
+
 /// The formula of the references: a tensor by its name and shape.
-fn value(name: &str, shape: &[usize]) -> Result<Tensor> {
-    let phase = name.bytes().enumerate().map(|(k, c)| (k + 1) * usize::from(c)).sum::<usize>() % 1009;
-    let p = pattern(shape, phase as f64)?;
+pub fn value(name: &str, shape: &[usize]) -> Result<Tensor> {
+    let p = pattern(shape, phase(name))?;
     match name {
         _ if name.ends_with("running_var") => p.affine(0.5, 1.0),
         _ if name.ends_with("norm.weight") => p.affine(0.2, 1.0),

@@ -1,0 +1,103 @@
+//! `orator bench generate`.
+
+use super::{child, median};
+use crate::cli::{Outcome, ui::Ui};
+use anyhow::{Result, ensure};
+use orator::demo::speech::Speech;
+use orator::generate::Speaker;
+use orator::nn::params::Params;
+use orator::nn::unet::{Config, Generator, Preset};
+use orator::stage::progress::Progress as _;
+use orator::train::poses::{N_NUMBERS, Normalisation};
+use orator::train::representation::Representation;
+use orator::train::speaker::{Facts, TrainedSpeaker};
+use orator::types::skeleton::{N_BONES, N_JOINTS};
+use orator::types::sound::Sound;
+use orator::types::time::FrameRate;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::json;
+use std::time::Instant;
+
+/// Speech to motion with both presets at their full size: how many times faster than the speech itself, and the most
+/// memory it took. The speech is synthetic, the weights are random. From samples to joints, with the spectrogram but
+/// without files.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Seconds of speech.
+    #[arg(long, default_value_t = 600.0, value_name = "SECS")]
+    secs: f64,
+    /// Rounds; each measures every preset once.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    rounds: usize,
+    /// Threads.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    threads: usize,
+    /// This preset only.
+    #[arg(long, value_name = "light|paper")]
+    preset: Option<Preset>,
+}
+
+/// Motion is made at this rate.
+const FPS: FrameRate = FrameRate::new(15, 1);
+
+pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+    ensure!(args.secs >= 1.0 && args.secs < 1e6, "--secs is {}, expected 1 to a million", args.secs);
+    ensure!(args.rounds > 0 && args.threads > 0, "nothing to measure: there must be rounds and threads");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build()?;
+    let presets = [("light", Preset::Light), ("paper", Preset::Paper)];
+    let presets: Vec<_> = presets.into_iter().filter(|(_, p)| args.preset.is_none_or(|only| only == *p)).collect();
+    let sound = speech(args.secs);
+    let task = ui.begin("bench generate", (args.rounds * presets.len()) as u64);
+    // One after the other, the smaller first: the peak of memory is that of the whole program until then.
+    let measured = presets.iter().map(|(name, preset)| {
+        task.detail(name);
+        let speaker = untrained(*preset)?;
+        let mut secs = Vec::new();
+        for _ in 0..args.rounds {
+            let start = Instant::now();
+            let motion = pool.install(|| speaker.motion(&sound))?;
+            secs.push(start.elapsed().as_secs_f64());
+            ensure!(motion.joints.iter().all(|v| v.is_finite()), "the motion made is not finite");
+            task.advance(1);
+        }
+        Ok((*name, median(secs), child::own_peak_mib()))
+    });
+    let measured = measured.collect::<Result<Vec<_>>>()?;
+    drop(task);
+
+    let mut lines = vec![format!(
+        "{:.0} s of speech, {} thread(s), median of {} round(s); before it {:.0} MiB are the sound's",
+        args.secs,
+        args.threads,
+        args.rounds,
+        sound.samples.len() as f64 * 4.0 / 1024.0 / 1024.0
+    )];
+    let mut facts = json!({ "audio_secs": args.secs, "threads": args.threads });
+    for (name, secs, peak_mib) in measured {
+        let speed = args.secs / secs;
+        lines.push(format!("{name:6} {secs:8.2} s  {speed:6.0} x real time  peak memory {peak_mib:.0} MiB"));
+        facts[name] = json!({ "secs": secs, "times_real_time": speed, "peak_mib": peak_mib });
+    }
+    ui.summary(&lines.join("\n"), None, facts);
+    Ok(Outcome::Done)
+}
+
+fn speech(secs: f64) -> Sound {
+    let mut dice = ChaCha8Rng::seed_from_u64(1337);
+    Speech::new(secs, &mut dice).sound(secs, &mut dice)
+}
+
+/// A speaker with random weights.
+fn untrained(preset: Preset) -> Result<Speaker> {
+    let network = Config::of(preset, N_NUMBERS);
+    let mut random = Params::new(1337);
+    Generator::new(&mut random, &network)?;
+    let mut params = Params::frozen();
+    let generator = Generator::new(&mut params, &network)?;
+    params.load(&random.tensors()?)?;
+    let table = ndarray::Array2::from_elem((N_JOINTS, 3), 0.1);
+    let normalisation = Normalisation::new(&table, &table, vec![0.1; N_BONES]);
+    let facts = Facts::new("untrained", FPS, "", network, normalisation, Representation::Positions);
+    Ok(Speaker::from(TrainedSpeaker { facts, generator }))
+}
