@@ -6,6 +6,7 @@
 pub mod batch_norm;
 pub mod body_lifter;
 pub mod chunks;
+pub mod composed;
 pub mod conv1d;
 pub mod conv3x3;
 pub mod conv_block;

@@ -96,8 +96,8 @@ pub fn linear_part(x: &Tensor, part: &Part) -> Result<Tensor> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use candle_core::Device;
     use crate::nn::finite_difference::{pattern, worst};
+    use candle_core::Device;
 
     #[test]
     fn gradients_are_right_also_where_the_input_is_used_again() -> Result<()> {

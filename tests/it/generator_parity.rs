@@ -141,7 +141,7 @@ fn compare(
 fn generator(preset: Preset, network: &str, train: bool, dtype: DType) -> anyhow::Result<()> {
     let mut params = Params::with_dtype(0, dtype);
     let net = Generator::new(&mut params, &Config::of(preset, 147))?;
-    let mels = pattern(&[2, 64, 418], 1.0)?;
+    let mels = pattern(&[2, 64, 418], if preset == Preset::Paper { 15.0 } else { 25.0 })?;
     compare(network, train, dtype, &params, &mels, None, |mels| net.forward(mels, 64, train))
 }
 
