@@ -11,21 +11,21 @@ use std::sync::{Arc, OnceLock};
 
 /// Mean and variance of each channel.
 #[derive(Clone, Debug, PartialEq)]
-struct Statistics {
-    mean: Vec<f64>,
-    variance: Vec<f64>,
+pub struct Statistics {
+    pub mean: Vec<f64>,
+    pub variance: Vec<f64>,
 }
 
 /// A normalisation with its numbers: `<name>.weight` (1), `<name>.bias` (0), `<name>.running_mean` (0) and
 /// `<name>.running_var` (1), each [C].
 pub struct BatchNorm {
-    weight: Tensor,
-    bias: Tensor,
+    pub(super) weight: Tensor,
+    pub(super) bias: Tensor,
     running_mean: Var,
     running_var: Var,
-    eps: f64,
+    pub(super) eps: f64,
     momentum: f64,
-    slope: f64,
+    pub(super) slope: f64,
 }
 
 impl BatchNorm {
@@ -52,23 +52,31 @@ impl BatchNorm {
     pub fn forward(&self, x: &Tensor, train: bool) -> Result<Tensor> {
         let statistics = Arc::new(OnceLock::new());
         if !train {
-            let values = |var: &Var| var.to_dtype(candle_core::DType::F64)?.to_vec1();
-            let _ =
-                statistics.set(Statistics { mean: values(&self.running_mean)?, variance: values(&self.running_var)? });
+            let _ = statistics.set(self.running()?);
         }
         let op = Op { statistics: statistics.clone(), eps: self.eps, slope: self.slope, train };
         let y = x.contiguous()?.apply_op3(&self.weight, &self.bias, op)?;
         if let (true, Some(batch)) = (train, statistics.get()) {
-            let n = (x.elem_count() / batch.mean.len()) as f64;
-            self.follow(&self.running_mean, &batch.mean, 1.0)?;
-            self.follow(&self.running_var, &batch.variance, n / (n - 1.0).max(1.0))?;
+            self.follow(batch, x.elem_count() / batch.mean.len())?;
         }
         Ok(y)
     }
 
-    fn follow(&self, running: &Var, batch: &[f64], scale: f64) -> Result<()> {
-        let batch = Tensor::new(batch, &Device::Cpu)?.to_dtype(running.dtype())?;
-        running.set(&((running.as_tensor() * (1.0 - self.momentum))? + (batch * (self.momentum * scale))?)?)
+    /// The running statistics.
+    pub fn running(&self) -> Result<Statistics> {
+        let values = |var: &Var| var.to_dtype(candle_core::DType::F64)?.to_vec1();
+        Ok(Statistics { mean: values(&self.running_mean)?, variance: values(&self.running_var)? })
+    }
+
+    /// Moves the running statistics towards those of a batch of `n` values a channel; the variance is the unbiased one.
+    pub fn follow(&self, batch: &Statistics, n: usize) -> Result<()> {
+        let n = n as f64;
+        let towards = |running: &Var, batch: &[f64], scale: f64| {
+            let batch = Tensor::new(batch, &Device::Cpu)?.to_dtype(running.dtype())?;
+            running.set(&((running.as_tensor() * (1.0 - self.momentum))? + (batch * (self.momentum * scale))?)?)
+        };
+        towards(&self.running_mean, &batch.mean, 1.0)?;
+        towards(&self.running_var, &batch.variance, n / (n - 1.0).max(1.0))
     }
 }
 

@@ -46,8 +46,8 @@ pub fn conv2d(x: &Tensor, weight: &Tensor, bias: &Tensor, [over_time, across]: [
 
 /// As [`super::resize::twice`].
 pub fn twice(x: &Tensor) -> Result<Tensor> {
-    let (batch, channels, n_frames) = x.dims3()?;
-    x.unsqueeze(3)?.broadcast_as((batch, channels, n_frames, 2))?.contiguous()?.reshape((batch, channels, 2 * n_frames))
+    let (batch, n_frames, channels) = x.dims3()?;
+    x.unsqueeze(2)?.broadcast_as((batch, n_frames, 2, channels))?.contiguous()?.reshape((batch, 2 * n_frames, channels))
 }
 
 /// Mean and variance (of the batch itself, not the estimate) of every channel of [B, C, ...], [C] each.

@@ -2,6 +2,7 @@
 //! and the one matrix product. Everything here gives the same bits for any number of threads: work is cut into
 //! pieces of a fixed size and each number is summed by one thread in one order.
 
+use super::kernel::{self, Kernel};
 use candle_core::{CpuStorage, DType, Layout, Result, Storage, Tensor, WithDType};
 use rayon::prelude::*;
 use std::cell::RefCell;
@@ -17,11 +18,17 @@ pub const GRAIN: usize = 16 * 1024;
 /// The number types our operators are written for: f32 to train with, f64 to prove the gradients with.
 pub trait Real: WithDType {
     fn pool() -> &'static LocalKey<RefCell<Vec<Vec<Self>>>>;
+    /// The loop of the processor at hand.
+    fn kernel() -> Kernel<Self>;
 }
 
 macro_rules! real {
-    ($type:ty) => {
+    ($type:ty, $kernel:path) => {
         impl Real for $type {
+            fn kernel() -> Kernel<Self> {
+                $kernel()
+            }
+
             fn pool() -> &'static LocalKey<RefCell<Vec<Vec<Self>>>> {
                 thread_local!(static POOL: RefCell<Vec<Vec<$type>>> = const { RefCell::new(Vec::new()) });
                 &POOL
@@ -29,8 +36,8 @@ macro_rules! real {
         }
     };
 }
-real!(f32);
-real!(f64);
+real!(f32, kernel::of_f32);
+real!(f64, kernel::of_f64);
 
 /// The numbers of a contiguous tensor inside an operator. Errors when it is not contiguous (callers see to it).
 pub fn slice<'a, T: Real>(storage: &'a CpuStorage, layout: &Layout) -> Result<&'a [T]> {
@@ -136,17 +143,30 @@ pub fn matmul<T: Real>(product: &mut [T], left: Matrix<T>, right: Matrix<T>, m: 
     });
 }
 
-/// Where a product begins: tasks write disjoint tiles of it.
-#[derive(Clone, Copy)]
-struct Start<T>(*mut T);
+/// New numbers, which `write` writes without zeros having been there before.
+///
+/// # Safety
+/// `write` writes every one of the `len` numbers, and reads none that it has not written.
+pub unsafe fn written<T: Real>(len: usize, write: impl FnOnce(Start<T>)) -> Vec<T> {
+    let mut values = Vec::with_capacity(len);
+    write(Start(values.as_mut_ptr()));
+    // SAFETY: all are written, as the caller promises.
+    unsafe { values.set_len(len) };
+    values
+}
 
-// SAFETY: only the address is shared; who writes where is the affair of `matmul`.
+/// Where a result begins: tasks write disjoint parts of it.
+#[derive(Clone, Copy)]
+pub struct Start<T>(*mut T);
+
+// SAFETY: only the address is shared; who writes where is the affair of those who call `at`.
 unsafe impl<T: Send> Send for Start<T> {}
 unsafe impl<T: Send> Sync for Start<T> {}
 
 impl<T> Start<T> {
-    /// SAFETY: `offset` lies inside the product.
-    unsafe fn at(self, offset: usize) -> *mut T {
+    /// # Safety
+    /// `offset` lies inside the result.
+    pub unsafe fn at(self, offset: usize) -> *mut T {
         unsafe { self.0.add(offset) }
     }
 }

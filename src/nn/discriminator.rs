@@ -2,7 +2,7 @@
 //! about every fourth frame as real or made (Ginosar et al. 2019).
 
 use super::conv_block::{Block1d, SLOPE};
-use super::conv1d::Conv1d;
+use super::conv2d::Conv;
 use super::params::Params;
 use candle_core::{Result, Tensor};
 
@@ -11,31 +11,31 @@ const WIDTH: usize = 64;
 
 /// Two halvings of time, then two layers at that rate.
 pub struct Discriminator {
-    first: Conv1d,
+    first: Conv,
     blocks: [Block1d; 2],
-    last: Conv1d,
+    last: Conv,
 }
 
 impl Discriminator {
     /// Makes the network's tensors; `n_in` numbers a pose.
     pub fn new(params: &mut Params, n_in: usize) -> Result<Self> {
         Ok(Self {
-            first: Conv1d::new(params, "first", n_in, WIDTH, KERNEL)?.with_stride(2),
+            first: Conv::new(params, "first", &[WIDTH, n_in, KERNEL], 2)?,
             blocks: [
                 Block1d::new(params, "block.0", WIDTH, 2 * WIDTH, KERNEL, 2)?,
                 Block1d::new(params, "block.1", 2 * WIDTH, 4 * WIDTH, KERNEL, 1)?,
             ],
-            last: Conv1d::new(params, "last", 4 * WIDTH, 1, KERNEL)?,
+            last: Conv::new(params, "last", &[1, 4 * WIDTH, KERNEL], 1)?,
         })
     }
 
     /// Differences [B, n_in, T - 1] to scores [B, 1, about T / 4]; 1 means real, 0 made.
     pub fn forward(&self, motion: &Tensor, train: bool) -> Result<Tensor> {
-        let mut x = candle_nn::ops::leaky_relu(&self.first.forward(motion)?, SLOPE)?;
+        let mut x = candle_nn::ops::leaky_relu(&self.first.forward(&motion.t()?)?, SLOPE)?;
         for block in &self.blocks {
             x = block.forward(&x, train)?;
         }
-        self.last.forward(&x)
+        self.last.forward(&x)?.t()?.contiguous()
     }
 }
 

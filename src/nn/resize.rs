@@ -5,7 +5,7 @@ use candle_core::backend::BackendStorage;
 use candle_core::{CpuStorage, CustomOp1, Layout, Result, Shape, Tensor};
 use std::ops::Range;
 
-/// Every frame twice: [B, C, T] to [B, C, 2T]. An own operator: the stock one overwrites the gradient where `x` is
+/// Every frame twice: [B, T, C] to [B, 2T, C]. An own operator: the stock one overwrites the gradient where `x` is
 /// used again.
 pub fn twice(x: &Tensor) -> Result<Tensor> {
     x.contiguous()?.apply_op1(Twice)
@@ -19,21 +19,25 @@ impl CustomOp1 for Twice {
     }
 
     fn cpu_fwd(&self, x: &CpuStorage, layout: &Layout) -> Result<(CpuStorage, Shape)> {
-        fn repeat<T: Real>(x: &[T]) -> Vec<T> {
-            x.iter().flat_map(|v| [*v, *v]).collect()
+        fn repeat<T: Real>(x: &[T], n_channels: usize) -> Vec<T> {
+            x.chunks_exact(n_channels).flat_map(|frame| [frame, frame]).flatten().copied().collect()
         }
-        let (batch, channels, n_frames) = layout.shape().dims3()?;
+        let (batch, n_frames, channels) = layout.shape().dims3()?;
         let y = if is_f64(x.dtype())? {
-            CpuStorage::F64(repeat(slice(x, layout)?))
+            CpuStorage::F64(repeat(slice(x, layout)?, channels))
         } else {
-            CpuStorage::F32(repeat(slice(x, layout)?))
+            CpuStorage::F32(repeat(slice(x, layout)?, channels))
         };
-        Ok((y, Shape::from((batch, channels, 2 * n_frames))))
+        Ok((y, Shape::from((batch, 2 * n_frames, channels))))
     }
 
     fn bwd(&self, x: &Tensor, _y: &Tensor, grad: &Tensor) -> Result<Option<Tensor>> {
         fn typed<T: Real>(grad: &Tensor) -> Result<Vec<T>> {
-            read::<T, _>(grad, |grad| Ok(grad.as_chunks::<2>().0.iter().map(|[a, b]| *a + *b).collect()))
+            let n = grad.dim(2)?;
+            read::<T, _>(grad, |grad| {
+                let pairs = grad.chunks_exact(2 * n).map(|pair| pair.split_at(n));
+                Ok(pairs.flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| *a + *b)).collect())
+            })
         }
         Ok(Some(if is_f64(grad.dtype())? {
             Tensor::from_vec(typed::<f64>(grad)?, x.shape(), x.device())?
@@ -124,7 +128,7 @@ mod tests {
         let some = linear_part(&x.narrow(2, 1, 3)?, &part)?.flatten_all()?.to_vec1::<f64>()?;
         assert_eq!(some, [1.5, 2.0, 2.5]);
         assert!(linear_part(&x, &part).is_err());
-        assert_eq!(twice(&x)?.flatten_all()?.to_vec1::<f64>()?, [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
+        assert_eq!(twice(&x.t()?)?.flatten_all()?.to_vec1::<f64>()?, [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
         Ok(())
     }
 }

@@ -3,7 +3,7 @@
 //! into motion. Fully convolutional: any number of frames that is a multiple of [`FRAMES_MULTIPLE`].
 
 use super::conv_block::{Block1d, Block2d};
-use super::conv1d::Conv1d;
+use super::conv2d::Conv;
 use super::params::Params;
 use super::resize;
 use candle_core::{Result, Tensor};
@@ -72,7 +72,7 @@ pub struct Generator {
     downs: Vec<Block1d>,
     ups: Vec<Block1d>,
     decoder: Vec<Block1d>,
-    last: Conv1d,
+    last: Conv,
 }
 
 /// A block of so many channels in and out.
@@ -97,7 +97,7 @@ impl Generator {
         let downs = row("down", N_LEVELS, Block1d::down)?;
         let ups = row("up", N_LEVELS, Block1d::plain)?;
         let decoder = row("decoder", N_DECODER, Block1d::plain)?;
-        let last = Conv1d::new(params, "last", n, config.n_out, 1)?;
+        let last = Conv::new(params, "last", &[config.n_out, n, 1], 1)?;
         Ok(Self { front, enter, downs, ups, decoder, last })
     }
 
@@ -112,13 +112,13 @@ impl Generator {
 
     /// `mels` [B, n_mels, T_mel] to what is heard [B, width, about T_mel / 8].
     pub fn front(&self, mels: &Tensor, train: bool) -> Result<Tensor> {
-        self.front.forward(mels, train)
+        self.front.forward(mels, train)?.t()?.contiguous()
     }
 
     /// What is heard at every pose frame, [B, width, T], to poses [B, n_out, T]; T is a multiple of
     /// [`FRAMES_MULTIPLE`].
     pub fn trunk(&self, x: &Tensor, train: bool) -> Result<Tensor> {
-        let mut x = x.clone();
+        let mut x = x.t()?;
         for block in &self.enter {
             x = block.forward(&x, train)?;
         }
@@ -133,7 +133,7 @@ impl Generator {
         for block in &self.decoder {
             x = block.forward(&x, train)?;
         }
-        self.last.forward(&x)
+        self.last.forward(&x)?.t()?.contiguous()
     }
 }
 
@@ -165,20 +165,20 @@ impl Front {
                     Block2d::plain(params, &name(4), n / 2, n)?,
                     Block2d::down(params, &name(5), n, n)?,
                     Block2d::plain(params, &name(6), n, n)?,
-                    Block2d::valid(params, &name(7), [n, n, 3, mels / 8])?,
+                    Block2d::across(params, &name(7), [n, n, 3, mels / 8])?,
                 ];
                 Front::Paper(blocks.into_iter().map(|block| block.with_momentum(momentum)).collect())
             }
         })
     }
 
-    /// [B, n_mels, T_mel] to [B, width, T_mel / 8].
+    /// [B, n_mels, T_mel] to [B, T_mel / 8, width].
     fn forward(&self, mels: &Tensor, train: bool) -> Result<Tensor> {
         match self {
-            Front::Light(blocks) => blocks.iter().try_fold(mels.clone(), |x, block| block.forward(&x, train)),
+            Front::Light(blocks) => blocks.iter().try_fold(mels.t()?, |x, block| block.forward(&x, train)),
             Front::Paper(blocks) => {
-                let image = mels.t()?.unsqueeze(1)?.contiguous()?;
-                blocks.iter().try_fold(image, |x, block| block.forward(&x, train))?.squeeze(3)
+                let image = mels.t()?.unsqueeze(3)?;
+                blocks.iter().try_fold(image, |x, block| block.forward(&x, train))?.squeeze(2)
             }
         }
     }
