@@ -52,7 +52,8 @@ impl<T: Real> Panels<T> {
 impl Panel {
     /// Adds the products of one block of steps to the sums at every place.
     ///
-    /// Safety: places lie inside `left` (with the block's reach) and `to`, which no other thread writes to there.
+    /// # Safety
+    /// Places lie inside `left` (with the block's reach) and `to`, which no other thread writes to there.
     pub unsafe fn multiply<T: Real>(
         &self,
         right: &[T],

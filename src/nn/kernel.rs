@@ -34,7 +34,8 @@ pub struct Kernel<T> {
     pub most_vectors: usize,
     /// Runs a job of so many rows and so many vectors (1, 2 or 4).
     ///
-    /// Safety: every address the job names is readable, those of `to` writable by this thread alone.
+    /// # Safety
+    /// Every address the job names is readable, those of `to` writable by this thread alone.
     pub run: unsafe fn(&Job<T>, usize, usize),
 }
 
