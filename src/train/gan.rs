@@ -101,7 +101,7 @@ fn run(
 ) -> Result<Outcome> {
     let settings = training.settings.clone();
     let began_at = training.step;
-    let mut log = Log::open(&folder.join("metrics.jsonl"), began_at)?;
+    let mut log = Log::open(folder, began_at)?;
     let task = progress.begin(&format!("train {}", training.facts.name), settings.steps as u64);
     task.advance(began_at.min(settings.steps) as u64);
     let (start, mut waiting) = (Instant::now(), Duration::ZERO);

@@ -141,7 +141,7 @@ fn train_until(
     if start > 0 {
         progress.say(&format!("going on at step {start} of {}", schedule.steps));
     }
-    let mut log = Log::open(&beside(out, ".jsonl"), start)?;
+    let mut log = Log::lines_alone(&beside(out, ".jsonl"), start)?;
     let weights = lesson.weights();
     let n_points = weights.len();
     let mean_weight = weights.iter().sum::<f32>() / n_points as f32;

@@ -1,41 +1,90 @@
-//! The log of a training: one JSON object a line, each with its `step`. A resumed training drops the lines that its
-//! checkpoint has not seen, so that the file is the one of an undisturbed training.
+//! The log of a training: `metrics.jsonl`, one JSON object a line, each with its `step`, and the same numbers as an event
+//! file for TensorBoard. A resumed training drops the lines that its checkpoint has not seen, so that both files are
+//! those of an undisturbed training.
 
+use super::events;
 use crate::stage::workdir;
 use anyhow::{Context, Result};
 use serde_json::Value;
 use std::fs::{File, OpenOptions};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+
+/// The lines, in the folder of a training.
+pub const FILE: &str = "metrics.jsonl";
 
 /// The open log.
 pub struct Log {
-    path: PathBuf,
-    file: File,
+    lines: Growing,
+    events: Option<Growing>,
 }
 
 impl Log {
-    /// Opens the file `path`, made if missing, with the lines up to `step`.
-    pub fn open(path: &Path, step: usize) -> Result<Self> {
-        let path = path.to_owned();
-        let old = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
-            Err(error) => return Err(error).with_context(|| format!("cannot read {}", path.display())),
-        };
-        let seen = |line: &&str| {
-            let step_of_line = serde_json::from_str::<Value>(line).ok().and_then(|value| value["step"].as_u64());
-            step_of_line.is_some_and(|of_line| of_line <= step as u64)
-        };
-        let kept: String = old.lines().filter(seen).map(|line| format!("{line}\n")).collect();
-        workdir::write_file(&path, kept.as_bytes())?;
-        let file = OpenOptions::new().append(true).open(&path);
-        Ok(Self { file: file.with_context(|| format!("cannot write {}", path.display()))?, path })
+    /// Opens the log in `folder`, made if missing, with the lines up to `step`.
+    pub fn open(folder: &Path, step: usize) -> Result<Self> {
+        let mut log = Self::lines_alone(&folder.join(FILE), step)?;
+        let records = read(folder)?.iter().filter_map(events::record).collect();
+        let start = [vec![events::first()], records].concat().concat();
+        log.events = Some(Growing::open(&folder.join(events::FILE), &start)?);
+        Ok(log)
+    }
+
+    /// Opens the file `path` as a log without events.
+    pub fn lines_alone(path: &Path, step: usize) -> Result<Self> {
+        let text = text(path)?;
+        let seen = |line: &&str| parsed(line).is_some_and(|line| step_of(&line) <= step as u64);
+        let kept: String = text.lines().filter(seen).map(|line| format!("{line}\n")).collect();
+        Ok(Self { lines: Growing::open(path, kept.as_bytes())?, events: None })
     }
 
     /// Adds a line.
     pub fn write(&mut self, line: &Value) -> Result<()> {
-        writeln!(self.file, "{line}").with_context(|| format!("cannot write {}", self.path.display()))
+        let text = line.to_string();
+        self.lines.add(format!("{text}\n").as_bytes())?;
+        // From the text, as on resuming: a number read back may differ in its last digit.
+        match (&mut self.events, parsed(&text).as_ref().and_then(events::record)) {
+            (Some(events), Some(record)) => events.add(&record),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The whole lines of the log in `folder`, none where there is no log.
+pub fn read(folder: &Path) -> Result<Vec<Value>> {
+    Ok(text(&folder.join(FILE))?.lines().filter_map(parsed).collect())
+}
+
+fn text(path: &Path) -> Result<String> {
+    match std::fs::read_to_string(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(String::new()),
+        text => text.with_context(|| format!("cannot read {}", path.display())),
+    }
+}
+
+/// A line of a log; `None` of half a line.
+fn parsed(line: &str) -> Option<Value> {
+    serde_json::from_str::<Value>(line).ok().filter(|line| line["step"].is_u64())
+}
+
+fn step_of(line: &Value) -> u64 {
+    line["step"].as_u64().unwrap_or(u64::MAX)
+}
+
+/// A file that only grows.
+struct Growing {
+    path: PathBuf,
+    file: File,
+}
+
+impl Growing {
+    fn open(path: &Path, start: &[u8]) -> Result<Self> {
+        workdir::write_file(path, start)?;
+        let file = OpenOptions::new().append(true).open(path);
+        Ok(Self { file: file.with_context(|| format!("cannot write {}", path.display()))?, path: path.to_owned() })
+    }
+
+    fn add(&mut self, bytes: &[u8]) -> Result<()> {
+        self.file.write_all(bytes).with_context(|| format!("cannot write {}", self.path.display()))
     }
 }
 
@@ -46,16 +95,23 @@ mod tests {
 
     #[test]
     fn resuming_drops_what_the_checkpoint_has_not_seen() -> Result<()> {
-        let folder = tempfile::tempdir()?;
-        let path = folder.path().join("metrics.jsonl");
-        let mut log = Log::open(&path, 0)?;
+        let (folder, other) = (tempfile::tempdir()?, tempfile::tempdir()?);
+        let mut log = Log::open(folder.path(), 0)?;
         for step in [10, 20, 30] {
-            log.write(&json!({"step": step, "l1": 0.5}))?;
+            log.write(&json!({"step": step, "l1": 0.1 + 0.2}))?;
         }
-        log.file.write_all(b"{\"step\": 40, \"l")?;
-        Log::open(&path, 20)?.write(&json!({"step": 30, "l1": 0.25}))?;
-        let text = std::fs::read_to_string(path)?;
-        assert_eq!(text, "{\"step\":10,\"l1\":0.5}\n{\"step\":20,\"l1\":0.5}\n{\"step\":30,\"l1\":0.25}\n");
+        log.lines.add(b"{\"step\": 40, \"l")?;
+        if let Some(events) = &mut log.events {
+            events.add(&[1, 2, 3])?;
+        }
+        Log::open(folder.path(), 20)?.write(&json!({"step": 30, "l1": 0.25}))?;
+        let bytes = |folder: &Path, file: &str| std::fs::read(folder.join(file));
+        let text = bytes(folder.path(), FILE)?;
+        let expected = "{\"step\":10,\"l1\":0.30000000000000004}\n{\"step\":20,\"l1\":0.30000000000000004}\n{\"step\":30,\"l1\":0.25}\n";
+        assert_eq!(text, expected.as_bytes());
+        let mut undisturbed = Log::open(other.path(), 0)?;
+        read(folder.path())?.iter().try_for_each(|line| undisturbed.write(line))?;
+        assert_eq!(bytes(folder.path(), events::FILE)?, bytes(other.path(), events::FILE)?);
         Ok(())
     }
 }

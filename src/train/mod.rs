@@ -9,6 +9,7 @@ pub mod body_errors;
 pub mod body_motion;
 pub mod body_scene;
 pub mod checkpoint;
+pub mod events;
 pub mod examples;
 pub mod gan;
 pub mod hand_scene;

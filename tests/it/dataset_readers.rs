@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// The folder of the Python packages; `None`, with a loud line, where they are not.
-fn readers(package: &str) -> Option<PathBuf> {
+pub fn readers(package: &str) -> Option<PathBuf> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/readers");
     let folder = std::env::var_os("ORATOR_READERS").map_or(here, PathBuf::from);
     let there = folder.join(package).exists();

@@ -51,3 +51,4 @@ mod shots;
 mod support;
 mod sync;
 mod sync_clips;
+mod training_readers;

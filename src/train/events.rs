@@ -1,0 +1,114 @@
+//! The log as TensorBoard reads it: each line of numbers as one record of an event file. Records are framed as
+//! TensorFlow's TFRecord (length, masked CRC-32C, bytes, masked CRC-32C); a record is an `Event` of tensorflow's
+//! event.proto with a `Summary` of `simple_value`s. The time of an event is its step, so that the bytes repeat.
+
+use serde_json::{Map, Value};
+
+/// The file beside `metrics.jsonl`; TensorBoard looks for `tfevents` in the name.
+pub const FILE: &str = "events.out.tfevents.orator";
+/// The version that TensorBoard expects in the first record.
+const VERSION: &[u8] = b"brain.Event:2";
+/// Castagnoli's polynomial, bits reversed.
+const POLYNOMIAL: u32 = 0x82f6_3b78;
+const MASK: u32 = 0xa282_ead8;
+
+/// The record that begins a file.
+pub fn first() -> Vec<u8> {
+    let mut event = Vec::new();
+    field(&mut event, 3, VERSION);
+    framed(&event)
+}
+
+/// The record of a line of the log; none where it has no number. `l1` of a training line becomes `train/l1`; of a
+/// validation, the generator's `pck` becomes `validation/pck`, another predictor's `validation/mean_pose/pck`.
+pub fn record(line: &Value) -> Option<Vec<u8>> {
+    let step = line["step"].as_u64()?;
+    let mut scalars = Vec::new();
+    match line["validation"].as_object() {
+        Some(validation) => collect("validation", validation, &mut scalars),
+        None => collect("train", line.as_object()?, &mut scalars),
+    }
+    let mut summary = Vec::new();
+    for (tag, value) in scalars {
+        let mut scalar = Vec::new();
+        field(&mut scalar, 1, tag.as_bytes());
+        scalar.push(2 << 3 | 5); // simple_value, 4 bytes
+        scalar.extend((value as f32).to_le_bytes());
+        field(&mut summary, 1, &scalar);
+    }
+    if summary.is_empty() {
+        return None;
+    }
+    let mut event = vec![1 << 3 | 1]; // wall_time, 8 bytes
+    event.extend((step as f64).to_le_bytes());
+    event.push(2 << 3); // step, varint
+    varint(&mut event, step);
+    field(&mut event, 5, &summary);
+    Some(framed(&event))
+}
+
+/// The numbers below `object` with their names from `under` on.
+fn collect(under: &str, object: &Map<String, Value>, scalars: &mut Vec<(String, f64)>) {
+    for (name, value) in object {
+        match value {
+            Value::Object(inner) if name == "generator" => collect(under, inner, scalars),
+            Value::Object(inner) => collect(&format!("{under}/{name}"), inner, scalars),
+            Value::Number(number) if name != "step" => {
+                scalars.extend(number.as_f64().map(|number| (format!("{under}/{name}"), number)));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// A field of protobuf that holds bytes.
+fn field(message: &mut Vec<u8>, number: u8, bytes: &[u8]) {
+    message.push(number << 3 | 2);
+    varint(message, bytes.len() as u64);
+    message.extend(bytes);
+}
+
+fn varint(message: &mut Vec<u8>, mut value: u64) {
+    while value >= 0x80 {
+        message.push(value as u8 | 0x80);
+        value >>= 7;
+    }
+    message.push(value as u8);
+}
+
+fn framed(event: &[u8]) -> Vec<u8> {
+    let length = (event.len() as u64).to_le_bytes();
+    [&length[..], &masked_crc(&length).to_le_bytes(), event, &masked_crc(event).to_le_bytes()].concat()
+}
+
+fn masked_crc(bytes: &[u8]) -> u32 {
+    crc32c(bytes).rotate_right(15).wrapping_add(MASK)
+}
+
+fn crc32c(bytes: &[u8]) -> u32 {
+    let bit = |crc: u32, _| if crc & 1 == 1 { (crc >> 1) ^ POLYNOMIAL } else { crc >> 1 };
+    !bytes.iter().fold(!0, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), bit))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn the_checksum_is_castagnolis() {
+        // RFC 3720, appendix B.4
+        assert_eq!(crc32c(b"123456789"), 0xe306_9283);
+        assert_eq!(crc32c(&[0; 32]), 0x8a91_36aa);
+    }
+
+    #[test]
+    fn names_follow_the_line() {
+        let mut found = Vec::new();
+        let line = json!({"generator": {"pck": 0.5, "frechet": null}, "mean_pose": {"pck": 0.25}, "split": "test", "score": 2});
+        collect("validation", line.as_object().unwrap(), &mut found);
+        let expected = [("validation/pck", 0.5), ("validation/mean_pose/pck", 0.25), ("validation/score", 2.0)];
+        assert_eq!(found, expected.map(|(name, value)| (name.to_owned(), value)));
+        assert!(record(&json!({"step": 3})).is_none() && record(&json!({"l1": 3})).is_none());
+    }
+}
