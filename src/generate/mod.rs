@@ -6,7 +6,7 @@ use crate::nn::unet::FRAMES_MULTIPLE;
 use crate::train::examples::mel_frames;
 use crate::train::gan::BEST;
 use crate::train::poses::N_NUMBERS;
-use crate::train::speaker::{self, TrainedSpeaker};
+use crate::train::speaker::{self, Facts, TrainedSpeaker};
 use crate::types::pose3d::Motion;
 use crate::types::sound::{SAMPLE_RATE, Sound};
 use crate::types::time::FrameRate;
@@ -41,6 +41,11 @@ impl Speaker {
     /// The speaker's name.
     pub fn name(&self) -> &str {
         &self.trained.facts.name
+    }
+
+    /// What its checkpoint says of it.
+    pub fn facts(&self) -> &Facts {
+        &self.trained.facts
     }
 
     /// The rate of the motion it makes.

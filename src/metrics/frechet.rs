@@ -10,11 +10,8 @@ use std::ops::AddAssign;
 
 const CM: f64 = 100.0;
 
-/// Numbers of a pose: x, y, z in centimetres of every joint but the neck and the hand roots.
-pub const N_NUMBERS: usize = 3 * (N_JOINTS - 3);
-
 /// The normal distribution of a set of rows.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Gaussian {
     /// Number of rows.
     pub n: usize,
@@ -23,13 +20,26 @@ pub struct Gaussian {
     scatter: Array2<f64>,
 }
 
-/// The poses of `joints` [T, 49, 3], metres, in which `mask` [T, 49] is true for every joint but the hand roots, as
-/// rows [n, 138] of centimetres. For a made motion the mask is that of the real one beside it.
-pub fn poses(joints: ArrayView3<f32>, mask: ArrayView2<bool>) -> Array2<f64> {
-    let counted: Vec<usize> = (NECK + 1..N_JOINTS).filter(|joint| !is_duplicate(*joint)).collect();
-    let whole: Vec<usize> = (0..mask.nrows()).filter(|t| counted.iter().all(|joint| mask[[*t, *joint]])).collect();
-    Array2::from_shape_fn((whole.len(), N_NUMBERS), |(row, i)| {
-        CM * f64::from(joints[[whole[row], counted[i / 3], i % 3]])
+/// The joints to compare poses by: those that are true in at least half of the frames of all `masks` [T, 49] together, but
+/// the neck and the hand roots. A dataset that has no finger tips is compared without them.
+pub fn joints<'a>(masks: impl IntoIterator<Item = ArrayView2<'a, bool>>) -> Vec<usize> {
+    let (mut n_seen, mut n_frames) = ([0; N_JOINTS], 0);
+    for mask in masks {
+        n_frames += mask.nrows();
+        for frame in mask.outer_iter() {
+            n_seen.iter_mut().zip(frame).for_each(|(n, seen)| *n += usize::from(*seen));
+        }
+    }
+    (NECK + 1..N_JOINTS).filter(|joint| !is_duplicate(*joint) && n_seen[*joint] * 2 >= n_frames.max(1)).collect()
+}
+
+/// The poses of `motion` [T, 49, 3], metres, in which `mask` [T, 49] is true for all of `joints`: rows of x, y, z of each,
+/// centimetres. For a made motion the mask is that of the real one beside it.
+pub fn poses(motion: ArrayView3<f32>, mask: ArrayView2<bool>, joints: &[usize]) -> Array2<f64> {
+    let is_whole = |t: &usize| !joints.is_empty() && joints.iter().all(|joint| mask[[*t, *joint]]);
+    let whole: Vec<usize> = (0..mask.nrows()).filter(is_whole).collect();
+    Array2::from_shape_fn((whole.len(), 3 * joints.len()), |(row, i)| {
+        CM * f64::from(motion[[whole[row], joints[i / 3], i % 3]])
     })
 }
 
@@ -47,17 +57,16 @@ impl Gaussian {
     }
 }
 
-impl Default for Gaussian {
-    /// Of no pose.
-    fn default() -> Self {
-        Self { n: 0, mean: Array1::zeros(N_NUMBERS), scatter: Array2::zeros((N_NUMBERS, N_NUMBERS)) }
-    }
-}
-
 impl AddAssign<&Self> for Gaussian {
     /// Both sets together (Chan, Golub, LeVeque 1979). Both must have rows of the same length.
     fn add_assign(&mut self, other: &Self) {
-        let n = (self.n + other.n).max(1) as f64;
+        if self.n == 0 || other.n == 0 {
+            if other.n > 0 {
+                *self = other.clone();
+            }
+            return;
+        }
+        let n = (self.n + other.n) as f64;
         let (own, others) = (self.n as f64 / n, other.n as f64 / n);
         let apart = &other.mean - &self.mean;
         self.scatter += &other.scatter;
@@ -139,12 +148,17 @@ mod tests {
         let mut mask = Array2::from_elem((3, N_JOINTS), true);
         mask[[0, 48]] = false;
         mask[[2, 7]] = false;
-        let rows = poses(joints.view(), mask.view());
-        assert_eq!(rows.shape(), [2, N_NUMBERS]);
+        let counted = super::joints([mask.view()]);
+        assert_eq!(counted.len(), 46);
+        let rows = poses(joints.view(), mask.view(), &counted);
+        assert_eq!(rows.shape(), [2, 138]);
         assert_eq!((rows[[0, 0]], rows[[1, 18]], rows[[1, 137]]), (10_100.0, 20_800.0, 25_000.0));
         let mut none = Gaussian::default();
         none += &Gaussian::of(rows.view());
         assert_eq!(none.n, 2);
         assert_eq!(none.mean[0], 15_100.0);
+        mask.column_mut(48).fill(false);
+        assert_eq!(super::joints([mask.view(), mask.view()]).len(), 45);
+        assert!(super::joints([]).is_empty());
     }
 }

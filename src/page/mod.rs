@@ -1,9 +1,10 @@
 //! HTML pages for people: the one room that writes markup. `html` builds elements and escapes every word in them,
 //! `document` makes of them one file that needs nothing else, `figures` writes numbers as people read them; the rest are
-//! pictures of numbers, drawn without a script: `timeline`, `bars`, `histogram`, `curve`, `ranges`, `profile`, `picture`. What stands on a
-//! page is decided elsewhere (`report`).
+//! pictures of numbers, drawn without a script: `timeline`, `bars`, `histogram`, `curve`, `chart`, `ranges`,
+//! `profile`, `picture`. What stands on a page is decided elsewhere (`report`).
 
 pub mod bars;
+pub mod chart;
 pub mod curve;
 pub mod document;
 pub mod figures;

@@ -2,6 +2,8 @@
 //! other `thresholds` would keep), `spread` (how often each value was measured), `movement` (where joints are and how fast),
 //! `worst` and `pictures` (frames that show what a rule refuses); `gather` goes through the videos once and fills them all.
 //! Shown, a file a section: `summary`, `lines`, `gallery`, `distributions`, `sliders`, `motion`; `whole` puts them on a page.
+//!
+//! And what stands on the page of a training: `training`, of `training_charts`, `training_strip`, `training_picture`.
 
 mod distributions;
 mod gallery;
@@ -15,6 +17,10 @@ mod sliders;
 mod spread;
 mod summary;
 mod thresholds;
+pub mod training;
+mod training_charts;
+mod training_picture;
+pub mod training_strip;
 mod video;
 mod what_if;
 mod whole;

@@ -14,7 +14,7 @@ use crate::nn::unet::Generator;
 use crate::stage::progress::Progress;
 use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WRIST, is_duplicate, parent};
 use crate::types::time::FrameRate;
-use anyhow::{Result, ensure};
+use anyhow::Result;
 use candle_core::Tensor;
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
 
@@ -27,6 +27,8 @@ pub struct HeldOut {
     fps: FrameRate,
     n_frames: usize,
     batches: Vec<Batch>,
+    /// What poses are compared by.
+    joints: Vec<usize>,
 }
 
 /// A held-out window: what was made for its sound, and what is real. [T, 49, 3] metres; mask [T, 49].
@@ -50,8 +52,16 @@ impl HeldOut {
         }
         let n = examples.len().min(N_WINDOWS);
         let chosen: Vec<usize> = (0..n).map(|i| i * examples.len() / n).collect();
-        let batches = chosen.chunks(settings.batch).map(|which| examples.batch(which)).collect::<Result<_>>()?;
-        Ok(Self { split, fps: dataset.info().fps, n_frames, batches })
+        let batches: Vec<Batch> =
+            chosen.chunks(settings.batch).map(|which| examples.batch(which)).collect::<Result<_>>()?;
+        let mut masks = Vec::new();
+        for batch in &batches {
+            for i in 0..batch.mask.dim(0)? {
+                masks.push(joints_seen(numbers(&batch.mask, i)?.view()));
+            }
+        }
+        let joints = frechet::joints(masks.iter().map(|mask| mask.view()));
+        Ok(Self { split, fps: dataset.info().fps, n_frames, batches, joints })
     }
 
     /// Both predictors on the same windows.
@@ -68,9 +78,9 @@ impl HeldOut {
             let windows = windows(&poses, batch, normal)?;
             let still_window = joints(&nothing, 0, normal)?;
             for window in &windows {
-                made.add(window.made.view(), window, self.fps);
-                still.add(still_window.view(), window, self.fps);
-                real.add(window.real.view(), window, self.fps);
+                made.add(window.made.view(), window, self);
+                still.add(still_window.view(), window, self);
+                real.add(window.real.view(), window, self);
                 change.add(bone_changes(window.made.view()));
                 spread.add(window);
             }
@@ -88,28 +98,6 @@ impl HeldOut {
             score: score::score(&generator, &mean_pose),
             alarm: score::alarm(generator.energy, spread.share()),
         })
-    }
-
-    /// The first `n` windows, evenly spread over all, to look at.
-    pub fn look(
-        &self,
-        generator: &Generator,
-        decoder: &Decoder,
-        normal: &Normalisation,
-        n: usize,
-    ) -> Result<Vec<Window>> {
-        ensure!(n > 0, "no window to look at");
-        let step = self.batches.len().div_ceil(n).max(1);
-        let mut looks = Vec::new();
-        for batch in self.batches.iter().step_by(step) {
-            let poses = decoder.poses(&generator.forward(&batch.mels, self.n_frames, false)?.detach())?;
-            let share = n.div_ceil(self.batches.len().div_ceil(step));
-            let mut some = windows(&poses, batch, normal)?;
-            let every = some.len().div_ceil(share).max(1);
-            looks.extend(some.drain(..).step_by(every));
-        }
-        looks.truncate(n);
-        Ok(looks)
     }
 }
 
@@ -148,10 +136,10 @@ impl Tally {
         Ok(())
     }
 
-    fn add(&mut self, made: ArrayView3<f32>, window: &Window, fps: FrameRate) {
+    fn add(&mut self, made: ArrayView3<f32>, window: &Window, of: &HeldOut) {
         self.correct.count(made, window.real.view(), window.mask.view());
-        self.energy.add(made, window.mask.view(), fps);
-        self.poses += &Gaussian::of(frechet::poses(made, window.mask.view()).view());
+        self.energy.add(made, window.mask.view(), of.fps);
+        self.poses += &Gaussian::of(frechet::poses(made, window.mask.view(), &of.joints).view());
     }
 
     fn figures(&self, real: &Self) -> Figures {

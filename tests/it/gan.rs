@@ -46,7 +46,7 @@ pub fn sample(key: &str, n_frames: usize, phase: f64) -> Sample {
     Sample { key: key.into(), motion: Motion { fps: FPS, joints, mask }, pose2d, sound, meta: serde_json::json!({}) }
 }
 
-fn dataset(folder: &Path) -> Dataset {
+pub fn dataset(folder: &Path) -> Dataset {
     let samples = [
         (Split::Train, sample("a-00000000-000000", 99, 0.0)),
         (Split::Train, sample("b-00000000-000000", 64, 2.0)),

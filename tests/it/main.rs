@@ -10,6 +10,7 @@ mod dataset_readers;
 mod dataset_verify;
 mod demo;
 mod evaluate;
+mod evaluate_speaker;
 mod extract;
 mod figures;
 mod film;

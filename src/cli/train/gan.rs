@@ -4,12 +4,22 @@ use crate::cli::config_args::ConfigArgs;
 use crate::cli::{Outcome, ui::Ui};
 use anyhow::{Context, Result, bail};
 use orator::config::Config;
-use orator::dataset::Dataset;
+use orator::dataset::{Dataset, Split};
+use orator::evaluate::held_out::{self, HeldOut};
+use orator::evaluate::predictors;
+use orator::generate::Speaker;
+use orator::report::training;
+use orator::report::training_strip::Pair;
+use orator::stage::progress::Progress as _;
 use orator::train::gan;
 use orator::train::score::{Figures, Validation};
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
+
+/// Intervals on the page of a training, and how much of each is generated.
+const N_PAIRS: usize = 3;
+const PAIR_SECS: f64 = 8.0;
 
 /// Train a speaker's speech-to-gesture generator.
 ///
@@ -51,9 +61,10 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let start = Instant::now();
     let outcome = gan::train(&dataset, &settings, &out, ui)?;
     let steps_per_sec = (outcome.steps - outcome.began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
+    let page = page(&dataset, &outcome.best, &out, ui);
     let text = format!(
         "{}: {} steps{} ({steps_per_sec:.2} a second, {:.1} % of it waiting for data) on {} windows, {} parameters\n\
-         {}\nnewest checkpoint  {}\nbest (step {})  {}",
+         {}\nnewest checkpoint  {}\nbest (step {})  {}{}",
         dataset.info().speaker,
         outcome.steps,
         if outcome.stopped_early { ", ended early: the score had stopped falling" } else { "" },
@@ -64,6 +75,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         outcome.newest.display(),
         outcome.best_step,
         outcome.best.display(),
+        page.as_ref().map(|page| format!("\ncurves and poses  {}", page.display())).unwrap_or_default(),
     );
     let next = format!("orator generate --checkpoint {} --audio speech.wav --out motion.bvh", outcome.best.display());
     let facts = json!({
@@ -78,6 +90,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         "newest": outcome.newest,
         "best": outcome.best,
         "best_step": outcome.best_step,
+        "page": page,
     });
     ui.summary(&text, Some(&next), facts);
     Ok(Outcome::Done)
@@ -103,6 +116,39 @@ fn figures(validation: &Validation) -> String {
         text += &format!("\nALARM: {alarm}");
     }
     text
+}
+
+/// Writes the page of the training; the training is done, so what hinders the page is told and no more.
+fn page(dataset: &Dataset, best: &Path, folder: &Path, ui: &Ui) -> Option<PathBuf> {
+    let written = || -> Result<()> {
+        let pairs = pairs(dataset, &Speaker::open(best)?)?;
+        training::write(folder, &dataset.info().speaker, &pairs)
+    };
+    match written() {
+        Ok(()) => Some(folder.join(training::PAGE)),
+        Err(error) => {
+            ui.say(&format!("no page of this training: {error:#}"));
+            None
+        }
+    }
+}
+
+/// True and generated poses of a few intervals that were not trained on; of the training split where there are no others.
+fn pairs(dataset: &Dataset, speaker: &Speaker) -> Result<Vec<Pair>> {
+    let splits = [Split::Validation, Split::Train].map(|split| dataset.samples(split));
+    let samples = splits.into_iter().find(|samples| !samples.is_empty()).unwrap_or_default();
+    let n = samples.len().min(N_PAIRS);
+    let chosen: Vec<_> = (0..n).map(|i| samples[i * samples.len() / n].clone()).collect();
+    let intervals = held_out::read(dataset, &chosen, &speaker.facts().normalisation)?;
+    let pair = |interval: HeldOut| {
+        let n_frames = interval.real.n_frames();
+        let span = ((PAIR_SECS * speaker.fps().per_sec()) as usize).min(n_frames);
+        let first = (n_frames - span) / 2;
+        let HeldOut { key, real, sound } = interval.cut(first..first + span);
+        let made = predictors::motion(speaker, &sound, span)?;
+        Ok(Pair { name: key, start_secs: speaker.fps().secs(first), real, made })
+    };
+    intervals.into_iter().map(pair).collect()
 }
 
 /// The speaker's name: given, or the only one configured.

@@ -1,0 +1,96 @@
+//! A trained speaker measured on held-out sound, and the page of its training, as the program makes them; and the
+//! predictor that copies, on a dataset where the right copy is known.
+
+use crate::browser::Browser;
+use crate::gan::{dataset, sample};
+use crate::support::Project;
+use ndarray::s;
+use orator::dataset::{Dataset, Split, write_dataset};
+use orator::evaluate::{held_out, neighbour};
+use orator::train::gan::normalisation;
+use orator::types::time::FrameRate;
+use serde_json::Value;
+use std::path::Path;
+
+#[test]
+fn a_training_ends_with_its_page_and_its_speaker_is_measured() {
+    let project = Project::with_clips("measured", 0, 1.0);
+    let (data, out) = (project.dir().join("data"), project.dir().join("gan"));
+    dataset(&data);
+    let [data, out] = [&data, &out].map(|path| path.to_string_lossy().into_owned());
+    let sets = ["gan.batch=2", "gan.epoch_steps=2", "gan.checkpoint_every=2"].map(|set| ["--set", set]).concat();
+    let train = [&["train", "gan", "--dataset", &data, "--out", &out, "--steps", "4"], &sets[..]].concat();
+    let answer = project.answer(&train);
+    assert_eq!(answer.code, 0, "{}", answer.errors);
+    let page = project.dir().join("gan/training.html");
+    assert_eq!(answer.json["page"], page.to_string_lossy().as_ref());
+    let bytes =
+        ["training.html", "training.png"].map(|file| std::fs::read(project.dir().join("gan").join(file)).unwrap());
+    look(&page);
+    // the same again: nothing is left to train, and the page is the same
+    assert_eq!(project.answer(&train).code, 0);
+    let again =
+        ["training.html", "training.png"].map(|file| std::fs::read(project.dir().join("gan").join(file)).unwrap());
+    assert!(bytes == again, "another page of the same training");
+
+    let answer = project.answer(&["evaluate", "speaker", "--dataset", &data, "--checkpoint", &out]);
+    assert_eq!(answer.code, 0, "{}", answer.errors);
+    let table = &answer.json["speaker"];
+    assert_eq!(
+        (&table["split"], &table["n_intervals"], &table["n_blocks"]),
+        (&"validation".into(), &1.into(), &2.into())
+    );
+    let rows = table["rows"].as_array().unwrap();
+    let names: Vec<&str> = rows.iter().map(|row| row["predictor"].as_str().unwrap()).collect();
+    assert_eq!(names, ["model", "mean pose", "nearest neighbour", "mismatched"]);
+    let number = |row: &Value, of: &str| row[of]["value"].as_f64().unwrap();
+    for row in rows {
+        for share in ["pck", "pck_body", "pck_hands"] {
+            assert!((0.0..=1.0).contains(&number(row, share)), "{row}");
+        }
+        assert!(number(row, "l1") > 0.0 && number(row, "frechet") > 0.0, "{row}");
+    }
+    assert_eq!(number(&rows[1], "energy"), 0.0);
+    assert!(answer.json["meaning"].as_str().unwrap().contains("doing nothing"));
+    let wrong = project.answer(&["evaluate", "speaker", "--dataset", &data, "--checkpoint", &out, "--split", "test"]);
+    assert!(wrong.code == 1 && wrong.errors.contains("it has train, validation"), "{}", wrong.errors);
+}
+
+/// What a browser sees of the page.
+fn look(page: &Path) {
+    let Some(mut browser) = Browser::open(page, [1200, 900]) else { return };
+    let mut count = |selector: &str| browser.value(&format!("document.querySelectorAll('{selector}').length"));
+    assert_eq!((count(".chart svg"), count("#best tbody tr"), count("img.strip")), (7.into(), 6.into(), 1.into()));
+    let flat =
+        "[...document.querySelectorAll('svg, .chart path')].filter(e => !(e.getBoundingClientRect().width > 0)).length";
+    assert_eq!(browser.value(flat), 0);
+    for (width, scheme) in [(360, "dark"), (1200, "light")] {
+        browser.resize([width, 800]);
+        browser.colours(scheme);
+        let wide = browser.value("document.documentElement.scrollWidth").as_u64().unwrap();
+        assert!(wide <= u64::from(width), "{wide} px wide in a window of {width} px");
+    }
+    assert!(browser.problems.is_empty(), "{:?}", browser.problems);
+}
+
+#[test]
+fn the_neighbour_by_sound_is_found_where_it_was_taken_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let fps = FrameRate::new(15, 1);
+    let source = sample("b-00000000-000000", 200, 2.0);
+    // frames 40 to 140 of a training interval, held out as well
+    let mut copy = sample("c-00000000-000000", 100, 0.0);
+    copy.motion.joints = source.motion.joints.slice(s![40..140, .., ..]).to_owned();
+    copy.motion.mask.fill(true);
+    copy.motion.joints[[60, 5, 0]] = copy.motion.joints[[59, 5, 0]];
+    copy.sound.samples = source.sound.samples[40 * 16_000 / 15..][..copy.sound.samples.len()].to_vec();
+    let samples =
+        [(Split::Train, sample("a-00000000-000000", 120, 0.0)), (Split::Train, source), (Split::Validation, copy)];
+    write_dataset(folder.path(), "host", fps, &samples).unwrap();
+    let dataset = Dataset::open(folder.path()).unwrap();
+    let normal = normalisation(&dataset).unwrap();
+    let real = held_out::read(&dataset, &held_out::samples(&dataset, Split::Validation).unwrap(), &normal).unwrap();
+    let found = neighbour::motions(&dataset, &normal, &real).unwrap().unwrap();
+    let apart = found[0].joints.iter().zip(&real[0].real.joints).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
+    assert!(apart < found[0].joints.len() / 20, "{apart} of {} numbers are others", found[0].joints.len());
+}
