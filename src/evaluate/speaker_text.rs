@@ -4,11 +4,14 @@ use super::bootstrap::Estimate;
 use super::predictors::{MEAN_POSE, MISMATCHED};
 use super::speaker::{N_DRAWS, N_FRECHET_DRAWS, Row, Table};
 
+/// Fewer blocks than this carry no conclusion.
+const FEW_BLOCKS: usize = 10;
+
 /// The table and what follows from it.
 pub fn text(table: &Table) -> String {
     let Table { n_intervals, n_blocks, n_poses, secs, split, .. } = table;
     let mut text = format!(
-        "{}: {secs:.1} s of the {split} split, {n_intervals} intervals, {n_blocks} blocks of about 4 s\n",
+        "{}: {secs:.1} s of the {split} split, intervals: {n_intervals}, blocks of about 4 s: {n_blocks}\n",
         table.speaker
     );
     text += &format!(
@@ -24,7 +27,7 @@ pub fn text(table: &Table) -> String {
     table.rows.iter().for_each(|row| text += &line(row));
     text += &format!(
         "in brackets: 95 % intervals of {N_DRAWS} draws of the blocks (Frechet: {N_FRECHET_DRAWS}){}\n{}",
-        if *n_blocks < 10 { "; with so few blocks they say little" } else { "" },
+        if *n_blocks < FEW_BLOCKS { "; with so few blocks they say little" } else { "" },
         meaning(table)
     );
     text
@@ -58,6 +61,10 @@ pub fn meaning(table: &Table) -> String {
         format!("{:+.1} points of PCK, 95 % interval {:+.1} to {:+.1}", 100.0 * e.value, 100.0 * e.low, 100.0 * e.high)
     };
     let (nothing, other) = (&table.over_mean_pose, &table.over_mismatched);
+    let gains = format!("over the {MEAN_POSE} {}, over the {MISMATCHED} {}", points(nothing), points(other));
+    if table.n_blocks < FEW_BLOCKS {
+        return format!("{} blocks are too few to say whether it beats doing nothing: {gains}.", table.n_blocks);
+    }
     let beats = match (nothing.is_apart_from_zero(), nothing.value > 0.0) {
         (true, true) => format!("It beats doing nothing ({MEAN_POSE})"),
         (true, false) => format!("It is worse than doing nothing ({MEAN_POSE})"),
@@ -85,7 +92,7 @@ mod tests {
             speaker: "host".to_owned(),
             split: "test",
             n_intervals: 2,
-            n_blocks: 5,
+            n_blocks: 10,
             secs: 20.0,
             n_poses: 300,
             rows: vec![Row {
@@ -105,13 +112,13 @@ mod tests {
             "40.0 % [39.0, 41.0]",
             "123 [0, 323]",
             "0.00 [-, -]",
-            "say little",
             "It beats doing nothing",
             "not shown to fit",
             "n 300",
         ] {
             assert!(shown.contains(words), "{words}: {shown}");
         }
+        assert!(meaning(&Table { n_blocks: 9, ..table.clone() }).starts_with("9 blocks are too few"));
         table.over_mean_pose = estimate(-0.05, 0.02);
         assert!(meaning(&table).contains("worse than doing nothing"));
     }

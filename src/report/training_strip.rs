@@ -119,7 +119,7 @@ mod tests {
                 Pair { name: "a".to_owned(), start_secs: 0.0, real: motion(n_real, 0.0), made: motion(n_made, 0.1) };
             let image = strip(&[pair]).unwrap();
             assert_eq!((image.width, image.height), (WIDTH, PAIR_PX));
-            assert_eq!(image.data.iter().any(|v| *v < 100), n_real > 0, "{n_real}");
+            assert!(image.data.iter().any(|v| *v < 100), "{n_real}");
         }
         assert_eq!(strip(&[]).unwrap().height, 1);
     }

@@ -60,7 +60,7 @@ fn a_training_ends_with_its_page_and_its_speaker_is_measured() {
 fn look(page: &Path) {
     let Some(mut browser) = Browser::open(page, [1200, 900]) else { return };
     let mut count = |selector: &str| browser.value(&format!("document.querySelectorAll('{selector}').length"));
-    assert_eq!((count(".chart svg"), count("#best tbody tr"), count("img.strip")), (7.into(), 6.into(), 1.into()));
+    assert_eq!((count(".chart svg"), count("#best tbody tr"), count("img.strip")), (5.into(), 6.into(), 1.into()));
     let flat =
         "[...document.querySelectorAll('svg, .chart path')].filter(e => !(e.getBoundingClientRect().width > 0)).length";
     assert_eq!(browser.value(flat), 0);

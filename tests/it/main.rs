@@ -35,6 +35,7 @@ mod lifter_parity;
 mod media_frames;
 mod media_sound;
 mod memory;
+mod metrics;
 mod models_verb;
 mod networks;
 mod operators;
