@@ -18,6 +18,7 @@ pub mod conv_norm;
 pub mod conv_panels;
 pub mod conv_weight;
 pub mod cpu;
+pub mod device;
 pub mod discriminator;
 pub mod dropout;
 pub mod finite_difference;

@@ -22,6 +22,7 @@ pub struct Params {
     /// None: for inference.
     seed: Option<u64>,
     dtype: DType,
+    device: Device,
     trainable: BTreeMap<String, Var>,
     /// Savable, but not moved by the optimiser: running statistics.
     buffers: BTreeMap<String, Var>,
@@ -35,7 +36,18 @@ impl Params {
 
     /// An empty set of this type (f64 is for proving gradients).
     pub fn with_dtype(seed: u64, dtype: DType) -> Self {
-        Self { seed: Some(seed), dtype, trainable: BTreeMap::new(), buffers: BTreeMap::new() }
+        let (trainable, buffers) = (BTreeMap::new(), BTreeMap::new());
+        Self { seed: Some(seed), dtype, device: Device::Cpu, trainable, buffers }
+    }
+
+    /// The same set, its tensors on this device. The first values are those of the CPU.
+    pub fn on(self, device: &Device) -> Self {
+        Self { device: device.clone(), ..self }
+    }
+
+    /// Where the tensors are.
+    pub fn device(&self) -> &Device {
+        &self.device
     }
 
     /// An empty set in f32 for a network that is loaded and not trained: a forward pass keeps no graph, so that its
@@ -73,7 +85,8 @@ impl Params {
             (Some(seed), Init::Glorot) => uniform(seed, name, n, (6.0 / (fan_in + fan_out)).sqrt()),
             (Some(seed), Init::He) => uniform(seed, name, n, (6.0 / fan_in).sqrt()),
         };
-        Var::from_tensor(&Tensor::from_vec(values, shape, &Device::Cpu)?.to_dtype(self.dtype)?)
+        let values = Tensor::from_vec(values, shape, &Device::Cpu)?.to_dtype(self.dtype)?;
+        Var::from_tensor(&values.to_device(&self.device)?)
     }
 
     /// What the optimiser moves, sorted by name.
@@ -91,9 +104,10 @@ impl Params {
         self.trainable.values().map(|var| var.elem_count()).sum()
     }
 
-    /// Copies of everything, to save.
+    /// Copies of everything on the CPU, to save.
     pub fn tensors(&self) -> Result<BTreeMap<String, Tensor>> {
-        self.all().map(|(name, var)| Ok((name.to_owned(), var.as_tensor().copy()?))).collect()
+        let copy = |var: &Var| if var.device().is_cpu() { var.copy() } else { var.to_device(&Device::Cpu) };
+        self.all().map(|(name, var)| Ok((name.to_owned(), copy(var)?))).collect()
     }
 
     /// Overwrites every tensor with that of the same name. Errors, naming the tensor, when one is missing, too many
@@ -107,7 +121,7 @@ impl Params {
                 tensor.dims(),
                 var.dims()
             );
-            var.set(&tensor.to_dtype(self.dtype)?)?;
+            var.set(&tensor.to_dtype(self.dtype)?.to_device(&self.device)?)?;
         }
         match tensors.keys().find(|name| !self.all().any(|(own, _)| own == name.as_str())) {
             Some(name) => bail!("tensor {name} belongs to no layer of this network"),

@@ -1,6 +1,7 @@
 //! Adam (Kingma & Ba 2015), optionally AMSGrad (Reddi 2018), with moments that can be saved, and clipping of the
 //! gradient's norm. One pass over the memory of each tensor; the same bits for any number of threads.
 
+use super::adam_composed;
 use crate::nn::params::Params;
 use anyhow::{Context, ensure};
 use candle_core::backprop::GradStore;
@@ -41,7 +42,14 @@ pub struct Adam {
 struct Slot {
     name: String,
     var: Var,
-    moments: RefCell<Moments>,
+    moments: Place,
+}
+
+/// Where the moments are.
+enum Place {
+    Cpu(RefCell<Moments>),
+    /// Elsewhere, beside their tensor.
+    Device(adam_composed::Moments),
 }
 
 /// First moment, second moment, largest second moment (empty without AMSGrad).
@@ -54,14 +62,19 @@ struct Moments {
 
 impl Adam {
     /// Moments of zero for every trainable tensor (f32).
-    pub fn new(params: &Params, config: Config) -> Self {
-        let slot = |(name, var): (&str, &Var)| {
+    pub fn new(params: &Params, config: Config) -> Result<Self> {
+        let moments = |var: &Var| -> Result<Place> {
+            if !var.device().is_cpu() {
+                return Ok(Place::Device(adam_composed::Moments::zeros(var, config.amsgrad)?));
+            }
             let zeros = vec![0.0; var.elem_count()];
             let largest = if config.amsgrad { zeros.clone() } else { Vec::new() };
-            let moments = Moments { first: zeros.clone(), second: zeros, largest };
-            Slot { name: name.to_owned(), var: var.clone(), moments: RefCell::new(moments) }
+            Ok(Place::Cpu(RefCell::new(Moments { first: zeros.clone(), second: zeros, largest })))
         };
-        Self { config, step: 0, slots: params.trainables().map(slot).collect() }
+        let slot = |(name, var): (&str, &Var)| -> Result<Slot> {
+            Ok(Slot { name: name.to_owned(), var: var.clone(), moments: moments(var)? })
+        };
+        Ok(Self { config, step: 0, slots: params.trainables().map(slot).collect::<Result<_>>()? })
     }
 
     /// One update at this learning rate. A tensor without gradient stays. Returns the gradient's norm before
@@ -74,7 +87,10 @@ impl Adam {
             .collect::<Result<_>>()?;
         let mut squares = 0.0;
         for gradient in gradients.iter().flatten() {
-            squares += crate::nn::cpu::read::<f32, _>(gradient, |g| Ok(sum_of_squares(g)))?;
+            squares += match gradient.device().is_cpu() {
+                true => crate::nn::cpu::read::<f32, _>(gradient, |g| Ok(sum_of_squares(g)))?,
+                false => adam_composed::sum_of_squares(gradient)?,
+            };
         }
         let norm = squares.sqrt();
         if !norm.is_finite() {
@@ -84,19 +100,20 @@ impl Adam {
         let Config { beta1, beta2, eps, amsgrad, max_norm } = self.config;
         let age = self.step.min(i32::MAX as u64) as i32;
         let scale = max_norm.map_or(1.0, |max| if norm > max { max / norm } else { 1.0 });
-        for (slot, gradient) in self.slots.iter().zip(&gradients) {
+        let numbers = Numbers {
+            beta1: beta1 as f32,
+            beta2: beta2 as f32,
+            eps: eps as f32,
+            scale: scale as f32,
+            rate: (learning_rate / (1.0 - beta1.powi(age))) as f32,
+            correction: (1.0 / (1.0 - beta2.powi(age))).sqrt() as f32,
+        };
+        for (slot, gradient) in self.slots.iter_mut().zip(&gradients) {
             let Some(gradient) = gradient else { continue };
-            let update = Update {
-                moments: &slot.moments,
-                beta1: beta1 as f32,
-                beta2: beta2 as f32,
-                eps: eps as f32,
-                amsgrad,
-                scale: scale as f32,
-                rate: (learning_rate / (1.0 - beta1.powi(age))) as f32,
-                correction: (1.0 / (1.0 - beta2.powi(age))).sqrt() as f32,
-            };
-            slot.var.inplace_op2(gradient, &update)?;
+            match &mut slot.moments {
+                Place::Cpu(moments) => slot.var.inplace_op2(gradient, &Update { moments, amsgrad, numbers })?,
+                Place::Device(moments) => moments.update(&slot.var, gradient, &numbers)?,
+            }
         }
         Ok(norm)
     }
@@ -108,14 +125,8 @@ impl Adam {
         let halves = [(self.step >> 24) as f32, (self.step & 0xff_ffff) as f32];
         tensors.insert(format!("{prefix}step"), Tensor::new(&halves, &Device::Cpu)?);
         for slot in &self.slots {
-            let moments = slot.moments.borrow();
-            for (kind, values) in
-                [("first", &moments.first), ("second", &moments.second), ("largest", &moments.largest)]
-            {
-                if !values.is_empty() {
-                    let tensor = Tensor::from_slice(values, slot.var.shape(), &Device::Cpu)?;
-                    tensors.insert(format!("{prefix}{}.{kind}", slot.name), tensor);
-                }
+            for (kind, tensor) in slot.kinds()? {
+                tensors.insert(format!("{prefix}{}.{kind}", slot.name), tensor);
             }
         }
         Ok(tensors)
@@ -129,19 +140,38 @@ impl Adam {
             Ok(tensor.flatten_all()?.to_vec1()?)
         };
         let halves = values(format!("{prefix}step"), 2)?;
-        for slot in &self.slots {
-            let mut moments = slot.moments.borrow_mut();
-            let of_kind = |kind: &str, old: &[f32]| {
-                if old.is_empty() { Ok(Vec::new()) } else { values(format!("{prefix}{}.{kind}", slot.name), old.len()) }
+        for slot in &mut self.slots {
+            let of_kind = |kind: &str, n: usize| match n {
+                0 => Ok(Vec::new()),
+                n => values(format!("{prefix}{}.{kind}", slot.name), n),
             };
-            *moments = Moments {
-                first: of_kind("first", &moments.first)?,
-                second: of_kind("second", &moments.second)?,
-                largest: of_kind("largest", &moments.largest)?,
-            };
+            match &mut slot.moments {
+                Place::Cpu(moments) => {
+                    let moments = moments.get_mut();
+                    *moments = Moments {
+                        first: of_kind("first", moments.first.len())?,
+                        second: of_kind("second", moments.second.len())?,
+                        largest: of_kind("largest", moments.largest.len())?,
+                    };
+                }
+                Place::Device(moments) => moments.load(of_kind)?,
+            }
         }
         self.step = ((halves[0] as u64) << 24) + halves[1] as u64;
         Ok(())
+    }
+}
+
+impl Slot {
+    /// The moments that there are, by kind, on the CPU.
+    fn kinds(&self) -> Result<Vec<(&'static str, Tensor)>> {
+        let moments = match &self.moments {
+            Place::Cpu(moments) => moments.borrow(),
+            Place::Device(moments) => return moments.tensors(),
+        };
+        let kinds = [("first", &moments.first), ("second", &moments.second), ("largest", &moments.largest)];
+        let there = kinds.into_iter().filter(|(_, values)| !values.is_empty());
+        there.map(|(kind, values)| Ok((kind, Tensor::from_slice(values, self.var.shape(), &Device::Cpu)?))).collect()
     }
 }
 
@@ -157,17 +187,24 @@ fn sum_of_squares(values: &[f32]) -> f64 {
     values.par_chunks(GRAIN).map(of_piece).collect::<Vec<f64>>().iter().sum()
 }
 
+/// The numbers of one update.
+#[derive(Clone, Copy)]
+pub(super) struct Numbers {
+    pub beta1: f32,
+    pub beta2: f32,
+    pub eps: f32,
+    /// What gradients are multiplied with, to clip them.
+    pub scale: f32,
+    /// Learning rate over the first moment's bias correction.
+    pub rate: f32,
+    /// Square root of the second moment's bias correction.
+    pub correction: f32,
+}
+
 struct Update<'a> {
     moments: &'a RefCell<Moments>,
-    beta1: f32,
-    beta2: f32,
-    eps: f32,
     amsgrad: bool,
-    scale: f32,
-    /// Learning rate over the first moment's bias correction.
-    rate: f32,
-    /// Square root of the second moment's bias correction.
-    correction: f32,
+    numbers: Numbers,
 }
 
 impl InplaceOp2 for Update<'_> {
@@ -180,7 +217,7 @@ impl InplaceOp2 for Update<'_> {
         let Some((start, end)) = layout.contiguous_offsets() else { candle_core::bail!("adam: variable in pieces") };
         let grad = crate::nn::cpu::slice::<f32>(grad, grad_layout)?;
         let moments = &mut *self.moments.borrow_mut();
-        let Self { beta1, beta2, eps, scale, rate, correction, .. } = *self;
+        let Numbers { beta1, beta2, eps, scale, rate, correction } = self.numbers;
         let update = |value: &mut f32, grad: &f32, first: &mut f32, second: &mut f32, largest: Option<&mut f32>| {
             let grad = grad * scale;
             *first = beta1 * *first + (1.0 - beta1) * grad;
@@ -226,11 +263,11 @@ mod tests {
     fn descend(config: Config, gradients: &[f64], resume_at: Option<usize>) -> anyhow::Result<f32> {
         let mut params = Params::new(0);
         let w = params.trainable("w", &[3], Init::Constant(1.0))?;
-        let mut adam = Adam::new(&params, config);
+        let mut adam = Adam::new(&params, config)?;
         for (i, gradient) in gradients.iter().enumerate() {
             if resume_at == Some(i) {
                 let saved = adam.tensors("adam.")?;
-                adam = Adam::new(&params, config);
+                adam = Adam::new(&params, config)?;
                 adam.load("adam.", &saved)?;
             }
             adam.step(&(&w * *gradient)?.sum_all()?.backward()?, 0.1)?;
@@ -251,13 +288,38 @@ mod tests {
     }
 
     #[test]
+    fn the_composed_update_is_the_own_one() -> anyhow::Result<()> {
+        for amsgrad in [false, true] {
+            let config = Config { amsgrad, max_norm: Some(2.0), ..Config::default() };
+            let walk = |composed: bool| -> anyhow::Result<Vec<f32>> {
+                let mut params = Params::new(3);
+                let w = params.trainable("w", &[5, 4], Init::Glorot)?;
+                let mut adam = Adam::new(&params, config)?;
+                for step in 0..6 {
+                    if composed && step % 3 == 0 {
+                        // Elsewhere from the beginning, and again from what was saved.
+                        let saved = adam.tensors("")?;
+                        adam.slots[0].moments = Place::Device(adam_composed::Moments::zeros(&w, amsgrad)?);
+                        adam.load("", &saved)?;
+                    }
+                    adam.step(&(&w * (f64::from(step) - 2.5))?.sqr()?.sum_all()?.backward()?, 0.1)?;
+                }
+                Ok(w.flatten_all()?.to_vec1()?)
+            };
+            let (own, composed) = (walk(false)?, walk(true)?);
+            assert!(own.iter().zip(&composed).all(|(a, b)| (a - b).abs() < 1e-6), "{own:?} {composed:?}");
+        }
+        Ok(())
+    }
+
+    #[test]
     fn large_gradients_are_clipped_and_broken_ones_change_nothing() -> anyhow::Result<()> {
         let mut params = Params::new(0);
         let w = params.trainable("w", &[4], Init::Constant(1.0))?;
-        let mut adam = Adam::new(&params, Config { max_norm: Some(1.0), ..Config::default() });
+        let mut adam = Adam::new(&params, Config { max_norm: Some(1.0), ..Config::default() })?;
         let norm = adam.step(&(&w * 5.0)?.sum_all()?.backward()?, 0.1)?;
         assert!((norm - 10.0).abs() < 1e-5);
-        assert!((adam.slots[0].moments.borrow().first[0] - 0.05).abs() < 1e-6);
+        assert!((adam.tensors("")?["w.first"].to_vec1::<f32>()?[0] - 0.05).abs() < 1e-6);
         let before = w.to_vec1::<f32>()?;
         assert!(adam.step(&(&w * f64::NAN)?.sum_all()?.backward()?, 0.1)?.is_nan());
         assert_eq!(w.to_vec1::<f32>()?, before);

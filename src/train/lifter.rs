@@ -136,7 +136,7 @@ fn train_until(
 ) -> Result<()> {
     ensure!(schedule.batch > 1, "a training needs at least two samples a batch");
     let mut adam =
-        Adam::new(lesson.params(), adam::Config { amsgrad: true, max_norm: Some(1.0), ..Default::default() });
+        Adam::new(lesson.params(), adam::Config { amsgrad: true, max_norm: Some(1.0), ..Default::default() })?;
     let start = resume(lesson, schedule, out, &mut adam)?;
     if start > 0 {
         progress.say(&format!("going on at step {start} of {}", schedule.steps));

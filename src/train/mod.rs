@@ -5,6 +5,7 @@
 //! best. `speaker` is what a checkpoint of the generator means.
 
 pub mod adam;
+mod adam_composed;
 pub mod body_errors;
 pub mod body_motion;
 pub mod body_scene;
