@@ -2,6 +2,7 @@
 //! passes of the two built from parts. Training uses the batch's statistics and follows them with running ones;
 //! evaluation uses the running ones.
 
+use super::composed;
 use super::cpu::{GRAIN, LANES, Real, is_f64, read, slice, sum};
 use super::params::{Init, Params};
 use candle_core::backend::BackendStorage;
@@ -50,6 +51,9 @@ impl BatchNorm {
 
     /// [B, C, ...] to the same shape. Training moves the running statistics.
     pub fn forward(&self, x: &Tensor, train: bool) -> Result<Tensor> {
+        if composed::needed(x) {
+            return self.forward_composed(x, train);
+        }
         let statistics = Arc::new(OnceLock::new());
         if !train {
             let _ = statistics.set(self.running()?);
@@ -62,6 +66,19 @@ impl BatchNorm {
         Ok(y)
     }
 
+    /// The same of the framework's operators, on any device.
+    pub fn forward_composed(&self, x: &Tensor, train: bool) -> Result<Tensor> {
+        let (mean, variance) = match train {
+            true => composed::statistics(x)?,
+            false => (self.running_mean.as_detached_tensor(), self.running_var.as_detached_tensor()),
+        };
+        let y = composed::normalise(x, (&mean, &variance), &self.weight, &self.bias, self.eps, self.slope)?;
+        if train {
+            self.follow_tensors(&mean.detach(), &variance.detach(), x.elem_count() / mean.elem_count())?;
+        }
+        Ok(y)
+    }
+
     /// The running statistics.
     pub fn running(&self) -> Result<Statistics> {
         let values = |var: &Var| var.to_dtype(candle_core::DType::F64)?.to_vec1();
@@ -70,13 +87,18 @@ impl BatchNorm {
 
     /// Moves the running statistics towards those of a batch of `n` values a channel; the variance is the unbiased one.
     pub fn follow(&self, batch: &Statistics, n: usize) -> Result<()> {
+        let tensor = |values: &[f64]| Tensor::new(values, &Device::Cpu)?.to_dtype(self.running_mean.dtype());
+        self.follow_tensors(&tensor(&batch.mean)?, &tensor(&batch.variance)?, n)
+    }
+
+    fn follow_tensors(&self, mean: &Tensor, variance: &Tensor, n: usize) -> Result<()> {
         let n = n as f64;
-        let towards = |running: &Var, batch: &[f64], scale: f64| {
-            let batch = Tensor::new(batch, &Device::Cpu)?.to_dtype(running.dtype())?;
-            running.set(&((running.as_tensor() * (1.0 - self.momentum))? + (batch * (self.momentum * scale))?)?)
+        let towards = |running: &Var, batch: &Tensor, scale: f64| {
+            running
+                .set(&((running.as_detached_tensor() * (1.0 - self.momentum))? + (batch * (self.momentum * scale))?)?)
         };
-        towards(&self.running_mean, &batch.mean, 1.0)?;
-        towards(&self.running_var, &batch.variance, n / (n - 1.0).max(1.0))
+        towards(&self.running_mean, mean, 1.0)?;
+        towards(&self.running_var, variance, n / (n - 1.0).max(1.0))
     }
 }
 

@@ -2,6 +2,9 @@
 //! a gradient that finite differences confirm, and runs wherever the framework does. On the CPU they are only tested:
 //! they give what the room's own operators give.
 
+use super::batch_norm::BatchNorm;
+use super::conv::Sizes;
+use super::conv_axis::Axis;
 use super::conv1d::Walk;
 use candle_core::{D, Result, Tensor};
 
@@ -10,44 +13,78 @@ pub fn needed(x: &Tensor) -> bool {
     !x.device().is_cpu()
 }
 
-/// Pads axis `dim` of `x`, or cuts its end, so that a kernel walks to the very last place: with some left over the
-/// framework's backward pass fails.
-fn fitted(x: &Tensor, dim: usize, kernel: usize, walk: Walk) -> Result<Tensor> {
-    let n = x.dim(dim)?;
-    let Some(n_out) = walk.n_out(n, kernel) else {
-        candle_core::bail!("a kernel of {kernel} does not fit into {n} places with {walk:?}");
-    };
-    let reach = (n_out - 1) * walk.stride + walk.dilation * (kernel - 1) + 1;
-    let end = reach.saturating_sub(walk.pad.0);
+/// Pads axis `dim` of `x` by `before`, and on the other side pads or cuts it to `reach` places in all, so that a kernel
+/// walks to the very last one: with some left over the framework's backward pass fails.
+fn fitted(x: &Tensor, dim: usize, before: usize, reach: usize) -> Result<Tensor> {
+    let (n, end) = (x.dim(dim)?, reach.saturating_sub(before));
     if end < n {
-        return x.narrow(dim, 0, end)?.pad_with_zeros(dim, walk.pad.0, 0);
+        return x.narrow(dim, 0, end)?.pad_with_zeros(dim, before, 0);
     }
-    x.pad_with_zeros(dim, walk.pad.0, end - n)
+    x.pad_with_zeros(dim, before, end - n)
 }
 
 /// As [`super::conv1d::conv1d`]: a convolution of pictures one place high.
 pub fn conv1d(x: &Tensor, weight: &Tensor, bias: &Tensor, walk: Walk) -> Result<Tensor> {
-    let x = fitted(x, 2, weight.dim(2)?, walk)?.unsqueeze(2)?.contiguous()?;
+    let (n, kernel) = (x.dim(2)?, weight.dim(2)?);
+    let Some(n_out) = walk.n_out(n, kernel) else {
+        candle_core::bail!("a kernel of {kernel} does not fit into {n} frames with {walk:?}");
+    };
+    let reach = (n_out - 1) * walk.stride + walk.dilation * (kernel - 1) + 1;
+    let x = fitted(x, 2, walk.pad.0, reach)?.unsqueeze(2)?.contiguous()?;
     let weight = weight.unsqueeze(2)?.contiguous()?;
     let y = x.conv2d(&weight, 0, walk.stride, walk.dilation, 1)?.squeeze(2)?;
     y.broadcast_add(&bias.reshape((1, (), 1))?)
 }
 
-/// Convolves `x` [B, C, T, F] with `weight` [O, C, K, L] and adds `bias` [O]; one stride and dilation for both axes.
-pub fn conv2d(x: &Tensor, weight: &Tensor, bias: &Tensor, [over_time, across]: [Walk; 2]) -> Result<Tensor> {
-    if (over_time.stride, over_time.dilation) != (across.stride, across.dilation) {
-        candle_core::bail!("one stride and dilation for both axes, not {over_time:?} and {across:?}");
+/// A convolution of `x` [B, T, C] or [B, T, F, C] with `weight` [O, C, K] or [O, C, K, K'], and `bias` [O]: channels
+/// first, [B, O, T', F'].
+fn conv_first(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &Sizes) -> Result<Tensor> {
+    let (x, weight) = match x.rank() {
+        3 => (x.unsqueeze(2)?, weight.unsqueeze(3)?),
+        _ => (x.clone(), weight.clone()),
+    };
+    let mut x = x.permute((0, 3, 1, 2))?;
+    let [down, across] = s.axes;
+    // Over time alone there is one frequency, on which every stride stands once.
+    let stride = down.stride;
+    if across.stride != stride && across.n_out != 1 {
+        candle_core::bail!("one stride for both axes, not {} and {}", down.stride, across.stride);
     }
-    let (_, _, height, width) = weight.dims4()?;
-    let x = fitted(&fitted(x, 2, height, over_time)?, 3, width, across)?.contiguous()?;
-    let y = x.conv2d(&weight.contiguous()?, 0, over_time.stride, over_time.dilation, 1)?;
+    for (dim, Axis { n_out, kernel, pad, .. }) in [(2, down), (3, across)] {
+        x = fitted(&x, dim, pad, (n_out - 1) * stride + kernel)?;
+    }
+    let y = x.contiguous()?.conv2d(&weight.contiguous()?, 0, stride, 1, 1)?;
     y.broadcast_add(&bias.reshape((1, (), 1, 1))?)
+}
+
+/// From channels first to channels last, and to the rank that the input had.
+fn last(y: &Tensor, rank: usize) -> Result<Tensor> {
+    let y = y.permute((0, 2, 3, 1))?;
+    if rank == 3 { y.squeeze(2)?.contiguous() } else { y.contiguous() }
+}
+
+/// A convolution, channels last: as [`super::conv2d::Conv`].
+pub fn conv(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &Sizes) -> Result<Tensor> {
+    last(&conv_first(x, weight, bias, s)?, x.rank())
+}
+
+/// As [`super::conv_norm::conv_norm`].
+pub fn conv_norm(
+    x: &Tensor,
+    weight: &Tensor,
+    bias: &Tensor,
+    norm: &BatchNorm,
+    s: &Sizes,
+    train: bool,
+) -> Result<Tensor> {
+    last(&norm.forward_composed(&conv_first(x, weight, bias, s)?, train)?, x.rank())
 }
 
 /// As [`super::resize::twice`].
 pub fn twice(x: &Tensor) -> Result<Tensor> {
     let (batch, n_frames, channels) = x.dims3()?;
-    x.unsqueeze(2)?.broadcast_as((batch, n_frames, 2, channels))?.contiguous()?.reshape((batch, 2 * n_frames, channels))
+    let pairs = x.unsqueeze(2)?.broadcast_as((batch, n_frames, 2, channels))?.contiguous()?;
+    pairs.reshape((batch, 2 * n_frames, channels))
 }
 
 /// Mean and variance (of the batch itself, not the estimate) of every channel of [B, C, ...], [C] each.
@@ -85,7 +122,9 @@ pub fn normalise(
 mod tests {
     use super::*;
     use crate::nn::finite_difference::{pattern, worst};
-    use crate::nn::{conv1d as own, resize};
+    use crate::nn::params::Params;
+    use crate::nn::{conv_norm, conv1d as own, conv2d, resize};
+    use candle_core::{DType, Var};
 
     /// Largest difference of the results and of the gradients of all inputs.
     fn apart(
@@ -93,7 +132,7 @@ mod tests {
         a: impl Fn(&[Tensor]) -> Result<Tensor>,
         b: impl Fn(&[Tensor]) -> Result<Tensor>,
     ) -> Result<f64> {
-        let vars = inputs.iter().map(candle_core::Var::from_tensor).collect::<Result<Vec<_>>>()?;
+        let vars = inputs.iter().map(Var::from_tensor).collect::<Result<Vec<_>>>()?;
         let inputs: Vec<Tensor> = vars.iter().map(|var| var.as_tensor().clone()).collect();
         let (a, b) = (a(&inputs)?, b(&inputs)?);
         let most = |a: &Tensor, b: &Tensor| (a - b)?.abs()?.max_all()?.to_scalar::<f64>();
@@ -130,18 +169,44 @@ mod tests {
         Ok(())
     }
 
+    /// Inputs and kernels of the networks' layers, small: over time, over time and frequency, even and odd.
+    const LAYERS: [(&[usize], &[usize], usize); 8] = [
+        (&[2, 9, 2], &[3, 2, 3], 1),
+        (&[2, 12, 2], &[3, 2, 4], 2),
+        (&[2, 13, 2], &[3, 2, 4], 2),
+        (&[3, 16, 2], &[3, 2, 4], 1),
+        (&[2, 7, 2], &[3, 2, 1], 1),
+        (&[2, 6, 5, 2], &[3, 2, 3, 3], 1),
+        (&[2, 9, 8, 2], &[3, 2, 4, 4], 2),
+        (&[2, 7, 7, 1], &[3, 1, 4, 4], 2),
+    ];
+
     #[test]
-    fn convolution_of_pictures_has_right_gradients() -> Result<()> {
-        for (height, width, [k, l], stride) in
-            [(6, 5, [3, 3], 1), (9, 8, [4, 4], 2), (7, 7, [4, 4], 2), (5, 4, [3, 4], 1)]
-        {
-            let walks = match (k, l) {
-                (3, 4) => [Walk::VALID; 2],
-                _ => [Walk::same(height, k, stride), Walk::same(width, l, stride)],
-            };
-            let inputs = [pattern(&[2, 2, height, width], 0.0)?, pattern(&[3, 2, k, l], 7.0)?, pattern(&[3], 3.0)?];
-            let error = worst(&inputs, |v| conv2d(&v[0], &v[1], &v[2], walks))?;
-            assert!(error < 1e-7, "{height} x {width}, {k} x {l}: {error:e}");
+    fn convolution_channels_last_is_the_rooms_own() -> Result<()> {
+        for (shape, kernel, stride) in LAYERS {
+            let inputs = [pattern(shape, 0.0)?, pattern(kernel, 7.0)?, pattern(&kernel[..1], 3.0)?];
+            let s = conv2d::same(&inputs[0], &inputs[1], stride)?;
+            let composed = |v: &[Tensor]| conv(&v[0], &v[1], &v[2], &s);
+            let off = apart(&inputs, composed, |v| conv2d::conv(&v[0], &v[1], &v[2], s))?;
+            assert!(off < 1e-12, "{shape:?} {kernel:?}: {off:e}");
+            assert!(worst(&inputs, composed)? < 1e-7, "{shape:?} {kernel:?}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_whole_layer_is_the_rooms_own_with_its_running_statistics() -> Result<()> {
+        for ((shape, kernel, stride), train) in LAYERS.into_iter().flat_map(|layer| [(layer, true), (layer, false)]) {
+            let inputs = [pattern(shape, 0.0)?, pattern(kernel, 7.0)?, pattern(&kernel[..1], 3.0)?];
+            let s = conv2d::same(&inputs[0], &inputs[1], stride)?;
+            let norm = |slope| BatchNorm::new(&mut Params::with_dtype(0, DType::F64), "n", 3, 1e-3, 0.1, slope);
+            let (mine, own) = (norm(0.2)?, norm(0.2)?);
+            let composed = |v: &[Tensor]| conv_norm(&v[0], &v[1], &v[2], &mine, &s, train);
+            let off = apart(&inputs, composed, |v| conv_norm::conv_norm(&v[0], &v[1], &v[2], &own, s, train))?;
+            assert!(off < 1e-11, "{shape:?} {kernel:?} {train}: {off:e}");
+            let (mine, own) = (mine.running()?, own.running()?);
+            let pairs = mine.mean.iter().chain(&mine.variance).zip(own.mean.iter().chain(&own.variance));
+            assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-12), "{mine:?} {own:?}");
         }
         Ok(())
     }

@@ -2,6 +2,7 @@
 //! batch larger than one). All frames of the whole batch become the columns of one matrix, so that a pass is one
 //! matrix product; sums run in a fixed order, so results do not depend on the number of threads.
 
+use super::composed;
 use super::cpu::{GRAIN, Matrix, Real, is_f64, matmul, read, scratch, slice, sum};
 use super::params::{Init, Params};
 use candle_core::backend::BackendStorage;
@@ -36,8 +37,11 @@ impl Walk {
 }
 
 /// Convolves `x` [B, C, T] with `weight` [O, C, K] and adds `bias` [O]: [B, O, T'], T' = `walk.n_out(T, K)`. f32 or
-/// f64, on the CPU.
+/// f64.
 pub fn conv1d(x: &Tensor, weight: &Tensor, bias: &Tensor, walk: Walk) -> Result<Tensor> {
+    if composed::needed(x) {
+        return composed::conv1d(x, weight, bias, walk);
+    }
     x.contiguous()?.apply_op3(&weight.contiguous()?, &bias.contiguous()?, Op { walk })
 }
 

@@ -1,6 +1,7 @@
 //! Convolution as an operator on tensors, channels last, with its weights: [B, T, C] over time and [B, T, F, C] over
 //! time and frequency. The sums are in `conv`; where a batch norm follows, `conv_norm` does both at once.
 
+use super::composed;
 use super::conv::{self, Sizes};
 use super::conv_axis::Axis;
 use super::conv_weight;
@@ -73,10 +74,16 @@ impl Conv {
 
     /// [B, T, C] to [B, T', O].
     pub fn forward(&self, x: &Tensor) -> Result<Tensor> {
-        let x = x.contiguous()?;
-        let sizes = same(&x, &self.weight, self.stride)?;
-        x.apply_op3(&self.weight, &self.bias, Op { sizes })
+        conv(x, &self.weight, &self.bias, same(x, &self.weight, self.stride)?)
     }
+}
+
+/// The convolution of these sizes, on any device.
+pub fn conv(x: &Tensor, weight: &Tensor, bias: &Tensor, sizes: Sizes) -> Result<Tensor> {
+    if composed::needed(x) {
+        return composed::conv(x, weight, bias, &sizes);
+    }
+    x.contiguous()?.apply_op3(weight, bias, Op { sizes })
 }
 
 struct Op {

@@ -3,6 +3,7 @@
 //! layer in training two numbers a place are kept: before the norm, and the result.
 
 use super::batch_norm::{BatchNorm, Statistics};
+use super::composed;
 use super::conv::{self, Sizes};
 use super::conv2d;
 use super::cpu::{GRAIN, Real, Start, is_f64, read, slice, written};
@@ -22,6 +23,9 @@ pub fn conv_norm(
     sizes: Sizes,
     train: bool,
 ) -> Result<Tensor> {
+    if composed::needed(x) {
+        return composed::conv_norm(x, weight, bias, norm, &sizes, train);
+    }
     let x = x.contiguous()?;
     let channels = Tensor::cat(&[bias, &norm.weight, &norm.bias], 0)?;
     let statistics = Arc::new(OnceLock::new());

@@ -1,5 +1,6 @@
 //! Changing the number of frames: twice as many by repetition, any number by linear interpolation.
 
+use super::composed;
 use super::cpu::{Real, is_f64, read, slice};
 use candle_core::backend::BackendStorage;
 use candle_core::{CpuStorage, CustomOp1, Layout, Result, Shape, Tensor};
@@ -8,6 +9,9 @@ use std::ops::Range;
 /// Every frame twice: [B, T, C] to [B, 2T, C]. An own operator: the stock one overwrites the gradient where `x` is
 /// used again.
 pub fn twice(x: &Tensor) -> Result<Tensor> {
+    if composed::needed(x) {
+        return composed::twice(x);
+    }
     x.contiguous()?.apply_op1(Twice)
 }
 
