@@ -33,6 +33,9 @@ pub struct Args {
     /// Threads.
     #[arg(long, default_value_t = 1, value_name = "N")]
     threads: usize,
+    /// Frames made at once, a multiple of 32; without: as `orator generate` does.
+    #[arg(long, value_name = "N")]
+    chunk: Option<usize>,
     /// This preset only.
     #[arg(long, value_name = "light|paper")]
     preset: Option<Preset>,
@@ -56,7 +59,10 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         let mut secs = Vec::new();
         for _ in 0..args.rounds {
             let start = Instant::now();
-            let motion = pool.install(|| speaker.motion(&sound))?;
+            let motion = pool.install(|| match args.chunk {
+                Some(chunk) => speaker.motion_with_chunk(&sound, chunk),
+                None => speaker.motion(&sound),
+            })?;
             secs.push(start.elapsed().as_secs_f64());
             ensure!(motion.joints.iter().all(|v| v.is_finite()), "the motion made is not finite");
             task.advance(1);
