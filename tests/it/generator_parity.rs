@@ -162,11 +162,13 @@ fn the_published_generator_is_that_of_pytorch_but_for_rounding() -> anyhow::Resu
 
 #[test]
 fn the_light_generator_trains_and_evaluates_as_in_pytorch() -> anyhow::Result<()> {
-    for dtype in [DType::F32, DType::F64] {
-        generator(Preset::Light, "light", true, dtype)?;
-        generator(Preset::Light, "light", false, dtype)?;
-    }
-    Ok(())
+    generator(Preset::Light, "light", true, DType::F32)?;
+    generator(Preset::Light, "light", false, DType::F32)
+}
+
+#[test]
+fn the_light_generator_is_that_of_pytorch_but_for_rounding() -> anyhow::Result<()> {
+    generator(Preset::Light, "light", true, DType::F64)
 }
 
 #[test]
