@@ -59,7 +59,8 @@ pub fn own_peak_mib() -> f64 {
     fs::read_to_string("/proc/self/status").ok().as_deref().and_then(high_water_mib).unwrap_or(f64::NAN)
 }
 
-fn high_water_mib(status: &str) -> Option<f64> {
+/// Peak resident memory from a `status` file of /proc.
+pub fn high_water_mib(status: &str) -> Option<f64> {
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     Some(line.split_whitespace().next()?.parse::<f64>().ok()? / 1024.0)
 }

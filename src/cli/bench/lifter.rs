@@ -1,8 +1,9 @@
 //! `orator bench lifter`: a training step of the temporal lifter, one thread, in turns with PyTorch's for the same
 //! network, the same batch and the same optimiser; and how far apart the two networks' outputs are.
 
+use super::reference::Reference;
 use crate::cli::{Outcome, ui::Ui};
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
 use orator::motion::body_view::{N_IN, N_OUT};
 use orator::nn::Mode;
@@ -15,9 +16,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Instant;
 
 /// Training of the temporal lifter on one thread: seconds a step and, with `--python`, against PyTorch. Both train the
@@ -84,6 +83,30 @@ impl Fixed {
         let strided = self.net.forward_windows(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1()?;
         let dilated = self.net.forward(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1()?;
         Ok([strided, dilated])
+    }
+
+    /// Weights and batch for the reference.
+    fn contents(&self) -> Result<Contents> {
+        let mut contents = Contents { facts: json!({ "kind": "benchmark" }), tensors: BTreeMap::new() };
+        contents.add("", self.params.tensors()?);
+        let (x, y) = self.tensors()?;
+        let weights = Tensor::from_vec(self.weights(), N_OUT / 3, &Device::Cpu)?;
+        contents.add("", [("x", x), ("y", y), ("weights", weights)].map(|(name, t)| (name.to_owned(), t)).into());
+        Ok(contents)
+    }
+
+    /// Largest difference of the outputs to the reference's in either form, over the largest output.
+    fn apart(&self, reference: &mut Reference) -> Result<f64> {
+        let answer = reference.ask("forward")?;
+        let mut apart = 0.0f64;
+        for (form, own) in ["strided", "dilated"].into_iter().zip(self.outputs()?) {
+            let their: Vec<f64> = serde_json::from_value(answer[form].clone())?;
+            ensure!(their.len() == own.len(), "the reference gave {} {form} outputs, we {}", their.len(), own.len());
+            let most = their.iter().fold(1e-9f64, |most, v| most.max(v.abs()));
+            let far = own.iter().zip(&their).map(|(a, b)| (f64::from(*a) - b).abs() / most);
+            apart = far.fold(apart, f64::max);
+        }
+        Ok(apart)
     }
 
     /// Seconds of `steps` training steps; `scratch` is where the training leaves its weights.
@@ -158,17 +181,19 @@ fn measure(args: &Args, config: &Config, folder: &Path, ui: &Ui) -> Result<(Stri
     // running statistics that are not the first ones
     ours.train(2, &scratch)?;
     let mut theirs = match &args.python {
-        Some(script) => Some(Reference::start(script, &ours, &folder.join("given.safetensors"))?),
+        Some(script) => Some(Reference::start(script, 1, &ours.contents()?, &folder.join("given.safetensors"))?),
         None => None,
     };
-    let apart = theirs.as_mut().map(|theirs| theirs.apart(&ours)).transpose()?;
+    let apart = theirs.as_mut().map(|theirs| ours.apart(theirs)).transpose()?;
     let task = ui.begin("bench lifter", args.rounds as u64);
     let (mut own, mut conv, mut linear) = (vec![], vec![], vec![]);
     for _ in 0..args.rounds {
         own.push(ours.train(args.steps, &scratch)? / args.steps as f64);
         if let Some(theirs) = &mut theirs {
-            conv.push(theirs.step(args.steps, "conv")?);
-            linear.push(theirs.step(args.steps, "linear")?);
+            let mut step =
+                |form| Ok::<_, anyhow::Error>(theirs.secs(&format!("step {} {form}", args.steps))? / args.steps as f64);
+            conv.push(step("conv")?);
+            linear.push(step("linear")?);
         }
         task.advance(1);
     }
@@ -201,81 +226,9 @@ fn measure(args: &Args, config: &Config, folder: &Path, ui: &Ui) -> Result<(Stri
             facts[format!("pytorch_{form}_secs_a_step")] = json!(secs);
             facts[format!("ratio_to_pytorch_{form}")] = json!(ratio);
         }
-        text += &format!("\nPyTorch {}: outputs at most {apart:.1e} apart, over the largest output", theirs.version);
+        text += &format!("\nPyTorch {}: outputs at most {apart:.1e} apart, over the largest output", theirs.version());
         facts["outputs_apart"] = json!(apart);
-        facts["pytorch"] = json!(theirs.version);
+        facts["pytorch"] = json!(theirs.version());
     }
     Ok((text, facts))
-}
-
-/// The Python reference at work beside us, answering one line a command.
-struct Reference {
-    child: Child,
-    to: ChildStdin,
-    from: BufReader<ChildStdout>,
-    version: String,
-}
-
-impl Reference {
-    /// Starts it on one thread with the lesson's weights and batch, written to `given`.
-    fn start(script: &Path, lesson: &Fixed, given: &Path) -> Result<Self> {
-        let mut contents = Contents { facts: json!({ "kind": "benchmark" }), tensors: BTreeMap::new() };
-        contents.add("", lesson.params.tensors()?);
-        let (x, y) = lesson.tensors()?;
-        let weights = Tensor::from_vec(lesson.weights(), N_OUT / 3, &Device::Cpu)?;
-        contents.add("", [("x", x), ("y", y), ("weights", weights)].map(|(name, t)| (name.to_owned(), t)).into());
-        contents.write(given)?;
-        let python = std::env::var("ORATOR_REFERENCE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-        let mut command = Command::new(&python);
-        command.arg(script).arg("serve").arg(given).env("OMP_NUM_THREADS", "1").env("MKL_NUM_THREADS", "1");
-        let mut child =
-            command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().with_context(|| {
-                format!("{python} cannot be run; ORATOR_REFERENCE_PYTHON names a Python with torch")
-            })?;
-        let (Some(to), Some(from)) = (child.stdin.take(), child.stdout.take()) else {
-            bail!("{python} has no standard input and output");
-        };
-        let mut reference = Self { child, to, from: BufReader::new(from), version: String::new() };
-        let hello = reference.answer().with_context(|| format!("{} did not start", script.display()))?;
-        reference.version = hello["torch"].as_str().unwrap_or("?").to_owned();
-        Ok(reference)
-    }
-
-    /// Largest difference of the outputs in either form, over the largest output.
-    fn apart(&mut self, lesson: &Fixed) -> Result<f64> {
-        let answer = self.ask("forward")?;
-        let mut apart = 0.0f64;
-        for (form, own) in ["strided", "dilated"].into_iter().zip(lesson.outputs()?) {
-            let their: Vec<f64> = serde_json::from_value(answer[form].clone())?;
-            ensure!(their.len() == own.len(), "the reference gave {} {form} outputs, we {}", their.len(), own.len());
-            let most = their.iter().fold(1e-9f64, |most, v| most.max(v.abs()));
-            let far = own.iter().zip(&their).map(|(a, b)| (f64::from(*a) - b).abs() / most);
-            apart = far.fold(apart, f64::max);
-        }
-        Ok(apart)
-    }
-
-    /// Seconds a step.
-    fn step(&mut self, steps: usize, form: &str) -> Result<f64> {
-        let answer = self.ask(&format!("step {steps} {form}"))?;
-        Ok(answer["secs"].as_f64().context("the reference gave no time")? / steps as f64)
-    }
-
-    fn ask(&mut self, command: &str) -> Result<Value> {
-        writeln!(self.to, "{command}").context("the reference has stopped")?;
-        self.answer().with_context(|| format!("no answer to `{command}`"))
-    }
-
-    fn answer(&mut self) -> Result<Value> {
-        let mut line = String::new();
-        self.from.read_line(&mut line)?;
-        serde_json::from_str(&line).with_context(|| format!("the reference said {line:?}"))
-    }
-}
-
-impl Drop for Reference {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
 }

@@ -7,8 +7,10 @@ mod generate;
 mod lift;
 mod lifter;
 mod pose2d;
+mod reference;
 mod run;
 mod scale;
+mod train;
 
 use super::{Outcome, ui::Ui};
 use anyhow::Result;
@@ -29,6 +31,7 @@ enum Part {
     Lifter(lifter::Args),
     Run(run::Args),
     Scale(scale::Args),
+    Train(train::Args),
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
@@ -40,6 +43,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         Part::Lifter(args) => lifter::run(&args, ui),
         Part::Run(args) => run::run(&args, ui),
         Part::Scale(args) => scale::run(&args, ui),
+        Part::Train(args) => train::run(&args, ui),
     }
 }
 
