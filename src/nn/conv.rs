@@ -5,7 +5,7 @@
 //! Every number is summed by one thread in one order, so results do not depend on how many threads there are.
 
 use super::conv_axis::{Axis, Windows};
-use super::conv_panels::{Block, Panels};
+use super::conv_panels::{Block, Order, Panels};
 use super::cpu::{Real, Start, scratch, written};
 use super::kernel::{MOST_ROWS, Steps};
 use rayon::prelude::*;
@@ -56,8 +56,7 @@ pub fn forward<T: Real>(
 ) -> Vec<T> {
     assert!(x.len() == s.len_in() && weight.len() == s.len_weight() && bias.len() == s.n_out);
     let pass = forward_pass(s);
-    let per_column = s.n_in * s.n_taps();
-    let panels = Panels::pack(weight, s.n_out, per_column, &pass.offsets(|c, tap| c * s.n_taps() + tap));
+    let panels = Panels::pack(weight, &pass.order(s.n_in * s.n_taps(), s.n_taps()));
     let per_row = s.axes[1].n_out * s.n_out;
     // SAFETY: the pieces together write every row of every output, each its own.
     unsafe {
@@ -90,7 +89,6 @@ fn forward_pass(s: &Sizes) -> Pass {
 /// The gradient of the input.
 pub fn gradient_of_input<T: Real>(s: &Sizes, weight: &[T], grad: &[T]) -> Vec<T> {
     assert!(grad.len() == s.len_out() && weight.len() == s.len_weight());
-    let per_out = s.n_in * s.n_taps();
     let zeros = vec![T::zero(); s.n_in];
     // SAFETY: the pieces of the phases together write every place, each its own.
     unsafe {
@@ -104,7 +102,7 @@ pub fn gradient_of_input<T: Real>(s: &Sizes, weight: &[T], grad: &[T]) -> Vec<T>
                         windows: [rows.clone(), columns],
                         kernel: s.axes.map(|axis| axis.kernel),
                     };
-                    let panels = Panels::pack(weight, s.n_in, s.n_taps(), &pass.offsets(|o, tap| o * per_out + tap));
+                    let panels = Panels::pack(weight, &pass.order(s.n_taps(), s.n_in * s.n_taps()));
                     pass.pieces().into_par_iter().for_each(|(b, rows)| pass.run(grad, &panels, &zeros, to, b, rows));
                 }
             }
@@ -123,11 +121,12 @@ struct Pass {
 }
 
 impl Pass {
-    /// For every step of a sum (row tap, column tap, channel): where its weight lies in the weights of one column.
-    fn offsets(&self, of: impl Fn(usize, usize) -> usize) -> Vec<usize> {
+    /// Where the weights lie for this pass.
+    fn order(&self, per_column: usize, per_channel: usize) -> Order {
         let [rows, columns] = &self.windows;
-        let taps = rows.taps.iter().flat_map(|row| columns.taps.iter().map(move |c| row * self.kernel[1] + c));
-        taps.flat_map(|tap| (0..self.n_from).map(move |channel| (channel, tap))).map(|(c, tap)| of(c, tap)).collect()
+        let taps =
+            rows.taps.iter().flat_map(|row| columns.taps.iter().map(move |c| row * self.kernel[1] + c)).collect();
+        Order { n_columns: self.n_to, per_column, n_channels: self.n_from, per_channel, taps }
     }
 
     /// Sample and windows' rows of each piece of work; the same for any number of threads.

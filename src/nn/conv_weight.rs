@@ -2,13 +2,15 @@
 //! share out the weights, not the places, so that no two threads add to one number.
 
 use super::conv::Sizes;
-use super::cpu::Real;
+use super::cpu::{Real, Start, written};
 use super::kernel::{Job, MOST_ROWS, Steps, panels};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Places of a piece, whose gradients stay in the first-level cache.
 const PLACES: usize = 128;
+/// Numbers of an output's weights that are written at once: whole lines of memory.
+const AT_ONCE: usize = 32;
 /// Input channels of a task.
 const CHANNELS: usize = 11 * MOST_ROWS;
 
@@ -22,7 +24,7 @@ pub fn gradient_of_weight<T: Real>(s: &Sizes, x: &[T], grad: &[T]) -> Vec<T> {
     let panels = panels(&kernel, s.n_out);
     let (padded, n_columns) = pad_channels(grad, s.n_out, kernel.lanes);
     let grad = padded.as_deref().unwrap_or(grad);
-    let [rows, columns] = s.axes;
+    let rows = s.axes[0];
     let n_chunks = s.n_in.div_ceil(CHANNELS);
     let tasks: Vec<(usize, usize, usize)> = (0..panels.len())
         .flat_map(|panel| (0..rows.kernel).flat_map(move |tap| (0..n_chunks).map(move |chunk| (panel, tap, chunk))))
@@ -32,23 +34,35 @@ pub fn gradient_of_weight<T: Real>(s: &Sizes, x: &[T], grad: &[T]) -> Vec<T> {
         .par_iter()
         .map(|&(panel, tap, of_chunk)| sum_products(s, x, grad, n_columns, panels[panel], tap, chunk(of_chunk)))
         .collect();
-    let mut gradient = vec![T::zero(); s.len_weight()];
-    gradient.par_chunks_mut(s.n_in * s.n_taps()).enumerate().for_each(|(o, gradient)| {
-        for ((panel, row_tap, of_chunk), sums) in tasks.iter().zip(&sums) {
-            let ((first, n_vectors), channels) = (panels[*panel], chunk(*of_chunk));
-            let width = n_vectors * kernel.lanes;
-            if !(first..first + width).contains(&o) {
-                continue;
-            }
-            for column_tap in 0..columns.kernel {
-                let sums = sums[column_tap * channels.len() * width + o - first..].iter().step_by(width);
-                let tap = row_tap * columns.kernel + column_tap;
-                let to = gradient[channels.start * s.n_taps() + tap..].iter_mut().step_by(s.n_taps());
-                to.take(channels.len()).zip(sums).for_each(|(to, sum)| *to = *sum);
+    let spread = |gradient: Start<T>, (panel, of_chunk): (usize, usize)| {
+        let ((first, n_vectors), channels) = (panels[panel], chunk(of_chunk));
+        let width = n_vectors * kernel.lanes;
+        let of_row = tasks.iter().zip(&sums).filter(|((p, _, c), _)| (*p, *c) == (panel, of_chunk));
+        let of_row: Vec<&[T]> = of_row.map(|(_, sums)| &sums[..]).collect();
+        let taps = of_row.iter().flat_map(|sums| sums.chunks_exact(channels.len() * width));
+        let taps: Vec<&[T]> = taps.collect();
+        let n_at_once = (AT_ONCE / s.n_taps()).max(1);
+        for some in (0..channels.len()).step_by(n_at_once).map(|c| c..channels.len().min(c + n_at_once)) {
+            for o in first..s.n_out.min(first + width) {
+                let mut at = (o * s.n_in + channels.start + some.start) * s.n_taps();
+                for c in some.clone() {
+                    for sums in &taps {
+                        // SAFETY: the numbers of these channels of this output, which only this task writes.
+                        unsafe { gradient.at(at).write(sums[c * width + o - first]) };
+                        at += 1;
+                    }
+                }
             }
         }
-    });
-    gradient
+    };
+    let parts: Vec<(usize, usize)> =
+        (0..panels.len()).flat_map(|panel| (0..n_chunks).map(move |chunk| (panel, chunk))).collect();
+    // SAFETY: the parts together write every number.
+    unsafe {
+        written(s.len_weight(), |gradient: Start<T>| {
+            parts.into_par_iter().for_each(|part| spread(gradient, part));
+        })
+    }
 }
 
 /// The numbers with their channels filled up with zeros to whole vectors (None where they are), and how many there are.

@@ -24,7 +24,12 @@ impl CustomOp1 for Twice {
 
     fn cpu_fwd(&self, x: &CpuStorage, layout: &Layout) -> Result<(CpuStorage, Shape)> {
         fn repeat<T: Real>(x: &[T], n_channels: usize) -> Vec<T> {
-            x.chunks_exact(n_channels).flat_map(|frame| [frame, frame]).flatten().copied().collect()
+            let mut y = Vec::with_capacity(2 * x.len());
+            for frame in x.chunks_exact(n_channels) {
+                y.extend_from_slice(frame);
+                y.extend_from_slice(frame);
+            }
+            y
         }
         let (batch, n_frames, channels) = layout.shape().dims3()?;
         let y = if is_f64(x.dtype())? {
@@ -39,8 +44,11 @@ impl CustomOp1 for Twice {
         fn typed<T: Real>(grad: &Tensor) -> Result<Vec<T>> {
             let n = grad.dim(2)?;
             read::<T, _>(grad, |grad| {
-                let pairs = grad.chunks_exact(2 * n).map(|pair| pair.split_at(n));
-                Ok(pairs.flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| *a + *b)).collect())
+                let mut sums = Vec::with_capacity(grad.len() / 2);
+                for (a, b) in grad.chunks_exact(2 * n).map(|pair| pair.split_at(n)) {
+                    sums.extend(a.iter().zip(b).map(|(a, b)| *a + *b));
+                }
+                Ok(sums)
             })
         }
         Ok(Some(if is_f64(grad.dtype())? {

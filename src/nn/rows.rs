@@ -1,7 +1,7 @@
 //! Statistics over the rows of a matrix whose columns are channels, and batch norm with the leaky ReLU behind it on
 //! such rows: plain memory in, plain memory out. Sums run over blocks of fixed size in one order.
 
-use super::cpu::Real;
+use super::cpu::{LANES, Real};
 use rayon::prelude::*;
 
 /// Numbers summed before the sum goes on in f64, and numbers one task takes.
@@ -23,12 +23,15 @@ impl Moments {
         for block in values.chunks(whole_rows(BLOCK, n_channels)) {
             let n = (block.len() / n_channels) as f64;
             let mean: Vec<T> = block_sums(block, n_channels).iter().map(|s| T::from_f64(s.to_f64() / n)).collect();
-            let mut squares = vec![T::zero(); n_channels];
-            for row in block.chunks_exact(n_channels) {
-                for ((sum, value), mean) in squares.iter_mut().zip(row).zip(&mean) {
-                    let off = *value - *mean;
-                    *sum += off * off;
-                }
+            let (mut squares, mut first) = (vec![T::zero(); n_channels], 0);
+            let (wide, rest) = squares.as_chunks_mut::<LANES>();
+            for (sums, mean) in wide.iter_mut().zip(mean.as_chunks().0) {
+                *sums = sums_of_squares(block, n_channels, first, mean);
+                first += LANES;
+            }
+            for (sum, mean) in rest.iter_mut().zip(&mean[first..]) {
+                [*sum] = sums_of_squares(block, n_channels, first, &[*mean]);
+                first += 1;
             }
             let f64s = |values: Vec<T>| values.into_iter().map(|v| v.to_f64()).collect();
             all = all.and(&Self { n, mean: f64s(mean), squares: f64s(squares) });
@@ -56,9 +59,36 @@ fn whole_rows(n: usize, n_channels: usize) -> usize {
 }
 
 fn block_sums<T: Real>(block: &[T], n_channels: usize) -> Vec<T> {
-    let mut sums = vec![T::zero(); n_channels];
-    for row in block.chunks_exact(n_channels) {
-        sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += *value);
+    fn some<T: Real, const N: usize>(block: &[T], n_channels: usize, first: usize) -> [T; N] {
+        let mut sums = [T::zero(); N];
+        rows(block, n_channels, first).for_each(|row: &[T; N]| (0..N).for_each(|i| sums[i] += row[i]));
+        sums
+    }
+    let (mut sums, mut first) = (vec![T::zero(); n_channels], 0);
+    let (wide, rest) = sums.as_chunks_mut::<LANES>();
+    for sums in wide {
+        *sums = some(block, n_channels, first);
+        first += LANES;
+    }
+    for sum in rest {
+        [*sum] = some(block, n_channels, first);
+        first += 1;
+    }
+    sums
+}
+
+/// `N` channels from `first` on of every row.
+fn rows<T, const N: usize>(block: &[T], n_channels: usize, first: usize) -> impl Iterator<Item = &[T; N]> {
+    block.chunks_exact(n_channels).filter_map(move |row| row.get(first..)?.first_chunk())
+}
+
+fn sums_of_squares<T: Real, const N: usize>(block: &[T], n_channels: usize, first: usize, mean: &[T; N]) -> [T; N] {
+    let mut sums = [T::zero(); N];
+    for row in rows::<T, N>(block, n_channels, first) {
+        for i in 0..N {
+            let off = row[i] - mean[i];
+            sums[i] += off * off;
+        }
     }
     sums
 }
@@ -95,22 +125,43 @@ pub struct Norm<T> {
 impl<T: Real> Norm<T> {
     /// `z` overwritten with the result.
     pub fn apply(&self, z: &mut [T]) {
+        let (scale, scale_rest) = self.scale.as_chunks::<LANES>();
+        let (shift, shift_rest) = self.shift.as_chunks::<LANES>();
         for row in z.chunks_exact_mut(self.scale.len()) {
-            for ((z, scale), shift) in row.iter_mut().zip(&self.scale).zip(&self.shift) {
-                let y = *z * *scale + *shift;
-                *z = if y > T::zero() { y } else { y * self.slope };
+            let (wide, rest) = row.as_chunks_mut::<LANES>();
+            for ((z, scale), shift) in wide.iter_mut().zip(scale).zip(shift) {
+                *z = self.result(z, scale, shift);
+            }
+            for ((z, scale), shift) in rest.iter_mut().zip(scale_rest).zip(shift_rest) {
+                [*z] = self.result(&[*z], &[*scale], &[*shift]);
             }
         }
     }
 
     /// `y` from `z`.
     pub fn forward(&self, z: &[T], y: &mut [T]) {
-        for (z, y) in z.chunks_exact(self.scale.len()).zip(y.chunks_exact_mut(self.scale.len())) {
-            for (((z, y), scale), shift) in z.iter().zip(y).zip(&self.scale).zip(&self.shift) {
-                let value = *z * *scale + *shift;
-                *y = if value > T::zero() { value } else { value * self.slope };
-            }
+        y.copy_from_slice(z);
+        self.apply(y);
+    }
+
+    #[inline(always)]
+    fn result<const N: usize>(&self, z: &[T; N], scale: &[T; N], shift: &[T; N]) -> [T; N] {
+        let mut y = [T::zero(); N];
+        for i in 0..N {
+            let value = z[i] * scale[i] + shift[i];
+            y[i] = if value > T::zero() { value } else { value * self.slope };
         }
+        y
+    }
+
+    /// `grad` taken back through the activation.
+    #[inline(always)]
+    fn before<const N: usize>(&self, z: &[T; N], grad: &[T; N], scale: &[T; N], shift: &[T; N]) -> [T; N] {
+        let mut before = [T::zero(); N];
+        for i in 0..N {
+            before[i] = if z[i] * scale[i] + shift[i] > T::zero() { grad[i] } else { grad[i] * self.slope };
+        }
+        before
     }
 
     /// Sums over all rows of `g` and of `g * (z - mean)`, `g` being `grad` taken back through the activation.
@@ -119,16 +170,12 @@ impl<T: Real> Norm<T> {
         let of_task = |(z, grad): (&[T], &[T])| {
             let mut sums = vec![0.0; 2 * n];
             for (z, grad) in z.chunks(whole_rows(BLOCK, n)).zip(grad.chunks(whole_rows(BLOCK, n))) {
-                let (mut plain, mut product) = (vec![T::zero(); n], vec![T::zero(); n]);
-                for (z, grad) in z.chunks_exact(n).zip(grad.chunks_exact(n)) {
-                    let channels = plain.iter_mut().zip(&mut product).zip(self.channels());
-                    for (((plain, product), (mean, scale, shift)), (z, grad)) in channels.zip(z.iter().zip(grad)) {
-                        let g = if *z * *scale + *shift > T::zero() { *grad } else { *grad * self.slope };
-                        *plain += g;
-                        *product += g * (*z - *mean);
-                    }
+                let mut first = 0;
+                while first + LANES <= n {
+                    self.add_sums::<LANES>(z, grad, first, &mut sums);
+                    first += LANES;
                 }
-                sums.iter_mut().zip(plain.iter().chain(&product)).for_each(|(sum, value)| *sum += value.to_f64());
+                (first..n).for_each(|first| self.add_sums::<1>(z, grad, first, &mut sums));
             }
             sums
         };
@@ -139,23 +186,55 @@ impl<T: Real> Norm<T> {
         (plain, product)
     }
 
+    /// Adds both sums of `N` channels over a block to `sums`.
+    fn add_sums<const N: usize>(&self, z: &[T], grad: &[T], first: usize, sums: &mut [f64]) {
+        let n = self.scale.len();
+        let some = |values: &[T]| std::array::from_fn::<T, N, _>(|i| values[first + i]);
+        let (mean, scale, shift) = (some(&self.mean), some(&self.scale), some(&self.shift));
+        let (mut plain, mut product) = ([T::zero(); N], [T::zero(); N]);
+        for (z, grad) in rows::<T, N>(z, n, first).zip(rows::<T, N>(grad, n, first)) {
+            let g = self.before(z, grad, &scale, &shift);
+            for i in 0..N {
+                plain[i] += g[i];
+                product[i] += g[i] * (z[i] - mean[i]);
+            }
+        }
+        for i in 0..N {
+            sums[first + i] += plain[i].to_f64();
+            sums[n + first + i] += product[i].to_f64();
+        }
+    }
+
     /// Overwrites `z` with the gradient before the norm: `scale * g + constant + linear * (z - mean)`.
     pub fn backward(&self, z: &mut [T], grad: &[T], constant: &[T], linear: &[T]) {
         let n = self.scale.len();
+        // constant + linear * (z - mean), with one number less.
+        let offset: Vec<T> =
+            constant.iter().zip(linear).zip(&self.mean).map(|((c, l), mean)| *c - *l * *mean).collect();
         let chunk = whole_rows(TASK, n);
         z.par_chunks_mut(chunk).zip(grad.par_chunks(chunk)).for_each(|(z, grad)| {
             for (z, grad) in z.chunks_exact_mut(n).zip(grad.chunks_exact(n)) {
-                let channels = self.channels().zip(constant.iter().zip(linear));
-                for (((mean, scale, shift), (constant, linear)), (z, grad)) in channels.zip(z.iter_mut().zip(grad)) {
-                    let g = if *z * *scale + *shift > T::zero() { *grad } else { *grad * self.slope };
-                    *z = *scale * g + *constant + *linear * (*z - *mean);
+                let n_wide = n / LANES * LANES;
+                for first in (0..n_wide).step_by(LANES) {
+                    self.turn::<LANES>(z, grad, first, &offset, linear);
                 }
+                (n_wide..n).for_each(|first| self.turn::<1>(z, grad, first, &offset, linear));
             }
         });
     }
 
-    fn channels(&self) -> impl Iterator<Item = (&T, &T, &T)> {
-        self.mean.iter().zip(&self.scale).zip(&self.shift).map(|((mean, scale), shift)| (mean, scale, shift))
+    #[inline(always)]
+    fn turn<const N: usize>(&self, z: &mut [T], grad: &[T], first: usize, offset: &[T], linear: &[T]) {
+        let Some(z) = z[first..].first_chunk_mut::<N>() else { return };
+        let some = |values: &[T]| values[first..].first_chunk::<N>().copied().unwrap_or([T::zero(); N]);
+        let (scale, shift) = (some(&self.scale), some(&self.shift));
+        let (offset, linear) = (some(offset), some(linear));
+        let g = self.before(z, &some(grad), &scale, &shift);
+        let mut turned = [T::zero(); N];
+        for i in 0..N {
+            turned[i] = scale[i] * g[i] + offset[i] + linear[i] * z[i];
+        }
+        *z = turned;
     }
 }
 

@@ -12,6 +12,7 @@ use orator::nn::resize;
 use orator::nn::unet::{Config, Generator, Preset};
 use orator::stage::progress::Progress;
 use orator::train::adam::{self, Adam};
+use orator::train::awake::awake;
 use orator::train::checkpoint::Contents;
 use orator::train::losses::Adversarial;
 use rand::{Rng, SeedableRng};
@@ -120,11 +121,13 @@ impl Training {
 
     /// Seconds of `steps` steps, and the last one's losses.
     fn train(&mut self, steps: usize) -> Result<(f64, [f32; 3])> {
-        let (start, mut losses) = (Instant::now(), [0.0; 3]);
-        for _ in 0..steps {
-            losses = self.step()?;
-        }
-        Ok((start.elapsed().as_secs_f64(), losses))
+        awake(|| {
+            let (start, mut losses) = (Instant::now(), [0.0; 3]);
+            for _ in 0..steps {
+                losses = self.step()?;
+            }
+            Ok((start.elapsed().as_secs_f64(), losses))
+        })
     }
 
     /// A step in parts that end where one can look at the clock: names and seconds.
@@ -197,7 +200,7 @@ fn measure(args: &Args, folder: &Path, ui: &Ui) -> Result<(String, Value)> {
     }
     drop(task);
     let peak = high_water_mib(&std::fs::read_to_string("/proc/self/status").unwrap_or_default()).unwrap_or(f64::NAN);
-    let parts = ours.parts()?;
+    let parts = awake(|| ours.parts())?;
 
     let secs = super::median(own.clone());
     let mut text = format!(
