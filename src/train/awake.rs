@@ -15,16 +15,16 @@ pub fn awake<R: Send>(f: impl FnOnce() -> R + Send) -> R {
     }
     let done = AtomicBool::new(false);
     rayon::scope(|scope| {
-        for _ in 1..rayon::current_num_threads() {
-            scope.spawn(|_| {
-                while !done.load(Ordering::Relaxed) {
-                    if rayon::yield_now() != Some(rayon::Yield::Executed) {
-                        std::hint::spin_loop();
-                    }
+        let own = rayon::current_thread_index();
+        let done = &done;
+        scope.spawn_broadcast(move |_, thread| {
+            while Some(thread.index()) != own && !done.load(Ordering::Relaxed) {
+                if rayon::yield_now() != Some(rayon::Yield::Executed) {
+                    std::hint::spin_loop();
                 }
-            });
-        }
-        let _done = Done(&done);
+            }
+        });
+        let _done = Done(done);
         f()
     })
 }
@@ -40,6 +40,7 @@ mod tests {
         let sum = pool.install(|| awake(|| (0..1000u64).into_par_iter().sum::<u64>()));
         assert_eq!(sum, 499_500);
         assert_eq!(pool.install(|| awake(rayon::current_num_threads)), 3);
-        assert!(std::panic::catch_unwind(|| pool.install(|| awake(|| panic!("a step that fails")))).is_err());
+        let failing = std::panic::AssertUnwindSafe(|| pool.install(|| awake(|| panic!("a step that fails"))));
+        assert!(std::panic::catch_unwind(failing).is_err());
     }
 }
