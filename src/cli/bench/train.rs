@@ -77,8 +77,8 @@ impl Training {
             Tensor::from_vec((0..n).map(|_| rng.random_range(-1.0f32..1.0)).collect(), shape, &Device::Cpu)
         };
         Ok(Self {
-            adam_g: Adam::new(&generator_params, adam::Config::default()),
-            adam_d: Adam::new(&discriminator_params, adam::Config::default()),
+            adam_g: Adam::new(&generator_params, adam::Config::default())?,
+            adam_d: Adam::new(&discriminator_params, adam::Config::default())?,
             mels: draw((batch, 64, N_MELS))?,
             poses: draw((batch, N_NUMBERS, N_FRAMES))?,
             generator_params,
