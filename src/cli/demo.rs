@@ -7,7 +7,7 @@ use orator::dataset::Dataset;
 use orator::demo::GENERATOR;
 use orator::demo::folder::{self, Plan};
 use orator::demo::measure::{self, LEAST_FOUND, LEAST_FRAMES, LEAST_JOINTS, MOST_MM, MOST_PX, Millimetres};
-use orator::demo::{learned, sheet, speaker};
+use orator::demo::{learned, sheet, speaker, traces};
 use orator::generate::Speaker;
 use orator::motion::npy;
 use orator::stage::workdir;
@@ -59,7 +59,8 @@ enum Part {
         #[arg(long, default_value_t = 1)]
         seed: u64,
     },
-    /// Measure on the test split of `orator demo speaker` how much of the rule a trained speaker has learnt.
+    /// Measure on the test split of `orator demo speaker` how much of the rule a trained speaker has learnt; exit code 2
+    /// where a target is missed.
     Learned {
         /// The dataset.
         #[arg(long, value_name = "DIR")]
@@ -67,6 +68,9 @@ enum Part {
         /// A checkpoint of `orator train gan` or its folder; without it the simple predictors alone are measured.
         #[arg(long, value_name = "FILE|FOLDER")]
         checkpoint: Option<PathBuf>,
+        /// A picture to write, .png: wrist speeds and poses over the first test sound, of rule, speaker and checkpoint.
+        #[arg(long, value_name = "FILE", requires = "checkpoint")]
+        picture: Option<PathBuf>,
     },
     /// Draw a contact sheet of a run in DIR: video, keypoints, 3D figure, generated motion.
     Sheet {
@@ -90,7 +94,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         }
         Part::Measure { dir } => measure(&dir, ui),
         Part::Speaker { dir, hours, seed } => speak(&dir, hours, seed, ui),
-        Part::Learned { dataset, checkpoint } => learned(&dataset, checkpoint.as_deref(), ui),
+        Part::Learned { dataset, checkpoint, picture } => {
+            learned(&dataset, checkpoint.as_deref(), picture.as_deref(), ui)
+        }
         Part::Sheet { dir, out, motion } => draw_sheet(&dir, &out, motion.as_deref(), ui),
     }
 }
@@ -170,7 +176,7 @@ fn speak(dir: &Path, hours: f64, seed: u64, ui: &Ui) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-fn learned(dataset: &Path, checkpoint: Option<&Path>, ui: &Ui) -> Result<Outcome> {
+fn learned(dataset: &Path, checkpoint: Option<&Path>, picture: Option<&Path>, ui: &Ui) -> Result<Outcome> {
     let dataset = Dataset::open(dataset)?;
     let speaker = checkpoint.map(Speaker::open).transpose()?;
     let learned = learned::measure(&dataset, speaker.as_ref(), ui)?;
@@ -201,8 +207,23 @@ fn learned(dataset: &Path, checkpoint: Option<&Path>, ui: &Ui) -> Result<Outcome
     }
     text += "speed: correlation of a wrist's speed (m/s, frame by frame, not smoothed, all clips in a row) with that of the\n\
              rule without whims; PCK, energy (mean squared joint speed, share of the data's) and L1 (normalised): against the data.";
+    if let Some(good) = learned.good {
+        text += &format!(
+            "\ntargets of the generator: speed {}, PCK {} x that of another sound and of the mean pose, energy {:.0} to {:.0} %: {}",
+            learned::LEAST_CORRELATION,
+            learned::LEAST_PCK,
+            100.0 * learned::ENERGY.start(),
+            100.0 * learned::ENERGY.end(),
+            if good { "met" } else { "MISSED" }
+        );
+    }
+    if let (Some(path), Some(clip)) = (picture, &learned.first) {
+        let image = traces::picture(clip, dataset.info().fps)?;
+        workdir::replace(path, |attempt| png::write(attempt, &image))?;
+        text += &format!("\nwrote {}", path.display());
+    }
     ui.summary(&text, None, serde_json::to_value(&learned)?);
-    Ok(Outcome::Done)
+    Ok(if learned.good == Some(false) { Outcome::SomeFailed } else { Outcome::Done })
 }
 
 fn draw_sheet(dir: &Path, out: &Path, generated: Option<&Path>, ui: &Ui) -> Result<Outcome> {

@@ -4,6 +4,7 @@
 use super::listener::{Listener, sound_of_frames, wrist_speeds};
 use super::ridge::correlation;
 use super::speaker::Clip;
+use super::traces;
 use crate::dataset::{Dataset, Sample, Split};
 use crate::generate::Speaker;
 use crate::metrics::energy::MotionEnergy;
@@ -45,7 +46,18 @@ pub struct Learned {
     pub rows: Vec<Row>,
     /// Penalties of the ridge regressions to speeds and to poses.
     pub ridge_strengths: [f64; 2],
+    /// Whether the generator reaches the targets; `None`: there is none.
+    pub good: Option<bool>,
+    /// The first clip, to look at.
+    #[serde(skip)]
+    pub first: Option<traces::Clip>,
 }
+
+/// What the generator has to reach: correlation of each wrist's speed, PCK as a multiple of the mean pose's and of the
+/// mismatched prediction's, motion energy as a share of the data's.
+pub const LEAST_CORRELATION: f64 = 0.7;
+pub const LEAST_PCK: f64 = 1.5;
+pub const ENERGY: std::ops::RangeInclusive<f64> = 0.7..=1.3;
 
 /// A clip of the test split.
 struct Test {
@@ -65,7 +77,7 @@ pub fn measure(dataset: &Dataset, speaker: Option<&Speaker>, progress: &dyn Prog
     let listener = Listener::learn(dataset)?;
     let row = |predictor, made: Vec<Array3<f32>>| judge.row(predictor, &made);
     let each = |predict: &dyn Fn(&Test) -> Array3<f32>| tests.iter().map(predict).collect::<Vec<_>>();
-    let mut rows = Vec::new();
+    let (mut rows, mut first) = (Vec::new(), None);
     if let Some(speaker) = speaker {
         task.detail("generating");
         let made: Vec<Array3<f32>> =
@@ -73,6 +85,11 @@ pub fn measure(dataset: &Dataset, speaker: Option<&Speaker>, progress: &dyn Prog
         for (made, test) in made.iter().zip(&tests) {
             ensure!(made.shape() == test.predictable.shape(), "the speaker has another frame rate than the dataset");
         }
+        first = made.first().zip(tests.first()).map(|(made, test)| traces::Clip {
+            rule: test.predictable.clone(),
+            data: test.sample.motion.joints.clone(),
+            made: made.clone(),
+        });
         rows.push(row("generator", made.clone()));
         let mut other = made;
         other.rotate_left(1);
@@ -90,7 +107,24 @@ pub fn measure(dataset: &Dataset, speaker: Option<&Speaker>, progress: &dyn Prog
     rows.push(row("the data itself", each(&|test| test.sample.motion.joints.clone())));
     rows.push(row("the rule without whims", each(&|test| test.predictable.clone())));
     let n_frames: usize = tests.iter().map(|test| test.sample.n_frames()).sum();
-    Ok(Learned { n_clips: tests.len(), secs: fps.secs(n_frames), rows, ridge_strengths: listener.strengths })
+    Ok(Learned {
+        n_clips: tests.len(),
+        secs: fps.secs(n_frames),
+        good: speaker.map(|_| good(&rows)),
+        rows,
+        ridge_strengths: listener.strengths,
+        first,
+    })
+}
+
+/// Whether the first row, the generator's, reaches the targets; the second is the mismatched one, the third the mean pose.
+fn good(rows: &[Row]) -> bool {
+    let [made, others @ ..] = rows else { return false };
+    let Some(poses) = made.poses else { return false };
+    let beats = |other: &Row| other.poses.is_some_and(|other| poses.pck >= LEAST_PCK * other.pck);
+    made.speed_correlation.iter().all(|correlation| *correlation >= LEAST_CORRELATION)
+        && others.iter().take(2).all(beats)
+        && ENERGY.contains(&poses.energy)
 }
 
 impl Test {

@@ -6,7 +6,8 @@
 //! body's controls into joints -> `camera` sees them -> `paint` draws them, one colour a joint (`palette`).
 //!
 //! Without a picture: `speech` -> `rule` (a known rule, instead of `gesture`) -> `figure` -> `speaker` (hours of it, as a
-//! dataset) -> `train::gan` -> `learned`, which holds a trained speaker against the rule and against `listener`.
+//! dataset) -> `train::gan` -> `learned`, which holds a trained speaker against the rule and against `listener`
+//! (`traces` draws it).
 
 /// Version of the generator. Version 2 fixed the figure's posture (commit 93b1773); the lifter trained afterwards, but
 /// its training was changed once when this figure's error was known, so the error is no blind test.
@@ -28,4 +29,5 @@ pub mod scene;
 pub mod sheet;
 pub mod speaker;
 pub mod speech;
+pub mod traces;
 pub mod truth;
