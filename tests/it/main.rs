@@ -44,6 +44,7 @@ mod pose_parity;
 mod real;
 mod redecide;
 mod report;
+mod rule;
 mod runner;
 mod segment;
 mod shard;

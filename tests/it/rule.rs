@@ -1,0 +1,45 @@
+//! The synthetic speaker with a known rule, by the program: what its dataset must be like before anything is trained on it.
+//! That a training learns the rule is proved by the commands in `fixtures/rule.toml`.
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::Command;
+
+fn answer(args: &[&str]) -> Value {
+    let output = Command::new(env!("CARGO_BIN_EXE_orator")).args(args).arg("--json").output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn neither_the_mean_pose_nor_the_sound_of_the_moment_explains_the_gestures() {
+    let dir = tempfile::tempdir().unwrap();
+    let data = dir.path().join("data").to_string_lossy().into_owned();
+    answer(&["demo", "speaker", &data, "--hours", "0.1", "--seed", "3"]);
+    let measured = answer(&["demo", "learned", "--dataset", &data]);
+    let row = |name: &str| {
+        let rows = measured["rows"].as_array().unwrap();
+        rows.iter().find(|row| row["predictor"] == name).unwrap_or_else(|| panic!("no {name}: {measured}")).clone()
+    };
+    let number = |row: &Value, path: &str| row.pointer(path).and_then(Value::as_f64).unwrap();
+    let mean_pck = number(&row("mean pose"), "/poses/pck");
+    assert!((0.2..0.45).contains(&mean_pck), "{mean_pck}");
+    for ridge in ["ridge of the frame, to speeds", "ridge of the frame, to poses"] {
+        for hand in ["/speed_correlation/0", "/speed_correlation/1"] {
+            assert!(number(&row(ridge), hand) < 0.5, "{ridge}: {measured}");
+        }
+    }
+    let rule = row("the rule without whims");
+    assert!(number(&rule, "/poses/pck") > 0.7 && number(&rule, "/speed_correlation/0") > 0.999, "{rule}");
+    let data = row("the data itself");
+    assert!((number(&data, "/poses/energy") - 1.0).abs() < 1e-9 && number(&data, "/poses/l1") == 0.0, "{data}");
+    assert!(number(&data, "/speed_correlation/1") < 0.95, "without whims there is nothing to tell apart: {data}");
+}
+
+#[test]
+fn the_settings_of_the_proof_are_settings() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/rule.toml");
+    let gan = orator::config::load(&file, &[]).unwrap().settings.gan;
+    assert_eq!((gan.preset.as_str(), gan.representation.as_str()), ("light", "bones"));
+    assert!(gan.lambda_gan > 0.0);
+}
