@@ -74,8 +74,8 @@ fn lead(told: &Told) -> String {
     let last = told.epochs.last().map_or(0, |line| step(line));
     let windows = best["validation"]["n_windows"].as_u64().unwrap_or(0) as usize;
     format!(
-        "{last} steps. The best of {} by its score is that of step {}, measured on {} of the {} split.",
-        counted(told.epochs.len(), "epoch"),
+        "{last} steps. Of {} validations the one at step {} has the best score, measured on {} of the {} split.",
+        told.epochs.len(),
         step(best),
         counted(windows, "window"),
         best["validation"]["split"].as_str().unwrap_or("validation"),
