@@ -47,6 +47,14 @@ pub struct Batch {
     pub mask: Tensor,
 }
 
+impl Batch {
+    /// The same on this device.
+    pub fn on(&self, device: &Device) -> Result<Self> {
+        let on = |tensor: &Tensor| tensor.to_device(device);
+        Ok(Self { mels: on(&self.mels)?, poses: on(&self.poses)?, mask: on(&self.mask)? })
+    }
+}
+
 impl Examples {
     /// Reads the intervals of `split` that hold a window of `n_frames`; one begins every `stride` frames.
     pub fn load(

@@ -15,6 +15,7 @@ use super::validate::HeldOut;
 use crate::config::Gan;
 use crate::dataset::{Dataset, Split};
 use crate::motion::bones;
+use crate::nn::device;
 use crate::nn::unet::{Config, FRAMES_MULTIPLE};
 use crate::stage::progress::{Progress, Task};
 use crate::stage::workdir;
@@ -121,8 +122,7 @@ fn run(
         let is_last = step == settings.steps;
         let ends_epoch = step % settings.epoch_steps == 0;
         if ends_epoch || is_last {
-            let validation =
-                held_out.validate(&training.generator, &training.decoder, &training.facts.normalisation)?;
+            let validation = held_out.validate(training)?;
             log.write(
                 &json!({ "step": step, "epoch": step.div_ceil(settings.epoch_steps), "validation": validation }),
             )?;
@@ -147,7 +147,7 @@ fn run(
     };
     let validation = match last {
         Some(validation) => validation,
-        None => held_out.validate(&training.generator, &training.decoder, &training.facts.normalisation)?,
+        None => held_out.validate(training)?,
     };
     Ok(Outcome {
         steps: training.step,
@@ -234,7 +234,7 @@ fn check(settings: &Gan) -> Result<()> {
         settings.checkpoint_every > 0 && settings.epoch_steps > 0 && settings.stride_frames > 0,
         "gan.checkpoint_every, gan.epoch_steps and gan.stride_frames must be at least 1"
     );
-    ensure!(settings.device == "cpu", "gan.device is {:?}, and this build knows the processor only", settings.device);
+    device::named(&settings.device)?;
     Ok(())
 }
 

@@ -82,7 +82,7 @@ pub struct BoneConstancy {
 
 impl BoneConstancy {
     /// For the bones that were measured, without those to the hand roots, which are the wrists.
-    pub fn new(normal: &Normalisation, dtype: DType) -> Result<Self> {
+    pub fn new(normal: &Normalisation, dtype: DType, device: &Device) -> Result<Self> {
         let (mut children, mut parents, mut inverse) = (Vec::new(), Vec::new(), Vec::new());
         for joint in 1..N_JOINTS {
             let length = f64::from(normal.bone_lengths.get(joint - 1).copied().unwrap_or(0.0));
@@ -98,7 +98,6 @@ impl BoneConstancy {
             parents.extend((0..3).map(|k| (3 * from + k) as u32));
             inverse.push(1.0 / length);
         }
-        let device = &Device::Cpu;
         let column = |values: &[f32]| Tensor::new(values, device)?.to_dtype(dtype)?.reshape((1, (), 1));
         Ok(Self {
             mean: column(&normal.mean)?,
@@ -150,7 +149,7 @@ mod tests {
             assert!(worst(&[made.clone(), real.clone()], |v| game.discriminator(&v[0], &v[1]))? < 1e-7);
             assert!(worst(std::slice::from_ref(&made), |v| game.generator(&v[0]))? < 1e-7);
         }
-        let bones = BoneConstancy::new(&normal(), DType::F64)?;
+        let bones = BoneConstancy::new(&normal(), DType::F64, &Device::Cpu)?;
         assert!(worst(&[pattern(&[2, N_NUMBERS, 3], 0.0)?], |v| bones.loss(&v[0]))? < 1e-6);
         Ok(())
     }
@@ -183,7 +182,7 @@ mod tests {
 
     #[test]
     fn only_changing_bones_cost() -> Result<()> {
-        let bones = BoneConstancy::new(&normal(), DType::F64)?;
+        let bones = BoneConstancy::new(&normal(), DType::F64, &Device::Cpu)?;
         let still = pattern(&[1, N_NUMBERS, 1], 0.0)?.broadcast_as((1, N_NUMBERS, 5))?.contiguous()?;
         assert!(bones.loss(&still)?.to_scalar::<f64>()? < 1e-12);
         assert!(bones.loss(&pattern(&[1, N_NUMBERS, 5], 0.0)?)?.to_scalar::<f64>()? > 0.01);

@@ -9,6 +9,7 @@ use super::representation::Decoder;
 use super::score::Validation;
 use super::speaker::{Facts, GENERATOR};
 use crate::config::Gan;
+use crate::nn::device;
 use crate::nn::discriminator::{Discriminator, motion};
 use crate::nn::params::Params;
 use crate::nn::unet::Generator;
@@ -73,15 +74,16 @@ pub struct Training {
 impl Training {
     /// Networks as the seed makes them.
     pub fn new(facts: Facts, settings: Gan) -> Result<Self> {
-        let mut generator_params = Params::new(settings.seed);
+        let device = device::named(&settings.device)?;
+        let mut generator_params = Params::new(settings.seed).on(&device);
         let generator = Generator::new(&mut generator_params, &facts.network)?;
         // Another seed, or tensors of the same name would begin alike.
-        let mut discriminator_params = Params::new(!settings.seed);
+        let mut discriminator_params = Params::new(!settings.seed).on(&device);
         let discriminator = Discriminator::new(&mut discriminator_params, N_NUMBERS)?;
         let adam = adam::Config { max_norm: Some(MAX_NORM), ..adam::Config::default() };
         Ok(Self {
-            decoder: facts.representation.decoder(&facts.normalisation, DType::F32, &Device::Cpu)?,
-            bones: BoneConstancy::new(&facts.normalisation, DType::F32)?,
+            decoder: facts.representation.decoder(&facts.normalisation, DType::F32, &device)?,
+            bones: BoneConstancy::new(&facts.normalisation, DType::F32, &device)?,
             adversarial: settings.adversarial.parse()?,
             adam_g: Adam::new(&generator_params, adam)?,
             adam_d: Adam::new(&discriminator_params, adam)?,
@@ -101,8 +103,14 @@ impl Training {
         self.generator_params.n_parameters()
     }
 
+    /// Where the tensors are.
+    pub fn device(&self) -> &Device {
+        self.generator_params.device()
+    }
+
     /// One step of the discriminator, then one of the generator, on the same windows.
     pub fn step(&mut self, batch: &Batch) -> Result<Losses> {
+        let batch = batch.on(self.device())?;
         let Gan { lambda_l1, lambda_velocity, lambda_gan, lambda_bone, learning_rate, .. } = self.settings;
         let raw = self.generator.forward(&batch.mels, self.settings.window_frames, true)?;
         let made = self.decoder.poses(&raw)?;

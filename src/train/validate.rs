@@ -3,14 +3,13 @@
 use super::examples::{Batch, Examples};
 use super::losses;
 use super::poses::{N_NUMBERS, Normalisation};
-use super::representation::Decoder;
 use super::score::{self, Figures, Validation};
+use super::training::Training;
 use crate::config::Gan;
 use crate::dataset::{Dataset, Split};
 use crate::metrics::energy::MotionEnergy;
 use crate::metrics::frechet::{self, Gaussian, frechet};
 use crate::metrics::pck::Correct;
-use crate::nn::unet::Generator;
 use crate::stage::progress::Progress;
 use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WRIST, is_duplicate, parent};
 use crate::types::time::FrameRate;
@@ -65,11 +64,14 @@ impl HeldOut {
     }
 
     /// Both predictors on the same windows.
-    pub fn validate(&self, generator: &Generator, decoder: &Decoder, normal: &Normalisation) -> Result<Validation> {
+    pub fn validate(&self, training: &Training) -> Result<Validation> {
+        let Training { generator, decoder, .. } = training;
+        let normal = &training.facts.normalisation;
         let (mut made, mut still, mut real) = (Tally::default(), Tally::default(), Tally::default());
         let (mut change, mut spread) = (Mean::default(), Spread::default());
         let mut n_windows = 0;
         for batch in &self.batches {
+            let batch = &batch.on(training.device())?;
             let poses = decoder.poses(&generator.forward(&batch.mels, self.n_frames, false)?.detach())?;
             let nothing = poses.zeros_like()?;
             for (tally, poses) in [(&mut made, &poses), (&mut still, &nothing), (&mut real, &batch.poses)] {
