@@ -212,29 +212,51 @@ impl<T: Real> Norm<T> {
         let offset: Vec<T> =
             constant.iter().zip(linear).zip(&self.mean).map(|((c, l), mean)| *c - *l * *mean).collect();
         let chunk = whole_rows(TASK, n);
+        let channels = |i: usize| (self.scale[i], self.shift[i], offset[i], linear[i]);
+        let n_wide = n / LANES;
+        let wide: Vec<Turn<T, LANES>> = (0..n_wide).map(|i| Turn::new(|lane| channels(i * LANES + lane))).collect();
+        let rest: Vec<Turn<T, 1>> = (n_wide * LANES..n).map(|i| Turn::new(|_| channels(i))).collect();
         z.par_chunks_mut(chunk).zip(grad.par_chunks(chunk)).for_each(|(z, grad)| {
             for (z, grad) in z.chunks_exact_mut(n).zip(grad.chunks_exact(n)) {
-                let n_wide = n / LANES * LANES;
-                for first in (0..n_wide).step_by(LANES) {
-                    self.turn::<LANES>(z, grad, first, &offset, linear);
+                let ((z, z_rest), (grad, grad_rest)) = (z.as_chunks_mut(), grad.as_chunks());
+                for ((z, grad), turn) in z.iter_mut().zip(grad).zip(&wide) {
+                    *z = turn.turned(self, z, grad);
                 }
-                (n_wide..n).for_each(|first| self.turn::<1>(z, grad, first, &offset, linear));
+                for ((z, grad), turn) in z_rest.iter_mut().zip(grad_rest).zip(&rest) {
+                    [*z] = turn.turned(self, &[*z], &[*grad]);
+                }
             }
         });
     }
+}
+
+/// What turns `z` of `N` channels into its gradient.
+struct Turn<T, const N: usize> {
+    scale: [T; N],
+    shift: [T; N],
+    offset: [T; N],
+    linear: [T; N],
+}
+
+impl<T: Real, const N: usize> Turn<T, N> {
+    fn new(of: impl Fn(usize) -> (T, T, T, T)) -> Self {
+        use std::array::from_fn;
+        Self {
+            scale: from_fn(|i| of(i).0),
+            shift: from_fn(|i| of(i).1),
+            offset: from_fn(|i| of(i).2),
+            linear: from_fn(|i| of(i).3),
+        }
+    }
 
     #[inline(always)]
-    fn turn<const N: usize>(&self, z: &mut [T], grad: &[T], first: usize, offset: &[T], linear: &[T]) {
-        let Some(z) = z[first..].first_chunk_mut::<N>() else { return };
-        let some = |values: &[T]| values[first..].first_chunk::<N>().copied().unwrap_or([T::zero(); N]);
-        let (scale, shift) = (some(&self.scale), some(&self.shift));
-        let (offset, linear) = (some(offset), some(linear));
-        let g = self.before(z, &some(grad), &scale, &shift);
+    fn turned(&self, norm: &Norm<T>, z: &[T; N], grad: &[T; N]) -> [T; N] {
+        let g = norm.before(z, grad, &self.scale, &self.shift);
         let mut turned = [T::zero(); N];
         for i in 0..N {
-            turned[i] = scale[i] * g[i] + offset[i] + linear[i] * z[i];
+            turned[i] = self.scale[i] * g[i] + self.offset[i] + self.linear[i] * z[i];
         }
-        *z = turned;
+        turned
     }
 }
 
