@@ -8,7 +8,7 @@ use super::conv_axis::{Axis, Windows};
 use super::conv_panels::{Block, Order, Panels};
 use super::cpu::{Real, Start, scratch, written};
 use super::kernel::{MOST_ROWS, Steps};
-use rayon::prelude::*;
+use super::team::each;
 use std::ops::Range;
 
 /// Numbers of input a piece of work copies at most (some rows at least), and steps of a sum whose packed weights stay
@@ -61,7 +61,9 @@ pub fn forward<T: Real>(
     // SAFETY: the pieces together write every row of every output, each its own.
     unsafe {
         written(s.len_out(), |to: Start<T>| {
-            pass.pieces().into_par_iter().enumerate().for_each(|(number, (b, rows))| {
+            let pieces = pass.pieces();
+            each(pieces.len(), |number| {
+                let (b, rows) = pieces[number].clone();
                 let start = to.at((b * s.axes[0].n_out + rows.start) * per_row);
                 let n = rows.len() * per_row;
                 pass.run(x, &panels, bias, to, b, rows);
@@ -103,7 +105,11 @@ pub fn gradient_of_input<T: Real>(s: &Sizes, weight: &[T], grad: &[T]) -> Vec<T>
                         kernel: s.axes.map(|axis| axis.kernel),
                     };
                     let panels = Panels::pack(weight, &pass.order(s.n_taps(), s.n_in * s.n_taps()));
-                    pass.pieces().into_par_iter().for_each(|(b, rows)| pass.run(grad, &panels, &zeros, to, b, rows));
+                    let pieces = pass.pieces();
+                    each(pieces.len(), |number| {
+                        let (b, rows) = pieces[number].clone();
+                        pass.run(grad, &panels, &zeros, to, b, rows);
+                    });
                 }
             }
         })

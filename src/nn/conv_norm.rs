@@ -8,9 +8,9 @@ use super::conv::{self, Sizes};
 use super::conv2d;
 use super::cpu::{GRAIN, Real, Start, is_f64, read, slice, written};
 use super::rows::{Moments, Norm};
+use super::team::each;
 use candle_core::backend::BackendStorage;
 use candle_core::{CpuStorage, CustomOp3, Layout, Result, Shape, Tensor};
-use rayon::prelude::*;
 use std::sync::{Arc, Mutex, OnceLock};
 
 /// `x` [B, T, C] or [B, T, F, C] through the convolution of these sizes, then `norm` with its activation. Training uses
@@ -88,13 +88,18 @@ impl Op {
         let norm = self.norm(channels, statistics);
         let chunk = (GRAIN / s.n_out).max(1) * s.n_out;
         if self.kept.is_none() {
-            z.par_chunks_mut(chunk).for_each(|z| norm.apply(z));
+            let (n, start) = (z.len(), Start::of(&mut z));
+            // SAFETY: every piece is a part of `z` of its own.
+            each(n.div_ceil(chunk), |i| unsafe {
+                norm.apply(std::slice::from_raw_parts_mut(start.at(i * chunk), chunk.min(n - i * chunk)));
+            });
             return (z, None);
         }
         // SAFETY: every chunk writes as many numbers of the result as it reads, at the same place.
         let y = unsafe {
             written(z.len(), |y: Start<T>| {
-                z.par_chunks(chunk).enumerate().for_each(|(i, z)| {
+                each(z.len().div_ceil(chunk), |i| {
+                    let z = &z[i * chunk..z.len().min((i + 1) * chunk)];
                     norm.forward(z, std::slice::from_raw_parts_mut(y.at(i * chunk), z.len()));
                 });
             })

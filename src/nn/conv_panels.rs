@@ -3,7 +3,7 @@
 
 use super::cpu::{Real, Start, written};
 use super::kernel::{Job, MOST_ROWS, Steps, panels};
-use rayon::prelude::*;
+use super::team::each;
 use std::ops::Range;
 
 /// Weights in the order in which tiles want them: panel after panel of columns, in each one row a step of the sum.
@@ -94,7 +94,7 @@ impl<T: Real> Panels<T> {
         // SAFETY: the tasks together write every row of every panel.
         let data = unsafe {
             written(start, |data: Start<T>| {
-                tasks.into_par_iter().for_each(|(panel, channels)| pack(data, panel, channels));
+                each(tasks.len(), |task| pack(data, tasks[task].0, tasks[task].1.clone()));
             })
         };
         Self { data, panels }

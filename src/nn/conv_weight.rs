@@ -4,8 +4,10 @@
 use super::conv::Sizes;
 use super::cpu::{Real, Start, written};
 use super::kernel::{Job, MOST_ROWS, Steps, panels};
+use super::team::each;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// Places of a piece, whose gradients stay in the first-level cache.
 const PLACES: usize = 128;
@@ -30,10 +32,12 @@ pub fn gradient_of_weight<T: Real>(s: &Sizes, x: &[T], grad: &[T]) -> Vec<T> {
         .flat_map(|panel| (0..rows.kernel).flat_map(move |tap| (0..n_chunks).map(move |chunk| (panel, tap, chunk))))
         .collect();
     let chunk = |chunk: usize| chunk * CHANNELS..s.n_in.min((chunk + 1) * CHANNELS);
-    let sums: Vec<Vec<T>> = tasks
-        .par_iter()
-        .map(|&(panel, tap, of_chunk)| sum_products(s, x, grad, n_columns, panels[panel], tap, chunk(of_chunk)))
-        .collect();
+    let sums: Vec<OnceLock<Vec<T>>> = tasks.iter().map(|_| OnceLock::new()).collect();
+    each(tasks.len(), |task| {
+        let (panel, tap, of_chunk) = tasks[task];
+        let _ = sums[task].set(sum_products(s, x, grad, n_columns, panels[panel], tap, chunk(of_chunk)));
+    });
+    let sums: Vec<Vec<T>> = sums.into_iter().filter_map(OnceLock::into_inner).collect();
     let spread = |gradient: Start<T>, (panel, of_chunk): (usize, usize)| {
         let ((first, n_vectors), channels) = (panels[panel], chunk(of_chunk));
         let width = n_vectors * kernel.lanes;
@@ -60,7 +64,7 @@ pub fn gradient_of_weight<T: Real>(s: &Sizes, x: &[T], grad: &[T]) -> Vec<T> {
     // SAFETY: the parts together write every number.
     unsafe {
         written(s.len_weight(), |gradient: Start<T>| {
-            parts.into_par_iter().for_each(|part| spread(gradient, part));
+            each(parts.len(), |part| spread(gradient, parts[part]));
         })
     }
 }

@@ -164,6 +164,11 @@ unsafe impl<T: Send> Send for Start<T> {}
 unsafe impl<T: Send> Sync for Start<T> {}
 
 impl<T> Start<T> {
+    /// That of these numbers, which nobody else uses meanwhile.
+    pub fn of(values: &mut [T]) -> Self {
+        Self(values.as_mut_ptr())
+    }
+
     /// # Safety
     /// `offset` lies inside the result.
     pub unsafe fn at(self, offset: usize) -> *mut T {

@@ -29,6 +29,7 @@ pub mod linear;
 pub mod params;
 pub mod resize;
 pub mod rows;
+pub mod team;
 pub mod temporal_lifter;
 pub mod unet;
 

@@ -1,8 +1,10 @@
 //! Statistics over the rows of a matrix whose columns are channels, and batch norm with the leaky ReLU behind it on
 //! such rows: plain memory in, plain memory out. Sums run over blocks of fixed size in one order.
 
-use super::cpu::{LANES, Real};
+use super::cpu::{LANES, Real, Start};
+use super::team::each;
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// Numbers summed before the sum goes on in f64, and numbers one task takes.
 const BLOCK: usize = 16 * 1024;
@@ -180,8 +182,12 @@ impl<T: Real> Norm<T> {
             sums
         };
         let chunk = whole_rows(TASK, n);
-        let tasks: Vec<Vec<f64>> = z.par_chunks(chunk).zip(grad.par_chunks(chunk)).map(of_task).collect();
-        let mut plain = add_up(tasks, 2 * n);
+        let tasks: Vec<_> = z.chunks(chunk).zip(grad.chunks(chunk)).collect();
+        let sums: Vec<OnceLock<Vec<f64>>> = tasks.iter().map(|_| OnceLock::new()).collect();
+        each(tasks.len(), |task| {
+            let _ = sums[task].set(of_task(tasks[task]));
+        });
+        let mut plain = add_up(sums.into_iter().filter_map(OnceLock::into_inner).collect(), 2 * n);
         let product = plain.split_off(n);
         (plain, product)
     }
@@ -216,7 +222,12 @@ impl<T: Real> Norm<T> {
         let n_wide = n / LANES;
         let wide: Vec<Turn<T, LANES>> = (0..n_wide).map(|i| Turn::new(|lane| channels(i * LANES + lane))).collect();
         let rest: Vec<Turn<T, 1>> = (n_wide * LANES..n).map(|i| Turn::new(|_| channels(i))).collect();
-        z.par_chunks_mut(chunk).zip(grad.par_chunks(chunk)).for_each(|(z, grad)| {
+        let (n_all, start) = (z.len(), Start::of(z));
+        each(n_all.div_ceil(chunk), |task| {
+            let part = task * chunk..n_all.min((task + 1) * chunk);
+            // SAFETY: every task's part of `z` is its own.
+            let z = unsafe { std::slice::from_raw_parts_mut(start.at(part.start), part.len()) };
+            let grad = &grad[part];
             for (z, grad) in z.chunks_exact_mut(n).zip(grad.chunks_exact(n)) {
                 let ((z, z_rest), (grad, grad_rest)) = (z.as_chunks_mut(), grad.as_chunks());
                 for ((z, grad), turn) in z.iter_mut().zip(grad).zip(&wide) {

@@ -6,7 +6,6 @@
 
 pub mod adam;
 mod adam_composed;
-pub mod awake;
 pub mod body_errors;
 pub mod body_motion;
 pub mod body_scene;

@@ -1,0 +1,155 @@
+//! Parallel pieces of work for this room's operators. By themselves they run on rayon's threads. A training step is some
+//! hundred small ones, though, and a thread that falls asleep between two of them comes too late to the next, on a
+//! shared machine by a time slice; so a training keeps a team of threads that look for work all the time, as those of
+//! other frameworks do. Who does a piece never changes what it gives.
+
+use rayon::prelude::*;
+use std::cell::{Cell, UnsafeCell};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
+
+/// A piece's work by its number, as the team sees it: alive as long as `Team::run` has not returned.
+type Work = *const (dyn Fn(usize) + Sync);
+
+struct Team {
+    /// Written by the leader alone, while it is closed and nobody is active.
+    work: UnsafeCell<Option<(Work, usize)>>,
+    next: AtomicUsize,
+    /// Helpers that may be reading `work`.
+    active: AtomicUsize,
+    closed: AtomicBool,
+    broken: AtomicBool,
+    over: AtomicBool,
+}
+
+// SAFETY: `work` is guarded by `closed` and `active` as said there.
+unsafe impl Sync for Team {}
+
+thread_local!(static TEAM: Cell<*const Team> = const { Cell::new(std::ptr::null()) });
+
+/// Runs `f`, whose parallel pieces are shared out among threads that stay awake until it returns.
+pub fn awake<R>(f: impl FnOnce() -> R) -> R {
+    let team = Team {
+        work: UnsafeCell::new(None),
+        next: AtomicUsize::new(0),
+        active: AtomicUsize::new(0),
+        closed: AtomicBool::new(true),
+        broken: AtomicBool::new(false),
+        over: AtomicBool::new(false),
+    };
+    let n_helpers = rayon::current_num_threads().saturating_sub(1);
+    if n_helpers == 0 || !TEAM.get().is_null() {
+        return f();
+    }
+    std::thread::scope(|scope| {
+        (0..n_helpers).for_each(|_| {
+            scope.spawn(|| team.help());
+        });
+        TEAM.set(&team);
+        let result = catch_unwind(AssertUnwindSafe(f));
+        TEAM.set(std::ptr::null());
+        team.over.store(true, SeqCst);
+        result.unwrap_or_else(|panic| resume_unwind(panic))
+    })
+}
+
+/// Runs `f` for 0..n, on all threads at hand, in any order.
+pub fn each(n: usize, f: impl Fn(usize) + Sync) {
+    let team = TEAM.get();
+    if team.is_null() {
+        return (0..n).into_par_iter().for_each(&f);
+    }
+    // Pieces of pieces are the business of the thread that has them.
+    TEAM.set(std::ptr::null());
+    // SAFETY: a team outlives the time for which its leader's thread points to it.
+    let result = catch_unwind(AssertUnwindSafe(|| unsafe { &*team }.run(n, &f)));
+    TEAM.set(team);
+    if let Err(panic) = result {
+        resume_unwind(panic);
+    }
+}
+
+impl Team {
+    fn run(&self, n: usize, f: &(dyn Fn(usize) + Sync)) {
+        // SAFETY: only the lifetime is forgotten; nobody is active when this function returns.
+        let work: Work = unsafe { std::mem::transmute::<&(dyn Fn(usize) + Sync), Work>(f) };
+        // SAFETY: closed, and nobody active: since the last run, or from the beginning.
+        unsafe { *self.work.get() = Some((work, n)) };
+        self.next.store(0, SeqCst);
+        self.closed.store(false, SeqCst);
+        let own = catch_unwind(AssertUnwindSafe(|| self.take(f, n)));
+        self.closed.store(true, SeqCst);
+        while self.active.load(SeqCst) > 0 {
+            std::hint::spin_loop();
+        }
+        if let Err(panic) = own {
+            resume_unwind(panic);
+        }
+        assert!(!self.broken.load(SeqCst), "a piece of parallel work failed");
+    }
+
+    fn take(&self, f: &(dyn Fn(usize) + Sync), n: usize) {
+        loop {
+            let piece = self.next.fetch_add(1, SeqCst);
+            if piece >= n {
+                return;
+            }
+            f(piece);
+        }
+    }
+
+    fn help(&self) {
+        while !self.over.load(SeqCst) {
+            if self.closed.load(SeqCst) {
+                std::hint::spin_loop();
+                continue;
+            }
+            self.active.fetch_add(1, SeqCst);
+            // Seen open while active: the leader waits for us from here on.
+            if !self.closed.load(SeqCst) {
+                // SAFETY: the leader writes only while nobody is active.
+                if let Some((work, n)) = unsafe { *self.work.get() } {
+                    // SAFETY: the work lives until the leader has seen that nobody is active.
+                    let help = AssertUnwindSafe(|| self.take(unsafe { &*work }, n));
+                    if catch_unwind(help).is_err() {
+                        self.broken.store(true, SeqCst);
+                    }
+                }
+            }
+            self.active.fetch_sub(1, SeqCst);
+            std::hint::spin_loop();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with_threads<R: Send>(n: usize, f: impl FnOnce() -> R + Send) -> R {
+        rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(f)
+    }
+
+    #[test]
+    fn every_piece_is_done_once() {
+        for n_threads in [1, 3] {
+            with_threads(n_threads, || {
+                awake(|| {
+                    for n in (0..200).chain([10_000]) {
+                        let done: Vec<AtomicUsize> = (0..n).map(|_| AtomicUsize::new(0)).collect();
+                        each(n, |i| {
+                            done[i].fetch_add(1, SeqCst);
+                        });
+                        assert!(done.iter().all(|done| done.load(SeqCst) == 1));
+                    }
+                });
+            });
+        }
+    }
+
+    #[test]
+    fn a_piece_that_fails_is_told_and_the_threads_are_let_go() {
+        let failing = || awake(|| each(100, |i| assert!(i != 50, "piece 50")));
+        assert!(with_threads(3, || catch_unwind(failing)).is_err());
+    }
+}
