@@ -15,7 +15,7 @@ pub fn text(table: &Table) -> String {
         table.speaker
     );
     text += &format!(
-        "{:18}{:>22}{:>22}{:>22}{:>21}{:>27}{:>21}\n",
+        "{:18}{:>24}{:>24}{:>24}{:>22}{:>28}{:>22}\n",
         "",
         "PCK 0.2",
         "arms",
@@ -36,7 +36,7 @@ pub fn text(table: &Table) -> String {
 fn line(row: &Row) -> String {
     let percent = |e: &Estimate| bracketed(e, 100.0, 1, " %");
     format!(
-        "{:18}{:>22}{:>22}{:>22}{:>21}{:>27}{:>21}\n",
+        "{:18}{:>24}{:>24}{:>24}{:>22}{:>28}{:>22}\n",
         row.predictor,
         percent(&row.pck),
         percent(&row.pck_body),
