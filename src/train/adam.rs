@@ -3,12 +3,13 @@
 
 use super::adam_composed;
 use crate::nn::params::Params;
+use crate::nn::team::each;
 use anyhow::{Context, ensure};
 use candle_core::backprop::GradStore;
 use candle_core::{CpuStorage, Device, InplaceOp2, Layout, Result, Tensor, Var};
-use rayon::prelude::*;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::sync::{Mutex, OnceLock};
 
 /// Numbers one task updates.
 const GRAIN: usize = 32 * 1024;
@@ -97,7 +98,7 @@ impl Adam {
             return Ok(norm);
         }
         self.step += 1;
-        let Config { beta1, beta2, eps, amsgrad, max_norm } = self.config;
+        let Config { beta1, beta2, eps, max_norm, .. } = self.config;
         let age = self.step.min(i32::MAX as u64) as i32;
         let scale = max_norm.map_or(1.0, |max| if norm > max { max / norm } else { 1.0 });
         let numbers = Numbers {
@@ -111,7 +112,7 @@ impl Adam {
         for (slot, gradient) in self.slots.iter_mut().zip(&gradients) {
             let Some(gradient) = gradient else { continue };
             match &mut slot.moments {
-                Place::Cpu(moments) => slot.var.inplace_op2(gradient, &Update { moments, amsgrad, numbers })?,
+                Place::Cpu(moments) => slot.var.inplace_op2(gradient, &Update { moments, numbers })?,
                 Place::Device(moments) => moments.update(&slot.var, gradient, &numbers)?,
             }
         }
@@ -184,7 +185,12 @@ fn sum_of_squares(values: &[f32]) -> f64 {
         }
         lanes.iter().map(|lane| f64::from(*lane)).sum::<f64>()
     };
-    values.par_chunks(GRAIN).map(of_piece).collect::<Vec<f64>>().iter().sum()
+    let pieces: Vec<&[f32]> = values.chunks(GRAIN).collect();
+    let sums: Vec<OnceLock<f64>> = pieces.iter().map(|_| OnceLock::new()).collect();
+    each(pieces.len(), |piece| {
+        let _ = sums[piece].set(of_piece(pieces[piece]));
+    });
+    sums.iter().filter_map(OnceLock::get).sum()
 }
 
 /// The numbers of one update.
@@ -203,7 +209,6 @@ pub(super) struct Numbers {
 
 struct Update<'a> {
     moments: &'a RefCell<Moments>,
-    amsgrad: bool,
     numbers: Numbers,
 }
 
@@ -231,13 +236,23 @@ impl InplaceOp2 for Update<'_> {
             };
             *value -= rate * *first / (spread.sqrt() * correction + eps);
         };
-        let values = values[start..end].par_iter_mut().zip(grad);
-        let both = values.zip(&mut moments.first).zip(&mut moments.second).with_min_len(GRAIN);
-        if self.amsgrad {
-            both.zip(&mut moments.largest).for_each(|((((v, g), f), s), l)| update(v, g, f, s, Some(l)));
-        } else {
-            both.for_each(|(((v, g), f), s)| update(v, g, f, s, None));
-        }
+        let values = values[start..end].chunks_mut(GRAIN).zip(grad.chunks(GRAIN));
+        let both = values.zip(moments.first.chunks_mut(GRAIN)).zip(moments.second.chunks_mut(GRAIN));
+        let mut largest = moments.largest.chunks_mut(GRAIN);
+        let pieces: Vec<_> = both.map(|piece| Mutex::new((piece, largest.next()))).collect();
+        each(pieces.len(), |piece| {
+            // Every piece is taken once: the lock is free.
+            let Ok(mut piece) = pieces[piece].lock() else { return };
+            let piece = &mut *piece;
+            let (((values, grad), first), second) = &mut piece.0;
+            let numbers = values.iter_mut().zip(grad.iter()).zip(first.iter_mut().zip(second.iter_mut()));
+            match &mut piece.1 {
+                Some(largest) => {
+                    numbers.zip(largest.iter_mut()).for_each(|(((v, g), (f, s)), l)| update(v, g, f, s, Some(l)));
+                }
+                None => numbers.for_each(|((v, g), (f, s))| update(v, g, f, s, None)),
+            }
+        });
         Ok(())
     }
 }
