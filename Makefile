@@ -6,7 +6,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: setup runtime readers browser build test demo prove clean-demo
+.PHONY: setup runtime readers browser build test demo prove prove-rule clean-demo
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -83,18 +83,19 @@ test: build readers browser
 	@echo 'make test: all passed'
 
 # The long proofs, each printing its figures: 20 kills, a 10-minute video, ten minutes of sound in step with their
-# pictures, the dataset beside plain copy, 10 and 100 hours, both cores at work, speed on a real clip (CLIP, MODELS), alone
-# and against the Python REFERENCE. ORATOR_REFERENCE_PYTHON names a Python with onnxruntime, cv2 and numpy (and torch: the
-# lifter's training beside PyTorch's).
+# pictures, 20 kills of a training and eight windows learnt by heart, the dataset beside plain copy, 10 and 100 hours, both
+# cores at work, speed on a real clip (CLIP, MODELS), alone and against the Python REFERENCE, training and generation.
+# ORATOR_REFERENCE_PYTHON names a Python with onnxruntime, cv2 and numpy (and torch: training beside PyTorch's).
 SHARED := ../shared
 CLIP := $(SHARED)/data/videos/talk_tyson_2cam_17s_720p.mp4
 MODELS := $(SHARED)/models
 REFERENCE := $(SHARED)/reference/pose_chain_reference.py
 LIFTER_REFERENCE := fixtures/reference/lifter_reference.py
+TRAINING_REFERENCE := fixtures/reference/training_reference.py
 export ORATOR_REFERENCE_PYTHON ?= python3
 
 prove: build
-	ORATOR_KILLS=20 ORATOR_LONG=1 cargo test --release --locked --test it -- --nocapture --test-threads 1 kill:: memory:: sync::
+	ORATOR_KILLS=20 ORATOR_LONG=1 cargo test --release --locked --test it -- --nocapture --test-threads 1 kill:: memory:: sync:: gan
 	cargo test --release --locked --test it -- --nocapture --test-threads 1 golden:: pose_parity:: real::
 	$(ORATOR) bench lift
 	$(ORATOR) bench dataset --dir $(TARGET)
@@ -106,7 +107,19 @@ prove: build
 		echo "SKIPPED: $$ORATOR_REFERENCE_PYTHON has no onnxruntime, cv2 and numpy (ORATOR_REFERENCE_PYTHON names another)"; \
 	else $(ORATOR) bench pose2d $(CLIP) --models-dir $(MODELS) --person person-yolox-nano --python $(REFERENCE); fi
 	if "$$ORATOR_REFERENCE_PYTHON" -c 'import torch, numpy' 2>/dev/null; then $(ORATOR) bench lifter --python $(LIFTER_REFERENCE); \
-	else echo "SKIPPED: $$ORATOR_REFERENCE_PYTHON has no torch and numpy: no training step beside PyTorch's"; $(ORATOR) bench lifter; fi
+		for preset in light paper; do $(ORATOR) bench train --preset $$preset --python $(TRAINING_REFERENCE); done; \
+	else echo "SKIPPED: $$ORATOR_REFERENCE_PYTHON has no torch and numpy: no training step beside PyTorch's"; \
+		$(ORATOR) bench lifter; for preset in light paper; do $(ORATOR) bench train --preset $$preset; done; fi
+	$(ORATOR) bench generate
+	$(MAKE) prove-rule
+
+# The synthetic speaker with a known rule: trained on two hours of it, and the same without discriminator.
+prove-rule: build
+	$(ORATOR) demo speaker $(TARGET)/rule/data --hours 2 --seed 2
+	for gan in 0.15 0; do \
+		$(ORATOR) train gan -c fixtures/rule.toml --set gan.lambda_gan=$$gan --dataset $(TARGET)/rule/data --out $(TARGET)/rule/gan-$$gan; \
+		$(ORATOR) demo learned --dataset $(TARGET)/rule/data --checkpoint $(TARGET)/rule/gan-$$gan --picture $(TARGET)/rule/gan-$$gan.png; \
+	done
 
 # The whole road on the synthetic speaker. DEMO: its folder; DRAW and STEPS: how much of it.
 DEMO := $(TARGET)/demo

@@ -79,8 +79,9 @@ impl Team {
         self.closed.store(false, SeqCst);
         let own = catch_unwind(AssertUnwindSafe(|| self.take(f, n)));
         self.closed.store(true, SeqCst);
+        let mut patience = Patience::default();
         while self.active.load(SeqCst) > 0 {
-            std::hint::spin_loop();
+            patience.wait();
         }
         if let Err(panic) = own {
             resume_unwind(panic);
@@ -99,11 +100,13 @@ impl Team {
     }
 
     fn help(&self) {
+        let mut patience = Patience::default();
         while !self.over.load(SeqCst) {
             if self.closed.load(SeqCst) {
-                std::hint::spin_loop();
+                patience.wait();
                 continue;
             }
+            patience = Patience::default();
             self.active.fetch_add(1, SeqCst);
             // Seen open while active: the leader waits for us from here on.
             if !self.closed.load(SeqCst) {
@@ -118,6 +121,23 @@ impl Team {
             }
             self.active.fetch_sub(1, SeqCst);
             std::hint::spin_loop();
+        }
+    }
+}
+
+/// Waits awake; where it takes long, whoever else wants the processor gets it.
+#[derive(Default)]
+struct Patience {
+    n_spins: u32,
+}
+
+impl Patience {
+    fn wait(&mut self) {
+        if self.n_spins < 1 << 12 {
+            self.n_spins += 1;
+            std::hint::spin_loop();
+        } else {
+            std::thread::yield_now();
         }
     }
 }

@@ -16,6 +16,7 @@ use crate::config::Gan;
 use crate::dataset::{Dataset, Split};
 use crate::motion::bones;
 use crate::nn::device;
+use crate::nn::team::awake;
 use crate::nn::unet::{Config, FRAMES_MULTIPLE};
 use crate::stage::progress::{Progress, Task};
 use crate::stage::workdir;
@@ -89,7 +90,7 @@ pub fn train(dataset: &Dataset, wanted: &Gan, folder: &Path, progress: &dyn Prog
     if let Some((stored, contents)) = &resumed {
         training.load(stored, contents)?;
     }
-    run(&mut training, &examples, &held_out, folder, progress)
+    awake(|| run(&mut training, &examples, &held_out, folder, progress))
 }
 
 /// The loop: steps, and at the end of each epoch a validation.
