@@ -116,12 +116,12 @@ fn run(
         let step = training.step;
         losses.check(step).with_context(|| kept(folder))?;
         task.advance(1);
-        if step % LOG_EVERY == 0 {
+        if step.is_multiple_of(LOG_EVERY) {
             show(&*task, &losses, (step - began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9));
             log.write(&losses.line(step))?;
         }
         let is_last = step == settings.steps;
-        let ends_epoch = step % settings.epoch_steps == 0;
+        let ends_epoch = step.is_multiple_of(settings.epoch_steps);
         if ends_epoch || is_last {
             let validation = held_out.validate(training)?;
             log.write(
@@ -138,7 +138,7 @@ fn run(
             }
             last = Some(validation);
         }
-        if ends_epoch || is_last || step % settings.checkpoint_every == 0 {
+        if ends_epoch || is_last || step.is_multiple_of(settings.checkpoint_every) {
             training.save(folder)?;
         }
     }
