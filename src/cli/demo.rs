@@ -180,33 +180,19 @@ fn learned(dataset: &Path, checkpoint: Option<&Path>, picture: Option<&Path>, ui
     let dataset = Dataset::open(dataset)?;
     let speaker = checkpoint.map(Speaker::open).transpose()?;
     let learned = learned::measure(&dataset, speaker.as_ref(), ui)?;
-    let mut text = format!(
-        "test split: {} clips, {:.0} s\n{:34}{:>9}{:>9}{:>9}{:>9}{:>9}\n{:34}{:>9}{:>9}{:>9}{:>9}{:>9}\n",
-        learned.n_clips,
-        learned.secs,
-        "",
-        "speed",
-        "speed",
-        "",
-        "",
-        "",
-        "predictor",
-        "left",
-        "right",
-        "PCK 0.2",
-        "energy",
-        "L1"
-    );
+    let heads = "predictor                          speed L  speed R  PCK 0.2   energy   pauses       L1";
+    let mut text = format!("test split: {} clips, {:.0} s\n{heads}\n", learned.n_clips, learned.secs);
     for row in &learned.rows {
         let [left, right] = row.speed_correlation;
         text += &format!("{:34}{left:>9.3}{right:>9.3}", row.predictor);
-        text += &row
-            .poses
-            .map_or(String::new(), |p| format!("{:>7.1} %{:>7.1} %{:>9.3}", 100.0 * p.pck, 100.0 * p.energy, p.l1));
+        text += &row.poses.map_or(String::new(), |p| {
+            format!("{:>7.1} %{:>7.1} %{:>7.1} %{:>9.3}", 100.0 * p.pck, 100.0 * p.energy, 100.0 * p.pauses, p.l1)
+        });
         text += "\n";
     }
     text += "speed: correlation of a wrist's speed (m/s, frame by frame, not smoothed, all clips in a row) with that of the\n\
-             rule without whims; PCK, energy (mean squared joint speed, share of the data's) and L1 (normalised): against the data.";
+             rule without whims; PCK, energy (mean squared joint speed, share of the data's) and L1 (normalised): against the data;\n\
+             pauses: the energy where the rule holds both wrists still, which no sound tells.";
     if let Some(good) = learned.good {
         text += &format!(
             "\ntargets of the generator: speed {}, PCK {} x that of another sound and of the mean pose, energy {:.0} to {:.0} %: {}",

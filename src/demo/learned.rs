@@ -34,6 +34,9 @@ pub struct Poses {
     pub pck: f64,
     /// Mean squared speed of the joints, as a share of the data's.
     pub energy: f64,
+    /// The same over the steps in which the rule holds both wrists still: the whims alone, which no sound tells. Where a
+    /// predictor falls back to what is likely, this is what goes first.
+    pub pauses: f64,
     /// Mean absolute error of coordinates, each in standard deviations of the training split (of 1 cm at least).
     pub l1: f64,
 }
@@ -58,6 +61,9 @@ pub struct Learned {
 pub const LEAST_CORRELATION: f64 = 0.7;
 pub const LEAST_PCK: f64 = 1.5;
 pub const ENERGY: std::ops::RangeInclusive<f64> = 0.7..=1.3;
+
+/// Slower than this a wrist of the rule stands still, m/s.
+const HELD: f64 = 0.05;
 
 /// A clip of the test split.
 struct Test {
@@ -146,12 +152,16 @@ impl Judge<'_> {
     fn row(&self, predictor: &'static str, made: &[Array3<f32>]) -> Row {
         let mut correct = Correct::default();
         let (mut energy, mut real_energy) = (MotionEnergy::default(), MotionEnergy::default());
+        let (mut pauses, mut real_pauses) = (MotionEnergy::default(), MotionEnergy::default());
         let mut errors = (0.0, 0.0);
         for (made, test) in made.iter().zip(self.tests) {
             let real = &test.sample.motion;
             correct.count(made.view(), real.joints.view(), real.mask.view());
             energy.add(made.view(), real.mask.view(), self.fps);
             real_energy.add(real.joints.view(), real.mask.view(), self.fps);
+            let held = held(test, self.fps);
+            pauses.add(made.view(), held.view(), self.fps);
+            real_pauses.add(real.joints.view(), held.view(), self.fps);
             let of_clip = self.error(made.view(), real.joints.view());
             errors = (errors.0 + of_clip.0, errors.1 + of_clip.1);
         }
@@ -162,6 +172,7 @@ impl Judge<'_> {
             poses: Some(Poses {
                 pck: correct.share(),
                 energy: energy.relative_to(&real_energy),
+                pauses: pauses.relative_to(&real_pauses),
                 l1: errors.0 / f64::max(errors.1, 1.0),
             }),
         }
@@ -189,4 +200,13 @@ impl Judge<'_> {
         }
         sum
     }
+}
+
+/// The mask of the frames at whose both sides the rule moves no wrist faster than `HELD`; two such frames in a row have
+/// such a step between them.
+fn held(test: &Test, fps: FrameRate) -> Array2<bool> {
+    let speeds = wrist_speeds(test.predictable.view(), fps);
+    let still = |t: usize| speeds.row(t.min(speeds.nrows() - 1)).iter().all(|speed| *speed < HELD);
+    let mask = &test.sample.motion.mask;
+    Array2::from_shape_fn(mask.dim(), |(t, joint)| mask[[t, joint]] && still(t.saturating_sub(1)) && still(t))
 }
