@@ -105,10 +105,11 @@ impl Task for Shared {
 fn a_training_stopped_at_any_step_ends_with_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
-    for (name, settings) in [
-        ("bones", settings()),
+    for (name, stops, settings) in [
+        ("bones", vec![1, 2, 3, 4, 5, 6], settings()),
         (
             "positions",
+            vec![4],
             Gan { representation: "positions".into(), adversarial: "log".into(), lambda_velocity: 0.5, ..settings() },
         ),
     ] {
@@ -123,7 +124,7 @@ fn a_training_stopped_at_any_step_ends_with_the_same_bytes() {
                 .iter()
                 .all(|n| names.contains(n))
         );
-        for stop in 1..=6 {
+        for stop in stops {
             let parts = place(&stop.to_string());
             let progress = Shared(Stop::at(stop));
             let stopped = std::panic::catch_unwind(AssertUnwindSafe(|| train(&dataset, &settings, &parts, &progress)));
@@ -248,8 +249,8 @@ fn eight_windows_are_learnt_to_two_hundredths() {
         let out = folder.path().join(representation);
         let settings = Gan {
             batch: 8,
-            steps: 1_500,
-            learning_rate: 1e-3,
+            steps: 2_500,
+            learning_rate: 3e-4,
             lambda_gan: 0.0,
             representation: representation.into(),
             epoch_steps: 10_000,
@@ -257,9 +258,7 @@ fn eight_windows_are_learnt_to_two_hundredths() {
             ..Gan::default()
         };
         let mut least = f64::INFINITY;
-        for (steps, rate) in [(1_000, 1e-3), (1_500, 1e-3)] {
-            train(&dataset, &Gan { steps, learning_rate: rate, ..settings.clone() }, &out, &Silent).unwrap();
-        }
+        train(&dataset, &settings, &out, &Silent).unwrap();
         let log = std::fs::read_to_string(out.join("metrics.jsonl")).unwrap();
         for line in log.lines() {
             let line: serde_json::Value = serde_json::from_str(line).unwrap();
