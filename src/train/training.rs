@@ -189,7 +189,10 @@ impl Training {
 impl Stored {
     /// What a checkpoint of a training says. Errors when it is none, or of another program's version.
     pub fn of(contents: &Contents) -> Result<Self> {
-        ensure!(contents.facts["settings"].is_object(), "it is no checkpoint that a training can go on from");
+        ensure!(
+            contents.facts["settings"].is_object(),
+            "it is no checkpoint that this version can go on from; choose another --out, or move that folder away"
+        );
         serde_json::from_value(contents.facts.clone()).context("its facts are not those of this program's version")
     }
 
