@@ -83,7 +83,7 @@ test: build readers browser
 	@echo 'make test: all passed'
 
 # The long proofs, each printing its figures: 20 kills, a 10-minute video, ten minutes of sound in step with their
-# pictures, 20 kills of a training and eight windows learnt by heart, the dataset beside plain copy, 10 and 100 hours, both
+# pictures, 20 kills of a training, the dataset beside plain copy, 10 and 100 hours, both
 # cores at work, speed on a real clip (CLIP, MODELS), alone and against the Python REFERENCE, training and generation.
 # ORATOR_REFERENCE_PYTHON names a Python with onnxruntime, cv2 and numpy (and torch: training beside PyTorch's).
 SHARED := ../shared

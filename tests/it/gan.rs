@@ -233,42 +233,6 @@ fn a_few_windows_are_learnt_by_heart_and_spoken() {
     assert!(Speaker::open(&dataset_folder.join("info.json")).is_err());
 }
 
-/// The proof that the networks, losses and the optimiser fit together: eight windows learnt to 0.02 deviations.
-#[test]
-fn eight_windows_are_learnt_to_two_hundredths() {
-    if std::env::var_os("ORATOR_LONG").is_none() {
-        eprintln!("SKIPPED: learning eight windows by heart; ORATOR_LONG=1 runs it");
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let dataset_folder = folder.path().join("dataset");
-    write_dataset(&dataset_folder, "host", FPS, &[(Split::Train, sample("a-00000000-000000", 64 + 7 * 5, 0.0))])
-        .unwrap();
-    let dataset = Dataset::open(&dataset_folder).unwrap();
-    for representation in ["bones", "positions"] {
-        let out = folder.path().join(representation);
-        let settings = Gan {
-            batch: 8,
-            steps: 2_500,
-            learning_rate: 3e-4,
-            lambda_gan: 0.0,
-            representation: representation.into(),
-            epoch_steps: 10_000,
-            checkpoint_every: 10_000,
-            ..Gan::default()
-        };
-        let mut least = f64::INFINITY;
-        train(&dataset, &settings, &out, &Silent).unwrap();
-        let log = std::fs::read_to_string(out.join("metrics.jsonl")).unwrap();
-        for line in log.lines() {
-            let line: serde_json::Value = serde_json::from_str(line).unwrap();
-            least = line["l1"].as_f64().map_or(least, |l1| least.min(l1));
-        }
-        eprintln!("{representation}: L1 {least:.4} on eight windows");
-        assert!(least < 0.02, "{representation}: {least}");
-    }
-}
-
 #[test]
 fn a_training_that_explodes_keeps_its_last_good_checkpoint() {
     let folder = tempfile::tempdir().unwrap();
