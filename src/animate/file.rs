@@ -1,11 +1,18 @@
 //! A motion file of any kind we write, chosen by its name's extension, put in its place atomically.
 
-use super::{bvh, video};
+use super::performance::Performance;
+use super::video;
 use crate::motion::{authors_txt, npy};
 use crate::stage::progress::Progress;
 use crate::stage::workdir;
 use crate::types::{pose3d::Motion, sound::Sound};
 use std::path::Path;
+
+/// What else goes into a file than the performance.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sources<'a> {
+    pub sound: Option<&'a Sound>,
+}
 
 /// What a motion can be written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,19 +44,35 @@ impl Format {
         }
     }
 
-    /// Writes the motion; only a film has use for the sound.
+    /// Whether the file holds joints and nothing of a figure.
+    pub fn holds_joints(self) -> bool {
+        matches!(self, Self::Npy | Self::AuthorsTxt)
+    }
+
+    /// Writes a performance; only a film has use for the sound.
     pub fn write(
         self,
         path: &Path,
-        motion: &Motion,
-        sound: Option<&Sound>,
+        performance: &Performance,
+        sources: &Sources,
         progress: &dyn Progress,
     ) -> anyhow::Result<()> {
         match self {
+            Self::Npy | Self::AuthorsTxt => self.write_joints(path, &performance.motion()),
+            Self::Bvh => workdir::write_file(path, performance.clip.to_bvh().as_bytes()),
+            Self::Mp4 => {
+                let motion = performance.motion();
+                workdir::replace(path, |attempt| video::write(attempt, &motion, sources.sound, progress))
+            }
+        }
+    }
+
+    /// Writes joints as they are, which only the files of joints can hold.
+    pub fn write_joints(self, path: &Path, motion: &Motion) -> anyhow::Result<()> {
+        match self {
             Self::Npy => workdir::replace(path, |attempt| npy::write(attempt, motion)),
             Self::AuthorsTxt => workdir::write_file(path, authors_txt::format(motion).as_bytes()),
-            Self::Bvh => workdir::write_file(path, bvh::text(motion).as_bytes()),
-            Self::Mp4 => workdir::replace(path, |attempt| video::write(attempt, motion, sound, progress)),
+            Self::Bvh | Self::Mp4 => anyhow::bail!("{} holds more than joints", path.display()),
         }
     }
 }

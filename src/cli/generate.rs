@@ -2,7 +2,8 @@
 
 use super::{Outcome, ui::Ui};
 use anyhow::{Context as _, Result, bail, ensure};
-use orator::animate::file::Format;
+use orator::animate::file::{Format, Sources};
+use orator::animate::{Options, perform};
 use orator::generate::Speaker;
 use orator::media::audio;
 use orator::stage::progress::Progress as _;
@@ -47,8 +48,15 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         (sound, motion)
     };
     let motion_secs = started.elapsed().as_secs_f64();
+    let performance = perform(&motion, None, &Options::default());
+    let sources = Sources { sound: Some(&sound) };
     for (path, format) in &outputs {
-        format.write(path, &motion, Some(&sound), ui)?;
+        // Files of joints hold what the speaker said, before it is put on a figure.
+        if format.holds_joints() {
+            format.write_joints(path, &motion)?;
+        } else {
+            format.write(path, &performance, &sources, ui)?;
+        }
     }
     let speed = sound.secs() / motion_secs.max(1e-6);
     let names: Vec<String> = outputs.iter().map(|(path, _)| path.display().to_string()).collect();

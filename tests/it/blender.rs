@@ -3,7 +3,7 @@
 
 use crate::bvh::{Bvh, worst_mm};
 use crate::figures::{FPS, swinging};
-use orator::animate::bvh;
+use orator::animate::{Options, perform};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -26,7 +26,7 @@ fn blender_sees_the_joints_of_the_motion() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("swinging.bvh");
     let motion = swinging(1, 20);
-    let text = bvh::text(&motion);
+    let text = perform(&motion, None, &Options::default()).clip.to_bvh();
     std::fs::write(&file, &text).unwrap();
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/reference/blender_joints.py");
     let output = Command::new(python).arg(script).arg(&file).output().unwrap();

@@ -3,11 +3,24 @@
 
 use crate::figures::{FPS, swinging};
 use ndarray::{Array3, s};
-use orator::animate::{bvh, figure::Figure};
+use orator::animate::{Options, Performance, figure::Figure, perform};
+use orator::motion::bvh_write::Clip;
 use orator::motion::{authors_txt, rotation::Rotation};
 use orator::types::pose3d::Motion;
 use orator::types::skeleton::{self, L_HAND, N_JOINTS, R_HAND};
 use std::path::Path;
+
+fn performed(motion: &Motion) -> Performance {
+    perform(motion, None, &Options::default())
+}
+
+fn text(motion: &Motion) -> String {
+    performed(motion).clip.to_bvh()
+}
+
+fn clip(motion: &Motion) -> Clip {
+    performed(motion).clip
+}
 
 type Matrix = [[f64; 3]; 3];
 
@@ -148,7 +161,7 @@ pub fn worst_mm(motion: &Motion, bvh: &Bvh, places: impl Fn(usize) -> Vec<[f64; 
 fn the_bvh_gives_back_the_joints_within_a_tenth_of_a_millimetre() {
     for seed in 0..4 {
         let motion = swinging(seed, 60);
-        let bvh = Bvh::parse(&bvh::text(&motion));
+        let bvh = Bvh::parse(&text(&motion));
         assert!((bvh.frame_secs - 1.0 / FPS.per_sec()).abs() < 1e-7);
         let worst = worst_mm(&motion, &bvh, |frame| bvh.places(frame));
         assert!(worst < 0.1, "seed {seed}: {worst} mm");
@@ -166,7 +179,7 @@ fn a_t_pose_is_the_rest_pose_facing_plus_z() {
         (sign * (places[figure.places[joint]][k] - neck[k]) / 100.0) as f32
     });
     assert!(joints[[0, skeleton::L_WRIST, 0]] > 0.5, "the left wrist is at the right of the picture");
-    let clip = bvh::clip(&Motion::from_joints(FPS, joints));
+    let clip = clip(&Motion::from_joints(FPS, joints));
     // The hand's axis runs to the middle of the knuckles, a degree beside the rest axis; all else is at rest.
     for (joint, rotation) in clip.skeleton.joints.iter().zip(&clip.local[0]) {
         let degrees = rotation.angle().to_degrees();
@@ -187,7 +200,7 @@ fn a_mirrored_motion_gives_the_mirrored_file() {
             mirrored.joints[[frame, joint, 0]] *= -1.0;
         }
     }
-    let (clip, other) = (bvh::clip(&motion), bvh::clip(&mirrored));
+    let (clip, other) = (clip(&motion), clip(&mirrored));
     for (joint, bone) in clip.skeleton.joints.iter().enumerate().filter(|(_, bone)| !bone.end) {
         let swapped = match (bone.name.strip_prefix("Left"), bone.name.strip_prefix("Right")) {
             (Some(rest), _) => format!("Right{rest}"),
@@ -210,7 +223,7 @@ fn gaps_are_bridged_and_a_hand_never_seen_is_relaxed() {
     motion.joints.slice_mut(s![.., L_HAND..R_HAND, ..]).fill(f32::NAN);
     motion.joints.slice_mut(s![20..24, .., ..]).fill(f32::NAN);
     motion.joints.slice_mut(s![..3, 1.., ..]).fill(f32::NAN);
-    let clip = bvh::clip(&motion);
+    let clip = clip(&motion);
     let at = |name: &str| clip.skeleton.find(name).unwrap();
     let finger = at("LeftHandMiddle2");
     for frame in 0..60 {
@@ -226,7 +239,7 @@ fn gaps_are_bridged_and_a_hand_never_seen_is_relaxed() {
 
     for n_frames in [0, 1] {
         let nothing = Motion::from_joints(FPS, Array3::from_elem((n_frames, N_JOINTS, 3), f32::NAN));
-        assert_eq!(Bvh::parse(&bvh::text(&nothing)).frames.len(), n_frames);
+        assert_eq!(Bvh::parse(&text(&nothing)).frames.len(), n_frames);
     }
 }
 
@@ -244,7 +257,7 @@ fn a_straightening_arm_does_not_spin() {
             (0..3).for_each(|k| motion.joints[[frame, joint, k]] = place[k] as f32);
         }
     }
-    let clip = bvh::clip(&motion);
+    let clip = clip(&motion);
     let upper = clip.skeleton.find("LeftArm").unwrap();
     for frame in 0..59 {
         let step = (clip.local[frame].get(upper).unwrap().inverse() * clip.local[frame + 1][upper]).angle();
@@ -260,7 +273,7 @@ fn the_released_clips_keep_their_gesture() {
         return;
     }
     let motion = authors_txt::read(&folder.join("gt_interval_102571.txt"), FPS).unwrap();
-    let clip = bvh::clip(&motion);
+    let clip = clip(&motion);
     // The clip's bones vary by some percent of their length: the file keeps directions and gives each one length.
     let figure = Figure::of(&motion);
     let mut apart = Vec::new();
