@@ -18,7 +18,7 @@
 //! | `onnx` | the only room that knows ONNX Runtime; the model manifest | `types stage config` |
 //! | `audio` | sound to features | `types` |
 //! | `motion` | motion as numbers: bones, rotations, smoothing; motion files | `types` |
-//! | `metrics` | how good made motion is beside the real one, as pure sums | `types motion` |
+//! | `metrics` | how good made motion is beside the real one, as pure sums | `types motion nn` |
 //! | `nn` | network architectures | `types motion` |
 //! | `extract` | stage 1: sound, timeline, shots | `media vision` |
 //! | `pose2d` | stage 2: 2D keypoints of the one speaker | `media vision onnx motion` |

@@ -26,6 +26,7 @@ pub mod hand_lifter;
 pub mod heatmap_lifter;
 pub mod kernel;
 pub mod linear;
+pub mod motion_encoder;
 pub mod params;
 pub mod resize;
 pub mod rows;

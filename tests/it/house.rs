@@ -13,7 +13,7 @@ const MAY_IMPORT: [(&str, &str); 24] = [
     ("onnx", "types stage config"),
     ("audio", "types"),
     ("motion", "types"),
-    ("metrics", "types motion"),
+    ("metrics", "types motion nn"),
     ("nn", "types motion"),
     ("dataset", "types stage config motion media audio"),
     ("extract", "types stage config media vision"),

@@ -1,0 +1,187 @@
+//! The auto-encoder of motion windows: convolutions over time to a code of 32 numbers, and back, for training. After
+//! the embedding network of Yoon et al. 2020 (34 frames; 3, 3, 4 by twos, 3 wide; then 256, 128, 32), on all bones.
+//! Every layer has batch norm and leaky ReLU; the code itself is normalised without activation, so that its numbers have
+//! about unit variance over what was learnt from.
+//!
+//! No layer is padded on the way in, so neighbouring windows share their convolutions: `codes` runs these once over a
+//! stretch and only the last layers window by window.
+
+use super::Mode;
+use super::batch_norm::BatchNorm;
+use super::conv1d::Conv1d;
+use super::linear::Linear;
+use super::params::Params;
+use candle_core::{Device, Result, Tensor, Var};
+use ndarray::{Array2, ArrayView2};
+use serde::{Deserialize, Serialize};
+
+/// Frames of a window.
+pub const WINDOW: usize = 34;
+/// Numbers of a code.
+pub const N_CODE: usize = 32;
+/// Windows that share convolutions begin a multiple of this apart.
+pub const STEP: usize = 2;
+/// Prefixes of the two halves' tensors.
+pub const NAME: &str = "encoder.";
+const DECODER: &str = "decoder.";
+
+/// Channels of the last convolution, and how many places of it a window has.
+const LAST: usize = 32;
+const PLACES: usize = 12;
+const SLOPE: f64 = 0.2;
+const MOMENTUM: f64 = 0.1;
+
+/// The network's shape.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Config {
+    /// Numbers of a frame.
+    pub n_in: usize,
+    /// Channels of the first three convolutions.
+    pub channels: [usize; 3],
+    /// Widths of the two layers before the code.
+    pub hidden: [usize; 2],
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self { n_in: 138, channels: [96, 64, 64], hidden: [256, 128] }
+    }
+}
+
+/// Windows to codes.
+pub struct MotionEncoder {
+    /// Of each number of a frame, [1, n_in, 1]: what is learnt is (x - mean) / std.
+    mean: Var,
+    std: Var,
+    convs: Vec<(Conv1d, BatchNorm)>,
+    dense: Vec<(Linear, BatchNorm)>,
+}
+
+fn norm(params: &mut Params, name: &str, n: usize, slope: f64) -> Result<BatchNorm> {
+    BatchNorm::new(params, &format!("{name}.norm"), n, 1e-5, MOMENTUM, slope)
+}
+
+impl MotionEncoder {
+    /// Makes the network's tensors in `params`.
+    pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
+        let mean = params.buffer(&format!("{NAME}mean"), &[1, config.n_in, 1], 0.0)?;
+        let std = params.buffer(&format!("{NAME}std"), &[1, config.n_in, 1], 1.0)?;
+        let [a, b, c] = config.channels;
+        let mut convs = Vec::new();
+        for (i, (n_in, n_out, kernel, stride)) in
+            [(config.n_in, a, 3, 1), (a, b, 3, 1), (b, c, 4, STEP), (c, LAST, 3, 1)].into_iter().enumerate()
+        {
+            let name = format!("{NAME}conv{i}");
+            let conv = Conv1d::valid(params, &name, n_in, n_out, kernel, 1)?.with_stride(stride);
+            convs.push((conv, norm(params, &name, n_out, SLOPE)?));
+        }
+        let [d, e] = config.hidden;
+        let mut dense = Vec::new();
+        for (i, (n_in, n_out, slope)) in
+            [(LAST * PLACES, d, SLOPE), (d, e, SLOPE), (e, N_CODE, 1.0)].into_iter().enumerate()
+        {
+            let name = format!("{NAME}dense{i}");
+            dense.push((Linear::new(params, &name, n_in, n_out)?, norm(params, &name, n_out, slope)?));
+        }
+        Ok(Self { mean, std, convs, dense })
+    }
+
+    /// Sets mean and standard deviation of the numbers of a frame.
+    pub fn set_statistics(&self, mean: &[f32], std: &[f32]) -> Result<()> {
+        let shape = (1, mean.len(), 1);
+        self.mean.set(&Tensor::from_slice(mean, shape, self.mean.device())?)?;
+        self.std.set(&Tensor::from_slice(std, shape, self.std.device())?)
+    }
+
+    /// [B, n_in, T] as the network wants it.
+    pub fn normalised(&self, x: &Tensor) -> Result<Tensor> {
+        x.broadcast_sub(&self.mean.as_detached_tensor())?.broadcast_div(&self.std.as_detached_tensor())
+    }
+
+    /// The other way round.
+    pub fn plain(&self, x: &Tensor) -> Result<Tensor> {
+        x.broadcast_mul(&self.std.as_detached_tensor())?.broadcast_add(&self.mean.as_detached_tensor())
+    }
+
+    /// Windows [B, n_in, 34], normalised, to codes [B, 32].
+    pub fn forward(&self, x: &Tensor, mode: &Mode) -> Result<Tensor> {
+        self.finish(&self.convolve(x, mode)?.flatten_from(1)?, mode)
+    }
+
+    /// Codes [n, 32] of the windows of `frames` [T, n_in] that begin at 0, `stride`, 2 `stride` ... (a multiple of 2).
+    pub fn codes(&self, frames: ArrayView2<f32>, stride: usize) -> Result<Array2<f32>> {
+        let (n_frames, n_in) = frames.dim();
+        let n = (n_frames + 1).saturating_sub(WINDOW).div_ceil(stride);
+        if n == 0 {
+            return Ok(Array2::zeros((0, N_CODE)));
+        }
+        let values: Vec<f32> = frames.t().iter().copied().collect();
+        let x = self.normalised(&Tensor::from_vec(values, (1, n_in, n_frames), &Device::Cpu)?)?;
+        let y = self.convolve(&x, &Mode::Eval)?.squeeze(0)?.to_vec2::<f32>()?;
+        let window = |i: usize| y.iter().flat_map(move |row| &row[i * stride / STEP..][..PLACES]).copied();
+        let windows: Vec<f32> = (0..n).flat_map(window).collect();
+        let codes = self.finish(&Tensor::from_vec(windows, (n, LAST * PLACES), &Device::Cpu)?, &Mode::Eval)?;
+        let codes = codes.flatten_all()?.to_vec1()?;
+        Array2::from_shape_vec((n, N_CODE), codes).map_err(candle_core::Error::wrap)
+    }
+
+    fn convolve(&self, x: &Tensor, mode: &Mode) -> Result<Tensor> {
+        self.convs.iter().try_fold(x.clone(), |x, (conv, norm)| norm.forward(&conv.forward(&x)?, mode.trains()))
+    }
+
+    fn finish(&self, x: &Tensor, mode: &Mode) -> Result<Tensor> {
+        self.dense.iter().try_fold(x.clone(), |x, (linear, norm)| norm.forward(&linear.forward(&x)?, mode.trains()))
+    }
+
+    fn set_momentum(&mut self, momentum: f64) {
+        self.convs.iter_mut().for_each(|(_, norm)| norm.set_momentum(momentum));
+        self.dense.iter_mut().for_each(|(_, norm)| norm.set_momentum(momentum));
+    }
+}
+
+/// Encoder and decoder, to train with.
+pub struct AutoEncoder {
+    pub encoder: MotionEncoder,
+    dense: Vec<(Linear, BatchNorm)>,
+    /// From the last dense layer's numbers on, which are channels x 34 frames.
+    convs: Vec<(Conv1d, BatchNorm)>,
+    last: Conv1d,
+}
+
+impl AutoEncoder {
+    /// Makes both halves' tensors in `params`.
+    pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
+        let encoder = MotionEncoder::new(params, config)?;
+        let mut dense = Vec::new();
+        for (i, (n_in, n_out)) in [(N_CODE, 128), (128, LAST * WINDOW)].into_iter().enumerate() {
+            let name = format!("{DECODER}dense{i}");
+            dense.push((Linear::new(params, &name, n_in, n_out)?, norm(params, &name, n_out, SLOPE)?));
+        }
+        let mut convs = Vec::new();
+        for (i, (n_in, n_out)) in [(LAST, 64), (64, 64)].into_iter().enumerate() {
+            let name = format!("{DECODER}conv{i}");
+            convs.push((Conv1d::new(params, &name, n_in, n_out, 3)?, norm(params, &name, n_out, SLOPE)?));
+        }
+        let last = Conv1d::new(params, &format!("{DECODER}last"), 64, config.n_in, 3)?;
+        Ok(Self { encoder, dense, convs, last })
+    }
+
+    /// Windows [B, n_in, 34], normalised, to what is left of them after the code, the same shape.
+    pub fn forward(&self, x: &Tensor, mode: &Mode) -> Result<Tensor> {
+        let code = self.encoder.forward(x, mode)?;
+        let y = self
+            .dense
+            .iter()
+            .try_fold(code, |x, (linear, norm)| norm.forward(&linear.forward(&x)?, mode.trains()))?
+            .reshape((x.dim(0)?, LAST, WINDOW))?;
+        let y = self.convs.iter().try_fold(y, |x, (conv, norm)| norm.forward(&conv.forward(&x)?, mode.trains()))?;
+        self.last.forward(&y)
+    }
+
+    /// How much a batch counts in the running statistics.
+    pub fn set_momentum(&mut self, momentum: f64) {
+        self.encoder.set_momentum(momentum);
+        self.dense.iter_mut().for_each(|(_, norm)| norm.set_momentum(momentum));
+        self.convs.iter_mut().for_each(|(_, norm)| norm.set_momentum(momentum));
+    }
+}
