@@ -1,9 +1,14 @@
 //! Share of correct keypoints (rebol.md section 12, after Ginosar et al. 2019): a joint is correct when it lies within
-//! a fifth of the real pose's largest extent from the real one.
+//! a share of the real pose's largest extent from the real one. `Correct` counts at a fifth, for training; the metric has any
+//! share, in the plane and in space.
 
+use super::definition::{Better, Definition, Metric};
+use super::interval::{Pair, Point};
+use super::part::Part;
 use crate::types::skeleton::{L_WRIST, N_JOINTS, NECK, R_SHOULDER, is_duplicate};
 use ndarray::{ArrayView2, ArrayView3};
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 use std::ops::AddAssign;
 
 /// A joint is correct up to this share of the pose's largest extent.
@@ -48,6 +53,94 @@ impl Count {
     }
 }
 
+/// Shares at several alphas, in several axes, of several parts.
+struct Pck {
+    /// One a share.
+    figures: Vec<(Axes, Part, f64)>,
+}
+
+/// For each of `axes`, each alpha and each of `parts` one share.
+pub(super) fn metric(axes: &[Axes], parts: &[Part], alphas: &[f64]) -> Box<dyn Metric> {
+    let mut figures = Vec::new();
+    for axes in axes {
+        for alpha in alphas {
+            figures.extend(parts.iter().map(|part| (*axes, *part, *alpha)));
+        }
+    }
+    Box::new(Pck { figures })
+}
+
+impl Metric for Pck {
+    fn definitions(&self) -> Vec<Definition> {
+        let definition = |(axes, part, alpha): &(Axes, Part, f64)| Definition {
+            name: if *axes == Axes::Xyz { "pck_3d" } else { "pck_2d" },
+            part: part.name(),
+            unit: "1",
+            better: Better::Higher,
+            formula: match axes {
+                Axes::Xyz => {
+                    "share of all seen joints of the part in all frames with |p - g| <= alpha * the largest of the sides \
+                     x, y, z of the box around all seen joints of g in the frame but the neck, whatever the part; a made \
+                     joint that is not finite is wrong"
+                }
+                Axes::Xy => {
+                    "share of all seen joints of the part in all frames with |p - g| <= alpha * the larger of the sides \
+                     x, y of the box around all seen joints of g in the frame but the neck, whatever the part; distances \
+                     in x and y alone; a made joint that is not finite is wrong"
+                }
+            },
+            undefined: "no joint of the part is seen",
+            parameters: json!({"alpha": alpha}),
+        };
+        self.figures.iter().map(definition).collect()
+    }
+
+    fn n_sums(&self) -> usize {
+        2 * self.figures.len()
+    }
+
+    fn measure(&self, pair: &Pair, sums: &mut [f64]) {
+        let figures: Vec<_> = self.figures.iter().map(|(axes, part, alpha)| (*axes, part.joints(), *alpha)).collect();
+        for t in 0..pair.n_frames() {
+            let (made, real, seen) = (&pair.made[t], &pair.real[t], &pair.seen[t]);
+            for (row, (axes, joints, alpha)) in sums.chunks_exact_mut(2).zip(&figures) {
+                let radius = alpha * extent(*axes, real, seen);
+                for &joint in joints.iter().filter(|joint| seen[**joint]) {
+                    row[0] += f64::from(u8::from(distance(*axes, &made[joint], &real[joint]) <= radius));
+                    row[1] += 1.0;
+                }
+            }
+        }
+    }
+
+    fn values(&self, sums: &[f64]) -> Vec<f64> {
+        sums.chunks_exact(2).map(|row| row[0] / row[1]).collect()
+    }
+}
+
+impl Axes {
+    fn n(self) -> usize {
+        match self {
+            Self::Xy => 2,
+            Self::Xyz => 3,
+        }
+    }
+}
+
+/// Largest side of the box around the seen joints but the neck.
+fn extent(axes: Axes, pose: &[Point; N_JOINTS], seen: &[bool; N_JOINTS]) -> f64 {
+    let side = |k: usize| {
+        let values = (NECK + 1..N_JOINTS).filter(|joint| seen[*joint]).map(|joint| pose[joint][k]);
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        high - low
+    };
+    (0..axes.n()).map(side).fold(0.0, f64::max)
+}
+
+fn distance(axes: Axes, a: &Point, b: &Point) -> f64 {
+    (0..axes.n()).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
+}
+
 impl Correct {
     /// The published figure, 0..1.
     pub fn share(&self) -> f64 {
@@ -64,10 +157,7 @@ impl Correct {
 
     /// As `count`, with distance and box in these axes.
     pub fn count_in(&mut self, axes: Axes, made: ArrayView3<f32>, real: ArrayView3<f32>, mask: ArrayView2<bool>) {
-        let n_axes = match axes {
-            Axes::Xy => 2,
-            Axes::Xyz => 3,
-        };
+        let n_axes = axes.n();
         for ((made, real), mask) in made.outer_iter().zip(real.outer_iter()).zip(mask.outer_iter()) {
             let seen: Vec<usize> = (NECK + 1..N_JOINTS).filter(|joint| mask[*joint]).collect();
             let extent = |k: usize| {

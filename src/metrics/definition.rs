@@ -1,0 +1,117 @@
+//! What a number means: its name, its part of the body, its formula and every parameter, with a hash over all of it.
+//! Values under different hashes are different things. And what every metric is: sums that add, and numbers from them.
+
+use super::interval::Pair;
+use serde::Serialize;
+use serde_json::Value;
+
+/// Which way a value is good.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Better {
+    Higher,
+    Lower,
+    /// The nearer to the same figure of the real motion, which is the definition `<name>_of_real` of the same part.
+    NearerTruth,
+    /// The nearer to 1.
+    One,
+    /// A figure of the real motion alone: says nothing of the made one.
+    Neither,
+}
+
+/// One number exactly.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Definition {
+    /// For instance `pck_3d`, `mpjpe`, `frechet_pose`.
+    pub name: &'static str,
+    /// `all`: the 48 joints without the neck (the two hand roots, which are the wrists again, included). `body`: shoulders,
+    /// elbows, wrists. `hands`: the 40 finger joints. More in `part`.
+    pub part: &'static str,
+    /// `1` for a share or a ratio.
+    pub unit: &'static str,
+    pub better: Better,
+    /// The exact definition in words: g real, p made, t frame, j joint.
+    pub formula: &'static str,
+    /// When there is no value (NaN).
+    pub undefined: &'static str,
+    /// All that can be set, and what it is set to.
+    pub parameters: Value,
+}
+
+impl Definition {
+    /// First 16 hexadecimal digits of blake3 over name, part, unit, formula and parameters (keys in order).
+    pub fn hash(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        for word in [self.name, self.part, self.unit, self.formula, &canonical(&self.parameters)] {
+            hasher.update(word.as_bytes());
+            hasher.update(&[0]);
+        }
+        hasher.finalize().to_hex()[..16].to_owned()
+    }
+
+    /// For people: name, what it is set to where one name has several, part; `pck_3d@0.2 hands`.
+    pub fn label(&self) -> String {
+        match self.parameters.get("alpha") {
+            Some(alpha) => format!("{}@{alpha} {}", self.name, self.part),
+            None => format!("{} {}", self.name, self.part),
+        }
+    }
+}
+
+/// JSON without spaces, keys sorted.
+fn canonical(value: &Value) -> String {
+    match value {
+        Value::Object(map) => {
+            let mut entries: Vec<_> = map.iter().collect();
+            entries.sort_by_key(|(key, _)| *key);
+            let entries: Vec<_> = entries
+                .into_iter()
+                .map(|(key, value)| format!("{}:{}", Value::from(key.as_str()), canonical(value)))
+                .collect();
+            format!("{{{}}}", entries.join(","))
+        }
+        Value::Array(values) => format!("[{}]", values.iter().map(canonical).collect::<Vec<_>>().join(",")),
+        _ => value.to_string(),
+    }
+}
+
+/// A family of numbers that share their sums.
+pub(super) trait Metric: Send + Sync {
+    /// What `values` gives, in order.
+    fn definitions(&self) -> Vec<Definition>;
+    /// How many sums it takes.
+    fn n_sums(&self) -> usize;
+    /// Adds one interval to the sums, `n_sums` numbers that start at 0.
+    fn measure(&self, pair: &Pair, sums: &mut [f64]);
+    /// The numbers from added sums; NaN where undefined.
+    fn values(&self, sums: &[f64]) -> Vec<f64>;
+    /// Whether the sums are large and the numbers slow (matrices): fewer draws.
+    fn is_costly(&self) -> bool {
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn the_hash_sees_all_but_the_order_of_keys() {
+        let definition = |parameters| Definition {
+            name: "pck_3d",
+            part: "all",
+            unit: "1",
+            better: Better::Higher,
+            formula: "share",
+            undefined: "never",
+            parameters,
+        };
+        let one = definition(json!({"alpha": 0.2, "fps": [15, 1]}));
+        assert_eq!(one.hash(), definition(json!({"fps": [15, 1], "alpha": 0.2})).hash());
+        assert_ne!(one.hash(), definition(json!({"alpha": 0.1, "fps": [15, 1]})).hash());
+        assert_ne!(one.hash(), Definition { part: "body", ..one.clone() }.hash());
+        assert_ne!(one.hash(), Definition { formula: "part", ..one.clone() }.hash());
+        assert_eq!((one.hash().len(), one.label()), (16, "pck_3d@0.2 all".into()));
+    }
+}

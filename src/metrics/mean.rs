@@ -1,0 +1,91 @@
+//! The commonest form of a figure: a number of each frame and point, and their mean over all there are. What the number
+//! is stands in the file of each metric.
+
+use super::definition::{Definition, Metric};
+use super::interval::{Pair, Point};
+use super::part::{From, Part};
+
+/// Mean over frames and points.
+pub(super) struct Mean {
+    definition: Definition,
+    points: Vec<From>,
+    /// How many frames in a row it looks at.
+    n_frames: usize,
+    of: fn(&Window) -> f64,
+}
+
+/// What such a number is computed from: one point in a few frames in a row, all of them seen.
+pub(super) struct Window<'a> {
+    pair: &'a Pair,
+    t: usize,
+    point: From,
+    /// Frames a second.
+    #[allow(dead_code)]
+    pub fps: f64,
+}
+
+impl Window<'_> {
+    /// Where the made point is in frame `k` of the window.
+    pub fn made(&self, k: usize) -> Point {
+        self.at(&self.pair.made, k)
+    }
+
+    /// Where the real point is in frame `k` of the window.
+    pub fn real(&self, k: usize) -> Point {
+        self.at(&self.pair.real, k)
+    }
+
+    /// Made less real.
+    pub fn apart(&self, k: usize) -> Point {
+        less(self.made(k), self.real(k))
+    }
+
+    fn at(&self, poses: &[[Point; crate::types::skeleton::N_JOINTS]], k: usize) -> Point {
+        let pose = &poses[self.t + k];
+        match self.point.origin {
+            Some(origin) => less(pose[self.point.joint], pose[origin]),
+            None => pose[self.point.joint],
+        }
+    }
+}
+
+pub(super) fn less(a: Point, b: Point) -> Point {
+    std::array::from_fn(|k| a[k] - b[k])
+}
+
+pub(super) fn norm(v: Point) -> f64 {
+    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
+}
+
+impl Mean {
+    /// Of `of` over all points of `part` and all `n_frames` frames in a row.
+    pub fn new(definition: Definition, part: Part, n_frames: usize, of: fn(&Window) -> f64) -> Box<dyn Metric> {
+        Box::new(Self { definition, points: part.points(), n_frames, of })
+    }
+}
+
+impl Metric for Mean {
+    fn definitions(&self) -> Vec<Definition> {
+        vec![self.definition.clone()]
+    }
+
+    fn n_sums(&self) -> usize {
+        2
+    }
+
+    fn measure(&self, pair: &Pair, sums: &mut [f64]) {
+        for t in 0..(pair.n_frames() + 1).saturating_sub(self.n_frames) {
+            for &point in &self.points {
+                let seen = |joint| pair.sees(t, self.n_frames, joint);
+                if seen(point.joint) && point.origin.is_none_or(seen) {
+                    sums[0] += (self.of)(&Window { pair, t, point, fps: pair.fps });
+                    sums[1] += 1.0;
+                }
+            }
+        }
+    }
+
+    fn values(&self, sums: &[f64]) -> Vec<f64> {
+        vec![sums[0] / sums[1]]
+    }
+}
