@@ -8,7 +8,7 @@ use crate::dataset::leakage::Leakage;
 use crate::dataset::part::{self, Part, SplitBy};
 use crate::dataset::{INFO, LEAKAGE};
 use crate::stage::workdir;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -18,6 +18,28 @@ const FORGOTTEN: &str = "a video that was forgotten";
 /// Whether the video of this name has samples in the dataset; one whose file is damaged may have.
 pub fn has_samples(dir: &Path, name: &str) -> bool {
     Part::read(&Part::path(dir, name)).map_or(true, |part| !part.samples.is_empty())
+}
+
+/// Whether what stays of `dir` without the videos `names` is as it was written: putting it together again would give
+/// damage a checksum of its own.
+///
+/// # Errors
+/// A file of another video that is not what `checksums.b3` says.
+pub fn ensure_sound_without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
+    if !dir.join(part::FOLDER).is_dir() {
+        return Ok(());
+    }
+    let stated = part::stated_hashes(dir);
+    for name in part::names(dir)?.into_iter().filter(|name| !names.contains(name)) {
+        let is_sound = Part::read(&Part::path(dir, &name)).is_ok_and(|part| part.is_sound(dir, &stated));
+        ensure!(
+            is_sound,
+            "{name}, which stays, is damaged in the dataset {}: nothing was removed. Make it anew with `orator run` \
+             (`orator dataset verify --deep` names its files), or forget it too",
+            dir.display()
+        );
+    }
+    Ok(())
 }
 
 /// Puts a dataset without the videos `names` in the place of `dir`; without any video left, `dir` goes.

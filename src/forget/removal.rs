@@ -102,7 +102,13 @@ impl Removal {
     }
 
     /// Does it, with the trained models unless they are kept.
+    ///
+    /// # Errors
+    /// A damaged video among those that stay, before anything is removed; a file that cannot be removed or written.
     pub fn carry_out(&self, keep_models: bool) -> Result<()> {
+        if let Some((dir, names)) = &self.dataset {
+            dataset::ensure_sound_without(dir, names)?;
+        }
         if let Some((dir, _)) = self.dataset.as_ref().filter(|(dir, _)| dir.exists()) {
             let text = "A video of this dataset is being forgotten. Run the same `orator forget` again to finish.\n";
             workdir::write_file(&dir.join(PENDING), text.as_bytes())?;

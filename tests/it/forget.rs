@@ -129,6 +129,16 @@ fn a_dataset_alone_forgets_too_and_a_hidden_copy_is_found() {
     assert!(found.len() == 1 && found[0]["file"].as_str().unwrap().ends_with("notes.txt"), "{found:?}");
 
     let other = project.clips()[1].file_name().unwrap().to_str().unwrap().to_owned();
+    assert_eq!(project.run(&[]).code, 0, "the forgotten one comes back");
+    let parts = files_under(&project.work().join("dataset/host/videos"));
+    let (_, part) = parts.iter().find(|(_, path)| fs::read_to_string(path).is_ok_and(|t| t.contains(&other))).unwrap();
+    let sound = fs::read_to_string(part).unwrap();
+    fs::write(part, sound.replacen("0.", "1.", 1)).unwrap();
+    let answer = project.answer(&["forget", "--video", &name, "--keep-models"]);
+    assert!(answer.code == 1 && answer.errors.contains("nothing was removed"), "{}", answer.errors);
+    fs::write(part, sound).unwrap();
+    fs::write(project.work().join("notes.txt"), "").unwrap();
+    assert_eq!(project.answer(&["forget", "--video", &name, "--keep-models"]).code, 0);
     fs::write(project.dir().join("pipeline.toml"), "").unwrap();
     let dataset = project.work().join("dataset/host");
     let folder = dataset.to_str().unwrap();
