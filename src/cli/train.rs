@@ -1,11 +1,14 @@
 //! `orator train`: one file a network.
 
+mod basis;
+mod corpus;
+mod embedding;
 mod gan;
 mod lifter;
 
 use super::{Outcome, ui::Ui};
 
-/// Train the lifters or a speaker's generator.
+/// Train the lifters, a speaker's generator, or the spaces that `evaluate` compares motion in.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -14,12 +17,16 @@ pub struct Args {
 
 #[derive(clap::Subcommand)]
 enum Network {
+    Basis(basis::Args),
+    Embedding(embedding::Args),
     Gan(gan::Args),
     Lifter(lifter::Args),
 }
 
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
     match args.network {
+        Network::Basis(args) => basis::run(args, ui),
+        Network::Embedding(args) => embedding::run(args, ui),
         Network::Gan(args) => gan::run(args, ui),
         Network::Lifter(args) => lifter::run(args, ui),
     }

@@ -1,6 +1,8 @@
 //! Speech to motion with a trained speaker, chunk by chunk: memory does not grow with the sound.
 
-use crate::audio::mel;
+mod heard;
+
+use self::heard::Heard;
 use crate::nn::chunks::Chunks;
 use crate::nn::unet::FRAMES_MULTIPLE;
 use crate::train::examples::mel_frames;
@@ -8,12 +10,11 @@ use crate::train::gan::BEST;
 use crate::train::poses::N_NUMBERS;
 use crate::train::speaker::{self, Facts, TrainedSpeaker};
 use crate::types::pose3d::Motion;
+use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::{SAMPLE_RATE, Sound};
 use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
-use candle_core::{Device, Tensor};
-use ndarray::{Array2, s};
-use std::ops::Range;
+use ndarray::{Array2, Array3, s};
 use std::path::Path;
 
 /// Frames made at once: with 256 more beside them that are thrown away, a small part.
@@ -53,24 +54,47 @@ impl Speaker {
         self.trained.facts.fps
     }
 
-    /// Motion for `sound` (16 kHz): as many whole frames as fit into it, bones of the speaker's lengths. Sound of any
-    /// length takes the same memory, but for itself and the motion. Errors on another rate, and on sound shorter than
-    /// a frame.
+    /// Motion for `sound` (16 kHz): as many whole frames as fit into it, bones of the speaker's lengths. Errors on another
+    /// rate, and on sound shorter than a frame.
     pub fn motion(&self, sound: &Sound) -> Result<Motion> {
         self.motion_with_chunk(sound, CHUNK)
     }
 
     /// The same in chunks of `chunk` frames, a multiple of 32.
     pub fn motion_with_chunk(&self, sound: &Sound, chunk: usize) -> Result<Motion> {
-        let facts = &self.trained.facts;
-        let mut numbers = Array2::zeros((N_NUMBERS, self.n_frames(sound)?));
+        ensure!(sound.rate == SAMPLE_RATE, "the sound has {} Hz, expected {SAMPLE_RATE}", sound.rate);
+        self.joined(pieces(sound), sound.samples.len(), chunk, &mut |_| ())
+    }
+
+    /// The same motion for `n_samples` at 16 kHz that come piece by piece: sound of any length takes the same memory, but
+    /// for the motion. `made` hears of every so many frames. Errors as `motion`, and where the pieces are not `n_samples`.
+    pub fn motion_of_pieces(
+        &self,
+        pieces: impl Iterator<Item = Result<Vec<f32>>>,
+        n_samples: usize,
+        made: &mut dyn FnMut(usize),
+    ) -> Result<Motion> {
+        self.joined(pieces, n_samples, CHUNK, made)
+    }
+
+    fn joined(
+        &self,
+        pieces: impl Iterator<Item = Result<Vec<f32>>>,
+        n_samples: usize,
+        chunk: usize,
+        made: &mut dyn FnMut(usize),
+    ) -> Result<Motion> {
+        let n_frames = self.n_frames(n_samples)?;
+        let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
         let mut first = 0;
-        for poses in self.numbers(sound, chunk)? {
+        for poses in self.numbers_of(pieces, n_samples, chunk)? {
             let poses = poses?;
-            numbers.slice_mut(s![.., first..first + poses.ncols()]).assign(&poses);
+            let part = self.trained.facts.motion(poses.view());
+            joints.slice_mut(s![first..first + poses.ncols(), .., ..]).assign(&part.joints);
             first += poses.ncols();
+            made(poses.ncols());
         }
-        Ok(facts.motion(numbers.view()))
+        Ok(Motion::from_joints(self.fps(), joints))
     }
 
     /// What the network says for `sound`, [144, T] of one chunk after another, `chunk` frames or less each: raw numbers
@@ -81,11 +105,22 @@ impl Speaker {
         sound: &'a Sound,
         chunk: usize,
     ) -> Result<impl Iterator<Item = Result<Array2<f32>>> + 'a> {
+        ensure!(sound.rate == SAMPLE_RATE, "the sound has {} Hz, expected {SAMPLE_RATE}", sound.rate);
+        self.numbers_of(pieces(sound), sound.samples.len(), chunk)
+    }
+
+    fn numbers_of<'a>(
+        &'a self,
+        pieces: impl Iterator<Item = Result<Vec<f32>>> + 'a,
+        n_samples: usize,
+        chunk: usize,
+    ) -> Result<impl Iterator<Item = Result<Array2<f32>>> + 'a> {
         let facts = &self.trained.facts;
-        let n_frames = self.n_frames(sound)?;
+        let n_frames = self.n_frames(n_samples)?;
         let padded = (n_frames / FRAMES_MULTIPLE + 1) * FRAMES_MULTIPLE;
         let n_mel_frames = mel_frames(facts.fps, padded);
-        let mels = |frames| log_mels(&sound.samples, frames);
+        let mut heard = Heard::new(pieces, n_samples, n_mel_frames);
+        let mels = move |frames| heard.log_mels(frames).map_err(|error| candle_core::Error::Msg(format!("{error:#}")));
         let chunks = Chunks::new(&self.trained.generator, facts.network.preset, n_mel_frames, padded, chunk, mels)?;
         Ok(chunks.zip((0..n_frames).step_by(chunk)).map(move |(poses, first)| {
             let n = chunk.min(n_frames - first);
@@ -94,37 +129,16 @@ impl Speaker {
         }))
     }
 
-    fn n_frames(&self, sound: &Sound) -> Result<usize> {
-        ensure!(sound.rate == SAMPLE_RATE, "the sound has {} Hz, expected {SAMPLE_RATE}", sound.rate);
-        let n_frames = (sound.secs() * self.fps().per_sec() + 1e-6) as usize;
-        ensure!(n_frames > 0, "the sound is {:.3} s long: too short for one frame of motion", sound.secs());
+    /// Frames of motion for so many samples.
+    pub fn n_frames(&self, n_samples: usize) -> Result<usize> {
+        let secs = n_samples as f64 / f64::from(SAMPLE_RATE);
+        let n_frames = (secs * self.fps().per_sec() + 1e-6) as usize;
+        ensure!(n_frames > 0, "the sound is {secs:.3} s long: too short for one frame of motion");
         Ok(n_frames)
     }
 }
 
-/// Spectrogram frames of the sound and its mirror images, [1, 64, T].
-fn log_mels(samples: &[f32], frames: Range<usize>) -> candle_core::Result<Tensor> {
-    let first = frames.start * mel::HOP;
-    let mels = mel::log_mel(&mirrored(samples, first..first + mel::n_samples(frames.len())));
-    let shape = (1, mel::N_MELS, frames.len());
-    Tensor::from_iter(mels.t().iter().copied(), &Device::Cpu)?.reshape(shape)
-}
-
-/// These samples of the sound, then its mirror image, then the sound again, as long as needed.
-fn mirrored(samples: &[f32], range: Range<usize>) -> Vec<f32> {
-    let period = (2 * samples.len()).saturating_sub(2).max(1);
-    let at = |i: usize| if i < samples.len() { i } else { period - i };
-    range.map(|i| samples[at(i % period)]).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sound_is_mirrored_as_long_as_needed() {
-        assert_eq!(mirrored(&[1.0, 2.0, 3.0], 0..8), [1.0, 2.0, 3.0, 2.0, 1.0, 2.0, 3.0, 2.0]);
-        assert_eq!(mirrored(&[1.0], 0..3), [1.0, 1.0, 1.0]);
-        assert_eq!(mirrored(&[1.0, 2.0, 3.0], 3..5), [2.0, 1.0]);
-    }
+/// Sound in memory as if it came in.
+fn pieces(sound: &Sound) -> impl Iterator<Item = Result<Vec<f32>>> {
+    sound.samples.chunks(SAMPLE_RATE as usize).map(|piece| Ok(piece.to_vec()))
 }

@@ -91,7 +91,7 @@ impl WavWriter {
 }
 
 /// What `stream_mono` handed on.
-struct Heard {
+pub(super) struct Heard {
     n_samples: u64,
     n_misplaced: u64,
 }
@@ -103,7 +103,7 @@ impl Heard {
 }
 
 /// Decodes the sound of `path` and hands it to `sink` piece by piece; `None` without sound.
-fn stream_mono(path: &Path, rate: u32, sink: &mut dyn FnMut(&[f32]) -> Result<()>) -> Result<Option<Heard>> {
+pub(super) fn stream_mono(path: &Path, rate: u32, sink: &mut dyn FnMut(&[f32]) -> Result<()>) -> Result<Option<Heard>> {
     let input = source::open(path)?;
     let Some(stream) = source::audio_stream(&input) else { return Ok(None) };
     let stream_idx = stream.index();

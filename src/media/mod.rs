@@ -1,5 +1,5 @@
 //! The only room that knows ffmpeg. `probe` says what a file holds, `frames` streams its pictures at a chosen rate by
-//! presentation time (`ahead`: beside other work), `audio` its sound on the same clock, `encode` writes mp4. Beneath
+//! presentation time (`ahead`: beside other work), `audio` its sound on the same clock (`sound_stream`: as it is asked for), `encode` writes mp4. Beneath
 //! them: `source` opens files and names what is wrong with them, `decode` turns one stream into decoded frames, `picture`
 //! makes those upright RGB.
 //!
@@ -16,6 +16,7 @@ mod origin;
 mod picture;
 pub mod probe;
 mod resample;
+pub mod sound_stream;
 mod source;
 
 /// Starts ffmpeg, once; its own log lines are kept off the terminal, since every error is told by this room.

@@ -1,0 +1,67 @@
+//! The motion that the two fixed spaces are learnt from, as `orator train basis` and `orator train embedding` gather it.
+
+use crate::cli::ui::Ui;
+use anyhow::{Context, Result, ensure};
+use orator::demo::figure::Figure;
+use orator::demo::{gesture, speaker, speech::Speech};
+use orator::motion::mocap;
+use orator::motion::vec3;
+use orator::stage::progress::Progress as _;
+use orator::train::motion_corpus::Corpus;
+use orator::types::pose3d::Motion;
+use orator::types::skeleton::{N_JOINTS, NECK};
+use orator::types::time::FrameRate;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::path::PathBuf;
+
+/// Clips of a minute of each kind of speaker made by rule, and how many more are only measured on.
+const CLIPS: usize = 12;
+const HELD_OUT: usize = 2;
+const FPS: FrameRate = FrameRate::new(15, 1);
+const CLIP_SECS: f64 = 60.0;
+
+/// Where it comes from.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Captured motion: .bvh or .npz files, or folders of them; may be given several times.
+    #[arg(long, value_name = "PATH", num_args = 1.., required = true)]
+    mocap: Vec<PathBuf>,
+    /// Takes to measure on and not to learn from, by their names: patterns like 'test_*'.
+    #[arg(long, value_name = "PATTERN", num_args = 1..)]
+    hold_out: Vec<String>,
+    /// The same seed gives the same numbers.
+    #[arg(long, default_value_t = 1337)]
+    pub seed: u64,
+}
+
+pub fn gather(args: &Args, ui: &Ui) -> Result<Corpus> {
+    let task = ui.begin("gathering motion", 0);
+    let takes = mocap::read_all(&args.mocap).context("reading --mocap")?;
+    let (held_out, mut takes) = mocap::divide(takes, &args.hold_out)?;
+    ensure!(!takes.is_empty(), "--hold-out leaves nothing to learn from");
+    takes.sort_by(|a, b| a.name.cmp(&b.name));
+    task.detail("speakers made by rule");
+    let mut speakers = Vec::new();
+    for seed in 0..CLIPS + HELD_OUT {
+        let number = args.seed.wrapping_add(seed as u64);
+        let clip = speaker::clips(CLIP_SECS / 3600.0, number)?.into_iter().next().context("no clip of the rule")?;
+        speakers.push((format!("speaker {number}"), clip.motion()));
+        speakers.push((format!("gestures {number}"), gestures(number)));
+    }
+    let others = speakers.split_off(2 * CLIPS);
+    Corpus::new(&takes, &held_out, &speakers, &others, args.seed)
+}
+
+/// A minute of the demo's figure.
+fn gestures(seed: u64) -> Motion {
+    let mut dice = ChaCha8Rng::seed_from_u64(seed);
+    let speech = Speech::new(CLIP_SECS, &mut dice);
+    let gestures = gesture::Gestures::new(&speech, &mut dice);
+    let figures: Vec<Figure> =
+        (0..FPS.frames_in(CLIP_SECS)).map(|t| Figure::new(&gestures.controls(FPS.secs(t)))).collect();
+    let joints = ndarray::Array3::from_shape_fn((figures.len(), N_JOINTS, 3), |(t, joint, k)| {
+        vec3::sub(figures[t].joints[joint], figures[t].joints[NECK])[k] as f32
+    });
+    Motion::from_joints(FPS, joints)
+}
