@@ -49,6 +49,17 @@ pub fn log_mel(samples: &[f32]) -> Array2<f32> {
     mels
 }
 
+/// Lower corner of a band's triangle in Hz.
+pub fn lowest_hz(band: usize) -> f64 {
+    let (low, high) = (mel_of(LOWEST_HZ), mel_of(HIGHEST_HZ));
+    let corner = low + (high - low) * band as f64 / (N_MELS + 1) as f64;
+    700.0 * ((corner / 1127.0).exp() - 1.0)
+}
+
+fn mel_of(hz: f64) -> f64 {
+    1127.0 * (1.0 + hz / 700.0).ln()
+}
+
 static BANDS: LazyLock<Vec<Band>> = LazyLock::new(bands);
 
 /// The bins of one band that have a weight.
@@ -59,11 +70,10 @@ struct Band {
 
 /// Triangles with corners equally spaced in mel; the zero bin belongs to none.
 fn bands() -> Vec<Band> {
-    let mel = |hz: f64| 1127.0 * (1.0 + hz / 700.0).ln();
-    let (low, high) = (mel(LOWEST_HZ), mel(HIGHEST_HZ));
+    let (low, high) = (mel_of(LOWEST_HZ), mel_of(HIGHEST_HZ));
     let corner = |i: usize| low + (high - low) * i as f64 / (N_MELS + 1) as f64;
     let weight = |band: usize, bin: usize| {
-        let at = mel(bin as f64 * f64::from(SAMPLE_RATE) / FFT as f64);
+        let at = mel_of(bin as f64 * f64::from(SAMPLE_RATE) / FFT as f64);
         let (left, middle, right) = (corner(band), corner(band + 1), corner(band + 2));
         ((at - left) / (middle - left)).min((right - at) / (right - middle)).max(0.0)
     };

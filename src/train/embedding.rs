@@ -1,6 +1,6 @@
 //! What the motion encoder (`nn::motion_encoder`) learns: to give windows of motion back after a code of 32 numbers. Loss:
 //! mean absolute error of the normalised bone directions plus that of their steps from frame to frame (as in the GENEA
-//! evaluation's auto-encoder).
+//! evaluation's auto-encoder), the six bones of arms and shoulders together counting as much as the forty of the fingers.
 
 use super::lifter::Lesson;
 use super::motion_corpus::{Corpus, Piece};
@@ -29,6 +29,8 @@ pub struct EmbeddingLesson {
     params: Params,
     net: AutoEncoder,
     corpus: Corpus,
+    /// Of each number in the loss, [1, 138, 1].
+    weights: Tensor,
     /// Directions [T, 138] of each piece.
     directions: Vec<Array2<f32>>,
     /// Windows up to and with each piece.
@@ -57,7 +59,8 @@ impl EmbeddingLesson {
         let ends = ends.collect();
         let (mean, std) = statistics(&directions);
         net.encoder.set_statistics(&mean, &std)?;
-        Ok(Self { params, net, corpus, directions, ends })
+        let weights = Tensor::from_vec(weights(), (1, N_NUMBERS, 1), &Device::Cpu)?;
+        Ok(Self { params, net, corpus, weights, directions, ends })
     }
 
     /// Errors over the windows of `pieces`: of the network, and of the corpus' mean pose.
@@ -132,6 +135,16 @@ impl Errors {
     }
 }
 
+/// Of each of the 138 numbers in the loss: arms and shoulders together as much as all fingers, 1 on average.
+fn weights() -> Vec<f32> {
+    let n_arms = joints_used().filter(|joint| *joint < L_HAND).count();
+    let of = |joint: usize| {
+        let n = if joint < L_HAND { n_arms } else { N_JOINTS_USED - n_arms };
+        N_JOINTS_USED as f32 / (2 * n) as f32
+    };
+    joints_used().flat_map(|joint| [of(joint); 3]).collect()
+}
+
 /// Mean and standard deviation of each of the 138 numbers.
 fn statistics(pieces: &[Array2<f32>]) -> (Vec<f32>, Vec<f32>) {
     let mut sums = [(0.0f64, 0.0f64); N_NUMBERS];
@@ -185,7 +198,7 @@ impl Lesson for EmbeddingLesson {
     }
 
     fn loss(&self, out: &Tensor, _: &Tensor, _: &Tensor) -> candle_core::Result<Tensor> {
-        let rest = out.reshape((out.dim(0)?, N_NUMBERS, WINDOW))?;
+        let rest = out.reshape((out.dim(0)?, N_NUMBERS, WINDOW))?.broadcast_mul(&self.weights)?;
         let steps = (rest.narrow(2, 1, WINDOW - 1)? - rest.narrow(2, 0, WINDOW - 1)?)?;
         rest.abs()?.mean_all()? + steps.abs()?.mean_all()?
     }

@@ -25,7 +25,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 /// A checkpoint whose network knows nothing: it moves about the mean pose of a made-up motion.
-fn write_untrained_speaker(file: &Path) {
+pub fn write_untrained_speaker(file: &Path) {
     let motion = swinging(1, 40);
     let mean = motion.joints.mean_axis(Axis(0)).unwrap();
     let lengths: Vec<f32> = bone_metres(&motion)[1..].iter().map(|&metres| metres as f32).collect();
@@ -39,7 +39,7 @@ fn write_untrained_speaker(file: &Path) {
     contents.write(file).unwrap();
 }
 
-fn generate(dir: &Path, args: &str) -> Output {
+pub fn generate(dir: &Path, args: &str) -> Output {
     let words = args.split_whitespace();
     Command::new(env!("CARGO_BIN_EXE_orator")).arg("generate").args(words).current_dir(dir).output().unwrap()
 }

@@ -19,6 +19,8 @@ mod forget;
 mod gan;
 mod gan_program;
 mod generate;
+mod generate_batch;
+mod generate_sounds;
 mod generator_parity;
 mod golden;
 mod heatmap_parity;

@@ -2,11 +2,13 @@
 //! (`make prove`) compares a 10-minute video with a 1-minute one, and an hour of keypoints with a minute; otherwise short
 //! twins.
 
-use crate::clips::ffmpeg;
+use crate::clips::{self, ffmpeg};
+use crate::generate::write_untrained_speaker;
 use crate::lift::keypoints;
 use crate::support::Project;
 use ndarray::{Array3, s};
 use ndarray_npy::NpzWriter;
+use orator::media::audio::write_wav;
 use orator::train::body_scene::{Filming, Scene};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -80,4 +82,27 @@ fn lifting_holds_its_arrays_and_little_more() {
         "900 frames {short:.0} MiB, {n_frames} frames {long:.0} MiB: {grown:.0} MiB more, the arrays {arrays:.0}"
     );
     assert!(short > 10.0 && grown <= 1.4 * arrays + 32.0, "{grown:.0} MiB more for {arrays:.0} MiB of arrays");
+}
+
+/// Peak resident memory in MiB of `orator generate` from so many seconds of sound to joints, and of these joints.
+fn peak_of_generate(secs: f64) -> (f64, f64) {
+    let dir = tempfile::tempdir().unwrap();
+    write_untrained_speaker(&dir.path().join("host.safetensors"));
+    write_wav(&dir.path().join("speech.wav"), &clips::tone(16_000, secs, 220.0)).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+    command.args(["generate", "--checkpoint", "host.safetensors", "--audio", "speech.wav", "--out", "a.npy"]);
+    let peak = peak_mib(command.current_dir(dir.path()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
+    (peak, secs * 15.0 * 49.0 * 3.0 * 4.0 / f64::from(1 << 20))
+}
+
+#[test]
+fn a_long_sound_takes_no_memory_but_for_its_motion() {
+    let secs = if std::env::var("ORATOR_LONG").is_ok() { 10_800.0 } else { 900.0 };
+    let ((short, short_joints), (long, long_joints)) = (peak_of_generate(150.0), peak_of_generate(secs));
+    let (grown, joints) = (long - short, long_joints - short_joints);
+    let sound = (secs - 150.0) * 16_000.0 * 4.0 / f64::from(1 << 20);
+    eprintln!(
+        "150 s {short:.0} MiB, {secs} s {long:.0} MiB: {grown:.0} MiB more, joints {joints:.0}, sound {sound:.0}"
+    );
+    assert!(short > 10.0 && grown <= 2.2 * joints + 24.0, "{grown:.0} MiB more for {joints:.0} MiB of joints");
 }

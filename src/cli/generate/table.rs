@@ -1,0 +1,199 @@
+//! Which sounds a batch has and what each motion is called: from a folder, or from a table of comma-separated values (RFC 4180;
+//! semicolons and tabs are understood too).
+
+use anyhow::{Context, Result, bail, ensure};
+use orator::animate::file::Format;
+use std::collections::BTreeMap;
+use std::path::{Component, Path, PathBuf};
+
+/// Endings of files that have sound.
+const SOUNDS: [&str; 18] = [
+    "wav", "flac", "mp3", "ogg", "oga", "opus", "m4a", "aac", "aif", "aiff", "wma", "caf", "mp4", "m4v", "mov", "mkv",
+    "webm", "avi",
+];
+
+/// A sound of a batch.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    pub audio: PathBuf,
+    /// The motion's name below the folder of outputs, `/` between folders, without an ending.
+    pub name: String,
+    /// The checkpoint, if it is not that of the command.
+    pub checkpoint: Option<PathBuf>,
+}
+
+/// All that sounds below `folder`, each called as its file; where two would be called the same, with their endings.
+pub fn of_folder(folder: &Path) -> Result<Vec<Row>> {
+    ensure!(folder.is_dir(), "{} is no folder", folder.display());
+    let mut files = Vec::new();
+    collect(folder, "", &mut files)?;
+    ensure!(!files.is_empty(), "{} holds no file that sounds ({})", folder.display(), SOUNDS.join(", "));
+    let stem = |file: &str| file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned();
+    let mut called = BTreeMap::<String, usize>::new();
+    files.iter().for_each(|(file, _)| *called.entry(stem(file).to_lowercase()).or_default() += 1);
+    let rows = files.into_iter().map(|(file, audio)| {
+        let alone = called.get(&stem(&file).to_lowercase()) == Some(&1);
+        Row { audio, name: if alone { stem(&file) } else { file.replacen('.', "_", usize::MAX) }, checkpoint: None }
+    });
+    distinct(rows.collect())
+}
+
+fn collect(folder: &Path, before: &str, files: &mut Vec<(String, PathBuf)>) -> Result<()> {
+    let entries = std::fs::read_dir(folder).with_context(|| format!("cannot list {}", folder.display()))?;
+    let mut entries = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>()?;
+    entries.sort();
+    for path in entries {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        if name.starts_with('.') {
+            continue;
+        } else if path.is_dir() {
+            collect(&path, &format!("{before}{name}/"), files)?;
+        } else if SOUNDS.contains(&ending.as_str()) {
+            files.push((format!("{before}{name}"), path));
+        }
+    }
+    Ok(())
+}
+
+/// The rows of the table `path`: columns `audio`, and if they are there `out` and `checkpoint` (or `speaker`). Paths count
+/// from the table's folder. Errors name the line.
+pub fn of_file(path: &Path) -> Result<Vec<Row>> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = std::str::from_utf8(&bytes).with_context(|| format!("{} is no text in UTF-8", path.display()))?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    parse(text, folder).and_then(distinct).with_context(|| format!("the table {}", path.display()))
+}
+
+fn parse(text: &str, folder: &Path) -> Result<Vec<Row>> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let heads = text.lines().next().unwrap_or_default();
+    let comma = [',', ';', '\t'].into_iter().max_by_key(|c| heads.matches(*c).count()).filter(|c| heads.contains(*c));
+    let mut lines = fields(text, comma.unwrap_or(','))?.into_iter();
+    let (_, heads) = lines.next().context("it is empty; its first line names the columns: audio,out,checkpoint")?;
+    let heads: Vec<String> = heads.iter().map(|head| head.trim().to_lowercase()).collect();
+    for head in &heads {
+        let known = ["audio", "out", "checkpoint", "speaker"].contains(&head.as_str());
+        ensure!(known, "line 1: column `{head}` is unknown; expected audio, out, checkpoint");
+    }
+    let column = |names: &[&str]| heads.iter().position(|head| names.contains(&head.as_str()));
+    let audio = column(&["audio"]).context("line 1: there is no column `audio`")?;
+    let (out, checkpoint) = (column(&["out"]), column(&["checkpoint", "speaker"]));
+    let mut rows = Vec::new();
+    for (line, fields) in lines {
+        let field = |at: Option<usize>| at.and_then(|at| fields.get(at)).map(|f| f.trim()).filter(|f| !f.is_empty());
+        let n = (fields.len(), heads.len());
+        ensure!(n.0 <= n.1, "line {line}: {} fields under {} columns", n.0, n.1);
+        let Some(file) = field(Some(audio)) else { bail!("line {line}: no audio is named") };
+        let name = match field(out) {
+            Some(out) => named(out).with_context(|| format!("line {line}"))?,
+            None => named(&Path::new(file).file_stem().unwrap_or_default().to_string_lossy())
+                .with_context(|| format!("line {line}"))?,
+        };
+        rows.push(Row { audio: folder.join(file), name, checkpoint: field(checkpoint).map(|path| folder.join(path)) });
+    }
+    ensure!(!rows.is_empty(), "it names no sound");
+    Ok(rows)
+}
+
+/// A motion's name as given: relative, below the folder of outputs, without the ending of a format.
+fn named(out: &str) -> Result<String> {
+    let path = Path::new(out);
+    let path = if Format::of(path).is_ok() { path.with_extension("") } else { path.to_owned() };
+    let parts: Option<Vec<String>> = path
+        .components()
+        .filter(|part| *part != Component::CurDir)
+        .map(|part| if let Component::Normal(part) = part { part.to_str().map(str::to_owned) } else { None })
+        .collect();
+    let parts = parts.filter(|parts| !parts.is_empty() && !parts.iter().any(|part| part.starts_with('.')));
+    let parts = parts.with_context(|| format!("out `{out}` is no name below the folder of outputs"))?;
+    Ok(parts.join("/"))
+}
+
+/// Errors where two motions would be one file, upper and lower case being the same on many disks.
+fn distinct(rows: Vec<Row>) -> Result<Vec<Row>> {
+    let mut seen = BTreeMap::new();
+    for row in &rows {
+        if let Some(other) = seen.insert(row.name.to_lowercase(), &row.audio) {
+            bail!("{} and {} would both be written to `{}`", other.display(), row.audio.display(), row.name);
+        }
+    }
+    Ok(rows)
+}
+
+/// Fields of each line with something on it, and its number.
+fn fields(text: &str, comma: char) -> Result<Vec<(usize, Vec<String>)>> {
+    let mut rows = Vec::new();
+    let (mut row, mut field, mut quoted, mut line, mut began) = (Vec::new(), String::new(), false, 1, 1);
+    let mut letters = text.chars().peekable();
+    while let Some(letter) = letters.next() {
+        match letter {
+            '"' if quoted && letters.peek() == Some(&'"') => field.extend(letters.next()),
+            '"' if quoted => quoted = false,
+            '"' if field.is_empty() => quoted = true,
+            c if c == comma && !quoted => row.push(std::mem::take(&mut field)),
+            '\n' if !quoted => {
+                row.push(std::mem::take(&mut field));
+                rows.push((began, std::mem::take(&mut row)));
+                began = line + 1;
+            }
+            '\r' if !quoted => {}
+            c => field.push(c),
+        }
+        line += usize::from(letter == '\n');
+    }
+    ensure!(!quoted, "line {began}: a quotation mark is not closed");
+    row.push(field);
+    rows.push((began, row));
+    rows.retain(|(_, fields)| fields.iter().any(|field| !field.trim().is_empty()));
+    Ok(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_of_every_kind_are_read() {
+        let row = |audio: &str, name: &str, checkpoint: Option<&str>| Row {
+            audio: PathBuf::from(audio),
+            name: name.into(),
+            checkpoint: checkpoint.map(PathBuf::from),
+        };
+        let read = |text: &str| parse(text, Path::new("t")).unwrap();
+        assert_eq!(read("audio\na.wav\n\nsub/b.mp3"), [row("t/a.wav", "a", None), row("t/sub/b.mp3", "b", None)]);
+        let text = "\u{feff}Out;Audio;speaker\r\n\"take \"\"1\"\".bvh\";\"a;b.wav\";host\r\nx/y;/c.wav;\r\n";
+        assert_eq!(read(text), [row("t/a;b.wav", "take \"1\"", Some("t/host")), row("/c.wav", "x/y", None)]);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_its_line() {
+        for (text, words) in [
+            ("", "empty"),
+            ("out\na", "no column `audio`"),
+            ("audio,loud\na.wav,1", "`loud` is unknown"),
+            ("audio\n", "names no sound"),
+            ("audio,out\na.wav,../b", "line 2"),
+            ("audio,out\na.wav,/b", "line 2"),
+            ("audio,out\n\n,b", "line 3: no audio"),
+            ("audio\na.wav,b", "line 2: 2 fields under 1"),
+            ("audio\n\"a.wav", "line 2: a quotation mark"),
+            ("audio,out\na.wav,Same\nb.wav,same.bvh", "a.wav and t/b.wav would both be written to `same`"),
+        ] {
+            let error = parse(text, Path::new("t")).and_then(distinct).unwrap_err();
+            assert!(format!("{error:#}").contains(words), "{text:?}: {error:#}");
+        }
+    }
+
+    #[test]
+    fn a_folders_sounds_keep_apart() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::create_dir(dir.path().join("sub")).unwrap();
+        for file in ["a.wav", "A.mp3", "b.WAV", "notes.txt", ".hidden.wav", "sub/a.wav"] {
+            std::fs::write(dir.path().join(file), "").unwrap();
+        }
+        let names: Vec<String> = of_folder(dir.path()).unwrap().into_iter().map(|row| row.name).collect();
+        assert_eq!(names, ["A_mp3", "a_wav", "b", "sub/a"]);
+        assert!(of_folder(&dir.path().join("none")).is_err());
+    }
+}
