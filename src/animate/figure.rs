@@ -1,10 +1,12 @@
 //! The figure that motion is put on: a whole body in T-pose (y up, facing +z, palms down), Hips to Head, fixed legs,
-//! both arms with all fingers. Its arms and hands have the motion's own bone lengths; trunk, head and legs, which no
-//! joint of ours tells of, are in proportion to the arms. Lengths in cm. A finger's metacarpal starts at the wrist
-//! (`LeftInHandIndex`): our joints do not hold the palm rigid, and the figure follows them exactly.
+//! both arms with all fingers. Its arms and hands have the motion's own bone lengths and its palms the motion's own
+//! shape, medians over the clip; they are rigid, and the fingers hang on the hand. Trunk, head and legs, which no
+//! joint of ours tells of, are in proportion to the arms. Lengths in cm.
 
+use super::hinge::Hinge;
+use super::places::Places;
 use crate::motion::fk::Skeleton;
-use crate::motion::vec3::{Vec3, scale};
+use crate::motion::vec3::{Vec3, across, cross, norm, scale};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::{self, L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_HAND};
 
@@ -21,32 +23,24 @@ const DEFAULT_FINGERS: [[f64; 4]; 5] = [
     [0.073, 0.043, 0.027, 0.023],
     [0.070, 0.034, 0.020, 0.020],
 ];
-/// Where a metacarpal points at rest: degrees from the hand's axis towards the thumb's side.
+/// Where a finger's base lies by default: degrees from the hand's axis towards the thumb's side.
 const SPREAD_DEGREES: [f64; 5] = [50.0, 16.0, 5.0, -6.0, -17.0];
-/// The same for the thumb's phalanges.
-const THUMB_DEGREES: f64 = 35.0;
+/// The left thumb at rest, and whither it bends; both as medians of speaking hands have them, about.
+const THUMB_ALONG: Vec3 = [0.74, -0.35, 0.57];
+const THUMB_BENDS: Vec3 = [0.0, -0.5, -0.87];
+const X: Vec3 = [1.0, 0.0, 0.0];
 
 /// One arm: indices of its joints in the skeleton.
 #[derive(Clone, Debug)]
 pub struct Arm {
     /// +1 left, -1 right: the sign of x.
     pub sign: f64,
-    /// First of the motion's joints of this arm (its shoulder) and of its hand (the hand root).
-    pub shoulder: usize,
-    pub hand_root: usize,
     pub clavicle: usize,
     pub upper: usize,
     pub fore: usize,
     pub hand: usize,
-    /// Thumb to little finger: metacarpal and three phalanges.
-    pub fingers: [[usize; 4]; 5],
-}
-
-impl Arm {
-    /// Along the arm at rest.
-    pub fn along(&self) -> Vec3 {
-        [self.sign, 0.0, 0.0]
-    }
+    /// Thumb to little finger, each its three phalanges.
+    pub fingers: [[usize; 3]; 5],
 }
 
 /// The skeleton with the meaning of its joints.
@@ -64,13 +58,17 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// The figure for a motion: bone lengths are medians over its frames.
+    /// The figure for a motion: lengths and palms are medians over its frames.
     pub fn of(motion: &Motion) -> Self {
-        Self::with_lengths(&bone_metres(motion))
+        let (places, metres) = (Places::of(motion), bone_metres(motion));
+        let [left, right] = [median_palm(&places), median_palm(&places.mirrored())];
+        let palms = [left.or(right), right.or(left)].map(|palm| palm.unwrap_or_else(|| default_palm(&metres)));
+        Self::with_measures(&metres, &palms)
     }
 
-    /// The figure with given bone lengths in metres; entry `j` is the bone from joint `j` to its parent.
-    pub fn with_lengths(metres: &[f64; N_JOINTS]) -> Self {
+    /// The figure with given bone lengths in metres (entry `j` is the bone from joint `j` to its parent) and palms:
+    /// the bases of the fingers in the hand's frame, metres, left and right, the right one in the mirror.
+    pub fn with_measures(metres: &[f64; N_JOINTS], palms: &[[Vec3; 5]; 2]) -> Self {
         let arm = |shoulder: usize| metres[shoulder + 1] + metres[shoulder + 2];
         let body = (arm(L_SHOULDER) + arm(skeleton::R_SHOULDER)) / 2.0 / ARM_METRES * CM;
         let mut bones = Skeleton::default();
@@ -84,8 +82,8 @@ impl Figure {
         let head = bones.push("Head", Some(neck), up(0.11), false);
         bones.push("", Some(head), up(0.20), true);
         places[NECK] = neck;
-        let arms = [(1.0, "Left"), (-1.0, "Right")]
-            .map(|(sign, side)| push_arm(&mut bones, &mut places, metres, chest, up(0.21), sign, side));
+        let arms = [(1.0, &palms[0]), (-1.0, &palms[1])]
+            .map(|(sign, palm)| push_arm(&mut bones, &mut places, (metres, palm), chest, up(0.21), sign));
         for (sign, side) in [(1.0, "Left"), (-1.0, "Right")] {
             let from_hips = [sign * 0.09 * body, -0.04 * body, 0.0];
             let upper = bones.push(&format!("{side}UpLeg"), Some(hips), from_hips, false);
@@ -100,75 +98,92 @@ impl Figure {
 fn push_arm(
     bones: &mut Skeleton,
     places: &mut [usize; N_JOINTS],
-    metres: &[f64; N_JOINTS],
+    (metres, palm): (&[f64; N_JOINTS], &[Vec3; 5]),
     chest: usize,
     neck: Vec3,
     sign: f64,
-    side: &str,
 ) -> Arm {
-    let (shoulder, hand_root) = if sign > 0.0 { (L_SHOULDER, L_HAND) } else { (skeleton::R_SHOULDER, R_HAND) };
-    let bone = |joint: usize, direction: Vec3| scale(direction, metres[joint] * CM);
-    let along = [sign, 0.0, 0.0];
+    let (side, shoulder, hand_root) =
+        if sign > 0.0 { ("Left", L_SHOULDER, L_HAND) } else { ("Right", skeleton::R_SHOULDER, R_HAND) };
+    let on_side = |[x, y, z]: Vec3| [sign * x, y, z];
+    let bone = |joint: usize, direction: Vec3| on_side(scale(direction, metres[joint] * CM));
     let clavicle = bones.push(&format!("{side}Shoulder"), Some(chest), neck, false);
-    let upper = bones.push(&format!("{side}Arm"), Some(clavicle), bone(shoulder, along), false);
-    let fore = bones.push(&format!("{side}ForeArm"), Some(upper), bone(shoulder + 1, along), false);
-    let hand = bones.push(&format!("{side}Hand"), Some(fore), bone(shoulder + 2, along), false);
+    let upper = bones.push(&format!("{side}Arm"), Some(clavicle), bone(shoulder, X), false);
+    let fore = bones.push(&format!("{side}ForeArm"), Some(upper), bone(shoulder + 1, X), false);
+    let hand = bones.push(&format!("{side}Hand"), Some(fore), bone(shoulder + 2, X), false);
     places[shoulder] = upper;
     places[shoulder + 1] = fore;
     places[shoulder + 2] = hand;
     places[hand_root] = hand;
-    let mut fingers = [[0; 4]; 5];
+    let mut fingers = [[0; 3]; 5];
     for (finger, name) in FINGERS.iter().enumerate() {
         let base = hand_root + 1 + 4 * finger;
-        let mut parent = bones.push(&format!("{side}InHand{name}"), Some(hand), [0.0; 3], false);
-        fingers[finger][0] = parent;
+        let mut parent = hand;
         for k in 0..4 {
-            let offset = bone(base + k, rest_direction(finger, k, sign));
+            let offset =
+                if k == 0 { on_side(scale(palm[finger], CM)) } else { bone(base + k, finger_hinge(finger).along()) };
             let end = k == 3;
             let label = if end { String::new() } else { format!("{side}Hand{name}{}", k + 1) };
             parent = bones.push(&label, Some(parent), offset, end);
             places[base + k] = parent;
             if !end {
-                fingers[finger][k + 1] = parent;
+                fingers[finger][k] = parent;
             }
         }
     }
-    Arm { sign, shoulder, hand_root, clavicle, upper, fore, hand, fingers }
+    Arm { sign, clavicle, upper, fore, hand, fingers }
 }
 
-/// Where bone `k` of a finger (0: metacarpal) points in the T-pose.
-pub fn rest_direction(finger: usize, k: usize, sign: f64) -> Vec3 {
-    let degrees: f64 = match (finger, k) {
-        (_, 0) => SPREAD_DEGREES[finger],
-        (0, _) => THUMB_DEGREES,
-        _ => 0.0,
-    };
-    let (sin, cos) = degrees.to_radians().sin_cos();
-    [sign * cos, 0.0, sin]
+/// How a finger's joints bend, in the axes of the left hand: the four along x about the line through the knuckles, the
+/// thumb across the palm.
+pub fn finger_hinge(finger: usize) -> Hinge {
+    if finger > 0 {
+        return Hinge::new(X, [0.0, 0.0, -1.0]);
+    }
+    let along = scale(THUMB_ALONG, 1.0 / norm(THUMB_ALONG));
+    let bends = across(THUMB_BENDS, along);
+    Hinge::new(along, scale(cross(along, bends), 1.0 / norm(bends)))
 }
 
-/// Median length over the frames of the bone to each joint, metres; defaults in proportion where never seen.
-pub fn bone_metres(motion: &Motion) -> [f64; N_JOINTS] {
-    let mut metres = [0.0; N_JOINTS];
-    for joint in 1..N_JOINTS {
-        let Some(parent) = skeleton::parent(joint) else { continue };
-        let mut seen: Vec<f64> = motion
-            .joints
-            .outer_iter()
-            .map(|frame| {
-                let square = |k| (f64::from(frame[[joint, k]]) - f64::from(frame[[parent, k]])).powi(2);
-                (0..3).map(square).sum::<f64>().sqrt()
-            })
-            .filter(|length| length.is_finite())
-            .collect();
-        if seen.is_empty() {
-            metres[joint] = default_metres(joint);
-        } else {
-            let middle = seen.len() / 2;
-            metres[joint] = *seen.select_nth_unstable_by(middle, f64::total_cmp).1;
+/// Medians over the frames of the bases of the left hand's fingers in its frame; `None` if they are never seen.
+fn median_palm(places: &Places) -> Option<[Vec3; 5]> {
+    let seen: Vec<_> = (0..places.n_frames()).filter_map(|t| places.palm(t)).collect();
+    let middle =
+        |finger: usize, axis: usize| median(seen.iter().filter_map(|palm| Some(palm[finger]?[axis])).collect());
+    let mut palm = [[0.0; 3]; 5];
+    for (finger, base) in palm.iter_mut().enumerate() {
+        for (axis, place) in base.iter_mut().enumerate() {
+            *place = middle(finger, axis)?;
         }
     }
-    metres
+    Some(palm)
+}
+
+/// A flat palm with metacarpals of these lengths.
+fn default_palm(metres: &[f64; N_JOINTS]) -> [Vec3; 5] {
+    std::array::from_fn(|finger| {
+        let (sin, cos) = SPREAD_DEGREES[finger].to_radians().sin_cos();
+        scale([cos, 0.0, sin], metres[L_HAND + 1 + 4 * finger])
+    })
+}
+
+fn median(mut numbers: Vec<f64>) -> Option<f64> {
+    let middle = numbers.len() / 2;
+    (!numbers.is_empty()).then(|| *numbers.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// Median length over the frames of the bone to each joint, metres; that of the other side where never seen, else a
+/// default.
+pub fn bone_metres(motion: &Motion) -> [f64; N_JOINTS] {
+    let seen: [Option<f64>; N_JOINTS] = std::array::from_fn(|joint| {
+        let parent = skeleton::parent(joint)?;
+        let lengths = motion.joints.outer_iter().map(|frame| {
+            let square = |k| (f64::from(frame[[joint, k]]) - f64::from(frame[[parent, k]])).powi(2);
+            (0..3).map(square).sum::<f64>().sqrt()
+        });
+        median(lengths.filter(|length| length.is_finite()).collect())
+    });
+    std::array::from_fn(|joint| seen[joint].or(seen[skeleton::mirror(joint)]).unwrap_or_else(|| default_metres(joint)))
 }
 
 fn default_metres(joint: usize) -> f64 {

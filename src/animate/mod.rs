@@ -1,15 +1,28 @@
 //! Joints to rotations, and the files people open: BVH, MP4, contact sheets.
 
+pub mod arm;
+pub mod constraints;
 pub mod draw;
 pub mod figure;
 pub mod file;
+pub mod head;
+pub mod hinge;
+pub mod limits;
 pub mod overlay;
 pub mod performance;
+pub mod places;
+pub mod pose;
+pub mod roll;
 pub mod rotations;
 pub mod sheet;
 pub mod sheet_cells;
+pub mod smoothing;
 pub mod strip;
+pub mod track;
 pub mod video;
 
+pub use constraints::Constraints;
 pub use draw::{View, draw_pose};
-pub use performance::{Face, Options, Performance, perform};
+pub use head::Face;
+pub use performance::{Options, Performance, Yaw, perform};
+pub use smoothing::Smoothing;

@@ -1,33 +1,61 @@
-//! The road from joints to animation: motion is put on a figure whose rotations every file is written from. What was
-//! done to it on the way is told.
+//! The road from joints to animation: motion is smoothed, put on a figure as rotations, brought to the rate asked for
+//! and held within what a body can do. Every file is written from what comes out; what was done on the way is told.
 
+use super::arm::Means;
+use super::constraints::{Clamps, Constraints, Tally};
 use super::figure::Figure;
+use super::head::{self, Face};
 use super::rotations::rotations;
+use super::smoothing::Smoothing;
 use crate::motion::bvh_write::Clip;
+use crate::motion::jerk;
+use crate::motion::rotation::Rotation;
 use crate::types::pose3d::Motion;
-use crate::types::skeleton::N_JOINTS;
+use crate::types::skeleton::{L_HAND, L_SHOULDER, N_JOINTS, NECK, R_HAND, R_SHOULDER};
 use crate::types::time::FrameRate;
-use ndarray::Array3;
+use ndarray::{Array2, Array3};
 use serde::Serialize;
 
 /// How motion becomes an animation; the default is what a user wants.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Options {
+    pub smoothing: Smoothing,
+    pub constraints: Constraints,
+    pub yaw: Yaw,
     /// Frames a second of what is written; `None`: those of the motion.
     pub fps: Option<FrameRate>,
 }
 
-/// Keypoints of the speaker's body in the picture, from which the head is turned: COCO's 17 points, frame by frame
-/// those of the motion.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Face {
-    /// [T, 17, 3]: x px, y px, score.
-    pub body: Array3<f32>,
+/// What becomes of the turn of the shoulders about the vertical.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Yaw {
+    /// Spine and chest turn.
+    #[default]
+    Spine,
+    /// The figure always faces +z.
+    Removed,
 }
 
 /// What was done to the motion.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Told {}
+pub struct Told {
+    pub n_frames: usize,
+    /// Jerk at the motion's own rate, over the frames that were seen.
+    pub arms: Jerk,
+    /// That of fingers about their wrist.
+    pub hands: Jerk,
+    /// Clamps by kind, counted at the motion's own rate.
+    pub clamps: Vec<Clamps>,
+    /// Frames in which the face was seen; `None` without keypoints of it.
+    pub face_frames: Option<usize>,
+}
+
+/// Mean norm of the third derivative, m/s^3; `None` where no four frames in a row are seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Jerk {
+    pub before: Option<f64>,
+    pub after: Option<f64>,
+}
 
 /// A motion on its figure.
 #[derive(Clone, Debug)]
@@ -38,27 +66,70 @@ pub struct Performance {
 }
 
 /// Puts a motion on the figure of its own bone lengths; with a `face` the head turns.
-pub fn perform(motion: &Motion, _face: Option<&Face>, options: &Options) -> Performance {
+pub fn perform(motion: &Motion, face: Option<&Face>, options: &Options) -> Performance {
     let figure = Figure::of(motion);
-    let local = rotations(motion, &figure);
-    let clip = Clip { root: figure.root, skeleton: figure.skeleton.clone(), fps: motion.fps, local };
-    let clip = options.fps.map_or_else(|| clip.clone(), |fps| clip.resampled(fps));
-    Performance { figure, clip, told: Told::default() }
+    let means = Means {
+        fps: motion.fps.per_sec(),
+        arms: options.smoothing.arms(motion.fps),
+        hands: options.smoothing.hands(motion.fps),
+    };
+    let mut tracks = rotations(motion, &figure, &means);
+    let face_frames = face.map(|face| head::turn(face, &figure, &means, &mut tracks));
+    if options.yaw == Yaw::Removed {
+        for joint in [figure.spine, figure.chest] {
+            tracks[joint].fill(Rotation::IDENTITY);
+        }
+    }
+    let local = (0..motion.n_frames()).map(|t| tracks.iter().map(|track| track[t]).collect()).collect();
+    let free = Clip { root: figure.root, skeleton: figure.skeleton.clone(), fps: motion.fps, local };
+
+    let constrained = |mut clip: Clip| {
+        let mut tally = Tally::default();
+        clip.local.iter_mut().for_each(|frame| options.constraints.apply(&figure, frame, &mut tally));
+        (clip, tally)
+    };
+    // Between frames first, limits then: so they hold in every frame that is written.
+    let resampled = options.fps.filter(|&fps| fps != motion.fps).map(|fps| constrained(free.resampled(fps)).0);
+    let (clip, tally) = constrained(free);
+    let after = joints(&figure, &clip);
+    let jerk = |joints: &[(usize, usize)]| {
+        let of = |places: &Array3<f32>| jerk::mean(places.view(), seen(motion).view(), motion.fps.per_sec(), joints);
+        Jerk { before: of(&motion.joints), after: of(&after) }
+    };
+    let arms = [R_SHOULDER, L_SHOULDER].into_iter().flat_map(|shoulder| (shoulder..shoulder + 3).map(|j| (j, NECK)));
+    let hands = [R_HAND, L_HAND].into_iter().flat_map(|root| (root + 1..root + 21).map(move |j| (j, root)));
+    let told = Told {
+        n_frames: motion.n_frames(),
+        arms: jerk(&arms.collect::<Vec<_>>()),
+        hands: jerk(&hands.collect::<Vec<_>>()),
+        clamps: if options.constraints == Constraints::NONE { Vec::new() } else { tally.clamps() },
+        face_frames,
+    };
+    Performance { clip: resampled.unwrap_or(clip), figure, told }
 }
 
 impl Performance {
     /// The joints [T, 49, 3] of the figure (metres, house axes, the neck at the origin) at the clip's rate.
     pub fn motion(&self) -> Motion {
-        let mut joints = Array3::zeros((self.clip.n_frames(), N_JOINTS, 3));
-        for (frame_idx, mut frame) in joints.outer_iter_mut().enumerate() {
-            let places = self.clip.positions(frame_idx);
-            let neck = places[self.figure.places[0]];
-            for (joint, &place) in self.figure.places.iter().enumerate() {
-                for (axis, sign) in [1.0, -1.0, -1.0].into_iter().enumerate() {
-                    frame[[joint, axis]] = (sign * (places[place][axis] - neck[axis]) / 100.0) as f32;
-                }
+        Motion::from_joints(self.clip.fps, joints(&self.figure, &self.clip))
+    }
+}
+
+fn joints(figure: &Figure, clip: &Clip) -> Array3<f32> {
+    let mut joints = Array3::zeros((clip.n_frames(), N_JOINTS, 3));
+    for (frame_idx, mut frame) in joints.outer_iter_mut().enumerate() {
+        let places = clip.positions(frame_idx);
+        let neck = places[figure.places[NECK]];
+        for (joint, &place) in figure.places.iter().enumerate() {
+            for (axis, sign) in [1.0, -1.0, -1.0].into_iter().enumerate() {
+                frame[[joint, axis]] = (sign * (places[place][axis] - neck[axis]) / 100.0) as f32;
             }
         }
-        Motion::from_joints(self.clip.fps, joints)
     }
+    joints
+}
+
+/// [T, 49]: where there are numbers, seen or filled.
+fn seen(motion: &Motion) -> Array2<bool> {
+    motion.joints.map_axis(ndarray::Axis(2), |place| place.iter().all(|v| v.is_finite()))
 }

@@ -31,15 +31,18 @@ impl Clip {
         self.skeleton.positions(self.root, &self.local[frame_idx])
     }
 
-    /// The same motion at another rate: rotations are interpolated along the shortest way, the last frame is held.
+    /// The same motion at another rate: through the given frames, its speed without a jump at them; the last frame is
+    /// held.
     pub fn resampled(&self, fps: FrameRate) -> Self {
         let n_frames = if self.local.is_empty() { 0 } else { fps.frames_in(self.fps.secs(self.n_frames())) };
+        let last = self.n_frames().saturating_sub(1);
         let local = (0..n_frames).map(|frame| {
-            let at = fps.secs(frame) * self.fps.per_sec();
-            let before = (at.floor() as usize).min(self.n_frames() - 1);
-            let after = (before + 1).min(self.n_frames() - 1);
-            let share = (at - before as f64).clamp(0.0, 1.0);
-            self.local[before].iter().zip(&self.local[after]).map(|(a, &b)| a.slerp(b, share)).collect()
+            let at = (fps.secs(frame) * self.fps.per_sec()).min(last as f64);
+            let before = at.floor() as usize;
+            let near = [before.saturating_sub(1), before, (before + 1).min(last), (before + 2).min(last)];
+            let share = at - before as f64;
+            let between = |joint: usize| Rotation::cubic(near.map(|t| self.local[t][joint]), share);
+            (0..self.skeleton.joints.len()).map(between).collect()
         });
         Self { local: local.collect(), fps, skeleton: self.skeleton.clone(), root: self.root }
     }
@@ -142,12 +145,20 @@ mod tests {
     }
 
     #[test]
-    fn resampling_keeps_the_time_and_turns_evenly() {
-        let twice = clip().resampled(FrameRate::new(30, 1));
-        assert_eq!(twice.n_frames(), 4);
+    fn resampling_keeps_the_time_and_passes_through_the_frames() {
+        let mut given = clip();
+        let turns = [0.0, 30.0, 60.0, 90.0].map(|degrees: f64| {
+            vec![Rotation::about([0.0, 0.0, 1.0], degrees.to_radians()); given.skeleton.joints.len()]
+        });
+        given.local = turns.to_vec();
+        let twice = given.resampled(FrameRate::new(30, 1));
         let degrees: Vec<f64> = twice.local.iter().map(|frame| frame[1].angle().to_degrees()).collect();
-        for (found, expected) in degrees.iter().zip([0.0, 15.0, 30.0, 30.0]) {
-            assert!((found - expected).abs() < 1e-9);
+        assert_eq!(degrees.len(), 8);
+        for (n, expected) in [(0, 0.0), (2, 30.0), (3, 45.0), (4, 60.0), (6, 90.0), (7, 90.0)] {
+            assert!((degrees[n] - expected).abs() < 1e-9, "{degrees:?}");
         }
+        assert!(degrees[1] > 8.0 && degrees[1] < 15.0 && degrees[5] > 75.0, "{degrees:?}");
+        given.local.clear();
+        assert_eq!(given.resampled(FrameRate::new(30, 1)).n_frames(), 0);
     }
 }

@@ -73,6 +73,11 @@ impl Rotation {
         Self { w: self.w, v: scale(self.v, -1.0) }
     }
 
+    /// The same rotation seen in a mirror that turns x round.
+    pub fn mirrored(self) -> Self {
+        Self { w: self.w, v: [self.v[0], -self.v[1], -self.v[2]] }
+    }
+
     /// The angle of the rotation, 0..=pi.
     pub fn angle(self) -> f64 {
         2.0 * norm(self.v).atan2(self.w.abs())
@@ -97,12 +102,36 @@ impl Rotation {
     /// The share `t` (0..=1) of the shortest way from `self` to `to`.
     pub fn slerp(self, to: Self, t: f64) -> Self {
         let turn = self.inverse() * to;
-        let turn = if turn.w < 0.0 { Self { w: -turn.w, v: scale(turn.v, -1.0) } } else { turn };
+        let turn = if turn.w < 0.0 { turn.opposite() } else { turn };
         let sin = norm(turn.v);
         if sin < 1e-12 {
             return self;
         }
         (self * Self::about(scale(turn.v, 1.0 / sin), 2.0 * sin.atan2(turn.w) * t)).normalised()
+    }
+
+    /// The share `t` (0..=1) of the way from the second of four rotations, evenly spaced in time, to the third: the cubic
+    /// with the speed of the neighbours' chord at both (Catmull and Rom), laid through their quaternions and made a unit
+    /// one again. Piece after piece it has no corner.
+    pub fn cubic(near: [Self; 4], t: f64) -> Self {
+        let turned = |to: Self, from: Self| if to.w * from.w + dot(to.v, from.v) < 0.0 { to.opposite() } else { to };
+        let [before, from, to, after] = near;
+        let to = turned(to, from);
+        let (before, after) = (turned(before, from), turned(after, to));
+        let (t2, t3) = (t * t, t * t * t);
+        let shares =
+            [-t / 2.0 + t2 - t3 / 2.0, 1.0 - 2.5 * t2 + 1.5 * t3, t / 2.0 + 2.0 * t2 - 1.5 * t3, (t3 - t2) / 2.0];
+        let quaternions = [before, from, to, after];
+        let sum = quaternions.iter().zip(shares).fold(Self { w: 0.0, v: [0.0; 3] }, |sum, (q, share)| Self {
+            w: sum.w + share * q.w,
+            v: add(sum.v, scale(q.v, share)),
+        });
+        if sum.w.hypot(norm(sum.v)) > 1e-9 { sum.normalised() } else { from }
+    }
+
+    /// The same rotation by the other of its two quaternions.
+    fn opposite(self) -> Self {
+        Self { w: -self.w, v: scale(self.v, -1.0) }
     }
 
     /// Degrees about Z, X and Y such that `self = Rz * Rx * Ry` (BVH channels `Zrotation Xrotation Yrotation`);

@@ -8,6 +8,7 @@ use crate::networks::value;
 use candle_core::{Device, Tensor};
 use ndarray::{Axis, s};
 use orator::animate::figure::bone_metres;
+use orator::animate::{Options, perform};
 use orator::audio::mel;
 use orator::generate::Speaker;
 use orator::media::{audio, probe};
@@ -64,7 +65,8 @@ fn one_sound_becomes_every_kind_of_file() {
     let motion = npy::read(&made.join("a.npy"), FPS).unwrap();
     assert_eq!(authors_txt::read(&made.join("a.txt"), FPS).unwrap(), motion);
     let bvh = Bvh::parse(&std::fs::read_to_string(made.join("a.bvh")).unwrap());
-    let worst = worst_mm(&motion, &bvh, |frame| bvh.places(frame));
+    let performed = perform(&motion, None, &Options::default()).motion();
+    let worst = worst_mm(&performed, &bvh, |frame| bvh.places(frame));
     assert!(worst < 0.1, "{worst} mm");
     let film = probe::probe(&made.join("a.mp4")).unwrap();
     assert!((film.duration_secs.unwrap() - 2.05).abs() < 0.1);

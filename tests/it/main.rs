@@ -1,5 +1,6 @@
 //! The integration tests: one binary, a module a concern.
 
+mod animate;
 mod bad_input;
 mod blender;
 mod browser;
