@@ -2,3 +2,5 @@
 
 pub mod fingerprint;
 pub mod mel;
+pub mod mfcc;
+pub mod onset;

@@ -1,34 +1,23 @@
 //! Which numbers there are, under which convention, and the two steps to each: measure every interval (sums that add),
 //! then read the values off any sum of intervals. A metric's own arithmetic is in its own file.
 
+use super::convention;
 use super::definition::Metric;
 use super::interval::Pair;
-use super::part::Part;
-use super::pck::Axes;
-use super::{l1, mpjpe, pck, sums};
+use super::sums::{self, Blocks, Costly};
 use crate::types::time::FrameRate;
 use anyhow::ensure;
 use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
+pub use super::convention::Convention;
 pub use super::definition::{Better, Definition};
 pub use super::interval::Interval;
 pub use super::sums::Sums;
 
-/// Whose definitions.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Convention {
-    /// This project's own.
-    #[default]
-    Orator,
-    Speech2gesture,
-    Genea,
-    Emage,
-    Trimodal,
-    Aist,
-}
+/// Numbers that stand before the cheap sums: made joints that are not finite, frames of another rate.
+const N_FACTS: usize = 2;
 
 /// What the numbers are set to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -52,7 +41,16 @@ impl Default for Settings {
 pub struct Catalogue {
     metrics: Vec<Box<dyn Metric>>,
     definitions: Vec<Definition>,
+    /// How many definitions each metric has.
+    n_values: Vec<usize>,
     fps: FrameRate,
+}
+
+/// One interval, whole and in blocks.
+#[derive(Clone, Debug, Default)]
+pub struct Measured {
+    pub whole: Sums,
+    pub blocks: Vec<Sums>,
 }
 
 impl Catalogue {
@@ -64,13 +62,15 @@ impl Catalogue {
                 "alpha of PCK is {alpha}, expected a number above 0, such as 0.2"
             );
         }
-        let metrics = metrics(settings);
-        let mut definitions: Vec<_> = metrics.iter().flat_map(|metric| metric.definitions()).collect();
+        let metrics = convention::metrics(settings);
+        let of_each: Vec<_> = metrics.iter().map(|metric| metric.definitions()).collect();
+        let n_values = of_each.iter().map(Vec::len).collect();
+        let mut definitions = of_each.concat();
         for definition in &mut definitions {
             definition.parameters["convention"] = serde_json::to_value(settings.convention)?;
             definition.parameters["fps"] = settings.fps.per_sec().into();
         }
-        Ok(Self { metrics, definitions, fps: settings.fps })
+        Ok(Self { metrics, definitions, n_values, fps: settings.fps })
     }
 
     /// What `values` gives, in order.
@@ -80,7 +80,9 @@ impl Catalogue {
 
     /// Whether definition `index` is of those for which few draws are taken.
     pub fn is_costly(&self, index: usize) -> bool {
-        self.costly().get(index).copied().unwrap_or(false)
+        let mut of_each =
+            self.metrics.iter().zip(&self.n_values).flat_map(|(metric, n)| std::iter::repeat_n(metric, *n));
+        of_each.nth(index).is_some_and(|metric| metric.is_costly())
     }
 
     /// For a figure that should be near the real motion's: the index of that figure of the real motion.
@@ -93,19 +95,41 @@ impl Catalogue {
     /// The sums of one interval. Frames beyond the shortest of its arrays are not looked at. An interval of another
     /// frame rate than the settings' makes every value NaN.
     pub fn measure(&self, interval: &Interval) -> Sums {
+        self.measure_blocks(interval, usize::MAX).whole
+    }
+
+    /// The same, and as blocks of about `n_frames` frames: what begins in a block is counted there, whatever it reaches
+    /// into, so that the blocks add up to the whole and no value depends on how long they are.
+    pub fn measure_blocks(&self, interval: &Interval, n_frames: usize) -> Measured {
         let pair = Pair::new(interval);
-        let mut sums = Sums { cheap: vec![pair.n_broken() as f64, pair.n_frames() as f64], costly: Vec::new() };
-        for metric in &self.metrics {
-            let mut own = vec![if interval.fps == self.fps { 0.0 } else { f64::NAN }; metric.n_sums()];
-            metric.measure(&pair, &mut own);
-            if metric.is_costly() { &mut sums.costly } else { &mut sums.cheap }.append(&mut own);
+        let n = ((pair.n_frames() as f64 / n_frames.max(1) as f64).round() as usize).max(1);
+        let mut facts = Blocks::new(n, N_FACTS, pair.n_frames(), 0.0);
+        let other_rate = interval.fps != self.fps;
+        for t in 0..pair.n_frames() {
+            facts.at(t)[0] += pair.n_broken(t) as f64;
+            facts.at(t)[1] += f64::from(u8::from(other_rate));
         }
-        sums
+        let start = if other_rate { f64::NAN } else { 0.0 };
+        let (mut cheap, mut costly) = (vec![facts], Vec::new());
+        for metric in &self.metrics {
+            let mut blocks = Blocks::new(n, metric.n_sums(), pair.n_frames(), start);
+            metric.measure(&pair, &mut blocks);
+            if metric.is_costly() { &mut costly } else { &mut cheap }.push(blocks);
+        }
+        let row = |all: &mut [Blocks], block| all.iter_mut().flat_map(|blocks| blocks.row(block).to_vec()).collect();
+        let mut measured = Measured::default();
+        for block in 0..n {
+            let (cheap, costly): (Vec<f64>, Vec<f64>) = (row(&mut cheap, block), row(&mut costly, block));
+            let short = Costly::Block(costly.iter().map(|v| *v as f32).collect());
+            measured.whole += &Sums { cheap: cheap.clone(), costly: Costly::Added(costly) };
+            measured.blocks.push(Sums { cheap, costly: short });
+        }
+        measured
     }
 
     /// One value a definition; NaN where undefined.
     pub fn values(&self, sums: &Sums) -> Vec<f64> {
-        self.read(Some(&sums.cheap), Some(&sums.costly))
+        self.read(Some(&sums.cheap), Some(&sums.costly.row()))
     }
 
     /// The same, with NaN in place of every costly value.
@@ -115,7 +139,7 @@ impl Catalogue {
 
     /// The same, with NaN in place of every value that is not costly.
     pub fn costly_values(&self, sums: &Sums) -> Vec<f64> {
-        self.read(None, Some(&sums.costly))
+        self.read(None, Some(&sums.costly.row()))
     }
 
     /// Values [n_draws, n_definitions] of draws of blocks with replacement, NaN in place of costly ones. `counts`
@@ -133,12 +157,15 @@ impl Catalogue {
 
     /// Why value `index` of these sums is NaN.
     pub fn reason(&self, sums: &Sums, index: usize) -> String {
-        match sums.cheap.first() {
-            Some(n_broken) if *n_broken > 0.0 => {
+        match sums.cheap.get(..N_FACTS) {
+            None => "nothing was measured".to_owned(),
+            Some([_, n_other]) if *n_other > 0.0 => {
+                format!("{n_other} frames are of another frame rate than {}", self.fps.per_sec())
+            }
+            Some([n_broken, _]) if *n_broken > 0.0 => {
                 format!("{n_broken} joints of the made motion are not finite where the real ones are seen")
             }
             Some(_) => self.definitions.get(index).map_or("", |definition| definition.undefined).to_owned(),
-            None => "nothing was measured".to_owned(),
         }
     }
 
@@ -149,35 +176,19 @@ impl Catalogue {
     }
 
     fn read(&self, cheap: Option<&[f64]>, costly: Option<&[f64]>) -> Vec<f64> {
-        let (mut at_cheap, mut at_costly) = (2, 0);
+        let (mut at_cheap, mut at_costly) = (N_FACTS, 0);
         let mut values = Vec::with_capacity(self.definitions.len());
-        for metric in &self.metrics {
+        for (metric, n) in self.metrics.iter().zip(&self.n_values) {
             let (row, at) = if metric.is_costly() { (costly, &mut at_costly) } else { (cheap, &mut at_cheap) };
             let own = row.and_then(|row| row.get(*at..*at + metric.n_sums()));
             *at += metric.n_sums();
             match own {
                 Some(own) => values.extend(metric.values(own)),
-                None => values.extend(metric.definitions().iter().map(|_| f64::NAN)),
+                None => values.extend(std::iter::repeat_n(f64::NAN, *n)),
             }
         }
         values
     }
-
-    fn costly(&self) -> Vec<bool> {
-        self.metrics.iter().flat_map(|metric| metric.definitions().into_iter().map(|_| metric.is_costly())).collect()
-    }
-}
-
-fn metrics(settings: &Settings) -> Vec<Box<dyn Metric>> {
-    let mut all: Vec<Box<dyn Metric>> =
-        vec![pck::metric(&[Axes::Xyz, Axes::Xy], &[Part::All, Part::Body, Part::Hands], &settings.alphas)];
-    let mut parts = vec![Part::All, Part::Body, Part::Hands, Part::Wrists, Part::FingersFromWrist];
-    if settings.with_neck {
-        parts.push(Part::WithNeck);
-    }
-    all.extend(parts.iter().map(|part| l1::metric(*part)));
-    all.extend(parts.iter().map(|part| mpjpe::metric(*part)));
-    all
 }
 
 #[cfg(test)]
@@ -205,6 +216,54 @@ mod tests {
             fps: FrameRate::new(15, 1),
             onsets: Some(&[0.3, 1.7, 2.5]),
         })
+    }
+
+    /// As in the reference script.
+    fn moving(made: bool) -> Array3<f32> {
+        let kind = f64::from(u8::from(made));
+        Array3::from_shape_fn((90, N_JOINTS, 3), |(t, joint, k)| {
+            if joint == 0 {
+                return 0.0;
+            }
+            let hash = ((joint * 7919 + k * 104_729) % 1009) as f64 / 1009.0;
+            let (t, phase) = (t as f64, (joint + k) as f64);
+            let place = hash - 0.5
+                + 0.08 * (t * (0.07 + 0.05 * hash + 0.01 * kind) + 6.0 * hash).sin()
+                + 0.02 * (0.9 * t + joint as f64).sin();
+            (if made { 1.1 * place + 0.03 * (0.4 * t + phase).cos() } else { place }) as f32
+        })
+    }
+
+    #[test]
+    fn figures_are_those_of_the_reference_script() {
+        let golden: serde_json::Value =
+            serde_json::from_str(include_str!("../../fixtures/reference/metrics_golden.json")).unwrap();
+        let onsets: Vec<f64> = serde_json::from_value(golden["motion"]["onsets"].clone()).unwrap();
+        let (made, real) = (moving(true), moving(false));
+        let mask = Array2::from_elem((90, N_JOINTS), true);
+        for convention in Convention::ALL {
+            let known = &golden["motion"]["known"];
+            let known = if convention == Convention::Orator { known } else { &known[convention.name()] };
+            let catalogue = Catalogue::new(&Settings { convention, ..Settings::default() }).unwrap();
+            let fps = FrameRate::new(15, 1);
+            let (made, real) = (made.view(), real.view());
+            let interval = Interval { made, real, mask: mask.view(), fps, onsets: Some(&onsets) };
+            let measured = catalogue.measure_blocks(&interval, 20);
+            let mut added = Sums::default();
+            measured.blocks.iter().for_each(|block| added += block);
+            let values = catalogue.values(&measured.whole);
+            for (label, known) in known.as_object().into_iter().flatten().filter(|(_, v)| v.is_number()) {
+                let label_of = |d: &Definition| format!("{} {}", d.name, d.part);
+                let i = catalogue.definitions().iter().position(|d| label_of(d) == *label).expect(label);
+                let (found, known) = (values[i], known.as_f64().unwrap());
+                assert!((found - known).abs() < 1e-5 * known, "{convention:?} {label}: {found}, known {known}");
+            }
+            for ((whole, added), definition) in values.iter().zip(catalogue.values(&added)).zip(catalogue.definitions())
+            {
+                let same = (whole - added).abs() <= 1e-3 * whole.abs() || (whole.is_nan() && added.is_nan());
+                assert!(same, "{}: {whole} {added}", definition.label());
+            }
+        }
     }
 
     /// The same number, or both not one.

@@ -2,6 +2,7 @@
 //! Values under different hashes are different things. And what every metric is: sums that add, and numbers from them.
 
 use super::interval::Pair;
+use super::sums::Blocks;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -81,8 +82,9 @@ pub(super) trait Metric: Send + Sync {
     fn definitions(&self) -> Vec<Definition>;
     /// How many sums it takes.
     fn n_sums(&self) -> usize;
-    /// Adds one interval to the sums, `n_sums` numbers that start at 0.
-    fn measure(&self, pair: &Pair, sums: &mut [f64]);
+    /// Adds one interval to the sums, `n_sums` numbers in each block that start at 0. What belongs to several frames
+    /// goes to the block of the first.
+    fn measure(&self, pair: &Pair, blocks: &mut Blocks);
     /// The numbers from added sums; NaN where undefined.
     fn values(&self, sums: &[f64]) -> Vec<f64>;
     /// Whether the sums are large and the numbers slow (matrices): fewer draws.

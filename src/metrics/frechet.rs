@@ -76,17 +76,22 @@ impl AddAssign<&Self> for Gaussian {
     }
 }
 
-/// `|m1 - m2|^2 + tr(C1 + C2 - 2 sqrt(C1 C2))`, at least 0; for poses in square centimetres. The trace of the root is the sum of
-/// the roots of the eigenvalues of `fᵀ C2 f` with `C1 = f fᵀ`, which are those of `C1 C2`: no matrix is inverted, and
-/// fewer rows than numbers are no hindrance. NaN where a number is, or where either set is empty.
+/// `|m1 - m2|^2 + tr(C1 + C2 - 2 sqrt(C1 C2))`, at least 0; for poses in square centimetres. NaN where a number is, or
+/// where either set is empty.
 pub fn frechet(a: &Gaussian, b: &Gaussian) -> f64 {
     if a.n == 0 || b.n == 0 {
         return f64::NAN;
     }
-    let apart = &a.mean - &b.mean;
-    let (of_a, of_b) = (a.covariance(), b.covariance());
-    let factor = spectrum::factor(&of_a);
-    let eigenvalues = spectrum::eigenvalues(factor.t().dot(&of_b).dot(&factor));
+    between((&a.mean, &a.covariance()), (&b.mean, &b.covariance()))
+}
+
+/// The same of means and covariances. The trace of the root is the sum of the roots of the eigenvalues of `fᵀ C2 f` with
+/// `C1 = f fᵀ`, which are those of `C1 C2`: no matrix is inverted, and fewer rows than numbers are no hindrance.
+pub fn between(a: (&Array1<f64>, &Array2<f64>), b: (&Array1<f64>, &Array2<f64>)) -> f64 {
+    let ((mean_a, of_a), (mean_b, of_b)) = (a, b);
+    let apart = mean_a - mean_b;
+    let factor = spectrum::factor(of_a);
+    let eigenvalues = spectrum::eigenvalues(factor.t().dot(of_b).dot(&factor));
     // what is below 0 is rounding
     let root: f64 = eigenvalues.iter().map(|value| value.max(0.0).sqrt()).sum();
     let distance = apart.dot(&apart) + of_a.diag().sum() + of_b.diag().sum() - 2.0 * root;

@@ -23,18 +23,17 @@ pub struct Interval<'a> {
 pub(super) type Point = [f64; 3];
 
 /// The same in the form metrics compute with: as many frames as all of it has.
-pub(super) struct Pair {
+pub(super) struct Pair<'a> {
+    pub interval: Interval<'a>,
     pub made: Vec<[Point; N_JOINTS]>,
     pub real: Vec<[Point; N_JOINTS]>,
     pub seen: Vec<[bool; N_JOINTS]>,
     /// Frames a second.
     pub fps: f64,
-    #[allow(dead_code)]
-    pub onsets: Option<Vec<f64>>,
 }
 
-impl Pair {
-    pub fn new(interval: &Interval) -> Self {
+impl<'a> Pair<'a> {
+    pub fn new(interval: &Interval<'a>) -> Self {
         let frames = |joints: &ArrayView3<f32>| {
             let n_joints = joints.shape()[1];
             let pose = |t: usize| {
@@ -55,7 +54,7 @@ impl Pair {
             })
         };
         let seen = (0..n).map(seen).collect();
-        Self { made, real, seen, fps: interval.fps.per_sec(), onsets: interval.onsets.map(<[f64]>::to_vec) }
+        Self { interval: *interval, made, real, seen, fps: interval.fps.per_sec() }
     }
 
     pub fn n_frames(&self) -> usize {
@@ -67,11 +66,9 @@ impl Pair {
         self.seen.get(t..t + n).is_some_and(|frames| frames.iter().all(|seen| seen[joint]))
     }
 
-    /// How many seen joints of the made motion are not finite.
-    pub fn n_broken(&self) -> usize {
-        let broken = |(pose, seen): (&[Point; N_JOINTS], &[bool; N_JOINTS])| {
-            pose.iter().zip(seen).filter(|(p, seen)| **seen && p.iter().any(|v| !v.is_finite())).count()
-        };
-        self.made.iter().zip(&self.seen).map(broken).sum()
+    /// How many seen joints of the made motion are not finite in frame `t`.
+    pub fn n_broken(&self, t: usize) -> usize {
+        let joints = self.made[t].iter().zip(&self.seen[t]);
+        joints.filter(|(p, seen)| **seen && p.iter().any(|v| !v.is_finite())).count()
     }
 }

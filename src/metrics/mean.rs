@@ -4,6 +4,8 @@
 use super::definition::{Definition, Metric};
 use super::interval::{Pair, Point};
 use super::part::{From, Part};
+use super::sums::Blocks;
+use crate::types::skeleton::N_JOINTS;
 
 /// Mean over frames and points.
 pub(super) struct Mean {
@@ -16,23 +18,23 @@ pub(super) struct Mean {
 
 /// What such a number is computed from: one point in a few frames in a row, all of them seen.
 pub(super) struct Window<'a> {
-    pair: &'a Pair,
+    made: &'a [[Point; N_JOINTS]],
+    real: &'a [[Point; N_JOINTS]],
     t: usize,
     point: From,
     /// Frames a second.
-    #[allow(dead_code)]
     pub fps: f64,
 }
 
 impl Window<'_> {
     /// Where the made point is in frame `k` of the window.
     pub fn made(&self, k: usize) -> Point {
-        self.at(&self.pair.made, k)
+        self.at(self.made, k)
     }
 
     /// Where the real point is in frame `k` of the window.
     pub fn real(&self, k: usize) -> Point {
-        self.at(&self.pair.real, k)
+        self.at(self.real, k)
     }
 
     /// Made less real.
@@ -40,7 +42,7 @@ impl Window<'_> {
         less(self.made(k), self.real(k))
     }
 
-    fn at(&self, poses: &[[Point; crate::types::skeleton::N_JOINTS]], k: usize) -> Point {
+    fn at(&self, poses: &[[Point; N_JOINTS]], k: usize) -> Point {
         let pose = &poses[self.t + k];
         match self.point.origin {
             Some(origin) => less(pose[self.point.joint], pose[origin]),
@@ -73,12 +75,13 @@ impl Metric for Mean {
         2
     }
 
-    fn measure(&self, pair: &Pair, sums: &mut [f64]) {
+    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
         for t in 0..(pair.n_frames() + 1).saturating_sub(self.n_frames) {
+            let sums = blocks.at(t);
             for &point in &self.points {
                 let seen = |joint| pair.sees(t, self.n_frames, joint);
                 if seen(point.joint) && point.origin.is_none_or(seen) {
-                    sums[0] += (self.of)(&Window { pair, t, point, fps: pair.fps });
+                    sums[0] += (self.of)(&Window { made: &pair.made, real: &pair.real, t, point, fps: pair.fps });
                     sums[1] += 1.0;
                 }
             }

@@ -5,6 +5,7 @@
 use super::definition::{Better, Definition, Metric};
 use super::interval::{Pair, Point};
 use super::part::Part;
+use super::sums::Blocks;
 use crate::types::skeleton::{L_WRIST, N_JOINTS, NECK, R_SHOULDER, is_duplicate};
 use ndarray::{ArrayView2, ArrayView3};
 use serde::{Deserialize, Serialize};
@@ -57,6 +58,10 @@ impl Count {
 struct Pck {
     /// One a share.
     figures: Vec<(Axes, Part, f64)>,
+    /// Whether the box is around the neck as well.
+    neck_in_box: bool,
+    /// The speech2gesture convention: every frame weighs the same, however many joints are seen.
+    by_frame: bool,
 }
 
 /// For each of `axes`, each alpha and each of `parts` one share.
@@ -67,17 +72,43 @@ pub(super) fn metric(axes: &[Axes], parts: &[Part], alphas: &[f64]) -> Box<dyn M
             figures.extend(parts.iter().map(|part| (*axes, *part, *alpha)));
         }
     }
-    Box::new(Pck { figures })
+    Box::new(Pck { figures, neck_in_box: false, by_frame: false })
+}
+
+/// As speech2gesture counts (`common/evaluation.py` of its repository).
+pub(super) fn by_frame(alphas: &[f64]) -> Box<dyn Metric> {
+    let figures = alphas.iter().map(|alpha| (Axes::Xy, Part::All, *alpha)).collect();
+    Box::new(Pck { figures, neck_in_box: false, by_frame: true })
+}
+
+/// In space, of all joints, with the neck in the box.
+pub(super) fn neck_in_box(alphas: &[f64]) -> Box<dyn Metric> {
+    let figures = alphas.iter().map(|alpha| (Axes::Xyz, Part::All, *alpha)).collect();
+    Box::new(Pck { figures, neck_in_box: true, by_frame: false })
 }
 
 impl Metric for Pck {
     fn definitions(&self) -> Vec<Definition> {
         let definition = |(axes, part, alpha): &(Axes, Part, f64)| Definition {
-            name: if *axes == Axes::Xyz { "pck_3d" } else { "pck_2d" },
+            name: match axes {
+                Axes::Xyz if self.neck_in_box => "pck_3d_neck_in_box",
+                Axes::Xyz => "pck_3d",
+                Axes::Xy => "pck_2d",
+            },
             part: part.name(),
             unit: "1",
             better: Better::Higher,
             formula: match axes {
+                Axes::Xy if self.by_frame => {
+                    "mean over frames of the share of the 48 joints without the neck with |p - g| <= alpha * max(width, \
+                     height) of the box around those of g in the frame; x and y alone; metres, not scaled to another \
+                     speaker (a scale cancels); not seen joints left out"
+                }
+                Axes::Xyz if self.neck_in_box => {
+                    "share of all seen joints of the part in all frames with |p - g| <= alpha * the largest of the sides \
+                     x, y, z of the box around all seen joints of g in the frame, the neck among them; a made joint that \
+                     is not finite is wrong"
+                }
                 Axes::Xyz => {
                     "share of all seen joints of the part in all frames with |p - g| <= alpha * the largest of the sides \
                      x, y, z of the box around all seen joints of g in the frame but the neck, whatever the part; a made \
@@ -99,15 +130,19 @@ impl Metric for Pck {
         2 * self.figures.len()
     }
 
-    fn measure(&self, pair: &Pair, sums: &mut [f64]) {
+    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
         let figures: Vec<_> = self.figures.iter().map(|(axes, part, alpha)| (*axes, part.joints(), *alpha)).collect();
         for t in 0..pair.n_frames() {
             let (made, real, seen) = (&pair.made[t], &pair.real[t], &pair.seen[t]);
-            for (row, (axes, joints, alpha)) in sums.chunks_exact_mut(2).zip(&figures) {
-                let radius = alpha * extent(*axes, real, seen);
+            for (row, (axes, joints, alpha)) in blocks.at(t).chunks_exact_mut(2).zip(&figures) {
+                let from = if self.neck_in_box { NECK } else { NECK + 1 };
+                let radius = alpha * extent(*axes, real, seen, from);
+                let n_seen = joints.iter().filter(|joint| seen[**joint]).count();
+                let weight = if self.by_frame { 1.0 / n_seen as f64 } else { 1.0 };
                 for &joint in joints.iter().filter(|joint| seen[**joint]) {
-                    row[0] += f64::from(u8::from(distance(*axes, &made[joint], &real[joint]) <= radius));
-                    row[1] += 1.0;
+                    let correct = distance(*axes, &made[joint], &real[joint]) <= radius;
+                    row[0] += if correct { weight } else { 0.0 };
+                    row[1] += weight;
                 }
             }
         }
@@ -127,10 +162,10 @@ impl Axes {
     }
 }
 
-/// Largest side of the box around the seen joints but the neck.
-fn extent(axes: Axes, pose: &[Point; N_JOINTS], seen: &[bool; N_JOINTS]) -> f64 {
+/// Largest side of the box around the seen joints, those before `from` left out.
+fn extent(axes: Axes, pose: &[Point; N_JOINTS], seen: &[bool; N_JOINTS], from: usize) -> f64 {
     let side = |k: usize| {
-        let values = (NECK + 1..N_JOINTS).filter(|joint| seen[*joint]).map(|joint| pose[joint][k]);
+        let values = (from..N_JOINTS).filter(|joint| seen[*joint]).map(|joint| pose[joint][k]);
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
         high - low
     };

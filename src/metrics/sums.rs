@@ -1,70 +1,147 @@
 //! All sums of some intervals: two rows of numbers, so that resampling intervals with replacement is adding rows.
 
 use ndarray::{Array2, ArrayView2, Axis, s};
+use rayon::prelude::*;
 use std::ops::{AddAssign, Range};
 
-/// What one interval, or many added, come to. `Default` is nothing. Costly sums stand apart, since they are large and
-/// fewer draws are taken of them.
+/// What one interval, or many added, come to. `Default` is nothing. Costly sums (packed matrices) stand apart, since
+/// they are large and fewer draws are taken of them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sums {
     pub(super) cheap: Vec<f64>,
-    pub(super) costly: Vec<f64>,
+    pub(super) costly: Costly,
+}
+
+/// Large sums: of one block in f32 (half the memory; the rounding of 6e-8 is nothing beside drawing blocks), of
+/// anything added in f64.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Costly {
+    Block(Vec<f32>),
+    Added(Vec<f64>),
+}
+
+/// Sums of one metric over the blocks of an interval.
+pub(super) struct Blocks {
+    n_frames: usize,
+    width: usize,
+    /// [n_blocks x width].
+    rows: Vec<f64>,
 }
 
 impl Sums {
     /// Memory of these sums, bytes.
     pub fn n_bytes(&self) -> usize {
-        size_of::<f64>() * (self.cheap.len() + self.costly.len())
+        let costly = match &self.costly {
+            Costly::Block(row) => size_of_val(&row[..]),
+            Costly::Added(row) => size_of_val(&row[..]),
+        };
+        size_of_val(&self.cheap[..]) + costly
+    }
+}
+
+impl Default for Costly {
+    fn default() -> Self {
+        Self::Added(Vec::new())
+    }
+}
+
+impl Costly {
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Block(row) => row.len(),
+            Self::Added(row) => row.len(),
+        }
+    }
+
+    /// As f64.
+    pub fn row(&self) -> Vec<f64> {
+        self.part(0..self.len()).collect()
+    }
+
+    fn part(&self, range: Range<usize>) -> Box<dyn Iterator<Item = f64> + '_> {
+        match self {
+            Self::Block(row) => Box::new(row.get(range).unwrap_or_default().iter().map(|v| f64::from(*v))),
+            Self::Added(row) => Box::new(row.get(range).unwrap_or_default().iter().copied()),
+        }
     }
 }
 
 impl AddAssign<&Self> for Sums {
     fn add_assign(&mut self, other: &Self) {
-        add(&mut self.cheap, &other.cheap);
-        add(&mut self.costly, &other.costly);
+        add(&mut self.cheap, other.cheap.iter().copied());
+        if let Costly::Block(row) = &self.costly {
+            self.costly = Costly::Added(row.iter().map(|v| f64::from(*v)).collect());
+        }
+        if let Costly::Added(row) = &mut self.costly {
+            add(row, other.costly.part(0..other.costly.len()));
+        }
     }
 }
 
 /// What is not there yet is 0.
-fn add(own: &mut Vec<f64>, others: &[f64]) {
-    if own.len() < others.len() {
-        own.resize(others.len(), 0.0);
+fn add(own: &mut Vec<f64>, others: impl Iterator<Item = f64>) {
+    for (i, other) in others.enumerate() {
+        match own.get_mut(i) {
+            Some(own) => *own += other,
+            None => own.push(other),
+        }
     }
-    own.iter_mut().zip(others).for_each(|(own, other)| *own += other);
+}
+
+impl Blocks {
+    /// `n` blocks of `width` numbers, all `start`, over an interval of `n_frames`.
+    pub fn new(n: usize, width: usize, n_frames: usize, start: f64) -> Self {
+        Self { n_frames, width, rows: vec![start; n * width] }
+    }
+
+    /// How many blocks.
+    pub fn n(&self) -> usize {
+        self.rows.len().checked_div(self.width).unwrap_or(0)
+    }
+
+    /// The block that frame `t` belongs to.
+    pub fn of(&self, t: usize) -> usize {
+        (t * self.n() / self.n_frames.max(1)).min(self.n().saturating_sub(1))
+    }
+
+    /// The sums of the block of frame `t`.
+    pub fn at(&mut self, t: usize) -> &mut [f64] {
+        let block = self.of(t);
+        self.row(block)
+    }
+
+    pub fn row(&mut self, block: usize) -> &mut [f64] {
+        &mut self.rows[block * self.width..(block + 1) * self.width]
+    }
 }
 
 /// One row of cheap sums for each draw [n_draws, n_cheap]. `counts` [n_draws, n_blocks] says how often a block was
 /// drawn.
 pub(super) fn draw_cheap(blocks: &[Sums], counts: ArrayView2<f64>) -> Array2<f64> {
-    drawn(blocks, counts, |sums| &sums.cheap)
+    let width = blocks.iter().map(|sums| sums.cheap.len()).max().unwrap_or(0);
+    drawn(width, blocks, counts, |sums, range| Box::new(sums.cheap.get(range).unwrap_or_default().iter().copied()))
 }
 
 /// The same of the costly sums.
 pub(super) fn draw_costly(blocks: &[Sums], counts: ArrayView2<f64>) -> Array2<f64> {
-    drawn(blocks, counts, |sums| &sums.costly)
+    let width = blocks.iter().map(|sums| sums.costly.len()).max().unwrap_or(0);
+    drawn(width, blocks, counts, |sums, range| sums.costly.part(range))
 }
 
 /// Columns at a time, so that the copy stays small.
-const N_COLUMNS: usize = 2048;
+const N_COLUMNS: usize = 1024;
 
-fn drawn(blocks: &[Sums], counts: ArrayView2<f64>, part: fn(&Sums) -> &Vec<f64>) -> Array2<f64> {
-    let width = blocks.iter().map(|sums| part(sums).len()).max().unwrap_or(0);
+type Part = for<'a> fn(&'a Sums, Range<usize>) -> Box<dyn Iterator<Item = f64> + 'a>;
+
+fn drawn(width: usize, blocks: &[Sums], counts: ArrayView2<f64>, part: Part) -> Array2<f64> {
     let mut all = Array2::zeros((counts.nrows(), width));
-    for from in (0..width).step_by(N_COLUMNS) {
-        let range = from..(from + N_COLUMNS).min(width);
-        let columns = gather(blocks, range.clone(), part);
-        all.slice_mut(s![.., range]).assign(&counts.dot(&columns));
-    }
-    all
-}
-
-/// Blocks as rows [n_blocks, range].
-fn gather(blocks: &[Sums], range: Range<usize>, part: fn(&Sums) -> &Vec<f64>) -> Array2<f64> {
-    let mut rows = Array2::zeros((blocks.len(), range.len()));
-    for (sums, mut row) in blocks.iter().zip(rows.axis_iter_mut(Axis(0))) {
-        if let Some(numbers) = part(sums).get(range.clone()) {
-            row.iter_mut().zip(numbers).for_each(|(to, from)| *to = *from);
+    all.axis_chunks_iter_mut(Axis(1), N_COLUMNS).into_par_iter().enumerate().for_each(|(i, mut all)| {
+        let from = i * N_COLUMNS;
+        let mut columns = Array2::zeros((counts.ncols(), all.ncols()));
+        for (sums, mut row) in blocks.iter().zip(columns.outer_iter_mut()) {
+            row.iter_mut().zip(part(sums, from..from + all.ncols())).for_each(|(to, from)| *to = from);
         }
-    }
-    rows
+        all.assign(&counts.dot(&columns.slice(s![.., ..])));
+    });
+    all
 }

@@ -24,6 +24,7 @@ mod generate_batch;
 mod generate_sounds;
 mod generator_parity;
 mod golden;
+mod golden_metrics;
 mod heatmap_parity;
 mod house;
 mod import;

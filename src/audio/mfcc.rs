@@ -1,0 +1,128 @@
+//! Mel-frequency cepstra as FineMotion computes them (`finemotion.md` section 3, the library python_speech_features): 26
+//! cepstra of 26 bands every 10 ms, the first replaced by the log energy, and their means to 20 a second.
+
+use ndarray::{Array2, Axis, s};
+use realfft::RealFftPlanner;
+use std::f64::consts::PI;
+
+/// Cepstra, and mel bands.
+pub const N_CEPSTRA: usize = 26;
+const FFT: usize = 1024;
+/// Seconds of a window, and between the starts of two.
+const WINDOW_SECS: f64 = 0.02;
+const STEP_SECS: f64 = 0.01;
+const PRE_EMPHASIS: f64 = 0.97;
+const LIFTER: f64 = 22.0;
+/// The scale of 16-bit samples, which the log energy shows.
+const FULL: f64 = 32_768.0;
+/// Windows in a row that are averaged: 20 rows a second.
+pub const N_AVERAGED: usize = 5;
+
+/// Of mono sound at `rate` samples a second (at most 51.2 kHz: a window is one transform), samples in -1..1: [n, 26], row
+/// k the 20 ms from k * 10 ms on; the last window is filled up with zeros.
+pub fn mfcc(samples: &[f32], rate: u32) -> Array2<f64> {
+    let length = ((WINDOW_SECS * f64::from(rate)).round() as usize).clamp(1, FFT);
+    let step = ((STEP_SECS * f64::from(rate)).round() as usize).max(1);
+    let n = match samples.len() {
+        0 => 0,
+        n if n <= length => 1,
+        n => 1 + (n - length).div_ceil(step),
+    };
+    let fft = RealFftPlanner::<f64>::new().plan_fft_forward(FFT);
+    let (mut frame, mut spectrum) = (fft.make_input_vec(), fft.make_output_vec());
+    let mut work = fft.make_scratch_vec();
+    let (bands, cosines) = (bands(rate), cosines());
+    let sample = |i: usize| samples.get(i).map_or(0.0, |v| FULL * f64::from(*v));
+    // past the end python_speech_features has zeros, not what pre-emphasis makes of the step down to zero
+    let emphasised = |i: usize| match i {
+        0 => sample(0),
+        _ if i >= samples.len() => 0.0,
+        _ => sample(i) - PRE_EMPHASIS * sample(i - 1),
+    };
+    let mut cepstra = Array2::zeros((n, N_CEPSTRA));
+    for (k, mut row) in cepstra.outer_iter_mut().enumerate() {
+        frame.fill(0.0);
+        (0..length).for_each(|i| frame[i] = emphasised(k * step + i));
+        // the lengths are the transform's own, so it cannot refuse
+        let _ = fft.process_with_scratch(&mut frame, &mut spectrum, &mut work);
+        let power: Vec<f64> = spectrum.iter().map(|bin| bin.norm_sqr() / FFT as f64).collect();
+        let log = |v: f64| if v == 0.0 { f64::EPSILON.ln() } else { v.ln() };
+        let mels: Vec<f64> =
+            bands.iter().map(|band| log(band.iter().zip(&power).map(|(weight, power)| weight * power).sum())).collect();
+        for (c, value) in row.iter_mut().enumerate() {
+            let lift = 1.0 + LIFTER / 2.0 * (PI * c as f64 / LIFTER).sin();
+            *value = lift * mels.iter().zip(cosines.row(c)).map(|(mel, cosine)| mel * cosine).sum::<f64>();
+        }
+        row[0] = log(power.iter().sum());
+    }
+    cepstra
+}
+
+/// The same at 20 rows a second [n, 26]: means of 5 in a row, what is left over dropped.
+pub fn at_20_fps(samples: &[f32], rate: u32) -> Array2<f64> {
+    let all = mfcc(samples, rate);
+    let rows = all.nrows() / N_AVERAGED;
+    let mean = |k: usize| all.slice(s![k * N_AVERAGED..(k + 1) * N_AVERAGED, ..]).sum_axis(Axis(0)) / N_AVERAGED as f64;
+    let mut means = Array2::zeros((rows, N_CEPSTRA));
+    means.outer_iter_mut().enumerate().for_each(|(k, mut row)| row.assign(&mean(k)));
+    means
+}
+
+/// Weights of each band over the bins [26][513]: triangles between bins equally spaced in mel.
+fn bands(rate: u32) -> Vec<Vec<f64>> {
+    let most = 2595.0 * (1.0 + f64::from(rate) / 2.0 / 700.0).log10();
+    let corner = |i: usize| {
+        let hz = 700.0 * (10f64.powf(most * i as f64 / (N_CEPSTRA + 1) as f64 / 2595.0) - 1.0);
+        ((FFT + 1) as f64 * hz / f64::from(rate)).floor()
+    };
+    let weights = |band: usize| {
+        let (left, middle, right) = (corner(band), corner(band + 1), corner(band + 2));
+        let weight = |bin: usize| match bin as f64 {
+            at if at >= left && at < middle => (at - left) / (middle - left),
+            at if at >= middle && at < right => (right - at) / (right - middle),
+            _ => 0.0,
+        };
+        (0..=FFT / 2).map(weight).collect()
+    };
+    (0..N_CEPSTRA).map(weights).collect()
+}
+
+/// The orthonormal cosine transform [cepstrum, band].
+fn cosines() -> Array2<f64> {
+    let n = N_CEPSTRA as f64;
+    Array2::from_shape_fn((N_CEPSTRA, N_CEPSTRA), |(c, band)| {
+        let scale = if c == 0 { 1.0 / n } else { 2.0 / n };
+        scale.sqrt() * (PI * c as f64 * (band as f64 + 0.5) / n).cos()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cepstra_are_those_of_python_speech_features() {
+        let golden: serde_json::Value =
+            serde_json::from_str(include_str!("../../fixtures/reference/audio_features_golden.json")).unwrap();
+        for case in golden["mfcc"].as_array().unwrap() {
+            let rate = case["rate"].as_u64().unwrap() as u32;
+            let sample = |i: usize| {
+                let t = i as f64 / f64::from(rate);
+                (0.4 * (2.0 * PI * (200.0 + 300.0 * t) * t).sin() * (1.0 + (11.0 * t).cos()) / 2.0
+                    + 0.05 * (2.0 * PI * 2900.0 * t).sin()) as f32
+            };
+            let sound: Vec<f32> = (0..case["n_samples"].as_u64().unwrap() as usize).map(sample).collect();
+            let check = |found: Array2<f64>, name: &str| {
+                let known: Vec<Vec<f64>> = serde_json::from_value(case[name].clone()).unwrap();
+                assert_eq!(found.nrows(), known.len());
+                for (found, known) in found.iter().zip(known.iter().flatten()) {
+                    assert!((found - known).abs() < 1e-3 * (1.0 + known.abs()), "{name} {rate}: {found} {known}");
+                }
+            };
+            check(mfcc(&sound, rate), "cepstra");
+            check(at_20_fps(&sound, rate), "at_20_fps");
+        }
+        assert_eq!(mfcc(&[], 16_000).nrows(), 0);
+        assert!(mfcc(&[0.0; 10], 16_000).iter().all(|v| v.is_finite()));
+    }
+}

@@ -1,0 +1,102 @@
+//! Whose definitions, and which figures each convention has: the one table. Where a convention was made for another
+//! frame rate than the data's, what it counts in frames is turned into seconds and back into the nearest number of frames of
+//! the data; the definitions say both.
+//!
+//! | convention | figures | what is peculiar |
+//! |---|---|---|
+//! | `orator` | PCK in space and in the plane, L1, MPJPE, P-MPJPE, acceleration error; speed, acceleration, jerk, diversity, pairwise distance, bone lengths, beat consistency of the made and of the real motion; Hellinger distance of speeds; Frechet distance of poses and of windows in two fixed spaces; CCA | this project's own |
+//! | `speech2gesture` (Ginosar et al. 2019) | PCK in the plane | the 48 keypoints without the neck; `<=`; mean over keypoints, then over frames; the docstring speaks of 0.1, the default is 0.2; positions as they are, scaling cancels |
+//! | `genea` (Kucherenko et al. 2020, 2022) | acceleration, jerk, Hellinger distance of speeds, CCA | centimetres; mean over the intervals of the intervals' means, 49 joints with the one that stands still; speeds of 49 cm/s and more are dropped; the first 8 joints are cut off before the histogram (`[:, 8:]`), here neck, arms and the left hand's root; one CCA over all. Their Frechet distance needs an encoder trained anew for every run, and is not given |
+//! | `emage` (Liu et al. 2024) | L1div, beat consistency | speeds over their mean, local minima above a threshold (not below); positions are replaced by their distances from the mean before, since L1div overwrites them; the threshold is looked up 2 s early; first and last 2 s ignored. Their Frechet distance needs their encoder, and is not given |
+//! | `trimodal` (Yoon et al. 2020; beats: its descendants) | MAJE, acceleration error, beat consistency | the first 4 frames, given as a seed, are left out; accelerations by coordinate and frame, without the frame rate; beats where the angle between bones changes slowly. Their Frechet distance needs their encoder (in which `LeakyReLU(True)` means slope 1, so that it is linear there), and is not given |
+//! | `aist` (Li et al. 2021) | beat alignment | mean over the beats of the MOTION; an interval without any scores 0; every interval weighs the same |
+
+use super::catalogue::Settings;
+use super::definition::Metric;
+use super::part::Part;
+use super::pck::Axes;
+use super::{acceleration_error, beat_aist, beat_angles, beats, bones, cca, derivatives, diversity, frechet_sums};
+use super::{hellinger, l1, mpjpe, pairwise, pck, procrustes_error};
+use serde::{Deserialize, Serialize};
+
+/// Whose definitions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Convention {
+    /// This project's own.
+    #[default]
+    Orator,
+    Speech2gesture,
+    Genea,
+    Emage,
+    Trimodal,
+    Aist,
+}
+
+impl Convention {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::Orator, Self::Speech2gesture, Self::Genea, Self::Emage, Self::Trimodal, Self::Aist];
+
+    /// As on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Orator => "orator",
+            Self::Speech2gesture => "speech2gesture",
+            Self::Genea => "genea",
+            Self::Emage => "emage",
+            Self::Trimodal => "trimodal",
+            Self::Aist => "aist",
+        }
+    }
+}
+
+/// The metrics of the settings' convention.
+pub(super) fn metrics(settings: &Settings) -> Vec<Box<dyn Metric>> {
+    let fps = settings.fps.per_sec();
+    match settings.convention {
+        Convention::Orator => own(settings),
+        Convention::Speech2gesture => vec![pck::by_frame(&settings.alphas)],
+        Convention::Genea => vec![
+            derivatives::by_interval(derivatives::Order::Acceleration),
+            derivatives::by_interval(derivatives::Order::Jerk),
+            hellinger::genea(),
+            cca::metric(Part::WithNeck),
+        ],
+        Convention::Emage => vec![diversity::metric(Part::All), beats::emage(fps)],
+        Convention::Trimodal => {
+            vec![acceleration_error::maje(fps), acceleration_error::by_coordinate(), beat_angles::metric(fps)]
+        }
+        Convention::Aist => vec![beat_aist::metric(fps)],
+    }
+}
+
+fn own(settings: &Settings) -> Vec<Box<dyn Metric>> {
+    let parts = [Part::All, Part::Body, Part::Hands];
+    let mut measured = vec![Part::All, Part::Body, Part::Hands, Part::Wrists, Part::FingersFromWrist];
+    if settings.with_neck {
+        measured.push(Part::WithNeck);
+    }
+    let mut all = vec![pck::metric(&[Axes::Xyz, Axes::Xy], &parts, &settings.alphas)];
+    if settings.with_neck {
+        all.push(pck::neck_in_box(&settings.alphas));
+    }
+    all.extend(measured.iter().map(|part| l1::metric(*part)));
+    all.extend(measured.iter().map(|part| mpjpe::metric(*part)));
+    all.extend(parts.iter().map(|part| procrustes_error::metric(*part)));
+    all.extend(measured.iter().map(|part| acceleration_error::metric(*part)));
+    for order in derivatives::Order::ALL {
+        all.extend(measured.iter().map(|part| derivatives::metric(order, *part)));
+    }
+    all.extend(parts.iter().map(|part| hellinger::metric(*part)));
+    all.extend(parts.iter().map(|part| diversity::metric(*part)));
+    all.extend(parts.iter().map(|part| pairwise::metric(*part)));
+    all.push(bones::metric());
+    all.push(beats::metric(settings.fps.per_sec()));
+    all.push(frechet_sums::poses(Part::All));
+    all.push(frechet_sums::poses(Part::Body));
+    all.push(frechet_sums::basis());
+    all.push(frechet_sums::embedding());
+    all.push(cca::metric(Part::Body));
+    all
+}
