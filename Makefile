@@ -6,7 +6,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: setup runtime readers browser build test demo prove prove-rule clean-demo
+.PHONY: setup runtime readers browser blender validator build test demo prove prove-rule clean-demo
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -72,10 +72,44 @@ $(READERS)/.there: tests/readers.txt
 browser:
 	@$(INSTALL); command -v chromium >/dev/null || install chromium; echo "browser: $$(command -v chromium)"
 
+# Blender as a Python module, for the Python it is made for; where that is missing the tests skip, loudly.
+export ORATOR_BLENDER ?= $(abspath $(TARGET)/blender)
+BLENDER := $(ORATOR_BLENDER)
+BLENDER_LIBRARIES := libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libgl1
+
+blender: $(BLENDER)/.there
+
+$(BLENDER)/.there: tests/blender.txt
+	@$(INSTALL); python=''; \
+	find_python() { for try in python3.11 python3 /usr/bin/python3; do \
+		if $$try -c 'import sys, pip; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null; then python=$$try; return; fi; done; }; \
+	find_python; [ -n "$$python" ] || { install python3 python3-pip; hash -r; find_python; }; \
+	if [ -z "$$python" ]; then echo 'SKIPPED: no Python 3.11 with pip here, so no Blender: its tests skip' >&2; exit 0; fi; \
+	dpkg-query -W $(BLENDER_LIBRARIES) >/dev/null 2>&1 || install $(BLENDER_LIBRARIES); \
+	rm -rf $(BLENDER); $$python -m pip install --quiet --disable-pip-version-check --no-input --root-user-action ignore \
+		--no-cache-dir --no-warn-conflicts --no-deps --target $(BLENDER) -r tests/blender.txt; touch $@; echo "blender: $(BLENDER)"
+
+# The Khronos glTF validator (Apache-2.0) from npm's own registry, as npm is set up here.
+VALIDATOR_VERSION := 2.0.0-dev.3.10
+VALIDATOR_SHA256 := 4e03dbdc3bc0d1342afd5d2d7ae341a7e3474502ccb872b02dbbaddaee0fdec6
+export ORATOR_GLTF_VALIDATOR ?= $(abspath $(TARGET)/validator)
+VALIDATOR := $(ORATOR_GLTF_VALIDATOR)
+
+validator: $(VALIDATOR)/package.json
+
+$(VALIDATOR)/package.json:
+	@$(INSTALL); missing=(); for tool in node:nodejs npm:npm; do command -v $${tool%%:*} >/dev/null || missing+=($${tool##*:}); done; \
+	[ $${#missing[@]} -eq 0 ] || install "$${missing[@]}"; \
+	attempt=$(VALIDATOR).attempt; rm -rf $$attempt $(VALIDATOR); mkdir -p $$attempt; \
+	npm pack --silent --pack-destination $$attempt gltf-validator@$(VALIDATOR_VERSION) >/dev/null; \
+	echo "$(VALIDATOR_SHA256)  $$attempt/gltf-validator-$(VALIDATOR_VERSION).tgz" | sha256sum --check --quiet; \
+	tar -xzf $$attempt/gltf-validator-$(VALIDATOR_VERSION).tgz -C $$attempt; \
+	mv $$attempt/package $(VALIDATOR); rm -rf $$attempt; touch $@; echo "validator: $(VALIDATOR)"
+
 build: setup runtime
 	cargo build --release --locked
 
-test: build readers browser
+test: build readers browser blender validator
 	cargo fmt --check
 	cargo clippy --locked --all-targets -- -D warnings
 	cargo test --locked

@@ -1,17 +1,24 @@
 //! A motion file of any kind we write, chosen by its name's extension, put in its place atomically.
 
+use super::avatar::Avatar;
+use super::names::Names;
 use super::performance::Performance;
-use super::video;
+use super::{glb_scene, json, video};
+use crate::motion::bvh_write::Clip;
 use crate::motion::{authors_txt, npy};
 use crate::stage::progress::Progress;
 use crate::stage::workdir;
 use crate::types::{pose3d::Motion, sound::Sound};
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
 /// What else goes into a file than the performance.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sources<'a> {
     pub sound: Option<&'a Sound>,
+    /// What the bones are called where they have names.
+    pub names: Names,
 }
 
 /// What a motion can be written as.
@@ -23,6 +30,10 @@ pub enum Format {
     AuthorsTxt,
     /// Bone rotations of the whole figure.
     Bvh,
+    /// The skinned avatar with its motion.
+    Glb,
+    /// Joints and rotations for programs of one's own (`json`).
+    Json,
     /// A film of the figure with the sound.
     Mp4,
 }
@@ -35,9 +46,11 @@ impl Format {
             "npy" => Ok(Self::Npy),
             "txt" => Ok(Self::AuthorsTxt),
             "bvh" => Ok(Self::Bvh),
+            "glb" => Ok(Self::Glb),
+            "json" => Ok(Self::Json),
             "mp4" => Ok(Self::Mp4),
             _ => anyhow::bail!(
-                "{}: motion is written as .npy (joints), .txt (the authors' layout), .bvh or .mp4; \
+                "{}: motion is written as .npy (joints), .txt (the authors' layout), .json, .bvh, .glb or .mp4; \
                  give the file one of these endings",
                 path.display()
             ),
@@ -59,7 +72,21 @@ impl Format {
     ) -> anyhow::Result<()> {
         match self {
             Self::Npy | Self::AuthorsTxt => self.write_joints(path, &performance.motion()),
-            Self::Bvh => workdir::write_file(path, performance.clip.to_bvh().as_bytes()),
+            Self::Bvh => {
+                let skeleton = sources.names.applied(&performance.clip.skeleton);
+                let clip = Clip { skeleton, ..performance.clip.clone() };
+                workdir::write_file(path, clip.to_bvh().as_bytes())
+            }
+            Self::Glb => {
+                let avatar = Avatar::of(&performance.figure);
+                let bytes = glb_scene::file(&performance.figure, &performance.clip, &avatar, sources.names);
+                workdir::write_file(path, &bytes)
+            }
+            Self::Json => workdir::replace(path, |attempt| {
+                let mut text = BufWriter::new(File::create(attempt)?);
+                json::write(&mut text, performance, sources.names)?;
+                Ok(text.flush()?)
+            }),
             Self::Mp4 => {
                 let motion = performance.motion();
                 workdir::replace(path, |attempt| video::write(attempt, &motion, sources.sound, progress))
@@ -72,7 +99,7 @@ impl Format {
         match self {
             Self::Npy => workdir::replace(path, |attempt| npy::write(attempt, motion)),
             Self::AuthorsTxt => workdir::write_file(path, authors_txt::format(motion).as_bytes()),
-            Self::Bvh | Self::Mp4 => anyhow::bail!("{} holds more than joints", path.display()),
+            _ => anyhow::bail!("{} holds more than joints", path.display()),
         }
     }
 }
@@ -84,9 +111,10 @@ mod tests {
     #[test]
     fn the_extension_chooses() {
         assert_eq!(Format::of(Path::new("a/b.BVH")).unwrap(), Format::Bvh);
+        assert_eq!(Format::of(Path::new("a.Glb")).unwrap(), Format::Glb);
         assert_eq!(Format::of(Path::new("a.b/c.npy")).unwrap(), Format::Npy);
         for wrong in ["a.mov", "mp4", "a", ""] {
-            assert!(Format::of(Path::new(wrong)).unwrap_err().to_string().contains(".bvh or .mp4"));
+            assert!(Format::of(Path::new(wrong)).unwrap_err().to_string().contains(".glb or .mp4"));
         }
     }
 }

@@ -1,13 +1,18 @@
-//! Joints to rotations, and the files people open: BVH, MP4, contact sheets.
+//! Joints to rotations, and the files people open: BVH, GLB, MP4, contact sheets.
 
 pub mod arm;
+pub mod avatar;
 pub mod constraints;
 pub mod draw;
 pub mod figure;
 pub mod file;
+pub mod glb;
+pub mod glb_scene;
 pub mod head;
 pub mod hinge;
+pub mod json;
 pub mod limits;
+pub mod names;
 pub mod overlay;
 pub mod performance;
 pub mod places;

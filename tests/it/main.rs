@@ -23,6 +23,7 @@ mod generate;
 mod generate_batch;
 mod generate_sounds;
 mod generator_parity;
+mod gltf;
 mod golden;
 mod golden_metrics;
 mod heatmap_parity;

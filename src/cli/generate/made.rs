@@ -50,7 +50,7 @@ pub fn make(speaker: &Speaker, audio: &Path, outputs: &[(PathBuf, Format)], prog
         drop(motion);
         let is_film = figures.iter().any(|(_, format)| *format == Format::Mp4);
         let sound = if is_film { audio::read_mono(audio, SAMPLE_RATE)? } else { None };
-        let sources = Sources { sound: sound.as_ref() };
+        let sources = Sources { sound: sound.as_ref(), ..Sources::default() };
         for (path, format) in figures {
             format.write(path, &performance, &sources, progress)?;
         }

@@ -1,0 +1,166 @@
+//! The form of the body in its stance: head and neck, shirt, trousers, shoes. A calm mannequin; hands are elsewhere.
+//! Numbers are cm of a body of 1.78 m, in the axes of the joint they hang on (x to its left, y up, z forward).
+
+use super::field::{Form, Limb, around, joined};
+use super::stance::{Stance, Trunk};
+use crate::animate::figure::{Arm, Figure};
+use crate::motion::vec3::{Vec3, add, dot, norm, scale, sub, unit};
+
+/// Half the distance of the shoulders the numbers below are for.
+const SHOULDERS: f64 = 16.5;
+/// The sleeve ends this far before the wrist, with this radius; of a hand of size 1.
+const BARE: f64 = 1.9;
+const SLEEVE: f64 = 3.05;
+
+/// Forms on the figure in its stance.
+pub struct Body<'a> {
+    pub figure: &'a Figure,
+    pub stance: &'a Stance,
+    pub trunk: Trunk,
+    /// Width of the shoulders against the form's.
+    broad: f64,
+    /// Sizes of the hands.
+    hands: [f64; 2],
+}
+
+impl<'a> Body<'a> {
+    pub fn new(figure: &'a Figure, stance: &'a Stance, hands: [f64; 2]) -> Self {
+        let half = |arm: &Arm| norm(figure.skeleton.joints[arm.upper].offset) / 2.0;
+        let half: f64 = figure.arms.iter().map(half).sum();
+        let broad = (half / SHOULDERS / stance.scale).clamp(0.75, 1.3);
+        Self { figure, stance, trunk: Trunk::of(figure), broad, hands }
+    }
+
+    /// A limb from point to point of the form's size; `joint` gives the axes.
+    fn limb(&self, joint: usize, ends: [Vec3; 2], radii: [f64; 2]) -> Limb {
+        Limb::new(ends.map(|end| self.stance.at(joint, end)), radii.map(|r| r * self.stance.scale))
+    }
+
+    fn cm(&self, cm: f64) -> f64 {
+        cm * self.stance.scale
+    }
+
+    /// Head and neck down into the collar.
+    pub fn head(&self) -> Form {
+        let (head, neck) = (self.trunk.head, self.trunk.neck);
+        Form::default()
+            .with(self.limb(head, [[0.0, 13.4, -1.7], [0.0, 13.6, 1.4]], [7.7, 7.6]), 0.0)
+            .with(self.limb(head, [[0.0, 10.5, 2.0], [0.0, 5.6, 3.2]], [7.3, 6.1]), self.cm(5.0))
+            .with(self.limb(head, [[0.0, 4.6, 4.0], [0.0, 2.9, 5.2]], [4.6, 3.0]), self.cm(4.0))
+            .with(self.limb(head, [[0.0, 11.6, 8.3], [0.0, 8.2, 9.0]], [0.4, 0.8]), self.cm(2.2))
+            .with(self.limb(neck, [[0.0, -1.0, -1.6], [0.0, 13.0, -0.6]], [5.6, 4.9]), self.cm(2.5))
+    }
+
+    /// The trunk of the shirt without its sleeves.
+    pub fn trunk(&self) -> Form {
+        let (hips, neck) = (self.trunk.hips, self.trunk.neck);
+        let wide = |x: f64| x * self.broad;
+        let across = |y: f64, x: f64, z: f64, r: f64| self.limb(hips, [[-x, y, z], [x, y, z]], [r, r]);
+        let mut form = Form::default()
+            .with(across(-4.0, 6.0, -0.4, 9.9), 0.0)
+            .with(across(-10.0, 7.2, -0.4, 9.6), self.cm(4.0))
+            .with(across(9.0, wide(5.6), 0.3, 9.2), self.cm(10.0))
+            .with(across(28.0, wide(5.4), 0.5, 9.9), self.cm(12.0))
+            .with(across(39.0, wide(6.4), -0.4, 8.8), self.cm(8.0));
+        for side in [1.0, -1.0] {
+            let ends = [[side * 2.4, 3.4, -1.6], [side * wide(14.0), -1.2, -0.8]];
+            form = form.with(self.limb(neck, ends, [4.6, 4.1]), self.cm(6.0));
+        }
+        form.with(self.limb(neck, [[0.0, -4.0, -1.8], [0.0, 8.0, -0.4]], [7.2, 6.2]), self.cm(4.0))
+    }
+
+    /// One sleeve, open at the wrist.
+    pub fn sleeve(&self, side: usize) -> Form {
+        let arm = &self.figure.arms[side];
+        let (out, end) = (arm.sign, self.sleeve_end(side));
+        let (upper, fore) = (self.length(arm.upper, arm.fore), self.length(arm.fore, arm.hand));
+        let wrist = SLEEVE * self.hands[side] / self.stance.scale;
+        let on_upper = |from: Vec3, to: Vec3, radii: [f64; 2]| self.limb(arm.upper, [from, to], radii);
+        let on_fore = |from: Vec3, to: Vec3, radii: [f64; 2]| self.limb(arm.fore, [from, to], radii);
+        Form::default()
+            .with(on_upper([out * 0.6, -0.3, 0.0], [out * upper, 0.0, 0.0], [4.5, 3.9]), 0.0)
+            .with(on_upper([out * 3.0, 0.0, 0.0], [out * 0.45 * upper, 0.1, 0.0], [4.6, 4.2]), self.cm(3.0))
+            .with(on_fore([0.0; 3], [out * 0.35 * fore, 0.0, 0.2], [4.0, 4.0]), self.cm(2.0))
+            .with(on_fore([out * 0.3 * fore, 0.0, 0.2], [out * fore, 0.0, 0.0], [4.0, wrist]), self.cm(2.0))
+            .cut(end, self.stance.direction(arm.fore, arm.hand), self.cm(0.5))
+    }
+
+    /// The band at a sleeve's end.
+    pub fn cuff(&self, side: usize) -> Form {
+        let arm = &self.figure.arms[side];
+        let along = self.stance.direction(arm.fore, arm.hand);
+        let (end, hand) = (self.sleeve_end(side), self.hands[side]);
+        let [near, far] = [-2.6 * hand, 0.25 * hand].map(|cm| add(end, scale(along, cm)));
+        // The sleeve widens towards the elbow.
+        let wider = (self.cm(4.0) - SLEEVE * hand).max(0.0) * (2.6 + BARE) * hand
+            / (0.7 * self.cm(self.length(arm.fore, arm.hand)));
+        Form::default()
+            .with(Limb::new([near, far], [(SLEEVE + 0.32) * hand + wider, (SLEEVE + 0.2) * hand]), 0.0)
+            .cut(far, along, 0.35 * hand)
+            .cut(near, scale(along, -1.0), 0.35 * hand)
+    }
+
+    fn sleeve_end(&self, side: usize) -> Vec3 {
+        let arm = &self.figure.arms[side];
+        let along = self.stance.direction(arm.fore, arm.hand);
+        sub(self.stance.places[arm.hand], scale(along, BARE * self.hands[side]))
+    }
+
+    /// The whole shirt.
+    pub fn shirt(&self) -> impl Fn(Vec3) -> f64 + Sync + use<'_> {
+        let trunk = self.trunk();
+        let sleeves = [0, 1].map(|side| self.sleeve(side));
+        let collar = self.stance.at(self.trunk.neck, [0.0, 4.4, 0.0]);
+        let hem = self.stance.at(self.trunk.hips, [0.0, -9.0, 0.0]);
+        let tilt = unit([0.0, 1.0, 0.42], 0.0).unwrap_or([0.0, 1.0, 0.0]);
+        let (armpit, edge) = (self.cm(2.6), self.cm(0.9));
+        move |at| {
+            let grown = sleeves.iter().fold(trunk.distance(at), |d, sleeve| joined(d, sleeve.distance(at), armpit));
+            [(collar, tilt), (hem, [0.0, -1.0, 0.0])]
+                .into_iter()
+                .fold(grown, |d, (point, normal)| -joined(-d, -dot(sub(at, point), normal), edge))
+        }
+    }
+
+    /// Corners of a box around the shirt.
+    pub fn shirt_bounds(&self) -> [Vec3; 2] {
+        let sleeves = [0, 1].map(|side| self.sleeve(side).bounds()).into_iter();
+        around(sleeves.chain([self.trunk().bounds()]))
+    }
+
+    /// Trousers from the waist to the ankles.
+    pub fn trousers(&self) -> Form {
+        let hips = self.trunk.hips;
+        let mut form = Form::default().with(self.limb(hips, [[-5.6, -3.5, -0.5], [5.6, -3.5, -0.5]], [8.8, 8.8]), 0.0);
+        for (side, [upper, lower, foot, _]) in [1.0, -1.0].into_iter().zip(self.trunk.legs) {
+            let knee = self.length(upper, lower);
+            let ankle = self.length(lower, foot);
+            form = form
+                .with(self.limb(upper, [[0.0, -2.0, 0.0], [0.0, -knee, 0.0]], [7.3, 5.8]), self.cm(2.5))
+                .with(self.limb(upper, [[side * -1.5, -1.0, -2.0], [0.0, -12.0, -0.5]], [7.2, 6.7]), self.cm(3.0))
+                .with(self.limb(lower, [[0.0, 0.0, 0.0], [0.0, -ankle, 0.0]], [5.9, 5.2]), self.cm(2.0))
+                .with(self.limb(lower, [[0.0, -7.0, -1.6], [0.0, -18.0, -1.2]], [5.2, 4.8]), self.cm(4.0));
+        }
+        let waist = self.stance.at(hips, [0.0, 4.0, 0.0]);
+        let ankles = self.stance.at(self.trunk.legs[0][2], [0.0, -1.6, 0.0]);
+        form.cut(waist, [0.0, 1.0, 0.0], self.cm(0.8)).cut(ankles, [0.0, -1.0, 0.0], self.cm(0.8))
+    }
+
+    /// One shoe.
+    pub fn shoe(&self, side: usize) -> Form {
+        let foot = self.trunk.legs[side][2];
+        let out = [0.6, -0.6][side];
+        let ground = self.stance.at(foot, [0.0, -8.0, 0.0]);
+        Form::default()
+            .with(self.limb(foot, [[0.0, 2.0, -0.6], [0.0, -3.5, -1.6]], [4.4, 4.4]), 0.0)
+            .with(self.limb(foot, [[0.0, -4.6, -3.6], [out, -5.4, 8.0]], [4.1, 4.3]), self.cm(2.0))
+            .with(self.limb(foot, [[0.0, -1.6, 1.0], [out, -5.4, 9.0]], [4.0, 3.7]), self.cm(3.0))
+            .with(self.limb(foot, [[out, -6.0, 8.0], [out, -6.6, 15.0]], [4.3, 3.0]), self.cm(3.0))
+            .cut(ground, [0.0, -1.0, 0.0], self.cm(1.2))
+    }
+
+    /// Distance of two joints in the form's size.
+    fn length(&self, from: usize, to: usize) -> f64 {
+        norm(scale(sub(self.stance.places[to], self.stance.places[from]), 1.0 / self.stance.scale))
+    }
+}

@@ -1,0 +1,94 @@
+//! The stance in which the form of the avatar is made: arms hanging aside, elbows and fingers half bent. It lies in
+//! the middle of what speakers do, so that skinning bends the form little either way; the T-pose gets what the inverse
+//! of the skinning gives it.
+
+use crate::animate::figure::Figure;
+use crate::motion::rotation::Rotation;
+use crate::motion::vec3::{Vec3, add, scale, sub, unit};
+use crate::types::skeleton::{L_HAND, R_HAND};
+
+/// Degrees: the arm below the level, the elbow's bend, a finger's bends from knuckle to tip.
+const ARM: f64 = 54.0;
+const ELBOW: f64 = 35.0;
+const FINGER: [f64; 3] = [22.0, 28.0, 18.0];
+const THUMB: [f64; 3] = [0.0, 8.0, 10.0];
+/// How far the fingers are fanned out towards the thumb, thumb to little finger.
+const FAN: [f64; 5] = [0.0, 4.0, 1.0, -2.0, -5.0];
+
+/// The figure in that stance: places (cm) and rotations of its joints.
+pub struct Stance {
+    pub places: Vec<Vec3>,
+    pub world: Vec<Rotation>,
+    /// Places in the T-pose.
+    pub rest: Vec<Vec3>,
+    /// Length of the trunk against the one whose form is given, so that cm of the form become cm of the figure.
+    pub scale: f64,
+}
+
+/// Indices of the figure's joints that are not in its `Arm`s.
+pub struct Trunk {
+    pub hips: usize,
+    pub spine: usize,
+    pub chest: usize,
+    pub neck: usize,
+    pub head: usize,
+    /// Left, right: upper leg, leg, foot, the end of the foot.
+    pub legs: [[usize; 4]; 2],
+}
+
+impl Trunk {
+    pub fn of(figure: &Figure) -> Self {
+        let bones = &figure.skeleton;
+        let find = |name: &str| bones.find(name).unwrap_or_default();
+        let legs = ["Left", "Right"].map(|side| {
+            let [upper, lower, foot] = ["UpLeg", "Leg", "Foot"].map(|part| find(&format!("{side}{part}")));
+            [upper, lower, foot, bones.children(foot).next().unwrap_or(foot)]
+        });
+        Self { hips: 0, spine: figure.spine, chest: figure.chest, neck: figure.places[0], head: find("Head"), legs }
+    }
+}
+
+/// Joints of a finger of the arm, knuckle to tip.
+pub fn finger_joints(figure: &Figure, side: usize, finger: usize) -> [usize; 4] {
+    let base = [L_HAND, R_HAND][side] + 1 + 4 * finger;
+    std::array::from_fn(|k| figure.places[base + k])
+}
+
+impl Stance {
+    pub fn of(figure: &Figure) -> Self {
+        let still = vec![Rotation::IDENTITY; figure.skeleton.joints.len()];
+        let mut local = still.clone();
+        for (side, arm) in figure.arms.iter().enumerate() {
+            let curl = [0.0, 0.0, -arm.sign];
+            local[arm.upper] = Rotation::about(curl, ARM.to_radians());
+            local[arm.fore] = Rotation::about([0.0, -arm.sign, 0.0], ELBOW.to_radians());
+            for finger in 0..5 {
+                let degrees = if finger == 0 { THUMB } else { FINGER };
+                let joints = finger_joints(figure, side, finger);
+                for (&joint, degrees) in joints.iter().zip(degrees) {
+                    local[joint] = Rotation::about(curl, degrees.to_radians());
+                }
+                let fan = Rotation::about([0.0, -arm.sign, 0.0], FAN[finger].to_radians());
+                local[joints[0]] = fan * local[joints[0]];
+            }
+        }
+        let trunk = Trunk::of(figure);
+        let rest = figure.skeleton.positions(figure.root, &still);
+        Self {
+            places: figure.skeleton.positions(figure.root, &local),
+            world: figure.skeleton.world(&local),
+            scale: (rest[trunk.neck][1] - rest[trunk.hips][1]) / 50.0,
+            rest,
+        }
+    }
+
+    /// The point `cm` away from a joint, in the joint's axes and the form's size.
+    pub fn at(&self, joint: usize, cm: Vec3) -> Vec3 {
+        add(self.places[joint], self.world[joint].turn(scale(cm, self.scale)))
+    }
+
+    /// Unit vector from one joint to another.
+    pub fn direction(&self, from: usize, to: usize) -> Vec3 {
+        unit(sub(self.places[to], self.places[from]), 1e-6).unwrap_or([0.0, 1.0, 0.0])
+    }
+}

@@ -1,0 +1,236 @@
+//! A closed surface of triangles around a distance field: surface nets (one vertex in every cell that the surface
+//! passes, a quad around every edge that crosses it), then every vertex drawn onto the surface itself and
+//! evenly over it. Its normals are
+//! the field's own.
+
+use crate::motion::vec3::{Vec3, add, dot, norm, scale, sub, unit};
+use rayon::prelude::*;
+
+/// Cells of a block that is passed over at once where the surface is far.
+const BLOCK: usize = 4;
+/// Share of a cell a vertex may move onto the surface at once.
+const REACH: f64 = 0.9;
+/// How often vertices are moved towards the middle of their neighbours.
+const ROUNDS: usize = 3;
+
+/// Triangles, outside counter-clockwise.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Surface {
+    pub points: Vec<Vec3>,
+    pub normals: Vec<Vec3>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// Values of the field at the corners of the cells.
+struct Grid {
+    low: Vec3,
+    cell: f64,
+    /// Corners along x, y, z.
+    n: [usize; 3],
+    values: Vec<f32>,
+}
+
+impl Surface {
+    /// The surface of `field` inside the box `bounds`, with cells of `cell`.
+    pub fn of(field: &(dyn Fn(Vec3) -> f64 + Sync), bounds: [Vec3; 2], cell: f64) -> Self {
+        let grid = Grid::of(field, bounds, cell);
+        let mut surface = Self::default();
+        let mut vertex_of = vec![u32::MAX; grid.values.len()];
+        for z in 0..grid.n[2] - 1 {
+            for y in 0..grid.n[1] - 1 {
+                for x in 0..grid.n[0] - 1 {
+                    if let Some(point) = grid.vertex([x, y, z]) {
+                        vertex_of[grid.index([x, y, z])] = surface.points.len() as u32;
+                        surface.points.push(point);
+                    }
+                }
+            }
+        }
+        grid.quads(|corners, inwards| {
+            let [a, b, c, d] = corners.map(|corner| vertex_of[corner]);
+            let [a, b, c, d] = if inwards { [d, c, b, a] } else { [a, b, c, d] };
+            let apart = |i: u32, j: u32| norm(sub(surface.points[i as usize], surface.points[j as usize]));
+            let pair = if apart(a, c) <= apart(b, d) { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
+            surface.triangles.extend(pair);
+        });
+        surface.settle(field, cell);
+        surface
+    }
+
+    /// Draws the vertices onto the surface and evenly over it.
+    fn settle(&mut self, field: &(dyn Fn(Vec3) -> f64 + Sync), cell: f64) {
+        let near = self.neighbours();
+        for round in 0..=ROUNDS {
+            let points = &self.points;
+            let even = |(n, &point): (usize, &Vec3)| {
+                let sum = near[n].iter().fold([0.0; 3], |sum, &other| add(sum, points[other as usize]));
+                let middle = scale(sum, 1.0 / near[n].len().max(1) as f64);
+                let from = if round == 0 { point } else { scale(add(point, middle), 0.5) };
+                onto(field, from, cell, if round == 0 { 3 } else { 1 })
+            };
+            let drawn: Vec<(Vec3, Vec3)> = points.par_iter().enumerate().map(even).collect();
+            (self.points, self.normals) = drawn.into_iter().unzip();
+        }
+    }
+
+    /// The same under the light of another field: its normals.
+    #[must_use]
+    pub fn lit(mut self, field: &(dyn Fn(Vec3) -> f64 + Sync), cell: f64) -> Self {
+        let normals = self
+            .points
+            .iter()
+            .zip(&self.normals)
+            .map(|(&at, &own)| unit(gradient(field, at, cell), 1e-9).unwrap_or(own));
+        self.normals = normals.collect();
+        self
+    }
+
+    /// Vertices that share an edge with each vertex, in order.
+    pub fn neighbours(&self) -> Vec<Vec<u32>> {
+        let mut all = vec![Vec::new(); self.points.len()];
+        for &[a, b, c] in &self.triangles {
+            for [from, to] in [[a, b], [b, c], [c, a]] {
+                all[from as usize].push(to);
+                all[to as usize].push(from);
+            }
+        }
+        all.iter_mut().for_each(|near| {
+            near.sort_unstable();
+            near.dedup();
+        });
+        all
+    }
+
+    /// Six times the volume inside, positive where the triangles face outwards.
+    #[cfg(test)]
+    pub fn volume6(&self) -> f64 {
+        let at = |i: u32| self.points[i as usize];
+        self.triangles.iter().map(|&[a, b, c]| dot(at(a), crate::motion::vec3::cross(at(b), at(c)))).sum()
+    }
+}
+
+/// The point of the surface near `point`, and the outward normal there.
+fn onto(field: &(dyn Fn(Vec3) -> f64 + Sync), point: Vec3, cell: f64, steps: usize) -> (Vec3, Vec3) {
+    let mut at = point;
+    for _ in 0..steps {
+        let slope = gradient(field, at, cell);
+        let steep = dot(slope, slope);
+        let next = sub(at, scale(slope, field(at) / steep.max(0.05)));
+        if norm(sub(next, point)) < REACH * cell {
+            at = next;
+        }
+    }
+    (at, unit(gradient(field, at, cell), 1e-9).unwrap_or([0.0, 1.0, 0.0]))
+}
+
+/// The slope of the field, over a fiftieth of a cell.
+fn gradient(field: &(dyn Fn(Vec3) -> f64 + Sync), at: Vec3, cell: f64) -> Vec3 {
+    let step = cell * 0.02;
+    std::array::from_fn(|k| {
+        let mut shift = [0.0; 3];
+        shift[k] = step;
+        (field(add(at, shift)) - field(sub(at, shift))) / (2.0 * step)
+    })
+}
+
+impl Grid {
+    fn of(field: &(dyn Fn(Vec3) -> f64 + Sync), [low, high]: [Vec3; 2], cell: f64) -> Self {
+        let low = low.map(|v| v - 1.5 * cell);
+        let n = [0, 1, 2].map(|k| (((high[k] + 1.5 * cell - low[k]) / cell).ceil().max(1.0) as usize) + 1);
+        let layer = n[0] * n[1];
+        let mut values = vec![f32::INFINITY; layer * n[2]];
+        let place = |[x, y, z]: [usize; 3]| [x, y, z].map(|v| v as f64 * cell);
+        values.par_chunks_mut(layer * BLOCK).enumerate().for_each(|(slab, values)| {
+            for y0 in (0..n[1]).step_by(BLOCK) {
+                for x0 in (0..n[0]).step_by(BLOCK) {
+                    let half = (BLOCK - 1) as f64 / 2.0 * cell;
+                    let first = place([x0, y0, slab * BLOCK]);
+                    let middle = field([0, 1, 2].map(|k| low[k] + first[k] + half));
+                    // The fields are no steeper than 1 by much.
+                    let far = (middle.abs() > 1.4 * half * 3f64.sqrt() + cell).then_some(middle as f32);
+                    for z in 0..values.len() / layer {
+                        for y in y0..(y0 + BLOCK).min(n[1]) {
+                            for x in x0..(x0 + BLOCK).min(n[0]) {
+                                let at = place([x, y, slab * BLOCK + z]);
+                                let value = far.unwrap_or_else(|| field([0, 1, 2].map(|k| low[k] + at[k])) as f32);
+                                values[z * layer + y * n[0] + x] = value;
+                            }
+                        }
+                    }
+                }
+            }
+        });
+        Self { low, cell, n, values }
+    }
+
+    fn index(&self, [x, y, z]: [usize; 3]) -> usize {
+        (z * self.n[1] + y) * self.n[0] + x
+    }
+
+    /// The mean of where the surface crosses the edges of a cell.
+    fn vertex(&self, cell: [usize; 3]) -> Option<Vec3> {
+        let corner = |bits: usize| [0, 1, 2].map(|k| cell[k] + (bits >> k & 1));
+        let values: [f32; 8] = std::array::from_fn(|bits| self.values[self.index(corner(bits))]);
+        let (mut sum, mut n) = ([0.0; 3], 0.0);
+        for bits in 0..8 {
+            for axis in 0..3 {
+                let other = bits | 1 << axis;
+                let (a, b) = (f64::from(values[bits]), f64::from(values[other]));
+                if other != bits && (a < 0.0) != (b < 0.0) {
+                    let mut at = corner(bits).map(|v| v as f64);
+                    at[axis] += a / (a - b);
+                    (sum, n) = (add(sum, at), n + 1.0);
+                }
+            }
+        }
+        (n > 0.0).then(|| add(self.low, scale(sum, self.cell / n)))
+    }
+
+    /// The four cells (by their index) around every edge that crosses the surface.
+    fn quads(&self, mut see: impl FnMut([usize; 4], bool)) {
+        for axis in 0..3 {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let step = |k: usize| [1, self.n[0], self.n[0] * self.n[1]][k];
+            for z in 0..self.n[2] {
+                for y in 0..self.n[1] {
+                    for x in 0..self.n[0] {
+                        let at = [x, y, z];
+                        if at[axis] + 1 >= self.n[axis] || at[u] == 0 || at[v] == 0 {
+                            continue;
+                        }
+                        let here = self.index(at);
+                        let inside = self.values[here] < 0.0;
+                        if inside != (self.values[here + step(axis)] < 0.0) {
+                            let cells = [here - step(u) - step(v), here - step(v), here, here - step(u)];
+                            see(cells, !inside);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::field::Limb;
+    use super::*;
+
+    #[test]
+    fn a_ball_is_round_closed_and_faces_outwards() {
+        let ball = Limb::new([[0.3, -0.2, 0.1]; 2], [2.0; 2]);
+        let surface = Surface::of(&|at| ball.distance(at), [[-1.7, -2.2, -1.9], [2.3, 1.8, 2.1]], 0.3);
+        assert!((surface.volume6() / 6.0 - 4.0 / 3.0 * std::f64::consts::PI * 8.0).abs() < 0.6);
+        for (&point, &normal) in surface.points.iter().zip(&surface.normals) {
+            assert!(ball.distance(point).abs() < 1e-3);
+            assert!(norm(sub(normal, scale(sub(point, [0.3, -0.2, 0.1]), 0.5))) < 1e-2);
+        }
+        let mut edges = std::collections::BTreeMap::new();
+        for [a, b, c] in &surface.triangles {
+            for edge in [[a, b], [b, c], [c, a]] {
+                *edges.entry(edge).or_insert(0) += 1;
+            }
+        }
+        assert!(edges.iter().all(|([a, b], &n)| n == 1 && edges.get(&[*b, *a]) == Some(&1)));
+    }
+}

@@ -1,0 +1,103 @@
+//! A binary glTF 2.0 file: one buffer, its views and accessors, and the two chunks around it and the scene's JSON.
+//! What is in the scene is `glb_scene`'s.
+
+use serde_json::{Value, json};
+
+/// What a run of numbers is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    Vertices = 34_962,
+    Indices = 34_963,
+    /// Matrices and animation.
+    Other = 0,
+}
+
+/// The numbers of a file so far.
+#[derive(Debug, Default)]
+pub struct Buffer {
+    bytes: Vec<u8>,
+    views: Vec<Value>,
+    accessors: Vec<Value>,
+}
+
+impl Buffer {
+    /// Adds vectors of `N` floats with their smallest and greatest values; gives the accessor's index. `kind`: `SCALAR`,
+    /// `VEC3`, `VEC4`, `MAT4`.
+    pub fn floats<const N: usize>(&mut self, values: &[[f32; N]], kind: &str, purpose: Use) -> usize {
+        let view = self.view(values.iter().flatten().flat_map(|v| v.to_le_bytes()), purpose);
+        let bound = |pick: fn(f32, f32) -> f32| -> Vec<f32> {
+            (0..N).map(|k| values.iter().map(|value| value[k]).reduce(pick).unwrap_or(0.0)).collect()
+        };
+        self.accessors.push(json!({
+            "bufferView": view, "componentType": 5126, "count": values.len(), "type": kind,
+            "min": bound(f32::min), "max": bound(f32::max),
+        }));
+        self.accessors.len() - 1
+    }
+
+    /// Adds vectors of four bytes (joints).
+    pub fn bytes4(&mut self, values: &[[u8; 4]]) -> usize {
+        let view = self.view(values.iter().flatten().copied(), Use::Vertices);
+        self.accessors
+            .push(json!({ "bufferView": view, "componentType": 5121, "count": values.len(), "type": "VEC4" }));
+        self.accessors.len() - 1
+    }
+
+    /// Adds vectors of four shares of 65535 (weights).
+    pub fn shares4(&mut self, values: &[[u16; 4]]) -> usize {
+        let view = self.view(values.iter().flatten().flat_map(|v| v.to_le_bytes()), Use::Vertices);
+        self.accessors.push(json!({
+            "bufferView": view, "componentType": 5123, "normalized": true, "count": values.len(), "type": "VEC4",
+        }));
+        self.accessors.len() - 1
+    }
+
+    /// Adds corners of triangles, in two bytes each where they fit.
+    pub fn indices(&mut self, triangles: &[[u32; 3]]) -> usize {
+        let flat = || triangles.iter().flatten();
+        let small = flat().all(|&v| v < u32::from(u16::MAX));
+        let view = if small {
+            self.view(flat().flat_map(|&v| (v as u16).to_le_bytes()), Use::Indices)
+        } else {
+            self.view(flat().flat_map(|&v| v.to_le_bytes()), Use::Indices)
+        };
+        self.accessors.push(json!({
+            "bufferView": view, "componentType": if small { 5123 } else { 5125 },
+            "count": 3 * triangles.len(), "type": "SCALAR",
+        }));
+        self.accessors.len() - 1
+    }
+
+    fn view(&mut self, bytes: impl Iterator<Item = u8>, purpose: Use) -> usize {
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        let offset = self.bytes.len();
+        self.bytes.extend(bytes);
+        let mut view = json!({ "buffer": 0, "byteOffset": offset, "byteLength": self.bytes.len() - offset });
+        if purpose != Use::Other {
+            view["target"] = json!(purpose as u32);
+        }
+        self.views.push(view);
+        self.views.len() - 1
+    }
+
+    /// The whole file of a scene that refers to these accessors.
+    pub fn file(mut self, mut scene: Value) -> Vec<u8> {
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        scene["accessors"] = json!(self.accessors);
+        scene["bufferViews"] = json!(self.views);
+        scene["buffers"] = json!([{ "byteLength": self.bytes.len() }]);
+        let mut text = scene.to_string().into_bytes();
+        text.resize(text.len().next_multiple_of(4), b' ');
+        let length = 12 + 8 + text.len() + 8 + self.bytes.len();
+        let mut file = Vec::with_capacity(length);
+        file.extend(b"glTF");
+        file.extend(2_u32.to_le_bytes());
+        file.extend((length as u32).to_le_bytes());
+        for (kind, chunk) in [(b"JSON", &text), (b"BIN\0", &self.bytes)] {
+            file.extend((chunk.len() as u32).to_le_bytes());
+            file.extend(kind);
+            file.extend(chunk);
+        }
+        file
+    }
+}
