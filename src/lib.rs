@@ -26,11 +26,11 @@
 //! | `lift` | stage 4: 2D to 3D | `motion nn` |
 //! | `dataset` | stage 5: shards; and reading them back | `motion media audio` |
 //! | `train` | losses, optimiser, checkpoints, the two training loops | `motion nn audio dataset metrics` |
-//! | `evaluate` | errors of the lifters on captured motion, figures of a trained speaker on held-out sound | `motion nn train lift metrics audio dataset generate` |
+//! | `evaluate` | errors of the lifters on captured motion; made motion beside the real one, with what defends each figure | `motion media nn train lift metrics audio dataset generate import` |
 //! | `generate` | speech to motion with a trained speaker | `motion nn audio train metrics` |
 //! | `animate` | joints to rotations; BVH and drawn video | `motion media vision` |
 //! | `page` | HTML pages for people: elements, plots, one file | nothing |
-//! | `report` | what became of every second, and how a training went, each on one page; no stage, so it may know `segment` | `motion media vision segment animate page train` |
+//! | `report` | what became of every second, how a training went, and how good made motion is, each on one page; no stage, so it may know `segment` | `motion media vision segment animate page train metrics evaluate` |
 //! | `import` | motion that others captured, with its sound, becomes a dataset | `motion media audio dataset` |
 //! | `forget` | a video and all that was derived from it goes, and a search proves it | `dataset` |
 //! | `demo` | the synthetic speaker: videos with known truth, hours by a known rule, and the comparison with both | `motion media vision audio dataset animate train generate metrics` |

@@ -1,84 +1,92 @@
 //! `orator evaluate`.
 
+mod compare;
+mod lifter;
+
 use super::{Outcome, ui::Ui};
-use anyhow::{Context, Result, ensure};
-use orator::config;
+use anyhow::{Context, Result, bail, ensure};
 use orator::dataset::{Dataset, Split};
-use orator::evaluate::{bodies, hands, speaker, speaker_text};
+use orator::evaluate::baselines::{self, Predictor};
+use orator::evaluate::clips::{self, Clips};
+use orator::evaluate::table;
+use orator::evaluate::{motion_file, pairs, result, speaker, text};
 use orator::generate::Speaker;
-use orator::motion::{finger_files, mocap};
-use orator::stage::progress::Progress as _;
+use orator::metrics::catalogue::{Convention, Settings};
+use orator::report::evaluation;
+use orator::stage::progress::{Progress as _, Task};
+use orator::stage::workdir;
+use orator::types::time::FrameRate;
+use serde::Deserialize as _;
+use serde::de::IntoDeserializer as _;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// Measure the lifters on captured motion, or a trained speaker on held-out sound.
+/// Measure made motion beside the real one, and say what the figures are worth.
+///
+/// Files or folders of motion (.npy, .npz, the authors' .txt, .bvh), or a checkpoint on a split of a dataset. Beside each
+/// figure stands the same for poses that never move, the nearest neighbour, mismatched motion and the truth itself; with its
+/// 95 % interval, and a plain sentence: is it better than doing nothing, and does it hear?
 #[derive(clap::Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct Args {
     #[command(subcommand)]
-    what: What,
+    what: Option<What>,
+    #[command(flatten)]
+    motion: MotionArgs,
 }
 
 #[derive(clap::Subcommand)]
 enum What {
-    Lifter(LifterArgs),
-    Speaker(SpeakerArgs),
+    Lifter(lifter::Args),
+    Compare(compare::Args),
 }
 
-/// Print the errors of a lifter on captured motion seen by random cameras, beside those of trivial methods.
 #[derive(clap::Args)]
-struct LifterArgs {
-    /// body or hands.
-    #[arg(long, value_enum, default_value = "body")]
-    part: Part,
-    /// Captured motion, files or folders of them. body: .bvh, CMU or TED .npz; hands: .bvh with fingers, SMPL-X or TED
-    /// .npz, ICVL or NYU label .txt.
-    #[arg(long, value_name = "PATH", num_args = 1.., required = true)]
-    mocap: Vec<PathBuf>,
-    /// body: measure the takes of these names apart, and no others: patterns like 'test_*' or 'walk#1' (a file's second
-    /// take) [default: all as one set]
-    #[arg(long, value_name = "PATTERN", num_args = 1..)]
-    takes: Vec<String>,
-    /// body: scenes of 4 s a set.
-    #[arg(long, value_name = "N", default_value_t = bodies::SCENES)]
-    scenes: usize,
-    /// Weights of `orator train lifter --part body` [default: the built-in ones]
-    #[arg(long, value_name = "FILE")]
-    body_weights: Option<PathBuf>,
-    /// Weights of `orator train lifter --part hands` [default: the built-in ones]
-    #[arg(long, value_name = "FILE")]
-    hand_weights: Option<PathBuf>,
-}
-
-/// Print how good a trained speaker's motion is for sound it was not trained on.
-///
-/// Share of correct keypoints (PCK at 0.2: all, arms, fingers), L1 error, Frechet distance of single poses and motion
-/// energy, of the model, the mean pose that never moves, the nearest neighbour by sound in the training split, and the
-/// model hearing another sound; each with its 95 % interval over blocks of 4 s.
-#[derive(clap::Args)]
-struct SpeakerArgs {
-    /// The dataset, a folder of `orator run` or `orator import`.
-    #[arg(long, value_name = "DIR")]
-    dataset: PathBuf,
+struct MotionArgs {
+    /// The real motion: a file, or a folder of files that are paired by name.
+    #[arg(long, value_name = "PATH")]
+    truth: Option<PathBuf>,
+    /// The made motion of the same sound: a file or a folder (it may be the same one: gt_interval_7.txt belongs to
+    /// prediction_interval_7.txt).
+    #[arg(long, value_name = "PATH", requires = "truth")]
+    prediction: Option<PathBuf>,
+    /// The sound, a file or a folder: for the beats, and for the nearest neighbour.
+    #[arg(long, value_name = "PATH", requires = "truth")]
+    audio: Option<PathBuf>,
+    /// Frames a second of files that do not say it themselves (.npy, .txt), like 15 or 30000/1001 [default: 15]
+    #[arg(long, value_name = "RATE", requires = "truth", value_parser = motion_file::rate)]
+    fps: Option<FrameRate>,
+    /// Instead of files: a dataset, a folder of `orator run` or `orator import`.
+    #[arg(long, value_name = "DIR", conflicts_with = "truth", requires = "checkpoint")]
+    dataset: Option<PathBuf>,
     /// A checkpoint of `orator train gan`, or its folder (the best checkpoint is taken).
-    #[arg(long, value_name = "FILE|FOLDER")]
-    checkpoint: PathBuf,
-    /// Which intervals: validation, test or train.
+    #[arg(long, value_name = "FILE|FOLDER", requires = "dataset")]
+    checkpoint: Option<PathBuf>,
+    /// Which intervals of the dataset: validation, test or train.
     #[arg(long, value_name = "SPLIT", default_value = "validation", value_parser = split)]
     split: Split,
-}
-
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum Part {
-    Body,
-    Hands,
+    /// Whose definitions: orator, speech2gesture, genea, emage, trimodal or aist.
+    #[arg(long, value_name = "NAME", default_value = "orator", value_parser = convention)]
+    convention: Convention,
+    /// Shares of the pose's extent for correct keypoints (PCK).
+    #[arg(long, value_name = "SHARE", num_args = 1.., default_values_t = [0.2, 0.1])]
+    alpha: Vec<f64>,
+    /// Also give errors and speeds over all 49 joints, the neck included, which stands still.
+    #[arg(long)]
+    with_neck: bool,
+    /// Print every figure, those of arms, fingers and wrists too (--json and the page have all of them).
+    #[arg(long)]
+    all: bool,
+    /// Also write one HTML page: the table, plots, and truth and prediction playing side by side with the sound.
+    #[arg(long, value_name = "PAGE.html")]
+    report: Option<PathBuf>,
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.what {
-        What::Lifter(args) => match args.part {
-            Part::Body => body(args, ui),
-            Part::Hands => hands(args, ui),
-        },
-        What::Speaker(args) => speaker(&args, ui),
+        Some(What::Lifter(args)) => lifter::run(args, ui),
+        Some(What::Compare(args)) => compare::run(&args, ui),
+        None => motion(&args.motion, ui),
     }
 }
 
@@ -87,42 +95,70 @@ fn split(name: &str) -> std::result::Result<Split, String> {
     found.ok_or_else(|| format!("a split is {}", Split::ALL.map(Split::name).join(", ")))
 }
 
-fn speaker(args: &SpeakerArgs, ui: &Ui) -> Result<Outcome> {
-    let dataset = Dataset::open(&args.dataset)?;
-    let table = {
-        let _task = ui.begin("evaluating", 0);
-        speaker::evaluate(&dataset, &Speaker::open(&args.checkpoint)?, args.split)?
+fn convention(name: &str) -> std::result::Result<Convention, String> {
+    let known = Convention::deserialize(name.into_deserializer());
+    known.map_err(|error: serde::de::value::Error| error.to_string())
+}
+
+fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
+    let settings = Settings {
+        convention: args.convention,
+        alphas: args.alpha.clone(),
+        with_neck: args.with_neck,
+        ..Settings::default()
     };
-    let facts = serde_json::json!({ "speaker": table, "meaning": speaker_text::meaning(&table) });
-    ui.summary(&speaker_text::text(&table), None, facts);
+    let (clips, table) = {
+        let task = ui.begin("evaluating", 0);
+        let (clips, predictors) = material(args, &*task)?;
+        let table = table::measure(&clips, &settings, &predictors, &*task)?;
+        (clips, table)
+    };
+    let mut facts: Value = result::json(&table);
+    let mut text = text::text(&table, args.all);
+    if let Some(path) = &args.report {
+        let title = format!("Evaluation of {}", title(args));
+        let html = evaluation::html(&table, &clips, &title)?;
+        workdir::write_file(path, html.as_bytes())?;
+        text += &format!("\nwrote {} ({:.1} MB)\n", path.display(), html.len() as f64 / 1e6);
+        facts["report"] = json!(path);
+    }
+    ui.summary(&text, None, facts);
     Ok(Outcome::Done)
 }
 
-fn body(args: LifterArgs, ui: &Ui) -> Result<Outcome> {
-    ensure!((1..=100_000).contains(&args.scenes), "--scenes must lie between 1 and 100000");
-    let settings = config::Lift {
-        body_weights: args.body_weights.unwrap_or_default(),
-        hand_weights: args.hand_weights.unwrap_or_default(),
-        ..Default::default()
+/// What is measured, in a few words: names, no folders of this machine.
+fn title(args: &MotionArgs) -> String {
+    let name = |path: &Option<PathBuf>| {
+        let name = path.as_deref().and_then(|path| path.file_name());
+        name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
     };
-    let takes = mocap::read_all(&args.mocap).context("reading --mocap")?;
-    let sets = if args.takes.is_empty() {
-        vec![("all takes".to_owned(), takes)]
-    } else {
-        mocap::divide(takes, &args.takes)?.0
-    };
-    let rows = bodies::table(&bodies::Lifters::new(&settings)?, &sets, args.scenes)?;
-    ui.summary(&bodies::text(&rows), None, serde_json::json!({ "body": rows }));
-    Ok(Outcome::Done)
+    match &args.checkpoint {
+        Some(_) => format!("{} on the {} split of {}", name(&args.checkpoint), args.split.name(), name(&args.dataset)),
+        None => name(&args.prediction),
+    }
 }
 
-fn hands(args: LifterArgs, ui: &Ui) -> Result<Outcome> {
-    let rows = hands::evaluate(
-        &*hands::lifter_of(&args.hand_weights.unwrap_or_default())?,
-        &finger_files::read_all(&args.mocap)?,
-        hands::MEASURED,
-        1,
-    )?;
-    ui.summary(&hands::text(&rows), None, serde_json::json!({ "hands": rows }));
-    Ok(Outcome::Done)
+/// What is measured, from files or from a dataset.
+fn material(args: &MotionArgs, task: &dyn Task) -> Result<(Clips, Vec<Predictor>)> {
+    if let (Some(dataset), Some(checkpoint)) = (&args.dataset, &args.checkpoint) {
+        let made = speaker::material(&Dataset::open(dataset)?, &Speaker::open(checkpoint)?, args.split, task)?;
+        return Ok((made.clips, made.predictors));
+    }
+    let (Some(truth), Some(prediction)) = (&args.truth, &args.prediction) else {
+        bail!("nothing to measure: give --truth and --prediction, or --dataset and --checkpoint")
+    };
+    task.detail("reading");
+    let found = pairs::find(truth, prediction, args.audio.as_deref())?;
+    let mut clips = clips::read(&found.pairs, args.fps)?;
+    ensure!(
+        args.audio.is_none() || clips.have_sound() || args.audio.as_ref().is_some_and(|audio| audio.is_dir()),
+        "{} holds no sound",
+        args.audio.as_deref().context("no sound")?.display()
+    );
+    clips.notes.splice(0..0, found.notes);
+    let mut predictors = vec![Predictor::prediction(&clips, "the motion under test")];
+    let (others, left_out) = baselines::of_files(&clips)?;
+    predictors.extend(others);
+    clips.notes.extend(left_out);
+    Ok((clips, predictors))
 }

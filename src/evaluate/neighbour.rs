@@ -1,102 +1,124 @@
-//! Nearest neighbour by sound: what a predictor reaches that copies. For each 4 s of sound the stretch of the training
-//! split whose log-mel spectrogram is nearest, and the poses that the speaker made there.
+//! Nearest neighbour by sound: what a predictor reaches that copies. For each 4 s of sound the stretch of a library whose
+//! log-mel spectrogram is nearest, and the poses that the speaker made there.
 
-use super::held_out::HeldOut;
+use super::hearing::POOLED;
 use crate::audio::mel;
-use crate::dataset::{Dataset, Split};
-use crate::train::examples::mel_frames;
-use crate::train::poses::Normalisation;
-use crate::types::pose3d::Motion;
+use crate::types::skeleton::N_JOINTS;
 use crate::types::time::FrameRate;
 use anyhow::Result;
-use ndarray::s;
+use ndarray::{Array3, s};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Length of a stretch that is looked for.
 const WINDOW_SECS: f64 = 4.0;
-/// Frames of motion whose spectrogram is averaged into one row, and rows between two places looked at.
-const POOLED: usize = 2;
+/// Rows between two places looked at.
 const STRIDE: usize = 2;
+
+/// A sound to find poses for: rows of pooled spectrogram (`hearing::Heard`), and how many frames of motion it has.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked<'a> {
+    pub rows: &'a [f32],
+    pub n_frames: usize,
+}
+
+/// Where neighbours are looked for.
+pub trait Library: Sync {
+    /// How many entries it has.
+    fn len(&self) -> usize;
+
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The pooled spectrogram of an entry and its frames of motion; `None`: it has no sound.
+    fn heard(&self, entry: usize) -> Result<Option<(Vec<f32>, usize)>>;
+
+    /// The poses of an entry [T, 49, 3].
+    fn joints(&self, entry: usize) -> Result<Array3<f32>>;
+
+    /// Whether an entry may answer for that sound: a clip must not copy itself.
+    fn may_answer(&self, asked: usize, entry: usize) -> bool;
+}
 
 /// A stretch to find poses for.
 struct Wanted {
-    interval: usize,
-    first_frame: usize,
-    n_frames: usize,
-    /// Rows of 64 numbers.
-    sound: Vec<f32>,
+    asked: usize,
+    frames: Range<usize>,
+    rows: Vec<f32>,
 }
 
-/// The best place so far: squared distance, interval of the training split, first frame.
+/// The best place so far: squared distance, entry of the library, first frame.
 type Found = (f32, usize, usize);
 
-/// Motion for each of `held_out`; `None` where a stretch is longer than every interval of the training split.
-pub fn motions(dataset: &Dataset, normal: &Normalisation, held_out: &[HeldOut]) -> Result<Option<Vec<Motion>>> {
-    let fps = dataset.info().fps;
-    let wanted: Vec<Wanted> = held_out.iter().enumerate().flat_map(|(i, interval)| wanted(i, interval, fps)).collect();
-    let training = super::held_out::read(dataset, &dataset.samples(Split::Train), normal)?;
-    let best = training
-        .par_iter()
-        .enumerate()
-        .map(|(i, interval)| {
-            let rows = pooled(&interval.sound.samples, fps, interval.real.n_frames());
-            wanted.iter().map(|wanted| nearest(&rows, interval.real.n_frames(), wanted, i)).collect::<Vec<_>>()
+/// Motion [T, 49, 3] for each sound, NaN where the library's is; `None` where a stretch finds nothing long enough.
+pub fn motions(asked: &[Asked], library: &dyn Library, fps: FrameRate) -> Result<Option<Vec<Array3<f32>>>> {
+    let wanted: Vec<Wanted> = asked.iter().enumerate().flat_map(|(i, asked)| stretches(i, asked, fps)).collect();
+    let best = (0..library.len())
+        .into_par_iter()
+        .map(|entry| -> Result<Vec<Option<Found>>> {
+            let Some((rows, n_frames)) = library.heard(entry)? else { return Ok(vec![None; wanted.len()]) };
+            let find = |wanted: &Wanted| {
+                library.may_answer(wanted.asked, entry).then(|| nearest(&rows, n_frames, wanted, entry)).flatten()
+            };
+            Ok(wanted.par_iter().map(find).collect())
         })
-        .reduce(|| vec![None; wanted.len()], |a, b| a.into_iter().zip(b).map(|(a, b)| nearer(a, b)).collect());
-    let mut motions: Vec<Motion> = held_out.iter().map(|interval| interval.real.clone()).collect();
+        .try_reduce(
+            || vec![None; wanted.len()],
+            |a, b| Ok(a.into_iter().zip(b).map(|(a, b)| nearer(a, b)).collect()),
+        )?;
+    let mut made: Vec<Array3<f32>> = asked.iter().map(|a| Array3::zeros((a.n_frames, N_JOINTS, 3))).collect();
+    // entry by entry, so that each is read once
+    let mut places: Vec<(usize, usize, &Wanted)> = Vec::with_capacity(wanted.len());
     for (wanted, found) in wanted.iter().zip(best) {
-        let Some((_, interval, first)) = found else { return Ok(None) };
-        let from = training[interval].real.joints.slice(s![first..first + wanted.n_frames, .., ..]);
-        let to = wanted.first_frame..wanted.first_frame + wanted.n_frames;
-        motions[wanted.interval].joints.slice_mut(s![to, .., ..]).assign(&from);
+        let Some((_, entry, first)) = found else { return Ok(None) };
+        places.push((entry, first, wanted));
     }
-    // what is missing where it copies from is the mean there
-    for motion in &mut motions {
-        motion.joints = normal.joints(normal.numbers(motion).0.view());
+    places.sort_by_key(|(entry, _, _)| *entry);
+    for of_entry in places.chunk_by(|a, b| a.0 == b.0) {
+        let joints = library.joints(of_entry[0].0)?;
+        for (_, first, wanted) in of_entry {
+            let from = joints.slice(s![*first..first + wanted.frames.len(), .., ..]);
+            made[wanted.asked].slice_mut(s![wanted.frames.clone(), .., ..]).assign(&from);
+        }
     }
-    Ok(Some(motions))
+    Ok(Some(made))
 }
 
-/// The interval cut into stretches, the last one shorter.
-fn wanted(interval: usize, held_out: &HeldOut, fps: FrameRate) -> Vec<Wanted> {
-    let n_frames = held_out.real.n_frames();
+/// The sound cut into stretches, the last one shorter.
+fn stretches(asked: usize, sound: &Asked, fps: FrameRate) -> Vec<Wanted> {
     let window = (((WINDOW_SECS * fps.per_sec()) as usize) / POOLED * POOLED).max(POOLED);
-    let rows = pooled(&held_out.sound.samples, fps, n_frames);
-    let stretch = |first_frame: usize| {
-        let n = window.min(n_frames - first_frame);
-        let from = first_frame / POOLED * mel::N_MELS;
-        let sound = rows[from..from + n.div_ceil(POOLED) * mel::N_MELS].to_vec();
-        Wanted { interval, first_frame, n_frames: n, sound }
+    let stretch = |first: usize| {
+        let frames = first..(first + window).min(sound.n_frames);
+        let from = first / POOLED * mel::N_MELS;
+        let to = (from + frames.len().div_ceil(POOLED) * mel::N_MELS).min(sound.rows.len());
+        Wanted { asked, frames, rows: sound.rows.get(from..to).unwrap_or_default().to_vec() }
     };
-    (0..n_frames).step_by(window).map(stretch).collect()
+    (0..sound.n_frames).step_by(window).map(stretch).collect()
 }
 
-/// The spectrogram's mean over every `POOLED` frames of motion: rows of 64 numbers, one begun counts.
-fn pooled(samples: &[f32], fps: FrameRate, n_frames: usize) -> Vec<f32> {
-    let n_rows = n_frames.div_ceil(POOLED);
-    let mut samples = samples.to_vec();
-    samples.resize(samples.len().max(mel::n_samples(mel_frames(fps, n_rows * POOLED) + 1)), 0.0);
-    let mels = mel::log_mel(&samples);
-    let row = |row: usize| {
-        let frames = mel_frames(fps, row * POOLED)..mel_frames(fps, (row + 1) * POOLED);
-        let n = frames.len().max(1) as f32;
-        mels.slice(s![frames, ..]).sum_axis(ndarray::Axis(0)).into_iter().map(move |sum| sum / n)
-    };
-    (0..n_rows).flat_map(row).collect()
-}
-
-/// The place in an interval of the training split whose sound is nearest.
-fn nearest(rows: &[f32], n_frames: usize, wanted: &Wanted, interval: usize) -> Option<Found> {
-    let places = (0..).step_by(STRIDE).take_while(|row| row * POOLED + wanted.n_frames <= n_frames);
+/// The place in an entry whose sound is nearest.
+fn nearest(rows: &[f32], n_frames: usize, wanted: &Wanted, entry: usize) -> Option<Found> {
+    let places = (0..).step_by(STRIDE).take_while(|row| row * POOLED + wanted.frames.len() <= n_frames);
     let of_place = |row: usize| {
-        let sound = &rows[row * mel::N_MELS..][..wanted.sound.len()];
-        let distance = sound.iter().zip(&wanted.sound).map(|(a, b)| (a - b) * (a - b)).sum::<f32>();
-        (distance, interval, row * POOLED)
+        let sound = rows.get(row * mel::N_MELS..)?.get(..wanted.rows.len())?;
+        Some((distance(sound, &wanted.rows), entry, row * POOLED))
     };
-    places.map(of_place).map(Some).fold(None, nearer)
+    places.map(of_place).fold(None, nearer)
 }
 
-/// The nearer of two; of equals the one that comes first in the dataset.
+/// Squared distance, in eight sums side by side.
+fn distance(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0f32; 8];
+    for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
+        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
+            *sum += (a - b) * (a - b);
+        }
+    }
+    sums.iter().sum()
+}
+
+/// The nearer of two; of equals the one that comes first in the library.
 fn nearer(a: Option<Found>, b: Option<Found>) -> Option<Found> {
     let order = |a: &Found, b: &Found| a.0.total_cmp(&b.0).then_with(|| (a.1, a.2).cmp(&(b.1, b.2)));
     a.into_iter().chain(b).min_by(order)

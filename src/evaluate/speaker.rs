@@ -1,59 +1,36 @@
-//! How good a trained speaker is on intervals it was not trained on, beside predictors that know less: each figure with
-//! its interval over blocks of 4 s. The figures themselves are `metrics`, the predictors `predictors`.
+//! Clips and baselines of a trained speaker on a split of a dataset: what is true is in the dataset, what is made comes
+//! from the sound alone, and all that a baseline knows is of the training split.
 
-use super::bootstrap::{Estimate, draws};
-use super::held_out;
-use super::predictors::{self, Predicted};
-use super::speaker_blocks::{Block, blocks, sum};
+use super::baselines::{self, Made, Predictor, Who};
+use super::clips::{Clip, Clips, Voice, compared, pcm};
+use super::hearing::{self, Listener};
+use super::held_out::{self, HeldOut};
+use super::neighbour::{self, Asked, Library};
+use super::predictors;
+use super::stills::Stills;
+use crate::dataset::index::SampleRef;
 use crate::dataset::{Dataset, Split};
 use crate::generate::Speaker;
-use crate::metrics::energy::MotionEnergy;
-use crate::metrics::frechet::{Gaussian, frechet};
-use anyhow::{Result, ensure};
+use crate::stage::progress::Task;
+use crate::train::poses::{N_NUMBERS, Normalisation};
+use crate::types::skeleton::N_JOINTS;
+use crate::types::sound::Sound;
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, ensure};
+use ndarray::{Array2, Array3, s};
 use rayon::prelude::*;
-use serde::Serialize;
 
-/// Draws behind an interval; a Frechet distance costs more.
-pub const N_DRAWS: usize = 1000;
-pub const N_FRECHET_DRAWS: usize = 100;
-
-/// A predictor's figures.
-#[derive(Clone, Debug, Serialize)]
-pub struct Row {
-    pub predictor: &'static str,
-    /// Shares of correct keypoints, 0..1: all, arms, fingers.
-    pub pck: Estimate,
-    pub pck_body: Estimate,
-    pub pck_hands: Estimate,
-    /// Mean absolute error of normalised coordinates.
-    pub l1: Estimate,
-    /// Square centimetres, of `Table::n_poses` poses each.
-    pub frechet: Estimate,
-    /// Mean squared speed of the joints as a share of the real one's.
-    pub energy: Estimate,
+/// What is measured: the clips, and the predictors beside each other, the speaker's own motion first.
+pub struct Material {
+    pub clips: Clips,
+    pub predictors: Vec<Predictor>,
 }
 
-/// All predictors on the same intervals.
-#[derive(Clone, Debug, Serialize)]
-pub struct Table {
-    pub speaker: String,
-    pub split: &'static str,
-    pub n_intervals: usize,
-    pub n_blocks: usize,
-    pub secs: f64,
-    /// Wholly seen poses behind each Frechet distance, made and real alike.
-    pub n_poses: usize,
-    pub rows: Vec<Row>,
-    /// PCK of the model less that of the mean pose, and of itself with the wrong sound, block by block.
-    pub over_mean_pose: Estimate,
-    pub over_mismatched: Estimate,
-}
-
-/// Measures the speaker of a checkpoint on a split of `dataset`.
+/// The speaker of a checkpoint on a split of `dataset`.
 ///
 /// # Errors
 /// A dataset of another frame rate; a split without intervals.
-pub fn evaluate(dataset: &Dataset, speaker: &Speaker, split: Split) -> Result<Table> {
+pub fn material(dataset: &Dataset, speaker: &Speaker, split: Split, task: &dyn Task) -> Result<Material> {
     let (of_dataset, of_speaker) = (dataset.info().fps, speaker.fps());
     ensure!(
         of_dataset == of_speaker,
@@ -61,63 +38,124 @@ pub fn evaluate(dataset: &Dataset, speaker: &Speaker, split: Split) -> Result<Ta
         dataset.dir().display()
     );
     let normal = &speaker.facts().normalisation;
+    task.detail("reading the intervals");
     let held_out = held_out::read(dataset, &held_out::samples(dataset, split)?, normal)?;
-    let predicted = predictors::predict(dataset, speaker, normal, &held_out)?;
-    let measured: Vec<(&'static str, Vec<Block>)> =
-        predicted.iter().map(|Predicted { name, motions }| (*name, blocks(&held_out, motions, normal))).collect();
-    let n_blocks = measured.first().map_or(0, |(_, blocks)| blocks.len());
-    let drawn = draws(n_blocks, N_DRAWS);
-    let rows = measured.iter().map(|(name, blocks)| row(name, blocks, &drawn)).collect();
-    let over = |other: &str| {
-        let of = |name: &str| measured.iter().find(|(found, _)| *found == name).map(|(_, blocks)| blocks.as_slice());
-        let (own, others) = (of(predictors::MODEL).unwrap_or_default(), of(other).unwrap_or_default());
-        let difference = |which: &mut dyn Iterator<Item = usize>| {
-            let which: Vec<usize> = which.collect();
-            let share = |blocks: &[Block]| sum(blocks, &which, |block| block.correct).share();
-            share(own) - share(others)
-        };
-        let drawn: Vec<f64> = drawn.iter().map(|draw| difference(&mut draw.iter().copied())).collect();
-        Estimate::of(difference(&mut (0..n_blocks)), &drawn)
-    };
-    Ok(Table {
-        speaker: speaker.name().to_owned(),
-        split: split.name(),
-        n_intervals: held_out.len(),
-        n_blocks,
-        secs: held_out.iter().map(|interval| of_dataset.secs(interval.real.n_frames())).sum(),
-        n_poses: measured.first().map_or(0, |(_, blocks)| blocks.iter().map(|block| block.real_poses.n).sum()),
-        rows,
-        over_mean_pose: over(predictors::MEAN_POSE),
-        over_mismatched: over(predictors::MISMATCHED),
-    })
+    task.detail("generating motion");
+    let made = generated(speaker, &held_out, |sounds, i| sounds[i].clone())?;
+    let other = generated(speaker, &held_out, predictors::turned)?;
+    task.detail("listening");
+    let clips: Vec<Clip> =
+        held_out.into_par_iter().zip(made).map(|(held_out, made)| clip(held_out, made, of_dataset)).collect();
+    let mut clips = Clips { fps: of_dataset, clips, notes: Vec::new() };
+    task.detail("what the training split knows");
+    let prediction = format!("{} of the checkpoint, hearing the sound of each interval", speaker.name());
+    let mut all = vec![Predictor::prediction(&clips, &prediction)];
+    all.extend(stills(dataset, normal, clips.clips.len())?);
+    match copied(dataset, normal, &clips)? {
+        Some(motions) => {
+            let says = "for each 4 s of sound the motion of the stretch of the training split that sounds most alike";
+            let mut predictor = Predictor { who: Who::NearestNeighbour, says: says.to_owned(), motions };
+            baselines::fill(&mut predictor, &all[1]);
+            all.push(predictor);
+        }
+        None => clips.notes.push(format!(
+            "{}: left out, since no interval of the training split is long enough to copy from",
+            Who::NearestNeighbour.name()
+        )),
+    }
+    let says = "the same speaker hearing another sound: what is said half of the split later".to_owned();
+    let motions = other.into_iter().map(Made::Moves).collect();
+    all.push(Predictor { who: Who::MismatchedPrediction, says, motions });
+    match baselines::mismatched(&clips, Who::MismatchedTruth, &all[1]) {
+        Some(predictor) => all.push(predictor),
+        None => clips.notes.push(baselines::too_short(Who::MismatchedTruth)),
+    }
+    Ok(Material { clips, predictors: all })
 }
 
-fn row(predictor: &'static str, blocks: &[Block], drawn: &[Vec<usize>]) -> Row {
-    let all: Vec<usize> = (0..blocks.len()).collect();
-    let estimate = |drawn: &[Vec<usize>], figure: &(dyn Fn(&[usize]) -> f64 + Sync)| {
-        Estimate::of(figure(&all), &drawn.par_iter().map(|draw| figure(draw)).collect::<Vec<_>>())
-    };
-    let correct = |which: &[usize]| sum(blocks, which, |block| block.correct);
-    let energy = |which: &[usize]| {
-        let of = |energy: fn(&Block) -> MotionEnergy| sum(blocks, which, energy);
-        of(|block| block.made_energy).relative_to(&of(|block| block.real_energy))
-    };
-    let distance = |which: &[usize]| {
-        let of = |poses: fn(&Block) -> &Gaussian| {
-            which.iter().fold(Gaussian::default(), |mut all, block| {
-                all += poses(&blocks[*block]);
-                all
-            })
-        };
-        frechet(&of(|block| &block.made_poses), &of(|block| &block.real_poses))
-    };
-    Row {
-        predictor,
-        pck: estimate(drawn, &|which| correct(which).share()),
-        pck_body: estimate(drawn, &|which| correct(which).body.share()),
-        pck_hands: estimate(drawn, &|which| correct(which).hands.share()),
-        l1: estimate(drawn, &|which| sum(blocks, which, |block| block.error).mean()),
-        frechet: estimate(&drawn[..N_FRECHET_DRAWS.min(drawn.len())], &distance),
-        energy: estimate(drawn, &energy),
+fn generated(
+    speaker: &Speaker,
+    held_out: &[HeldOut],
+    heard: impl Fn(&[&Sound], usize) -> Sound,
+) -> Result<Vec<Array3<f32>>> {
+    let sounds: Vec<&Sound> = held_out.iter().map(|interval| &interval.sound).collect();
+    let made = held_out.iter().enumerate().map(|(i, interval)| {
+        let made = predictors::motion(speaker, &heard(&sounds, i), interval.real.n_frames());
+        Ok(made.with_context(|| format!("no motion for {}", interval.key))?.joints)
+    });
+    made.collect()
+}
+
+fn clip(held_out: HeldOut, made: Array3<f32>, fps: FrameRate) -> Clip {
+    let HeldOut { key, real, sound } = held_out;
+    let heard = Some(hearing::of_samples(&sound.samples, fps, real.n_frames()));
+    let (mask, _) = compared(&real.joints, &real.mask, &made);
+    let voice = Some(Voice::Kept(sound.samples.into_iter().map(pcm).collect()));
+    Clip { name: key, real: real.joints, made, mask, heard, voice }
+}
+
+/// Mean and median pose of the training split.
+fn stills(dataset: &Dataset, normal: &Normalisation, n_clips: usize) -> Result<Vec<Predictor>> {
+    let mut stills = Stills::default();
+    for sample in dataset.samples(Split::Train) {
+        let interval = held_out::read(dataset, &[sample], normal)?.remove(0);
+        stills.add(interval.real.joints.view(), interval.real.mask.view());
     }
+    let mean: Array2<f32> = normal.joints(Array2::zeros((N_NUMBERS, 1)).view()).slice(s![0, .., ..]).to_owned();
+    let mut median = stills.median();
+    median.zip_mut_with(&mean, |v, mean| *v = if v.is_finite() { *v } else { *mean });
+    let predictor = |who: Who, pose: Array2<f32>| Predictor {
+        who,
+        says: format!("the {} of the training split in every frame, which never moves", who.name()),
+        motions: vec![Made::Still(pose); n_clips],
+    };
+    Ok(vec![predictor(Who::MeanPose, mean), predictor(Who::MedianPose, median)])
+}
+
+/// The training split as a library, read anew for every question, so that its length costs no memory.
+struct Training<'a> {
+    dataset: &'a Dataset,
+    normal: &'a Normalisation,
+    samples: Vec<SampleRef>,
+}
+
+impl Training<'_> {
+    fn read(&self, entry: usize) -> Result<HeldOut> {
+        let sample = self.samples.get(entry).context("no such interval")?;
+        held_out::read(self.dataset, std::slice::from_ref(sample), self.normal)?.pop().context("no such interval")
+    }
+}
+
+impl Library for Training<'_> {
+    fn len(&self) -> usize {
+        self.samples.len()
+    }
+
+    fn heard(&self, entry: usize) -> Result<Option<(Vec<f32>, usize)>> {
+        let interval = self.read(entry)?;
+        let mut listener = Listener::new(interval.real.fps, None);
+        listener.push(&interval.sound.samples);
+        let n_frames = interval.real.n_frames();
+        Ok(Some((listener.finish(n_frames).rows, n_frames)))
+    }
+
+    fn joints(&self, entry: usize) -> Result<Array3<f32>> {
+        Ok(self.read(entry)?.real.joints)
+    }
+
+    fn may_answer(&self, _: usize, _: usize) -> bool {
+        true
+    }
+}
+
+/// The nearest neighbours' motion; what is missing where it was copied from is NaN.
+pub fn copied(dataset: &Dataset, normal: &Normalisation, clips: &Clips) -> Result<Option<Vec<Made>>> {
+    let rows = |clip: &Clip| clip.heard.as_ref().map(|heard| heard.rows.clone()).unwrap_or_default();
+    let rows: Vec<Vec<f32>> = clips.clips.iter().map(rows).collect();
+    let asked: Vec<Asked> =
+        clips.clips.iter().zip(&rows).map(|(clip, rows)| Asked { rows, n_frames: clip.n_frames() }).collect();
+    let library = Training { dataset, normal, samples: dataset.samples(Split::Train) };
+    let made = neighbour::motions(&asked, &library, clips.fps)?;
+    debug_assert!(made.iter().flatten().all(|joints| joints.shape()[1..] == [N_JOINTS, 3]));
+    Ok(made.map(|made| made.into_iter().map(Made::Moves).collect()))
 }

@@ -10,6 +10,8 @@ const UNITS: [(&str, f64); 5] =
     [("metre", 1.0), ("centimetre", 0.01), ("millimetre", 0.001), ("inch", 0.0254), ("0.45 inch", 0.0254 / 0.45)];
 /// Upper arm and forearm of people, metres: the common adult's, and what is taken for a person's at all.
 const ARM_METRES: f64 = 0.54;
+/// A speaker who sits a little askew still faces +z.
+const MOST_DEGREES: f64 = 60.0;
 const ARM_RANGE: std::ops::Range<f64> = 0.33..0.85;
 
 /// What tells how a skeleton stands: a frame's joints, in the source's unit and axes.
@@ -67,6 +69,13 @@ impl House {
         let rest = [1.0, 0.0, 0.0];
         let (cos, sin) = (vec3::dot(rest, x), vec3::dot(vec3::cross(rest, x), up));
         Ok(Self { axes: [x, y, z], metres, unit, up: up_axis, turned_degrees: -sin.atan2(cos).to_degrees() })
+    }
+
+    /// The same without the turn, for a source that is y up and faces +z (within `MOST_DEGREES`) already.
+    pub fn as_it_stands(&self) -> Option<Self> {
+        let faces = self.up == "+y" && self.turned_degrees.abs() <= MOST_DEGREES;
+        let axes = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
+        faces.then_some(Self { axes, turned_degrees: 0.0, ..*self })
     }
 
     /// A joint of a frame in house axes and metres, seen from the neck.

@@ -2,7 +2,7 @@
 
 use crate::types::{pose3d::Motion, skeleton::N_JOINTS, time::FrameRate};
 use anyhow::{Context as _, ensure};
-use ndarray::{Array, Array3, Dimension, Ix3};
+use ndarray::{Array, Array3, Dimension, Ix3, IxDyn};
 use ndarray_npy::npy::header::Header;
 use ndarray_npy::{ReadNpyError, ReadNpyExt as _, ReadableElement, WriteNpyExt as _};
 use std::fs::File;
@@ -20,6 +20,26 @@ pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
         path.display(),
         joints.shape()
     );
+    Ok(Motion::from_joints(fps, joints))
+}
+
+/// Reads a motion of `fps` from an array of f32 or f64, [T, 49, 3] or [T, 147] (the same numbers, joint after joint).
+pub fn read_any(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot open {}", path.display()))?;
+    let numbers = parse::<f32, IxDyn>(&bytes).or_else(|error| match error {
+        ReadNpyError::WrongDescriptor(_) => Ok(parse::<f64, IxDyn>(&bytes)?.mapv(|v| v as f32)),
+        error => Err(error),
+    });
+    let numbers = numbers.with_context(|| format!("{} is not a .npy file of float32 or float64", path.display()))?;
+    let shape = numbers.shape().to_vec();
+    let is_motion = matches!(shape[..], [_, N_JOINTS, 3]) || matches!(shape[..], [_, n] if n == 3 * N_JOINTS);
+    ensure!(
+        is_motion,
+        "{} has the shape {shape:?}, expected [frames, {N_JOINTS}, 3] or [frames, {}]",
+        path.display(),
+        3 * N_JOINTS
+    );
+    let joints = Array3::from_shape_vec((shape[0], N_JOINTS, 3), numbers.iter().copied().collect())?;
     Ok(Motion::from_joints(fps, joints))
 }
 

@@ -14,7 +14,8 @@ pub fn jpeg(bytes: &[u8], [width, height]: [usize; 2], says: &str) -> Node {
         .attr("loading", "lazy")
 }
 
-fn base64(bytes: &[u8]) -> String {
+/// As `data:` addresses hold bytes (RFC 4648, section 4).
+pub fn base64(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for three in bytes.chunks(3) {
         let bits = three.iter().fold(0_u32, |bits, byte| bits << 8 | u32::from(*byte)) << (8 * (3 - three.len()));

@@ -3,9 +3,14 @@
 //! `worst` and `pictures` (frames that show what a rule refuses); `gather` goes through the videos once and fills them all.
 //! Shown, a file a section: `summary`, `lines`, `gallery`, `distributions`, `sliders`, `motion`; `whole` puts them on a page.
 //!
-//! And what stands on the page of a training: `training`, of `training_charts`, `training_strip`, `training_picture`.
+//! And what stands on the page of a training: `training`, of `training_charts`, `training_strip`, `training_picture`; and on that
+//! of an evaluation: `evaluation`, of `evaluation_table`, `evaluation_charts`, `evaluation_player`.
 
 mod distributions;
+pub mod evaluation;
+mod evaluation_charts;
+mod evaluation_player;
+mod evaluation_table;
 mod gallery;
 mod gather;
 mod lines;

@@ -6,10 +6,13 @@ use crate::gan::{dataset, sample};
 use crate::support::Project;
 use ndarray::s;
 use orator::dataset::{Dataset, Split, write_dataset};
-use orator::evaluate::{held_out, neighbour};
+use orator::evaluate::baselines::Made;
+use orator::evaluate::clips::{Clip, Clips};
+use orator::evaluate::hearing::of_samples;
+use orator::evaluate::held_out;
+use orator::evaluate::speaker::copied;
 use orator::train::gan::normalisation;
 use orator::types::time::FrameRate;
-use serde_json::Value;
 use std::path::Path;
 
 #[test]
@@ -33,26 +36,33 @@ fn a_training_ends_with_its_page_and_its_speaker_is_measured() {
         ["training.html", "training.png"].map(|file| std::fs::read(project.dir().join("gan").join(file)).unwrap());
     assert!(bytes == again, "another page of the same training");
 
-    let answer = project.answer(&["evaluate", "speaker", "--dataset", &data, "--checkpoint", &out]);
+    let answer = project.answer(&["evaluate", "--dataset", &data, "--checkpoint", &out]);
     assert_eq!(answer.code, 0, "{}", answer.errors);
-    let table = &answer.json["speaker"];
-    assert_eq!(
-        (&table["split"], &table["n_intervals"], &table["n_blocks"]),
-        (&"validation".into(), &1.into(), &2.into())
-    );
-    let rows = table["rows"].as_array().unwrap();
-    let names: Vec<&str> = rows.iter().map(|row| row["predictor"].as_str().unwrap()).collect();
-    assert_eq!(names, ["model", "mean pose", "nearest neighbour", "mismatched"]);
-    let number = |row: &Value, of: &str| row[of]["value"].as_f64().unwrap();
-    for row in rows {
-        for share in ["pck", "pck_body", "pck_hands"] {
-            assert!((0.0..=1.0).contains(&number(row, share)), "{row}");
-        }
-        assert!(number(row, "l1") > 0.0 && number(row, "frechet") > 0.0, "{row}");
+    let result = &answer.json;
+    assert_eq!((&result["n_clips"], &result["n_blocks"]), (&1.into(), &2.into()));
+    let names: Vec<&str> =
+        result["predictors"].as_array().unwrap().iter().map(|row| row["name"].as_str().unwrap()).collect();
+    let expected = [
+        "prediction",
+        "mean_pose",
+        "median_pose",
+        "nearest_neighbour",
+        "mismatched_prediction",
+        "mismatched_truth",
+        "truth_halves",
+        "truth",
+    ];
+    assert_eq!(names, expected);
+    let metrics = result["metrics"].as_array().unwrap();
+    let metric = |name: &str| metrics.iter().find(|metric| metric["name"] == name).unwrap();
+    let value = |name: &str, who: &str| metric(name)["values"][who]["value"].as_f64().unwrap();
+    for who in expected.iter().filter(|who| **who != "truth_halves") {
+        assert!((0.0..=1.0).contains(&value("pck_3d", who)) && value("mpjpe", who) >= 0.0, "{who}");
     }
-    assert_eq!(number(&rows[1], "energy"), 0.0);
-    assert!(answer.json["meaning"].as_str().unwrap().contains("doing nothing"));
-    let wrong = project.answer(&["evaluate", "speaker", "--dataset", &data, "--checkpoint", &out, "--split", "test"]);
+    assert_eq!((value("pck_3d", "truth"), value("mpjpe", "truth")), (1.0, 0.0));
+    let sentence = result["better_than_nothing"]["sentence"].as_str().unwrap();
+    assert!(sentence.contains("2 blocks of about 4 s are too few"), "{sentence}");
+    let wrong = project.answer(&["evaluate", "--dataset", &data, "--checkpoint", &out, "--split", "test"]);
     assert!(wrong.code == 1 && wrong.errors.contains("it has train, validation"), "{}", wrong.errors);
 }
 
@@ -90,7 +100,13 @@ fn the_neighbour_by_sound_is_found_where_it_was_taken_from() {
     let dataset = Dataset::open(folder.path()).unwrap();
     let normal = normalisation(&dataset).unwrap();
     let real = held_out::read(&dataset, &held_out::samples(&dataset, Split::Validation).unwrap(), &normal).unwrap();
-    let found = neighbour::motions(&dataset, &normal, &real).unwrap().unwrap();
-    let apart = found[0].joints.iter().zip(&real[0].real.joints).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
-    assert!(apart < found[0].joints.len() / 20, "{apart} of {} numbers are others", found[0].joints.len());
+    let held_out::HeldOut { key, real, sound } = real.into_iter().next().unwrap();
+    let heard = Some(of_samples(&sound.samples, fps, real.n_frames()));
+    let clip =
+        Clip { name: key, made: real.joints.clone(), real: real.joints.clone(), mask: real.mask, heard, voice: None };
+    let clips = Clips { fps, clips: vec![clip], notes: Vec::new() };
+    let found = copied(&dataset, &normal, &clips).unwrap().unwrap();
+    let Made::Moves(found) = &found[0] else { panic!("it stands still") };
+    let apart = found.iter().zip(&real.joints).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
+    assert!(apart < found.len() / 20, "{apart} of {} numbers are others", found.len());
 }

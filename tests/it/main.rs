@@ -11,6 +11,8 @@ mod dataset_readers;
 mod dataset_verify;
 mod demo;
 mod evaluate;
+mod evaluate_files;
+mod evaluate_page;
 mod evaluate_speaker;
 mod extract;
 mod figures;

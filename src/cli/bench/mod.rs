@@ -3,6 +3,7 @@
 
 mod child;
 mod dataset;
+mod evaluate;
 mod generate;
 mod lift;
 mod lifter;
@@ -26,6 +27,7 @@ pub struct Args {
 enum Part {
     Pose2d(pose2d::Args),
     Dataset(dataset::Args),
+    Evaluate(evaluate::Args),
     Generate(generate::Args),
     Lift(lift::Args),
     Lifter(lifter::Args),
@@ -38,6 +40,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.part {
         Part::Pose2d(args) => pose2d::run(&args, ui),
         Part::Dataset(args) => dataset::run(&args, ui),
+        Part::Evaluate(args) => evaluate::run(&args, ui),
         Part::Generate(args) => generate::run(&args, ui),
         Part::Lift(args) => lift::run(&args, ui),
         Part::Lifter(args) => lifter::run(&args, ui),

@@ -1,0 +1,138 @@
+//! `orator bench evaluate`.
+
+use super::child;
+use crate::cli::{Outcome, ui::Ui};
+use anyhow::{Result, ensure};
+use ndarray::{Array2, Array3};
+use orator::demo::speaker::{Clip as Rule, RULE};
+use orator::evaluate::baselines::{self, Predictor};
+use orator::evaluate::clips::{Clip, Clips, Voice, compared, pcm};
+use orator::evaluate::{hearing, result, table, text};
+use orator::metrics::catalogue::Settings;
+use orator::report::evaluation;
+use orator::stage::progress::{Progress as _, Task};
+use orator::types::sound::Sound;
+use orator::types::split::Split;
+use orator::types::time::FrameRate;
+use rayon::prelude::*;
+use serde_json::json;
+use std::sync::Mutex;
+use std::time::Instant;
+
+/// Evaluation of made motion beside the real one, in memory: all metrics, all baselines, all draws and the page. How long
+/// each part takes, and the most memory. Motion and sound are those of the synthetic speaker, 15 frames a second.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Hours of motion.
+    #[arg(long, default_value_t = 1.0, value_name = "HOURS")]
+    hours: f64,
+    /// Clips that they are cut into.
+    #[arg(long, default_value_t = 60, value_name = "N")]
+    clips: usize,
+    /// Threads.
+    #[arg(long, default_value_t = 2, value_name = "N")]
+    threads: usize,
+}
+
+const FPS: FrameRate = FrameRate::new(15, 1);
+
+/// When each part began.
+#[derive(Default)]
+struct Stopwatch(Mutex<Vec<(String, Instant)>>);
+
+impl Task for Stopwatch {
+    fn advance(&self, _steps: u64) {}
+    fn detail(&self, text: &str) {
+        if let Ok(mut parts) = self.0.lock() {
+            parts.push((text.to_owned(), Instant::now()));
+        }
+    }
+}
+
+pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+    ensure!(args.hours > 0.0 && args.hours <= 24.0, "--hours is {}, expected up to 24", args.hours);
+    ensure!(args.clips > 0 && args.threads > 0, "nothing to measure: there must be clips and threads");
+    let n_frames = (args.hours * 3600.0 * FPS.per_sec()) as usize / args.clips;
+    ensure!(n_frames > 15, "{} clips of {n_frames} frames are too short", args.clips);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build()?;
+    let task = ui.begin("bench evaluate", 0);
+    task.detail("making the speaker");
+    let speaker = pool.install(|| speaker(args.clips, n_frames));
+    let before_mib = child::own_peak_mib();
+    let watch = Stopwatch::default();
+    task.detail("evaluating");
+    let (table, html) = pool.install(|| evaluate(speaker, &watch))?;
+    watch.detail("");
+    drop(task);
+
+    let parts = watch.0.into_inner().unwrap_or_default();
+    let secs = |a: &(String, Instant), b: &(String, Instant)| b.1.duration_since(a.1).as_secs_f64();
+    let times: Vec<(&str, f64)> = parts.windows(2).map(|two| (two[0].0.as_str(), secs(&two[0], &two[1]))).collect();
+    let all: f64 = times.iter().map(|(_, secs)| secs).sum();
+    let peak = child::own_peak_mib();
+    let mut lines = vec![format!(
+        "{:.2} h of motion in {} clips, {} figures, {} blocks, {} threads",
+        args.hours,
+        args.clips,
+        table.definitions.len(),
+        table.n_blocks,
+        args.threads
+    )];
+    lines.extend(times.iter().map(|(part, secs)| format!("{part:24}{secs:8.2} s")));
+    lines.push(format!("{:24}{all:8.2} s", "all"));
+    lines.push(format!(
+        "page {:.1} MB; peak memory {peak:.0} MiB, of that before evaluation {before_mib:.0} MiB",
+        html.len() as f64 / 1e6
+    ));
+    let facts = json!({
+        "hours": args.hours,
+        "secs": all,
+        "parts": times.iter().map(|(part, secs)| json!({ "part": part, "secs": secs })).collect::<Vec<_>>(),
+        "peak_mib": peak,
+        "n_blocks": table.n_blocks,
+        "n_figures": table.definitions.len(),
+    });
+    ui.summary(&lines.join("\n"), None, facts);
+    Ok(Outcome::Done)
+}
+
+/// A clip that is still to be heard.
+struct Unheard {
+    real: Array3<f32>,
+    mask: Array2<bool>,
+    made: Array3<f32>,
+    sound: Sound,
+}
+
+/// Real motion with its whims; the made one is what the rule alone would have it do.
+fn speaker(n_clips: usize, n_frames: usize) -> Vec<Unheard> {
+    let clip = |number: usize| {
+        let rule = Rule { rule: RULE, seed: 1, split: Split::Validation, number, n_frames };
+        let real = rule.motion();
+        Unheard { mask: real.mask, real: real.joints, made: rule.predictable().joints, sound: rule.sound() }
+    };
+    (0..n_clips).into_par_iter().map(clip).collect()
+}
+
+fn evaluate(speaker: Vec<Unheard>, watch: &Stopwatch) -> Result<(table::Table, String)> {
+    watch.detail("listening");
+    let clip = |(number, unheard): (usize, Unheard)| {
+        let Unheard { real, mask, made, sound } = unheard;
+        let heard = Some(hearing::of_samples(&sound.samples, FPS, real.shape()[0]));
+        let (mask, _) = compared(&real, &mask, &made);
+        let voice = Some(Voice::Kept(sound.samples.into_iter().map(pcm).collect()));
+        Clip { name: format!("clip {number}"), real, made, mask, heard, voice }
+    };
+    let clips = speaker.into_par_iter().enumerate().map(clip).collect();
+    let clips = Clips { fps: FPS, clips, notes: Vec::new() };
+    watch.detail("making the baselines");
+    let mut predictors = vec![Predictor::prediction(&clips, "what the rule alone would do")];
+    predictors.extend(baselines::of_files(&clips)?.0);
+    let table = table::measure(&clips, &Settings::default(), &predictors, watch)?;
+    watch.detail("the verdict and the JSON");
+    let length = text::text(&table, true).len() + result::json(&table).to_string().len();
+    ensure!(length > 0, "there is nothing to say");
+    watch.detail("the page");
+    let html = evaluation::html(&table, &clips, "bench")?;
+    Ok((table, html))
+}
