@@ -19,6 +19,8 @@ pub struct Sources<'a> {
     pub sound: Option<&'a Sound>,
     /// What the bones are called where they have names.
     pub names: Names,
+    /// What a film shows beside the figure.
+    pub beside: video::Beside<'a>,
 }
 
 /// What a motion can be written as.
@@ -89,7 +91,9 @@ impl Format {
             }),
             Self::Mp4 => {
                 let motion = performance.motion();
-                workdir::replace(path, |attempt| video::write(attempt, &motion, sources.sound, progress))
+                workdir::replace(path, |attempt| {
+                    video::write(attempt, &motion, sources.sound, sources.beside, progress)
+                })
             }
         }
     }

@@ -58,8 +58,8 @@ impl<'a> Body<'a> {
         let across = |y: f64, x: f64, z: f64, r: f64| self.limb(hips, [[-x, y, z], [x, y, z]], [r, r]);
         let mut form = Form::default()
             .with(across(-4.0, 6.0, -0.4, 9.9), 0.0)
-            .with(across(-10.0, 7.2, -0.4, 9.6), self.cm(4.0))
-            .with(across(9.0, wide(5.6), 0.3, 9.2), self.cm(10.0))
+            .with(across(-9.0, 7.2, -0.4, 9.7), self.cm(4.0))
+            .with(across(9.0, wide(5.6), 0.3, 9.3), self.cm(13.0))
             .with(across(28.0, wide(5.4), 0.5, 9.9), self.cm(12.0))
             .with(across(39.0, wide(6.4), -0.4, 8.8), self.cm(8.0));
         for side in [1.0, -1.0] {
@@ -111,7 +111,7 @@ impl<'a> Body<'a> {
         let trunk = self.trunk();
         let sleeves = [0, 1].map(|side| self.sleeve(side));
         let collar = self.stance.at(self.trunk.neck, [0.0, 4.4, 0.0]);
-        let hem = self.stance.at(self.trunk.hips, [0.0, -9.0, 0.0]);
+        let hem = self.stance.at(self.trunk.hips, [0.0, -7.5, 0.0]);
         let tilt = unit([0.0, 1.0, 0.42], 0.0).unwrap_or([0.0, 1.0, 0.0]);
         let (armpit, edge) = (self.cm(2.6), self.cm(0.9));
         move |at| {
