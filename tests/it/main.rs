@@ -44,6 +44,7 @@ mod media_sound;
 mod memory;
 mod metrics;
 mod models_verb;
+mod motion_files;
 mod networks;
 mod operators;
 mod pose_chain;
