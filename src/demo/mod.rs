@@ -15,6 +15,7 @@ pub const GENERATOR: &str = "synthetic speaker, version 2 (commit 93b1773); the 
      its error here was seen (models/body_lifter.md)";
 
 pub mod camera;
+pub mod disturbed;
 pub mod figure;
 pub mod folder;
 pub mod gesture;

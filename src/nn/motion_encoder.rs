@@ -88,9 +88,12 @@ impl MotionEncoder {
 
     /// Sets mean and standard deviation of the numbers of a frame.
     pub fn set_statistics(&self, mean: &[f32], std: &[f32]) -> Result<()> {
-        let shape = (1, mean.len(), 1);
-        self.mean.set(&Tensor::from_slice(mean, shape, self.mean.device())?)?;
-        self.std.set(&Tensor::from_slice(std, shape, self.std.device())?)
+        let set = |var: &Var, values: &[f32]| {
+            let values = Tensor::from_slice(values, (1, values.len(), 1), &Device::Cpu)?;
+            var.set(&values.to_dtype(var.dtype())?.to_device(var.device())?)
+        };
+        set(&self.mean, mean)?;
+        set(&self.std, std)
     }
 
     /// [B, n_in, T] as the network wants it.

@@ -1,9 +1,10 @@
 //! The networks give what the same networks in PyTorch give (`fixtures/reference/networks_reference.py`), weights and
 //! inputs being filled by one formula on both sides.
 
-use candle_core::{DType, Result, Tensor};
+use candle_core::{DType, Device, Result, Tensor};
 use orator::nn::discriminator::Discriminator;
 use orator::nn::finite_difference::pattern;
+use orator::nn::motion_encoder::{self, AutoEncoder};
 use orator::nn::params::Params;
 use orator::nn::temporal_lifter::{self, TemporalLifter};
 use orator::nn::unet::{Config, Generator, Preset};
@@ -73,4 +74,34 @@ fn generator_discriminator_and_lifter_agree_with_pytorch() -> anyhow::Result<()>
     let net = TemporalLifter::new(&mut params, "lifter", &config)?;
     fill(&params)?;
     agree("temporal_lifter", &net.forward(&pattern(&[2, 8, 31], 3.0)?, &mut Mode::Eval)?)
+}
+
+#[test]
+fn the_motion_encoder_agrees_with_pytorch_on_windows_and_on_whole_stretches() -> anyhow::Result<()> {
+    let config = motion_encoder::Config { n_in: 12, channels: [10, 8, 6], hidden: [16, 12] };
+    let mut params = Params::with_dtype(0, DType::F64);
+    let net = AutoEncoder::new(&mut params, &config)?;
+    fill(&params)?;
+    let mean: Vec<f32> = (0..12).map(|i| 0.01 * i as f32).collect();
+    let std: Vec<f32> = (0..12).map(|i| 1.0 + 0.1 * i as f32).collect();
+    net.encoder.set_statistics(&mean, &std)?;
+    let x = net.encoder.normalised(&pattern(&[2, 12, 34], 4.0)?)?;
+    agree("motion_code", &net.encoder.forward(&x, &Mode::Eval)?)?;
+    agree("motion_back", &net.forward(&x, &Mode::Eval)?)?;
+
+    let mut params = Params::with_dtype(0, DType::F32);
+    let net = AutoEncoder::new(&mut params, &config)?;
+    fill(&params)?;
+    net.encoder.set_statistics(&mean, &std)?;
+    let frames = ndarray::Array2::from_shape_fn((91, 12), |(t, i)| ((t * 12 + i) as f32 * 0.37).sin());
+    let codes = net.encoder.codes(frames.view(), 4)?;
+    assert_eq!(codes.dim(), (15, 32));
+    for (n, code) in codes.outer_iter().enumerate() {
+        let window = frames.slice(ndarray::s![4 * n..4 * n + 34, ..]);
+        let window = Tensor::from_vec(window.t().iter().copied().collect(), (1, 12, 34), &Device::Cpu)?;
+        let own =
+            net.encoder.forward(&net.encoder.normalised(&window)?, &Mode::Eval)?.flatten_all()?.to_vec1::<f32>()?;
+        assert!(code.iter().zip(&own).all(|(a, b)| (a - b).abs() < 1e-4), "window {n}");
+    }
+    Ok(())
 }

@@ -11,6 +11,7 @@ mod pose2d;
 mod reference;
 mod run;
 mod scale;
+mod spaces;
 mod train;
 
 use super::{Outcome, ui::Ui};
@@ -33,6 +34,7 @@ enum Part {
     Lifter(lifter::Args),
     Run(run::Args),
     Scale(scale::Args),
+    Spaces(spaces::Args),
     Train(train::Args),
 }
 
@@ -46,6 +48,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         Part::Lifter(args) => lifter::run(&args, ui),
         Part::Run(args) => run::run(&args, ui),
         Part::Scale(args) => scale::run(&args, ui),
+        Part::Spaces(args) => spaces::run(&args, ui),
         Part::Train(args) => train::run(&args, ui),
     }
 }
