@@ -124,6 +124,22 @@ mod tests {
     }
 
     #[test]
+    fn the_bits_do_not_depend_on_threads() {
+        let joints = moving(700);
+        let mask = Array2::from_elem((700, N_JOINTS), true);
+        let with = |n: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
+            pool.install(|| {
+                (
+                    windows(joints.view(), mask.view(), FPS),
+                    super::super::basis::windows(joints.view(), mask.view(), FPS),
+                )
+            })
+        };
+        assert_eq!(with(1), with(4));
+    }
+
+    #[test]
     fn the_built_in_weights_fit() {
         parse(FILE).unwrap();
         assert!(FILE.len() < 1_000_000);

@@ -6,6 +6,7 @@ use super::rotation::Rotation;
 use super::vec3::Vec3;
 use crate::types::time::FrameRate;
 use std::fmt::Write as _;
+use std::io;
 
 const ROTATION_CHANNELS: &str = "Zrotation Xrotation Yrotation";
 
@@ -49,6 +50,14 @@ impl Clip {
 
     /// The clip as the text of a BVH file. Lengths keep 1e-6 of their unit, angles 1e-5 degrees.
     pub fn to_bvh(&self) -> String {
+        let mut text = Vec::new();
+        // memory takes whatever is written, and all of it is text
+        let _ = self.write_bvh(&mut text);
+        String::from_utf8(text).unwrap_or_default()
+    }
+
+    /// Writes the same text frame by frame: that of hours is larger than they are.
+    pub fn write_bvh(&self, out: &mut dyn io::Write) -> io::Result<()> {
         let mut text = String::from("HIERARCHY\n");
         let order = self.written_order();
         let mut open: Vec<usize> = Vec::new();
@@ -72,8 +81,10 @@ impl Clip {
                 let _ = write!(text, " {z:.5} {x:.5} {y:.5}");
             }
             text.push('\n');
+            out.write_all(text.as_bytes())?;
+            text.clear();
         }
-        text
+        out.write_all(text.as_bytes())
     }
 
     /// Name, offset and channels of a joint, its brace left open.

@@ -224,13 +224,26 @@ impl Lesson for EmbeddingLesson {
 mod tests {
     use super::*;
     use crate::stage::progress::Silent;
-    use crate::train::lifter::{Schedule, train};
+    use crate::train::lifter::{Schedule, start_from, train};
+    use std::path::Path;
+
+    /// Millimetres of arms and fingers in a line of errors.
+    fn mm(line: &str) -> [f64; 2] {
+        let number = |before: &str| line.split(before).nth(1).unwrap().split_whitespace().next().unwrap().parse();
+        [number("arms").unwrap(), number("wrist").unwrap()]
+    }
 
     #[test]
-    fn what_a_training_writes_is_an_encoder() {
+    fn what_a_training_writes_is_an_encoder_and_the_built_in_one_gives_motion_back() {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("e.safetensors");
         let mut lesson = EmbeddingLesson::new(Corpus::new(&[], &[], &[], &[], 3).unwrap(), 3).unwrap();
+        let built_in = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/motion_embedding.safetensors");
+        start_from(&lesson, &built_in).unwrap();
+        let lines = lesson.errors(false).unwrap();
+        for (network, mean) in mm(&lines[0]).into_iter().zip(mm(&lines[1])) {
+            assert!(network < 0.5 * mean, "{lines:?}");
+        }
         let schedule =
             Schedule { steps: 3, batch: 8, learning_rate: 1e-3, seed: 3, checkpoint_every: 100, started_from: None };
         let lines = train(&mut lesson, &schedule, &out, &Silent).unwrap();
