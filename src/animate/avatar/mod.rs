@@ -19,13 +19,13 @@ use stance::Stance;
 use surface::Surface;
 
 /// Size of the cells that surfaces are made of, cm.
-const SHIRT_CELL: f64 = 1.35;
+const SHIRT_CELL: f64 = 1.6;
 const LEGS_CELL: f64 = 2.0;
 const SHOE_CELL: f64 = 1.4;
-const HEAD_CELL: f64 = 1.05;
-const PALM_CELL: f64 = 0.48;
-const CUFF_CELL: f64 = 0.65;
-const FINGER_CELL: f64 = 0.36;
+const HEAD_CELL: f64 = 1.15;
+const PALM_CELL: f64 = 0.56;
+const CUFF_CELL: f64 = 0.7;
+const FINGER_CELL: f64 = 0.42;
 
 /// What a part is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
