@@ -51,10 +51,10 @@ impl Hand {
             room.fold(cm(FINGERS[finger]), |r, gap| r.min(CROWDED * gap))
         });
         let mut palm = Form::default();
-        for finger in 1..5 {
+        for (finger, radius) in radius.iter().enumerate().skip(1) {
             let end = inwards(knuckle(finger), 0.12);
             let start = mix(inwards(wrist, 0.1), end, 0.16);
-            palm = palm.with(Limb::new([start, end], [cm(1.25), radius[finger] * 1.08]), cm(0.9));
+            palm = palm.with(Limb::new([start, end], [cm(1.25), radius * 1.08]), cm(0.9));
         }
         let thumb = fingers[0].map(|joint| stance.places[joint]);
         // The balls of the thumb and of the little finger; the web between thumb and index finger.

@@ -10,7 +10,7 @@ mod surface;
 
 use super::figure::Figure;
 use crate::motion::rotation::Rotation;
-use crate::motion::vec3::{Vec3, add, sub, unit};
+use crate::motion::vec3::{Vec3, add, cross, dot, sub, unit};
 use body::Body;
 use field::Form;
 use hand::Hand;
@@ -146,9 +146,8 @@ impl Blend {
         for &(joint, weight) in weights {
             let turn: Rotation = stance.world[joint];
             let part = |a: Vec3| a.map(|v| v * weight);
-            let axes = turn.axes();
-            for k in 0..3 {
-                blend.columns[k] = add(blend.columns[k], part(axes[k]));
+            for (column, axis) in blend.columns.iter_mut().zip(turn.axes()) {
+                *column = add(*column, part(axis));
             }
             blend.shift = add(blend.shift, part(sub(stance.places[joint], turn.turn(stance.rest[joint]))));
         }
@@ -157,7 +156,6 @@ impl Blend {
 
     /// The inverse of the map without its shift (Cramer's rule).
     fn back(&self, a: Vec3) -> Vec3 {
-        use crate::motion::vec3::{cross, dot};
         let [x, y, z] = self.columns;
         let volume = dot(x, cross(y, z));
         [dot(a, cross(y, z)) / volume, dot(x, cross(a, z)) / volume, dot(x, cross(y, a)) / volume]
@@ -167,7 +165,7 @@ impl Blend {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::vec3::{cross, dot, norm, scale};
+    use crate::motion::vec3::{norm, scale};
     use crate::types::{pose3d::Motion, skeleton::N_JOINTS, time::FrameRate};
 
     fn figure() -> Figure {

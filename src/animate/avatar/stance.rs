@@ -62,13 +62,13 @@ impl Stance {
             let curl = [0.0, 0.0, -arm.sign];
             local[arm.upper] = Rotation::about(curl, ARM.to_radians());
             local[arm.fore] = Rotation::about([0.0, -arm.sign, 0.0], ELBOW.to_radians());
-            for finger in 0..5 {
+            for (finger, fan) in FAN.into_iter().enumerate() {
                 let degrees = if finger == 0 { THUMB } else { FINGER };
                 let joints = finger_joints(figure, side, finger);
                 for (&joint, degrees) in joints.iter().zip(degrees) {
                     local[joint] = Rotation::about(curl, degrees.to_radians());
                 }
-                let fan = Rotation::about([0.0, -arm.sign, 0.0], FAN[finger].to_radians());
+                let fan = Rotation::about([0.0, -arm.sign, 0.0], f64::to_radians(fan));
                 local[joints[0]] = fan * local[joints[0]];
             }
         }
