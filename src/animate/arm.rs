@@ -8,11 +8,12 @@ use super::hinge::Bend;
 use super::places::{Places, hand_rotation};
 use super::pose::{ArmPose, elbow};
 use super::roll::elbow_axes;
-use super::smoothing::Filter;
+use super::smoothing::{Filter, Smoothing};
 use super::track::{Seen, Track, filled, world};
 use crate::motion::rotation::Rotation;
 use crate::motion::vec3::Vec3;
 use crate::types::skeleton::{L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, NECK};
+use crate::types::time::FrameRate;
 
 const X: Vec3 = [1.0, 0.0, 0.0];
 /// A missing hand is relaxed after this time.
@@ -29,6 +30,12 @@ pub struct Means {
     pub fps: f64,
     pub arms: Filter,
     pub hands: Filter,
+}
+
+impl Means {
+    pub fn of(smoothing: Smoothing, fps: FrameRate) -> Self {
+        Self { fps: fps.per_sec(), arms: smoothing.arms(fps), hands: smoothing.hands(fps) }
+    }
 }
 
 type Directions = Vec<Option<Vec3>>;

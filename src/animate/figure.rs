@@ -4,13 +4,14 @@
 //! joint of ours tells of, are in proportion to the arms. Lengths in cm.
 
 use super::hinge::Hinge;
-use super::places::Places;
+use super::places::{Places, palm_frame};
 use crate::motion::fk::Skeleton;
 use crate::motion::vec3::{Vec3, across, cross, norm, scale};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::{self, L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_HAND};
 
-const CM: f64 = 100.0;
+/// Our lengths in a metre.
+pub const CM: f64 = 100.0;
 /// Upper arm and forearm of the body whose trunk and legs are given below, metres.
 const ARM_METRES: f64 = 0.55;
 const FINGERS: [&str; 5] = ["Thumb", "Index", "Middle", "Ring", "Pinky"];
@@ -51,6 +52,8 @@ pub struct Figure {
     pub root: Vec3,
     pub spine: usize,
     pub chest: usize,
+    pub neck: usize,
+    pub head: usize,
     /// Left, right.
     pub arms: [Arm; 2],
     /// For each of the 49 joints of a motion the joint of the skeleton at its place (ends of bones included).
@@ -91,7 +94,7 @@ impl Figure {
             let foot = bones.push(&format!("{side}Foot"), Some(lower), up(-0.42), false);
             bones.push("", Some(foot), [0.0, -0.08 * body, 0.16 * body], true);
         }
-        Self { skeleton: bones, root: up(0.04 + 0.42 + 0.42 + 0.08), spine, chest, arms, places }
+        Self { skeleton: bones, root: up(0.04 + 0.42 + 0.42 + 0.08), spine, chest, neck, head, arms, places }
     }
 }
 
@@ -156,7 +159,9 @@ fn median_palm(places: &Places) -> Option<[Vec3; 5]> {
             *place = middle(finger, axis)?;
         }
     }
-    Some(palm)
+    // In the frame of its own knuckles, as every frame's palm is.
+    let out_of_palm = palm_frame(&palm)?.inverse();
+    Some(palm.map(|base| out_of_palm.turn(base)))
 }
 
 /// A flat palm with metacarpals of these lengths.

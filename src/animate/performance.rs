@@ -5,8 +5,10 @@ use super::arm::Means;
 use super::constraints::{Clamps, Constraints, Tally};
 use super::figure::Figure;
 use super::head::{self, Face};
+use super::places::Places;
 use super::rotations::rotations;
 use super::smoothing::Smoothing;
+use super::track::Track;
 use crate::motion::bvh_write::Clip;
 use crate::motion::jerk;
 use crate::motion::rotation::Rotation;
@@ -44,7 +46,7 @@ pub struct Told {
     pub arms: Jerk,
     /// That of fingers about their wrist.
     pub hands: Jerk,
-    /// Clamps by kind, counted at the motion's own rate.
+    /// Clamps by kind of the joints as they came, at the motion's own rate.
     pub clamps: Vec<Clamps>,
     /// Frames in which the face was seen; `None` without keypoints of it.
     pub face_frames: Option<usize>,
@@ -66,31 +68,38 @@ pub struct Performance {
 }
 
 /// Puts a motion on the figure of its own bone lengths; with a `face` the head turns.
+///
+/// What no body can do is clamped before smoothing, so that a joint found on the wrong side pulls no other frame with
+/// it, and once more behind it and at the rate that is written, so that the limits hold in every frame of the file.
 pub fn perform(motion: &Motion, face: Option<&Face>, options: &Options) -> Performance {
     let figure = Figure::of(motion);
-    let means = Means {
-        fps: motion.fps.per_sec(),
-        arms: options.smoothing.arms(motion.fps),
-        hands: options.smoothing.hands(motion.fps),
+    let clip_of = |tracks: &[Track]| {
+        let local = (0..motion.n_frames()).map(|t| tracks.iter().map(|track| track[t]).collect()).collect();
+        Clip { root: figure.root, skeleton: figure.skeleton.clone(), fps: motion.fps, local }
     };
-    let mut tracks = rotations(motion, &figure, &means);
+    let constrained = |mut clip: Clip, tally: &mut Tally| {
+        clip.local.iter_mut().for_each(|frame| options.constraints.apply(&figure, frame, tally));
+        clip
+    };
+    let mut tally = Tally::default();
+    let mut places = Places::of(motion);
+    if options.constraints != Constraints::NONE {
+        let as_it_is = rotations(&places, &figure, &Means::of(Smoothing::None, motion.fps));
+        places = places.moved(&figure, &constrained(clip_of(&as_it_is), &mut tally));
+    }
+    let means = Means::of(options.smoothing, motion.fps);
+    let mut tracks = rotations(&places, &figure, &means);
     let face_frames = face.map(|face| head::turn(face, &figure, &means, &mut tracks));
     if options.yaw == Yaw::Removed {
         for joint in [figure.spine, figure.chest] {
             tracks[joint].fill(Rotation::IDENTITY);
         }
     }
-    let local = (0..motion.n_frames()).map(|t| tracks.iter().map(|track| track[t]).collect()).collect();
-    let free = Clip { root: figure.root, skeleton: figure.skeleton.clone(), fps: motion.fps, local };
+    let free = clip_of(&tracks);
+    let resampled = options.fps.filter(|&fps| fps != motion.fps).map(|fps| free.resampled(fps));
+    let resampled = resampled.map(|clip| constrained(clip, &mut Tally::default()));
+    let clip = constrained(free, &mut Tally::default());
 
-    let constrained = |mut clip: Clip| {
-        let mut tally = Tally::default();
-        clip.local.iter_mut().for_each(|frame| options.constraints.apply(&figure, frame, &mut tally));
-        (clip, tally)
-    };
-    // Between frames first, limits then: so they hold in every frame that is written.
-    let resampled = options.fps.filter(|&fps| fps != motion.fps).map(|fps| constrained(free.resampled(fps)).0);
-    let (clip, tally) = constrained(free);
     let after = joints(&figure, &clip);
     let jerk = |joints: &[(usize, usize)]| {
         let of = |places: &Array3<f32>| jerk::mean(places.view(), seen(motion).view(), motion.fps.per_sec(), joints);

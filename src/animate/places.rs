@@ -2,6 +2,8 @@
 //! missing one `None`. The right side is looked at in a mirror, so that everything about arms and hands is said once,
 //! for the left, and the two sides cannot differ.
 
+use super::figure::{CM, Figure};
+use crate::motion::bvh_write::Clip;
 use crate::motion::rotation::Rotation;
 use crate::motion::vec3::{Vec3, across, add, scale, sub, unit};
 use crate::types::pose3d::Motion;
@@ -30,6 +32,15 @@ impl Places {
         Self(self.0.iter().map(image).collect())
     }
 
+    /// Where a clip of the figure has these joints; what was missing stays missing.
+    pub fn moved(&self, figure: &Figure, clip: &Clip) -> Self {
+        let moved = |(t, frame): (usize, &[Option<Vec3>; N_JOINTS])| {
+            let places = clip.positions(t);
+            std::array::from_fn(|joint| frame[joint].map(|_| scale(places[figure.places[joint]], 1.0 / CM)))
+        };
+        Self(self.0.iter().enumerate().map(moved).collect())
+    }
+
     pub fn n_frames(&self) -> usize {
         self.0.len()
     }
@@ -48,12 +59,8 @@ impl Places {
     /// World rotation of the left hand: along from the wrist to the middle of its knuckles, across from the index
     /// finger's base to the little finger's. At rest it lies along x, palm down, the thumb at +z.
     pub fn hand_frame(&self, t: usize) -> Option<Rotation> {
-        let knuckles = [1, 2, 3, 4].map(|finger| self.place(t, L_HAND + 1 + 4 * finger));
-        let [index, .., little] = knuckles;
-        let (sum, n) =
-            knuckles.into_iter().flatten().fold(([0.0; 3], 0.0), |(sum, n), place| (add(sum, place), n + 1.0));
-        let along = unit(sub(scale(sum, 1.0 / n), self.place(t, L_HAND)?), LEAST_METRES)?;
-        hand_rotation(along, sub(little?, index?))
+        let wrist = self.place(t, L_HAND)?;
+        knuckle_frame([1, 2, 3, 4].map(|finger| Some(sub(self.place(t, L_HAND + 1 + 4 * finger)?, wrist))))
     }
 
     /// The bases of the left hand's fingers, thumb first, in the hand's frame.
@@ -67,6 +74,17 @@ impl Places {
         // A hand's root is its wrist.
         if joint == L_HAND { self.0[t][L_HAND].or(self.0[t][L_WRIST]) } else { self.0[t][joint] }
     }
+}
+
+/// The frame of a palm whose fingers' bases, thumb first, are given from the wrist.
+pub fn palm_frame(&[_, index, middle, ring, little]: &[Vec3; 5]) -> Option<Rotation> {
+    knuckle_frame([index, middle, ring, little].map(Some))
+}
+
+fn knuckle_frame(knuckles: [Option<Vec3>; 4]) -> Option<Rotation> {
+    let [index, .., little] = knuckles;
+    let (sum, n) = knuckles.into_iter().flatten().fold(([0.0; 3], 0.0), |(sum, n), place| (add(sum, place), n + 1.0));
+    hand_rotation(unit(scale(sum, 1.0 / n), LEAST_METRES)?, sub(little?, index?))
 }
 
 /// The rotation of a left hand that points along the unit vector `along`, its little finger towards `side`.

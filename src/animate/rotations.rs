@@ -9,12 +9,10 @@ use super::places::Places;
 use super::track::{Track, filled, mirrored};
 use crate::motion::rotation::Rotation;
 use crate::motion::vec3::Vec3;
-use crate::types::pose3d::Motion;
 
 /// Local rotations of the figure's joints, joint by joint, in the figure's axes (x, -y, -z of the motion's). Hips,
 /// neck, head and legs rest.
-pub fn rotations(motion: &Motion, figure: &Figure, means: &Means) -> Vec<Track> {
-    let places = Places::of(motion);
+pub fn rotations(places: &Places, figure: &Figure, means: &Means) -> Vec<Track> {
     let n_frames = places.n_frames();
     let mut local: Vec<Track> = vec![vec![Rotation::IDENTITY; n_frames]; figure.skeleton.joints.len()];
 
@@ -27,7 +25,7 @@ pub fn rotations(motion: &Motion, figure: &Figure, means: &Means) -> Vec<Track> 
     local[figure.chest] = half_yaw;
 
     let [left, right] = &figure.arms;
-    arm::solve(&places, left, &chest, means, &mut local);
+    arm::solve(places, left, &chest, means, &mut local);
     arm::solve(&places.mirrored(), right, &mirrored(chest), means, &mut local);
     let fingers = right.fingers.iter().flatten();
     for &joint in [right.clavicle, right.upper, right.fore, right.hand].iter().chain(fingers) {

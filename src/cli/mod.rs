@@ -2,6 +2,8 @@
 //! `--help`. Exit codes: 0 all done; 1 usage, configuration, or a check that did not pass; 2 some units failed, the others are done.
 
 mod account;
+mod animate;
+mod animate_input;
 mod bench;
 mod config_args;
 mod dataset;
@@ -52,6 +54,7 @@ enum Verb {
     Train(train::Args),
     Evaluate(evaluate::Args),
     Generate(generate::Args),
+    Animate(animate::Args),
     Bench(bench::Args),
     Demo(demo::Args),
 }
@@ -92,6 +95,7 @@ pub fn main() -> ExitCode {
         Verb::Train(args) => train::run(args, &ui),
         Verb::Evaluate(args) => evaluate::run(args, &ui),
         Verb::Generate(args) => generate::run(args, &ui),
+        Verb::Animate(args) => animate::run(args, &ui),
         Verb::Bench(args) => bench::run(args, &ui),
         Verb::Demo(args) => demo::run(args, &ui),
     };

@@ -1,6 +1,7 @@
 //! The integration tests: one binary, a module a concern.
 
 mod animate;
+mod animate_verb;
 mod bad_input;
 mod blender;
 mod browser;

@@ -1,6 +1,7 @@
 //! `orator bench`: how fast a part of the road is, measured so that a noisy machine cannot flatter it: the variants take
 //! turns, round after round, and the median round counts. One file a part.
 
+mod animate;
 mod child;
 mod dataset;
 mod evaluate;
@@ -26,6 +27,7 @@ pub struct Args {
 
 #[derive(clap::Subcommand)]
 enum Part {
+    Animate(animate::Args),
     Pose2d(pose2d::Args),
     Dataset(dataset::Args),
     Evaluate(evaluate::Args),
@@ -40,6 +42,7 @@ enum Part {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.part {
+        Part::Animate(args) => animate::run(&args, ui),
         Part::Pose2d(args) => pose2d::run(&args, ui),
         Part::Dataset(args) => dataset::run(&args, ui),
         Part::Evaluate(args) => evaluate::run(&args, ui),

@@ -1,0 +1,315 @@
+//! `orator animate`.
+
+use super::animate_input::{Input, Take, inputs};
+use super::{Outcome, ui::Ui};
+use anyhow::{Context as _, Result, bail, ensure};
+use orator::animate::file::{Format, Sources};
+use orator::animate::performance::{Jerk, Told};
+use orator::animate::smoothing::ONE_EURO;
+use orator::animate::{Constraints, Options, Performance, Smoothing, Yaw, perform};
+use orator::dataset::Split;
+use orator::media::audio;
+use orator::motion::one_euro::OneEuro;
+use orator::stage::progress::Progress as _;
+use orator::types::sound::{SAMPLE_RATE, Sound};
+use orator::types::time::FrameRate;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Turn joints into files for animation programs: rotations of a whole figure, smoothed and held within what a body
+/// can do.
+///
+/// IN is a motion: .npy (joints [frames, 49, 3], metres), .txt (the layout of Rebol et al. 2021), joints.npz or the
+/// folder of a lifted video (work/lift/SPEAKER/VIDEO), or a dataset (work/dataset/SPEAKER) with --sample. The ending of
+/// each output chooses what is written: .bvh (cm, y up, facing +z, T-pose at rest), .npy and .txt (the joints of the
+/// figure), .mp4 (a film), and what else `--out x.what` lists when it does not know an ending.
+/// With --format, IN may be a folder of motions, a speaker's folder of lifted videos or a whole dataset, and --out is a
+/// folder.
+///
+/// The head turns with the face where keypoints are known: of a dataset and of a run by themselves, else with
+/// --keypoints; otherwise it rests. Bones have the lengths, palms the shape that are the motion's medians.
+///
+/// Smoothing has the motion's own time step; hands are smoothed more than arms. Constraints: limits of elbow, forearm,
+/// wrist and every finger joint; the four fingers curl within 10 degrees of their mean (a pointing finger needs
+/// `--curl-coherence off`). Every clamp is counted.
+#[derive(clap::Args)]
+pub struct Args {
+    /// A motion, or a folder of them.
+    #[arg(value_name = "IN")]
+    input: PathBuf,
+    /// What to write; may be given several times. With --format: one folder.
+    #[arg(long, value_name = "FILE|FOLDER", required = true, num_args = 1..)]
+    out: Vec<PathBuf>,
+    /// Write every motion of IN into the folder --out, in these formats: bvh,mp4,npy,txt ...
+    #[arg(long, value_name = "ENDING", value_delimiter = ',')]
+    format: Vec<String>,
+    /// Of a dataset: the sample of this key.
+    #[arg(long, value_name = "KEY")]
+    sample: Option<String>,
+    /// Of a dataset: only this part.
+    #[arg(long, value_name = "train|validation|test", value_parser = split, conflicts_with = "sample")]
+    split: Option<Split>,
+    /// Keypoints of the same frames (`body` [T, 17, 3], COCO), from which the head is turned.
+    #[arg(long, value_name = "FILE.npz", conflicts_with = "format")]
+    keypoints: Option<PathBuf>,
+    /// Sound of a film.
+    #[arg(long, value_name = "FILE", conflicts_with = "format")]
+    audio: Option<PathBuf>,
+    /// Frames a second of a .npy or .txt.
+    #[arg(long, value_name = "RATE", default_value = "15", value_parser = rate)]
+    in_fps: FrameRate,
+    /// Frames a second of what is written; without: those of the motion. A fraction is 30000/1001.
+    #[arg(long, value_name = "RATE", value_parser = rate)]
+    fps: Option<FrameRate>,
+    /// The turn of the shoulders about the vertical: of spine and chest, or removed, so that the figure faces ahead.
+    #[arg(long, value_enum, default_value = "spine")]
+    shoulder_yaw: ShoulderYaw,
+    /// Cubics over 0.6 s (arms) and 1 s (hands), which come not late; the causal one-Euro filter; or none.
+    #[arg(long, value_enum, default_value = "savitzky-golay")]
+    smoothing: Kind,
+    /// One-Euro: cut-off of arms at rest, Hz; that of hands is half of it.
+    #[arg(long, value_name = "HZ", default_value_t = ONE_EURO.rest_hz)]
+    one_euro_hz: f64,
+    /// One-Euro: Hz by which the cut-off rises with a radian a second.
+    #[arg(long, value_name = "BETA", default_value_t = ONE_EURO.beta)]
+    one_euro_beta: f64,
+    /// Leave every joint as it was, possible or not.
+    #[arg(long)]
+    no_constraints: bool,
+    /// Whether the four fingers curl within 10 degrees of their mean.
+    #[arg(long, value_enum, default_value = "on", conflicts_with = "no_constraints")]
+    curl_coherence: Switch,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum ShoulderYaw {
+    Spine,
+    Removed,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Kind {
+    SavitzkyGolay,
+    OneEuro,
+    None,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Switch {
+    On,
+    Off,
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let options = options(&args)?;
+    let inputs = inputs(&args.input, args.sample.as_deref(), args.split)?;
+    if !args.format.is_empty() {
+        return whole_folder(&args, &inputs, &options, ui);
+    }
+    let [input] = inputs.as_slice() else {
+        bail!(
+            "{} holds {} motions: name one (--sample for a dataset), or give --format bvh and a folder as --out",
+            args.input.display(),
+            inputs.len()
+        );
+    };
+    let outputs = outputs(&args, input)?;
+    let sound = args.audio.as_deref().map(read_sound).transpose()?;
+    let done = animate(&args, input, sound, &outputs, &options, ui)?;
+    let next = next_command(&args, &outputs);
+    let text = format!("{}wrote {}", done.text, names(&outputs).join(", "));
+    let mut facts = done.facts;
+    facts["next"] = json!(next);
+    ui.summary(&text, next.as_deref(), facts);
+    Ok(Outcome::Done)
+}
+
+/// Every motion of a folder or dataset; one that fails does not stop the others.
+fn whole_folder(args: &Args, inputs: &[Input], options: &Options, ui: &Ui) -> Result<Outcome> {
+    let [folder] = args.out.as_slice() else { bail!("--format writes into one folder; give one --out") };
+    ensure!(!folder.is_file(), "{} is a file; with --format --out is a folder", folder.display());
+    let endings: Vec<&str> = args.format.iter().map(|ending| ending.trim_start_matches('.')).collect();
+    endings.iter().try_for_each(|ending| Format::of(&folder.join(format!("x.{ending}"))).map(drop))?;
+    let task = ui.begin("animating", inputs.len() as u64);
+    let (mut text, mut facts, mut n_failed, mut n_files) = (String::new(), Vec::new(), 0, 0);
+    for input in inputs {
+        task.detail(&input.name);
+        let named = |ending: &&str| {
+            let path = folder.join(format!("{}.{ending}", input.name));
+            ensure!(!input.is_at(&path), "{} is the motion itself; write to another folder", path.display());
+            Ok((path.clone(), Format::of(&path)?))
+        };
+        let outputs: Result<Vec<_>> = endings.iter().map(named).collect();
+        match outputs.and_then(|outputs| animate(args, input, None, &outputs, options, ui)) {
+            Ok(done) => {
+                n_files += endings.len();
+                text += &format!("{}\n{}", input.name, done.text);
+                facts.push(done.facts);
+            }
+            Err(error) => {
+                n_failed += 1;
+                ui.say(&format!("failed  {}: {error:#}", input.name));
+                facts.push(json!({ "name": input.name, "error": format!("{error:#}") }));
+            }
+        }
+        task.advance(1);
+    }
+    drop(task);
+    text += &format!("wrote {n_files} files into {}", folder.display());
+    if n_failed > 0 {
+        text += &format!("\n{n_failed} of {} motions failed", inputs.len());
+    }
+    ui.summary(&text, None, json!({ "motions": facts, "failed": n_failed, "out": folder }));
+    Ok(if n_failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
+}
+
+/// What a motion's animation is told as.
+struct Done {
+    text: String,
+    facts: Value,
+}
+
+fn animate(
+    args: &Args,
+    input: &Input,
+    sound: Option<Sound>,
+    outputs: &[(PathBuf, Format)],
+    options: &Options,
+    ui: &Ui,
+) -> Result<Done> {
+    let Take { motion, face, sound: own } = input.read(args.in_fps, args.keypoints.as_deref())?;
+    let sound = sound.or(own);
+    let started = Instant::now();
+    let performance = perform(&motion, face.as_ref(), options);
+    let secs = started.elapsed().as_secs_f64();
+    let sources = Sources { sound: sound.as_ref() };
+    for (path, format) in outputs {
+        format.write(path, &performance, &sources, ui).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    let motion_secs = motion.fps.secs(motion.n_frames());
+    let Performance { told, clip, .. } = &performance;
+    let text = format!(
+        "{} frames at {}, {motion_secs:.1} s; written: {} frames at {}\n{}",
+        motion.n_frames(),
+        motion.fps,
+        clip.n_frames(),
+        clip.fps,
+        words(told)
+    );
+    let facts = json!({
+        "name": input.name,
+        "n_frames": motion.n_frames(),
+        "fps": motion.fps,
+        "written_frames": clip.n_frames(),
+        "written_fps": clip.fps,
+        "times_real_time": motion_secs / secs.max(1e-9),
+        "told": told,
+        "outputs": names(outputs),
+    });
+    Ok(Done { text, facts })
+}
+
+fn words(told: &Told) -> String {
+    let number = |jerk: Option<f64>| jerk.map_or("-".to_owned(), |jerk| format!("{jerk:.0}"));
+    let jerk = |jerk: Jerk| format!("{} -> {}", number(jerk.before), number(jerk.after));
+    let mut text = format!("jerk, m/s3: arms {}, hands {}\n", jerk(told.arms), jerk(told.hands));
+    text += &match told.face_frames {
+        Some(n) => format!("head: seen in {n} of {} frames\n", told.n_frames),
+        None => "head: at rest, no keypoints of the face\n".to_owned(),
+    };
+    let clamped: Vec<_> = told.clamps.iter().filter(|clamps| clamps.joint_frames > 0).collect();
+    match (told.clamps.is_empty(), clamped.is_empty()) {
+        (true, _) => text += "no constraints\n",
+        (_, true) => text += "nothing had to be clamped\n",
+        _ => text += "clamped                      angles   share    by, mean and most, degrees\n",
+    }
+    for clamps in clamped {
+        text += &format!(
+            "  {:26}{:>7}  {:>5.1} %  {:>6.1}  {:>6.1}\n",
+            clamps.kind,
+            clamps.joint_frames,
+            100.0 * clamps.share,
+            clamps.mean_excess_degrees,
+            clamps.largest_excess_degrees
+        );
+    }
+    text
+}
+
+fn options(args: &Args) -> Result<Options> {
+    let smoothing = match args.smoothing {
+        Kind::None => Smoothing::None,
+        Kind::SavitzkyGolay => Smoothing::SavitzkyGolay,
+        Kind::OneEuro => {
+            let (rest_hz, beta) = (args.one_euro_hz, args.one_euro_beta);
+            ensure!((0.01..=100.0).contains(&rest_hz), "--one-euro-hz is {rest_hz}, expected 0.01 to 100");
+            ensure!((0.0..=100.0).contains(&beta), "--one-euro-beta is {beta}, expected 0 to 100");
+            Smoothing::OneEuro(OneEuro { rest_hz, beta })
+        }
+    };
+    let constraints = match args.no_constraints {
+        true => Constraints::NONE,
+        false => Constraints { limits: true, curl_coherence: args.curl_coherence == Switch::On },
+    };
+    let yaw = if args.shoulder_yaw == ShoulderYaw::Removed { Yaw::Removed } else { Yaw::Spine };
+    Ok(Options { smoothing, constraints, yaw, fps: args.fps })
+}
+
+/// Output files with their formats; none may be an input or another output.
+fn outputs(args: &Args, input: &Input) -> Result<Vec<(PathBuf, Format)>> {
+    for (n, path) in args.out.iter().enumerate() {
+        let is_sound = args.audio.as_ref().is_some_and(|sound| sound == path);
+        ensure!(!input.is_at(path) && !is_sound, "{} is what is read; write to another file", path.display());
+        ensure!(!args.out[..n].contains(path), "{} is asked for twice", path.display());
+        ensure!(!path.is_dir(), "{} is a folder; name a file in it, or give --format bvh", path.display());
+    }
+    args.out.iter().map(|path| Ok((path.clone(), Format::of(path)?))).collect()
+}
+
+fn read_sound(path: &Path) -> Result<Sound> {
+    ensure!(path.is_file(), "{} is no file", path.display());
+    match audio::read_mono(path, SAMPLE_RATE)? {
+        Some(sound) if !sound.samples.is_empty() => Ok(sound),
+        _ => bail!("{} has no sound", path.display()),
+    }
+}
+
+fn names(outputs: &[(PathBuf, Format)]) -> Vec<String> {
+    outputs.iter().map(|(path, _)| path.display().to_string()).collect()
+}
+
+/// The same again as a film, or for an animation program; nothing when both are there.
+fn next_command(args: &Args, outputs: &[(PathBuf, Format)]) -> Option<String> {
+    let missing = [(Format::Mp4, "mp4"), (Format::Bvh, "bvh")]
+        .into_iter()
+        .find(|&(format, _)| outputs.iter().all(|&(_, written)| written != format));
+    let (_, ending) = missing?;
+    let sample = args.sample.as_ref().map(|key| format!(" --sample {key}")).unwrap_or_default();
+    let out = outputs.first()?.0.with_extension(ending);
+    Some(format!("orator animate {}{sample} --out {}", args.input.display(), out.display()))
+}
+
+fn split(name: &str) -> Result<Split, String> {
+    Split::ALL
+        .into_iter()
+        .find(|split| split.name() == name)
+        .ok_or_else(|| "expected train, validation or test".to_owned())
+}
+
+/// `15`, `29.97` or `30000/1001`, 1 to 240.
+fn rate(text: &str) -> Result<FrameRate, String> {
+    let wrong = || "expected frames a second between 1 and 240, such as 30 or 30000/1001".to_owned();
+    let fps = match text.split_once('/') {
+        Some((num, den)) => match (num.parse(), den.parse()) {
+            (Ok(num), Ok(den)) if num > 0 && den > 0 => FrameRate::new(num, den),
+            _ => return Err(wrong()),
+        },
+        None => match text.parse::<f64>() {
+            Ok(fps) if fps.fract() == 0.0 && (1.0..=240.0).contains(&fps) => FrameRate::new(fps as u32, 1),
+            Ok(fps) if (1.0..=240.0).contains(&fps) => FrameRate::new((fps * 1000.0).round() as u32, 1000),
+            _ => return Err(wrong()),
+        },
+    };
+    if (1.0..=240.0).contains(&fps.per_sec()) { Ok(fps) } else { Err(wrong()) }
+}

@@ -1,0 +1,82 @@
+//! `orator bench animate`.
+
+use super::median;
+use crate::cli::{Outcome, ui::Ui};
+use anyhow::{Result, ensure};
+use orator::animate::{Options, perform};
+use orator::demo::rule::Gestures;
+use orator::demo::speech::Speech;
+use orator::stage::progress::Progress as _;
+use orator::types::time::FrameRate;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::json;
+use std::time::Instant;
+
+/// Joints to animation, on one core: smoothing, rotations and constraints, then the bytes of each kind of file, none of
+/// which is written. The motion is the synthetic speaker's, with missing hands.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Seconds of motion.
+    #[arg(long, default_value_t = 300.0, value_name = "SECS")]
+    secs: f64,
+    /// Rounds; each measures every step once.
+    #[arg(long, default_value_t = 5, value_name = "N")]
+    rounds: usize,
+    /// Frames a second that are written; the motion has 15.
+    #[arg(long, default_value_t = 15, value_name = "N")]
+    fps: u32,
+}
+
+const FPS: FrameRate = FrameRate::new(15, 1);
+
+pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+    ensure!(args.secs >= 1.0 && args.secs < 1e5, "--secs is {}, expected 1 to a hundred thousand", args.secs);
+    ensure!(args.rounds > 0 && args.fps > 0, "nothing to measure: there must be rounds and frames a second");
+    let mut dice = ChaCha8Rng::seed_from_u64(1337);
+    let speech = Speech::new(args.secs, &mut dice);
+    let mut motion = Gestures::with_whims(&speech, args.secs, &mut dice).motion(FPS.frames_in(args.secs), FPS);
+    for (t, mut frame) in motion.joints.outer_iter_mut().enumerate() {
+        if t % 100 < 10 {
+            frame.slice_mut(ndarray::s![8..28, ..]).fill(f32::NAN);
+        }
+    }
+    let options = Options { fps: Some(FrameRate::new(args.fps, 1)), ..Options::default() };
+    let task = ui.begin("bench animate", args.rounds as u64);
+    let mut secs: [Vec<f64>; 2] = Default::default();
+    let mut n_bytes = 0;
+    for _ in 0..args.rounds {
+        let start = Instant::now();
+        let performance = perform(&motion, None, &options);
+        secs[0].push(start.elapsed().as_secs_f64());
+        let start = Instant::now();
+        n_bytes = performance.clip.to_bvh().len();
+        secs[1].push(start.elapsed().as_secs_f64());
+        task.advance(1);
+    }
+    drop(task);
+    let [perform_secs, bvh_secs] = secs.map(median);
+    let speed = |secs: f64| args.secs / secs;
+    let whole = speed(perform_secs + bvh_secs);
+    let text = format!(
+        "{:.0} s of motion at {FPS}, written at {} fps, one core, median of {} round(s)\n\
+         joints to performance {:6.0} x real time\n\
+         performance to BVH    {:6.0} x real time ({:.1} KiB a second)\n\
+         joints to BVH         {whole:6.0} x real time",
+        args.secs,
+        args.fps,
+        args.rounds,
+        speed(perform_secs),
+        speed(bvh_secs),
+        n_bytes as f64 / 1024.0 / args.secs,
+    );
+    let facts = json!({
+        "secs": args.secs,
+        "fps": args.fps,
+        "perform_times_real_time": speed(perform_secs),
+        "bvh_times_real_time": speed(bvh_secs),
+        "times_real_time": whole,
+    });
+    ui.summary(&text, None, facts);
+    Ok(Outcome::Done)
+}
