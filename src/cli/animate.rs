@@ -4,6 +4,7 @@ use super::animate_input::{Input, Take, inputs};
 use super::{Outcome, ui::Ui};
 use anyhow::{Context as _, Result, bail, ensure};
 use orator::animate::file::{Format, Sources};
+use orator::animate::names::Names;
 use orator::animate::performance::{Jerk, Told};
 use orator::animate::smoothing::ONE_EURO;
 use orator::animate::{Constraints, Options, Performance, Smoothing, Yaw, perform};
@@ -22,8 +23,8 @@ use std::time::Instant;
 ///
 /// IN is a motion: .npy (joints [frames, 49, 3], metres), .txt (the layout of Rebol et al. 2021), joints.npz or the
 /// folder of a lifted video (work/lift/SPEAKER/VIDEO), or a dataset (work/dataset/SPEAKER) with --sample. The ending of
-/// each output chooses what is written: .bvh (cm, y up, facing +z, T-pose at rest), .npy and .txt (the joints of the
-/// figure), .mp4 (a film), and what else `--out x.what` lists when it does not know an ending.
+/// each output chooses what is written: .bvh (cm, y up, facing +z, T-pose at rest), .glb (a skinned avatar), .json,
+/// .npy and .txt (the joints of the figure), .mp4 (a film).
 /// With --format, IN may be a folder of motions, a speaker's folder of lifted videos or a whole dataset, and --out is a
 /// folder.
 ///
@@ -41,7 +42,7 @@ pub struct Args {
     /// What to write; may be given several times. With --format: one folder.
     #[arg(long, value_name = "FILE|FOLDER", required = true, num_args = 1..)]
     out: Vec<PathBuf>,
-    /// Write every motion of IN into the folder --out, in these formats: bvh,mp4,npy,txt ...
+    /// Write every motion of IN into the folder --out, in these formats: bvh,glb,json,mp4,npy,txt
     #[arg(long, value_name = "ENDING", value_delimiter = ',')]
     format: Vec<String>,
     /// Of a dataset: the sample of this key.
@@ -50,6 +51,9 @@ pub struct Args {
     /// Of a dataset: only this part.
     #[arg(long, value_name = "train|validation|test", value_parser = split, conflicts_with = "sample")]
     split: Option<Split>,
+    /// What the bones are called in .bvh, .glb and .json.
+    #[arg(long, value_name = "own|mixamo|unity-humanoid|vrm", default_value = "own", value_parser = names_called)]
+    names: Names,
     /// Keypoints of the same frames (`body` [T, 17, 3], COCO), from which the head is turned.
     #[arg(long, value_name = "FILE.npz", conflicts_with = "format")]
     keypoints: Option<PathBuf>,
@@ -183,7 +187,7 @@ fn animate(
     let started = Instant::now();
     let performance = perform(&motion, face.as_ref(), options);
     let secs = started.elapsed().as_secs_f64();
-    let sources = Sources { sound: sound.as_ref() };
+    let sources = Sources { sound: sound.as_ref(), names: args.names };
     for (path, format) in outputs {
         format.write(path, &performance, &sources, ui).with_context(|| format!("cannot write {}", path.display()))?;
     }
@@ -295,6 +299,11 @@ fn split(name: &str) -> Result<Split, String> {
         .into_iter()
         .find(|split| split.name() == name)
         .ok_or_else(|| "expected train, validation or test".to_owned())
+}
+
+fn names_called(label: &str) -> Result<Names, String> {
+    let known = || Names::ALL.map(Names::label).join(", ");
+    Names::ALL.into_iter().find(|names| names.label() == label).ok_or_else(|| format!("expected one of {}", known()))
 }
 
 /// `15`, `29.97` or `30000/1001`, 1 to 240.

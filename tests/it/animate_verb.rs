@@ -54,9 +54,11 @@ fn a_motion_becomes_files_and_what_was_done_is_told() {
     done(dir, "made/b.txt --in-fps 30 --out c.npy --smoothing none --no-constraints");
     let same = npy::read(&dir.join("c.npy"), fps).unwrap();
     assert!((&same.joints - &joints.joints).iter().all(|v| v.abs() < 1e-4));
-    for more in
-        ["--smoothing one-euro --one-euro-hz 2", "--shoulder-yaw removed --curl-coherence off", "--fps 30000/1001"]
-    {
+    for more in [
+        "--smoothing one-euro --one-euro-hz 2",
+        "--shoulder-yaw removed --curl-coherence off",
+        "--fps 30000/1001 --names mixamo",
+    ] {
         done(dir, &format!("a.npy --out d.bvh {more}"));
     }
 }
