@@ -5,7 +5,7 @@
 
 use super::figure::{Arm, finger_hinge};
 use super::hinge::Bend;
-use super::places::{Places, hand_rotation};
+use super::places::Places;
 use super::pose::{ArmPose, elbow};
 use super::roll::elbow_axes;
 use super::smoothing::{Filter, Smoothing};
@@ -83,16 +83,19 @@ pub fn solve(places: &Places, arm: &Arm, chest: &Track, means: &Means, local: &m
     }
 }
 
-/// The hand's rotations against the untwisted forearm, smoothed by its two directions.
+/// The hand's rotations against the untwisted forearm, smoothed by their three angles: within its limits a hand has no
+/// two sets of them, and between a palm up and a palm down lies a hand on edge, where directions would cancel out.
 fn smooth_hand(forearm: &Track, frames: &Seen, filter: &Filter) -> Seen {
-    let relative: Seen = frames.iter().zip(forearm).map(|(hand, fore)| Some(fore.inverse() * (*hand)?)).collect();
-    let of = |axis: Vec3| -> Directions {
-        let mut track: Directions = relative.iter().map(|hand| Some((*hand)?.turn(axis))).collect();
-        filter.directions(&mut track);
-        track
+    let mut followed = 0.0;
+    let mut angle = |(hand, fore): (&Option<Rotation>, &Rotation)| {
+        let (supination, wrist) = ArmPose::of_hand(fore.inverse() * (*hand)?, followed, FOLLOWED);
+        followed = supination;
+        Some([supination, wrist.flexion, wrist.side])
     };
-    let pairs = of(X).into_iter().zip(of([0.0, 0.0, -1.0]));
-    pairs.map(|(along, side)| hand_rotation(along?, side?)).collect()
+    let mut angles: Vec<Option<Vec3>> = frames.iter().zip(forearm).map(&mut angle).collect();
+    filter.runs(&mut angles);
+    let rotation = |[supination, flexion, side]: Vec3| ArmPose::hand(supination, Bend { flexion, side });
+    angles.into_iter().map(|angles| angles.map(rotation)).collect()
 }
 
 /// Local rotations of a finger's three joints. Bones are smoothed in the axes of the hand as it was seen: what shakes

@@ -69,7 +69,8 @@ mod tests {
         let along = unit([0.7, -0.4, 0.5], 0.0).unwrap();
         let thumb = Hinge::new(along, unit(cross(along, [0.0, -0.5, -0.87]), 0.0).unwrap());
         for hinge in [elbow, thumb] {
-            assert_eq!(hinge.bend(hinge.along()).side.abs() + hinge.bend(hinge.along()).flexion.abs() < 1e-5, true);
+            let rest = hinge.bend(hinge.along());
+            assert!(rest.side.abs() + rest.flexion.abs() < 1e-5);
             for flexion in [-170.0, -90.0, -5.0, 0.0, 60.0, 100.0, 179.0] {
                 for side in [-80.0, -20.0, 0.0, 45.0] {
                     let bend = Bend { flexion, side };

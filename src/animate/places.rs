@@ -88,7 +88,7 @@ fn knuckle_frame(knuckles: [Option<Vec3>; 4]) -> Option<Rotation> {
 }
 
 /// The rotation of a left hand that points along the unit vector `along`, its little finger towards `side`.
-pub fn hand_rotation(along: Vec3, side: Vec3) -> Option<Rotation> {
+fn hand_rotation(along: Vec3, side: Vec3) -> Option<Rotation> {
     let side = unit(across(side, along), LEAST_METRES)?;
     Some(Rotation::between_frames(([1.0, 0.0, 0.0], [0.0, 0.0, -1.0]), (along, side)))
 }

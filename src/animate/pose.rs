@@ -69,6 +69,11 @@ impl ArmPose {
         (supination, Bend { flexion: (-y).atan2(x).to_degrees(), side })
     }
 
+    /// The hand with these angles, against the untwisted forearm.
+    pub fn hand(supination: f64, wrist: Bend) -> Rotation {
+        about_x(-supination) * sideways(wrist.side) * flexed(wrist.flexion)
+    }
+
     /// Local rotations of forearm and hand: `bent` is the untwisted forearm.
     pub fn shared(bent: Rotation, supination: f64, wrist: Bend) -> (Rotation, Rotation) {
         let half = about_x(-supination / 2.0);

@@ -1,8 +1,8 @@
 //! Smoothing before rotations are made. Every bone's direction is smoothed as a vector, in the axes of what it hangs
-//! on (the trunk for arms, the forearm for a hand, the hand for fingers), and made a unit vector again. So bones keep
-//! their length, hands can be smoothed more than arms without coming late after them, no angle can jump through half a
-//! turn, and the elbow's plane and the hand's roll, which come from the smooth directions, tremble less than if they
-//! were smoothed after they are known. The time step is the motion's own; a gap divides.
+//! on (the trunk for arms, the hand for fingers), and made a unit vector again; a hand by its three angles against the
+//! forearm. So bones keep their length, hands can be smoothed more than arms without coming late after them, no angle
+//! can jump through half a turn, and the elbow's plane, which comes from the smooth directions, trembles less than if
+//! it were smoothed after it is known. The time step is the motion's own; a gap divides.
 
 use crate::motion::one_euro::OneEuro;
 use crate::motion::savitzky_golay::SavitzkyGolay;
