@@ -1,12 +1,13 @@
 //! `orator animate`.
 
-use super::animate_input::{Input, Take, inputs};
+use super::animate_input::{Input, Take, inputs, is_motion, read_motion};
 use super::{Outcome, ui::Ui};
 use anyhow::{Context as _, Result, bail, ensure};
 use orator::animate::file::{Format, Sources};
 use orator::animate::names::Names;
 use orator::animate::performance::{Jerk, Told};
 use orator::animate::smoothing::ONE_EURO;
+use orator::animate::video::Beside;
 use orator::animate::{Constraints, Options, Performance, Smoothing, Yaw, perform};
 use orator::dataset::Split;
 use orator::media::audio;
@@ -60,6 +61,12 @@ pub struct Args {
     /// Sound of a film.
     #[arg(long, value_name = "FILE", conflicts_with = "format")]
     audio: Option<PathBuf>,
+    /// What a film shows beside the figure: the video it was taken from, or another motion (.npy, .txt, .npz).
+    #[arg(long, value_name = "FILE", conflicts_with = "format")]
+    beside: Option<PathBuf>,
+    /// The second of the video beside, at which the motion begins.
+    #[arg(long, value_name = "SECS", default_value_t = 0.0, requires = "beside")]
+    beside_from: f64,
     /// Frames a second of a .npy or .txt.
     #[arg(long, value_name = "RATE", default_value = "15", value_parser = rate)]
     in_fps: FrameRate,
@@ -187,7 +194,18 @@ fn animate(
     let started = Instant::now();
     let performance = perform(&motion, face.as_ref(), options);
     let secs = started.elapsed().as_secs_f64();
-    let sources = Sources { sound: sound.as_ref(), names: args.names };
+    let other = match &args.beside {
+        Some(path) if is_motion(path) => Some(read_motion(path, args.in_fps)?),
+        _ => None,
+    };
+    let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let labels = [input.name.clone(), args.beside.as_deref().map(stem).unwrap_or_default()];
+    let beside = match (&args.beside, &other) {
+        (None, _) => Beside::Itself,
+        (Some(_), Some(motion)) => Beside::Motion { motion, labels: labels.each_ref().map(String::as_str) },
+        (Some(path), None) => Beside::Video { path, from_secs: args.beside_from },
+    };
+    let sources = Sources { sound: sound.as_ref(), names: args.names, beside };
     for (path, format) in outputs {
         format.write(path, &performance, &sources, ui).with_context(|| format!("cannot write {}", path.display()))?;
     }

@@ -62,7 +62,7 @@ pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
         let entry = entry.with_context(|| format!("cannot read {}", path.display()))?.path();
         if entry.join(JOINTS).is_file() {
             found.push(file(entry.join(JOINTS), &entry));
-        } else if entry.is_file() && ["npy", "txt", "npz"].iter().any(|known| ending(&entry) == *known) {
+        } else if entry.is_file() && is_motion(&entry) {
             found.push(file(entry.clone(), &entry));
         }
     }
@@ -124,19 +124,7 @@ impl Input {
                 let body = sample.pose2d.slice(ndarray::s![.., ..N_BODY, ..]).to_owned();
                 Take { motion: sample.motion, face: Some(Face { body }), sound: Some(sample.sound) }
             }
-            Place::File(path) => {
-                let motion = match ending(path).as_str() {
-                    "npy" => npy::read(path, fps)?,
-                    "txt" => authors_txt::read(path, fps)?,
-                    "npz" => joints_npz::read(path)?,
-                    _ => bail!(
-                        "{}: motion is read from .npy (joints), .txt (the authors' layout), .npz (of a run), a lifted \
-                         video's folder or a dataset",
-                        path.display()
-                    ),
-                };
-                Take { motion, face: None, sound: None }
-            }
+            Place::File(path) => Take { motion: read_motion(path, fps)?, face: None, sound: None },
         };
         check(&take.motion).with_context(|| format!("no animation of {}", self.name))?;
         match keypoints.map(Path::to_owned).or_else(|| self.keypoints_of_run()) {
@@ -166,6 +154,25 @@ fn read_face(path: &Path, motion: &Motion) -> Result<Face> {
         motion.n_frames()
     );
     Ok(Face { body: keypoints.body })
+}
+
+/// Whether a file is a motion by its ending.
+pub fn is_motion(path: &Path) -> bool {
+    ["npy", "txt", "npz"].contains(&ending(path).as_str())
+}
+
+/// Reads a file of joints; `fps` is that of a kind of file without a rate.
+pub fn read_motion(path: &Path, fps: FrameRate) -> Result<Motion> {
+    match ending(path).as_str() {
+        "npy" => npy::read(path, fps),
+        "txt" => authors_txt::read(path, fps),
+        "npz" => joints_npz::read(path),
+        _ => bail!(
+            "{}: motion is read from .npy (joints), .txt (the authors' layout), .npz (of a run), a lifted video's folder \
+             or a dataset",
+            path.display()
+        ),
+    }
 }
 
 /// That there is something to animate, in metres.
