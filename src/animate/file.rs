@@ -4,13 +4,12 @@ use super::avatar::Avatar;
 use super::names::Names;
 use super::performance::Performance;
 use super::{glb_scene, json, video};
-use crate::motion::bvh_write::Clip;
 use crate::motion::{authors_txt, npy};
 use crate::stage::progress::Progress;
 use crate::stage::workdir;
 use crate::types::{pose3d::Motion, sound::Sound};
 use std::fs::File;
-use std::io::{BufWriter, Write as _};
+use std::io::{self, BufWriter, Write as _};
 use std::path::Path;
 
 /// What else goes into a file than the performance.
@@ -75,20 +74,15 @@ impl Format {
         match self {
             Self::Npy | Self::AuthorsTxt => self.write_joints(path, &performance.motion()),
             Self::Bvh => {
-                let skeleton = sources.names.applied(&performance.clip.skeleton);
-                let clip = Clip { skeleton, ..performance.clip.clone() };
-                workdir::write_file(path, clip.to_bvh().as_bytes())
+                let named = sources.names.applied(&performance.clip.skeleton);
+                streamed(path, |text| performance.clip.write_bvh(&named, text))
             }
             Self::Glb => {
                 let avatar = Avatar::of(&performance.figure);
                 let bytes = glb_scene::file(&performance.figure, &performance.clip, &avatar, sources.names);
                 workdir::write_file(path, &bytes)
             }
-            Self::Json => workdir::replace(path, |attempt| {
-                let mut text = BufWriter::new(File::create(attempt)?);
-                json::write(&mut text, performance, sources.names)?;
-                Ok(text.flush()?)
-            }),
+            Self::Json => streamed(path, |text| json::write(text, performance, sources.names)),
             Self::Mp4 => {
                 let motion = performance.motion();
                 workdir::replace(path, |attempt| {
@@ -106,6 +100,15 @@ impl Format {
             _ => anyhow::bail!("{} holds more than joints", path.display()),
         }
     }
+}
+
+/// A text written piece by piece.
+fn streamed(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> anyhow::Result<()> {
+    workdir::replace(path, |attempt| {
+        let mut text = BufWriter::new(File::create(attempt)?);
+        write(&mut text)?;
+        Ok(text.flush()?)
+    })
 }
 
 #[cfg(test)]

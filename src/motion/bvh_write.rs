@@ -1,7 +1,7 @@
 //! Writes BVH: a skeleton with local rotations over time. The root has six channels, every other joint three, in the
 //! order Z X Y; an end of a bone is an `End Site`. Which skeleton, and in which axes and units, is the caller's.
 
-use super::fk::Skeleton;
+use super::fk::{Joint, Skeleton};
 use super::rotation::Rotation;
 use super::vec3::Vec3;
 use crate::types::time::FrameRate;
@@ -52,12 +52,13 @@ impl Clip {
     pub fn to_bvh(&self) -> String {
         let mut text = Vec::new();
         // memory takes whatever is written, and all of it is text
-        let _ = self.write_bvh(&mut text);
+        let _ = self.write_bvh(&self.skeleton, &mut text);
         String::from_utf8(text).unwrap_or_default()
     }
 
-    /// Writes the same text frame by frame: that of hours is larger than they are.
-    pub fn write_bvh(&self, out: &mut dyn io::Write) -> io::Result<()> {
+    /// Writes the same text frame by frame: that of hours is larger than they are. `named` is the clip's skeleton,
+    /// maybe under other names.
+    pub fn write_bvh(&self, named: &Skeleton, out: &mut dyn io::Write) -> io::Result<()> {
         let mut text = String::from("HIERARCHY\n");
         let order = self.written_order();
         let mut open: Vec<usize> = Vec::new();
@@ -66,7 +67,7 @@ impl Clip {
                 open.pop();
                 let _ = writeln!(text, "{}}}", "\t".repeat(open.len()));
             }
-            self.head(&mut text, joint, open.len());
+            head(&mut text, &named.joints[joint], open.len());
             open.push(joint);
         }
         while open.pop().is_some() {
@@ -87,26 +88,6 @@ impl Clip {
         out.write_all(text.as_bytes())
     }
 
-    /// Name, offset and channels of a joint, its brace left open.
-    fn head(&self, text: &mut String, joint: usize, depth: usize) {
-        let indent = "\t".repeat(depth);
-        let joint = &self.skeleton.joints[joint];
-        let [x, y, z] = joint.offset;
-        let _ = match (joint.end, joint.parent) {
-            (true, _) => writeln!(text, "{indent}End Site"),
-            (false, None) => writeln!(text, "{indent}ROOT {}", joint.name),
-            (false, Some(_)) => writeln!(text, "{indent}JOINT {}", joint.name),
-        };
-        let _ = writeln!(text, "{indent}{{\n{indent}\tOFFSET {x:.6} {y:.6} {z:.6}");
-        let _ = match (joint.end, joint.parent) {
-            (true, _) => Ok(()),
-            (false, None) => {
-                writeln!(text, "{indent}\tCHANNELS 6 Xposition Yposition Zposition {ROTATION_CHANNELS}")
-            }
-            (false, Some(_)) => writeln!(text, "{indent}\tCHANNELS 3 {ROTATION_CHANNELS}"),
-        };
-    }
-
     /// Joints depth first: the order in which a BVH names them and gives their channels.
     fn written_order(&self) -> Vec<usize> {
         let mut order = Vec::with_capacity(self.skeleton.joints.len());
@@ -118,6 +99,25 @@ impl Clip {
         }
         order
     }
+}
+
+/// Name, offset and channels of a joint, its brace left open.
+fn head(text: &mut String, joint: &Joint, depth: usize) {
+    let indent = "\t".repeat(depth);
+    let [x, y, z] = joint.offset;
+    let _ = match (joint.end, joint.parent) {
+        (true, _) => writeln!(text, "{indent}End Site"),
+        (false, None) => writeln!(text, "{indent}ROOT {}", joint.name),
+        (false, Some(_)) => writeln!(text, "{indent}JOINT {}", joint.name),
+    };
+    let _ = writeln!(text, "{indent}{{\n{indent}\tOFFSET {x:.6} {y:.6} {z:.6}");
+    let _ = match (joint.end, joint.parent) {
+        (true, _) => Ok(()),
+        (false, None) => {
+            writeln!(text, "{indent}\tCHANNELS 6 Xposition Yposition Zposition {ROTATION_CHANNELS}")
+        }
+        (false, Some(_)) => writeln!(text, "{indent}\tCHANNELS 3 {ROTATION_CHANNELS}"),
+    };
 }
 
 #[cfg(test)]
