@@ -121,7 +121,7 @@ fn peaks(strengths: &[f32]) -> Vec<usize> {
     let least = strengths.iter().copied().fold(f32::INFINITY, f32::min);
     let most = strengths.iter().copied().fold(f32::NEG_INFINITY, f32::max) - least;
     // nothing at all, or nothing that changes
-    if !(most > 0.0) {
+    if most.is_nan() || most <= 0.0 {
         return Vec::new();
     }
     let scaled: Vec<f32> = strengths.iter().map(|v| (v - least) / (most + f32::MIN_POSITIVE)).collect();

@@ -19,7 +19,7 @@ pub(super) fn metric(part: Part) -> Box<dyn Metric> {
         undefined: "no joint of the part is seen in 3 frames in a row",
         parameters: json!({}),
     };
-    Mean::new(definition, part, 3, |window| norm(second_difference(window)) * window.fps * window.fps)
+    Mean::over(definition, part, 3, |window| norm(second_difference(window)) * window.fps * window.fps)
 }
 
 /// Of made less real.
@@ -40,7 +40,7 @@ pub(super) fn by_coordinate() -> Box<dyn Metric> {
         undefined: "no joint is seen in 3 frames in a row",
         parameters: json!({}),
     };
-    Mean::new(definition, Part::All, 3, |window| second_difference(window).iter().map(|v| v.abs()).sum::<f64>() / 3.0)
+    Mean::over(definition, Part::All, 3, |window| second_difference(window).iter().map(|v| v.abs()).sum::<f64>() / 3.0)
 }
 
 /// Frames given as a seed, of the trimodal convention's 15 a second.

@@ -19,9 +19,11 @@ pub fn minima(values: &[f64], order: usize) -> Vec<usize> {
     (0..values.len()).filter(is_lowest).collect()
 }
 
-/// `exp(-d^2 / 2 sigma^2)` with the distance to the nearest of `times`; 0 when there are none.
+/// `exp(-d^2 / 2 sigma^2)` with the distance to the nearest of `times`, which are in order; 0 when there are none.
 pub(super) fn nearness(time: f64, times: &[f64], sigma: f64) -> f64 {
-    let nearest = times.iter().map(|other| (other - time).abs()).fold(f64::INFINITY, f64::min);
+    let after = times.partition_point(|other| *other < time);
+    let beside = times.iter().skip(after.saturating_sub(1)).take(2);
+    let nearest = beside.map(|other| (other - time).abs()).fold(f64::INFINITY, f64::min);
     (-nearest * nearest / (2.0 * sigma * sigma)).exp()
 }
 
@@ -217,7 +219,7 @@ mod tests {
 
     #[test]
     fn a_beat_on_the_onset_counts_one() {
-        assert_eq!(nearness(1.0, &[3.0, 1.0], 0.1), 1.0);
+        assert_eq!(nearness(1.0, &[1.0, 3.0], 0.1), 1.0);
         assert!((nearness(1.0, &[1.1], 0.1) - (-0.5f64).exp()).abs() < 1e-9);
         assert_eq!(nearness(1.0, &[], 0.1), 0.0);
     }

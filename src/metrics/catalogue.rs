@@ -110,11 +110,15 @@ impl Catalogue {
             facts.at(t)[1] += f64::from(u8::from(other_rate));
         }
         let start = if other_rate { f64::NAN } else { 0.0 };
-        let (mut cheap, mut costly) = (vec![facts], Vec::new());
-        for metric in &self.metrics {
+        let measure = |metric: &dyn Metric| {
             let mut blocks = Blocks::new(n, metric.n_sums(), pair.n_frames(), start);
             metric.measure(&pair, &mut blocks);
-            if metric.is_costly() { &mut costly } else { &mut cheap }.push(blocks);
+            (metric.is_costly(), blocks)
+        };
+        let of_each: Vec<_> = self.metrics.par_iter().map(|metric| measure(metric.as_ref())).collect();
+        let (mut cheap, mut costly) = (vec![facts], Vec::new());
+        for (is_costly, blocks) in of_each {
+            if is_costly { &mut costly } else { &mut cheap }.push(blocks);
         }
         let row = |all: &mut [Blocks], block| all.iter_mut().flat_map(|blocks| blocks.row(block).to_vec()).collect();
         let mut measured = Measured::default();
@@ -327,5 +331,37 @@ mod tests {
         assert!(catalogue.reason(&nothing, 0).contains("no joint"));
         let other = catalogue.measure(&Interval { fps: FrameRate::new(30, 1), ..interval });
         assert!(catalogue.values(&other).iter().all(|value| value.is_nan()));
+    }
+
+    #[test]
+    fn what_is_not_seen_changes_nothing() {
+        // the left hand is hidden for a second, the right wrist now and then
+        let mask = Array2::from_shape_fn((90, N_JOINTS), |(t, joint)| {
+            !((20..35).contains(&t) && (7..28).contains(&joint) || t % 40 == 13 && joint == 3)
+        });
+        for convention in Convention::ALL {
+            let catalogue = Catalogue::new(&Settings { convention, ..Settings::default() }).unwrap();
+            let [first, second] = [f32::NAN, 7.0].map(|hidden| {
+                let [made, real] = [true, false].map(|made| {
+                    let mut joints = moving(made);
+                    joints
+                        .indexed_iter_mut()
+                        .filter(|((t, joint, _), _)| !mask[[*t, *joint]])
+                        .for_each(|(_, v)| *v = hidden);
+                    joints
+                });
+                let onsets: &[f64] = &[0.35, 1.4, 2.2, 3.3, 4.4];
+                let (made, real, fps) = (made.view(), real.view(), FrameRate::new(15, 1));
+                let sums = catalogue.measure(&Interval { made, real, mask: mask.view(), fps, onsets: Some(onsets) });
+                catalogue.values(&sums)
+            });
+            for ((a, b), definition) in first.iter().zip(&second).zip(catalogue.definitions()) {
+                assert!(same(*a, *b), "{convention:?} {}: {a} {b}", definition.label());
+                // too few frames, or too few in a row
+                let few = definition.name == "frechet_embedding"
+                    || definition.name == "cca" && convention == Convention::Genea;
+                assert!(a.is_finite() || few, "{convention:?} {}: {a}", definition.label());
+            }
+        }
     }
 }

@@ -15,7 +15,7 @@ pub struct Interval<'a> {
     /// seen is left out everywhere, as is a real joint that is not finite.
     pub mask: ArrayView2<'a, bool>,
     pub fps: FrameRate,
-    /// Onsets of the sound, seconds from the interval's start (`audio::onset`); `None` without sound.
+    /// Onsets of the sound in order, seconds from the interval's start (`audio::onset`); `None` without sound.
     pub onsets: Option<&'a [f64]>,
 }
 

@@ -15,5 +15,5 @@ pub(super) fn metric(part: Part) -> Box<dyn Metric> {
         undefined: "no joint of the part is seen",
         parameters: json!({}),
     };
-    Mean::new(definition, part, 1, |window| window.apart(0).iter().map(|v| v.abs()).sum::<f64>() / 3.0)
+    Mean::over(definition, part, 1, |window| window.apart(0).iter().map(|v| v.abs()).sum::<f64>() / 3.0)
 }

@@ -61,7 +61,7 @@ pub(super) fn norm(v: Point) -> f64 {
 
 impl Mean {
     /// Of `of` over all points of `part` and all `n_frames` frames in a row.
-    pub fn new(definition: Definition, part: Part, n_frames: usize, of: fn(&Window) -> f64) -> Box<dyn Metric> {
+    pub fn over(definition: Definition, part: Part, n_frames: usize, of: fn(&Window) -> f64) -> Box<dyn Metric> {
         Box::new(Self { definition, points: part.points(), n_frames, of })
     }
 }

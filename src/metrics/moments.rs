@@ -28,8 +28,7 @@ pub(super) fn add(rows: ArrayView2<f64>, packed: &mut [f64]) {
 /// Number of rows, mean [d] and unbiased covariance [d, d]; `None` for fewer than two rows.
 pub(super) fn read(packed: &[f64], d: usize) -> Option<(f64, Array1<f64>, Array2<f64>)> {
     let n = packed[0];
-    // also where it is NaN
-    if !(n >= 2.0) {
+    if n.is_nan() || n < 2.0 {
         return None;
     }
     let mean: Array1<f64> = packed[1..=d].iter().map(|sum| sum / n).collect();

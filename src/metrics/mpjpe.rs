@@ -16,5 +16,5 @@ pub(super) fn metric(part: Part) -> Box<dyn Metric> {
         undefined: "no joint of the part is seen",
         parameters: json!({}),
     };
-    Mean::new(definition, part, 1, |window| 1000.0 * norm(window.apart(0)))
+    Mean::over(definition, part, 1, |window| 1000.0 * norm(window.apart(0)))
 }

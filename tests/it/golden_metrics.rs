@@ -201,3 +201,18 @@ fn baselines_on_the_released_clips_have_the_measured_figures() {
     mismatched(&made, "pck_2d@0.2 all", 100.0, "14.7 26.1 19.9");
     mismatched(&made, "mpjpe all", 1.0, "406.0 284.1 318.0");
 }
+
+#[test]
+fn the_released_sounds_have_the_measured_onsets() {
+    let Some(folder) = folder() else { return };
+    for (clip, n) in [("1845", 92), ("3821", 98), ("3838", 120)] {
+        let sound = orator::media::audio::read_mono(&folder.join(format!("{clip}.wav")), 44_100).unwrap().unwrap();
+        let mut at_16_khz = Vec::new();
+        let mut resampler = orator::audio::resample::Resampler::new(44_100, 16_000);
+        resampler.push(&sound.samples, &mut at_16_khz);
+        resampler.finish(&mut at_16_khz);
+        let onsets = orator::audio::onset::onsets(&at_16_khz);
+        eprintln!("{clip}: {} onsets", onsets.len());
+        assert_eq!(onsets.len(), n, "{clip}");
+    }
+}
