@@ -28,7 +28,7 @@
 //! | `train` | losses, optimiser, checkpoints, the two training loops | `motion nn audio dataset metrics` |
 //! | `evaluate` | errors of the lifters on captured motion; made motion beside the real one, with what defends each figure | `motion media nn train lift metrics audio dataset generate import` |
 //! | `generate` | speech to motion with a trained speaker | `motion nn audio train metrics` |
-//! | `animate` | joints to rotations; BVH and drawn video | `motion media vision` |
+//! | `animate` | joints to rotations; BVH, GLB with an avatar of our own, and drawn video | `motion media vision` |
 //! | `page` | HTML pages for people: elements, plots, one file | nothing |
 //! | `report` | what became of every second, how a training went, and how good made motion is, each on one page; no stage, so it may know `segment` | `motion media vision segment animate page train metrics evaluate` |
 //! | `import` | motion that others captured, with its sound, becomes a dataset | `motion media audio dataset` |

@@ -61,12 +61,16 @@ pub struct Args {
     /// Sound of a film.
     #[arg(long, value_name = "FILE", conflicts_with = "format")]
     audio: Option<PathBuf>,
-    /// What a film shows beside the figure: the video it was taken from, or another motion (.npy, .txt, .npz).
+    /// What a film shows beside the figure: the video it was taken from, whose sound it has where there is no other, or
+    /// another motion (.npy, .txt, .npz), put on a figure in the same way.
     #[arg(long, value_name = "FILE", conflicts_with = "format")]
     beside: Option<PathBuf>,
     /// The second of the video beside, at which the motion begins.
     #[arg(long, value_name = "SECS", default_value_t = 0.0, requires = "beside")]
     beside_from: f64,
+    /// What the two motions of --beside are called, such as `prediction truth`; without: their files' names.
+    #[arg(long, value_names = ["OURS", "OTHER"], num_args = 2, requires = "beside")]
+    labels: Option<Vec<String>>,
     /// Frames a second of a .npy or .txt.
     #[arg(long, value_name = "RATE", default_value = "15", value_parser = rate)]
     in_fps: FrameRate,
@@ -195,15 +199,24 @@ fn animate(
     let performance = perform(&motion, face.as_ref(), options);
     let secs = started.elapsed().as_secs_f64();
     let other = match &args.beside {
-        Some(path) if is_motion(path) => Some(read_motion(path, args.in_fps)?),
+        Some(path) if is_motion(path) => Some(perform(&read_motion(path, args.in_fps)?, None, options).motion()),
         _ => None,
     };
     let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let labels = [input.name.clone(), args.beside.as_deref().map(stem).unwrap_or_default()];
+    let labels = match args.labels.as_deref() {
+        Some([ours, other]) => [ours.clone(), other.clone()],
+        _ => [input.name.clone(), args.beside.as_deref().map(stem).unwrap_or_default()],
+    };
     let beside = match (&args.beside, &other) {
         (None, _) => Beside::Itself,
         (Some(_), Some(motion)) => Beside::Motion { motion, labels: labels.each_ref().map(String::as_str) },
         (Some(path), None) => Beside::Video { path, from_secs: args.beside_from },
+    };
+    let is_film = outputs.iter().any(|&(_, format)| format == Format::Mp4);
+    let sound = match (sound, beside) {
+        (None, Beside::Video { path, from_secs }) if is_film => audio::read_mono(path, SAMPLE_RATE)?
+            .map(|whole| part(&whole, from_secs, motion.fps.secs(motion.n_frames()))),
+        (sound, _) => sound,
     };
     let sources = Sources { sound: sound.as_ref(), names: args.names, beside };
     for (path, format) in outputs {
@@ -281,8 +294,8 @@ fn options(args: &Args) -> Result<Options> {
 /// Output files with their formats; none may be an input or another output.
 fn outputs(args: &Args, input: &Input) -> Result<Vec<(PathBuf, Format)>> {
     for (n, path) in args.out.iter().enumerate() {
-        let is_sound = args.audio.as_ref().is_some_and(|sound| sound == path);
-        ensure!(!input.is_at(path) && !is_sound, "{} is what is read; write to another file", path.display());
+        let is_read = [&args.audio, &args.beside].into_iter().flatten().any(|read| read == path);
+        ensure!(!input.is_at(path) && !is_read, "{} is what is read; write to another file", path.display());
         ensure!(!args.out[..n].contains(path), "{} is asked for twice", path.display());
         ensure!(!path.is_dir(), "{} is a folder; name a file in it, or give --format bvh", path.display());
     }
@@ -295,6 +308,12 @@ fn read_sound(path: &Path) -> Result<Sound> {
         Some(sound) if !sound.samples.is_empty() => Ok(sound),
         _ => bail!("{} has no sound", path.display()),
     }
+}
+
+/// The part of a sound from a second on, as much as there is of `secs`.
+fn part(whole: &Sound, from_secs: f64, secs: f64) -> Sound {
+    let at = |secs: f64| ((secs * f64::from(whole.rate)).round() as usize).min(whole.samples.len());
+    Sound { rate: whole.rate, samples: whole.samples[at(from_secs)..at(from_secs + secs)].to_vec() }
 }
 
 fn names(outputs: &[(PathBuf, Format)]) -> Vec<String> {

@@ -18,7 +18,8 @@ use std::path::{Path, PathBuf};
 ///
 /// The sound may be a wav, flac or mp3 file or the sound of a video, of any length. The ending of each output file
 /// chooses what is written: .npy (joints [frames, 49, 3], metres), .txt (the layout of Rebol et al. 2021), .bvh (bone
-/// rotations, cm, y up, facing +z), .mp4 (a film of the figure with the sound).
+/// rotations, cm, y up, facing +z), .glb (a skinned avatar with the motion), .json (joints and rotations), .mp4 (a film
+/// of the figure with the sound).
 ///
 /// Many sounds at once: --audio-folder (everything that sounds below it) or --batch (a table, columns `audio`, `out` and
 /// `checkpoint`, of which the first is needed and paths count from the table's folder), with --out-folder and --format. What

@@ -3,7 +3,9 @@
 use super::median;
 use crate::cli::{Outcome, ui::Ui};
 use anyhow::{Result, ensure};
-use orator::animate::{Options, perform};
+use orator::animate::avatar::Avatar;
+use orator::animate::names::Names;
+use orator::animate::{Options, glb_scene, perform};
 use orator::demo::rule::Gestures;
 use orator::demo::speech::Speech;
 use orator::stage::progress::Progress as _;
@@ -43,32 +45,45 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     }
     let options = Options { fps: Some(FrameRate::new(args.fps, 1)), ..Options::default() };
     let task = ui.begin("bench animate", args.rounds as u64);
-    let mut secs: [Vec<f64>; 2] = Default::default();
-    let mut n_bytes = 0;
+    let one_core = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let mut secs: [Vec<f64>; 4] = Default::default();
+    let mut n_bytes = [0; 2];
     for _ in 0..args.rounds {
         let start = Instant::now();
         let performance = perform(&motion, None, &options);
         secs[0].push(start.elapsed().as_secs_f64());
         let start = Instant::now();
-        n_bytes = performance.clip.to_bvh().len();
+        n_bytes[0] = performance.clip.to_bvh().len();
         secs[1].push(start.elapsed().as_secs_f64());
+        let start = Instant::now();
+        let avatar = one_core.install(|| Avatar::of(&performance.figure));
+        secs[2].push(start.elapsed().as_secs_f64());
+        let start = Instant::now();
+        n_bytes[1] = glb_scene::file(&performance.figure, &performance.clip, &avatar, Names::Own).len();
+        secs[3].push(start.elapsed().as_secs_f64());
         task.advance(1);
     }
     drop(task);
-    let [perform_secs, bvh_secs] = secs.map(median);
+    let [perform_secs, bvh_secs, avatar_secs, glb_secs] = secs.map(median);
     let speed = |secs: f64| args.secs / secs;
     let whole = speed(perform_secs + bvh_secs);
     let text = format!(
         "{:.0} s of motion at {FPS}, written at {} fps, one core, median of {} round(s)\n\
          joints to performance {:6.0} x real time\n\
          performance to BVH    {:6.0} x real time ({:.1} KiB a second)\n\
-         joints to BVH         {whole:6.0} x real time",
+         joints to BVH         {whole:6.0} x real time\n\
+         the avatar, once      {avatar_secs:6.2} s\n\
+         performance to GLB    {:6.0} x real time ({:.1} KiB a second)\n\
+         avatar and GLB        {:6.0} x real time",
         args.secs,
         args.fps,
         args.rounds,
         speed(perform_secs),
         speed(bvh_secs),
-        n_bytes as f64 / 1024.0 / args.secs,
+        n_bytes[0] as f64 / 1024.0 / args.secs,
+        speed(glb_secs),
+        n_bytes[1] as f64 / 1024.0 / args.secs,
+        speed(avatar_secs + glb_secs),
     );
     let facts = json!({
         "secs": args.secs,
@@ -76,6 +91,9 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         "perform_times_real_time": speed(perform_secs),
         "bvh_times_real_time": speed(bvh_secs),
         "times_real_time": whole,
+        "avatar_secs": avatar_secs,
+        "glb_times_real_time": speed(glb_secs),
+        "glb_with_avatar_times_real_time": speed(avatar_secs + glb_secs),
     });
     ui.summary(&text, None, facts);
     Ok(Outcome::Done)
