@@ -23,7 +23,7 @@ const CLIP_SECS: f64 = 60.0;
 
 /// Where it comes from.
 #[derive(clap::Args)]
-pub struct Args {
+pub struct MotionArgs {
     /// Captured motion: .bvh or .npz files, or folders of them; may be given several times.
     #[arg(long, value_name = "PATH", num_args = 1.., required = true)]
     mocap: Vec<PathBuf>,
@@ -35,7 +35,7 @@ pub struct Args {
     pub seed: u64,
 }
 
-pub fn gather(args: &Args, ui: &Ui) -> Result<Corpus> {
+pub fn gather(args: &MotionArgs, ui: &Ui) -> Result<Corpus> {
     let task = ui.begin("gathering motion", 0);
     let takes = mocap::read_all(&args.mocap).context("reading --mocap")?;
     let (held_out, mut takes) = mocap::divide(takes, &args.hold_out)?;

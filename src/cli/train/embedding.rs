@@ -16,7 +16,7 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    corpus: corpus::Args,
+    corpus: corpus::MotionArgs,
     /// The weights file to write (safetensors).
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
