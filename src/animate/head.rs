@@ -21,7 +21,7 @@ pub struct Face {
 /// Nose, left and right eye, left and right ear of a grown person, metres from the middle between the ears, in the
 /// figure's axes (x to the person's left, y up, z ahead).
 const FACE: [Vec3; 5] =
-    [[0.0, -0.015, 0.120], [0.032, 0.030, 0.085], [-0.032, 0.030, 0.085], [0.075, 0.0, 0.0], [-0.075, 0.0, 0.0]];
+    [[0.0, -0.020, 0.105], [0.032, 0.030, 0.075], [-0.032, 0.030, 0.075], [0.075, 0.0, 0.0], [-0.075, 0.0, 0.0]];
 /// A keypoint with a lower score is not seen; with fewer of the five the head is not.
 const LEAST_SCORE: f32 = 0.3;
 const LEAST_POINTS: usize = 3;
@@ -89,7 +89,8 @@ fn rotation([yaw, pitch, roll]: Vec3) -> Rotation {
         * Rotation::about([0.0, 0.0, 1.0], roll)
 }
 
-/// The face's keypoints in one frame: places in px (y up) with weights, those unseen 0.
+/// The face's keypoints in one frame: places in px (y up) with weights, those unseen 0. An ear behind the head is
+/// guessed with a somewhat lower score; its fourth power makes that tell.
 struct Points {
     places: [[f64; 2]; 5],
     weights: [f64; 5],
@@ -102,7 +103,7 @@ impl Points {
         let at = |point: usize| [f64::from(body[[point, 0]]), -f64::from(body[[point, 1]])];
         let seen = |point: usize| (0..3).all(|k| body[[point, k]].is_finite()) && body[[point, 2]] >= LEAST_SCORE;
         let weights: [f64; 5] =
-            std::array::from_fn(|point| if seen(point) { f64::from(body[[point, 2]]).min(1.0) } else { 0.0 });
+            std::array::from_fn(|point| if seen(point) { f64::from(body[[point, 2]]).min(1.0).powi(4) } else { 0.0 });
         if weights.iter().filter(|&&weight| weight > 0.0).count() < LEAST_POINTS {
             return None;
         }

@@ -1,5 +1,5 @@
 //! Contact sheets of a lifted clip: at regular moments the picture with its keypoints, the 3D pose from the front and
-//! from the left, page after page, each with a strip of the wrists' way. The video is streamed; only the page at work
+//! from the left, and, if asked for, the animated figure beside it, page after page, each with a strip of the wrists' way. The video is streamed; only the page at work
 //! is in memory.
 
 use super::draw::{INK, LEFT, PAPER, RIGHT};
@@ -17,13 +17,12 @@ use anyhow::{Context, Result, ensure};
 use ndarray::Axis;
 use std::path::Path;
 
-/// Moments side by side, and rows of them on a page.
-const COLUMNS: usize = 2;
+/// Rows of moments on a page.
 const ROWS: usize = 5;
-/// A moment: a line of words over three cells, then a gap.
+/// A moment: a line of words over its cells, then a gap.
 const WORDS_PX: usize = 22;
 const GAP_PX: usize = 16;
-const MOMENT_PX: [usize; 2] = [3 * CELL_PX + GAP_PX, WORDS_PX + CELL_PX + 6];
+const MOMENT_HIGH_PX: usize = WORDS_PX + CELL_PX + 6;
 const TITLE_PX: usize = 36;
 
 /// What a sheet is drawn of.
@@ -32,6 +31,8 @@ pub struct Clip<'a> {
     pub video: &'a Path,
     pub keypoints: &'a Keypoints,
     pub motion: &'a Motion,
+    /// What the animation makes of it, if that is to be seen too, frame by frame the motion's.
+    pub figure: Option<&'a Motion>,
 }
 
 impl Clip<'_> {
@@ -48,15 +49,17 @@ impl Clip<'_> {
         self.check_length(&reader)?;
         let crop = Crop::of(self.keypoints, reader.image_size());
         let task = progress.begin("drawing", moments.len() as u64);
-        let pages: Vec<&[usize]> = moments.chunks(COLUMNS * ROWS).collect();
+        let pages: Vec<&[usize]> = moments.chunks(self.n_columns() * ROWS).collect();
         for (number, moments) in pages.iter().enumerate() {
             let end = pages.get(number + 1).and_then(|next| next.first()).copied().unwrap_or(self.motion.n_frames());
-            let n_rows = moments.len().div_ceil(COLUMNS);
-            let strip_top = TITLE_PX + n_rows * MOMENT_PX[1];
-            let mut page = Image::filled(COLUMNS * MOMENT_PX[0] - GAP_PX, strip_top + STRIP_PX, PAPER);
+            let n_rows = moments.len().div_ceil(self.n_columns());
+            let strip_top = TITLE_PX + n_rows * MOMENT_HIGH_PX;
+            let mut page =
+                Image::filled(self.n_columns() * self.moment_wide_px() - GAP_PX, strip_top + STRIP_PX, PAPER);
             self.draw_title(&mut page, number, pages.len())?;
             for (n, &moment) in moments.iter().enumerate() {
-                let corner = [n % COLUMNS * MOMENT_PX[0], TITLE_PX + n / COLUMNS * MOMENT_PX[1]];
+                let (column, row) = (n % self.n_columns(), n / self.n_columns());
+                let corner = [column * self.moment_wide_px(), TITLE_PX + row * MOMENT_HIGH_PX];
                 self.draw_moment(&mut page, corner, moment, &mut reader, &crop)?;
                 task.advance(1);
             }
@@ -65,6 +68,16 @@ impl Clip<'_> {
             page_done(number, pages.len(), &page)?;
         }
         Ok(())
+    }
+
+    /// Moments side by side.
+    fn n_columns(&self) -> usize {
+        if self.figure.is_some() { 1 } else { 2 }
+    }
+
+    fn moment_wide_px(&self) -> usize {
+        let n_cells = if self.figure.is_some() { 5 } else { 3 };
+        n_cells * CELL_PX + GAP_PX
     }
 
     /// The frames drawn.
@@ -132,11 +145,19 @@ impl Clip<'_> {
             }
         }
         let joints = self.motion.joints.index_axis(Axis(0), frame_idx);
-        let cells = [
+        let mut cells = vec![
             crop.cell(reader, self.keypoints, frame_idx)?,
             pose_cell(joints, From::Front)?,
             pose_cell(joints, From::Left)?,
         ];
+        if let Some(figure) = self.figure.filter(|figure| frame_idx < figure.n_frames()) {
+            let joints = figure.joints.index_axis(Axis(0), frame_idx);
+            for from in [From::Front, From::Left] {
+                let mut cell = pose_cell(joints, from)?;
+                draw::text(&mut cell, "animated", [6.0, 30.0], 9.0, INK)?;
+                cells.push(cell);
+            }
+        }
         for (column, cell) in cells.iter().enumerate() {
             draw::paste(page, cell, [left + column * CELL_PX, top + WORDS_PX]);
         }

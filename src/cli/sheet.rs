@@ -5,6 +5,7 @@ use super::road;
 use super::{Outcome, ui::Ui};
 use anyhow::{Result, bail, ensure};
 use orator::animate::sheet::Clip;
+use orator::animate::{Options, perform};
 use orator::motion::clip_figures::{self, ArmFigures, ClipFigures};
 use orator::motion::{joints_npz, keypoints_npz, npy};
 use orator::stage::progress::Progress as _;
@@ -38,6 +39,9 @@ pub struct Args {
     /// Loose files: the joints lifted from them, .npy or .npz.
     #[arg(long, value_name = "FILE", requires = "keypoints")]
     joints: Option<PathBuf>,
+    /// Beside the lifted pose show the figure that `orator animate` makes of it.
+    #[arg(long)]
+    figure: bool,
     /// Seconds between two moments.
     #[arg(long, default_value_t = 1.0, value_name = "SECS")]
     every: f64,
@@ -68,7 +72,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     };
     let (mut text, mut facts, mut n_failed, mut next) = (String::new(), Vec::new(), 0, None);
     for files in &clips {
-        match draw(files, args.every, ui) {
+        match draw(files, args.every, args.figure, ui) {
             Ok((written, figures)) => {
                 text += &format!("{}\n{}", files.title, table(&figures));
                 written.iter().for_each(|path| text += &format!("wrote {}\n", path.display()));
@@ -125,11 +129,13 @@ fn of_run(args: &Args) -> Result<Vec<Files>> {
 }
 
 /// Draws one clip; the pictures written, and its figures.
-fn draw(files: &Files, every_secs: f64, ui: &Ui) -> Result<(Vec<PathBuf>, ClipFigures)> {
+fn draw(files: &Files, every_secs: f64, figure: bool, ui: &Ui) -> Result<(Vec<PathBuf>, ClipFigures)> {
     let (keypoints, notes) = keypoints_npz::read_noting(&files.keypoints)?;
     notes.iter().for_each(|note| ui.say(&format!("{}: {note}", files.keypoints.display())));
     let motion = read_motion(&files.joints, keypoints.fps)?;
-    let clip = Clip { title: &files.title, video: &files.video, keypoints: &keypoints, motion: &motion };
+    let figure = figure.then(|| perform(&motion, None, &Options::default()).motion());
+    let figure = figure.as_ref();
+    let clip = Clip { title: &files.title, video: &files.video, keypoints: &keypoints, motion: &motion, figure };
     let mut written = Vec::new();
     clip.pages(every_secs, ui, |number, n_pages, page| {
         let path = if n_pages == 1 { files.out.clone() } else { numbered(&files.out, number) };
