@@ -47,7 +47,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let formats = formats(&args.format)?;
     let rows = match (&args.batch, &args.audio_folder) {
         (Some(table), _) => table::of_file(table)?,
-        (None, Some(folder)) => table::of_folder(folder)?,
+        (None, Some(sounds)) => table::of_folder(sounds, folder)?,
         (None, None) => anyhow::bail!("give --audio, --audio-folder or --batch"),
     };
     let checkpoint = args.checkpoint.as_deref().map(checkpoint_at).transpose()?;

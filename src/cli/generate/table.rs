@@ -22,11 +22,19 @@ pub struct Row {
     pub checkpoint: Option<PathBuf>,
 }
 
-/// All that sounds below `folder`, each called as its file; where two would be called the same, with their endings.
-pub fn of_folder(folder: &Path) -> Result<Vec<Row>> {
+/// All that sounds below `folder`, each called as its file; where two would be called the same, with their endings. What is
+/// below `out`, where motions go, is none of it: films sound too.
+pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<Row>> {
     ensure!(folder.is_dir(), "{} is no folder", folder.display());
+    let out = out.canonicalize().ok();
+    ensure!(
+        out != folder.canonicalize().ok(),
+        "motions would lie among the sounds in {}; choose another --out-folder, say {}",
+        folder.display(),
+        folder.join("motions").display()
+    );
     let mut files = Vec::new();
-    collect(folder, "", &mut files)?;
+    collect(folder, "", out.as_deref(), &mut files)?;
     ensure!(!files.is_empty(), "{} holds no file that sounds ({})", folder.display(), SOUNDS.join(", "));
     let stem = |file: &str| file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned();
     let mut called = BTreeMap::<String, usize>::new();
@@ -38,17 +46,17 @@ pub fn of_folder(folder: &Path) -> Result<Vec<Row>> {
     distinct(rows.collect())
 }
 
-fn collect(folder: &Path, before: &str, files: &mut Vec<(String, PathBuf)>) -> Result<()> {
+fn collect(folder: &Path, before: &str, without: Option<&Path>, files: &mut Vec<(String, PathBuf)>) -> Result<()> {
     let entries = std::fs::read_dir(folder).with_context(|| format!("cannot list {}", folder.display()))?;
     let mut entries = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>()?;
     entries.sort();
     for path in entries {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        if name.starts_with('.') {
+        if name.starts_with('.') || (path.is_dir() && path.canonicalize().ok().as_deref() == without) {
             continue;
         } else if path.is_dir() {
-            collect(&path, &format!("{before}{name}/"), files)?;
+            collect(&path, &format!("{before}{name}/"), without, files)?;
         } else if SOUNDS.contains(&ending.as_str()) {
             files.push((format!("{before}{name}"), path));
         }
@@ -192,8 +200,12 @@ mod tests {
         for file in ["a.wav", "A.mp3", "b.WAV", "notes.txt", ".hidden.wav", "sub/a.wav"] {
             std::fs::write(dir.path().join(file), "").unwrap();
         }
-        let names: Vec<String> = of_folder(dir.path()).unwrap().into_iter().map(|row| row.name).collect();
-        assert_eq!(names, ["A_mp3", "a_wav", "b", "sub/a"]);
-        assert!(of_folder(&dir.path().join("none")).is_err());
+        let names = |out: &str| -> Vec<String> {
+            of_folder(dir.path(), &dir.path().join(out)).unwrap().into_iter().map(|row| row.name).collect()
+        };
+        assert_eq!(names("elsewhere"), ["A_mp3", "a_wav", "b", "sub/a"]);
+        assert_eq!(names("sub"), ["A_mp3", "a_wav", "b"]);
+        assert!(of_folder(dir.path(), dir.path()).unwrap_err().to_string().contains("--out-folder"));
+        assert!(of_folder(&dir.path().join("none"), dir.path()).is_err());
     }
 }
