@@ -99,7 +99,8 @@ pub fn of_files(clips: &Clips) -> Result<(Vec<Predictor>, Vec<String>)> {
             match (clips.have_sound(), clips.clips.len()) {
                 (false, _) => "it listens, and no sound is given (--audio)",
                 (true, 1) => "there is no other clip to copy from",
-                (true, _) => "not every clip has a sound, or none of the others is long enough to copy from",
+                (true, _) if clips.clips.iter().any(|clip| clip.heard.is_none()) => "not every clip has a sound",
+                (true, _) => "no other clip is long enough to copy from",
             }
         )),
     }

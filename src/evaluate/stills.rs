@@ -60,19 +60,22 @@ impl Stills {
 
     /// The median pose [49, 3], to a quarter of a millimetre; NaN where nothing was seen.
     pub fn median(&self) -> Array2<f32> {
-        pose(|i| {
-            let half = self.n[i] as f64 / 2.0;
-            let mut before = 0.0;
-            for (bin, count) in self.bins[i * N_BINS..(i + 1) * N_BINS].iter().enumerate().filter(|(_, n)| **n > 0) {
-                let count = f64::from(*count);
-                if before + count >= half {
-                    let inside = (half - before) / count;
-                    return (bin as f64 + inside) / N_BINS as f64 * 2.0 * REACH - REACH;
-                }
-                before += count;
+        // of an even number the mean of the two in the middle
+        pose(|i| (self.ranked(i, self.n[i].saturating_sub(1) / 2) + self.ranked(i, self.n[i] / 2)) / 2.0)
+    }
+
+    /// The value of number `i` that has `rank` below it, those of a bin spread evenly over it.
+    fn ranked(&self, i: usize, rank: u64) -> f64 {
+        let mut before = 0;
+        for (bin, count) in self.bins[i * N_BINS..(i + 1) * N_BINS].iter().enumerate() {
+            let count = u64::from(*count);
+            if before + count > rank {
+                let inside = (rank - before) as f64 + 0.5;
+                return (bin as f64 + inside / count as f64) / N_BINS as f64 * 2.0 * REACH - REACH;
             }
-            f64::NAN
-        })
+            before += count;
+        }
+        f64::NAN
     }
 }
 

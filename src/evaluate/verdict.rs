@@ -177,15 +177,17 @@ fn aspect(table: &Table, index: usize) -> Option<Aspect> {
     let definition = &table.definitions[index];
     let is_first = |start: &str| table.definitions.iter().position(|d| d.name.starts_with(start)) == Some(index);
     let starts = |start: &str| definition.name.starts_with(start);
+    // the whole body, or the first part there is
+    let is_whole = table.definitions.iter().position(|d| d.name == definition.name) == Some(index);
     match definition.better {
         Better::Neither => None,
         // of several shares, planes and parts the first
         _ if starts("pck") => is_first("pck").then_some(Aspect::Place),
         _ if starts("mpjpe") => is_first("mpjpe").then_some(Aspect::Place),
-        _ if starts("frechet") => Some(Aspect::Poses),
+        _ if starts("frechet") => is_whole.then_some(Aspect::Poses),
         _ if starts("hellinger") => is_first("hellinger").then_some(Aspect::Movement),
         _ if starts("jerk") => is_first("jerk").then_some(Aspect::Movement),
-        _ if starts("beat") => Some(Aspect::Beat),
+        _ if starts("beat") => is_whole.then_some(Aspect::Beat),
         _ => None,
     }
 }

@@ -89,7 +89,15 @@ pub fn unit(definition: &Definition) -> &str {
     if is_share(definition) {
         return "%";
     }
-    if definition.unit == "1" { "" } else { definition.unit }
+    match definition.unit {
+        "1" => "",
+        "m/s^2" => "m/s\u{b2}",
+        "m/s^3" => "m/s\u{b3}",
+        "cm^2" => "cm\u{b2}",
+        "cm/s^2" => "cm/s\u{b2}",
+        "cm/s^3" => "cm/s\u{b3}",
+        unit => unit,
+    }
 }
 
 fn is_share(definition: &Definition) -> bool {

@@ -55,13 +55,13 @@ fn meaning(table: &Table, verdicts: &[Verdict; 2]) -> Vec<Node> {
     let card = |verdict: &Verdict| {
         let class = format!("card verdict {}", verdict.word.replace(' ', "-"));
         let votes = verdict.votes.iter().map(|vote| {
-            let word = match vote.answer {
-                Answer::Yes => "better",
-                Answer::No => "worse",
-                Answer::Undecided => "not told apart",
+            let (class, words) = match vote.answer {
+                Answer::Yes => ("better", "better than"),
+                Answer::No => ("worse", "worse than"),
+                Answer::Undecided => ("undecided", "not told apart from"),
             };
-            let class = format!("vote {}", word.replace(' ', "-"));
-            node("li").class(class).text(format!("{}: {word} than {}", vote.figure, vote.against.name()))
+            let says = format!("{}: {words} {}", vote.figure, vote.against.name());
+            node("li").class(format!("vote {class}")).text(says)
         });
         let card = node("div").class(class).child(node("p").text(&verdict.sentence));
         card.child(node("ul").class("votes").children(votes))

@@ -40,8 +40,8 @@ pub fn joints(table: &Table, clips: &Clips) -> Vec<Node> {
     let hand = |root: usize| mean(&mut (root + 1..root + skeleton::N_HAND_JOINTS));
     let labels = [
         label([180.0, 268.0], "arms", mean(&mut (R_SHOULDER..=L_WRIST))),
-        label([430.0, 268.0], "right hand", hand(R_HAND)),
-        label([610.0, 268.0], "left hand", hand(L_HAND)),
+        label([405.0, 268.0], "right hand", hand(R_HAND)),
+        label([640.0, 268.0], "left hand", hand(L_HAND)),
     ];
     let drawing = dots("Share of correct keypoints of every joint", [720.0, 280.0], &edges, &all, &labels);
     let about = format!(
@@ -88,7 +88,7 @@ fn body_place(joint: usize) -> [f64; 2] {
 
 /// Where a joint of a hand is drawn, fingers up, the thumbs inside; the root of a hand stands for its wrist.
 fn hand_place(joint: usize) -> [f64; 2] {
-    let (root, sign, x) = if joint >= R_HAND { (R_HAND, 1.0, 430.0) } else { (L_HAND, -1.0, 610.0) };
+    let (root, sign, x) = if joint >= R_HAND { (R_HAND, 1.0, 405.0) } else { (L_HAND, -1.0, 640.0) };
     let wrist = [x, 228.0];
     if joint == root {
         return wrist;

@@ -191,7 +191,7 @@ fn bad_input_is_refused_in_clear_words() {
         (&["t.npy", "wrong.npy"], "[120, 43, 3], expected [frames, 49, 3]"),
         (&["t.npy", "missing.npy"], "all joints of all 120 frames are missing"),
         (&["missing.npy", "t.npy"], "missing.npy: all joints"),
-        (&["t.npy", "many-nan.npy"], "for 19.1 % of the joints"),
+        (&["t.npy", "many-nan.npy"], "for 18.7 % of the joints"),
         (&["t.npy", "long.npy"], "8.00 s (120 frames at 15 fps) and the prediction 12.00 s"),
         (&["t.npy", "one"], "two files or two folders"),
         (&["one", "other"], "has a partner of its name"),

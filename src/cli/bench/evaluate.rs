@@ -58,7 +58,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let task = ui.begin("bench evaluate", 0);
     task.detail("making the speaker");
     let speaker = pool.install(|| speaker(args.clips, n_frames));
-    let before_mib = child::own_peak_mib();
+    let (before_mib, before_cpu) = (child::own_peak_mib(), child::own_cpu_secs());
     let watch = Stopwatch::default();
     task.detail("evaluating");
     let (table, html) = pool.install(|| evaluate(speaker, &watch))?;
@@ -79,7 +79,8 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         args.threads
     )];
     lines.extend(times.iter().map(|(part, secs)| format!("{part:24}{secs:8.2} s")));
-    lines.push(format!("{:24}{all:8.2} s", "all"));
+    let cpu = child::own_cpu_secs() - before_cpu;
+    lines.push(format!("{:24}{all:8.2} s, {cpu:.1} s of processor time", "all"));
     lines.push(format!(
         "page {:.1} MB; peak memory {peak:.0} MiB, of that before evaluation {before_mib:.0} MiB",
         html.len() as f64 / 1e6
@@ -87,6 +88,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let facts = json!({
         "hours": args.hours,
         "secs": all,
+        "cpu_secs": cpu,
         "parts": times.iter().map(|(part, secs)| json!({ "part": part, "secs": secs })).collect::<Vec<_>>(),
         "peak_mib": peak,
         "n_blocks": table.n_blocks,
