@@ -4,20 +4,26 @@
 use super::baselines::Predictor;
 use super::clips::Clips;
 use crate::metrics::catalogue::{Catalogue, Interval, Measured};
-use crate::types::time::FrameRate;
 use ndarray::{Array2, s};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Length of a block, seconds: a clip has as many as fit best, all of one length.
+/// Length of a block, seconds: a clip has as many as fit best, all of one length. Of more than an hour they are longer, so
+/// that there are not many more of them.
 const BLOCK_SECS: f64 = 4.0;
+const MOST_SECS: f64 = 3600.0;
 /// A longer clip is measured in pieces, so that it takes no more memory and several threads; what lies across a border is
 /// not seen.
 const PIECE_SECS: f64 = 600.0;
 
-/// Frames of a block.
-fn block_frames(fps: FrameRate) -> usize {
-    ((BLOCK_SECS * fps.per_sec()).round() as usize).max(1)
+/// Length of the blocks of these clips, seconds.
+pub fn block_secs(clips: &Clips) -> f64 {
+    BLOCK_SECS * (clips.secs() / MOST_SECS).ceil().max(1.0)
+}
+
+/// The same in frames.
+fn block_frames(clips: &Clips) -> usize {
+    ((block_secs(clips) * clips.fps.per_sec()).round() as usize).max(1)
 }
 
 /// A predictor's sums over all clips and their blocks. The same whatever the number of threads.
@@ -39,7 +45,7 @@ pub fn measure(catalogue: &Catalogue, clips: &Clips, predictor: &Predictor) -> M
                 fps: clips.fps,
                 onsets: onsets.as_deref(),
             };
-            catalogue.measure_blocks(&interval, block_frames(clips.fps))
+            catalogue.measure_blocks(&interval, block_frames(clips))
         })
         .collect();
     together(all)
@@ -58,7 +64,7 @@ fn pieces(clips: &Clips) -> Vec<(usize, Range<usize>)> {
 /// One half of the truth beside the other: every second stretch of a block's length as if it were made, beside the one
 /// before it.
 pub fn halves(catalogue: &Catalogue, clips: &Clips) -> Measured {
-    let length = block_frames(clips.fps);
+    let length = block_frames(clips);
     let stretches = |clip: usize| (0..clips.clips[clip].n_frames() / length).map(move |i| (clip, i * length));
     let all: Vec<(usize, usize)> = (0..clips.clips.len()).flat_map(stretches).collect();
     let beside = |pair: &[(usize, usize)]| {

@@ -25,6 +25,7 @@ pub fn json(table: &Table) -> Value {
         "n_clips": table.n_clips,
         "n_frames": table.n_frames,
         "n_blocks": table.n_blocks,
+        "block_secs": table.block_secs,
         "secs": table.secs,
         "with_sound": table.with_sound,
         "notes": table.notes,

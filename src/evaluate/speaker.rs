@@ -48,7 +48,7 @@ pub fn material(dataset: &Dataset, speaker: &Speaker, split: Split, task: &dyn T
         held_out.into_par_iter().zip(made).map(|(held_out, made)| clip(held_out, made, of_dataset)).collect();
     let mut clips = Clips { fps: of_dataset, clips, notes: Vec::new() };
     task.detail("what the training split knows");
-    let prediction = format!("{} of the checkpoint, hearing the sound of each interval", speaker.name());
+    let prediction = format!("the speaker {} of the checkpoint, hearing the sound of each interval", speaker.name());
     let mut all = vec![Predictor::prediction(&clips, &prediction)];
     all.extend(stills(dataset, normal, clips.clips.len())?);
     match copied(dataset, normal, &clips)? {

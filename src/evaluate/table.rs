@@ -38,6 +38,8 @@ pub struct Table {
     pub truth_of: Vec<Option<usize>>,
     pub n_clips: usize,
     pub n_blocks: usize,
+    /// About how long each is.
+    pub block_secs: f64,
     pub n_frames: usize,
     pub secs: f64,
     pub with_sound: bool,
@@ -78,6 +80,7 @@ pub fn measure(clips: &Clips, settings: &Settings, predictors: &[Predictor], tas
         truth_of,
         n_clips: clips.clips.len(),
         n_blocks,
+        block_secs: blocks::block_secs(clips),
         n_frames: clips.n_frames(),
         secs: clips.secs(),
         with_sound: clips.have_sound(),

@@ -25,9 +25,10 @@ const fn heads(who: Who) -> [&'static str; 2] {
 ///
 /// With `all`, every figure; otherwise those of arms, fingers and wrists only of correct keypoints and joint errors.
 pub fn text(table: &Table, all: bool) -> String {
-    let Table { n_clips, n_blocks, n_frames, secs, .. } = table;
+    let Table { n_clips, n_blocks, n_frames, secs, block_secs, .. } = table;
     let clips = if *n_clips == 1 { "clip" } else { "clips" };
-    let mut text = format!("{n_clips} {clips}, {secs:.1} s, {n_frames} frames, {n_blocks} blocks of about 4 s\n\n");
+    let mut text =
+        format!("{n_clips} {clips}, {secs:.1} s, {n_frames} frames, {n_blocks} blocks of about {block_secs} s\n\n");
     let is_shown =
         |i: &usize| (all || is_main(table, *i)) && table.definitions[*i].better != Better::Neither && any(table, *i);
     let shown: Vec<usize> = (0..table.definitions.len()).filter(is_shown).collect();

@@ -63,9 +63,29 @@ pub fn better_than_nothing(table: &Table) -> Verdict {
     let votes = votes(table, own, &asked, |index| better_still(table, index));
     let of = |aspect: Aspect| summed(votes.iter().filter(|vote| vote.aspect == aspect));
     let rest = summed(votes.iter().filter(|vote| vote.aspect != Aspect::Place));
+    let n_place = votes.iter().filter(|vote| vote.aspect == Aspect::Place).count();
     let (word, says) = match (of(Aspect::Place), rest) {
-        _ if votes.is_empty() => return nothing(question),
-        _ if table.n_blocks < FEW_BLOCKS => return too_few(question, table, votes),
+        _ if votes.is_empty() => return no_figure(question),
+        _ if table.n_blocks < FEW_BLOCKS => return too_few(question, table),
+        (place, _) if n_place == votes.len() => match place {
+            Answer::Yes => (
+                "in part",
+                "it is nearer to where the speaker is than a pose that never moves; how it moves, no figure of this convention says",
+            ),
+            Answer::No => (
+                "no",
+                "a pose that never moves is nearer to where the speaker is; how it moves, no figure of this convention says",
+            ),
+            Answer::Undecided => ("undecided", "no figure tells it apart from a pose that never moves"),
+        },
+        (_, rest) if n_place == 0 => match rest {
+            Answer::Yes => (
+                "in part",
+                "its poses and movements are more like the speaker's than a pose that never moves; whether it is nearer to where the speaker is, no figure of this convention says",
+            ),
+            Answer::No => ("no", "its poses or movements are less like the speaker's than a pose that never moves"),
+            Answer::Undecided => ("undecided", "no figure tells it apart from a pose that never moves"),
+        },
         (Answer::Yes, Answer::Yes) => (
             "yes",
             "it is nearer to where the speaker is, and moves more like the speaker, than a pose that never moves",
@@ -132,8 +152,8 @@ pub fn hears(table: &Table) -> Verdict {
     let Some((own, other)) = own else { return nothing(question) };
     let votes = votes(table, own, &[Aspect::Place, Aspect::Beat], |_| Some(other));
     let (word, says) = match summed(votes.iter()) {
-        _ if votes.is_empty() => return nothing(question),
-        _ if table.n_blocks < FEW_BLOCKS => return too_few(question, table, votes),
+        _ if votes.is_empty() => return no_figure(question),
+        _ if table.n_blocks < FEW_BLOCKS => return too_few(question, table),
         Answer::Yes => ("yes", "its motion fits its own clip better than a motion made for another sound"),
         Answer::No => ("no", "a motion made for another sound fits as well or better"),
         Answer::Undecided if votes.iter().any(|vote| vote.answer == Answer::Yes) => {
@@ -151,12 +171,17 @@ fn nothing(question: &str) -> Verdict {
     Verdict { word: "undecided", sentence, votes: Vec::new() }
 }
 
-fn too_few(question: &str, table: &Table, votes: Vec<Vote>) -> Verdict {
+fn no_figure(question: &str) -> Verdict {
+    let sentence = format!("{question} Undecided: this convention has no figure that could say.");
+    Verdict { word: "undecided", sentence, votes: Vec::new() }
+}
+
+fn too_few(question: &str, table: &Table) -> Verdict {
     let sentence = format!(
-        "{question} Undecided: {} blocks of about 4 s are too few to say (at least {FEW_BLOCKS}).",
-        table.n_blocks
+        "{question} Undecided: {} blocks of about {} s are too few to say (at least {FEW_BLOCKS}).",
+        table.n_blocks, table.block_secs
     );
-    Verdict { word: "undecided", sentence, votes }
+    Verdict { word: "undecided", sentence, votes: Vec::new() }
 }
 
 /// What the figures of these aspects say, each against a row of its own.
@@ -183,6 +208,7 @@ fn aspect(table: &Table, index: usize) -> Option<Aspect> {
         Better::Neither => None,
         // of several shares, planes and parts the first
         _ if starts("pck") => is_first("pck").then_some(Aspect::Place),
+        _ if starts("maje") => Some(Aspect::Place),
         _ if starts("mpjpe") => is_first("mpjpe").then_some(Aspect::Place),
         _ if starts("frechet") => is_whole.then_some(Aspect::Poses),
         _ if starts("hellinger") => is_first("hellinger").then_some(Aspect::Movement),

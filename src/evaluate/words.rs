@@ -69,6 +69,7 @@ pub fn part(definition: &Definition) -> &'static str {
         "body" => "arms",
         "hands" => "fingers",
         "fingers_from_wrist" => "fingers from the wrist",
+        "from_joint_8" => "from joint 8 on",
         other => other,
     }
 }
@@ -117,7 +118,8 @@ pub fn number(definition: &Definition, value: f64) -> String {
         n if n >= 10.0 => 1,
         n if n >= 1.0 => 2,
         n if n >= 0.001 => (2.0 - n.log10().floor()) as usize,
-        _ => 5,
+        // what is less is rounding
+        _ => 4,
     };
     let text = format!("{value:.digits$}");
     if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') { "0".to_owned() } else { text }

@@ -28,7 +28,7 @@
         top = Math.min(top, numbers[i + 1]); bottom = Math.max(bottom, numbers[i + 1]);
       }
     }
-    return { width: right - left, top, height: bottom - top, middle: (left + right) / 2 };
+    return { width: right - left, top, height: bottom - top };
   };
   let box = null;
 
@@ -45,12 +45,13 @@
       const pen = canvas.getContext("2d");
       pen.clearRect(0, 0, canvas.width, canvas.height);
       const scale = 0.9 * Math.min(canvas.width / box.width, canvas.height / box.height);
+      const above = (canvas.height - scale * box.height) / 2;
       const frame = Math.max(0, Math.min(n - 1, Math.floor(secs * excerpt.fps + 1e-6)));
       const place = (joint) => {
         const i = 3 * (frame * JOINTS + joint);
         if (numbers[i] === MISSING) return null;
         const x = numbers[i] * Math.cos(turn) - numbers[i + 2] * Math.sin(turn);
-        return [canvas.width / 2 + scale * x, canvas.height * 0.05 + scale * (numbers[i + 1] - box.top)];
+        return [canvas.width / 2 + scale * x, above + scale * (numbers[i + 1] - box.top)];
       };
       // a head, so that it is seen who this is
       const neck = place(0);

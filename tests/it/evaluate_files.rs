@@ -35,6 +35,9 @@ pub fn folders(dir: &Path, secs: &[usize]) {
     }
 }
 
+/// A convention of one figure, which is soon measured.
+const SMALL: [&str; 2] = ["--convention", "speech2gesture"];
+
 fn value(answer: &Answer, name: &str, part: &str, who: &str) -> f64 {
     let metrics = answer.json["metrics"].as_array().unwrap();
     let is_it = |metric: &&Value| metric["name"] == name && metric["part"] == part;
@@ -85,7 +88,7 @@ fn only_values_of_one_hash_are_compared() {
     let project = Project::with_clips("compared", 0, 1.0);
     folders(project.dir(), &[8]);
     let save = |name: &str, more: &[&str]| {
-        let args = [&["evaluate", "--truth", "truth", "--prediction", "prediction"], more].concat();
+        let args = [&["evaluate", "--truth", "truth", "--prediction", "prediction"], &SMALL[..], more].concat();
         let answer = project.answer(&args);
         assert_eq!(answer.code, 0, "{}", answer.errors);
         fs::write(project.dir().join(name), answer.json.to_string()).unwrap();
@@ -96,12 +99,12 @@ fn only_values_of_one_hash_are_compared() {
     let same = project.answer(&["evaluate", "compare", "a.json", "b.json"]);
     assert_eq!(same.code, 0, "{}", same.errors);
     let of = |answer: &Answer, what: &str| answer.json["compared"][what].as_array().unwrap().clone();
-    assert!(of(&same, "beside").len() > 20 && of(&same, "refused").is_empty());
+    assert!(!of(&same, "beside").is_empty() && of(&same, "refused").is_empty());
     assert!(of(&same, "only_in_a").iter().all(|name| name.as_str().unwrap().contains("at 0.1")));
     let other = project.answer(&["evaluate", "compare", "a.json", "c.json"]);
     assert_eq!(other.code, 1, "{}", other.errors);
     let refused = of(&other, "refused");
-    let said = refused.iter().find(|said| said.as_str().unwrap().starts_with("mpjpe (all)")).unwrap();
+    let said = refused.iter().find(|said| said.as_str().unwrap().starts_with("pck_2d (all)")).unwrap();
     assert!(said.as_str().unwrap().contains("fps is 15.0 in A and 30.0 in B"), "{said}");
     fs::write(project.dir().join("d.json"), "{}").unwrap();
     let wrong = project.answer(&["evaluate", "compare", "a.json", "d.json"]);
@@ -112,7 +115,7 @@ fn only_values_of_one_hash_are_compared() {
 fn bad_files() -> Project {
     let project = Project::with_clips("bad-motion", 0, 1.0);
     let clip = spoken(0, 8);
-    let (motion, sound) = (clip.motion(), clip.sound());
+    let (motion, sound, made) = (clip.motion(), clip.sound(), clip.predictable().joints);
     let at = |name: &str| project.dir().join(name);
     let joints = &motion.joints;
     write_npy(&at("t.npy"), joints);
@@ -121,14 +124,14 @@ fn bad_files() -> Project {
     write_npy(&at("wrong.npy"), &Array3::zeros((120, 43, 3)));
     write_npy(&at("missing.npy"), &Array3::from_elem((120, 49, 3), f32::NAN));
     let hole = |n: usize| {
-        let mut holed = clip.predictable().joints;
+        let mut holed = made.clone();
         holed.slice_mut(s![..n, 20..30, ..]).fill(f32::NAN);
         holed
     };
     write_npy(&at("few-nan.npy"), &hole(10));
     write_npy(&at("many-nan.npy"), &hole(110));
-    write_npy(&at("mm.npy"), &(clip.predictable().joints * 1000.0));
-    let away = clip.predictable().joints.mapv(|v| v + 0.5);
+    write_npy(&at("mm.npy"), &(&made * 1000.0));
+    let away = made.mapv(|v| v + 0.5);
     write_npy(&at("away.npy"), &away);
     fs::write(at("empty.npy"), "").unwrap();
     fs::create_dir_all(at("nobody")).unwrap();
@@ -137,7 +140,7 @@ fn bad_files() -> Project {
     fs::create_dir_all(at("other")).unwrap();
     write_npy(&at("other/b.npy"), joints);
     let slow = FrameRate::new(30, 1);
-    let twice = Array3::from_shape_fn((240, 49, 3), |(t, j, k)| clip.predictable().joints[[t / 2, j, k]]);
+    let twice = Array3::from_shape_fn((240, 49, 3), |(t, j, k)| made[[t / 2, j, k]]);
     joints_npz::write(&at("30.npz"), &Motion::from_joints(slow, twice)).unwrap();
     fs::write(at("t.txt"), authors_txt::format(&motion)).unwrap();
     audio::write_wav(&at("t.wav"), &sound).unwrap();
@@ -204,7 +207,7 @@ fn bad_input_is_refused_in_clear_words() {
     ];
     for (args, says) in cases {
         let (sides, more) = args.split_at(2);
-        let args = [&["evaluate", "--truth", sides[0], "--prediction", sides[1]], more].concat();
+        let args = [&["evaluate", "--truth", sides[0], "--prediction", sides[1]], &SMALL[..], more].concat();
         let answer = project.answer(&args);
         assert_eq!(answer.code, 1, "{args:?}");
         assert!(answer.errors.contains(says) && !answer.errors.contains("panicked"), "{args:?}: {}", answer.errors);
@@ -217,6 +220,7 @@ fn bad_input_is_refused_in_clear_words() {
 fn what_can_be_mended_is_measured_with_a_note() {
     let project = bad_files();
     let noted = |truth: &str, prediction: &str, more: &[&str], note: &str| {
+        let more = if more.is_empty() { &SMALL[..] } else { more };
         let answer = project.answer(&[&["evaluate", "--truth", truth, "--prediction", prediction], more].concat());
         assert_eq!(answer.code, 0, "{prediction}: {}", answer.errors);
         let notes = answer.json["notes"].to_string();
@@ -229,11 +233,11 @@ fn what_can_be_mended_is_measured_with_a_note() {
     noted("t.npy", "away.npy", &[], "neck stands 0.87 m from the origin");
     noted("t.npy", "30.npz", &[], "at 30 fps was resampled to 15 fps");
     let exact = noted("t.txt", "t.npy", &[], "does not say its rate");
-    assert!(value(&exact, "mpjpe", "all", "prediction") < 1e-3);
+    assert_eq!(value(&exact, "pck_2d", "all", "prediction"), 1.0);
     // telephone sound has onsets, and three hours of sound beside eight seconds of motion are no matter
-    let phone = noted("t.npy", "few-nan.npy", &["--audio", "phone.wav"], "NaN");
-    assert!(value(&phone, "beat_consistency", "arms", "prediction") > 0.0);
-    let hours = noted("t.npy", "few-nan.npy", &["--audio", "hours.wav"], "NaN");
+    let phone = noted("t.npy", "few-nan.npy", &["--audio", "phone.wav", "--convention", "aist"], "NaN");
+    assert!(phone.json["metrics"][0]["values"]["truth"]["value"].as_f64().unwrap() > 0.0);
+    let hours = noted("t.npy", "few-nan.npy", &["--audio", "hours.wav", "--convention", "aist"], "NaN");
     assert_eq!(hours.json["with_sound"], true);
 }
 
@@ -242,15 +246,16 @@ fn the_released_clips_have_the_published_baselines() {
     let Some(clips) = shared("data/released_clips") else { return };
     let project = Project::with_clips("released", 0, 1.0);
     let path = |name: &str| clips.join(name).to_string_lossy().into_owned();
-    // PCK@0.2 in space: of the prediction, and of the median of the clip itself
-    for (clip, prediction, median) in [("1845", 0.296, 0.087), ("3821", 0.190, 0.475), ("3838", 0.067, 0.365)] {
+    // PCK@0.2 in the plane: of the prediction, and of the median of the clip itself
+    for (clip, prediction, median) in [("1845", 0.3690, 0.1543), ("3821", 0.2553, 0.5201), ("3838", 0.1136, 0.4998)] {
         let [truth, made] = ["gt", "prediction"].map(|side| path(&format!("{side}_interval_{clip}.txt")));
         let sound = path(&format!("{clip}.wav"));
-        let answer = project.answer(&["evaluate", "--truth", &truth, "--prediction", &made, "--audio", &sound]);
+        let args = ["evaluate", "--truth", &truth, "--prediction", &made, "--audio", &sound];
+        let answer = project.answer(&[&args, &SMALL[..]].concat());
         assert_eq!(answer.code, 0, "{}", answer.errors);
-        for (who, expected) in [("prediction", prediction), ("median_pose", median)] {
-            let found = value(&answer, "pck_3d", "all", who);
-            assert!((found - expected).abs() < 0.001, "{clip} {who}: {found}, expected {expected}");
+        for (who, expected, within) in [("prediction", prediction, 1e-4), ("median_pose", median, 1e-3)] {
+            let found = value(&answer, "pck_2d", "all", who);
+            assert!((found - expected).abs() < within, "{clip} {who}: {found}, expected {expected}");
         }
         let sentence = answer.json["better_than_nothing"]["sentence"].as_str().unwrap();
         assert!(sentence.contains("too few to say"), "{sentence}");
@@ -268,11 +273,12 @@ fn the_released_clips_have_the_published_baselines() {
     for link in links {
         fs::copy(&link, folder.join(link.file_name().unwrap())).unwrap();
     }
-    let answer = project.answer(&["evaluate", "--truth", "gruber", "--prediction", "gruber", "--audio", "gruber"]);
+    let args = ["evaluate", "--truth", "gruber", "--prediction", "gruber", "--audio", "gruber"];
+    let answer = project.answer(&[&args, &SMALL[..]].concat());
     assert_eq!(answer.code, 0, "{}", answer.errors);
-    let found = value(&answer, "pck_3d", "all", "mean_pose");
-    // 8.1, 9.4 and 24.0 % of 254, 242 and 284 frames
-    let expected = (8.1 * 254.0 + 9.4 * 242.0 + 24.0 * 284.0) / 78_000.0;
+    let found = value(&answer, "pck_2d", "all", "mean_pose");
+    // 17.2, 14.6 and 34.0 % of 254, 242 and 284 frames
+    let expected = (17.2 * 254.0 + 14.6 * 242.0 + 34.0 * 284.0) / 78_000.0;
     assert!((found - expected).abs() < 0.001, "{found}, expected {expected}");
     assert_eq!(answer.json["predictors"][3]["name"], "nearest_neighbour");
 }

@@ -7,7 +7,7 @@ use crate::support::Project;
 #[test]
 fn the_page_opens_plays_and_is_scrubbed_by_keys() {
     let project = Project::with_clips("judged-page", 0, 1.0);
-    folders(project.dir(), &[24, 20]);
+    folders(project.dir(), &[14, 8, 9]);
     let args =
         ["evaluate", "--truth", "truth", "--prediction", "prediction", "--audio", "audio", "--report", "deep/p.html"];
     let answer = project.answer(&args);
