@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn a_cubic_passes_and_a_short_run_is_no_error() {
-        let cubic: Vec<f64> = (0..30).map(|t| f64::from(t)).map(|t| 1.0 + t - 0.2 * t * t + 0.01 * t * t * t).collect();
+        let cubic: Vec<f64> = (0..30).map(f64::from).map(|t| 1.0 + t - 0.2 * t * t + 0.01 * t * t * t).collect();
         for n in [0, 1, 4, 5, 8, 9, 30] {
             for (found, expected) in run(4, 3, &cubic[..n]).iter().zip(&cubic) {
                 assert!((found - expected).abs() < 1e-9, "{n} frames");
