@@ -7,6 +7,7 @@ use orator::animate::draw::{LEFT, PAPER, RIGHT};
 use orator::animate::video::{self, Beside, Film, SIZE};
 use orator::media::frames::FrameReader;
 use orator::media::{audio, probe};
+use orator::motion::npy;
 use orator::stage::progress::Silent;
 use orator::types::{image::Image, sound::Sound};
 use std::path::Path;
@@ -177,4 +178,22 @@ fn another_motion_is_drawn_beside_in_the_same_size_until_it_ends() {
     let (early, late) = (film.frame(5).unwrap(), film.frame(12).unwrap());
     assert!(half(&early, 30) > 500 && half(&early, 660) > 500);
     assert!(half(&late, 30) > 500 && half(&late, 660) == 0);
+}
+
+#[test]
+fn a_film_beside_its_video_has_the_videos_sound_from_there_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(clip) = make(folder.path(), &Kind { secs: 6.0, ..PLAIN }) else { return };
+    let [motion, film] = ["motion.npy", "film.mp4"].map(|name| folder.path().join(name));
+    npy::write(&motion, &swinging(6, 30)).unwrap();
+    let mut orator = Command::new(env!("CARGO_BIN_EXE_orator"));
+    orator.arg("animate").arg(&motion).arg("--out").arg(&film).arg("--beside").arg(&clip.path);
+    let output = orator.args(["--beside-from", "2"]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let lengths: Vec<f64> = streams(&film).into_iter().map(|stream| stream.2).collect();
+    assert!(lengths.len() == 2 && lengths.iter().all(|secs| (secs - 2.0).abs() < FPS.secs(1)), "{lengths:?}");
+    let sound = audio::read_mono(&film, 16_000).unwrap().expect("a sound track");
+    let flash = clip.flashes.iter().find(|flash| (2.1..3.8).contains(&flash.on_secs)).expect("a flash in the film");
+    let heard = chirp_begins(&sound.samples, 16_000, flash.on_secs - 2.0);
+    assert!((heard - (flash.on_secs - 2.0)).abs() < 0.002, "{heard}");
 }
