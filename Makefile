@@ -89,7 +89,7 @@ $(BLENDER)/.there: tests/blender.txt
 	rm -rf $(BLENDER); $$python -m pip install --quiet --disable-pip-version-check --no-input --root-user-action ignore \
 		--no-cache-dir --no-warn-conflicts --no-deps --target $(BLENDER) -r tests/blender.txt; touch $@; echo "blender: $(BLENDER)"
 
-# The Khronos glTF validator (Apache-2.0) from npm's own registry, as npm is set up here.
+# The Khronos glTF validator (Apache-2.0), through npm as it is set up here.
 VALIDATOR_VERSION := 2.0.0-dev.3.10
 VALIDATOR_SHA256 := 4e03dbdc3bc0d1342afd5d2d7ae341a7e3474502ccb872b02dbbaddaee0fdec6
 export ORATOR_GLTF_VALIDATOR ?= $(abspath $(TARGET)/validator)
