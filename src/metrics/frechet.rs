@@ -2,6 +2,10 @@
 //! on raw poses as in the GENEA evaluation, so that no trained network stands in between). It sees which poses are
 //! made and how they vary together, not their order. With few poses it is too large, and not comparable between sets
 //! of other sizes: its count belongs beside every value.
+//!
+//! Training validates with the poses of this file: 138 numbers, without the hand roots (which are the wrists again), of
+//! the joints a dataset has. The catalogue's `frechet_pose` is of all 144 and lives in `frechet_sums`: made hand roots may
+//! lie beside the wrists, and that is to be seen. The two are not comparable.
 
 use super::spectrum;
 use crate::types::skeleton::{N_JOINTS, NECK, is_duplicate};
