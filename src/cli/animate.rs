@@ -58,6 +58,9 @@ pub struct Args {
     /// Keypoints of the same frames (`body` [T, 17, 3], COCO), from which the head is turned.
     #[arg(long, value_name = "FILE.npz", conflicts_with = "format")]
     keypoints: Option<PathBuf>,
+    /// Leave the head at rest though the face is known.
+    #[arg(long, conflicts_with = "keypoints")]
+    neutral_head: bool,
     /// Sound of a film.
     #[arg(long, value_name = "FILE", conflicts_with = "format")]
     audio: Option<PathBuf>,
@@ -194,7 +197,7 @@ fn animate(
     ui: &Ui,
 ) -> Result<Done> {
     let Take { motion, face, sound: own } = input.read(args.in_fps, args.keypoints.as_deref())?;
-    let sound = sound.or(own);
+    let (sound, face) = (sound.or(own), face.filter(|_| !args.neutral_head));
     let started = Instant::now();
     let performance = perform(&motion, face.as_ref(), options);
     let secs = started.elapsed().as_secs_f64();
@@ -251,7 +254,7 @@ fn words(told: &Told) -> String {
     let mut text = format!("jerk, m/s3: arms {}, hands {}\n", jerk(told.arms), jerk(told.hands));
     text += &match told.face_frames {
         Some(n) => format!("head: seen in {n} of {} frames\n", told.n_frames),
-        None => "head: at rest, no keypoints of the face\n".to_owned(),
+        None => "head: at rest\n".to_owned(),
     };
     let clamped: Vec<_> = told.clamps.iter().filter(|clamps| clamps.joint_frames > 0).collect();
     match (told.clamps.is_empty(), clamped.is_empty()) {

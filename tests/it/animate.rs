@@ -2,11 +2,11 @@
 //! asked for nothing is changed.
 
 use crate::figures::swinging;
-use ndarray::s;
+use ndarray::{Array3, s};
 use orator::animate::constraints::Tally;
 use orator::animate::limits::{CURL_COHERENCE, ELBOW, FINGERS, Limit, SUPINATION, WRIST};
 use orator::animate::pose::ArmPose;
-use orator::animate::{Constraints, Options, Performance, Smoothing, Yaw, perform};
+use orator::animate::{Constraints, Face, Options, Performance, Smoothing, Yaw, perform};
 use orator::motion::bvh_write::Clip;
 use orator::motion::one_euro::OneEuro;
 use orator::motion::rotation::Rotation;
@@ -236,5 +236,31 @@ fn removed_yaw_faces_ahead_and_keeps_the_shape() {
     for t in 0..60 {
         let length = |motion: &Motion| (0..3).map(|k| motion.joints[[t, L_HAND, k]].powi(2)).sum::<f32>().sqrt();
         assert!((length(&kept) - length(&removed)).abs() < 1e-4);
+    }
+}
+
+#[test]
+fn the_head_turns_with_the_face_and_rests_without() {
+    let motion = swinging(3, 90);
+    // For 45 frames a face that looks to the person's left, 500 px a metre; then none.
+    let points = [[0.0, 0.02, 0.1], [0.03, -0.03, 0.08], [-0.03, -0.03, 0.08], [0.075, 0.0, 0.0], [-0.075, 0.0, 0.0]];
+    let mut body = Array3::zeros((90, 17, 3));
+    for t in 0..45 {
+        let yaw = 0.6f32;
+        for (k, [x, y, z]) in points.into_iter().enumerate() {
+            let place = [640.0 + 500.0 * (yaw.cos() * x + yaw.sin() * z), 300.0 + 500.0 * y, 0.95];
+            body.slice_mut(s![t, k, ..]).assign(&ndarray::arr1(&place));
+        }
+    }
+    let performance = perform(&motion, Some(&Face { body }), &Options::default());
+    assert_eq!(performance.told.face_frames, Some(45));
+    let (figure, clip) = (&performance.figure, &performance.clip);
+    let ahead = |t: usize| figure.skeleton.world(&clip.local[t])[figure.head].turn([0.0, 0.0, 1.0]);
+    for t in [5, 20, 40] {
+        let [x, y, _] = ahead(t);
+        assert!((x - 0.6f64.sin()).abs() < 0.12 && y.abs() < 0.15, "frame {t}: {:?}", ahead(t));
+    }
+    for joint in [figure.neck, figure.head] {
+        assert!(clip.local[70][joint].angle() < 1e-6 && clip.local[20][joint].angle() > 0.1);
     }
 }

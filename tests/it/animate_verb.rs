@@ -57,7 +57,7 @@ fn a_motion_becomes_files_and_what_was_done_is_told() {
     for more in [
         "--smoothing one-euro --one-euro-hz 2",
         "--shoulder-yaw removed --curl-coherence off",
-        "--fps 30000/1001 --names mixamo",
+        "--fps 30000/1001 --names mixamo --neutral-head",
     ] {
         done(dir, &format!("a.npy --out d.bvh {more}"));
     }
