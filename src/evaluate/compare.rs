@@ -59,7 +59,7 @@ pub fn compare(a: &Stored, b: &Stored) -> Compared {
     compared
 }
 
-/// `mpjpe (all) is not comparable: fps is 15 in A and 30 in B (hashes ...)`
+/// `mpjpe (all), joint error, is not comparable: fps is 15.0 in A and 30.0 in B (hash ... and ...)`
 fn refusal(a: &Metric, b: &Metric) -> String {
     let mut differ = Vec::new();
     differences("", &a.parameters, &b.parameters, &mut differ);
@@ -72,7 +72,8 @@ fn refusal(a: &Metric, b: &Metric) -> String {
     if differ.is_empty() {
         differ.push("the hash is not that of the definition: the file was changed".to_owned());
     }
-    format!("{} ({}) is not comparable: {} (hash {} and {})", a.name, a.part, differ.join("; "), a.hash, b.hash)
+    let differ = differ.join("; ");
+    format!("{} ({}), {}, is not comparable: {differ} (hash {} and {})", a.name, a.part, a.plain_name, a.hash, b.hash)
 }
 
 fn differences(path: &str, a: &Value, b: &Value, differ: &mut Vec<String>) {
