@@ -145,6 +145,9 @@ prove: build
 	else echo "SKIPPED: $$ORATOR_REFERENCE_PYTHON has no torch and numpy: no training step beside PyTorch's"; \
 		$(ORATOR) bench lifter; for preset in light paper; do $(ORATOR) bench train --preset $$preset; done; fi
 	$(ORATOR) bench generate
+	$(ORATOR) bench animate
+	$(ORATOR) bench evaluate
+	$(ORATOR) bench spaces
 	$(MAKE) prove-rule
 
 # The synthetic speaker with a known rule: trained on two hours of it, and the same without discriminator.
@@ -165,11 +168,14 @@ demo: build
 	$(ORATOR) run -c $(DEMO)/pipeline.toml
 	$(ORATOR) train gan -c $(DEMO)/pipeline.toml --steps $(STEPS)
 	$(ORATOR) generate --checkpoint $(DEMO)/work/gan/host --audio $(DEMO)/speech.wav \
-		--out $(DEMO)/motion.npy $(DEMO)/motion.bvh $(DEMO)/motion.mp4
+		--out $(DEMO)/motion.npy $(DEMO)/motion.bvh $(DEMO)/motion.glb $(DEMO)/motion.mp4
 	$(ORATOR) demo sheet $(DEMO) --motion $(DEMO)/motion.npy --out $(DEMO)/contact_sheet.png
+	$(ORATOR) evaluate --dataset $(DEMO)/work/dataset/host --checkpoint $(DEMO)/work/gan/host --split test \
+		--report $(DEMO)/evaluation.html
 	@echo; $(ORATOR) demo measure $(DEMO)
 	@printf '\nmade:\n'; ls -d $(DEMO)/videos/host $(DEMO)/work/dataset/host $(DEMO)/work/gan/host/best.safetensors \
-		$(DEMO)/motion.npy $(DEMO)/motion.bvh $(DEMO)/motion.mp4 $(DEMO)/contact_sheet.png
+		$(DEMO)/motion.npy $(DEMO)/motion.bvh $(DEMO)/motion.glb $(DEMO)/motion.mp4 $(DEMO)/contact_sheet.png \
+		$(DEMO)/evaluation.html
 
 clean-demo:
 	rm -rf $(DEMO) $(TARGET)/demo-test
