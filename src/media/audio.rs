@@ -5,7 +5,7 @@
 
 use super::decode::Decode;
 use super::origin;
-use super::resample::{Resampler, format_of};
+use super::resample::{Resampler, first_not_finite, format_of};
 use super::source::{self, LONGEST_GAP_SECS, LONGEST_SECS};
 use crate::types::sound::Sound;
 use anyhow::{Context, Result, bail};
@@ -102,7 +102,8 @@ impl Heard {
     }
 }
 
-/// Decodes the sound of `path` and hands it to `sink` piece by piece; `None` without sound.
+/// Decodes the sound of `path` and hands it to `sink` piece by piece; `None` without sound. A sample that is no number is
+/// an error that names its second.
 pub(super) fn stream_mono(path: &Path, rate: u32, sink: &mut dyn FnMut(&[f32]) -> Result<()>) -> Result<Option<Heard>> {
     let input = source::open(path)?;
     let Some(stream) = source::audio_stream(&input) else { return Ok(None) };
@@ -125,6 +126,13 @@ pub(super) fn stream_mono(path: &Path, rate: u32, sink: &mut dyn FnMut(&[f32]) -
         let at = at.map(|at| at - zero).filter(|at| *at < latest_secs);
         if timeline.reaches(at) {
             n_frames += 1;
+            if let Some(sample_idx) = first_not_finite(&frame) {
+                let secs = at.unwrap_or(timeline.end_secs()) + sample_idx as f64 / f64::from(frame.rate());
+                bail!(
+                    "the sound of {} is damaged: a sample that is no number at second {secs:.2}; convert or record it again",
+                    path.display()
+                );
+            }
             timeline.push(at, &frame).with_context(|| format!("the sound of {}", path.display()))?;
         } else {
             n_misplaced += 1;

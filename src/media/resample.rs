@@ -17,6 +17,32 @@ pub(super) fn format_of(frame: &frame::Audio) -> Format {
     (frame.format(), if named.is_empty() { usual() } else { named }, frame.rate())
 }
 
+/// The first sample of `frame` that is no number (NaN or infinite) in any channel: one of them makes all that is
+/// reckoned from the sound no number too, without a word.
+pub(super) fn first_not_finite(frame: &frame::Audio) -> Option<usize> {
+    let (n_samples, n_channels) = (frame.samples(), usize::from(frame.channels()));
+    let (n_planes, n_each) = match frame.format() {
+        Sample::F32(sample::Type::Planar) | Sample::F64(sample::Type::Planar) => (n_channels, 1),
+        Sample::F32(sample::Type::Packed) | Sample::F64(sample::Type::Packed) => (1, n_channels),
+        _ => return None,
+    };
+    let is_double = matches!(frame.format(), Sample::F64(_));
+    let n_values = n_samples * n_each;
+    let first = |plane: usize| {
+        // SAFETY: the extended_data of a decoded frame holds a pointer for each of its planes, each to `n_values`
+        // values of its format.
+        let value = unsafe {
+            let values = *(*frame.as_ptr()).extended_data.add(plane);
+            match is_double {
+                true => std::slice::from_raw_parts(values.cast::<f64>(), n_values).iter().position(|v| !v.is_finite()),
+                false => std::slice::from_raw_parts(values.cast::<f32>(), n_values).iter().position(|v| !v.is_finite()),
+            }
+        };
+        value.map(|at| at / n_each)
+    };
+    (0..n_planes).filter_map(first).min()
+}
+
 /// One continuous run of sound on its way to mono f32.
 pub(super) struct Resampler {
     context: resampling::Context,

@@ -5,6 +5,7 @@ use crate::support::shared;
 use orator::media::audio::{extract_wav, read_mono, write_wav};
 use orator::media::encode::VideoWriter;
 use orator::media::frames::FrameReader;
+use orator::media::sound_stream::SoundStream;
 use orator::types::image::Image;
 use orator::types::sound::Sound;
 use orator::types::time::FrameRate;
@@ -158,6 +159,37 @@ fn wavs_round_trip_to_the_bit_and_streaming_gives_the_same() {
     let extracted = extract_wav(&path, &out, RATE).unwrap().unwrap();
     assert_eq!((extracted.secs, extracted.damage), ((1.2345f64 * 16_000.0).round() / 16_000.0, None));
     assert_eq!(std::fs::read(&path).unwrap(), std::fs::read(&out).unwrap());
+}
+
+#[test]
+fn a_sample_that_is_no_number_is_named_with_its_second() {
+    let dir = tempfile::tempdir().unwrap();
+    let written = |name: &str, n_channels: u16, spoilt: &dyn Fn(usize) -> Option<f32>| {
+        let path = dir.path().join(name);
+        let sample_format = hound::SampleFormat::Float;
+        let spec = hound::WavSpec { channels: n_channels, sample_rate: 48_000, bits_per_sample: 32, sample_format };
+        let mut wav = hound::WavWriter::create(&path, spec).unwrap();
+        for n in 0..96_000 * usize::from(n_channels) {
+            wav.write_sample(spoilt(n).unwrap_or((n as f32 * 0.01).sin() * 0.3)).unwrap();
+        }
+        wav.finalize().unwrap();
+        path
+    };
+    assert!(read_mono(&written("whole.wav", 2, &|_| None), RATE).is_ok());
+    let one = |at: usize, value: f32| move |n: usize| (n == at).then_some(value);
+    for (path, second) in [
+        (written("one.wav", 1, &one(72_000, f32::NAN)), "1.50"),
+        (written("right.wav", 2, &one(72_001, f32::INFINITY)), "0.75"),
+        (written("all.wav", 1, &|_| Some(f32::NAN)), "0.00"),
+    ] {
+        let out = dir.path().join("out.wav");
+        let pieces = SoundStream::open(&path, RATE).last().unwrap().map(drop);
+        for read in [read_mono(&path, RATE).map(drop), extract_wav(&path, &out, RATE).map(drop), pieces] {
+            let words = format!("{} is damaged: a sample that is no number at second {second};", path.display());
+            let error = format!("{:#}", read.unwrap_err());
+            assert!(error.contains(&words), "{error}");
+        }
+    }
 }
 
 #[test]
