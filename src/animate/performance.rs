@@ -13,10 +13,11 @@ use crate::motion::bvh_write::Clip;
 use crate::motion::jerk;
 use crate::motion::rotation::Rotation;
 use crate::types::pose3d::Motion;
-use crate::types::skeleton::{L_HAND, L_SHOULDER, N_JOINTS, NECK, R_HAND, R_SHOULDER};
+use crate::types::skeleton::{L_HAND, L_SHOULDER, N_HAND_JOINTS, N_JOINTS, NECK, R_HAND, R_SHOULDER};
 use crate::types::time::FrameRate;
 use ndarray::{Array2, Array3};
 use serde::Serialize;
+use std::ops::Range;
 
 /// How motion becomes an animation; the default is what a user wants.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -50,6 +51,38 @@ pub struct Told {
     pub clamps: Vec<Clamps>,
     /// Frames in which the face was seen; `None` without keypoints of it.
     pub face_frames: Option<usize>,
+    pub seen: Seen,
+}
+
+/// Frames, at the motion's own rate, in which a part of the body was seen; in the others it is bridged or held.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Seen {
+    /// Shoulder, elbow and wrist.
+    pub left_arm: usize,
+    pub right_arm: usize,
+    /// At least half of the hand's joints.
+    pub left_hand: usize,
+    pub right_hand: usize,
+}
+
+impl Seen {
+    fn of(motion: &Motion) -> Self {
+        let there = seen(motion);
+        let is_seen =
+            |t: usize, joint: usize| there[[t, joint]] && motion.mask.get([t, joint]).is_none_or(|&seen| seen);
+        let frames = |joints: Range<usize>, least: usize| {
+            let enough = |t: &usize| joints.clone().filter(|&joint| is_seen(*t, joint)).count() >= least;
+            (0..motion.n_frames()).filter(enough).count()
+        };
+        let arm = |shoulder: usize| frames(shoulder..shoulder + 3, 3);
+        let hand = |root: usize| frames(root + 1..root + N_HAND_JOINTS, N_HAND_JOINTS / 2);
+        Self {
+            left_arm: arm(L_SHOULDER),
+            right_arm: arm(R_SHOULDER),
+            left_hand: hand(L_HAND),
+            right_hand: hand(R_HAND),
+        }
+    }
 }
 
 /// Mean norm of the third derivative, m/s^3; `None` where no four frames in a row are seen.
@@ -113,6 +146,7 @@ pub fn perform(motion: &Motion, face: Option<&Face>, options: &Options) -> Perfo
         hands: jerk(&hands.collect::<Vec<_>>()),
         clamps: if options.constraints == Constraints::NONE { Vec::new() } else { tally.clamps() },
         face_frames,
+        seen: Seen::of(motion),
     };
     Performance { clip: resampled.unwrap_or(clip), figure, told }
 }

@@ -5,7 +5,7 @@ use super::{Outcome, ui::Ui};
 use anyhow::{Context as _, Result, bail, ensure};
 use orator::animate::file::{Format, Sources};
 use orator::animate::names::Names;
-use orator::animate::performance::{Jerk, Told};
+use orator::animate::performance::{Jerk, Seen, Told};
 use orator::animate::smoothing::ONE_EURO;
 use orator::animate::video::Beside;
 use orator::animate::{Constraints, Options, Performance, Smoothing, Yaw, perform};
@@ -256,6 +256,7 @@ fn words(told: &Told) -> String {
         Some(n) => format!("head: seen in {n} of {} frames\n", told.n_frames),
         None => "head: at rest\n".to_owned(),
     };
+    text += &seen(told);
     let clamped: Vec<_> = told.clamps.iter().filter(|clamps| clamps.joint_frames > 0).collect();
     match (told.clamps.is_empty(), clamped.is_empty()) {
         (true, _) => text += "no constraints\n",
@@ -273,6 +274,21 @@ fn words(told: &Told) -> String {
         );
     }
     text
+}
+
+/// What was not seen in all frames; nothing when all was.
+fn seen(told: &Told) -> String {
+    let Seen { left_arm, right_arm, left_hand, right_hand } = told.seen;
+    let arms = match left_arm == right_arm {
+        true => vec![("arms", left_arm)],
+        false => vec![("left arm", left_arm), ("right arm", right_arm)],
+    };
+    let parts = || arms.iter().copied().chain([("left hand", left_hand), ("right hand", right_hand)]);
+    if parts().all(|(_, n)| n == told.n_frames) {
+        return String::new();
+    }
+    let parts: Vec<_> = parts().map(|(part, n)| format!("{part} in {n}")).collect();
+    format!("seen, of {} frames: {}; the rest is bridged or held\n", told.n_frames, parts.join(", "))
 }
 
 fn options(args: &Args) -> Result<Options> {

@@ -6,8 +6,9 @@ use crate::figures::{FPS, swinging};
 use ndarray::{Array3, s};
 use orator::dataset::sample::N_KEYPOINTS;
 use orator::dataset::{Sample, Split, write_dataset};
-use orator::motion::{authors_txt, npy};
+use orator::motion::{authors_txt, joints_npz, npy};
 use orator::types::pose3d::Motion;
+use orator::types::skeleton::{L_HAND, R_HAND};
 use orator::types::sound::{SAMPLE_RATE, Sound};
 use orator::types::time::FrameRate;
 use serde_json::Value;
@@ -61,6 +62,32 @@ fn a_motion_becomes_files_and_what_was_done_is_told() {
     ] {
         done(dir, &format!("a.npy --out d.bvh {more}"));
     }
+}
+
+#[test]
+fn how_much_of_the_body_was_seen_is_told_where_it_is_not_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let words = |motion: &Motion| {
+        joints_npz::write(&dir.join("a.npz"), motion).unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+        let output = command.args(["animate", "a.npz", "--out", "a.bvh"]).current_dir(dir).output().unwrap();
+        assert!(output.status.success());
+        String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
+    };
+    let whole = swinging(1, 40);
+    assert!(!words(&whole).contains("seen"));
+    // Filled, but seen in no more than the mask says; no number at all.
+    let mut motion = whole;
+    motion.mask.slice_mut(s![..10, ..]).fill(false);
+    motion.joints.slice_mut(s![35.., R_HAND.., ..]).fill(f32::NAN);
+    motion.mask.slice_mut(s![12..14, L_HAND + 1..L_HAND + 10]).fill(false);
+    motion.mask.slice_mut(s![14..17, L_HAND + 1..L_HAND + 12]).fill(false);
+    let told = words(&motion);
+    let expected = "seen, of 40 frames: arms in 30, left hand in 27, right hand in 25; the rest is bridged or held";
+    assert!(told.contains(expected), "{told}");
+    let seen = &done(dir, "a.npz --out a.bvh")["told"]["seen"];
+    assert_eq!(*seen, serde_json::json!({ "left_arm": 30, "right_arm": 30, "left_hand": 27, "right_hand": 25 }));
 }
 
 #[test]
