@@ -61,7 +61,7 @@ pub struct Args {
     /// Leave the head at rest though the face is known.
     #[arg(long, conflicts_with = "keypoints")]
     neutral_head: bool,
-    /// Sound of a film.
+    /// Sound of a film; without: that of the dataset or of the run that the motion is from.
     #[arg(long, value_name = "FILE", conflicts_with = "format")]
     audio: Option<PathBuf>,
     /// What a film shows beside the figure: the video it was taken from, whose sound it has where there is no other, or
@@ -221,6 +221,17 @@ fn animate(
             .map(|whole| part(&whole, from_secs, motion.fps.secs(motion.n_frames()))),
         (sound, _) => sound,
     };
+    let sound = match (sound, input.sound_of_run()) {
+        (None, Some(path)) if is_film => {
+            audio::read_mono(&path, SAMPLE_RATE)?.map(|whole| part(&whole, 0.0, motion.fps.secs(motion.n_frames())))
+        }
+        (sound, _) => sound,
+    };
+    let silence = match (is_film && sound.is_none(), args.format.is_empty()) {
+        (false, _) => "",
+        (true, true) => "the film is without sound: give --audio\n",
+        (true, false) => "the film is without sound\n",
+    };
     let sources = Sources { sound: sound.as_ref(), names: args.names, beside };
     for (path, format) in outputs {
         format.write(path, &performance, &sources, ui).with_context(|| format!("cannot write {}", path.display()))?;
@@ -228,7 +239,7 @@ fn animate(
     let motion_secs = motion.fps.secs(motion.n_frames());
     let Performance { told, clip, .. } = &performance;
     let text = format!(
-        "{} frames at {}, {motion_secs:.1} s; written: {} frames at {}\n{}",
+        "{} frames at {}, {motion_secs:.1} s; written: {} frames at {}\n{}{silence}",
         motion.n_frames(),
         motion.fps,
         clip.n_frames(),
@@ -243,6 +254,7 @@ fn animate(
         "written_fps": clip.fps,
         "times_real_time": motion_secs / secs.max(1e-9),
         "told": told,
+        "film_has_sound": is_film.then_some(sound.is_some()),
         "outputs": names(outputs),
     });
     Ok(Done { text, facts })

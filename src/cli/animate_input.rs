@@ -127,20 +127,25 @@ impl Input {
             Place::File(path) => Take { motion: read_motion(path, fps)?, face: None, sound: None },
         };
         check(&take.motion).with_context(|| format!("no animation of {}", self.name))?;
-        match keypoints.map(Path::to_owned).or_else(|| self.keypoints_of_run()) {
+        match keypoints.map(Path::to_owned).or_else(|| self.of_run("pose2d", "keypoints.npz")) {
             Some(path) => Ok(Take { face: Some(read_face(&path, &take.motion)?), ..take }),
             None => Ok(take),
         }
     }
 
-    /// `work/lift/SPEAKER/VIDEO/joints.npz` has its keypoints at `work/pose2d/SPEAKER/VIDEO/keypoints.npz`.
-    fn keypoints_of_run(&self) -> Option<PathBuf> {
+    /// The sound of the run that a lifted video belongs to.
+    pub fn sound_of_run(&self) -> Option<PathBuf> {
+        self.of_run("extract", "audio.wav")
+    }
+
+    /// `work/lift/SPEAKER/VIDEO/joints.npz` has its keypoints at `work/pose2d/SPEAKER/VIDEO/keypoints.npz`, and so on.
+    fn of_run(&self, stage: &str, file: &str) -> Option<PathBuf> {
         let Place::File(path) = &self.place else { return None };
         let folder = path.canonicalize().ok()?.parent()?.to_owned();
         let (video, speaker) = (folder.file_name()?, folder.parent()?.file_name()?);
-        let stage = folder.parent()?.parent()?;
-        let found = stage.parent()?.join("pose2d").join(speaker).join(video).join("keypoints.npz");
-        (stage.file_name()? == "lift" && found.is_file()).then_some(found)
+        let lift = folder.parent()?.parent()?;
+        let found = lift.parent()?.join(stage).join(speaker).join(video).join(file);
+        (lift.file_name()? == "lift" && found.is_file()).then_some(found)
     }
 }
 

@@ -6,6 +6,7 @@ use crate::figures::{FPS, swinging};
 use ndarray::{Array3, s};
 use orator::dataset::sample::N_KEYPOINTS;
 use orator::dataset::{Sample, Split, write_dataset};
+use orator::media::audio;
 use orator::motion::{authors_txt, joints_npz, npy};
 use orator::types::pose3d::Motion;
 use orator::types::skeleton::{L_HAND, R_HAND};
@@ -88,6 +89,25 @@ fn how_much_of_the_body_was_seen_is_told_where_it_is_not_all() {
     assert!(told.contains(expected), "{told}");
     let seen = &done(dir, "a.npz --out a.bvh")["told"]["seen"];
     assert_eq!(*seen, serde_json::json!({ "left_arm": 30, "right_arm": 30, "left_hand": 27, "right_hand": 25 }));
+}
+
+#[test]
+fn a_film_has_the_sound_of_its_run_and_a_silent_one_is_told_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let (lifted, extracted) = (dir.join("work/lift/host/talk"), dir.join("work/extract/host/talk"));
+    std::fs::create_dir_all(&lifted).unwrap();
+    std::fs::create_dir_all(&extracted).unwrap();
+    joints_npz::write(&lifted.join("joints.npz"), &swinging(1, 15)).unwrap();
+    let silent = done(dir, "work/lift/host/talk --out silent.mp4");
+    assert_eq!(silent["film_has_sound"], false);
+    assert!(audio::read_mono(&dir.join("silent.mp4"), SAMPLE_RATE).unwrap().is_none());
+    let sound = crate::clips::tone(SAMPLE_RATE, 2.0, 440.0);
+    audio::write_wav(&extracted.join("audio.wav"), &sound).unwrap();
+    assert_eq!(done(dir, "work/lift/host/talk --out heard.mp4")["film_has_sound"], true);
+    let heard = audio::read_mono(&dir.join("heard.mp4"), SAMPLE_RATE).unwrap().unwrap();
+    assert!((15_000..18_000).contains(&heard.samples.len()), "{} samples", heard.samples.len());
+    assert!(done(dir, "work/lift/host/talk --out a.bvh")["film_has_sound"].is_null());
 }
 
 #[test]
