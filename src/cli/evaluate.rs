@@ -100,7 +100,17 @@ fn convention(name: &str) -> std::result::Result<Convention, String> {
     known.map_err(|error: serde::de::value::Error| error.to_string())
 }
 
+/// The page is a page, and none of what is read.
+fn check_report(args: &MotionArgs) -> Result<()> {
+    let Some(path) = &args.report else { return Ok(()) };
+    let is_page = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("html"));
+    ensure!(is_page, "{}: a page ends in .html; name such a file", path.display());
+    ensure!(!path.is_dir(), "{} is a folder; name a file in it", path.display());
+    Ok(())
+}
+
 fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
+    check_report(args)?;
     let settings = Settings {
         convention: args.convention,
         alphas: args.alpha.clone(),

@@ -21,6 +21,8 @@ pub enum Who {
     MedianPose,
     NearestNeighbour,
     MismatchedPrediction,
+    /// The clip's own prediction, out of step with it.
+    LatePrediction,
     MismatchedTruth,
     /// One half of the truth beside the other.
     TruthHalves,
@@ -36,6 +38,7 @@ impl Who {
             Self::MedianPose => "median pose",
             Self::NearestNeighbour => "nearest neighbour",
             Self::MismatchedPrediction => "mismatched prediction",
+            Self::LatePrediction => "late prediction",
             Self::MismatchedTruth => "mismatched truth",
             Self::TruthHalves => "truth halves",
             Self::Truth => "truth",
@@ -109,8 +112,24 @@ pub fn of_files(clips: &Clips) -> Result<(Vec<Predictor>, Vec<String>)> {
             Some(predictor) => all.push(predictor),
             None => left_out.push(too_short(who)),
         }
+        if who == Who::MismatchedPrediction && clips.clips.len() > 1 {
+            all.push(late(clips, &all[0]));
+        }
     }
     Ok((all, left_out))
+}
+
+/// Each clip's own prediction, half of the clip later and from the beginning again: it knows where the speaker of the clip
+/// holds the arms, which another clip's motion does not, and only the sound's moment is wrong.
+fn late(clips: &Clips, still: &Predictor) -> Predictor {
+    let of = |clip: &Clip| {
+        let n_frames = clip.n_frames();
+        Made::Moves(taken(&clip.made, (0..n_frames).map(|t| (t + n_frames / 2) % n_frames)))
+    };
+    let says = "the clip's own prediction half of the clip later, and from the beginning again".to_owned();
+    let mut predictor = Predictor { who: Who::LatePrediction, says, motions: clips.clips.iter().map(of).collect() };
+    fill(&mut predictor, still);
+    predictor
 }
 
 /// Why a mismatched motion is left out.

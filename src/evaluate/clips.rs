@@ -33,7 +33,7 @@ pub struct Clip {
     /// [T, 49, 3], metres, the neck at the origin.
     pub real: Array3<f32>,
     pub made: Array3<f32>,
-    /// [T, 49]: what is compared: seen in the real motion, and there in the made one.
+    /// [T, 49]: what is compared: seen in the real motion.
     pub mask: Array2<bool>,
     pub heard: Option<Heard>,
     /// Where its sound is, for whoever wants to hear it.
@@ -90,6 +90,8 @@ pub struct Clips {
     pub clips: Vec<Clip>,
     /// What had to be assumed, changed or left out, in sentences.
     pub notes: Vec<String>,
+    /// Whether the prediction's maker learnt from these very clips: then it can show nothing.
+    pub learnt: bool,
 }
 
 impl Clips {
@@ -99,6 +101,21 @@ impl Clips {
 
     pub fn secs(&self) -> f64 {
         self.fps.secs(self.n_frames())
+    }
+
+    /// Hash of the real motion, and of what of it is compared.
+    pub fn truth(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        for clip in &self.clips {
+            let seen = clip.mask.indexed_iter().filter(|(_, seen)| **seen).map(|(place, _)| place);
+            for (t, joint) in seen {
+                for k in 0..3 {
+                    hasher.update(&clip.real[[t, joint, k]].to_le_bytes());
+                }
+            }
+            hasher.update(&clip.n_frames().to_le_bytes());
+        }
+        hasher.finalize().to_hex().as_str()[..16].to_owned()
     }
 
     pub fn have_sound(&self) -> bool {
@@ -117,7 +134,7 @@ pub fn read(pairs: &[Pair], fps: Option<FrameRate>) -> Result<Clips> {
     let clip = |pair: &Pair| clip(pair, fps, rate).with_context(|| format!("clip {}", pair.name));
     let read: Vec<(Clip, Vec<String>)> = pairs.par_iter().map(clip).collect::<Result<_>>()?;
     let (clips, notes): (Vec<Clip>, Vec<Vec<String>>) = read.into_iter().unzip();
-    Ok(Clips { fps: rate, clips, notes: notes.into_iter().flatten().collect() })
+    Ok(Clips { fps: rate, clips, notes: notes.into_iter().flatten().collect(), learnt: false })
 }
 
 fn clip(pair: &Pair, given: Option<FrameRate>, fps: FrameRate) -> Result<(Clip, Vec<String>)> {
@@ -150,21 +167,21 @@ fn clip(pair: &Pair, given: Option<FrameRate>, fps: FrameRate) -> Result<(Clip, 
     }
     notes.extend(other_unit(&real, &made).map(|note| format!("{}: {note}", pair.name)));
     real.mask = real.mask.slice(s![..n_frames, ..]).to_owned();
-    let (real_joints, made_joints) = (cut(real.joints, n_frames), cut(made.joints, n_frames));
-    let (mask, n_missing) = compared(&real_joints, &real.mask, &made_joints);
+    let (real_joints, mut made_joints) = (cut(real.joints, n_frames), cut(made.joints, n_frames));
+    let (mask, n_missing) = compared(&real_joints, &real.mask, &mut made_joints);
     let n_seen = real.mask.iter().filter(|seen| **seen).count().max(1);
     let share = n_missing as f64 / n_seen as f64;
     ensure!(
         share <= MOST_MISSING,
-        "the prediction {} has no number (NaN) for {:.1} % of the joints that the truth has: at most {:.0} % can be left \
-         out, or a prediction could leave out what it cannot do",
+        "the prediction {} has no number (NaN) for {:.1} % of the joints that the truth has: at most {:.0} % can be \
+         held over, or a prediction could leave out what it cannot do",
         pair.prediction.display(),
         100.0 * share,
         100.0 * MOST_MISSING
     );
     if n_missing > 0 {
         notes.push(format!(
-            "{}: the prediction has no number (NaN) for {n_missing} of {n_seen} joints: left out",
+            "{}: the prediction has no number (NaN) for {n_missing} of {n_seen} joints: each counts as where it was last",
             pair.name
         ));
     }
@@ -193,16 +210,18 @@ fn cut(joints: Array3<f32>, n_frames: usize) -> Array3<f32> {
     if joints.shape()[0] == n_frames { joints } else { joints.slice(s![..n_frames, .., ..]).to_owned() }
 }
 
-/// What is compared, and at how many places the made motion has no number for a real joint that is seen.
-pub fn compared(real: &Array3<f32>, seen: &Array2<bool>, made: &Array3<f32>) -> (Array2<bool>, usize) {
-    let mut n_missing = 0;
+/// What is compared: the real joints that are seen. Where the made motion has no number it is held where it was last (before
+/// its first number, at the neck); at how many of the compared places is told.
+pub fn compared(real: &Array3<f32>, seen: &Array2<bool>, made: &mut Array3<f32>) -> (Array2<bool>, usize) {
     let there = |joints: &Array3<f32>, t: usize, joint: usize| (0..3).all(|k| joints[[t, joint, k]].is_finite());
-    let mask = Array2::from_shape_fn(seen.raw_dim(), |(t, joint)| {
-        let wanted = seen[[t, joint]] && there(real, t, joint);
-        let found = wanted && there(made, t, joint);
-        n_missing += usize::from(wanted && !found);
-        found
-    });
+    let mask = Array2::from_shape_fn(seen.raw_dim(), |(t, joint)| seen[[t, joint]] && there(real, t, joint));
+    let mut n_missing = 0;
+    for ((t, joint), wanted) in mask.indexed_iter() {
+        if !there(made, t, joint) {
+            n_missing += usize::from(*wanted);
+            (0..3).for_each(|k| made[[t, joint, k]] = if t > 0 { made[[t - 1, joint, k]] } else { 0.0 });
+        }
+    }
     (mask, n_missing)
 }
 

@@ -21,6 +21,8 @@ pub struct Beside {
 /// What came of it.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Compared {
+    /// Said where the figures are of different real motion.
+    pub warning: Option<String>,
     pub beside: Vec<Beside>,
     /// A sentence for each metric of one name whose definitions differ.
     pub refused: Vec<String>,
@@ -31,7 +33,11 @@ pub struct Compared {
 
 /// Compares the predictions of two results.
 pub fn compare(a: &Stored, b: &Stored) -> Compared {
-    let mut compared = Compared::default();
+    let warning = format!(
+        "A is of {} clips and B of {}, and their real motion is not the same: a better figure may be an easier clip",
+        a.n_clips, b.n_clips
+    );
+    let mut compared = Compared { warning: (a.truth != b.truth).then_some(warning), ..Compared::default() };
     let mut rest: Vec<&Metric> = b.metrics.iter().collect();
     let mut alone: Vec<&Metric> = Vec::new();
     for metric in &a.metrics {
@@ -101,11 +107,11 @@ fn shown(value: &Value) -> String {
 /// Side by side as text.
 pub fn text(compared: &Compared) -> String {
     let cell = |estimate: &Option<Estimate>| match estimate {
-        Some(e) if e.low.is_finite() => format!("{:.4} [{:.4}, {:.4}]", e.value, e.low, e.high),
+        Some(e) if e.low.is_finite() => format!("  {:.4} [{:.4}, {:.4}]", e.value, e.low, e.high),
         Some(e) => format!("{:.4}", e.value),
         None => "-".to_owned(),
     };
-    let mut text = String::new();
+    let mut text = compared.warning.iter().map(|warning| format!("WARNING: {warning}\n\n")).collect::<String>();
     let width = compared.beside.iter().map(|row| row.name.chars().count() + row.unit.len() + 3).max().unwrap_or(0);
     if !compared.beside.is_empty() {
         text += &format!("{:width$}{:>34}{:>34}\n", "", "A", "B");
@@ -117,7 +123,7 @@ pub fn text(compared: &Compared) -> String {
     compared.refused.iter().for_each(|refusal| text += &format!("refused: {refusal}\n"));
     for (names, which) in [(&compared.only_in_a, "A"), (&compared.only_in_b, "B")] {
         if !names.is_empty() {
-            text += &format!("only in {which}: {}\n", names.join(", "));
+            text += &format!("only in {which}: {}\n", names.join("; "));
         }
     }
     text

@@ -28,6 +28,8 @@ pub fn json(table: &Table) -> Value {
         "block_secs": table.block_secs,
         "secs": table.secs,
         "with_sound": table.with_sound,
+        "truth": table.truth,
+        "learnt_from_these_clips": table.learnt,
         "notes": table.notes,
         "predictors": predictors.collect::<Vec<_>>(),
         "metrics": metrics.collect::<Vec<_>>(),
@@ -79,6 +81,9 @@ pub struct Metric {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct Stored {
     evaluation: u64,
+    /// Hash of the real motion behind the figures, and how many clips it has.
+    pub truth: String,
+    pub n_clips: usize,
     pub metrics: Vec<Metric>,
 }
 

@@ -46,12 +46,24 @@ pub fn material(dataset: &Dataset, speaker: &Speaker, split: Split, task: &dyn T
     task.detail("listening");
     let clips: Vec<Clip> =
         held_out.into_par_iter().zip(made).map(|(held_out, made)| clip(held_out, made, of_dataset)).collect();
-    let mut clips = Clips { fps: of_dataset, clips, notes: Vec::new() };
+    let mut clips = Clips { fps: of_dataset, clips, notes: Vec::new(), learnt: split == Split::Train };
+    if clips.learnt {
+        clips
+            .notes
+            .push("THE CHECKPOINT WAS TRAINED ON THIS SPLIT: its figures say what it learnt by heart".to_owned());
+    }
+    if dataset.info().speaker != speaker.name() {
+        clips.notes.push(format!(
+            "the dataset is of {}, the checkpoint of {}: its bones were put on the checkpoint's lengths",
+            dataset.info().speaker,
+            speaker.name()
+        ));
+    }
     task.detail("what the training split knows");
     let prediction = format!("the speaker {} of the checkpoint, hearing the sound of each interval", speaker.name());
     let mut all = vec![Predictor::prediction(&clips, &prediction)];
     all.extend(stills(dataset, normal, clips.clips.len())?);
-    match copied(dataset, normal, &clips)? {
+    match copied(dataset, normal, &clips, split)? {
         Some(motions) => {
             let says = "for each 4 s of sound the motion of the stretch of the training split that sounds most alike";
             let mut predictor = Predictor { who: Who::NearestNeighbour, says: says.to_owned(), motions };
@@ -89,7 +101,8 @@ fn generated(
 fn clip(held_out: HeldOut, made: Array3<f32>, fps: FrameRate) -> Clip {
     let HeldOut { key, real, sound } = held_out;
     let heard = Some(hearing::of_samples(&sound.samples, fps, real.n_frames()));
-    let (mask, _) = compared(&real.joints, &real.mask, &made);
+    let mut made = made;
+    let (mask, _) = compared(&real.joints, &real.mask, &mut made);
     let voice = Some(Voice::Kept(sound.samples.into_iter().map(pcm).collect()));
     Clip { name: key, real: real.joints, made, mask, heard, voice }
 }
@@ -117,6 +130,8 @@ struct Training<'a> {
     dataset: &'a Dataset,
     normal: &'a Normalisation,
     samples: Vec<SampleRef>,
+    /// Whether the clips that ask are its own entries, in the same order.
+    asks_itself: bool,
 }
 
 impl Training<'_> {
@@ -143,18 +158,19 @@ impl Library for Training<'_> {
         Ok(self.read(entry)?.real.joints)
     }
 
-    fn may_answer(&self, _: usize, _: usize) -> bool {
-        true
+    fn may_answer(&self, asked: usize, entry: usize) -> bool {
+        !self.asks_itself || asked != entry
     }
 }
 
 /// The nearest neighbours' motion; what is missing where it was copied from is NaN.
-pub fn copied(dataset: &Dataset, normal: &Normalisation, clips: &Clips) -> Result<Option<Vec<Made>>> {
+pub fn copied(dataset: &Dataset, normal: &Normalisation, clips: &Clips, split: Split) -> Result<Option<Vec<Made>>> {
     let rows = |clip: &Clip| clip.heard.as_ref().map(|heard| heard.rows.clone()).unwrap_or_default();
     let rows: Vec<Vec<f32>> = clips.clips.iter().map(rows).collect();
     let asked: Vec<Asked> =
         clips.clips.iter().zip(&rows).map(|(clip, rows)| Asked { rows, n_frames: clip.n_frames() }).collect();
-    let library = Training { dataset, normal, samples: dataset.samples(Split::Train) };
+    let asks_itself = split == Split::Train;
+    let library = Training { dataset, normal, samples: dataset.samples(Split::Train), asks_itself };
     let made = neighbour::motions(&asked, &library, clips.fps)?;
     debug_assert!(made.iter().flatten().all(|joints| joints.shape()[1..] == [N_JOINTS, 3]));
     Ok(made.map(|made| made.into_iter().map(Made::Moves).collect()))

@@ -43,6 +43,10 @@ pub struct Table {
     pub n_frames: usize,
     pub secs: f64,
     pub with_sound: bool,
+    /// Whether the prediction's maker learnt from these very clips.
+    pub learnt: bool,
+    /// Hash of the real motion and of what of it is compared.
+    pub truth: String,
     /// The prediction first, the truth last.
     pub rows: Vec<Row>,
     pub notes: Vec<String>,
@@ -84,6 +88,8 @@ pub fn measure(clips: &Clips, settings: &Settings, predictors: &[Predictor], tas
         n_frames: clips.n_frames(),
         secs: clips.secs(),
         with_sound: clips.have_sound(),
+        learnt: clips.learnt,
+        truth: clips.truth(),
         rows,
         notes: clips.notes.clone(),
     })

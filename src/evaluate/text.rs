@@ -15,6 +15,7 @@ const fn heads(who: Who) -> [&'static str; 2] {
         Who::MedianPose => ["median", "pose"],
         Who::NearestNeighbour => ["nearest", "neighbour"],
         Who::MismatchedPrediction => ["mismatched", "prediction"],
+        Who::LatePrediction => ["late", "prediction"],
         Who::MismatchedTruth => ["mismatched", "truth"],
         Who::TruthHalves => ["truth", "halves"],
         Who::Truth => ["", "truth"],

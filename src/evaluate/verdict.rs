@@ -62,9 +62,15 @@ pub fn better_than_nothing(table: &Table) -> Verdict {
     let asked = [Aspect::Place, Aspect::Poses, Aspect::Movement];
     let votes = votes(table, own, &asked, |index| better_still(table, index));
     let of = |aspect: Aspect| summed(votes.iter().filter(|vote| vote.aspect == aspect));
-    let rest = summed(votes.iter().filter(|vote| vote.aspect != Aspect::Place));
+    let asks = |aspect: Aspect| votes.iter().any(|vote| vote.aspect == aspect);
+    let rest = match summed(votes.iter().filter(|vote| vote.aspect != Aspect::Place)) {
+        // a pose that fits better, and never moves either, has its poses for it and no movement
+        Answer::Yes if asks(Aspect::Movement) && of(Aspect::Movement) != Answer::Yes => Answer::Undecided,
+        rest => rest,
+    };
     let n_place = votes.iter().filter(|vote| vote.aspect == Aspect::Place).count();
     let (word, says) = match (of(Aspect::Place), rest) {
+        _ if table.learnt => return by_heart(question),
         _ if votes.is_empty() => return no_figure(question),
         _ if table.n_blocks < FEW_BLOCKS => return too_few(question, table),
         (place, _) if n_place == votes.len() => match place {
@@ -91,7 +97,7 @@ pub fn better_than_nothing(table: &Table) -> Verdict {
             "it is nearer to where the speaker is, and moves more like the speaker, than a pose that never moves",
         ),
         (Answer::Yes, Answer::Undecided) => (
-            "yes",
+            "in part",
             "it is nearer to where the speaker is than a pose that never moves; that it moves like the speaker is not shown",
         ),
         (Answer::Yes, Answer::No) => (
@@ -145,29 +151,38 @@ fn answer(gain: &Estimate) -> Answer {
     }
 }
 
-/// Does it fit its own sound better than another's?
+/// Does it fit its own sound better than another's? It is held against itself out of step where there is such a row:
+/// another clip's motion is made for another posture too.
 pub fn hears(table: &Table) -> Verdict {
     let question = "Does it hear?";
-    let own = table.row(Who::Prediction).zip(table.row(Who::MismatchedPrediction));
+    let other = table.row(Who::LatePrediction).or_else(|| table.row(Who::MismatchedPrediction));
+    let own = table.row(Who::Prediction).zip(other);
     let Some((own, other)) = own else { return nothing(question) };
     let votes = votes(table, own, &[Aspect::Place, Aspect::Beat], |_| Some(other));
     let (word, says) = match summed(votes.iter()) {
+        _ if table.learnt => return by_heart(question),
         _ if votes.is_empty() => return no_figure(question),
         _ if table.n_blocks < FEW_BLOCKS => return too_few(question, table),
-        Answer::Yes => ("yes", "its motion fits its own clip better than a motion made for another sound"),
-        Answer::No => ("no", "a motion made for another sound fits as well or better"),
+        Answer::Yes => ("yes", "its motion fits its own sound better than a motion made for another sound or moment"),
+        Answer::No => ("no", "a motion made for another sound or moment fits better"),
         Answer::Undecided if votes.iter().any(|vote| vote.answer == Answer::Yes) => {
-            ("in part", "its motion fits its own clip better in some figures and worse in others")
+            ("in part", "its motion fits its own sound better in some figures and worse in others")
         }
-        Answer::Undecided => {
-            ("undecided", "its motion is not shown to fit its own clip better than a motion made for another sound")
-        }
+        Answer::Undecided => (
+            "undecided",
+            "its motion is not shown to fit its own sound better than a motion made for another sound or moment",
+        ),
     };
     Verdict { word, sentence: format!("{question} {}: {says}.", capital(word)), votes }
 }
 
 fn nothing(question: &str) -> Verdict {
     let sentence = format!("{question} Undecided: there is nothing to hold it against.");
+    Verdict { word: "undecided", sentence, votes: Vec::new() }
+}
+
+fn by_heart(question: &str) -> Verdict {
+    let sentence = format!("{question} Undecided: the speaker was trained on these very clips; use another split.");
     Verdict { word: "undecided", sentence, votes: Vec::new() }
 }
 

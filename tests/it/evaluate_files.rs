@@ -111,6 +111,30 @@ fn only_values_of_one_hash_are_compared() {
     assert!(wrong.code == 1 && wrong.errors.contains("is no result of an evaluation"), "{}", wrong.errors);
 }
 
+#[test]
+fn what_stands_still_or_is_out_of_step_is_not_praised() {
+    let project = Project::with_clips("praised", 0, 1.0);
+    folders(project.dir(), &[24, 20]);
+    for (number, secs) in [(0, 24), (1, 20)] {
+        let real = spoken(number, secs).motion().joints;
+        let mean = real.mean_axis(ndarray::Axis(0)).unwrap();
+        write_npy(&project.dir().join(format!("still/{number}.npy")), &mean.broadcast(real.dim()).unwrap().to_owned());
+        let n = real.shape()[0];
+        let late = Array3::from_shape_fn(real.dim(), |(t, j, k)| real[[(t + n / 3) % n, j, k]]);
+        write_npy(&project.dir().join(format!("late/{number}.npy")), &late);
+    }
+    for made in ["still", "late"] {
+        let answer = project.answer(&[&["evaluate", "--truth", "truth", "--prediction", made], &SMALL[..]].concat());
+        assert_eq!(answer.code, 0, "{}", answer.errors);
+        assert_ne!(answer.json["better_than_nothing"]["word"], "yes", "{made}");
+        assert_ne!(answer.json["hears"]["word"], "yes", "{made}: {}", answer.json["hears"]);
+        assert!(value(&answer, "pck_2d", "all", "late_prediction") > 0.0);
+    }
+    let args = ["evaluate", "--truth", "truth", "--prediction", "late", "--report", "truth/0.npy"];
+    let answer = project.answer(&[&args[..], &SMALL].concat());
+    assert!(answer.code == 1 && answer.errors.contains("ends in .html"), "{}", answer.errors);
+}
+
 /// A project with a clip of 8 s, and files that are not as they should be.
 fn bad_files() -> Project {
     let project = Project::with_clips("bad-motion", 0, 1.0);

@@ -104,8 +104,8 @@ fn the_neighbour_by_sound_is_found_where_it_was_taken_from() {
     let heard = Some(of_samples(&sound.samples, fps, real.n_frames()));
     let clip =
         Clip { name: key, made: real.joints.clone(), real: real.joints.clone(), mask: real.mask, heard, voice: None };
-    let clips = Clips { fps, clips: vec![clip], notes: Vec::new() };
-    let found = copied(&dataset, &normal, &clips).unwrap().unwrap();
+    let clips = Clips { fps, clips: vec![clip], notes: Vec::new(), learnt: false };
+    let found = copied(&dataset, &normal, &clips, Split::Validation).unwrap().unwrap();
     let Made::Moves(found) = &found[0] else { panic!("it stands still") };
     let apart = found.iter().zip(&real.joints).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
     assert!(apart < found.len() / 20, "{apart} of {} numbers are others", found.len());

@@ -119,14 +119,14 @@ fn speaker(n_clips: usize, n_frames: usize) -> Vec<Unheard> {
 fn evaluate(speaker: Vec<Unheard>, watch: &Stopwatch) -> Result<(table::Table, String)> {
     watch.detail("listening");
     let clip = |(number, unheard): (usize, Unheard)| {
-        let Unheard { real, mask, made, sound } = unheard;
+        let Unheard { real, mask, mut made, sound } = unheard;
         let heard = Some(hearing::of_samples(&sound.samples, FPS, real.shape()[0]));
-        let (mask, _) = compared(&real, &mask, &made);
+        let (mask, _) = compared(&real, &mask, &mut made);
         let voice = Some(Voice::Kept(sound.samples.into_iter().map(pcm).collect()));
         Clip { name: format!("clip {number}"), real, made, mask, heard, voice }
     };
     let clips = speaker.into_par_iter().enumerate().map(clip).collect();
-    let clips = Clips { fps: FPS, clips, notes: Vec::new() };
+    let clips = Clips { fps: FPS, clips, notes: Vec::new(), learnt: false };
     watch.detail("making the baselines");
     let mut predictors = vec![Predictor::prediction(&clips, "what the rule alone would do")];
     predictors.extend(baselines::of_files(&clips)?.0);
