@@ -4,4 +4,3 @@ pub mod fingerprint;
 pub mod mel;
 pub mod mfcc;
 pub mod onset;
-pub mod resample;

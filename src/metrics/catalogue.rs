@@ -141,11 +141,6 @@ impl Catalogue {
         self.read(Some(&sums.cheap), None)
     }
 
-    /// The same, with NaN in place of every value that is not costly.
-    pub fn costly_values(&self, sums: &Sums) -> Vec<f64> {
-        self.read(None, Some(&sums.costly.row()))
-    }
-
     /// Values [n_draws, n_definitions] of draws of blocks with replacement, NaN in place of costly ones. `counts`
     /// [n_draws, n_blocks]: how often each block was drawn. Much faster than adding `Sums` one by one.
     pub fn draw_cheap(&self, blocks: &[Sums], counts: ArrayView2<f64>) -> Array2<f64> {

@@ -251,7 +251,7 @@ fn the_released_sounds_have_the_measured_onsets() {
     for (clip, n) in [("1845", 92), ("3821", 98), ("3838", 120)] {
         let sound = orator::media::audio::read_mono(&folder.join(format!("{clip}.wav")), 44_100).unwrap().unwrap();
         let mut at_16_khz = Vec::new();
-        let mut resampler = orator::audio::resample::Resampler::new(44_100, 16_000);
+        let mut resampler = crate::librosa_resampler::Resampler::new(44_100, 16_000);
         resampler.push(&sound.samples, &mut at_16_khz);
         resampler.finish(&mut at_16_khz);
         let onsets = orator::audio::onset::onsets(&at_16_khz);

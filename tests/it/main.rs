@@ -34,6 +34,7 @@ mod house;
 mod import;
 mod import_readers;
 mod kill;
+mod librosa_resampler;
 mod lift;
 mod lift_bad_input;
 mod lift_camera;

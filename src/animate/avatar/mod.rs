@@ -92,11 +92,6 @@ impl Avatar {
         ];
         Self { parts: parts.into_iter().map(|(material, built)| built.rested(material, &stance)).collect() }
     }
-
-    /// Number of triangles.
-    pub fn n_triangles(&self) -> usize {
-        self.parts.iter().map(|part| part.triangles.len()).sum()
-    }
 }
 
 /// Surfaces of one material in the stance.

@@ -1,6 +1,7 @@
 //! Sound from one rate to another, in pieces: a windowed sinc whose band ends as librosa's default (soxr, high quality)
 //! does, half way down at 0.9565 of the lower Nyquist frequency. Onsets found in what it gives are those librosa finds
-//! after loading a file at 16 kHz; a plainer resampler moves some of them across the threshold.
+//! after loading a file at 16 kHz; a plainer resampler, such as the program's own, moves some of them across the threshold:
+//! the published onset counts need this one.
 
 /// Zero crossings of the kernel on either side, at the lower rate.
 const HALF: f64 = 96.0;
