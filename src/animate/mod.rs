@@ -1,33 +1,18 @@
 //! Joints to rotations, and the files people open: BVH, GLB, MP4, contact sheets.
 
-pub mod arm;
 pub mod avatar;
-pub mod constraints;
 pub mod draw;
-pub mod figure;
-pub mod file;
-pub mod glb;
-pub mod glb_scene;
-pub mod head;
-pub mod hinge;
-pub mod json;
-pub mod limits;
-pub mod names;
-pub mod overlay;
+pub mod export;
 pub mod performance;
-pub mod places;
-pub mod pose;
-pub mod roll;
-pub mod rotations;
-pub mod sheet;
-pub mod sheet_cells;
-pub mod smoothing;
-pub mod strip;
-pub mod track;
-pub mod video;
+pub mod rig;
+pub mod solve;
 
-pub use constraints::Constraints;
-pub use draw::{View, draw_pose};
-pub use head::Face;
-pub use performance::{Options, Performance, Yaw, perform};
-pub use smoothing::Smoothing;
+pub use draw::figure::View;
+pub use draw::figure::draw_pose;
+pub use performance::Options;
+pub use performance::Performance;
+pub use performance::Yaw;
+pub use performance::perform;
+pub use rig::constraints::Constraints;
+pub use solve::head::Face;
+pub use solve::smoothing::Smoothing;

@@ -1,17 +1,18 @@
 //! The road from joints to animation: motion is smoothed, put on a figure as rotations, brought to the rate asked for
 //! and held within what a body can do. Every file is written from what comes out; what was done on the way is told.
 
-use super::arm::Means;
-use super::constraints::{Clamps, Constraints, Tally};
-use super::figure::Figure;
-use super::head::{self, Face};
-use super::places::Places;
-use super::rotations::rotations;
-use super::smoothing::Smoothing;
-use super::track::Track;
-use crate::motion::bvh_write::Clip;
+use super::rig::constraints::{Clamps, Constraints, Tally};
+use super::rig::rig::Figure;
+use super::solve::arm::Means;
+use super::solve::head;
+use super::solve::head::Face;
+use super::solve::positions::Places;
+use super::solve::rotations::rotations;
+use super::solve::smoothing::Smoothing;
+use super::solve::track::Track;
+use crate::formats::bvh::write::Clip;
+use crate::math::rotation::Rotation;
 use crate::motion::jerk;
-use crate::motion::rotation::Rotation;
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::{L_HAND, L_SHOULDER, N_HAND_JOINTS, N_JOINTS, NECK, R_HAND, R_SHOULDER};
 use crate::types::time::FrameRate;

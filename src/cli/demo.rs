@@ -1,19 +1,23 @@
 //! `orator demo`.
 
-use super::{Outcome, ui::Ui};
+use super::Outcome;
+use super::ui::Ui;
 use anyhow::{Context, Result, bail, ensure};
 use orator::config;
 use orator::dataset::Dataset;
 use orator::demo::GENERATOR;
-use orator::demo::folder::{self, Plan};
-use orator::demo::measure::{self, LEAST_FOUND, LEAST_FRAMES, LEAST_JOINTS, MOST_MM, MOST_PX, Millimetres};
-use orator::demo::{learned, sheet, speaker, traces};
+use orator::demo::check::pipeline;
+use orator::demo::check::pipeline::{LEAST_FOUND, LEAST_FRAMES, LEAST_JOINTS, MOST_MM, MOST_PX, Millimetres};
+use orator::demo::check::{learned, sheet, traces};
+use orator::demo::drawn::folder;
+use orator::demo::drawn::folder::Plan;
+use orator::demo::rule::dataset;
+use orator::external::opencv::png;
+use orator::formats::npy;
 use orator::generate::Speaker;
-use orator::motion::npy;
 use orator::stage::workdir;
 use orator::types::pose3d::Motion;
 use orator::types::time::FrameRate;
-use orator::vision::png;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -110,11 +114,11 @@ fn draw(dir: &Path, plan: &Plan, ui: &Ui) -> Result<Outcome> {
 }
 
 fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
-    let m = measure::measure(dir)?;
+    let m = pipeline::measure(dir)?;
     let row = |name: &str, mm: &Millimetres| {
         format!("{name:34}{:>8.1}{:>8.1}{:>8.1}{:>9.1}\n", mm.all, mm.body, mm.wrists, mm.fingers)
     };
-    let px = |name: &str, px: &measure::Pixels| {
+    let px = |name: &str, px: &pipeline::Pixels| {
         format!("{name:34}{:>8.2}{:>8.2}{:>7.1} %\n", px.median, px.p90, 100.0 * px.found)
     };
     let mut text = format!("{:34}{:>8}{:>8}{:>9}\n", "2D, px from the truth", "median", "90 %", "found");
@@ -157,12 +161,12 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
 }
 
 fn speak(dir: &Path, hours: f64, seed: u64, ui: &Ui) -> Result<Outcome> {
-    let clips = speaker::clips(hours, seed)?;
+    let clips = dataset::clips(hours, seed)?;
     let out = std::path::absolute(dir)?;
     let taken = out.exists() && std::fs::read_dir(&out).map_or(true, |mut entries| entries.next().is_some());
     ensure!(!taken, "{} is not empty; choose another folder", dir.display());
     let attempt = workdir::attempt_folder(&out)?;
-    let written = speaker::write(&attempt, &clips, ui).and_then(|info| {
+    let written = dataset::write(&attempt, &clips, ui).and_then(|info| {
         workdir::replace_folder(&attempt, &out)?;
         Ok(info)
     });
@@ -170,7 +174,7 @@ fn speak(dir: &Path, hours: f64, seed: u64, ui: &Ui) -> Result<Outcome> {
         let _ = std::fs::remove_dir_all(&attempt);
     }
     let secs: Vec<String> = written?.splits.iter().map(|(name, split)| format!("{name} {:.0} s", split.secs)).collect();
-    let text = format!("{} clips by version {} of the rule: {}", clips.len(), speaker::RULE, secs.join(", "));
+    let text = format!("{} clips by version {} of the rule: {}", clips.len(), dataset::RULE, secs.join(", "));
     let next = format!("orator demo learned --dataset {}", dir.display());
     ui.summary(&text, Some(&next), json!({ "dataset": dir, "clips": clips.len(), "next": next }));
     Ok(Outcome::Done)

@@ -1,120 +1,18 @@
 //! The command line: the one place with clap, indicatif and println. One file a verb; a verb's doc comment is its
 //! `--help`. Exit codes: 0 all done; 1 usage, configuration, or a check that did not pass; 2 some units failed, the others are done.
 
-mod account;
-mod animate;
-mod animate_input;
-mod bench;
-mod config_args;
-mod dataset;
-mod demo;
-mod doctor;
-mod evaluate;
-mod forget;
-mod generate;
-mod import;
-mod init;
-mod lift;
-mod models;
-mod report;
-mod road;
-mod run;
-mod sheet;
-mod status;
-mod train;
-mod ui;
+pub mod animate;
+pub mod bench;
+pub mod config_args;
+pub mod dataset;
+pub mod demo;
+pub mod evaluate;
+pub mod generate;
+pub mod motion;
+pub mod pipeline;
+pub mod program;
+pub mod setup;
+pub mod train;
+pub mod ui;
 
-use clap::{Parser, Subcommand};
-use std::process::ExitCode;
-
-/// Videos of one speaker to a 3D speech-gesture dataset, and to a model that gestures like that speaker.
-#[derive(Parser)]
-#[command(name = "orator", version, help_expected = true, subcommand_required = true, arg_required_else_help = true)]
-struct Cli {
-    #[command(subcommand)]
-    verb: Verb,
-    /// Print one JSON object on standard output instead of text for people.
-    #[arg(long, global = true)]
-    json: bool,
-}
-
-#[derive(Subcommand)]
-enum Verb {
-    Init(init::Args),
-    Run(run::Args),
-    Status(status::Args),
-    Models(models::Args),
-    Doctor(doctor::Args),
-    Lift(lift::Args),
-    Sheet(sheet::Args),
-    Report(report::Args),
-    Import(import::Args),
-    Forget(forget::Args),
-    Dataset(dataset::Args),
-    Train(train::Args),
-    Evaluate(evaluate::Args),
-    Generate(generate::Args),
-    Animate(animate::Args),
-    Bench(bench::Args),
-    Demo(demo::Args),
-}
-
-/// How a verb ended, when it ended well enough to say so itself.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// Everything asked for is done.
-    Done,
-    /// Some units failed (each was reported); the others are done.
-    SomeFailed,
-    /// What was looked at (the set-up, a dataset) is not as it must be; what is wrong was said.
-    Wrong,
-}
-
-/// Parses the command line, runs the verb, reports an error, and gives the exit code.
-pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
-        Err(error) => {
-            let _ = error.print();
-            return if error.use_stderr() { ExitCode::from(1) } else { ExitCode::SUCCESS };
-        }
-    };
-    let ui = ui::Ui::new(cli.json);
-    let outcome = match cli.verb {
-        Verb::Init(args) => init::run(args, &ui),
-        Verb::Run(args) => run::run(args, &ui),
-        Verb::Status(args) => status::run(args, &ui),
-        Verb::Models(args) => models::run(args, &ui),
-        Verb::Doctor(args) => doctor::run(args, &ui),
-        Verb::Lift(args) => lift::run(args, &ui),
-        Verb::Sheet(args) => sheet::run(args, &ui),
-        Verb::Report(args) => report::run(args, &ui),
-        Verb::Dataset(args) => dataset::run(args, &ui),
-        Verb::Import(args) => import::run(args, &ui),
-        Verb::Forget(args) => forget::run(args, &ui),
-        Verb::Train(args) => train::run(args, &ui),
-        Verb::Evaluate(args) => evaluate::run(args, &ui),
-        Verb::Generate(args) => generate::run(args, &ui),
-        Verb::Animate(args) => animate::run(args, &ui),
-        Verb::Bench(args) => bench::run(args, &ui),
-        Verb::Demo(args) => demo::run(args, &ui),
-    };
-    match outcome {
-        Ok(Outcome::Done) => ExitCode::SUCCESS,
-        Ok(Outcome::SomeFailed) => ExitCode::from(2),
-        Ok(Outcome::Wrong) => ExitCode::from(1),
-        Err(error) => {
-            ui.error(&error);
-            ExitCode::from(1)
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    /// Every argument has its help; no two clash.
-    #[test]
-    fn the_command_line_is_sound() {
-        <super::Cli as clap::CommandFactory>::command().debug_assert();
-    }
-}
+pub use program::{Outcome, main};

@@ -1,10 +1,11 @@
 //! `info.json`: what the numbers mean. Everything a reader needs who has never seen this project.
 
 use super::index::Shard;
-use super::part::SplitBy;
 use super::sample::N_KEYPOINTS;
 use super::split::Split;
-use crate::types::skeleton::{self, N_JOINTS, Side};
+use super::write::part::SplitBy;
+use crate::types::skeleton;
+use crate::types::skeleton::{N_JOINTS, Side};
 use crate::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

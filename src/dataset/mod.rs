@@ -8,47 +8,34 @@
 //! `split` and `shared_sound` decide where a video goes, `verify` checks all of it. Sound and motion meet by time in
 //! `sync`, nowhere else.
 
-pub mod assemble;
 pub mod bones;
-mod card;
+pub mod card;
+pub mod forget;
+pub mod import;
 pub mod index;
 pub mod info;
+pub mod joint_stats;
+pub mod layout;
 pub mod leakage;
-pub mod moments;
-pub mod npy;
-mod outcome;
-pub mod part;
 pub mod read;
 pub mod sample;
-pub mod shard;
 pub mod shared_sound;
 pub mod split;
-mod stage;
 pub mod stats;
-pub mod sync;
 pub mod verify;
-mod verify_sample;
-mod video;
-pub mod wav;
 pub mod write;
 
+pub use layout::CHECKSUMS;
+pub use layout::INDEX;
+pub use layout::INFO;
+pub use layout::LEAKAGE;
+pub use layout::LEDGER;
+pub use layout::README;
+pub use layout::SCHEMA;
+pub use layout::STATS;
+pub use layout::STRIDE_FRAMES;
+pub use layout::WINDOW_FRAMES;
 pub use read::Dataset;
 pub use sample::Sample;
 pub use split::Split;
-pub use stage::ShardStage;
-pub use write::write_dataset;
-
-/// Version of the folder's layout; a reader refuses any other.
-pub const SCHEMA: u32 = 2;
-/// The window of the paper, in frames, and the stride of training windows: what statistics count.
-pub const WINDOW_FRAMES: usize = 64;
-pub const STRIDE_FRAMES: usize = 5;
-
-/// Names of the files that speak of all videos.
-pub const INFO: &str = "info.json";
-pub const STATS: &str = "stats.json";
-pub const INDEX: &str = "index.jsonl";
-pub const LEDGER: &str = "ledger.jsonl";
-pub const LEAKAGE: &str = "leakage.json";
-pub const README: &str = "README.md";
-pub const CHECKSUMS: &str = "checksums.b3";
+pub use write::writer::write_dataset;

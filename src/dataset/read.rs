@@ -3,11 +3,13 @@
 
 use super::index::{SampleRef, Span};
 use super::info::Info;
-use super::npy::{self, Element, Layout};
 use super::sample::{N_KEYPOINTS, Sample};
 use super::split::Split;
 use super::stats::Stats;
-use super::{CHECKSUMS, INDEX, INFO, STATS, wav};
+use super::{CHECKSUMS, INDEX, INFO, STATS};
+use crate::formats::npy_slice;
+use crate::formats::npy_slice::{Element, Layout};
+use crate::formats::wav;
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::{SAMPLE_RATE, Sound};
@@ -125,7 +127,8 @@ impl Dataset {
         let meta = serde_json::from_slice(&self.bytes(sample, sample.json)?)
             .with_context(|| format!("reading {}.json in {}", sample.key, sample.shard))?;
         let frames = 0..sample.n_frames;
-        let pose2d = npy::floats(&self.rows(sample, sample.pose2d, Element::F32, &[N_KEYPOINTS, 3], frames.clone())?);
+        let pose2d =
+            npy_slice::floats(&self.rows(sample, sample.pose2d, Element::F32, &[N_KEYPOINTS, 3], frames.clone())?);
         let pose2d = Array3::from_shape_vec((frames.len(), N_KEYPOINTS, 3), pose2d).context("shaping keypoints")?;
         let n_samples = (sample.wav.size.saturating_sub(wav::HEADER_BYTES as u64) / 2) as usize;
         let sound = self.sound(sample, 0..n_samples)?;
@@ -135,8 +138,9 @@ impl Dataset {
     /// The motion of the frames `frames` of a sample; only these are read, no hash is checked.
     fn motion(&self, sample: &SampleRef, frames: Range<usize>) -> Result<Motion> {
         let n_frames = frames.len();
-        let joints = npy::floats(&self.rows(sample, sample.pose3d, Element::F32, &[N_JOINTS, 3], frames.clone())?);
-        let mask = npy::bools(&self.rows(sample, sample.mask, Element::Bool, &[N_JOINTS], frames)?);
+        let joints =
+            npy_slice::floats(&self.rows(sample, sample.pose3d, Element::F32, &[N_JOINTS, 3], frames.clone())?);
+        let mask = npy_slice::bools(&self.rows(sample, sample.mask, Element::Bool, &[N_JOINTS], frames)?);
         Ok(Motion {
             fps: self.info.fps,
             joints: Array3::from_shape_vec((n_frames, N_JOINTS, 3), joints).context("shaping joints")?,
@@ -164,7 +168,7 @@ impl Dataset {
         frames: Range<usize>,
     ) -> Result<Vec<u8>> {
         let place = || format!("reading an array of {} in {}", sample.key, self.dir.join(&sample.shard).display());
-        let head = Span { offset: span.offset, size: span.size.min(npy::HEADER_BYTES as u64) };
+        let head = Span { offset: span.offset, size: span.size.min(npy_slice::HEADER_BYTES as u64) };
         let layout = Layout::parse(&self.bytes(sample, head)?, span.size, element, row).with_context(place)?;
         ensure!(
             frames.start <= frames.end && frames.end <= layout.n_rows,

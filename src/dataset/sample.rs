@@ -1,10 +1,11 @@
 //! One sample of the dataset: an interval's motion, keypoints, sound and facts, and its members as bytes.
 
-use super::{npy, sync, wav};
+use crate::formats::{npy_slice, wav};
 use crate::types::pose2d::{N_BODY, N_HAND};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::{SAMPLE_RATE, Sound};
+use crate::types::sync;
 use anyhow::{Context, Result, ensure};
 use ndarray::Array3;
 
@@ -54,9 +55,9 @@ impl Sample {
         json.push(b'\n');
         Ok([
             json,
-            npy::write_bool(self.motion.mask.shape(), self.motion.mask.iter()),
-            npy::write_f32(self.pose2d.shape(), self.pose2d.iter()),
-            npy::write_f32(self.motion.joints.shape(), self.motion.joints.iter()),
+            npy_slice::write_bool(self.motion.mask.shape(), self.motion.mask.iter()),
+            npy_slice::write_f32(self.pose2d.shape(), self.pose2d.iter()),
+            npy_slice::write_f32(self.motion.joints.shape(), self.motion.joints.iter()),
             wav::write(&self.sound),
         ])
     }

@@ -2,8 +2,8 @@
 //! name in the configuration, so that adding videos moves none of the others. Videos that share sound (a re-upload, the
 //! same intro) are kept together: the later one goes where the earlier one is.
 
-use super::part::SplitBy;
 use super::shared_sound::Shared;
+use super::write::part::SplitBy;
 pub use crate::types::split::Split;
 use std::collections::BTreeMap;
 

@@ -1,8 +1,8 @@
 //! `stats.json`: what the numbers are like. Means and deviations come from the training split alone, from joints that
 //! were seen; hours, windows and refused seconds are of everything.
 
-use super::moments::Moments;
-use super::part::Part;
+use super::joint_stats::Moments;
+use super::write::part::Part;
 use super::{STRIDE_FRAMES, WINDOW_FRAMES};
 use crate::types::interval::Interval;
 use crate::types::skeleton::N_JOINTS;
@@ -62,7 +62,7 @@ impl Stats {
     }
 
     /// Whether every table has one row a joint.
-    pub(super) fn is_whole(&self) -> bool {
+    pub(crate) fn is_whole(&self) -> bool {
         self.n_seen.len() == N_JOINTS
             && [&self.mean, &self.std, &self.min, &self.max].iter().all(|t| t.len() == N_JOINTS)
     }

@@ -9,26 +9,8 @@
 //! dataset) -> `train::gan` -> `learned`, which holds a trained speaker against the rule and against `listener`
 //! (`traces` draws it).
 
-/// Version of the generator. Version 2 fixed the figure's posture (commit 93b1773); the lifter trained afterwards, but
-/// its training was changed once when this figure's error was known, so the error is no blind test.
-pub const GENERATOR: &str = "synthetic speaker, version 2 (commit 93b1773); the lifter's training was changed once after \
-     its error here was seen (models/body_lifter.md)";
-
-pub mod camera;
-pub mod disturbed;
-pub mod figure;
-pub mod folder;
-pub mod gesture;
-pub mod learned;
-pub mod listener;
-pub mod measure;
-pub mod paint;
-pub mod palette;
-pub mod ridge;
+pub mod check;
+pub mod drawn;
 pub mod rule;
-pub mod scene;
-pub mod sheet;
-pub mod speaker;
-pub mod speech;
-pub mod traces;
-pub mod truth;
+
+pub use drawn::generator_version::GENERATOR;

@@ -3,8 +3,9 @@
 
 use super::convention;
 use super::definition::Metric;
-use super::interval::Pair;
-use super::sums::{self, Blocks, Costly};
+use super::pair::Pair;
+use super::sums;
+use super::sums::{Blocks, Costly};
 use crate::types::time::FrameRate;
 use anyhow::ensure;
 use ndarray::{Array2, ArrayView2};
@@ -13,7 +14,7 @@ use serde::Serialize;
 
 pub use super::convention::Convention;
 pub use super::definition::{Better, Definition};
-pub use super::interval::Interval;
+pub use super::pair::Interval;
 pub use super::sums::Sums;
 
 /// Numbers that stand before the cheap sums: made joints that are not finite, frames of another rate.

@@ -11,12 +11,17 @@
 //! | `trimodal` (Yoon et al. 2020; beats: its descendants) | MAJE, acceleration error, beat consistency | the first 4 frames, given as a seed, are left out; accelerations by coordinate and frame, without the frame rate; beats where the angle between bones changes slowly. Their Frechet distance needs their encoder (in which `LeakyReLU(True)` means slope 1, so that it is linear there), and is not given |
 //! | `aist` (Li et al. 2021) | beat alignment | mean over the beats of the MOTION; an interval without any scores 0; every interval weighs the same |
 
+use super::beat::{aist, angles, consistency};
+use super::body_part::Part;
 use super::catalogue::Settings;
 use super::definition::Metric;
-use super::part::Part;
-use super::pck::Axes;
-use super::{acceleration_error, beat_aist, beat_angles, beats, bones, cca, derivatives, diversity, frechet_sums};
-use super::{hellinger, l1, mpjpe, pairwise, pck, procrustes_error};
+use super::distribution::pairwise;
+use super::distribution::{diversity, frechet_metrics};
+use super::movement::hellinger;
+use super::movement::{bone_change, cca, derivatives};
+use super::position::acceleration;
+use super::position::pck::Axes;
+use super::position::{l1, mpjpe, p_mpjpe, pck};
 use serde::{Deserialize, Serialize};
 
 /// Whose definitions.
@@ -52,7 +57,7 @@ impl Convention {
 }
 
 /// The metrics of the settings' convention.
-pub(super) fn metrics(settings: &Settings) -> Vec<Box<dyn Metric>> {
+pub(crate) fn metrics(settings: &Settings) -> Vec<Box<dyn Metric>> {
     let fps = settings.fps.per_sec();
     match settings.convention {
         Convention::Orator => own(settings),
@@ -63,11 +68,11 @@ pub(super) fn metrics(settings: &Settings) -> Vec<Box<dyn Metric>> {
             hellinger::genea(),
             cca::metric(Part::WithNeck),
         ],
-        Convention::Emage => vec![diversity::metric(Part::All), beats::emage(fps)],
+        Convention::Emage => vec![diversity::metric(Part::All), consistency::emage(fps)],
         Convention::Trimodal => {
-            vec![acceleration_error::maje(fps), acceleration_error::by_coordinate(), beat_angles::metric(fps)]
+            vec![acceleration::maje(fps), acceleration::by_coordinate(), angles::metric(fps)]
         }
-        Convention::Aist => vec![beat_aist::metric(fps)],
+        Convention::Aist => vec![aist::metric(fps)],
     }
 }
 
@@ -83,20 +88,20 @@ fn own(settings: &Settings) -> Vec<Box<dyn Metric>> {
     }
     all.extend(measured.iter().map(|part| l1::metric(*part)));
     all.extend(measured.iter().map(|part| mpjpe::metric(*part)));
-    all.extend(parts.iter().map(|part| procrustes_error::metric(*part)));
-    all.extend(measured.iter().map(|part| acceleration_error::metric(*part)));
+    all.extend(parts.iter().map(|part| p_mpjpe::metric(*part)));
+    all.extend(measured.iter().map(|part| acceleration::metric(*part)));
     for order in derivatives::Order::ALL {
         all.extend(measured.iter().map(|part| derivatives::metric(order, *part)));
     }
     all.extend(parts.iter().map(|part| hellinger::metric(*part)));
     all.extend(parts.iter().map(|part| diversity::metric(*part)));
     all.extend(parts.iter().map(|part| pairwise::metric(*part)));
-    all.push(bones::metric());
-    all.push(beats::metric(settings.fps.per_sec()));
-    all.push(frechet_sums::poses(Part::All));
-    all.push(frechet_sums::poses(Part::Body));
-    all.push(frechet_sums::basis());
-    all.push(frechet_sums::embedding());
+    all.push(bone_change::metric());
+    all.push(consistency::metric(settings.fps.per_sec()));
+    all.push(frechet_metrics::poses(Part::All));
+    all.push(frechet_metrics::poses(Part::Body));
+    all.push(frechet_metrics::basis());
+    all.push(frechet_metrics::embedding());
     all.push(cca::metric(Part::Body));
     all
 }

@@ -1,7 +1,7 @@
 //! What a number means: its name, its part of the body, its formula and every parameter, with a hash over all of it.
 //! Values under different hashes are different things. And what every metric is: sums that add, and numbers from them.
 
-use super::interval::Pair;
+use super::pair::Pair;
 use super::sums::Blocks;
 use serde::Serialize;
 use serde_json::Value;
@@ -77,7 +77,7 @@ fn canonical(value: &Value) -> String {
 }
 
 /// A family of numbers that share their sums.
-pub(super) trait Metric: Send + Sync {
+pub(crate) trait Metric: Send + Sync {
     /// What `values` gives, in order.
     fn definitions(&self) -> Vec<Definition>;
     /// How many sums it takes.

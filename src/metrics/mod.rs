@@ -3,32 +3,15 @@
 //! with what is not said here. `catalogue` is the way in: it lists all figures with their definitions, measures intervals and
 //! reads values off their sums.
 
-mod acceleration_error;
-pub mod basis;
-mod beat_aist;
-mod beat_angles;
-pub mod beats;
-mod bones;
+pub mod beat;
+pub mod body_part;
 pub mod catalogue;
-mod cca;
 pub mod convention;
-mod definition;
-mod derivatives;
-mod diversity;
-pub mod embedding;
-pub mod energy;
-pub mod fixed_rate;
-pub mod frechet;
-mod frechet_sums;
-mod hellinger;
-mod interval;
-mod l1;
-mod mean;
-mod moments;
-mod mpjpe;
-mod pairwise;
-pub mod part;
-pub mod pck;
-mod procrustes_error;
-pub mod spectrum;
-mod sums;
+pub mod definition;
+pub mod distribution;
+pub mod movement;
+pub mod pair;
+pub mod per_frame;
+pub mod position;
+pub mod space;
+pub mod sums;

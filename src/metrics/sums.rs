@@ -8,20 +8,20 @@ use std::ops::{AddAssign, Range};
 /// they are large and fewer draws are taken of them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sums {
-    pub(super) cheap: Vec<f64>,
-    pub(super) costly: Costly,
+    pub(crate) cheap: Vec<f64>,
+    pub(crate) costly: Costly,
 }
 
 /// Large sums: of one block in f32 (half the memory; the rounding of 6e-8 is nothing beside drawing blocks), of
 /// anything added in f64.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Costly {
+pub(crate) enum Costly {
     Block(Vec<f32>),
     Added(Vec<f64>),
 }
 
 /// Sums of one metric over the blocks of an interval.
-pub(super) struct Blocks {
+pub(crate) struct Blocks {
     n_frames: usize,
     width: usize,
     /// [n_blocks x width].
@@ -117,13 +117,13 @@ impl Blocks {
 
 /// One row of cheap sums for each draw [n_draws, n_cheap]. `counts` [n_draws, n_blocks] says how often a block was
 /// drawn.
-pub(super) fn draw_cheap(blocks: &[Sums], counts: ArrayView2<f64>) -> Array2<f64> {
+pub(crate) fn draw_cheap(blocks: &[Sums], counts: ArrayView2<f64>) -> Array2<f64> {
     let width = blocks.iter().map(|sums| sums.cheap.len()).max().unwrap_or(0);
     drawn(width, blocks, counts, |sums, range| Box::new(sums.cheap.get(range).unwrap_or_default().iter().copied()))
 }
 
 /// The same of the costly sums.
-pub(super) fn draw_costly(blocks: &[Sums], counts: ArrayView2<f64>) -> Array2<f64> {
+pub(crate) fn draw_costly(blocks: &[Sums], counts: ArrayView2<f64>) -> Array2<f64> {
     let width = blocks.iter().map(|sums| sums.costly.len()).max().unwrap_or(0);
     drawn(width, blocks, counts, |sums, range| sums.costly.part(range))
 }

@@ -1,7 +1,7 @@
 //! Skeletons of bones with fixed offsets, and forward kinematics: local rotations to joint positions, in f64.
 
-use super::rotation::Rotation;
-use super::vec3::{Vec3, add};
+use crate::math::rotation::Rotation;
+use crate::math::vec3::{Vec3, add};
 
 /// A joint of a skeleton.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,8 +64,8 @@ impl Skeleton {
 
 #[cfg(test)]
 mod tests {
-    use super::super::vec3::{norm, sub};
     use super::*;
+    use crate::math::vec3::{norm, sub};
 
     #[test]
     fn a_bent_arm_stands_where_it_should() {

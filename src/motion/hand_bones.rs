@@ -1,8 +1,9 @@
 //! A mean human hand: lengths of its bones, how the palm fans out, and the hand made of them at given joint angles.
 //! What angles hands take is `train::hand_shape`'s.
 
-use super::hand_view::Hand;
-use super::vec3::{self, Vec3};
+use super::view::hand::Hand;
+use crate::math::vec3;
+use crate::math::vec3::Vec3;
 use crate::types::pose2d::N_HAND;
 
 /// Bones of the thumb, index, middle, ring and little finger in mm: from the wrist to the first joint, then the

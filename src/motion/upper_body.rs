@@ -1,6 +1,7 @@
 //! The nine points of the upper body that the body lifter sees, and the size they are given.
 
-use super::vec3::{self, Vec3};
+use crate::math::vec3;
+use crate::math::vec3::Vec3;
 use crate::types::pose2d::coco;
 use crate::types::skeleton;
 

@@ -7,9 +7,9 @@
 //! stretch and only the last layers window by window.
 
 use super::Mode;
-use super::batch_norm::BatchNorm;
-use super::conv1d::Conv1d;
-use super::linear::Linear;
+use super::ops::batch_norm::BatchNorm;
+use super::ops::conv1d::Conv1d;
+use super::ops::linear::Linear;
 use super::params::Params;
 use candle_core::{Device, Result, Tensor, Var};
 use ndarray::{Array2, ArrayView2};

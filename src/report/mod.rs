@@ -6,30 +6,13 @@
 //! And what stands on the page of a training: `training`, of `training_charts`, `training_strip`, `training_picture`; and on that
 //! of an evaluation: `evaluation`, of `evaluation_table`, `evaluation_charts`, `evaluation_player`.
 
-mod distributions;
 pub mod evaluation;
-mod evaluation_charts;
-mod evaluation_player;
-mod evaluation_table;
-mod gallery;
-mod gather;
-mod lines;
-mod motion;
-mod movement;
-mod pictures;
-mod reasons;
-mod sliders;
-mod spread;
-mod summary;
-mod thresholds;
+pub mod html;
+pub mod sheet;
 pub mod training;
-mod training_charts;
-mod training_picture;
-pub mod training_strip;
-mod video;
-mod what_if;
-mod whole;
-mod worst;
+pub mod videos;
 
-pub use summary::Sums;
-pub use whole::{Made, Wanted, make};
+pub use videos::page::Made;
+pub use videos::page::Wanted;
+pub use videos::page::make;
+pub use videos::summary::Sums;

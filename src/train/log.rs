@@ -2,7 +2,7 @@
 //! file for TensorBoard. A resumed training drops the lines that its checkpoint has not seen, so that both files are
 //! those of an undisturbed training.
 
-use super::events;
+use crate::formats::tfevents;
 use crate::stage::workdir;
 use anyhow::{Context, Result};
 use serde_json::Value;
@@ -23,9 +23,9 @@ impl Log {
     /// Opens the log in `folder`, made if missing, with the lines up to `step`.
     pub fn open(folder: &Path, step: usize) -> Result<Self> {
         let mut log = Self::lines_alone(&folder.join(FILE), step)?;
-        let records = read(folder)?.iter().filter_map(events::record).collect();
-        let start = [vec![events::first()], records].concat().concat();
-        log.events = Some(Growing::open(&folder.join(events::FILE), &start)?);
+        let records = read(folder)?.iter().filter_map(tfevents::record).collect();
+        let start = [vec![tfevents::first()], records].concat().concat();
+        log.events = Some(Growing::open(&folder.join(tfevents::FILE), &start)?);
         Ok(log)
     }
 
@@ -42,7 +42,7 @@ impl Log {
         let text = line.to_string();
         self.lines.add(format!("{text}\n").as_bytes())?;
         // From the text, as on resuming: a number read back may differ in its last digit.
-        match (&mut self.events, parsed(&text).as_ref().and_then(events::record)) {
+        match (&mut self.events, parsed(&text).as_ref().and_then(tfevents::record)) {
             (Some(events), Some(record)) => events.add(&record),
             _ => Ok(()),
         }
@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(text, expected.as_bytes());
         let mut undisturbed = Log::open(other.path(), 0)?;
         read(folder.path())?.iter().try_for_each(|line| undisturbed.write(line))?;
-        assert_eq!(bytes(folder.path(), events::FILE)?, bytes(other.path(), events::FILE)?);
+        assert_eq!(bytes(folder.path(), tfevents::FILE)?, bytes(other.path(), tfevents::FILE)?);
         Ok(())
     }
 }

@@ -8,4 +8,5 @@ pub mod pose3d;
 pub mod skeleton;
 pub mod sound;
 pub mod split;
+pub mod sync;
 pub mod time;

@@ -3,8 +3,8 @@
 
 use super::field::{Form, Limb, around, joined};
 use super::stance::{Stance, Trunk};
-use crate::animate::figure::{Arm, Figure};
-use crate::motion::vec3::{Vec3, add, dot, norm, scale, sub, unit};
+use crate::animate::rig::rig::{Arm, Figure};
+use crate::math::vec3::{Vec3, add, dot, norm, scale, sub, unit};
 
 /// Half the distance of the shoulders the numbers below are for.
 const SHOULDERS: f64 = 16.5;

@@ -1,7 +1,7 @@
 //! Forms as signed distance fields (cm, negative inside): tapered limbs grown together and cut. What a body is made of
 //! is told elsewhere.
 
-use crate::motion::vec3::{Vec3, add, dot, norm, scale, sub};
+use crate::math::vec3::{Vec3, add, dot, norm, scale, sub};
 
 /// A rounded limb between two points with a radius at each.
 #[derive(Clone, Copy, Debug)]

@@ -3,8 +3,8 @@
 
 use super::field::{Form, Limb, around, joined};
 use super::stance::{Stance, finger_joints};
-use crate::animate::figure::Figure;
-use crate::motion::vec3::{Vec3, add, cross, norm, scale, sub, unit};
+use crate::animate::rig::rig::Figure;
+use crate::math::vec3::{Vec3, add, cross, norm, scale, sub, unit};
 
 /// Mean length of the four metacarpals of the hand the numbers are for, cm.
 const METACARPAL: f64 = 7.5;

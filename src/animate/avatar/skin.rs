@@ -4,7 +4,7 @@
 use super::body::Body;
 use super::stance::finger_joints;
 use super::surface::Surface;
-use crate::motion::vec3::{Vec3, dot, norm, sub};
+use crate::math::vec3::{Vec3, dot, norm, sub};
 
 /// Joints of a vertex with their weights, which sum to 1.
 pub type Weights = [(usize, f64); 4];

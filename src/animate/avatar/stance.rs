@@ -2,9 +2,9 @@
 //! the middle of what speakers do, so that skinning bends the form little either way; the T-pose gets what the inverse
 //! of the skinning gives it.
 
-use crate::animate::figure::Figure;
-use crate::motion::rotation::Rotation;
-use crate::motion::vec3::{Vec3, add, scale, sub, unit};
+use crate::animate::rig::rig::Figure;
+use crate::math::rotation::Rotation;
+use crate::math::vec3::{Vec3, add, scale, sub, unit};
 use crate::types::skeleton::{L_HAND, R_HAND};
 
 /// Degrees: the arm below the level, the elbow's bend, a finger's bends from knuckle to tip.

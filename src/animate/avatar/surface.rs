@@ -3,7 +3,7 @@
 //! evenly over it. Its normals are
 //! the field's own.
 
-use crate::motion::vec3::{Vec3, add, dot, norm, scale, sub, unit};
+use crate::math::vec3::{Vec3, add, dot, norm, scale, sub, unit};
 use rayon::prelude::*;
 
 /// Cells of a block that is passed over at once where the surface is far.
@@ -105,7 +105,7 @@ impl Surface {
     #[cfg(test)]
     pub fn volume6(&self) -> f64 {
         let at = |i: u32| self.points[i as usize];
-        self.triangles.iter().map(|&[a, b, c]| dot(at(a), crate::motion::vec3::cross(at(b), at(c)))).sum()
+        self.triangles.iter().map(|&[a, b, c]| dot(at(a), crate::math::vec3::cross(at(b), at(c)))).sum()
     }
 }
 
@@ -213,8 +213,8 @@ impl Grid {
 
 #[cfg(test)]
 mod tests {
-    use super::super::field::Limb;
     use super::*;
+    use crate::animate::avatar::field::Limb;
 
     #[test]
     fn a_ball_is_round_closed_and_faces_outwards() {

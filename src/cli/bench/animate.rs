@@ -1,13 +1,15 @@
 //! `orator bench animate`.
 
 use super::median;
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use anyhow::{Result, ensure};
 use orator::animate::avatar::Avatar;
-use orator::animate::names::Names;
-use orator::animate::{Options, glb_scene, perform};
-use orator::demo::rule::Gestures;
-use orator::demo::speech::Speech;
+use orator::animate::export::glb_scene;
+use orator::animate::rig::names::Names;
+use orator::animate::{Options, perform};
+use orator::demo::drawn::speech::Speech;
+use orator::demo::rule::rule::Gestures;
 use orator::stage::progress::Progress as _;
 use orator::types::time::FrameRate;
 use rand::SeedableRng;

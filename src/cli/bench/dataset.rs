@@ -1,19 +1,22 @@
 //! `orator bench dataset`.
 
 use super::median;
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3};
 use orator::config;
-use orator::dataset::part::{Source, SplitBy};
-use orator::dataset::write::DatasetWriter;
-use orator::dataset::{Dataset, Sample, Split, info::About, sync};
+use orator::dataset::info::About;
+use orator::dataset::write::part::{Source, SplitBy};
+use orator::dataset::write::writer::DatasetWriter;
+use orator::dataset::{Dataset, Sample, Split};
 use orator::stage::progress::{Progress, Silent, Task};
-use orator::train::examples::Examples;
-use orator::train::gan;
+use orator::train::gan::train;
+use orator::train::gan::windows::Examples;
 use orator::types::pose3d::Motion;
 use orator::types::skeleton::N_JOINTS;
 use orator::types::sound::{SAMPLE_RATE, Sound};
+use orator::types::sync;
 use orator::types::time::FrameRate;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -209,7 +212,7 @@ fn loader(args: &Args, dir: &Path, out: &Path) -> Result<Loaded> {
     };
     let dataset = Dataset::open(dir)?;
     let start = Instant::now();
-    let examples = Examples::load(&dataset, Split::Train, &gan::normalisation(&dataset)?, 64, 5)?;
+    let examples = Examples::load(&dataset, Split::Train, &train::normalisation(&dataset)?, 64, 5)?;
     let load_secs = start.elapsed().as_secs_f64();
     let mut rng = ChaCha8Rng::seed_from_u64(1337);
     let (mut n_loaded, start) = (0, Instant::now());
@@ -222,7 +225,7 @@ fn loader(args: &Args, dir: &Path, out: &Path) -> Result<Loaded> {
     drop(examples);
 
     let steps = Steps::default();
-    gan::train(&dataset, &settings, out, &steps)?;
+    train::train(&dataset, &settings, out, &steps)?;
     let at = steps.at.lock().map(|at| at.clone()).unwrap_or_default();
     let gaps = at.windows(2).map(|pair| (pair[1] - pair[0]).as_secs_f64()).collect();
     Ok(Loaded { n_windows, load_secs, windows_a_second, trained_a_second: settings.batch as f64 / median(gaps) })

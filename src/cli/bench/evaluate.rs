@@ -1,15 +1,19 @@
 //! `orator bench evaluate`.
 
 use super::child;
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use anyhow::{Result, ensure};
 use ndarray::{Array2, Array3};
-use orator::demo::speaker::{Clip as Rule, RULE};
-use orator::evaluate::baselines::{self, Predictor};
-use orator::evaluate::clips::{Clip, Clips, Voice, compared, pcm};
-use orator::evaluate::{hearing, result, table, text};
+use orator::demo::rule::dataset::{Clip as Rule, RULE};
+use orator::evaluate::baseline::baselines;
+use orator::evaluate::baseline::baselines::Predictor;
+use orator::evaluate::clips::clips::{Clip, Clips, Voice, compared, pcm};
+use orator::evaluate::clips::sound_features;
+use orator::evaluate::table::{result, table};
+use orator::evaluate::verdict::text;
 use orator::metrics::catalogue::Settings;
-use orator::report::evaluation;
+use orator::report::evaluation::page;
 use orator::stage::progress::{Progress as _, Task};
 use orator::types::sound::Sound;
 use orator::types::split::Split;
@@ -120,7 +124,7 @@ fn evaluate(speaker: Vec<Unheard>, watch: &Stopwatch) -> Result<(table::Table, S
     watch.detail("listening");
     let clip = |(number, unheard): (usize, Unheard)| {
         let Unheard { real, mask, mut made, sound } = unheard;
-        let heard = Some(hearing::of_samples(&sound.samples, FPS, real.shape()[0]));
+        let heard = Some(sound_features::of_samples(&sound.samples, FPS, real.shape()[0]));
         let (mask, _) = compared(&real, &mask, &mut made);
         let voice = Some(Voice::Kept(sound.samples.into_iter().map(pcm).collect()));
         Clip { name: format!("clip {number}"), real, made, mask, heard, voice }
@@ -135,6 +139,6 @@ fn evaluate(speaker: Vec<Unheard>, watch: &Stopwatch) -> Result<(table::Table, S
     let length = text::text(&table, true).len() + result::json(&table).to_string().len();
     ensure!(length > 0, "there is nothing to say");
     watch.detail("the page");
-    let html = evaluation::html(&table, &clips, "bench")?;
+    let html = page::html(&table, &clips, "bench")?;
     Ok((table, html))
 }

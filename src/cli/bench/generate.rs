@@ -1,16 +1,17 @@
 //! `orator bench generate`.
 
 use super::{child, median};
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use anyhow::{Result, ensure};
-use orator::demo::speech::Speech;
+use orator::demo::drawn::speech::Speech;
 use orator::generate::Speaker;
+use orator::generate::model::{Facts, TrainedSpeaker};
+use orator::generate::normalisation::{N_NUMBERS, Normalisation};
+use orator::generate::representation::Representation;
+use orator::nn::gan::generator::{Config, Generator, Preset};
 use orator::nn::params::Params;
-use orator::nn::unet::{Config, Generator, Preset};
 use orator::stage::progress::Progress as _;
-use orator::train::poses::{N_NUMBERS, Normalisation};
-use orator::train::representation::Representation;
-use orator::train::speaker::{Facts, TrainedSpeaker};
 use orator::types::skeleton::{N_BONES, N_JOINTS};
 use orator::types::sound::Sound;
 use orator::types::time::FrameRate;

@@ -1,17 +1,20 @@
 //! `orator bench lift`.
 
 use super::median;
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use anyhow::{Result, ensure};
 use candle_core::{DType, Device, Tensor};
 use ndarray::{Array3, s};
 use orator::config;
-use orator::lift::{Lifter, weights};
 use orator::motion::upper_body::{COCO, L_WRIST, R_WRIST};
-use orator::nn::{Mode, body_lifter::BodyLifter, hand_lifter::HandLifter};
+use orator::nn::Mode;
+use orator::nn::lifter::body::BodyLifter;
+use orator::nn::lifter::hand::HandLifter;
+use orator::pipeline::lift::{Lifter, weights};
 use orator::stage::progress::Progress;
-use orator::train::body_scene::{Filming, Scene};
-use orator::train::hand_shape;
+use orator::train::scene::body::{Filming, Scene};
+use orator::train::scene::hand_shape;
 use orator::types::pose2d::Keypoints;
 use orator::types::time::FrameRate;
 use rand::SeedableRng;

@@ -2,16 +2,18 @@
 //! network, the same batch and the same optimiser; and how far apart the two networks' outputs are.
 
 use super::reference::Reference;
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
-use orator::motion::body_view::{N_IN, N_OUT};
+use orator::formats::checkpoint::Contents;
+use orator::motion::view::body::{N_IN, N_OUT};
 use orator::nn::Mode;
+use orator::nn::lifter::temporal::{Config, TemporalLifter};
 use orator::nn::params::Params;
-use orator::nn::temporal_lifter::{Config, TemporalLifter};
 use orator::stage::progress::{Progress, Silent};
-use orator::train::checkpoint::Contents;
-use orator::train::lifter::{self, Lesson, Schedule};
+use orator::train::supervised;
+use orator::train::supervised::{Lesson, Schedule};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
@@ -115,7 +117,7 @@ impl Fixed {
         let schedule =
             Schedule { steps, batch, learning_rate: 1e-3, seed: 0, checkpoint_every: usize::MAX, started_from: None };
         let start = Instant::now();
-        lifter::train(self, &schedule, scratch, &Silent)?;
+        supervised::train(self, &schedule, scratch, &Silent)?;
         Ok(start.elapsed().as_secs_f64())
     }
 }

@@ -1,12 +1,13 @@
 //! `orator bench pose2d`.
 
 use super::median;
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail, ensure};
 use orator::config::Settings;
-use orator::media::frames::FrameReader;
-use orator::onnx::{Manifest, Runtime};
-use orator::pose2d::Chain;
+use orator::external::ffmpeg::frames::FrameReader;
+use orator::external::onnx::{Manifest, Runtime};
+use orator::pipeline::pose2d::Chain;
 use orator::stage::progress::Progress;
 use orator::types::image::Image;
 use orator::types::time::FrameRate;

@@ -2,7 +2,7 @@
 //! command.
 
 use anyhow::{Context, Result, bail};
-use orator::train::checkpoint::Contents;
+use orator::formats::checkpoint::Contents;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;

@@ -2,7 +2,8 @@
 
 use super::child::{Child, measure};
 use super::median;
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
 use orator::config;
 use orator::stage::progress::Progress;

@@ -1,12 +1,14 @@
 //! `orator bench scale`.
 
 use super::child::{Child, measure};
-use crate::cli::road::Step;
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::Outcome;
+use crate::cli::pipeline::steps::Step;
+use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
 use orator::config;
-use orator::demo::folder::{self, Plan};
-use orator::media::audio;
+use orator::demo::drawn::folder;
+use orator::demo::drawn::folder::Plan;
+use orator::external::ffmpeg::audio;
 use orator::stage::Unit;
 use orator::stage::fingerprint::{Fingerprint, HashCache};
 use orator::stage::progress::{Progress, Silent};

@@ -1,12 +1,14 @@
 //! `orator bench spaces`.
 
 use super::median;
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
 use ndarray::{ArrayView3, Axis, concatenate};
 use orator::dataset::Dataset;
-use orator::demo::disturbed::{self, Disturbance};
-use orator::metrics::{basis, embedding};
+use orator::demo::check::disturbed;
+use orator::demo::check::disturbed::Disturbance;
+use orator::metrics::space::{basis, embedding};
 use orator::stage::progress::Progress as _;
 use orator::types::pose3d::Motion;
 use orator::types::split::Split;

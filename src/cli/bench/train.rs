@@ -3,18 +3,20 @@
 
 use super::child::high_water_mib;
 use super::reference::Reference;
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor, Var};
-use orator::nn::discriminator::{Discriminator, motion};
+use orator::formats::checkpoint::Contents;
+use orator::nn::cpu::thread_team::awake;
+use orator::nn::gan::discriminator::{Discriminator, motion};
+use orator::nn::gan::generator::{Config, Generator, Preset};
+use orator::nn::ops::resize;
 use orator::nn::params::Params;
-use orator::nn::resize;
-use orator::nn::team::awake;
-use orator::nn::unet::{Config, Generator, Preset};
 use orator::stage::progress::Progress;
-use orator::train::adam::{self, Adam};
-use orator::train::checkpoint::Contents;
-use orator::train::losses::Adversarial;
+use orator::train::gan::losses::Adversarial;
+use orator::train::optim::adam;
+use orator::train::optim::adam::Adam;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};

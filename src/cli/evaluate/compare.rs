@@ -1,9 +1,10 @@
 //! `orator evaluate compare`.
 
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use anyhow::{Result, bail};
-use orator::evaluate::compare;
-use orator::evaluate::result::Stored;
+use orator::evaluate::table::compare;
+use orator::evaluate::table::result::Stored;
 use serde_json::json;
 use std::path::PathBuf;
 

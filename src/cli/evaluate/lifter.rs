@@ -1,10 +1,12 @@
 //! `orator evaluate lifter`.
 
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
 use orator::config;
-use orator::evaluate::{bodies, hands};
-use orator::motion::{finger_files, mocap};
+use orator::evaluate::lifter::{bodies, hands};
+use orator::mocap::fingers::files;
+use orator::mocap::upper_body;
 use std::path::PathBuf;
 
 /// Print the errors of a lifter on captured motion seen by random cameras, beside those of trivial methods.
@@ -52,11 +54,11 @@ fn body(args: Args, ui: &Ui) -> Result<Outcome> {
         hand_weights: args.hand_weights.unwrap_or_default(),
         ..Default::default()
     };
-    let takes = mocap::read_all(&args.mocap).context("reading --mocap")?;
+    let takes = upper_body::read_all(&args.mocap).context("reading --mocap")?;
     let sets = if args.takes.is_empty() {
         vec![("all takes".to_owned(), takes)]
     } else {
-        mocap::divide(takes, &args.takes)?.0
+        upper_body::divide(takes, &args.takes)?.0
     };
     let rows = bodies::table(&bodies::Lifters::new(&settings)?, &sets, args.scenes)?;
     ui.summary(&bodies::text(&rows), None, serde_json::json!({ "body": rows }));
@@ -66,7 +68,7 @@ fn body(args: Args, ui: &Ui) -> Result<Outcome> {
 fn hands(args: Args, ui: &Ui) -> Result<Outcome> {
     let rows = hands::evaluate(
         &*hands::lifter_of(&args.hand_weights.unwrap_or_default())?,
-        &finger_files::read_all(&args.mocap)?,
+        &files::read_all(&args.mocap)?,
         hands::MEASURED,
         1,
     )?;

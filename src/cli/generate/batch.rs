@@ -1,14 +1,17 @@
 //! Many sounds to motions in one call. Each motion has a record (`.made/NAME.record.json` below the folder of outputs) of what it
 //! was made from, written last, so that the same call again makes only what is missing or changed.
 
-use super::table::{self, Row};
-use super::{Args, checkpoint_at, made};
-use crate::cli::{Outcome, ui::Ui};
+use super::made;
+use super::table;
+use super::table::Row;
+use super::verb::{Args, checkpoint_at};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, ensure};
 use orator::animate::Options;
-use orator::animate::file::Format;
+use orator::animate::export::file::Format;
+use orator::external::ffmpeg::probe;
 use orator::generate::Speaker;
-use orator::media::probe;
 use orator::stage::fingerprint::{Fingerprint, HashCache, hash_file};
 use orator::stage::progress::{Progress as _, Silent};
 use orator::stage::record::{Output, Record};

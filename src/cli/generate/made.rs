@@ -2,12 +2,13 @@
 //! holds the sound, reads it whole.
 
 use anyhow::{Context as _, Result, bail, ensure};
-use orator::animate::file::{Format, Sources};
+use orator::animate::export::file::{Format, Sources};
 use orator::animate::{Options, perform};
 use orator::audio::mel;
+use orator::external::ffmpeg::sound_stream;
+use orator::external::ffmpeg::sound_stream::SoundStream;
+use orator::external::ffmpeg::{audio, probe};
 use orator::generate::Speaker;
-use orator::media::sound_stream::{self, SoundStream};
-use orator::media::{audio, probe};
 use orator::stage::progress::Progress;
 use orator::types::sound::SAMPLE_RATE;
 use std::path::{Path, PathBuf};

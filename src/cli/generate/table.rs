@@ -2,7 +2,7 @@
 //! semicolons and tabs are understood too).
 
 use anyhow::{Context, Result, bail, ensure};
-use orator::animate::file::Format;
+use orator::animate::export::file::Format;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 

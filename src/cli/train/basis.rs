@@ -1,9 +1,10 @@
 //! `orator train basis`.
 
 use super::corpus;
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use orator::stage::progress::Progress as _;
-use orator::train::motion_basis;
+use orator::train::space::basis;
 use std::path::PathBuf;
 
 /// Find the fixed basis in which `evaluate` compares windows of motion.
@@ -23,7 +24,7 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
     let corpus = corpus::gather(&args.corpus, ui)?;
     let fitted = {
         let _task = ui.begin("principal components", 0);
-        motion_basis::fit(&corpus, args.corpus.seed, &args.out)?
+        basis::fit(&corpus, args.corpus.seed, &args.out)?
     };
     let mut text = format!(
         "{} written: {} windows, fingers weigh {:.2}\nvariance that the 64 directions hold: {:.1} %",

@@ -2,12 +2,14 @@
 
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
-use orator::demo::figure::Figure;
-use orator::demo::{gesture, speaker, speech::Speech};
-use orator::motion::mocap;
-use orator::motion::vec3;
+use orator::demo::drawn::figure::Figure;
+use orator::demo::drawn::gesture;
+use orator::demo::drawn::speech::Speech;
+use orator::demo::rule::dataset;
+use orator::math::vec3;
+use orator::mocap::upper_body;
 use orator::stage::progress::Progress as _;
-use orator::train::motion_corpus::Corpus;
+use orator::train::space::corpus::Corpus;
 use orator::types::pose3d::Motion;
 use orator::types::skeleton::{N_JOINTS, NECK};
 use orator::types::time::FrameRate;
@@ -37,15 +39,15 @@ pub struct MotionArgs {
 
 pub fn gather(args: &MotionArgs, ui: &Ui) -> Result<Corpus> {
     let task = ui.begin("gathering motion", 0);
-    let takes = mocap::read_all(&args.mocap).context("reading --mocap")?;
-    let (held_out, mut takes) = mocap::divide(takes, &args.hold_out)?;
+    let takes = upper_body::read_all(&args.mocap).context("reading --mocap")?;
+    let (held_out, mut takes) = upper_body::divide(takes, &args.hold_out)?;
     ensure!(!takes.is_empty(), "--hold-out leaves nothing to learn from");
     takes.sort_by(|a, b| a.name.cmp(&b.name));
     task.detail("speakers made by rule");
     let mut speakers = Vec::new();
     for seed in 0..CLIPS + HELD_OUT {
         let number = args.seed.wrapping_add(seed as u64);
-        let clip = speaker::clips(CLIP_SECS / 3600.0, number)?.into_iter().next().context("no clip of the rule")?;
+        let clip = dataset::clips(CLIP_SECS / 3600.0, number)?.into_iter().next().context("no clip of the rule")?;
         speakers.push((format!("speaker {number}"), clip.motion()));
         speakers.push((format!("gestures {number}"), gestures(number)));
     }

@@ -1,10 +1,11 @@
 //! `orator train embedding`.
 
 use super::corpus;
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use anyhow::ensure;
-use orator::train::embedding::EmbeddingLesson;
-use orator::train::lifter::{Schedule, start_from, train};
+use orator::train::space::embedding::EmbeddingLesson;
+use orator::train::supervised::{Schedule, start_from, train};
 use std::path::PathBuf;
 
 /// Train the encoder in whose space `evaluate` measures the Frechet gesture distance.

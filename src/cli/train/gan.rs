@@ -1,18 +1,20 @@
 //! `orator train gan`.
 
+use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail};
 use orator::config::Config;
 use orator::dataset::{Dataset, Split};
-use orator::evaluate::held_out::{self, HeldOut};
-use orator::evaluate::predictors;
+use orator::evaluate::baseline::predictor;
+use orator::evaluate::clips::held_out;
+use orator::evaluate::clips::held_out::HeldOut;
 use orator::generate::Speaker;
-use orator::report::training;
-use orator::report::training_strip::Pair;
+use orator::report::training::page;
+use orator::report::training::strip::Pair;
 use orator::stage::progress::Progress as _;
-use orator::train::gan;
-use orator::train::score::{Figures, Validation};
+use orator::train::gan::score::{Figures, Validation};
+use orator::train::gan::train;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -59,7 +61,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let dataset = Dataset::open(&folder).context("`orator run` makes the dataset to train on")?;
 
     let start = Instant::now();
-    let outcome = gan::train(&dataset, &settings, &out, ui)?;
+    let outcome = train::train(&dataset, &settings, &out, ui)?;
     let steps_per_sec = (outcome.steps - outcome.began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
     let page = page(&dataset, &outcome.best, &out, ui);
     let text = format!(
@@ -122,10 +124,10 @@ fn figures(validation: &Validation) -> String {
 fn page(dataset: &Dataset, best: &Path, folder: &Path, ui: &Ui) -> Option<PathBuf> {
     let written = || -> Result<()> {
         let pairs = pairs(dataset, &Speaker::open(best)?)?;
-        training::write(folder, &dataset.info().speaker, &pairs)
+        page::write(folder, &dataset.info().speaker, &pairs)
     };
     match written() {
-        Ok(()) => Some(folder.join(training::PAGE)),
+        Ok(()) => Some(folder.join(page::PAGE)),
         Err(error) => {
             ui.say(&format!("no page of this training: {error:#}"));
             None
@@ -145,7 +147,7 @@ fn pairs(dataset: &Dataset, speaker: &Speaker) -> Result<Vec<Pair>> {
         let span = ((PAIR_SECS * speaker.fps().per_sec()) as usize).min(n_frames);
         let first = (n_frames - span) / 2;
         let HeldOut { key, real, sound } = interval.cut(first..first + span);
-        let made = predictors::motion(speaker, &sound, span)?;
+        let made = predictor::motion(speaker, &sound, span)?;
         Ok(Pair { name: key, start_secs: speaker.fps().secs(first), real, made })
     };
     intervals.into_iter().map(pair).collect()

@@ -1,13 +1,14 @@
 //! `orator train lifter`.
 
-use crate::cli::{Outcome, ui::Ui};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use anyhow::{Context, ensure};
-use orator::motion::mocap;
-use orator::nn::body_lifter::BodyLifter;
-use orator::train::lifter::{Lesson, Schedule, start_from, train};
-use orator::train::lifter_body::BodyLesson;
-use orator::train::lifter_hands::HandLesson;
-use orator::train::lifter_heatmaps::HeatmapLesson;
+use orator::mocap::upper_body;
+use orator::nn::lifter::body::BodyLifter;
+use orator::train::lifter::body::BodyLesson;
+use orator::train::lifter::hands::HandLesson;
+use orator::train::lifter::heatmaps::HeatmapLesson;
+use orator::train::supervised::{Lesson, Schedule, start_from, train};
 use std::path::PathBuf;
 
 /// Train the networks that lift 2D keypoints to 3D joints.
@@ -83,8 +84,8 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
                 args.widths.iter().all(|w| w % 2 == 1) && args.widths.iter().product::<usize>() <= 729,
                 "--widths are odd, and their product is at most 729 frames"
             );
-            let takes = mocap::read_all(&args.mocap).context("reading --mocap")?;
-            let (held_out, takes) = mocap::divide(takes, &args.hold_out)?;
+            let takes = upper_body::read_all(&args.mocap).context("reading --mocap")?;
+            let (held_out, takes) = upper_body::divide(takes, &args.hold_out)?;
             ensure!(!takes.is_empty(), "--hold-out leaves nothing to learn from");
             let config = BodyLifter::config(args.width.unwrap_or(256), &args.widths);
             (Box::new(BodyLesson::new(takes, held_out, &config, args.seed)?), 9000)

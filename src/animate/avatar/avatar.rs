@@ -1,0 +1,228 @@
+//! The avatar: a skinned figure of our own, made from the figure's bones. Its form is a distance field around the
+//! bones in a stance near to what speakers do; surfaces, weights, and the way back to the T-pose follow from it.
+
+use super::body::Body;
+use super::field::Form;
+use super::hand::Hand;
+use super::skin::Weights;
+use super::stance::Stance;
+use super::surface::Surface;
+use crate::animate::rig::rig::Figure;
+use crate::math::rotation::Rotation;
+use crate::math::vec3::{Vec3, add, cross, dot, sub, unit};
+
+/// Size of the cells that surfaces are made of, cm.
+const SHIRT_CELL: f64 = 1.6;
+const LEGS_CELL: f64 = 2.0;
+const SHOE_CELL: f64 = 1.4;
+const HEAD_CELL: f64 = 1.15;
+const PALM_CELL: f64 = 0.56;
+const CUFF_CELL: f64 = 0.7;
+const FINGER_CELL: f64 = 0.42;
+
+/// What a part is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Material {
+    Skin,
+    Shirt,
+    Trousers,
+    Shoes,
+}
+
+/// Triangles of one material in the T-pose (cm, in the figure's axes, the soles at y = 0), with their joints.
+#[derive(Clone, Debug)]
+pub struct Part {
+    pub material: Material,
+    pub points: Vec<Vec3>,
+    pub normals: Vec<Vec3>,
+    pub triangles: Vec<[u32; 3]>,
+    /// Four joints a vertex with weights that sum to 1.
+    pub weights: Vec<Weights>,
+}
+
+/// The skin of a figure.
+#[derive(Clone, Debug)]
+pub struct Avatar {
+    pub parts: Vec<Part>,
+}
+
+impl Avatar {
+    pub fn of(figure: &Figure) -> Self {
+        let stance = Stance::of(figure);
+        let hands = [0, 1].map(|side| Hand::new(figure, &stance, side));
+        let body = Body::new(figure, &stance, hands.each_ref().map(|hand| hand.scale));
+        let cm = stance.scale;
+        let [mut skin, mut shirt, mut trousers, mut shoes] = [(); 4].map(|()| Built::default());
+        let surface_of = |form: &Form, cell: f64| Surface::of(&|at| form.distance(at), form.bounds(), cell);
+
+        let surface = surface_of(&body.head(), HEAD_CELL * cm);
+        skin.add(body.head_weights(&surface), surface);
+        let surface = Surface::of(&body.shirt(), body.shirt_bounds(), SHIRT_CELL * cm);
+        shirt.add(body.shirt_weights(&surface), surface);
+        let surface = surface_of(&body.trousers(), LEGS_CELL * cm);
+        trousers.add(body.leg_weights(&surface), surface);
+        for (side, hand) in hands.iter().enumerate() {
+            let size = hand.scale;
+            let light = |at: Vec3| hand.whole(at);
+            let palm = PALM_CELL * size;
+            let surface = Surface::of(&|at| hand.palm(at), hand.bounds(None), palm).lit(&light, palm);
+            skin.add(body.palm_weights(side, size, &surface), surface);
+            for n in 1..5 {
+                let finger = FINGER_CELL * size;
+                let surface = Surface::of(&|at| hand.finger(n, at), hand.bounds(Some(n)), finger).lit(&light, finger);
+                skin.add(body.finger_weights(side, n, size, &surface), surface);
+            }
+            let surface = surface_of(&body.cuff(side), CUFF_CELL * size);
+            shirt.add(body.cuff_weights(side, &surface), surface);
+            let surface = surface_of(&body.shoe(side), SHOE_CELL * cm);
+            shoes.add(body.leg_weights(&surface), surface);
+        }
+        let parts = [
+            (Material::Skin, skin),
+            (Material::Shirt, shirt),
+            (Material::Trousers, trousers),
+            (Material::Shoes, shoes),
+        ];
+        Self { parts: parts.into_iter().map(|(material, built)| built.rested(material, &stance)).collect() }
+    }
+}
+
+/// Surfaces of one material in the stance.
+#[derive(Default)]
+struct Built {
+    surface: Surface,
+    weights: Vec<Weights>,
+}
+
+impl Built {
+    fn add(&mut self, weights: Vec<Weights>, surface: Surface) {
+        let first = self.surface.points.len() as u32;
+        self.surface.points.extend(surface.points);
+        self.surface.normals.extend(surface.normals);
+        self.surface.triangles.extend(surface.triangles.into_iter().map(|triangle| triangle.map(|v| v + first)));
+        self.weights.extend(weights);
+    }
+
+    /// The part in the T-pose: linear skinning brings it exactly into the stance.
+    fn rested(self, material: Material, stance: &Stance) -> Part {
+        let Surface { points, normals, triangles } = self.surface;
+        let (points, normals) = points
+            .into_iter()
+            .zip(normals)
+            .zip(&self.weights)
+            .map(|((point, normal), weights)| {
+                let turn = Blend::of(stance, weights);
+                // point = sum of w (R (rest - rest joint) + joint)
+                let rest = turn.back(sub(point, turn.shift));
+                (rest, unit(turn.back(normal), 1e-9).unwrap_or(normal))
+            })
+            .unzip();
+        Part { material, points, normals, triangles, weights: self.weights }
+    }
+}
+
+/// The linear map of linear skinning at one vertex.
+struct Blend {
+    /// Columns.
+    columns: [Vec3; 3],
+    shift: Vec3,
+}
+
+impl Blend {
+    fn of(stance: &Stance, weights: &Weights) -> Self {
+        let mut blend = Self { columns: [[0.0; 3]; 3], shift: [0.0; 3] };
+        for &(joint, weight) in weights {
+            let turn: Rotation = stance.world[joint];
+            let part = |a: Vec3| a.map(|v| v * weight);
+            for (column, axis) in blend.columns.iter_mut().zip(turn.axes()) {
+                *column = add(*column, part(axis));
+            }
+            blend.shift = add(blend.shift, part(sub(stance.places[joint], turn.turn(stance.rest[joint]))));
+        }
+        blend
+    }
+
+    /// The inverse of the map without its shift (Cramer's rule).
+    fn back(&self, a: Vec3) -> Vec3 {
+        let [x, y, z] = self.columns;
+        let volume = dot(x, cross(y, z));
+        [dot(a, cross(y, z)) / volume, dot(x, cross(a, z)) / volume, dot(x, cross(y, a)) / volume]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::vec3::{norm, scale};
+    use crate::types::pose3d::Motion;
+    use crate::types::skeleton::N_JOINTS;
+    use crate::types::time::FrameRate;
+
+    fn figure() -> Figure {
+        let unseen = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
+        Figure::of(&Motion::from_joints(FrameRate::new(15, 1), unseen))
+    }
+
+    #[test]
+    fn skinning_brings_the_rest_into_the_stance_and_both_sides_are_alike() {
+        let figure = figure();
+        let (avatar, stance) = (Avatar::of(&figure), Stance::of(&figure));
+        let shirt = &avatar.parts[1];
+        let hands = [0, 1].map(|side| Hand::new(&figure, &stance, side).scale);
+        let body = Body::new(&figure, &stance, hands);
+        let form = body.shirt();
+        let cuffs = [0, 1].map(|side| body.cuff(side));
+        let mut far = 0;
+        for (&point, weights) in shirt.points.iter().zip(&shirt.weights) {
+            assert!((weights.iter().map(|w| w.1).sum::<f64>() - 1.0).abs() < 1e-9);
+            let turn = Blend::of(&stance, weights);
+            let mut at = turn.shift;
+            (0..3).for_each(|k| at = add(at, turn.columns[k].map(|v| v * point[k])));
+            let off = cuffs.iter().map(|cuff| cuff.distance(at).abs()).fold(form(at).abs(), f64::min);
+            far += usize::from(off > 0.05);
+        }
+        assert!(far < shirt.points.len() / 100, "{far} of {} vertices are off the form", shirt.points.len());
+        let side =
+            |sign: f64| avatar.parts.iter().flat_map(|part| &part.points).filter(|p| sign * p[0] > 1.0).count() as f64;
+        assert!((side(1.0) / side(-1.0) - 1.0).abs() < 0.01, "{} {}", side(1.0), side(-1.0));
+    }
+
+    #[test]
+    fn bent_joints_do_not_collapse() {
+        // The thinnest place around a finger's middle joint and around an elbow, straight and bent by 90 degrees.
+        let figure = figure();
+        let avatar = Avatar::of(&figure);
+        let arm = &figure.arms[0];
+        let finger = super::super::stance::finger_joints(&figure, 0, 2);
+        for (part, joint, next, axis) in [
+            (&avatar.parts[0], finger[1], finger[2], [0.0, 0.0, -1.0]),
+            (&avatar.parts[1], arm.fore, arm.hand, [0.0, -1.0, 0.0]),
+        ] {
+            let thickness = |degrees: f64| {
+                let mut local = vec![Rotation::IDENTITY; figure.skeleton.joints.len()];
+                local[joint] = Rotation::about(axis, f64::to_radians(degrees));
+                let world = figure.skeleton.world(&local);
+                let places = figure.skeleton.positions(figure.root, &local);
+                let rest = figure.skeleton.positions(figure.root, &vec![Rotation::IDENTITY; local.len()]);
+                // On the side that the bend stretches, how far the skin is from the joint.
+                let half = Rotation::about(axis, f64::to_radians(degrees / 2.0));
+                let along = unit(sub(rest[next], rest[joint]), 0.0).unwrap();
+                let out = half.turn(cross(along, axis));
+                let mut reach: f64 = 0.0;
+                for (&point, weights) in part.points.iter().zip(&part.weights) {
+                    let at = weights.iter().fold([0.0; 3], |sum, &(j, w)| {
+                        add(sum, scale(add(world[j].turn(sub(point, rest[j])), places[j]), w))
+                    });
+                    let from = sub(at, places[joint]);
+                    if norm(from) < 8.0 && norm(sub(from, scale(out, dot(from, out)))) < 0.7 * dot(from, out) {
+                        reach = reach.max(dot(from, out));
+                    }
+                }
+                reach
+            };
+            let (straight, bent) = (thickness(0.0), thickness(90.0));
+            // Linear skinning keeps 0.71 at a right angle; a collapse would be far below.
+            assert!(bent > 0.6 * straight && straight > 0.0, "{straight} cm straight, {bent} cm bent");
+        }
+    }
+}

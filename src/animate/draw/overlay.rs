@@ -1,0 +1,80 @@
+//! 2D keypoints over the picture they were found in: body and both hands, left and right in their colours. A point that
+//! was not found is not drawn, nor the bones that end in it.
+
+use super::figure::{INK, LEFT, RIGHT};
+use crate::external::opencv::draw;
+use crate::types::image::Image;
+use crate::types::pose2d::{Keypoints, N_HAND};
+use anyhow::Result;
+use ndarray::{ArrayView2, Axis};
+
+/// A point counts as found from this score on.
+const FOUND_SCORE: f32 = 0.3;
+/// Bones between the points of COCO-17 that are drawn.
+const BONES: [(usize, usize); 10] =
+    [(5, 6), (5, 7), (7, 9), (6, 8), (8, 10), (5, 11), (6, 12), (11, 12), (0, 1), (0, 2)];
+
+/// Where the video's pixels are in the picture drawn on: `scale * px + shift`, by axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    pub scale: [f32; 2],
+    pub shift: [f32; 2],
+}
+
+/// Draws the keypoints of one frame, bones `width_px` wide (fingers half of it).
+pub fn draw_keypoints(
+    image: &mut Image,
+    keypoints: &Keypoints,
+    frame_idx: usize,
+    place: Place,
+    width_px: f32,
+) -> Result<()> {
+    let at = |points: ArrayView2<f32>, point: usize| -> Option<[f32; 2]> {
+        let found = points[[point, 2]] > FOUND_SCORE;
+        found.then(|| [0, 1].map(|axis| points[[point, axis]] * place.scale[axis] + place.shift[axis]))
+    };
+    let body = keypoints.body.index_axis(Axis(0), frame_idx);
+    for (from, to) in BONES {
+        let rgb = match (from, to) {
+            (0, _) => INK,
+            _ if from % 2 != to % 2 => INK,
+            _ if from % 2 == 1 => LEFT,
+            _ => RIGHT,
+        };
+        if let (Some(from), Some(to)) = (at(body, from), at(body, to)) {
+            draw::line(image, from, to, width_px, rgb)?;
+            draw::circle(image, to, 1.25 * width_px, rgb)?;
+        }
+    }
+    for (hand, rgb) in [(&keypoints.left_hand, LEFT), (&keypoints.right_hand, RIGHT)] {
+        let points = hand.index_axis(Axis(0), frame_idx);
+        for point in 1..N_HAND {
+            let base = if point % 4 == 1 { 0 } else { point - 1 };
+            if let (Some(from), Some(to)) = (at(points, base), at(points, point)) {
+                draw::line(image, from, to, width_px / 2.0, rgb)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The box around what was found of the upper body and the hands over the whole clip, but for each point's outermost
+/// places (one frame in fifty on each side): left, top, right, bottom in px; `None` where nothing was found.
+pub fn extent(keypoints: &Keypoints) -> Option<[f32; 4]> {
+    const N_UPPER: usize = 11;
+    let mut extent: Option<[f32; 4]> = None;
+    let arrays = [(&keypoints.body, N_UPPER), (&keypoints.left_hand, N_HAND), (&keypoints.right_hand, N_HAND)];
+    for (points, point) in arrays.into_iter().flat_map(|(points, n)| (0..n).map(move |point| (points, point))) {
+        let found = points.outer_iter().filter(|frame| frame[[point, 2]] > FOUND_SCORE);
+        let [mut x, mut y]: [Vec<f32>; 2] =
+            [0, 1].map(|axis| found.clone().map(|frame| frame[[point, axis]]).collect());
+        x.sort_by(f32::total_cmp);
+        y.sort_by(f32::total_cmp);
+        let rest = x.len() / 50;
+        let ends = |v: &[f32]| Some([*v.get(rest)?, *v.get(v.len().checked_sub(rest + 1)?)?]);
+        let (Some([left, right]), Some([top, bottom])) = (ends(&x), ends(&y)) else { continue };
+        let [l, t, r, b] = extent.unwrap_or([left, top, right, bottom]);
+        extent = Some([l.min(left), t.min(top), r.max(right), b.max(bottom)]);
+    }
+    extent
+}

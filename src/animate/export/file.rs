@@ -1,0 +1,126 @@
+//! A motion file of any kind we write, chosen by its name's extension, put in its place atomically.
+
+use super::{film, glb_scene, json};
+use crate::animate::avatar::Avatar;
+use crate::animate::performance::Performance;
+use crate::animate::rig::names::Names;
+use crate::formats::{authors_txt, npy};
+use crate::stage::progress::Progress;
+use crate::stage::workdir;
+use crate::types::pose3d::Motion;
+use crate::types::sound::Sound;
+use std::fs::File;
+use std::io::{self, BufWriter, Write as _};
+use std::path::Path;
+
+/// What else goes into a file than the performance.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sources<'a> {
+    pub sound: Option<&'a Sound>,
+    /// What the bones are called where they have names.
+    pub names: Names,
+    /// What a film shows beside the figure.
+    pub beside: film::Beside<'a>,
+}
+
+/// What a motion can be written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Joints [T, 49, 3] f32.
+    Npy,
+    /// The layout of Rebol et al. 2021.
+    AuthorsTxt,
+    /// Bone rotations of the whole figure.
+    Bvh,
+    /// The skinned avatar with its motion.
+    Glb,
+    /// Joints and rotations for programs of one's own (`json`).
+    Json,
+    /// A film of the figure with the sound.
+    Mp4,
+}
+
+impl Format {
+    /// The format of a file by its extension, upper or lower case.
+    pub fn of(path: &Path) -> anyhow::Result<Self> {
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        match extension.as_str() {
+            "npy" => Ok(Self::Npy),
+            "txt" => Ok(Self::AuthorsTxt),
+            "bvh" => Ok(Self::Bvh),
+            "glb" => Ok(Self::Glb),
+            "json" => Ok(Self::Json),
+            "mp4" => Ok(Self::Mp4),
+            _ => anyhow::bail!(
+                "{}: motion is written as .npy (joints), .txt (the authors' layout), .json, .bvh, .glb or .mp4; \
+                 give the file one of these endings",
+                path.display()
+            ),
+        }
+    }
+
+    /// Whether the file holds joints and nothing of a figure.
+    pub fn holds_joints(self) -> bool {
+        matches!(self, Self::Npy | Self::AuthorsTxt)
+    }
+
+    /// Writes a performance; only a film has use for the sound.
+    pub fn write(
+        self,
+        path: &Path,
+        performance: &Performance,
+        sources: &Sources,
+        progress: &dyn Progress,
+    ) -> anyhow::Result<()> {
+        match self {
+            Self::Npy | Self::AuthorsTxt => self.write_joints(path, &performance.motion()),
+            Self::Bvh => {
+                let named = sources.names.applied(&performance.clip.skeleton);
+                streamed(path, |text| performance.clip.write_bvh(&named, text))
+            }
+            Self::Glb => {
+                let avatar = Avatar::of(&performance.figure);
+                let bytes = glb_scene::file(&performance.figure, &performance.clip, &avatar, sources.names);
+                workdir::write_file(path, &bytes)
+            }
+            Self::Json => streamed(path, |text| json::write(text, performance, sources.names)),
+            Self::Mp4 => {
+                let motion = performance.motion();
+                workdir::replace(path, |attempt| film::write(attempt, &motion, sources.sound, sources.beside, progress))
+            }
+        }
+    }
+
+    /// Writes joints as they are, which only the files of joints can hold.
+    pub fn write_joints(self, path: &Path, motion: &Motion) -> anyhow::Result<()> {
+        match self {
+            Self::Npy => workdir::replace(path, |attempt| npy::write(attempt, motion)),
+            Self::AuthorsTxt => workdir::write_file(path, authors_txt::format(motion).as_bytes()),
+            _ => anyhow::bail!("{} holds more than joints", path.display()),
+        }
+    }
+}
+
+/// A text written piece by piece.
+fn streamed(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> anyhow::Result<()> {
+    workdir::replace(path, |attempt| {
+        let mut text = BufWriter::new(File::create(attempt)?);
+        write(&mut text)?;
+        Ok(text.flush()?)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_extension_chooses() {
+        assert_eq!(Format::of(Path::new("a/b.BVH")).unwrap(), Format::Bvh);
+        assert_eq!(Format::of(Path::new("a.Glb")).unwrap(), Format::Glb);
+        assert_eq!(Format::of(Path::new("a.b/c.npy")).unwrap(), Format::Npy);
+        for wrong in ["a.mov", "mp4", "a", ""] {
+            assert!(Format::of(Path::new(wrong)).unwrap_err().to_string().contains(".glb or .mp4"));
+        }
+    }
+}

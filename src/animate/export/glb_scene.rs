@@ -1,0 +1,175 @@
+//! A performance as a glTF scene: the figure's joints as nodes in T-pose (metres, y up, facing +z), the avatar as one
+//! skinned mesh on them, the clip as one animation. A joint that does not turn has one key.
+
+use super::glb::{Buffer, Use};
+use crate::animate::avatar::{Avatar, Material, Part};
+use crate::animate::rig::names::Names;
+use crate::animate::rig::rig::Figure;
+use crate::formats::bvh::write::Clip;
+use crate::math::rotation::Rotation;
+use crate::math::vec3::Vec3;
+use serde_json::{Value, json};
+
+const METRES: f64 = 0.01;
+/// A joint whose quaternions never differ by more does not turn.
+const STILL: f64 = 1e-7;
+/// Where the licence of a VRM's own terms is found; the format wants it named.
+const VRM_LICENSE: &str = "https://vrm.dev/licenses/1.0/";
+
+/// The bytes of the file of a clip on its figure, which wears `avatar`.
+pub fn file(figure: &Figure, clip: &Clip, avatar: &Avatar, names: Names) -> Vec<u8> {
+    let mut buffer = Buffer::default();
+    let bones = &figure.skeleton.joints;
+    let own = Names::Own.of(&figure.skeleton);
+    let called = names.of(&figure.skeleton);
+    let mut nodes: Vec<Value> = bones
+        .iter()
+        .zip(&called)
+        .enumerate()
+        .map(|(joint, (bone, name))| {
+            let at = bone.parent.map_or(clip.root, |_| bone.offset);
+            let mut node = json!({ "name": name, "translation": metres(at) });
+            let children: Vec<usize> = figure.skeleton.children(joint).collect();
+            if !children.is_empty() {
+                node["children"] = json!(children);
+            }
+            node
+        })
+        .collect();
+    nodes.push(json!({ "name": "Avatar", "mesh": 0, "skin": 0 }));
+    let mut scene = json!({
+        "asset": { "version": "2.0", "generator": concat!("orator ", env!("CARGO_PKG_VERSION")) },
+        "scene": 0,
+        "scenes": [{ "name": "Figure", "nodes": [0, bones.len()] }],
+        "nodes": nodes,
+        "materials": avatar.parts.iter().map(|part| material(part.material)).collect::<Vec<_>>(),
+        "meshes": [{
+            "name": "Avatar",
+            "primitives": avatar.parts.iter().enumerate().map(|(n, part)| primitive(&mut buffer, part, n)).collect::<Vec<_>>(),
+        }],
+        "skins": [{
+            "inverseBindMatrices": inverse_binds(&mut buffer, figure, clip.root),
+            "skeleton": 0,
+            "joints": (0..bones.len()).collect::<Vec<_>>(),
+        }],
+    });
+    if clip.n_frames() > 0 {
+        scene["animations"] = json!([animation(&mut buffer, clip)]);
+    }
+    if names == Names::Vrm {
+        scene["extensionsUsed"] = json!(["VRMC_vrm"]);
+        scene["extensions"] = json!({ "VRMC_vrm": vrm(&own, &called) });
+    }
+    buffer.file(scene)
+}
+
+fn metres(cm: Vec3) -> [f32; 3] {
+    cm.map(|v| (v * METRES) as f32)
+}
+
+fn material(material: Material) -> Value {
+    let (name, rgb, roughness) = match material {
+        Material::Skin => ("Skin", [0.60, 0.42, 0.33], 0.65),
+        Material::Shirt => ("Shirt", [0.16, 0.30, 0.38], 0.9),
+        Material::Trousers => ("Trousers", [0.055, 0.065, 0.085], 0.9),
+        Material::Shoes => ("Shoes", [0.30, 0.28, 0.26], 0.8),
+    };
+    json!({
+        "name": name,
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [rgb[0], rgb[1], rgb[2], 1.0], "metallicFactor": 0.0, "roughnessFactor": roughness,
+        },
+    })
+}
+
+fn primitive(buffer: &mut Buffer, part: &Part, material: usize) -> Value {
+    let points: Vec<[f32; 3]> = part.points.iter().map(|&point| metres(point)).collect();
+    let normals: Vec<[f32; 3]> = part.normals.iter().map(|normal| normal.map(|v| v as f32)).collect();
+    let (joints, weights): (Vec<[u8; 4]>, Vec<[u16; 4]>) = part.weights.iter().map(whole_shares).unzip();
+    json!({
+        "attributes": {
+            "POSITION": buffer.floats(&points, "VEC3", Use::Vertices),
+            "NORMAL": buffer.floats(&normals, "VEC3", Use::Vertices),
+            "JOINTS_0": buffer.bytes4(&joints),
+            "WEIGHTS_0": buffer.shares4(&weights),
+        },
+        "indices": buffer.indices(&part.triangles),
+        "material": material,
+    })
+}
+
+/// Weights as whole shares that sum to 65535, greatest first; a joint without a share is joint 0.
+fn whole_shares(weights: &crate::animate::avatar::Weights) -> ([u8; 4], [u16; 4]) {
+    let mut shares = weights.map(|(_, weight)| (weight * 65_535.0).round() as u16);
+    let others: u16 = shares[1..].iter().sum();
+    shares[0] = u16::MAX - others;
+    let joints = std::array::from_fn(|k| if shares[k] == 0 { 0 } else { weights[k].0 as u8 });
+    (joints, shares)
+}
+
+fn inverse_binds(buffer: &mut Buffer, figure: &Figure, root: Vec3) -> usize {
+    let still = vec![Rotation::IDENTITY; figure.skeleton.joints.len()];
+    let rest = figure.skeleton.positions(root, &still);
+    let matrices: Vec<[f32; 16]> = rest
+        .into_iter()
+        .map(|place| {
+            let [x, y, z] = metres(place).map(|v| 0.0 - v);
+            [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, x, y, z, 1.0]
+        })
+        .collect();
+    buffer.floats(&matrices, "MAT4", Use::Other)
+}
+
+fn animation(buffer: &mut Buffer, clip: &Clip) -> Value {
+    let times: Vec<[f32; 1]> = (0..clip.n_frames()).map(|frame| [clip.fps.secs(frame) as f32]).collect();
+    let once = buffer.floats(&times[..1], "SCALAR", Use::Other);
+    let mut every = None;
+    let mut samplers =
+        vec![json!({ "input": once, "output": buffer.floats(&[metres(clip.root)], "VEC3", Use::Other) })];
+    let mut channels = vec![json!({ "sampler": 0, "target": { "node": 0, "path": "translation" } })];
+    for joint in (0..clip.skeleton.joints.len()).filter(|&joint| !clip.skeleton.joints[joint].end) {
+        let track = quaternions(clip, joint);
+        let moves = track.iter().any(|q| (0..4).any(|k| (f64::from(q[k]) - f64::from(track[0][k])).abs() > STILL));
+        let (input, output) = if moves {
+            (*every.get_or_insert_with(|| buffer.floats(&times, "SCALAR", Use::Other)), &track[..])
+        } else {
+            (once, &track[..1])
+        };
+        let output = buffer.floats(output, "VEC4", Use::Other);
+        channels.push(json!({ "sampler": samplers.len(), "target": { "node": joint, "path": "rotation" } }));
+        samplers.push(json!({ "input": input, "output": output, "interpolation": "LINEAR" }));
+    }
+    json!({ "name": "Gesture", "samplers": samplers, "channels": channels })
+}
+
+/// x, y, z, w of a joint over time, each on the side of the one before.
+fn quaternions(clip: &Clip, joint: usize) -> Vec<[f32; 4]> {
+    let mut before = [0.0, 0.0, 0.0, 1.0];
+    let next = |local: &Vec<Rotation>| {
+        let Rotation { w, v: [x, y, z] } = local[joint];
+        let mut q = [x, y, z, w];
+        if (0..4).map(|k| q[k] * before[k]).sum::<f64>() < 0.0 {
+            q = q.map(|v| -v);
+        }
+        before = q;
+        q.map(|v| v as f32)
+    };
+    clip.local.iter().map(next).collect()
+}
+
+/// The VRM 1.0 extension: which node is which bone of a human, and whose the avatar is.
+fn vrm(own: &[String], called: &[String]) -> Value {
+    let is_bone = |name: &str| !name.ends_with('4') && !name.ends_with("End");
+    let bones: serde_json::Map<String, Value> = own
+        .iter()
+        .zip(called)
+        .enumerate()
+        .filter(|(_, (own, _))| is_bone(own))
+        .map(|(node, (_, name))| (name.clone(), json!({ "node": node })))
+        .collect();
+    json!({
+        "specVersion": "1.0",
+        "meta": { "name": "Avatar", "authors": ["orator"], "licenseUrl": VRM_LICENSE },
+        "humanoid": { "humanBones": bones },
+    })
+}

@@ -1,0 +1,53 @@
+//! A performance as JSON, for programs of one's own. One object:
+//!
+//! `format` "orator motion"; `version` 1; `fps` [numerator, denominator]; `n_frames`; `units` "metres"; `axes` "x to
+//! the figure's left, y up, z forward"; `names`, `parents` (index or null) and `offsets` ([x, y, z] from the parent in
+//! T-pose) of the joints, ends of bones included; `joints49`, for each of the 49 joints of a motion the index of the
+//! joint at its place; `positions` [frame][joint][x, y, z], the soles at y = 0; `rotations` [frame][joint]
+//! [x, y, z, w], unit quaternions relative to the parent, identity in the T-pose. Places keep 1e-6 m, quaternions 1e-7.
+
+use crate::animate::performance::Performance;
+use crate::animate::rig::names::Names;
+use crate::math::rotation::Rotation;
+use crate::math::vec3::Vec3;
+use serde_json::json;
+use std::io::{self, Write};
+
+/// Writes the text of the file.
+pub fn write(text: &mut impl Write, performance: &Performance, names: Names) -> io::Result<()> {
+    let (clip, bones) = (&performance.clip, &performance.clip.skeleton.joints);
+    let head = json!({
+        "format": "orator motion",
+        "version": 1,
+        "fps": [clip.fps.num, clip.fps.den],
+        "n_frames": clip.n_frames(),
+        "units": "metres",
+        "axes": "x to the figure's left, y up, z forward",
+        "names": names.of(&clip.skeleton),
+        "parents": bones.iter().map(|bone| bone.parent).collect::<Vec<_>>(),
+        "offsets": bones.iter().map(|bone| bone.offset.map(|cm| (cm * 1e4).round() / 1e6)).collect::<Vec<_>>(),
+        "joints49": performance.figure.places.to_vec(),
+    });
+    let head = head.to_string();
+    write!(text, "{},\n\"positions\":[", head.trim_end_matches('}'))?;
+    for frame in 0..clip.n_frames() {
+        text.write_all(if frame == 0 { b"\n[" } else { b",\n[" })?;
+        for (joint, place) in clip.positions(frame).into_iter().enumerate() {
+            let [x, y, z]: Vec3 = place.map(|cm| cm / 100.0);
+            let comma = if joint == 0 { "" } else { "," };
+            write!(text, "{comma}[{x:.6},{y:.6},{z:.6}]")?;
+        }
+        text.write_all(b"]")?;
+    }
+    text.write_all(b"],\n\"rotations\":[")?;
+    for (frame, local) in clip.local.iter().enumerate() {
+        text.write_all(if frame == 0 { b"\n[" } else { b",\n[" })?;
+        for (joint, (rotation, bone)) in local.iter().zip(bones).enumerate() {
+            let Rotation { w, v: [x, y, z] } = if bone.end { Rotation::IDENTITY } else { *rotation };
+            let comma = if joint == 0 { "" } else { "," };
+            write!(text, "{comma}[{x:.7},{y:.7},{z:.7},{w:.7}]")?;
+        }
+        text.write_all(b"]")?;
+    }
+    text.write_all(b"]}\n")
+}

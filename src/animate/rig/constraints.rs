@@ -1,0 +1,187 @@
+//! Plausibility constraints (Rebol et al. 2021): no joint bends where no person's does, and neighbouring fingers curl
+//! together. A frame is changed by itself alone; what is within the limits stays, what is changed is counted by kind,
+//! and nothing that moves evenly is made to jump. The limits are in `limits`.
+
+use super::hinge::Bend;
+use super::limits;
+use super::limits::{CURL_COHERENCE, Limit, turn, within};
+use super::rig::Figure;
+use crate::animate::solve::arm_pose::ArmPose;
+use crate::animate::solve::track::smoothstep;
+use crate::math::rotation::Rotation;
+use serde::Serialize;
+
+/// Which constraints hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Constraints {
+    /// Limits of every joint.
+    pub limits: bool,
+    /// Fingers within 10 degrees of the mean curl of the four. A finger that points is then bent with the others.
+    pub curl_coherence: bool,
+}
+
+impl Default for Constraints {
+    fn default() -> Self {
+        Self { limits: true, curl_coherence: true }
+    }
+}
+
+impl Constraints {
+    pub const NONE: Self = Self { limits: false, curl_coherence: false };
+}
+
+/// What can be clamped: where, with the number of such angles in both arms.
+const KINDS: [(&str, usize); 14] = [
+    ("elbow flexion", 2),
+    ("elbow to the side", 2),
+    ("forearm turn", 2),
+    ("wrist flexion", 2),
+    ("wrist deviation", 2),
+    ("knuckle flexion", 8),
+    ("knuckle spread", 8),
+    ("middle joint flexion", 8),
+    ("middle joint to the side", 8),
+    ("end joint flexion", 8),
+    ("end joint to the side", 8),
+    ("thumb flexion", 6),
+    ("thumb to the side", 6),
+    ("curl coherence", 24),
+];
+const ELBOW: usize = 0;
+const TURN: usize = 2;
+const WRIST: usize = 3;
+const FINGER: usize = 5;
+const THUMB: usize = 11;
+const COHERENCE: usize = 13;
+/// A change of less than this, degrees, is rounding.
+const LEAST_DEGREES: f64 = 1e-6;
+
+/// Clamps of one kind.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Clamps {
+    pub kind: &'static str,
+    /// How many angles were clamped, and their share of all of this kind.
+    pub joint_frames: usize,
+    pub share: f64,
+    /// How far the clamped ones were beyond their limit.
+    pub mean_excess_degrees: f64,
+    pub largest_excess_degrees: f64,
+}
+
+/// Counts clamps.
+#[derive(Clone, Debug, Default)]
+pub struct Tally {
+    n_frames: usize,
+    /// For each kind: how many, sum and largest of the excess.
+    kinds: [(usize, f64, f64); KINDS.len()],
+}
+
+impl Tally {
+    fn changed(&mut self, kind: usize, from: f64, to: f64) -> f64 {
+        let excess = turn(from - to).abs();
+        if excess > LEAST_DEGREES {
+            let (n, sum, largest) = &mut self.kinds[kind];
+            *n += 1;
+            *sum += excess;
+            *largest = largest.max(excess);
+        }
+        to
+    }
+
+    /// Every kind, those without a clamp too.
+    pub fn clamps(&self) -> Vec<Clamps> {
+        let kinds = KINDS.into_iter().zip(self.kinds);
+        kinds
+            .map(|((kind, n_angles), (joint_frames, sum, largest_excess_degrees))| Clamps {
+                kind,
+                joint_frames,
+                share: joint_frames as f64 / (n_angles * self.n_frames).max(1) as f64,
+                mean_excess_degrees: sum / joint_frames.max(1) as f64,
+                largest_excess_degrees,
+            })
+            .collect()
+    }
+}
+
+impl Constraints {
+    /// Constrains one frame of local rotations.
+    pub fn apply(self, figure: &Figure, local: &mut [Rotation], tally: &mut Tally) {
+        if self == Self::NONE {
+            return;
+        }
+        tally.n_frames += 1;
+        for arm in &figure.arms {
+            let mut pose = ArmPose::of(arm, local);
+            if self.limits {
+                limit(&mut pose, tally);
+            }
+            if self.curl_coherence {
+                cohere(&mut pose, tally);
+            }
+            pose.write(arm, local);
+        }
+    }
+}
+
+fn limit(pose: &mut ArmPose, tally: &mut Tally) {
+    pose.elbow = bend(pose.elbow, limits::ELBOW, ELBOW, tally);
+    // Followed beyond half a turn it is still beyond the same end.
+    let [pronated, supinated] = limits::SUPINATION;
+    let turned = pose.supination.clamp(pronated, supinated);
+    // A hand that lies across the forearm, whatever its turn: the turn and the flexion cannot be told apart.
+    let turned = turned * told(pose.wrist.side);
+    pose.supination = tally.changed(TURN, pose.supination, turned);
+    pose.wrist = bend(pose.wrist, limits::WRIST, WRIST, tally);
+    for (finger, limits) in limits::FINGERS.iter().enumerate() {
+        for (k, &limit) in limits.iter().enumerate() {
+            let kind = if finger == 0 { THUMB } else { FINGER + 2 * k };
+            pose.fingers[finger][k] = bend(pose.fingers[finger][k], limit, kind, tally);
+        }
+    }
+}
+
+/// The bend within its limits; `kind` counts the flexion, the next one the side.
+fn bend(given: Bend, limit: Limit, kind: usize, tally: &mut Tally) -> Bend {
+    let middle = (limit.flexion[0] + limit.flexion[1]) / 2.0;
+    let flexion = middle + told(given.side) * (within(limit.flexion, given.flexion) - middle);
+    Bend {
+        flexion: tally.changed(kind, given.flexion, flexion),
+        side: tally.changed(kind + 1, given.side, given.side.clamp(limit.side[0], limit.side[1])),
+    }
+}
+
+/// How well a flexion is defined: 1, and from 60 degrees to the side on less, down to 0 straight to the side.
+fn told(side: f64) -> f64 {
+    1.0 - smoothstep([60.0, 90.0], side.abs())
+}
+
+/// Brings the four fingers' flexion, level by level, within reach of their mean. That is the mean of what comes out, so
+/// that nothing is left to do.
+fn cohere(pose: &mut ArmPose, tally: &mut Tally) {
+    for k in 0..3 {
+        let given = [1, 2, 3, 4].map(|finger: usize| pose.fingers[finger][k].flexion);
+        let mean = coherent_mean(given);
+        for (finger, flexion) in (1..).zip(given) {
+            let to = flexion.clamp(mean - CURL_COHERENCE, mean + CURL_COHERENCE);
+            pose.fingers[finger][k].flexion = tally.changed(COHERENCE, flexion, to);
+        }
+    }
+}
+
+/// The mean of four angles that is also the mean of them clamped around it; of several such the one nearest to the
+/// plain mean. `rise(m)`, the clamped ones' mean less m, falls with m: it is bisected from the plain mean on.
+fn coherent_mean(given: [f64; 4]) -> f64 {
+    let rise = |m: f64| given.iter().map(|f| (f - m).clamp(-CURL_COHERENCE, CURL_COHERENCE)).sum::<f64>() / 4.0;
+    let mean = given.iter().sum::<f64>() / 4.0;
+    let sign = rise(mean);
+    if sign.abs() < 1e-12 {
+        return mean;
+    }
+    let reach = given.iter().fold(0.0f64, |reach, f| reach.max((f - mean).abs()));
+    let (mut near, mut far) = (mean, mean + reach.copysign(sign));
+    for _ in 0..60 {
+        let middle = (near + far) / 2.0;
+        if rise(middle) * sign > 1e-12 { near = middle } else { far = middle }
+    }
+    (near + far) / 2.0
+}

@@ -1,0 +1,178 @@
+//! What bones are called in the files: by us, by Mixamo, by Unity's humanoid, by VRM 1.0. The skeleton is the same;
+//! only its names change.
+
+use crate::motion::fk::Skeleton;
+
+/// Whose names.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Names {
+    /// `Hips`, `LeftForeArm`, `LeftHandIndex1`: Mixamo's without its prefix, and `Chest`.
+    #[default]
+    Own,
+    /// `mixamorig:Hips` and so on. Our chest is its `Spine1`; it has a `Spine2` more.
+    Mixamo,
+    /// Unity's `HumanBodyBones`.
+    UnityHumanoid,
+    /// Humanoid bones of VRM 1.0 (`VRMC_vrm`).
+    Vrm,
+}
+
+impl Names {
+    pub const ALL: [Self; 4] = [Self::Own, Self::Mixamo, Self::UnityHumanoid, Self::Vrm];
+
+    /// As a user writes it.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Own => "own",
+            Self::Mixamo => "mixamo",
+            Self::UnityHumanoid => "unity-humanoid",
+            Self::Vrm => "vrm",
+        }
+    }
+
+    /// The names of all joints of a skeleton, ends of bones too (a finger's fourth, `HeadEnd`, `LeftFootEnd`).
+    pub fn of(self, skeleton: &Skeleton) -> Vec<String> {
+        let own = |joint: usize| -> String {
+            let bone = &skeleton.joints[joint];
+            match bone.parent.map(|parent| skeleton.joints[parent].name.as_str()) {
+                Some(before) if bone.end => match before.strip_suffix('3') {
+                    Some(finger) => format!("{finger}4"),
+                    None => format!("{before}End"),
+                },
+                _ => bone.name.clone(),
+            }
+        };
+        (0..skeleton.joints.len()).map(|joint| self.translated(&own(joint))).collect()
+    }
+
+    /// The skeleton under these names; ends of bones stay without one.
+    pub fn applied(self, skeleton: &Skeleton) -> Skeleton {
+        let mut renamed = skeleton.clone();
+        for (joint, name) in renamed.joints.iter_mut().zip(self.of(skeleton)) {
+            if !joint.end {
+                joint.name = name;
+            }
+        }
+        renamed
+    }
+
+    fn translated(self, own: &str) -> String {
+        match self {
+            Self::Own => own.to_owned(),
+            Self::Mixamo => {
+                let name = match own {
+                    "Chest" => "Spine1".to_owned(),
+                    "HeadEnd" => "HeadTop_End".to_owned(),
+                    _ => own.replace("FootEnd", "ToeBase"),
+                };
+                format!("mixamorig:{name}")
+            }
+            Self::UnityHumanoid => humanoid(own, ["Proximal", "Intermediate", "Distal"]),
+            Self::Vrm => {
+                let name = humanoid(own, ["Metacarpal", "Proximal", "Distal"]);
+                let mut letters = name.chars();
+                letters.next().map(|first| first.to_lowercase().chain(letters).collect()).unwrap_or_default()
+            }
+        }
+    }
+}
+
+/// The name in Unity's way; `thumb` names the thumb's bones from base to tip.
+fn humanoid(own: &str, thumb: [&str; 3]) -> String {
+    let Some((side, part)) = ["Left", "Right"].iter().find_map(|side| Some((*side, own.strip_prefix(side)?))) else {
+        return own.to_owned();
+    };
+    let part = match part {
+        "Arm" => "UpperArm".to_owned(),
+        "ForeArm" => "LowerArm".to_owned(),
+        "UpLeg" => "UpperLeg".to_owned(),
+        "Leg" => "LowerLeg".to_owned(),
+        _ => match part.strip_prefix("Hand").and_then(|finger| finger.split_at_checked(finger.len().saturating_sub(1)))
+        {
+            Some((finger, digit)) if !finger.is_empty() => {
+                let bones = if finger == "Thumb" { thumb } else { ["Proximal", "Intermediate", "Distal"] };
+                let bone = ["1", "2", "3"].iter().position(|known| *known == digit).map_or("Tip", |k| bones[k]);
+                format!("{}{bone}", if finger == "Pinky" { "Little" } else { finger })
+            }
+            _ => part.to_owned(),
+        },
+    };
+    format!("{side}{part}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::animate::rig::rig::Figure;
+    use std::collections::BTreeSet;
+
+    const FINGERS: [&str; 5] = ["Thumb", "Index", "Middle", "Ring", "Little"];
+
+    fn skeleton() -> Skeleton {
+        let motion = crate::types::pose3d::Motion::from_joints(
+            crate::types::time::FrameRate::new(15, 1),
+            ndarray::Array3::from_elem((1, crate::types::skeleton::N_JOINTS, 3), f32::NAN),
+        );
+        Figure::of(&motion).skeleton
+    }
+
+    fn called(names: Names) -> BTreeSet<String> {
+        let all = names.of(&skeleton());
+        let set: BTreeSet<String> = all.iter().cloned().collect();
+        assert_eq!(set.len(), all.len(), "a name is given twice");
+        set
+    }
+
+    /// Both sides, and the trunk.
+    fn all_of(trunk: &[&str], sides: [&str; 2], parts: &[String]) -> Vec<String> {
+        let both = sides.iter().flat_map(|side| parts.iter().map(move |part| format!("{side}{part}")));
+        trunk.iter().map(ToString::to_string).chain(both).collect()
+    }
+
+    fn missing(expected: Vec<String>, names: Names) -> Vec<String> {
+        let called = called(names);
+        expected.into_iter().filter(|name| !called.contains(name)).collect()
+    }
+
+    #[test]
+    fn unitys_bones_are_all_there() {
+        // HumanBodyBones without those it calls optional and we have nothing for: eyes, jaw, toes, UpperChest.
+        let limbs = ["UpperLeg", "LowerLeg", "Foot", "Shoulder", "UpperArm", "LowerArm", "Hand"].map(String::from);
+        let fingers = FINGERS.iter().flat_map(|f| ["Proximal", "Intermediate", "Distal"].map(|b| format!("{f}{b}")));
+        let parts: Vec<String> = limbs.into_iter().chain(fingers).collect();
+        let expected = all_of(&["Hips", "Spine", "Chest", "Neck", "Head"], ["Left", "Right"], &parts);
+        assert_eq!((expected.len(), missing(expected, Names::UnityHumanoid)), (49, vec![]));
+    }
+
+    #[test]
+    fn vrms_bones_are_all_there() {
+        // VRM 1.0, humanoid.md, without upperChest, eyes, jaw and toes, which it does not require.
+        let limbs = ["UpperLeg", "LowerLeg", "Foot", "Shoulder", "UpperArm", "LowerArm", "Hand"].map(String::from);
+        let thumb = ["ThumbMetacarpal", "ThumbProximal", "ThumbDistal"].map(String::from);
+        let fingers =
+            FINGERS[1..].iter().flat_map(|f| ["Proximal", "Intermediate", "Distal"].map(|b| format!("{f}{b}")));
+        let parts: Vec<String> = limbs.into_iter().chain(thumb).chain(fingers).collect();
+        let expected = all_of(&["hips", "spine", "chest", "neck", "head"], ["left", "right"], &parts);
+        assert_eq!((expected.len(), missing(expected, Names::Vrm)), (49, vec![]));
+    }
+
+    #[test]
+    fn mixamos_bones_are_all_there() {
+        // Its 65 bones without Spine2 and the ends of the toes.
+        let limbs = ["UpLeg", "Leg", "Foot", "ToeBase", "Shoulder", "Arm", "ForeArm", "Hand"].map(String::from);
+        let fingers = ["Thumb", "Index", "Middle", "Ring", "Pinky"];
+        let fingers = fingers.iter().flat_map(|f| (1..=4).map(move |k| format!("Hand{f}{k}")));
+        let parts: Vec<String> = limbs.into_iter().chain(fingers).collect();
+        let trunk = ["Hips", "Spine", "Spine1", "Neck", "Head", "HeadTop_End"];
+        let expected = all_of(&trunk, ["Left", "Right"], &parts).into_iter().map(|name| format!("mixamorig:{name}"));
+        let expected: Vec<String> = expected.collect();
+        assert_eq!((expected.len(), missing(expected, Names::Mixamo)), (62, vec![]));
+    }
+
+    #[test]
+    fn ends_keep_no_name_in_a_bvh() {
+        let renamed = Names::Mixamo.applied(&skeleton());
+        assert!(renamed.find("mixamorig:LeftHandPinky3").is_some() && renamed.find("Hips").is_none());
+        assert!(renamed.joints.iter().all(|joint| joint.end == joint.name.is_empty()));
+    }
+}

@@ -1,0 +1,117 @@
+//! A left arm from its joints, shoulder to finger tips. Bones are given their smoothed directions; the upper arm's
+//! roll makes the elbow's axis lie across upper arm and forearm, and is bridged where the arm is straight; the hand's
+//! frame comes from its knuckles, and half of its turn about the forearm is the forearm's own. Fingers bend without
+//! twist.
+
+use super::arm_pose::{ArmPose, elbow};
+use super::positions::Places;
+use super::roll::elbow_axes;
+use super::smoothing::{Filter, Smoothing};
+use super::track::{Seen, Track, filled, world};
+use crate::animate::rig::hinge::Bend;
+use crate::animate::rig::rig::{Arm, finger_hinge};
+use crate::math::rotation::Rotation;
+use crate::math::vec3::Vec3;
+use crate::types::skeleton::{L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, NECK};
+use crate::types::time::FrameRate;
+
+const X: Vec3 = [1.0, 0.0, 0.0];
+/// A missing hand is relaxed after this time.
+const RELAX_SECS: f64 = 0.5;
+/// Flexion of the relaxed hand's joints, thumb first.
+const RELAXED: [[f64; 3]; 5] =
+    [[8.0, 10.0, 10.0], [20.0, 26.0, 16.0], [20.0, 26.0, 16.0], [20.0, 26.0, 16.0], [20.0, 26.0, 16.0]];
+/// How far a hand's turn is followed beyond half a turn from the middle of its range, degrees, before it is taken for
+/// a turn the other way.
+const FOLLOWED: f64 = 60.0;
+
+/// Frames a second and the filters for them.
+pub struct Means {
+    pub fps: f64,
+    pub arms: Filter,
+    pub hands: Filter,
+}
+
+impl Means {
+    pub fn of(smoothing: Smoothing, fps: FrameRate) -> Self {
+        Self { fps: fps.per_sec(), arms: smoothing.arms(fps), hands: smoothing.hands(fps) }
+    }
+}
+
+type Directions = Vec<Option<Vec3>>;
+
+/// Solves the arm and writes its tracks into `local` (one a joint of the skeleton), as a left arm whatever `arm` is.
+pub fn solve(places: &Places, arm: &Arm, chest: &Track, means: &Means, local: &mut [Track]) {
+    let n_frames = places.n_frames();
+    let relax_frames = Some(RELAX_SECS * means.fps);
+    let smooth = |parent: &Track, from: usize, to: usize| -> Directions {
+        let seen = |t: usize| Some(parent[t].inverse().turn(places.direction(t, from, to)?));
+        let mut track: Directions = (0..n_frames).map(seen).collect();
+        means.arms.directions(&mut track);
+        track
+    };
+    let clavicle = smooth(chest, NECK, L_SHOULDER).into_iter().map(|to| Some(Rotation::between(X, to?)));
+    local[arm.clavicle] = filled(clavicle.collect(), Rotation::IDENTITY, None);
+    let clavicle = world(chest, &local[arm.clavicle]);
+
+    let (along, fore) = (smooth(&clavicle, L_SHOULDER, L_ELBOW), smooth(&clavicle, L_ELBOW, L_WRIST));
+    let upper: Seen = elbow_axes(&along, &fore);
+    let hanging = Rotation::between(X, [0.17, -0.985, 0.0]);
+    local[arm.upper] = filled(upper, hanging, None);
+    let bent = |(upper, fore): (&Rotation, &Option<Vec3>)| {
+        Some(elbow().rotation(elbow().bend(upper.inverse().turn((*fore)?))))
+    };
+    let bent: Seen = local[arm.upper].iter().zip(&fore).map(bent).collect();
+    let relaxed_elbow = elbow().rotation(Bend { flexion: 17.0, side: 0.0 });
+    let fore = filled(bent, relaxed_elbow, None);
+    let forearm = world(&world(&clavicle, &local[arm.upper]), &fore);
+
+    let frames: Seen = (0..n_frames).map(|t| places.hand_frame(t)).collect();
+    let hand = filled(smooth_hand(&forearm, &frames, &means.hands), Rotation::IDENTITY, relax_frames);
+    let mut followed = 0.0;
+    for t in 0..n_frames {
+        let (supination, wrist) = ArmPose::of_hand(hand[t], followed, FOLLOWED);
+        followed = supination;
+        (local[arm.fore][t], local[arm.hand][t]) = ArmPose::shared(fore[t], supination, wrist);
+    }
+    for (finger, joints) in arm.fingers.iter().enumerate() {
+        let bones = solve_finger(places, &frames, finger, &means.hands);
+        for ((&joint, bone), relaxed) in joints.iter().zip(bones).zip(RELAXED[finger]) {
+            let rest = finger_hinge(finger).rotation(Bend { flexion: relaxed, side: 0.0 });
+            local[joint] = filled(bone, rest, relax_frames);
+        }
+    }
+}
+
+/// The hand's rotations against the untwisted forearm, smoothed by their three angles: within its limits a hand has no
+/// two sets of them, and between a palm up and a palm down lies a hand on edge, where directions would cancel out.
+fn smooth_hand(forearm: &Track, frames: &Seen, filter: &Filter) -> Seen {
+    let mut followed = 0.0;
+    let mut angle = |(hand, fore): (&Option<Rotation>, &Rotation)| {
+        let (supination, wrist) = ArmPose::of_hand(fore.inverse() * (*hand)?, followed, FOLLOWED);
+        followed = supination;
+        Some([supination, wrist.flexion, wrist.side])
+    };
+    let mut angles: Vec<Option<Vec3>> = frames.iter().zip(forearm).map(&mut angle).collect();
+    filter.runs(&mut angles);
+    let rotation = |[supination, flexion, side]: Vec3| ArmPose::hand(supination, Bend { flexion, side });
+    angles.into_iter().map(|angles| angles.map(rotation)).collect()
+}
+
+/// Local rotations of a finger's three joints. Bones are smoothed in the axes of the hand as it was seen: what shakes
+/// the whole hand does not shake them.
+fn solve_finger(places: &Places, frames: &Seen, finger: usize, filter: &Filter) -> [Seen; 3] {
+    let (hinge, base) = (finger_hinge(finger), L_HAND + 1 + 4 * finger);
+    let mut parent: Seen = vec![Some(Rotation::IDENTITY); frames.len()];
+    [0, 1, 2].map(|k| {
+        let seen = |t: usize| Some(frames[t]?.inverse().turn(places.direction(t, base + k, base + k + 1)?));
+        let mut track: Directions = (0..frames.len()).map(seen).collect();
+        filter.directions(&mut track);
+        let bone = |(parent, to): (&Option<Rotation>, Option<Vec3>)| {
+            Some(hinge.rotation(hinge.bend((*parent)?.inverse().turn(to?))))
+        };
+        let bones: Seen = parent.iter().zip(track).map(bone).collect();
+        parent = parent.iter().zip(&bones).map(|(parent, bone)| Some((*parent)? * (*bone)?)).collect();
+        bones
+    })
+}

@@ -1,0 +1,91 @@
+//! What a left arm does below its upper arm, in angles: the one place that knows how rotations of the figure's joints
+//! are made of angles and angles of rotations. Half of the hand's turn about the forearm belongs to the forearm.
+
+use crate::animate::rig::hinge::{Bend, Hinge, flexed, sideways};
+use crate::animate::rig::limits::turn;
+use crate::animate::rig::rig::{Arm, finger_hinge};
+use crate::math::rotation::Rotation;
+use crate::math::vec3::Vec3;
+
+const X: Vec3 = [1.0, 0.0, 0.0];
+
+/// Angles of an arm, degrees.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ArmPose {
+    pub elbow: Bend,
+    /// Turn of the hand about the forearm; 0: the palm lies along the elbow's axis, positive: supination.
+    pub supination: f64,
+    /// Positive flexion: towards the palm; positive side: radial.
+    pub wrist: Bend,
+    /// Thumb to little finger, knuckle to end joint.
+    pub fingers: [[Bend; 3]; 5],
+}
+
+/// The left elbow: it bends forward.
+pub fn elbow() -> Hinge {
+    Hinge::new(X, [0.0, -1.0, 0.0])
+}
+
+impl ArmPose {
+    /// The angles of the arm in a frame's local rotations. A finger's twist, which no joint tells, is left out.
+    pub fn of(arm: &Arm, local: &[Rotation]) -> Self {
+        let of = |joint: usize| on_left(arm, local[joint]);
+        let (fore, hand) = (of(arm.fore), of(arm.hand));
+        let elbow_bend = elbow().bend(fore.turn(X));
+        let untwisted = elbow().rotation(elbow_bend).inverse() * fore;
+        let (_, half) = untwisted.swing_twist(X);
+        let (supination, wrist) = Self::of_hand(untwisted * hand, -2.0 * half.to_degrees(), 0.0);
+        let fingers = std::array::from_fn(|finger| {
+            let hinge = finger_hinge(finger);
+            arm.fingers[finger].map(|joint| hinge.bend(of(joint).turn(hinge.along())))
+        });
+        Self { elbow: elbow_bend, supination, wrist, fingers }
+    }
+
+    /// Puts the angles into a frame's local rotations.
+    pub fn write(&self, arm: &Arm, local: &mut [Rotation]) {
+        let mut put = |joint: usize, rotation: Rotation| local[joint] = on_left(arm, rotation);
+        let (fore, hand) = Self::shared(elbow().rotation(self.elbow), self.supination, self.wrist);
+        put(arm.fore, fore);
+        put(arm.hand, hand);
+        for (finger, bends) in self.fingers.iter().enumerate() {
+            for (&joint, &bend) in arm.fingers[finger].iter().zip(bends) {
+                put(joint, finger_hinge(finger).rotation(bend));
+            }
+        }
+    }
+
+    /// Supination and wrist of a hand given against the untwisted forearm. The turn is the one nearest to `followed`,
+    /// unless that is more than half a turn and `leave` from the palm along the elbow's axis.
+    pub fn of_hand(hand: Rotation, followed: f64, leave: f64) -> (f64, Bend) {
+        // hand = about x (supination) * sideways * flexed: the flexion's axis -z shows the first two.
+        let [x, y, z] = hand.turn([0.0, 0.0, 1.0]);
+        let pronation = (-y).atan2(z).to_degrees();
+        let along = (about_x(pronation).inverse() * hand).turn(X);
+        let side = (-x).clamp(-1.0, 1.0).asin().to_degrees();
+        let [x, y, _] = sideways(side).inverse().turn(along);
+        let near = followed + turn(-pronation - followed);
+        let supination = if leave > 0.0 && near.abs() > 180.0 + leave { -pronation } else { near };
+        (supination, Bend { flexion: (-y).atan2(x).to_degrees(), side })
+    }
+
+    /// The hand with these angles, against the untwisted forearm.
+    pub fn hand(supination: f64, wrist: Bend) -> Rotation {
+        about_x(-supination) * sideways(wrist.side) * flexed(wrist.flexion)
+    }
+
+    /// Local rotations of forearm and hand: `bent` is the untwisted forearm.
+    pub fn shared(bent: Rotation, supination: f64, wrist: Bend) -> (Rotation, Rotation) {
+        let half = about_x(-supination / 2.0);
+        (bent * half, half * sideways(wrist.side) * flexed(wrist.flexion))
+    }
+}
+
+fn about_x(degrees: f64) -> Rotation {
+    Rotation::about(X, degrees.to_radians())
+}
+
+/// A rotation of this arm as one of a left arm, and back.
+fn on_left(arm: &Arm, rotation: Rotation) -> Rotation {
+    if arm.sign < 0.0 { rotation.mirrored() } else { rotation }
+}

@@ -1,0 +1,10 @@
+//! Joint positions to joint rotations: arms, roll, head, hands, and their smoothing.
+
+pub mod arm;
+pub mod arm_pose;
+pub mod head;
+pub mod positions;
+pub mod roll;
+pub mod rotations;
+pub mod smoothing;
+pub mod track;

@@ -1,0 +1,101 @@
+//! The roll of an upper arm. The elbow's axis lies across upper arm and forearm; a straight arm does not show it. So
+//! the axis is carried along with the upper arm without roll, the elbow's plane is measured against it where the arm
+//! is bent, and between such stretches the roll passes evenly from one to the other; before and after them it is held.
+
+use super::track::{Seen, smoothstep};
+use crate::math::rotation::Rotation;
+use crate::math::vec3::{Vec3, across, cross, dot, unit};
+
+/// Elbow angles, degrees (0: straight), between which the plane passes from not seen to seen.
+const STRAIGHT_DEGREES: [f64; 2] = [8.0, 20.0];
+/// The left upper arm and the axis its elbow bends about, at rest.
+const REST: (Vec3, Vec3) = ([1.0, 0.0, 0.0], [0.0, -1.0, 0.0]);
+/// How much an uneven roll counts against a frame's own plane.
+const EVEN: f64 = 0.02;
+/// How much a roll other than the one carried along counts where nothing is seen: hardly.
+const CARRIED: f64 = 1e-9;
+
+/// Rotations of the upper arm from the directions of upper arm and forearm in the clavicle's axes; none where the upper
+/// arm is not seen.
+pub fn elbow_axes(upper: &[Option<Vec3>], fore: &[Option<Vec3>]) -> Seen {
+    // Carried along, and the measured roll against it with its weight.
+    let mut carried = REST;
+    let mut frames: Vec<(usize, (Vec3, Vec3))> = Vec::with_capacity(upper.len());
+    let mut measured: Vec<[f64; 2]> = Vec::with_capacity(upper.len());
+    let mut trusted = 0.0;
+    for (t, (upper, fore)) in upper.iter().zip(fore).enumerate() {
+        let Some(upper) = *upper else { continue };
+        let axis = across(Rotation::between(carried.0, upper).turn(carried.1), upper);
+        carried = (upper, unit(axis, 1e-9).unwrap_or(carried.1));
+        let seen = fore.and_then(|fore| {
+            let axis = unit(cross(upper, fore), 1e-9)?;
+            let bent = dot(upper, fore).clamp(-1.0, 1.0).acos().to_degrees();
+            let roll = dot(cross(carried.1, axis), upper).atan2(dot(carried.1, axis));
+            Some((roll, smoothstep(STRAIGHT_DEGREES, bent)))
+        });
+        let (roll, weight) = seen.unwrap_or((trusted, 0.0));
+        let near = trusted + wrapped(roll - trusted);
+        trusted += weight * (near - trusted);
+        frames.push((t, carried));
+        measured.push([near, weight]);
+    }
+    let mut rolls = vec![None; upper.len()];
+    for ((t, carried), roll) in frames.into_iter().zip(evened(&measured)) {
+        rolls[t] = Some(Rotation::about(carried.0, roll) * Rotation::between_frames(REST, carried));
+    }
+    rolls
+}
+
+/// The rolls nearest to the measured ones (each with its weight) that change evenly where nothing is measured: the
+/// least of `sum w (r - m)^2 + EVEN sum (r[t] - r[t - 1])^2`, by elimination in a matrix of three diagonals.
+fn evened(measured: &[[f64; 2]]) -> Vec<f64> {
+    let n = measured.len();
+    let mut ahead: Vec<[f64; 2]> = Vec::with_capacity(n);
+    for (t, &[roll, weight]) in measured.iter().enumerate() {
+        let neighbours = f64::from(u8::from(t > 0)) + f64::from(u8::from(t + 1 < n));
+        let (diagonal, right) = (weight + CARRIED + EVEN * neighbours, weight * roll);
+        let [link, value] = ahead.last().copied().unwrap_or([0.0, 0.0]);
+        let pivot = diagonal - if t > 0 { EVEN * link } else { 0.0 };
+        ahead.push([EVEN / pivot, (right + if t > 0 { EVEN * value } else { 0.0 }) / pivot]);
+    }
+    let mut rolls = vec![0.0; n];
+    let mut next = 0.0;
+    for (t, [link, value]) in ahead.into_iter().enumerate().rev() {
+        next = value + if t + 1 < n { link * next } else { 0.0 };
+        rolls[t] = next;
+    }
+    rolls
+}
+
+fn wrapped(angle: f64) -> f64 {
+    angle - std::f64::consts::TAU * (angle / std::f64::consts::TAU).round()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seen_rolls_stay_and_unseen_ones_pass_evenly() {
+        let measured: Vec<[f64; 2]> =
+            (0..40).map(|t| if (10..30).contains(&t) { [9.0, 0.0] } else { [f64::from(t / 20), 1.0] }).collect();
+        let rolls = evened(&measured);
+        assert!(rolls[0].abs() < 1e-3 && (rolls[39] - 1.0).abs() < 1e-3);
+        assert!(rolls.windows(2).all(|pair| (-1e-9..0.06).contains(&(pair[1] - pair[0]))), "{rolls:?}");
+        assert!((rolls[19] + rolls[20] - 1.0).abs() < 1e-4);
+        assert_eq!(evened(&[]), Vec::<f64>::new());
+        assert!(evened(&[[3.0, 0.0]; 5]).iter().all(|roll| roll.abs() < 1e-6));
+    }
+
+    #[test]
+    fn the_elbow_bends_about_its_axis() {
+        let upper = vec![unit([0.3, -0.9, 0.1], 0.0); 20];
+        let fore = vec![unit([0.2, 0.1, 0.9], 0.0); 20];
+        for rotation in elbow_axes(&upper, &fore) {
+            let rotation = rotation.unwrap();
+            assert!(dot(rotation.turn(REST.0), upper[0].unwrap()) > 1.0 - 1e-9);
+            let into = rotation.inverse().turn(fore[0].unwrap());
+            assert!(into[1].abs() < 1e-4 && into[2] > 0.0, "{into:?}");
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! Joints to bone rotations, by swing and twist. The turn of the shoulders about the vertical goes half to the spine
+//! and half to the chest; the clavicle swings; arms and hands are in `arm`, the right one solved as the left one's
+//! mirror image. Forward kinematics gives the joints back wherever bones keep their length and palms their shape, but
+//! for what was smoothed.
+
+use super::arm;
+use super::arm::Means;
+use super::positions::Places;
+use super::track::{Track, filled, mirrored};
+use crate::animate::rig::rig::Figure;
+use crate::math::rotation::Rotation;
+use crate::math::vec3::Vec3;
+
+/// Local rotations of the figure's joints, joint by joint, in the figure's axes (x, -y, -z of the motion's). Hips,
+/// neck, head and legs rest.
+pub fn rotations(places: &Places, figure: &Figure, means: &Means) -> Vec<Track> {
+    let n_frames = places.n_frames();
+    let mut local: Vec<Track> = vec![vec![Rotation::IDENTITY; n_frames]; figure.skeleton.joints.len()];
+
+    let mut line: Vec<Option<Vec3>> = (0..n_frames).map(|t| places.shoulder_line(t)).collect();
+    means.arms.directions(&mut line);
+    let half_yaw = |[x, _, z]: Vec3| Rotation::about([0.0, 1.0, 0.0], (-z).atan2(x) / 2.0);
+    let half_yaw = filled(line.into_iter().map(|line| line.map(half_yaw)).collect(), Rotation::IDENTITY, None);
+    let chest: Track = half_yaw.iter().map(|&half| half * half).collect();
+    local[figure.spine].clone_from(&half_yaw);
+    local[figure.chest] = half_yaw;
+
+    let [left, right] = &figure.arms;
+    arm::solve(places, left, &chest, means, &mut local);
+    arm::solve(&places.mirrored(), right, &mirrored(chest), means, &mut local);
+    let fingers = right.fingers.iter().flatten();
+    for &joint in [right.clavicle, right.upper, right.fore, right.hand].iter().chain(fingers) {
+        local[joint] = mirrored(std::mem::take(&mut local[joint]));
+    }
+    local
+}

@@ -1,0 +1,205 @@
+//! Which motions `orator animate` is given, and what is beside them: face keypoints, sound.
+
+use anyhow::{Context as _, Result, bail, ensure};
+use orator::animate::Face;
+use orator::dataset::index::SampleRef;
+use orator::dataset::{Dataset, Split};
+use orator::formats::{authors_txt, joints_npz, keypoints_npz, npy};
+use orator::types::pose2d::N_BODY;
+use orator::types::pose3d::Motion;
+use orator::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
+use orator::types::sound::Sound;
+use orator::types::time::FrameRate;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+/// A motion not yet read.
+pub struct Input {
+    pub name: String,
+    place: Place,
+}
+
+enum Place {
+    File(PathBuf),
+    Sample(Rc<Dataset>, Box<SampleRef>),
+}
+
+/// A motion with what is beside it.
+pub struct Take {
+    pub motion: Motion,
+    pub face: Option<Face>,
+    pub sound: Option<Sound>,
+}
+
+/// A joints file of a run.
+const JOINTS: &str = "joints.npz";
+
+/// The motions meant by a file, a lifted video's or a speaker's folder, a folder of motions, or a dataset.
+pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result<Vec<Input>> {
+    ensure!(path.exists(), "{} is not there", path.display());
+    let is_dataset = path.join("info.json").is_file() && path.join("index.jsonl").is_file();
+    ensure!(
+        is_dataset || (sample.is_none() && split.is_none()),
+        "{} is no dataset (work/dataset/SPEAKER): --sample and --split have no meaning for it",
+        path.display()
+    );
+    if is_dataset {
+        return of_dataset(path, sample, split);
+    }
+    let file = |path: PathBuf, named: &Path| {
+        let name = named.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Input { name, place: Place::File(path) }
+    };
+    if path.is_file() {
+        return Ok(vec![file(path.to_owned(), path)]);
+    }
+    if path.join(JOINTS).is_file() {
+        let whole = path.canonicalize().with_context(|| format!("cannot open {}", path.display()))?;
+        return Ok(vec![file(path.join(JOINTS), &whole)]);
+    }
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(path).with_context(|| format!("cannot open {}", path.display()))? {
+        let entry = entry.with_context(|| format!("cannot read {}", path.display()))?.path();
+        if entry.join(JOINTS).is_file() {
+            found.push(file(entry.join(JOINTS), &entry));
+        } else if entry.is_file() && is_motion(&entry) {
+            found.push(file(entry.clone(), &entry));
+        }
+    }
+    found.sort_by(|a, b| a.name.cmp(&b.name));
+    for pair in found.windows(2) {
+        ensure!(
+            pair[0].name != pair[1].name,
+            "{}: two motions are called {}; their outputs would be one file",
+            path.display(),
+            pair[0].name
+        );
+    }
+    ensure!(
+        !found.is_empty(),
+        "{} holds no motion: neither .npy, .txt or .npz files nor folders with a {JOINTS}",
+        path.display()
+    );
+    Ok(found)
+}
+
+fn of_dataset(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result<Vec<Input>> {
+    let dataset = Rc::new(Dataset::open(path)?);
+    let splits = split.map_or(Split::ALL.to_vec(), |split| vec![split]);
+    let samples: Vec<SampleRef> = splits.into_iter().flat_map(|split| dataset.samples(split)).collect();
+    let keys = || samples.iter().take(5).map(|sample| sample.key.clone()).collect::<Vec<_>>().join(", ");
+    let meant = |found: &&SampleRef| sample.is_none_or(|key| found.key == key);
+    let inputs: Vec<Input> = samples
+        .iter()
+        .filter(meant)
+        .map(|found| Input {
+            name: found.key.clone(),
+            place: Place::Sample(Rc::clone(&dataset), Box::new(found.clone())),
+        })
+        .collect();
+    match (inputs.is_empty(), sample) {
+        (true, Some(key)) => bail!("{} has no sample {key}; it has, for instance: {}", path.display(), keys()),
+        (true, None) => bail!("{} has no sample in this split", path.display()),
+        _ => Ok(inputs),
+    }
+}
+
+impl Input {
+    /// Whether this is that file.
+    pub fn is_at(&self, path: &Path) -> bool {
+        match &self.place {
+            Place::File(file) => {
+                file == path || file.canonicalize().is_ok_and(|a| path.canonicalize().is_ok_and(|b| a == b))
+            }
+            Place::Sample(..) => false,
+        }
+    }
+
+    /// Reads the motion; `fps` is that of files without a rate. `keypoints` is where the face is from, else what a run
+    /// or a dataset has.
+    pub fn read(&self, fps: FrameRate, keypoints: Option<&Path>) -> Result<Take> {
+        let take = match &self.place {
+            Place::Sample(dataset, sample) => {
+                let sample = dataset.read(sample)?;
+                let body = sample.pose2d.slice(ndarray::s![.., ..N_BODY, ..]).to_owned();
+                Take { motion: sample.motion, face: Some(Face { body }), sound: Some(sample.sound) }
+            }
+            Place::File(path) => Take { motion: read_motion(path, fps)?, face: None, sound: None },
+        };
+        check(&take.motion).with_context(|| format!("no animation of {}", self.name))?;
+        match keypoints.map(Path::to_owned).or_else(|| self.of_run("pose2d", "keypoints.npz")) {
+            Some(path) => Ok(Take { face: Some(read_face(&path, &take.motion)?), ..take }),
+            None => Ok(take),
+        }
+    }
+
+    /// The sound of the run that a lifted video belongs to.
+    pub fn sound_of_run(&self) -> Option<PathBuf> {
+        self.of_run("extract", "audio.wav")
+    }
+
+    /// `work/lift/SPEAKER/VIDEO/joints.npz` has its keypoints at `work/pose2d/SPEAKER/VIDEO/keypoints.npz`, and so on.
+    fn of_run(&self, stage: &str, file: &str) -> Option<PathBuf> {
+        let Place::File(path) = &self.place else { return None };
+        let folder = path.canonicalize().ok()?.parent()?.to_owned();
+        let (video, speaker) = (folder.file_name()?, folder.parent()?.file_name()?);
+        let lift = folder.parent()?.parent()?;
+        let found = lift.parent()?.join(stage).join(speaker).join(video).join(file);
+        (lift.file_name()? == "lift" && found.is_file()).then_some(found)
+    }
+}
+
+fn read_face(path: &Path, motion: &Motion) -> Result<Face> {
+    let keypoints = keypoints_npz::read(path)?;
+    ensure!(
+        keypoints.n_frames() == motion.n_frames(),
+        "{} has {} frames of keypoints, the motion has {}: they are not of the same clip",
+        path.display(),
+        keypoints.n_frames(),
+        motion.n_frames()
+    );
+    Ok(Face { body: keypoints.body })
+}
+
+/// Whether a file is a motion by its ending.
+pub fn is_motion(path: &Path) -> bool {
+    ["npy", "txt", "npz"].contains(&ending(path).as_str())
+}
+
+/// Reads a file of joints; `fps` is that of a kind of file without a rate.
+pub fn read_motion(path: &Path, fps: FrameRate) -> Result<Motion> {
+    match ending(path).as_str() {
+        "npy" => npy::read(path, fps),
+        "txt" => authors_txt::read(path, fps),
+        "npz" => joints_npz::read(path),
+        _ => bail!(
+            "{}: motion is read from .npy (joints), .txt (the authors' layout), .npz (of a run), a lifted video's folder \
+             or a dataset",
+            path.display()
+        ),
+    }
+}
+
+/// That there is something to animate, in metres.
+fn check(motion: &Motion) -> Result<()> {
+    ensure!(motion.n_frames() > 0, "it has no frames");
+    let mut lengths: Vec<f32> = Vec::new();
+    for frame in motion.joints.outer_iter() {
+        for (a, b) in [(L_SHOULDER, L_ELBOW), (L_ELBOW, L_WRIST), (R_SHOULDER, R_ELBOW), (R_ELBOW, R_WRIST)] {
+            lengths.push((0..3).map(|k| (frame[[a, k]] - frame[[b, k]]).powi(2)).sum::<f32>().sqrt());
+        }
+    }
+    lengths.retain(|length| length.is_finite());
+    ensure!(!lengths.is_empty(), "no arm is seen in any of its {} frames: every joint is NaN", motion.n_frames());
+    let middle = lengths.len() / 2;
+    let length = *lengths.select_nth_unstable_by(middle, f32::total_cmp).1;
+    ensure!(
+        (0.02..=2.0).contains(&length),
+        "its arm bones are {length} long; joints must be in metres about the neck, x image right, y down, z away"
+    );
+    Ok(())
+}
+
+fn ending(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+}

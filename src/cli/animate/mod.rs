@@ -1,0 +1,6 @@
+//! `orator animate`.
+
+pub mod input;
+pub mod verb;
+
+pub use verb::{Args, run};

@@ -1,0 +1,393 @@
+//! `orator animate`.
+
+use super::input::{Input, Take, inputs, is_motion, read_motion};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
+use anyhow::{Context as _, Result, bail, ensure};
+use orator::animate::export::file::{Format, Sources};
+use orator::animate::export::film::Beside;
+use orator::animate::performance::{Jerk, Seen, Told};
+use orator::animate::rig::names::Names;
+use orator::animate::solve::smoothing::ONE_EURO;
+use orator::animate::{Constraints, Options, Performance, Smoothing, Yaw, perform};
+use orator::dataset::Split;
+use orator::external::ffmpeg::audio;
+use orator::math::one_euro::OneEuro;
+use orator::stage::progress::Progress as _;
+use orator::types::sound::{SAMPLE_RATE, Sound};
+use orator::types::time::FrameRate;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Turn joints into files for animation programs: rotations of a whole figure, smoothed and held within what a body
+/// can do.
+///
+/// IN is a motion: .npy (joints [frames, 49, 3], metres), .txt (the layout of Rebol et al. 2021), joints.npz or the
+/// folder of a lifted video (work/lift/SPEAKER/VIDEO), or a dataset (work/dataset/SPEAKER) with --sample. The ending of
+/// each output chooses what is written: .bvh (cm, y up, facing +z, T-pose at rest), .glb (a skinned avatar), .json,
+/// .npy and .txt (the joints of the figure), .mp4 (a film).
+/// With --format, IN may be a folder of motions, a speaker's folder of lifted videos or a whole dataset, and --out is a
+/// folder.
+///
+/// The head turns with the face where keypoints are known: of a dataset and of a run by themselves, else with
+/// --keypoints; otherwise it rests. Bones have the lengths, palms the shape that are the motion's medians.
+///
+/// Smoothing has the motion's own time step; hands are smoothed more than arms. Constraints: limits of elbow, forearm,
+/// wrist and every finger joint; the four fingers curl within 10 degrees of their mean (a pointing finger needs
+/// `--curl-coherence off`). Every clamp is counted.
+#[derive(clap::Args)]
+pub struct Args {
+    /// A motion, or a folder of them.
+    #[arg(value_name = "IN")]
+    input: PathBuf,
+    /// What to write; may be given several times. With --format: one folder.
+    #[arg(long, value_name = "FILE|FOLDER", required = true, num_args = 1..)]
+    out: Vec<PathBuf>,
+    /// Write every motion of IN into the folder --out, in these formats: bvh,glb,json,mp4,npy,txt
+    #[arg(long, value_name = "ENDING", value_delimiter = ',')]
+    format: Vec<String>,
+    /// Of a dataset: the sample of this key.
+    #[arg(long, value_name = "KEY")]
+    sample: Option<String>,
+    /// Of a dataset: only this part.
+    #[arg(long, value_name = "train|validation|test", value_parser = split, conflicts_with = "sample")]
+    split: Option<Split>,
+    /// What the bones are called in .bvh, .glb and .json.
+    #[arg(long, value_name = "own|mixamo|unity-humanoid|vrm", default_value = "own", value_parser = names_called)]
+    names: Names,
+    /// Keypoints of the same frames (`body` [T, 17, 3], COCO), from which the head is turned.
+    #[arg(long, value_name = "FILE.npz", conflicts_with = "format")]
+    keypoints: Option<PathBuf>,
+    /// Leave the head at rest though the face is known.
+    #[arg(long, conflicts_with = "keypoints")]
+    neutral_head: bool,
+    /// Sound of a film; without: that of the dataset or of the run that the motion is from.
+    #[arg(long, value_name = "FILE", conflicts_with = "format")]
+    audio: Option<PathBuf>,
+    /// What a film shows beside the figure: the video it was taken from, whose sound it has where there is no other, or
+    /// another motion (.npy, .txt, .npz), put on a figure in the same way.
+    #[arg(long, value_name = "FILE", conflicts_with = "format")]
+    beside: Option<PathBuf>,
+    /// The second of the video beside, at which the motion begins.
+    #[arg(long, value_name = "SECS", default_value_t = 0.0, requires = "beside")]
+    beside_from: f64,
+    /// What the two motions of --beside are called, such as `prediction truth`; without: their files' names.
+    #[arg(long, value_names = ["OURS", "OTHER"], num_args = 2, requires = "beside")]
+    labels: Option<Vec<String>>,
+    /// Frames a second of a .npy or .txt.
+    #[arg(long, value_name = "RATE", default_value = "15", value_parser = rate)]
+    in_fps: FrameRate,
+    /// Frames a second of what is written; without: those of the motion. A fraction is 30000/1001.
+    #[arg(long, value_name = "RATE", value_parser = rate)]
+    fps: Option<FrameRate>,
+    /// The turn of the shoulders about the vertical: of spine and chest, or removed, so that the figure faces ahead.
+    #[arg(long, value_enum, default_value = "spine")]
+    shoulder_yaw: ShoulderYaw,
+    /// Cubics over 0.6 s (arms) and 1 s (hands), which come not late; the causal one-Euro filter; or none.
+    #[arg(long, value_enum, default_value = "savitzky-golay")]
+    smoothing: Kind,
+    /// One-Euro: cut-off of arms at rest, Hz; that of hands is half of it.
+    #[arg(long, value_name = "HZ", default_value_t = ONE_EURO.rest_hz)]
+    one_euro_hz: f64,
+    /// One-Euro: Hz by which the cut-off rises with a radian a second.
+    #[arg(long, value_name = "BETA", default_value_t = ONE_EURO.beta)]
+    one_euro_beta: f64,
+    /// Leave every joint as it was, possible or not.
+    #[arg(long)]
+    no_constraints: bool,
+    /// Whether the four fingers curl within 10 degrees of their mean.
+    #[arg(long, value_enum, default_value = "on", conflicts_with = "no_constraints")]
+    curl_coherence: Switch,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum ShoulderYaw {
+    Spine,
+    Removed,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Kind {
+    SavitzkyGolay,
+    OneEuro,
+    None,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Switch {
+    On,
+    Off,
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let options = options(&args)?;
+    let inputs = inputs(&args.input, args.sample.as_deref(), args.split)?;
+    if !args.format.is_empty() {
+        return whole_folder(&args, &inputs, &options, ui);
+    }
+    let [input] = inputs.as_slice() else {
+        bail!(
+            "{} holds {} motions: name one (--sample for a dataset), or give --format bvh and a folder as --out",
+            args.input.display(),
+            inputs.len()
+        );
+    };
+    let outputs = outputs(&args, input)?;
+    let sound = args.audio.as_deref().map(read_sound).transpose()?;
+    let done = animate(&args, input, sound, &outputs, &options, ui)?;
+    let next = next_command(&args, &outputs);
+    let text = format!("{}wrote {}", done.text, names(&outputs).join(", "));
+    let mut facts = done.facts;
+    facts["next"] = json!(next);
+    ui.summary(&text, next.as_deref(), facts);
+    Ok(Outcome::Done)
+}
+
+/// Every motion of a folder or dataset; one that fails does not stop the others.
+fn whole_folder(args: &Args, inputs: &[Input], options: &Options, ui: &Ui) -> Result<Outcome> {
+    let [folder] = args.out.as_slice() else { bail!("--format writes into one folder; give one --out") };
+    ensure!(!folder.is_file(), "{} is a file; with --format --out is a folder", folder.display());
+    let endings: Vec<&str> = args.format.iter().map(|ending| ending.trim_start_matches('.')).collect();
+    endings.iter().try_for_each(|ending| Format::of(&folder.join(format!("x.{ending}"))).map(drop))?;
+    let task = ui.begin("animating", inputs.len() as u64);
+    let (mut text, mut facts, mut n_failed, mut n_files) = (String::new(), Vec::new(), 0, 0);
+    for input in inputs {
+        task.detail(&input.name);
+        let named = |ending: &&str| {
+            let path = folder.join(format!("{}.{ending}", input.name));
+            ensure!(!input.is_at(&path), "{} is the motion itself; write to another folder", path.display());
+            Ok((path.clone(), Format::of(&path)?))
+        };
+        let outputs: Result<Vec<_>> = endings.iter().map(named).collect();
+        match outputs.and_then(|outputs| animate(args, input, None, &outputs, options, ui)) {
+            Ok(done) => {
+                n_files += endings.len();
+                text += &format!("{}\n{}", input.name, done.text);
+                facts.push(done.facts);
+            }
+            Err(error) => {
+                n_failed += 1;
+                ui.say(&format!("failed  {}: {error:#}", input.name));
+                facts.push(json!({ "name": input.name, "error": format!("{error:#}") }));
+            }
+        }
+        task.advance(1);
+    }
+    drop(task);
+    text += &format!("wrote {n_files} files into {}", folder.display());
+    if n_failed > 0 {
+        text += &format!("\n{n_failed} of {} motions failed", inputs.len());
+    }
+    ui.summary(&text, None, json!({ "motions": facts, "failed": n_failed, "out": folder }));
+    Ok(if n_failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
+}
+
+/// What a motion's animation is told as.
+struct Done {
+    text: String,
+    facts: Value,
+}
+
+fn animate(
+    args: &Args,
+    input: &Input,
+    sound: Option<Sound>,
+    outputs: &[(PathBuf, Format)],
+    options: &Options,
+    ui: &Ui,
+) -> Result<Done> {
+    let Take { motion, face, sound: own } = input.read(args.in_fps, args.keypoints.as_deref())?;
+    let (sound, face) = (sound.or(own), face.filter(|_| !args.neutral_head));
+    let started = Instant::now();
+    let performance = perform(&motion, face.as_ref(), options);
+    let secs = started.elapsed().as_secs_f64();
+    let other = match &args.beside {
+        Some(path) if is_motion(path) => Some(perform(&read_motion(path, args.in_fps)?, None, options).motion()),
+        _ => None,
+    };
+    let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let labels = match args.labels.as_deref() {
+        Some([ours, other]) => [ours.clone(), other.clone()],
+        _ => [input.name.clone(), args.beside.as_deref().map(stem).unwrap_or_default()],
+    };
+    let beside = match (&args.beside, &other) {
+        (None, _) => Beside::Itself,
+        (Some(_), Some(motion)) => Beside::Motion { motion, labels: labels.each_ref().map(String::as_str) },
+        (Some(path), None) => Beside::Video { path, from_secs: args.beside_from },
+    };
+    let is_film = outputs.iter().any(|&(_, format)| format == Format::Mp4);
+    let sound = match (sound, beside) {
+        (None, Beside::Video { path, from_secs }) if is_film => audio::read_mono(path, SAMPLE_RATE)?
+            .map(|whole| part(&whole, from_secs, motion.fps.secs(motion.n_frames()))),
+        (sound, _) => sound,
+    };
+    let sound = match (sound, input.sound_of_run()) {
+        (None, Some(path)) if is_film => {
+            audio::read_mono(&path, SAMPLE_RATE)?.map(|whole| part(&whole, 0.0, motion.fps.secs(motion.n_frames())))
+        }
+        (sound, _) => sound,
+    };
+    let silence = match (is_film && sound.is_none(), args.format.is_empty()) {
+        (false, _) => "",
+        (true, true) => "the film is without sound: give --audio\n",
+        (true, false) => "the film is without sound\n",
+    };
+    let sources = Sources { sound: sound.as_ref(), names: args.names, beside };
+    for (path, format) in outputs {
+        format.write(path, &performance, &sources, ui).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    let motion_secs = motion.fps.secs(motion.n_frames());
+    let Performance { told, clip, .. } = &performance;
+    let text = format!(
+        "{} frames at {}, {motion_secs:.1} s; written: {} frames at {}\n{}{silence}",
+        motion.n_frames(),
+        motion.fps,
+        clip.n_frames(),
+        clip.fps,
+        words(told)
+    );
+    let facts = json!({
+        "name": input.name,
+        "n_frames": motion.n_frames(),
+        "fps": motion.fps,
+        "written_frames": clip.n_frames(),
+        "written_fps": clip.fps,
+        "times_real_time": motion_secs / secs.max(1e-9),
+        "told": told,
+        "film_has_sound": is_film.then_some(sound.is_some()),
+        "outputs": names(outputs),
+    });
+    Ok(Done { text, facts })
+}
+
+fn words(told: &Told) -> String {
+    let number = |jerk: Option<f64>| jerk.map_or("-".to_owned(), |jerk| format!("{jerk:.0}"));
+    let jerk = |jerk: Jerk| format!("{} -> {}", number(jerk.before), number(jerk.after));
+    let mut text = format!("jerk, m/s3: arms {}, hands {}\n", jerk(told.arms), jerk(told.hands));
+    text += &match told.face_frames {
+        Some(n) => format!("head: seen in {n} of {} frames\n", told.n_frames),
+        None => "head: at rest\n".to_owned(),
+    };
+    text += &seen(told);
+    let clamped: Vec<_> = told.clamps.iter().filter(|clamps| clamps.joint_frames > 0).collect();
+    match (told.clamps.is_empty(), clamped.is_empty()) {
+        (true, _) => text += "no constraints\n",
+        (_, true) => text += "nothing had to be clamped\n",
+        _ => text += "clamped                      angles   share    by, mean and most, degrees\n",
+    }
+    for clamps in clamped {
+        text += &format!(
+            "  {:26}{:>7}  {:>5.1} %  {:>6.1}  {:>6.1}\n",
+            clamps.kind,
+            clamps.joint_frames,
+            100.0 * clamps.share,
+            clamps.mean_excess_degrees,
+            clamps.largest_excess_degrees
+        );
+    }
+    text
+}
+
+/// What was not seen in all frames; nothing when all was.
+fn seen(told: &Told) -> String {
+    let Seen { left_arm, right_arm, left_hand, right_hand } = told.seen;
+    let arms = match left_arm == right_arm {
+        true => vec![("arms", left_arm)],
+        false => vec![("left arm", left_arm), ("right arm", right_arm)],
+    };
+    let parts = || arms.iter().copied().chain([("left hand", left_hand), ("right hand", right_hand)]);
+    if parts().all(|(_, n)| n == told.n_frames) {
+        return String::new();
+    }
+    let parts: Vec<_> = parts().map(|(part, n)| format!("{part} in {n}")).collect();
+    format!("seen, of {} frames: {}; the rest is bridged or held\n", told.n_frames, parts.join(", "))
+}
+
+fn options(args: &Args) -> Result<Options> {
+    let smoothing = match args.smoothing {
+        Kind::None => Smoothing::None,
+        Kind::SavitzkyGolay => Smoothing::SavitzkyGolay,
+        Kind::OneEuro => {
+            let (rest_hz, beta) = (args.one_euro_hz, args.one_euro_beta);
+            ensure!((0.01..=100.0).contains(&rest_hz), "--one-euro-hz is {rest_hz}, expected 0.01 to 100");
+            ensure!((0.0..=100.0).contains(&beta), "--one-euro-beta is {beta}, expected 0 to 100");
+            Smoothing::OneEuro(OneEuro { rest_hz, beta })
+        }
+    };
+    let constraints = match args.no_constraints {
+        true => Constraints::NONE,
+        false => Constraints { limits: true, curl_coherence: args.curl_coherence == Switch::On },
+    };
+    let yaw = if args.shoulder_yaw == ShoulderYaw::Removed { Yaw::Removed } else { Yaw::Spine };
+    Ok(Options { smoothing, constraints, yaw, fps: args.fps })
+}
+
+/// Output files with their formats; none may be an input or another output.
+fn outputs(args: &Args, input: &Input) -> Result<Vec<(PathBuf, Format)>> {
+    for (n, path) in args.out.iter().enumerate() {
+        let is_read = [&args.audio, &args.beside].into_iter().flatten().any(|read| read == path);
+        ensure!(!input.is_at(path) && !is_read, "{} is what is read; write to another file", path.display());
+        ensure!(!args.out[..n].contains(path), "{} is asked for twice", path.display());
+        ensure!(!path.is_dir(), "{} is a folder; name a file in it, or give --format bvh", path.display());
+    }
+    args.out.iter().map(|path| Ok((path.clone(), Format::of(path)?))).collect()
+}
+
+fn read_sound(path: &Path) -> Result<Sound> {
+    ensure!(path.is_file(), "{} is no file", path.display());
+    match audio::read_mono(path, SAMPLE_RATE)? {
+        Some(sound) if !sound.samples.is_empty() => Ok(sound),
+        _ => bail!("{} has no sound", path.display()),
+    }
+}
+
+/// The part of a sound from a second on, as much as there is of `secs`.
+fn part(whole: &Sound, from_secs: f64, secs: f64) -> Sound {
+    let at = |secs: f64| ((secs * f64::from(whole.rate)).round() as usize).min(whole.samples.len());
+    Sound { rate: whole.rate, samples: whole.samples[at(from_secs)..at(from_secs + secs)].to_vec() }
+}
+
+fn names(outputs: &[(PathBuf, Format)]) -> Vec<String> {
+    outputs.iter().map(|(path, _)| path.display().to_string()).collect()
+}
+
+/// The same again as a film, or for an animation program; nothing when both are there.
+fn next_command(args: &Args, outputs: &[(PathBuf, Format)]) -> Option<String> {
+    let missing = [(Format::Mp4, "mp4"), (Format::Bvh, "bvh")]
+        .into_iter()
+        .find(|&(format, _)| outputs.iter().all(|&(_, written)| written != format));
+    let (_, ending) = missing?;
+    let sample = args.sample.as_ref().map(|key| format!(" --sample {key}")).unwrap_or_default();
+    let out = outputs.first()?.0.with_extension(ending);
+    Some(format!("orator animate {}{sample} --out {}", args.input.display(), out.display()))
+}
+
+fn split(name: &str) -> Result<Split, String> {
+    Split::ALL
+        .into_iter()
+        .find(|split| split.name() == name)
+        .ok_or_else(|| "expected train, validation or test".to_owned())
+}
+
+fn names_called(label: &str) -> Result<Names, String> {
+    let known = || Names::ALL.map(Names::label).join(", ");
+    Names::ALL.into_iter().find(|names| names.label() == label).ok_or_else(|| format!("expected one of {}", known()))
+}
+
+/// `15`, `29.97` or `30000/1001`, 1 to 240.
+fn rate(text: &str) -> Result<FrameRate, String> {
+    let wrong = || "expected frames a second between 1 and 240, such as 30 or 30000/1001".to_owned();
+    let fps = match text.split_once('/') {
+        Some((num, den)) => match (num.parse(), den.parse()) {
+            (Ok(num), Ok(den)) if num > 0 && den > 0 => FrameRate::new(num, den),
+            _ => return Err(wrong()),
+        },
+        None => match text.parse::<f64>() {
+            Ok(fps) if fps.fract() == 0.0 && (1.0..=240.0).contains(&fps) => FrameRate::new(fps as u32, 1),
+            Ok(fps) if (1.0..=240.0).contains(&fps) => FrameRate::new((fps * 1000.0).round() as u32, 1000),
+            _ => return Err(wrong()),
+        },
+    };
+    if (1.0..=240.0).contains(&fps.per_sec()) { Ok(fps) } else { Err(wrong()) }
+}

@@ -1,0 +1,187 @@
+//! `orator forget`.
+
+use crate::cli::Outcome;
+use crate::cli::config_args::ConfigArgs;
+use crate::cli::ui::Ui;
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use orator::config::{Config, videos};
+use orator::dataset::forget::known;
+use orator::dataset::forget::known::Known;
+use orator::dataset::forget::removal::Removal;
+use orator::dataset::forget::search::{Searched, search};
+use orator::stage::workdir;
+use serde_json::json;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// Forget a video, or a speaker: remove all that was derived from it, and prove by search that nothing is left.
+///
+/// Goes through the stages' files, the dataset (shards, statistics, index, ledger, card, checksums), trained models (a
+/// model cannot unlearn) and the table of hashes; the other videos' shards stay byte for byte. Then every file under the
+/// work folder is searched for the video's names and hashes. Exit code 1 says that something was found. The video file
+/// itself, and copies elsewhere, are yours to delete.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    config: ConfigArgs,
+    /// The video: its path, its file's name, or its work name.
+    #[arg(long, value_name = "NAME|FILE", required_unless_present = "speaker")]
+    video: Option<String>,
+    /// The speaker of the video; without a video, everything of the speaker goes.
+    #[arg(long, value_name = "NAME")]
+    speaker: Option<String>,
+    /// Forget in this dataset's folder alone; no configuration is read.
+    #[arg(long, value_name = "DIR", requires = "video", conflicts_with_all = ["speaker", "keep_models"])]
+    dataset: Option<PathBuf>,
+    /// Keep the models trained with it, and name them.
+    #[arg(long)]
+    keep_models: bool,
+    /// Only say what would go.
+    #[arg(long)]
+    dry_run: bool,
+}
+
+/// What is to be done, and where the search looks.
+struct Task {
+    removals: Vec<Removal>,
+    titles: Vec<String>,
+    folders: Vec<PathBuf>,
+    /// What the user must do so that the video does not come back, or should know.
+    advice: Vec<String>,
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let (task, _lock) = match &args.dataset {
+        Some(dir) => (of_dataset(dir, args.video.as_deref().unwrap_or_default(), args.dry_run)?, None),
+        None => of_project(&args)?,
+    };
+    let lines: Vec<String> = task.removals.iter().flat_map(|removal| removal.lines(args.keep_models)).collect();
+    let kept: Vec<&PathBuf> = task.removals.iter().filter(|_| args.keep_models).flat_map(|r| &r.models).collect();
+    let what = task.titles.join(", ");
+    if args.dry_run {
+        let text = match lines.is_empty() {
+            true => format!("nothing of {what} is there"),
+            false => format!("of {what} would go:\n  {}", lines.join("\n  ")),
+        };
+        ui.summary(&text, None, json!({ "videos": task.titles, "would_remove": lines, "dry_run": true }));
+        return Ok(Outcome::Done);
+    }
+    for removal in &task.removals {
+        let done = removal.carry_out(args.keep_models);
+        done.with_context(|| format!("{what} is forgotten by half; run the same command again to finish"))?;
+    }
+    let marks: Vec<_> = task.removals.iter().flat_map(|removal| removal.marks.clone()).collect();
+    let searched = search(&task.folders, &marks).context("nothing is proved")?;
+    let mut text = match lines.is_empty() {
+        true => vec![format!("nothing of {what} was there")],
+        false => vec![format!("forgotten: {what}"), format!("  {}", lines.join("\n  "))],
+    };
+    text.extend(kept.iter().map(|model| format!("kept, though it was trained with it: {}", model.display())));
+    text.extend(task.advice.iter().cloned());
+    text.extend(searched.places.iter().map(|place| match place.at {
+        Some(at) => format!("FOUND   {} at byte {at}: {}", place.file, place.what),
+        None => format!("FOUND   {}: {} in its name", place.file, place.what),
+    }));
+    let Searched { n_files, bytes, inside_bytes, places } = &searched;
+    text.push(format!(
+        "searched {n_files} files, {bytes} bytes and {inside_bytes} more inside archives, for {} names and hashes: {} found",
+        marks.len(),
+        places.len()
+    ));
+    let found: Vec<_> =
+        places.iter().map(|place| json!({ "file": place.file, "at": place.at, "what": place.what })).collect();
+    let facts = json!({
+        "videos": task.titles, "removed": lines, "kept_models": kept, "advice": task.advice, "found": found,
+        "searched": { "files": n_files, "bytes": bytes, "inside_bytes": inside_bytes, "marks": marks.len() },
+    });
+    ui.summary(&text.join("\n"), None, facts);
+    Ok(if places.is_empty() { Outcome::Done } else { Outcome::Wrong })
+}
+
+fn of_dataset(dir: &Path, wanted: &str, dry_run: bool) -> Result<Task> {
+    let dir = std::path::absolute(dir)?;
+    if !dry_run {
+        workdir::restore_folder(&dir)?;
+    }
+    let all = known::of_dataset(&dir)?;
+    let video = known::one(&all, wanted, None)?;
+    let others: Vec<&Known> = all.iter().filter(|k| *k != video).collect();
+    let removal = Removal::of_dataset(&dir, &[video], &others);
+    let mut folders = vec![dir.clone()];
+    folders.extend(workdir::left_over(&dir));
+    let advice = vec!["models trained with this dataset, and its copies, are not looked for".to_owned()];
+    Ok(Task {
+        titles: vec![video.title().trim_start_matches('/').to_owned()],
+        removals: vec![removal],
+        folders,
+        advice,
+    })
+}
+
+fn of_project(args: &Args) -> Result<(Task, Option<File>)> {
+    let config = args.config.load()?;
+    let work = &config.settings.work.dir;
+    let lock = if args.dry_run || !work.exists() { None } else { Some(lock(work)?) };
+    if !args.dry_run {
+        for entry in std::fs::read_dir(work.join("dataset")).into_iter().flatten().flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if let Some(speaker) = name.strip_prefix('.').and_then(|name| name.strip_suffix(".old")) {
+                workdir::restore_folder(&work.join("dataset").join(speaker.trim_end_matches(".attempt")))?;
+            }
+        }
+    }
+    let all = known::of_project(&config)?;
+    let (videos, whole) = match (&args.video, &args.speaker) {
+        (Some(video), speaker) => (vec![known::one(&all, video, speaker.as_deref())?], false),
+        (None, Some(speaker)) => (known::of_speaker(&all, speaker)?, true),
+        (None, None) => bail!("say --video or --speaker"),
+    };
+    let speaker = videos.first().map(|video| video.speaker.clone()).unwrap_or_default();
+    let others: Vec<&Known> = all.iter().filter(|k| !videos.contains(k)).collect();
+    let removal = Removal::of_work(work, &speaker, &videos, &others, whole)?;
+    let mut advice: Vec<String> = Vec::new();
+    for video in &videos {
+        let twins = others.iter().filter(|other| video.content.is_some() && other.content == video.content);
+        advice.extend(twins.map(|twin| {
+            format!("{} has the same content and stays: forget it too, if it shows the same", twin.title())
+        }));
+    }
+    advice.extend(how_to_keep_away(&config, &speaker, &videos, whole));
+    let titles = if whole { vec![speaker] } else { videos.iter().map(|video| video.title()).collect() };
+    Ok((Task { titles, removals: vec![removal], folders: vec![work.clone()], advice }, lock))
+}
+
+/// What keeps the next run from bringing the videos back; nothing, where it would not.
+fn how_to_keep_away(config: &Config, speaker: &str, gone: &[&Known], whole: bool) -> Option<String> {
+    let named =
+        videos::of(config).into_iter().filter(|videos| videos.speaker == speaker).flat_map(|videos| videos.units);
+    let back: Vec<PathBuf> =
+        named.map(|unit| unit.source).filter(|source| gone.iter().any(|k| k.source.as_ref() == Some(source))).collect();
+    if back.is_empty() {
+        return None;
+    }
+    if whole {
+        return Some(format!(
+            "remove [[speaker]] {speaker} from {}, or the next run brings it back",
+            config.file.display()
+        ));
+    }
+    let folder = config.file.parent().unwrap_or(Path::new("."));
+    let relative = |path: &PathBuf| path.strip_prefix(folder).unwrap_or(path).to_string_lossy().into_owned();
+    let said = config.settings.speaker.iter().find(|s| s.name == speaker);
+    let mut list: Vec<String> = said.map(|speaker| speaker.exclude.clone()).unwrap_or_default();
+    list.extend(back.iter().map(relative));
+    Some(format!(
+        "delete the video file, or write under [[speaker]] {speaker} in {} the line\n  exclude = {list:?}\n\
+         else the next run brings it back",
+        config.file.display()
+    ))
+}
+
+/// No run may be at work meanwhile.
+fn lock(work: &Path) -> Result<File> {
+    let file = File::create(work.join(".lock")).with_context(|| format!("cannot write in {}", work.display()))?;
+    file.try_lock().map_err(|_| anyhow!("a run is at work in {}; wait for it to end", work.display()))?;
+    ensure!(work.is_dir(), "{} is no folder", work.display());
+    Ok(file)
+}

@@ -1,0 +1,160 @@
+//! `orator import`.
+
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
+use anyhow::{Result, ensure};
+use clap::ValueEnum;
+use orator::config;
+use orator::dataset::import::find::Kind as Found;
+use orator::dataset::import::take::Limits;
+use orator::dataset::import::write::{Line, rate_of};
+use orator::dataset::import::{Imported, Plan, import};
+use orator::dataset::info::About;
+use orator::dataset::{INFO, Split};
+use orator::stage::workdir;
+use orator::types::time::FrameRate;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Make a dataset of motion that others captured, with its sound.
+///
+/// Sources are files, or folders that are searched: the authors' text clips (147 numbers a line), TED Expressive (.npz
+/// with `human_joints`), BVH, and WebDataset shards or dataset folders of this program, to merge them or to take them
+/// back. Sound (.wav, .flac, ...) and transcript (.tsv, .json, .txt) have the motion's name and lie beside it or in
+/// folders beside its own (bvh/, wav/, tsv/). Each take ends kept, refused with its reason, or failed; exit code 2 says
+/// that some failed.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Files or folders to import.
+    #[arg(required = true, value_name = "SOURCE")]
+    sources: Vec<PathBuf>,
+    /// Take only files of this kind; auto: what their contents say.
+    #[arg(long, value_enum, default_value_t = Kind::Auto)]
+    kind: Kind,
+    /// Name of the speaker in the dataset.
+    #[arg(long, value_name = "NAME")]
+    speaker: String,
+    /// The dataset's folder, made new.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Replace the dataset that is in the folder.
+    #[arg(long)]
+    force: bool,
+    /// Frames a second of the dataset. Default: 15, or the rate of the first dataset among the sources.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=240))]
+    fps: Option<u32>,
+    /// Shortest take, in frames of the dataset.
+    #[arg(long, default_value_t = 64, value_name = "N")]
+    min_frames: usize,
+    /// Most seconds by which sound and motion may differ in length.
+    #[arg(long, default_value_t = 0.5, value_name = "SECS")]
+    max_apart: f64,
+    /// Share of the takes for validation, by their content.
+    #[arg(long, default_value_t = 0.15, value_name = "SHARE")]
+    validation: f64,
+    /// Share of the takes for test, by their content.
+    #[arg(long, default_value_t = 0.15, value_name = "SHARE")]
+    test: f64,
+    /// Identifier of the licence, for the dataset's card.
+    #[arg(long, default_value = "", value_name = "ID")]
+    licence: String,
+    /// How the speaker agreed, for the dataset's card.
+    #[arg(long, default_value = "", value_name = "TEXT")]
+    consent: String,
+    /// Where the motion comes from, for the dataset's card.
+    #[arg(long, default_value = "", value_name = "TEXT")]
+    source: String,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Kind {
+    Auto,
+    Authors,
+    Ted,
+    Bvh,
+    Shards,
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let plan = plan(&args)?;
+    let out = std::path::absolute(&args.out)?;
+    let taken = out.exists() && std::fs::read_dir(&out).map_or(true, |mut entries| entries.next().is_some());
+    ensure!(
+        !taken || args.force,
+        "{} is not empty; choose another folder, or --force replaces the dataset",
+        out.display()
+    );
+    ensure!(!taken || out.join(INFO).is_file(), "{} holds no dataset, so --force does not replace it", out.display());
+    for source in &args.sources {
+        let inside = out.exists() && out.starts_with(std::path::absolute(source)?);
+        ensure!(!inside, "{} lies in {}, which is imported; choose another folder", out.display(), source.display());
+    }
+    let attempt = workdir::attempt_folder(&out)?;
+    let imported = import(&plan, &attempt, ui).and_then(|imported| {
+        workdir::replace_folder(&attempt, &out)?;
+        Ok(imported)
+    });
+    if imported.is_err() {
+        let _ = std::fs::remove_dir_all(&attempt);
+    }
+    close(&imported?, &args.out, ui)
+}
+
+fn plan(args: &Args) -> Result<Plan> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    let name = &args.speaker;
+    ensure!(!name.is_empty() && name.chars().all(plain), "--speaker {name:?}: expected letters, digits, - and _");
+    let share = 0.0..=0.9;
+    ensure!(
+        share.contains(&args.validation) && share.contains(&args.test) && args.validation + args.test <= 0.95,
+        "--validation and --test: expected 0 to 0.9, together at most 0.95"
+    );
+    ensure!((0.0..=60.0).contains(&args.max_apart), "--max-apart: expected 0 to 60 seconds");
+    let fps = match args.fps {
+        Some(fps) => FrameRate::new(fps, 1),
+        None => rate_of(&args.sources).unwrap_or(FrameRate::new(15, 1)),
+    };
+    let (licence, consent, source) = (args.licence.clone(), args.consent.clone(), args.source.clone());
+    Ok(Plan {
+        sources: args.sources.clone(),
+        kind: match args.kind {
+            Kind::Auto => None,
+            Kind::Authors => Some(Found::Authors),
+            Kind::Ted => Some(Found::Ted),
+            Kind::Bvh => Some(Found::Bvh),
+            Kind::Shards => Some(Found::Shards),
+        },
+        about: About { licence, consent, source, ..About::new(name, fps) },
+        limits: Limits { fps, min_frames: args.min_frames.max(1), max_apart_secs: args.max_apart },
+        shard: config::Shard { validation: args.validation, test: args.test, ..config::Shard::default() },
+    })
+}
+
+fn close(imported: &Imported, out: &Path, ui: &Ui) -> Result<Outcome> {
+    let count = |ended: &str| imported.lines.iter().filter(|line| line.ended == ended).count();
+    let mut text: Vec<String> = imported.lines.iter().filter(|line| !line.says.is_empty()).map(said).collect();
+    text.extend(imported.notes.iter().cloned());
+    let secs: BTreeMap<&str, f64> =
+        imported.info.splits.iter().map(|(split, info)| (split.as_str(), info.secs)).collect();
+    let parts = Split::ALL.map(|split| format!("{} {:.1} s", split.name(), secs.get(split.name()).unwrap_or(&0.0)));
+    let (kept, refused, failed) = (count("kept"), count("refused"), count("failed"));
+    text.push(format!("{kept} kept, {refused} refused, {failed} failed; {}", parts.join(", ")));
+    text.push(format!("dataset  {}", out.display()));
+    let next = format!("orator dataset verify --deep {}", out.display());
+    let facts = json!({
+        "dataset": out, "takes": imported.lines, "notes": imported.notes, "secs": secs,
+        "kept": kept, "refused": refused, "failed": failed, "next": next,
+    });
+    ui.summary(&text.join("\n"), Some(&next), facts);
+    Ok(if failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
+}
+
+fn said(line: &Line) -> String {
+    let Line { file, ended, reason, says, .. } = line;
+    match *ended {
+        "kept" => format!("kept     {file}: {says}"),
+        "failed" => format!("failed   {file}: {says}"),
+        _ => format!("{ended}  {file}: {reason}: {says}"),
+    }
+}

@@ -1,0 +1,115 @@
+//! `orator dataset`: what is in a dataset, and whether it is what was written.
+
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
+use anyhow::Result;
+use orator::dataset::verify::verify;
+use orator::dataset::verify::verify::accounts;
+use orator::dataset::{Dataset, Split};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Look at a finished dataset: what it holds, and whether every byte is as it was written.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(clap::Subcommand)]
+enum Verb {
+    /// Check the dataset: files, sizes, counts, sums, and that every second of every video is accounted for.
+    ///
+    /// Exit code 1 says that something is not as it was written.
+    Verify {
+        /// The dataset's folder, work/dataset/SPEAKER.
+        dir: PathBuf,
+        /// Read everything: every hash, every array's shape and numbers, every bone's length.
+        #[arg(long)]
+        deep: bool,
+    },
+    /// Show what the dataset holds: splits, hours, what was refused and why, each video.
+    Info {
+        /// The dataset's folder, work/dataset/SPEAKER.
+        dir: PathBuf,
+    },
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    match args.verb {
+        Verb::Verify { dir, deep } => check(&dir, deep, ui),
+        Verb::Info { dir } => info(&dir, ui),
+    }
+}
+
+fn check(dir: &std::path::Path, deep: bool, ui: &Ui) -> Result<Outcome> {
+    let found = verify::verify(dir, deep, ui)?;
+    let good = found.problems.is_empty();
+    let mut lines: Vec<String> =
+        found.problems.iter().map(|problem| format!("wrong   {}: {}", problem.file, problem.what)).collect();
+    lines.push(format!(
+        "{}: {} files, {} videos, {} intervals, {:.1} s of motion; {} MB read; {}",
+        if good { "sound" } else { "NOT SOUND" },
+        found.n_files,
+        found.n_videos,
+        found.n_samples,
+        found.secs,
+        found.bytes / 1_000_000,
+        if good { "nothing wrong".to_owned() } else { format!("{} things wrong", found.problems.len()) }
+    ));
+    let next = match (good, deep) {
+        (true, false) => format!("orator dataset verify --deep {}", dir.display()),
+        (true, true) => format!("orator dataset info {}", dir.display()),
+        (false, _) => "orator run --from shard --force".to_owned(),
+    };
+    let problems: Vec<_> = found.problems.iter().map(|p| json!({ "file": p.file, "what": p.what })).collect();
+    let facts = json!({
+        "sound": good, "deep": deep, "problems": problems, "files": found.n_files, "videos": found.n_videos,
+        "samples": found.n_samples, "secs": found.secs, "bytes_read": found.bytes, "next": next,
+    });
+    ui.summary(&lines.join("\n"), Some(&next), facts);
+    Ok(if good { Outcome::Done } else { Outcome::Wrong })
+}
+
+fn info(dir: &std::path::Path, ui: &Ui) -> Result<Outcome> {
+    let dataset = Dataset::open(dir)?;
+    let (info, stats) = (dataset.info(), dataset.stats());
+    let said = |text: &str| if text.is_empty() { "not said".to_owned() } else { text.to_owned() };
+    let mut lines = vec![
+        format!("{} at {}, made by {}", info.speaker, info.fps, info.tool),
+        format!("licence {}, consent {}, source {}", said(&info.licence), said(&info.consent), said(&info.source)),
+    ];
+    for split in Split::ALL {
+        let part = info.splits.get(split.name()).cloned().unwrap_or_default();
+        let windows = stats.windows.strided.get(split.name()).copied().unwrap_or(0);
+        lines.push(format!(
+            "{:11} {:9.1} s, {} intervals of {} videos, {windows} windows of {} frames, {} shards",
+            split.name(),
+            part.secs,
+            part.samples,
+            part.videos.len(),
+            stats.windows.n_frames,
+            part.shards.len()
+        ));
+    }
+    let footage = &stats.footage;
+    lines.push(format!("of {:.1} s of video: kept {:.1}", footage.secs, footage.kept_secs));
+    lines.extend(footage.refused_secs.iter().map(|(reason, secs)| format!("  refused, {reason}: {secs:.1} s")));
+    lines.push(format!(
+        "  failed: {:.1} s, and {} videos of unknown length",
+        footage.failed_secs, footage.n_of_unknown_length
+    ));
+    for account in accounts(dir)? {
+        lines.push(format!(
+            "  {:40} {:10} kept {:7.1} of {:7.1} s{}",
+            account.name,
+            account.split.map_or("-", Split::name),
+            account.ledger.kept_secs(),
+            account.ledger.duration_secs,
+            account.failure.map(|failure| format!("; {failure}")).unwrap_or_default()
+        ));
+    }
+    let next = format!("orator dataset verify --deep {}", dir.display());
+    ui.summary(&lines.join("\n"), Some(&next), json!({ "info": info, "stats": stats, "next": next }));
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,7 @@
+//! `orator evaluate`.
+
+pub mod compare;
+pub mod lifter;
+pub mod verb;
+
+pub use verb::{Args, run};

@@ -1,0 +1,178 @@
+//! `orator evaluate`.
+
+use super::{compare, lifter};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
+use anyhow::{Context, Result, bail, ensure};
+use orator::dataset::{Dataset, Split};
+use orator::evaluate::baseline::baselines;
+use orator::evaluate::baseline::baselines::Predictor;
+use orator::evaluate::clips::clips;
+use orator::evaluate::clips::clips::Clips;
+use orator::evaluate::clips::{of_speaker, pairs};
+use orator::evaluate::table::result;
+use orator::evaluate::table::table;
+use orator::evaluate::verdict::text;
+use orator::generate::Speaker;
+use orator::metrics::catalogue::{Convention, Settings};
+use orator::mocap::motion_file;
+use orator::report::evaluation::page;
+use orator::stage::progress::{Progress as _, Task};
+use orator::stage::workdir;
+use orator::types::time::FrameRate;
+use serde::Deserialize as _;
+use serde::de::IntoDeserializer as _;
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// Measure made motion beside the real one, and say what the figures are worth.
+///
+/// Files or folders of motion (.npy, .npz, the authors' .txt, .bvh), or a checkpoint on a split of a dataset. Beside each
+/// figure stands the same for poses that never move, the nearest neighbour, mismatched motion and the truth itself; with its
+/// 95 % interval, and a plain sentence: is it better than doing nothing, and does it hear?
+#[derive(clap::Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub struct Args {
+    #[command(subcommand)]
+    what: Option<What>,
+    #[command(flatten)]
+    motion: MotionArgs,
+}
+
+#[derive(clap::Subcommand)]
+enum What {
+    Lifter(lifter::Args),
+    Compare(compare::Args),
+}
+
+#[derive(clap::Args)]
+struct MotionArgs {
+    /// The real motion: a file, or a folder of files that are paired by name.
+    #[arg(long, value_name = "PATH")]
+    truth: Option<PathBuf>,
+    /// The made motion of the same sound: a file or a folder (it may be the same one: gt_interval_7.txt belongs to
+    /// prediction_interval_7.txt).
+    #[arg(long, value_name = "PATH", requires = "truth")]
+    prediction: Option<PathBuf>,
+    /// The sound, a file or a folder: for the beats, and for the nearest neighbour.
+    #[arg(long, value_name = "PATH", requires = "truth")]
+    audio: Option<PathBuf>,
+    /// Frames a second of files that do not say it themselves (.npy, .txt), like 15 or 30000/1001 [default: 15]
+    #[arg(long, value_name = "RATE", requires = "truth", value_parser = motion_file::rate)]
+    fps: Option<FrameRate>,
+    /// Instead of files: a dataset, a folder of `orator run` or `orator import`.
+    #[arg(long, value_name = "DIR", conflicts_with = "truth", requires = "checkpoint")]
+    dataset: Option<PathBuf>,
+    /// A checkpoint of `orator train gan`, or its folder (the best checkpoint is taken).
+    #[arg(long, value_name = "FILE|FOLDER", requires = "dataset")]
+    checkpoint: Option<PathBuf>,
+    /// Which intervals of the dataset: validation, test or train.
+    #[arg(long, value_name = "SPLIT", default_value = "validation", value_parser = split)]
+    split: Split,
+    /// Whose definitions: orator, speech2gesture, genea, emage, trimodal or aist.
+    #[arg(long, value_name = "NAME", default_value = "orator", value_parser = convention)]
+    convention: Convention,
+    /// Shares of the pose's extent for correct keypoints (PCK).
+    #[arg(long, value_name = "SHARE", num_args = 1.., default_values_t = [0.2, 0.1])]
+    alpha: Vec<f64>,
+    /// Also give errors and speeds over all 49 joints, the neck included, which stands still.
+    #[arg(long)]
+    with_neck: bool,
+    /// Print every figure, those of arms, fingers and wrists too (--json and the page have all of them).
+    #[arg(long)]
+    all: bool,
+    /// Also write one HTML page: the table, plots, and truth and prediction playing side by side with the sound.
+    #[arg(long, value_name = "PAGE.html")]
+    report: Option<PathBuf>,
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    match args.what {
+        Some(What::Lifter(args)) => lifter::run(args, ui),
+        Some(What::Compare(args)) => compare::run(&args, ui),
+        None => motion(&args.motion, ui),
+    }
+}
+
+fn split(name: &str) -> std::result::Result<Split, String> {
+    let found = Split::ALL.into_iter().find(|split| split.name() == name);
+    found.ok_or_else(|| format!("a split is {}", Split::ALL.map(Split::name).join(", ")))
+}
+
+fn convention(name: &str) -> std::result::Result<Convention, String> {
+    let known = Convention::deserialize(name.into_deserializer());
+    known.map_err(|error: serde::de::value::Error| error.to_string())
+}
+
+/// The page is a page, and none of what is read.
+fn check_report(args: &MotionArgs) -> Result<()> {
+    let Some(path) = &args.report else { return Ok(()) };
+    let is_page = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("html"));
+    ensure!(is_page, "{}: a page ends in .html; name such a file", path.display());
+    ensure!(!path.is_dir(), "{} is a folder; name a file in it", path.display());
+    Ok(())
+}
+
+fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
+    check_report(args)?;
+    let settings = Settings {
+        convention: args.convention,
+        alphas: args.alpha.clone(),
+        with_neck: args.with_neck,
+        ..Settings::default()
+    };
+    let (clips, table) = {
+        let task = ui.begin("evaluating", 0);
+        let (clips, predictors) = material(args, &*task)?;
+        let table = table::measure(&clips, &settings, &predictors, &*task)?;
+        (clips, table)
+    };
+    let mut facts: Value = result::json(&table);
+    let mut text = text::text(&table, args.all);
+    if let Some(path) = &args.report {
+        let title = format!("Evaluation of {}", title(args));
+        let html = page::html(&table, &clips, &title)?;
+        workdir::write_file(path, html.as_bytes())?;
+        text += &format!("\nwrote {} ({:.1} MB)\n", path.display(), html.len() as f64 / 1e6);
+        facts["report"] = json!(path);
+    }
+    ui.summary(&text, None, facts);
+    Ok(Outcome::Done)
+}
+
+/// What is measured, in a few words: names, no folders of this machine.
+fn title(args: &MotionArgs) -> String {
+    let name = |path: &Option<PathBuf>| {
+        let name = path.as_deref().and_then(|path| path.file_name());
+        name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+    };
+    match &args.checkpoint {
+        Some(_) => format!("{} on the {} split of {}", name(&args.checkpoint), args.split.name(), name(&args.dataset)),
+        None => name(&args.prediction),
+    }
+}
+
+/// What is measured, from files or from a dataset.
+fn material(args: &MotionArgs, task: &dyn Task) -> Result<(Clips, Vec<Predictor>)> {
+    if let (Some(dataset), Some(checkpoint)) = (&args.dataset, &args.checkpoint) {
+        let made = of_speaker::material(&Dataset::open(dataset)?, &Speaker::open(checkpoint)?, args.split, task)?;
+        return Ok((made.clips, made.predictors));
+    }
+    let (Some(truth), Some(prediction)) = (&args.truth, &args.prediction) else {
+        bail!("nothing to measure: give --truth and --prediction, or --dataset and --checkpoint")
+    };
+    task.detail("reading");
+    let found = pairs::find(truth, prediction, args.audio.as_deref())?;
+    let mut clips = clips::read(&found.pairs, args.fps)?;
+    ensure!(
+        args.audio.is_none() || clips.have_sound() || args.audio.as_ref().is_some_and(|audio| audio.is_dir()),
+        "{} holds no sound",
+        args.audio.as_deref().context("no sound")?.display()
+    );
+    clips.notes.splice(0..0, found.notes);
+    let mut predictors = vec![Predictor::prediction(&clips, "the motion under test")];
+    let (others, left_out) = baselines::of_files(&clips)?;
+    predictors.extend(others);
+    clips.notes.extend(left_out);
+    Ok((clips, predictors))
+}

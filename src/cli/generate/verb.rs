@@ -1,0 +1,131 @@
+//! `orator generate`: one sound to files (here), or a folder or table of sounds (`batch`, `table`); what both do with a
+//! sound is in `made`.
+
+use super::{batch, made};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
+use anyhow::{Context as _, Result, ensure};
+use orator::animate::export::file::Format;
+use orator::formats::checkpoint;
+use orator::generate::Speaker;
+use orator::stage::progress::Progress as _;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Turn speech into motion with a trained speaker.
+///
+/// The sound may be a wav, flac or mp3 file or the sound of a video, of any length. The ending of each output file
+/// chooses what is written: .npy (joints [frames, 49, 3], metres), .txt (the layout of Rebol et al. 2021), .bvh (bone
+/// rotations, cm, y up, facing +z), .glb (a skinned avatar with the motion), .json (joints and rotations), .mp4 (a film
+/// of the figure with the sound).
+///
+/// Many sounds at once: --audio-folder (everything that sounds below it) or --batch (a table, columns `audio`, `out` and
+/// `checkpoint`, of which the first is needed and paths count from the table's folder), with --out-folder and --format. What
+/// was made before from the same sound and checkpoint is not made again; a sound that fails does not stop the others
+/// (exit code 2).
+#[derive(clap::Args)]
+pub struct Args {
+    /// A checkpoint of `orator train gan`, or its folder (the best checkpoint, else the newest, is taken).
+    #[arg(long, value_name = "FILE|FOLDER", required_unless_present = "batch")]
+    pub(crate) checkpoint: Option<PathBuf>,
+    /// The speech.
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["audio_folder", "batch"], requires = "out")]
+    pub(crate) audio: Option<PathBuf>,
+    /// What to write; may be given several times.
+    #[arg(long, value_name = "FILE", num_args = 1.., requires = "audio")]
+    pub(crate) out: Vec<PathBuf>,
+    /// Speech in every file below this folder.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["audio", "batch"], requires = "out_folder")]
+    pub(crate) audio_folder: Option<PathBuf>,
+    /// A table (.csv) of speech.
+    #[arg(long, value_name = "FILE", conflicts_with = "audio", requires = "out_folder")]
+    pub(crate) batch: Option<PathBuf>,
+    /// Where many motions go.
+    #[arg(long, value_name = "DIR", conflicts_with = "audio")]
+    pub(crate) out_folder: Option<PathBuf>,
+    /// What many motions are written as: endings, divided by commas.
+    #[arg(long, value_name = "ENDINGS", value_delimiter = ',', default_value = "bvh", conflicts_with = "audio")]
+    pub(crate) format: Vec<String>,
+    /// Make many motions again even where nothing changed.
+    #[arg(long, conflicts_with = "audio")]
+    pub(crate) again: bool,
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let Some(audio) = &args.audio else { return batch::run(&args, ui) };
+    let Some(given) = &args.checkpoint else { anyhow::bail!("give --checkpoint") };
+    let outputs = outputs(&args.out, audio)?;
+    let checkpoint = checkpoint_at(given)?;
+    if checkpoint != *given {
+        ui.say(&format!("checkpoint {}", checkpoint.display()));
+    }
+    let speaker = Speaker::open(&checkpoint)?;
+    let made = made::make(&speaker, audio, &outputs, ui)?;
+    let speed = made.secs / made.motion_secs.max(1e-6);
+    let names: Vec<String> = outputs.iter().map(|(path, _)| path.display().to_string()).collect();
+    let note = made.note.as_ref().map_or(String::new(), |note| format!("note: {note}\n"));
+    let text = format!(
+        "{:.1} s of speech, {} frames of {} at {}, {speed:.0} x real time\n{note}wrote {}",
+        made.secs,
+        made.n_frames,
+        speaker.name(),
+        speaker.fps(),
+        names.join(", ")
+    );
+    let next = next_command(given, audio, &outputs);
+    let facts = json!({
+        "audio_secs": made.secs,
+        "n_frames": made.n_frames,
+        "fps": speaker.fps(),
+        "times_real_time": speed,
+        "checkpoint": checkpoint,
+        "speaker": speaker.name(),
+        "outputs": names,
+        "note": made.note,
+        "next": next,
+    });
+    ui.summary(&text, next.as_deref(), facts);
+    Ok(Outcome::Done)
+}
+
+/// Output files with their formats; none may be the input or another output.
+fn outputs(out: &[PathBuf], audio: &Path) -> Result<Vec<(PathBuf, Format)>> {
+    let same = |a: &Path, b: &Path| a == b || a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
+    for (n, path) in out.iter().enumerate() {
+        ensure!(!same(path, audio), "{} is the speech itself; write to another file", path.display());
+        ensure!(!out[..n].contains(path), "{} is asked for twice", path.display());
+        ensure!(!path.is_dir(), "{} is a folder; name a file in it", path.display());
+    }
+    out.iter().map(|path| Ok((path.clone(), Format::of(path)?))).collect()
+}
+
+/// The checkpoint file meant by a file or a training's folder.
+pub(crate) fn checkpoint_at(path: &Path) -> Result<PathBuf> {
+    ensure!(path.exists(), "{} is not there; `orator train gan` makes checkpoints", path.display());
+    if !path.is_dir() {
+        return Ok(path.to_owned());
+    }
+    let best = path.join("best.safetensors");
+    if best.is_file() {
+        return Ok(best);
+    }
+    let newest = checkpoint::list(path)?.pop();
+    newest
+        .map(|(_, file)| file)
+        .with_context(|| format!("{} holds no checkpoint (best.safetensors or step-*.safetensors)", path.display()))
+}
+
+/// The same again as a film, or for an animation program; nothing when both are there.
+fn next_command(checkpoint: &Path, audio: &Path, outputs: &[(PathBuf, Format)]) -> Option<String> {
+    let missing = [(Format::Mp4, "mp4"), (Format::Bvh, "bvh")]
+        .into_iter()
+        .find(|&(format, _)| outputs.iter().all(|&(_, written)| written != format));
+    let (_, extension) = missing?;
+    let out = outputs.first()?.0.with_extension(extension);
+    Some(format!(
+        "orator generate --checkpoint {} --audio {} --out {}",
+        checkpoint.display(),
+        audio.display(),
+        out.display()
+    ))
+}

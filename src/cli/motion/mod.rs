@@ -1,0 +1,4 @@
+//! The verbs of keypoints and joints: `lift`, `sheet`.
+
+pub mod lift;
+pub mod sheet;

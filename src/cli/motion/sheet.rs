@@ -1,0 +1,205 @@
+//! `orator sheet`.
+
+use crate::cli::Outcome;
+use crate::cli::config_args::ConfigArgs;
+use crate::cli::pipeline::steps;
+use crate::cli::ui::Ui;
+use anyhow::{Result, bail, ensure};
+use orator::animate::{Options, perform};
+use orator::external::opencv::png;
+use orator::formats::{joints_npz, keypoints_npz, npy};
+use orator::pipeline::lift::quality;
+use orator::pipeline::lift::quality::{ArmFigures, ClipFigures};
+use orator::report::sheet::sheet::Clip;
+use orator::stage::progress::Progress as _;
+use orator::stage::runner::place;
+use orator::stage::{Unit, workdir};
+use orator::types::pose3d::Motion;
+use orator::types::time::FrameRate;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// Draw contact sheets of lifted clips: picture and keypoints, the 3D pose from the front and from the side.
+///
+/// Of the videos of a run (`-c`), once they are lifted; or of loose files (`--video`, `--keypoints`, `--joints`). A
+/// moment every second; the grid is 0.1 m, the neck at its axes; a strip shows height and depth of the wrists. Beside
+/// each sheet its figures are printed: spread of bone lengths, shake of the wrists (median second difference), depth of
+/// elbow and wrist behind their shoulder (negative: forward), length of arm bones in 3D over that in the picture.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    config: ConfigArgs,
+    /// Only this speaker; may be given several times.
+    #[arg(long, value_name = "NAME")]
+    speaker: Vec<String>,
+    /// Of a run: only this video, by its work name or the file's name without its ending. Of loose files: the video.
+    #[arg(long, value_name = "NAME|FILE")]
+    video: Option<PathBuf>,
+    /// Loose files: the keypoints of the video.
+    #[arg(long, value_name = "FILE.npz", requires_all = ["video", "joints"], conflicts_with = "speaker")]
+    keypoints: Option<PathBuf>,
+    /// Loose files: the joints lifted from them, .npy or .npz.
+    #[arg(long, value_name = "FILE", requires = "keypoints")]
+    joints: Option<PathBuf>,
+    /// Beside the lifted pose show the figure that `orator animate` makes of it.
+    #[arg(long)]
+    figure: bool,
+    /// Seconds between two moments.
+    #[arg(long, default_value_t = 1.0, value_name = "SECS")]
+    every: f64,
+    /// Of loose files: the picture, .png (without: sheet.png). Of a run: the folder of the pictures (without: `sheets` in
+    /// the work folder). Where one picture does not hold all moments, they are numbered: sheet_000.png.
+    #[arg(long, value_name = "FILE|DIR")]
+    out: Option<PathBuf>,
+}
+
+/// The files of one clip.
+struct Files {
+    title: String,
+    video: PathBuf,
+    keypoints: PathBuf,
+    joints: PathBuf,
+    out: PathBuf,
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let clips = match (&args.keypoints, &args.joints, &args.video) {
+        (Some(keypoints), Some(joints), Some(video)) => {
+            let out = args.out.clone().unwrap_or_else(|| PathBuf::from("sheet.png"));
+            ensure!(out.extension().is_some_and(|e| e == "png"), "{}: a sheet is written as .png", out.display());
+            let title = video.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            vec![Files { title, video: video.clone(), keypoints: keypoints.clone(), joints: joints.clone(), out }]
+        }
+        _ => of_run(&args)?,
+    };
+    let (mut text, mut facts, mut n_failed, mut next) = (String::new(), Vec::new(), 0, None);
+    for files in &clips {
+        match draw(files, args.every, args.figure, ui) {
+            Ok((written, figures)) => {
+                text += &format!("{}\n{}", files.title, table(&figures));
+                written.iter().for_each(|path| text += &format!("wrote {}\n", path.display()));
+                next = next.or_else(|| Some(format!("xdg-open {}", written.first()?.display())));
+                facts.push(json!({ "clip": files.title, "sheets": written, "figures": as_json(&figures) }));
+            }
+            Err(error) if clips.len() > 1 => {
+                n_failed += 1;
+                ui.say(&format!("failed  {}: {error:#}", files.title));
+                facts.push(json!({ "clip": files.title, "error": format!("{error:#}") }));
+            }
+            Err(error) => return Err(error.context(format!("no sheet of {}", files.title))),
+        }
+    }
+    if n_failed > 0 {
+        text += &format!("{n_failed} of {} clips failed\n", clips.len());
+    }
+    ui.summary(&text, next.as_deref(), json!({ "clips": facts, "failed": n_failed, "next": next }));
+    Ok(if n_failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
+}
+
+/// The lifted clips of a run that are asked for.
+fn of_run(args: &Args) -> Result<Vec<Files>> {
+    let config = args.config.load()?;
+    let work = &config.settings.work.dir;
+    let folder = args.out.clone().unwrap_or_else(|| work.join("sheets"));
+    let wanted = |unit: &Unit| {
+        let Some(name) = &args.video else { return true };
+        name.as_os_str() == unit.video.as_str() || unit.source.file_stem() == Some(name.as_os_str())
+    };
+    let mut clips = Vec::new();
+    let mut names = Vec::new();
+    for unit in steps::speakers(&config, &args.speaker)?.into_iter().flat_map(|videos| videos.units) {
+        names.push(unit.video.clone());
+        if wanted(&unit) {
+            clips.push(Files {
+                title: unit.to_string(),
+                keypoints: place(work, "pose2d", &unit).join("keypoints.npz"),
+                joints: place(work, "lift", &unit).join("joints.npz"),
+                out: folder.join(&unit.speaker).join(format!("{}.png", unit.video)),
+                video: unit.source,
+            });
+        }
+    }
+    if let (true, Some(name)) = (clips.is_empty(), &args.video) {
+        bail!("no video is called {}; there are: {}", name.display(), names.join(", "));
+    }
+    ensure!(!clips.is_empty(), "{} names no video", config.file.display());
+    let (lifted, waiting): (Vec<_>, Vec<_>) = clips.into_iter().partition(|files| files.joints.exists());
+    let first = waiting.first().map(|files| files.title.clone()).unwrap_or_default();
+    let flags = args.config.flags();
+    ensure!(!lifted.is_empty(), "{first} is not lifted yet: orator run --to lift{flags}");
+    Ok(lifted)
+}
+
+/// Draws one clip; the pictures written, and its figures.
+fn draw(files: &Files, every_secs: f64, figure: bool, ui: &Ui) -> Result<(Vec<PathBuf>, ClipFigures)> {
+    let (keypoints, notes) = keypoints_npz::read_noting(&files.keypoints)?;
+    notes.iter().for_each(|note| ui.say(&format!("{}: {note}", files.keypoints.display())));
+    let motion = read_motion(&files.joints, keypoints.fps)?;
+    let figure = figure.then(|| perform(&motion, None, &Options::default()).motion());
+    let figure = figure.as_ref();
+    let clip = Clip { title: &files.title, video: &files.video, keypoints: &keypoints, motion: &motion, figure };
+    let mut written = Vec::new();
+    clip.pages(every_secs, ui, |number, n_pages, page| {
+        let path = if n_pages == 1 { files.out.clone() } else { numbered(&files.out, number) };
+        workdir::replace(&path, |attempt| png::write(attempt, page))?;
+        written.push(path);
+        Ok(())
+    })?;
+    Ok((written, quality::measure(&motion, &keypoints)?))
+}
+
+/// A .npy has no rate of its own and is taken to run as the keypoints do.
+fn read_motion(path: &Path, fps: FrameRate) -> Result<Motion> {
+    match path.extension().and_then(|ending| ending.to_str()) {
+        Some("npy") => npy::read(path, fps),
+        Some("npz") => joints_npz::read(path),
+        _ => bail!("{}: joints are .npy (of `orator lift`) or .npz (of a run)", path.display()),
+    }
+}
+
+/// `sheet.png` to `sheet_003.png`.
+fn numbered(path: &Path, number: usize) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{stem}_{number:03}.png"))
+}
+
+type Row = (&'static str, &'static str, fn(&ArmFigures) -> f64);
+
+/// Name in the table, name in JSON, value.
+const ROWS: [Row; 17] = [
+    ("upper arm, m", "upper_arm_metres", |a| a.upper_arm_metres),
+    ("forearm, m", "forearm_metres", |a| a.forearm_metres),
+    ("upper arm, std of its length, %", "upper_arm_spread_percent", |a| a.upper_arm_spread),
+    ("forearm, std of its length, %", "forearm_spread_percent", |a| a.forearm_spread),
+    ("wrist shake, mm", "jitter_mm", |a| a.jitter_mm),
+    ("wrist shake in its stillest second, mm", "still_jitter_mm", |a| a.still_jitter_mm),
+    ("elbow behind its shoulder, mm", "elbow_z_mm", |a| a.elbow_z_mm),
+    ("wrist behind its shoulder, mm", "wrist_z_mm", |a| a.wrist_z_mm),
+    ("upper arm 3D / picture, median", "upper_arm_ratio", |a| a.upper_arm_ratio[0]),
+    ("upper arm 3D / picture, lowest 5 %", "upper_arm_ratio_low", |a| a.upper_arm_ratio[1]),
+    ("forearm 3D / picture, median", "forearm_ratio", |a| a.forearm_ratio[0]),
+    ("forearm 3D / picture, lowest 5 %", "forearm_ratio_low", |a| a.forearm_ratio[1]),
+    ("wrist off the picture's, mm", "wrist_off_mm", |a| a.wrist_off_mm),
+    ("frames without the wrist, %", "missing_percent", |a| 100.0 * a.missing),
+    ("frames that did not see the wrist, %", "masked_percent", |a| 100.0 * a.masked),
+    ("hand joints there, %", "hand_there_percent", |a| 100.0 * a.hand_there),
+    ("hand joints seen, %", "hand_seen_percent", |a| 100.0 * a.hand_seen),
+];
+
+fn table(figures: &ClipFigures) -> String {
+    if figures.left.missing + figures.right.missing >= 2.0 {
+        return "  no frame is lifted (`orator status --why` says why; `orator lift` takes any keypoints)\n".to_owned();
+    }
+    let number = |v: f64| if v.is_finite() { format!("{v:.2}") } else { "-".to_owned() };
+    let head = format!("  {:40}{:>9}{:>9}\n", "", "left", "right");
+    ROWS.iter().fold(head, |text, (name, _, of)| {
+        text + &format!("  {name:40}{:>9}{:>9}\n", number(of(&figures.left)), number(of(&figures.right)))
+    })
+}
+
+fn as_json(figures: &ClipFigures) -> Value {
+    let arm = |arm: &ArmFigures| -> serde_json::Map<String, Value> {
+        ROWS.iter().map(|(_, name, of)| ((*name).to_owned(), json!(of(arm)))).collect()
+    };
+    json!({ "left": arm(&figures.left), "right": arm(&figures.right) })
+}

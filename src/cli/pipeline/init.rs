@@ -1,0 +1,35 @@
+//! `orator init`.
+
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
+use anyhow::{Context, Result};
+use orator::config::DEFAULT_FILE;
+use orator::stage::workdir;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Write a commented pipeline.toml, and the folders for videos and models, into DIR.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The project's folder; made if it is not there.
+    dir: PathBuf,
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let file = args.dir.join("pipeline.toml");
+    anyhow::ensure!(!file.exists(), "{} is there already; nothing was changed", file.display());
+    for folder in ["videos/host", "models"] {
+        let folder = args.dir.join(folder);
+        std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    }
+    workdir::write_file(&file, DEFAULT_FILE.as_bytes())?;
+    let text = format!(
+        "wrote {}\nput the videos of one speaker into {}\nput the pose models into {} (`orator models list` says which, `orator models fetch` gets them)",
+        file.display(),
+        args.dir.join("videos/host").display(),
+        args.dir.join("models").display()
+    );
+    let next = format!("orator run -c {}", file.display());
+    ui.summary(&text, Some(&next), json!({ "file": file, "next": next }));
+    Ok(Outcome::Done)
+}

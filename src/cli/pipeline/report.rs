@@ -1,0 +1,58 @@
+//! `orator report`.
+
+use super::steps;
+use crate::cli::Outcome;
+use crate::cli::config_args::ConfigArgs;
+use crate::cli::ui::Ui;
+use anyhow::Result;
+use orator::report;
+use orator::report::Wanted;
+use orator::report::html::numbers::{length, percent};
+use orator::stage::workdir;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Write one HTML page that shows what became of every second: kept, refused and why, or failed.
+///
+/// With a timeline of each video, the worst frames of each rule, the distributions of what was measured, sliders that say
+/// what other thresholds would keep, and how the joints move. The page needs no network and nothing beside it.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    config: ConfigArgs,
+    /// Only this speaker; may be given several times.
+    #[arg(long, value_name = "NAME")]
+    speaker: Vec<String>,
+    /// The page; without: report.html in the work folder.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Most pictures of a rule; 0: none, and no video is read.
+    #[arg(long, default_value_t = 6, value_name = "N")]
+    pictures: usize,
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let config = args.config.load()?;
+    let videos = steps::speakers(&config, &args.speaker)?;
+    let out = args.out.unwrap_or_else(|| config.settings.work.dir.join("report.html"));
+    let wanted = Wanted { settings: &config.settings, videos: &videos, n_pictures: args.pictures };
+    let made = report::make(&wanted, ui);
+    workdir::write_file(&out, made.html.as_bytes())?;
+    let (sums, mut facts) = (made.sums, made.facts);
+    let text = format!(
+        "kept {} of {} ({}), refused {}, failed {}\nwrote {} ({:.1} MB)",
+        length(sums.kept),
+        length(sums.whole),
+        percent(sums.kept, sums.whole),
+        length(sums.refused_secs()),
+        length(sums.failed),
+        out.display(),
+        made.html.len() as f64 / 1e6
+    );
+    let next = format!("xdg-open {}", out.display());
+    facts["report"] = json!(out);
+    facts["bytes"] = json!(made.html.len());
+    facts["next"] = json!(next);
+    ui.summary(&text, Some(&next), facts);
+    Ok(Outcome::Done)
+}

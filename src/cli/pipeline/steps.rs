@@ -1,0 +1,110 @@
+//! The five stages in their order, and the units each works on.
+
+use anyhow::Result;
+use clap::ValueEnum;
+use orator::config::videos::Videos;
+use orator::config::{Config, Settings};
+use orator::dataset::info::ModelUsed;
+use orator::external::onnx::{Model, Runtime};
+use orator::pipeline::extract::Extract;
+use orator::pipeline::lift::LiftStage;
+use orator::pipeline::pose2d::Pose2dStage;
+use orator::pipeline::segment::SegmentStage;
+use orator::pipeline::shard::stage::ShardStage;
+use orator::stage::fingerprint::HashCache;
+use orator::stage::runner;
+use orator::stage::runner::State;
+use orator::stage::{Stage, Unit};
+
+/// A stage by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub enum Step {
+    Extract,
+    Pose2d,
+    Segment,
+    Lift,
+    Shard,
+}
+
+pub const STEPS: [Step; 5] = [Step::Extract, Step::Pose2d, Step::Segment, Step::Lift, Step::Shard];
+
+impl Step {
+    /// The stage, ready to run. `videos` are those the dataset is made of.
+    ///
+    /// # Errors
+    /// A model that is missing or not what its manifest says, weights that cannot be read.
+    pub fn stage(self, config: &Config, videos: &[Unit]) -> Result<Box<dyn Stage>> {
+        let settings = &config.settings;
+        Ok(match self {
+            Self::Extract => Box::new(Extract::new(&settings.extract)),
+            Self::Pose2d => Box::new(Pose2dStage::new(settings)?),
+            Self::Segment => Box::new(SegmentStage::new(&settings.segment, &settings.work.dir)),
+            Self::Lift => Box::new(LiftStage::new(&settings.lift, &settings.segment, &settings.work.dir)?),
+            Self::Shard => Box::new(
+                ShardStage::new(settings, videos)
+                    .with_videos(orator::config::videos::of(config))
+                    .with_models(models_used(settings)?),
+            ),
+        })
+    }
+
+    pub fn name(self) -> &'static str {
+        ["extract", "pose2d", "segment", "lift", "shard"][self as usize]
+    }
+
+    /// What the stage works on: every video, or the speaker as a whole.
+    pub fn units(self, config: &Config, videos: &Videos) -> Vec<Unit> {
+        if self != Self::Shard {
+            return videos.units.clone();
+        }
+        let speaker = videos.speaker.clone();
+        vec![Unit { speaker, video: String::new(), source: config.file.clone() }]
+    }
+}
+
+/// The videos of a speaker that are fresh at every stage before `shard`: those a dataset is made of.
+///
+/// # Errors
+/// As `Step::stage`.
+pub fn ready(config: &Config, videos: &Videos, hashes: &HashCache) -> Result<Vec<Unit>> {
+    let before = STEPS.iter().filter(|step| **step != Step::Shard);
+    let stages = before.map(|step| step.stage(config, &[])).collect::<Result<Vec<_>>>()?;
+    let state = |stage: &dyn Stage, unit: &Unit| runner::state(stage, unit, &config.settings.work.dir, hashes);
+    let fresh = |unit: &&Unit| stages.iter().all(|stage| matches!(state(&**stage, unit), State::Fresh(_)));
+    Ok(videos.units.iter().filter(fresh).cloned().collect())
+}
+
+/// The speakers asked for; all where none is named.
+///
+/// # Errors
+/// A name the configuration does not have, or a configuration without speakers.
+pub fn speakers(config: &Config, wanted: &[String]) -> Result<Vec<Videos>> {
+    let all = orator::config::videos::of(config);
+    let names: Vec<&str> = all.iter().map(|videos| videos.speaker.as_str()).collect();
+    anyhow::ensure!(!all.is_empty(), "{} names no [[speaker]]", config.file.display());
+    for name in wanted {
+        let known = names.join(", ");
+        anyhow::ensure!(names.contains(&name.as_str()), "no speaker is called {name}; there are: {known}");
+    }
+    Ok(all.into_iter().filter(|videos| wanted.is_empty() || wanted.contains(&videos.speaker)).collect())
+}
+
+/// Opens every model the configuration chooses, so that a wrong set-up is said before any work.
+///
+/// # Errors
+/// No ONNX Runtime; a model that is missing or not what the manifest says.
+pub fn check_models(settings: &Settings) -> Result<()> {
+    let runtime = Runtime::load(&settings.models.onnxruntime, &settings.models.dir)?;
+    for (_, entry) in Pose2dStage::new(settings)?.used()? {
+        Model::open(&runtime, entry, &settings.models.dir)?;
+    }
+    Ok(())
+}
+
+fn models_used(settings: &Settings) -> Result<Vec<ModelUsed>> {
+    let stage = Pose2dStage::new(settings)?;
+    let used = stage.used()?.into_iter();
+    let named =
+        used.map(|(role, entry)| ModelUsed { role: role.into(), id: entry.id.clone(), sha256: entry.sha256.clone() });
+    Ok(named.collect())
+}

@@ -1,0 +1,135 @@
+//! `orator doctor`.
+
+use crate::cli::Outcome;
+use crate::cli::config_args::ConfigArgs;
+use crate::cli::ui::Ui;
+use anyhow::Result;
+use orator::config::{Config, Settings};
+use orator::external::onnx::{Manifest, Model, Runtime};
+use serde_json::json;
+use std::path::Path;
+
+/// Say what is installed, what is missing, and the command that fixes it.
+///
+/// Looks at the libraries, the ONNX models that the configuration chooses, and the work folder. Without a
+/// configuration file the defaults are looked at. Exit code 1 says that something is missing.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    config: ConfigArgs,
+}
+
+/// One thing looked at: what was found, or what is wrong with the command that fixes it.
+struct Check {
+    name: String,
+    found: Result<String, (String, String)>,
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let config =
+        if args.config.config.exists() || !args.config.set.is_empty() { args.config.load() } else { defaults() };
+    let mut checks = vec![
+        ok("ffmpeg libraries", orator::external::ffmpeg::version()),
+        ok("OpenCV", orator::external::opencv::version()),
+        ok("processor cores", std::thread::available_parallelism().map_or(1, |n| n.get()).to_string()),
+    ];
+    match config {
+        Ok(config) => {
+            checks.push(ok("configuration", config.file.display().to_string()));
+            checks.extend(models(&config.settings));
+            checks.push(work(&config.settings.work.dir));
+        }
+        Err(error) => {
+            checks.push(wrong(
+                "configuration",
+                format!("{error:#}"),
+                "mend it, or write a new one with `orator init DIR`",
+            ));
+        }
+    }
+    let lines: Vec<String> = checks.iter().map(Check::line).collect();
+    let missing: Vec<&Check> = checks.iter().filter(|check| check.found.is_err()).collect();
+    let facts: Vec<_> = checks.iter().map(Check::json).collect();
+    let next = match missing.first().map(|check| &check.found) {
+        Some(Err((_, fix))) => fix.clone(),
+        _ => format!("orator run{}", args.config.flags()),
+    };
+    ui.summary(&lines.join("\n"), Some(&next), json!({ "checks": facts, "missing": missing.len(), "next": next }));
+    Ok(if missing.is_empty() { Outcome::Done } else { Outcome::Wrong })
+}
+
+fn defaults() -> Result<Config> {
+    let here = std::env::current_dir()?;
+    let mut settings = Settings::default();
+    settings.work.dir = here.join(&settings.work.dir);
+    settings.models.dir = here.join(&settings.models.dir);
+    Ok(Config { settings, file: here.join("pipeline.toml (not there: defaults)") })
+}
+
+fn ok(name: &str, found: String) -> Check {
+    Check { name: name.to_owned(), found: Ok(found) }
+}
+
+fn wrong(name: &str, what: String, fix: &str) -> Check {
+    Check { name: name.to_owned(), found: Err((what, fix.to_owned())) }
+}
+
+/// ONNX Runtime, and the models the configuration chooses.
+fn models(settings: &Settings) -> Vec<Check> {
+    let dir = &settings.models.dir;
+    let runtime = match Runtime::load(&settings.models.onnxruntime, dir) {
+        Ok(runtime) => runtime,
+        Err(error) => return vec![wrong("ONNX Runtime", format!("{error:#}"), "make runtime")],
+    };
+    let mut checks = vec![ok("ONNX Runtime", format!("{} ({})", runtime.version(), runtime.library().display()))];
+    let manifest = match Manifest::load(dir) {
+        Ok(manifest) => manifest,
+        Err(error) => {
+            checks.push(wrong(
+                "model manifest",
+                format!("{error:#}"),
+                "mend it, or take it away: a full one is built in",
+            ));
+            return checks;
+        }
+    };
+    let chosen = [&settings.pose2d.person, &settings.pose2d.body, &settings.pose2d.hand, &settings.pose2d.palm];
+    for id in chosen.into_iter().filter(|id| !id.is_empty()) {
+        let opened = manifest.get(id).and_then(|entry| Ok(Model::open(&runtime, entry, dir)?));
+        checks.push(match opened {
+            Ok(model) => ok(&format!("model {id}"), dir.join(&model.entry().file).display().to_string()),
+            Err(error) => wrong(&format!("model {id}"), format!("{error:#}"), "orator models fetch"),
+        });
+    }
+    checks
+}
+
+/// The work folder: can it be written?
+fn work(dir: &Path) -> Check {
+    let existing = dir.ancestors().find(|folder| folder.exists()).unwrap_or(dir);
+    let probe = existing.join(".orator-doctor");
+    match std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe)) {
+        Ok(()) => ok("work folder", dir.display().to_string()),
+        Err(error) => wrong(
+            "work folder",
+            format!("cannot write in {}: {error}", existing.display()),
+            "choose another with --set work.dir=FOLDER",
+        ),
+    }
+}
+
+impl Check {
+    fn line(&self) -> String {
+        match &self.found {
+            Ok(found) => format!("ok       {:26} {found}", self.name),
+            Err((what, fix)) => format!("missing  {:26} {what}\n         {:26} fix: {fix}", self.name, ""),
+        }
+    }
+
+    fn json(&self) -> serde_json::Value {
+        match &self.found {
+            Ok(found) => json!({ "name": self.name, "ok": true, "found": found }),
+            Err((what, fix)) => json!({ "name": self.name, "ok": false, "wrong": what, "fix": fix }),
+        }
+    }
+}

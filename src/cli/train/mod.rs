@@ -1,0 +1,10 @@
+//! `orator train`.
+
+pub mod basis;
+pub mod corpus;
+pub mod embedding;
+pub mod gan;
+pub mod lifter;
+pub mod verb;
+
+pub use verb::{Args, run};

@@ -1,0 +1,29 @@
+//! `orator train`: one file a network.
+
+use super::{basis, embedding, gan, lifter};
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
+
+/// Train the lifters, a speaker's generator, or the spaces that `evaluate` compares motion in.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    network: Network,
+}
+
+#[derive(clap::Subcommand)]
+enum Network {
+    Basis(basis::Args),
+    Embedding(embedding::Args),
+    Gan(gan::Args),
+    Lifter(lifter::Args),
+}
+
+pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
+    match args.network {
+        Network::Basis(args) => basis::run(args, ui),
+        Network::Embedding(args) => embedding::run(args, ui),
+        Network::Gan(args) => gan::run(args, ui),
+        Network::Lifter(args) => lifter::run(args, ui),
+    }
+}

@@ -1,0 +1,172 @@
+//! `pipeline.toml`, twice: as written (`file`: a table with the line of every key) and resolved (`Settings`:
+//! defaults in, paths absolute, every value in its range). Each section is one small struct whose defaults are the
+//! documented ones; the top level `pipeline.toml` documents them and a test holds the two together.
+
+use super::file::Problem;
+use super::sections::Settings;
+use super::{file, rules};
+use anyhow::{Context, Result};
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// The documented default, embedded: what `orator init` writes.
+pub const DEFAULT_FILE: &str = include_str!("../../pipeline.toml");
+
+/// A configuration ready to use.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// Resolved: paths absolute, values in range.
+    pub settings: Settings,
+    /// The file it was read from, absolute.
+    pub file: PathBuf,
+}
+
+/// Everything wrong with a configuration, one line a problem.
+#[derive(Debug, thiserror::Error)]
+pub struct Invalid {
+    pub file: PathBuf,
+    pub problems: Vec<Problem>,
+}
+
+impl fmt::Display for Invalid {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let plural = if self.problems.len() == 1 { "problem" } else { "problems" };
+        write!(f, "{} {plural} in {}", self.problems.len(), self.file.display())?;
+        self.problems.iter().try_for_each(|problem| write!(f, "\n  {problem}"))
+    }
+}
+
+/// Reads `file` and lays the `--set` changes over it. Paths in the file are relative to its folder, paths given by
+/// `--set` to the current folder.
+///
+/// # Errors
+/// A file that cannot be read, or `Invalid` with every problem at once.
+pub fn load(file: &Path, sets: &[String]) -> Result<Config> {
+    let text = std::fs::read_to_string(file).with_context(|| {
+        format!("cannot read the configuration {}; `orator init DIR` writes one, -c FILE names another", file.display())
+    })?;
+    let file = std::path::absolute(file)?;
+    let mut settings = resolve(&text, sets, &file)?;
+    let here = std::env::current_dir()?;
+    let folder = file.parent().unwrap_or(&here).to_owned();
+    let on_command_line = |key: &str| sets.iter().any(|set| set.starts_with(&format!("{key}=")));
+    let paths: [(&str, &mut PathBuf); 5] = [
+        ("work.dir", &mut settings.work.dir),
+        ("models.dir", &mut settings.models.dir),
+        ("models.onnxruntime", &mut settings.models.onnxruntime),
+        ("lift.body_weights", &mut settings.lift.body_weights),
+        ("lift.hand_weights", &mut settings.lift.hand_weights),
+    ];
+    for (key, path) in paths {
+        if !path.as_os_str().is_empty() {
+            *path = if on_command_line(key) { here.join(&*path) } else { folder.join(&*path) };
+        }
+    }
+    for speaker in settings.speaker.iter_mut().filter(|speaker| !speaker.reference.as_os_str().is_empty()) {
+        speaker.reference = folder.join(&speaker.reference);
+    }
+    Ok(Config { settings, file })
+}
+
+/// The settings a text gives, checked but with paths as written.
+fn resolve(text: &str, sets: &[String], file: &Path) -> Result<Settings> {
+    let given = file::read(text, sets);
+    let mut problems = given.problems;
+    problems.extend(rules::check(&given.settings, &given.places));
+    problems.sort_by(|a, b| (a.place, &a.key).cmp(&(b.place, &b.key)));
+    if problems.is_empty() { Ok(given.settings) } else { Err(Invalid { file: file.to_owned(), problems }.into()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    fn problems(text: &str, sets: &[&str]) -> Vec<String> {
+        let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+        match resolve(text, &sets, Path::new("pipeline.toml")) {
+            Ok(_) => Vec::new(),
+            Err(error) => error.to_string().lines().skip(1).map(|line| line.trim().to_owned()).collect(),
+        }
+    }
+
+    #[test]
+    fn the_documented_file_is_the_default() {
+        let settings = resolve(DEFAULT_FILE, &[], Path::new("pipeline.toml")).unwrap();
+        assert_eq!(Settings { speaker: Vec::new(), ..settings }, Settings::default());
+        let one_speaker = Settings { speaker: vec![crate::config::Speaker::default()], ..Settings::default() };
+        let defaults = toml::Table::try_from(one_speaker).unwrap();
+        assert_eq!(keys(&DEFAULT_FILE.parse().unwrap()), keys(&defaults));
+    }
+
+    /// `section.key` of all that a file holds.
+    fn keys(file: &toml::Table) -> BTreeSet<String> {
+        let tables = |value: &toml::Value| match value {
+            toml::Value::Array(entries) => entries.iter().filter_map(|entry| entry.as_table().cloned()).collect(),
+            value => value.as_table().cloned().into_iter().collect::<Vec<_>>(),
+        };
+        let of = |(section, value): (&String, &toml::Value)| {
+            let names = tables(value).into_iter().flat_map(|table| table.into_iter().map(|(key, _)| key));
+            names.map(|key| format!("{section}.{key}")).collect::<Vec<_>>()
+        };
+        file.iter().flat_map(of).collect()
+    }
+
+    #[test]
+    fn a_number_too_large_for_its_type_is_named() {
+        let text = "[extract]\nfps = 5000000000\n[shard]\ntest = 7.0\n";
+        assert_eq!(
+            problems(text, &["shard.max_mb=4294967296"]),
+            [
+                "line 2: extract.fps: 5000000000 is too large",
+                "line 4: shard.test: 7 is out of range: expected 0 to 0.9",
+                "line 4: shard.test: validation and test together leave less than 5 % to train on",
+                "--set: shard.max_mb: 4294967296 is too large",
+            ]
+        );
+    }
+
+    #[test]
+    fn the_smallest_file_works() {
+        let text = "[[speaker]]\nname = \"host\"\nvideos = [\"videos/host/*.mp4\"]\n";
+        let settings = resolve(text, &["extract.fps=10".into()], Path::new("p.toml")).unwrap();
+        assert_eq!((settings.speaker[0].name.as_str(), settings.extract.fps), ("host", 10));
+    }
+
+    #[test]
+    fn all_problems_are_reported_at_once_with_key_and_line() {
+        let text =
+            "[segment]\nshot_threshold = 7\n[extract]\nfsp = 15\n[work]\njobs = \"two\"\n[[speaker]]\nname = \"a b\"\n";
+        assert_eq!(
+            problems(text, &["gan.batch=0", "nothing=1", "lift.smooth_arms"]),
+            [
+                "line 2: segment.shot_threshold: 7 is out of range: expected 0 to 1",
+                "line 4: extract.fsp: unknown key (did you mean fps?)",
+                "line 6: work.jobs: expected a whole number, found string",
+                "line 7: speaker[0]: the key videos is missing",
+                "line 8: speaker[0].name: \"a b\": expected letters, digits, - and _ (it names folders)",
+                "--set: lift.smooth_arms: expected KEY=VALUE, like extract.fps=15",
+                "--set: gan.batch: 0 is out of range: expected 2 to 4096 windows",
+                "--set: nothing: unknown key",
+            ]
+        );
+    }
+
+    #[test]
+    fn no_gap_is_kept_that_lift_leaves_open() {
+        let said = problems("", &["segment.max_body_gap_secs=1.5", "segment.max_hand_gap_secs=60"]).join("\n");
+        for key in ["segment.max_body_gap_secs: 1.5", "segment.max_hand_gap_secs: 60"] {
+            assert!(
+                said.contains(&format!("{key} is out of range: expected 0 to 1 seconds, all that lift fills")),
+                "{said}"
+            );
+        }
+    }
+
+    #[test]
+    fn broken_toml_says_where() {
+        assert!(problems("[extract\nfps = 15", &[])[0].starts_with("line 1: not valid TOML"));
+        assert!(problems("extract = 3", &[])[0].contains("expected a table"));
+        assert!(problems("speaker = 3", &[])[0].contains("[[speaker]]"));
+    }
+}

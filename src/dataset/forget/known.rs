@@ -1,0 +1,194 @@
+//! The videos a project knows of: those its configuration names, those with folders in the work folder, and those in its
+//! datasets; and which of them is meant by a path, a file's name or a work name.
+
+use crate::config::{Config, videos};
+use crate::dataset::write::part;
+use crate::dataset::write::part::Part;
+use crate::stage::fingerprint::hash_file;
+use crate::stage::record::Record;
+use anyhow::{Result, bail, ensure};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// The folders of the stages that work video by video.
+pub const STAGES: [&str; 4] = ["extract", "pose2d", "segment", "lift"];
+
+/// A video and the names it goes by.
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Known {
+    pub speaker: String,
+    /// Its work name; `None`: only a dataset knows it.
+    pub work: Option<String>,
+    /// Where the configuration says it is.
+    pub source: Option<PathBuf>,
+    /// BLAKE3 of its content, where anything tells.
+    pub content: Option<String>,
+    /// File name.
+    pub file: String,
+    /// Its names in the speaker's dataset.
+    pub parts: BTreeSet<String>,
+}
+
+impl Known {
+    /// For people.
+    pub fn title(&self) -> String {
+        let name = self.work.as_ref().or(self.parts.first()).cloned().unwrap_or_else(|| self.file.clone());
+        format!("{}/{name}", self.speaker)
+    }
+
+    fn is_called(&self, wanted: &str) -> bool {
+        let path = Path::new(wanted);
+        let same_path = |source: &PathBuf| {
+            source == path
+                || std::path::absolute(path).is_ok_and(|path| path == *source)
+                || path.canonicalize().is_ok_and(|path| source.canonicalize().is_ok_and(|source| source == path))
+        };
+        let stem = Path::new(&self.file).file_stem().is_some_and(|stem| stem == wanted);
+        self.work.as_deref() == Some(wanted)
+            || self.parts.contains(wanted)
+            || self.file == wanted
+            || stem
+            || self.source.as_ref().is_some_and(same_path)
+    }
+}
+
+/// Every video of a project, also those the configuration excludes.
+///
+/// # Errors
+/// A folder that cannot be listed.
+pub fn of_project(config: &Config) -> Result<Vec<Known>> {
+    let work = &config.settings.work.dir;
+    let mut all = config.clone();
+    all.settings.speaker.iter_mut().for_each(|speaker| speaker.exclude.clear());
+    let mut known: Vec<Known> = Vec::new();
+    for unit in videos::of(&all).into_iter().flat_map(|videos| videos.units) {
+        let content = content(work, &unit.speaker, &unit.video);
+        let file = unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let (speaker, work, source) = (unit.speaker, Some(unit.video), Some(unit.source));
+        known.push(Known { speaker, work, source, content, file, parts: BTreeSet::new() });
+    }
+    for stage in STAGES {
+        for speaker in folders(&work.join(stage)) {
+            for video in entries(&work.join(stage).join(&speaker)) {
+                let there = known.iter().any(|k| k.speaker == speaker && k.work.as_ref() == Some(&video));
+                if !there {
+                    let content = content(work, &speaker, &video);
+                    known.push(Known { speaker: speaker.clone(), work: Some(video), content, ..Known::default() });
+                }
+            }
+        }
+    }
+    for speaker in folders(&work.join("dataset")) {
+        add_dataset(&work.join("dataset").join(&speaker), &speaker, &mut known)?;
+    }
+    known.sort();
+    Ok(known)
+}
+
+/// Every video of the dataset in `dir`.
+///
+/// # Errors
+/// No dataset is there.
+pub fn of_dataset(dir: &Path) -> Result<Vec<Known>> {
+    ensure!(dir.join(part::FOLDER).is_dir(), "{} is no dataset: it has no folder {}", dir.display(), part::FOLDER);
+    let mut known = Vec::new();
+    add_dataset(dir, "", &mut known)?;
+    Ok(known)
+}
+
+/// A video of a dataset is the known one with its content, or with its name.
+fn add_dataset(dir: &Path, speaker: &str, known: &mut Vec<Known>) -> Result<()> {
+    if !dir.join(part::FOLDER).is_dir() {
+        return Ok(());
+    }
+    for name in part::names(dir)? {
+        // a damaged file still has a name to be forgotten by
+        let part = Part::read(&Part::path(dir, &name)).ok();
+        let (content, file) = part.map(|part| (part.content, part.file)).unwrap_or_default();
+        let own = |k: &&mut Known| k.speaker == speaker && k.work.is_some();
+        let called = known.iter_mut().filter(own).find(|k| k.work.as_ref() == Some(&name));
+        let called = called.map(|k| k.parts.insert(name.clone()));
+        if called.is_some() {
+            continue;
+        }
+        // without a record of its first stage, a video of that name is looked at itself
+        for k in known.iter_mut().filter(own).filter(|k| k.content.is_none() && k.file == file) {
+            k.content = k.source.as_ref().and_then(|source| hash_file(source).ok());
+        }
+        let same = |k: &Known| {
+            k.speaker == speaker && k.work.is_some() && !content.is_empty() && k.content.as_ref() == Some(&content)
+        };
+        let exact = known.iter().position(|k| same(k) && k.file == file);
+        let first = exact.or_else(|| known.iter().position(same)).and_then(|at| known.get_mut(at));
+        match first {
+            Some(k) => {
+                k.parts.insert(name);
+            }
+            None => {
+                let content = Some(content).filter(|content| !content.is_empty());
+                let (speaker, parts) = (speaker.to_owned(), [name].into());
+                known.push(Known { speaker, work: None, source: None, content, file, parts });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The content of a video, from the record of the stage that read it.
+fn content(work: &Path, speaker: &str, video: &str) -> Option<String> {
+    let record = Record::read(&work.join("extract").join(speaker).join(video))?;
+    record.fingerprint.inputs.get("video").cloned()
+}
+
+fn folders(dir: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten().filter(|entry| entry.path().is_dir());
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let mut names: Vec<String> = names.filter(|name| !name.starts_with('.')).collect();
+    names.sort();
+    names
+}
+
+/// The units of a stage's folder: their folders, records, failures and left-over attempts.
+fn entries(dir: &Path) -> BTreeSet<String> {
+    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
+    let name = |name: String| {
+        let name = name.trim_start_matches('.');
+        let end = [".record.", ".failed.", ".attempt", ".old"].iter().filter_map(|mark| name.find(mark)).min();
+        name[..end.unwrap_or(name.len())].to_owned()
+    };
+    let names = entries.map(|entry| name(entry.file_name().to_string_lossy().into_owned()));
+    names.filter(|name| !name.is_empty()).collect()
+}
+
+/// The one video that is meant.
+///
+/// # Errors
+/// None, or several; the message lists them.
+pub fn one<'a>(known: &'a [Known], wanted: &str, speaker: Option<&str>) -> Result<&'a Known> {
+    let all: Vec<&Known> = known.iter().filter(|k| speaker.is_none_or(|speaker| k.speaker == speaker)).collect();
+    let list = |videos: &[&Known]| {
+        let line = |k: &&Known| match &k.source {
+            Some(source) => format!("\n  {}  {}", k.title(), source.display()),
+            None => format!("\n  {}  {}", k.title(), k.file),
+        };
+        videos.iter().map(line).collect::<String>()
+    };
+    let called: Vec<&Known> = all.iter().copied().filter(|k| k.is_called(wanted)).collect();
+    match called.as_slice() {
+        [one] => Ok(one),
+        [] => bail!("no video is called {wanted}; there are:{}", list(&all)),
+        several => bail!("{wanted} may be one of several videos; say which by its work name or path:{}", list(several)),
+    }
+}
+
+/// All videos of a speaker.
+///
+/// # Errors
+/// Nobody is called so; the message lists the speakers.
+pub fn of_speaker<'a>(known: &'a [Known], speaker: &str) -> Result<Vec<&'a Known>> {
+    let own: Vec<&Known> = known.iter().filter(|k| k.speaker == speaker).collect();
+    let names: BTreeSet<&str> = known.iter().map(|k| k.speaker.as_str()).collect();
+    let names = names.into_iter().collect::<Vec<_>>().join(", ");
+    ensure!(!own.is_empty(), "no speaker is called {speaker}; there are: {names}");
+    Ok(own)
+}

@@ -1,0 +1,226 @@
+//! Which files belong together: every motion file below the sources by what is in it, with the sound and the
+//! transcript that have its name, beside it or in a folder beside its own (`bvh/`, `wav/`, `tsv/`).
+
+use crate::dataset::INFO;
+use crate::dataset::write::part;
+use crate::formats::npz::Npz;
+use anyhow::{Context, Result, ensure};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+/// What a file of motion is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// The authors' text clips: 147 numbers a line.
+    Authors,
+    /// TED Expressive: `.npz` with `human_joints`.
+    Ted,
+    Bvh,
+    /// WebDataset tar shards of ours, or a dataset's folder.
+    Shards,
+}
+
+impl Kind {
+    /// Its name on the command line and in facts.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Authors => "authors",
+            Self::Ted => "ted",
+            Self::Bvh => "bvh",
+            Self::Shards => "shards",
+        }
+    }
+}
+
+/// A motion file with what belongs to it.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Found {
+    pub kind: Kind,
+    pub motion: PathBuf,
+    pub sound: Option<PathBuf>,
+    pub transcript: Option<PathBuf>,
+}
+
+/// What the sources hold.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Sources {
+    /// In the order of their paths.
+    pub takes: Vec<Found>,
+    /// Folders of datasets of ours.
+    pub datasets: Vec<PathBuf>,
+    /// Tar files elsewhere, and why each of the other files that look like motion was left out.
+    pub tars: Vec<PathBuf>,
+    pub unknown: Vec<(PathBuf, String)>,
+}
+
+const SOUND: [&str; 7] = ["wav", "flac", "mp3", "m4a", "ogg", "opus", "aac"];
+const TRANSCRIPT: [&str; 3] = ["tsv", "json", "txt"];
+/// Folders beside a motion's own, in small letters.
+const SOUND_FOLDERS: [&str; 6] = ["wav", "wavs", "audio", "audios", "sound", "speech"];
+const TRANSCRIPT_FOLDERS: [&str; 8] = ["tsv", "transcript", "transcripts", "text", "texts", "txt", "json", "words"];
+
+/// Looks through `sources`, files or folders; with `only`, files of other kinds are left out.
+///
+/// # Errors
+/// A source that is not there, or sources in which nothing is motion.
+pub fn find(sources: &[PathBuf], only: Option<Kind>) -> Result<Sources> {
+    let (mut files, mut found) = (Vec::new(), Sources::default());
+    for source in sources {
+        ensure!(source.exists(), "{} is not there", source.display());
+        walk(source, &mut files, &mut found.datasets)
+            .with_context(|| format!("cannot look into {}", source.display()))?;
+    }
+    files.sort();
+    files.dedup();
+    found.datasets.sort();
+    found.datasets.dedup();
+    if only.is_some_and(|only| only != Kind::Shards) {
+        found.datasets.clear();
+    }
+    for path in files {
+        match kind(&path) {
+            Ok(None) => {}
+            Ok(Some(kind)) if only.is_some_and(|only| only != kind) => {}
+            Ok(Some(Kind::Shards)) => found.tars.push(path),
+            Ok(Some(kind)) => found.takes.push(with_company(kind, path)),
+            Err(_) if only.is_some_and(|only| only != Kind::Ted) => {}
+            Err(why) => found.unknown.push((path, why)),
+        }
+    }
+    let nothing =
+        found.takes.is_empty() && found.datasets.is_empty() && found.tars.is_empty() && found.unknown.is_empty();
+    ensure!(
+        !nothing,
+        "nothing to import in {sources:?}{}: expected text clips of 147 numbers a line, .npz with `human_joints`, .bvh, \
+         or .tar shards",
+        only.map(|kind| format!(" of the kind {}", kind.name())).unwrap_or_default()
+    );
+    Ok(found)
+}
+
+/// The files below `path`; a dataset's folder is not looked into.
+fn walk(path: &Path, files: &mut Vec<PathBuf>, datasets: &mut Vec<PathBuf>) -> Result<()> {
+    if !path.is_dir() {
+        files.push(path.to_owned());
+        return Ok(());
+    }
+    if path.join(INFO).is_file() && path.join(part::FOLDER).is_dir() {
+        datasets.push(path.to_owned());
+        return Ok(());
+    }
+    for entry in std::fs::read_dir(path)? {
+        let path = entry?.path();
+        let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+        if !hidden {
+            walk(&path, files, datasets)?;
+        }
+    }
+    Ok(())
+}
+
+/// What a file is; `None`: no motion; an error: it looks like motion but is none that is understood.
+fn kind(path: &Path) -> std::result::Result<Option<Kind>, String> {
+    match ending(path).as_str() {
+        "bvh" => Ok(Some(Kind::Bvh)),
+        "tar" => Ok(Some(Kind::Shards)),
+        "npz" => {
+            let npz = Npz::open(path).map_err(|error| format!("{error:#}"))?;
+            let known = npz.has("human_joints").then_some(Kind::Ted);
+            let names = npz.names().join(", ");
+            known
+                .map(Some)
+                .ok_or_else(|| format!("it holds no `human_joints` [T, 43, 3] (TED Expressive), but: {names}"))
+        }
+        "txt" => Ok(has_147_numbers(path).then_some(Kind::Authors)),
+        _ => Ok(None),
+    }
+}
+
+fn has_147_numbers(path: &Path) -> bool {
+    let Ok(file) = File::open(path) else { return false };
+    let mut line = String::new();
+    // a line of the authors' is under 4 kB
+    let read = BufReader::new(file.take(16 << 10)).read_line(&mut line);
+    read.is_ok() && line.split_whitespace().count() == 147 && line.split_whitespace().all(|w| w.parse::<f64>().is_ok())
+}
+
+fn with_company(kind: Kind, motion: PathBuf) -> Found {
+    let stem = motion.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let mut stems = vec![stem.as_str()];
+    // gt_interval_3821.txt is said in 3821.wav
+    stems.extend(["gt_interval_", "prediction_interval_"].iter().filter_map(|prefix| stem.strip_prefix(prefix)));
+    let sound = beside(&motion, &stems, &SOUND, &SOUND_FOLDERS);
+    let transcript = beside(&motion, &stems, &TRANSCRIPT, &TRANSCRIPT_FOLDERS);
+    Found { kind, sound, transcript, motion }
+}
+
+/// The file of one of these names and endings in the motion's own folder, or in a folder of those names beside it.
+fn beside(motion: &Path, stems: &[&str], endings: &[&str], folders: &[&str]) -> Option<PathBuf> {
+    let own = motion.parent()?;
+    let mut places = vec![own.to_owned()];
+    let above = if own.as_os_str().is_empty() { Path::new("..") } else { own.parent()? };
+    let above = if above.as_os_str().is_empty() { Path::new(".") } else { above };
+    let mut siblings: Vec<PathBuf> =
+        std::fs::read_dir(above).into_iter().flatten().flatten().map(|e| e.path()).collect();
+    siblings.sort();
+    let called = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        folders.contains(&name.as_str())
+    };
+    places.extend(siblings.into_iter().filter(called));
+    let candidates = places.iter().flat_map(|place| {
+        stems.iter().flat_map(move |stem| endings.iter().map(move |ending| place.join(format!("{stem}.{ending}"))))
+    });
+    candidates.filter(|path| path != motion).find(|path| path.is_file())
+}
+
+fn ending(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_one_take_find_each_other() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = |name: &str, content: &str| {
+            let path = dir.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(&path, content).unwrap();
+            path
+        };
+        let numbers = vec!["0.0"; 147].join(" ");
+        let clip = file("clips/gt_interval_38.txt", &numbers);
+        let clip_sound = file("clips/38.wav", "");
+        let flat = file("flat/a.bvh", "");
+        let (flat_sound, flat_words) = (file("flat/a.wav", ""), file("flat/a.json", ""));
+        let apart = file("trn/bvh/b.BVH", "");
+        let (apart_sound, apart_words) = (file("trn/wav/b.flac", ""), file("trn/tsv/b.tsv", ""));
+        let alone = file("trn/bvh/c.bvh", "");
+        file("trn/bvh/notes.txt", "words");
+        let broken = file("d.npz", "no zip");
+        let tar = file("train-000.tar", "");
+        let found = find(&[dir.path().to_owned()], None).unwrap();
+        let take = |kind, motion: &PathBuf, sound: Option<PathBuf>, transcript: Option<PathBuf>| Found {
+            kind,
+            motion: motion.clone(),
+            sound,
+            transcript,
+        };
+        let expected = [
+            take(Kind::Authors, &clip, Some(clip_sound), None),
+            take(Kind::Bvh, &flat, Some(flat_sound), Some(flat_words)),
+            take(Kind::Bvh, &apart, Some(apart_sound), Some(apart_words)),
+            take(Kind::Bvh, &alone, None, None),
+        ];
+        assert_eq!(found.takes, expected);
+        assert_eq!((found.tars, found.unknown[0].0.clone()), (vec![tar], broken));
+        assert_eq!(find(&[dir.path().to_owned()], Some(Kind::Authors)).unwrap().takes.len(), 1);
+        let text = format!("{:#}", find(&[dir.path().join("flat/a.wav")], None).unwrap_err());
+        assert!(text.contains("147 numbers"), "{text}");
+        assert!(find(&[dir.path().join("gone")], None).is_err());
+    }
+}

@@ -1,0 +1,216 @@
+//! Tar shards by themselves, of ours or passed through other hands: members are found by their names, in any order and
+//! any tar; what is no member of a sample is left out and noted. The bytes of a member stay as they are wherever a
+//! dataset can hold them.
+
+use crate::dataset::Split;
+use crate::dataset::sample::{EXTENSIONS, N_KEYPOINTS, Sample};
+use crate::formats::npy_slice;
+use crate::formats::npy_slice::{Element, Layout};
+use crate::formats::wav;
+use crate::stage::ledger::{Kept, Ledger, Refused};
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::N_JOINTS;
+use crate::types::sound::{SAMPLE_RATE, Sound};
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, bail, ensure};
+use ndarray::{Array2, Array3};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// Where a member lies.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Place {
+    tar: PathBuf,
+    offset: u64,
+    bytes: u64,
+}
+
+/// A sample that waits to be read: its members in the order of `EXTENSIONS`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Waiting {
+    pub key: String,
+    members: [Option<Place>; 5],
+}
+
+/// The samples whose keys differ only behind the last dash.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LooseVideo {
+    pub name: String,
+    /// By the names of the tars; `None`: they do not tell.
+    pub split: Option<Split>,
+    /// In the order of their keys.
+    pub samples: Vec<Waiting>,
+}
+
+/// What tars hold.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Loose {
+    pub videos: Vec<LooseVideo>,
+    /// What was left out, a sentence each.
+    pub notes: Vec<String>,
+    /// Tars that cannot be read, and why.
+    pub failed: Vec<(PathBuf, String)>,
+}
+
+impl LooseVideo {
+    /// The tars its samples lie in.
+    pub fn tars(&self) -> Vec<&PathBuf> {
+        self.samples.iter().flat_map(|sample| sample.members.iter().flatten().map(|place| &place.tar)).collect()
+    }
+}
+
+/// Looks through the tars; no member is read yet.
+pub fn open(tars: &[PathBuf]) -> Loose {
+    let mut loose = Loose::default();
+    let mut samples: BTreeMap<String, Waiting> = BTreeMap::new();
+    for tar in tars {
+        let mut unknown = BTreeMap::<String, usize>::new();
+        if let Err(error) = list(tar, &mut samples, &mut unknown) {
+            loose.failed.push((tar.clone(), format!("{error:#}")));
+        }
+        let name = tar.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let left_out =
+            |(ending, n): (String, usize)| format!("{name}: {n} x .{ending} left out, no member of a sample");
+        loose.notes.extend(unknown.into_iter().map(left_out));
+    }
+    let mut videos: BTreeMap<String, LooseVideo> = BTreeMap::new();
+    for (key, sample) in samples {
+        let name = key.rsplit_once('-').map_or(key.as_str(), |(video, _)| video).to_owned();
+        let video = videos.entry(name.clone()).or_insert(LooseVideo { name, split: None, samples: Vec::new() });
+        video.split = video.split.or_else(|| sample.members.iter().flatten().find_map(|place| split_of(&place.tar)));
+        video.samples.push(sample);
+    }
+    loose.videos = videos.into_values().collect();
+    loose
+}
+
+fn list(tar: &Path, samples: &mut BTreeMap<String, Waiting>, unknown: &mut BTreeMap<String, usize>) -> Result<()> {
+    let reading = || format!("cannot read {} as a tar file", tar.display());
+    let file = File::open(tar).with_context(reading)?;
+    let length = file.metadata().with_context(reading)?.len();
+    let mut archive = tar::Archive::new(file);
+    for entry in archive.entries_with_seek().with_context(reading)? {
+        let entry = entry.with_context(reading)?;
+        if !entry.header().entry_type().is_file() {
+            continue;
+        }
+        let path = entry.path().with_context(reading)?.into_owned();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let (key, ending) = name.split_once('.').unwrap_or((&name, ""));
+        let Some(member) = EXTENSIONS.iter().position(|extension| *extension == ending) else {
+            *unknown.entry(ending.to_owned()).or_default() += 1;
+            continue;
+        };
+        let place = Place { tar: tar.to_owned(), offset: entry.raw_file_position(), bytes: entry.size() };
+        ensure!(place.offset.saturating_add(place.bytes) <= length, "{}: {name} is cut off", reading());
+        let fresh = || Waiting { key: key.to_owned(), members: Default::default() };
+        let sample = samples.entry(key.to_owned()).or_insert_with(fresh);
+        if let Some(first) = &sample.members[member] {
+            let same = read_place(first)? == read_place(&place)?;
+            ensure!(same, "{name} lies in {} and in {} with other bytes", first.tar.display(), tar.display());
+        }
+        sample.members[member].get_or_insert(place);
+    }
+    Ok(())
+}
+
+/// `train-...tar`.
+fn split_of(tar: &Path) -> Option<Split> {
+    let name = tar.file_name()?.to_string_lossy().into_owned();
+    Split::ALL.into_iter().find(|split| name.starts_with(&format!("{}-", split.name())))
+}
+
+fn read_place(place: &Place) -> Result<Vec<u8>> {
+    let read = || -> std::io::Result<Vec<u8>> {
+        let mut file = File::open(&place.tar)?;
+        file.seek(SeekFrom::Start(place.offset))?;
+        let mut bytes = Vec::new();
+        file.take(place.bytes).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    };
+    read().with_context(|| format!("cannot read {}", place.tar.display()))
+}
+
+impl Waiting {
+    /// The sample, and the bytes of its JSON as they are.
+    ///
+    /// # Errors
+    /// A member that is missing or damaged; the message names it and its tar.
+    pub fn read(&self) -> Result<(Sample, Vec<u8>)> {
+        let mut members: [Vec<u8>; 5] = Default::default();
+        let mut tar = String::new();
+        for ((place, extension), bytes) in self.members.iter().zip(EXTENSIONS).zip(&mut members) {
+            let Some(place) = place else { bail!("the sample {} has no {}.{extension}", self.key, self.key) };
+            tar = place.tar.display().to_string();
+            *bytes = read_place(place)?;
+        }
+        let [json, mask, pose2d, pose3d, sound] = &members;
+        let sample = self.parse(json, mask, pose2d, pose3d, sound);
+        let sample = sample.with_context(|| format!("the sample {} in {tar} is damaged", self.key))?;
+        Ok((sample, members.into_iter().next().unwrap_or_default()))
+    }
+
+    fn parse(&self, json: &[u8], mask: &[u8], pose2d: &[u8], pose3d: &[u8], sound: &[u8]) -> Result<Sample> {
+        let meta: serde_json::Value = serde_json::from_slice(json).context("json")?;
+        let fps: FrameRate = serde_json::from_value(meta["fps"].clone()).context("json: fps")?;
+        let rows = |bytes: &[u8], element: Element, row: &[usize]| -> Result<(usize, usize)> {
+            let layout = Layout::parse(bytes, bytes.len() as u64, element, row)?;
+            Ok((layout.n_rows, layout.data_at))
+        };
+        let (n_frames, at) = rows(pose3d, Element::F32, &[N_JOINTS, 3]).context("pose3d.npy")?;
+        let joints =
+            Array3::from_shape_vec((n_frames, N_JOINTS, 3), npy_slice::floats(&pose3d[at..])).context("pose3d.npy")?;
+        let (n_rows, at) = rows(mask, Element::Bool, &[N_JOINTS]).context("mask.npy")?;
+        let mask = Array2::from_shape_vec((n_rows, N_JOINTS), npy_slice::bools(&mask[at..])).context("mask.npy")?;
+        let (n_rows, at) = rows(pose2d, Element::F32, &[N_KEYPOINTS, 3]).context("pose2d.npy")?;
+        let pose2d =
+            Array3::from_shape_vec((n_rows, N_KEYPOINTS, 3), npy_slice::floats(&pose2d[at..])).context("pose2d.npy")?;
+        let sound = read_wav(sound).context("wav")?;
+        let sample = Sample { key: self.key.clone(), motion: Motion { fps, joints, mask }, pose2d, sound, meta };
+        sample.members()?;
+        Ok(sample)
+    }
+}
+
+/// A 16-bit mono wav at the dataset's rate, with whatever header.
+fn read_wav(bytes: &[u8]) -> Result<Sound> {
+    if wav::n_samples(bytes, bytes.len() as u64, SAMPLE_RATE).is_ok() {
+        return Ok(Sound { rate: SAMPLE_RATE, samples: wav::samples(&bytes[wav::HEADER_BYTES..]) });
+    }
+    let reader = hound::WavReader::new(bytes)?;
+    let spec = reader.spec();
+    ensure!(
+        (spec.sample_rate, spec.channels, spec.bits_per_sample) == (SAMPLE_RATE, 1, 16),
+        "{} Hz, {} channels, {} bits; expected 16-bit mono at {SAMPLE_RATE} Hz",
+        spec.sample_rate,
+        spec.channels,
+        spec.bits_per_sample
+    );
+    let samples: Result<Vec<f32>, _> = reader.into_samples::<i16>().map(|s| Ok(f32::from(s?) / 32_768.0)).collect();
+    samples.map(|samples| Sound { rate: SAMPLE_RATE, samples }).map_err(|error: hound::Error| error.into())
+}
+
+/// The account of a video of which only these samples are known: where each begins, and its seconds.
+pub fn ledger(samples: &[(f64, f64)]) -> Ledger {
+    let mut ledger = Ledger::default();
+    for &(start, secs) in samples {
+        let at = ledger.duration_secs;
+        let start_secs = if start.is_finite() && start > at { start } else { at };
+        if start_secs > at {
+            ledger.refused.push(Refused {
+                start_secs: at,
+                end_secs: start_secs,
+                reason: "not here".to_owned(),
+                measured: 0.0,
+                threshold: 0.0,
+                unit: "s".to_owned(),
+                says: "the shards that were imported do not hold it".to_owned(),
+            });
+        }
+        ledger.duration_secs = start_secs + secs;
+        ledger.kept.push(Kept { start_secs, end_secs: ledger.duration_secs });
+    }
+    ledger
+}

@@ -1,0 +1,331 @@
+//! What is imported: a take, a video of another dataset, or the samples of a video in loose tars. Each is looked at
+//! (kept or not, its account, its sound's codes), and written when its split is known.
+
+use super::find::{Found, Sources};
+use super::shards;
+use super::shards::LooseVideo;
+use super::take::{Ended, Refusal, Take};
+use super::write::{Line, Plan};
+use crate::audio::fingerprint::Fingerprinter;
+use crate::config::videos::slug;
+use crate::dataset::bones::{VideoBones, of_speaker};
+use crate::dataset::info::Info;
+use crate::dataset::shared_sound::Shared;
+use crate::dataset::write::part;
+use crate::dataset::write::part::{Part, Source, SplitBy};
+use crate::dataset::write::writer::DatasetWriter;
+use crate::dataset::{INFO, Split};
+use crate::motion::bones;
+use crate::stage::fingerprint::hash_file;
+use crate::stage::ledger::{Kept, Ledger, Refused};
+use crate::types::sound::Sound;
+use anyhow::{Context, Result, ensure};
+use std::path::{Path, PathBuf};
+
+/// Joints moved by more than this, in the median of a take, are worth a remark.
+const MUCH_MOVED_MM: f64 = 5.0;
+
+/// Something to import.
+#[derive(Clone, Debug)]
+pub enum Origin {
+    Take(Found),
+    /// The video of this name in the dataset's folder.
+    Part(PathBuf, String),
+    Loose(LooseVideo),
+    /// A file that looks like motion and is none, and why.
+    Unknown(PathBuf, String),
+}
+
+/// What was found out about it.
+#[derive(Clone, Debug, Default)]
+pub struct Look {
+    pub source: Source,
+    /// The split it comes with, then the one it is given.
+    pub split: Option<(Split, SplitBy)>,
+    pub codes: Option<Vec<u32>>,
+    /// What a user should know of a take that is kept.
+    pub remark: String,
+    /// Hash of the codes, once written.
+    pub sound: Option<String>,
+}
+
+impl Origin {
+    /// Everything in the sources, and what was left out of their tars.
+    pub fn all(sources: &Sources) -> (Vec<Self>, Vec<String>) {
+        let mut origins: Vec<Self> = sources.takes.iter().cloned().map(Self::Take).collect();
+        for dir in &sources.datasets {
+            match part::names(dir) {
+                Ok(names) => origins.extend(names.into_iter().map(|name| Self::Part(dir.clone(), name))),
+                Err(error) => origins.push(Self::Unknown(dir.clone(), format!("{error:#}"))),
+            }
+        }
+        let loose = shards::open(&sources.tars);
+        origins.extend(loose.videos.into_iter().map(Self::Loose));
+        let unknown = loose.failed.into_iter().chain(sources.unknown.iter().cloned());
+        origins.extend(unknown.map(|(path, why)| Self::Unknown(path, why)));
+        (origins, loose.notes)
+    }
+
+    /// Its name for people.
+    pub fn file(&self) -> String {
+        match self {
+            Self::Take(Found { motion: path, .. }) | Self::Unknown(path, _) => path.display().to_string(),
+            Self::Part(dir, name) => format!("{} of {}", name, dir.display()),
+            Self::Loose(video) => video.name.clone(),
+        }
+    }
+
+    /// The folders its files lie in.
+    fn folders(&self) -> Vec<String> {
+        let files: Vec<&PathBuf> = match self {
+            Self::Take(found) => {
+                [Some(&found.motion), found.sound.as_ref(), found.transcript.as_ref()].into_iter().flatten().collect()
+            }
+            Self::Part(path, _) | Self::Unknown(path, _) => vec![path],
+            Self::Loose(video) => video.tars(),
+        };
+        let folders = files.into_iter().filter_map(|path| path.parent()).map(|dir| dir.display().to_string());
+        let mut folders: Vec<String> = folders.filter(|dir| !dir.is_empty()).collect();
+        folders.sort();
+        folders.dedup();
+        folders
+    }
+
+    /// Looks at it; what cannot be read is a failure.
+    pub fn look(&self, plan: &Plan) -> Look {
+        let look = match self {
+            Self::Take(found) => look_at_take(found, plan),
+            Self::Part(dir, name) => look_at_part(dir, name, plan),
+            Self::Loose(video) => look_at_loose(video, plan),
+            Self::Unknown(_, why) => Err(anyhow::anyhow!("{why}")),
+        };
+        look.unwrap_or_else(|error| self.failed(&format!("{error:#}")))
+    }
+
+    fn failed(&self, error: &str) -> Look {
+        let (path, name) = match self {
+            Self::Take(Found { motion: path, .. }) | Self::Unknown(path, _) => (path.clone(), None),
+            Self::Part(dir, name) => (dir.clone(), Some(name.clone())),
+            Self::Loose(video) => (PathBuf::from(&video.name), Some(video.name.clone())),
+        };
+        // where the files lay has no say in the dataset
+        let error = self.folders().iter().fold(error.to_owned(), |error, dir| error.replace(&format!("{dir}/"), ""));
+        let content = hash_file(&path).unwrap_or_default();
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let marks =
+            if content.is_empty() { blake3::hash(stem.as_bytes()).to_hex().to_string() } else { content.clone() };
+        let source = Source {
+            name: name.unwrap_or_else(|| format!("{}-{}", slug(&stem), marks.get(..8).unwrap_or_default())),
+            file: file_name(&path),
+            content,
+            failure: Some(format!("import: {error}")),
+            ..Source::default()
+        };
+        Look { source, ..Look::default() }
+    }
+
+    /// Writes it into the dataset in `out` as `look` says.
+    pub fn write(&self, look: &Look, plan: &Plan, writer: &DatasetWriter, out: &Path) -> Result<()> {
+        let Some((split, by)) = look.split.clone().filter(|_| look.is_kept()) else {
+            writer.video(look.source.clone(), Split::Train, SplitBy::Content)?.finish(None)?;
+            return Ok(());
+        };
+        if let Self::Part(dir, name) = self {
+            return Part::read(&Part::path(dir, name))?.take_over(dir, out);
+        }
+        let mut part = writer.video(look.source.clone(), split, by)?;
+        match self {
+            Self::Take(found) => {
+                let Ended::Kept(kept) = Take::read(found, &plan.limits)?.ended else {
+                    anyhow::bail!("{} changed while it was imported", found.motion.display());
+                };
+                part.push(&kept.sample, 0.0)?;
+            }
+            Self::Loose(video) => {
+                for waiting in &video.samples {
+                    let (sample, json) = waiting.read()?;
+                    part.push_as_it_was(&sample, json)?;
+                }
+            }
+            Self::Part(..) | Self::Unknown(..) => {}
+        }
+        part.finish(look.sound.clone())?;
+        Ok(())
+    }
+}
+
+fn look_at_take(found: &Found, plan: &Plan) -> Result<Look> {
+    let take = Take::read(found, &plan.limits)?;
+    let duration_secs = plan.limits.fps.secs(take.n_frames);
+    let mut source = Source {
+        name: take.name,
+        file: file_name(&found.motion),
+        content: take.content,
+        made_from: made_from(found, plan)?,
+        ledger: Ledger { duration_secs, ..Ledger::default() },
+        ..Source::default()
+    };
+    match take.ended {
+        Ended::Refused(refusal) => {
+            source.ledger.refused.push(refused(0.0, duration_secs, &refusal));
+            Ok(Look { source, ..Look::default() })
+        }
+        Ended::Kept(kept) => {
+            let n_frames = kept.sample.n_frames();
+            let end_secs = plan.limits.fps.secs(n_frames);
+            source.ledger.kept.push(Kept { start_secs: 0.0, end_secs });
+            if end_secs < duration_secs {
+                let says = "the sound ends here".to_owned();
+                let refusal = Refusal { reason: "no sound", measured: 0.0, threshold: 0.0, unit: "s", says };
+                source.ledger.refused.push(refused(end_secs, duration_secs, &refusal));
+            }
+            source.bones = VideoBones { lengths_metres: kept.lengths.map(f64::from).to_vec(), n_frames };
+            let remark = match kept.moved_mm {
+                moved if moved > MUCH_MOVED_MM => {
+                    format!("its bones vary: one length each moved its joints by {moved} mm (median)")
+                }
+                _ => String::new(),
+            };
+            Ok(Look { source, remark, codes: Some(codes([&kept.sample.sound])), ..Look::default() })
+        }
+    }
+}
+
+/// Of the files and of what is made of them.
+fn made_from(found: &Found, plan: &Plan) -> Result<String> {
+    let files = [Some(&found.motion), found.sound.as_ref(), found.transcript.as_ref()];
+    let hashes = files.into_iter().flatten().map(|path| hash_file(path)).collect::<Result<Vec<_>>>()?;
+    let all = serde_json::json!([env!("CARGO_PKG_VERSION"), hashes, plan.limits.fps, plan.shard.max_mb]);
+    Ok(blake3::hash(all.to_string().as_bytes()).to_hex().to_string())
+}
+
+fn refused(start_secs: f64, end_secs: f64, refusal: &Refusal) -> Refused {
+    let Refusal { reason, measured, threshold, unit, says } = refusal.clone();
+    Refused { start_secs, end_secs, reason: reason.to_owned(), measured, threshold, unit: unit.to_owned(), says }
+}
+
+fn look_at_part(dir: &Path, name: &str, plan: &Plan) -> Result<Look> {
+    let info = std::fs::read(dir.join(INFO)).with_context(|| format!("cannot read {}", dir.join(INFO).display()))?;
+    let info: Info =
+        serde_json::from_slice(&info).with_context(|| format!("{} is damaged", dir.join(INFO).display()))?;
+    let fps = plan.limits.fps;
+    ensure!(
+        info.fps == fps,
+        "{} runs at {}, the dataset at {fps}: import it with the same --fps",
+        dir.display(),
+        info.fps
+    );
+    let part = Part::read(&Part::path(dir, name))?;
+    ensure!(
+        part.is_sound(dir, &part::stated_hashes(dir)),
+        "{name}: its files are not what was written; orator dataset verify says what is wrong"
+    );
+    let codes = part.codes(dir)?;
+    let split = part.split.map(|split| (split, part.split_by.clone()));
+    let Part { name, file, content, made_from, ledger, bones, failure, .. } = part;
+    let source = Source { name, file, content, made_from, ledger, bones, failure };
+    Ok(Look { source, split, codes: Some(codes).filter(|codes| !codes.is_empty()), ..Look::default() })
+}
+
+fn look_at_loose(video: &LooseVideo, plan: &Plan) -> Result<Look> {
+    let fps = plan.limits.fps;
+    let (mut stretches, mut measured, mut fingerprinter) = (Vec::new(), Vec::new(), Fingerprinter::default());
+    let mut content = String::new();
+    for waiting in &video.samples {
+        let (sample, _) = waiting.read()?;
+        let (key, own) = (&sample.key, sample.motion.fps);
+        ensure!(own == fps, "{key} runs at {own}, the dataset at {fps}: import it with the same --fps");
+        let n_frames = sample.n_frames();
+        let start = sample.meta["start_secs"].as_f64().unwrap_or(0.0);
+        stretches.push((start, fps.secs(n_frames)));
+        measured.push(VideoBones { lengths_metres: bones::measure(&sample.motion).map(f64::from).to_vec(), n_frames });
+        fingerprinter.push(&sample.sound.samples);
+        if let Some(said) = sample.meta["content"].as_str() {
+            content = said.to_owned();
+        }
+    }
+    let source = Source {
+        name: video.name.clone(),
+        file: video.name.clone(),
+        content,
+        ledger: shards::ledger(&stretches),
+        bones: VideoBones {
+            lengths_metres: of_speaker(&measured).map(f64::from).to_vec(),
+            n_frames: measured.iter().map(|bones| bones.n_frames).sum(),
+        },
+        ..Source::default()
+    };
+    Ok(Look {
+        source,
+        split: video.split.map(|split| (split, SplitBy::Name)),
+        codes: Some(fingerprinter.finish()),
+        ..Look::default()
+    })
+}
+
+fn codes<'a>(sounds: impl IntoIterator<Item = &'a Sound>) -> Vec<u32> {
+    let mut fingerprinter = Fingerprinter::default();
+    sounds.into_iter().for_each(|sound| fingerprinter.push(&sound.samples));
+    fingerprinter.finish()
+}
+
+impl Look {
+    /// Whether it has a sample.
+    pub fn is_kept(&self) -> bool {
+        !self.source.ledger.kept.is_empty() && self.source.failure.is_none()
+    }
+
+    /// The same name was there before: it is refused, under a name of its own.
+    pub fn twice(mut self, nth: usize) -> Self {
+        let first = self.source.name.clone();
+        let says = format!("{first} is there already");
+        self.refuse("duplicate", self.source.ledger.kept_secs(), 0.0, &says);
+        let mark = blake3::hash(format!("{first} {nth}").as_bytes()).to_hex();
+        let stem = first.rsplit_once('-').map_or(first.as_str(), |(stem, _)| stem);
+        self.source.name = format!("{stem}-{}", &mark[..8]);
+        self
+    }
+
+    /// It shares sound with videos of different splits.
+    pub fn refuse_shared(&mut self, with: &[Shared], threshold: f64) {
+        let name = self.source.name.clone();
+        let others: Vec<&str> = with.iter().filter_map(|shared| shared.other(&name)).collect();
+        let secs = with.first().map_or(0.0, |shared| shared.secs);
+        let says =
+            format!("the same {secs:.1} s of sound are in {}, which are in different splits", others.join(" and "));
+        self.refuse("duplicate", secs, threshold, &says);
+        (self.sound, self.split) = (None, None);
+    }
+
+    fn refuse(&mut self, reason: &str, measured: f64, threshold: f64, says: &str) {
+        let ledger = &mut self.source.ledger;
+        let refused = |kept: Kept| Refused {
+            start_secs: kept.start_secs,
+            end_secs: kept.end_secs,
+            reason: reason.to_owned(),
+            measured,
+            threshold,
+            unit: "s".to_owned(),
+            says: says.to_owned(),
+        };
+        let all: Vec<Refused> = ledger.kept.drain(..).map(refused).collect();
+        ledger.refused.extend(all);
+        ledger.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+        self.codes = None;
+    }
+
+    /// What became of it, in a line.
+    pub fn line(&self, file: &str) -> Line {
+        let (ended, reason, says) = match (&self.source.failure, self.source.ledger.refused.first()) {
+            (Some(error), _) => ("failed", "error".to_owned(), error.clone()),
+            (None, _) if self.is_kept() => ("kept", String::new(), self.remark.clone()),
+            (None, Some(refused)) => ("refused", refused.reason.clone(), refused.says.clone()),
+            (None, None) => ("refused", "empty".to_owned(), "it holds nothing".to_owned()),
+        };
+        Line { file: file.to_owned(), ended, kept_secs: self.source.ledger.kept_secs(), reason, says }
+    }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}

@@ -1,0 +1,205 @@
+//! One take on its way to a sample: its motion at the dataset's rate with constant bones, its sound, and the cut to
+//! what both have; or the reason why it is refused. A take is one continuous interval.
+
+use super::find::{Found, Kind};
+use super::transcript::Transcript;
+use crate::config::videos::slug;
+use crate::dataset::sample::{N_KEYPOINTS, Sample};
+use crate::external::ffmpeg::audio;
+use crate::mocap::captured::Captured;
+use crate::motion::bones;
+use crate::motion::resample;
+use crate::stage::fingerprint::hash_file;
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::{L_HAND, N_BONES, N_HAND_JOINTS, N_JOINTS, R_HAND};
+use crate::types::sound::{SAMPLE_RATE, Sound};
+use crate::types::sync;
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result};
+use ndarray::{Array3, s};
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// What a take must be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// The dataset's rate.
+    pub fps: FrameRate,
+    /// Shortest take, in frames of the dataset.
+    pub min_frames: usize,
+    /// Most seconds by which sound and motion may differ in length.
+    pub max_apart_secs: f64,
+}
+
+/// A take that was read.
+#[derive(Clone, Debug)]
+pub struct Take {
+    /// `<slug of the file's name>-<8 hex of its content>`.
+    pub name: String,
+    /// BLAKE3 of the motion file.
+    pub content: String,
+    /// Frames at the dataset's rate that the motion has, before the cut.
+    pub n_frames: usize,
+    pub ended: Ended,
+}
+
+/// What became of it.
+#[derive(Clone, Debug)]
+pub enum Ended {
+    Kept(Box<Kept>),
+    Refused(Refusal),
+}
+
+/// A sample, and the bones its motion was given (metres; 0: not there).
+#[derive(Clone, Debug)]
+pub struct Kept {
+    /// By how much the joints moved when every bone was given one length: the median, mm.
+    pub moved_mm: f64,
+    pub sample: Sample,
+    pub lengths: [f32; N_BONES],
+}
+
+/// Why a take is left out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refusal {
+    /// A word or two, for programs.
+    pub reason: &'static str,
+    pub measured: f64,
+    pub threshold: f64,
+    pub unit: &'static str,
+    /// The same as a sentence, for people.
+    pub says: String,
+}
+
+impl Take {
+    /// Reads the files of a take. Errors: one of them is not what it should be; the message names it.
+    pub fn read(found: &Found, limits: &Limits) -> Result<Self> {
+        let content = hash_file(&found.motion)?;
+        let stem = found.motion.file_stem().unwrap_or_default().to_string_lossy();
+        let name = format!("{}-{}", slug(&stem), content.get(..8).unwrap_or(&content));
+        let captured = Captured::read(found.kind, &found.motion)?;
+        let motion = resample::at_rate(&captured.motion, limits.fps);
+        let n_frames = motion.n_frames();
+        let sound = match &found.sound {
+            Some(path) => audio::read_mono(path, SAMPLE_RATE)?.filter(|sound| !sound.samples.is_empty()),
+            None => None,
+        };
+        let ended = match (refusal(n_frames, sound.as_ref(), found, limits), sound) {
+            (None, Some(sound)) => Ended::Kept(Box::new(keep(&name, found, &captured, motion, sound)?)),
+            (refusal, _) => Ended::Refused(refusal.unwrap_or_else(|| no_sound(found))),
+        };
+        Ok(Self { name, content, n_frames, ended })
+    }
+}
+
+fn refusal(n_frames: usize, sound: Option<&Sound>, found: &Found, limits: &Limits) -> Option<Refusal> {
+    let stem = found.motion.file_stem().unwrap_or_default().to_string_lossy();
+    if found.kind == Kind::Authors && stem.starts_with("prediction") {
+        let says = "it is what a model predicted, not how a person moved".to_owned();
+        return Some(Refusal { reason: "prediction", measured: 0.0, threshold: 0.0, unit: "", says });
+    }
+    let Some(sound) = sound else { return Some(no_sound(found)) };
+    let (motion_secs, sound_secs) = (limits.fps.secs(n_frames), sound.secs());
+    let apart = sound_secs - motion_secs;
+    if apart.abs() > limits.max_apart_secs {
+        return Some(Refusal {
+            reason: "out of step",
+            measured: apart.abs(),
+            threshold: limits.max_apart_secs,
+            unit: "s",
+            says: format!(
+                "the sound has {sound_secs:.3} s, the motion {motion_secs:.3} s: {:.3} s apart, at most {} s are believed",
+                apart.abs(),
+                limits.max_apart_secs
+            ),
+        });
+    }
+    let n_common = n_common(n_frames, sound, limits.fps);
+    (n_common < limits.min_frames).then(|| Refusal {
+        reason: "too short",
+        measured: n_common as f64,
+        threshold: limits.min_frames as f64,
+        unit: "frames",
+        says: format!("{n_common} frames have motion and sound, at least {} are needed", limits.min_frames),
+    })
+}
+
+fn no_sound(found: &Found) -> Refusal {
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let says = match &found.sound {
+        Some(sound) => format!("{} holds no sound", name(sound)),
+        None => format!("no sound file has the name of {}", name(&found.motion)),
+    };
+    Refusal { reason: "no sound", measured: 0.0, threshold: 0.0, unit: "s", says }
+}
+
+/// Frames that lie in the motion and wholly in the sound.
+fn n_common(n_frames: usize, sound: &Sound, fps: FrameRate) -> usize {
+    n_frames.min((sound.secs() * fps.per_sec() + 1e-6).floor() as usize)
+}
+
+fn keep(name: &str, found: &Found, captured: &Captured, mut motion: Motion, mut sound: Sound) -> Result<Kept> {
+    let (fps, n_before) = (motion.fps, motion.n_frames());
+    let lengths = bones::measure(&captured.motion);
+    let n_frames = n_common(n_before, &sound, fps);
+    motion.joints = motion.joints.slice(s![..n_frames, .., ..]).to_owned();
+    motion.mask = motion.mask.slice(s![..n_frames, ..]).to_owned();
+    let before = motion.joints.clone();
+    bones::with_lengths(&mut motion, &lengths);
+    let moved = moved_mm(&before, &motion.joints);
+    let sound_secs = sound.secs();
+    sound.samples.resize(sync::sample_at(fps, SAMPLE_RATE, n_frames), 0.0);
+    let transcript = match &found.transcript {
+        Some(path) => Transcript::read(path)?,
+        None => captured.text.as_deref().map(Transcript::of_text).unwrap_or_default(),
+    };
+    let transcript = transcript.until(fps.secs(n_frames));
+    let seen = |root: usize| {
+        let hand = motion.mask.slice(s![.., root..root + N_HAND_JOINTS]);
+        hand.iter().filter(|&&seen| seen).count() as f64 / hand.len().max(1) as f64
+    };
+    let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut meta = json!({
+        "video": name,
+        "first_frame": 0,
+        "n_frames": n_frames,
+        "fps": fps,
+        "start_secs": 0.0,
+        "end_secs": fps.secs(n_frames),
+        "image_size": null,
+        "left_hand_seen": seen(L_HAND),
+        "right_hand_seen": seen(R_HAND),
+        "sound_samples_padded": 0,
+        "imported": {
+            "kind": found.kind.name(),
+            "motion": file(&found.motion),
+            "sound": found.sound.as_deref().map(file),
+            "source_fps": captured.motion.fps,
+            "motion_secs": fps.secs(n_before),
+            "sound_secs": sound_secs,
+            "bones_moved_mm": { "median": moved[0], "largest": moved[1] },
+        },
+        "text": transcript.text,
+        "words": transcript.words,
+    });
+    if let Some(imported) = meta.get_mut("imported").and_then(Value::as_object_mut) {
+        imported.extend(captured.facts.clone());
+    }
+    let pose2d = Array3::zeros((n_frames, N_KEYPOINTS, 3));
+    let key = format!("{name}-{:06}", 0);
+    let sample = Sample { key, motion, pose2d, sound, meta };
+    sample.members().with_context(|| format!("{} makes no sample", found.motion.display()))?;
+    Ok(Kept { moved_mm: moved[0], sample, lengths })
+}
+
+/// By how much the joints were moved to give every bone one length: the median and the largest, mm to a hundredth.
+fn moved_mm(before: &Array3<f32>, after: &Array3<f32>) -> [f64; 2] {
+    let mut moved: Vec<f32> = (0..before.shape()[0])
+        .flat_map(|t| (1..N_JOINTS).map(move |joint| (t, joint)))
+        .map(|(t, joint)| (0..3).map(|k| (after[[t, joint, k]] - before[[t, joint, k]]).powi(2)).sum::<f32>().sqrt())
+        .filter(|distance| distance.is_finite())
+        .collect();
+    moved.sort_by(f32::total_cmp);
+    let mm = |metres: Option<&f32>| metres.map_or(0.0, |m| (f64::from(*m) * 1e5).round() / 100.0);
+    [mm(moved.get(moved.len() / 2)), mm(moved.last())]
+}

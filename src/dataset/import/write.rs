@@ -1,0 +1,187 @@
+//! From sources to a dataset's folder. Everything is looked at first (is it kept? what does it sound like?), so that
+//! splits can be chosen without leaks; then it is read again and written. Memory: one take, and the codes of all sound.
+
+use super::find;
+use super::find::{Found, Kind};
+use super::source::{Look, Origin};
+use super::take::Limits;
+use crate::config;
+use crate::dataset::info::{About, Info};
+use crate::dataset::leakage::Compared;
+use crate::dataset::split;
+use crate::dataset::split::{Placed, Waiting};
+use crate::dataset::stats::Stats;
+use crate::dataset::write::part;
+use crate::dataset::write::writer::DatasetWriter;
+use crate::dataset::{INFO, shared_sound};
+use crate::stage::progress::Progress;
+use anyhow::{Context, Result, ensure};
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// What is wanted.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    pub sources: Vec<PathBuf>,
+    /// Only sources of this kind; `None`: of every kind.
+    pub kind: Option<Kind>,
+    /// The dataset; `about.fps` and `limits.fps` agree.
+    pub about: About,
+    pub limits: Limits,
+    /// Shares of the splits, seconds of shared sound, size of shards.
+    pub shard: config::Shard,
+}
+
+/// What became of a take, or of a video of other shards.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Line {
+    pub file: String,
+    /// `kept`, `refused` or `failed`.
+    pub ended: &'static str,
+    /// Seconds in the dataset.
+    pub kept_secs: f64,
+    pub reason: String,
+    pub says: String,
+}
+
+/// The dataset that was written.
+#[derive(Clone, Debug)]
+pub struct Imported {
+    pub lines: Vec<Line>,
+    /// What was left out of tars.
+    pub notes: Vec<String>,
+    pub info: Info,
+    pub stats: Stats,
+}
+
+/// The rate of the first dataset folder among the sources: what an import without a rate of its own takes.
+pub fn rate_of(sources: &[PathBuf]) -> Option<crate::types::time::FrameRate> {
+    let info = sources.iter().find_map(|source| std::fs::read(source.join(INFO)).ok())?;
+    serde_json::from_slice::<Info>(&info).ok().map(|info| info.fps)
+}
+
+/// Imports into the empty folder `out`.
+///
+/// # Errors
+/// Nothing to import, or nothing of it kept; files that cannot be written. A take that fails is a line.
+pub fn import(plan: &Plan, out: &Path, progress: &dyn Progress) -> Result<Imported> {
+    let sources = find::find(&plan.sources, plan.kind)?;
+    let (mut about, notes) = (plan.about.clone(), notes(&sources.takes));
+    about.notes.extend(notes);
+    let (origins, left_out) = Origin::all(&sources);
+    let task = progress.begin("look", origins.len() as u64);
+    let mut names = BTreeSet::new();
+    let mut looks: Vec<Look> = Vec::new();
+    for origin in &origins {
+        task.detail(&origin.file());
+        let mut look = origin.look(plan);
+        if !names.insert(look.source.name.clone()) {
+            look = look.twice(names.len() + looks.len());
+            names.insert(look.source.name.clone());
+        }
+        if let (Some(codes), true) = (&look.codes, look.is_kept()) {
+            look.sound = Some(part::write_sound(out, &look.source.name, codes)?);
+            look.codes = None;
+        }
+        looks.push(look);
+        task.advance(1);
+    }
+    drop(task);
+    let kept: Vec<usize> = (0..looks.len()).filter(|&at| looks[at].is_kept()).collect();
+    ensure!(!kept.is_empty(), "nothing can be imported: {}", first_reasons(&origins, &looks));
+    let compared = compare(&looks, &kept, out, plan.shard.duplicate_secs)?;
+    for (&at, placed) in kept.iter().zip(place(&looks, &kept, &compared, &plan.shard)) {
+        match placed {
+            Placed::In(split, by) => looks[at].split = Some((split, by)),
+            Placed::Nowhere(with) => {
+                part::remove_sound(out, &looks[at].source.name)?;
+                looks[at].refuse_shared(&with, plan.shard.duplicate_secs);
+            }
+        }
+    }
+    let max_shard_bytes = u64::from(plan.shard.max_mb) << 20;
+    let writer = DatasetWriter::new(out, about, max_shard_bytes).with_compared(compared);
+    let task = progress.begin("write", origins.len() as u64);
+    let mut lines = Vec::new();
+    for (origin, look) in origins.iter().zip(&looks) {
+        task.detail(&origin.file());
+        origin.write(look, plan, &writer, out).with_context(|| format!("importing {}", origin.file()))?;
+        lines.push(look.line(&origin.file()));
+        task.advance(1);
+    }
+    let (info, stats) = writer.finish()?;
+    Ok(Imported { lines, notes: left_out, info, stats })
+}
+
+fn compare(looks: &[Look], kept: &[usize], out: &Path, duplicate_secs: f64) -> Result<Compared> {
+    if duplicate_secs <= 0.0 {
+        return Ok(Compared::default());
+    }
+    let audible = kept.iter().filter(|&&at| looks[at].sound.is_some());
+    let mut names: Vec<String> = audible.map(|&at| looks[at].source.name.clone()).collect();
+    names.sort();
+    let shared = shared_sound::find(&names, |n| part::read_sound(out, &names[n]), duplicate_secs)?;
+    Ok(Compared { duplicate_secs, shared })
+}
+
+/// Where each kept video goes; one that comes from a dataset stays in its split.
+fn place(looks: &[Look], kept: &[usize], compared: &Compared, shard: &config::Shard) -> Vec<Placed> {
+    let waiting = kept.iter().map(|&at| {
+        let Look { source, split, .. } = &looks[at];
+        // what has no content of its own is placed by its name
+        let content = if source.content.is_empty() { &source.name } else { &source.content };
+        Waiting { name: &source.name, content, named: split.as_ref().map(|(split, _)| *split), before: None }
+    });
+    let placed = split::place(&waiting.collect::<Vec<_>>(), &compared.shared, shard.validation, shard.test);
+    let as_before = |(at, placed): (&usize, Placed)| match (&looks[*at].split, placed) {
+        (Some((split, by)), _) => Placed::In(*split, by.clone()),
+        (None, placed) => placed,
+    };
+    kept.iter().zip(placed).map(as_before).collect()
+}
+
+/// What a reader of the dataset must know about the kinds in it.
+fn notes(takes: &[Found]) -> Vec<String> {
+    let there: BTreeSet<Kind> = takes.iter().map(|take| take.kind).collect();
+    let mut notes: Vec<String> = there
+        .into_iter()
+        .map(|kind| match kind {
+            Kind::Authors => {
+                "Joints of the authors' text clips: fingers turned to base first, camera axes as they were."
+            }
+            Kind::Ted => {
+                "Joints of TED Expressive, of a monocular regressor: camera axes as they were, no finger tips."
+            }
+            Kind::Bvh => {
+                "Joints of BVH takes: metres, and each take turned about the vertical as a whole so that over it the \
+                 speaker faces the camera (`turned_degrees` in a sample's json)."
+            }
+            Kind::Shards => "Samples of other datasets of this form, as they were.",
+        })
+        .map(str::to_owned)
+        .collect();
+    if !takes.is_empty() {
+        notes.push(
+            "Imported motion was captured, not seen in a video: pose2d is 0 everywhere. The bones of a take have their \
+             median lengths; by how much that moved its joints is in a sample's json (`bones_moved_mm`)."
+                .to_owned(),
+        );
+    }
+    notes
+}
+
+/// The first few reasons why nothing is kept.
+fn first_reasons(origins: &[Origin], looks: &[Look]) -> String {
+    let mut reasons: BTreeMap<String, usize> = BTreeMap::new();
+    let lines = origins.iter().zip(looks).map(|(origin, look)| look.line(&origin.file()));
+    let mut said: Vec<String> = Vec::new();
+    for line in lines {
+        let n = reasons.entry(line.reason.clone()).or_default();
+        *n += 1;
+        if *n <= 2 {
+            said.push(format!("{}: {}", line.file, line.says));
+        }
+    }
+    said.join("; ")
+}

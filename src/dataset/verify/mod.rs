@@ -1,0 +1,4 @@
+//! The dataset checked: every sum, every sample, every array.
+
+pub mod sample;
+pub mod verify;

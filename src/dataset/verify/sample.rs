@@ -1,0 +1,50 @@
+//! Whether the numbers of a sample can be: shapes that agree, joints that are there where the mask says so, bones of one
+//! length, keypoints in range.
+
+use crate::dataset::sample::Sample;
+use crate::types::skeleton::{L_HAND, N_JOINTS, NECK, R_HAND, parent};
+use anyhow::{Result, ensure};
+
+/// How far a bone may be from its length, metres: the rounding of float32 half a metre from the neck.
+const BONE_TOLERANCE: f64 = 1e-5;
+
+/// Checks a sample whose video has these bone lengths (metres; 0: not measured).
+pub fn check_sample(sample: &Sample, lengths: &[f64]) -> Result<()> {
+    // What cannot be written cannot have been written.
+    sample.members()?;
+    let (joints, mask) = (&sample.motion.joints, &sample.motion.mask);
+    for t in 0..sample.n_frames() {
+        let at = |joint: usize| -> [f64; 3] { std::array::from_fn(|k| f64::from(joints[[t, joint, k]])) };
+        for joint in 0..N_JOINTS {
+            let position = at(joint);
+            let finite = position.iter().all(|v| v.is_finite());
+            ensure!(finite || position.iter().all(|v| v.is_nan()), "frame {t}: joint {joint} is {position:?}");
+            ensure!(finite || !mask[[t, joint]], "frame {t}: joint {joint} is missing, the mask says it was seen");
+            ensure!(!finite || position.iter().all(|v| v.abs() < 10.0), "frame {t}: joint {joint} is {position:?}");
+            let (Some(parent), Some(&length)) =
+                (parent(joint), joint.checked_sub(1).and_then(|bone| lengths.get(bone)))
+            else {
+                continue;
+            };
+            let own = distance(at(parent), position);
+            if !own.is_finite() {
+                continue;
+            }
+            let root = joint == L_HAND || joint == R_HAND;
+            let wanted = if root { 0.0 } else { length };
+            ensure!(
+                (!root && length == 0.0) || (own - wanted).abs() < BONE_TOLERANCE,
+                "frame {t}: the bone to joint {joint} is {own:.6} m, the video's is {wanted:.6} m"
+            );
+        }
+        ensure!(at(NECK) == [0.0; 3] || at(NECK)[0].is_nan(), "frame {t}: the neck is not the origin");
+    }
+    let scores = sample.pose2d.index_axis(ndarray::Axis(2), 2);
+    ensure!(sample.pose2d.iter().all(|v| v.is_finite()), "a keypoint is not finite");
+    ensure!(scores.iter().all(|score| (-1e-6..=1.0 + 1e-3).contains(score)), "a keypoint's score is not in 0..1");
+    Ok(())
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
+}

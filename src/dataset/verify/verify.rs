@@ -1,0 +1,264 @@
+//! Whether a dataset is what was written. Fast: every file is there with its size, the small ones and all sums are right,
+//! every second of every video is accounted for. Deep: every hash, and every array's shape, numbers and bones.
+//!
+//! What is put together from the videos (`assemble`) is put together again and compared, so that a number that is not
+//! what the videos add up to is found whichever file holds it.
+
+use super::sample::check_sample;
+use crate::dataset::info::Info;
+use crate::dataset::leakage::Leakage;
+use crate::dataset::read::Dataset;
+use crate::dataset::write::assemble::{Account, assemble_into};
+use crate::dataset::write::part;
+use crate::dataset::write::part::Part;
+use crate::dataset::{CHECKSUMS, INFO, LEAKAGE};
+use crate::stage::fingerprint::hash_file;
+use crate::stage::progress::Progress;
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, ensure};
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::Write;
+use std::path::Path;
+use std::rc::Rc;
+
+/// Something that is not as it was written.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Problem {
+    /// Path in the dataset's folder.
+    pub file: String,
+    pub what: String,
+}
+
+/// What was looked at, and found wrong.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Verified {
+    pub problems: Vec<Problem>,
+    pub n_files: usize,
+    pub n_videos: usize,
+    pub n_samples: usize,
+    /// Seconds of motion.
+    pub secs: f64,
+    /// Bytes read.
+    pub bytes: u64,
+}
+
+impl Verified {
+    fn wrong(&mut self, file: &str, what: impl Into<String>) {
+        self.problems.push(Problem { file: file.to_owned(), what: what.into() });
+    }
+
+    fn note(&mut self, file: &str, result: Result<()>) {
+        if let Err(error) = result {
+            self.wrong(file, format!("{error:#}"));
+        }
+    }
+}
+
+/// Checks the dataset in `dir`; what is wrong is in the answer, sorted and each once.
+///
+/// # Errors
+/// A folder that cannot be listed, or is no dataset at all.
+pub fn verify(dir: &Path, deep: bool, progress: &dyn Progress) -> Result<Verified> {
+    let is_dataset = [INFO, CHECKSUMS].iter().any(|name| dir.join(name).exists());
+    ensure!(is_dataset, "{} is no dataset: it has neither {INFO} nor {CHECKSUMS}", dir.display());
+    let mut found = Verified::default();
+    let there = files_of(dir)?;
+    found.n_files = there.len();
+    let wanted = assembled(dir, &there, &mut found).unwrap_or_else(|error| {
+        found.wrong(INFO, format!("{error:#}"));
+        BTreeMap::new()
+    });
+    if !wanted.is_empty() {
+        listed(&there, &wanted, &mut found);
+        videos(dir, &mut found)?;
+        hashes(dir, &wanted, deep, &mut found, progress);
+        if deep {
+            samples(dir, &mut found, progress);
+        }
+    }
+    found.problems.sort();
+    found.problems.dedup();
+    Ok(found)
+}
+
+/// Assembles the dataset again: the hash that every file must have, by its path.
+fn assembled(dir: &Path, there: &BTreeMap<String, u64>, found: &mut Verified) -> Result<BTreeMap<String, String>> {
+    let info: Info = read_json(dir, INFO)?;
+    let leakage: Leakage = read_json(dir, LEAKAGE)?;
+    let written: Rc<RefCell<Vec<u8>>> = Rc::default();
+    let mut open = |name: &str| -> Result<Box<dyn Write>> {
+        Ok(if name == CHECKSUMS { Box::new(Kept(written.clone())) } else { Box::new(std::io::sink()) })
+    };
+    assemble_into(dir, &info.about(), &leakage.compared(), &mut open)?;
+    let text = String::from_utf8(written.borrow().clone()).context("checksums are text")?;
+    let wanted: BTreeMap<String, String> =
+        text.lines().filter_map(|line| line.split_once("  ")).map(|(hash, file)| (file.into(), hash.into())).collect();
+    if there.contains_key(CHECKSUMS) {
+        let stated = std::fs::read(dir.join(CHECKSUMS)).with_context(|| format!("reading {CHECKSUMS}"))?;
+        if stated != text.as_bytes() {
+            let text_of = String::from_utf8_lossy(&stated).into_owned();
+            let named = text_of.lines().filter_map(|line| line.split_once("  ")).map(|(_, file)| file);
+            for file in named.filter(|file| !there.contains_key(*file)) {
+                found.wrong(file, format!("it is missing ({CHECKSUMS} names it)"));
+            }
+            let stated: BTreeSet<&[u8]> = stated.split(|byte| *byte == b'\n').collect();
+            let unlike =
+                text.lines().filter(|line| !stated.contains(line.as_bytes())).filter_map(|line| line.split_once("  "));
+            let unlike: Vec<&str> = unlike.map(|(_, file)| file).collect();
+            let files = if unlike.is_empty() { "the form of its lines".to_owned() } else { unlike.join(", ") };
+            found.wrong(CHECKSUMS, format!("it does not agree with the videos' own files about {files}"));
+        }
+    }
+    Ok(wanted)
+}
+
+/// A file kept in memory.
+struct Kept(Rc<RefCell<Vec<u8>>>);
+
+impl Write for Kept {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.borrow_mut().extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Every file of the list is there, and no other.
+fn listed(there: &BTreeMap<String, u64>, wanted: &BTreeMap<String, String>, found: &mut Verified) {
+    for file in wanted.keys().map(String::as_str).chain([CHECKSUMS]).filter(|file| !there.contains_key(*file)) {
+        found.wrong(file, "it is missing");
+    }
+    for file in there.keys().filter(|file| !wanted.contains_key(*file) && *file != CHECKSUMS) {
+        found.wrong(file, "it does not belong to the dataset");
+    }
+}
+
+/// Sizes and sums of each video.
+fn videos(dir: &Path, found: &mut Verified) -> Result<()> {
+    let fps = read_json::<Info>(dir, INFO)?.fps;
+    let mut keys = BTreeSet::new();
+    for name in part::names(dir)? {
+        let file = format!("{}/{name}.json", part::FOLDER);
+        let part = match Part::read(&Part::path(dir, &name)) {
+            Ok(part) => part,
+            Err(error) => {
+                found.wrong(&file, format!("{error:#}"));
+                continue;
+            }
+        };
+        found.n_videos += 1;
+        found.n_samples += part.samples.len();
+        found.secs += fps.secs(part.samples.iter().map(|sample| sample.n_frames).sum());
+        for shard in &part.shards {
+            let bytes = std::fs::metadata(dir.join(&shard.file)).map_or(0, |meta| meta.len());
+            if bytes != shard.bytes {
+                found.wrong(&shard.file, format!("it has {bytes} bytes, {} were written", shard.bytes));
+            }
+            let n_samples = part.samples.iter().filter(|sample| sample.shard == shard.file).count();
+            if n_samples != shard.n_samples {
+                found.wrong(&file, format!("{n_samples} samples of {} in {}", shard.n_samples, shard.file));
+            }
+        }
+        for sample in &part.samples {
+            let in_shard = part.shards.iter().any(|shard| shard.file == sample.shard && sample.fits(shard.bytes));
+            let same_split = part.split == Some(sample.split) && sample.shard.starts_with(sample.split.name());
+            if !in_shard || !same_split || !sample.key.starts_with(&name) || !keys.insert(sample.key.clone()) {
+                found.wrong(&file, format!("the place of the sample {} cannot be", sample.key));
+            }
+        }
+        found.note(&file, account(&part, fps));
+    }
+    Ok(())
+}
+
+/// Every second of a video is in its ledger, and what was kept is in its samples, to a frame each.
+fn account(part: &Part, fps: FrameRate) -> Result<()> {
+    let ledger = &part.ledger;
+    let unknown = ledger.duration_secs == 0.0 && part.failure.is_some();
+    ensure!(ledger.is_whole() || unknown, "its ledger does not fill {} s end to end", ledger.duration_secs);
+    let frames: usize = part.samples.iter().map(|sample| sample.n_frames).sum();
+    let off = (ledger.kept_secs() - fps.secs(frames)).abs();
+    let allowed = fps.secs(1) * part.samples.len().max(1) as f64 + 1e-6;
+    ensure!(
+        off <= allowed && ledger.kept.len() == part.samples.len(),
+        "its ledger keeps {:.3} s in {} stretches, its samples hold {:.3} s in {}",
+        ledger.kept_secs(),
+        ledger.kept.len(),
+        fps.secs(frames),
+        part.samples.len()
+    );
+    Ok(())
+}
+
+/// The hash of every small file; of the large ones only if `deep`.
+fn hashes(dir: &Path, wanted: &BTreeMap<String, String>, deep: bool, found: &mut Verified, progress: &dyn Progress) {
+    let task = progress.begin("hashes", wanted.len() as u64);
+    for (file, hash) in wanted {
+        let large = file.ends_with(".tar") || file.ends_with(".sound");
+        let path = dir.join(file);
+        if (deep || !large) && path.is_file() {
+            found.bytes += std::fs::metadata(&path).map_or(0, |meta| meta.len());
+            match hash_file(&path) {
+                Ok(now) if now == *hash => {}
+                Ok(_) if large => found.wrong(file, "its hash is not the one written"),
+                Ok(_) => found.wrong(file, "it is not what the videos' own files add up to"),
+                Err(error) => found.wrong(file, format!("{error:#}")),
+            }
+        }
+        task.advance(1);
+    }
+}
+
+/// Every array of every sample.
+fn samples(dir: &Path, found: &mut Verified, progress: &dyn Progress) {
+    let dataset = match Dataset::open(dir) {
+        Ok(dataset) => dataset,
+        Err(error) => return found.wrong(INFO, format!("{error:#}")),
+    };
+    let task = progress.begin("samples", found.n_samples as u64);
+    for name in part::names(dir).unwrap_or_default() {
+        let Ok(part) = Part::read(&Part::path(dir, &name)) else { continue };
+        for sample in &part.samples {
+            let checked = dataset.read(sample).and_then(|read| check_sample(&read, &part.bones.lengths_metres));
+            found.note(&sample.shard, checked.with_context(|| sample.key.clone()));
+            task.advance(1);
+        }
+    }
+}
+
+/// Every file under `dir` by its path, with its size.
+fn files_of(dir: &Path) -> Result<BTreeMap<String, u64>> {
+    let mut files = BTreeMap::new();
+    let mut folders = vec![(dir.to_owned(), String::new())];
+    while let Some((folder, prefix)) = folders.pop() {
+        let listing = || format!("listing the folder {}", folder.display());
+        for entry in std::fs::read_dir(&folder).with_context(listing)? {
+            let entry = entry.with_context(listing)?;
+            let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
+            let meta = entry.metadata().with_context(listing)?;
+            if meta.is_dir() {
+                folders.push((entry.path(), format!("{name}/")));
+            } else {
+                files.insert(name, meta.len());
+            }
+        }
+    }
+    Ok(files)
+}
+
+fn read_json<T: serde::de::DeserializeOwned>(dir: &Path, name: &str) -> Result<T> {
+    let bytes = std::fs::read(dir.join(name)).with_context(|| format!("reading {name}"))?;
+    serde_json::from_slice(&bytes).with_context(|| format!("{name} is not as it was written"))
+}
+
+/// The accounts of all videos of the dataset in `dir`.
+pub fn accounts(dir: &Path) -> Result<Vec<Account>> {
+    let path = dir.join(crate::dataset::LEDGER);
+    let text = std::fs::read_to_string(&path).with_context(|| format!("reading {}", path.display()))?;
+    let parse = |line: &str| serde_json::from_str(line).with_context(|| format!("{} is damaged", path.display()));
+    text.lines().map(parse).collect()
+}

@@ -1,0 +1,139 @@
+//! The files of a dataset that speak of all its videos, put together from the videos' own (`part`): `index.jsonl`,
+//! `ledger.jsonl`, `info.json`, `stats.json`, `leakage.json`, the card `README.md`, and `checksums.b3` with the BLAKE3 of
+//! every other file, in the form of `b3sum`. The same videos give the same bytes, so that a dataset grows, forgets and is
+//! verified by assembling it again. Memory: one video, and a line for each.
+
+use super::part;
+use super::part::Part;
+use crate::dataset::bones::{VideoBones, of_speaker};
+use crate::dataset::info::{About, Info, SplitInfo, VideoInfo};
+use crate::dataset::leakage::{Compared, Leakage};
+use crate::dataset::split::Split;
+use crate::dataset::stats::{Gatherer, Stats};
+use crate::dataset::{CHECKSUMS, INDEX, INFO, LEAKAGE, LEDGER, README, STATS, card};
+use crate::stage::ledger::Ledger;
+use anyhow::{Context, Result};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+/// A line of `ledger.jsonl`: what became of every second of a video.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Account {
+    pub name: String,
+    pub file: String,
+    pub split: Option<Split>,
+    /// Why nothing came of it.
+    pub failure: Option<String>,
+    #[serde(flatten)]
+    pub ledger: Ledger,
+}
+
+/// Where an assembled file of this name goes.
+pub type Open<'a> = dyn FnMut(&str) -> Result<Box<dyn Write>> + 'a;
+
+/// Assembles the dataset in `dir` in place.
+pub fn assemble(dir: &Path, about: &About, compared: &Compared) -> Result<(Info, Stats)> {
+    assemble_into(dir, about, compared, &mut |name| {
+        let path = dir.join(name);
+        let file = File::create(&path).with_context(|| format!("writing {}", path.display()))?;
+        Ok(Box::new(BufWriter::new(file)))
+    })
+}
+
+/// Assembles the dataset in `dir`, whose files `open` takes.
+pub fn assemble_into(dir: &Path, about: &About, compared: &Compared, open: &mut Open) -> Result<(Info, Stats)> {
+    let mut checksums = BTreeMap::new();
+    let mut index = Hashed::new(open(INDEX)?);
+    let mut ledger = Hashed::new(open(LEDGER)?);
+    let mut splits: BTreeMap<Split, SplitInfo> = Split::ALL.map(|split| (split, SplitInfo::default())).into();
+    let (mut videos, mut bones, mut gatherer) = (Vec::new(), Vec::<VideoBones>::new(), Gatherer::default());
+    for name in part::names(dir)? {
+        let path = Part::path(dir, &name);
+        let part = Part::read(&path)?;
+        checksums.extend(part.files());
+        checksums.insert(format!("{}/{name}.json", part::FOLDER), crate::stage::fingerprint::hash_file(&path)?);
+        gatherer.push(&part);
+        part.samples.iter().try_for_each(|sample| index.line(sample))?;
+        let n_frames: usize = part.samples.iter().map(|sample| sample.n_frames).sum();
+        if let Some(split) = part.split {
+            bones.push(part.bones.clone());
+            let info = splits.entry(split).or_default();
+            info.shards.extend(part.shards);
+            info.videos.push(name.clone());
+            info.samples += part.samples.len();
+            info.frames += n_frames;
+            info.secs = about.fps.secs(info.frames);
+        }
+        videos.push(VideoInfo {
+            name: name.clone(),
+            file: part.file.clone(),
+            content: part.content,
+            split: part.split,
+            split_by: part.split_by,
+            samples: part.samples.len(),
+            secs: about.fps.secs(n_frames),
+        });
+        let (file, split, failure, of_video) = (part.file, part.split, part.failure, part.ledger);
+        ledger.line(&Account { name, file, split, failure, ledger: of_video })?;
+    }
+    checksums.insert(INDEX.to_owned(), index.finish()?);
+    checksums.insert(LEDGER.to_owned(), ledger.finish()?);
+    let of_video = videos.iter().filter_map(|video| Some((video.name.clone(), video.split?))).collect();
+    let leakage = Leakage::new(compared, &of_video);
+    let info = Info::new(about, &of_speaker(&bones), splits, videos);
+    let stats = gatherer.finish();
+    let texts = [
+        (INFO, pretty(&info)?),
+        (STATS, pretty(&stats)?),
+        (LEAKAGE, pretty(&leakage)?),
+        (README, card::text(&info, &stats, &leakage).into_bytes()),
+    ];
+    for (name, bytes) in texts {
+        let mut file = Hashed::new(open(name)?);
+        file.write(&bytes)?;
+        checksums.insert(name.to_owned(), file.finish()?);
+    }
+    let mut file = Hashed::new(open(CHECKSUMS)?);
+    for (name, hash) in &checksums {
+        file.write(format!("{hash}  {name}\n").as_bytes())?;
+    }
+    file.finish()?;
+    Ok((info, stats))
+}
+
+fn pretty(value: &impl Serialize) -> Result<Vec<u8>> {
+    let mut bytes = serde_json::to_vec_pretty(value)?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+/// A file being written, and its hash.
+struct Hashed {
+    to: Box<dyn Write>,
+    hasher: blake3::Hasher,
+}
+
+impl Hashed {
+    fn new(to: Box<dyn Write>) -> Self {
+        Self { to, hasher: blake3::Hasher::new() }
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<()> {
+        self.hasher.update(bytes);
+        self.to.write_all(bytes).context("writing a file of the dataset")
+    }
+
+    fn line(&mut self, value: &impl Serialize) -> Result<()> {
+        let mut bytes = serde_json::to_vec(value)?;
+        bytes.push(b'\n');
+        self.write(&bytes)
+    }
+
+    fn finish(mut self) -> Result<String> {
+        self.to.flush().context("writing a file of the dataset")?;
+        Ok(self.hasher.finalize().to_hex().to_string())
+    }
+}

@@ -1,0 +1,257 @@
+//! What a dataset has of one video: its shards, the codes of its sound (`videos/<name>.sound`, u32 little endian), and
+//! `videos/<name>.json`, which says where it comes from and adds up what is in them. All other files of a dataset are
+//! put together from these (`assemble`), so that a video is added or forgotten without touching another.
+
+use super::tar::Writer;
+use crate::dataset::bones::VideoBones;
+use crate::dataset::index::{SampleRef, Shard};
+use crate::dataset::joint_stats::Moments;
+use crate::dataset::sample::Sample;
+use crate::stage::fingerprint::hash_file;
+use crate::stage::ledger::Ledger;
+use crate::types::split::Split;
+use anyhow::{Context, Result, ensure};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The folder of the parts, in the dataset's.
+pub const FOLDER: &str = "videos";
+
+/// A video of a dataset.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Part {
+    pub schema: u32,
+    /// `<slug of the file's name>-<8 hex of its content>`: the beginning of its samples' keys.
+    pub name: String,
+    /// File name of the video.
+    pub file: String,
+    /// BLAKE3 of the video file; empty: it could not be read.
+    pub content: String,
+    /// BLAKE3 of all that its shards are made of; shards with the same are taken over as they are.
+    pub made_from: String,
+    /// `None`: it has no sample.
+    pub split: Option<Split>,
+    /// Why it is in that split.
+    pub split_by: SplitBy,
+    pub ledger: Ledger,
+    /// Why nothing came of it: the stage and its error.
+    pub failure: Option<String>,
+    /// Of the arms and hands in its samples.
+    pub bones: VideoBones,
+    /// BLAKE3 of the codes of its sound; `None`: it has none.
+    pub sound: Option<String>,
+    pub shards: Vec<Shard>,
+    pub samples: Vec<SampleRef>,
+    /// Silence appended where the sound ended before the motion, seconds.
+    pub padded_sound_secs: f64,
+    pub moments: Moments,
+}
+
+/// Why a video is in its split.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SplitBy {
+    /// The hash of its content.
+    #[default]
+    Content,
+    /// Whoever made the dataset.
+    Name,
+    /// It shares sound with the video of this name, and goes where that one goes.
+    SoundOf(String),
+}
+
+/// What a writer of a video knows beforehand.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Source {
+    /// [a-z0-9_-] only.
+    pub name: String,
+    pub file: String,
+    pub content: String,
+    pub made_from: String,
+    pub ledger: Ledger,
+    pub bones: VideoBones,
+    pub failure: Option<String>,
+}
+
+/// Writes one video into a dataset's folder.
+pub struct PartWriter {
+    dir: PathBuf,
+    part: Part,
+    shards: Writer,
+}
+
+impl PartWriter {
+    /// Begins a video of the dataset in `dir`. A shard is closed before it would grow past `max_shard_bytes`.
+    pub fn new(dir: &Path, source: Source, split: Split, split_by: SplitBy, max_shard_bytes: u64) -> Result<Self> {
+        let Source { name, file, content, made_from, ledger, bones, failure } = source;
+        let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
+        ensure!(
+            !name.is_empty() && name.len() <= 64 && name.chars().all(plain),
+            "{name:?} is no name of a video in a dataset: expected 1 to 64 of a-z, 0-9, - and _"
+        );
+        let shards = Writer::new(dir, &name, split, max_shard_bytes);
+        let part = Part {
+            schema: crate::dataset::SCHEMA,
+            name,
+            file,
+            content,
+            made_from,
+            split: Some(split),
+            split_by,
+            ledger,
+            failure,
+            bones,
+            sound: None,
+            shards: Vec::new(),
+            samples: Vec::new(),
+            padded_sound_secs: 0.0,
+            moments: Moments::default(),
+        };
+        Ok(Self { dir: dir.to_owned(), part, shards })
+    }
+
+    /// Adds an interval; the order of intervals is the order in the shards. `padded_secs` of its sound are silence that
+    /// the video does not have.
+    pub fn push(&mut self, sample: &Sample, padded_secs: f64) -> Result<()> {
+        self.part.padded_sound_secs += padded_secs;
+        self.push_members(sample, &sample.members()?)
+    }
+
+    /// Adds an interval that comes from another dataset: its JSON stays byte for byte what it was.
+    pub fn push_as_it_was(&mut self, sample: &Sample, json: Vec<u8>) -> Result<()> {
+        let mut members = sample.members()?;
+        members[0] = json;
+        self.push_members(sample, &members)
+    }
+
+    fn push_members(&mut self, sample: &Sample, members: &[Vec<u8>; 5]) -> Result<()> {
+        let name = &self.part.name;
+        ensure!(sample.key.starts_with(name), "the key {} does not begin with its video's name {name}", sample.key);
+        self.shards.push_members(sample, members)?;
+        self.part.moments.learn(&sample.motion);
+        Ok(())
+    }
+
+    /// Closes the shards and writes the video's JSON; `sound` is what `write_sound` gave, if it has sound. A video without
+    /// a sample is in no split.
+    pub fn finish(mut self, sound: Option<String>) -> Result<Part> {
+        let (shards, samples) = self.shards.finish()?;
+        self.part.split = self.part.split.filter(|_| !samples.is_empty());
+        (self.part.shards, self.part.samples) = (shards, samples);
+        let folder = self.dir.join(FOLDER);
+        fs::create_dir_all(&folder).with_context(|| format!("making the folder {}", folder.display()))?;
+        self.part.sound = sound;
+        self.part.write(&self.dir)?;
+        Ok(self.part)
+    }
+}
+
+impl Part {
+    /// `videos/<name>.json` of the dataset in `dir`.
+    pub fn path(dir: &Path, name: &str) -> PathBuf {
+        dir.join(FOLDER).join(format!("{name}.json"))
+    }
+
+    /// Reads one; its ledger must be whole, and it must be of this layout.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = fs::read(path).with_context(|| format!("reading {}", path.display()))?;
+        let wrong = || format!("{} is not as the shard stage writes it; run the stage again", path.display());
+        let part: Self = serde_json::from_slice(&bytes).with_context(wrong)?;
+        ensure!(part.schema == crate::dataset::SCHEMA, "{} has layout version {}", path.display(), part.schema);
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        ensure!(part.name == *stem, "{} speaks of the video {:?}", path.display(), part.name);
+        Ok(part)
+    }
+
+    fn write(&self, dir: &Path) -> Result<()> {
+        let path = Self::path(dir, &self.name);
+        let mut bytes = serde_json::to_vec_pretty(self)?;
+        bytes.push(b'\n');
+        fs::write(&path, bytes).with_context(|| format!("writing {}", path.display()))
+    }
+
+    /// The codes of its sound, from the dataset in `dir`; empty without sound.
+    pub fn codes(&self, dir: &Path) -> Result<Vec<u32>> {
+        if self.sound.is_none() { Ok(Vec::new()) } else { read_sound(dir, &self.name) }
+    }
+
+    /// Its files by their paths in the dataset's folder, the JSON left out, with their hashes.
+    pub fn files(&self) -> Vec<(String, String)> {
+        let shards = self.shards.iter().map(|shard| (shard.file.clone(), shard.blake3.clone()));
+        let sound = self.sound.iter().map(|hash| (format!("{FOLDER}/{}.sound", self.name), hash.clone()));
+        shards.chain(sound).collect()
+    }
+
+    /// Takes over this video from the dataset in `from` into that in `to`, byte for byte, without copying where the file
+    /// system can (hard links).
+    pub fn take_over(&self, from: &Path, to: &Path) -> Result<()> {
+        fs::create_dir_all(to.join(FOLDER)).with_context(|| format!("making {}", to.join(FOLDER).display()))?;
+        let json = format!("{FOLDER}/{}.json", self.name);
+        for file in self.files().into_iter().map(|(file, _)| file).chain([json]) {
+            let (old, new) = (from.join(&file), to.join(&file));
+            if new.exists() {
+                continue;
+            }
+            fs::hard_link(&old, &new)
+                .or_else(|_| fs::copy(&old, &new).map(|_| ()))
+                .with_context(|| format!("taking over {}", old.display()))?;
+        }
+        Ok(())
+    }
+
+    /// Whether every file of it in the dataset in `dir` is what `stated` says (hashes by path, as in `checksums.b3`).
+    pub fn is_sound(&self, dir: &Path, stated: &BTreeMap<String, String>) -> bool {
+        let json = format!("{FOLDER}/{}.json", self.name);
+        let as_stated =
+            |file: &str| stated.get(file).is_some_and(|hash| hash_file(&dir.join(file)).is_ok_and(|now| now == *hash));
+        as_stated(&json) && self.files().iter().all(|(file, hash)| stated.get(file) == Some(hash) && as_stated(file))
+    }
+}
+
+/// The hashes that `checksums.b3` of the dataset in `dir` states, by path; none where it cannot be read.
+pub fn stated_hashes(dir: &Path) -> BTreeMap<String, String> {
+    let text = fs::read_to_string(dir.join(crate::dataset::CHECKSUMS)).unwrap_or_default();
+    text.lines().filter_map(|line| line.split_once("  ")).map(|(hash, file)| (file.into(), hash.into())).collect()
+}
+
+/// The names of the videos of the dataset in `dir`, sorted.
+pub fn names(dir: &Path) -> Result<Vec<String>> {
+    let folder = dir.join(FOLDER);
+    let entries = fs::read_dir(&folder).with_context(|| format!("reading the folder {}", folder.display()))?;
+    let mut names = Vec::new();
+    for entry in entries {
+        let file = entry.with_context(|| format!("reading the folder {}", folder.display()))?.file_name();
+        names.extend(file.to_string_lossy().strip_suffix(".json").map(str::to_owned));
+    }
+    names.sort();
+    Ok(names)
+}
+
+/// Writes the codes of the sound of the video `name` into the dataset in `dir`; their hash.
+pub fn write_sound(dir: &Path, name: &str, codes: &[u32]) -> Result<String> {
+    let bytes: Vec<u8> = codes.iter().flat_map(|code| code.to_le_bytes()).collect();
+    let path = sound_path(dir, name);
+    let written = fs::create_dir_all(dir.join(FOLDER)).and_then(|()| fs::write(&path, &bytes));
+    written.with_context(|| format!("writing {}", path.display()))?;
+    Ok(blake3::hash(&bytes).to_hex().to_string())
+}
+
+/// What `write_sound` wrote.
+pub fn read_sound(dir: &Path, name: &str) -> Result<Vec<u32>> {
+    let path = sound_path(dir, name);
+    let bytes = fs::read(&path).with_context(|| format!("reading {}", path.display()))?;
+    ensure!(bytes.len().is_multiple_of(4), "{} is cut off: run the shard stage again with --force", path.display());
+    Ok(bytes.as_chunks::<4>().0.iter().map(|code| u32::from_le_bytes(*code)).collect())
+}
+
+/// Takes the codes of a video that is left out away again.
+pub fn remove_sound(dir: &Path, name: &str) -> Result<()> {
+    let path = sound_path(dir, name);
+    fs::remove_file(&path).with_context(|| format!("removing {}", path.display()))
+}
+
+fn sound_path(dir: &Path, name: &str) -> PathBuf {
+    dir.join(FOLDER).join(format!("{name}.sound"))
+}

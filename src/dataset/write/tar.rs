@@ -1,0 +1,139 @@
+//! Tar shards: the same samples give the same bytes on any machine (ustar, no times, no owners), a sample is never
+//! divided, and every sample's place and hash are noted while writing.
+
+use crate::dataset::index::{SampleRef, Shard, Span};
+use crate::dataset::sample::{EXTENSIONS, Sample};
+use crate::dataset::split::Split;
+use anyhow::{Context, Result};
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+const BLOCK: usize = 512;
+
+/// Writes the samples of one video into `<split>-<video>-0000.tar`, `<split>-<video>-0001.tar`, ... of a folder.
+pub struct Writer {
+    dir: PathBuf,
+    video: String,
+    split: Split,
+    max_bytes: u64,
+    open: Option<OpenShard>,
+    shards: Vec<Shard>,
+    samples: Vec<SampleRef>,
+}
+
+struct OpenShard {
+    file: BufWriter<File>,
+    hasher: blake3::Hasher,
+    bytes: u64,
+    n_samples: usize,
+}
+
+impl Writer {
+    /// A shard is closed before it would grow past `max_bytes`; a longer sample is a shard by itself.
+    pub fn new(dir: &Path, video: &str, split: Split, max_bytes: u64) -> Self {
+        let (dir, video) = (dir.to_owned(), video.to_owned());
+        Self { dir, video, split, max_bytes, open: None, shards: Vec::new(), samples: Vec::new() }
+    }
+
+    fn file_name(&self) -> String {
+        format!("{}-{}-{:04}.tar", self.split.name(), self.video, self.shards.len())
+    }
+
+    /// Appends a sample.
+    pub fn push(&mut self, sample: &Sample) -> Result<()> {
+        self.push_members(sample, &sample.members()?)
+    }
+
+    /// Appends a sample whose members are these bytes.
+    pub fn push_members(&mut self, sample: &Sample, members: &[Vec<u8>; 5]) -> Result<()> {
+        let bytes: usize = members.iter().map(|m| BLOCK + m.len().next_multiple_of(BLOCK)).sum();
+        if self.open.as_ref().is_some_and(|open| open.bytes + (bytes + 2 * BLOCK) as u64 > self.max_bytes) {
+            self.close()?;
+        }
+        let path = self.dir.join(self.file_name());
+        let open = match &mut self.open {
+            Some(open) => open,
+            None => {
+                let file = File::create(&path).with_context(|| format!("creating {}", path.display()))?;
+                let file = BufWriter::with_capacity(1 << 20, file);
+                self.open.insert(OpenShard { file, hasher: blake3::Hasher::new(), bytes: 0, n_samples: 0 })
+            }
+        };
+        let offset = open.bytes;
+        let mut hasher = blake3::Hasher::new();
+        let mut spans = Vec::with_capacity(EXTENSIONS.len());
+        for (extension, member) in EXTENSIONS.iter().zip(members) {
+            let header = header(&format!("{}.{extension}", sample.key), member.len())?;
+            let padding = [0; BLOCK];
+            let padding = &padding[..member.len().next_multiple_of(BLOCK) - member.len()];
+            spans.push(Span { offset: open.bytes + BLOCK as u64, size: member.len() as u64 });
+            for part in [header.as_bytes().as_slice(), member, padding] {
+                hasher.update(part);
+                open.push(part).with_context(|| format!("writing {}", path.display()))?;
+            }
+        }
+        open.n_samples += 1;
+        let [json, mask, pose2d, pose3d, wav] = spans.try_into().unwrap_or([Span::default(); 5]);
+        self.samples.push(SampleRef {
+            key: sample.key.clone(),
+            split: self.split,
+            shard: self.file_name(),
+            offset,
+            size: bytes as u64,
+            n_frames: sample.n_frames(),
+            blake3: hasher.finalize().to_hex().to_string(),
+            json,
+            mask,
+            pose2d,
+            pose3d,
+            wav,
+        });
+        Ok(())
+    }
+
+    fn close(&mut self) -> Result<()> {
+        let file = self.file_name();
+        let Some(mut open) = self.open.take() else { return Ok(()) };
+        let written =
+            open.push(&[0; 2 * BLOCK]).and_then(|()| open.file.into_inner().map_err(|error| error.into_error()));
+        let shard = written.with_context(|| format!("writing {}", self.dir.join(&file).display()))?;
+        // Whoever puts the folder in place flushes every file; this only lets the disk begin while the next is made.
+        drop(std::thread::spawn(move || shard.sync_all()));
+        self.shards.push(Shard {
+            file,
+            bytes: open.bytes,
+            n_samples: open.n_samples,
+            blake3: open.hasher.finalize().to_hex().to_string(),
+        });
+        Ok(())
+    }
+
+    /// Closes and flushes the last shard; what was written, in order.
+    pub fn finish(mut self) -> Result<(Vec<Shard>, Vec<SampleRef>)> {
+        self.close()?;
+        Ok((self.shards, self.samples))
+    }
+}
+
+impl OpenShard {
+    fn push(&mut self, bytes: &[u8]) -> std::io::Result<()> {
+        self.file.write_all(bytes)?;
+        self.hasher.update(bytes);
+        self.bytes += bytes.len() as u64;
+        Ok(())
+    }
+}
+
+/// The ustar header of a member: readable by all, owned by nobody in particular, from no time in particular.
+fn header(name: &str, size: usize) -> Result<tar::Header> {
+    let mut header = tar::Header::new_ustar();
+    header.set_path(name).with_context(|| format!("`{name}` does not fit a tar header"))?;
+    header.set_size(size as u64);
+    header.set_mode(0o644);
+    header.set_uid(0);
+    header.set_gid(0);
+    header.set_mtime(0);
+    header.set_cksum();
+    Ok(header)
+}

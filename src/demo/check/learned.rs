@@ -1,0 +1,212 @@
+//! What a trained speaker has learnt of the rule: its motion for the sound of the test split, held against what the synthetic
+//! speaker did and against what the rule alone would have it do, beside predictors that know less.
+
+use super::traces;
+use crate::dataset::{Dataset, Sample, Split};
+use crate::demo::rule::dataset::Clip;
+use crate::demo::rule::listener::{Listener, sound_of_frames, wrist_speeds};
+use crate::demo::rule::ridge::correlation;
+use crate::generate::Speaker;
+use crate::metrics::movement::energy::MotionEnergy;
+use crate::metrics::position::pck::Correct;
+use crate::stage::progress::Progress;
+use crate::types::skeleton::{NECK, is_duplicate};
+use crate::types::time::FrameRate;
+use anyhow::{Result, ensure};
+use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis, concatenate};
+use serde::Serialize;
+
+/// A predictor on the whole test split.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    pub predictor: &'static str,
+    /// Pearson's correlation of the speed of the left and of the right wrist with the predictable part's, all clips one
+    /// after the other, a number a frame, no smoothing.
+    pub speed_correlation: [f64; 2],
+    /// The other figures; `None`: it predicts no poses.
+    pub poses: Option<Poses>,
+}
+
+/// How near the poses are to what the speaker did.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Poses {
+    /// Share of keypoints within 0.2 of the pose's extent, 48 joints.
+    pub pck: f64,
+    /// Mean squared speed of the joints, as a share of the data's.
+    pub energy: f64,
+    /// The same over the steps in which the rule holds both wrists still: the whims alone, which no sound tells. Where a
+    /// predictor falls back to what is likely, this is what goes first.
+    pub pauses: f64,
+    /// Mean absolute error of coordinates, each in standard deviations of the training split (of 1 cm at least).
+    pub l1: f64,
+}
+
+/// All predictors.
+#[derive(Clone, Debug, Serialize)]
+pub struct Learned {
+    pub n_clips: usize,
+    pub secs: f64,
+    pub rows: Vec<Row>,
+    /// Penalties of the ridge regressions to speeds and to poses.
+    pub ridge_strengths: [f64; 2],
+    /// Whether the generator reaches the targets; `None`: there is none.
+    pub good: Option<bool>,
+    /// The first clip, to look at.
+    #[serde(skip)]
+    pub first: Option<traces::Clip>,
+}
+
+/// What the generator has to reach: correlation of each wrist's speed, PCK as a multiple of the mean pose's and of the
+/// mismatched prediction's, motion energy as a share of the data's.
+pub const LEAST_CORRELATION: f64 = 0.7;
+pub const LEAST_PCK: f64 = 1.5;
+pub const ENERGY: std::ops::RangeInclusive<f64> = 0.7..=1.3;
+
+/// Slower than this a wrist of the rule stands still, m/s.
+const HELD: f64 = 0.05;
+
+/// A clip of the test split.
+struct Test {
+    sample: Sample,
+    predictable: Array3<f32>,
+    sound: Array2<f64>,
+}
+
+/// Measures `speaker` on the test split of the synthetic speaker's `dataset`; without one, the others alone.
+pub fn measure(dataset: &Dataset, speaker: Option<&Speaker>, progress: &dyn Progress) -> Result<Learned> {
+    let tests: Vec<Test> =
+        dataset.samples(Split::Test).iter().map(|s| Test::of(dataset.read(s)?)).collect::<Result<_>>()?;
+    ensure!(tests.len() > 1, "{}: the test split needs two clips at least", dataset.dir().display());
+    let fps = dataset.info().fps;
+    let judge = Judge { tests: &tests, std: dataset.stats().std(), fps };
+    let task = progress.begin("listen", 0);
+    let listener = Listener::learn(dataset)?;
+    let row = |predictor, made: Vec<Array3<f32>>| judge.row(predictor, &made);
+    let each = |predict: &dyn Fn(&Test) -> Array3<f32>| tests.iter().map(predict).collect::<Vec<_>>();
+    let (mut rows, mut first) = (Vec::new(), None);
+    if let Some(speaker) = speaker {
+        task.detail("generating");
+        let made: Vec<Array3<f32>> =
+            tests.iter().map(|test| Ok(speaker.motion(&test.sample.sound)?.joints)).collect::<Result<_>>()?;
+        for (made, test) in made.iter().zip(&tests) {
+            ensure!(made.shape() == test.predictable.shape(), "the speaker has another frame rate than the dataset");
+        }
+        first = made.first().zip(tests.first()).map(|(made, test)| traces::Clip {
+            rule: test.predictable.clone(),
+            data: test.sample.motion.joints.clone(),
+            made: made.clone(),
+        });
+        rows.push(row("generator", made.clone()));
+        let mut other = made;
+        other.rotate_left(1);
+        rows.push(row("generator, another test sound", other));
+    }
+    rows.push(row("mean pose", each(&|test| listener.still(test.sample.n_frames()))));
+    rows.push(row("ridge of the frame, to poses", each(&|test| listener.ridge_poses(&test.sound))));
+    let speeds: Vec<Array2<f64>> = tests.iter().map(|test| listener.ridge_speeds(&test.sound)).collect();
+    rows.push(Row {
+        predictor: "ridge of the frame, to speeds",
+        speed_correlation: judge.correlation(&speeds),
+        poses: None,
+    });
+    rows.push(row("nearest training window by sound", each(&|test| listener.nearest(&test.sound))));
+    rows.push(row("the data itself", each(&|test| test.sample.motion.joints.clone())));
+    rows.push(row("the rule without whims", each(&|test| test.predictable.clone())));
+    let n_frames: usize = tests.iter().map(|test| test.sample.n_frames()).sum();
+    Ok(Learned {
+        n_clips: tests.len(),
+        secs: fps.secs(n_frames),
+        good: speaker.map(|_| good(&rows)),
+        rows,
+        ridge_strengths: listener.strengths,
+        first,
+    })
+}
+
+/// Whether the first row, the generator's, reaches the targets; the second is the mismatched one, the third the mean pose.
+fn good(rows: &[Row]) -> bool {
+    let [made, others @ ..] = rows else { return false };
+    let Some(poses) = made.poses else { return false };
+    let beats = |other: &Row| other.poses.is_some_and(|other| poses.pck >= LEAST_PCK * other.pck);
+    made.speed_correlation.iter().all(|correlation| *correlation >= LEAST_CORRELATION)
+        && others.iter().take(2).all(beats)
+        && ENERGY.contains(&poses.energy)
+}
+
+impl Test {
+    fn of(sample: Sample) -> Result<Self> {
+        let predictable = Clip::of(&sample)?.predictable().joints;
+        let sound = sound_of_frames(&sample.sound, sample.n_frames(), sample.motion.fps);
+        Ok(Self { sample, predictable, sound })
+    }
+}
+
+struct Judge<'a> {
+    tests: &'a [Test],
+    /// [49, 3] metres
+    std: Array2<f32>,
+    fps: FrameRate,
+}
+
+impl Judge<'_> {
+    fn row(&self, predictor: &'static str, made: &[Array3<f32>]) -> Row {
+        let mut correct = Correct::default();
+        let (mut energy, mut real_energy) = (MotionEnergy::default(), MotionEnergy::default());
+        let (mut pauses, mut real_pauses) = (MotionEnergy::default(), MotionEnergy::default());
+        let mut errors = (0.0, 0.0);
+        for (made, test) in made.iter().zip(self.tests) {
+            let real = &test.sample.motion;
+            correct.count(made.view(), real.joints.view(), real.mask.view());
+            energy.add(made.view(), real.mask.view(), self.fps);
+            real_energy.add(real.joints.view(), real.mask.view(), self.fps);
+            let held = held(test, self.fps);
+            pauses.add(made.view(), held.view(), self.fps);
+            real_pauses.add(real.joints.view(), held.view(), self.fps);
+            let of_clip = self.error(made.view(), real.joints.view());
+            errors = (errors.0 + of_clip.0, errors.1 + of_clip.1);
+        }
+        let speeds: Vec<Array2<f64>> = made.iter().map(|made| wrist_speeds(made.view(), self.fps)).collect();
+        Row {
+            predictor,
+            speed_correlation: self.correlation(&speeds),
+            poses: Some(Poses {
+                pck: correct.share(),
+                energy: energy.relative_to(&real_energy),
+                pauses: pauses.relative_to(&real_pauses),
+                l1: errors.0 / f64::max(errors.1, 1.0),
+            }),
+        }
+    }
+
+    fn correlation(&self, speeds: &[Array2<f64>]) -> [f64; 2] {
+        let truth: Vec<Array2<f64>> =
+            self.tests.iter().map(|test| wrist_speeds(test.predictable.view(), self.fps)).collect();
+        let joined = |parts: &[Array2<f64>]| {
+            let views: Vec<ArrayView2<f64>> = parts.iter().map(|part| part.view()).collect();
+            concatenate(Axis(0), &views).unwrap_or_default()
+        };
+        let (made, truth) = (joined(speeds), joined(&truth));
+        std::array::from_fn(|hand| correlation(made.column(hand), truth.column(hand)))
+    }
+
+    /// Sum of normalised errors, and how many.
+    fn error(&self, made: ArrayView3<f32>, real: ArrayView3<f32>) -> (f64, f64) {
+        let mut sum = (0.0, 0.0);
+        for ((t, joint, k), real) in real.indexed_iter() {
+            if joint != NECK && !is_duplicate(joint) {
+                sum.0 += f64::from((made[[t, joint, k]] - real).abs() / self.std[[joint, k]].max(0.01));
+                sum.1 += 1.0;
+            }
+        }
+        sum
+    }
+}
+
+/// The mask of the frames at whose both sides the rule moves no wrist faster than `HELD`; two such frames in a row have
+/// such a step between them.
+fn held(test: &Test, fps: FrameRate) -> Array2<bool> {
+    let speeds = wrist_speeds(test.predictable.view(), fps);
+    let still = |t: usize| speeds.row(t.min(speeds.nrows() - 1)).iter().all(|speed| *speed < HELD);
+    let mask = &test.sample.motion.mask;
+    Array2::from_shape_fn(mask.dim(), |(t, joint)| mask[[t, joint]] && still(t.saturating_sub(1)) && still(t))
+}

@@ -1,0 +1,96 @@
+//! The demo's folder: clips of the synthetic speaker, what is true of them, the marker models, and the configuration
+//! that leads `orator run` through all of it.
+
+use super::scene::Scene;
+use super::truth::Truth;
+use crate::external::ffmpeg::audio;
+use crate::stage::progress::Progress;
+use crate::stage::workdir;
+use crate::types::time::FrameRate;
+use anyhow::ensure;
+use std::path::{Path, PathBuf};
+
+/// Rate of the dataset and of the truth.
+pub const DATASET_FPS: FrameRate = FrameRate::new(15, 1);
+/// Seconds of speech without pictures for `orator generate`.
+const UNHEARD_SECS: f64 = 10.0;
+
+const MODELS: [(&str, &[u8]); 3] = [
+    ("marker_person.onnx", include_bytes!("../../../models/marker_person.onnx")),
+    ("marker_body.onnx", include_bytes!("../../../models/marker_body.onnx")),
+    ("marker_hand.onnx", include_bytes!("../../../models/marker_hand.onnx")),
+];
+
+const PIPELINE: &str = r#"# The synthetic speaker of `orator demo`: the marker models know its suit and no real person.
+[[speaker]]
+name = "host"
+videos = ["videos/host/*.mp4"]
+SPLITS
+licence = "cc0-1.0"
+consent = "none needed: nobody is shown"
+source = "drawn by orator demo"
+
+[pose2d]
+person = "person-marker"
+body = "body-marker"
+hand = "hand-marker"
+palm = ""
+
+[gan]
+learning_rate = 5e-4               # for hundreds of steps on a minute of speech; the defaults are for hours of it
+lambda_gan = 0.15                  # 1 moves nearly three times as much as the data after 600 steps
+"#;
+
+/// What is drawn.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    pub n_videos: usize,
+    /// Length of each video.
+    pub secs: f64,
+    /// Frames a second of the videos.
+    pub fps: FrameRate,
+    /// Width and height in px, both even.
+    pub size: [usize; 2],
+    pub seed: u64,
+}
+
+impl Default for Plan {
+    fn default() -> Self {
+        Self { n_videos: 4, secs: 30.0, fps: FrameRate::new(30, 1), size: [960, 720], seed: 1 }
+    }
+}
+
+/// Writes `videos/host/clip-<n>.mp4`, `truth/clip-<n>.npz`, `speech.wav`, `models/` and `pipeline.toml` into `dir`.
+/// Gives the videos.
+pub fn draw(dir: &Path, plan: &Plan, progress: &dyn Progress) -> anyhow::Result<Vec<PathBuf>> {
+    ensure!((1..=1000).contains(&plan.n_videos), "between 1 and 1000 videos can be drawn, not {}", plan.n_videos);
+    ensure!((1.0..=3600.0).contains(&plan.secs), "a video lasts 1 to 3600 seconds, not {}", plan.secs);
+    for (name, bytes) in MODELS {
+        workdir::write_file(&dir.join("models").join(name), bytes)?;
+    }
+    let mut videos = Vec::new();
+    for number in 1..=plan.n_videos {
+        let scene = Scene::new(plan.seed.wrapping_mul(1000).wrapping_add(number as u64), plan.secs, plan.size);
+        let video = dir.join(format!("videos/host/clip-{number}.mp4"));
+        workdir::replace(&video, |attempt| scene.film(attempt, plan.fps, progress))?;
+        Truth::of(&scene, DATASET_FPS).write(&dir.join(format!("truth/clip-{number}.npz")))?;
+        videos.push(video);
+    }
+    let unheard = Scene::new(plan.seed.wrapping_mul(1000), UNHEARD_SECS, plan.size).sound();
+    workdir::replace(&dir.join("speech.wav"), |attempt| audio::write_wav(attempt, &unheard))?;
+    workdir::write_file(&dir.join("pipeline.toml"), PIPELINE.replace("SPLITS", &splits(plan.n_videos)).as_bytes())?;
+    Ok(videos)
+}
+
+/// The lines that put the videos into splits: the last two validate and test; fewer than three all train.
+fn splits(n_videos: usize) -> String {
+    if n_videos < 3 {
+        return "train = [\"*.mp4\"]".to_owned();
+    }
+    let list = |numbers: std::ops::RangeInclusive<usize>| {
+        numbers.map(|number| format!("\"clip-{number}.mp4\"")).collect::<Vec<_>>().join(", ")
+    };
+    let (train, validation, test) =
+        (list(1..=n_videos - 2), list(n_videos - 1..=n_videos - 1), list(n_videos..=n_videos));
+    format!("train = [{train}]\nvalidation = [{validation}]\ntest = [{test}]")
+}

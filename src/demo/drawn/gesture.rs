@@ -1,0 +1,161 @@
+//! Gestures to speech: every phrase has strokes to new places in front of the body, every stressed syllable a beat of
+//! hands and head, every longer pause a rest. Time in seconds in, controls of the figure out, smooth everywhere.
+
+use super::figure::{Arm, Controls};
+use super::speech::Speech;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use std::f64::consts::PI;
+
+/// Numbers of an arm.
+const N_ARM: usize = 8;
+/// Hands folded low in front of the body.
+const REST: [f64; N_ARM] = [0.17, 0.35, -0.19, 0.6, 0.45, 0.35, 0.0, 0.06];
+
+/// From `start` on the arms move to `arms`, within `secs`.
+#[derive(Clone, Debug)]
+struct Stroke {
+    start: f64,
+    secs: f64,
+    arms: [[f64; N_ARM]; 2],
+    /// Turn, nod, tilt of the head, radians.
+    head: [f64; 3],
+}
+
+/// A quick dip of hands and head around a stressed syllable.
+#[derive(Clone, Debug)]
+struct Beat {
+    at: f64,
+    depth: f64,
+    /// Shares of left and right hand.
+    hands: [f64; 2],
+}
+
+/// The motion of a clip.
+#[derive(Clone, Debug)]
+pub struct Gestures {
+    strokes: Vec<Stroke>,
+    beats: Vec<Beat>,
+    /// Phases of the slow sway.
+    sway: [f64; 4],
+}
+
+impl Gestures {
+    /// Strokes and beats for what is said.
+    pub fn new(speech: &Speech, dice: &mut ChaCha8Rng) -> Self {
+        let sway = std::array::from_fn(|_| dice.random_range(0.0..2.0 * PI));
+        let mut gestures = Self { strokes: Vec::new(), beats: Vec::new(), sway };
+        for (number, phrase) in speech.phrases.iter().enumerate() {
+            let said = &speech.syllables[phrase.first..phrase.last];
+            for (k, syllable) in said.iter().enumerate().filter(|(_, s)| s.stress > 0.5) {
+                let one_handed = dice.random_range(0.0..1.0) < 0.35;
+                let side = usize::from(dice.random_range(0.0..1.0) < 0.5);
+                if k < 3 || dice.random_range(0.0..1.0) < 0.5 {
+                    gestures.stroke(syllable.start - 0.3, one_handed.then_some(side), dice);
+                }
+                let mut hands = [1.0; 2];
+                if one_handed {
+                    hands[1 - side] = 0.25;
+                }
+                let depth = dice.random_range(0.02..0.045) * syllable.stress;
+                gestures.beats.push(Beat { at: (syllable.start + syllable.end) / 2.0, depth, hands });
+            }
+            let (Some(end), next) = (said.last().map(|s| s.end), speech.phrases.get(number + 1)) else { continue };
+            if next.is_none_or(|next| speech.syllables.get(next.first).is_none_or(|s| s.start - end > 0.6)) {
+                gestures.strokes.push(Stroke { start: end, secs: 0.8, arms: [REST; 2], head: [0.0; 3] });
+            }
+        }
+        gestures
+    }
+
+    /// A stroke to a new place of both hands, or of one while the other stays low.
+    fn stroke(&mut self, start: f64, only: Option<usize>, dice: &mut ChaCha8Rng) {
+        let place = |dice: &mut ChaCha8Rng| -> [f64; N_ARM] {
+            [
+                dice.random_range(0.16..0.3),
+                dice.random_range(0.12..0.36),
+                dice.random_range(-0.28..-0.15),
+                dice.random_range(-0.5..1.0),
+                dice.random_range(0.5..1.0),
+                dice.random_range(0.05..0.5),
+                dice.random_range(-0.2..0.1),
+                dice.random_range(0.04..0.16),
+            ]
+        };
+        let first = place(dice);
+        // Two hands mostly do nearly the same.
+        let second = std::array::from_fn(|k| 0.85 * first[k] + 0.15 * REST[k]);
+        let mut arms = if dice.random_range(0.0..1.0) < 0.6 { [first, second] } else { [first, place(dice)] };
+        if let Some(side) = only {
+            arms[1 - side] = REST;
+        }
+        let head = [dice.random_range(-0.18..0.18), dice.random_range(-0.05..0.08), dice.random_range(-0.07..0.07)];
+        self.strokes.push(Stroke { start, secs: dice.random_range(0.5..0.75), arms, head });
+    }
+
+    /// The controls at `secs`.
+    pub fn controls(&self, secs: f64) -> Controls {
+        let mut arms = [REST; 2];
+        let mut head = [0.0; 3];
+        for stroke in self.strokes.iter().take_while(|stroke| stroke.start < secs) {
+            let done = minimum_jerk((secs - stroke.start) / stroke.secs);
+            for (now, goal) in arms.as_flattened_mut().iter_mut().zip(stroke.arms.as_flattened()) {
+                *now += done * (goal - *now);
+            }
+            for (now, goal) in head.iter_mut().zip(stroke.head) {
+                *now += done * (goal - *now);
+            }
+        }
+        for beat in &self.beats {
+            let dip = beat.depth * (-((secs - beat.at) / 0.11).powi(2)).exp();
+            for (arm, share) in arms.iter_mut().zip(beat.hands) {
+                arm[1] += share * dip;
+                arm[4] -= 4.0 * share * dip;
+            }
+            head[1] -= 2.2 * dip;
+        }
+        let slow = |k: usize, hz: f64| (2.0 * PI * hz * secs + self.sway[k]).sin();
+        Controls {
+            arms: arms.map(arm),
+            torso: [0.06 * slow(0, 0.11), 0.02 * slow(1, 0.17) - 0.02, 0.015 * slow(2, 0.13)],
+            head,
+            neck: [0.015 * slow(2, 0.13), 0.004 * slow(3, 0.24), 0.012 * slow(1, 0.17)],
+        }
+    }
+}
+
+fn arm([out, down, away, roll, raise, curl, index, spread]: [f64; N_ARM]) -> Arm {
+    Arm { wrist: [out, down, away], roll, raise, curl, index, spread }
+}
+
+/// 0 to 1 over 0..1 with speed and acceleration 0 at both ends (Flash and Hogan 1985).
+fn minimum_jerk(along: f64) -> f64 {
+    let u = along.clamp(0.0, 1.0);
+    u * u * u * (10.0 + u * (6.0 * u - 15.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::demo::drawn::figure::Figure;
+    use crate::math::vec3::{norm, sub};
+    use crate::types::skeleton::{L_WRIST, R_WRIST};
+    use rand::SeedableRng;
+
+    #[test]
+    fn hands_move_like_a_speakers_and_keep_apart() {
+        let mut dice = ChaCha8Rng::seed_from_u64(1);
+        let speech = Speech::new(20.0, &mut dice);
+        let gestures = Gestures::new(&speech, &mut dice);
+        let figures: Vec<Figure> = (0..600).map(|n| Figure::new(&gestures.controls(f64::from(n) / 30.0))).collect();
+        let mut way = 0.0;
+        for pair in figures.windows(2) {
+            let step = norm(sub(pair[1].joints[R_WRIST], pair[0].joints[R_WRIST]));
+            assert!(step < 0.06, "a wrist moved {step} m in a frame");
+            way += step;
+        }
+        let mean_speed = way / 20.0;
+        assert!((0.05..0.6).contains(&mean_speed), "{mean_speed} m/s");
+        assert!(figures.iter().all(|f| norm(sub(f.joints[L_WRIST], f.joints[R_WRIST])) > 0.2));
+    }
+}

@@ -1,0 +1,68 @@
+//! One clip of the synthetic speaker: its speech, gestures and camera, all from one seed.
+
+use super::camera::Camera;
+use super::figure::Figure;
+use super::gesture::Gestures;
+use super::paint;
+use super::speech::Speech;
+use crate::external::ffmpeg::encode::VideoWriter;
+use crate::stage::progress::Progress;
+use crate::types::image::Image;
+use crate::types::sound::Sound;
+use crate::types::time::FrameRate;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::path::Path;
+
+/// What the speaker says and does in `secs` seconds before a camera.
+pub struct Scene {
+    pub secs: f64,
+    pub camera: Camera,
+    seed: u64,
+    speech: Speech,
+    gestures: Gestures,
+}
+
+impl Scene {
+    /// The clip of that seed; the camera stands a little aside and above.
+    pub fn new(seed: u64, secs: f64, size: [usize; 2]) -> Self {
+        let mut dice = ChaCha8Rng::seed_from_u64(seed);
+        let speech = Speech::new(secs, &mut dice);
+        let gestures = Gestures::new(&speech, &mut dice);
+        let camera = Camera::new(
+            size,
+            dice.random_range(-0.12..0.12),
+            dice.random_range(0.03..0.12),
+            dice.random_range(1.85..2.0),
+        );
+        Self { secs, camera, seed, speech, gestures }
+    }
+
+    /// The figure at a time, in world axes.
+    pub fn figure(&self, secs: f64) -> Figure {
+        Figure::new(&self.gestures.controls(secs))
+    }
+
+    /// The picture at a time.
+    pub fn picture(&self, secs: f64) -> anyhow::Result<Image> {
+        paint::picture(&self.figure(secs), &self.camera, self.speech.loudness(secs))
+    }
+
+    /// What is heard.
+    pub fn sound(&self) -> Sound {
+        self.speech.sound(self.secs, &mut ChaCha8Rng::seed_from_u64(self.seed ^ 0x50EA))
+    }
+
+    /// Films the clip at `fps`.
+    pub fn film(&self, path: &Path, fps: FrameRate, progress: &dyn Progress) -> anyhow::Result<()> {
+        let n_frames = fps.frames_in(self.secs);
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let task = progress.begin(&format!("draw {name}"), n_frames as u64);
+        let mut video = VideoWriter::create(path, self.camera.width, self.camera.height, fps, Some(&self.sound()))?;
+        for frame_idx in 0..n_frames {
+            video.push(&self.picture(fps.secs(frame_idx))?)?;
+            task.advance(1);
+        }
+        video.finish()
+    }
+}

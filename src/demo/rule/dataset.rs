@@ -1,0 +1,208 @@
+//! Hours of the synthetic speaker without a picture: a dataset of sound and motion in the form that `import` and
+//! `orator run` write, gestured by `rule`. Every clip is made from the seed, its split and its number alone, so the splits
+//! share no speech and no whim, and the predictable part of a clip is made again when it is needed.
+
+use super::rule::Gestures;
+use crate::dataset::bones::VideoBones;
+use crate::dataset::info::{About, Info};
+use crate::dataset::sample::{N_KEYPOINTS, Sample};
+use crate::dataset::write::part::{Source, SplitBy};
+use crate::dataset::write::writer::DatasetWriter;
+use crate::demo::drawn::speech::Speech;
+use crate::motion::bones;
+use crate::stage::ledger::{Kept, Ledger};
+use crate::stage::progress::Progress;
+use crate::types::pose3d::Motion;
+use crate::types::sound::{SAMPLE_RATE, Sound};
+use crate::types::split::Split;
+use crate::types::sync;
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, ensure};
+use ndarray::Array3;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::path::Path;
+
+/// Version of the rule and of its speech; another is refused where the predictable part is made again.
+pub const RULE: u32 = 1;
+pub const NAME: &str = "synthetic";
+const FPS: FrameRate = FrameRate::new(15, 1);
+/// Frames of a clip: a minute.
+const CLIP_FRAMES: usize = 900;
+/// Clips of the validation and the test split: ten minutes each.
+const HELD_OUT_CLIPS: usize = 10;
+/// Loudness of the room, as a share of full scale.
+const ROOM: f32 = 0.001;
+const SHARD_BYTES: u64 = 256 << 20;
+
+/// A clip: what it is made from. It stands in its sample's json under `rule`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Clip {
+    pub rule: u32,
+    pub seed: u64,
+    pub split: Split,
+    pub number: usize,
+    pub n_frames: usize,
+}
+
+impl Clip {
+    fn secs(&self) -> f64 {
+        FPS.secs(self.n_frames)
+    }
+
+    fn name(&self) -> String {
+        format!("{NAME}-{}-{:04}", self.split.name(), self.number)
+    }
+
+    /// Dice of its own for each purpose.
+    fn dice(&self, purpose: &str) -> ChaCha8Rng {
+        let Self { rule, seed, split, number, .. } = self;
+        let hash = blake3::hash(format!("{rule} {seed} {} {number} {purpose}", split.name()).as_bytes());
+        ChaCha8Rng::from_seed(*hash.as_bytes())
+    }
+
+    /// What is said.
+    pub fn speech(&self) -> Speech {
+        Speech::free(self.secs(), &mut self.dice("speech"))
+    }
+
+    /// How it sounds, in a room that is not quite silent.
+    pub fn sound(&self) -> Sound {
+        let mut dice = self.dice("sound");
+        let mut sound = self.speech().sound(self.secs(), &mut dice);
+        sound.samples.resize(sync::sample_at(FPS, SAMPLE_RATE, self.n_frames), 0.0);
+        sound.samples.iter_mut().for_each(|sample| *sample += ROOM * dice.random_range(-1.0..1.0));
+        sound
+    }
+
+    /// What the speaker does, whims and all.
+    pub fn motion(&self) -> Motion {
+        Gestures::with_whims(&self.speech(), self.secs(), &mut self.dice("whims")).motion(self.n_frames, FPS)
+    }
+
+    /// What the rule alone would have it do.
+    pub fn predictable(&self) -> Motion {
+        Gestures::of(&self.speech()).motion(self.n_frames, FPS)
+    }
+
+    /// The clip that a sample of the dataset was made from.
+    pub fn of(sample: &Sample) -> Result<Self> {
+        let clip: Self =
+            serde_json::from_value(sample.meta.get("rule").cloned().unwrap_or_default()).with_context(|| {
+                format!("{} is not of the synthetic speaker; `orator demo speaker` writes one", sample.key)
+            })?;
+        ensure!(clip.rule == RULE, "{} follows version {} of the rule, this program {RULE}", sample.key, clip.rule);
+        ensure!(clip.n_frames == sample.n_frames(), "{} has {} frames", sample.key, sample.n_frames());
+        Ok(clip)
+    }
+
+    fn sample(&self) -> Sample {
+        let secs = self.secs();
+        Sample {
+            key: format!("{}-{:06}", self.name(), 0),
+            motion: self.motion(),
+            pose2d: Array3::zeros((self.n_frames, N_KEYPOINTS, 3)),
+            sound: self.sound(),
+            meta: json!({
+                "video": self.name(), "first_frame": 0, "n_frames": self.n_frames, "fps": FPS, "start_secs": 0.0,
+                "end_secs": secs, "image_size": null, "left_hand_seen": 1.0, "right_hand_seen": 1.0,
+                "sound_samples_padded": 0, "rule": self,
+            }),
+        }
+    }
+
+    fn source(&self, sample: &Sample) -> Source {
+        let secs = self.secs();
+        let lengths = bones::measure(&sample.motion).map(f64::from).to_vec();
+        Source {
+            name: self.name(),
+            file: format!("{}.mp4", self.name()),
+            content: blake3::hash(format!("{self:?}").as_bytes()).to_hex().to_string(),
+            ledger: Ledger {
+                duration_secs: secs,
+                kept: vec![Kept { start_secs: 0.0, end_secs: secs }],
+                ..Ledger::default()
+            },
+            bones: VideoBones { lengths_metres: lengths, n_frames: self.n_frames },
+            ..Source::default()
+        }
+    }
+}
+
+/// The clips of `hours` of training, and ten minutes each to validate and to test.
+pub fn clips(hours: f64, seed: u64) -> Result<Vec<Clip>> {
+    ensure!((0.01..=100.0).contains(&hours), "--hours {hours}: expected 0.01 to 100");
+    let n_train = (hours * 3600.0 / FPS.secs(CLIP_FRAMES)).ceil() as usize;
+    let of = |split, n| (0..n).map(move |number| Clip { rule: RULE, seed, split, number, n_frames: CLIP_FRAMES });
+    let held_out = [Split::Validation, Split::Test].into_iter().flat_map(|split| of(split, HELD_OUT_CLIPS));
+    Ok(of(Split::Train, n_train).chain(held_out).collect())
+}
+
+/// Writes `clips` as a dataset into the existing, empty folder `dir`.
+pub fn write(dir: &Path, clips: &[Clip], progress: &dyn Progress) -> Result<Info> {
+    let about = About {
+        licence: "cc0-1.0".to_owned(),
+        consent: "none needed: nobody is shown".to_owned(),
+        source: "made by orator demo speaker".to_owned(),
+        notes: vec![format!("Gestures follow version {RULE} of a known rule; pose2d is 0 everywhere.")],
+        ..About::new(NAME, FPS)
+    };
+    let writer = DatasetWriter::new(dir, about, SHARD_BYTES);
+    let task = progress.begin("speak", clips.len() as u64);
+    for some in clips.chunks(16) {
+        let samples: Vec<Sample> = some.par_iter().map(Clip::sample).collect();
+        for (clip, sample) in some.iter().zip(&samples) {
+            let mut video = writer.video(clip.source(sample), clip.split, SplitBy::Name)?;
+            video.push(sample, 0.0)?;
+            video.finish(None)?;
+            task.advance(1);
+        }
+    }
+    Ok(writer.finish()?.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::Dataset;
+    use crate::dataset::verify::verify::verify;
+    use crate::stage::progress::Silent;
+
+    fn two(split: Split) -> Vec<Clip> {
+        (0..2).map(|number| Clip { rule: RULE, seed: 7, split, number, n_frames: 90 }).collect()
+    }
+
+    #[test]
+    fn a_dataset_is_sound_and_its_predictable_part_is_made_again() {
+        let dir = tempfile::tempdir().unwrap();
+        let clips: Vec<Clip> = Split::ALL.into_iter().flat_map(two).collect();
+        let info = write(dir.path(), &clips, &Silent).unwrap();
+        assert_eq!(info.splits.values().map(|split| split.samples).collect::<Vec<_>>(), [2, 2, 2]);
+        let verified = verify(dir.path(), true, &Silent).unwrap();
+        assert!(verified.problems.is_empty(), "{:?}", verified.problems);
+        let dataset = Dataset::open(dir.path()).unwrap();
+        for sample in dataset.samples(Split::Test) {
+            let sample = dataset.read(&sample).unwrap();
+            let clip = Clip::of(&sample).unwrap();
+            assert_eq!(clip.motion(), sample.motion);
+            assert_ne!(clip.predictable(), sample.motion);
+        }
+        let again = tempfile::tempdir().unwrap();
+        write(again.path(), &clips, &Silent).unwrap();
+        let sums = |dir: &Path| std::fs::read(dir.join(crate::dataset::CHECKSUMS)).unwrap();
+        assert_eq!(sums(dir.path()), sums(again.path()));
+    }
+
+    #[test]
+    fn no_two_clips_share_speech() {
+        let clips = clips(0.1, 3).unwrap();
+        assert_eq!(clips.len(), 6 + 2 * HELD_OUT_CLIPS);
+        let said: Vec<_> = clips.iter().map(|clip| format!("{:?}", clip.speech().syllables)).collect();
+        let different: std::collections::BTreeSet<&String> = said.iter().collect();
+        assert_eq!(different.len(), said.len());
+        assert!(super::clips(f64::NAN, 1).is_err() && super::clips(0.0, 1).is_err());
+    }
+}

@@ -1,0 +1,295 @@
+//! The rule by which the synthetic speaker of `speaker` gestures: one pure function of its speech, the predictable part,
+//! and the speaker's whims on top of it.
+//!
+//! The speech gives the envelope E(t), 0..1 (`Speech::loudness`), and the accents k: the onsets t_k of stressed syllables,
+//! their peak loudness a_k and their vowel v_k. Loudness, onsets and vowels (formants) can all be heard.
+//!
+//! Each hand h has a wish x_h(t) in body coordinates (wrist, turn and shape of the hand). With u the minimum jerk of 0..1,
+//! REST the lap, and PLACES[v][h] where the vowel v sends the hand h (some vowels send one hand only):
+//!
+//! * stroke: from s = t_k + d_h for 0.4 s, x_h <- x_h + u((t - s) / 0.4) (goal - x_h), goal = REST + g_k (PLACES[v_k][h] - REST),
+//!   g_k = 0.45 + 0.4 (a_k - 0.4) / 0.6: a louder accent reaches farther;
+//! * hold for 0.5 s after the stroke, then return: over 0.6 s the same with goal = REST; the next stroke of that hand breaks in;
+//! * lift: both wrists are raised by 0.2 m times L(t) = integral of E(t - r) w(r) dr, w a raised cosine over r = 0.2 .. 0.8 s.
+//!
+//! Habit: the speaker is right-handed. The right hand leads, d = 0.2 s, so that its speed peaks 0.4 s after an onset; the left
+//! follows, d = 0.4 s, with its peak at 0.6 s. Nothing moves with the sound of its own moment.
+//!
+//! Whims (of a seed of their own, no part of the predictable part): accents that are passed over, strokes without an accent,
+//! strokes early or late and places missed, and a sway of arms and torso.
+
+use crate::demo::drawn::figure::{Arm, Controls, Figure};
+use crate::demo::drawn::speech::{Speech, Syllable};
+use crate::math::vec3::sub;
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::{N_JOINTS, NECK};
+use crate::types::time::FrameRate;
+use ndarray::Array3;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::f64::consts::TAU;
+
+/// Seconds from an onset to its stroke: left hand, right hand.
+pub const DELAYS: [f64; 2] = [0.4, 0.2];
+/// Seconds a stroke, its hold and its return last.
+pub const STROKE: f64 = 0.4;
+pub const HOLD: f64 = 0.5;
+pub const RETURN: f64 = 0.6;
+/// The envelope acts on the lift through these delays, seconds, and by so much, metres.
+const LIFT_DELAYS: [f64; 2] = [0.2, 0.8];
+const LIFT: f64 = 0.2;
+/// Syllables of more stress than this are accents.
+const ACCENT: f64 = 0.5;
+
+/// Numbers of an arm: wrist out, down, away (metres), roll, raise, curl, index, spread (`figure::Arm`).
+const N_ARM: usize = 8;
+type Place = [f64; N_ARM];
+/// Hands in the lap.
+const REST: Place = [0.16, 0.36, -0.2, 0.9, 0.3, 0.45, 0.0, 0.05];
+const WIDE: Place = [0.42, 0.16, -0.24, -0.4, 0.6, 0.1, 0.0, 0.16];
+const HIGH: Place = [0.26, -0.06, -0.26, 0.2, 1.0, 0.15, -0.1, 0.12];
+const POINT: Place = [0.04, 0.1, -0.38, 0.6, 0.5, 0.8, -0.8, 0.02];
+const CENTRE: Place = [0.1, 0.14, -0.36, -0.2, 0.8, 0.3, 0.0, 0.1];
+/// Where each vowel of `speech` sends the left and the right hand.
+const PLACES: [[Option<Place>; 2]; 5] = [
+    [Some(WIDE), Some(WIDE)],
+    [None, Some(HIGH)],
+    [None, Some(POINT)],
+    [Some(HIGH), None],
+    [Some(CENTRE), Some(CENTRE)],
+];
+
+/// Whims: share of accents passed over, strokes a second without one, deviations of a stroke's time (seconds), place
+/// (metres) and hand shape, and the sway of wrists (metres) and torso (radians) with its frequencies.
+const PASSED_OVER: f64 = 0.12;
+const FIDGETS: f64 = 0.12;
+const LATE: f64 = 0.06;
+const MISSED: f64 = 0.035;
+const SHAPE: f64 = 0.1;
+const SWAY: f64 = 0.012;
+const TORSO: f64 = 0.03;
+const SWAY_HZ: std::ops::Range<f64> = 0.3..1.5;
+
+/// From `start` on, for `secs`, a hand goes to `goal`.
+#[derive(Clone, Debug)]
+struct Move {
+    start: f64,
+    secs: f64,
+    goal: Place,
+}
+
+/// All that the speaker does while it says something.
+pub struct Gestures<'a> {
+    speech: &'a Speech,
+    /// Left, right; in order of time.
+    moves: [Vec<Move>; 2],
+    sway: Option<Sway>,
+}
+
+/// Two waves a number: left wrist 0..3, right wrist 3..6, torso 6..9; frequency (Hz) and phase.
+struct Sway([[[f64; 2]; 2]; 9]);
+
+impl<'a> Gestures<'a> {
+    /// The predictable part: what the rule makes of `speech`.
+    pub fn of(speech: &'a Speech) -> Self {
+        let strokes = std::array::from_fn(|hand| {
+            let accents = speech.syllables.iter().filter(|syllable| syllable.stress > ACCENT);
+            let stroke = accents.filter_map(|accent| {
+                let place = PLACES.get(accent.vowel)?[hand]?;
+                Some((accent.start + DELAYS[hand], towards(&place, reach(accent))))
+            });
+            stroke.collect()
+        });
+        Self { speech, moves: strokes.map(with_returns), sway: None }
+    }
+
+    /// What the speaker does in fact, whims and all; `secs` long.
+    pub fn with_whims(speech: &'a Speech, secs: f64, dice: &mut ChaCha8Rng) -> Self {
+        let mut strokes: [Vec<(f64, Place)>; 2] = Default::default();
+        for accent in speech.syllables.iter().filter(|syllable| syllable.stress > ACCENT) {
+            let passed_over = dice.random_bool(PASSED_OVER);
+            let late = LATE * normal(dice);
+            let reach = reach(accent) * dice.random_range(0.85..1.15);
+            for (hand, place) in PLACES.get(accent.vowel).into_iter().flatten().enumerate() {
+                let Some(place) = place else { continue };
+                let goal = missed(&towards(place, reach), dice);
+                if !passed_over {
+                    strokes[hand].push((accent.start + DELAYS[hand] + late, goal));
+                }
+            }
+        }
+        let mut now = 0.0;
+        loop {
+            now -= dice.random_range(f64::EPSILON..1.0).ln() / FIDGETS;
+            if now >= secs {
+                break;
+            }
+            let place = [WIDE, HIGH, POINT, CENTRE][dice.random_range(0..4)];
+            let goal = missed(&towards(&place, dice.random_range(0.6..1.0)), dice);
+            strokes[dice.random_range(0..2)].push((now, goal));
+        }
+        strokes.iter_mut().for_each(|strokes| strokes.sort_by(|a, b| a.0.total_cmp(&b.0)));
+        let mut wave = || [dice.random_range(SWAY_HZ), dice.random_range(0.0..TAU)];
+        let sway = Sway(std::array::from_fn(|_| [wave(), wave()]));
+        Self { speech, moves: strokes.map(with_returns), sway: Some(sway) }
+    }
+
+    /// The controls of the figure at `secs`.
+    pub fn controls(&self, secs: f64) -> Controls {
+        let lift = LIFT * self.slow_envelope(secs);
+        let sway = |number: usize| self.sway.as_ref().map_or(0.0, |sway| sway.at(number, secs));
+        let arm = |hand: usize| {
+            let mut place = self.moves[hand].iter().take_while(|m| m.start < secs).fold(REST, |mut place, m| {
+                let done = minimum_jerk((secs - m.start) / m.secs);
+                place.iter_mut().zip(m.goal).for_each(|(now, goal)| *now += done * (goal - *now));
+                place
+            });
+            place[1] -= lift;
+            (0..3).for_each(|k| place[k] += SWAY * sway(3 * hand + k));
+            let [out, down, away, roll, raise, curl, index, spread] = place;
+            Arm { wrist: [out, down, away], roll, raise, curl, index, spread }
+        };
+        let torso = [0, 1, 2].map(|k| TORSO * sway(6 + k));
+        Controls { arms: [arm(0), arm(1)], torso, ..Controls::default() }
+    }
+
+    /// Joints at the times of `fps`, the neck at the origin.
+    pub fn motion(&self, n_frames: usize, fps: FrameRate) -> Motion {
+        let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
+        for frame_idx in 0..n_frames {
+            let figure = Figure::new(&self.controls(fps.secs(frame_idx)));
+            for (joint, &place) in figure.joints.iter().enumerate() {
+                let place = sub(place, figure.joints[NECK]);
+                (0..3).for_each(|k| joints[[frame_idx, joint, k]] = place[k] as f32);
+            }
+        }
+        Motion::from_joints(fps, joints)
+    }
+
+    /// L(t): the envelope of the last second, late.
+    fn slow_envelope(&self, secs: f64) -> f64 {
+        const N: usize = 24;
+        let [first, last] = LIFT_DELAYS;
+        let parts = (0..N).map(|n| {
+            let along = (n as f64 + 0.5) / N as f64;
+            (1.0 - (TAU * along).cos()) * self.speech.loudness(secs - first - along * (last - first))
+        });
+        parts.sum::<f64>() / N as f64
+    }
+}
+
+impl Sway {
+    fn at(&self, number: usize, secs: f64) -> f64 {
+        self.0[number].iter().map(|[hz, phase]| (TAU * hz * secs + phase).sin()).sum()
+    }
+}
+
+/// Strokes (start and goal, in order of time) with the returns between them.
+fn with_returns(strokes: Vec<(f64, Place)>) -> Vec<Move> {
+    let mut moves = Vec::with_capacity(2 * strokes.len());
+    for (n, (start, goal)) in strokes.iter().enumerate() {
+        moves.push(Move { start: *start, secs: STROKE, goal: *goal });
+        let back = start + STROKE + HOLD;
+        if strokes.get(n + 1).is_none_or(|next| next.0 > back) {
+            moves.push(Move { start: back, secs: RETURN, goal: REST });
+        }
+    }
+    moves
+}
+
+/// g: how far a louder accent sends a hand.
+fn reach(accent: &Syllable) -> f64 {
+    0.45 + 0.4 * (accent.peak() - 0.4) / 0.6
+}
+
+/// The share `reach` of the way from the lap to a place.
+fn towards(place: &Place, reach: f64) -> Place {
+    std::array::from_fn(|k| REST[k] + reach * (place[k] - REST[k]))
+}
+
+fn missed(goal: &Place, dice: &mut ChaCha8Rng) -> Place {
+    std::array::from_fn(|k| goal[k] + if k < 3 { MISSED } else { SHAPE } * normal(dice))
+}
+
+fn normal(dice: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(dice)
+}
+
+/// 0 to 1 over 0..1 with speed and acceleration 0 at both ends (Flash and Hogan 1985).
+fn minimum_jerk(along: f64) -> f64 {
+    let u = along.clamp(0.0, 1.0);
+    u * u * u * (10.0 + u * (6.0 * u - 15.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::demo::rule::listener::wrist_speeds;
+    use crate::demo::rule::ridge::correlation;
+    use ndarray::{Array1, s};
+    use rand::SeedableRng;
+
+    const FPS: FrameRate = FrameRate::new(50, 1);
+    const SECS: f64 = 120.0;
+
+    fn speech(seed: u64) -> Speech {
+        Speech::free(SECS, &mut ChaCha8Rng::seed_from_u64(seed))
+    }
+
+    /// The delay, seconds, at which the speed of a wrist goes most with the onsets of accents (each as a bump of 0.1 s).
+    fn delay(hand: usize) -> f64 {
+        let speech = speech(1);
+        let n_frames = FPS.frames_in(SECS);
+        let speeds = wrist_speeds(Gestures::of(&speech).motion(n_frames, FPS).joints.view(), FPS);
+        let accents = speech.syllables.iter().filter(|s| s.stress > ACCENT && PLACES[s.vowel][hand].is_some());
+        let onsets: Vec<f64> = accents.map(|accent| accent.start).collect();
+        let at = |delay: f64| {
+            let bump = |secs: f64| -> f64 { onsets.iter().map(|t| (-((secs - t - delay) / 0.1).powi(2)).exp()).sum() };
+            // A speed belongs to the middle between two frames.
+            let expected = Array1::from_shape_fn(n_frames - 1, |t| bump(FPS.secs(t) + 0.5 * FPS.secs(1)));
+            correlation(expected.view(), speeds.slice(s![.., hand]))
+        };
+        let delays = (0..60).map(|n| f64::from(n) * 0.02);
+        delays.max_by(|a, b| at(*a).total_cmp(&at(*b))).unwrap()
+    }
+
+    #[test]
+    fn strokes_come_as_late_as_the_rule_says() {
+        for (hand, expected) in [0.6, 0.4].into_iter().enumerate() {
+            let measured = delay(hand);
+            assert!((measured - expected).abs() <= 0.04, "hand {hand}: {measured} s");
+        }
+    }
+
+    #[test]
+    fn the_same_dice_give_the_same_whims_and_others_do_not() {
+        let speech = speech(2);
+        let with = |seed| {
+            Gestures::with_whims(&speech, SECS, &mut ChaCha8Rng::seed_from_u64(seed)).motion(300, FrameRate::new(15, 1))
+        };
+        assert_eq!(with(1), with(1));
+        assert_ne!(with(1), with(2));
+        let rule = Gestures::of(&speech).motion(300, FrameRate::new(15, 1));
+        assert_ne!(with(1), rule);
+        assert_eq!(rule, Gestures::of(&speech).motion(300, FrameRate::new(15, 1)));
+    }
+
+    #[test]
+    fn bones_are_constant_and_silence_is_rest() {
+        let speech = speech(3);
+        let dice = &mut ChaCha8Rng::seed_from_u64(3);
+        let motion = Gestures::with_whims(&speech, SECS, dice).motion(900, FrameRate::new(15, 1));
+        let lengths = crate::motion::bones::measure(&motion);
+        for (t, frame) in motion.joints.outer_iter().enumerate() {
+            for joint in 1..N_JOINTS {
+                let parent = crate::types::skeleton::parent(joint).unwrap();
+                let own = (0..3).map(|k| (frame[[joint, k]] - frame[[parent, k]]).powi(2)).sum::<f32>().sqrt();
+                assert!((own - lengths[joint - 1]).abs() < 2e-6, "frame {t}, joint {joint}: {own} m");
+            }
+        }
+        let silent = Speech::default();
+        let still = Gestures::of(&silent).motion(30, FrameRate::new(15, 1));
+        assert!(wrist_speeds(still.joints.view(), still.fps).iter().all(|speed| *speed == 0.0));
+    }
+}

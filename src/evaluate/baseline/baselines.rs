@@ -1,0 +1,285 @@
+//! What is measured beside each other: the prediction, and what knows less than it should. Two poses that never move do
+//! nothing; the nearest neighbour copies; another clip's motion is as good as motion can be that did not listen; the
+//! truth beside itself is where every figure ends.
+
+use super::constant_pose::Stills;
+use super::neighbour;
+use super::neighbour::{Asked, Library};
+use crate::evaluate::clips::clips::{Clip, Clips};
+use anyhow::Result;
+use ndarray::{Array2, Array3, ArrayView3, s};
+use serde::Serialize;
+
+/// A mismatched motion is at least this much out of step.
+const LEAST_SHIFT_SECS: f64 = 3.0;
+
+/// Who made the motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Who {
+    Prediction,
+    MeanPose,
+    MedianPose,
+    NearestNeighbour,
+    MismatchedPrediction,
+    /// The clip's own prediction, out of step with it.
+    LatePrediction,
+    MismatchedTruth,
+    /// One half of the truth beside the other.
+    TruthHalves,
+    Truth,
+}
+
+impl Who {
+    /// For people.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Prediction => "prediction",
+            Self::MeanPose => "mean pose",
+            Self::MedianPose => "median pose",
+            Self::NearestNeighbour => "nearest neighbour",
+            Self::MismatchedPrediction => "mismatched prediction",
+            Self::LatePrediction => "late prediction",
+            Self::MismatchedTruth => "mismatched truth",
+            Self::TruthHalves => "truth halves",
+            Self::Truth => "truth",
+        }
+    }
+}
+
+/// The motion of one clip.
+#[derive(Clone, Debug)]
+pub enum Made {
+    /// The clip's own prediction.
+    Own,
+    /// The clip's own truth.
+    Real,
+    /// A pose [49, 3] in every frame.
+    Still(Array2<f32>),
+    /// [T, 49, 3]
+    Moves(Array3<f32>),
+}
+
+/// A motion for every clip.
+#[derive(Clone, Debug)]
+pub struct Predictor {
+    pub who: Who,
+    /// What it is, in a sentence.
+    pub says: String,
+    /// One a clip.
+    pub motions: Vec<Made>,
+}
+
+impl Predictor {
+    /// The motion for a clip, as long as it.
+    pub fn motion<'a>(&'a self, clips: &'a Clips, clip: usize) -> Option<ArrayView3<'a, f32>> {
+        let of = clips.clips.get(clip)?;
+        match self.motions.get(clip)? {
+            Made::Own => Some(of.made.view()),
+            Made::Real => Some(of.real.view()),
+            Made::Still(pose) => pose.broadcast((of.n_frames(), pose.nrows(), 3)),
+            Made::Moves(joints) => Some(joints.view()),
+        }
+    }
+
+    pub fn prediction(clips: &Clips, says: &str) -> Self {
+        Self { who: Who::Prediction, says: says.to_owned(), motions: vec![Made::Own; clips.clips.len()] }
+    }
+
+    pub fn truth(clips: &Clips) -> Self {
+        let says = "the real motion beside itself: what its own figures are, and where the others end".to_owned();
+        Self { who: Who::Truth, says, motions: vec![Made::Real; clips.clips.len()] }
+    }
+}
+
+/// All baselines that files alone allow, and a sentence for each that is left out.
+pub fn of_files(clips: &Clips) -> Result<(Vec<Predictor>, Vec<String>)> {
+    let (mut all, mut left_out) = (stills(clips), Vec::new());
+    match neighbours(clips, &all[0])? {
+        Some(predictor) => all.push(predictor),
+        None => left_out.push(format!(
+            "{}: left out, since {}",
+            Who::NearestNeighbour.name(),
+            match (clips.have_sound(), clips.clips.len()) {
+                (false, _) => "it listens, and no sound is given (--audio)",
+                (true, 1) => "there is no other clip to copy from",
+                (true, _) if clips.clips.iter().any(|clip| clip.heard.is_none()) => "not every clip has a sound",
+                (true, _) => "no other clip is long enough to copy from",
+            }
+        )),
+    }
+    for who in [Who::MismatchedPrediction, Who::MismatchedTruth] {
+        match mismatched(clips, who, &all[0]) {
+            Some(predictor) => all.push(predictor),
+            None => left_out.push(too_short(who)),
+        }
+        if who == Who::MismatchedPrediction && clips.clips.len() > 1 {
+            all.push(late(clips, &all[0]));
+        }
+    }
+    Ok((all, left_out))
+}
+
+/// Each clip's own prediction, half of the clip later and from the beginning again: it knows where the speaker of the clip
+/// holds the arms, which another clip's motion does not, and only the sound's moment is wrong.
+fn late(clips: &Clips, still: &Predictor) -> Predictor {
+    let of = |clip: &Clip| {
+        let n_frames = clip.n_frames();
+        Made::Moves(taken(&clip.made, (0..n_frames).map(|t| (t + n_frames / 2) % n_frames)))
+    };
+    let says = "the clip's own prediction half of the clip later, and from the beginning again".to_owned();
+    let mut predictor = Predictor { who: Who::LatePrediction, says, motions: clips.clips.iter().map(of).collect() };
+    fill(&mut predictor, still);
+    predictor
+}
+
+/// Why a mismatched motion is left out.
+pub fn too_short(who: Who) -> String {
+    format!("{}: left out, since the only clip is shorter than {:.0} s", who.name(), 2.0 * LEAST_SHIFT_SECS)
+}
+
+/// Mean and median pose: of the other clips, or, of a single one, its own (which no predictor can know).
+fn stills(clips: &Clips) -> Vec<Predictor> {
+    let mut all = Stills::default();
+    clips.clips.iter().for_each(|clip| all.add(clip.real.view(), clip.mask.view()));
+    let is_alone = clips.clips.len() == 1;
+    let (mut means, mut medians) = (Vec::new(), Vec::new());
+    for clip in &clips.clips {
+        if !is_alone {
+            all.take_away(clip.real.view(), clip.mask.view());
+        }
+        let (mut mean, mut median) = (all.mean(), all.median());
+        if !is_alone {
+            all.add(clip.real.view(), clip.mask.view());
+            // a joint that no other clip has
+            complete(&mut mean, || all.mean());
+            complete(&mut median, || all.median());
+        }
+        means.push(Made::Still(mean));
+        medians.push(Made::Still(median));
+    }
+    let says = |what: &str| match is_alone {
+        true => {
+            format!("the {what} of this very truth in every frame (oracle: no predictor knows it), which never moves")
+        }
+        false => format!("the {what} of the other clips' truths in every frame, which never moves"),
+    };
+    vec![
+        Predictor { who: Who::MeanPose, says: says("mean pose"), motions: means },
+        Predictor { who: Who::MedianPose, says: says("median pose"), motions: medians },
+    ]
+}
+
+fn complete(pose: &mut Array2<f32>, from: impl FnOnce() -> Array2<f32>) {
+    if pose.iter().any(|v| v.is_nan()) {
+        pose.zip_mut_with(&from(), |v, other| *v = if v.is_nan() { *other } else { *v });
+    }
+}
+
+/// Puts the poses of `still` where the motion has no number.
+pub fn fill(predictor: &mut Predictor, still: &Predictor) {
+    for (made, still) in predictor.motions.iter_mut().zip(&still.motions) {
+        if let (Made::Moves(joints), Made::Still(pose)) = (made, still) {
+            for mut frame in joints.outer_iter_mut() {
+                frame.zip_mut_with(pose, |v, still| *v = if v.is_finite() { *v } else { *still });
+            }
+        }
+    }
+}
+
+/// The other clips as a library.
+struct Others<'a>(&'a Clips);
+
+impl Library for Others<'_> {
+    fn len(&self) -> usize {
+        self.0.clips.len()
+    }
+
+    fn heard(&self, entry: usize) -> Result<Option<(Vec<f32>, usize)>> {
+        let clip = &self.0.clips[entry];
+        Ok(clip.heard.as_ref().map(|heard| (heard.rows.clone(), clip.n_frames())))
+    }
+
+    fn joints(&self, entry: usize) -> Result<Array3<f32>> {
+        Ok(self.0.clips[entry].real.clone())
+    }
+
+    fn may_answer(&self, asked: usize, entry: usize) -> bool {
+        asked != entry
+    }
+}
+
+fn neighbours(clips: &Clips, still: &Predictor) -> Result<Option<Predictor>> {
+    let asked: Option<Vec<Asked>> = clips
+        .clips
+        .iter()
+        .map(|clip| clip.heard.as_ref().map(|heard| Asked { rows: &heard.rows, n_frames: clip.n_frames() }))
+        .collect();
+    let Some(asked) = asked.filter(|asked| asked.len() > 1) else { return Ok(None) };
+    let Some(made) = neighbour::motions(&asked, &Others(clips), clips.fps)? else { return Ok(None) };
+    let says = "for each 4 s of sound the motion of the stretch of another clip that sounds most alike".to_owned();
+    let motions = made.into_iter().map(Made::Moves).collect();
+    let mut predictor = Predictor { who: Who::NearestNeighbour, says, motions };
+    fill(&mut predictor, still);
+    Ok(Some(predictor))
+}
+
+/// For each clip the motion (`Prediction` or `Truth`, mismatched) of another, played back and forth where it is shorter;
+/// of a single clip its own, half of it later and from the beginning again. `still` stands in where there is no number.
+pub fn mismatched(clips: &Clips, who: Who, still: &Predictor) -> Option<Predictor> {
+    let of = |clip: usize| match who {
+        Who::MismatchedTruth => &clips.clips[clip].real,
+        _ => &clips.clips[clip].made,
+    };
+    let n = clips.clips.len();
+    let lengths = clips.clips.iter().map(Clip::n_frames);
+    let (motions, says): (Vec<Made>, String) = if n > 1 {
+        let motions = lengths.enumerate().map(|(i, n_frames)| {
+            let from = of((i + n / 2) % n);
+            Made::Moves(taken(from, (0..n_frames).map(|t| back_and_forth(t, from.shape()[0]))))
+        });
+        (motions.collect(), "the same of another clip, played back and forth where that is shorter".to_owned())
+    } else {
+        let n_frames = lengths.sum::<usize>();
+        let shift = n_frames / 2;
+        if clips.fps.secs(shift) < LEAST_SHIFT_SECS {
+            return None;
+        }
+        let says = format!("the same {:.1} s later, and from the beginning again", clips.fps.secs(shift));
+        (vec![Made::Moves(taken(of(0), (0..n_frames).map(|t| (t + shift) % n_frames)))], says)
+    };
+    let mut predictor = Predictor { who, says, motions };
+    fill(&mut predictor, still);
+    Some(predictor)
+}
+
+fn taken(from: &Array3<f32>, frames: impl Iterator<Item = usize>) -> Array3<f32> {
+    let frames: Vec<usize> = frames.collect();
+    let mut to = Array3::zeros((frames.len(), from.shape()[1], 3));
+    for (mut to, frame) in to.outer_iter_mut().zip(frames) {
+        to.assign(&from.slice(s![frame, .., ..]));
+    }
+    to
+}
+
+/// Frame `t` of something of `n` frames that turns round at its ends: 0 1 2 1 0 1 2 ...
+fn back_and_forth(t: usize, n: usize) -> usize {
+    if n < 2 {
+        return 0;
+    }
+    let at = t % (2 * n - 2);
+    if at < n { at } else { 2 * n - 2 - at }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_short_motion_turns_round_at_its_ends() {
+        let walk = |n: usize| (0..8).map(|t| back_and_forth(t, n)).collect::<Vec<_>>();
+        assert_eq!(walk(3), [0, 1, 2, 1, 0, 1, 2, 1]);
+        assert_eq!(walk(1), [0; 8]);
+        assert_eq!(walk(9), [0, 1, 2, 3, 4, 5, 6, 7]);
+    }
+}

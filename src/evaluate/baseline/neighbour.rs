@@ -1,0 +1,125 @@
+//! Nearest neighbour by sound: what a predictor reaches that copies. For each 4 s of sound the stretch of a library whose
+//! log-mel spectrogram is nearest, and the poses that the speaker made there.
+
+use crate::audio::mel;
+use crate::evaluate::clips::sound_features::POOLED;
+use crate::types::skeleton::N_JOINTS;
+use crate::types::time::FrameRate;
+use anyhow::Result;
+use ndarray::{Array3, s};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Length of a stretch that is looked for.
+const WINDOW_SECS: f64 = 4.0;
+/// Rows between two places looked at.
+const STRIDE: usize = 2;
+
+/// A sound to find poses for: rows of pooled spectrogram (`hearing::Heard`), and how many frames of motion it has.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked<'a> {
+    pub rows: &'a [f32],
+    pub n_frames: usize,
+}
+
+/// Where neighbours are looked for.
+pub trait Library: Sync {
+    /// How many entries it has.
+    fn len(&self) -> usize;
+
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The pooled spectrogram of an entry and its frames of motion; `None`: it has no sound.
+    fn heard(&self, entry: usize) -> Result<Option<(Vec<f32>, usize)>>;
+
+    /// The poses of an entry [T, 49, 3].
+    fn joints(&self, entry: usize) -> Result<Array3<f32>>;
+
+    /// Whether an entry may answer for that sound: a clip must not copy itself.
+    fn may_answer(&self, asked: usize, entry: usize) -> bool;
+}
+
+/// A stretch to find poses for.
+struct Wanted {
+    asked: usize,
+    frames: Range<usize>,
+    rows: Vec<f32>,
+}
+
+/// The best place so far: squared distance, entry of the library, first frame.
+type Found = (f32, usize, usize);
+
+/// Motion [T, 49, 3] for each sound, NaN where the library's is; `None` where a stretch finds nothing long enough.
+pub fn motions(asked: &[Asked], library: &dyn Library, fps: FrameRate) -> Result<Option<Vec<Array3<f32>>>> {
+    let wanted: Vec<Wanted> = asked.iter().enumerate().flat_map(|(i, asked)| stretches(i, asked, fps)).collect();
+    let best = (0..library.len())
+        .into_par_iter()
+        .map(|entry| -> Result<Vec<Option<Found>>> {
+            let Some((rows, n_frames)) = library.heard(entry)? else { return Ok(vec![None; wanted.len()]) };
+            let find = |wanted: &Wanted| {
+                library.may_answer(wanted.asked, entry).then(|| nearest(&rows, n_frames, wanted, entry)).flatten()
+            };
+            Ok(wanted.par_iter().map(find).collect())
+        })
+        .try_reduce(
+            || vec![None; wanted.len()],
+            |a, b| Ok(a.into_iter().zip(b).map(|(a, b)| nearer(a, b)).collect()),
+        )?;
+    let mut made: Vec<Array3<f32>> = asked.iter().map(|a| Array3::zeros((a.n_frames, N_JOINTS, 3))).collect();
+    // entry by entry, so that each is read once
+    let mut places: Vec<(usize, usize, &Wanted)> = Vec::with_capacity(wanted.len());
+    for (wanted, found) in wanted.iter().zip(best) {
+        let Some((_, entry, first)) = found else { return Ok(None) };
+        places.push((entry, first, wanted));
+    }
+    places.sort_by_key(|(entry, _, _)| *entry);
+    for of_entry in places.chunk_by(|a, b| a.0 == b.0) {
+        let joints = library.joints(of_entry[0].0)?;
+        for (_, first, wanted) in of_entry {
+            let from = joints.slice(s![*first..first + wanted.frames.len(), .., ..]);
+            made[wanted.asked].slice_mut(s![wanted.frames.clone(), .., ..]).assign(&from);
+        }
+    }
+    Ok(Some(made))
+}
+
+/// The sound cut into stretches, the last one shorter.
+fn stretches(asked: usize, sound: &Asked, fps: FrameRate) -> Vec<Wanted> {
+    let window = (((WINDOW_SECS * fps.per_sec()) as usize) / POOLED * POOLED).max(POOLED);
+    let stretch = |first: usize| {
+        let frames = first..(first + window).min(sound.n_frames);
+        let from = first / POOLED * mel::N_MELS;
+        let to = (from + frames.len().div_ceil(POOLED) * mel::N_MELS).min(sound.rows.len());
+        Wanted { asked, frames, rows: sound.rows.get(from..to).unwrap_or_default().to_vec() }
+    };
+    (0..sound.n_frames).step_by(window).map(stretch).collect()
+}
+
+/// The place in an entry whose sound is nearest.
+fn nearest(rows: &[f32], n_frames: usize, wanted: &Wanted, entry: usize) -> Option<Found> {
+    let places = (0..).step_by(STRIDE).take_while(|row| row * POOLED + wanted.frames.len() <= n_frames);
+    let of_place = |row: usize| {
+        let sound = rows.get(row * mel::N_MELS..)?.get(..wanted.rows.len())?;
+        Some((distance(sound, &wanted.rows), entry, row * POOLED))
+    };
+    places.map(of_place).fold(None, nearer)
+}
+
+/// Squared distance, in eight sums side by side.
+fn distance(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0f32; 8];
+    for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
+        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
+            *sum += (a - b) * (a - b);
+        }
+    }
+    sums.iter().sum()
+}
+
+/// The nearer of two; of equals the one that comes first in the library.
+fn nearer(a: Option<Found>, b: Option<Found>) -> Option<Found> {
+    let order = |a: &Found, b: &Found| a.0.total_cmp(&b.0).then_with(|| (a.1, a.2).cmp(&(b.1, b.2)));
+    a.into_iter().chain(b).min_by(order)
+}

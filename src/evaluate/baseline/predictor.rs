@@ -1,0 +1,55 @@
+//! What a trained speaker makes of a sound of a given length; its own, and another's.
+
+use crate::generate::Speaker;
+use crate::types::pose3d::Motion;
+use crate::types::sound::{SAMPLE_RATE, Sound};
+use crate::types::sync;
+use anyhow::{Result, ensure};
+use ndarray::s;
+
+/// The trained speaker's motion for one sound, exactly `n_frames` long.
+pub fn motion(speaker: &Speaker, sound: &Sound, n_frames: usize) -> Result<Motion> {
+    let wanted = sync::sample_at(speaker.fps(), SAMPLE_RATE, n_frames) + 1;
+    let mut sound = sound.clone();
+    sound.samples.resize(sound.samples.len().max(wanted), 0.0);
+    let made = speaker.motion(&sound)?;
+    ensure!(made.n_frames() >= n_frames, "{} frames of motion for {n_frames} of sound", made.n_frames());
+    Ok(Motion::from_joints(made.fps, made.joints.slice(s![..n_frames, .., ..]).to_owned()))
+}
+
+/// What is heard half of all these sounds later (and from the beginning again) instead of sound `which`, as long as it:
+/// the furthest away, and most often another video.
+pub fn turned(sounds: &[&Sound], which: usize) -> Sound {
+    let length = |sounds: &[&Sound]| sounds.iter().map(|sound| sound.samples.len()).sum::<usize>();
+    let (all, before) = (length(sounds), length(&sounds[..which]));
+    let own = sounds[which];
+    let (mut samples, mut at) = (Vec::with_capacity(own.samples.len()), before + all / 2);
+    while samples.len() < own.samples.len() {
+        let mut start = at % all;
+        for sound in sounds {
+            if start < sound.samples.len() {
+                let n = (sound.samples.len() - start).min(own.samples.len() - samples.len());
+                samples.extend_from_slice(&sound.samples[start..start + n]);
+                at += n;
+                break;
+            }
+            start -= sound.samples.len();
+        }
+    }
+    Sound { rate: own.rate, samples }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_sound_becomes_another_one_of_its_length() {
+        let sound = |samples: &[f32]| Sound { rate: SAMPLE_RATE, samples: samples.to_vec() };
+        let all = [sound(&[1.0, 2.0, 3.0]), sound(&[]), sound(&[4.0, 5.0, 6.0, 7.0])];
+        let all: Vec<&Sound> = all.iter().collect();
+        let turned: Vec<Sound> = (0..3).map(|i| turned(&all, i)).collect();
+        assert_eq!(turned, [sound(&[4.0, 5.0, 6.0]), sound(&[]), sound(&[7.0, 1.0, 2.0, 3.0])]);
+        assert_eq!(super::turned(&[&sound(&[])], 0), sound(&[]));
+    }
+}

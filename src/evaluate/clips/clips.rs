@@ -1,0 +1,251 @@
+//! What is measured: clips of one rate, each the real motion, the made one of the same frames, and what was heard. Here
+//! files become clips; a dataset and a speaker become them in `speaker`.
+
+use super::pairs::Pair;
+use super::sound_features;
+use super::sound_features::Heard;
+use crate::external::ffmpeg::sound_stream::SoundStream;
+use crate::mocap::motion_file;
+use crate::motion::bones;
+use crate::motion::resample;
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::{N_JOINTS, NECK};
+use crate::types::sound::SAMPLE_RATE;
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, ensure};
+use ndarray::{Array2, Array3, s};
+use rayon::prelude::*;
+use std::path::PathBuf;
+
+/// Two lengths of one clip may differ by a second, or by this share of the longer.
+const MOST_APART_SECS: f64 = 1.0;
+const MOST_APART: f64 = 0.05;
+/// Share of the real joints for which a prediction may have no number.
+const MOST_MISSING: f64 = 0.05;
+/// How far a neck may stand from the origin before it is moved there, metres.
+const NECK_METRES: f32 = 1e-3;
+/// Median bones this many times longer or shorter are in another unit.
+const OTHER_UNIT: f64 = 2.5;
+
+/// One clip.
+#[derive(Clone, Debug)]
+pub struct Clip {
+    pub name: String,
+    /// [T, 49, 3], metres, the neck at the origin.
+    pub real: Array3<f32>,
+    pub made: Array3<f32>,
+    /// [T, 49]: what is compared: seen in the real motion.
+    pub mask: Array2<bool>,
+    pub heard: Option<Heard>,
+    /// Where its sound is, for whoever wants to hear it.
+    pub voice: Option<Voice>,
+}
+
+/// A sound that can be heard again.
+#[derive(Clone, Debug)]
+pub enum Voice {
+    File(PathBuf),
+    /// 16 kHz.
+    Kept(Vec<i16>),
+}
+
+impl Voice {
+    /// The 16 kHz samples from second `start` to `end`, fewer where the sound ends before.
+    pub fn samples(&self, start: f64, end: f64) -> Result<Vec<i16>> {
+        let at = |secs: f64| (secs.max(0.0) * f64::from(SAMPLE_RATE)).round() as usize;
+        let (from, to) = (at(start), at(end));
+        match self {
+            Self::Kept(samples) => Ok(samples.get(from..to.min(samples.len())).unwrap_or_default().to_vec()),
+            Self::File(path) => {
+                let (mut n, mut samples) = (0, Vec::new());
+                for piece in SoundStream::open(path, SAMPLE_RATE) {
+                    let piece = piece?;
+                    let wanted = from.saturating_sub(n).min(piece.len())..to.saturating_sub(n).min(piece.len());
+                    samples.extend(piece[wanted].iter().copied().map(pcm));
+                    n += piece.len();
+                    if n >= to {
+                        break;
+                    }
+                }
+                Ok(samples)
+            }
+        }
+    }
+}
+
+/// A sample of 16 bits.
+pub fn pcm(sample: f32) -> i16 {
+    (sample * 32_768.0).round().clamp(-32_768.0, 32_767.0) as i16
+}
+
+impl Clip {
+    pub fn n_frames(&self) -> usize {
+        self.mask.nrows()
+    }
+}
+
+/// Clips of one rate.
+#[derive(Clone, Debug)]
+pub struct Clips {
+    pub fps: FrameRate,
+    pub clips: Vec<Clip>,
+    /// What had to be assumed, changed or left out, in sentences.
+    pub notes: Vec<String>,
+    /// Whether the prediction's maker learnt from these very clips: then it can show nothing.
+    pub learnt: bool,
+}
+
+impl Clips {
+    pub fn n_frames(&self) -> usize {
+        self.clips.iter().map(Clip::n_frames).sum()
+    }
+
+    pub fn secs(&self) -> f64 {
+        self.fps.secs(self.n_frames())
+    }
+
+    /// Hash of the real motion, and of what of it is compared.
+    pub fn truth(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        for clip in &self.clips {
+            let seen = clip.mask.indexed_iter().filter(|(_, seen)| **seen).map(|(place, _)| place);
+            for (t, joint) in seen {
+                for k in 0..3 {
+                    hasher.update(&clip.real[[t, joint, k]].to_le_bytes());
+                }
+            }
+            hasher.update(&clip.n_frames().to_le_bytes());
+        }
+        hasher.finalize().to_hex().as_str()[..16].to_owned()
+    }
+
+    pub fn have_sound(&self) -> bool {
+        self.clips.iter().any(|clip| clip.heard.is_some())
+    }
+}
+
+/// Reads pairs of files at the rate of the first truth. `fps`: for files that do not say theirs.
+///
+/// # Errors
+/// A file that is no motion; a prediction much longer or shorter than its truth, or with many missing joints. The
+/// message names the clip and what to do.
+pub fn read(pairs: &[Pair], fps: Option<FrameRate>) -> Result<Clips> {
+    let first = pairs.first().context("there is no pair to measure")?;
+    let rate = motion_file::read(&first.truth, fps)?.motion.fps;
+    let clip = |pair: &Pair| clip(pair, fps, rate).with_context(|| format!("clip {}", pair.name));
+    let read: Vec<(Clip, Vec<String>)> = pairs.par_iter().map(clip).collect::<Result<_>>()?;
+    let (clips, notes): (Vec<Clip>, Vec<Vec<String>>) = read.into_iter().unzip();
+    Ok(Clips { fps: rate, clips, notes: notes.into_iter().flatten().collect(), learnt: false })
+}
+
+fn clip(pair: &Pair, given: Option<FrameRate>, fps: FrameRate) -> Result<(Clip, Vec<String>)> {
+    let mut notes = Vec::new();
+    let mut side = |path: &PathBuf, what: &str| -> Result<Motion> {
+        let read = motion_file::read(path, given)?;
+        notes.extend(read.notes);
+        let mut motion = read.motion;
+        if motion.fps != fps {
+            notes.push(format!("{}: the {what} at {} was resampled to {fps}", pair.name, motion.fps));
+            motion = resample::at_rate(&motion, fps);
+        }
+        if let Some(far) = neck_to_origin(&mut motion) {
+            notes.push(format!("{}: the {what}'s neck stands {far:.2} m from the origin: moved there", pair.name));
+        }
+        Ok(motion)
+    };
+    let (mut real, made) = (side(&pair.truth, "truth")?, side(&pair.prediction, "prediction")?);
+    let (n_real, n_made) = (real.n_frames(), made.n_frames());
+    let (real_secs, made_secs) = (fps.secs(n_real), fps.secs(n_made));
+    let apart = (real_secs - made_secs).abs();
+    ensure!(
+        apart <= MOST_APART_SECS.max(MOST_APART * real_secs.max(made_secs)),
+        "the truth lasts {real_secs:.2} s ({n_real} frames at {fps}) and the prediction {made_secs:.2} s ({n_made} frames): \
+         more than a second and 5 % apart, so they are not of the same sound, or a rate is wrong (--fps)"
+    );
+    let n_frames = n_real.min(n_made);
+    if n_real != n_made {
+        notes.push(format!("{}: {n_real} frames of truth, {n_made} of prediction: cut to {n_frames}", pair.name));
+    }
+    notes.extend(other_unit(&real, &made).map(|note| format!("{}: {note}", pair.name)));
+    real.mask = real.mask.slice(s![..n_frames, ..]).to_owned();
+    let (real_joints, mut made_joints) = (cut(real.joints, n_frames), cut(made.joints, n_frames));
+    let (mask, n_missing) = compared(&real_joints, &real.mask, &mut made_joints);
+    let n_seen = real.mask.iter().filter(|seen| **seen).count().max(1);
+    let share = n_missing as f64 / n_seen as f64;
+    ensure!(
+        share <= MOST_MISSING,
+        "the prediction {} has no number (NaN) for {:.1} % of the joints that the truth has: at most {:.0} % can be \
+         held over, or a prediction could leave out what it cannot do",
+        pair.prediction.display(),
+        100.0 * share,
+        100.0 * MOST_MISSING
+    );
+    if n_missing > 0 {
+        notes.push(format!(
+            "{}: the prediction has no number (NaN) for {n_missing} of {n_seen} joints: each counts as where it was last",
+            pair.name
+        ));
+    }
+    let heard = match &pair.sound {
+        Some(path) => sound_features::hear(path, fps, n_frames)?,
+        None => None,
+    };
+    if let (Some(path), heard) = (&pair.sound, &heard) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let secs = fps.secs(n_frames);
+        match heard {
+            None => notes.push(format!("{name} holds no sound: {} is not part of what needs sound", pair.name)),
+            Some(heard) => ensure!(
+                heard.secs >= secs - MOST_APART_SECS.max(MOST_APART * secs),
+                "{} lasts {:.2} s, the motion {secs:.2} s: is it the sound of another clip?",
+                path.display(),
+                heard.secs
+            ),
+        }
+    }
+    let voice = pair.sound.clone().filter(|_| heard.is_some()).map(Voice::File);
+    Ok((Clip { name: pair.name.clone(), real: real_joints, made: made_joints, mask, heard, voice }, notes))
+}
+
+fn cut(joints: Array3<f32>, n_frames: usize) -> Array3<f32> {
+    if joints.shape()[0] == n_frames { joints } else { joints.slice(s![..n_frames, .., ..]).to_owned() }
+}
+
+/// What is compared: the real joints that are seen. Where the made motion has no number it is held where it was last (before
+/// its first number, at the neck); at how many of the compared places is told.
+pub fn compared(real: &Array3<f32>, seen: &Array2<bool>, made: &mut Array3<f32>) -> (Array2<bool>, usize) {
+    let there = |joints: &Array3<f32>, t: usize, joint: usize| (0..3).all(|k| joints[[t, joint, k]].is_finite());
+    let mask = Array2::from_shape_fn(seen.raw_dim(), |(t, joint)| seen[[t, joint]] && there(real, t, joint));
+    let mut n_missing = 0;
+    for ((t, joint), wanted) in mask.indexed_iter() {
+        if !there(made, t, joint) {
+            n_missing += usize::from(*wanted);
+            (0..3).for_each(|k| made[[t, joint, k]] = if t > 0 { made[[t - 1, joint, k]] } else { 0.0 });
+        }
+    }
+    (mask, n_missing)
+}
+
+/// Takes the neck off all joints of a frame; how far it stood away at most, where that is worth a word.
+fn neck_to_origin(motion: &mut Motion) -> Option<f32> {
+    let mut far = 0.0f32;
+    for mut frame in motion.joints.outer_iter_mut() {
+        let neck: [f32; 3] = std::array::from_fn(|k| frame[[NECK, k]]);
+        let length = neck.iter().map(|v| v * v).sum::<f32>().sqrt();
+        if length.is_finite() && length > NECK_METRES {
+            far = far.max(length);
+            for joint in 0..N_JOINTS {
+                (0..3).for_each(|k| frame[[joint, k]] -= neck[k]);
+            }
+        }
+    }
+    (far > 0.0).then_some(far)
+}
+
+/// A word where the made bones are so much longer or shorter that they must be in another unit.
+fn other_unit(real: &Motion, made: &Motion) -> Option<String> {
+    let size = |motion: &Motion| bones::measure(motion).iter().take(6).map(|v| f64::from(*v)).sum::<f64>();
+    let times = size(made) / size(real);
+    (times.is_finite() && times > 0.0 && !(1.0 / OTHER_UNIT..OTHER_UNIT).contains(&times))
+        .then(|| format!("the prediction's arms are {times:.2} times as long as the truth's: are both in metres?"))
+}

@@ -1,0 +1,66 @@
+//! The intervals a speaker is measured on: what is true, with the sound. No figure here.
+
+use crate::dataset::index::SampleRef;
+use crate::dataset::{Dataset, Split};
+use crate::generate::normalisation::Normalisation;
+use crate::motion::bones;
+use crate::types::pose3d::Motion;
+use crate::types::sound::Sound;
+use crate::types::sync;
+use anyhow::{Result, bail};
+use ndarray::s;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// One interval.
+pub struct HeldOut {
+    pub key: String,
+    /// With the bone lengths of the speaker, as in training: every video has its own.
+    pub real: Motion,
+    pub sound: Sound,
+}
+
+/// The intervals of `split`, in the dataset's order. Errors where there is none, naming the splits that have some.
+pub fn samples(dataset: &Dataset, split: Split) -> Result<Vec<SampleRef>> {
+    let samples = dataset.samples(split);
+    if samples.is_empty() {
+        let others = Split::ALL.into_iter().filter(|other| !dataset.samples(*other).is_empty());
+        let others: Vec<&str> = others.map(Split::name).collect();
+        bail!(
+            "{} has no interval in the {} split; it has {}",
+            dataset.dir().display(),
+            split.name(),
+            others.join(", ")
+        );
+    }
+    Ok(samples)
+}
+
+/// Reads them.
+pub fn read(dataset: &Dataset, samples: &[SampleRef], normal: &Normalisation) -> Result<Vec<HeldOut>> {
+    let lengths = std::array::from_fn(|bone| normal.bone_lengths.get(bone).copied().unwrap_or(0.0));
+    let interval = |sample| -> Result<HeldOut> {
+        let mut sample = dataset.read(sample)?;
+        bones::with_lengths(&mut sample.motion, &lengths);
+        Ok(HeldOut { key: sample.key, real: sample.motion, sound: sample.sound })
+    };
+    samples.par_iter().map(interval).collect()
+}
+
+impl HeldOut {
+    /// Only these frames of it.
+    pub fn cut(&self, frames: Range<usize>) -> Self {
+        let real = &self.real;
+        let sound = sync::samples_of(real.fps, self.sound.rate, frames.clone());
+        let sound = self.sound.samples.get(sound.start..sound.end.min(self.sound.samples.len())).unwrap_or_default();
+        Self {
+            key: self.key.clone(),
+            real: Motion {
+                fps: real.fps,
+                joints: real.joints.slice(s![frames.clone(), .., ..]).to_owned(),
+                mask: real.mask.slice(s![frames, ..]).to_owned(),
+            },
+            sound: Sound { rate: self.sound.rate, samples: sound.to_vec() },
+        }
+    }
+}

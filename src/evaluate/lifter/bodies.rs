@@ -1,0 +1,156 @@
+//! The body lifter's errors on captured motion, beside methods that need no network. Convention: bodies of the common
+//! adult's bones; 4 s scenes at 15 frames a second; cameras within 60 degrees of the side, 15 above or below, 4 of roll;
+//! keypoints that err and miss ("drop": `train::body_scene::Filming`). Each frame is taken relative to its own neck;
+//! prediction and truth of a scene are each scaled by one number to the reference size (0.90 m); nothing is turned.
+//! MPJPE over nose, shoulders, elbows, wrists; P-MPJPE after a similarity per frame on those and the neck. The methods
+//! without a network get exact keypoints, and what else they need: true lengths, the true scale, the set's own mean.
+
+use crate::config;
+use crate::mocap::upper_body::Set;
+use crate::motion::upper_body::{ARMS, COCO, L_HIP, N_POINTS, NOSE, Pose, R_HIP};
+use crate::nn::lifter::body::BodyLifter;
+use crate::pipeline::lift::{Lifter, weights};
+use crate::train::lifter::errors::{Errors, mean_pose, of_lifted, with_bone_depth, with_mean_depth};
+use crate::train::scene::body::{FPS, Filming, Scene, scenes};
+use crate::types::interval::Interval;
+use crate::types::pose2d::{Keypoints, N_BODY, N_HAND};
+use crate::types::time::FrameRate;
+use anyhow::{Result, ensure};
+use ndarray::{Array3, s};
+use serde::Serialize;
+
+/// Scenes of a set, unless told otherwise.
+pub const SCENES: usize = 240;
+/// Bands of |yaw| that errors are given apart for, in degrees.
+const BANDS: [(f64, f64); 3] = [(0.0, 20.0), (20.0, 40.0), (40.0, 60.0)];
+
+/// The middle of the picture in px.
+const MIDDLE: [f32; 2] = [640.0, 360.0];
+
+/// The lifter as a user meets it, and its network alone.
+pub struct Lifters {
+    whole: Lifter,
+    network: BodyLifter,
+}
+
+impl Lifters {
+    /// Of the weights that `settings` name, or the built-in ones.
+    pub fn new(settings: &config::Lift) -> Result<Self> {
+        Ok(Self { whole: Lifter::new(settings)?, network: weights::body(&settings.body_weights)? })
+    }
+}
+
+/// One method's errors on one set.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    pub set: String,
+    pub method: &'static str,
+    /// What the method was given: "drop" or "clean" keypoints.
+    pub input: &'static str,
+    pub errors: Errors,
+    /// The same by |yaw|: 0 to 20, 20 to 40, 40 to 60 degrees.
+    pub by_yaw: Vec<Errors>,
+    /// Share of the frames in which the method gave all points.
+    pub told: f64,
+}
+
+/// The table: for each set the lifter, its network alone, and three methods without a network. Errors: a set whose takes
+/// are all shorter than a scene.
+pub fn table(lifters: &Lifters, sets: &[Set], n_scenes: usize) -> Result<Vec<Row>> {
+    let mut rows = Vec::new();
+    for (set, takes) in sets {
+        let (drop, clean) = (scenes(takes, Filming::Drop, n_scenes), scenes(takes, Filming::Clean, n_scenes));
+        ensure!(!drop.is_empty(), "{set}: no take lasts for a scene of 4 s");
+        let mean = mean_pose(&clean);
+        let network = |scene: &Scene| Ok(lifters.network.poses(&scene.seen, 1.0)?);
+        rows.extend([
+            row(set, "orator lift", &drop, |scene| whole(&lifters.whole, scene))?,
+            row(set, "network alone", &drop, network)?,
+            Row { input: "clean", ..row(set, "orator lift", &clean, |scene| whole(&lifters.whole, scene))? },
+            Row { input: "clean", ..row(set, "bone-length depth", &clean, |s| Ok(with_bone_depth(s)))? },
+            Row { input: "clean", ..row(set, "mean depth per joint", &clean, |s| Ok(with_mean_depth(s, &mean)))? },
+            Row { input: "clean", ..row(set, "constant mean pose", &clean, |s| Ok(vec![Some(mean); s.truth.len()]))? },
+        ]);
+    }
+    Ok(rows)
+}
+
+fn row(
+    set: &str,
+    method: &'static str,
+    scenes: &[Scene],
+    lift: impl Fn(&Scene) -> Result<Vec<Option<Pose>>>,
+) -> Result<Row> {
+    let lifted = scenes.iter().map(|scene| Ok((scene, lift(scene)?))).collect::<Result<Vec<_>>>()?;
+    let errors = of_lifted(lifted.iter().map(|(scene, poses)| (*scene, &poses[..])));
+    let band = |&(low, high): &(f64, f64)| {
+        let inside = lifted.iter().filter(|(s, _)| (low..=high).contains(&s.yaw.to_degrees().abs()));
+        of_lifted(inside.map(|(scene, poses)| (*scene, &poses[..])))
+    };
+    let by_yaw = BANDS.iter().map(band).collect();
+    let n_frames: usize = scenes.iter().map(|s| s.truth.len()).sum();
+    let told = errors.n_frames as f64 / n_frames.max(1) as f64;
+    Ok(Row { set: set.to_owned(), method, input: "drop", errors, by_yaw, told })
+}
+
+/// A scene through the whole of `orator lift`.
+fn whole(lifter: &Lifter, scene: &Scene) -> Result<Vec<Option<Pose>>> {
+    let n_frames = scene.seen.len();
+    let none = Array3::zeros((n_frames, N_HAND, 3));
+    let mut body = Array3::zeros((n_frames, N_BODY, 3));
+    for (t, seen) in scene.seen.iter().enumerate() {
+        for (joint, point) in COCO.into_iter().zip(seen) {
+            if let Some([x, y]) = *point {
+                body.slice_mut(s![t, joint, ..]).assign(&ndarray::arr1(&[x + MIDDLE[0], y + MIDDLE[1], 1.0]));
+            }
+        }
+    }
+    let fps = FrameRate::new(FPS as u32, 1);
+    let keypoints = Keypoints { fps, image_size: [1280, 720], body, left_hand: none.clone(), right_hand: none };
+    let lifted = lifter.lift_intervals(&keypoints, &[Interval { start: 0, end: n_frames }])?;
+    let point = |array: &Array3<f32>, t: usize, j: usize| std::array::from_fn(|k| f64::from(array[[t, j, k]]));
+    let pose = |t: usize| {
+        let mut pose: Pose = [[f64::NAN; 3]; N_POINTS];
+        for joint in ARMS {
+            pose[joint] = point(&lifted.motion.joints, t, joint);
+        }
+        for (i, j) in [NOSE, R_HIP, L_HIP].into_iter().enumerate() {
+            pose[j] = point(&lifted.extra, t, i);
+        }
+        Some(pose)
+    };
+    Ok((0..n_frames).map(pose).collect())
+}
+
+/// The table for people.
+pub fn text(rows: &[Row]) -> String {
+    let mut text = format!(
+        "{:22} {:6} {:>6} {:>8} {:>6} {:>7} {:>9} {:>6}   MPJPE by yaw {}\n",
+        "mm",
+        "input",
+        "MPJPE",
+        "P-MPJPE",
+        "wrist",
+        "|dz|",
+        "mm/frame",
+        "told",
+        BANDS.map(|(low, high)| format!("{low}-{high}")).join("  ")
+    );
+    for same in rows.chunk_by(|a, b| a.set == b.set) {
+        text += &format!("{}\n", same[0].set);
+        for Row { method, input, errors: e, by_yaw, told, .. } in same {
+            let bands: Vec<String> = by_yaw.iter().map(|e| format!("{:5.0}", e.mpjpe)).collect();
+            text += &format!(
+                "  {method:20} {input:6} {:6.0} {:8.0} {:6.0} {:7.0} {:9.0} {:4.0} %               {}\n",
+                e.mpjpe,
+                e.p_mpjpe,
+                e.wrist,
+                e.wrist_depth,
+                e.wrist_velocity,
+                100.0 * told,
+                bands.join(" ")
+            );
+        }
+    }
+    text.trim_end().to_owned()
+}

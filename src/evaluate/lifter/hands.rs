@@ -1,0 +1,247 @@
+//! The hand lifter's error on captured or labelled fingers, seen by random cameras from every side.
+//!
+//! Every set's hands have one size (`motion::finger_take::Size`; the middle proximal phalanx is 48 mm). A hand is
+//! turned at random, any turn equally likely, stands at 5 to 20 of its lengths from the camera, and its keypoints get
+//! normal noise of 2 % of the palm in x and in y. Errors are relative to the wrist, in the camera's axes, not turned.
+//! A lifted hand is given the true hand's total length of the bones between counted points, since a picture shows no
+//! size. The wrist itself, and points that a source does not have, count nowhere.
+
+use crate::formats::checkpoint::Contents;
+use crate::math::procrustes;
+use crate::math::vec3;
+use crate::mocap::fingers::files::FingerSet;
+use crate::mocap::fingers::take::Truth;
+use crate::motion::bones::median;
+use crate::motion::hand_bones::relaxed;
+use crate::motion::view::hand::{Hand, SeenHand, parent};
+use crate::nn::lifter::hand::HandLifter;
+use crate::pipeline::lift::weights;
+use crate::train::lifter::heatmaps;
+use crate::train::lifter::heatmaps::HeatmapLesson;
+use crate::train::scene::hand_shape::{any_turn, normal};
+use crate::train::supervised::start_from;
+use crate::types::pose2d::N_HAND;
+use crate::types::skeleton::Side;
+use anyhow::{Result, ensure};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+use std::path::Path;
+
+/// Hands measured in a set.
+pub const MEASURED: usize = 4000;
+/// Noise of a keypoint, shares of wrist to middle knuckle.
+const NOISE: f64 = 0.02;
+/// Wrist to middle knuckle of a hand that has none, metres.
+const PALM: f64 = 0.093;
+/// px a metre at the wrist; the lifter does not see it.
+const PX: f64 = 1000.0;
+
+/// Something that lifts: keypoints of right hands to hands in any unit, the wrist at 0; `None`: not lifted.
+pub type Lift<'a> = dyn Fn(&[SeenHand]) -> Result<Vec<Option<Hand>>> + 'a;
+
+/// Errors in mm, medians over all counted points of all hands.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Errors {
+    /// As it is; none for hands without knuckles.
+    pub median_mm: Option<f32>,
+    /// Each hand after the similarity that fits it best.
+    pub aligned_mm: f32,
+    /// Share of hands whose points err by more than 30 mm on average (as it is).
+    pub above_30: Option<f64>,
+}
+
+/// One set's errors: of the lifter, and of what needs no network.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    pub set: String,
+    /// What gave the hands their size.
+    pub size: &'static str,
+    pub n_hands: usize,
+    /// Share of the hands that were lifted.
+    pub lifted: f64,
+    pub lifter: Errors,
+    /// The keypoints without depth, at the true scale.
+    pub flat: Errors,
+    /// A constant hand at rest, turned within the picture, palm or back towards the viewer, whichever fits better.
+    pub relaxed: Errors,
+}
+
+/// A hand before the camera: the truth in metres in the camera's axes, and its keypoints in px.
+struct Shot {
+    truth: Truth,
+    seen: SeenHand,
+}
+
+/// The error table of `lift` on `sets`, `MEASURED` hands each, drawn with `seed`.
+pub fn evaluate(lift: &Lift, sets: &[FingerSet], n_hands: usize, seed: u64) -> Result<Vec<Row>> {
+    sets.iter().map(|set| row(lift, set, n_hands, seed)).collect()
+}
+
+/// What the weights of a file (the built-in ones where `path` is empty) lift, of either network.
+pub fn lifter_of(path: &Path) -> Result<Box<Lift<'static>>> {
+    if !path.as_os_str().is_empty() && Contents::read(path)?.facts["kind"] == heatmaps::KIND {
+        let lesson = HeatmapLesson::new(0)?;
+        start_from(&lesson, path)?;
+        return Ok(Box::new(move |seen| Ok(lesson.lifter().lift(seen, Side::Right)?)));
+    }
+    let lifter: HandLifter = weights::hands(path)?;
+    Ok(Box::new(move |seen| Ok(lifter.lift(seen, Side::Right)?)))
+}
+
+fn row(lift: &Lift, set: &FingerSet, n_hands: usize, seed: u64) -> Result<Row> {
+    let mut truths = Vec::new();
+    for take in &set.takes {
+        truths.extend(take.truths()?);
+    }
+    truths.retain(|t| t.counted.iter().filter(|c| **c).count() >= 3);
+    ensure!(!truths.is_empty(), "{}: no frame holds a wrist and three points of fingers", set.name);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let shots: Vec<Shot> = (0..n_hands).map(|_| shot(&truths[rng.random_range(0..truths.len())], &mut rng)).collect();
+    let seen: Vec<SeenHand> = shots.iter().map(|s| s.seen).collect();
+    let lifted = lift(&seen)?;
+    let whole = set.takes.iter().all(|take| take.has_knuckles());
+    let sized: Vec<Option<Hand>> =
+        shots.iter().zip(&lifted).map(|(s, h)| Some(to_size(&s.truth, h.as_ref()?))).collect();
+    let of = |hands: &[Option<Hand>]| errors(&shots, hands, whole);
+    Ok(Row {
+        set: set.name.clone(),
+        size: set.takes.first().map_or("", |take| take.size.text()),
+        n_hands,
+        lifted: lifted.iter().filter(|h| h.is_some()).count() as f64 / n_hands.max(1) as f64,
+        lifter: of(&sized),
+        flat: of(&shots.iter().map(|s| Some(flat(&s.seen))).collect::<Vec<_>>()),
+        relaxed: of(&shots.iter().map(|s| Some(at_rest(&s.seen))).collect::<Vec<_>>()),
+    })
+}
+
+fn shot(truth: &Truth, rng: &mut ChaCha8Rng) -> Shot {
+    let turn = any_turn(rng);
+    let hand = truth.hand.map(|p| turn.turn(p));
+    let distance = 0.19 * rng.random_range(5.0..20.0);
+    let palm = if truth.there[9] { vec3::norm(hand[9]) } else { PALM };
+    let seen = std::array::from_fn(|j| {
+        let grow = distance / (distance + hand[j][2]);
+        let at = [0, 1].map(|k| (PX * (hand[j][k] * grow + NOISE * palm * normal(rng))) as f32);
+        truth.there[j].then_some(at)
+    });
+    Shot { truth: Truth { hand, ..truth.clone() }, seen }
+}
+
+/// The lifted hand with the true hand's bones, all counted together.
+fn to_size(truth: &Truth, hand: &Hand) -> Hand {
+    let counts = |j: usize| j == 0 || truth.counted[j];
+    let bones: Vec<usize> = (1..N_HAND).filter(|&j| counts(j) && counts(parent(j))).collect();
+    let total = |h: &Hand| bones.iter().map(|&j| vec3::norm(vec3::sub(h[j], h[parent(j)]))).sum::<f64>();
+    let grow = total(&truth.hand) / total(hand).max(1e-9);
+    hand.map(|p| vec3::scale(p, grow))
+}
+
+fn flat(seen: &SeenHand) -> Hand {
+    let [x0, y0] = seen[0].unwrap_or_default();
+    seen.map(|p| p.map_or([0.0; 3], |[x, y]| [f64::from(x - x0) / PX, f64::from(y - y0) / PX, 0.0]))
+}
+
+fn at_rest(seen: &SeenHand) -> Hand {
+    let points = flat(seen);
+    let palm = relaxed();
+    let back = palm.map(|[x, y, z]| [-x, y, -z]);
+    let fitted = [palm, back].map(|hand| {
+        let there = || (1..N_HAND).filter(|&j| seen[j].is_some()).map(|j| (hand[j], points[j]));
+        let cos: f64 = there().map(|(h, p)| h[0] * p[0] + h[1] * p[1]).sum();
+        let sin: f64 = there().map(|(h, p)| h[0] * p[1] - h[1] * p[0]).sum();
+        let angle = sin.atan2(cos);
+        let turned = hand.map(|[x, y, z]| [angle.cos() * x - angle.sin() * y, angle.sin() * x + angle.cos() * y, z]);
+        // of equal lengths, the one that agrees more fits better
+        (cos.hypot(sin), turned)
+    });
+    let [(palm_fit, palm), (back_fit, back)] = fitted;
+    if palm_fit >= back_fit { palm } else { back }
+}
+
+fn errors(shots: &[Shot], hands: &[Option<Hand>], whole: bool) -> Errors {
+    let (mut plain, mut aligned, mut above, mut n) = (Vec::new(), Vec::new(), 0, 0);
+    for (shot, hand) in shots.iter().zip(hands).filter_map(|(s, h)| Some((s, h.as_ref()?))) {
+        let counted: Vec<usize> = (1..N_HAND).filter(|&j| shot.truth.counted[j]).collect();
+        let off = |p: vec3::Vec3, j: usize| (1000.0 * vec3::norm(vec3::sub(p, shot.truth.hand[j]))) as f32;
+        let own: Vec<f32> = counted.iter().map(|&j| off(hand[j], j)).collect();
+        above += usize::from(own.iter().sum::<f32>() > 30.0 * own.len() as f32);
+        n += 1;
+        plain.extend(own);
+        let with_wrist = |hand: &Hand| [0].iter().chain(&counted).map(|&j| hand[j]).collect::<Vec<_>>();
+        if let Some(fit) = procrustes::similarity(&with_wrist(hand), &with_wrist(&shot.truth.hand)) {
+            aligned.extend(counted.iter().map(|&j| off(fit.apply(hand[j]), j)));
+        }
+    }
+    Errors {
+        median_mm: median(plain).filter(|_| whole),
+        aligned_mm: median(aligned).unwrap_or(f32::NAN),
+        above_30: whole.then_some(above as f64 / f64::from(n.max(1))),
+    }
+}
+
+/// The table as text, a line a set.
+pub fn text(rows: &[Row]) -> String {
+    let number = |value: Option<f32>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.1}"));
+    let one = |e: &Errors| format!("{:>5} /{:>5.1}", number(e.median_mm), e.aligned_mm);
+    let mut lines = vec![format!(
+        "{:<44} {:>13} {:>8} {:>14} {:>14}   size",
+        "hands: median / aligned, mm", "lifter", ">30 mm", "flat", "at rest"
+    )];
+    lines.extend(rows.iter().map(|row| {
+        let above = row.lifter.above_30.map_or_else(|| "-".to_owned(), |share| format!("{:.0} %", 100.0 * share));
+        let (lifter, flat, relaxed) = (one(&row.lifter), one(&row.flat), one(&row.relaxed));
+        format!("{:<44} {lifter:>13} {above:>8} {flat:>14} {relaxed:>14}   {}", row.set, row.size)
+    }));
+    lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mocap::fingers::take::{FingerTake, Size};
+
+    fn resting(size: Size, known: impl Fn(usize) -> bool) -> FingerSet {
+        let frame = std::array::from_fn(|j| known(j).then(|| relaxed()[j]));
+        let take = FingerTake {
+            name: "rest".into(),
+            side: Side::Right,
+            frames: vec![frame; 4],
+            counted: [true; N_HAND],
+            size,
+        };
+        FingerSet { name: "rest".into(), takes: vec![take] }
+    }
+
+    #[test]
+    fn the_truth_is_without_error_and_points_without_truth_do_not_count() -> Result<()> {
+        let set = resting(Size::Phalanx, |j| j != 4);
+        let truths = set.takes[0].truths()?;
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let shots: Vec<Shot> = (0..60).map(|_| shot(&truths[0], &mut rng)).collect();
+        let wrong_tip: Vec<Option<Hand>> = shots
+            .iter()
+            .map(|s| {
+                let mut hand = s.truth.hand.map(|p| vec3::scale(p, 7.0));
+                hand[4] = [9.0; 3];
+                Some(to_size(&s.truth, &hand))
+            })
+            .collect();
+        let found = errors(&shots, &wrong_tip, true);
+        assert!(found.median_mm.is_some_and(|e| e < 1e-3) && found.aligned_mm < 1e-3 && found.above_30 == Some(0.0));
+        Ok(())
+    }
+
+    #[test]
+    fn the_built_in_lifter_is_far_better_than_no_depth() -> Result<()> {
+        let lift = lifter_of(Path::new(""))?;
+        let sets = [resting(Size::Phalanx, |_| true), resting(Size::MiddleEnd, |j| j == 0 || j % 4 != 1 || j == 9)];
+        let rows = evaluate(&*lift, &sets, 300, 5)?;
+        let median = |e: Errors| e.median_mm.unwrap_or(f32::NAN);
+        assert!(median(rows[0].lifter) < 20.0, "{rows:?}");
+        assert!(median(rows[0].lifter) < 0.5 * median(rows[0].flat), "{rows:?}");
+        assert!(rows[1].lifter.aligned_mm < 20.0 && rows[0].lifted == 1.0, "{rows:?}");
+        assert!(text(&rows).lines().count() == 3);
+        Ok(())
+    }
+}

@@ -1,0 +1,101 @@
+//! Motion beside motion in blocks of about 4 s: what is resampled, since neighbouring frames say the same. The blocks add
+//! up to the whole.
+
+use crate::evaluate::baseline::baselines::Predictor;
+use crate::evaluate::clips::clips::Clips;
+use crate::metrics::catalogue::{Catalogue, Interval, Measured};
+use ndarray::{Array2, s};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Length of a block, seconds: a clip has as many as fit best, all of one length. Of more than an hour they are longer, so
+/// that there are not many more of them.
+const BLOCK_SECS: f64 = 4.0;
+const MOST_SECS: f64 = 3600.0;
+/// A longer clip is measured in pieces, so that it takes no more memory and several threads; what lies across a border is
+/// not seen.
+const PIECE_SECS: f64 = 600.0;
+
+/// Length of the blocks of these clips, seconds.
+pub fn block_secs(clips: &Clips) -> f64 {
+    BLOCK_SECS * (clips.secs() / MOST_SECS).ceil().max(1.0)
+}
+
+/// The same in frames.
+fn block_frames(clips: &Clips) -> usize {
+    ((block_secs(clips) * clips.fps.per_sec()).round() as usize).max(1)
+}
+
+/// A predictor's sums over all clips and their blocks. The same whatever the number of threads.
+pub fn measure(catalogue: &Catalogue, clips: &Clips, predictor: &Predictor) -> Measured {
+    let all: Vec<Measured> = pieces(clips)
+        .into_par_iter()
+        .map(|(clip, frames)| {
+            let (of, Some(made)) = (&clips.clips[clip], predictor.motion(clips, clip)) else {
+                return Measured::default();
+            };
+            let onsets: Option<Vec<f64>> = of.heard.as_ref().map(|heard| {
+                let (start, end) = (clips.fps.secs(frames.start), clips.fps.secs(frames.end));
+                heard.onsets.iter().filter(|onset| (start..end).contains(*onset)).map(|onset| onset - start).collect()
+            });
+            let interval = Interval {
+                made: made.slice(s![frames.clone(), .., ..]),
+                real: of.real.slice(s![frames.clone(), .., ..]),
+                mask: of.mask.slice(s![frames, ..]),
+                fps: clips.fps,
+                onsets: onsets.as_deref(),
+            };
+            catalogue.measure_blocks(&interval, block_frames(clips))
+        })
+        .collect();
+    together(all)
+}
+
+/// Clips with their frames, long ones in equal pieces.
+fn pieces(clips: &Clips) -> Vec<(usize, Range<usize>)> {
+    let of_clip = |clip: usize| {
+        let n_frames = clips.clips[clip].n_frames();
+        let n = (clips.fps.secs(n_frames) / PIECE_SECS).ceil().max(1.0) as usize;
+        (0..n).map(move |i| (clip, i * n_frames / n..(i + 1) * n_frames / n))
+    };
+    (0..clips.clips.len()).flat_map(of_clip).collect()
+}
+
+/// One half of the truth beside the other: every second stretch of a block's length as if it were made, beside the one
+/// before it.
+pub fn halves(catalogue: &Catalogue, clips: &Clips) -> Measured {
+    let length = block_frames(clips);
+    let stretches = |clip: usize| (0..clips.clips[clip].n_frames() / length).map(move |i| (clip, i * length));
+    let all: Vec<(usize, usize)> = (0..clips.clips.len()).flat_map(stretches).collect();
+    let beside = |pair: &[(usize, usize)]| {
+        let part = |(clip, start): (usize, usize)| {
+            let (clip, frames) = (&clips.clips[clip], start..start + length);
+            (clip.real.slice(s![frames.clone(), .., ..]), clip.mask.slice(s![frames, ..]))
+        };
+        let ((real, seen), (made, also)) = (part(pair[0]), part(pair[1]));
+        let mut mask = seen.to_owned();
+        mask.zip_mut_with(&also, |seen, also| *seen &= also);
+        let interval = Interval { made, real, mask: mask.view(), fps: clips.fps, onsets: None };
+        catalogue.measure_blocks(&interval, length)
+    };
+    together(all.par_chunks_exact(2).map(beside).collect())
+}
+
+/// In their order.
+fn together(all: Vec<Measured>) -> Measured {
+    let mut sum = Measured::default();
+    for one in all {
+        sum.whole += &one.whole;
+        sum.blocks.extend(one.blocks);
+    }
+    sum
+}
+
+/// How often each of `n` blocks is in each draw [n_draws, n].
+pub fn counts(drawn: &[Vec<usize>], n: usize) -> Array2<f64> {
+    let mut counts = Array2::zeros((drawn.len(), n));
+    for (mut row, draw) in counts.outer_iter_mut().zip(drawn) {
+        draw.iter().filter(|i| **i < n).for_each(|i| row[*i] += 1.0);
+    }
+    counts
+}

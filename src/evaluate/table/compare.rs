@@ -1,0 +1,130 @@
+//! Two results side by side. Values are put beside each other only where their definitions are the same to the last
+//! parameter; where they differ, it is said in what, and nothing is compared.
+
+use super::bootstrap::Estimate;
+use super::result::{Metric, Stored};
+use crate::evaluate::baseline::baselines::Who;
+use serde::Serialize;
+use serde_json::Value;
+use std::collections::BTreeSet;
+
+/// A metric that both have.
+#[derive(Clone, Debug, Serialize)]
+pub struct Beside {
+    pub name: String,
+    pub unit: String,
+    pub hash: String,
+    pub a: Option<Estimate>,
+    pub b: Option<Estimate>,
+}
+
+/// What came of it.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Compared {
+    /// Said where the figures are of different real motion.
+    pub warning: Option<String>,
+    pub beside: Vec<Beside>,
+    /// A sentence for each metric of one name whose definitions differ.
+    pub refused: Vec<String>,
+    /// Metrics that one of them has, and which.
+    pub only_in_a: Vec<String>,
+    pub only_in_b: Vec<String>,
+}
+
+/// Compares the predictions of two results.
+pub fn compare(a: &Stored, b: &Stored) -> Compared {
+    let warning = format!(
+        "A is of {} clips and B of {}, and their real motion is not the same: a better figure may be an easier clip",
+        a.n_clips, b.n_clips
+    );
+    let mut compared = Compared { warning: (a.truth != b.truth).then_some(warning), ..Compared::default() };
+    let mut rest: Vec<&Metric> = b.metrics.iter().collect();
+    let mut alone: Vec<&Metric> = Vec::new();
+    for metric in &a.metrics {
+        match rest.iter().position(|other| other.hash == metric.hash) {
+            Some(at) => {
+                let other = rest.remove(at);
+                compared.beside.push(Beside {
+                    name: metric.plain_name.clone(),
+                    unit: metric.unit.clone(),
+                    hash: metric.hash.clone(),
+                    a: metric.value(Who::Prediction),
+                    b: other.value(Who::Prediction),
+                });
+            }
+            None => alone.push(metric),
+        }
+    }
+    for metric in alone {
+        match rest.iter().position(|other| (&other.name, &other.part) == (&metric.name, &metric.part)) {
+            Some(at) => compared.refused.push(refusal(metric, rest.remove(at))),
+            None => compared.only_in_a.push(metric.plain_name.clone()),
+        }
+    }
+    compared.only_in_b = rest.iter().map(|metric| metric.plain_name.clone()).collect();
+    compared
+}
+
+/// `mpjpe (all), joint error, is not comparable: fps is 15.0 in A and 30.0 in B (hash ... and ...)`
+fn refusal(a: &Metric, b: &Metric) -> String {
+    let mut differ = Vec::new();
+    differences("", &a.parameters, &b.parameters, &mut differ);
+    if a.definition != b.definition {
+        differ.push("the definition itself is another".to_owned());
+    }
+    if a.unit != b.unit {
+        differ.push(format!("the unit is {} in A and {} in B", a.unit, b.unit));
+    }
+    if differ.is_empty() {
+        differ.push("the hash is not that of the definition: the file was changed".to_owned());
+    }
+    let differ = differ.join("; ");
+    format!("{} ({}), {}, is not comparable: {differ} (hash {} and {})", a.name, a.part, a.plain_name, a.hash, b.hash)
+}
+
+fn differences(path: &str, a: &Value, b: &Value, differ: &mut Vec<String>) {
+    match (a, b) {
+        (Value::Object(of_a), Value::Object(of_b)) => {
+            let keys: BTreeSet<&String> = of_a.keys().chain(of_b.keys()).collect();
+            for key in keys {
+                let place = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+                let of = |map: &serde_json::Map<String, Value>| map.get(key).cloned().unwrap_or(Value::Null);
+                differences(&place, &of(of_a), &of(of_b), differ);
+            }
+        }
+        _ if a == b => {}
+        _ => differ.push(format!("{path} is {} in A and {} in B", shown(a), shown(b))),
+    }
+}
+
+fn shown(value: &Value) -> String {
+    match value {
+        Value::Null => "not set".to_owned(),
+        value => value.to_string(),
+    }
+}
+
+/// Side by side as text.
+pub fn text(compared: &Compared) -> String {
+    let cell = |estimate: &Option<Estimate>| match estimate {
+        Some(e) if e.low.is_finite() => format!("  {:.4} [{:.4}, {:.4}]", e.value, e.low, e.high),
+        Some(e) => format!("{:.4}", e.value),
+        None => "-".to_owned(),
+    };
+    let mut text = compared.warning.iter().map(|warning| format!("WARNING: {warning}\n\n")).collect::<String>();
+    let width = compared.beside.iter().map(|row| row.name.chars().count() + row.unit.len() + 3).max().unwrap_or(0);
+    if !compared.beside.is_empty() {
+        text += &format!("{:width$}{:>34}{:>34}\n", "", "A", "B");
+    }
+    for row in &compared.beside {
+        let name = if row.unit == "1" { row.name.clone() } else { format!("{} ({})", row.name, row.unit) };
+        text += &format!("{name:width$}{:>34}{:>34}\n", cell(&row.a), cell(&row.b));
+    }
+    compared.refused.iter().for_each(|refusal| text += &format!("refused: {refusal}\n"));
+    for (names, which) in [(&compared.only_in_a, "A"), (&compared.only_in_b, "B")] {
+        if !names.is_empty() {
+            text += &format!("only in {which}: {}\n", names.join("; "));
+        }
+    }
+    text
+}

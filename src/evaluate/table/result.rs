@@ -1,0 +1,119 @@
+//! A table as JSON: each value with its definition, parameters and their hash, so that it can be held against another one
+//! later; and reading it back. Only values of one hash are comparable.
+
+use super::bootstrap::Estimate;
+use super::table::Table;
+use crate::evaluate::baseline::baselines::Who;
+use crate::evaluate::verdict::labels;
+use crate::evaluate::verdict::verdict::{better_than_nothing, hears};
+use anyhow::{Context, Result, ensure};
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
+use std::path::Path;
+
+/// Of the form of the JSON.
+pub const VERSION: u64 = 1;
+
+/// The whole result.
+pub fn json(table: &Table) -> Value {
+    let metrics = (0..table.definitions.len()).map(|index| metric(table, index));
+    let predictors = table.rows.iter().map(|row| json!({ "name": row.who, "says": row.says }));
+    json!({
+        "evaluation": VERSION,
+        "convention": table.settings.convention,
+        "fps": table.settings.fps,
+        "n_clips": table.n_clips,
+        "n_frames": table.n_frames,
+        "n_blocks": table.n_blocks,
+        "block_secs": table.block_secs,
+        "secs": table.secs,
+        "with_sound": table.with_sound,
+        "truth": table.truth,
+        "learnt_from_these_clips": table.learnt,
+        "notes": table.notes,
+        "predictors": predictors.collect::<Vec<_>>(),
+        "metrics": metrics.collect::<Vec<_>>(),
+        "better_than_nothing": better_than_nothing(table),
+        "hears": hears(table),
+    })
+}
+
+fn metric(table: &Table, index: usize) -> Value {
+    let definition = &table.definitions[index];
+    let mut values = Map::new();
+    for row in &table.rows {
+        let estimate = &row.values[index];
+        let name = serde_json::to_value(row.who).ok().and_then(|name| name.as_str().map(str::to_owned));
+        let value = match (estimate.value.is_finite(), row.reasons[index].as_str()) {
+            (true, _) => json!(estimate),
+            (false, "") => json!({ "value": null }),
+            (false, reason) => json!({ "value": null, "undefined": reason }),
+        };
+        values.insert(name.unwrap_or_default(), value);
+    }
+    json!({
+        "name": definition.name,
+        "part": definition.part,
+        "plain_name": labels::name(definition),
+        "unit": definition.unit,
+        "better": definition.better,
+        "definition": definition.formula,
+        "parameters": definition.parameters,
+        "hash": definition.hash(),
+        "values": values,
+    })
+}
+
+/// One metric of a result that was read.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct Metric {
+    pub name: String,
+    pub part: String,
+    pub plain_name: String,
+    pub unit: String,
+    pub definition: String,
+    pub parameters: Value,
+    pub hash: String,
+    values: Map<String, Value>,
+}
+
+/// Metrics of a result.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct Stored {
+    evaluation: u64,
+    /// Hash of the real motion behind the figures, and how many clips it has.
+    pub truth: String,
+    pub n_clips: usize,
+    pub metrics: Vec<Metric>,
+}
+
+impl Stored {
+    /// Reads what `orator evaluate --json` wrote.
+    ///
+    /// # Errors
+    /// Not there, no such JSON, of another version, or with a hash that is not that of its definition.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let stored: Self = serde_json::from_str(&text).with_context(|| {
+            format!("{} is no result of an evaluation: `orator evaluate --json ... > FILE` writes one", path.display())
+        })?;
+        ensure!(
+            stored.evaluation == VERSION,
+            "{} has version {}, expected {VERSION}: evaluate again",
+            path.display(),
+            stored.evaluation
+        );
+        Ok(stored)
+    }
+}
+
+impl Metric {
+    /// The value of a predictor, with its interval where it has one.
+    pub fn value(&self, who: Who) -> Option<Estimate> {
+        let name = serde_json::to_value(who).ok()?;
+        let value = self.values.get(name.as_str()?)?;
+        let number = |key: &str| value.get(key).and_then(Value::as_f64);
+        let (low, high) = (number("low").unwrap_or(f64::NAN), number("high").unwrap_or(f64::NAN));
+        Some(Estimate { value: number("value")?, low, high })
+    }
+}

@@ -1,0 +1,176 @@
+//! The table: every figure of every predictor with its interval, on the same clips and the same draws.
+
+use super::blocks;
+use super::bootstrap::{Estimate, draws};
+use crate::evaluate::baseline::baselines::{Predictor, Who};
+use crate::evaluate::clips::clips::Clips;
+use crate::metrics::catalogue::{Better, Catalogue, Definition, Measured, Settings};
+use crate::stage::progress::Task;
+use anyhow::{Result, ensure};
+use ndarray::{Array2, s};
+
+/// Draws behind an interval; a costly figure (Frechet distances, correlations) takes fewer.
+pub const N_DRAWS: usize = 1000;
+pub const N_COSTLY_DRAWS: usize = 100;
+/// Fewer blocks than this carry no conclusion.
+pub const FEW_BLOCKS: usize = 10;
+
+/// One predictor's figures.
+#[derive(Clone, Debug)]
+pub struct Row {
+    pub who: Who,
+    /// What it is, in a sentence.
+    pub says: String,
+    /// One a definition.
+    pub values: Vec<Estimate>,
+    /// Why a value is none; empty where there is one.
+    pub reasons: Vec<String>,
+    /// [`N_DRAWS`, definitions]; NaN where a costly figure has no more draws. Empty where none were taken.
+    drawn: Array2<f64>,
+}
+
+/// All of them.
+#[derive(Clone, Debug)]
+pub struct Table {
+    pub settings: Settings,
+    pub definitions: Vec<Definition>,
+    /// For a figure that should be near the real motion's: where that stands.
+    pub truth_of: Vec<Option<usize>>,
+    pub n_clips: usize,
+    pub n_blocks: usize,
+    /// About how long each is.
+    pub block_secs: f64,
+    pub n_frames: usize,
+    pub secs: f64,
+    pub with_sound: bool,
+    /// Whether the prediction's maker learnt from these very clips.
+    pub learnt: bool,
+    /// Hash of the real motion and of what of it is compared.
+    pub truth: String,
+    /// The prediction first, the truth last.
+    pub rows: Vec<Row>,
+    pub notes: Vec<String>,
+}
+
+/// Measures the prediction, the baselines, and the truth beside itself. One predictor after the other, so that memory
+/// holds the sums of one; the same figures whatever the number of threads.
+///
+/// # Errors
+/// Settings that the catalogue does not take; no frame to measure.
+pub fn measure(clips: &Clips, settings: &Settings, predictors: &[Predictor], task: &dyn Task) -> Result<Table> {
+    let settings = Settings { fps: clips.fps, ..settings.clone() };
+    let catalogue = Catalogue::new(&settings)?;
+    ensure!(clips.n_frames() > 0, "there is no frame to measure");
+    let (mut rows, mut n_blocks) = (Vec::new(), 0);
+    for predictor in predictors {
+        task.detail(predictor.who.name());
+        let measured = blocks::measure(&catalogue, clips, predictor);
+        n_blocks = measured.blocks.len();
+        rows.push(row(&catalogue, predictor.who, &predictor.says, &measured));
+        task.advance(1);
+    }
+    task.detail("truth");
+    rows.extend(halves(&catalogue, clips));
+    let truth = Predictor::truth(clips);
+    // without its blocks: nothing is drawn of it
+    let whole = blocks::measure(&catalogue, clips, &truth).whole;
+    rows.push(row(&catalogue, Who::Truth, &truth.says, &Measured { whole, blocks: Vec::new() }));
+    task.advance(1);
+    let definitions = catalogue.definitions().to_vec();
+    let truth_of = (0..definitions.len()).map(|index| catalogue.truth_of(index)).collect();
+    Ok(Table {
+        settings,
+        definitions,
+        truth_of,
+        n_clips: clips.clips.len(),
+        n_blocks,
+        block_secs: blocks::block_secs(clips),
+        n_frames: clips.n_frames(),
+        secs: clips.secs(),
+        with_sound: clips.have_sound(),
+        learnt: clips.learnt,
+        truth: clips.truth(),
+        rows,
+        notes: clips.notes.clone(),
+    })
+}
+
+/// One half of the truth beside the other: figures of whole sets of frames alone, since no frame has a partner.
+fn halves(catalogue: &Catalogue, clips: &Clips) -> Option<Row> {
+    let measured = blocks::halves(catalogue, clips);
+    if measured.blocks.is_empty() {
+        return None;
+    }
+    let says = "every second block of the truth beside the others: how far apart two sets of real motion are that have half \
+                the frames; only for figures of whole sets";
+    let mut row = row(catalogue, Who::TruthHalves, says, &measured);
+    for (index, definition) in catalogue.definitions().iter().enumerate().filter(|(_, d)| !is_of_sets(d)) {
+        row.values[index] = Estimate { value: f64::NAN, low: f64::NAN, high: f64::NAN };
+        row.reasons[index] = format!("{} needs two motions of the same seconds", definition.name);
+    }
+    Some(row)
+}
+
+/// Whether a figure compares two sets of frames whatever their order.
+fn is_of_sets(definition: &Definition) -> bool {
+    ["frechet", "hellinger"].iter().any(|start| definition.name.starts_with(start))
+}
+
+fn row(catalogue: &Catalogue, who: Who, says: &str, measured: &Measured) -> Row {
+    let values = catalogue.values(&measured.whole);
+    let n_blocks = measured.blocks.len();
+    let drawn = if n_blocks == 0 {
+        Array2::from_elem((0, values.len()), f64::NAN)
+    } else {
+        let counts = blocks::counts(&draws(n_blocks, N_DRAWS), n_blocks);
+        let mut drawn = catalogue.draw_cheap(&measured.blocks, counts.view());
+        // the first of the same draws
+        let costly = catalogue.draw_costly(&measured.blocks, counts.slice(s![..N_COSTLY_DRAWS, ..]));
+        for index in (0..values.len()).filter(|index| catalogue.is_costly(*index)) {
+            drawn.column_mut(index).fill(f64::NAN);
+            drawn.slice_mut(s![..N_COSTLY_DRAWS, index]).assign(&costly.column(index));
+        }
+        drawn
+    };
+    let estimate = |(index, value): (usize, &f64)| {
+        let estimate = Estimate::of(*value, &drawn.column(index).to_vec());
+        // no figure is below 0
+        Estimate { low: estimate.low.max(0.0 * estimate.low), ..estimate }
+    };
+    let reason = |(index, value): (usize, &f64)| match value.is_finite() {
+        true => String::new(),
+        false => catalogue.reason(&measured.whole, index),
+    };
+    Row {
+        who,
+        says: says.to_owned(),
+        reasons: values.iter().enumerate().map(reason).collect(),
+        values: values.iter().enumerate().map(estimate).collect(),
+        drawn,
+    }
+}
+
+impl Table {
+    /// The figures of a predictor, where it was measured.
+    pub fn row(&self, who: Who) -> Option<&Row> {
+        self.rows.iter().find(|row| row.who == who)
+    }
+
+    /// By how much `a` is better than `b` in a figure, in its unit: above 0 where it is better, with the interval of the
+    /// same draws of both. NaN where the figure knows no better.
+    pub fn gain(&self, a: &Row, b: &Row, index: usize) -> Estimate {
+        let good = |value: f64, truth: f64| match self.definitions.get(index).map(|d| d.better) {
+            Some(Better::Higher) => value,
+            Some(Better::Lower) => -value,
+            Some(Better::NearerTruth) => -(value - truth).abs(),
+            Some(Better::One) => -(value - 1.0).abs(),
+            Some(Better::Neither) | None => f64::NAN,
+        };
+        let truth = self.truth_of.get(index).copied().flatten().unwrap_or(index);
+        let of_values = |row: &Row| good(row.values[index].value, row.values[truth].value);
+        let of_draw = |row: &Row, draw: usize| good(row.drawn[[draw, index]], row.drawn[[draw, truth]]);
+        let n = a.drawn.nrows().min(b.drawn.nrows());
+        let drawn: Vec<f64> = (0..n).map(|draw| of_draw(a, draw) - of_draw(b, draw)).collect();
+        Estimate::of(of_values(a) - of_values(b), &drawn)
+    }
+}

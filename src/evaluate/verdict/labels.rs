@@ -1,0 +1,163 @@
+//! Figures as people read them: a plain name, digits that say something, the interval in brackets.
+
+use crate::evaluate::table::bootstrap::Estimate;
+use crate::metrics::catalogue::{Better, Definition};
+
+/// Names of families of figures, longest beginning first where two begin alike.
+const NAMES: [(&str, &str); 26] = [
+    ("pck_3d", "correct keypoints"),
+    ("pck_2d", "correct keypoints, front view"),
+    ("l1div", "diversity within a clip"),
+    ("l1", "mean coordinate error"),
+    ("mpjpe", "joint error"),
+    ("p_mpjpe", "joint error after alignment"),
+    ("pa_mpjpe", "joint error after alignment"),
+    ("acceleration_error", "acceleration error"),
+    ("acceleration", "acceleration"),
+    ("jerk", "jerk"),
+    ("speed", "speed"),
+    ("hellinger", "speeds unlike the truth's (Hellinger)"),
+    ("diversity", "diversity within a clip"),
+    ("pairwise_distance", "distance between poses"),
+    ("average_pairwise_distance", "distance between poses"),
+    ("bone_change", "bone change per frame"),
+    ("bone_deviation", "bone deviation"),
+    ("maje", "mean coordinate error after the seed"),
+    ("beat_consistency", "beat consistency"),
+    ("beat_alignment", "beat alignment"),
+    ("frechet_pose", "Frechet distance, poses"),
+    ("frechet_window", "Frechet distance, movements of a second"),
+    ("frechet_embedding", "Frechet distance, movements, embedded"),
+    ("frechet", "Frechet distance"),
+    ("cca", "canonical correlation"),
+    ("energy", "motion energy"),
+];
+
+/// `correct keypoints at 0.2, fingers`
+pub fn name(definition: &Definition) -> String {
+    match part(definition) {
+        "" => whole_name(definition),
+        part => format!("{}, {part}", whole_name(definition)),
+    }
+}
+
+/// The name without the part of the body.
+pub fn whole_name(definition: &Definition) -> String {
+    let known =
+        NAMES.iter().filter(|(start, _)| definition.name.starts_with(start)).max_by_key(|(start, _)| start.len());
+    let mut name = match known {
+        Some((_, plain)) => (*plain).to_owned(),
+        None => definition.name.replace('_', " "),
+    };
+    if definition.better == Better::Neither {
+        name += " of the truth";
+    }
+    if let Some(alpha) = definition.parameters.get("alpha") {
+        name += &format!(" at {alpha}");
+    }
+    if definition.unit == "%" && definition.name.starts_with("bone") {
+        name += ", relative";
+    }
+    name
+}
+
+/// The part of the body, plainly; all of it needs no word.
+pub fn part(definition: &Definition) -> &'static str {
+    match definition.part {
+        "all" => "",
+        "all_and_neck" => "with the neck",
+        "body" => "arms",
+        "hands" => "fingers",
+        "fingers_from_wrist" => "fingers from the wrist",
+        "from_joint_8" => "from joint 8 on",
+        other => other,
+    }
+}
+
+/// Which way it is good, as a sign of one letter or two: more, less, as the truth, one.
+pub const fn direction(better: Better) -> &'static str {
+    match better {
+        Better::Higher => "more is better",
+        Better::Lower => "less is better",
+        Better::NearerTruth => "as the truth is best",
+        Better::One => "1 is best",
+        Better::Neither => "",
+    }
+}
+
+/// What a figure is counted in; shares are shown in percent.
+pub fn unit(definition: &Definition) -> &str {
+    if is_share(definition) {
+        return "%";
+    }
+    match definition.unit {
+        "1" => "",
+        "m/s^2" => "m/s\u{b2}",
+        "m/s^3" => "m/s\u{b3}",
+        "cm^2" => "cm\u{b2}",
+        "cm/s^2" => "cm/s\u{b2}",
+        "cm/s^3" => "cm/s\u{b3}",
+        unit => unit,
+    }
+}
+
+fn is_share(definition: &Definition) -> bool {
+    definition.name.starts_with("pck")
+}
+
+/// The value alone, `-` where there is none.
+pub fn number(definition: &Definition, value: f64) -> String {
+    let value = if is_share(definition) { 100.0 * value } else { value };
+    if !value.is_finite() {
+        return "-".to_owned();
+    }
+    // three digits that say something
+    let digits = match value.abs() {
+        _ if is_share(definition) => 1,
+        n if n >= 100.0 => usize::from(n < 1000.0),
+        n if n >= 10.0 => 1,
+        n if n >= 1.0 => 2,
+        n if n >= 0.001 => (2.0 - n.log10().floor()) as usize,
+        // what is less is rounding
+        _ => 4,
+    };
+    let text = format!("{value:.digits$}");
+    if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') { "0".to_owned() } else { text }
+}
+
+/// `41.2 [38.0, 44.1]`
+pub fn bracketed(definition: &Definition, estimate: &Estimate) -> String {
+    let number = |value: f64| number(definition, value);
+    match estimate.low.is_finite() && estimate.high.is_finite() {
+        true => format!("{} [{}, {}]", number(estimate.value), number(estimate.low), number(estimate.high)),
+        false => number(estimate.value),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::catalogue::{Catalogue, Settings};
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_figure_has_a_plain_name_of_its_own() {
+        let catalogue = Catalogue::new(&Settings::default()).unwrap();
+        let names: Vec<String> = catalogue.definitions().iter().map(name).collect();
+        assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len(), "{names:#?}");
+        assert!(names.iter().all(|name| !name.contains('_')), "{names:#?}");
+        assert_eq!(names[0], "correct keypoints at 0.2");
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        let catalogue = Catalogue::new(&Settings::default()).unwrap();
+        let share = &catalogue.definitions()[0];
+        let estimate = Estimate { value: 0.4123, low: 0.38, high: 0.44 };
+        assert_eq!(bracketed(share, &estimate), "41.2 [38.0, 44.0]");
+        let error = catalogue.definitions().iter().find(|d| d.name == "mpjpe").unwrap();
+        assert_eq!(unit(error), "mm");
+        let shown = [1234.56, 233.04, 12.345, 0.12345, 0.012345, 0.0, f64::NAN].map(|v| number(error, v));
+        assert_eq!(shown, ["1235", "233.0", "12.3", "0.123", "0.0123", "0", "-"]);
+    }
+}

@@ -1,0 +1,130 @@
+//! The table as text for a terminal.
+
+use super::labels;
+use super::verdict::{better_than_nothing, hears};
+use crate::evaluate::baseline::baselines::Who;
+use crate::evaluate::table::table::{FEW_BLOCKS, N_COSTLY_DRAWS, N_DRAWS, Row, Table};
+use crate::metrics::catalogue::Better;
+use std::fmt::Write as _;
+
+/// Column heads, two lines each.
+const fn heads(who: Who) -> [&'static str; 2] {
+    match who {
+        Who::Prediction => ["", "prediction"],
+        Who::MeanPose => ["mean", "pose"],
+        Who::MedianPose => ["median", "pose"],
+        Who::NearestNeighbour => ["nearest", "neighbour"],
+        Who::MismatchedPrediction => ["mismatched", "prediction"],
+        Who::LatePrediction => ["late", "prediction"],
+        Who::MismatchedTruth => ["mismatched", "truth"],
+        Who::TruthHalves => ["truth", "halves"],
+        Who::Truth => ["", "truth"],
+    }
+}
+
+/// The table, what its columns are, and what follows from it.
+///
+/// With `all`, every figure; otherwise those of arms, fingers and wrists only of correct keypoints and joint errors.
+pub fn text(table: &Table, all: bool) -> String {
+    let Table { n_clips, n_blocks, n_frames, secs, block_secs, .. } = table;
+    let clips = if *n_clips == 1 { "clip" } else { "clips" };
+    let mut text =
+        format!("{n_clips} {clips}, {secs:.1} s, {n_frames} frames, {n_blocks} blocks of about {block_secs} s\n\n");
+    let is_shown =
+        |i: &usize| (all || is_main(table, *i)) && table.definitions[*i].better != Better::Neither && any(table, *i);
+    let shown: Vec<usize> = (0..table.definitions.len()).filter(is_shown).collect();
+    let first: Vec<String> = shown.iter().map(|i| named(table, *i)).collect();
+    let width = first.iter().map(|name| name.chars().count()).max().unwrap_or(0);
+    let columns: Vec<Vec<String>> = table.rows.iter().map(|row| column(table, row, &shown)).collect();
+    let widths: Vec<usize> =
+        columns.iter().map(|cells| cells.iter().map(|cell| cell.chars().count()).max().unwrap_or(0) + 2).collect();
+    let line = |head: &str, cells: &mut dyn Iterator<Item = &str>| {
+        let cells: String = cells.zip(&widths).map(|(cell, width)| format!("{cell:>width$}")).collect();
+        format!("{}{cells}", pad(head, width)).trim_end().to_owned() + "\n"
+    };
+    for k in 0..2 {
+        text += &line("", &mut columns.iter().map(|cells| cells[k].as_str()));
+    }
+    for (i, name) in first.iter().enumerate() {
+        text += &line(name, &mut columns.iter().map(|cells| cells[i + 2].as_str()));
+    }
+    let few = if *n_blocks < FEW_BLOCKS { "; with so few blocks they say little" } else { "" };
+    let _ = writeln!(
+        text,
+        "\nin brackets: 95 % intervals, {N_DRAWS} draws of the blocks (Frechet distances, correlations: {N_COSTLY_DRAWS}){few}"
+    );
+    text += "which way is better stands before each name: more, less, like the truth, near to one\n";
+    if !all {
+        text += "--all shows the other figures of arms, fingers and wrists too\n";
+    }
+    for row in &table.rows {
+        let _ = writeln!(text, "{}: {}", row.who.name(), row.says);
+    }
+    for note in &table.notes {
+        let _ = writeln!(text, "note: {note}");
+    }
+    for note in undefined(table) {
+        let _ = writeln!(text, "no value: {note}");
+    }
+    let _ = write!(text, "\n{}\n{}\n", better_than_nothing(table).text(), hears(table).text());
+    text
+}
+
+/// Figures that nobody has a value of, with the reason; those of one reason together.
+pub fn undefined(table: &Table) -> Vec<String> {
+    let mut by_reason: Vec<(String, Vec<String>)> = Vec::new();
+    let Some(own) = table.row(Who::Prediction) else { return Vec::new() };
+    let hidden = (0..table.definitions.len()).filter(|i| table.definitions[*i].better != Better::Neither);
+    for index in hidden.filter(|i| !own.values[*i].value.is_finite()) {
+        let (reason, name) = (own.reasons[index].clone(), labels::name(&table.definitions[index]));
+        match by_reason.iter_mut().find(|(other, _)| *other == reason) {
+            Some((_, names)) => names.push(name),
+            None => by_reason.push((reason, vec![name])),
+        }
+    }
+    by_reason.into_iter().map(|(reason, names)| format!("{}: {reason}", names.join(", "))).collect()
+}
+
+/// Whether a figure is shown where not all are: the whole of it, its only part, or a part of the first figures of place.
+fn is_main(table: &Table, index: usize) -> bool {
+    let definition = &table.definitions[index];
+    let name = labels::whole_name(definition);
+    let first = table.definitions.iter().position(|other| labels::whole_name(other) == name);
+    let is_place = ["pck_3d", "mpjpe"].iter().any(|start| definition.name.starts_with(start));
+    first == Some(index) || (is_place && ["body", "hands"].contains(&definition.part))
+}
+
+fn any(table: &Table, index: usize) -> bool {
+    table.rows.iter().any(|row| row.values[index].value.is_finite())
+}
+
+fn named(table: &Table, index: usize) -> String {
+    let definition = &table.definitions[index];
+    let sign = match definition.better {
+        Better::Higher => "more",
+        Better::Lower => "less",
+        Better::NearerTruth => "like",
+        Better::One => "one ",
+        Better::Neither => "    ",
+    };
+    let unit = labels::unit(definition);
+    let unit = if unit.is_empty() { String::new() } else { format!(" ({unit})") };
+    format!("{sign}  {}{unit}", labels::name(definition))
+}
+
+/// Two heads and a cell for each figure; the prediction's with their intervals.
+fn column(table: &Table, row: &Row, shown: &[usize]) -> Vec<String> {
+    let cell = |index: &usize| {
+        let (definition, estimate) = (&table.definitions[*index], &row.values[*index]);
+        match row.who {
+            Who::Prediction => labels::bracketed(definition, estimate),
+            _ => labels::number(definition, estimate.value),
+        }
+    };
+    heads(row.who).iter().map(|head| (*head).to_owned()).chain(shown.iter().map(cell)).collect()
+}
+
+fn pad(text: &str, width: usize) -> String {
+    let n = text.chars().count();
+    format!("{text}{}", " ".repeat(width.saturating_sub(n)))
+}

@@ -1,0 +1,267 @@
+//! What a table means in plain words: is the prediction better than doing nothing, and does it hear? Several figures are
+//! asked, each with the interval of its difference on the same draws; one alone says little (a pose that never moves
+//! has many correct keypoints).
+
+use super::labels;
+use crate::evaluate::baseline::baselines::Who;
+use crate::evaluate::table::bootstrap::Estimate;
+use crate::evaluate::table::table::{FEW_BLOCKS, Row, Table};
+use crate::metrics::catalogue::Better;
+use serde::Serialize;
+
+/// What a figure is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Aspect {
+    /// Where the joints are at each moment.
+    Place,
+    /// Which poses are made, and how they follow each other.
+    Poses,
+    /// How fast it moves.
+    Movement,
+    /// Whether it moves on the beat of the sound.
+    Beat,
+}
+
+/// What a figure says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Answer {
+    Yes,
+    No,
+    Undecided,
+}
+
+/// A figure that was asked.
+#[derive(Clone, Debug, Serialize)]
+pub struct Vote {
+    pub figure: String,
+    pub aspect: Aspect,
+    /// Who it was held against.
+    pub against: Who,
+    pub answer: Answer,
+    /// How much better, in the figure's unit; below 0: worse.
+    pub gain: Estimate,
+}
+
+/// A question with its answer.
+#[derive(Clone, Debug, Serialize)]
+pub struct Verdict {
+    /// `yes`, `no`, `in part` or `undecided`.
+    pub word: &'static str,
+    /// In full, but for what each figure says.
+    pub sentence: String,
+    /// The figures that were asked.
+    pub votes: Vec<Vote>,
+}
+
+/// Is it better than the better of the poses that never move?
+pub fn better_than_nothing(table: &Table) -> Verdict {
+    let question = "Is it better than doing nothing?";
+    let Some(own) = table.row(Who::Prediction) else { return nothing(question) };
+    let asked = [Aspect::Place, Aspect::Poses, Aspect::Movement];
+    let votes = votes(table, own, &asked, |index| better_still(table, index));
+    let of = |aspect: Aspect| summed(votes.iter().filter(|vote| vote.aspect == aspect));
+    let asks = |aspect: Aspect| votes.iter().any(|vote| vote.aspect == aspect);
+    let rest = match summed(votes.iter().filter(|vote| vote.aspect != Aspect::Place)) {
+        // a pose that fits better, and never moves either, has its poses for it and no movement
+        Answer::Yes if asks(Aspect::Movement) && of(Aspect::Movement) != Answer::Yes => Answer::Undecided,
+        rest => rest,
+    };
+    let n_place = votes.iter().filter(|vote| vote.aspect == Aspect::Place).count();
+    let (word, says) = match (of(Aspect::Place), rest) {
+        _ if table.learnt => return by_heart(question),
+        _ if votes.is_empty() => return no_figure(question),
+        _ if table.n_blocks < FEW_BLOCKS => return too_few(question, table),
+        (place, _) if n_place == votes.len() => match place {
+            Answer::Yes => (
+                "in part",
+                "it is nearer to where the speaker is than a pose that never moves; how it moves, no figure of this convention says",
+            ),
+            Answer::No => (
+                "no",
+                "a pose that never moves is nearer to where the speaker is; how it moves, no figure of this convention says",
+            ),
+            Answer::Undecided => ("undecided", "no figure tells it apart from a pose that never moves"),
+        },
+        (_, rest) if n_place == 0 => match rest {
+            Answer::Yes => (
+                "in part",
+                "its poses and movements are more like the speaker's than a pose that never moves; whether it is nearer to where the speaker is, no figure of this convention says",
+            ),
+            Answer::No => ("no", "its poses or movements are less like the speaker's than a pose that never moves"),
+            Answer::Undecided => ("undecided", "no figure tells it apart from a pose that never moves"),
+        },
+        (Answer::Yes, Answer::Yes) => (
+            "yes",
+            "it is nearer to where the speaker is, and moves more like the speaker, than a pose that never moves",
+        ),
+        (Answer::Yes, Answer::Undecided) => (
+            "in part",
+            "it is nearer to where the speaker is than a pose that never moves; that it moves like the speaker is not shown",
+        ),
+        (Answer::Yes, Answer::No) => (
+            "in part",
+            "it is nearer to where the speaker is than a pose that never moves, but its poses or movements are less like the speaker's",
+        ),
+        (Answer::No, Answer::Yes) => (
+            "in part",
+            "its poses and movements are more like the speaker's than a pose that never moves, but that pose is nearer to where the speaker is",
+        ),
+        (Answer::Undecided, Answer::Yes) => (
+            "in part",
+            "its poses and movements are more like the speaker's than a pose that never moves, but it is not shown to be nearer to where the speaker is",
+        ),
+        (Answer::No, _) => (
+            "no",
+            "a pose that never moves is nearer to where the speaker is, and its poses and movements are not shown to be more like the speaker's",
+        ),
+        (Answer::Undecided, Answer::No) => (
+            "no",
+            "its poses or movements are less like the speaker's than a pose that never moves, and it is not shown to be nearer to where the speaker is",
+        ),
+        (Answer::Undecided, Answer::Undecided) => {
+            ("undecided", "no figure tells it apart from a pose that never moves")
+        }
+    };
+    let oracle = table.row(Who::MeanPose).is_some_and(|row| row.says.contains("oracle"));
+    let oracle =
+        if oracle { " (The pose is taken from the truth itself, which no predictor knows: a hard rival.)" } else { "" };
+    Verdict { word, sentence: format!("{question} {}: {says}.{oracle}", capital(word)), votes }
+}
+
+/// The better of the poses that never move, in a figure.
+fn better_still(table: &Table, index: usize) -> Option<&Row> {
+    let better = |a: &Row, b: &Row| table.gain(a, b, index).value >= 0.0;
+    let stills = [Who::MeanPose, Who::MedianPose].into_iter().filter_map(|who| table.row(who));
+    stills.reduce(|a, b| if better(a, b) { a } else { b })
+}
+
+/// Whether the prediction is better in one figure than the better of the poses that never move, whatever that says.
+pub fn against_nothing(table: &Table, index: usize) -> Option<Answer> {
+    let gain = table.gain(table.row(Who::Prediction)?, better_still(table, index)?, index);
+    (gain.value.is_finite() && table.n_blocks >= FEW_BLOCKS).then(|| answer(&gain))
+}
+
+fn answer(gain: &Estimate) -> Answer {
+    match (gain.is_apart_from_zero(), gain.value > 0.0) {
+        (true, true) => Answer::Yes,
+        (true, false) => Answer::No,
+        (false, _) => Answer::Undecided,
+    }
+}
+
+/// Does it fit its own sound better than another's? It is held against itself out of step where there is such a row:
+/// another clip's motion is made for another posture too.
+pub fn hears(table: &Table) -> Verdict {
+    let question = "Does it hear?";
+    let other = table.row(Who::LatePrediction).or_else(|| table.row(Who::MismatchedPrediction));
+    let own = table.row(Who::Prediction).zip(other);
+    let Some((own, other)) = own else { return nothing(question) };
+    let votes = votes(table, own, &[Aspect::Place, Aspect::Beat], |_| Some(other));
+    let (word, says) = match summed(votes.iter()) {
+        _ if table.learnt => return by_heart(question),
+        _ if votes.is_empty() => return no_figure(question),
+        _ if table.n_blocks < FEW_BLOCKS => return too_few(question, table),
+        Answer::Yes => ("yes", "its motion fits its own sound better than a motion made for another sound or moment"),
+        Answer::No => ("no", "a motion made for another sound or moment fits better"),
+        Answer::Undecided if votes.iter().any(|vote| vote.answer == Answer::Yes) => {
+            ("in part", "its motion fits its own sound better in some figures and worse in others")
+        }
+        Answer::Undecided => (
+            "undecided",
+            "its motion is not shown to fit its own sound better than a motion made for another sound or moment",
+        ),
+    };
+    Verdict { word, sentence: format!("{question} {}: {says}.", capital(word)), votes }
+}
+
+fn nothing(question: &str) -> Verdict {
+    let sentence = format!("{question} Undecided: there is nothing to hold it against.");
+    Verdict { word: "undecided", sentence, votes: Vec::new() }
+}
+
+fn by_heart(question: &str) -> Verdict {
+    let sentence = format!("{question} Undecided: the speaker was trained on these very clips; use another split.");
+    Verdict { word: "undecided", sentence, votes: Vec::new() }
+}
+
+fn no_figure(question: &str) -> Verdict {
+    let sentence = format!("{question} Undecided: this convention has no figure that could say.");
+    Verdict { word: "undecided", sentence, votes: Vec::new() }
+}
+
+fn too_few(question: &str, table: &Table) -> Verdict {
+    let sentence = format!(
+        "{question} Undecided: {} blocks of about {} s are too few to say (at least {FEW_BLOCKS}).",
+        table.n_blocks, table.block_secs
+    );
+    Verdict { word: "undecided", sentence, votes: Vec::new() }
+}
+
+/// What the figures of these aspects say, each against a row of its own.
+fn votes<'a>(table: &'a Table, own: &Row, aspects: &[Aspect], against: impl Fn(usize) -> Option<&'a Row>) -> Vec<Vote> {
+    let vote = |index: usize| {
+        let aspect = aspect(table, index).filter(|aspect| aspects.contains(aspect))?;
+        let other = against(index)?;
+        let gain = table.gain(own, other, index);
+        let answer = answer(&gain);
+        let figure = labels::name(&table.definitions[index]);
+        gain.value.is_finite().then_some(Vote { figure, aspect, against: other.who, answer, gain })
+    };
+    (0..table.definitions.len()).filter_map(vote).collect()
+}
+
+/// What a figure is asked for; none for those that say the same as another.
+fn aspect(table: &Table, index: usize) -> Option<Aspect> {
+    let definition = &table.definitions[index];
+    let is_first = |start: &str| table.definitions.iter().position(|d| d.name.starts_with(start)) == Some(index);
+    let starts = |start: &str| definition.name.starts_with(start);
+    // the whole body, or the first part there is
+    let is_whole = table.definitions.iter().position(|d| d.name == definition.name) == Some(index);
+    match definition.better {
+        Better::Neither => None,
+        // of several shares, planes and parts the first
+        _ if starts("pck") => is_first("pck").then_some(Aspect::Place),
+        _ if starts("maje") => Some(Aspect::Place),
+        _ if starts("mpjpe") => is_first("mpjpe").then_some(Aspect::Place),
+        _ if starts("frechet") => is_whole.then_some(Aspect::Poses),
+        _ if starts("hellinger") => is_first("hellinger").then_some(Aspect::Movement),
+        _ if starts("jerk") => is_first("jerk").then_some(Aspect::Movement),
+        _ if starts("beat") => is_whole.then_some(Aspect::Beat),
+        _ => None,
+    }
+}
+
+/// Yes or no where some say so and none the contrary.
+fn summed<'a>(votes: impl Iterator<Item = &'a Vote>) -> Answer {
+    let (mut yes, mut no) = (false, false);
+    for vote in votes {
+        yes |= vote.answer == Answer::Yes;
+        no |= vote.answer == Answer::No;
+    }
+    match (yes, no) {
+        (true, false) => Answer::Yes,
+        (false, true) => Answer::No,
+        _ => Answer::Undecided,
+    }
+}
+
+impl Verdict {
+    /// The sentence with what the figures say: `... (better: a, b; worse: c; not told apart: d)`
+    pub fn text(&self) -> String {
+        let of = |answer: Answer| {
+            let names: Vec<&str> =
+                self.votes.iter().filter(|v| v.answer == answer).map(|v| v.figure.as_str()).collect();
+            names.join("; ")
+        };
+        let parts = [(Answer::Yes, "better"), (Answer::No, "worse"), (Answer::Undecided, "not told apart")];
+        let parts = parts.into_iter().map(|(answer, word)| (word, of(answer))).filter(|(_, names)| !names.is_empty());
+        parts.fold(self.sentence.clone(), |text, (word, names)| format!("{text}\n  {word}: {names}"))
+    }
+}
+
+fn capital(word: &str) -> String {
+    let mut letters = word.chars();
+    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
+}

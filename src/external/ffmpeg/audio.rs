@@ -1,0 +1,281 @@
+//! The sound of a file as mono at one rate, on the clock of its pictures: sample k belongs to second k / rate after
+//! the first picture. Sound before that is cut, a late start and gaps in the container are silence. A file without
+//! pictures starts with its first sample. Sound more than ten minutes after the sound before it, or beyond a day, is
+//! left out as damage.
+
+use super::decode::Decode;
+use super::origin;
+use super::resample::{Resampler, first_not_finite, format_of};
+use super::source;
+use super::source::{LONGEST_GAP_SECS, LONGEST_SECS};
+use crate::types::sound::Sound;
+use anyhow::{Context, Result, bail};
+use ffmpeg_next::frame;
+use std::path::Path;
+
+/// Timestamps this far from the count of samples are a gap, seconds: less than a lost frame of any codec, more than the
+/// rounding of any container.
+const GAP_SECS: f64 = 0.015;
+/// Timestamps that wander away from the count of samples, as where a clock ran slow, are followed: where their mean
+/// distance over `MEAN_SECS` is more than the rounding of a container, the next `STRETCH_SECS` are stretched by it.
+const MEAN_SECS: f64 = 1.0;
+const ROUNDING_SECS: f64 = 0.0005;
+const STRETCH_SECS: f64 = 1.0;
+
+/// The whole sound of `path` (wav, flac, mp3, a video, ...) as mono at `rate` samples a second; `None` when it has no
+/// sound.
+pub fn read_mono(path: &Path, rate: u32) -> Result<Option<Sound>> {
+    let mut samples = Vec::new();
+    let heard = stream_mono(path, rate, &mut |piece| {
+        samples.extend_from_slice(piece);
+        Ok(())
+    })?;
+    Ok(heard.map(|_| Sound { rate, samples }))
+}
+
+/// What `extract_wav` wrote.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Extracted {
+    pub secs: f64,
+    /// What was left out, in words.
+    pub damage: Option<String>,
+}
+
+/// Writes the sound of `path` to the 16-bit mono wav `out`, a piece at a time; `None` (and no file) when there is no
+/// sound.
+pub fn extract_wav(path: &Path, out: &Path, rate: u32) -> Result<Option<Extracted>> {
+    let mut wav = None;
+    let heard = stream_mono(path, rate, &mut |piece| {
+        if wav.is_none() {
+            wav = Some(WavWriter::create(out, rate)?);
+        }
+        wav.as_mut().map_or(Ok(()), |wav: &mut WavWriter| wav.push(piece))
+    })?;
+    if let Some(wav) = wav {
+        wav.finish()?;
+    }
+    Ok(heard.map(|heard| Extracted { secs: heard.n_samples as f64 / f64::from(rate), damage: heard.damage() }))
+}
+
+/// Writes `sound` to the 16-bit mono wav `out`.
+pub fn write_wav(out: &Path, sound: &Sound) -> Result<()> {
+    let mut wav = WavWriter::create(out, sound.rate)?;
+    wav.push(&sound.samples)?;
+    wav.finish()
+}
+
+/// A 16-bit mono wav file being written.
+struct WavWriter {
+    path: std::path::PathBuf,
+    file: hound::WavWriter<std::io::BufWriter<std::fs::File>>,
+}
+
+impl WavWriter {
+    fn create(path: &Path, rate: u32) -> Result<Self> {
+        let sample_format = hound::SampleFormat::Int;
+        let spec = hound::WavSpec { channels: 1, sample_rate: rate, bits_per_sample: 16, sample_format };
+        let file = hound::WavWriter::create(path, spec).with_context(|| format!("cannot write {}", path.display()))?;
+        Ok(Self { path: path.to_owned(), file })
+    }
+
+    fn push(&mut self, samples: &[f32]) -> Result<()> {
+        for sample in samples {
+            let sample = (sample * 32_768.0).round().clamp(-32_768.0, 32_767.0) as i16;
+            self.file.write_sample(sample).with_context(|| format!("cannot write {}", self.path.display()))?;
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> Result<()> {
+        self.file.finalize().with_context(|| format!("cannot write {}", self.path.display()))
+    }
+}
+
+/// What `stream_mono` handed on.
+pub(crate) struct Heard {
+    n_samples: u64,
+    n_misplaced: u64,
+}
+
+impl Heard {
+    fn damage(&self) -> Option<String> {
+        (self.n_misplaced > 0).then(|| format!("{} pieces of sound with impossible times", self.n_misplaced))
+    }
+}
+
+/// Decodes the sound of `path` and hands it to `sink` piece by piece; `None` without sound. A sample that is no number is
+/// an error that names its second.
+pub(crate) fn stream_mono(path: &Path, rate: u32, sink: &mut dyn FnMut(&[f32]) -> Result<()>) -> Result<Option<Heard>> {
+    let input = source::open(path)?;
+    let Some(stream) = source::audio_stream(&input) else { return Ok(None) };
+    let stream_idx = stream.index();
+    let latest_secs = source::latest_secs(&input, &stream);
+    let mut zero_secs = origin::first_picture_secs(path)?;
+    let mut decode = Decode::new(path, input, stream_idx, 1)?;
+    let secs_per_tick = f64::from(decode.time_base());
+    let mut timeline =
+        Timeline { rate, n_written: 0, n_skip: 0, run: None, ahead: Ahead::default(), ready: Vec::new(), sink };
+    let mut frame = frame::Audio::empty();
+    let (mut n_frames, mut n_misplaced) = (0u64, 0u64);
+    while decode.next(&mut frame)? {
+        if frame.samples() == 0 || frame.rate() == 0 {
+            continue;
+        }
+        let at = frame.timestamp().map(|ticks| ticks as f64 * secs_per_tick);
+        let zero = *zero_secs.get_or_insert(at.unwrap_or(0.0));
+        // A time far beyond the file's stated end is a broken one: the sound goes on where it was.
+        let at = at.map(|at| at - zero).filter(|at| *at < latest_secs);
+        if timeline.reaches(at) {
+            n_frames += 1;
+            if let Some(sample_idx) = first_not_finite(&frame) {
+                let secs = at.unwrap_or(timeline.end_secs()) + sample_idx as f64 / f64::from(frame.rate());
+                bail!(
+                    "the sound of {} is damaged: a sample that is no number at second {secs:.2}; convert or record it again",
+                    path.display()
+                );
+            }
+            timeline.push(at, &frame).with_context(|| format!("the sound of {}", path.display()))?;
+        } else {
+            n_misplaced += 1;
+        }
+    }
+    if n_frames == 0 {
+        let misplaced = Heard { n_samples: 0, n_misplaced }.damage();
+        let Some(damage) = misplaced.or_else(|| decode.damage()) else { return Ok(None) };
+        bail!("no sound of {} can be decoded ({damage}): copy or download it again", path.display());
+    }
+    timeline.end_run()?;
+    Ok(Some(Heard { n_samples: timeline.n_written, n_misplaced }))
+}
+
+/// How far timestamps are ahead of the count of samples.
+#[derive(Default)]
+struct Ahead {
+    sum: f64,
+    secs: f64,
+}
+
+impl Ahead {
+    /// Takes in a frame of `secs` whose timestamp is `ahead` seconds late; the mean at the end of each `MEAN_SECS`.
+    fn mean(&mut self, ahead: f64, secs: f64) -> Option<f64> {
+        self.sum += ahead * secs;
+        self.secs += secs;
+        let mean = (self.secs >= MEAN_SECS).then(|| self.sum / self.secs);
+        if mean.is_some() {
+            *self = Self::default();
+        }
+        mean
+    }
+}
+
+/// Lays runs of continuous sound at their places in time.
+struct Timeline<'a> {
+    rate: u32,
+    n_written: u64,
+    /// Samples at the start of the run that are before time 0, or that were heard already.
+    n_skip: u64,
+    /// The run at hand, and its start in seconds.
+    run: Option<(Resampler, f64)>,
+    ahead: Ahead,
+    ready: Vec<f32>,
+    sink: &'a mut dyn FnMut(&[f32]) -> Result<()>,
+}
+
+impl Timeline<'_> {
+    /// Second at which the sound so far ends.
+    fn end_secs(&self) -> f64 {
+        let written = self.n_written as f64 / f64::from(self.rate);
+        self.run.as_ref().map_or(written, |(run, start)| start + run.secs())
+    }
+
+    /// Whether sound at second `at` is near enough to what came before, and before the last second believed.
+    fn reaches(&self, at: Option<f64>) -> bool {
+        let end = self.end_secs();
+        let at = at.unwrap_or(end);
+        at - end.max(0.0) <= LONGEST_GAP_SECS && at < LONGEST_SECS
+    }
+
+    /// Sound that starts at second `at`; without a time it goes on where the sound before it ended.
+    fn push(&mut self, at: Option<f64>, frame: &frame::Audio) -> Result<()> {
+        let format = format_of(frame);
+        let end = self.end_secs();
+        let at = at.unwrap_or(end);
+        let goes_on = self.run.is_some() && (at - end).abs() <= GAP_SECS;
+        if !goes_on || self.run.as_ref().is_none_or(|(run, _)| run.format() != format) {
+            self.end_run()?;
+            self.begin_run(Resampler::new(format, self.rate)?, at)?;
+        }
+        if let Some((run, _)) = &mut self.run {
+            if goes_on
+                && run.is_even()
+                && let Some(mean) = self.ahead.mean(at - end, frame.samples() as f64 / f64::from(frame.rate()))
+                && mean.abs() > ROUNDING_SECS
+            {
+                run.stretch(mean, STRETCH_SECS)?;
+            }
+            run.push(frame, &mut self.ready)?;
+        }
+        self.deliver()
+    }
+
+    fn begin_run(&mut self, run: Resampler, at: f64) -> Result<()> {
+        let place = (at * f64::from(self.rate)).round() as i64;
+        let late = place.saturating_sub(i64::try_from(self.n_written)?);
+        self.n_skip = late.min(0).unsigned_abs();
+        self.run = Some((run, at));
+        self.ahead = Ahead::default();
+        const SILENCE: [f32; 4096] = [0.0; 4096];
+        let mut n_silent = late.max(0) as u64;
+        while n_silent > 0 {
+            let n = n_silent.min(SILENCE.len() as u64);
+            (self.sink)(&SILENCE[..n as usize])?;
+            self.n_written += n;
+            n_silent -= n;
+        }
+        Ok(())
+    }
+
+    fn end_run(&mut self) -> Result<()> {
+        if let Some((run, _)) = self.run.take() {
+            run.finish(&mut self.ready)?;
+        }
+        self.deliver()
+    }
+
+    fn deliver(&mut self) -> Result<()> {
+        let n_skip = self.n_skip.min(self.ready.len() as u64);
+        self.n_skip -= n_skip;
+        let heard = &self.ready[n_skip as usize..];
+        if !heard.is_empty() {
+            (self.sink)(heard)?;
+            self.n_written += heard.len() as u64;
+        }
+        self.ready.clear();
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_jump_in_time_is_believed_up_to_ten_minutes_and_a_day() {
+        let mut sink = |_: &[f32]| Ok(());
+        let mut timeline = Timeline {
+            rate: 10,
+            n_written: 50,
+            n_skip: 0,
+            run: None,
+            ahead: Ahead::default(),
+            ready: Vec::new(),
+            sink: &mut sink,
+        };
+        let reaches =
+            |timeline: &Timeline| [None, Some(-1e12), Some(604.0), Some(606.0)].map(|at| timeline.reaches(at));
+        assert_eq!(reaches(&timeline), [true, true, true, false]);
+        timeline.n_written = 864_000;
+        assert_eq!(reaches(&timeline), [false, true, true, true]);
+        assert!(!timeline.reaches(Some(f64::NAN)));
+    }
+}

@@ -1,0 +1,111 @@
+//! One stream of a file, decoded frame by frame with presentation times. Broken packets are counted and passed over,
+//! so that what can be read is read; what the frames are for is not known here.
+
+use anyhow::{Context, Result};
+use ffmpeg_next as ffmpeg;
+use ffmpeg_next::{Frame, Packet, Rational, codec, decoder, format, media};
+use std::path::{Path, PathBuf};
+
+/// A decoder with its place in the file.
+pub(crate) struct Decode {
+    path: PathBuf,
+    input: format::context::Input,
+    stream_idx: usize,
+    decoder: decoder::Opened,
+    time_base: Rational,
+    draining: bool,
+    n_bad: usize,
+    n_flawed: usize,
+    stopped: Option<ffmpeg::Error>,
+}
+
+impl Decode {
+    /// A decoder of `input`'s stream `stream_idx`; `threads` decoder threads (0: one a core). The other streams are
+    /// not read.
+    pub fn new(path: &Path, mut input: format::context::Input, stream_idx: usize, threads: usize) -> Result<Self> {
+        for idx in 0..input.nb_streams() as usize {
+            if idx != stream_idx {
+                // SAFETY: idx is below nb_streams, and the context is ours alone.
+                unsafe {
+                    (**(*input.as_mut_ptr()).streams.add(idx)).discard = ffmpeg::ffi::AVDiscard::AVDISCARD_ALL;
+                }
+            }
+        }
+        let stream = input.stream(stream_idx).with_context(|| format!("{} lost a stream", path.display()))?;
+        let time_base = stream.time_base();
+        let parameters = stream.parameters();
+        let (id, medium) = (parameters.id(), parameters.medium());
+        let kind = if medium == media::Type::Audio { "sound" } else { "pictures" };
+        let open = || -> Result<decoder::Opened, ffmpeg::Error> {
+            let mut context = codec::Context::from_parameters(parameters)?;
+            context.set_threading(codec::threading::Config { count: threads, ..Default::default() });
+            let mut decoder = context.decoder();
+            decoder.set_packet_time_base(time_base);
+            decoder.open_as(decoder::find(id).ok_or(ffmpeg::Error::DecoderNotFound)?)
+        };
+        let decoder =
+            open().with_context(|| format!("cannot decode the {kind} of {}, codec {id:?}", path.display()))?;
+        let path = path.to_owned();
+        Ok(Self { path, input, stream_idx, decoder, time_base, draining: false, n_bad: 0, n_flawed: 0, stopped: None })
+    }
+
+    /// Seconds of one tick of the stream's clock, as a fraction (numerator, denominator).
+    pub fn time_base(&self) -> Rational {
+        self.time_base
+    }
+
+    /// The next decoded frame into `frame`, in the order of presentation; false at the end.
+    pub fn next(&mut self, frame: &mut Frame) -> Result<bool> {
+        loop {
+            match self.decoder.receive_frame(frame) {
+                Ok(()) => {
+                    self.n_flawed += usize::from(frame.is_corrupt() || frame.has_decode_errors());
+                    return Ok(true);
+                }
+                Err(ffmpeg::Error::Eof) => return Ok(false),
+                Err(ffmpeg::Error::Other { errno }) if errno == ffmpeg::error::EAGAIN => {
+                    if self.draining {
+                        return Ok(false);
+                    }
+                }
+                // The decoder's last frames are broken: what came before them stands.
+                Err(_) if self.draining && self.n_bad > 1000 => return Ok(false),
+                Err(_) => self.n_bad += 1,
+            }
+            if !self.draining {
+                self.feed()?;
+            }
+        }
+    }
+
+    /// Gives the decoder its next packet, or tells it that there is none.
+    fn feed(&mut self) -> Result<()> {
+        let mut packet = Packet::empty();
+        match packet.read(&mut self.input) {
+            Ok(()) if packet.stream() != self.stream_idx => {}
+            Ok(()) => {
+                if self.decoder.send_packet(&packet).is_err() {
+                    self.n_bad += 1;
+                }
+            }
+            Err(error) => {
+                if error != ffmpeg::Error::Eof {
+                    self.stopped = Some(error);
+                }
+                self.draining = true;
+                let ended = self.decoder.send_eof();
+                ended.with_context(|| format!("cannot finish decoding {}", self.path.display()))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// What went wrong on the way, if anything did, in words.
+    pub fn damage(&self) -> Option<String> {
+        let stopped = self.stopped.map(|error| format!("reading broke off ({error})"));
+        let bad = (self.n_bad > 0).then(|| format!("{} packets could not be decoded", self.n_bad));
+        let flawed = (self.n_flawed > 0).then(|| format!("{} frames are flawed", self.n_flawed));
+        let parts: Vec<String> = stopped.into_iter().chain(bad).chain(flawed).collect();
+        (!parts.is_empty()).then(|| parts.join(", "))
+    }
+}

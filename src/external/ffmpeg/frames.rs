@@ -1,0 +1,235 @@
+//! The pictures of a video as a stream at the dataset rate, by presentation time: output frame n shows the source
+//! frame whose time is nearest n / rate, the earlier one of two equally near. So a slower source repeats frames, a
+//! faster one loses some, and a variable rate needs no case of its own. Only frames that are shown are converted.
+//!
+//! Time 0 is the first source frame that decodes. The last frame lasts as long as its packet says (else one source
+//! frame, ten minutes at most), which ends the video at `duration_secs`; there are `FrameRate::frames_in(duration_secs)` output frames.
+
+use super::decode::Decode;
+use super::picture::{Converter, Orientation};
+use super::probe;
+use super::probe::MediaInfo;
+use super::source;
+use super::source::LONGEST_GAP_SECS;
+use crate::types::image::Image;
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result};
+use ffmpeg_next::frame;
+use std::path::{Path, PathBuf};
+
+/// One picture at the dataset rate.
+#[derive(Clone, Debug)]
+pub struct TimedFrame {
+    pub frame_idx: usize,
+    /// RGB, upright.
+    pub image: Image,
+    /// Presentation time of the source frame shown, seconds from the first one.
+    pub source_secs: f64,
+    /// It is the same source frame as the one before.
+    pub repeated: bool,
+}
+
+/// The times of one output frame, without its picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrameTime {
+    pub frame_idx: usize,
+    pub source_secs: f64,
+    pub repeated: bool,
+}
+
+/// A source frame and its time in ticks from the first one.
+struct Source {
+    frame: frame::Video,
+    ticks: i64,
+}
+
+/// Streams a video's pictures at one rate. As an iterator it gives them in full size; `advance` and `picture` give
+/// times alone and pictures on demand.
+pub struct FrameReader {
+    path: PathBuf,
+    fps: FrameRate,
+    decode: Decode,
+    info: MediaInfo,
+    orientation: Orientation,
+    image_size: [usize; 2],
+    converters: Vec<([usize; 2], Converter)>,
+    /// Ticks of the stream's clock at the first frame.
+    origin: i64,
+    /// The frame on show and the one after it.
+    shown: Source,
+    following: Option<Source>,
+    next_idx: usize,
+    last_shown: Option<i64>,
+    /// No time after this is believed.
+    latest_secs: f64,
+    n_misplaced: usize,
+    failed: bool,
+}
+
+impl FrameReader {
+    /// Opens the video `path` with one decoder thread and decodes its first frames; an error if none decodes.
+    pub fn open(path: &Path, fps: FrameRate) -> Result<Self> {
+        Self::open_with(path, fps, 1)
+    }
+
+    /// The same with `threads` decoder threads (0: one a core). The frames are the same whatever their number.
+    pub fn open_with(path: &Path, fps: FrameRate, threads: usize) -> Result<Self> {
+        let input = source::open(path)?;
+        let info = probe::describe(&input);
+        let stream = source::video_stream(&input)
+            .with_context(|| format!("{} has no pictures: expected a video, not sound alone", path.display()))?;
+        let orientation = Orientation::of(&stream);
+        let latest_secs = source::latest_secs(&input, &stream);
+        let stream_idx = stream.index();
+        let mut decode = Decode::new(path, input, stream_idx, threads)?;
+        let mut first = frame::Video::empty();
+        if !decode.next(&mut first)? {
+            let why = decode.damage().unwrap_or_else(|| "it holds no complete one".to_owned());
+            anyhow::bail!("no picture of {} can be decoded ({why}): copy or download it again", path.display());
+        }
+        let size = [first.width() as usize, first.height() as usize];
+        let image_size = orientation.upright_size(probe::square_pixels(size, first.aspect_ratio()));
+        let origin = first.timestamp().unwrap_or(0);
+        let shown = Source { frame: first, ticks: 0 };
+        let mut reader = Self {
+            path: path.to_owned(),
+            fps,
+            decode,
+            info,
+            orientation,
+            image_size,
+            converters: Vec::new(),
+            origin,
+            shown,
+            following: None,
+            next_idx: 0,
+            last_shown: None,
+            latest_secs,
+            n_misplaced: 0,
+            failed: false,
+        };
+        reader.following = reader.decode_after(0)?;
+        Ok(reader)
+    }
+
+    /// What the headers say.
+    pub fn info(&self) -> &MediaInfo {
+        &self.info
+    }
+
+    /// Width and height in px of the upright pictures.
+    pub fn image_size(&self) -> [usize; 2] {
+        self.image_size
+    }
+
+    /// How many frames there will be, as far as the headers tell; for progress bars.
+    pub fn expected_frames(&self) -> Option<usize> {
+        self.info.duration_secs.map(|secs| self.fps.frames_in(secs))
+    }
+
+    /// Seconds of pictures read so far; once the frames are at their end, the length of the video.
+    pub fn duration_secs(&self) -> f64 {
+        let last = self.following.as_ref().unwrap_or(&self.shown);
+        self.secs(last.ticks) + self.secs_of(last).min(LONGEST_GAP_SECS)
+    }
+
+    /// What was wrong with the file although frames came, in words; complete once the frames are at their end.
+    pub fn damage(&self) -> Option<String> {
+        let misplaced = (self.n_misplaced > 0).then(|| format!("{} frames with impossible times", self.n_misplaced));
+        let last = self.secs_of(self.following.as_ref().unwrap_or(&self.shown));
+        let endless = (last > LONGEST_GAP_SECS).then(|| format!("the last picture claims to last {last:.0} s"));
+        let read = self.duration_secs();
+        let stated = self.info.duration_secs.filter(|stated| self.following.is_none() && *stated > read + 1.0);
+        let short = stated.map(|stated| format!("pictures end at {read:.2} s of {stated:.2} s"));
+        let parts: Vec<String> =
+            self.decode.damage().into_iter().chain(misplaced).chain(endless).chain(short).collect();
+        (!parts.is_empty()).then(|| parts.join(", "))
+    }
+
+    /// The times of the next output frame, whose picture `picture` then gives; `None` at the end.
+    pub fn advance(&mut self) -> Result<Option<FrameTime>> {
+        let frame_idx = self.next_idx;
+        while let Some(following) = &self.following {
+            if self.is_before_middle(frame_idx, self.shown.ticks, following.ticks) {
+                break;
+            }
+            let ticks = following.ticks;
+            let after = self.decode_after(ticks)?;
+            if let Some(shown) = std::mem::replace(&mut self.following, after) {
+                self.shown = shown;
+            }
+        }
+        if self.following.is_none() && frame_idx >= self.fps.frames_in(self.duration_secs()) {
+            return Ok(None);
+        }
+        self.next_idx += 1;
+        let repeated = self.last_shown.replace(self.shown.ticks) == Some(self.shown.ticks);
+        Ok(Some(FrameTime { frame_idx, source_secs: self.secs(self.shown.ticks), repeated }))
+    }
+
+    /// The picture on show, upright: in full, or scaled to `size` (width, height in px).
+    pub fn picture(&mut self, size: Option<[usize; 2]>) -> Result<Image> {
+        let size = size.unwrap_or(self.image_size);
+        let at = self.converters.iter().position(|(of, _)| *of == size).unwrap_or_else(|| {
+            self.converters.push((size, Converter::new(size, self.orientation)));
+            self.converters.len() - 1
+        });
+        let picture = self.converters[at].1.picture(&self.shown.frame);
+        picture.with_context(|| format!("{}, at {:.3} s", self.path.display(), self.secs(self.shown.ticks)))
+    }
+
+    /// Whether output frame `frame_idx` is at most as far from `early` as from `late` (ticks), exactly.
+    fn is_before_middle(&self, frame_idx: usize, early: i64, late: i64) -> bool {
+        let base = self.decode.time_base();
+        let (num, den) = (i128::from(base.numerator().max(1)), i128::from(base.denominator().max(1)));
+        // 2 n den_fps / num_fps <= (early + late) num / den
+        let twice_target = 2 * frame_idx as i128 * i128::from(self.fps.den) * den;
+        twice_target <= (i128::from(early) + i128::from(late)) * num * i128::from(self.fps.num)
+    }
+
+    /// The next source frame later than `ticks`.
+    fn decode_after(&mut self, ticks: i64) -> Result<Option<Source>> {
+        let mut frame = frame::Video::empty();
+        while self.decode.next(&mut frame)? {
+            // A frame without a time follows the one before by that one's length.
+            let own = frame.timestamp().map(|at| at.saturating_sub(self.origin));
+            let at = own.unwrap_or_else(|| ticks.saturating_add(frame.packet().duration.max(1)));
+            let is_near = self.secs(at.saturating_sub(ticks)) <= LONGEST_GAP_SECS;
+            if at > ticks && is_near && self.secs(at) < self.latest_secs {
+                return Ok(Some(Source { frame, ticks: at }));
+            }
+            self.n_misplaced += 1;
+        }
+        Ok(None)
+    }
+
+    fn secs(&self, ticks: i64) -> f64 {
+        ticks as f64 * f64::from(self.decode.time_base())
+    }
+
+    /// How long a source frame lasts, as the file says.
+    fn secs_of(&self, source: &Source) -> f64 {
+        let stated = self.secs(source.frame.packet().duration);
+        if stated > 0.0 {
+            return stated;
+        }
+        let video = self.info.video.as_ref();
+        video.and_then(|video| video.fps).unwrap_or(self.fps).secs(1)
+    }
+}
+
+impl Iterator for FrameReader {
+    type Item = Result<TimedFrame>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.failed {
+            return None;
+        }
+        let frame = self.advance().and_then(|time| {
+            let Some(FrameTime { frame_idx, source_secs, repeated }) = time else { return Ok(None) };
+            Ok(Some(TimedFrame { frame_idx, image: self.picture(None)?, source_secs, repeated }))
+        });
+        self.failed = frame.is_err();
+        frame.transpose()
+    }
+}

@@ -1,0 +1,110 @@
+//! What a media file says about itself, without decoding it. What a header leaves out stays unknown; a file that
+//! holds neither pictures nor sound is an error.
+
+use super::picture::Orientation;
+use super::source;
+use crate::types::time::FrameRate;
+use anyhow::Result;
+use ffmpeg_next::Rational;
+use ffmpeg_next::format::context::Input;
+use ffmpeg_next::format::stream::Stream;
+use std::path::Path;
+
+/// What a file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MediaInfo {
+    /// Length as stated: of the pictures if there are any, else of the sound; `None` if no header says.
+    pub duration_secs: Option<f64>,
+    pub video: Option<VideoInfo>,
+    pub audio: Option<AudioInfo>,
+}
+
+/// The stream of pictures.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VideoInfo {
+    /// ffmpeg's name: `h264`, `hevc`, `vp9`.
+    pub codec: String,
+    /// Width and height in px as coded.
+    pub coded_size: [usize; 2],
+    /// Width and height in px as shown: turned upright, with square pixels.
+    pub image_size: [usize; 2],
+    /// Degrees clockwise from coded to upright: 0, 90, 180 or 270.
+    pub rotation: u32,
+    /// Average frames a second; `None` if no header says.
+    pub fps: Option<FrameRate>,
+}
+
+/// The stream of sound.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AudioInfo {
+    /// ffmpeg's name: `aac`, `opus`, `pcm_s16le`.
+    pub codec: String,
+    /// Samples a second.
+    pub rate: u32,
+    pub n_channels: u32,
+}
+
+/// Reads the headers of `path`.
+pub fn probe(path: &Path) -> Result<MediaInfo> {
+    Ok(describe(&source::open(path)?))
+}
+
+pub(crate) fn describe(input: &Input) -> MediaInfo {
+    let video = source::video_stream(input);
+    let audio = source::audio_stream(input);
+    let duration_secs = video.as_ref().or(audio.as_ref()).and_then(|stream| source::stated_secs(input, stream));
+    MediaInfo {
+        duration_secs,
+        video: video.map(|stream| describe_video(&stream)),
+        audio: audio.map(|stream| {
+            // SAFETY: the parameters live as long as the input, which is borrowed here.
+            let (rate, n_channels) = unsafe {
+                let parameters = stream.parameters();
+                let parameters = parameters.as_ptr();
+                ((*parameters).sample_rate, (*parameters).ch_layout.nb_channels)
+            };
+            AudioInfo {
+                codec: codec_name(&stream),
+                rate: u32::try_from(rate).unwrap_or(0),
+                n_channels: u32::try_from(n_channels).unwrap_or(0),
+            }
+        }),
+    }
+}
+
+fn describe_video(stream: &Stream) -> VideoInfo {
+    // SAFETY: as above.
+    let (width, height, aspect) = unsafe {
+        let parameters = stream.parameters();
+        let parameters = parameters.as_ptr();
+        ((*parameters).width, (*parameters).height, (*parameters).sample_aspect_ratio)
+    };
+    let coded_size = [width, height].map(|n| usize::try_from(n).unwrap_or(0));
+    let orientation = Orientation::of(stream);
+    let fps = [stream.avg_frame_rate(), stream.rate()].into_iter().find_map(frame_rate);
+    VideoInfo {
+        codec: codec_name(stream),
+        coded_size,
+        image_size: orientation.upright_size(square_pixels(coded_size, Rational::from(aspect))),
+        rotation: orientation.degrees(),
+        fps,
+    }
+}
+
+/// The size with square pixels: the width stretched by the sample aspect ratio, when that differs from 1 by more than
+/// a hundredth and less than a factor 4 (other values are slips of an encoder).
+pub(crate) fn square_pixels([width, height]: [usize; 2], aspect: Rational) -> [usize; 2] {
+    let ratio = f64::from(aspect);
+    let believable = ratio.is_finite() && (0.25..=4.0).contains(&ratio) && (ratio - 1.0).abs() > 0.01;
+    if believable { [((width as f64 * ratio).round() as usize).max(1), height] } else { [width, height] }
+}
+
+fn frame_rate(rate: Rational) -> Option<FrameRate> {
+    let num = u32::try_from(rate.numerator()).ok().filter(|n| *n > 0)?;
+    let den = u32::try_from(rate.denominator()).ok().filter(|n| *n > 0)?;
+    Some(FrameRate::new(num, den))
+}
+
+fn codec_name(stream: &Stream) -> String {
+    stream.parameters().id().name().to_owned()
+}

@@ -1,0 +1,137 @@
+//! Decoded sound to mono f32 at one rate, by swresample. A `Resampler` lives as long as the sound is continuous and
+//! its format stays; where sound belongs in time is `audio`'s business.
+
+use anyhow::{Context, Result, ensure};
+use ffmpeg_next as ffmpeg;
+use ffmpeg_next::format::{Sample, sample};
+use ffmpeg_next::software::resampling;
+use ffmpeg_next::{ChannelLayout, Dictionary, frame};
+
+/// What a frame of sound looks like: sample format, channel layout, rate.
+pub(crate) type Format = (Sample, ChannelLayout, u32);
+
+/// The format of `frame`; a layout that the file does not name is the usual one for its number of channels.
+pub(crate) fn format_of(frame: &frame::Audio) -> Format {
+    let named = frame.channel_layout();
+    let usual = || ChannelLayout::default(i32::from(frame.channels()));
+    (frame.format(), if named.is_empty() { usual() } else { named }, frame.rate())
+}
+
+/// The first sample of `frame` that is no number (NaN or infinite) in any channel: one of them makes all that is
+/// reckoned from the sound no number too, without a word.
+pub(crate) fn first_not_finite(frame: &frame::Audio) -> Option<usize> {
+    let (n_samples, n_channels) = (frame.samples(), usize::from(frame.channels()));
+    let (n_planes, n_each) = match frame.format() {
+        Sample::F32(sample::Type::Planar) | Sample::F64(sample::Type::Planar) => (n_channels, 1),
+        Sample::F32(sample::Type::Packed) | Sample::F64(sample::Type::Packed) => (1, n_channels),
+        _ => return None,
+    };
+    let is_double = matches!(frame.format(), Sample::F64(_));
+    let n_values = n_samples * n_each;
+    let first = |plane: usize| {
+        // SAFETY: the extended_data of a decoded frame holds a pointer for each of its planes, each to `n_values`
+        // values of its format.
+        let value = unsafe {
+            let values = *(*frame.as_ptr()).extended_data.add(plane);
+            match is_double {
+                true => std::slice::from_raw_parts(values.cast::<f64>(), n_values).iter().position(|v| !v.is_finite()),
+                false => std::slice::from_raw_parts(values.cast::<f32>(), n_values).iter().position(|v| !v.is_finite()),
+            }
+        };
+        value.map(|at| at / n_each)
+    };
+    (0..n_planes).filter_map(first).min()
+}
+
+/// One continuous run of sound on its way to mono f32.
+pub(crate) struct Resampler {
+    context: resampling::Context,
+    format: Format,
+    rate: u32,
+    n_in: u64,
+    n_out: u64,
+    /// Samples added (or left out) by stretching, and the count of samples in at which the last stretch is done.
+    n_stretched: i64,
+    even_at: u64,
+}
+
+impl Resampler {
+    pub fn new(format: Format, rate: u32) -> Result<Self> {
+        let (sample, layout, source_rate) = format;
+        ensure!(source_rate > 0 && rate > 0, "sound at {source_rate} Hz cannot be brought to {rate} Hz");
+        let mono = ChannelLayout::MONO;
+        let packed = Sample::F32(sample::Type::Packed);
+        // Without a bound, float sound mixed down from several channels grows beyond 1.
+        let options = Dictionary::from_iter([("rematrix_maxval", "1.0")]);
+        let context = resampling::Context::get_with(sample, layout, source_rate, packed, mono, rate, options);
+        let context = context.with_context(|| {
+            format!("cannot bring {sample:?} sound of {} channels at {source_rate} Hz to mono", layout.channels())
+        })?;
+        Ok(Self { context, format, rate, n_in: 0, n_out: 0, n_stretched: 0, even_at: 0 })
+    }
+
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// Seconds of sound taken in, stretched as it was.
+    pub fn secs(&self) -> f64 {
+        self.n_in as f64 / f64::from(self.format.2) + self.n_stretched as f64 / f64::from(self.rate)
+    }
+
+    /// Whether no stretch is under way.
+    pub fn is_even(&self) -> bool {
+        self.n_in >= self.even_at
+    }
+
+    /// Makes the next `over_secs` seconds `secs` longer (shorter, if negative).
+    pub fn stretch(&mut self, secs: f64, over_secs: f64) -> Result<()> {
+        let n = (secs * f64::from(self.rate)).round() as i32;
+        let over = (over_secs * f64::from(self.rate)) as i32;
+        // SAFETY: the context is live and ours.
+        let done = unsafe { ffmpeg::ffi::swr_set_compensation(self.context.as_mut_ptr(), n, over) };
+        ensure!(done >= 0, "swresample cannot stretch ({})", ffmpeg::Error::from(done));
+        self.n_stretched += i64::from(n);
+        self.even_at = self.n_in + (over_secs * f64::from(self.format.2)) as u64;
+        Ok(())
+    }
+
+    /// Takes a frame of this resampler's format; the samples that are ready are appended to `out`.
+    pub fn push(&mut self, frame: &frame::Audio, out: &mut Vec<f32>) -> Result<()> {
+        debug_assert!(format_of(frame) == self.format);
+        self.n_in += frame.samples() as u64;
+        // SAFETY: `frame` is a decoded frame, whose extended_data holds a pointer for each of its planes.
+        unsafe { self.convert((*frame.as_ptr()).extended_data as *mut *const u8, frame.samples(), out) }
+    }
+
+    /// Appends the samples still inside, so that input and output last equally long.
+    pub fn finish(mut self, out: &mut Vec<f32>) -> Result<()> {
+        let start = out.len();
+        // SAFETY: null input means flush.
+        unsafe { self.convert(std::ptr::null_mut(), 0, out)? };
+        let n_all = (self.n_in * u64::from(self.rate) + u64::from(self.format.2) / 2) / u64::from(self.format.2);
+        let n_all = n_all.saturating_add_signed(self.n_stretched);
+        let n_extra = usize::try_from(self.n_out.saturating_sub(n_all)).unwrap_or(usize::MAX);
+        out.truncate(out.len().saturating_sub(n_extra).max(start));
+        Ok(())
+    }
+
+    /// # Safety
+    /// `planes` is null or points to the planes of `n_samples` samples in this resampler's input format.
+    unsafe fn convert(&mut self, planes: *mut *const u8, n_samples: usize, out: &mut Vec<f32>) -> Result<()> {
+        let n_samples = i32::try_from(n_samples)?;
+        let start = out.len();
+        // SAFETY: `out` is given the room that swresample says it can fill, and cut to what it filled.
+        let n_out = unsafe {
+            let context = self.context.as_mut_ptr();
+            let room = ffmpeg::ffi::swr_get_out_samples(context, n_samples).max(0) + 32;
+            out.resize(start + room as usize, 0.0);
+            let mut plane = out.as_mut_ptr().add(start).cast::<u8>();
+            ffmpeg::ffi::swr_convert(context, &mut plane, room, planes, n_samples)
+        };
+        out.truncate(start + usize::try_from(n_out).unwrap_or(0));
+        ensure!(n_out >= 0, "swresample failed ({})", ffmpeg::Error::from(n_out));
+        self.n_out += n_out as u64;
+        Ok(())
+    }
+}

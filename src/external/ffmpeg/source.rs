@@ -1,0 +1,89 @@
+//! Opening a media file: its streams, or an error that names the file, what is wrong with it and what was expected.
+
+use anyhow::{Context, Result, bail, ensure};
+use ffmpeg_next as ffmpeg;
+use ffmpeg_next::format::context::Input;
+use ffmpeg_next::format::stream::{Disposition, Stream};
+use std::io::Read;
+use std::path::Path;
+
+const EXPECTED: &str = "expected a video or sound file (mp4, mov, mkv, webm, avi, wav, flac, mp3, ...)";
+
+/// Longest time between two frames that is believed, and that the last one lasts, seconds. What a broken time skips
+/// would be filled with repeated pictures or silence.
+pub(crate) const LONGEST_GAP_SECS: f64 = 600.0;
+/// Longest video or sound that is believed, seconds: a day.
+pub(crate) const LONGEST_SECS: f64 = 86_400.0;
+
+/// Opens `path` and reads its headers.
+pub(crate) fn open(path: &Path) -> Result<Input> {
+    open_with(path, &[])
+}
+
+/// The same with options for the container's reader.
+pub(crate) fn open_with(path: &Path, options: &[(&str, &str)]) -> Result<Input> {
+    super::library::init();
+    let mut file = std::fs::File::open(path).with_context(|| format!("cannot read {}: {EXPECTED}", path.display()))?;
+    let size = file.metadata().with_context(|| format!("cannot read {}", path.display()))?;
+    if size.is_dir() {
+        bail!("{} is a folder: {EXPECTED}", path.display());
+    }
+    if size.is_file() && size.len() == 0 {
+        bail!("{} is empty (0 bytes): {EXPECTED}; copy it again", path.display());
+    }
+    let mut head = [0u8; 12];
+    let n = file.read(&mut head).with_context(|| format!("cannot read {}", path.display()))?;
+    let is_mp4 = n == head.len() && &head[4..8] == b"ftyp";
+    let cut_short = || {
+        format!(
+            "{} is cut short: it begins like an mp4 but its index (moov) is missing or broken; copy or download it again",
+            path.display()
+        )
+    };
+    let input = match ffmpeg::format::input_with_dictionary(&url(path)?, options.iter().copied().collect()) {
+        Ok(input) => input,
+        Err(ffmpeg::Error::InvalidData) if is_mp4 => bail!(cut_short()),
+        Err(ffmpeg::Error::InvalidData) => bail!("{} is not a media file: {EXPECTED}", path.display()),
+        Err(error) => bail!("cannot open {} ({error}): {EXPECTED}", path.display()),
+    };
+    if video_stream(&input).is_none() && audio_stream(&input).is_none() {
+        ensure!(!is_mp4, cut_short());
+        bail!("{} holds neither pictures nor sound: {EXPECTED}", path.display());
+    }
+    Ok(input)
+}
+
+/// `path` as ffmpeg wants it: text, and marked as a file so that a colon in its name is not taken for a protocol.
+pub(crate) fn url(path: &Path) -> Result<String> {
+    let text = path.to_str().filter(|text| !text.contains('\0'));
+    let text = text.with_context(|| format!("the name {} is not UTF-8: rename the file", path.display()))?;
+    Ok(format!("file:{text}"))
+}
+
+/// The stream of moving pictures, if there is one; the cover picture of a sound file is none.
+pub(crate) fn video_stream(input: &Input) -> Option<Stream<'_>> {
+    let stream = input.streams().best(ffmpeg::media::Type::Video)?;
+    (!stream.disposition().contains(Disposition::ATTACHED_PIC)).then_some(stream)
+}
+
+/// The stream of sound, if there is one.
+pub(crate) fn audio_stream(input: &Input) -> Option<Stream<'_>> {
+    input.streams().best(ffmpeg::media::Type::Audio)
+}
+
+/// Length in seconds as the container states it for this stream, or else for the whole file.
+pub(crate) fn stated_secs(input: &Input, stream: &Stream) -> Option<f64> {
+    lengths(input, stream).into_iter().find(|secs| *secs > 0.0)
+}
+
+/// The second after which no timestamp is believed: a minute past every stated end, a day at most.
+pub(crate) fn latest_secs(input: &Input, stream: &Stream) -> f64 {
+    let stated = lengths(input, stream).into_iter().fold(0.0, f64::max);
+    if stated > 0.0 { LONGEST_SECS.min(stated + 60.0) } else { LONGEST_SECS }
+}
+
+/// The stream's length and the file's, in seconds; negative where unknown.
+fn lengths(input: &Input, stream: &Stream) -> [f64; 2] {
+    let own = stream.duration() as f64 * f64::from(stream.time_base());
+    [own, input.duration() as f64 / f64::from(ffmpeg::ffi::AV_TIME_BASE)]
+}

@@ -1,0 +1,5 @@
+//! One door each for the three foreign libraries.
+
+pub mod ffmpeg;
+pub mod onnx;
+pub mod opencv;

@@ -1,0 +1,10 @@
+//! The only room that knows OpenCV: warps and letterboxes, pixels to tensors, heat-map filters, drawing; and PNG files.
+
+pub mod blur;
+pub mod draw;
+pub mod library;
+pub mod png;
+pub mod tensor;
+pub mod warp;
+
+pub use library::version;

@@ -1,0 +1,267 @@
+//! Reads BVH: any hierarchy, channels in any order and number, and the positions of all joints in a frame. What the
+//! joints mean is `mocap`'s.
+
+use crate::math::rotation::Rotation;
+use crate::math::vec3;
+use crate::math::vec3::Vec3;
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use std::path::Path;
+
+/// A BVH file in memory, in its own units and axes.
+#[derive(Clone, Debug)]
+pub struct Bvh {
+    pub joints: Vec<Joint>,
+    /// Seconds between two frames.
+    pub frame_secs: f64,
+    pub n_frames: usize,
+    /// Frame by frame all channels in the order of the joints.
+    values: Vec<f64>,
+    n_channels: usize,
+}
+
+/// A joint, or the end of a bone (an `End Site`, named after its parent with `_end`).
+#[derive(Clone, Debug)]
+pub struct Joint {
+    pub name: String,
+    pub parent: Option<usize>,
+    pub offset: Vec3,
+    channels: Vec<Channel>,
+    first_channel: usize,
+}
+
+/// Axis 0 x, 1 y, 2 z.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Channel {
+    Position(usize),
+    Rotation(usize),
+}
+
+/// What a joint's position channels mean. The format never said, and both kinds are about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Positions {
+    /// They are added to the OFFSET (the original description; CMU files).
+    Add,
+    /// They stand in the OFFSET's place (Bandai-Namco files).
+    Replace,
+    /// `Replace` where joints below the root have position channels that lie closer to their OFFSET than to zero (an
+    /// added position would be near zero), else `Add`.
+    Auto,
+}
+
+impl Bvh {
+    /// Reads a file. Errors: unreadable, or not BVH (the message names what was expected).
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        Self::parse(&text).with_context(|| format!("{} is no readable BVH", path.display()))
+    }
+
+    /// Parses the text of a file.
+    pub fn parse(text: &str) -> Result<Self> {
+        let mut words = Words(text.split_ascii_whitespace());
+        words.expect("HIERARCHY")?;
+        words.expect("ROOT")?;
+        let mut joints: Vec<Joint> = Vec::new();
+        let mut n_channels = 0;
+        let mut open: Vec<usize> = Vec::new();
+        push(&mut joints, &mut open, words.next("the root's name")?.to_owned(), &mut words)?;
+        while let Some(&current) = open.last() {
+            match words.next("the rest of the hierarchy")? {
+                "OFFSET" => joints[current].offset = [words.number()?, words.number()?, words.number()?],
+                "CHANNELS" => {
+                    let count = words.number()?;
+                    ensure!((0.0..=6.0).contains(&count), "a joint with {count} channels");
+                    joints[current].first_channel = n_channels;
+                    joints[current].channels =
+                        (0..count as usize).map(|_| channel(words.next("a channel")?)).collect::<Result<_>>()?;
+                    n_channels += joints[current].channels.len();
+                }
+                "JOINT" => push(&mut joints, &mut open, words.next("a joint's name")?.to_owned(), &mut words)?,
+                "End" => {
+                    words.expect("Site")?;
+                    let name = format!("{}_end", joints[current].name);
+                    push(&mut joints, &mut open, name, &mut words)?;
+                }
+                "}" => drop(open.pop()),
+                other => bail!("`{other}` inside joint {}", joints[current].name),
+            }
+        }
+        words.expect("MOTION")?;
+        words.expect("Frames:")?;
+        let n_frames = words.number()?;
+        ensure!(n_frames >= 0.0 && n_frames.fract() == 0.0 && n_frames < 1e8, "Frames: {n_frames}");
+        words.expect("Frame")?;
+        words.expect("Time:")?;
+        let frame_secs = words.number()?;
+        ensure!(frame_secs > 0.0 && frame_secs.is_finite(), "Frame Time: {frame_secs}");
+        let values: Vec<f64> =
+            words.0.map(|w| w.parse().map_err(|_| anyhow!("`{w}` is no number"))).collect::<Result<_>>()?;
+        let expected = n_frames as usize * n_channels;
+        ensure!(
+            values.len() == expected,
+            "{} numbers after Frame Time, expected {n_frames} frames x {n_channels}",
+            values.len()
+        );
+        Ok(Self { joints, frame_secs, n_frames: n_frames as usize, values, n_channels })
+    }
+
+    /// The joint of that name.
+    pub fn find(&self, name: &str) -> Option<usize> {
+        self.joints.iter().position(|j| j.name == name)
+    }
+
+    /// `Add` or `Replace` for `Auto`, by the rule given there.
+    pub fn settle(&self, positions: Positions) -> Positions {
+        if positions != Positions::Auto {
+            return positions;
+        }
+        let (mut to_offset, mut to_zero) = (0.0, 0.0);
+        for joint in self.joints.iter().filter(|j| j.parent.is_some()) {
+            for frame in self.frames().take(100) {
+                for (channel, value) in joint.channels.iter().zip(&frame[joint.first_channel..]) {
+                    if let Channel::Position(axis) = *channel {
+                        to_offset += (value - joint.offset[axis]).abs();
+                        to_zero += value.abs();
+                    }
+                }
+            }
+        }
+        if to_offset < to_zero { Positions::Replace } else { Positions::Add }
+    }
+
+    /// Positions of all joints in every frame, in the file's units and axes.
+    pub fn positions(&self, positions: Positions) -> Vec<Vec<Vec3>> {
+        let positions = self.settle(positions);
+        self.frames().map(|frame| self.pose(frame, positions)).collect()
+    }
+
+    fn frames(&self) -> impl Iterator<Item = &[f64]> {
+        (0..self.n_frames).map(|t| &self.values[t * self.n_channels..(t + 1) * self.n_channels])
+    }
+
+    fn pose(&self, frame: &[f64], positions: Positions) -> Vec<Vec3> {
+        let mut turned = vec![Rotation::IDENTITY; self.joints.len()];
+        let mut placed = vec![[0.0; 3]; self.joints.len()];
+        for (i, joint) in self.joints.iter().enumerate() {
+            let (mut step, mut turn) = (joint.offset, Rotation::IDENTITY);
+            for (channel, &value) in joint.channels.iter().zip(&frame[joint.first_channel..]) {
+                match *channel {
+                    Channel::Position(axis) if positions == Positions::Replace => step[axis] = value,
+                    Channel::Position(axis) => step[axis] += value,
+                    Channel::Rotation(axis) => {
+                        let mut about = [0.0; 3];
+                        about[axis] = 1.0;
+                        turn = turn * Rotation::about(about, value.to_radians());
+                    }
+                }
+            }
+            (turned[i], placed[i]) = match joint.parent {
+                Some(p) => (turned[p] * turn, vec3::add(placed[p], turned[p].turn(step))),
+                None => (turn, step),
+            };
+        }
+        placed
+    }
+}
+
+/// Opens a joint below the innermost open one.
+fn push(joints: &mut Vec<Joint>, open: &mut Vec<usize>, name: String, words: &mut Words) -> Result<()> {
+    words.expect("{")?;
+    joints.push(Joint { name, parent: open.last().copied(), offset: [0.0; 3], channels: Vec::new(), first_channel: 0 });
+    open.push(joints.len() - 1);
+    Ok(())
+}
+
+fn channel(word: &str) -> Result<Channel> {
+    Ok(match word.to_ascii_lowercase().as_str() {
+        "xposition" => Channel::Position(0),
+        "yposition" => Channel::Position(1),
+        "zposition" => Channel::Position(2),
+        "xrotation" => Channel::Rotation(0),
+        "yrotation" => Channel::Rotation(1),
+        "zrotation" => Channel::Rotation(2),
+        _ => bail!("`{word}` is no channel"),
+    })
+}
+
+struct Words<'a>(std::str::SplitAsciiWhitespace<'a>);
+
+impl<'a> Words<'a> {
+    fn next(&mut self, what: &str) -> Result<&'a str> {
+        self.0.next().with_context(|| format!("the file ends before {what}"))
+    }
+
+    fn expect(&mut self, word: &str) -> Result<()> {
+        let found = self.next(&format!("`{word}`"))?;
+        ensure!(found.eq_ignore_ascii_case(word), "`{found}` where `{word}` was expected");
+        Ok(())
+    }
+
+    fn number(&mut self) -> Result<f64> {
+        let word = self.next("a number")?;
+        word.parse().map_err(|_| anyhow!("`{word}` where a number was expected"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A root and an arm of two bones of length 10 along x; the elbow has position channels when `positions`.
+    fn arm(elbow_channels: &str, motion: &str) -> String {
+        format!(
+            "HIERARCHY\nROOT Hips\n{{\nOFFSET 0 5 0\nCHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation\n\
+             JOINT Elbow\n{{\nOFFSET 10 0 0\nCHANNELS {elbow_channels}\nEnd Site\n{{\nOFFSET 10 0 0\n}}\n}}\n}}\n\
+             MOTION\nFrames: 1\nFrame Time: 0.04\n{motion}\n"
+        )
+    }
+
+    fn close(a: Vec3, b: Vec3) {
+        assert!((0..3).all(|k| (a[k] - b[k]).abs() < 1e-9), "{a:?} {b:?}");
+    }
+
+    #[test]
+    fn rotations_apply_in_the_order_of_the_channels() {
+        // root at (1, 5 + 2, 3) turned 90 about z; elbow turned 90 about y, then, in its own axes, 90 about x
+        let bvh = Bvh::parse(&arm("3 Yrotation Xrotation Zrotation", "1 2 3 90 0 0 90 90 90")).unwrap();
+        assert_eq!((bvh.n_frames, bvh.frame_secs, bvh.joints[2].name.as_str()), (1, 0.04, "Elbow_end"));
+        let pose = &bvh.positions(Positions::Auto)[0];
+        close(pose[0], [1.0, 7.0, 3.0]);
+        close(pose[1], [1.0, 17.0, 3.0]);
+        // Ry(90) Rx(90) Rz(90) x = Ry(90) Rx(90) y = Ry(90) z = x, and the root turns x into y
+        close(pose[2], [1.0, 27.0, 3.0]);
+        let other = Bvh::parse(&arm("3 Zrotation Yrotation Xrotation", "0 0 0 0 0 0 0 90 0")).unwrap();
+        close(other.positions(Positions::Auto)[0][2], [10.0, 5.0, -10.0]);
+    }
+
+    #[test]
+    fn position_channels_replace_or_add() {
+        let channels = "6 Xposition Yposition Zposition Zrotation Yrotation Xrotation";
+        let text = arm(channels, "0 0 0 0 0 0 10.2 0 0 0 0 0");
+        let bvh = Bvh::parse(&text).unwrap();
+        assert_eq!(bvh.settle(Positions::Auto), Positions::Replace);
+        close(bvh.positions(Positions::Auto)[0][1], [10.2, 0.0, 0.0]);
+        close(bvh.positions(Positions::Add)[0][1], [20.2, 5.0, 0.0]);
+        let small = Bvh::parse(&arm(channels, "0 0 0 0 0 0 0.1 0 0 0 0 0")).unwrap();
+        assert_eq!(small.settle(Positions::Auto), Positions::Add);
+        close(small.positions(Positions::Auto)[0][1], [10.1, 5.0, 0.0]);
+    }
+
+    #[test]
+    fn broken_files_are_errors_that_say_where() {
+        let good = arm("3 Zrotation Yrotation Xrotation", "0 0 0 0 0 0 0 0 0");
+        for (broken, says) in [
+            (String::new(), "ends before"),
+            (good.replace("ROOT", "LEAF"), "`LEAF`"),
+            (good.replace("Yrotation", "Wrotation"), "Wrotation"),
+            (good.replace("Frames: 1", "Frames: 2"), "9 numbers"),
+            (good.replace("Frames: 1", "Frames: -1"), "Frames: -1"),
+            (good.replace("0.04", "0"), "Frame Time"),
+            (good.replace("MOTION", "}"), "MOTION"),
+            (good.replace("OFFSET 10 0 0", "OFFSET ten 0 0"), "`ten`"),
+            (good[..20].to_owned(), "ends before"),
+        ] {
+            let text = format!("{:#}", Bvh::parse(&broken).unwrap_err());
+            assert!(text.contains(says), "{text}");
+        }
+    }
+}

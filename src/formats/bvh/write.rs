@@ -1,0 +1,175 @@
+//! Writes BVH: a skeleton with local rotations over time. The root has six channels, every other joint three, in the
+//! order Z X Y; an end of a bone is an `End Site`. Which skeleton, and in which axes and units, is the caller's.
+
+use crate::math::rotation::Rotation;
+use crate::math::vec3::Vec3;
+use crate::motion::fk::{Joint, Skeleton};
+use crate::types::time::FrameRate;
+use std::fmt::Write as _;
+use std::io;
+
+const ROTATION_CHANNELS: &str = "Zrotation Xrotation Yrotation";
+
+/// Rotations of a skeleton over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Clip {
+    pub skeleton: Skeleton,
+    pub fps: FrameRate,
+    /// Place of the root, the same in every frame.
+    pub root: Vec3,
+    /// Frame by frame one local rotation a joint (ends: anything).
+    pub local: Vec<Vec<Rotation>>,
+}
+
+impl Clip {
+    /// Number of frames.
+    pub fn n_frames(&self) -> usize {
+        self.local.len()
+    }
+
+    /// Positions of all joints in a frame.
+    pub fn positions(&self, frame_idx: usize) -> Vec<Vec3> {
+        self.skeleton.positions(self.root, &self.local[frame_idx])
+    }
+
+    /// The same motion at another rate: through the given frames, its speed without a jump at them; the last frame is
+    /// held.
+    pub fn resampled(&self, fps: FrameRate) -> Self {
+        let n_frames = if self.local.is_empty() { 0 } else { fps.frames_in(self.fps.secs(self.n_frames())) };
+        let last = self.n_frames().saturating_sub(1);
+        let local = (0..n_frames).map(|frame| {
+            let at = (fps.secs(frame) * self.fps.per_sec()).min(last as f64);
+            let before = at.floor() as usize;
+            let near = [before.saturating_sub(1), before, (before + 1).min(last), (before + 2).min(last)];
+            let share = at - before as f64;
+            let between = |joint: usize| Rotation::cubic(near.map(|t| self.local[t][joint]), share);
+            (0..self.skeleton.joints.len()).map(between).collect()
+        });
+        Self { local: local.collect(), fps, skeleton: self.skeleton.clone(), root: self.root }
+    }
+
+    /// The clip as the text of a BVH file. Lengths keep 1e-6 of their unit, angles 1e-5 degrees.
+    pub fn to_bvh(&self) -> String {
+        let mut text = Vec::new();
+        // memory takes whatever is written, and all of it is text
+        let _ = self.write_bvh(&self.skeleton, &mut text);
+        String::from_utf8(text).unwrap_or_default()
+    }
+
+    /// Writes the same text frame by frame: that of hours is larger than they are. `named` is the clip's skeleton,
+    /// maybe under other names.
+    pub fn write_bvh(&self, named: &Skeleton, out: &mut dyn io::Write) -> io::Result<()> {
+        let mut text = String::from("HIERARCHY\n");
+        let order = self.written_order();
+        let mut open: Vec<usize> = Vec::new();
+        for &joint in &order {
+            while open.last().is_some_and(|&last| Some(last) != self.skeleton.joints[joint].parent) {
+                open.pop();
+                let _ = writeln!(text, "{}}}", "\t".repeat(open.len()));
+            }
+            head(&mut text, &named.joints[joint], open.len());
+            open.push(joint);
+        }
+        while open.pop().is_some() {
+            let _ = writeln!(text, "{}}}", "\t".repeat(open.len()));
+        }
+        let _ = write!(text, "MOTION\nFrames: {}\nFrame Time: {:.8}\n", self.n_frames(), 1.0 / self.fps.per_sec());
+        let moving: Vec<usize> = order.into_iter().filter(|&joint| !self.skeleton.joints[joint].end).collect();
+        for local in &self.local {
+            let _ = write!(text, "{:.6} {:.6} {:.6}", self.root[0], self.root[1], self.root[2]);
+            for &joint in &moving {
+                let [z, x, y] = local[joint].euler_zxy_degrees();
+                let _ = write!(text, " {z:.5} {x:.5} {y:.5}");
+            }
+            text.push('\n');
+            out.write_all(text.as_bytes())?;
+            text.clear();
+        }
+        out.write_all(text.as_bytes())
+    }
+
+    /// Joints depth first: the order in which a BVH names them and gives their channels.
+    fn written_order(&self) -> Vec<usize> {
+        let mut order = Vec::with_capacity(self.skeleton.joints.len());
+        let mut ahead: Vec<usize> = (0..self.skeleton.joints.len().min(1)).collect();
+        while let Some(joint) = ahead.pop() {
+            order.push(joint);
+            let children: Vec<usize> = self.skeleton.children(joint).collect();
+            ahead.extend(children.into_iter().rev());
+        }
+        order
+    }
+}
+
+/// Name, offset and channels of a joint, its brace left open.
+fn head(text: &mut String, joint: &Joint, depth: usize) {
+    let indent = "\t".repeat(depth);
+    let [x, y, z] = joint.offset;
+    let _ = match (joint.end, joint.parent) {
+        (true, _) => writeln!(text, "{indent}End Site"),
+        (false, None) => writeln!(text, "{indent}ROOT {}", joint.name),
+        (false, Some(_)) => writeln!(text, "{indent}JOINT {}", joint.name),
+    };
+    let _ = writeln!(text, "{indent}{{\n{indent}\tOFFSET {x:.6} {y:.6} {z:.6}");
+    let _ = match (joint.end, joint.parent) {
+        (true, _) => Ok(()),
+        (false, None) => {
+            writeln!(text, "{indent}\tCHANNELS 6 Xposition Yposition Zposition {ROTATION_CHANNELS}")
+        }
+        (false, Some(_)) => writeln!(text, "{indent}\tCHANNELS 3 {ROTATION_CHANNELS}"),
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn clip() -> Clip {
+        let mut skeleton = Skeleton::default();
+        let hips = skeleton.push("Hips", None, [0.0; 3], false);
+        let left = skeleton.push("Left", Some(hips), [1.0, 0.0, 0.0], false);
+        let right = skeleton.push("Right", Some(hips), [-1.0, 0.0, 0.0], false);
+        skeleton.push("", Some(left), [1.0, 0.0, 0.0], true);
+        skeleton.push("", Some(right), [-1.0, 0.0, 0.0], true);
+        let turn = |degrees: f64| {
+            let r = Rotation::about([0.0, 0.0, 1.0], degrees.to_radians());
+            vec![Rotation::IDENTITY, r, Rotation::IDENTITY, Rotation::IDENTITY, Rotation::IDENTITY]
+        };
+        Clip { skeleton, fps: FrameRate::new(15, 1), root: [0.0, 90.0, 0.0], local: vec![turn(0.0), turn(30.0)] }
+    }
+
+    #[test]
+    fn the_text_is_a_bvh() {
+        let expected = "HIERARCHY\nROOT Hips\n{\n\tOFFSET 0.000000 0.000000 0.000000\n\tCHANNELS 6 Xposition Yposition \
+            Zposition Zrotation Xrotation Yrotation\n\tJOINT Left\n\t{\n\t\tOFFSET 1.000000 0.000000 0.000000\n\t\t\
+            CHANNELS 3 Zrotation Xrotation Yrotation\n\t\tEnd Site\n\t\t{\n\t\t\tOFFSET 1.000000 0.000000 0.000000\n\
+            \t\t}\n\t}\n\tJOINT Right\n";
+        let text = clip().to_bvh().replace("-0.00000 ", "0.00000 ").replace("-0.00000\n", "0.00000\n");
+        assert!(text.starts_with(expected), "{text}");
+        let zero = "0.00000 0.00000 0.00000";
+        let end = format!(
+            "}}\nMOTION\nFrames: 2\nFrame Time: 0.06666667\n0.000000 90.000000 0.000000 {zero} {zero} {zero}\n\
+             0.000000 90.000000 0.000000 {zero} 30.00000 0.00000 0.00000 {zero}\n"
+        );
+        assert!(text.ends_with(&end), "{text}");
+        assert_eq!(text.matches('{').count(), text.matches('}').count());
+    }
+
+    #[test]
+    fn resampling_keeps_the_time_and_passes_through_the_frames() {
+        let mut given = clip();
+        let turns = [0.0, 30.0, 60.0, 90.0].map(|degrees: f64| {
+            vec![Rotation::about([0.0, 0.0, 1.0], degrees.to_radians()); given.skeleton.joints.len()]
+        });
+        given.local = turns.to_vec();
+        let twice = given.resampled(FrameRate::new(30, 1));
+        let degrees: Vec<f64> = twice.local.iter().map(|frame| frame[1].angle().to_degrees()).collect();
+        assert_eq!(degrees.len(), 8);
+        for (n, expected) in [(0, 0.0), (2, 30.0), (3, 45.0), (4, 60.0), (6, 90.0), (7, 90.0)] {
+            assert!((degrees[n] - expected).abs() < 1e-9, "{degrees:?}");
+        }
+        assert!(degrees[1] > 8.0 && degrees[1] < 15.0 && degrees[5] > 75.0, "{degrees:?}");
+        given.local.clear();
+        assert_eq!(given.resampled(FrameRate::new(30, 1)).n_frames(), 0);
+    }
+}

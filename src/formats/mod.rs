@@ -1,0 +1,13 @@
+//! File formats, read and written. Every reader names the file, the place and what was expected.
+
+pub mod authors_txt;
+pub mod bvh;
+pub mod checkpoint;
+pub mod joints_npz;
+pub mod keypoints_npz;
+pub mod npy;
+pub mod npy_slice;
+pub mod npz;
+pub mod search;
+pub mod tfevents;
+pub mod wav;

@@ -1,0 +1,128 @@
+//! Motion as a plain `.npy` array [T, 49, 3] of f32 in house order, a missing joint NaN. The rate is not in the file.
+
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::N_JOINTS;
+use crate::types::time::FrameRate;
+use anyhow::{Context as _, ensure};
+use ndarray::{Array, Array3, Dimension, Ix3, IxDyn};
+use ndarray_npy::npy::header::Header;
+use ndarray_npy::{ReadNpyError, ReadNpyExt as _, ReadableElement, WriteNpyExt as _};
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
+use std::path::Path;
+
+/// Reads a motion of `fps`; joints that are not finite are missing, in the mask too.
+pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot open {}", path.display()))?;
+    let joints = parse::<f32, Ix3>(&bytes)
+        .with_context(|| format!("{} is not a .npy file of float32 with three axes", path.display()))?;
+    ensure!(
+        joints.shape()[1..] == [N_JOINTS, 3],
+        "{} has the shape {:?}, expected [frames, {N_JOINTS}, 3]",
+        path.display(),
+        joints.shape()
+    );
+    Ok(Motion::from_joints(fps, joints))
+}
+
+/// Reads a motion of `fps` from an array of f32 or f64, [T, 49, 3] or [T, 147] (the same numbers, joint after joint).
+pub fn read_any(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot open {}", path.display()))?;
+    let numbers = parse::<f32, IxDyn>(&bytes).or_else(|error| match error {
+        ReadNpyError::WrongDescriptor(_) => Ok(parse::<f64, IxDyn>(&bytes)?.mapv(|v| v as f32)),
+        error => Err(error),
+    });
+    let numbers = numbers.with_context(|| format!("{} is not a .npy file of float32 or float64", path.display()))?;
+    let shape = numbers.shape().to_vec();
+    let is_motion = matches!(shape[..], [_, N_JOINTS, 3]) || matches!(shape[..], [_, n] if n == 3 * N_JOINTS);
+    ensure!(
+        is_motion,
+        "{} has the shape {shape:?}, expected [frames, {N_JOINTS}, 3] or [frames, {}]",
+        path.display(),
+        3 * N_JOINTS
+    );
+    let joints = Array3::from_shape_vec((shape[0], N_JOINTS, 3), numbers.iter().copied().collect())?;
+    Ok(Motion::from_joints(fps, joints))
+}
+
+/// An array from the bytes of its file. What the header promises is held against these bytes before anything is
+/// allocated for it.
+pub(crate) fn parse<T: ReadableElement, D: Dimension>(bytes: &[u8]) -> Result<Array<T, D>, ReadNpyError> {
+    if !has_small_header(bytes) {
+        return Err(ReadNpyError::MissingData);
+    }
+    let n_numbers = Header::from_reader(&mut &*bytes)?.shape.iter().try_fold(1usize, |n, axis| n.checked_mul(*axis));
+    // A number takes a byte at least; the exact length is checked while reading.
+    if n_numbers.is_none_or(|n| n > bytes.len()) {
+        return Err(ReadNpyError::MissingData);
+    }
+    Array::read_npy(bytes)
+}
+
+/// Whether the whole header is there, without brackets in brackets in brackets (its parser is recursive).
+fn has_small_header(bytes: &[u8]) -> bool {
+    let header = match bytes {
+        [_, _, _, _, _, _, 1, _, a, b, rest @ ..] => rest.get(..usize::from(u16::from_le_bytes([*a, *b]))),
+        [_, _, _, _, _, _, _, _, a, b, c, d, rest @ ..] => rest.get(..u32::from_le_bytes([*a, *b, *c, *d]) as usize),
+        _ => None,
+    };
+    header.is_some_and(|header| header.iter().filter(|byte| b"([{".contains(byte)).count() <= 16)
+}
+
+/// Writes the joints. Call it inside `stage::workdir::replace`: it writes in place.
+pub fn write(path: &Path, motion: &Motion) -> anyhow::Result<()> {
+    write_points(path, &motion.joints)
+}
+
+/// Writes points [T, n, 3] of any number a frame; as `write`.
+pub fn write_points(path: &Path, points: &Array3<f32>) -> anyhow::Result<()> {
+    let mut file = BufWriter::new(File::create(path)?);
+    points.as_standard_layout().write_npy(&mut file)?;
+    Ok(file.flush()?)
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// The file with another shape in its header.
+    pub fn with_shape(bytes: &[u8], old: &str, new: &str) -> Vec<u8> {
+        let header = String::from_utf8_lossy(&bytes[10..128]).replace(old, new);
+        [&bytes[..10], format!("{:<117}\n", header.trim_end()).as_bytes(), &bytes[128..]].concat()
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_and_a_wrong_shape_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("motion.npy");
+        let mut joints = Array3::from_shape_fn((4, N_JOINTS, 3), |(t, j, k)| (t * 1000 + j * 3 + k) as f32);
+        joints[[2, 48, 0]] = f32::NAN;
+        let motion = Motion::from_joints(FrameRate::new(15, 1), joints);
+        assert!(!motion.mask[[2, 48]] && motion.mask[[1, 48]]);
+        write(&path, &motion).unwrap();
+        let again = read(&path, FrameRate::new(15, 1)).unwrap();
+        assert_eq!(again.mask, motion.mask);
+        assert!(again.joints.iter().zip(&motion.joints).all(|(a, b)| a.to_bits() == b.to_bits()));
+
+        Array3::<f32>::zeros((4, 43, 3)).write_npy(File::create(&path).unwrap()).unwrap();
+        let error = read(&path, FrameRate::new(15, 1)).unwrap_err().to_string();
+        assert!(error.contains("[4, 43, 3]"), "{error}");
+        std::fs::write(&path, "no array").unwrap();
+        assert!(read(&path, FrameRate::new(15, 1)).is_err());
+    }
+
+    #[test]
+    fn a_header_that_promises_too_much_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("motion.npy");
+        let mut bytes = Vec::new();
+        Array3::<f32>::zeros((2, N_JOINTS, 3)).write_npy(&mut bytes).unwrap();
+        for shape in ["(1000000000000, 49, 3)", "(18446744073709551615, 49, 3)", "(3, 49, 3)", "((((((((((((((((((2"] {
+            std::fs::write(&path, with_shape(&bytes, "(2, 49, 3)", shape)).unwrap();
+            assert!(read(&path, FrameRate::new(15, 1)).is_err(), "{shape}");
+        }
+        for end in 0..bytes.len() {
+            assert!(parse::<f32, Ix3>(&bytes[..end]).is_err());
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! Speech to motion with a trained speaker, chunk by chunk: memory does not grow with the sound.
+
+use super::mel_stream::Heard;
+use super::model;
+use super::model::{Facts, TrainedSpeaker};
+use super::normalisation::N_NUMBERS;
+use crate::nn::gan::generator::FRAMES_MULTIPLE;
+use crate::nn::gan::streaming::Chunks;
+use crate::train::gan::train::BEST;
+use crate::train::gan::windows::mel_frames;
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::N_JOINTS;
+use crate::types::sound::{SAMPLE_RATE, Sound};
+use crate::types::time::FrameRate;
+use anyhow::{Result, ensure};
+use ndarray::{Array2, Array3, s};
+use std::path::Path;
+
+/// Frames made at once: with 256 more beside them that are thrown away, a small part.
+const CHUNK: usize = 2048;
+
+/// A trained speaker.
+pub struct Speaker {
+    trained: TrainedSpeaker,
+}
+
+impl From<TrainedSpeaker> for Speaker {
+    fn from(trained: TrainedSpeaker) -> Self {
+        Self { trained }
+    }
+}
+
+impl Speaker {
+    /// Opens a checkpoint of `orator train gan`: a file, or the folder of a training (its best checkpoint).
+    pub fn open(path: &Path) -> Result<Self> {
+        let file = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
+        ensure!(file.is_file(), "there is no checkpoint {}; `orator train gan` writes one", file.display());
+        Ok(Self { trained: model::load(&file)? })
+    }
+
+    /// The speaker's name.
+    pub fn name(&self) -> &str {
+        &self.trained.facts.name
+    }
+
+    /// What its checkpoint says of it.
+    pub fn facts(&self) -> &Facts {
+        &self.trained.facts
+    }
+
+    /// The rate of the motion it makes.
+    pub fn fps(&self) -> FrameRate {
+        self.trained.facts.fps
+    }
+
+    /// Motion for `sound` (16 kHz): as many whole frames as fit into it, bones of the speaker's lengths. Errors on another
+    /// rate, and on sound shorter than a frame.
+    pub fn motion(&self, sound: &Sound) -> Result<Motion> {
+        self.motion_with_chunk(sound, CHUNK)
+    }
+
+    /// The same in chunks of `chunk` frames, a multiple of 32.
+    pub fn motion_with_chunk(&self, sound: &Sound, chunk: usize) -> Result<Motion> {
+        ensure!(sound.rate == SAMPLE_RATE, "the sound has {} Hz, expected {SAMPLE_RATE}", sound.rate);
+        self.joined(pieces(sound), sound.samples.len(), chunk, &mut |_| ())
+    }
+
+    /// The same motion for `n_samples` at 16 kHz that come piece by piece: sound of any length takes the same memory, but
+    /// for the motion. `made` hears of every so many frames. Errors as `motion`, and where the pieces are not `n_samples`.
+    pub fn motion_of_pieces(
+        &self,
+        pieces: impl Iterator<Item = Result<Vec<f32>>>,
+        n_samples: usize,
+        made: &mut dyn FnMut(usize),
+    ) -> Result<Motion> {
+        self.joined(pieces, n_samples, CHUNK, made)
+    }
+
+    fn joined(
+        &self,
+        pieces: impl Iterator<Item = Result<Vec<f32>>>,
+        n_samples: usize,
+        chunk: usize,
+        made: &mut dyn FnMut(usize),
+    ) -> Result<Motion> {
+        let n_frames = self.n_frames(n_samples)?;
+        let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
+        let mut first = 0;
+        for poses in self.numbers_of(pieces, n_samples, chunk)? {
+            let poses = poses?;
+            let part = self.trained.facts.motion(poses.view());
+            joints.slice_mut(s![first..first + poses.ncols(), .., ..]).assign(&part.joints);
+            first += poses.ncols();
+            made(poses.ncols());
+        }
+        Ok(Motion::from_joints(self.fps(), joints))
+    }
+
+    /// What the network says for `sound`, [144, T] of one chunk after another, `chunk` frames or less each: raw numbers
+    /// that the checkpoint's facts make into motion. The sound is continued by its mirror image up to a multiple of 32
+    /// frames (rebol.md section 6).
+    pub fn numbers<'a>(
+        &'a self,
+        sound: &'a Sound,
+        chunk: usize,
+    ) -> Result<impl Iterator<Item = Result<Array2<f32>>> + 'a> {
+        ensure!(sound.rate == SAMPLE_RATE, "the sound has {} Hz, expected {SAMPLE_RATE}", sound.rate);
+        self.numbers_of(pieces(sound), sound.samples.len(), chunk)
+    }
+
+    fn numbers_of<'a>(
+        &'a self,
+        pieces: impl Iterator<Item = Result<Vec<f32>>> + 'a,
+        n_samples: usize,
+        chunk: usize,
+    ) -> Result<impl Iterator<Item = Result<Array2<f32>>> + 'a> {
+        let facts = &self.trained.facts;
+        let n_frames = self.n_frames(n_samples)?;
+        let padded = (n_frames / FRAMES_MULTIPLE + 1) * FRAMES_MULTIPLE;
+        let n_mel_frames = mel_frames(facts.fps, padded);
+        let mut heard = Heard::new(pieces, n_samples, n_mel_frames);
+        let mels = move |frames| heard.log_mels(frames).map_err(|error| candle_core::Error::Msg(format!("{error:#}")));
+        let chunks = Chunks::new(&self.trained.generator, facts.network.preset, n_mel_frames, padded, chunk, mels)?;
+        Ok(chunks.zip((0..n_frames).step_by(chunk)).map(move |(poses, first)| {
+            let n = chunk.min(n_frames - first);
+            let poses = poses?.narrow(2, 0, n)?.flatten_all()?.to_vec1()?;
+            Ok(Array2::from_shape_vec((N_NUMBERS, n), poses)?)
+        }))
+    }
+
+    /// Frames of motion for so many samples.
+    pub fn n_frames(&self, n_samples: usize) -> Result<usize> {
+        let secs = n_samples as f64 / f64::from(SAMPLE_RATE);
+        let n_frames = (secs * self.fps().per_sec() + 1e-6) as usize;
+        ensure!(n_frames > 0, "the sound is {secs:.3} s long: too short for one frame of motion");
+        Ok(n_frames)
+    }
+}
+
+/// Sound in memory as if it came in.
+fn pieces(sound: &Sound) -> impl Iterator<Item = Result<Vec<f32>>> {
+    sound.samples.chunks(SAMPLE_RATE as usize).map(|piece| Ok(piece.to_vec()))
+}

@@ -1,0 +1,165 @@
+//! What a checkpoint of the generator means: the facts that make a new sound into motion, and the network itself.
+
+use super::normalisation::{N_NUMBERS, Normalisation};
+use super::representation::Representation;
+use crate::audio::mel;
+use crate::formats::checkpoint::Contents;
+use crate::motion::bones;
+use crate::nn::gan::generator::{Config, Generator};
+use crate::nn::params::Params;
+use crate::types::pose3d::Motion;
+use crate::types::sound::SAMPLE_RATE;
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, ensure};
+use ndarray::ArrayView2;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Tensors of the generator in a checkpoint begin with this.
+pub const GENERATOR: &str = "generator.";
+/// Name and version of the layout; another is refused.
+const KIND: &str = "orator speaker 2";
+const SKELETON: &str = "49 joints, house order";
+/// Most channels of a network that is believed; the published one has 256.
+const MOST_WIDTH: usize = 1024;
+/// Most frames a second that are believed.
+const MOST_FPS: f64 = 1000.0;
+
+/// Everything beside the tensors that generation needs. Stored under `speaker` in a checkpoint's facts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Facts {
+    pub kind: String,
+    /// The speaker's name.
+    pub name: String,
+    pub fps: FrameRate,
+    pub skeleton: String,
+    pub network: Config,
+    pub audio: Audio,
+    pub normalisation: Normalisation,
+    pub representation: Representation,
+    /// Hash of the dataset it learnt from.
+    pub dataset: String,
+}
+
+/// How the spectrogram was made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Audio {
+    pub rate: u32,
+    pub window: usize,
+    pub hop: usize,
+    pub fft: usize,
+    pub n_mels: usize,
+    pub lowest_hz: f64,
+    pub highest_hz: f64,
+}
+
+impl Audio {
+    /// This program's.
+    pub fn present() -> Self {
+        Self {
+            rate: SAMPLE_RATE,
+            window: mel::WINDOW,
+            hop: mel::HOP,
+            fft: mel::FFT,
+            n_mels: mel::N_MELS,
+            lowest_hz: mel::LOWEST_HZ,
+            highest_hz: mel::HIGHEST_HZ,
+        }
+    }
+}
+
+impl Facts {
+    /// This program's skeleton and audio; `name` and `fps` of the speaker, `dataset` as its hash.
+    pub fn new(
+        name: &str,
+        fps: FrameRate,
+        dataset: &str,
+        network: Config,
+        normalisation: Normalisation,
+        representation: Representation,
+    ) -> Self {
+        Self {
+            kind: KIND.to_owned(),
+            name: name.to_owned(),
+            fps,
+            skeleton: SKELETON.to_owned(),
+            network,
+            audio: Audio::present(),
+            normalisation,
+            representation,
+            dataset: dataset.to_owned(),
+        }
+    }
+
+    /// The generator's numbers [144, T] as motion whose bones have the speaker's lengths in every frame.
+    pub fn motion(&self, raw: ArrayView2<f32>) -> Motion {
+        let mut motion = Motion::from_joints(self.fps, self.representation.joints(raw, &self.normalisation));
+        let lengths = &self.normalisation.bone_lengths;
+        bones::with_lengths(&mut motion, &std::array::from_fn(|bone| lengths.get(bone).copied().unwrap_or(0.0)));
+        motion
+    }
+}
+
+/// A trained generator, ready to use.
+pub struct TrainedSpeaker {
+    pub facts: Facts,
+    pub generator: Generator,
+}
+
+/// Reads a checkpoint of `orator train gan`. Errors name the file and what is wrong with it.
+pub fn load(path: &Path) -> Result<TrainedSpeaker> {
+    let contents = Contents::read(path)?;
+    build(&contents).with_context(|| format!("{} is no checkpoint of `orator train gan`", path.display()))
+}
+
+fn build(contents: &Contents) -> Result<TrainedSpeaker> {
+    let kind = &contents.facts["speaker"]["kind"];
+    ensure!(kind == KIND, "its kind is {kind}, this program reads {KIND:?}");
+    let facts: Facts = serde_json::from_value(contents.facts["speaker"].clone()).context("its facts are incomplete")?;
+    ensure!(facts.skeleton == SKELETON, "its skeleton is {:?}, expected {SKELETON:?}", facts.skeleton);
+    ensure!(facts.audio == Audio::present(), "its audio settings are others than this program's: {:?}", facts.audio);
+    ensure!(facts.network.n_out == N_NUMBERS, "it makes {} numbers a pose, not {N_NUMBERS}", facts.network.n_out);
+    let (network, fps) = (&facts.network, facts.fps);
+    ensure!(network.n_mels == mel::N_MELS, "it reads {} mel bands, not {}", network.n_mels, mel::N_MELS);
+    ensure!((4..=MOST_WIDTH).contains(&network.width), "its width is {}, expected 4 to {MOST_WIDTH}", network.width);
+    ensure!(fps.per_sec() <= MOST_FPS, "it moves at {fps}, expected {MOST_FPS} at most");
+    facts.normalisation.check()?;
+    facts.representation.check()?;
+    let mut params = Params::frozen();
+    let generator = Generator::new(&mut params, &facts.network)?;
+    params.load(&contents.part(GENERATOR))?;
+    Ok(TrainedSpeaker { facts, generator })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nn::gan::generator::Preset;
+    use crate::types::skeleton::N_BONES;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn facts_that_no_training_writes_are_refused() {
+        let table = vec![1.0; N_NUMBERS];
+        let normal = Normalisation { mean: table.clone(), std: table, bone_lengths: vec![0.1; N_BONES] };
+        let network = Config { width: 8, ..Config::of(Preset::Light, N_NUMBERS) };
+        let facts = Facts::new("host", FrameRate::new(15, 1), "", network.clone(), normal, Representation::Positions);
+        let mut params = Params::new(0);
+        Generator::new(&mut params, &network).unwrap();
+        let mut contents = Contents { facts: serde_json::json!({ "speaker": facts }), tensors: BTreeMap::new() };
+        contents.add(GENERATOR, params.tensors().unwrap());
+        build(&contents).unwrap();
+        for (place, value) in [
+            ("/speaker/network/width", 1_000_000),
+            ("/speaker/network/width", 0),
+            ("/speaker/network/n_mels", 1_000_000),
+            ("/speaker/fps/num", 4_000_000_000u32),
+            ("/speaker/representation", 7),
+        ] {
+            let mut facts = contents.facts.clone();
+            *facts.pointer_mut(place).unwrap() = value.into();
+            let wrong = Contents { facts, tensors: contents.tensors.clone() };
+            assert!(build(&wrong).is_err(), "{place} {value}");
+        }
+    }
+}

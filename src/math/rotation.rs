@@ -1,0 +1,256 @@
+//! Rotations in space as unit quaternions: between directions, between frames, swing and twist, Euler angles in the
+//! order Z X Y (the channels of our BVH). Right-handed, angles in radians unless a name says degrees.
+
+use super::vec3::{Vec3, add, any_across, cross, dot, norm, scale};
+use std::ops::Mul;
+
+/// A rotation: the unit quaternion `w + xi + yj + zk`. `a * b` turns by `b` first, then by `a`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rotation {
+    pub w: f64,
+    pub v: Vec3,
+}
+
+impl Rotation {
+    pub const IDENTITY: Self = Self { w: 1.0, v: [0.0; 3] };
+
+    /// By `angle` about the unit vector `axis`.
+    pub fn about(axis: Vec3, angle: f64) -> Self {
+        let (sin, cos) = (angle / 2.0).sin_cos();
+        Self { w: cos, v: scale(axis, sin) }
+    }
+
+    /// The smallest rotation that turns the unit vector `from` into the unit vector `to`. For opposite vectors, where
+    /// every axis across is as good, one fixed axis is chosen.
+    pub fn between(from: Vec3, to: Vec3) -> Self {
+        let cos = dot(from, to);
+        let axis = cross(from, to);
+        let sin = norm(axis);
+        if sin < 1e-9 {
+            return if cos > 0.0 { Self::IDENTITY } else { Self::about(any_across(from), std::f64::consts::PI) };
+        }
+        Self::about(scale(axis, 1.0 / sin), sin.atan2(cos))
+    }
+
+    /// The rotation that turns the axes x, y, z into the orthonormal right-handed `x`, `y`, `z`.
+    pub fn from_axes(x: Vec3, y: Vec3, z: Vec3) -> Self {
+        // Shepperd's method: the largest of the four components first, so that nothing small is divided by.
+        let trace = x[0] + y[1] + z[2];
+        let q = if trace > x[0].max(y[1]).max(z[2]) {
+            let s = (1.0 + trace).sqrt() * 2.0;
+            Self { w: s / 4.0, v: [(y[2] - z[1]) / s, (z[0] - x[2]) / s, (x[1] - y[0]) / s] }
+        } else if x[0] > y[1].max(z[2]) {
+            let s = (1.0 + x[0] - y[1] - z[2]).sqrt() * 2.0;
+            Self { w: (y[2] - z[1]) / s, v: [s / 4.0, (x[1] + y[0]) / s, (z[0] + x[2]) / s] }
+        } else if y[1] > z[2] {
+            let s = (1.0 + y[1] - x[0] - z[2]).sqrt() * 2.0;
+            Self { w: (z[0] - x[2]) / s, v: [(x[1] + y[0]) / s, s / 4.0, (y[2] + z[1]) / s] }
+        } else {
+            let s = (1.0 + z[2] - x[0] - y[1]).sqrt() * 2.0;
+            Self { w: (x[1] - y[0]) / s, v: [(z[0] + x[2]) / s, (y[2] + z[1]) / s, s / 4.0] }
+        };
+        q.normalised()
+    }
+
+    /// The rotation that turns the unit vectors `from.0`, `from.1` (at right angles) into `to.0`, `to.1`.
+    pub fn between_frames(from: (Vec3, Vec3), to: (Vec3, Vec3)) -> Self {
+        let axes = |(a, b): (Vec3, Vec3)| Self::from_axes(a, b, cross(a, b));
+        axes(to) * axes(from).inverse()
+    }
+
+    /// The images of the axes x, y, z.
+    pub fn axes(self) -> [Vec3; 3] {
+        [self.turn([1.0, 0.0, 0.0]), self.turn([0.0, 1.0, 0.0]), self.turn([0.0, 0.0, 1.0])]
+    }
+
+    /// The image of `a`.
+    pub fn turn(self, a: Vec3) -> Vec3 {
+        let t = scale(cross(self.v, a), 2.0);
+        add(add(a, scale(t, self.w)), cross(self.v, t))
+    }
+
+    pub fn inverse(self) -> Self {
+        Self { w: self.w, v: scale(self.v, -1.0) }
+    }
+
+    /// The same rotation seen in a mirror that turns x round.
+    pub fn mirrored(self) -> Self {
+        Self { w: self.w, v: [self.v[0], -self.v[1], -self.v[2]] }
+    }
+
+    /// The angle of the rotation, 0..=pi.
+    pub fn angle(self) -> f64 {
+        2.0 * norm(self.v).atan2(self.w.abs())
+    }
+
+    /// `self = swing * twist`: the angle of the twist about the unit vector `axis`, -pi..=pi, and the swing, whose own
+    /// axis is across. A half turn across has no definite twist: it is 0.
+    pub fn swing_twist(self, axis: Vec3) -> (Self, f64) {
+        let along = dot(self.v, axis);
+        if along.hypot(self.w) < 1e-12 {
+            return (self, 0.0);
+        }
+        let mut angle = 2.0 * along.atan2(self.w);
+        if angle > std::f64::consts::PI {
+            angle -= std::f64::consts::TAU;
+        } else if angle < -std::f64::consts::PI {
+            angle += std::f64::consts::TAU;
+        }
+        (self * Self::about(axis, angle).inverse(), angle)
+    }
+
+    /// The share `t` (0..=1) of the shortest way from `self` to `to`.
+    pub fn slerp(self, to: Self, t: f64) -> Self {
+        let turn = self.inverse() * to;
+        let turn = if turn.w < 0.0 { turn.opposite() } else { turn };
+        let sin = norm(turn.v);
+        if sin < 1e-12 {
+            return self;
+        }
+        (self * Self::about(scale(turn.v, 1.0 / sin), 2.0 * sin.atan2(turn.w) * t)).normalised()
+    }
+
+    /// The share `t` (0..=1) of the way from the second of four rotations, evenly spaced in time, to the third: the cubic
+    /// with the speed of the neighbours' chord at both (Catmull and Rom), laid through their quaternions and made a unit
+    /// one again. Piece after piece it has no corner.
+    pub fn cubic(near: [Self; 4], t: f64) -> Self {
+        let turned = |to: Self, from: Self| if to.w * from.w + dot(to.v, from.v) < 0.0 { to.opposite() } else { to };
+        let [before, from, to, after] = near;
+        let to = turned(to, from);
+        let (before, after) = (turned(before, from), turned(after, to));
+        let (t2, t3) = (t * t, t * t * t);
+        let shares =
+            [-t / 2.0 + t2 - t3 / 2.0, 1.0 - 2.5 * t2 + 1.5 * t3, t / 2.0 + 2.0 * t2 - 1.5 * t3, (t3 - t2) / 2.0];
+        let quaternions = [before, from, to, after];
+        let sum = quaternions.iter().zip(shares).fold(Self { w: 0.0, v: [0.0; 3] }, |sum, (q, share)| Self {
+            w: sum.w + share * q.w,
+            v: add(sum.v, scale(q.v, share)),
+        });
+        if sum.w.hypot(norm(sum.v)) > 1e-9 { sum.normalised() } else { from }
+    }
+
+    /// The same rotation by the other of its two quaternions.
+    fn opposite(self) -> Self {
+        Self { w: -self.w, v: scale(self.v, -1.0) }
+    }
+
+    /// Degrees about Z, X and Y such that `self = Rz * Rx * Ry` (BVH channels `Zrotation Xrotation Yrotation`);
+    /// x lies in -90..=90.
+    pub fn euler_zxy_degrees(self) -> Vec3 {
+        let [x, y, z] = self.axes();
+        // Rows of the matrix: r21 = sin x; r01, r11 = -cos x sin z, cos x cos z; r20, r22 = -cos x sin y, cos x cos y.
+        let (r01, r11, r21) = (y[0], y[1], y[2]);
+        let cos_x = r01.hypot(r11);
+        let angle_x = r21.atan2(cos_x);
+        let (angle_z, angle_y) =
+            if cos_x > 1e-9 { ((-r01).atan2(r11), (-x[2]).atan2(z[2])) } else { (x[1].atan2(x[0]), 0.0) };
+        [angle_z.to_degrees(), angle_x.to_degrees(), angle_y.to_degrees()]
+    }
+
+    /// The inverse of `euler_zxy_degrees`.
+    pub fn from_euler_zxy_degrees([z, x, y]: Vec3) -> Self {
+        Self::about([0.0, 0.0, 1.0], z.to_radians())
+            * Self::about([1.0, 0.0, 0.0], x.to_radians())
+            * Self::about([0.0, 1.0, 0.0], y.to_radians())
+    }
+
+    fn normalised(self) -> Self {
+        let length = self.w.hypot(norm(self.v));
+        Self { w: self.w / length, v: scale(self.v, 1.0 / length) }
+    }
+}
+
+impl Mul for Rotation {
+    type Output = Self;
+    fn mul(self, b: Self) -> Self {
+        Self {
+            w: self.w * b.w - dot(self.v, b.v),
+            v: add(add(scale(b.v, self.w), scale(self.v, b.w)), cross(self.v, b.v)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::vec3::sub;
+    use rand::{Rng, SeedableRng};
+
+    fn close(a: Vec3, b: Vec3) -> bool {
+        norm(sub(a, b)) < 1e-9
+    }
+
+    fn directions() -> Vec<Vec3> {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        let mut all: Vec<Vec3> = (0..40)
+            .map(|_| [0; 3].map(|_| random.random_range(-1.0..1.0)))
+            .filter_map(|a| crate::math::vec3::unit(a, 0.1))
+            .collect();
+        for axis in 0..3 {
+            for sign in [1.0, -1.0] {
+                let mut a = [0.0; 3];
+                a[axis] = sign;
+                all.push(a);
+            }
+        }
+        all
+    }
+
+    fn rotations() -> Vec<Rotation> {
+        let angles = [0.0, 1e-10, 0.3, 1.5, 3.0, std::f64::consts::PI, -2.0];
+        directions().into_iter().flat_map(|axis| angles.map(|angle| Rotation::about(axis, angle))).collect()
+    }
+
+    #[test]
+    fn between_turns_one_direction_into_the_other_also_when_opposite() {
+        for a in directions() {
+            for b in directions().into_iter().chain([a, scale(a, -1.0)]) {
+                let r = Rotation::between(a, b);
+                assert!(close(r.turn(a), b));
+                assert!((r.angle() - dot(a, b).clamp(-1.0, 1.0).acos()).abs() < 1e-6);
+            }
+            // A hair beside the opposite direction.
+            let b = crate::math::vec3::unit(add(scale(a, -1.0), scale(any_across(a), 1e-7)), 0.0).unwrap();
+            assert!(norm(sub(Rotation::between(a, b).turn(a), b)) < 1e-7);
+        }
+    }
+
+    #[test]
+    fn axes_and_euler_angles_give_the_rotation_back() {
+        for r in rotations() {
+            let [x, y, z] = r.axes();
+            let same = Rotation::from_axes(x, y, z);
+            let euler = Rotation::from_euler_zxy_degrees(r.euler_zxy_degrees());
+            for a in [[1.0, 0.0, 0.0], [0.3, -0.5, 0.8]] {
+                assert!(close(same.turn(a), r.turn(a)));
+                assert!(norm(sub(euler.turn(a), r.turn(a))) < 1e-8, "{r:?} {:?}", r.euler_zxy_degrees());
+            }
+        }
+        // Known: a quarter turn about y takes z to x.
+        assert!(close(Rotation::from_euler_zxy_degrees([0.0, 0.0, 90.0]).turn([0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]));
+    }
+
+    #[test]
+    fn swing_and_twist_make_the_rotation() {
+        for r in rotations() {
+            for axis in [[1.0, 0.0, 0.0], [0.0, 0.6, 0.8]] {
+                let (swing, twist) = r.swing_twist(axis);
+                let whole = swing * Rotation::about(axis, twist);
+                assert!(close(whole.turn([0.2, 0.4, -0.7]), r.turn([0.2, 0.4, -0.7])));
+                assert!(dot(swing.v, axis).abs() < 1e-9 && twist.abs() <= std::f64::consts::PI + 1e-12);
+            }
+        }
+        let (_, twist) = Rotation::about([1.0, 0.0, 0.0], 0.7).swing_twist([1.0, 0.0, 0.0]);
+        assert!((twist - 0.7).abs() < 1e-12);
+    }
+
+    #[test]
+    fn slerp_walks_the_shortest_way() {
+        let (a, b) = (Rotation::about([0.0, 1.0, 0.0], 0.2), Rotation::about([0.0, 1.0, 0.0], 1.0));
+        let negative = Rotation { w: -b.w, v: scale(b.v, -1.0) };
+        for to in [b, negative] {
+            assert!(((a.inverse() * a.slerp(to, 0.25)).angle() - 0.2).abs() < 1e-12);
+            assert!((b.inverse() * a.slerp(to, 1.0)).angle() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! Sums from which mean and covariance of rows come, packed: number of rows, sums, and the upper triangle of the sums of
+//! products. Sums of different rows add, which is all that resampling needs.
+
+use ndarray::{Array1, Array2, ArrayView2};
+
+/// How many numbers the moments of rows of `d` take.
+pub(crate) const fn packed_len(d: usize) -> usize {
+    1 + d + d * (d + 1) / 2
+}
+
+/// Adds rows [n, d] to packed moments.
+pub(crate) fn add(rows: ArrayView2<f64>, packed: &mut [f64]) {
+    let d = rows.ncols();
+    packed[0] += rows.nrows() as f64;
+    for row in rows.outer_iter() {
+        packed[1..=d].iter_mut().zip(row).for_each(|(sum, v)| *sum += v);
+    }
+    let products = rows.t().dot(&rows);
+    let mut at = 1 + d;
+    for i in 0..d {
+        for j in i..d {
+            packed[at] += products[[i, j]];
+            at += 1;
+        }
+    }
+}
+
+/// Number of rows, mean [d] and unbiased covariance [d, d]; `None` for fewer than two rows.
+pub(crate) fn read(packed: &[f64], d: usize) -> Option<(f64, Array1<f64>, Array2<f64>)> {
+    let n = packed[0];
+    if n.is_nan() || n < 2.0 {
+        return None;
+    }
+    let mean: Array1<f64> = packed[1..=d].iter().map(|sum| sum / n).collect();
+    let mut covariance = Array2::zeros((d, d));
+    let mut at = 1 + d;
+    for i in 0..d {
+        for j in i..d {
+            let value = (packed[at] - n * mean[i] * mean[j]) / (n - 1.0);
+            covariance[[i, j]] = value;
+            covariance[[j, i]] = value;
+            at += 1;
+        }
+    }
+    Some((n, mean, covariance))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::{array, s};
+
+    #[test]
+    fn parts_give_mean_and_covariance_of_the_whole() {
+        let rows = array![[1.0, 2.0], [3.0, 5.0], [4.0, -1.0], [0.0, 2.0]];
+        let mut packed = vec![0.0; packed_len(2)];
+        add(rows.slice(s![..1, ..]), &mut packed);
+        assert!(read(&packed, 2).is_none());
+        add(rows.slice(s![1.., ..]), &mut packed);
+        let (n, mean, covariance) = read(&packed, 2).unwrap();
+        assert_eq!((n, mean), (4.0, array![2.0, 2.0]));
+        let known = array![[10.0 / 3.0, -1.0], [-1.0, 6.0]];
+        assert!((&covariance - &known).iter().all(|v| v.abs() < 1e-12));
+    }
+}

@@ -1,0 +1,129 @@
+//! How much bones change their length, which real ones do not: from frame to frame, and over time.
+
+use crate::metrics::body_part::Part;
+use crate::metrics::definition::{Better, Definition, Metric};
+use crate::metrics::pair::{Pair, Point};
+use crate::metrics::per_frame::{less, norm};
+use crate::metrics::sums::Blocks;
+use crate::types::skeleton::{N_JOINTS, parent};
+use serde_json::json;
+
+/// Sums of a bone of one motion: lengths, their squares, changes from frame to frame; then the counts of both.
+const LENGTH: usize = 0;
+const SQUARE: usize = 1;
+const CHANGE: usize = 2;
+const N_OF_MOTION: usize = 3;
+const N_LENGTHS: usize = 2 * N_OF_MOTION;
+const N_CHANGES: usize = N_LENGTHS + 1;
+const N_OF_BONE: usize = N_CHANGES + 1;
+
+const PARTS: [Part; 2] = [Part::Body, Part::Hands];
+
+struct Bones {
+    /// The joint at the end of each bone, and its parent.
+    bones: Vec<(usize, usize)>,
+}
+
+pub(crate) fn metric() -> Box<dyn Metric> {
+    let joints = PARTS.iter().flat_map(|part| part.joints());
+    Box::new(Bones { bones: joints.filter_map(|joint| Some((joint, parent(joint)?))).collect() })
+}
+
+impl Metric for Bones {
+    fn definitions(&self) -> Vec<Definition> {
+        let mut all = Vec::new();
+        for part in PARTS {
+            for (name, of_real, unit, formula) in FIGURES {
+                for (name, better) in [(name, Better::Lower), (of_real, Better::Neither)] {
+                    all.push(Definition {
+                        name,
+                        part: part.name(),
+                        unit,
+                        better,
+                        formula,
+                        undefined: "no bone of the part is seen (for changes: in 2 frames in a row), or one has no length",
+                        parameters: json!({"bones": part.joints()}),
+                    });
+                }
+            }
+        }
+        all
+    }
+
+    fn n_sums(&self) -> usize {
+        self.bones.len() * N_OF_BONE
+    }
+
+    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+        for t in 0..pair.n_frames() {
+            let sums = blocks.at(t);
+            for (sums, &(joint, parent)) in sums.chunks_exact_mut(N_OF_BONE).zip(&self.bones) {
+                let seen = |n| pair.sees(t, n, joint) && pair.sees(t, n, parent);
+                if !seen(1) {
+                    continue;
+                }
+                for (i, poses) in [&pair.made, &pair.real].into_iter().enumerate() {
+                    let length = |pose: &[Point; N_JOINTS]| norm(less(pose[joint], pose[parent]));
+                    let own = &mut sums[i * N_OF_MOTION..(i + 1) * N_OF_MOTION];
+                    own[LENGTH] += length(&poses[t]);
+                    own[SQUARE] += length(&poses[t]).powi(2);
+                    if seen(2) {
+                        own[CHANGE] += (length(&poses[t + 1]) - length(&poses[t])).abs();
+                    }
+                }
+                sums[N_LENGTHS] += 1.0;
+                sums[N_CHANGES] += f64::from(u8::from(seen(2)));
+            }
+        }
+    }
+
+    fn values(&self, sums: &[f64]) -> Vec<f64> {
+        let (body, hands) = sums.split_at(Part::Body.joints().len() * N_OF_BONE);
+        let mut values = Vec::new();
+        for part in [body, hands] {
+            let mean = |of: &dyn Fn(&[f64]) -> f64, needs: usize| {
+                let all: Vec<f64> = part.chunks_exact(N_OF_BONE).filter(|bone| bone[needs] != 0.0).map(of).collect();
+                all.iter().sum::<f64>() / all.len() as f64
+            };
+            let mean_length = |bone: &[f64], i: usize| bone[i + LENGTH] / bone[N_LENGTHS];
+            let mean_change = |bone: &[f64], i: usize| bone[i + CHANGE] / bone[N_CHANGES];
+            let [made, real] = [0, N_OF_MOTION];
+            values.extend([made, real].map(|i| 1000.0 * mean(&|bone| mean_change(bone, i), N_CHANGES)));
+            values.extend(
+                [made, real].map(|i| 100.0 * mean(&|bone| mean_change(bone, i) / mean_length(bone, i), N_CHANGES)),
+            );
+            let deviation = |bone: &[f64], i: usize| {
+                let variance = bone[i + SQUARE] / bone[N_LENGTHS] - mean_length(bone, i).powi(2);
+                variance.max(0.0).sqrt() / mean_length(bone, i)
+            };
+            values.extend([made, real].map(|i| 100.0 * mean(&|bone| deviation(bone, i), N_LENGTHS)));
+        }
+        values
+    }
+}
+
+/// Name, name of the real motion's, unit, formula.
+const FIGURES: [(&str, &str, &str, &str); 3] = [
+    (
+        "bone_change",
+        "bone_change_of_real",
+        "mm",
+        "1000 times the mean over the bones of the part of the mean over t of |l(t+1) - l(t)|, l the length in frames in \
+         which both ends are seen; bones end in joints 1-6 (body), 8-48 without 28 (hands)",
+    ),
+    (
+        "bone_change_share",
+        "bone_change_share_of_real",
+        "%",
+        "100 times the mean over the bones of the part of (mean over t of |l(t+1) - l(t)|) / (mean over t of l), l the \
+         length in frames in which both ends are seen; bones end in joints 1-6 (body), 8-48 without 28 (hands)",
+    ),
+    (
+        "bone_deviation",
+        "bone_deviation_of_real",
+        "%",
+        "100 times the mean over the bones of the part of (standard deviation over t of l, all frames of all intervals, \
+         divided by their number) / (mean over t of l), l the length in frames in which both ends are seen; bones end in \
+         joints 1-6 (body), 8-48 without 28 (hands)",
+    ),
+];

@@ -1,0 +1,8 @@
+//! Metrics of how joints move: speed, acceleration and jerk, energy, distributions of speeds, correlation, bone
+//! changes.
+
+pub mod bone_change;
+pub mod cca;
+pub mod derivatives;
+pub mod energy;
+pub mod hellinger;

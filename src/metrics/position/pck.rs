@@ -1,0 +1,262 @@
+//! Share of correct keypoints (rebol.md section 12, after Ginosar et al. 2019): a joint is correct when it lies within
+//! a share of the real pose's largest extent from the real one. `Correct` counts at a fifth, for training; the metric has any
+//! share, in the plane and in space.
+
+use crate::metrics::body_part::Part;
+use crate::metrics::definition::{Better, Definition, Metric};
+use crate::metrics::pair::{Pair, Point};
+use crate::metrics::sums::Blocks;
+use crate::types::skeleton::{L_WRIST, N_JOINTS, NECK, R_SHOULDER, is_duplicate};
+use ndarray::{ArrayView2, ArrayView3};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::ops::AddAssign;
+
+/// A joint is correct up to this share of the pose's largest extent.
+pub const ALPHA: f32 = 0.2;
+
+/// Correct and counted keypoints of one part of the body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Count {
+    pub n_correct: usize,
+    pub n: usize,
+}
+
+/// Correct and counted keypoints.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Correct {
+    /// The published figure: every joint but the neck, the two hand roots (the wrists again) included.
+    pub all: Count,
+    /// Shoulders, elbows and wrists.
+    pub body: Count,
+    /// The joints of both hands but their roots.
+    pub hands: Count,
+}
+
+/// In how many of the axes x, y, z distances and extents are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axes {
+    /// The picture's: as in the first publication.
+    Xy,
+    /// Space.
+    Xyz,
+}
+
+impl Count {
+    /// Share of correct keypoints, 0..1; 0 of none.
+    pub fn share(&self) -> f64 {
+        self.n_correct as f64 / self.n.max(1) as f64
+    }
+
+    fn add(&mut self, correct: bool) {
+        self.n_correct += usize::from(correct);
+        self.n += 1;
+    }
+}
+
+/// Shares at several alphas, in several axes, of several parts.
+struct Pck {
+    /// One a share.
+    figures: Vec<(Axes, Part, f64)>,
+    /// Whether the box is around the neck as well.
+    neck_in_box: bool,
+    /// The speech2gesture convention: every frame weighs the same, however many joints are seen.
+    by_frame: bool,
+}
+
+/// For each of `axes`, each alpha and each of `parts` one share.
+pub(crate) fn metric(axes: &[Axes], parts: &[Part], alphas: &[f64]) -> Box<dyn Metric> {
+    let mut figures = Vec::new();
+    for axes in axes {
+        for alpha in alphas {
+            figures.extend(parts.iter().map(|part| (*axes, *part, *alpha)));
+        }
+    }
+    Box::new(Pck { figures, neck_in_box: false, by_frame: false })
+}
+
+/// As speech2gesture counts (`common/evaluation.py` of its repository).
+pub(crate) fn by_frame(alphas: &[f64]) -> Box<dyn Metric> {
+    let figures = alphas.iter().map(|alpha| (Axes::Xy, Part::All, *alpha)).collect();
+    Box::new(Pck { figures, neck_in_box: false, by_frame: true })
+}
+
+/// In space, of all joints, with the neck in the box.
+pub(crate) fn neck_in_box(alphas: &[f64]) -> Box<dyn Metric> {
+    let figures = alphas.iter().map(|alpha| (Axes::Xyz, Part::All, *alpha)).collect();
+    Box::new(Pck { figures, neck_in_box: true, by_frame: false })
+}
+
+impl Metric for Pck {
+    fn definitions(&self) -> Vec<Definition> {
+        let definition = |(axes, part, alpha): &(Axes, Part, f64)| Definition {
+            name: match axes {
+                Axes::Xyz if self.neck_in_box => "pck_3d_neck_in_box",
+                Axes::Xyz => "pck_3d",
+                Axes::Xy => "pck_2d",
+            },
+            part: part.name(),
+            unit: "1",
+            better: Better::Higher,
+            formula: match axes {
+                Axes::Xy if self.by_frame => {
+                    "mean over frames of the share of the 48 joints without the neck with |p - g| <= alpha * max(width, \
+                     height) of the box around those of g in the frame; x and y alone; metres, not scaled to another \
+                     speaker (a scale cancels); not seen joints left out"
+                }
+                Axes::Xyz if self.neck_in_box => {
+                    "share of all seen joints of the part in all frames with |p - g| <= alpha * the largest of the sides \
+                     x, y, z of the box around all seen joints of g in the frame, the neck among them; a made joint that \
+                     is not finite is wrong"
+                }
+                Axes::Xyz => {
+                    "share of all seen joints of the part in all frames with |p - g| <= alpha * the largest of the sides \
+                     x, y, z of the box around all seen joints of g in the frame but the neck, whatever the part; a made \
+                     joint that is not finite is wrong"
+                }
+                Axes::Xy => {
+                    "share of all seen joints of the part in all frames with |p - g| <= alpha * the larger of the sides \
+                     x, y of the box around all seen joints of g in the frame but the neck, whatever the part; distances \
+                     in x and y alone; a made joint that is not finite is wrong"
+                }
+            },
+            undefined: "no joint of the part is seen",
+            parameters: json!({"alpha": alpha}),
+        };
+        self.figures.iter().map(definition).collect()
+    }
+
+    fn n_sums(&self) -> usize {
+        2 * self.figures.len()
+    }
+
+    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+        let figures: Vec<_> = self.figures.iter().map(|(axes, part, alpha)| (*axes, part.joints(), *alpha)).collect();
+        for t in 0..pair.n_frames() {
+            let (made, real, seen) = (&pair.made[t], &pair.real[t], &pair.seen[t]);
+            for (row, (axes, joints, alpha)) in blocks.at(t).chunks_exact_mut(2).zip(&figures) {
+                let from = if self.neck_in_box { NECK } else { NECK + 1 };
+                let radius = alpha * extent(*axes, real, seen, from);
+                let n_seen = joints.iter().filter(|joint| seen[**joint]).count();
+                let weight = if self.by_frame { 1.0 / n_seen as f64 } else { 1.0 };
+                for &joint in joints.iter().filter(|joint| seen[**joint]) {
+                    let correct = distance(*axes, &made[joint], &real[joint]) <= radius;
+                    row[0] += if correct { weight } else { 0.0 };
+                    row[1] += weight;
+                }
+            }
+        }
+    }
+
+    fn values(&self, sums: &[f64]) -> Vec<f64> {
+        sums.chunks_exact(2).map(|row| row[0] / row[1]).collect()
+    }
+}
+
+impl Axes {
+    fn n(self) -> usize {
+        match self {
+            Self::Xy => 2,
+            Self::Xyz => 3,
+        }
+    }
+}
+
+/// Largest side of the box around the seen joints, those before `from` left out.
+fn extent(axes: Axes, pose: &[Point; N_JOINTS], seen: &[bool; N_JOINTS], from: usize) -> f64 {
+    let side = |k: usize| {
+        let values = (from..N_JOINTS).filter(|joint| seen[*joint]).map(|joint| pose[joint][k]);
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        high - low
+    };
+    (0..axes.n()).map(side).fold(0.0, f64::max)
+}
+
+fn distance(axes: Axes, a: &Point, b: &Point) -> f64 {
+    (0..axes.n()).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
+}
+
+impl Correct {
+    /// The published figure, 0..1.
+    pub fn share(&self) -> f64 {
+        self.all.share()
+    }
+
+    /// Counts the joints of `made` [T, 49, 3] beside `real` [T, 49, 3], both metres, in space, where `mask` [T, 49] is
+    /// true: correct when the distance is at most `ALPHA` of the largest side of the box around all real joints of
+    /// the frame that are seen, the neck left out. The radius is the same for every part. A made joint that is not
+    /// finite is wrong.
+    pub fn count(&mut self, made: ArrayView3<f32>, real: ArrayView3<f32>, mask: ArrayView2<bool>) {
+        self.count_in(Axes::Xyz, made, real, mask);
+    }
+
+    /// As `count`, with distance and box in these axes.
+    pub fn count_in(&mut self, axes: Axes, made: ArrayView3<f32>, real: ArrayView3<f32>, mask: ArrayView2<bool>) {
+        let n_axes = axes.n();
+        for ((made, real), mask) in made.outer_iter().zip(real.outer_iter()).zip(mask.outer_iter()) {
+            let seen: Vec<usize> = (NECK + 1..N_JOINTS).filter(|joint| mask[*joint]).collect();
+            let extent = |k: usize| {
+                let values = seen.iter().map(|joint| real[[*joint, k]]);
+                let (low, high) =
+                    values.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+                high - low
+            };
+            let radius = ALPHA * (0..n_axes).map(extent).fold(0.0, f32::max);
+            for joint in seen {
+                let square: f32 = (0..n_axes).map(|k| (made[[joint, k]] - real[[joint, k]]).powi(2)).sum();
+                let correct = square.sqrt() <= radius;
+                self.all.add(correct);
+                match joint {
+                    R_SHOULDER..=L_WRIST => self.body.add(correct),
+                    _ if !is_duplicate(joint) => self.hands.add(correct),
+                    _ => {}
+                }
+            }
+        }
+    }
+}
+
+impl AddAssign for Count {
+    fn add_assign(&mut self, other: Self) {
+        self.n_correct += other.n_correct;
+        self.n += other.n;
+    }
+}
+
+impl AddAssign for Correct {
+    fn add_assign(&mut self, other: Self) {
+        self.all += other.all;
+        self.body += other.body;
+        self.hands += other.hands;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::{Array2, Array3};
+
+    #[test]
+    fn the_radius_is_a_fifth_of_the_largest_extent() {
+        let mut real = Array3::<f32>::zeros((1, N_JOINTS, 3));
+        real[[0, 1, 2]] = 1.0;
+        let mut made = real.clone();
+        made[[0, 2, 0]] = 0.19;
+        made[[0, 3, 0]] = 0.21;
+        made[[0, 4, 0]] = 9.0;
+        made[[0, 20, 1]] = f32::NAN;
+        let mut mask = Array2::from_elem((1, N_JOINTS), true);
+        mask[[0, 4]] = false;
+        let mut correct = Correct::default();
+        correct.count(made.view(), real.view(), mask.view());
+        let count = |n_correct, n| Count { n_correct, n };
+        assert_eq!(correct, Correct { all: count(45, 47), body: count(4, 5), hands: count(39, 40) });
+        // without z, the box is a point
+        let mut flat = Correct::default();
+        flat.count_in(Axes::Xy, made.view(), real.view(), mask.view());
+        assert_eq!(flat.body, count(3, 5));
+        let mut twice = correct;
+        twice += correct;
+        assert_eq!((twice.all, twice.share()), (count(90, 94), correct.share()));
+    }
+}

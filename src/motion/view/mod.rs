@@ -1,0 +1,5 @@
+//! What the lifters look at: keypoints of body and hands, normalised, and hand heat-maps.
+
+pub mod body;
+pub mod hand;
+pub mod heatmaps;

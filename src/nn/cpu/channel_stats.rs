@@ -1,0 +1,292 @@
+//! Statistics over the rows of a matrix whose columns are channels, and batch norm with the leaky ReLU behind it on
+//! such rows: plain memory in, plain memory out. Sums run over blocks of fixed size in one order.
+
+use super::tensor::{LANES, Real, Start};
+use super::thread_team::each;
+use rayon::prelude::*;
+use std::sync::OnceLock;
+
+/// Numbers summed before the sum goes on in f64, and numbers one task takes.
+const BLOCK: usize = 16 * 1024;
+const TASK: usize = 128 * 1024;
+
+/// How many values each channel has had, their mean, and the sum of their squared distances to it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Moments {
+    pub n: f64,
+    pub mean: Vec<f64>,
+    pub squares: Vec<f64>,
+}
+
+impl Moments {
+    /// Of rows of `n_channels`.
+    pub fn of<T: Real>(values: &[T], n_channels: usize) -> Self {
+        let mut all = Self::default();
+        for block in values.chunks(whole_rows(BLOCK, n_channels)) {
+            let n = (block.len() / n_channels) as f64;
+            let mean: Vec<T> = block_sums(block, n_channels).iter().map(|s| T::from_f64(s.to_f64() / n)).collect();
+            let (mut squares, mut first) = (vec![T::zero(); n_channels], 0);
+            let (wide, rest) = squares.as_chunks_mut::<LANES>();
+            for (sums, mean) in wide.iter_mut().zip(mean.as_chunks().0) {
+                *sums = sums_of_squares(block, n_channels, first, mean);
+                first += LANES;
+            }
+            for (sum, mean) in rest.iter_mut().zip(&mean[first..]) {
+                [*sum] = sums_of_squares(block, n_channels, first, &[*mean]);
+                first += 1;
+            }
+            let f64s = |values: Vec<T>| values.into_iter().map(|v| v.to_f64()).collect();
+            all = all.and(&Self { n, mean: f64s(mean), squares: f64s(squares) });
+        }
+        all
+    }
+
+    /// Those of both sets of values (Chan et al. 1979).
+    pub fn and(&self, other: &Self) -> Self {
+        if self.n == 0.0 {
+            return other.clone();
+        }
+        let n = self.n + other.n;
+        let apart: Vec<f64> = self.mean.iter().zip(&other.mean).map(|(a, b)| b - a).collect();
+        let mean = self.mean.iter().zip(&apart).map(|(mean, apart)| mean + apart * other.n / n).collect();
+        let squares = self.squares.iter().zip(&other.squares).zip(&apart);
+        let squares = squares.map(|((a, b), apart)| a + b + apart * apart * self.n * other.n / n).collect();
+        Self { n, mean, squares }
+    }
+}
+
+/// So many numbers, but whole rows and at least one.
+fn whole_rows(n: usize, n_channels: usize) -> usize {
+    (n / n_channels).max(1) * n_channels
+}
+
+fn block_sums<T: Real>(block: &[T], n_channels: usize) -> Vec<T> {
+    fn some<T: Real, const N: usize>(block: &[T], n_channels: usize, first: usize) -> [T; N] {
+        let mut sums = [T::zero(); N];
+        rows(block, n_channels, first).for_each(|row: &[T; N]| (0..N).for_each(|i| sums[i] += row[i]));
+        sums
+    }
+    let (mut sums, mut first) = (vec![T::zero(); n_channels], 0);
+    let (wide, rest) = sums.as_chunks_mut::<LANES>();
+    for sums in wide {
+        *sums = some(block, n_channels, first);
+        first += LANES;
+    }
+    for sum in rest {
+        [*sum] = some(block, n_channels, first);
+        first += 1;
+    }
+    sums
+}
+
+/// `N` channels from `first` on of every row.
+fn rows<T, const N: usize>(block: &[T], n_channels: usize, first: usize) -> impl Iterator<Item = &[T; N]> {
+    block.chunks_exact(n_channels).filter_map(move |row| row.get(first..)?.first_chunk())
+}
+
+fn sums_of_squares<T: Real, const N: usize>(block: &[T], n_channels: usize, first: usize, mean: &[T; N]) -> [T; N] {
+    let mut sums = [T::zero(); N];
+    for row in rows::<T, N>(block, n_channels, first) {
+        for i in 0..N {
+            let off = row[i] - mean[i];
+            sums[i] += off * off;
+        }
+    }
+    sums
+}
+
+/// The sum of each channel.
+pub fn sums<T: Real>(values: &[T], n_channels: usize) -> Vec<f64> {
+    let of_task = |task: &[T]| {
+        let mut sums = vec![0.0; n_channels];
+        for block in task.chunks(whole_rows(BLOCK, n_channels)) {
+            let of_block = block_sums(block, n_channels);
+            sums.iter_mut().zip(of_block).for_each(|(sum, value)| *sum += value.to_f64());
+        }
+        sums
+    };
+    let tasks: Vec<Vec<f64>> = values.par_chunks(whole_rows(TASK, n_channels)).map(of_task).collect();
+    add_up(tasks, n_channels)
+}
+
+fn add_up(tasks: Vec<Vec<f64>>, n: usize) -> Vec<f64> {
+    tasks.into_iter().fold(vec![0.0; n], |mut all, of_task| {
+        all.iter_mut().zip(of_task).for_each(|(sum, value)| *sum += value);
+        all
+    })
+}
+
+/// `y = leaky(z * scale + shift)`, a scale and a shift a channel.
+pub struct Norm<T> {
+    pub mean: Vec<T>,
+    pub scale: Vec<T>,
+    pub shift: Vec<T>,
+    pub slope: T,
+}
+
+impl<T: Real> Norm<T> {
+    /// `z` overwritten with the result.
+    pub fn apply(&self, z: &mut [T]) {
+        let (scale, scale_rest) = self.scale.as_chunks::<LANES>();
+        let (shift, shift_rest) = self.shift.as_chunks::<LANES>();
+        for row in z.chunks_exact_mut(self.scale.len()) {
+            let (wide, rest) = row.as_chunks_mut::<LANES>();
+            for ((z, scale), shift) in wide.iter_mut().zip(scale).zip(shift) {
+                *z = self.result(z, scale, shift);
+            }
+            for ((z, scale), shift) in rest.iter_mut().zip(scale_rest).zip(shift_rest) {
+                [*z] = self.result(&[*z], &[*scale], &[*shift]);
+            }
+        }
+    }
+
+    /// `y` from `z`.
+    pub fn forward(&self, z: &[T], y: &mut [T]) {
+        y.copy_from_slice(z);
+        self.apply(y);
+    }
+
+    #[inline(always)]
+    fn result<const N: usize>(&self, z: &[T; N], scale: &[T; N], shift: &[T; N]) -> [T; N] {
+        let mut y = [T::zero(); N];
+        for i in 0..N {
+            let value = z[i] * scale[i] + shift[i];
+            y[i] = if value > T::zero() { value } else { value * self.slope };
+        }
+        y
+    }
+
+    /// `grad` taken back through the activation.
+    #[inline(always)]
+    fn before<const N: usize>(&self, z: &[T; N], grad: &[T; N], scale: &[T; N], shift: &[T; N]) -> [T; N] {
+        let mut before = [T::zero(); N];
+        for i in 0..N {
+            before[i] = if z[i] * scale[i] + shift[i] > T::zero() { grad[i] } else { grad[i] * self.slope };
+        }
+        before
+    }
+
+    /// Sums over all rows of `g` and of `g * (z - mean)`, `g` being `grad` taken back through the activation.
+    pub fn sums_of_gradient(&self, z: &[T], grad: &[T]) -> (Vec<f64>, Vec<f64>) {
+        let n = self.scale.len();
+        let of_task = |(z, grad): (&[T], &[T])| {
+            let mut sums = vec![0.0; 2 * n];
+            for (z, grad) in z.chunks(whole_rows(BLOCK, n)).zip(grad.chunks(whole_rows(BLOCK, n))) {
+                let mut first = 0;
+                while first + LANES <= n {
+                    self.add_sums::<LANES>(z, grad, first, &mut sums);
+                    first += LANES;
+                }
+                (first..n).for_each(|first| self.add_sums::<1>(z, grad, first, &mut sums));
+            }
+            sums
+        };
+        let chunk = whole_rows(TASK, n);
+        let tasks: Vec<_> = z.chunks(chunk).zip(grad.chunks(chunk)).collect();
+        let sums: Vec<OnceLock<Vec<f64>>> = tasks.iter().map(|_| OnceLock::new()).collect();
+        each(tasks.len(), |task| {
+            let _ = sums[task].set(of_task(tasks[task]));
+        });
+        let mut plain = add_up(sums.into_iter().filter_map(OnceLock::into_inner).collect(), 2 * n);
+        let product = plain.split_off(n);
+        (plain, product)
+    }
+
+    /// Adds both sums of `N` channels over a block to `sums`.
+    fn add_sums<const N: usize>(&self, z: &[T], grad: &[T], first: usize, sums: &mut [f64]) {
+        let n = self.scale.len();
+        let some = |values: &[T]| std::array::from_fn::<T, N, _>(|i| values[first + i]);
+        let (mean, scale, shift) = (some(&self.mean), some(&self.scale), some(&self.shift));
+        let (mut plain, mut product) = ([T::zero(); N], [T::zero(); N]);
+        for (z, grad) in rows::<T, N>(z, n, first).zip(rows::<T, N>(grad, n, first)) {
+            let g = self.before(z, grad, &scale, &shift);
+            for i in 0..N {
+                plain[i] += g[i];
+                product[i] += g[i] * (z[i] - mean[i]);
+            }
+        }
+        for i in 0..N {
+            sums[first + i] += plain[i].to_f64();
+            sums[n + first + i] += product[i].to_f64();
+        }
+    }
+
+    /// Overwrites `z` with the gradient before the norm: `scale * g + constant + linear * (z - mean)`.
+    pub fn backward(&self, z: &mut [T], grad: &[T], constant: &[T], linear: &[T]) {
+        let n = self.scale.len();
+        // constant + linear * (z - mean), with one number less.
+        let offset: Vec<T> =
+            constant.iter().zip(linear).zip(&self.mean).map(|((c, l), mean)| *c - *l * *mean).collect();
+        let chunk = whole_rows(TASK, n);
+        let channels = |i: usize| (self.scale[i], self.shift[i], offset[i], linear[i]);
+        let n_wide = n / LANES;
+        let wide: Vec<Turn<T, LANES>> = (0..n_wide).map(|i| Turn::new(|lane| channels(i * LANES + lane))).collect();
+        let rest: Vec<Turn<T, 1>> = (n_wide * LANES..n).map(|i| Turn::new(|_| channels(i))).collect();
+        let (n_all, start) = (z.len(), Start::of(z));
+        each(n_all.div_ceil(chunk), |task| {
+            let part = task * chunk..n_all.min((task + 1) * chunk);
+            // SAFETY: every task's part of `z` is its own.
+            let z = unsafe { std::slice::from_raw_parts_mut(start.at(part.start), part.len()) };
+            let grad = &grad[part];
+            for (z, grad) in z.chunks_exact_mut(n).zip(grad.chunks_exact(n)) {
+                let ((z, z_rest), (grad, grad_rest)) = (z.as_chunks_mut(), grad.as_chunks());
+                for ((z, grad), turn) in z.iter_mut().zip(grad).zip(&wide) {
+                    *z = turn.turned(self, z, grad);
+                }
+                for ((z, grad), turn) in z_rest.iter_mut().zip(grad_rest).zip(&rest) {
+                    [*z] = turn.turned(self, &[*z], &[*grad]);
+                }
+            }
+        });
+    }
+}
+
+/// What turns `z` of `N` channels into its gradient.
+struct Turn<T, const N: usize> {
+    scale: [T; N],
+    shift: [T; N],
+    offset: [T; N],
+    linear: [T; N],
+}
+
+impl<T: Real, const N: usize> Turn<T, N> {
+    fn new(of: impl Fn(usize) -> (T, T, T, T)) -> Self {
+        use std::array::from_fn;
+        Self {
+            scale: from_fn(|i| of(i).0),
+            shift: from_fn(|i| of(i).1),
+            offset: from_fn(|i| of(i).2),
+            linear: from_fn(|i| of(i).3),
+        }
+    }
+
+    #[inline(always)]
+    fn turned(&self, norm: &Norm<T>, z: &[T; N], grad: &[T; N]) -> [T; N] {
+        let g = norm.before(z, grad, &self.scale, &self.shift);
+        let mut turned = [T::zero(); N];
+        for i in 0..N {
+            turned[i] = self.scale[i] * g[i] + self.offset[i] + self.linear[i] * z[i];
+        }
+        turned
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_of_parts_are_those_of_the_whole() {
+        let n_channels = 3;
+        let values: Vec<f64> = (0..3 * 20_000).map(|i| (i as f64 * 0.37).sin() + (i % 3) as f64).collect();
+        let whole = Moments::of(&values, n_channels);
+        for channel in 0..n_channels {
+            let own: Vec<f64> = values.iter().skip(channel).step_by(n_channels).copied().collect();
+            let mean = own.iter().sum::<f64>() / own.len() as f64;
+            let squares = own.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+            assert!((whole.mean[channel] - mean).abs() < 1e-12 && (whole.squares[channel] - squares).abs() < 1e-7);
+            assert!((sums(&values, n_channels)[channel] - own.iter().sum::<f64>()).abs() < 1e-8);
+        }
+        assert_eq!(whole.n, 20_000.0);
+    }
+}

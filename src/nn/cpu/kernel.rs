@@ -1,0 +1,298 @@
+//! The innermost loop of every convolution: a tile of up to [`MOST_ROWS`] x some vectors of sums that stay in registers
+//! while products are added to them. Written once, compiled for AVX-512, for AVX2 and for any processor; which one
+//! runs is found out when the program does.
+
+/// Rows of a tile at most.
+pub const MOST_ROWS: usize = 6;
+
+/// What a tile is made of: for all steps k, an outer and an inner loop,
+/// `to[row][column] += rows[row][at(k)] * right[at(k)][column]`.
+pub struct Job<T> {
+    /// Where each row's left factors and its sums begin.
+    pub rows: [*const T; MOST_ROWS],
+    pub to: [*mut T; MOST_ROWS],
+    /// Where the right factors begin: vectors of columns.
+    pub right: *const T,
+    pub outer: Steps,
+    pub inner: Steps,
+}
+
+/// `n` steps, and how far left and right factors lie apart.
+#[derive(Clone, Copy, Debug)]
+pub struct Steps {
+    pub n: usize,
+    pub left: usize,
+    pub right: usize,
+}
+
+/// The loop as the processor has it.
+#[derive(Clone, Copy)]
+pub struct Kernel<T> {
+    /// Numbers in a vector.
+    pub lanes: usize,
+    /// Vectors beside each other in a tile at most: 1, 2 or 4.
+    pub most_vectors: usize,
+    /// Runs a job of so many rows and so many vectors (1, 2 or 4).
+    ///
+    /// # Safety
+    /// Every address the job names is readable, those of `to` writable by this thread alone.
+    pub run: unsafe fn(&Job<T>, usize, usize),
+}
+
+/// A tile's loop and the choice of its size, for one kind of processor and one type of number.
+macro_rules! kernel {
+    ($(#[$attribute:meta])* $tile:ident, $choose:ident, $number:ty, $lanes:literal, $vectors:literal, $zero:path, $load:path, $store:path, $spread:path,
+     $add_product:expr) => {
+        $(#[$attribute])*
+        unsafe fn $tile<const ROWS: usize, const VECTORS: usize>(job: &Job<$number>) {
+            // SAFETY: the caller's.
+            unsafe {
+                let mut sums = [[$zero(); VECTORS]; ROWS];
+                for (sums, to) in sums.iter_mut().zip(&job.to) {
+                    for (v, sum) in sums.iter_mut().enumerate() {
+                        *sum = $load(to.add(v * $lanes));
+                    }
+                }
+                let mut rows = [std::ptr::null(); ROWS];
+                rows.copy_from_slice(&job.rows[..ROWS]);
+                let mut right_of_outer = job.right;
+                for outer in 0..job.outer.n {
+                    let (mut left, mut right) = (outer * job.outer.left, right_of_outer);
+                    for _ in 0..job.inner.n {
+                        let mut factors = [$zero(); VECTORS];
+                        for (v, factor) in factors.iter_mut().enumerate() {
+                            *factor = $load(right.add(v * $lanes));
+                        }
+                        for (sums, row) in sums.iter_mut().zip(&rows) {
+                            let one: $number = *row.add(left);
+                            let one = $spread(one);
+                            for (sum, factor) in sums.iter_mut().zip(&factors) {
+                                *sum = $add_product(one, *factor, *sum);
+                            }
+                        }
+                        left += job.inner.left;
+                        right = right.wrapping_add(job.inner.right);
+                    }
+                    right_of_outer = right_of_outer.wrapping_add(job.outer.right);
+                }
+                for (sums, to) in sums.iter().zip(&job.to) {
+                    for (v, sum) in sums.iter().enumerate() {
+                        $store(to.add(v * $lanes), *sum);
+                    }
+                }
+            }
+        }
+
+        #[allow(unreachable_patterns)]
+        pub(crate) unsafe fn $choose(job: &Job<$number>, n_rows: usize, n_vectors: usize) {
+            // SAFETY: the caller's.
+            unsafe {
+                match (n_rows, n_vectors) {
+                    (1, 1) => $tile::<1, 1>(job),
+                    (2, 1) => $tile::<2, 1>(job),
+                    (3, 1) => $tile::<3, 1>(job),
+                    (4, 1) => $tile::<4, 1>(job),
+                    (5, 1) => $tile::<5, 1>(job),
+                    (6, 1) => $tile::<6, 1>(job),
+                    (1, 2) => $tile::<1, 2>(job),
+                    (2, 2) => $tile::<2, 2>(job),
+                    (3, 2) => $tile::<3, 2>(job),
+                    (4, 2) => $tile::<4, 2>(job),
+                    (5, 2) => $tile::<5, 2>(job),
+                    (6, 2) => $tile::<6, 2>(job),
+                    (1, $vectors) => $tile::<1, $vectors>(job),
+                    (2, $vectors) => $tile::<2, $vectors>(job),
+                    (3, $vectors) => $tile::<3, $vectors>(job),
+                    (4, $vectors) => $tile::<4, $vectors>(job),
+                    (5, $vectors) => $tile::<5, $vectors>(job),
+                    (6, $vectors) => $tile::<6, $vectors>(job),
+                    _ => unreachable!("a tile of {n_rows} rows and {n_vectors} vectors"),
+                }
+            }
+        }
+    };
+}
+
+/// Four numbers side by side, for processors this room has no own words for.
+mod any {
+    pub fn zero<T: Copy + Default>() -> [T; 4] {
+        [T::default(); 4]
+    }
+
+    pub unsafe fn load<T: Copy>(at: *const T) -> [T; 4] {
+        // SAFETY: the caller's.
+        unsafe { at.cast::<[T; 4]>().read_unaligned() }
+    }
+
+    pub unsafe fn store<T: Copy>(at: *mut T, values: [T; 4]) {
+        // SAFETY: the caller's.
+        unsafe { at.cast::<[T; 4]>().write_unaligned(values) };
+    }
+
+    pub fn spread<T: Copy>(value: T) -> [T; 4] {
+        [value; 4]
+    }
+}
+
+fn add_product<T: std::ops::Mul<Output = T> + std::ops::Add<Output = T> + Copy>(
+    a: [T; 4],
+    b: [T; 4],
+    sum: [T; 4],
+) -> [T; 4] {
+    std::array::from_fn(|i| a[i] * b[i] + sum[i])
+}
+
+kernel!(any_tile_f32, any_f32, f32, 4, 2, any::zero, any::load, any::store, any::spread, add_product);
+kernel!(any_tile_f64, any_f64, f64, 4, 2, any::zero, any::load, any::store, any::spread, add_product);
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use super::Job;
+    use std::arch::x86_64::*;
+
+    kernel!(
+        #[target_feature(enable = "avx512f")]
+        wide_tile_f32,
+        wide_f32,
+        f32,
+        16,
+        4,
+        _mm512_setzero_ps,
+        _mm512_loadu_ps,
+        _mm512_storeu_ps,
+        _mm512_set1_ps,
+        _mm512_fmadd_ps
+    );
+    kernel!(
+        #[target_feature(enable = "avx512f")]
+        wide_tile_f64,
+        wide_f64,
+        f64,
+        8,
+        4,
+        _mm512_setzero_pd,
+        _mm512_loadu_pd,
+        _mm512_storeu_pd,
+        _mm512_set1_pd,
+        _mm512_fmadd_pd
+    );
+    kernel!(
+        #[target_feature(enable = "avx2,fma")]
+        half_tile_f32,
+        half_f32,
+        f32,
+        8,
+        2,
+        _mm256_setzero_ps,
+        _mm256_loadu_ps,
+        _mm256_storeu_ps,
+        _mm256_set1_ps,
+        _mm256_fmadd_ps
+    );
+    kernel!(
+        #[target_feature(enable = "avx2,fma")]
+        half_tile_f64,
+        half_f64,
+        f64,
+        4,
+        2,
+        _mm256_setzero_pd,
+        _mm256_loadu_pd,
+        _mm256_storeu_pd,
+        _mm256_set1_pd,
+        _mm256_fmadd_pd
+    );
+}
+
+/// For f32.
+pub fn of_f32() -> Kernel<f32> {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if std::arch::is_x86_feature_detected!("avx512f") {
+            return Kernel { lanes: 16, most_vectors: 4, run: x86::wide_f32 };
+        }
+        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+            return Kernel { lanes: 8, most_vectors: 2, run: x86::half_f32 };
+        }
+    }
+    Kernel { lanes: 4, most_vectors: 2, run: any_f32 }
+}
+
+/// For f64.
+pub fn of_f64() -> Kernel<f64> {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if std::arch::is_x86_feature_detected!("avx512f") {
+            return Kernel { lanes: 8, most_vectors: 4, run: x86::wide_f64 };
+        }
+        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+            return Kernel { lanes: 4, most_vectors: 2, run: x86::half_f64 };
+        }
+    }
+    Kernel { lanes: 4, most_vectors: 2, run: any_f64 }
+}
+
+/// Columns cut into panels as wide as tiles: (first column, vectors), widest first; the last may reach beyond.
+pub fn panels<T>(kernel: &Kernel<T>, n_columns: usize) -> Vec<(usize, usize)> {
+    let (mut panels, mut first, mut left) = (Vec::new(), 0, n_columns.div_ceil(kernel.lanes));
+    while left > 0 {
+        let n = [4, 2, 1].into_iter().find(|n| *n <= left && *n <= kernel.most_vectors).unwrap_or(1);
+        panels.push((first, n));
+        first += n * kernel.lanes;
+        left -= n;
+    }
+    panels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn agrees(kernel: Kernel<f64>) {
+        for n_vectors in [1, 2, 4].into_iter().filter(|n| *n <= kernel.most_vectors) {
+            for n_rows in 1..=MOST_ROWS {
+                let (n_columns, n_steps) = (n_vectors * kernel.lanes, 5);
+                let left: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.5).collect();
+                let right: Vec<f64> = (0..2000).map(|i| f64::from(i % 17)).collect();
+                let mut sums = vec![1.0; MOST_ROWS * n_columns];
+                let start = sums.as_mut_ptr();
+                let job = Job {
+                    rows: std::array::from_fn(|row| &raw const left[row * 20]),
+                    to: std::array::from_fn(|row| start.wrapping_add(row * n_columns)),
+                    right: right.as_ptr(),
+                    outer: Steps { n: 2, left: 10, right: 400 },
+                    inner: Steps { n: n_steps, left: 2, right: 60 },
+                };
+                // SAFETY: all lies inside the vectors above.
+                unsafe { (kernel.run)(&job, n_rows, n_vectors) };
+                for (i, sum) in sums.iter().enumerate() {
+                    let (row, column) = (i / n_columns, i % n_columns);
+                    let steps = (0..2).flat_map(|outer| (0..n_steps).map(move |inner| (outer, inner)));
+                    let product = |(outer, inner): (usize, usize)| {
+                        left[row * 20 + outer * 10 + inner * 2] * right[outer * 400 + inner * 60 + column]
+                    };
+                    let expected = if row < n_rows { 1.0 + steps.map(product).sum::<f64>() } else { 1.0 };
+                    assert_eq!(*sum, expected, "{n_rows} rows, {n_vectors} vectors");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_processors_tiles_are_right() {
+        agrees(of_f64());
+        agrees(Kernel { lanes: 4, most_vectors: 2, run: any_f64 });
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+            agrees(Kernel { lanes: 4, most_vectors: 2, run: x86::half_f64 });
+        }
+    }
+
+    #[test]
+    fn panels_cover_all_columns() {
+        let kernel = Kernel { lanes: 16, most_vectors: 4, run: any_f32 };
+        assert_eq!(panels(&kernel, 144), [(0, 4), (64, 4), (128, 1)]);
+        assert_eq!(panels(&kernel, 96), [(0, 4), (64, 2)]);
+        assert_eq!(panels(&kernel, 1), [(0, 1)]);
+    }
+}

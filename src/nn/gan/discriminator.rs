@@ -1,0 +1,68 @@
+//! The motion discriminator: a patch network over the frame-to-frame differences of normalised poses that scores
+//! about every fourth frame as real or made (Ginosar et al. 2019).
+
+use super::conv_block::{Block1d, SLOPE};
+use crate::nn::ops::conv2d::Conv;
+use crate::nn::params::Params;
+use candle_core::{Result, Tensor};
+
+const KERNEL: usize = 4;
+const WIDTH: usize = 64;
+
+/// Two halvings of time, then two layers at that rate.
+pub struct Discriminator {
+    first: Conv,
+    blocks: [Block1d; 2],
+    last: Conv,
+}
+
+impl Discriminator {
+    /// Makes the network's tensors; `n_in` numbers a pose.
+    pub fn new(params: &mut Params, n_in: usize) -> Result<Self> {
+        Ok(Self {
+            first: Conv::new(params, "first", &[WIDTH, n_in, KERNEL], 2)?,
+            blocks: [
+                Block1d::new(params, "block.0", WIDTH, 2 * WIDTH, KERNEL, 2)?,
+                Block1d::new(params, "block.1", 2 * WIDTH, 4 * WIDTH, KERNEL, 1)?,
+            ],
+            last: Conv::new(params, "last", &[1, 4 * WIDTH, KERNEL], 1)?,
+        })
+    }
+
+    /// Differences [B, n_in, T - 1] to scores [B, 1, about T / 4]; 1 means real, 0 made.
+    pub fn forward(&self, motion: &Tensor, train: bool) -> Result<Tensor> {
+        let mut x = candle_nn::ops::leaky_relu(&self.first.forward(&motion.t()?)?, SLOPE)?;
+        for block in &self.blocks {
+            x = block.forward(&x, train)?;
+        }
+        self.last.forward(&x)?.t()?.contiguous()
+    }
+}
+
+/// Differences of following frames: [B, C, T] to [B, C, T - 1].
+pub fn motion(poses: &Tensor) -> Result<Tensor> {
+    let n = poses.dim(2)?.saturating_sub(1);
+    poses.narrow(2, 1, n)? - poses.narrow(2, 0, n)?
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nn::ops::gradcheck::{pattern, worst};
+    use candle_core::DType;
+
+    #[test]
+    fn it_has_the_published_size_and_right_gradients() -> Result<()> {
+        let mut params = Params::with_dtype(2, DType::F64);
+        let net = Discriminator::new(&mut params, 144)?;
+        assert_eq!(params.n_parameters(), 202_945);
+        let poses = pattern(&[2, 144, 64], 0.0)?;
+        assert_eq!(net.forward(&motion(&poses)?, true)?.dims(), [2, 1, 16]);
+
+        let mut params = Params::with_dtype(2, DType::F64);
+        let net = Discriminator::new(&mut params, 3)?;
+        let error = worst(&[pattern(&[2, 3, 16], 4.0)?], |v| net.forward(&motion(&v[0])?, true))?;
+        assert!(error < 1e-5, "{error}");
+        Ok(())
+    }
+}

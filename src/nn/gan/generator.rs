@@ -1,0 +1,232 @@
+//! The speech-to-gesture generator (Ginosar et al. 2019, as Rebol et al. 2021 use it): log-mel in, poses out. An
+//! audio front turns the spectrogram into one vector a pose frame; a UNet over time with additive skips turns those
+//! into motion. Fully convolutional: any number of frames that is a multiple of [`FRAMES_MULTIPLE`].
+
+use super::conv_block::{Block1d, Block2d};
+use crate::nn::ops::conv2d::Conv;
+use crate::nn::ops::resize;
+use crate::nn::params::Params;
+use candle_core::{Result, Tensor};
+use serde::{Deserialize, Serialize};
+
+/// The UNet halves time five times.
+pub const FRAMES_MULTIPLE: usize = 32;
+pub const N_ENTER: usize = 2;
+pub const N_LEVELS: usize = 5;
+pub const N_DECODER: usize = 4;
+
+/// How the spectrogram is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Preset {
+    /// For CPUs: mel bands are channels, convolutions run over time only.
+    Light,
+    /// The published network: convolutions over time and frequency.
+    Paper,
+}
+
+impl std::str::FromStr for Preset {
+    type Err = anyhow::Error;
+
+    fn from_str(name: &str) -> anyhow::Result<Self> {
+        match name {
+            "light" => Ok(Preset::Light),
+            "paper" => Ok(Preset::Paper),
+            _ => anyhow::bail!("the network preset is `light` or `paper`, not `{name}`"),
+        }
+    }
+}
+
+/// The network's shape.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Config {
+    pub preset: Preset,
+    /// Mel bands that come in; 64 for `paper`.
+    pub n_mels: usize,
+    /// Channels of the UNet.
+    pub width: usize,
+    /// Numbers of a pose that come out.
+    pub n_out: usize,
+    /// Weight of a new batch in the running statistics of the batch norms (PyTorch's convention).
+    #[serde(default = "before_it_was_stated")]
+    pub norm_momentum: f64,
+}
+
+fn before_it_was_stated() -> f64 {
+    0.1
+}
+
+impl Config {
+    /// The sizes of a preset; the UNet is the same. The published momentum is 0.01, which a training of some hundred
+    /// steps on a CPU never catches up with: `light` takes 0.1.
+    pub fn of(preset: Preset, n_out: usize) -> Self {
+        let norm_momentum = if preset == Preset::Paper { 0.01 } else { 0.1 };
+        Self { preset, n_mels: 64, width: 256, n_out, norm_momentum }
+    }
+}
+
+/// The generator.
+pub struct Generator {
+    front: Front,
+    enter: Vec<Block1d>,
+    downs: Vec<Block1d>,
+    ups: Vec<Block1d>,
+    decoder: Vec<Block1d>,
+    last: Conv,
+}
+
+/// A block of so many channels in and out.
+type MakeBlock = fn(&mut Params, &str, usize, usize) -> Result<Block1d>;
+
+/// Both fronts shorten time by 8 before it is resized to the pose frames.
+enum Front {
+    Light(Vec<Block1d>),
+    Paper(Vec<Block2d>),
+}
+
+impl Generator {
+    /// Makes the network's tensors.
+    pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
+        let n = config.width;
+        let front = Front::new(params, config)?;
+        let mut row = |name: &str, n_blocks: usize, make: MakeBlock| {
+            let block = |i| Ok(make(params, &format!("{name}.{i}"), n, n)?.with_momentum(config.norm_momentum));
+            (0..n_blocks).map(block).collect::<Result<Vec<_>>>()
+        };
+        let enter = row("enter", N_ENTER, Block1d::plain)?;
+        let downs = row("down", N_LEVELS, Block1d::down)?;
+        let ups = row("up", N_LEVELS, Block1d::plain)?;
+        let decoder = row("decoder", N_DECODER, Block1d::plain)?;
+        let last = Conv::new(params, "last", &[config.n_out, n, 1], 1)?;
+        Ok(Self { front, enter, downs, ups, decoder, last })
+    }
+
+    /// `mels` [B, n_mels, T_mel] to poses [B, n_out, n_frames]; `n_frames` is a multiple of [`FRAMES_MULTIPLE`] and
+    /// both span the same time.
+    pub fn forward(&self, mels: &Tensor, n_frames: usize, train: bool) -> Result<Tensor> {
+        if n_frames == 0 || !n_frames.is_multiple_of(FRAMES_MULTIPLE) {
+            candle_core::bail!("the generator makes a multiple of {FRAMES_MULTIPLE} frames, not {n_frames}");
+        }
+        self.trunk(&resize::linear(&self.front(mels, train)?, n_frames)?, train)
+    }
+
+    /// `mels` [B, n_mels, T_mel] to what is heard [B, width, about T_mel / 8].
+    pub fn front(&self, mels: &Tensor, train: bool) -> Result<Tensor> {
+        self.front.forward(mels, train)?.t()?.contiguous()
+    }
+
+    /// What is heard at every pose frame, [B, width, T], to poses [B, n_out, T]; T is a multiple of
+    /// [`FRAMES_MULTIPLE`].
+    pub fn trunk(&self, x: &Tensor, train: bool) -> Result<Tensor> {
+        let mut x = x.t()?;
+        for block in &self.enter {
+            x = block.forward(&x, train)?;
+        }
+        let mut skips = Vec::new();
+        for block in &self.downs {
+            let down = block.forward(&x, train)?;
+            skips.push(std::mem::replace(&mut x, down));
+        }
+        for (block, skip) in self.ups.iter().zip(skips.iter().rev()) {
+            x = block.forward(&(resize::twice(&x)? + skip)?, train)?;
+        }
+        for block in &self.decoder {
+            x = block.forward(&x, train)?;
+        }
+        self.last.forward(&x)?.t()?.contiguous()
+    }
+}
+
+impl Front {
+    fn new(params: &mut Params, config: &Config) -> Result<Self> {
+        let (mels, n) = (config.n_mels, config.width);
+        let name = |i: usize| format!("front.{i}");
+        let momentum = config.norm_momentum;
+        Ok(match config.preset {
+            Preset::Light => {
+                let (narrow, wide) = (n * 3 / 8, n / 2);
+                let blocks = vec![
+                    Block1d::plain(params, &name(0), mels, narrow)?,
+                    Block1d::down(params, &name(1), narrow, narrow)?,
+                    Block1d::plain(params, &name(2), narrow, wide)?,
+                    Block1d::down(params, &name(3), wide, wide)?,
+                    Block1d::plain(params, &name(4), wide, wide)?,
+                    Block1d::down(params, &name(5), wide, n)?,
+                    Block1d::plain(params, &name(6), n, n)?,
+                ];
+                Front::Light(blocks.into_iter().map(|block| block.with_momentum(momentum)).collect())
+            }
+            Preset::Paper => {
+                let blocks = vec![
+                    Block2d::plain(params, &name(0), 1, n / 4)?,
+                    Block2d::down(params, &name(1), n / 4, n / 4)?,
+                    Block2d::plain(params, &name(2), n / 4, n / 2)?,
+                    Block2d::down(params, &name(3), n / 2, n / 2)?,
+                    Block2d::plain(params, &name(4), n / 2, n)?,
+                    Block2d::down(params, &name(5), n, n)?,
+                    Block2d::plain(params, &name(6), n, n)?,
+                    Block2d::across(params, &name(7), [n, n, 3, mels / 8])?,
+                ];
+                Front::Paper(blocks.into_iter().map(|block| block.with_momentum(momentum)).collect())
+            }
+        })
+    }
+
+    /// [B, n_mels, T_mel] to [B, T_mel / 8, width].
+    fn forward(&self, mels: &Tensor, train: bool) -> Result<Tensor> {
+        match self {
+            Front::Light(blocks) => blocks.iter().try_fold(mels.t()?, |x, block| block.forward(&x, train)),
+            Front::Paper(blocks) => {
+                let image = mels.t()?.unsqueeze(3)?;
+                blocks.iter().try_fold(image, |x, block| block.forward(&x, train))?.squeeze(2)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nn::ops::gradcheck::{pattern, worst};
+    use candle_core::DType;
+
+    fn size(preset: Preset, n_out: usize) -> Result<usize> {
+        let mut params = Params::frozen();
+        Generator::new(&mut params, &Config::of(preset, n_out))?;
+        Ok(params.n_parameters())
+    }
+
+    #[test]
+    fn sizes_are_the_published_ones() -> Result<()> {
+        // 7.42 M and 7.44 M parameters.
+        let sizes = [size(Preset::Paper, 98)?, size(Preset::Paper, 147)?, size(Preset::Light, 144)?];
+        assert_eq!(sizes, [7_423_266, 7_435_859, 4_060_496]);
+        Ok(())
+    }
+
+    #[test]
+    fn shapes_follow_the_frames_asked_for() -> Result<()> {
+        let mut params = Params::new(0);
+        let config = Config { width: 16, ..Config::of(Preset::Light, 6) };
+        let net = Generator::new(&mut params, &config)?;
+        for (n_mel, n_frames) in [(418, 64), (427, 64), (213, 32), (1000, 160)] {
+            let mels = pattern(&[2, 64, n_mel], 0.0)?.to_dtype(DType::F32)?;
+            assert_eq!(net.forward(&mels, n_frames, true)?.dims(), [2, 6, n_frames]);
+        }
+        let mels = pattern(&[2, 64, 100], 0.0)?.to_dtype(DType::F32)?;
+        assert!(net.forward(&mels, 15, false).is_err());
+        Ok(())
+    }
+
+    #[test]
+    fn gradients_reach_the_input_right() -> Result<()> {
+        for (preset, n_mels) in [(Preset::Light, 5), (Preset::Paper, 8)] {
+            let mut params = Params::with_dtype(1, DType::F64);
+            let net = Generator::new(&mut params, &Config { n_mels, width: 4, ..Config::of(preset, 3) })?;
+            let mels = pattern(&[2, n_mels, 41], 0.0)?;
+            let error = worst(&[mels], |v| net.forward(&v[0], 32, false))?;
+            assert!(error < 1e-5, "{preset:?}: {error}");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,7 @@
+//! The networks of the speech-to-gesture GAN: audio encoder and motion UNet (`generator`), motion discriminator, and
+//! the generator run in chunks (`streaming`).
+
+pub mod conv_block;
+pub mod discriminator;
+pub mod generator;
+pub mod streaming;

@@ -1,0 +1,243 @@
+//! The generator over a sound of any length in constant memory: the audio front and the UNet each run piece by piece,
+//! every piece with so much beside it that the padding at its ends reaches nothing that is kept. Pieces begin where
+//! every strided layer begins anew, and the resize between front and UNet counts from the beginning of the whole, so
+//! the result is that of one pass.
+//!
+//! What a layer reads follows from kernel and stride. With TensorFlow's "same" padding a layer of kernel 3 and stride 1
+//! computes place `i` from `i - 1..=i + 1`, and one of kernel 4 and stride 2 from `2 i - 1..=2 i + 2`, for even and odd
+//! lengths alike (the padding before is one place for both). Going back layer by layer, result `i` of the front depends
+//! on the spectrogram frames `8 i - 22..=8 i + 29` (`paper`: 45), and 32 frames of poses on 97 more before and behind.
+
+use super::generator::{FRAMES_MULTIPLE, Generator, N_DECODER, N_ENTER, N_LEVELS, Preset};
+use crate::nn::ops::resize;
+use candle_core::{Result, Tensor};
+use std::ops::Range;
+
+/// Spectrogram frames under one result of the front.
+const HOPS: usize = 8;
+/// Results of the front that one piece makes: 20 s of sound.
+const PIECE: usize = 256;
+
+/// Places that are read, first and last.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Span {
+    first: i64,
+    last: i64,
+}
+
+impl Span {
+    /// What a layer of kernel 3, stride 1 reads for these.
+    fn under_plain(self) -> Self {
+        Self { first: self.first - 1, last: self.last + 1 }
+    }
+
+    /// What a layer of kernel 4, stride 2 reads for these.
+    fn under_down(self) -> Self {
+        Self { first: 2 * self.first - 1, last: 2 * self.last + 2 }
+    }
+
+    /// What is repeated twice for these.
+    fn under_twice(self) -> Self {
+        Self { first: self.first.div_euclid(2), last: self.last.div_euclid(2) }
+    }
+
+    fn with(self, other: Self) -> Self {
+        Self { first: self.first.min(other.first), last: self.last.max(other.last) }
+    }
+}
+
+/// Spectrogram frames, relative to `8 * i`, that result `i` of the front depends on.
+fn under_front(preset: Preset) -> Span {
+    // The last layer of `paper` is not padded: place i reads i..=i + 2.
+    let mut span = Span { first: 0, last: if preset == Preset::Paper { 2 } else { 0 } }.under_plain();
+    for _ in 0..3 {
+        span = span.under_down().under_plain();
+    }
+    span
+}
+
+/// Frames of its input, relative to the first of 32, that these 32 of its results depend on.
+fn under_trunk() -> Span {
+    let mut span = Span { first: 0, last: FRAMES_MULTIPLE as i64 - 1 };
+    for _ in 0..N_DECODER {
+        span = span.under_plain();
+    }
+    let mut skips = Vec::new();
+    for _ in 0..N_LEVELS {
+        span = span.under_plain();
+        skips.push(span);
+        span = span.under_twice();
+    }
+    for skip in skips.into_iter().rev() {
+        span = span.under_down().with(skip);
+    }
+    for _ in 0..N_ENTER {
+        span = span.under_plain();
+    }
+    span
+}
+
+/// Results of the front for so many spectrogram frames.
+fn n_results(preset: Preset, n_mel_frames: usize) -> usize {
+    let eighth = (0..3).fold(n_mel_frames, |n, _| n.div_ceil(2));
+    if preset == Preset::Paper { eighth.saturating_sub(2) } else { eighth }
+}
+
+/// A sound of any length on its way through the generator; yields the poses [1, n_out, T] of one chunk after another.
+pub struct Chunks<'a, M> {
+    generator: &'a Generator,
+    preset: Preset,
+    /// Log-mels [1, n_mels, T_mel] of these spectrogram frames.
+    mels: M,
+    n_mel_frames: usize,
+    n_frames: usize,
+    chunk: usize,
+    /// First frame that is still to be made.
+    next: usize,
+    /// Results of the front that later chunks need, [1, width, n], and which is the first of them.
+    heard: Option<Tensor>,
+    first_heard: usize,
+}
+
+impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> Chunks<'a, M> {
+    /// `n_mel_frames` of sound, which `mels` makes as they are asked for, in order, become `n_frames` of poses, `chunk`
+    /// at a time; both are multiples of 32 frames and `n_frames` spans the same time as the sound.
+    pub fn new(
+        generator: &'a Generator,
+        preset: Preset,
+        n_mel_frames: usize,
+        n_frames: usize,
+        chunk: usize,
+        mels: M,
+    ) -> Result<Self> {
+        for (what, n) in [("the sound", n_frames), ("a chunk", chunk)] {
+            if n == 0 || !n.is_multiple_of(FRAMES_MULTIPLE) {
+                candle_core::bail!("{what} must have a multiple of {FRAMES_MULTIPLE} frames, not {n}");
+            }
+        }
+        if n_results(preset, n_mel_frames) == 0 {
+            candle_core::bail!("{n_mel_frames} spectrogram frames are too few for this network");
+        }
+        Ok(Self { generator, preset, mels, n_mel_frames, n_frames, chunk, next: 0, heard: None, first_heard: 0 })
+    }
+
+    fn chunk(&mut self, frames: Range<usize>) -> Result<Tensor> {
+        let reach = under_trunk();
+        let beside = |n: i64| (n.max(0) as usize).next_multiple_of(FRAMES_MULTIPLE);
+        let first = frames.start.saturating_sub(beside(-reach.first));
+        let end = (frames.end + beside(reach.last + 1 - FRAMES_MULTIPLE as i64)).min(self.n_frames);
+        let n_heard = n_results(self.preset, self.n_mel_frames);
+        let part = resize::Part { frames: first..end, n_out: self.n_frames, n_in: n_heard };
+        let needed = part.needed();
+        self.hear(needed.clone(), n_heard)?;
+        let Some(heard) = &self.heard else { candle_core::bail!("nothing was heard") };
+        let heard = heard.narrow(2, needed.start - self.first_heard, needed.len())?;
+        let poses = self.generator.trunk(&resize::linear_part(&heard, &part)?, false)?;
+        poses.narrow(2, frames.start - first, frames.len())
+    }
+
+    /// Sees to it that these results of the front are at hand, and lets go of those before them.
+    fn hear(&mut self, needed: Range<usize>, n_heard: usize) -> Result<()> {
+        let mut parts = Vec::new();
+        let mut end = needed.start;
+        if let Some(heard) = self.heard.take() {
+            end = self.first_heard + heard.dim(2)?;
+            parts.push(heard.narrow(2, needed.start - self.first_heard, end - needed.start)?);
+        }
+        self.first_heard = needed.start;
+        while end < needed.end {
+            let piece = end..(end + PIECE).min(n_heard);
+            end = piece.end;
+            parts.push(self.front(piece, n_heard)?);
+        }
+        // A copy, so that what is let go of is freed.
+        self.heard = Some(Tensor::cat(&parts, 2)?.force_contiguous()?);
+        Ok(())
+    }
+
+    /// These results of the front.
+    fn front(&mut self, piece: Range<usize>, n_heard: usize) -> Result<Tensor> {
+        let reach = under_front(self.preset);
+        let first = piece.start.saturating_sub(((-reach.first).max(0) as usize).div_ceil(HOPS));
+        let end = match piece.end {
+            end if end == n_heard => self.n_mel_frames,
+            end => ((end - 1) * HOPS + reach.last.max(0) as usize + 1).min(self.n_mel_frames),
+        };
+        let heard = self.generator.front(&(self.mels)(first * HOPS..end)?, false)?;
+        heard.narrow(2, piece.start - first, piece.len())
+    }
+}
+
+impl<M: FnMut(Range<usize>) -> Result<Tensor>> Iterator for Chunks<'_, M> {
+    type Item = Result<Tensor>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let frames = self.next..(self.next + self.chunk).min(self.n_frames);
+        if frames.is_empty() {
+            return None;
+        }
+        self.next = frames.end;
+        let poses = self.chunk(frames);
+        if poses.is_err() {
+            self.next = self.n_frames;
+        }
+        Some(poses)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nn::gan::generator::Config;
+    use crate::nn::ops::gradcheck::pattern;
+    use crate::nn::params::Params;
+    use candle_core::DType;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn what_is_read_follows_from_the_layers() {
+        assert_eq!(under_front(Preset::Light), Span { first: -22, last: 29 });
+        assert_eq!(under_front(Preset::Paper), Span { first: -22, last: 45 });
+        assert_eq!(under_trunk(), Span { first: -97, last: 31 + 97 });
+        assert_eq!([418, 425, 8, 1].map(|n| n_results(Preset::Light, n)), [53, 54, 1, 1]);
+        assert_eq!([418, 425, 17, 16].map(|n| n_results(Preset::Paper, n)), [51, 52, 1, 0]);
+    }
+
+    /// A network of random numbers, the running statistics too, in f64: what reached too far would be seen.
+    fn network(preset: Preset) -> anyhow::Result<Generator> {
+        let mut params = Params::with_dtype(5, DType::F64);
+        let net = Generator::new(&mut params, &Config { n_mels: 8, width: 8, ..Config::of(preset, 3) })?;
+        let mut tensors: BTreeMap<_, _> = params.tensors()?;
+        for (i, (name, tensor)) in tensors.iter_mut().enumerate().filter(|(_, (_, t))| t.rank() == 1) {
+            let around = if name.ends_with("running_var") || name.ends_with("norm.weight") { 1.0 } else { 0.0 };
+            *tensor = (pattern(tensor.dims(), 17.0 * i as f64)? * 0.5)?.affine(1.0, around)?;
+        }
+        params.load(&tensors)?;
+        Ok(net)
+    }
+
+    #[test]
+    fn chunks_of_any_size_are_one_pass() -> anyhow::Result<()> {
+        for preset in [Preset::Light, Preset::Paper] {
+            let net = network(preset)?;
+            // 6.67 spectrogram frames a pose frame, and other numbers, even and odd.
+            for (n_mel, n_frames) in [(213, 32), (427, 64), (2994, 448), (6829, 1024), (2003, 608)] {
+                let mels = pattern(&[1, 8, n_mel], 3.0)?;
+                let whole = net.forward(&mels, n_frames, false)?;
+                for chunk in [32, 96, 256, 4096] {
+                    let mels = |frames: Range<usize>| mels.narrow(2, frames.start, frames.len());
+                    let chunks = Chunks::new(&net, preset, n_mel, n_frames, chunk, mels)?;
+                    let parts = chunks.collect::<Result<Vec<_>>>()?;
+                    assert!(parts.iter().all(|part| part.dims()[2] <= chunk));
+                    let off = (Tensor::cat(&parts, 2)? - &whole)?.abs()?.max_all()?.to_scalar::<f64>()?;
+                    assert!(off < 1e-11, "{preset:?}, {n_mel} to {n_frames} by {chunk}: {off:e}");
+                }
+            }
+            let mels = |_: Range<usize>| candle_core::bail!("no sound");
+            assert!(Chunks::new(&net, preset, 427, 64, 33, mels).is_err());
+            assert!(Chunks::new(&net, preset, 0, 64, 32, mels).is_err());
+            assert_eq!(Chunks::new(&net, preset, 427, 64, 32, mels)?.filter(|chunk| chunk.is_err()).count(), 1);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,95 @@
+//! The hand lifter: the 21 keypoints of one hand in one frame to 21 joints. A plain perceptron on coordinates, which
+//! carry all that heat-maps drawn at the same points would (Zimmermann & Brox 2017 used such maps).
+
+use crate::motion::view::hand::{Hand, HandView, SeenHand};
+use crate::nn::Mode;
+use crate::nn::ops::dropout::dropout;
+use crate::nn::ops::linear::Linear;
+use crate::nn::params::Params;
+use crate::types::skeleton::Side;
+use candle_core::{Device, Result, Tensor};
+use serde::{Deserialize, Serialize};
+
+/// Prefix of the network's tensors in a weights file.
+pub const NAME: &str = "hand";
+
+/// The network's shape.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Config {
+    /// Numbers of a hand that go in: 21 x (x, y, score).
+    pub n_in: usize,
+    /// Numbers that come out: 21 x (x, y, z).
+    pub n_out: usize,
+    /// Width of the two hidden layers.
+    pub hidden: usize,
+    pub dropout: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self { n_in: 63, n_out: 63, hidden: 512, dropout: 0.0 }
+    }
+}
+
+/// Three fully connected layers with leaky ReLU (slope 0.01) between.
+pub struct HandLifter {
+    config: Config,
+    layers: [Linear; 3],
+}
+
+impl HandLifter {
+    /// Makes the network's tensors under `<name>.`.
+    pub fn new(params: &mut Params, name: &str, config: &Config) -> Result<Self> {
+        let hidden = config.hidden;
+        let layers = [
+            Linear::new(params, &format!("{name}.0"), config.n_in, hidden)?,
+            Linear::new(params, &format!("{name}.1"), hidden, hidden)?,
+            Linear::new(params, &format!("{name}.2"), hidden, config.n_out)?,
+        ];
+        Ok(Self { config: config.clone(), layers })
+    }
+
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// [B, n_in] to [B, n_out].
+    pub fn forward(&self, x: &Tensor, mode: &mut Mode) -> Result<Tensor> {
+        let [first, second, last] = &self.layers;
+        let x = dropout(&candle_nn::ops::leaky_relu(&first.forward(x)?, 0.01)?, self.config.dropout, mode)?;
+        let x = dropout(&candle_nn::ops::leaky_relu(&second.forward(&x)?, 0.01)?, self.config.dropout, mode)?;
+        last.forward(&x)
+    }
+
+    /// Hands of that side in px, the wrist at 0, in the axes of the picture; `None` where too little is seen.
+    pub fn lift(&self, seen: &[SeenHand], side: Side) -> Result<Vec<Option<Hand>>> {
+        let views: Vec<Option<HandView>> = seen.iter().map(|s| HandView::of(s, side)).collect();
+        let x: Vec<f32> = views.iter().flatten().flat_map(|view| view.numbers).collect();
+        if x.is_empty() {
+            return Ok(vec![None; seen.len()]);
+        }
+        let x = Tensor::from_vec(x, (views.iter().flatten().count(), self.config.n_in), &Device::Cpu)?;
+        let y = self.forward(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1::<f32>()?;
+        let mut outputs = y.chunks_exact(self.config.n_out);
+        Ok(views.iter().map(|view| view.as_ref().and_then(|view| Some(view.hand(outputs.next()?)))).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nn::ops::gradcheck::{pattern, worst};
+    use candle_core::DType;
+
+    #[test]
+    fn gradients_and_size_are_right() -> anyhow::Result<()> {
+        let mut params = Params::with_dtype(1, DType::F64);
+        let config = Config { n_in: 6, n_out: 5, hidden: 7, dropout: 0.0 };
+        let net = HandLifter::new(&mut params, "hand", &config)?;
+        assert!(worst(&[pattern(&[3, 6], 1.0)?], |v| net.forward(&v[0], &mut Mode::Eval))? < 1e-7);
+        let mut params = Params::new(1);
+        HandLifter::new(&mut params, "hand", &Config::default())?;
+        assert_eq!(params.n_parameters(), 64 * 512 + 513 * 512 + 513 * 63);
+        Ok(())
+    }
+}

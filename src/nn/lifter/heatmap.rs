@@ -1,0 +1,199 @@
+//! The hand lifter of Zimmermann & Brox 2017 (section 4.3): score maps of the 21 points and the hand's side to a hand
+//! in its own frame (`PosePrior`) and the turn of that frame (`ViewPoint`). Measured beside the coordinate network of
+//! `hand_lifter`; not built into the program.
+
+use super::hand;
+use crate::motion::view::hand::{Hand, SeenHand};
+use crate::motion::view::heatmaps::{Crop, N_MAPS, PLACES, assembled, score_maps};
+use crate::nn::Mode;
+use crate::nn::ops::conv3x3::Conv3x3;
+use crate::nn::ops::dropout::dropout;
+use crate::nn::params::{Init, Params};
+use crate::types::skeleton::Side;
+use candle_core::{D, Device, Result, Tensor};
+
+/// Prefix of the network's tensors in a weights file.
+pub const NAME: &str = hand::NAME;
+/// Score maps: one a point.
+const MAPS: usize = 21;
+/// Hands that go through the networks together when lifting.
+const BATCH: usize = 64;
+/// The crop a hand is lifted from is this much larger than it need be, as in training on average.
+const ROOM: f64 = 1.1;
+
+/// Both networks.
+pub struct HeatmapLifter {
+    pose_prior: Tower,
+    view_point: Tower,
+}
+
+/// Three pairs of convolutions (stride 1, then 2), then fully connected layers; leaky ReLU (0.01) after all but the
+/// last, dropout between the fully connected ones.
+struct Tower {
+    convolutions: Vec<Conv3x3>,
+    layers: Vec<Dense>,
+    dropout: f64,
+}
+
+/// `<name>.weight` [out, in] (Glorot uniform) and `<name>.bias` [out] (1e-4).
+struct Dense {
+    weight: Tensor,
+    bias: Tensor,
+}
+
+impl Dense {
+    fn new(params: &mut Params, name: &str, n_in: usize, n_out: usize) -> Result<Self> {
+        Ok(Self {
+            weight: params.trainable(&format!("{name}.weight"), &[n_out, n_in], Init::Glorot)?,
+            bias: params.trainable(&format!("{name}.bias"), &[n_out], Init::Constant(1e-4))?,
+        })
+    }
+
+    fn forward(&self, x: &Tensor) -> Result<Tensor> {
+        x.contiguous()?.matmul(&self.weight.t()?)?.broadcast_add(&self.bias)
+    }
+}
+
+impl Tower {
+    fn new(params: &mut Params, name: &str, channels: [usize; 3], widths: [usize; 3], dropout: f64) -> Result<Self> {
+        let mut convolutions = Vec::new();
+        let mut n_in = MAPS;
+        for (i, n_out) in channels.into_iter().enumerate() {
+            convolutions.push(Conv3x3::new(params, &format!("{name}.conv{}", 2 * i), n_in, n_out, 1)?);
+            convolutions.push(Conv3x3::new(params, &format!("{name}.conv{}", 2 * i + 1), n_out, n_out, 2)?);
+            n_in = n_out;
+        }
+        // the side's two numbers join what the convolutions leave
+        let mut n_in = (PLACES / 8) * (PLACES / 8) * n_in + 2;
+        let mut layers = Vec::new();
+        for (i, n_out) in widths.into_iter().enumerate() {
+            layers.push(Dense::new(params, &format!("{name}.dense{i}"), n_in, n_out)?);
+            n_in = n_out;
+        }
+        Ok(Self { convolutions, layers, dropout })
+    }
+
+    fn forward(&self, maps: &Tensor, sides: &Tensor, mode: &mut Mode) -> Result<Tensor> {
+        let leaky = |x: &Tensor| candle_nn::ops::leaky_relu(x, 0.01);
+        let mut x = maps.clone();
+        for convolution in &self.convolutions {
+            x = leaky(&convolution.forward(&x)?)?;
+        }
+        let mut x = Tensor::cat(&[&x.flatten_from(1)?, sides], 1)?;
+        for (i, layer) in self.layers.iter().enumerate() {
+            x = layer.forward(&x)?;
+            if i + 1 < self.layers.len() {
+                x = dropout(&leaky(&x)?, self.dropout, mode)?;
+            }
+        }
+        Ok(x)
+    }
+}
+
+impl HeatmapLifter {
+    /// Makes the networks' tensors under `<name>.pose_prior` (1.64 M numbers) and `<name>.view_point` (2.24 M).
+    pub fn new(params: &mut Params, name: &str) -> Result<Self> {
+        Ok(Self {
+            pose_prior: Tower::new(params, &format!("{name}.pose_prior"), [32, 64, 128], [512, 512, 63], 0.2)?,
+            view_point: Tower::new(params, &format!("{name}.view_point"), [64, 128, 256], [256, 128, 3], 0.25)?,
+        })
+    }
+
+    /// Score maps [B, 32, 32, 21] and sides [B, 2] (left: 1 0, right: 0 1) to [B, 72]: 21 points in the hand's own
+    /// frame, then the 9 entries of the turn, row by row.
+    pub fn forward(&self, maps: &Tensor, sides: &Tensor, mode: &mut Mode) -> Result<Tensor> {
+        let points = self.pose_prior.forward(maps, sides, mode)?;
+        let turn = rotation(&self.view_point.forward(maps, sides, mode)?)?;
+        Tensor::cat(&[&points, &turn], 1)
+    }
+
+    /// Hands of that side, the wrist at 0, in the axes of the picture, the middle finger's first phalanx about 1 long;
+    /// `None` where too little is seen. Left hands go through the networks in the mirror.
+    pub fn lift(&self, seen: &[SeenHand], side: Side) -> Result<Vec<Option<Hand>>> {
+        let flip = if side == Side::Left { -1.0 } else { 1.0 };
+        let mirrored: Vec<SeenHand> = seen.iter().map(|s| s.map(|p| p.map(|[x, y]| [flip * x, y]))).collect();
+        let crops: Vec<Option<Crop>> = mirrored.iter().map(Crop::of).collect();
+        let there: Vec<(usize, Crop)> = crops.iter().enumerate().filter_map(|(i, c)| Some((i, (*c)?))).collect();
+        let mut hands = vec![None; seen.len()];
+        for some in there.chunks(BATCH) {
+            let mut maps = vec![0.0; some.len() * N_MAPS];
+            for ((i, crop), maps) in some.iter().zip(maps.chunks_exact_mut(N_MAPS)) {
+                score_maps(&mirrored[*i], Crop { side: ROOM * crop.side, ..*crop }, maps);
+            }
+            let maps = Tensor::from_vec(maps, (some.len(), PLACES, PLACES, MAPS), &Device::Cpu)?;
+            let rows = self.forward(&maps, &right_sides(some.len(), &maps)?, &mut Mode::Eval)?.to_vec2::<f32>()?;
+            for ((i, _), row) in some.iter().zip(rows) {
+                let at = |j: usize| std::array::from_fn(|k| f64::from(row[3 * j + k]));
+                let axes = std::array::from_fn(|k| at(MAPS + k));
+                let hand = assembled(&std::array::from_fn(at), &axes, true);
+                hands[*i] = Some(hand.map(|[x, y, z]| [f64::from(flip) * x, y, z]));
+            }
+        }
+        Ok(hands)
+    }
+}
+
+/// The side input of `n` right hands, of the type of `like`.
+pub fn right_sides(n: usize, like: &Tensor) -> Result<Tensor> {
+    Tensor::new(&[[0f32, 1.0]], &Device::Cpu)?.to_dtype(like.dtype())?.repeat((n, 1))
+}
+
+/// Axis-angle vectors [B, 3] to matrices [B, 9], row by row: Rodrigues' formula, the angle sqrt(|v|^2 + 1e-8).
+pub fn rotation(vectors: &Tensor) -> Result<Tensor> {
+    let angle = (vectors.sqr()?.sum_keepdim(D::Minus1)? + 1e-8)?.sqrt()?;
+    let axis = vectors.broadcast_div(&angle)?;
+    let [x, y, z] = [axis.narrow(1, 0, 1)?, axis.narrow(1, 1, 1)?, axis.narrow(1, 2, 1)?];
+    let (sin, cos) = (angle.sin()?, angle.cos()?);
+    let rest = cos.affine(-1.0, 1.0)?;
+    let diagonal = |a: &Tensor| -> Result<Tensor> { &cos + (a.sqr()? * &rest)? };
+    let beside = |a: &Tensor, b: &Tensor, c: &Tensor, sign: f64| -> Result<Tensor> {
+        ((a * b)? * &rest)? + ((c * &sin)? * sign)?
+    };
+    let entries = [
+        diagonal(&x)?,
+        beside(&x, &y, &z, -1.0)?,
+        beside(&x, &z, &y, 1.0)?,
+        beside(&x, &y, &z, 1.0)?,
+        diagonal(&y)?,
+        beside(&y, &z, &x, -1.0)?,
+        beside(&x, &z, &y, -1.0)?,
+        beside(&y, &z, &x, 1.0)?,
+        diagonal(&z)?,
+    ];
+    Tensor::cat(&entries, 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::rotation::Rotation;
+    use crate::math::vec3;
+    use crate::nn::ops::gradcheck::{pattern, worst};
+    use candle_core::{DType, Device};
+
+    #[test]
+    fn the_layers_have_the_published_sizes() -> anyhow::Result<()> {
+        let mut params = Params::new(1);
+        let net = HeatmapLifter::new(&mut params, NAME)?;
+        let of = |part: &str| params.trainables().filter(|(n, _)| n.contains(part)).map(|(_, v)| v.elem_count()).sum();
+        let (prior, view): (usize, usize) = (of("pose_prior"), of("view_point"));
+        assert_eq!((prior, view), (1_637_279, 2_238_403), "1.64 M and 2.24 M");
+        let maps = Tensor::zeros((2, PLACES, PLACES, MAPS), DType::F32, &Device::Cpu)?;
+        let sides = Tensor::new(&[[0f32, 1.0], [1.0, 0.0]], &Device::Cpu)?;
+        assert_eq!(net.forward(&maps, &sides, &mut Mode::Eval)?.dims(), [2, 72]);
+        Ok(())
+    }
+
+    #[test]
+    fn turns_are_those_of_rodrigues_with_right_gradients() -> Result<()> {
+        let vectors = (pattern(&[4, 3], 2.0)? * 2.5)?;
+        assert!(worst(std::slice::from_ref(&vectors), |v| rotation(&v[0]))? < 1e-6);
+        let matrices = rotation(&vectors)?.to_vec2::<f64>()?;
+        for (v, m) in vectors.to_vec2::<f64>()?.iter().zip(matrices) {
+            let v = [v[0], v[1], v[2]];
+            let axes = Rotation::about(vec3::scale(v, 1.0 / vec3::norm(v)), vec3::norm(v)).axes();
+            assert!((0..9).all(|k| (m[k] - axes[k % 3][k / 3]).abs() < 1e-6), "{m:?}");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,325 @@
+//! Batch normalisation with the leaky ReLU behind it in one operator, forward and backward: a third of the memory
+//! passes of the two built from parts. Training uses the batch's statistics and follows them with running ones;
+//! evaluation uses the running ones.
+
+use super::fallback;
+use crate::nn::cpu::tensor::{GRAIN, LANES, Real, is_f64, read, slice, sum};
+use crate::nn::params::{Init, Params};
+use candle_core::backend::BackendStorage;
+use candle_core::{CpuStorage, CustomOp3, Device, Layout, Result, Shape, Tensor, Var};
+use rayon::prelude::*;
+use std::sync::{Arc, OnceLock};
+
+/// Mean and variance of each channel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Statistics {
+    pub mean: Vec<f64>,
+    pub variance: Vec<f64>,
+}
+
+/// A normalisation with its numbers: `<name>.weight` (1), `<name>.bias` (0), `<name>.running_mean` (0) and
+/// `<name>.running_var` (1), each [C].
+pub struct BatchNorm {
+    pub(crate) weight: Tensor,
+    pub(crate) bias: Tensor,
+    running_mean: Var,
+    running_var: Var,
+    pub(crate) eps: f64,
+    momentum: f64,
+    pub(crate) slope: f64,
+}
+
+impl BatchNorm {
+    /// `momentum`: weight of a new batch in the running statistics (PyTorch's convention: TensorFlow's 0.99 is 0.01
+    /// here). `slope`: what negative results are multiplied with afterwards; 1 for no activation, 0 for ReLU.
+    pub fn new(params: &mut Params, name: &str, n: usize, eps: f64, momentum: f64, slope: f64) -> Result<Self> {
+        Ok(Self {
+            weight: params.trainable(&format!("{name}.weight"), &[n], Init::Constant(1.0))?,
+            bias: params.trainable(&format!("{name}.bias"), &[n], Init::Constant(0.0))?,
+            running_mean: params.buffer(&format!("{name}.running_mean"), &[n], 0.0)?,
+            running_var: params.buffer(&format!("{name}.running_var"), &[n], 1.0)?,
+            eps,
+            momentum,
+            slope,
+        })
+    }
+
+    /// Changes the weight of a new batch in the running statistics.
+    pub fn set_momentum(&mut self, momentum: f64) {
+        self.momentum = momentum;
+    }
+
+    /// [B, C, ...] to the same shape. Training moves the running statistics.
+    pub fn forward(&self, x: &Tensor, train: bool) -> Result<Tensor> {
+        if fallback::needed(x) {
+            return self.forward_composed(x, train);
+        }
+        let statistics = Arc::new(OnceLock::new());
+        if !train {
+            let _ = statistics.set(self.running()?);
+        }
+        let op = Op { statistics: statistics.clone(), eps: self.eps, slope: self.slope, train };
+        let y = x.contiguous()?.apply_op3(&self.weight, &self.bias, op)?;
+        if let (true, Some(batch)) = (train, statistics.get()) {
+            self.follow(batch, x.elem_count() / batch.mean.len())?;
+        }
+        Ok(y)
+    }
+
+    /// The same of the framework's operators, on any device.
+    pub fn forward_composed(&self, x: &Tensor, train: bool) -> Result<Tensor> {
+        let (mean, variance) = match train {
+            true => fallback::statistics(x)?,
+            false => (self.running_mean.as_detached_tensor(), self.running_var.as_detached_tensor()),
+        };
+        let y = fallback::normalise(x, (&mean, &variance), &self.weight, &self.bias, self.eps, self.slope)?;
+        if train {
+            self.follow_tensors(&mean.detach(), &variance.detach(), x.elem_count() / mean.elem_count())?;
+        }
+        Ok(y)
+    }
+
+    /// The running statistics.
+    pub fn running(&self) -> Result<Statistics> {
+        let values = |var: &Var| var.to_dtype(candle_core::DType::F64)?.to_vec1();
+        Ok(Statistics { mean: values(&self.running_mean)?, variance: values(&self.running_var)? })
+    }
+
+    /// Moves the running statistics towards those of a batch of `n` values a channel; the variance is the unbiased one.
+    pub fn follow(&self, batch: &Statistics, n: usize) -> Result<()> {
+        let tensor = |values: &[f64]| Tensor::new(values, &Device::Cpu)?.to_dtype(self.running_mean.dtype());
+        self.follow_tensors(&tensor(&batch.mean)?, &tensor(&batch.variance)?, n)
+    }
+
+    fn follow_tensors(&self, mean: &Tensor, variance: &Tensor, n: usize) -> Result<()> {
+        let n = n as f64;
+        let towards = |running: &Var, batch: &Tensor, scale: f64| {
+            running
+                .set(&((running.as_detached_tensor() * (1.0 - self.momentum))? + (batch * (self.momentum * scale))?)?)
+        };
+        towards(&self.running_mean, mean, 1.0)?;
+        towards(&self.running_var, variance, n / (n - 1.0).max(1.0))
+    }
+}
+
+struct Op {
+    /// Set by the forward pass when training, before it when evaluating.
+    statistics: Arc<OnceLock<Statistics>>,
+    eps: f64,
+    slope: f64,
+    train: bool,
+}
+
+/// Batch, channels, and numbers of a channel in one sample.
+type Sizes = (usize, usize, usize);
+
+fn sizes(dims: &[usize], n_weights: usize) -> Result<Sizes> {
+    match dims {
+        [batch, channels, rest @ ..] if *channels == n_weights && dims.iter().all(|d| *d > 0) => {
+            Ok((*batch, *channels, rest.iter().product()))
+        }
+        _ => candle_core::bail!("batch norm of {n_weights} channels got shape {dims:?}"),
+    }
+}
+
+/// The rows [b, c] of channel `c`, over all b.
+fn rows<T>(x: &[T], c: usize, (_, channels, len): Sizes) -> impl Iterator<Item = &[T]> {
+    x.chunks_exact(len).skip(c).step_by(channels)
+}
+
+fn measure<T: Real>(x: &[T], s: Sizes) -> Statistics {
+    let n = (s.0 * s.2) as f64;
+    let per_channel = |c: usize| {
+        let mean = rows(x, c, s).map(sum).sum::<f64>() / n;
+        (mean, rows(x, c, s).map(|row| sum_of_squares(row, T::from_f64(mean))).sum::<f64>() / n)
+    };
+    let (mean, variance) = (0..s.1).into_par_iter().with_min_len(GRAIN / (s.0 * s.2)).map(per_channel).unzip();
+    Statistics { mean, variance }
+}
+
+/// The sum of `(x - centre)^2`, always in the same order.
+fn sum_of_squares<T: Real>(x: &[T], centre: T) -> f64 {
+    let (chunks, rest) = x.as_chunks::<LANES>();
+    let mut lanes = [T::zero(); LANES];
+    let add = |lane: &mut T, x: &T| *lane += (*x - centre) * (*x - centre);
+    chunks.iter().for_each(|x| lanes.iter_mut().zip(x).for_each(|(lane, x)| add(lane, x)));
+    lanes.iter_mut().zip(rest).for_each(|(lane, x)| add(lane, x));
+    lanes.iter().map(|lane| lane.to_f64()).sum()
+}
+
+/// The sums of `grad` and of `grad * (x - centre)`, `grad` being taken back through the activation whose result is
+/// `y`; always in the same order.
+fn sums_of_gradient<T: Real>(x: &[T], y: &[T], grad: &[T], centre: T, slope: T) -> (f64, f64) {
+    let (xs, ys, grads) = (x.as_chunks::<LANES>(), y.as_chunks::<LANES>(), grad.as_chunks::<LANES>());
+    let (mut plain, mut product) = ([T::zero(); LANES], [T::zero(); LANES]);
+    let mut add = |x: &[T], y: &[T], grad: &[T]| {
+        let lanes = plain.iter_mut().zip(&mut product);
+        for ((lanes, x), (y, grad)) in lanes.zip(x).zip(y.iter().zip(grad)) {
+            let grad = before_activation(*y, *grad, slope);
+            *lanes.0 += grad;
+            *lanes.1 += grad * (*x - centre);
+        }
+    };
+    xs.0.iter().zip(ys.0).zip(grads.0).for_each(|((x, y), grad)| add(x, y, grad));
+    add(xs.1, ys.1, grads.1);
+    let total = |lanes: [T; LANES]| lanes.iter().map(|lane| lane.to_f64()).sum();
+    (total(plain), total(product))
+}
+
+/// The gradient before the leaky ReLU whose result is `y`.
+fn before_activation<T: Real>(y: T, grad: T, slope: T) -> T {
+    if y > T::zero() { grad } else { grad * slope }
+}
+
+impl Op {
+    fn forward<T: Real>(&self, x: &[T], weight: &[T], bias: &[T], s: Sizes) -> Vec<T> {
+        let statistics = self.statistics.get_or_init(|| measure(x, s));
+        let (zero, slope) = (T::zero(), T::from_f64(self.slope));
+        let mut y = vec![zero; x.len()];
+        y.par_chunks_mut(s.2).zip(x.par_chunks(s.2)).with_min_len(GRAIN / s.2).enumerate().for_each(|(row, (y, x))| {
+            let c = row % s.1;
+            let scale = weight[c].to_f64() / (statistics.variance[c] + self.eps).sqrt();
+            let shift = T::from_f64(bias[c].to_f64() - statistics.mean[c] * scale);
+            let scale = T::from_f64(scale);
+            for (y, x) in y.iter_mut().zip(x) {
+                let z = *x * scale + shift;
+                *y = if z > zero { z } else { z * slope };
+            }
+        });
+        y
+    }
+
+    /// Gradients of the input, the weight and the bias.
+    fn backward<T: Real>(&self, x: &[T], weight: &[T], y: &[T], grad: &[T], s: Sizes) -> (Vec<T>, Vec<T>, Vec<T>) {
+        let statistics = self.statistics.get_or_init(|| measure(x, s));
+        let slope = T::from_f64(self.slope);
+        let per_channel = |c: usize| {
+            let centre = T::from_f64(statistics.mean[c]);
+            let (mut of_bias, mut of_product) = (0.0, 0.0);
+            for ((x, y), grad) in rows(x, c, s).zip(rows(y, c, s)).zip(rows(grad, c, s)) {
+                let (plain, product) = sums_of_gradient(x, y, grad, centre, slope);
+                of_bias += plain;
+                of_product += product;
+            }
+            let inverse = 1.0 / (statistics.variance[c] + self.eps).sqrt();
+            (T::from_f64(of_product * inverse), T::from_f64(of_bias))
+        };
+        let (grad_weight, grad_bias): (Vec<T>, Vec<T>) =
+            (0..s.1).into_par_iter().with_min_len(GRAIN / (s.0 * s.2)).map(per_channel).unzip();
+        let n = (s.0 * s.2) as f64;
+        let mut grad_x = vec![T::zero(); x.len()];
+        let inputs = x.par_chunks(s.2).zip(y.par_chunks(s.2)).zip(grad.par_chunks(s.2));
+        grad_x.par_chunks_mut(s.2).zip(inputs).with_min_len(GRAIN / s.2).enumerate().for_each(
+            |(row, (out, ((x, y), grad)))| {
+                let c = row % s.1;
+                let inverse = 1.0 / (statistics.variance[c] + self.eps).sqrt();
+                let scale = weight[c].to_f64() * inverse;
+                // The batch's own mean and variance move with x; fixed ones do not.
+                let moving = if self.train { scale / n } else { 0.0 };
+                let (scale, constant) = (T::from_f64(scale), T::from_f64(-moving * grad_bias[c].to_f64()));
+                let linear = T::from_f64(-moving * grad_weight[c].to_f64() * inverse);
+                let centre = T::from_f64(statistics.mean[c]);
+                for (((out, x), y), grad) in out.iter_mut().zip(x).zip(y).zip(grad) {
+                    *out = scale * before_activation(*y, *grad, slope) + constant + linear * (*x - centre);
+                }
+            },
+        );
+        (grad_x, grad_weight, grad_bias)
+    }
+}
+
+impl CustomOp3 for Op {
+    fn name(&self) -> &'static str {
+        "batch norm and leaky ReLU"
+    }
+
+    fn cpu_fwd(
+        &self,
+        x: &CpuStorage,
+        lx: &Layout,
+        w: &CpuStorage,
+        lw: &Layout,
+        b: &CpuStorage,
+        lb: &Layout,
+    ) -> Result<(CpuStorage, Shape)> {
+        let s = sizes(lx.dims(), lw.shape().elem_count())?;
+        let y = if is_f64(x.dtype())? {
+            CpuStorage::F64(self.forward(slice(x, lx)?, slice(w, lw)?, slice(b, lb)?, s))
+        } else {
+            CpuStorage::F32(self.forward(slice(x, lx)?, slice(w, lw)?, slice(b, lb)?, s))
+        };
+        Ok((y, lx.shape().clone()))
+    }
+
+    fn bwd(
+        &self,
+        x: &Tensor,
+        weight: &Tensor,
+        _bias: &Tensor,
+        y: &Tensor,
+        grad: &Tensor,
+    ) -> Result<(Option<Tensor>, Option<Tensor>, Option<Tensor>)> {
+        fn typed<T: Real>(op: &Op, x: &Tensor, w: &Tensor, y: &Tensor, grad: &Tensor) -> Result<[Tensor; 3]> {
+            let s = sizes(x.dims(), w.elem_count())?;
+            let (grad_x, grad_w, grad_b) = read::<T, _>(x, |x| {
+                read::<T, _>(w, |w| read::<T, _>(y, |y| read::<T, _>(grad, |grad| Ok(op.backward(x, w, y, grad, s)))))
+            })?;
+            let channels = |values| Tensor::from_vec(values, w.shape(), x.device());
+            Ok([Tensor::from_vec(grad_x, x.shape(), x.device())?, channels(grad_w)?, channels(grad_b)?])
+        }
+        let [grad_x, grad_w, grad_b] = if is_f64(x.dtype())? {
+            typed::<f64>(self, x, weight, y, grad)?
+        } else {
+            typed::<f32>(self, x, weight, y, grad)?
+        };
+        Ok((Some(grad_x), Some(grad_w), Some(grad_b)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nn::ops::gradcheck::{pattern, worst};
+    use candle_core::DType;
+
+    fn op(train: bool, slope: f64) -> Op {
+        let statistics = Arc::new(OnceLock::new());
+        if !train {
+            let _ = statistics.set(Statistics { mean: vec![0.2, -0.3, 0.1], variance: vec![0.5, 1.5, 2.0] });
+        }
+        Op { statistics, eps: 1e-3, slope, train }
+    }
+
+    #[test]
+    fn gradients_are_right() -> Result<()> {
+        for (train, slope) in [(true, 1.0), (true, 0.2), (true, 0.0), (false, 0.2)] {
+            let inputs = [pattern(&[4, 3, 5], 0.0)?, (pattern(&[3], 5.0)? + 1.5)?, pattern(&[3], 9.0)?];
+            let error = worst(&inputs, |v| v[0].apply_op3(&v[1], &v[2], op(train, slope)))?;
+            assert!(error < 1e-7, "train {train}, slope {slope}: {error}");
+        }
+        let images = [pattern(&[2, 3, 4, 5], 0.0)?, pattern(&[3], 5.0)?, pattern(&[3], 9.0)?];
+        assert!(worst(&images, |v| v[0].apply_op3(&v[1], &v[2], op(true, 0.2)))? < 1e-7);
+        Ok(())
+    }
+
+    #[test]
+    fn training_normalises_and_evaluation_uses_the_running_statistics() -> anyhow::Result<()> {
+        let mut params = Params::with_dtype(0, DType::F64);
+        let norm = BatchNorm::new(&mut params, "n", 3, 0.0, 0.5, 1.0)?;
+        let x = (pattern(&[8, 3, 7], 0.0)? * 3.0)?.affine(1.0, 2.0)?;
+        let y = norm.forward(&x, true)?;
+        let of_channel = |y: &Tensor| -> Result<Vec<f64>> { y.narrow(1, 1, 1)?.flatten_all()?.to_vec1() };
+        let y = of_channel(&y)?;
+        assert!(y.iter().sum::<f64>().abs() < 1e-9);
+        assert!((y.iter().map(|v| v * v).sum::<f64>() / 56.0 - 1.0).abs() < 1e-9);
+        for _ in 0..40 {
+            norm.forward(&x, true)?;
+        }
+        let evaluated = of_channel(&norm.forward(&x, false)?)?;
+        // The running variance is the unbiased one.
+        let shrink = (55.0f64 / 56.0).sqrt();
+        assert!(evaluated.iter().zip(&y).all(|(e, y)| (e - y * shrink).abs() < 1e-6));
+        assert!(norm.forward(&x.narrow(1, 0, 2)?, true).is_err());
+        Ok(())
+    }
+}

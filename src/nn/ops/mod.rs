@@ -1,0 +1,13 @@
+//! Operators with forward and backward passes: convolutions, batch norm, linear, dropout, resize; `fallback` is what
+//! runs on a device without the kernels of `nn::cpu`, `gradcheck` the finite differences that prove the gradients.
+
+pub mod batch_norm;
+pub mod conv1d;
+pub mod conv2d;
+pub mod conv3x3;
+pub mod conv_norm;
+pub mod dropout;
+pub mod fallback;
+pub mod gradcheck;
+pub mod linear;
+pub mod resize;

@@ -1,0 +1,286 @@
+//! Where the film changes its view. Thumbnails come in one after the other, the last few seconds of them are kept, and
+//! for each frame one number comes out: the score of its beginning a shot. How pictures are decoded is not known here.
+//!
+//! A cut is a single step: `change(n)` is the share of cells that differ between frames n - 1 and n (repeated frames
+//! left out), and its score is what it has beyond its surroundings,
+//!
+//! `score(n) = max(0, change(n) - max(change(n-2), change(n-1), change(n+1), change(n+2)))`,
+//!
+//! if the pictures before and after are unlike (`likeness`). Gestures, pans and noise go on for several frames and
+//! cancel out, after a flash the picture is back, another light shows the same things. A gradual transition (`gradual`) scores at
+//! its first frame and at the first frame after it: its own frames are a shot, short as it is.
+
+use super::block_match;
+use super::dissolves;
+use super::dissolves::{LEAST_TURNED, WINDOWS, ramp};
+use super::thumbnail::Thumbnail;
+use crate::types::image::Image;
+use crate::types::time::FrameRate;
+use std::collections::VecDeque;
+
+/// From this score on what was followed before is not followed further, whatever counts as a shot later on.
+pub const RESTART: f64 = 0.1;
+/// Changes beside a cut that are held against it.
+const AROUND: usize = 2;
+/// A picture that is back within so many frames at 15 a second was only flashed over.
+const FLASH: usize = 5;
+/// Least correlation of a block to be found again after a cut.
+const FOUND_AGAIN: f32 = 0.75;
+
+/// Finds where shots begin.
+pub struct ShotFinder {
+    /// Frames of the dataset rate to one at 15 a second.
+    pace: usize,
+    /// The newest frames that repeat none, the oldest first.
+    recent: VecDeque<Recent>,
+    /// Frame of each that repeats none.
+    frames: Vec<usize>,
+    n_frames: usize,
+    /// Of each that repeats none: share of changed cells against the one before.
+    changes: Vec<f64>,
+    /// The same in scores of cuts, as far as known.
+    cuts: Vec<f64>,
+    windows: Vec<Window>,
+}
+
+/// A frame with the way each cell's colour has gone since the film began, modulo 2^32.
+struct Recent {
+    thumbnail: Thumbnail,
+    way: Vec<[u32; 3]>,
+}
+
+/// A gradual transition from one frame to another, counted among those that repeat none.
+#[derive(Clone, Copy)]
+struct Window {
+    start: usize,
+    end: usize,
+    score: f64,
+}
+
+impl ShotFinder {
+    /// For frames at `rate`.
+    pub fn new(rate: FrameRate) -> Self {
+        Self {
+            pace: ((rate.per_sec() / 15.0).round() as usize).max(1),
+            recent: VecDeque::new(),
+            frames: Vec::new(),
+            n_frames: 0,
+            changes: Vec::new(),
+            cuts: Vec::new(),
+            windows: Vec::new(),
+        }
+    }
+
+    /// The next frame's thumbnail; `None` when it repeats the frame before.
+    pub fn push(&mut self, thumbnail: Option<Image>) {
+        let frame = self.n_frames;
+        self.n_frames += 1;
+        let Some(thumbnail) = thumbnail.map(Thumbnail::new) else { return };
+        let last = self.recent.back();
+        self.changes.push(last.map_or(0.0, |last| last.thumbnail.change(&thumbnail)));
+        let mut way = last.map_or_else(|| vec![[0; 3]; thumbnail.grid.len()], |last| last.way.clone());
+        if let Some(last) = last {
+            let steps = last.thumbnail.grid.iter().zip(&thumbnail.grid);
+            for (way, (a, b)) in way.iter_mut().zip(steps) {
+                (0..3).for_each(|channel| {
+                    way[channel] = way[channel].wrapping_add(u32::from(a[channel].abs_diff(b[channel])));
+                });
+            }
+        }
+        self.frames.push(frame);
+        self.recent.push_back(Recent { thumbnail, way });
+        self.judge(FLASH * self.pace);
+        let longest = WINDOWS.last().map_or(0, |(length, _)| length * self.pace);
+        while self.recent.len() > longest + 2 * FLASH * self.pace + 2 {
+            self.recent.pop_front();
+        }
+    }
+
+    /// The score of every frame, 0..1.
+    pub fn finish(mut self) -> Vec<f64> {
+        self.judge(0);
+        let mut scores = vec![0.0f64; self.n_frames];
+        for (cut, frame) in self.cuts.iter().zip(&self.frames) {
+            scores[*frame] = *cut;
+        }
+        for window in chosen(self.windows) {
+            for edge in [window.start + 1, window.end] {
+                let score = &mut scores[self.frames[edge]];
+                *score = score.max(window.score);
+            }
+        }
+        scores
+    }
+
+    /// Scores the cuts and windows that are followed by `after` frames; a window may hold no cut.
+    fn judge(&mut self, after: usize) {
+        let n = self.frames.len().saturating_sub(after);
+        for at in self.cuts.len()..n {
+            self.cuts.push(self.cut(at));
+            self.windows.extend(self.transition(at));
+        }
+    }
+
+    /// The frame `at`, counted among those that repeat none; `None` if it is no longer kept.
+    fn recent(&self, at: usize) -> Option<&Recent> {
+        let first = self.frames.len() - self.recent.len();
+        self.recent.get(at.checked_sub(first)?)
+    }
+
+    fn cut(&self, at: usize) -> f64 {
+        let around = (at.saturating_sub(AROUND).max(1)..(at + AROUND + 1).min(self.changes.len())).filter(|k| *k != at);
+        let score = self.changes[at] - around.map(|k| self.changes[k]).fold(0.0, f64::max);
+        let before = at.checked_sub(1).and_then(|before| self.recent(before));
+        let (Some(before), Some(after)) = (before, self.recent(at)) else { return 0.0 };
+        if score <= 0.0 || self.comes_back(at - 1, at, self.changes[at]) {
+            return 0.0;
+        }
+        let (before, after) = (&before.thumbnail, &after.thumbnail);
+        let missing = |a, b| block_match::missing(a, &[b], FOUND_AGAIN);
+        score * ramp(missing(after, before).min(missing(before, after)), 0.3, 0.6)
+    }
+
+    /// The likeliest transition that ends at the frame `end`.
+    fn transition(&self, end: usize) -> Option<Window> {
+        let last = self.recent(end)?;
+        let turned = |length: usize| {
+            let first = self.recent(end.checked_sub(length)?)?;
+            let way = first.way.iter().zip(&last.way);
+            let way = way.map(|(a, b)| std::array::from_fn(|channel| b[channel].wrapping_sub(a[channel])));
+            Some(dissolves::turned(&first.thumbnail, &last.thumbnail, way))
+        };
+        let longest = WINDOWS.last().map_or(0, |(length, _)| length * self.pace);
+        let near = (end.saturating_sub(longest)..=end).rev();
+        let cut = near.into_iter().find(|at| self.cuts.get(*at).is_some_and(|cut| *cut >= RESTART));
+        let windows = WINDOWS.iter().map(|(length, least)| (length * self.pace, *least));
+        let open = windows.filter(|(length, _)| cut.is_none_or(|cut| end.saturating_sub(*length) >= cut));
+        let open: Vec<_> =
+            open.filter_map(|(length, least)| Some((end.checked_sub(length)?, least, turned(length)?))).collect();
+        let most = open.iter().map(|(_, _, turned)| *turned).fold(0.0, f64::max);
+        let worth = open.into_iter().filter(|(_, _, turned)| *turned >= LEAST_TURNED.max(0.8 * most));
+        let judged = worth.filter(|(start, _, turned)| !self.comes_back(*start, end, *turned));
+        let windows = judged.filter_map(|(start, least, turned)| {
+            let frames: Option<Vec<_>> = (start..=end).map(|at| Some(&self.recent(at)?.thumbnail)).collect();
+            let score = dissolves::score(&frames?, turned, least);
+            (score > 0.0).then_some(Window { start, end, score })
+        });
+        tightest(&windows.collect::<Vec<_>>())
+    }
+
+    /// Whether the picture before is soon there again, or the one after was there shortly before.
+    fn comes_back(&self, start: usize, end: usize, turned: f64) -> bool {
+        let near = FLASH * self.pace;
+        let like = |a: usize, b: usize| {
+            let pair = self.recent(a).zip(self.recent(b));
+            pair.is_some_and(|(a, b)| a.thumbnail.change(&b.thumbnail) < 0.5 * turned)
+        };
+        (end + 1..=end + near).any(|at| like(at, start)) || (start.saturating_sub(near)..start).any(|at| like(at, end))
+    }
+}
+
+/// The windows of which none overlaps a better one.
+fn chosen(mut windows: Vec<Window>) -> Vec<Window> {
+    let apart = |a: &Window, b: &Window| a.end < b.start || b.end < a.start;
+    let mut chosen = Vec::new();
+    windows.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.start.cmp(&b.start)));
+    while let Some(best) = windows.first().copied() {
+        let (apart, around): (Vec<_>, Vec<_>) = windows.into_iter().partition(|window| apart(window, &best));
+        chosen.extend(tightest(&around));
+        windows = apart;
+    }
+    chosen
+}
+
+/// The shortest of the windows that score nearly as well as the best.
+fn tightest(windows: &[Window]) -> Option<Window> {
+    let best = windows.iter().map(|window| window.score).fold(0.0, f64::max);
+    let good = windows.iter().filter(|window| window.score >= 0.9 * best);
+    good.min_by(|a, b| (a.end - a.start).cmp(&(b.end - b.start)).then(b.score.total_cmp(&a.score))).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::extract::frame_difference::THUMBNAIL;
+    use crate::pipeline::extract::thumbnail::scene;
+
+    fn dim(seed: usize, light: f64) -> Option<Image> {
+        Some(scene(seed, 0, light))
+    }
+
+    fn mixed(seeds: [usize; 2], share: f64) -> Option<Image> {
+        let [mut a, b] = seeds.map(|seed| scene(seed, 0, 1.0));
+        let mix = |a: u8, b: u8| ((1.0 - share) * f64::from(a) + share * f64::from(b)).round() as u8;
+        a.data.iter_mut().zip(&b.data).for_each(|(a, b)| *a = mix(*a, *b));
+        Some(a)
+    }
+
+    fn scores(frames: &[Option<Image>]) -> Vec<f64> {
+        let mut finder = ShotFinder::new(FrameRate::new(15, 1));
+        frames.iter().for_each(|frame| finder.push(frame.clone()));
+        finder.finish()
+    }
+
+    fn begins(scores: &[f64]) -> Vec<usize> {
+        (0..scores.len()).filter(|n| scores[*n] >= 0.2).collect()
+    }
+
+    fn still(seed: usize, n: usize) -> Vec<Option<Image>> {
+        vec![dim(seed, 1.0); n]
+    }
+
+    #[test]
+    fn a_cut_begins_a_shot_at_its_first_frame() {
+        let found = scores(&[still(1, 3), still(900, 4), still(5_000, 7)].concat());
+        assert_eq!(begins(&found), [3, 7]);
+        assert!(found[3] > 0.8 && found[4] == 0.0, "{found:?}");
+    }
+
+    #[test]
+    fn repeated_frames_do_not_hide_a_cut() {
+        let [a, b] = [1, 900].map(|seed| still(seed, 1).remove(0));
+        assert_eq!(begins(&scores(&[a.clone(), None, a, None, b.clone(), None, b, None])), [4]);
+    }
+
+    #[test]
+    fn a_dissolve_is_a_shot_of_its_own() {
+        for length in [4, 8, 15, 30] {
+            let mix = (1..length).map(|step| mixed([1, 900], step as f64 / length as f64));
+            let film: Vec<_> = still(1, 40).into_iter().chain(mix).chain(still(900, 40)).collect();
+            let [start, end] = begins(&scores(&film))[..] else { panic!("{length} frames: {:?}", scores(&film)) };
+            let slack = length / 4 + 2;
+            assert!(start.abs_diff(41) <= slack && end.abs_diff(40 + length) <= slack, "{length}: {start} {end}");
+        }
+    }
+
+    #[test]
+    fn a_film_through_black_is_cut_and_a_flash_is_not() {
+        let black = || Some(Image::filled(THUMBNAIL[0], THUMBNAIL[1], [0; 3]));
+        let out = (1..8).map(|step| dim(1, 1.0 - f64::from(step) / 8.0));
+        let back = (1..8).map(|step| dim(900, f64::from(step) / 8.0));
+        let film: Vec<_> =
+            still(1, 20).into_iter().chain(out).chain(vec![black(); 10]).chain(back).chain(still(900, 20)).collect();
+        assert!(!begins(&scores(&film)).is_empty());
+        let white = || Some(Image::filled(THUMBNAIL[0], THUMBNAIL[1], [250; 3]));
+        for n in 1..4 {
+            let film = [still(1, 20), vec![white(); n], still(1, 20)].concat();
+            assert_eq!(begins(&scores(&film)), [0; 0], "{n}");
+        }
+    }
+
+    #[test]
+    fn another_light_is_no_cut() {
+        let step = [vec![dim(1, 1.0); 20], vec![dim(1, 0.5); 20]].concat();
+        assert_eq!(begins(&scores(&step)), [0; 0]);
+        let slow: Vec<_> = (0..60).map(|n| dim(1, 1.0 - f64::from(n) / 80.0)).collect();
+        assert_eq!(begins(&scores(&slow)), [0; 0]);
+    }
+
+    #[test]
+    fn short_videos_have_one_shot() {
+        assert_eq!(scores(&[]), [0.0; 0]);
+        assert_eq!(scores(&still(1, 1)), [0.0]);
+        assert_eq!(scores(&still(1, 2)), [0.0; 2]);
+        assert_eq!(scores(&[None, None]), [0.0; 2]);
+    }
+}

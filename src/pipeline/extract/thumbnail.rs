@@ -1,0 +1,58 @@
+//! A frame as the search for shots keeps it: small, in colour and in gray, and as a coarse grid. How two of them
+//! resemble each other is `likeness`.
+
+use super::frame_difference::THUMBNAIL;
+use crate::types::image::Image;
+
+/// Cells a side of the grid, each the mean of a block of the picture.
+pub const CELLS: usize = 16;
+/// Steps of 8-bit colour that count as a change: above what compression and soft light do to a cell's mean.
+pub const STEP: u8 = 20;
+
+pub struct Thumbnail {
+    /// `THUMBNAIL` in size.
+    pub image: Image,
+    /// Luma of each pixel, 0..255.
+    pub gray: Vec<f32>,
+    /// `CELLS` by `CELLS`, RGB.
+    pub grid: Vec<[u8; 3]>,
+}
+
+impl Thumbnail {
+    /// Keeps a picture of `THUMBNAIL` px.
+    pub fn new(image: Image) -> Self {
+        let block = THUMBNAIL.map(|side| side / CELLS);
+        let mut sums = vec![[0u32; 3]; CELLS * CELLS];
+        let mut gray = Vec::with_capacity(image.data.len() / 3);
+        for (at, pixel) in image.data.as_chunks::<3>().0.iter().enumerate() {
+            let (x, y) = (at % THUMBNAIL[0], at / THUMBNAIL[0]);
+            let cell = &mut sums[(y / block[1]).min(CELLS - 1) * CELLS + (x / block[0]).min(CELLS - 1)];
+            (0..3).for_each(|channel| cell[channel] += u32::from(pixel[channel]));
+            let [r, g, b] = pixel.map(f32::from);
+            gray.push(0.299 * r + 0.587 * g + 0.114 * b);
+        }
+        let n_pixels = (block[0] * block[1]) as u32;
+        let grid = sums.into_iter().map(|sum| sum.map(|sum| (sum / n_pixels).min(255) as u8)).collect();
+        Self { image, gray, grid }
+    }
+
+    /// Share of the grid's cells whose colour differs in any channel by more than `STEP`.
+    pub fn change(&self, other: &Self) -> f64 {
+        let cells = self.grid.iter().zip(&other.grid);
+        let n_changed = cells.filter(|(a, b)| a.iter().zip(*b).any(|(a, b)| a.abs_diff(*b) > STEP)).count();
+        n_changed as f64 / self.grid.len().max(1) as f64
+    }
+}
+
+/// A picture without pattern of its own `seed`, seen `shift` px to the right and made darker by `light`.
+#[cfg(test)]
+pub fn scene(seed: usize, shift: usize, light: f64) -> Image {
+    let mut image = Image::filled(THUMBNAIL[0], THUMBNAIL[1], [0; 3]);
+    for (at, byte) in image.data.iter_mut().enumerate() {
+        let (x, y) = ((at / 3 % THUMBNAIL[0] + shift) / 4, at / 3 / THUMBNAIL[0] / 4);
+        let mut bits = ((seed * 64 + x) * 64 + y).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        bits = (bits ^ bits >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        *byte = (light * ((bits >> 40) & 255) as f64) as u8;
+    }
+    image
+}

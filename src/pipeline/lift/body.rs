@@ -1,0 +1,104 @@
+//! Arms in 3D: what is seen of the upper body, through the body lifter, to joints of about the reference size.
+
+use super::gaps::long_gaps;
+use super::lengths::median;
+use super::lifter::Stretch;
+use super::observed::Sight;
+use crate::motion::upper_body::{ARMS, L_HIP, L_SHOULDER, NOSE, Pose, R_HIP, R_SHOULDER, REFERENCE_SIZE, Seen, size};
+use crate::nn::lifter::body::BodyLifter;
+use crate::types::interval::Interval;
+use crate::types::pose2d::Keypoints;
+use crate::types::skeleton::NECK;
+use anyhow::Result;
+use ndarray::s;
+
+/// Frames a second that the lifter was trained on.
+pub const TRAINED_FPS: f64 = 15.0;
+/// Frames at that rate, before and after, that a body's apparent size is taken over.
+const SIZE_FRAMES: f64 = 15.0;
+/// The same for telling a stray point.
+const STRAY_FRAMES: f64 = 2.0;
+/// Frames at that rate that are lifted in one go, so that no more poses are held at a time.
+const GO: f64 = 4096.0;
+/// Frames at that rate, before and after, that the lifter may look at beyond its window.
+const MARGIN: f64 = 128.0;
+
+/// Which of the nine points are lifted beside the joints.
+const EXTRA: [usize; 3] = [NOSE, R_HIP, L_HIP];
+
+/// Lifts arms, nose and hips over an interval into `into`, whose mask says which joints were seen. A point missing for
+/// more than `max_gap` frames stays NaN; without a shoulder all do.
+pub fn lift(
+    lifter: &BodyLifter,
+    keypoints: &Keypoints,
+    interval: Interval,
+    max_gap: usize,
+    into: &mut Stretch,
+) -> Result<()> {
+    let step = keypoints.fps.per_sec() / TRAINED_FPS;
+    let frames = |at_trained: f64| (at_trained * step).round() as usize;
+    let sight = Sight::of(keypoints, interval, frames(STRAY_FRAMES).max(2), max_gap);
+    let n_frames = interval.n_frames();
+    let mut sizes = vec![f32::NAN; n_frames];
+    // a frame is placed by frames that lie within this many
+    let margin = frames(MARGIN.max(lifter.net().config().receptive_field() as f64)).max(1);
+    for first in (0..n_frames).step_by(frames(GO).max(1)) {
+        let end = n_frames.min(first + frames(GO).max(1));
+        let from = first.saturating_sub(margin);
+        let points: Vec<Seen> = (from..n_frames.min(end + margin)).map(|t| sight.frame(t)).collect();
+        let poses = lifter.poses(&points, step)?;
+        for (t, pose) in poses.iter().enumerate().take(end - from).skip(first - from) {
+            if let Some(pose) = pose {
+                sizes[from + t] = size(pose) as f32;
+                place(pose, from + t, into);
+            }
+        }
+    }
+    to_reference(&sizes, frames(SIZE_FRAMES), into);
+    for joint in ARMS {
+        into.mask.slice_mut(s![.., joint]).assign(&sight.seen.slice(s![.., joint]));
+    }
+    for t in 0..n_frames {
+        into.mask[[t, NECK]] = sight.seen[[t, R_SHOULDER]] && sight.seen[[t, L_SHOULDER]];
+    }
+    forget_long_gaps(&sight, max_gap, into);
+    Ok(())
+}
+
+fn place(pose: &Pose, t: usize, into: &mut Stretch) {
+    into.joints.slice_mut(s![t, NECK, ..]).fill(0.0);
+    for joint in ARMS {
+        (0..3).for_each(|k| into.joints[[t, joint, k]] = pose[joint][k] as f32);
+    }
+    for (i, point) in EXTRA.into_iter().enumerate() {
+        (0..3).for_each(|k| into.extra[[t, i, k]] = pose[point][k] as f32);
+    }
+}
+
+/// From px to metres: the body's median size over the frames within `reach` becomes the reference size.
+fn to_reference(sizes: &[f32], reach: usize, into: &mut Stretch) {
+    for t in 0..sizes.len() {
+        let around = sizes[t.saturating_sub(reach)..sizes.len().min(t + reach + 1)].to_vec();
+        let grow = median(around).map_or(f32::NAN, |size| REFERENCE_SIZE as f32 / size);
+        into.joints.slice_mut(s![t, NECK.., ..]).mapv_inplace(|v| v * grow);
+        into.extra.slice_mut(s![t, .., ..]).mapv_inplace(|v| v * grow);
+    }
+}
+
+/// Makes missing what was not seen for more than `max_gap` frames, with the whole body where that is a shoulder.
+fn forget_long_gaps(sight: &Sight, max_gap: usize, into: &mut Stretch) {
+    let frames = |point: usize| {
+        let long = long_gaps(&sight.seen.column(point).to_vec(), max_gap);
+        (0..long.len()).filter(move |&t| long[t])
+    };
+    for joint in ARMS {
+        frames(joint).for_each(|t| into.joints.slice_mut(s![t, joint, ..]).fill(f32::NAN));
+    }
+    for (i, point) in EXTRA.into_iter().enumerate() {
+        frames(point).for_each(|t| into.extra.slice_mut(s![t, i, ..]).fill(f32::NAN));
+    }
+    for t in frames(R_SHOULDER).chain(frames(L_SHOULDER)) {
+        into.joints.slice_mut(s![t, .., ..]).fill(f32::NAN);
+        into.extra.slice_mut(s![t, .., ..]).fill(f32::NAN);
+    }
+}

@@ -1,0 +1,186 @@
+//! Stage 4: 2D keypoints to 3D joints, one straight way for each interval: `sight` (what is seen, strays out) -> `body`
+//! and `hands` (the networks, `hand_depth`) -> smoothing -> `lengths` (one set for the whole video) -> `camera` (levelled on
+//! request) -> every bone given its length, hands joined at the wrists. It is all done in place, in the arrays that come
+//! out. The networks are `nn`'s, their weights `weights`'.
+//!
+//! What is known and what is not: a joint not seen for up to a second is filled and masked; one missing for longer is
+//! NaN, with all that hangs on it. Size is a convention (`upper_body::REFERENCE_SIZE`), as no picture tells it.
+
+use super::body::TRAINED_FPS;
+use super::camera::Camera;
+use super::{body, hands, lengths, weights};
+use crate::config;
+use crate::math::gaussian;
+use crate::motion::bones;
+use crate::nn::lifter::body::BodyLifter;
+use crate::nn::lifter::hand::HandLifter;
+use crate::types::interval::Interval;
+use crate::types::pose2d::{Keypoints, N_HAND};
+use crate::types::pose3d::Motion;
+use crate::types::skeleton;
+use crate::types::skeleton::{L_HAND, N_BONES, N_JOINTS, R_HAND, Side};
+use anyhow::{Result, ensure};
+use ndarray::{Array2, Array3, ArrayViewMut2, ArrayViewMut3, s};
+
+/// A gap up to this long is filled; a longer one stays open. `config` lets `[segment]` keep no longer ones.
+pub(crate) const MAX_GAP_SECS: f64 = 1.0;
+
+/// Turns 2D keypoints into 3D motion.
+pub struct Lifter {
+    body: BodyLifter,
+    hands: HandLifter,
+    smooth_arms: f64,
+    smooth_hands: f64,
+    level: bool,
+}
+
+/// A video lifted.
+pub struct Lifted {
+    /// NaN outside the intervals.
+    pub motion: Motion,
+    /// Nose, right hip, left hip, [T, 3, 3], in metres and axes of the joints; NaN where not seen for long.
+    pub extra: Array3<f32>,
+    /// The video's bone lengths in metres, of joints 1..=48; 0: never seen (and the hand roots).
+    pub lengths: [f32; N_BONES],
+    /// How the camera was held, an entry an interval.
+    pub cameras: Vec<Camera>,
+    /// Frames that have arms.
+    pub n_frames: usize,
+}
+
+/// The frames of one interval of a `Lifted`.
+pub struct Stretch<'a> {
+    pub joints: ArrayViewMut3<'a, f32>,
+    pub extra: ArrayViewMut3<'a, f32>,
+    pub mask: ArrayViewMut2<'a, bool>,
+}
+
+impl Lifter {
+    /// Loads the networks that `settings` name, or the built-in ones. Errors name the file.
+    pub fn new(settings: &config::Lift) -> Result<Self> {
+        let (body, hands) = (weights::body(&settings.body_weights)?, weights::hands(&settings.hand_weights)?);
+        Ok(Self::from_parts(body, hands, settings))
+    }
+
+    /// With networks that are there already; of `settings` only what follows the networks counts.
+    pub fn from_parts(body: BodyLifter, hands: HandLifter, settings: &config::Lift) -> Self {
+        let config::Lift { smooth_arms, smooth_hands, level, .. } = *settings;
+        Self { body, hands, smooth_arms, smooth_hands, level }
+    }
+
+    /// The motion of the whole video, taken as one continuous stretch.
+    pub fn lift(&self, keypoints: &Keypoints) -> Result<Motion> {
+        Ok(self.lift_all(keypoints)?.motion)
+    }
+
+    /// The whole video, taken as one continuous stretch.
+    pub fn lift_all(&self, keypoints: &Keypoints) -> Result<Lifted> {
+        self.lift_intervals(keypoints, &[Interval { start: 0, end: keypoints.n_frames() }])
+    }
+
+    /// The motion inside each interval, each lifted and smoothed by itself, all with the same bone lengths.
+    /// Errors: an interval outside the video, keypoints of unequal lengths.
+    pub fn lift_intervals(&self, keypoints: &Keypoints, intervals: &[Interval]) -> Result<Lifted> {
+        let raw = self.raw(keypoints, intervals)?;
+        Ok(self.finish(raw, intervals))
+    }
+
+    /// Each interval lifted and smoothed by itself; bones as long as they came out, hands each in its own frame.
+    pub(crate) fn raw(&self, keypoints: &Keypoints, intervals: &[Interval]) -> Result<Lifted> {
+        let n_frames = keypoints.n_frames();
+        for hand in [&keypoints.left_hand, &keypoints.right_hand] {
+            ensure!(hand.shape()[0] == n_frames, "{n_frames} frames of body keypoints, {} of a hand", hand.shape()[0]);
+        }
+        let mut lifted = Lifted::nothing(keypoints);
+        for &interval in intervals {
+            let Interval { start, end } = interval;
+            ensure!(start <= end && end <= n_frames, "interval {start}..{end} of a video of {n_frames} frames");
+            self.lift_stretch(keypoints, interval, lifted.stretch(interval))?;
+        }
+        Ok(lifted)
+    }
+
+    /// One length a bone over all `intervals` (parts of those that `lifted` was lifted for), hands joined at the wrists;
+    /// frames in none of them are NaN.
+    pub(crate) fn finish(&self, mut lifted: Lifted, intervals: &[Interval]) -> Lifted {
+        lifted.keep_only(intervals);
+        lifted.lengths = lengths::measure(&lifted.motion);
+        for &interval in intervals {
+            let mut stretch = lifted.stretch(interval);
+            let camera = Camera::of(interval, &stretch);
+            if self.level {
+                camera.level(&mut stretch);
+            }
+            lifted.cameras.push(camera);
+        }
+        let lengths = lifted.lengths;
+        bones::with_lengths(&mut lifted.motion, &lengths);
+        for (root, wrist) in [(L_HAND, skeleton::L_WRIST), (R_HAND, skeleton::R_WRIST)] {
+            let wrists = lifted.motion.mask.column(wrist).to_owned();
+            lifted.motion.mask.column_mut(root).assign(&wrists);
+        }
+        let shoulder = lifted.motion.joints.slice(s![.., skeleton::R_SHOULDER, 0]);
+        lifted.n_frames = shoulder.iter().filter(|x| x.is_finite()).count();
+        lifted
+    }
+
+    /// One interval, smoothed, of about the reference size; each hand in its own frame, the root at 0.
+    fn lift_stretch(&self, keypoints: &Keypoints, interval: Interval, mut into: Stretch) -> Result<()> {
+        let fps = keypoints.fps.per_sec();
+        let max_gap = (MAX_GAP_SECS * fps).round() as usize;
+        let frames = |sigma: f64| sigma * fps / TRAINED_FPS;
+        body::lift(&self.body, keypoints, interval, max_gap, &mut into)?;
+        gaussian::gaussian(into.joints.slice_mut(s![.., ..L_HAND, ..]), frames(self.smooth_arms));
+        gaussian::gaussian(into.extra, frames(self.smooth_arms));
+        for (root, side, points) in
+            [(L_HAND, Side::Left, &keypoints.left_hand), (R_HAND, Side::Right, &keypoints.right_hand)]
+        {
+            let points = points.slice(s![interval.start..interval.end, .., ..]);
+            let mut joints = into.joints.slice_mut(s![.., root..root + N_HAND, ..]);
+            let mask = into.mask.slice_mut(s![.., root..root + N_HAND]);
+            hands::lift(&self.hands, points, side, ((1.0 / fps) as f32, max_gap), joints.view_mut(), mask)?;
+            gaussian::gaussian(joints, frames(self.smooth_hands));
+        }
+        Ok(())
+    }
+}
+
+impl Lifted {
+    fn nothing(keypoints: &Keypoints) -> Self {
+        let n_frames = keypoints.n_frames();
+        let joints = Array3::from_elem((n_frames, N_JOINTS, 3), f32::NAN);
+        let mask = Array2::from_elem((n_frames, N_JOINTS), false);
+        Self {
+            motion: Motion { fps: keypoints.fps, joints, mask },
+            extra: Array3::from_elem((n_frames, 3, 3), f32::NAN),
+            lengths: [0.0; N_BONES],
+            cameras: Vec::new(),
+            n_frames: 0,
+        }
+    }
+
+    /// Forgets the frames that are in none of `intervals`.
+    fn keep_only(&mut self, intervals: &[Interval]) {
+        let mut end = 0;
+        let after_all = self.motion.n_frames();
+        for next in intervals.iter().copied().chain([Interval { start: after_all, end: after_all }]) {
+            if end < next.start {
+                let stretch = self.stretch(Interval { start: end, end: next.start });
+                let Stretch { mut joints, mut extra, mut mask } = stretch;
+                joints.fill(f32::NAN);
+                extra.fill(f32::NAN);
+                mask.fill(false);
+            }
+            end = end.max(next.end);
+        }
+    }
+
+    fn stretch(&mut self, interval: Interval) -> Stretch<'_> {
+        let frames = interval.start..interval.end;
+        Stretch {
+            joints: self.motion.joints.slice_mut(s![frames.clone(), .., ..]),
+            extra: self.extra.slice_mut(s![frames.clone(), .., ..]),
+            mask: self.motion.mask.slice_mut(s![frames, ..]),
+        }
+    }
+}

@@ -1,0 +1,25 @@
+//! What was lifted and what was not, in sentences for the user.
+
+use super::lifter::{Lifted, MAX_GAP_SECS};
+use super::observed::SEEN_SCORE;
+use crate::types::pose2d::{Keypoints, coco};
+
+/// Why joints are missing (NaN), a sentence each; nothing when all are there.
+pub fn notes(keypoints: &Keypoints, lifted: &Lifted) -> Vec<String> {
+    let n_frames = keypoints.n_frames();
+    let mut notes = Vec::new();
+    if lifted.n_frames < n_frames {
+        let unseen = |j: usize| {
+            let scores = keypoints.body.slice(ndarray::s![.., j, 2]);
+            scores.iter().filter(|score| score.is_nan() || **score < SEEN_SCORE).count()
+        };
+        notes.push(format!(
+            "no body in {} of {n_frames} frames (NaN): it is lifted where both shoulders are seen within {MAX_GAP_SECS} s; \
+             the right shoulder is not seen in {} frames, the left in {}",
+            n_frames - lifted.n_frames,
+            unseen(coco::R_SHOULDER),
+            unseen(coco::L_SHOULDER)
+        ));
+    }
+    notes
+}

@@ -1,0 +1,28 @@
+//! Stage 4: 2D keypoints to 3D joints, one straight way for each interval: `sight` (what is seen, strays out) -> `body`
+//! and `hands` (the networks, `hand_depth`) -> smoothing -> `lengths` (one set for the whole video) -> `camera` (levelled on
+//! request) -> every bone given its length, hands joined at the wrists. It is all done in place, in the arrays that come
+//! out. The networks are `nn`'s, their weights `weights`'.
+//!
+//! What is known and what is not: a joint not seen for up to a second is filled and masked; one missing for longer is
+//! NaN, with all that hangs on it. Size is a convention (`upper_body::REFERENCE_SIZE`), as no picture tells it.
+
+pub mod body;
+pub mod camera;
+pub mod gaps;
+pub mod hand_depth;
+pub mod hands;
+pub mod lengths;
+pub mod lifter;
+pub mod missing;
+pub mod observed;
+pub mod outliers;
+pub mod quality;
+pub mod refuse;
+pub mod stage;
+pub mod weights;
+
+pub use camera::Camera;
+pub use lifter::Lifted;
+pub use lifter::Lifter;
+pub use missing::notes;
+pub use stage::LiftStage;

@@ -1,0 +1,87 @@
+//! What lifting tells of a video beyond its keypoints: frames whose bones came out far from the lengths they have in the
+//! rest of the video (a wrong keypoint, another person's arm), and frames in which a joint stayed open. How they change
+//! intervals and ledger is `amend`'s.
+
+use super::gaps::long_gaps;
+use super::lengths::{bone, median};
+use super::refuse::Mark;
+use crate::types::interval::Interval;
+use crate::types::pose2d::{Keypoints, coco};
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
+use ndarray::{Array2, s};
+
+/// The bones that are looked at, each with its ends.
+const BONES: [(usize, usize); 5] =
+    [(R_SHOULDER, L_SHOULDER), (R_SHOULDER, R_ELBOW), (L_SHOULDER, L_ELBOW), (R_ELBOW, R_WRIST), (L_ELBOW, L_WRIST)];
+/// The keypoints of those ends.
+const POINTS: [(usize, usize); 5] = [
+    (coco::R_SHOULDER, coco::L_SHOULDER),
+    (coco::R_SHOULDER, coco::R_ELBOW),
+    (coco::L_SHOULDER, coco::L_ELBOW),
+    (coco::R_ELBOW, coco::R_WRIST),
+    (coco::L_ELBOW, coco::L_WRIST),
+];
+
+/// How far the bones of each frame are from their lengths in the video.
+pub struct BoneChange {
+    /// [T, 5]: length in the frame by the bone's median in the video, less 1; NaN where an end is not seen.
+    changes: Array2<f32>,
+}
+
+impl BoneChange {
+    /// Measures bones as they were lifted, before they are given one length each.
+    pub fn of(raw: &Motion) -> Self {
+        let mut changes = Array2::from_elem((raw.n_frames(), BONES.len()), f32::NAN);
+        for (i, (from, to)) in BONES.into_iter().enumerate() {
+            let seen = |t: usize| raw.mask[[t, from]] && raw.mask[[t, to]];
+            let length = |t: usize| if seen(t) { bone(raw, t, from, to) } else { f32::NAN };
+            let lengths: Vec<f32> = (0..raw.n_frames()).map(length).collect();
+            let usual = median(lengths.clone()).unwrap_or(f32::NAN);
+            changes.column_mut(i).iter_mut().zip(lengths).for_each(|(change, length)| *change = length / usual - 1.0);
+        }
+        Self { changes }
+    }
+
+    /// The farthest of a frame's bones, [T]; NaN where none is seen.
+    pub fn farthest(&self) -> Vec<f32> {
+        self.changes
+            .outer_iter()
+            .map(|bones| bones.iter().map(|change| change.abs()).fold(f32::NAN, f32::max))
+            .collect()
+    }
+
+    /// Marks the frames of runs longer than `max_gap` in which a bone is more than `most` off. In shorter runs the ends
+    /// of such bones are made unseen in `keypoints`, so that lifting fills them.
+    pub fn judge(&self, most: f64, max_gap: usize, keypoints: &mut Keypoints) -> Vec<Option<Mark>> {
+        let is_off = |change: f32| f64::from(change.abs()) > most;
+        let farthest = self.farthest();
+        let fine: Vec<bool> = farthest.iter().map(|&change| !is_off(change)).collect();
+        let long = long_gaps(&fine, max_gap);
+        for (t, _) in fine.iter().enumerate().filter(|(t, fine)| !**fine && !long[*t]) {
+            for (i, (from, to)) in POINTS.into_iter().enumerate() {
+                if is_off(self.changes[[t, i]]) {
+                    [from, to].into_iter().for_each(|point| keypoints.body[[t, point, 2]] = 0.0);
+                }
+            }
+        }
+        let mark = |t: usize| long[t].then(|| Mark::bones(f64::from(farthest[t]), most));
+        (0..farthest.len()).map(mark).collect()
+    }
+
+    /// Whether any frame is more than `most` off.
+    pub fn exceeds(&self, most: f64) -> bool {
+        self.changes.iter().any(|change| f64::from(change.abs()) > most)
+    }
+}
+
+/// Marks the frames of `intervals` in which a joint was not seen for longer than lifting fills.
+pub fn open(raw: &Motion, intervals: &[Interval]) -> Vec<Option<Mark>> {
+    let mut marks = vec![None; raw.n_frames()];
+    for t in intervals.iter().flat_map(|interval| interval.start..interval.end) {
+        let joints = raw.joints.slice(s![t, .., 0]);
+        let n_open = joints.iter().filter(|x| !x.is_finite()).count();
+        marks[t] = (n_open > 0).then(|| Mark::open(n_open as f64));
+    }
+    marks
+}

@@ -1,0 +1,236 @@
+//! The stage: reads the keypoints of a video and the intervals worth keeping, writes `joints.npz`,
+//! `bones.json` and `camera.json` (roll and pitch of each interval), what `outliers` looked at
+//! (`measures.npz`), and the final `intervals.json` and `ledger.json`.
+
+use super::outliers;
+use super::outliers::BoneChange;
+use super::refuse::amend;
+use super::{Lifted, Lifter};
+use crate::config;
+use crate::formats::npz::Npz;
+use crate::formats::{joints_npz, keypoints_npz};
+use crate::stage::ledger::Ledger;
+use crate::stage::progress::Progress;
+use crate::stage::runner::place;
+use crate::stage::{Input, Report, Stage, Unit, write_json};
+use crate::types::interval::Intervals;
+use crate::types::pose2d::Keypoints;
+use anyhow::{Context, Result, ensure};
+use ndarray::{Array1, s};
+use ndarray_npy::NpzWriter;
+use serde_json::json;
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+
+/// Lifts videos.
+pub struct LiftStage {
+    lifter: Lifter,
+    settings: config::Lift,
+    rules: config::Segment,
+    work: PathBuf,
+}
+
+impl LiftStage {
+    /// Lifts as `settings` say and judges the bones by `rules`; reads the earlier stages' files under the folder `work`.
+    /// Errors: weights that cannot be loaded.
+    pub fn new(settings: &config::Lift, rules: &config::Segment, work: &Path) -> Result<Self> {
+        let lifter = Lifter::new(settings)?;
+        Ok(Self { lifter, settings: settings.clone(), rules: rules.clone(), work: work.to_owned() })
+    }
+
+    fn keypoints(&self, unit: &Unit) -> PathBuf {
+        place(&self.work, "pose2d", unit).join("keypoints.npz")
+    }
+
+    fn timeline(&self, unit: &Unit) -> PathBuf {
+        place(&self.work, "extract", unit).join("timeline.npz")
+    }
+
+    fn segmented(&self, unit: &Unit, name: &str) -> PathBuf {
+        place(&self.work, "segment", unit).join(name)
+    }
+}
+
+impl Stage for LiftStage {
+    fn name(&self) -> &'static str {
+        "lift"
+    }
+
+    fn version(&self) -> u32 {
+        6
+    }
+
+    fn settings(&self, _unit: &Unit) -> serde_json::Value {
+        // the weights of a file are an input; of the built-in ones the hash stands here
+        let hash = |file: &Path, builtin: &[u8]| match file.as_os_str().is_empty() {
+            true => json!(blake3::hash(builtin).to_hex().as_str()),
+            false => json!("file"),
+        };
+        json!({
+            "lift": {
+                "body_weights": hash(&self.settings.body_weights, super::weights::BODY),
+                "hand_weights": hash(&self.settings.hand_weights, super::weights::HANDS),
+                "smooth_arms": self.settings.smooth_arms,
+                "smooth_hands": self.settings.smooth_hands,
+                "level": self.settings.level,
+            },
+            "segment": {
+                "min_frames": self.rules.min_frames,
+                "max_body_gap_secs": self.rules.max_body_gap_secs,
+                "max_bone_change": self.rules.max_bone_change,
+            },
+        })
+    }
+
+    fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
+        let input = |role: &str, path| Input { role: role.to_owned(), path };
+        let mut inputs = vec![
+            input("timeline", self.timeline(unit)),
+            input("keypoints", self.keypoints(unit)),
+            input("intervals", self.segmented(unit, "intervals.json")),
+            input("ledger", self.segmented(unit, "ledger.json")),
+        ];
+        for (role, path) in
+            [("body weights", &self.settings.body_weights), ("hand weights", &self.settings.hand_weights)]
+        {
+            if !path.as_os_str().is_empty() {
+                inputs.push(input(role, path.clone()));
+            }
+        }
+        Ok(inputs)
+    }
+
+    fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
+        let mut keypoints = keypoints_npz::read(&self.keypoints(unit))?;
+        let timeline = self.timeline(unit);
+        let repeated = Npz::open(&timeline)?.bools("repeated", &[None])?.into_iter().collect::<Vec<bool>>();
+        ensure!(
+            repeated.len() == keypoints.n_frames(),
+            "the keypoints have {} frames, {} has {}: run the stage pose2d again",
+            keypoints.n_frames(),
+            timeline.display(),
+            repeated.len()
+        );
+        unsee(&mut keypoints, &repeated);
+        let path = self.segmented(unit, "intervals.json");
+        let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        let intervals: Intervals =
+            serde_json::from_slice(&bytes).with_context(|| format!("{} holds no intervals", path.display()))?;
+        ensure!(
+            intervals.n_frames == keypoints.n_frames(),
+            "the keypoints have {} frames, {} speaks of {}: run the stage segment again",
+            keypoints.n_frames(),
+            path.display(),
+            intervals.n_frames
+        );
+        let ledger = Ledger::read(&self.segmented(unit, "ledger.json"))?;
+        let (lifted, intervals, ledger) = self.lift(&mut keypoints, intervals, ledger, out)?;
+        joints_npz::write(&out.join("joints.npz"), &lifted.motion)?;
+        let bones = json!({ "lengths_metres": lifted.lengths.to_vec(), "n_frames": lifted.n_frames });
+        write_json(&out.join("bones.json"), &bones)?;
+        let camera = json!({ "levelled": self.settings.level, "intervals": lifted.cameras });
+        write_json(&out.join("camera.json"), &camera)?;
+        write_json(&out.join("intervals.json"), &intervals)?;
+        write_json(&out.join("ledger.json"), &ledger)?;
+        let seen = lifted.motion.mask.iter().filter(|m| **m).count();
+        let told = lifted.motion.joints.iter().filter(|v| v.is_finite()).count() / 3;
+        let filled = 100.0 * (1.0 - seen as f64 / told.max(1) as f64);
+        let line = match lifted.n_frames {
+            0 => "nothing to lift".to_owned(),
+            n => format!("{n} frames in {} intervals, {filled:.1} % of the joints filled", intervals.intervals.len()),
+        };
+        let facts = json!({ "n_frames": lifted.n_frames, "filled_percent": filled });
+        Ok(Report { line, facts: facts.as_object().cloned().unwrap_or_default() })
+    }
+}
+
+impl LiftStage {
+    /// Lifts, and takes out of intervals and ledger what lifting shows to be wrong; writes `measures.npz`.
+    fn lift(
+        &self,
+        keypoints: &mut Keypoints,
+        mut intervals: Intervals,
+        mut ledger: Ledger,
+        out: &Path,
+    ) -> Result<(Lifted, Intervals, Ledger)> {
+        let (most, min_frames) = (self.rules.max_bone_change, self.rules.min_frames);
+        let mut raw = self.lifter.raw(keypoints, &intervals.intervals)?;
+        let change = BoneChange::of(&raw.motion);
+        if change.exceeds(most) {
+            let max_gap = (self.rules.max_body_gap_secs * keypoints.fps.per_sec() + 1e-6) as usize;
+            let marks = change.judge(most, max_gap, keypoints);
+            (intervals, ledger) = amend(&intervals, &ledger, &marks, min_frames)?;
+            raw = self.lifter.raw(keypoints, &intervals.intervals)?;
+        }
+        let open = outliers::open(&raw.motion, &intervals.intervals);
+        (intervals, ledger) = amend(&intervals, &ledger, &open, min_frames)?;
+        write_measures(&out.join("measures.npz"), change.farthest())?;
+        Ok((self.lifter.finish(raw, &intervals.intervals), intervals, ledger))
+    }
+}
+
+/// `bone_change` f32 [T]: the farthest that a bone of the frame is from its length in the video, as a share of it.
+fn write_measures(path: &Path, bone_change: Vec<f32>) -> Result<()> {
+    let written = || -> Result<()> {
+        let mut npz = NpzWriter::new(BufWriter::new(File::create(path)?));
+        npz.add_array("bone_change", &Array1::from_vec(bone_change))?;
+        Ok(npz.finish()?.flush()?)
+    };
+    written().with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// A frame that only repeats the one before shows nothing new: its points count as not seen, so that the motion between
+/// its neighbours is filled in, and masked, instead of standing still.
+fn unsee(keypoints: &mut Keypoints, repeated: &[bool]) {
+    for points in [&mut keypoints.body, &mut keypoints.left_hand, &mut keypoints.right_hand] {
+        for (mut frame, _) in points.outer_iter_mut().zip(repeated).filter(|(_, repeated)| **repeated) {
+            frame.slice_mut(s![.., 2]).fill(0.0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::lift::Lifter;
+    use crate::types::pose2d::coco::{L_ELBOW, L_SHOULDER, L_WRIST, NOSE, R_ELBOW, R_SHOULDER, R_WRIST};
+    use crate::types::skeleton;
+    use crate::types::time::FrameRate;
+    use ndarray::Array3;
+
+    /// An arm that rises steadily, filmed at 10 frames a second and shown at 15: every third frame is the one before.
+    #[test]
+    fn repeated_frames_are_masked_and_do_not_stutter() {
+        let n_frames = 45;
+        let repeated: Vec<bool> = (0..n_frames).map(|t| t % 3 == 1).collect();
+        let mut body = Array3::zeros((n_frames, 17, 3));
+        for (t, is_repeated) in repeated.iter().enumerate() {
+            let filmed = (t - usize::from(*is_repeated)) as f32;
+            let points = [
+                (NOSE, 320.0, 130.0),
+                (L_SHOULDER, 390.0, 200.0),
+                (R_SHOULDER, 250.0, 200.0),
+                (L_ELBOW, 410.0, 310.0),
+                (R_ELBOW, 230.0, 310.0),
+                (L_WRIST, 400.0, 390.0 - 4.0 * filmed),
+                (R_WRIST, 240.0, 390.0),
+            ];
+            for (point, x, y) in points {
+                body.slice_mut(s![t, point, ..]).assign(&ndarray::arr1(&[x, y, 1.0]));
+            }
+        }
+        let none = Array3::zeros((n_frames, 21, 3));
+        let (fps, image_size) = (FrameRate::new(15, 1), [640, 480]);
+        let mut keypoints = Keypoints { fps, image_size, body, left_hand: none.clone(), right_hand: none };
+        unsee(&mut keypoints, &repeated);
+        let motion = Lifter::new(&config::Lift::default()).unwrap().lift(&keypoints).unwrap();
+        let wrist = skeleton::L_WRIST;
+        for (t, is_repeated) in repeated.iter().enumerate().take(n_frames - 3).skip(3) {
+            assert_eq!(motion.mask[[t, wrist]], !is_repeated, "frame {t}");
+        }
+        let rises = |t: usize| motion.joints[[t, wrist, 1]] - motion.joints[[t + 1, wrist, 1]];
+        let (least, most) = (6..n_frames - 7).map(rises).fold((f32::MAX, 0.0_f32), |(a, b), v| (a.min(v), b.max(v)));
+        assert!(least > 0.3 * most, "steps of the wrist from {least} to {most} m");
+    }
+}

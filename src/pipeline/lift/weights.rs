@@ -1,0 +1,100 @@
+//! The lifters' weights: built into the program, or from files of `orator train lifter`.
+
+use crate::nn::lifter::body::BodyLifter;
+use crate::nn::lifter::hand;
+use crate::nn::lifter::hand::HandLifter;
+use crate::nn::lifter::temporal;
+use crate::nn::params::Params;
+use anyhow::{Context, Result, ensure};
+use candle_core::safetensors::load_buffer;
+use candle_core::{Device, Tensor};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The built-in weights; `models/body_lifter.md` says how they were made.
+pub const BODY: &[u8] = include_bytes!("../../../models/body_lifter.safetensors");
+pub const HANDS: &[u8] = include_bytes!("../../../models/hand_lifter.safetensors");
+/// Widest layer that is believed; the published ones have 1024 channels.
+const MOST_WIDTH: usize = 2048;
+/// Longest window that is believed, in frames; the published ones have up to 243.
+const MOST_FRAMES: usize = 729;
+
+/// The body lifter of a file, or the built-in one where `path` is empty.
+pub fn body(path: &Path) -> Result<BodyLifter> {
+    load(path, BODY, "body-lifter", "body", |config, params| {
+        let config: temporal::Config = serde_json::from_value(config)?;
+        let own = BodyLifter::config(config.channels.clamp(1, MOST_WIDTH), &config.widths);
+        let window = config.receptive_field();
+        ensure!(
+            (1..=MOST_FRAMES).contains(&window),
+            "its network looks at {window} frames, expected 1 to {MOST_FRAMES}"
+        );
+        ensure!(config == own, "its network is {config:?}, expected {own:?}");
+        Ok(BodyLifter::new(params, &config)?)
+    })
+}
+
+/// The hand lifter of a file, or the built-in one where `path` is empty.
+pub fn hands(path: &Path) -> Result<HandLifter> {
+    load(path, HANDS, "hand-lifter", "hands", |config, params| {
+        let config: hand::Config = serde_json::from_value(config)?;
+        let own = hand::Config { hidden: config.hidden.clamp(1, MOST_WIDTH), ..Default::default() };
+        ensure!(config == own, "its network is {config:?}, expected {own:?}");
+        Ok(HandLifter::new(params, hand::NAME, &config)?)
+    })
+}
+
+fn load<T>(
+    path: &Path,
+    builtin: &[u8],
+    kind: &str,
+    part: &str,
+    make: impl Fn(Value, &mut Params) -> Result<T>,
+) -> Result<T> {
+    if path.as_os_str().is_empty() {
+        return parse(builtin, kind, make).with_context(|| format!("the built-in {kind} does not fit this program"));
+    }
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read the weights {}", path.display()))?;
+    parse(&bytes, kind, make)
+        .with_context(|| format!("{} does not hold weights of `orator train lifter --part {part}`", path.display()))
+}
+
+fn parse<T>(bytes: &[u8], kind: &str, make: impl Fn(Value, &mut Params) -> Result<T>) -> Result<T> {
+    let (_, header) = safetensors::SafeTensors::read_metadata(bytes)?;
+    let facts = header.metadata().as_ref().and_then(|m| m.get("orator")).context("it was not written by orator")?;
+    let facts: Value = serde_json::from_str(facts)?;
+    ensure!(facts["kind"] == kind, "it is of kind {}, expected {kind}", facts["kind"]);
+    let mut params = Params::frozen();
+    let net = make(facts["lesson"]["config"].clone(), &mut params)?;
+    let tensors: BTreeMap<String, Tensor> = load_buffer(bytes, &Device::Cpu)?.into_iter().collect();
+    params.load(&tensors)?;
+    Ok(net)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_built_in_weights_fit_and_are_small() {
+        body(Path::new("")).unwrap();
+        hands(Path::new("")).unwrap();
+        assert!(BODY.len() + HANDS.len() <= 6_000_000);
+    }
+
+    #[test]
+    fn a_wrong_file_says_what_is_wrong() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("w.safetensors");
+        std::fs::write(&path, HANDS).unwrap();
+        hands(&path).unwrap();
+        let says = |path: &Path| format!("{:#}", body(path).err().unwrap());
+        assert!(says(&path).contains("hand-lifter") && says(&path).contains("w.safetensors"), "{}", says(&path));
+        std::fs::write(&path, &HANDS[..HANDS.len() / 2]).unwrap();
+        assert!(says(&path).contains("w.safetensors"));
+        std::fs::write(&path, b"text").unwrap();
+        assert!(says(&path).contains("w.safetensors"));
+        assert!(says(&dir.path().join("none")).contains("cannot read"));
+    }
+}

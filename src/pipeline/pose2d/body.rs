@@ -1,0 +1,128 @@
+//! The body model: the keypoints of the person in a box, and those of both hands where the model gives them.
+
+use super::decode::{Point, heatmap, simcc};
+use super::model_input::Feed;
+use crate::external::onnx::{Decode, Fit, ModelEntry, Outputs, Points, Refine, Runtime};
+use crate::external::opencv::blur::Gaussian;
+use crate::external::opencv::warp::SrcFromDst;
+use crate::types::image::Image;
+use anyhow::{Result, bail};
+use std::path::Path;
+
+/// Reads the outputs that give one place a keypoint: heat-maps or SimCC.
+pub struct PointReader {
+    decode: Decode,
+    gaussian: Gaussian,
+}
+
+impl PointReader {
+    pub fn new(decode: &Decode) -> Self {
+        let width = if let Decode::Heatmap { blur, refine: Refine::Dark, .. } = decode { *blur } else { 1 };
+        Self { decode: decode.clone(), gaussian: Gaussian::new(width) }
+    }
+
+    /// All points the model gives, in px of its input, `size` its height and width.
+    pub fn points(&self, outputs: &Outputs, size: [usize; 2]) -> Result<Vec<Point>> {
+        match &self.decode {
+            Decode::Heatmap { heatmap: name, refine, .. } => {
+                let (shape, maps) = outputs.floats(name)?;
+                heatmap::decode(shape, maps, size, *refine, &self.gaussian)
+            }
+            Decode::Simcc { x, y, split } => simcc::decode(outputs.floats(x)?, outputs.floats(y)?, *split),
+            other => bail!("keypoints cannot be read as {other:?}"),
+        }
+    }
+}
+
+/// The points a map names, placed in the picture; a point the model did not give is zero.
+pub fn placed<const N: usize>(points: &[Point], map: &[usize], src_from_dst: &SrcFromDst) -> [Point; N] {
+    std::array::from_fn(|at| {
+        let [x, y, score] = map.get(at).and_then(|from| points.get(*from)).copied().unwrap_or_default();
+        let [x, y] = src_from_dst.apply([x, y]);
+        if score > 0.0 { [x, y, score] } else { [0.0; 3] }
+    })
+}
+
+/// What the body model gives of one person, in px of the picture.
+pub struct Body {
+    pub points: [Point; 17],
+    /// Left and right, from a whole-body model.
+    pub hands: Option<[[Point; 21]; 2]>,
+}
+
+/// The body model with its way of reading.
+pub struct BodyModel {
+    feed: Feed,
+    reader: PointReader,
+    margin: f64,
+    map: Points,
+}
+
+impl BodyModel {
+    pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
+        let margin = if let Fit::Box { margin } = entry.fit { margin } else { 1.0 };
+        let (reader, map) = (PointReader::new(&entry.decode), entry.points.clone());
+        Ok(Self { feed: Feed::open(runtime, entry, dir)?, reader, margin, map })
+    }
+
+    pub fn secs_inside(&self) -> f64 {
+        self.feed.secs_inside()
+    }
+
+    /// Whether it gives hands as well.
+    pub fn gives_hands(&self) -> bool {
+        !self.map.left_hand.is_empty()
+    }
+
+    /// The keypoints of the person in the box (x, y, width, height in px); None for a box that is no place.
+    pub fn find(&mut self, image: &Image, place: [f64; 4]) -> Result<Option<Body>> {
+        let size = self.feed.size();
+        let Some(src_from_dst) = grown(place, size, self.margin) else { return Ok(None) };
+        let outputs = self.feed.part(image, &src_from_dst)?;
+        let points = self.reader.points(&outputs, size)?;
+        let hand = |map: &[usize]| placed::<21>(&points, map, &src_from_dst);
+        let hands = (!self.map.left_hand.is_empty()).then(|| [hand(&self.map.left_hand), hand(&self.map.right_hand)]);
+        Ok(Some(Body { points: placed(&points, &self.map.body, &src_from_dst), hands }))
+    }
+}
+
+/// The transform of a crop of `[height, width]` px around a box: its short side grown to the crop's shape, then both by
+/// `margin`. None where that is no place in a picture.
+fn grown([x, y, width, height]: [f64; 4], size: [usize; 2], margin: f64) -> Option<SrcFromDst> {
+    let [rows, columns] = size.map(|px| px as f64);
+    let centre = [x + width / 2.0, y + height / 2.0];
+    let scale = (width / columns).max(height / rows) * margin;
+    let sound = scale.is_finite() && scale > 1e-6 && scale < 1e4 && centre.iter().all(|px| px.abs() < 1e6);
+    sound.then(|| {
+        SrcFromDst([[scale, 0.0, centre[0] - scale * columns / 2.0], [0.0, scale, centre[1] - scale * rows / 2.0]])
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_grows_to_the_inputs_shape_around_its_centre() {
+        for place in [[10.0, 20.0, 30.0, 200.0], [10.0, 20.0, 300.0, 20.0]] {
+            let transform = grown(place, [256, 192], 1.25).unwrap();
+            let centre = transform.apply([96.0, 128.0]);
+            assert!((centre[0] - place[0] - place[2] / 2.0).abs() < 1e-9);
+            assert!((centre[1] - place[1] - place[3] / 2.0).abs() < 1e-9);
+            let scale = transform.0[0][0];
+            assert!((scale * 192.0 >= place[2] * 1.25 - 1e-9) && (scale * 256.0 >= place[3] * 1.25 - 1e-9));
+        }
+        assert!(grown([f64::NAN; 4], [256, 192], 1.25).is_none());
+        assert!(grown([0.0; 4], [256, 192], 1.25).is_none());
+    }
+
+    #[test]
+    fn a_map_names_outputs_and_what_is_missing_is_zero() {
+        let transform = SrcFromDst([[2.0, 0.0, 1.0], [0.0, 2.0, 0.0]]);
+        let points = [[1.0, 1.0, 0.5], [4.0, 5.0, 0.9], [7.0, 7.0, 0.0]];
+        assert_eq!(
+            placed::<4>(&points, &[1, 0, 2, 9], &transform),
+            [[9.0, 10.0, 0.9], [3.0, 2.0, 0.5], [0.0; 3], [0.0; 3]]
+        );
+    }
+}

@@ -1,0 +1,24 @@
+//! Stage 2: frames to 2D keypoints of the one speaker: person box, body, both hands, followed through each shot.
+//! `decode` reads the models' outputs, one file a kind; `person`, `body`, `hand` and `palm` ask one model each; `speaker`
+//! says who is followed, with `followed` (the choice), `liveness` and `appearance` (on a `patch` of the picture); `region`
+//! says where to look for a hand; `chain` is the way of one frame; `stage` the way of a video.
+
+pub mod appearance;
+pub mod body;
+pub mod chain;
+pub mod decode;
+pub mod hand;
+pub mod liveness;
+pub mod model_input;
+pub mod other_hand;
+pub mod palm;
+pub mod patch;
+pub mod person;
+pub mod region;
+pub mod speaker;
+pub mod stage;
+pub mod store;
+pub mod tracker;
+
+pub use chain::Chain;
+pub use stage::Pose2dStage;

@@ -1,0 +1,60 @@
+//! A model with the picture it is fed: the crop or letterbox goes into a canvas that is kept, and from there, made
+//! numbers as the manifest says, into the model's input.
+
+use crate::external::onnx::{Anchor, Axes, Channels, Fit, Model, ModelEntry, Outputs, Runtime};
+use crate::external::opencv::tensor::Normaliser;
+use crate::external::opencv::warp;
+use crate::external::opencv::warp::SrcFromDst;
+use crate::types::image::Image;
+use anyhow::Result;
+use std::path::Path;
+
+pub struct Feed {
+    model: Model,
+    canvas: Image,
+    normaliser: Normaliser,
+}
+
+impl Feed {
+    pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
+        let [height, width] = entry.input_size()?;
+        let picture = &entry.picture;
+        let (bgr, planar) = (picture.channels == Channels::Bgr, picture.axes == Axes::Nchw);
+        Ok(Self {
+            model: Model::open(runtime, entry, dir)?,
+            canvas: Image::filled(width, height, [0; 3]),
+            normaliser: Normaliser::new(bgr, planar, picture.scale, picture.mean, picture.std),
+        })
+    }
+
+    /// Height and width of the input in px.
+    pub fn size(&self) -> [usize; 2] {
+        [self.canvas.height, self.canvas.width]
+    }
+
+    /// Seconds inside ONNX Runtime so far.
+    pub fn secs_inside(&self) -> f64 {
+        self.model.secs_inside()
+    }
+
+    /// Runs the model on the whole picture, letterboxed as its description says.
+    pub fn whole(&mut self, image: &Image) -> Result<(SrcFromDst, Outputs<'_>)> {
+        let src_from_dst = match self.model.entry().fit {
+            Fit::Letterbox { anchor: Anchor::Centre, pad } => warp::letterbox_centre(image, &mut self.canvas, pad)?,
+            Fit::Letterbox { pad, .. } => warp::letterbox_top_left(image, &mut self.canvas, pad)?,
+            Fit::Box { .. } | Fit::Region => warp::letterbox_top_left(image, &mut self.canvas, 0)?,
+        };
+        Ok((src_from_dst, self.run()?))
+    }
+
+    /// Runs the model on the part of the picture the transform names.
+    pub fn part(&mut self, image: &Image, src_from_dst: &SrcFromDst) -> Result<Outputs<'_>> {
+        warp::warp(image, src_from_dst, &mut self.canvas)?;
+        self.run()
+    }
+
+    fn run(&mut self) -> Result<Outputs<'_>> {
+        self.normaliser.fill(&self.canvas, self.model.input_mut());
+        self.model.run()
+    }
+}

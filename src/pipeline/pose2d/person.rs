@@ -1,0 +1,54 @@
+//! The person detector: all people of a picture. Which of them is the speaker is known to `followed`.
+
+use super::decode::{detections, yolox_grid};
+use super::model_input::Feed;
+use crate::external::onnx::{Decode, ModelEntry, Runtime};
+use crate::types::image::Image;
+use crate::types::pose2d::PersonBox;
+use anyhow::{Result, bail};
+use std::path::Path;
+
+/// Finds people in a picture.
+pub struct Detector {
+    feed: Feed,
+    decode: Decode,
+}
+
+impl Detector {
+    pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
+        Ok(Self { feed: Feed::open(runtime, entry, dir)?, decode: entry.decode.clone() })
+    }
+
+    pub fn secs_inside(&self) -> f64 {
+        self.feed.secs_inside()
+    }
+
+    /// The people in the picture, surest first, in px.
+    pub fn find(&mut self, image: &Image) -> Result<Vec<PersonBox>> {
+        let size = self.feed.size();
+        let (src_from_dst, outputs) = self.feed.whole(image)?;
+        let found = match &self.decode {
+            Decode::Detections { boxes, labels, person, min_score, max_overlap } => {
+                let (shape, rows) = outputs.floats(boxes)?;
+                if shape.last() != Some(&5) {
+                    bail!("the output {boxes:?} of a detector must have rows of 5 numbers, its shape is {shape:?}");
+                }
+                let labels = labels.as_ref().map(|name| outputs.integers(name)).transpose()?.map(|(_, labels)| labels);
+                detections::decode(rows, labels, *person, *min_score, *max_overlap)
+            }
+            Decode::YoloxGrid { predictions, strides, min_score, max_overlap } => {
+                let (shape, rows) = outputs.floats(predictions)?;
+                let row_len = shape.last().map_or(0, |len| usize::try_from(*len).unwrap_or(0));
+                yolox_grid::decode(rows, row_len, size, strides, *min_score, *max_overlap)?
+            }
+            other => bail!("a person detector cannot be read as {other:?}"),
+        };
+        let place = |person: PersonBox| {
+            let at = |x: f32, y: f32| src_from_dst.apply([f64::from(x), f64::from(y)]).map(|px| px as f32);
+            let [x, y] = at(person.x, person.y);
+            let [right, bottom] = at(person.x + person.width, person.y + person.height);
+            PersonBox { x, y, width: right - x, height: bottom - y, score: person.score }
+        };
+        Ok(found.into_iter().map(place).collect())
+    }
+}

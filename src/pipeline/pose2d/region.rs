@@ -1,0 +1,98 @@
+//! Where to look for a hand: the rotated square around one, from its own points of the frame before, from the arm, or
+//! from a palm. The numbers are MediaPipe's (hand_landmark_landmarks_to_roi, palm_detection_detection_to_roi) and, for
+//! the arm, measured on it.
+
+use crate::external::opencv::warp::Region;
+use std::f64::consts::{PI, TAU};
+
+/// Points of a hand that say where it is: wrist, thumb to its first joint, and the two lower joints of each finger.
+const STEADY: [usize; 12] = [0, 1, 2, 3, 5, 6, 9, 10, 13, 14, 17, 18];
+
+/// The square around a hand whose 21 points are known.
+pub fn around_hand(points: &[[f64; 2]; 21]) -> Region {
+    let half = |a: [f64; 2], b: [f64; 2]| [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0];
+    let knuckles = half(half(points[5], points[13]), points[9]);
+    let rotation = upright([knuckles[0] - points[0][0], knuckles[1] - points[0][1]]);
+    let steady = STEADY.map(|at| points[at]);
+    let (low, high) = extent(&steady);
+    let centre = half(low, high);
+    let (sin, cos) = rotation.sin_cos();
+    let turned = steady.map(|[x, y]| {
+        let (x, y) = (x - centre[0], y - centre[1]);
+        [x * cos + y * sin, y * cos - x * sin]
+    });
+    let (low, high) = extent(&turned);
+    let (width, height) = (high[0] - low[0], high[1] - low[1]);
+    let [x, y] = half(low, high);
+    let y = y - 0.1 * height;
+    Region {
+        centre: [centre[0] + x * cos - y * sin, centre[1] + x * sin + y * cos],
+        side: width.max(height) * 2.0,
+        rotation,
+    }
+}
+
+/// The square where the hand of an arm should be.
+pub fn beyond_wrist(elbow: [f64; 2], wrist: [f64; 2], shoulder_px: f64) -> Region {
+    let along = [wrist[0] - elbow[0], wrist[1] - elbow[1]];
+    let length = along[0].hypot(along[1]);
+    let unit = along.map(|part| part / (length + 1e-6));
+    let reach = 0.27 * length.max(0.45 * shoulder_px);
+    Region {
+        centre: [wrist[0] + unit[0] * reach, wrist[1] + unit[1] * reach],
+        side: 0.8 * shoulder_px,
+        rotation: upright(unit),
+    }
+}
+
+/// The square around a hand whose palm was detected: its box's corners, its wrist and the base of its middle finger.
+pub fn around_palm(low: [f64; 2], high: [f64; 2], wrist: [f64; 2], middle: [f64; 2]) -> Region {
+    let (width, height) = (high[0] - low[0], high[1] - low[1]);
+    let rotation = upright([middle[0] - wrist[0], middle[1] - wrist[1]]);
+    let (sin, cos) = rotation.sin_cos();
+    Region {
+        centre: [(low[0] + high[0]) / 2.0 + 0.5 * height * sin, (low[1] + high[1]) / 2.0 - 0.5 * height * cos],
+        side: width.max(height) * 2.6,
+        rotation,
+    }
+}
+
+/// The rotation that makes `direction` point up in the crop, -pi..pi.
+fn upright([x, y]: [f64; 2]) -> f64 {
+    let angle = PI / 2.0 - (-y).atan2(x);
+    angle - TAU * ((angle + PI) / TAU).floor()
+}
+
+fn extent(points: &[[f64; 2]]) -> ([f64; 2], [f64; 2]) {
+    points.iter().fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), [x, y]| {
+        ([low[0].min(*x), low[1].min(*y)], [high[0].max(*x), high[1].max(*y)])
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_upright_hand_has_no_rotation_and_a_turned_one_has() {
+        let hand: [[f64; 2]; 21] = std::array::from_fn(|at| [100.0 + (at / 4) as f64 * 8.0, 200.0 - at as f64 * 3.0]);
+        let turn = |angle: f64, [x, y]: [f64; 2]| {
+            let (sin, cos) = angle.sin_cos();
+            [cos * x - sin * y, sin * x + cos * y]
+        };
+        let plain = around_hand(&hand);
+        let turned = around_hand(&hand.map(|point| turn(0.8, point)));
+        assert!((turned.rotation - plain.rotation - 0.8).abs() < 1e-9 && (turned.side - plain.side).abs() < 20.0);
+        let arm = beyond_wrist([0.0, 100.0], [0.0, 50.0], 100.0);
+        assert!(arm.rotation.abs() < 1e-6 && (arm.centre[1] - (50.0 - 13.5)).abs() < 1e-6 && arm.side == 80.0);
+        let palm = around_palm([0.0, 0.0], [20.0, 20.0], [10.0, 10.0], [20.0, 10.0]);
+        assert!((palm.rotation - PI / 2.0).abs() < 1e-9 && (palm.centre[0] - 20.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn nonsense_gives_no_place() {
+        assert_eq!(around_hand(&[[f64::NAN; 2]; 21]).src_from_dst(224), None);
+        assert_eq!(around_hand(&[[3.0; 2]; 21]).src_from_dst(224), None);
+        assert_eq!(beyond_wrist([1.0; 2], [1.0; 2], 0.0).src_from_dst(224), None);
+    }
+}

@@ -1,0 +1,198 @@
+//! The one speaker in frame after frame: when to look for people, whom of them to follow (`followed`), and whether it
+//! still is the same person, which his or her colours tell (`appearance`) where two people cross.
+
+use super::appearance::Appearance;
+use super::body::BodyModel;
+use super::decode::{Point, boxes};
+use super::liveness::Tracks;
+use super::person::Detector;
+use super::tracker::{Candidate, Followed, Look};
+use crate::config;
+use crate::types::image::Image;
+use crate::types::pose2d::PersonBox;
+use anyhow::{Context, Result};
+
+/// Frames of a shot at which people are looked for beside the regular ones, so that a wrong choice is soon mended.
+const EARLY: [usize; 3] = [2, 5, 10];
+/// With several people in view, looks come so many times as often.
+const CROWD_LOOKS: usize = 3;
+/// A body whose colours are this far from the speaker's, in 8-bit steps, for so many frames, is another person.
+const STRANGER: f32 = 7.0;
+const STRANGE_FRAMES: i32 = 2;
+/// Frames for which a body found to be the speaker's after all is not doubted again.
+const TRUSTED_FRAMES: i32 = 6;
+/// A box that overlaps the followed one so much is whom is followed, unless another is so much more like the speaker.
+const HERE: f32 = 0.6;
+const LIKER: f32 = 0.6;
+/// Colours and box after a restart that are no further from those before are the same person's.
+const SAME_COLOURS: f32 = 5.0;
+const SAME_BOX: f32 = 0.5;
+/// Weight of a frame's colours in the speaker's.
+const FOLLOW_COLOURS: f32 = 0.05;
+
+/// Follows one person.
+pub struct Speaker {
+    detector: Option<Detector>,
+    pub followed: Followed,
+    tracks: Tracks,
+    reference: Option<Appearance>,
+    /// What the one followed looks like.
+    colours: Option<Appearance>,
+    /// Frames in a row that showed a stranger; below 0: frames for which that is not believed.
+    n_strange: i32,
+    /// More than one person was in view in this shot.
+    several: bool,
+    /// Whom the shot before showed, and where.
+    before: Option<(PersonBox, Appearance)>,
+}
+
+impl Speaker {
+    /// Without a detector the whole picture is the speaker's.
+    pub fn new(detector: Option<Detector>) -> Self {
+        Self {
+            detector,
+            followed: Followed::default(),
+            tracks: Tracks::default(),
+            reference: None,
+            colours: None,
+            n_strange: 0,
+            several: false,
+            before: None,
+        }
+    }
+
+    pub fn secs_inside(&self) -> f64 {
+        self.detector.as_ref().map_or(0.0, Detector::secs_inside)
+    }
+
+    /// A picture that shows the speaker, as its largest person. Errors: nobody is found in it.
+    pub fn set_reference(&mut self, image: &Image, body: &mut BodyModel, least: f64) -> Result<()> {
+        let found = self.detector.as_mut().map(|detector| detector.find(image)).transpose()?.unwrap_or_default();
+        let area = |one: &PersonBox| one.width * one.height;
+        let largest = found.iter().max_by(|a, b| area(a).total_cmp(&area(b)));
+        let colours = largest.map(|one| colours_of(image, one, body, least)).transpose()?.flatten();
+        self.reference = Some(colours.context("nobody with visible shoulders is found in the reference picture")?);
+        Ok(())
+    }
+
+    /// Nobody is followed any more.
+    pub fn begin_anew(&mut self) {
+        let place = self.followed.place.map(|_| self.followed.person());
+        self.before = place.zip(self.colours.take());
+        self.followed.begin_anew();
+        self.tracks = Tracks::default();
+        (self.n_strange, self.several) = (0, false);
+    }
+
+    /// Looks for people in frame `idx` of a shot, if it is time to.
+    pub fn look(
+        &mut self,
+        image: &Image,
+        idx: usize,
+        body: &mut BodyModel,
+        body_seen: bool,
+        settings: &config::Pose2d,
+    ) -> Result<()> {
+        let every = settings.person_every.max(1);
+        let crowd = self.followed.n_people > 1 && idx.is_multiple_of((every / CROWD_LOOKS).max(1));
+        let regular = idx.is_multiple_of(every);
+        if !regular && !crowd && self.followed.place.is_some() && !EARLY.contains(&idx) {
+            return Ok(());
+        }
+        let Some(mut found) = self.find(image)? else { return Ok(()) };
+        if let Some(reference) = self.reference.as_ref().filter(|_| found.len() > 1) {
+            measure(&mut found, reference, image, body, settings.joint_score)?;
+        }
+        let follow = regular.then_some(settings.person_follow);
+        let was = self.followed.identity();
+        self.followed.look(&found, Look { image_width: image.width, follow, body_seen });
+        self.several |= self.followed.n_people > 1;
+        if self.followed.identity() != was {
+            self.colours = None;
+        }
+        Ok(())
+    }
+
+    /// Takes in the body found in the followed box; true if it is another person's, who is followed from now on, so
+    /// that the body must be found again.
+    pub fn recognise(
+        &mut self,
+        image: &Image,
+        points: &[Point; 17],
+        body: &mut BodyModel,
+        settings: &config::Pose2d,
+    ) -> Result<bool> {
+        let Some(seen) = Appearance::of(image, points, settings.joint_score) else { return Ok(false) };
+        if let Some((place, colours)) = self.before.take()
+            && boxes::overlap(&place, &self.followed.person()) >= SAME_BOX
+            && colours.distance(&seen) <= SAME_COLOURS
+        {
+            self.followed.is_the_same();
+        }
+        let Some(colours) = self.colours.as_mut() else {
+            self.colours = Some(seen);
+            return Ok(false);
+        };
+        if !self.several || colours.distance(&seen) <= STRANGER {
+            colours.follow(&seen, FOLLOW_COLOURS);
+            self.n_strange = self.n_strange.min(0);
+            return Ok(false);
+        }
+        self.n_strange += 1;
+        if self.n_strange < STRANGE_FRAMES {
+            return Ok(false);
+        }
+        let colours = colours.clone();
+        let Some(mut found) = self.find(image)? else { return Ok(false) };
+        measure(&mut found, &colours, image, body, settings.joint_score)?;
+        if is_here(&found, &self.followed.person()) {
+            self.n_strange = -TRUSTED_FRAMES;
+            return Ok(false);
+        }
+        (self.n_strange, self.colours) = (0, None);
+        self.followed.choose(&found, image.width);
+        Ok(true)
+    }
+
+    /// Everybody in the picture; `None` without a detector.
+    fn find(&mut self, image: &Image) -> Result<Option<Vec<Candidate>>> {
+        let Some(detector) = self.detector.as_mut() else {
+            self.followed.place = Some([0.0, 0.0, image.width as f64, image.height as f64]);
+            (self.followed.score, self.followed.n_people) = (1.0, 1);
+            return Ok(None);
+        };
+        let found = detector.find(image)?;
+        let movements = self.tracks.look(image, &found);
+        let candidate = |(person, movement)| Candidate { person, movement, unlike: None };
+        Ok(Some(found.into_iter().zip(movements).map(candidate).collect()))
+    }
+}
+
+/// Whether the one in the followed box still is the speaker: nobody else found is much more like the speaker.
+fn is_here(found: &[Candidate], followed: &PersonBox) -> bool {
+    let overlap = |one: &Candidate| boxes::overlap(&one.person, followed);
+    let Some(here) = found.iter().max_by(|a, b| overlap(a).total_cmp(&overlap(b))) else { return false };
+    let unlike = |one: &Candidate| one.unlike.unwrap_or(f32::INFINITY);
+    overlap(here) >= HERE && found.iter().all(|one| unlike(one) >= LIKER * unlike(here))
+}
+
+/// How far the colours of everybody found are from those given.
+fn measure(
+    found: &mut [Candidate],
+    colours: &Appearance,
+    image: &Image,
+    body: &mut BodyModel,
+    least: f64,
+) -> Result<()> {
+    for one in found {
+        // A box without a body is nobody.
+        let seen = colours_of(image, &one.person, body, least)?;
+        one.unlike = Some(seen.map_or(f32::from(u8::MAX), |seen| seen.distance(colours)));
+    }
+    Ok(())
+}
+
+fn colours_of(image: &Image, one: &PersonBox, body: &mut BodyModel, least: f64) -> Result<Option<Appearance>> {
+    let found = body.find(image, [one.x, one.y, one.width, one.height].map(f64::from))?;
+    Ok(found.and_then(|found| Appearance::of(image, &found.points, least)))
+}

@@ -1,0 +1,85 @@
+//! The keypoints of a video as they are gathered, frame by frame, and written down (`motion::keypoints_npz` is the file).
+
+use crate::formats::keypoints_npz;
+use crate::formats::keypoints_npz::Extras;
+use crate::types::pose2d::{Keypoint, Keypoints, N_BODY, N_HAND, PersonBox, Pose2d};
+use crate::types::time::FrameRate;
+use anyhow::Result;
+use ndarray::{Array1, Array2, Array3};
+use std::path::Path;
+
+/// What was seen so far: plain numbers, 1 kB a frame.
+#[derive(Default)]
+pub struct Gathered {
+    body: Vec<f32>,
+    left_hand: Vec<f32>,
+    right_hand: Vec<f32>,
+    person: Vec<f32>,
+    n_people: Vec<i64>,
+    identity: Vec<i64>,
+    time_secs: Vec<f64>,
+}
+
+impl Gathered {
+    /// Takes in one frame and the time of the source frame it shows.
+    pub fn push(&mut self, pose: &Pose2d, source_secs: f64) {
+        let numbers = |points: &[Keypoint]| points.iter().flat_map(|p| [p.x, p.y, p.score]).collect::<Vec<_>>();
+        self.body.extend(numbers(&pose.body));
+        self.left_hand.extend(numbers(&pose.left_hand));
+        self.right_hand.extend(numbers(&pose.right_hand));
+        let PersonBox { x, y, width, height, score } = pose.person;
+        self.person.extend([x, y, width, height, score]);
+        self.n_people.push(i64::from(pose.n_people));
+        self.identity.push(pose.identity);
+        self.time_secs.push(source_secs);
+    }
+
+    /// Number of frames T.
+    pub fn n_frames(&self) -> usize {
+        self.time_secs.len()
+    }
+
+    /// The whole video's keypoints, and what stands beside them in the file.
+    pub fn finish(self, fps: FrameRate, image_size: [u32; 2]) -> Result<(Keypoints, Extras)> {
+        let n_frames = self.n_frames();
+        let points = |numbers: Vec<f32>, n: usize| Array3::from_shape_vec((n_frames, n, 3), numbers);
+        let keypoints = Keypoints {
+            fps,
+            image_size,
+            body: points(self.body, N_BODY)?,
+            left_hand: points(self.left_hand, N_HAND)?,
+            right_hand: points(self.right_hand, N_HAND)?,
+        };
+        let extras = Extras {
+            time_secs: Array1::from(self.time_secs),
+            person: Array2::from_shape_vec((n_frames, 5), self.person)?,
+            n_people: Array1::from(self.n_people),
+            identity: Array1::from(self.identity),
+        };
+        Ok((keypoints, extras))
+    }
+}
+
+/// Writes `keypoints.npz`.
+pub fn write(path: &Path, keypoints: &Keypoints, extras: &Extras) -> Result<()> {
+    keypoints_npz::write(path, keypoints, extras)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_become_arrays() {
+        let mut gathered = Gathered::default();
+        let mut pose = Pose2d { n_people: 2, identity: 3, ..Pose2d::default() };
+        gathered.push(&pose, 0.0);
+        pose.right_hand[20] = Keypoint { x: 5.0, y: 6.0, score: 0.5 };
+        pose.person.height = 9.0;
+        gathered.push(&pose, 0.07);
+        let (keypoints, extras) = gathered.finish(FrameRate::new(15, 1), [64, 48]).unwrap();
+        assert_eq!((keypoints.n_frames(), keypoints.right_hand[[1, 20, 1]], keypoints.body[[1, 0, 0]]), (2, 6.0, 0.0));
+        assert_eq!((extras.person[[1, 3]], extras.n_people[0], extras.time_secs[1]), (9.0, 2, 0.07));
+        assert_eq!(extras.identity[1], 3);
+    }
+}

@@ -1,0 +1,137 @@
+//! The stage: reads what `extract` and `pose2d` wrote of a video, judges it, writes `intervals.json`, `ledger.json`
+//! and `measures.npz`.
+
+use super::judge::{Video, judge};
+use super::measure;
+use super::measure::Measures;
+use super::sound;
+use crate::config;
+use crate::formats::keypoints_npz;
+use crate::formats::npz::Npz;
+use crate::stage::ledger::{Ledger, longest_first};
+use crate::stage::progress::Progress;
+use crate::stage::runner::place;
+use crate::stage::{Input, Report, Stage, Unit, counted, write_json};
+use crate::types::interval::Intervals;
+use anyhow::{Result, ensure};
+use std::path::{Path, PathBuf};
+
+/// Keypoints to intervals worth keeping.
+pub struct SegmentStage {
+    rules: config::Segment,
+    work: PathBuf,
+}
+
+impl SegmentStage {
+    /// Judges by `rules`; reads the earlier stages' files under the folder `work`.
+    pub fn new(rules: &config::Segment, work: &Path) -> Self {
+        Self { rules: rules.clone(), work: work.to_owned() }
+    }
+
+    fn file(&self, stage: &str, unit: &Unit, name: &str) -> PathBuf {
+        place(&self.work, stage, unit).join(name)
+    }
+}
+
+impl Stage for SegmentStage {
+    fn name(&self) -> &'static str {
+        "segment"
+    }
+
+    fn version(&self) -> u32 {
+        5
+    }
+
+    fn settings(&self, _unit: &Unit) -> serde_json::Value {
+        let mut rules = serde_json::json!(self.rules);
+        // `lift` judges by this one
+        rules.as_object_mut().map(|keys| keys.remove("max_bone_change"));
+        serde_json::json!({ "segment": rules })
+    }
+
+    fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
+        let input = |role: &str, path| Input { role: role.to_owned(), path };
+        let mut inputs = vec![
+            input("media", self.file("extract", unit, "media.json")),
+            input("timeline", self.file("extract", unit, "timeline.npz")),
+            input("keypoints", self.file("pose2d", unit, "keypoints.npz")),
+        ];
+        let sound = self.file("extract", unit, "audio.wav");
+        if sound.exists() {
+            inputs.push(input("sound", sound));
+        }
+        Ok(inputs)
+    }
+
+    fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
+        let video = Video::read(&self.file("extract", unit, "media.json"))?;
+        let measures = self.measures(unit, &video)?;
+        let (intervals, ledger) = judge(&measures, &video, &self.rules);
+        write_json(&out.join("intervals.json"), &intervals)?;
+        write_json(&out.join("ledger.json"), &ledger)?;
+        measures.write(&out.join("measures.npz"))?;
+        Ok(report(&intervals, &ledger))
+    }
+}
+
+impl SegmentStage {
+    fn measures(&self, unit: &Unit, video: &Video) -> Result<Measures> {
+        let path = self.file("pose2d", unit, "keypoints.npz");
+        let (keypoints, extras) = (keypoints_npz::read(&path)?, keypoints_npz::read_extras(&path)?);
+        let n_frames = video.n_frames;
+        ensure!(
+            keypoints.n_frames() == n_frames && extras.identity.len() == n_frames && keypoints.fps == video.fps,
+            "the keypoints have {} frames at {}, the video {n_frames} at {}: run the stage pose2d again",
+            keypoints.n_frames(),
+            keypoints.fps,
+            video.fps
+        );
+        let mut timeline = Npz::open(&self.file("extract", unit, "timeline.npz"))?;
+        let shot_score = timeline.floats("shot_score", &[Some(n_frames)])?.into_iter().collect();
+        let still = timeline.floats("still", &[Some(n_frames)])?.into_iter().collect();
+        let restart: Vec<bool> = timeline.bools("restart", &[Some(n_frames)])?.into_iter().collect();
+        let (sound, sound_db) = sound::levels(&self.file("extract", unit, "audio.wav"), video.fps, n_frames)?;
+        let of_body = Measures::of(&keypoints);
+        Ok(Measures {
+            sound,
+            sound_db,
+            still,
+            n_people: extras.n_people.iter().map(|&n| n as f32).collect(),
+            identity: measure::identity(&extras.identity.to_vec(), &restart, &of_body.jump),
+            shot_score,
+            ..of_body
+        })
+    }
+}
+
+fn report(intervals: &Intervals, ledger: &Ledger) -> Report {
+    let (kept, refused) = (ledger.kept_secs(), ledger.refused_secs());
+    let windows = intervals.windows_64;
+    let mut line = if intervals.intervals.is_empty() {
+        format!("nothing kept of {:.1} s", ledger.duration_secs)
+    } else {
+        format!(
+            "kept {kept:.1} s of {:.1} s in {}, {} windows of 64 frames (one every 5; {} side by side)",
+            ledger.duration_secs,
+            counted(intervals.intervals.len(), "interval"),
+            windows.stride_5,
+            windows.apart
+        )
+    };
+    if !refused.is_empty() {
+        line += &format!("; refused: {}", longest_first(&refused));
+    }
+    let length = |r: &crate::stage::ledger::Refused| r.end_secs - r.start_secs;
+    let worst = ledger.refused.iter().max_by(|a, b| length(a).total_cmp(&length(b)));
+    if let (true, Some(worst)) = (intervals.intervals.is_empty(), worst) {
+        line += &format!(" ({})", worst.says);
+    }
+    let facts = serde_json::json!({
+        "duration_secs": ledger.duration_secs,
+        "kept_secs": kept,
+        "refused_secs": refused,
+        "n_intervals": intervals.intervals.len(),
+        "windows_64": windows,
+    });
+    Report { line, facts: facts.as_object().cloned().unwrap_or_default() }
+}

@@ -1,0 +1,70 @@
+//! `measures.npz`: every array of `Measures` by its name, float32 [T].
+
+use super::measure::Measures;
+use crate::formats::npz::Npz;
+use anyhow::{Context, Result};
+use ndarray::Array1;
+use ndarray_npy::NpzWriter;
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
+use std::path::Path;
+
+impl Measures {
+    /// Every array with its name, in the order of the rules.
+    pub fn arrays(&self) -> [(&'static str, &[f32]); 15] {
+        [
+            ("sound", &self.sound),
+            ("sound_db", &self.sound_db),
+            ("still", &self.still),
+            ("person", &self.person),
+            ("shoulder_px", &self.shoulder_px),
+            ("face", &self.face),
+            ("facing", &self.facing),
+            ("nose_off", &self.nose_off),
+            ("arms", &self.arms),
+            ("left_hand", &self.left_hand),
+            ("right_hand", &self.right_hand),
+            ("n_people", &self.n_people),
+            ("jump", &self.jump),
+            ("identity", &self.identity),
+            ("shot_score", &self.shot_score),
+        ]
+    }
+
+    /// Writes `measures.npz`.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let written = || -> Result<()> {
+            let mut npz = NpzWriter::new(BufWriter::new(File::create(path)?));
+            for (name, values) in self.arrays() {
+                npz.add_array(name, &Array1::from_vec(values.to_vec()))?;
+            }
+            Ok(npz.finish()?.flush()?)
+        };
+        written().with_context(|| format!("cannot write {}", path.display()))
+    }
+
+    /// Reads `measures.npz`. Errors name the file and the array that is missing or of another length.
+    pub fn read(path: &Path) -> Result<Self> {
+        let mut npz = Npz::open(path)?;
+        let person = npz.floats("person", &[None])?.into_iter().collect::<Vec<f32>>();
+        let mut read =
+            |name: &str| -> Result<Vec<f32>> { Ok(npz.floats(name, &[Some(person.len())])?.into_iter().collect()) };
+        Ok(Self {
+            sound: read("sound")?,
+            sound_db: read("sound_db")?,
+            still: read("still")?,
+            shoulder_px: read("shoulder_px")?,
+            face: read("face")?,
+            facing: read("facing")?,
+            nose_off: read("nose_off")?,
+            arms: read("arms")?,
+            left_hand: read("left_hand")?,
+            right_hand: read("right_hand")?,
+            n_people: read("n_people")?,
+            jump: read("jump")?,
+            identity: read("identity")?,
+            shot_score: read("shot_score")?,
+            person,
+        })
+    }
+}

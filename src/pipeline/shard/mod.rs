@@ -1,0 +1,5 @@
+//! Stage 5: everything of a speaker to a dataset.
+
+pub mod outcome;
+pub mod stage;
+pub mod video;

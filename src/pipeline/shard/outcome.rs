@@ -1,0 +1,89 @@
+//! What the user is told of a dataset just written: how much there is, and what to mend.
+
+use super::video::Video;
+use crate::config;
+use crate::dataset::info::Info;
+use crate::dataset::leakage::Leakage;
+use crate::dataset::split::Split;
+use crate::dataset::stats::Stats;
+use crate::dataset::{INFO, LEAKAGE};
+use crate::stage::{Report, counted};
+use anyhow::{Context, Result};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// How the writing came out.
+pub struct Outcome<'a> {
+    pub shard: &'a config::Shard,
+    pub videos: &'a [Video],
+    pub stats: &'a Stats,
+    pub n_failed: usize,
+    pub n_left_out: usize,
+    pub n_taken_over: usize,
+}
+
+impl Outcome<'_> {
+    /// The stage's report on the dataset in `out`.
+    pub fn report(&self, out: &Path) -> Result<Report> {
+        let info: Info = serde_json::from_slice(&std::fs::read(out.join(INFO))?).context(INFO)?;
+        let leakage: Leakage = serde_json::from_slice(&std::fs::read(out.join(LEAKAGE))?).context(LEAKAGE)?;
+        let warnings = self.warnings(&leakage);
+        let part = |split: Split| {
+            let info = info.splits.get(split.name()).cloned().unwrap_or_default();
+            format!("{} {:.1} s in {}", split.name(), info.secs, counted(info.samples, "interval"))
+        };
+        let n_windows: usize = self.stats.windows.strided.values().sum();
+        let mut line = format!("{}; {n_windows} windows of 64 frames", Split::ALL.map(part).join(", "));
+        if self.n_taken_over > 0 {
+            line += &format!("; {} taken over as they were", counted(self.n_taken_over, "video"));
+        }
+        warnings.iter().for_each(|warning| line += &format!("; warning: {warning}"));
+        let secs: BTreeMap<_, _> = info.splits.iter().map(|(name, split)| (name, split.secs)).collect();
+        let Stats { windows, footage, .. } = self.stats;
+        let facts = serde_json::json!({ "secs": secs, "windows": windows, "footage": footage, "warnings": warnings });
+        Ok(Report { line, facts: facts.as_object().cloned().unwrap_or_default() })
+    }
+
+    /// What the user should know, each with what to do.
+    fn warnings(&self, leakage: &Leakage) -> Vec<String> {
+        let Self { videos, stats, n_failed, n_left_out, .. } = *self;
+        let mut warnings = Vec::new();
+        // The longest is the one to train on; each of the others is proposed once.
+        let mut by_length: Vec<&Video> = videos.iter().filter(|video| video.ledger.kept_secs() > 0.0).collect();
+        by_length.sort_by(|a, b| b.ledger.kept_secs().total_cmp(&a.ledger.kept_secs()));
+        let mut others = by_length.iter().skip(1);
+        let shares = [(Split::Train, 1.0), (Split::Validation, self.shard.validation), (Split::Test, self.shard.test)];
+        for (split, _) in shares.into_iter().filter(|(split, share)| *share > 0.0 && windows(stats, *split) == 0) {
+            let name = split.name();
+            let file = match split {
+                Split::Train => by_length.first(),
+                _ => others.next(),
+            };
+            warnings.push(match file {
+                Some(video) => format!(
+                    "no video for {name} (a video's content chooses its split): add under [[speaker]] the line  {name} = [{:?}]",
+                    video.file
+                ),
+                None => format!("no video for {name}: a video is in one split as a whole, so add more videos"),
+            });
+        }
+        for leak in &leakage.leaks {
+            let (a, b) =
+                (format!("{} ({})", leak.a, leak.a_split.name()), format!("{} ({})", leak.b, leak.b_split.name()));
+            warnings.push(format!("{a} and {b} share {:.1} s of sound: put them into one split", leak.secs));
+        }
+        if n_failed > 0 {
+            warnings
+                .push(format!("{} left out, a stage before failed: see `orator status`", counted(n_failed, "video")));
+        }
+        if n_left_out > 0 {
+            let videos = counted(n_left_out, "video");
+            warnings.push(format!("{videos} left out, the same content is there already (ledger.jsonl says where)"));
+        }
+        warnings
+    }
+}
+
+fn windows(stats: &Stats, split: Split) -> usize {
+    stats.windows.strided.get(split.name()).copied().unwrap_or(0)
+}

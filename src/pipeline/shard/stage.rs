@@ -1,0 +1,355 @@
+//! The shard stage: all videos of a speaker, as `extract`, `pose2d`, `segment` and `lift` left them, become one dataset.
+//! What the dataset that was there has of a video already is taken over as it is, so that a new video costs itself alone.
+
+use super::outcome::Outcome;
+use super::video::{FILES, Video};
+use crate::config;
+use crate::config::Settings;
+use crate::config::videos::Videos;
+use crate::dataset::info::{About, ModelUsed};
+use crate::dataset::leakage::Compared;
+use crate::dataset::shared_sound;
+use crate::dataset::split::{Placed, Split, Waiting, place as place_in_splits};
+use crate::dataset::write::part;
+use crate::dataset::write::part::{Part, Source, SplitBy};
+use crate::dataset::write::writer::DatasetWriter;
+use crate::stage::ledger::{Ledger, Refused, longest_first};
+use crate::stage::progress::Progress;
+use crate::stage::record::Failure;
+use crate::stage::runner::place;
+use crate::stage::{Input, Report, Stage, Unit, counted};
+use anyhow::{Result, ensure};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// A speaker's videos to shards. Its unit is the speaker.
+pub struct ShardStage {
+    shard: config::Shard,
+    speakers: Vec<config::Speaker>,
+    work: PathBuf,
+    /// Videos that came through the stages before.
+    ready: Vec<Unit>,
+    /// All videos of all speakers, with the splits that the configuration names.
+    all: Vec<Videos>,
+    models: Vec<ModelUsed>,
+}
+
+impl ShardStage {
+    /// `ready` are the units of videos that came through the stages before, of one speaker or of several.
+    pub fn new(settings: &Settings, ready: &[Unit]) -> Self {
+        Self {
+            shard: settings.shard.clone(),
+            speakers: settings.speaker.clone(),
+            work: settings.work.dir.clone(),
+            ready: ready.to_vec(),
+            all: Vec::new(),
+            models: Vec::new(),
+        }
+    }
+
+    /// Names all videos there are: those not ready stand in the ledger as failed.
+    pub fn with_videos(self, all: Vec<Videos>) -> Self {
+        Self { all, ..self }
+    }
+
+    /// Names the models that looked at the videos in `info.json`.
+    pub fn with_models(self, models: Vec<ModelUsed>) -> Self {
+        Self { models, ..self }
+    }
+
+    fn ready(&self, speaker: &Unit) -> Vec<&Unit> {
+        let lifted = |video: &&Unit| place(&self.work, "lift", video).join("joints.npz").exists();
+        self.ready.iter().filter(|video| video.speaker == speaker.speaker).filter(lifted).collect()
+    }
+
+    fn videos(&self, speaker: &Unit) -> Option<&Videos> {
+        self.all.iter().find(|videos| videos.speaker == speaker.speaker)
+    }
+
+    /// The videos of which nothing can come, as parts with their failures.
+    fn failures(&self, speaker: &Unit, ready: &[&Unit]) -> Vec<Source> {
+        let mut failed: Vec<&Unit> = self.ready.iter().filter(|video| video.speaker == speaker.speaker).collect();
+        failed.extend(self.videos(speaker).into_iter().flat_map(|videos| &videos.units));
+        failed.retain(|unit| !ready.contains(unit));
+        failed.sort_by(|a, b| a.video.cmp(&b.video));
+        failed.dedup();
+        failed.into_iter().map(|unit| failure(&self.work, unit)).collect()
+    }
+
+    fn about(&self, speaker: &Unit, first: &Video) -> About {
+        let said = self.speakers.iter().find(|said| said.name == speaker.speaker).cloned().unwrap_or_default();
+        let config::Speaker { licence, consent, source, .. } = said;
+        let models = self.models.clone();
+        About { models, licence, consent, source, ..About::new(&speaker.speaker, first.intervals.fps) }
+    }
+}
+
+/// A video that failed at a stage, or that no stage has finished.
+fn failure(work: &Path, unit: &Unit) -> Source {
+    let stages = ["extract", "pose2d", "segment", "lift"];
+    let error = stages.into_iter().find_map(|stage| Some((stage, Failure::read(&place(work, stage, unit))?.error)));
+    let (stage, error) = error.unwrap_or(("run", "not every stage is done".to_owned()));
+    let media = std::fs::read(place(work, "extract", unit).join("media.json")).unwrap_or_default();
+    let media: serde_json::Value = serde_json::from_slice(&media).unwrap_or_default();
+    let duration_secs = media["duration_secs"].as_f64().filter(|secs| secs.is_finite() && *secs > 0.0);
+    Source {
+        name: unit.video.clone(),
+        file: unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        ledger: duration_secs.map_or_else(Ledger::default, |secs| Ledger::of_failure(secs, stage, &error)),
+        failure: Some(format!("{stage}: {error}")),
+        ..Source::default()
+    }
+}
+
+impl Stage for ShardStage {
+    fn name(&self) -> &'static str {
+        "shard"
+    }
+
+    fn folder(&self) -> &'static str {
+        "dataset"
+    }
+
+    fn version(&self) -> u32 {
+        2
+    }
+
+    fn settings(&self, unit: &Unit) -> serde_json::Value {
+        let said = self.speakers.iter().find(|said| said.name == unit.speaker).cloned().unwrap_or_default();
+        let videos = self.videos(unit);
+        // What became of the videos that are not ready stands in the ledger.
+        let others = self.failures(unit, &self.ready(unit));
+        let others: BTreeMap<String, Option<String>> = others.into_iter().map(|s| (s.name, s.failure)).collect();
+        serde_json::json!({
+            "shard": self.shard, "models": self.models, "tool": env!("CARGO_PKG_VERSION"),
+            "speaker": { "licence": said.licence, "consent": said.consent, "source": said.source },
+            "splits": videos.map(|videos| &videos.splits), "others": others,
+        })
+    }
+
+    fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
+        let mut inputs = Vec::new();
+        for video in self.ready(unit) {
+            inputs.push(Input { role: format!("{} video", video.video), path: video.source.clone() });
+            for (stage, name, optional) in FILES {
+                let path = place(&self.work, stage, video).join(name);
+                if !optional || path.exists() {
+                    inputs.push(Input { role: format!("{} {name}", video.video), path });
+                }
+            }
+        }
+        Ok(inputs)
+    }
+
+    fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
+        let ready = self.ready(unit);
+        let failures = self.failures(unit, &ready);
+        let mut videos = ready.into_iter().map(|video| Video::open(&self.work, video)).collect::<Result<Vec<_>>>()?;
+        videos.sort_by(|a, b| (&a.name, &a.unit.video).cmp(&(&b.name, &b.unit.video)));
+        check(unit, &self.work, &videos)?;
+
+        let old = place(&self.work, self.folder(), unit);
+        let mut run = Run { stage: self, out, old: &old, before: parts_of(&old), n_taken_over: 0, progress };
+        let (mut kept, mut left_out): (Vec<&Video>, Vec<(&Video, Source)>) = (Vec::new(), Vec::new());
+        for video in &videos {
+            match kept.iter().find(|first| first.content == video.content) {
+                Some(first) => left_out.push((video, run.duplicate(video, &first.name, video.ledger.duration_secs))),
+                None => kept.push(video),
+            }
+        }
+        let sounds = run.sounds(&kept)?;
+        let compared = run.compare(&kept, &sounds)?;
+        let placed = run.place(&kept, &compared);
+        let Some(first) = kept.first() else { anyhow::bail!("no video of {unit} is ready") };
+        let writer = DatasetWriter::new(out, self.about(unit, first), u64::from(self.shard.max_mb) << 20)
+            .with_compared(compared);
+        let task = progress.begin(&format!("shard {unit}"), kept.len() as u64);
+        for (video, placed) in kept.iter().zip(placed) {
+            task.detail(&video.name);
+            match placed {
+                Placed::In(split, by) => run.write(&writer, video, split, by, &sounds)?,
+                Placed::Nowhere(with) => {
+                    part::remove_sound(out, &video.name)?;
+                    let secs = with.first().map_or(0.0, |shared| shared.secs);
+                    let others: Vec<&str> = with.iter().filter_map(|shared| shared.other(&video.name)).collect();
+                    left_out.push((video, run.duplicate(video, &others.join(" and "), secs)));
+                }
+            }
+            task.advance(1);
+        }
+        let n_left_out = left_out.len();
+        let empty = left_out.into_iter().map(|(_, source)| source).chain(failures.clone());
+        for source in empty {
+            writer.video(source, Split::Train, SplitBy::Content)?.finish(None)?;
+        }
+        let n_taken_over = run.n_taken_over;
+        let (_, stats) = writer.finish()?;
+        let outcome = Outcome {
+            shard: &self.shard,
+            videos: &videos,
+            stats: &stats,
+            n_failed: failures.len(),
+            n_left_out,
+            n_taken_over,
+        };
+        outcome.report(out)
+    }
+}
+
+/// The videos must have something to make a dataset of.
+fn check(unit: &Unit, work: &Path, videos: &[Video]) -> Result<()> {
+    ensure!(
+        !videos.is_empty(),
+        "none of the videos of {} came through the stages before, so there is no dataset; \
+         `orator status --why` says where each stands",
+        unit.speaker
+    );
+    let mut refused: BTreeMap<String, f64> = BTreeMap::new();
+    for (reason, secs) in videos.iter().flat_map(|video| video.ledger.refused_secs()) {
+        *refused.entry(reason).or_default() += secs;
+    }
+    ensure!(
+        videos.iter().any(|video| !video.intervals.intervals.is_empty()),
+        "no interval worth keeping in {} of {:.1} s, so there is no dataset of {}; refused: {}; \
+         the ledger.json of each video under {} says where and why",
+        counted(videos.len(), "video"),
+        videos.iter().map(|video| video.ledger.duration_secs).sum::<f64>(),
+        unit.speaker,
+        longest_first(&refused),
+        work.join("lift").join(&unit.speaker).display()
+    );
+    Ok(())
+}
+
+/// The videos of the dataset that is there; one with a damaged file is as good as not there.
+fn parts_of(dir: &Path) -> BTreeMap<String, Part> {
+    let stated = part::stated_hashes(dir);
+    let parts = part::names(dir).unwrap_or_default().into_iter();
+    let parts = parts.filter_map(|name| Part::read(&Part::path(dir, &name)).ok().map(|part| (name, part)));
+    parts.filter(|(_, part)| part.is_sound(dir, &stated)).collect()
+}
+
+/// Hashes of the codes of the videos that have sound.
+type Sounds = BTreeMap<String, String>;
+
+/// What is at hand while a dataset is written.
+struct Run<'a> {
+    stage: &'a ShardStage,
+    out: &'a Path,
+    /// The dataset that is there, and its videos.
+    old: &'a Path,
+    before: BTreeMap<String, Part>,
+    n_taken_over: usize,
+    progress: &'a dyn Progress,
+}
+
+impl Run<'_> {
+    /// Writes the codes of each video's sound, the old dataset's where the content is the same; their hashes.
+    fn sounds(&self, videos: &[&Video]) -> Result<Sounds> {
+        let task = self.progress.begin("sound", videos.len() as u64);
+        let mut hashes = Sounds::new();
+        for video in videos {
+            let before = self.before.get(&video.name).filter(|part| part.content == video.content);
+            let codes = match before.map(|part| part.codes(self.old)) {
+                Some(Ok(codes)) if !codes.is_empty() => Some(codes),
+                _ => video.sound_codes()?,
+            };
+            if let Some(codes) = codes {
+                hashes.insert(video.name.clone(), part::write_sound(self.out, &video.name, &codes)?);
+            }
+            task.advance(1);
+        }
+        Ok(hashes)
+    }
+
+    fn compare(&self, videos: &[&Video], sounds: &Sounds) -> Result<Compared> {
+        let duplicate_secs = self.stage.shard.duplicate_secs;
+        if duplicate_secs <= 0.0 {
+            return Ok(Compared::default());
+        }
+        let audible = videos.iter().filter(|v| !v.intervals.intervals.is_empty() && sounds.contains_key(&v.name));
+        let names: Vec<String> = audible.map(|video| video.name.clone()).collect();
+        let shared = shared_sound::find(&names, |n| part::read_sound(self.out, &names[n]), duplicate_secs)?;
+        Ok(Compared { duplicate_secs, shared })
+    }
+
+    fn place(&self, videos: &[&Video], compared: &Compared) -> Vec<Placed> {
+        let named: BTreeMap<&str, Split> = self
+            .stage
+            .all
+            .iter()
+            .flat_map(|videos| videos.splits.iter().map(|(video, split)| (video.as_str(), *split)))
+            .collect();
+        let waiting = videos.iter().map(|video| Waiting {
+            name: &video.name,
+            content: &video.content,
+            named: named.get(video.unit.video.as_str()).copied(),
+            before: self.before.get(&video.name).filter(|part| part.split.is_some()).map(|part| &part.split_by),
+        });
+        let waiting: Vec<Waiting> = waiting.collect();
+        place_in_splits(&waiting, &compared.shared, self.stage.shard.validation, self.stage.shard.test)
+    }
+
+    /// Writes a video, or takes it over from the old dataset.
+    fn write(
+        &mut self,
+        writer: &DatasetWriter,
+        video: &Video,
+        split: Split,
+        by: SplitBy,
+        sounds: &Sounds,
+    ) -> Result<()> {
+        let made_from = serde_json::json!([
+            crate::dataset::SCHEMA,
+            video.file,
+            video.files_hash,
+            split,
+            by,
+            self.stage.shard.max_mb
+        ]);
+        let made_from = blake3::hash(made_from.to_string().as_bytes()).to_hex().to_string();
+        let same = self.before.get(&video.name).filter(|part| part.made_from == made_from);
+        if let Some(part) = same {
+            self.n_taken_over += 1;
+            return part.take_over(self.old, self.out);
+        }
+        let source = Source {
+            name: video.name.clone(),
+            file: video.file.clone(),
+            content: video.content.clone(),
+            made_from,
+            ledger: video.ledger.clone(),
+            bones: video.bones.clone(),
+            failure: None,
+        };
+        let mut part = writer.video(source, split, by)?;
+        if !video.intervals.intervals.is_empty() {
+            let mut samples = video.samples()?;
+            while let Some(cut) = samples.next_sample()? {
+                part.push(&cut.sample, cut.padded_secs)?;
+            }
+        }
+        part.finish(sounds.get(&video.name).cloned())?;
+        Ok(())
+    }
+
+    /// A video that is left out, since what it shows is there already: what was kept of it is refused.
+    fn duplicate(&self, video: &Video, of: &str, secs: f64) -> Source {
+        let threshold = self.stage.shard.duplicate_secs;
+        let mut ledger = video.ledger.clone();
+        let refused = ledger.kept.drain(..).map(|kept| Refused {
+            start_secs: kept.start_secs,
+            end_secs: kept.end_secs,
+            reason: "duplicate".to_owned(),
+            measured: secs,
+            threshold,
+            unit: "s".to_owned(),
+            says: format!("the same {secs:.1} s are in {of}"),
+        });
+        let refused: Vec<Refused> = refused.collect();
+        ledger.refused.extend(refused);
+        ledger.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+        let (name, file, content) = (video.unit.video.clone(), video.file.clone(), video.content.clone());
+        Source { name, file, content, ledger, ..Source::default() }
+    }
+}

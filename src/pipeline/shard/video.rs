@@ -1,0 +1,217 @@
+//! One video of a speaker on its way into the dataset: the files of the stages before, and the samples cut from them.
+
+use crate::audio::fingerprint::Fingerprinter;
+use crate::config::videos::slug;
+use crate::dataset::bones::VideoBones;
+use crate::dataset::sample::Sample;
+use crate::formats::{joints_npz, keypoints_npz};
+use crate::stage::Unit;
+use crate::stage::fingerprint::hash_file;
+use crate::stage::ledger::Ledger;
+use crate::stage::record::Record;
+use crate::stage::runner::place;
+use crate::types::interval::{Interval, Intervals};
+use crate::types::pose2d::Keypoints;
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
+use crate::types::sound::{SAMPLE_RATE, Sound};
+use crate::types::sync;
+use anyhow::{Context, Result, ensure};
+use ndarray::{Axis, concatenate, s};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+/// A video whose stages are done.
+pub struct Video {
+    /// `<slug of the file's name>-<8 hex of its content>`: the beginning of its samples' keys.
+    pub name: String,
+    /// File name of the video.
+    pub file: String,
+    /// BLAKE3 of the video file.
+    pub content: String,
+    /// BLAKE3 of the hashes of all files its samples are made of.
+    pub files_hash: String,
+    pub intervals: Intervals,
+    pub ledger: Ledger,
+    pub bones: VideoBones,
+    /// What the stages call it.
+    pub unit: Unit,
+    sound: PathBuf,
+    keypoints: PathBuf,
+    joints: PathBuf,
+}
+
+/// The files read of each video: stage, name, whether it may be missing.
+pub const FILES: [(&str, &str, bool); 6] = [
+    ("extract", "audio.wav", true),
+    ("pose2d", "keypoints.npz", false),
+    ("lift", "intervals.json", false),
+    ("lift", "ledger.json", false),
+    ("lift", "joints.npz", false),
+    ("lift", "bones.json", false),
+];
+
+/// A sample, and how much silence was appended to its sound.
+pub struct Cut {
+    pub sample: Sample,
+    pub padded_secs: f64,
+}
+
+/// Samples of sound read at a time.
+const PIECE: usize = 1 << 15;
+
+/// BLAKE3 of a file that a stage made of the video.
+fn made(work: &Path, stage: &str, unit: &Unit, name: &str) -> Result<String> {
+    let place = place(work, stage, unit);
+    let recorded =
+        Record::read(&place).and_then(|record| record.outputs.into_iter().find(|output| output.file == name));
+    recorded.map_or_else(|| hash_file(&place.join(name)), |output| Ok(output.hash))
+}
+
+impl Video {
+    /// Reads the small files. Hashes are taken from the records of the stages, where there are any.
+    pub fn open(work: &Path, unit: &Unit) -> Result<Video> {
+        let file = |stage: &str, name: &str| place(work, stage, unit).join(name);
+        let extracted = Record::read(&place(work, "extract", unit));
+        let content = match extracted.and_then(|record| record.fingerprint.inputs.get("video").cloned()) {
+            Some(content) => content,
+            None => hash_file(&unit.source)?,
+        };
+        let mut hasher = blake3::Hasher::new();
+        for (stage, name, optional) in FILES {
+            if !optional || file(stage, name).exists() {
+                hasher.update(format!("{stage} {name} {}\n", made(work, stage, unit, name)?).as_bytes());
+            }
+        }
+        let stem = unit.source.file_stem().unwrap_or_default().to_string_lossy();
+        let path = file("lift", "intervals.json");
+        let intervals = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        let intervals: Intervals = serde_json::from_slice(&intervals)
+            .with_context(|| format!("{} is not as the lift stage writes it", path.display()))?;
+        for pair in intervals.intervals.windows(2) {
+            ensure!(pair[0].end <= pair[1].start, "{}: its intervals are out of order", path.display());
+        }
+        let inside = |interval: &Interval| interval.start < interval.end && interval.end <= intervals.n_frames;
+        ensure!(intervals.intervals.iter().all(inside), "{}: an interval outside the video", path.display());
+        Ok(Video {
+            name: format!("{}-{}", slug(&stem), content.get(..8).unwrap_or(&content)),
+            file: unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            files_hash: hasher.finalize().to_hex().to_string(),
+            ledger: Ledger::read(&file("lift", "ledger.json"))?,
+            unit: unit.clone(),
+            bones: VideoBones::read(&file("lift", "bones.json"))?,
+            sound: file("extract", "audio.wav"),
+            keypoints: file("pose2d", "keypoints.npz"),
+            joints: file("lift", "joints.npz"),
+            content,
+            intervals,
+        })
+    }
+
+    /// The codes of its sound (`audio::fingerprint`); `None` without sound. Memory: the codes, 0.45 MB an hour.
+    pub fn sound_codes(&self) -> Result<Option<Vec<u32>>> {
+        if !self.sound.exists() {
+            return Ok(None);
+        }
+        let reading = || format!("cannot read {}", self.sound.display());
+        let mut wav = hound::WavReader::open(&self.sound).with_context(reading)?;
+        let mut fingerprinter = Fingerprinter::default();
+        let mut piece = Vec::with_capacity(PIECE);
+        for sample in wav.samples::<i16>() {
+            piece.push(f32::from(sample.with_context(reading)?) / 32_768.0);
+            if piece.len() == PIECE {
+                fingerprinter.push(&piece);
+                piece.clear();
+            }
+        }
+        fingerprinter.push(&piece);
+        Ok(Some(fingerprinter.finish()))
+    }
+
+    /// Opens the large files, to cut samples.
+    pub fn samples(&self) -> Result<Samples<'_>> {
+        let keypoints = keypoints_npz::read(&self.keypoints)?;
+        let motion = joints_npz::read(&self.joints)?;
+        let n_frames = self.intervals.n_frames;
+        for (n, path) in [(keypoints.n_frames(), &self.keypoints), (motion.n_frames(), &self.joints)] {
+            ensure!(n == n_frames, "{} has {n} frames, the video {n_frames}: run its stage again", path.display());
+        }
+        let sound =
+            hound::WavReader::open(&self.sound).with_context(|| format!("cannot read {}", self.sound.display()))?;
+        let spec = sound.spec();
+        ensure!(
+            (spec.sample_rate, spec.channels, spec.bits_per_sample) == (SAMPLE_RATE, 1, 16),
+            "{} is not 16-bit mono at {SAMPLE_RATE} Hz: run the extract stage again",
+            self.sound.display()
+        );
+        Ok(Samples { video: self, keypoints, motion, sound, next: 0 })
+    }
+}
+
+/// The samples of a video one after the other.
+pub struct Samples<'a> {
+    video: &'a Video,
+    keypoints: Keypoints,
+    motion: Motion,
+    sound: hound::WavReader<BufReader<File>>,
+    next: usize,
+}
+
+impl Samples<'_> {
+    /// The next interval's sample; `None` after the last.
+    pub fn next_sample(&mut self) -> Result<Option<Cut>> {
+        let Some(&interval) = self.video.intervals.intervals.get(self.next) else { return Ok(None) };
+        self.next += 1;
+        self.cut(interval).map(Some)
+    }
+
+    fn cut(&mut self, interval: Interval) -> Result<Cut> {
+        let (fps, frames) = (self.video.intervals.fps, s![interval.start..interval.end, .., ..]);
+        let motion = Motion {
+            fps,
+            joints: self.motion.joints.slice(frames).to_owned(),
+            mask: self.motion.mask.slice(s![interval.start..interval.end, ..]).to_owned(),
+        };
+        let points = [&self.keypoints.body, &self.keypoints.left_hand, &self.keypoints.right_hand];
+        let points = points.map(|part| part.slice(frames));
+        let pose2d = concatenate(Axis(1), &points).context("joining the keypoints")?;
+        let (sound, n_padded) = self.sound_of(interval)?;
+        let seen = |root: usize| {
+            let hand = motion.mask.slice(s![.., root..root + N_HAND_JOINTS]);
+            hand.iter().filter(|&&seen| seen).count() as f64 / hand.len().max(1) as f64
+        };
+        let meta = serde_json::json!({
+            "video": self.video.name,
+            "first_frame": interval.start,
+            "n_frames": interval.n_frames(),
+            "fps": fps,
+            "start_secs": fps.secs(interval.start),
+            "end_secs": fps.secs(interval.end),
+            "image_size": self.keypoints.image_size,
+            "left_hand_seen": seen(L_HAND),
+            "right_hand_seen": seen(R_HAND),
+            "sound_samples_padded": n_padded,
+        });
+        let key = format!("{}-{:06}", self.video.name, interval.start);
+        let padded_secs = n_padded as f64 / f64::from(SAMPLE_RATE);
+        Ok(Cut { sample: Sample { key, motion, pose2d, sound, meta }, padded_secs })
+    }
+
+    /// The sound under an interval, and how many samples of silence had to be appended.
+    fn sound_of(&mut self, interval: Interval) -> Result<(Sound, usize)> {
+        let reading = || format!("cannot read {}", self.video.sound.display());
+        let range = sync::samples_of(self.video.intervals.fps, SAMPLE_RATE, interval.start..interval.end);
+        let n_held = (self.sound.duration() as usize).clamp(range.start, range.end) - range.start;
+        let mut samples = Vec::with_capacity(range.len());
+        if n_held > 0 {
+            self.sound.seek(range.start as u32).with_context(reading)?;
+            for sample in self.sound.samples::<i16>().take(n_held) {
+                samples.push(f32::from(sample.with_context(reading)?) / 32_768.0);
+            }
+        }
+        let n_padded = range.len() - samples.len();
+        samples.resize(range.len(), 0.0);
+        Ok((Sound { rate: SAMPLE_RATE, samples }, n_padded))
+    }
+}

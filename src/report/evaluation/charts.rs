@@ -1,0 +1,165 @@
+//! Pictures of an evaluation: the share of correct keypoints of every joint on a figure, and how often each speed and jerk
+//! is made and real.
+
+use crate::evaluate::clips::clips::{Clip, Clips};
+use crate::evaluate::table::table::Table;
+use crate::report::html::chart::dots::{Dot, Label, dots};
+use crate::report::html::chart::histogram::Counts;
+use crate::report::html::chart::profile::profile;
+use crate::report::html::{Node, node};
+use crate::types::skeleton;
+use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, is_duplicate};
+use ndarray::ArrayView3;
+
+/// What a joint is called beside what share of its frames is correct, on a body and two hands.
+pub fn joints(table: &Table, clips: &Clips) -> Vec<Node> {
+    let alpha = table.settings.alphas.first().copied().unwrap_or(0.2);
+    let shares = shares(clips, alpha);
+    let body = |joint: usize| joint <= L_WRIST;
+    let place = |joint: usize| if body(joint) { body_place(joint) } else { hand_place(joint) };
+    let mut edges = Vec::new();
+    let mut all = Vec::new();
+    for joint in (0..N_JOINTS).filter(|joint| !is_duplicate(*joint)) {
+        // a finger's first bone begins at the wrist of the large hand
+        let parent = skeleton::parent(joint);
+        edges.extend(parent.map(|parent| [place(parent), place(joint)]));
+        if joint == NECK {
+            continue;
+        }
+        let says = match shares[joint].is_nan() {
+            true => format!("{}: never seen", skeleton::name(joint)),
+            false => format!("{}: {:.0} %", skeleton::name(joint), 100.0 * shares[joint]),
+        };
+        let radius = if body(joint) { 9.0 } else { 6.0 };
+        all.push(Dot { at: place(joint), share: shares[joint], radius, says });
+    }
+    let mean = |joints: &mut dyn Iterator<Item = usize>| {
+        let known: Vec<f64> = joints.map(|joint| shares[joint]).filter(|share| share.is_finite()).collect();
+        known.iter().sum::<f64>() / known.len() as f64
+    };
+    let label = |at: [f64; 2], what: &str, share: f64| Label { at, text: format!("{what} {:.0} %", 100.0 * share) };
+    let hand = |root: usize| mean(&mut (root + 1..root + skeleton::N_HAND_JOINTS));
+    let labels = [
+        label([180.0, 268.0], "arms", mean(&mut (R_SHOULDER..=L_WRIST))),
+        label([405.0, 268.0], "right hand", hand(R_HAND)),
+        label([640.0, 268.0], "left hand", hand(L_HAND)),
+    ];
+    let drawing = dots("Share of correct keypoints of every joint", [720.0, 280.0], &edges, &all, &labels);
+    let about = format!(
+        "How often each joint of the prediction lies within {alpha} of the real pose's largest extent (PCK) of where it \
+         should be, seen as the camera sees the speaker. Touch a joint for its name."
+    );
+    let scale = node("p").class("scale").children([
+        node("span").text("0 %"),
+        node("span").class("ramp").attr("aria-hidden", "true"),
+        node("span").text("100 % of the frames"),
+    ]);
+    vec![node("p").text(about), node("div").class("card scroll wide").child(drawing), scale]
+}
+
+/// The share of each joint, NaN where it is never seen.
+fn shares(clips: &Clips, alpha: f64) -> Vec<f64> {
+    let (mut right, mut seen) = (vec![0.0; N_JOINTS], vec![0.0; N_JOINTS]);
+    for clip in &clips.clips {
+        for t in 0..clip.n_frames() {
+            let joints: Vec<usize> = (NECK + 1..N_JOINTS).filter(|joint| clip.mask[[t, *joint]]).collect();
+            let side = |k: usize| {
+                let values = joints.iter().map(|joint| clip.real[[t, *joint, k]]);
+                let (low, high) =
+                    values.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+                f64::from(high - low)
+            };
+            let radius = alpha * (0..3).map(side).fold(0.0, f64::max);
+            for joint in joints {
+                let apart = |k: usize| f64::from(clip.made[[t, joint, k]] - clip.real[[t, joint, k]]).powi(2);
+                seen[joint] += 1.0;
+                right[joint] += f64::from(u8::from((0..3).map(apart).sum::<f64>().sqrt() <= radius));
+            }
+        }
+    }
+    right.iter().zip(&seen).map(|(right, seen)| right / seen).collect()
+}
+
+/// Where a joint of the body is drawn; the speaker's right is on the left.
+fn body_place(joint: usize) -> [f64; 2] {
+    let places =
+        [[180.0, 60.0], [120.0, 72.0], [84.0, 150.0], [112.0, 222.0], [240.0, 72.0], [276.0, 150.0], [248.0, 222.0]];
+    places[joint.min(L_WRIST)]
+}
+
+/// Where a joint of a hand is drawn, fingers up, the thumbs inside; the root of a hand stands for its wrist.
+fn hand_place(joint: usize) -> [f64; 2] {
+    let (root, sign, x) = if joint >= R_HAND { (R_HAND, 1.0, 405.0) } else { (L_HAND, -1.0, 640.0) };
+    let wrist = [x, 228.0];
+    if joint == root {
+        return wrist;
+    }
+    let (finger, bone) = ((joint - root - 1) / 4, (joint - root - 1) % 4);
+    let (degrees, first, step): (f64, f64, f64) =
+        [(48.0, 52.0, 24.0), (20.0, 84.0, 25.0), (3.0, 88.0, 27.0), (-13.0, 84.0, 25.0), (-30.0, 78.0, 20.0)][finger];
+    let (length, angle) = (first + step * bone as f64, degrees.to_radians());
+    [wrist[0] + sign * length * angle.sin(), wrist[1] - length * angle.cos()]
+}
+
+/// How often each speed and jerk of wrists and finger tips is made and real.
+pub fn speeds(clips: &Clips) -> Vec<Node> {
+    let wrists = [skeleton::R_WRIST, L_WRIST];
+    let tips: Vec<usize> = [L_HAND, R_HAND].iter().flat_map(|root| (1..=5).map(move |k| root + 4 * k)).collect();
+    let charts = [
+        ("Speed of the wrists", "m/s", &wrists[..], 1, 2.0),
+        ("Speed of the finger tips", "m/s", &tips[..], 1, 3.0),
+        ("Jerk of the wrists", "m/s\u{b3}", &wrists[..], 3, 600.0),
+        ("Jerk of the finger tips", "m/s\u{b3}", &tips[..], 3, 1500.0),
+    ];
+    let card = |(title, unit, joints, order, most): (&str, &str, &[usize], usize, f64)| {
+        let count = |of: fn(&Clip) -> ArrayView3<f32>| {
+            let mut counts = Counts::new(0.0, most, 48);
+            for clip in &clips.clips {
+                for &joint in joints {
+                    derivative(clip, of(clip), joint, order, clips.fps.per_sec()).for_each(|value| counts.add(value));
+                }
+            }
+            counts
+        };
+        let (real, made) = (count(|clip| clip.real.view()), count(|clip| clip.made.view()));
+        let medians = format!(
+            "median: truth {}, prediction {} {unit}",
+            crate::report::html::numbers::number(real.quantile(0.5)),
+            crate::report::html::numbers::number(made.quantile(0.5))
+        );
+        node("div")
+            .class("card speed")
+            .child(node("h3").text(title))
+            .child(profile(&format!("{title}: {medians}"), unit, &[("real", &real), ("made", &made)]))
+            .child(node("small").text(medians))
+    };
+    let about = "How often each value occurs (heights go with the square root of the share, so that rare values are seen; the \
+                 last bin holds what is beyond). Dashed: the medians.";
+    vec![node("p").text(about), legend(), node("div").class("grid").children(charts.into_iter().map(card))]
+}
+
+/// The norms of the differences of that order of a joint, per second to that power, where it is seen throughout.
+fn derivative<'a>(
+    clip: &'a Clip,
+    joints: ArrayView3<'a, f32>,
+    joint: usize,
+    order: usize,
+    fps: f64,
+) -> impl Iterator<Item = f64> + 'a {
+    let signs: &[f64] = if order == 1 { &[-1.0, 1.0] } else { &[-1.0, 3.0, -3.0, 1.0] };
+    let seen = move |t: &usize| (0..signs.len()).all(|k| clip.mask[[t + k, joint]]);
+    (0..clip.n_frames().saturating_sub(signs.len() - 1)).filter(seen).map(move |t| {
+        let difference = |axis: usize| -> f64 {
+            signs.iter().enumerate().map(|(k, sign)| sign * f64::from(joints[[t + k, joint, axis]])).sum()
+        };
+        (0..3).map(|axis| difference(axis).powi(2)).sum::<f64>().sqrt() * fps.powi(order as i32)
+    })
+}
+
+/// Which colour is whose.
+pub fn legend() -> Node {
+    let key = |class: &str, name: &str| {
+        node("li").child(node("span").class(format!("swatch line {class}"))).child(node("span").text(name))
+    };
+    node("ul").class("legend").children([key("real", "truth"), key("made", "prediction")])
+}

@@ -1,0 +1,83 @@
+//! The page of an evaluation: what the figures mean, all of them beside what defends them, how made and real motion look
+//! beside each other, and both playing with the sound. The same table and clips give the same bytes.
+
+use super::charts::{joints, speeds};
+use super::player;
+use super::player::Excerpt;
+use super::table;
+use crate::evaluate::clips::clips::Clips;
+use crate::evaluate::table::table::Table;
+use crate::evaluate::verdict::text;
+use crate::evaluate::verdict::verdict::{Answer, Verdict, better_than_nothing, hears};
+use crate::report::html::numbers::{counted, length};
+use crate::report::html::{Node, Page, Section, node};
+use anyhow::Result;
+use serde_json::json;
+
+/// The whole file.
+pub fn html(table: &Table, clips: &Clips, title: &str) -> Result<String> {
+    let excerpts = player::choose(clips)?;
+    let section = |id, title, body| Section { id, title, body };
+    let verdicts = [better_than_nothing(table), hears(table)];
+    let page = Page {
+        title: title.to_owned(),
+        lead: lead(table),
+        sections: vec![
+            section("meaning", "What it means", meaning(table, &verdicts)),
+            section("watch", "Truth and prediction", player::body(&excerpts, table)),
+            section("figures", "All figures", table::body(table)),
+            section("joints", "Which joints are right", joints(table, clips)),
+            section("speeds", "How fast it moves", speeds(clips)),
+            section("definitions", "Exact definitions", table::definitions(table)),
+        ],
+        style: include_str!("page.css"),
+        script: include_str!("player.js"),
+        data: json!({
+            "bones": player::bones(),
+            "excerpts": excerpts.iter().map(Excerpt::data).collect::<Vec<_>>(),
+        }),
+    };
+    Ok(page.html())
+}
+
+fn lead(table: &Table) -> String {
+    format!(
+        "{} of {}, {} of motion at {}{}.",
+        counted(table.n_clips, "clip"),
+        counted(table.n_frames, "frame"),
+        length(table.secs),
+        table.settings.fps,
+        if table.with_sound { ", with sound" } else { ", without sound" }
+    )
+}
+
+/// The two sentences, what the figures say to each, and what had to be assumed.
+fn meaning(table: &Table, verdicts: &[Verdict; 2]) -> Vec<Node> {
+    let card = |verdict: &Verdict| {
+        let class = format!("card verdict {}", verdict.word.replace(' ', "-"));
+        let votes = verdict.votes.iter().map(|vote| {
+            let (class, words) = match vote.answer {
+                Answer::Yes => ("better", "better than"),
+                Answer::No => ("worse", "worse than"),
+                Answer::Undecided => ("undecided", "not told apart from"),
+            };
+            let says = format!("{}: {words} {}", vote.figure, vote.against.name());
+            node("li").class(format!("vote {class}")).text(says)
+        });
+        let card = node("div").class(class).child(node("p").text(&verdict.sentence));
+        card.child(node("ul").class("votes").children(votes))
+    };
+    let mut body = vec![node("div").class("verdicts").children(verdicts.iter().map(card))];
+    let rows = table.rows.iter().map(|row| {
+        let name = node("th").attr("scope", "row").text(row.who.name());
+        node("tr").child(name).child(node("td").text(&row.says))
+    });
+    body.push(node("h3").text("What is measured beside each other"));
+    body.push(node("table").class("who").child(node("tbody").children(rows)));
+    let notes: Vec<String> = table.notes.iter().cloned().chain(text::undefined(table)).collect();
+    if !notes.is_empty() {
+        body.push(node("h3").text("Notes"));
+        body.push(node("ul").class("notes").children(notes.iter().map(|note| node("li").text(note))));
+    }
+    body
+}

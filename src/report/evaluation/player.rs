@@ -1,0 +1,261 @@
+//! Excerpts of an evaluation to watch: the best, the typical and the worst by the error of the joints, truth and prediction
+//! side by side with the sound, and under them the wrists and the beats over time. A minute at most, motion to a
+//! millimetre, so that the page stays small.
+
+use super::charts::legend;
+use crate::evaluate::clips::clips::{Clip, Clips};
+use crate::evaluate::table::table::Table;
+use crate::metrics::beat::consistency;
+use crate::report::html::chart::tracks::{Lane, lanes};
+use crate::report::html::numbers::clock;
+use crate::report::html::picture::base64;
+use crate::report::html::{Node, node};
+use crate::types::skeleton;
+use crate::types::skeleton::{L_WRIST, N_JOINTS, R_WRIST, is_duplicate};
+use crate::types::sound::SAMPLE_RATE;
+use anyhow::Result;
+use ndarray::ArrayView3;
+use serde_json::{Value, json};
+use std::ops::Range;
+
+/// Longest excerpt, and most frames of it a second.
+const MOST_SECS: f64 = 20.0;
+const MOST_FPS: f64 = 30.0;
+/// A joint that is not there.
+const MISSING: i16 = i16::MIN;
+/// Order of a beat, as the beat consistency has it: 7 frames of 30 a second on either side are faster.
+const BEAT_SECS: f64 = 7.0 / 30.0;
+
+/// A stretch of a clip to watch.
+pub struct Excerpt {
+    pub name: String,
+    pub secs: f64,
+    fps: f64,
+    /// i16 millimetres [T, 49, 3], little endian.
+    real: Vec<u8>,
+    made: Vec<u8>,
+    /// A wav file.
+    sound: Option<Vec<u8>>,
+    lanes: Vec<Lane>,
+}
+
+/// The excerpts: of all stretches of at most `MOST_SECS` that with the least, the median and the largest error.
+pub fn choose(clips: &Clips) -> Result<Vec<Excerpt>> {
+    let mut stretches: Vec<(f64, usize, Range<usize>)> = Vec::new();
+    for (i, clip) in clips.clips.iter().enumerate() {
+        let n = (clips.fps.secs(clip.n_frames()) / MOST_SECS).ceil().max(1.0) as usize;
+        for k in 0..n {
+            let frames = k * clip.n_frames() / n..(k + 1) * clip.n_frames() / n;
+            let error = error_mm(clip, frames.clone());
+            if error.is_finite() && frames.len() > 1 {
+                stretches.push((error, i, frames));
+            }
+        }
+    }
+    stretches.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2.start).cmp(&(b.1, b.2.start))));
+    let n = stretches.len();
+    let chosen: &[(&str, usize)] = match n {
+        0 => &[],
+        1 => &[("all of it", 0)],
+        2 => &[("better", 0), ("worse", 1)],
+        n => &[("best", 0), ("typical", n / 2), ("worst", n - 1)],
+    };
+    let chosen = chosen.iter().map(|(word, at)| {
+        let (error, clip, frames) = &stretches[*at];
+        excerpt(word, *error, &clips.clips[*clip], frames.clone(), clips.fps.per_sec())
+    });
+    chosen.collect()
+}
+
+/// Mean error of the joints, mm; NaN where nothing is seen.
+fn error_mm(clip: &Clip, frames: Range<usize>) -> f64 {
+    let (mut sum, mut n) = (0.0, 0.0);
+    for t in frames {
+        for joint in (1..N_JOINTS).filter(|joint| clip.mask[[t, *joint]]) {
+            let apart = |k: usize| f64::from(clip.made[[t, joint, k]] - clip.real[[t, joint, k]]).powi(2);
+            sum += 1000.0 * (0..3).map(apart).sum::<f64>().sqrt();
+            n += 1.0;
+        }
+    }
+    sum / n
+}
+
+fn excerpt(word: &str, error: f64, clip: &Clip, frames: Range<usize>, fps: f64) -> Result<Excerpt> {
+    let (start, end) = (frames.start as f64 / fps, frames.end as f64 / fps);
+    let step = (fps / MOST_FPS).ceil().max(1.0) as usize;
+    let samples = clip.voice.as_ref().map(|voice| voice.samples(start, end)).transpose()?;
+    let shown: Vec<usize> = frames.clone().step_by(step).collect();
+    Ok(Excerpt {
+        name: format!("{word}: {} from {} to {} ({error:.0} mm)", clip.name, clock(start), clock(end)),
+        secs: end - start,
+        fps: fps / step as f64,
+        real: millimetres(clip.real.view(), &shown),
+        made: millimetres(clip.made.view(), &shown),
+        lanes: lanes_of(clip, frames, fps, samples.as_deref()),
+        sound: samples.map(|samples| wav(&samples)),
+    })
+}
+
+fn millimetres(joints: ArrayView3<f32>, frames: &[usize]) -> Vec<u8> {
+    let mm = |v: f32| if v.is_finite() { (1000.0 * v).round().clamp(-32_000.0, 32_000.0) as i16 } else { MISSING };
+    let numbers =
+        frames.iter().flat_map(|t| joints.index_axis(ndarray::Axis(0), *t).iter().map(|v| mm(*v)).collect::<Vec<_>>());
+    numbers.flat_map(i16::to_le_bytes).collect()
+}
+
+/// A wav file of 16 bits, mono.
+fn wav(samples: &[i16]) -> Vec<u8> {
+    let n_bytes = 2 * samples.len() as u32;
+    let mut file = Vec::with_capacity(44 + n_bytes as usize);
+    file.extend(b"RIFF");
+    file.extend((36 + n_bytes).to_le_bytes());
+    file.extend(b"WAVEfmt ");
+    file.extend(16u32.to_le_bytes());
+    file.extend(1u16.to_le_bytes());
+    file.extend(1u16.to_le_bytes());
+    file.extend(SAMPLE_RATE.to_le_bytes());
+    file.extend((2 * SAMPLE_RATE).to_le_bytes());
+    file.extend(2u16.to_le_bytes());
+    file.extend(16u16.to_le_bytes());
+    file.extend(b"data");
+    file.extend(n_bytes.to_le_bytes());
+    file.extend(samples.iter().flat_map(|sample| sample.to_le_bytes()));
+    file
+}
+
+/// Heights and speeds of the wrists over time, the loudness with its onsets, and the beats of the motion.
+fn lanes_of(clip: &Clip, frames: Range<usize>, fps: f64, samples: Option<&[i16]>) -> Vec<Lane> {
+    let secs = |t: usize| (t - frames.start) as f64 / fps;
+    let both: [(&str, ArrayView3<f32>); 2] = [("real", clip.real.view()), ("made", clip.made.view())];
+    let height = |name: &str, joint: usize| Lane {
+        name: name.to_owned(),
+        lines: both
+            .map(|(class, joints)| {
+                let value = |t: usize| if clip.mask[[t, joint]] { -f64::from(joints[[t, joint, 1]]) } else { f64::NAN };
+                (class, frames.clone().map(|t| [secs(t), value(t)]).collect())
+            })
+            .to_vec(),
+        marks: Vec::new(),
+    };
+    let mut all = vec![height("right wrist, up and down", R_WRIST), height("left wrist, up and down", L_WRIST)];
+    if let Some(samples) = samples {
+        let per_point = (SAMPLE_RATE / 25) as usize;
+        let loud = samples.chunks(per_point).enumerate().map(|(i, piece)| {
+            let power = piece.iter().map(|s| (f64::from(*s) / 32_768.0).powi(2)).sum::<f64>() / piece.len() as f64;
+            [i as f64 / 25.0, power.sqrt()]
+        });
+        all.push(Lane {
+            name: "loudness of the sound".to_owned(),
+            lines: vec![("sound", loud.collect())],
+            marks: Vec::new(),
+        });
+    }
+    let order = ((BEAT_SECS * fps).round() as usize).max(1);
+    let (mut lines, mut marks) = (Vec::new(), Vec::new());
+    for (class, joints) in both {
+        let speeds: Vec<f64> = frames.clone().map(|t| wrist_speed(clip, joints, &frames, t, fps)).collect();
+        marks.push((class, consistency::minima(&speeds, order).into_iter().map(|i| i as f64 / fps).collect()));
+        lines.push((class, speeds.iter().enumerate().map(|(i, speed)| [i as f64 / fps, *speed]).collect()));
+    }
+    all.push(Lane { name: "speed of the wrists".to_owned(), lines, marks: Vec::new() });
+    if let Some(heard) = clip.heard.as_ref().filter(|_| samples.is_some()) {
+        let (start, end) = (frames.start as f64 / fps, frames.end as f64 / fps);
+        let onsets = heard.onsets.iter().filter(|onset| (start..end).contains(*onset)).map(|onset| onset - start);
+        marks.push(("onset", onsets.collect()));
+    }
+    let name =
+        "beats: from above the onsets of the sound, where the prediction's wrists are slowest, where the truth's are";
+    let name = if marks.len() == 3 {
+        name
+    } else {
+        "beats: above, where the prediction's wrists are slowest; below, where the truth's are"
+    };
+    all.push(Lane { name: name.to_owned(), lines: Vec::new(), marks });
+    all
+}
+
+/// Mean speed of the two wrists by central differences, m/s.
+fn wrist_speed(clip: &Clip, joints: ArrayView3<f32>, frames: &Range<usize>, t: usize, fps: f64) -> f64 {
+    let (before, after) = (t.saturating_sub(1).max(frames.start), (t + 1).min(frames.end - 1));
+    let of = |joint: usize| {
+        if !(clip.mask[[before, joint]] && clip.mask[[after, joint]]) {
+            return f64::NAN;
+        }
+        let apart = |k: usize| f64::from(joints[[after, joint, k]] - joints[[before, joint, k]]).powi(2);
+        (0..3).map(apart).sum::<f64>().sqrt() * fps / (after - before).max(1) as f64
+    };
+    (of(R_WRIST) + of(L_WRIST)) / 2.0
+}
+
+impl Excerpt {
+    /// What the script reads.
+    pub fn data(&self) -> Value {
+        json!({
+            "secs": self.secs,
+            "fps": self.fps,
+            "real": base64(&self.real),
+            "made": base64(&self.made),
+            "sound": self.sound.as_deref().map(base64),
+        })
+    }
+}
+
+/// Child, parent and side (0 middle, 1 left, 2 right) of every bone.
+pub fn bones() -> Vec<[usize; 3]> {
+    let bone = |joint: usize| {
+        let side = match skeleton::side(joint) {
+            skeleton::Side::Centre => 0,
+            skeleton::Side::Left => 1,
+            skeleton::Side::Right => 2,
+        };
+        skeleton::parent(joint).map(|parent| [joint, parent, side])
+    };
+    (0..N_JOINTS).filter(|joint| !is_duplicate(*joint)).filter_map(bone).collect()
+}
+
+/// The player and the charts under it.
+pub fn body(excerpts: &[Excerpt], table: &Table) -> Vec<Node> {
+    if excerpts.is_empty() {
+        return vec![node("p").class("empty").text("There is no stretch with motion on both sides to show.")];
+    }
+    let option = |(i, excerpt): (usize, &Excerpt)| node("option").attr("value", i).text(&excerpt.name);
+    let select = node("select").id("excerpt").children(excerpts.iter().enumerate().map(option));
+    let stage = |id: &str, name: &str| {
+        let canvas =
+            node("canvas").id(id).attr("width", 480).attr("height", 400).attr("role", "img").attr("aria-label", name);
+        node("figure").class(id).child(node("figcaption").text(name)).child(canvas)
+    };
+    let range = |id: &str, label: &str, [low, high, at, step]: [&str; 4]| {
+        let slider = node("input").attr("type", "range").id(id).attr("aria-label", label);
+        slider.attr("min", low).attr("max", high).attr("value", at).attr("step", step)
+    };
+    let controls = node("div").class("controls").children([
+        node("button").id("play").attr("type", "button").text("Play"),
+        range("at", "Place in the excerpt", ["0", "1", "0", "0.01"]),
+        node("output").id("clock").text("0.0 s"),
+    ]);
+    let turn = node("div").class("controls").children([
+        node("label").attr("for", "turn").text("Turn"),
+        range("turn", "Turn the figures", ["-90", "90", "0", "1"]),
+        node("output").id("degrees").text("0\u{b0}"),
+    ]);
+    let player = node("div").class("card player").id("player").children([
+        node("div").class("controls").child(node("label").attr("for", "excerpt").text("Excerpt")).child(select),
+        node("div").class("stages").child(stage("real", "truth")).child(stage("made", "prediction")),
+        controls,
+        turn,
+        node("p").id("told").class("small").attr("role", "status"),
+    ]);
+    let charts = excerpts.iter().enumerate().map(|(i, excerpt)| {
+        let chart = lanes(&format!("Wrists and beats, {}", excerpt.name), excerpt.secs, &excerpt.lanes);
+        let card =
+            node("div").class("card scroll wide over-time").attr("data-excerpt", i).attr("data-secs", excerpt.secs);
+        card.child(chart)
+    });
+    let about = format!(
+        "Excerpts chosen by the mean error of the joints. Both figures are seen as the camera sees the speaker, who faces \
+         you{}. The lines under them are of the same excerpt.",
+        if table.with_sound { "" } else { "; no sound was given" }
+    );
+    [node("p").text(about), player, legend()].into_iter().chain(charts).collect()
+}

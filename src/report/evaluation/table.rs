@@ -1,0 +1,109 @@
+//! The figures of an evaluation as a table, and their exact definitions.
+
+use crate::evaluate::baseline::baselines::Who;
+use crate::evaluate::table::table::{N_COSTLY_DRAWS, N_DRAWS, Table};
+use crate::evaluate::verdict::labels;
+use crate::evaluate::verdict::verdict::{Answer, against_nothing};
+use crate::metrics::catalogue::{Better, Definition};
+use crate::report::html::{Node, node};
+
+/// Groups of figures by the beginnings of their names; the last takes what is left.
+const GROUPS: [(&str, &[&str]); 4] = [
+    ("Where the joints are", &["pck", "l1", "mpjpe", "p_mpjpe", "maje", "mae", "acceleration_error"]),
+    ("Which poses and movements", &["frechet", "l1div", "diversity", "pairwise", "average_pairwise", "apd", "cca"]),
+    ("How fast it moves", &["speed", "acceleration", "jerk", "hellinger", "energy", "bone"]),
+    ("Sound and the rest", &[""]),
+];
+
+/// The table.
+pub fn body(table: &Table) -> Vec<Node> {
+    let head = |text: &str| node("th").attr("scope", "col").class("num").text(text);
+    let heads = table.rows.iter().map(|row| head(row.who.name()));
+    let first = node("th").attr("scope", "col").text("");
+    let against = node("th").attr("scope", "col").class("against").text("against doing nothing");
+    let width = table.rows.len() + 2;
+    let mut rows: Vec<Node> = Vec::new();
+    for (group, (title, _)) in GROUPS.iter().enumerate() {
+        let of_group = (0..table.definitions.len()).filter(|i| group_of(&table.definitions[*i]) == group);
+        let mut last = String::new();
+        let shown: Vec<Node> = of_group.filter_map(|index| row(table, index, &mut last)).collect();
+        if !shown.is_empty() {
+            let title = node("th").attr("colspan", width).attr("scope", "rowgroup").text(title);
+            rows.push(node("tr").class("group").child(title));
+            rows.extend(shown);
+        }
+    }
+    let drawn = format!(
+        "In brackets, or under the pointer: 95 % intervals of {N_DRAWS} draws of the blocks (Frechet distances and correlations: {N_COSTLY_DRAWS}). \
+         Against doing nothing: the prediction beside the better of the poses that never move, on the same draws: better, \
+         worse, or not told apart."
+    );
+    let table = node("table")
+        .class("figures")
+        .child(node("thead").child(node("tr").child(first).child(against).children(heads)))
+        .child(node("tbody").children(rows));
+    vec![node("p").class("small").text(drawn), node("div").class("scroll").attr("tabindex", "0").child(table)]
+}
+
+fn group_of(definition: &Definition) -> usize {
+    // acceleration_error is an error of places, acceleration is none: the longest beginning counts
+    let starts =
+        GROUPS.iter().enumerate().flat_map(|(group, (_, starts))| starts.iter().map(move |start| (group, *start)));
+    let fitting = starts.filter(|(_, start)| definition.name.starts_with(start));
+    fitting.max_by_key(|(_, start)| start.len()).map_or(GROUPS.len() - 1, |(group, _)| group)
+}
+
+/// A figure; none that nobody has. Of one that differs from the `last` in its part alone only the part is named.
+fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
+    let definition = &table.definitions[index];
+    let has_value = table.rows.iter().any(|row| row.values[index].value.is_finite());
+    if definition.better == Better::Neither || !has_value {
+        return None;
+    }
+    let whole = labels::whole_name(definition);
+    let is_part = *last == whole && !labels::part(definition).is_empty();
+    let name = node("th").attr("scope", "row").attr("title", definition.formula);
+    let name = if is_part {
+        name.class("part").child(node("span").class("unseen").text(format!("{whole}, "))).text(labels::part(definition))
+    } else {
+        let unit = labels::unit(definition);
+        let unit = if unit.is_empty() { String::new() } else { format!("{unit}, ") };
+        let small = format!("{unit}{}", labels::direction(definition.better));
+        name.text(labels::name(definition)).child(node("small").text(small))
+    };
+    *last = whole;
+    let against = match against_nothing(table, index) {
+        Some(Answer::Yes) => ("yes", "better"),
+        Some(Answer::No) => ("no", "worse"),
+        Some(Answer::Undecided) => ("undecided", "not told apart"),
+        None => ("", ""),
+    };
+    let cells = table.rows.iter().map(|row| {
+        let estimate = &row.values[index];
+        let cell = node("td").class(if row.who == Who::Prediction { "num own" } else { "num" });
+        let cell = cell.text(labels::number(definition, estimate.value));
+        if !(estimate.low.is_finite() && estimate.high.is_finite()) {
+            return cell;
+        }
+        let [low, high] = [estimate.low, estimate.high].map(|value| labels::number(definition, value));
+        let interval = format!("[{low}, {high}]");
+        if row.who == Who::Prediction { cell.child(node("small").text(interval)) } else { cell.attr("title", interval) }
+    });
+    let against = node("td").class(format!("against {}", against.0)).text(against.1);
+    Some(node("tr").child(name).child(against).children(cells))
+}
+
+/// Every definition with its parameters and hash, those of the real motion alone too.
+pub fn definitions(table: &Table) -> Vec<Node> {
+    let item = |definition: &Definition| {
+        let name = node("summary").text(labels::name(definition));
+        let formula = node("p").text(format!("{}.", definition.formula));
+        let parameters = node("p").class("small").child(node("code").text(&definition.parameters));
+        let hash = format!("{} ({}), hash {}", definition.name, definition.part, definition.hash());
+        let hash = node("p").class("small").child(node("code").text(hash));
+        node("details").child(name).child(formula).child(parameters).child(hash)
+    };
+    let about = "Values are comparable where their hash is the same: it is of the definition and of every parameter. \
+                 `orator evaluate compare A.json B.json` refuses the others.";
+    vec![node("p").text(about), node("div").class("definitions").children(table.definitions.iter().map(item))]
+}

@@ -1,0 +1,35 @@
+//! Parts of a whole as bars in a table.
+
+use crate::report::html::node::{Node, node};
+use crate::report::html::numbers::{length, percent};
+
+/// A part.
+pub struct Bar {
+    pub name: String,
+    /// What colours it.
+    pub class: String,
+    pub secs: f64,
+    /// What it means, in a sentence; may be empty.
+    pub says: String,
+}
+
+/// A row a part, in the order given; `whole_secs` is what the shares are of.
+pub fn bars(caption: &str, parts: &[Bar], whole_secs: f64) -> Node {
+    let longest = parts.iter().map(|part| part.secs).fold(0.0, f64::max).max(1e-9);
+    let row = |part: &Bar| {
+        let bar = node("div")
+            .class(format!("bar {}", part.class))
+            .attr("style", format!("width:{:.2}%", 100.0 * part.secs / longest));
+        let name = node("th").attr("scope", "row").text(&part.name);
+        let name = if part.says.is_empty() { name } else { name.child(node("small").text(&part.says)) };
+        node("tr")
+            .child(name)
+            .child(node("td").class("barcell").child(bar))
+            .child(node("td").class("num").text(length(part.secs)))
+            .child(node("td").class("num").text(percent(part.secs, whole_secs)))
+    };
+    node("table")
+        .class("bars")
+        .child(node("caption").class("unseen").text(caption))
+        .child(node("tbody").children(parts.iter().map(row)))
+}

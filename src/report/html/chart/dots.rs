@@ -1,0 +1,60 @@
+//! Dots on a drawing of lines, each coloured by a share of a whole.
+
+use super::scale::{drawing, line, px, words};
+use crate::report::html::node::{Node, node};
+
+/// A dot.
+#[derive(Clone, Debug)]
+pub struct Dot {
+    pub at: [f64; 2],
+    /// 0..1; NaN: not known.
+    pub share: f64,
+    pub radius: f64,
+    /// What is shown under the pointer and read out.
+    pub says: String,
+}
+
+/// Words on the drawing.
+#[derive(Clone, Debug)]
+pub struct Label {
+    pub at: [f64; 2],
+    pub text: String,
+}
+
+/// The drawing of `size` units.
+pub fn dots(label: &str, size: [f64; 2], edges: &[[[f64; 2]; 2]], dots: &[Dot], labels: &[Label]) -> Node {
+    let mut svg = drawing(size[0], size[1], label).class("dots");
+    for [from, to] in edges {
+        svg = svg.child(line("edge", *from, *to));
+    }
+    for dot in dots {
+        let circle = node("g").child(node("title").text(&dot.says)).child(
+            node("circle")
+                .class(if dot.share.is_nan() { "share unknown" } else { "share" })
+                .attr("cx", px(dot.at[0]))
+                .attr("cy", px(dot.at[1]))
+                .attr("r", px(dot.radius))
+                .attr("style", format!("--share:{:.0}%", 100.0 * dot.share.clamp(0.0, 1.0))),
+        );
+        svg = svg.child(circle);
+    }
+    for label in labels {
+        svg = svg.child(words("name", label.at, "middle", &label.text));
+    }
+    svg
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dot_has_its_share_and_its_words() {
+        let dot = |share| Dot { at: [3.0, 4.0], share, radius: 2.0, says: "R<Wrist>: 40 %".to_owned() };
+        let label = Label { at: [1.0, 1.0], text: "hand".to_owned() };
+        let drawn =
+            dots("a", [9.0, 9.0], &[[[0.0, 0.0], [3.0, 4.0]]], &[dot(0.4), dot(f64::NAN)], &[label]).to_string();
+        assert!(drawn.contains("--share:40%") && drawn.contains("<title>R&lt;Wrist&gt;: 40 %</title>"), "{drawn}");
+        assert!(drawn.contains("share unknown") && drawn.contains("edge"), "{drawn}");
+    }
+}

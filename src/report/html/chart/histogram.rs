@@ -1,0 +1,127 @@
+//! How often each value was measured, with the threshold marked and the side that does not pass in another colour.
+
+use super::scale::{Scale, drawing, line, px, rect, words};
+use crate::report::html::node::Node;
+use crate::report::html::numbers::{number, with_unit};
+
+/// Counts in bins of equal width from `low` to `high`; the outer bins hold what is beyond as well.
+#[derive(Clone, Debug)]
+pub struct Counts {
+    pub low: f64,
+    pub high: f64,
+    pub bins: Vec<u64>,
+    /// Values that were not known.
+    pub unknown: u64,
+}
+
+impl Counts {
+    pub fn new(low: f64, high: f64, n_bins: usize) -> Self {
+        Self { low, high, bins: vec![0; n_bins.max(1)], unknown: 0 }
+    }
+
+    /// Counts a value.
+    pub fn add(&mut self, value: f64) {
+        if value.is_nan() {
+            self.unknown += 1;
+            return;
+        }
+        let share = (value - self.low) / (self.high - self.low);
+        let bin = ((share * self.bins.len() as f64 + 1e-6).max(0.0) as usize).min(self.bins.len() - 1);
+        self.bins[bin] += 1;
+    }
+
+    /// Known values.
+    pub fn total(&self) -> u64 {
+        self.bins.iter().sum()
+    }
+
+    /// Where bin `bin` begins.
+    pub fn edge(&self, bin: usize) -> f64 {
+        self.low + (self.high - self.low) * bin as f64 / self.bins.len() as f64
+    }
+
+    /// The value below which `share` of all lie, as if those of a bin were spread evenly over it; NaN of nothing.
+    pub fn quantile(&self, share: f64) -> f64 {
+        let wanted = share * self.total() as f64;
+        let mut before = 0.0;
+        for (bin, count) in self.bins.iter().enumerate().filter(|(_, count)| **count > 0) {
+            let count = *count as f64;
+            if before + count >= wanted {
+                let inside = ((wanted - before) / count).clamp(0.0, 1.0);
+                return self.edge(bin) + inside * (self.edge(bin + 1) - self.edge(bin));
+            }
+            before += count;
+        }
+        f64::NAN
+    }
+}
+
+/// A threshold on a drawing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Threshold {
+    pub value: f64,
+    /// Values below it do not pass; otherwise those above.
+    pub is_least: bool,
+}
+
+const WIDTH: f64 = 340.0;
+const HEIGHT: f64 = 150.0;
+const TOP: f64 = 22.0;
+const FLOOR: f64 = 122.0;
+const LEFT: f64 = 8.0;
+const RIGHT: f64 = 332.0;
+
+/// The drawing. Heights go with the square root of the share, so that rare values are seen beside frequent ones.
+pub fn histogram(label: &str, counts: &Counts, unit: &str, threshold: Option<Threshold>) -> Node {
+    let x = Scale { low: counts.low, high: counts.high, from: LEFT, to: RIGHT };
+    let most = counts.bins.iter().copied().max().unwrap_or(0).max(1) as f64;
+    let mut svg = drawing(WIDTH, HEIGHT, label);
+    for (bin, &count) in counts.bins.iter().enumerate().filter(|(_, count)| **count > 0) {
+        let (from, to) = (counts.edge(bin), counts.edge(bin + 1));
+        let middle = (from + to) / 2.0;
+        let fails = threshold.is_some_and(|t| if t.is_least { middle < t.value } else { middle > t.value });
+        let height = ((count as f64 / most).sqrt() * (FLOOR - TOP)).max(1.0);
+        let class = if fails { "bin fails" } else { "bin" };
+        let (left, right) = (x.at(from), x.at(to));
+        svg = svg.child(rect(class, [left + 0.4, FLOOR - height], [(right - left - 0.8).max(0.5), height]));
+    }
+    svg = svg.child(line("axis", [LEFT, FLOOR], [RIGHT, FLOOR]));
+    for tick in x.ticks(6) {
+        let at = x.at(tick);
+        let anchor = if at < LEFT + 10.0 {
+            "start"
+        } else if at > RIGHT - 10.0 {
+            "end"
+        } else {
+            "middle"
+        };
+        svg = svg.child(line("axis", [at, FLOOR], [at, FLOOR + 4.0]));
+        svg = svg.child(words("tick", [at, FLOOR + 17.0], anchor, &number(tick)));
+    }
+    if let Some(Threshold { value, is_least }) = threshold {
+        let at = x.at(value);
+        let anchor = if at > (LEFT + RIGHT) / 2.0 { "end" } else { "start" };
+        let says = format!("at {} {}", if is_least { "least" } else { "most" }, with_unit(value, unit));
+        svg = svg.child(line("threshold", [at, TOP - 8.0], [at, FLOOR]).attr("data-x", px(at)));
+        svg = svg.child(words("mark", [if anchor == "end" { at - 4.0 } else { at + 4.0 }, TOP - 9.0], anchor, &says));
+    }
+    svg
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_value_is_counted_and_quantiles_lie_where_they_should() {
+        let mut counts = Counts::new(0.0, 1.0, 10);
+        (0..100).for_each(|i| counts.add(f64::from(i) / 100.0));
+        [f64::NAN, -3.0, 7.0].into_iter().for_each(|value| counts.add(value));
+        assert_eq!((counts.total(), counts.unknown, counts.bins[0], counts.bins[9]), (102, 1, 11, 11));
+        assert!((counts.quantile(0.5) - 0.45).abs() < 0.11 && counts.quantile(1.0) > 0.9);
+        assert!(Counts::new(0.0, 1.0, 4).quantile(0.5).is_nan());
+        let drawn = histogram("", &counts, "s", Some(Threshold { value: 0.3, is_least: true })).to_string();
+        assert_eq!((drawn.matches("\"bin\"").count(), drawn.matches("\"bin fails\"").count()), (7, 3));
+        assert!(drawn.contains("at least 0.3 s"));
+    }
+}

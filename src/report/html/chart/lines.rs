@@ -1,0 +1,151 @@
+//! Lines over the steps of a training, with levels to compare them with and one step marked.
+
+use super::scale::{Scale, drawing, line, px, words};
+use crate::report::html::node::{Node, node};
+use crate::report::html::numbers::number;
+
+const WIDTH: f64 = 360.0;
+const HEIGHT: f64 = 190.0;
+const TOP: f64 = 12.0;
+const FLOOR: f64 = 160.0;
+const LEFT: f64 = 44.0;
+const RIGHT: f64 = 350.0;
+
+/// What a chart shows.
+#[derive(Clone, Debug, Default)]
+pub struct Chart {
+    pub title: String,
+    /// What it means, in a sentence.
+    pub says: String,
+    pub lines: Vec<Line>,
+    /// Levels across the whole width.
+    pub levels: Vec<Level>,
+    /// The step that is marked.
+    pub marked: Option<f64>,
+}
+
+/// A line.
+#[derive(Clone, Debug)]
+pub struct Line {
+    pub name: String,
+    /// Which of the colours, from 0.
+    pub colour: usize,
+    /// Step and value, by step; what is not finite is left out.
+    pub places: Vec<[f64; 2]>,
+}
+
+/// A level.
+#[derive(Clone, Debug)]
+pub struct Level {
+    pub name: String,
+    pub colour: usize,
+    pub value: f64,
+}
+
+impl Chart {
+    /// Whether there is anything to show.
+    pub fn is_empty(&self) -> bool {
+        self.places().next().is_none()
+    }
+
+    /// From the first to the last step, and from 0 (or the least value below it) to the largest value.
+    pub fn ranges(&self) -> [[f64; 2]; 2] {
+        let levels = self.levels.iter().map(|level| level.value).filter(|value| value.is_finite());
+        let around = |values: &mut dyn Iterator<Item = f64>, low: f64| {
+            values.fold([low, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+        };
+        let steps = around(&mut self.places().map(|[step, _]| step), f64::INFINITY);
+        let values = around(&mut self.places().map(|[_, value]| value).chain(levels), 0.0);
+        [steps, values]
+            .map(|[low, high]| if high > low { [low, high] } else { [low.min(0.0), low.max(0.0) + 1.0] })
+            .map(|range| if range.iter().all(|v| v.is_finite()) { range } else { [0.0, 1.0] })
+    }
+
+    /// Round numbers on the axis of the values.
+    pub fn ticks(&self) -> Vec<f64> {
+        let [_, [low, high]] = self.ranges();
+        Scale { low, high, from: 0.0, to: 1.0 }.ticks(4)
+    }
+
+    /// The card: title, drawing, what the colours are.
+    pub fn card(&self) -> Node {
+        let mut card = node("div").class("card chart").child(node("h3").text(&self.title));
+        if !self.says.is_empty() {
+            card = card.child(node("p").class("small").text(&self.says));
+        }
+        let key = |class: &str, colour: usize, name: &str| {
+            node("li")
+                .child(node("span").class(format!("swatch {class} colour-{colour}")))
+                .child(node("span").text(name))
+        };
+        let legend = node("ul").class("legend");
+        let legend = legend.children(self.lines.iter().map(|line| key("drawn", line.colour, &line.name)));
+        let legend = legend.children(self.levels.iter().map(|level| key("level", level.colour, &level.name)));
+        card.child(self.svg()).child(legend)
+    }
+
+    fn svg(&self) -> Node {
+        let [[first, last], [low, high]] = self.ranges();
+        let x = Scale { low: first, high: last, from: LEFT, to: RIGHT };
+        let y = Scale { low, high, from: FLOOR, to: TOP };
+        let mut svg = drawing(WIDTH, HEIGHT, &format!("{} over the steps", self.title));
+        for tick in self.ticks() {
+            svg = svg.child(line("grid", [LEFT, y.at(tick)], [RIGHT, y.at(tick)]));
+            svg = svg.child(words("tick", [LEFT - 6.0, y.at(tick) + 4.0], "end", &number(tick)));
+        }
+        for tick in x.ticks(4) {
+            svg = svg.child(words("tick", [x.at(tick), FLOOR + 16.0], "middle", &number(tick)));
+        }
+        svg = svg.child(line("axis", [LEFT, FLOOR], [RIGHT, FLOOR]));
+        if let Some(step) = self.marked {
+            svg = svg.child(line("configured", [x.at(step), TOP], [x.at(step), FLOOR]));
+        }
+        for level in self.levels.iter().filter(|level| level.value.is_finite()) {
+            let class = format!("level colour-{}", level.colour);
+            svg = svg.child(line(&class, [LEFT, y.at(level.value)], [RIGHT, y.at(level.value)]));
+        }
+        for drawn in &self.lines {
+            let finite = drawn.places.iter().filter(|place| place.iter().all(|v| v.is_finite()));
+            let places: Vec<String> =
+                finite.map(|[step, value]| format!("{} {}", px(x.at(*step)), px(y.at(*value)))).collect();
+            if !places.is_empty() {
+                let class = format!("stroke colour-{}", drawn.colour);
+                svg = svg.child(node("path").class(class).attr("d", format!("M{}", places.join(" L"))));
+            }
+            if let ([only], true) = (drawn.places.as_slice(), places.len() == 1) {
+                let dot = node("circle").class("dot").attr("cx", px(x.at(only[0]))).attr("cy", px(y.at(only[1])));
+                svg = svg.child(dot.attr("r", "3"));
+            }
+        }
+        svg
+    }
+
+    fn places(&self) -> impl Iterator<Item = [f64; 2]> {
+        let all = self.lines.iter().flat_map(|line| line.places.iter().copied());
+        all.filter(|place| place.iter().all(|v| v.is_finite()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_levels_and_the_mark_are_drawn() {
+        let places = vec![[0.0, 4.0], [50.0, f64::NAN], [100.0, 2.0]];
+        let chart = Chart {
+            title: "A < b".to_owned(),
+            lines: vec![Line { name: "made".to_owned(), colour: 0, places }],
+            levels: vec![Level { name: "mean pose".to_owned(), colour: 1, value: 1.0 }],
+            marked: Some(100.0),
+            ..Chart::default()
+        };
+        assert_eq!(chart.ranges(), [[0.0, 100.0], [0.0, 4.0]]);
+        let drawn = chart.card().to_string();
+        assert!(drawn.contains("d=\"M44 12 L350 86\""), "{drawn}");
+        assert!(drawn.contains("y1=\"123\" x2=\"350\" y2=\"123\"") && drawn.contains("A &lt; b"), "{drawn}");
+        let empty = Chart::default();
+        assert!(empty.is_empty() && empty.card().to_string().contains("<svg") && !chart.is_empty());
+        assert_eq!(empty.ranges(), [[0.0, 1.0], [0.0, 1.0]]);
+    }
+}

@@ -1,0 +1,12 @@
+//! Charts as SVG, drawn without a script.
+
+pub mod bars;
+pub mod curve;
+pub mod dots;
+pub mod histogram;
+pub mod lines;
+pub mod profile;
+pub mod ranges;
+pub mod scale;
+pub mod timeline;
+pub mod tracks;

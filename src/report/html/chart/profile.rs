@@ -1,0 +1,38 @@
+//! Two distributions over one another as lines: the left and the right of a pair.
+
+use super::histogram::Counts;
+use super::scale::{Scale, drawing, line, px, words};
+use crate::report::html::node::{Node, node};
+use crate::report::html::numbers::number;
+
+const WIDTH: f64 = 340.0;
+const HEIGHT: f64 = 130.0;
+const TOP: f64 = 10.0;
+const FLOOR: f64 = 100.0;
+const LEFT: f64 = 8.0;
+const RIGHT: f64 = 332.0;
+
+/// A line of each, in its class; heights go with the square root of the share. All have the bins of the first.
+pub fn profile(label: &str, unit: &str, lines: &[(&str, &Counts)]) -> Node {
+    let mut svg = drawing(WIDTH, HEIGHT, label);
+    let Some((_, first)) = lines.first() else { return svg };
+    let x = Scale { low: first.low, high: first.high, from: LEFT, to: RIGHT };
+    let share = |counts: &Counts, bin: usize| counts.bins[bin] as f64 / counts.total().max(1) as f64;
+    let shares = |counts: &Counts| (0..counts.bins.len()).map(|bin| share(counts, bin)).fold(0.0, f64::max);
+    let most = lines.iter().map(|(_, counts)| shares(counts)).fold(1e-9, f64::max);
+    for (class, counts) in lines.iter().filter(|(_, counts)| counts.total() > 0) {
+        let y = |bin: usize| FLOOR - (share(counts, bin) / most).sqrt() * (FLOOR - TOP);
+        let middle = |bin: usize| (counts.edge(bin) + counts.edge(bin + 1)) / 2.0;
+        let places: Vec<String> =
+            (0..counts.bins.len()).map(|bin| format!("{} {}", px(x.at(middle(bin))), px(y(bin)))).collect();
+        svg = svg.child(node("path").class(format!("stroke {class}")).attr("d", format!("M{}", places.join(" L"))));
+        let median = x.at(counts.quantile(0.5));
+        svg = svg.child(line(&format!("middle {class}"), [median, TOP], [median, FLOOR]));
+    }
+    svg = svg.child(line("axis", [LEFT, FLOOR], [RIGHT, FLOOR]));
+    for tick in x.ticks(5) {
+        let anchor = if tick <= first.low { "start" } else { "middle" };
+        svg = svg.child(words("tick", [x.at(tick), FLOOR + 15.0], anchor, &number(tick)));
+    }
+    svg.child(words("tick", [RIGHT, FLOOR + 28.0], "end", unit))
+}

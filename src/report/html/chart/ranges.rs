@@ -1,0 +1,65 @@
+//! Ranges of several things on one scale: from lowest to highest thin, the middle nine tenths thick, the median a tick.
+
+use super::scale::{Scale, drawing, line, rect, words};
+use crate::report::html::node::Node;
+use crate::report::html::numbers::number;
+
+/// One row.
+pub struct Range {
+    pub name: String,
+    pub class: &'static str,
+    /// Lowest, 5 %, median, 95 %, highest; NaN: nothing was measured.
+    pub marks: [f64; 5],
+}
+
+const WIDTH: f64 = 340.0;
+const ROW: f64 = 18.0;
+const TOP: f64 = 6.0;
+const LEFT: f64 = 104.0;
+const RIGHT: f64 = 332.0;
+
+/// The drawing, from `low` to `high`; `ends` says what lies there.
+pub fn ranges(label: &str, rows: &[Range], [low, high]: [f64; 2], ends: [&str; 2]) -> Node {
+    let x = Scale { low, high, from: LEFT, to: RIGHT };
+    let floor = TOP + ROW * rows.len() as f64;
+    let mut svg = drawing(WIDTH, floor + 34.0, label);
+    for tick in x.ticks(4) {
+        let at = x.at(tick);
+        let class = if tick.abs() < 1e-9 { "grid zero" } else { "grid" };
+        svg = svg.child(line(class, [at, TOP], [at, floor]));
+        svg = svg.child(words("tick", [at, floor + 14.0], "middle", &number(tick)));
+    }
+    for (row, range) in rows.iter().enumerate() {
+        let y = TOP + ROW * (row as f64 + 0.5);
+        svg = svg.child(words("name", [LEFT - 8.0, y + 4.0], "end", &range.name));
+        if range.marks.iter().any(|mark| mark.is_nan()) {
+            svg = svg.child(words("tick", [LEFT + 4.0, y + 4.0], "start", "not measured"));
+            continue;
+        }
+        let [lowest, low, median, high, highest] = range.marks.map(|mark| x.at(mark));
+        svg = svg
+            .child(line(&format!("whisker {}", range.class), [lowest, y], [highest, y]))
+            .child(rect(&format!("box {}", range.class), [low, y - 4.5], [(high - low).max(1.0), 9.0]))
+            .child(line("median", [median, y - 5.5], [median, y + 5.5]));
+    }
+    svg.child(words("tick", [LEFT, floor + 29.0], "start", ends[0])).child(words(
+        "tick",
+        [RIGHT, floor + 29.0],
+        "end",
+        ends[1],
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_without_a_measurement_says_so() {
+        let row = |marks| Range { name: "wrist".into(), class: "left", marks };
+        let rows = [row([-0.5, -0.2, 0.0, 0.3, 0.6]), row([f64::NAN; 5])];
+        let drawn = ranges("", &rows, [-1.0, 1.0], ["left", "right"]).to_string();
+        assert_eq!(drawn.matches("class=\"box left\"").count(), 1);
+        assert!(drawn.contains("not measured"));
+    }
+}

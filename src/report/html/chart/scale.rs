@@ -1,0 +1,80 @@
+//! From numbers to places on a drawing, and the round numbers marked beside it.
+
+use crate::report::html::node::{Node, node};
+
+/// A straight scale: `low` is drawn at `from`, `high` at `to` (units of the drawing).
+#[derive(Clone, Copy, Debug)]
+pub struct Scale {
+    pub low: f64,
+    pub high: f64,
+    pub from: f64,
+    pub to: f64,
+}
+
+impl Scale {
+    /// Where `value` is drawn; at the ends what is beyond them, at the start what is no number.
+    pub fn at(&self, value: f64) -> f64 {
+        let width = self.high - self.low;
+        let share = if width > 0.0 { (value - self.low) / width } else { 0.5 };
+        let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
+        self.from + share * (self.to - self.from)
+    }
+
+    /// About `n` round numbers from `low` to `high`.
+    pub fn ticks(&self, n: usize) -> Vec<f64> {
+        let width = self.high - self.low;
+        if !(width.is_finite() && width > 0.0) || n == 0 {
+            return vec![self.low];
+        }
+        let rough = width / n as f64;
+        let power = 10_f64.powf(rough.log10().floor());
+        let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|s| *s >= rough * 0.999).unwrap_or(rough);
+        let (first, last) = ((self.low / step - 1e-6).ceil() as i64, (self.high / step + 1e-6).floor() as i64);
+        (first..=last).take(100).map(|k| k as f64 * step).collect()
+    }
+}
+
+/// A place on a drawing, short.
+pub fn px(value: f64) -> String {
+    let text = format!("{value:.1}");
+    text.strip_suffix(".0").unwrap_or(&text).to_owned()
+}
+
+/// An SVG drawing of `width` x `height` units that shrinks with its column; `label` is read out in its stead.
+pub fn drawing(width: f64, height: f64, label: &str) -> Node {
+    node("svg")
+        .attr("viewBox", format!("0 0 {} {}", px(width), px(height)))
+        .attr("role", "img")
+        .attr("aria-label", label)
+        .attr("style", format!("aspect-ratio:{} / {}", px(width), px(height)))
+}
+
+pub fn rect(class: &str, [x, y]: [f64; 2], [width, height]: [f64; 2]) -> Node {
+    let sides = [("x", x), ("y", y), ("width", width), ("height", height)];
+    sides.into_iter().fold(node("rect").class(class), |rect, (name, value)| rect.attr(name, px(value)))
+}
+
+pub fn line(class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> Node {
+    let ends = [("x1", x1), ("y1", y1), ("x2", x2), ("y2", y2)];
+    ends.into_iter().fold(node("line").class(class), |line, (name, value)| line.attr(name, px(value)))
+}
+
+/// Words whose `anchor` (`start`, `middle`, `end`) is at the place.
+pub fn words(class: &str, [x, y]: [f64; 2], anchor: &str, text: &str) -> Node {
+    node("text").class(class).attr("x", px(x)).attr("y", px(y)).attr("text-anchor", anchor).text(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        let ticks = |low, high| Scale { low, high, from: 0.0, to: 100.0 }.ticks(5);
+        assert_eq!(ticks(-100.0, 0.0), [-100.0, -80.0, -60.0, -40.0, -20.0, 0.0]);
+        assert_eq!(ticks(0.0, 1.0).len(), 6);
+        assert_eq!(ticks(3.0, 3.0), [3.0]);
+        let scale = Scale { low: 0.0, high: 2.0, from: 10.0, to: 110.0 };
+        assert_eq!([1.0, 5.0, -1.0, f64::NAN].map(|v| scale.at(v)), [60.0, 110.0, 10.0, 10.0]);
+    }
+}

@@ -1,0 +1,85 @@
+//! The stretches of a video side by side, each as wide as it lasts: a list, so that it can be read out, walked by keys
+//! (`page.js`) and drawn at any width.
+
+use crate::report::html::node::{Node, node};
+
+/// One stretch.
+#[derive(Clone, Debug)]
+pub struct Stretch {
+    pub start_secs: f64,
+    pub end_secs: f64,
+    /// What colours it.
+    pub class: String,
+    /// A word shown where there is room.
+    pub word: String,
+    /// All there is to say of it.
+    pub says: String,
+}
+
+/// The line of a video of `duration_secs`, which `label` names. Of more than `most` stretches the shortest are drawn
+/// together, which leaves twice as many at most.
+pub fn timeline(label: &str, duration_secs: f64, stretches: &[Stretch], most: usize) -> Node {
+    let whole = duration_secs.max(1e-9);
+    let share = |secs: f64| format!("{:.3}%", 100.0 * (secs / whole).clamp(0.0, 1.0));
+    let list = node("ol").class("timeline").attr("tabindex", "0").attr("aria-label", label);
+    list.children(drawn(stretches, whole, most).into_iter().map(|stretch| {
+        let place =
+            format!("left:{};width:{}", share(stretch.start_secs), share(stretch.end_secs - stretch.start_secs));
+        let word = node("span").text(&stretch.word);
+        node("li").class(&stretch.class).attr("style", place).attr("title", &stretch.says).child(word)
+    }))
+}
+
+/// The stretches that are drawn: all of them, or, of more than `most`, slivers side by side as one, which looks like the
+/// longest of them and says how many it is.
+fn drawn(stretches: &[Stretch], whole: f64, most: usize) -> Vec<Stretch> {
+    if stretches.len() <= most {
+        return stretches.to_vec();
+    }
+    let secs = |stretch: &Stretch| stretch.end_secs - stretch.start_secs;
+    let narrow = |stretch: &Stretch| secs(stretch) * (most as f64) < whole;
+    // Each with the number of slivers in it, and the seconds of the longest.
+    let mut drawn: Vec<(Stretch, usize, f64)> = Vec::new();
+    for stretch in stretches {
+        match drawn.last_mut() {
+            Some((run, n, longest)) if *n > 0 && narrow(stretch) && narrow(run) => {
+                if secs(stretch) > *longest {
+                    *longest = secs(stretch);
+                    *run = Stretch { start_secs: run.start_secs, ..stretch.clone() };
+                }
+                run.end_secs = stretch.end_secs;
+                *n += 1;
+            }
+            _ => drawn.push((stretch.clone(), usize::from(narrow(stretch)), secs(stretch))),
+        }
+    }
+    let told = drawn.into_iter().map(|(stretch, n, _)| match n {
+        0 | 1 => stretch,
+        n => Stretch { says: format!("{n} short stretches, the longest: {}", stretch.says), ..stretch },
+    });
+    told.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_has_every_stretch_and_very_many_are_drawn_together() {
+        let of = |n: usize| {
+            let one = |i: usize| Stretch {
+                start_secs: i as f64,
+                end_secs: (i + 1) as f64,
+                class: format!("c{}", i % 2),
+                word: String::new(),
+                says: "<one>".to_owned(),
+            };
+            timeline("a \"b\"", n as f64, &(0..n).map(one).collect::<Vec<_>>(), 500).to_string()
+        };
+        assert_eq!(of(10).matches("<li").count(), 10);
+        assert!(of(10).contains("left:90.000%;width:10.000%") && of(10).contains("title=\"&lt;one&gt;\""));
+        let many = of(100_000);
+        assert!(many.matches("<li").count() <= 1001 && many.contains("short stretches, the longest"));
+        assert_eq!(timeline("", 0.0, &[], 9).to_string().matches("<li").count(), 0);
+    }
+}

@@ -1,0 +1,93 @@
+//! Lanes under one another over the same seconds: lines, and moments marked as short strokes. A script may move the line
+//! `at` over them (`data-left`, `data-right`: where the first and the last second are).
+
+use super::scale::{Scale, drawing, line, px, words};
+use crate::report::html::node::{Node, node};
+use crate::report::html::numbers::number;
+
+const WIDTH: f64 = 720.0;
+const LANE: f64 = 66.0;
+const GAP: f64 = 22.0;
+const FOOT: f64 = 20.0;
+const LEFT: f64 = 4.0;
+const RIGHT: f64 = 716.0;
+
+/// One lane.
+#[derive(Clone, Debug, Default)]
+pub struct Lane {
+    /// What it shows, with its unit.
+    pub name: String,
+    /// Class and places (second, value) of each line; values go up. What is not finite is a gap.
+    pub lines: Vec<(&'static str, Vec<[f64; 2]>)>,
+    /// Class and seconds of marks, drawn on the floor of the lane, the later ones above the earlier.
+    pub marks: Vec<(&'static str, Vec<f64>)>,
+}
+
+/// The drawing of `secs` seconds.
+pub fn lanes(label: &str, secs: f64, lanes: &[Lane]) -> Node {
+    let height = lanes.len() as f64 * (LANE + GAP) + FOOT;
+    let x = Scale { low: 0.0, high: secs.max(1e-9), from: LEFT, to: RIGHT };
+    let mut svg =
+        drawing(WIDTH, height, label).class("lanes").attr("data-left", px(LEFT)).attr("data-right", px(RIGHT));
+    for (i, lane) in lanes.iter().enumerate() {
+        let top = i as f64 * (LANE + GAP) + GAP;
+        let floor = top + LANE;
+        svg = svg.child(words("name", [LEFT, top - 6.0], "start", &lane.name));
+        svg = svg.child(line("grid", [LEFT, floor], [RIGHT, floor]));
+        let values = lane.lines.iter().flat_map(|(_, places)| places.iter().map(|place| place[1]));
+        let [low, high] = values
+            .filter(|value| value.is_finite())
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
+        let y = Scale { low, high, from: floor - 2.0, to: top };
+        for (class, places) in &lane.lines {
+            let runs = places.split(|place| place.iter().any(|v| !v.is_finite())).filter(|run| run.len() > 1);
+            let drawn: Vec<String> = runs
+                .map(|run| {
+                    let places: Vec<String> =
+                        run.iter().map(|[s, v]| format!("{} {}", px(x.at(*s)), px(y.at(*v)))).collect();
+                    format!("M{}", places.join(" L"))
+                })
+                .collect();
+            if !drawn.is_empty() {
+                svg = svg.child(node("path").class(format!("stroke {class}")).attr("d", drawn.join(" ")));
+            }
+        }
+        let n = lane.marks.len().max(1) as f64;
+        for (k, (class, moments)) in lane.marks.iter().enumerate() {
+            // alone from floor to top, else one above the other
+            let part = if lane.lines.is_empty() { LANE / n } else { 12.0 };
+            let base = floor - k as f64 * part;
+            let drawn: Vec<String> = moments
+                .iter()
+                .map(|moment| format!("M{} {}V{}", px(x.at(*moment)), px(base), px(base - part + 2.0)))
+                .collect();
+            if !drawn.is_empty() {
+                svg = svg.child(node("path").class(format!("moment {class}")).attr("d", drawn.join("")));
+            }
+        }
+    }
+    let foot = height - FOOT;
+    for tick in x.ticks(10) {
+        let anchor = if tick <= 0.0 { "start" } else { "middle" };
+        svg = svg.child(words("tick", [x.at(tick), foot + 15.0], anchor, &format!("{} s", number(tick))));
+    }
+    svg.child(line("at", [LEFT, GAP], [LEFT, foot]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_have_gaps_and_marks_stand_in_their_lane() {
+        let lane = Lane {
+            name: "height <m>".to_owned(),
+            lines: vec![("made", vec![[0.0, 1.0], [1.0, 2.0], [2.0, f64::NAN], [3.0, 1.0], [4.0, 2.0]])],
+            marks: vec![("onset", vec![2.0])],
+        };
+        let drawn = lanes("a", 4.0, &[lane.clone(), Lane { lines: Vec::new(), ..lane }]).to_string();
+        assert!(drawn.contains("M4 86 L182 22 M538 86 L716 22"), "{drawn}");
+        assert!(drawn.contains("height &lt;m&gt;") && drawn.matches("moment onset").count() == 2, "{drawn}");
+        assert!(lanes("", 0.0, &[]).to_string().contains("<svg"));
+    }
+}

@@ -1,0 +1,83 @@
+//! The file itself: head, navigation, sections, and the little script and style that all pages share. It needs nothing
+//! beside it and its policy lets it load nothing.
+
+use super::node::{Node, node};
+use serde_json::Value;
+
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+const POLICY: &str =
+    "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
+
+/// A page.
+pub struct Page {
+    pub title: String,
+    /// A sentence under the title.
+    pub lead: String,
+    pub sections: Vec<Section>,
+    /// Style and script of its own, after those of all pages.
+    pub style: &'static str,
+    pub script: &'static str,
+    /// What its script reads (element `data`).
+    pub data: Value,
+}
+
+/// A section of a page.
+pub struct Section {
+    /// What links point at; letters and dashes.
+    pub id: &'static str,
+    pub title: &'static str,
+    pub body: Vec<Node>,
+}
+
+impl Page {
+    /// The whole file.
+    pub fn html(&self) -> String {
+        let links =
+            self.sections.iter().map(|section| node("a").attr("href", format!("#{}", section.id)).text(section.title));
+        let sections = self.sections.iter().map(|section| {
+            let title = node("h2").text(section.title);
+            node("section").id(section.id).child(title).children(section.body.iter().cloned())
+        });
+        // `<` inside a JSON text only stands in strings, where this is the same letter.
+        let data = self.data.to_string().replace('<', "\\u003c");
+        let head = node("head")
+            .child(node("meta").attr("charset", "utf-8"))
+            .child(node("meta").attr("http-equiv", "Content-Security-Policy").attr("content", POLICY))
+            .child(node("meta").attr("name", "viewport").attr("content", "width=device-width, initial-scale=1"))
+            .child(node("meta").attr("name", "color-scheme").attr("content", "light dark"))
+            .child(node("title").text(&self.title))
+            .child(node("style").verbatim(STYLE).verbatim(self.style));
+        let top = node("header")
+            .child(node("h1").text(&self.title))
+            .child(node("p").class("lead").text(&self.lead))
+            .child(node("nav").attr("aria-label", "Sections").children(links));
+        let body = node("body")
+            .child(node("a").class("skip").attr("href", "#main").text("Skip to the content"))
+            .child(top)
+            .child(node("main").id("main").children(sections))
+            .child(node("div").id("tip").attr("role", "status").flag("hidden"))
+            .child(node("script").attr("type", "application/json").id("data").verbatim(&data))
+            .child(node("script").verbatim(SCRIPT).verbatim(self.script));
+        format!("<!doctype html>\n{}\n", node("html").attr("lang", "en").child(head).child(body))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_closes_what_it_opens_and_its_data_closes_nothing() {
+        let section = Section { id: "a", title: "A & b", body: vec![node("p").text("x < y")] };
+        let data = serde_json::json!({ "name": "</script><b>" });
+        let title = "\"<i>\"".to_owned();
+        let page = Page { title, lead: String::new(), sections: vec![section], style: "", script: "", data }.html();
+        for name in ["html", "head", "body", "script", "style", "section", "main", "header", "nav", "div"] {
+            let opened = page.matches(&format!("<{name}>")).count() + page.matches(&format!("<{name} ")).count();
+            assert_eq!(opened, page.matches(&format!("</{name}>")).count(), "{name}");
+        }
+        assert!(!page.contains("<i>") && !page.contains("<b>") && page.contains("href=\"#a\""));
+        assert!(!page.contains("http://") && !page.contains("https://"));
+    }
+}

@@ -1,0 +1,102 @@
+//! Elements of a page. Words and attribute values are escaped here and nowhere else; markup comes from `Node` alone, so
+//! no text of a user can become one.
+
+use std::fmt::{self, Display, Write as _};
+
+/// An element with its attributes and what is in it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Node {
+    name: &'static str,
+    attributes: String,
+    inner: String,
+}
+
+/// An empty element, like `node("p")`.
+pub fn node(name: &'static str) -> Node {
+    Node { name, attributes: String::new(), inner: String::new() }
+}
+
+/// Text with what would be markup replaced.
+pub fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\'' => escaped.push_str("&#39;"),
+            '\0' => escaped.push('\u{fffd}'),
+            c => escaped.push(c),
+        }
+    }
+    escaped
+}
+
+impl Node {
+    /// With an attribute; its name is ours, its value anybody's.
+    pub fn attr(mut self, name: &str, value: impl Display) -> Self {
+        let _ = write!(self.attributes, " {name}=\"{}\"", escape(&value.to_string()));
+        self
+    }
+
+    /// With an attribute that has no value, like `hidden`.
+    pub fn flag(mut self, name: &str) -> Self {
+        let _ = write!(self.attributes, " {name}");
+        self
+    }
+
+    pub fn class(self, names: impl Display) -> Self {
+        self.attr("class", names)
+    }
+
+    pub fn id(self, name: impl Display) -> Self {
+        self.attr("id", name)
+    }
+
+    /// Words after what is in it already.
+    pub fn text(mut self, words: impl Display) -> Self {
+        self.inner.push_str(&escape(&words.to_string()));
+        self
+    }
+
+    pub fn child(mut self, child: Node) -> Self {
+        let _ = write!(self.inner, "{child}");
+        self
+    }
+
+    pub fn children(self, children: impl IntoIterator<Item = Node>) -> Self {
+        children.into_iter().fold(self, Node::child)
+    }
+
+    /// The content of a style or script, which knows no escapes: `text` is our own, and its closing tag is not in it.
+    pub(crate) fn verbatim(mut self, text: &str) -> Self {
+        self.inner.push_str(text);
+        self
+    }
+}
+
+impl Display for Node {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, attributes, inner } = self;
+        match *name {
+            "img" | "input" | "meta" | "br" | "hr" => write!(f, "<{name}{attributes}>"),
+            "rect" | "line" | "path" | "circle" => write!(f, "<{name}{attributes}/>"),
+            _ => write!(f, "<{name}{attributes}>{inner}</{name}>"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_word_becomes_markup() {
+        let evil = "</p><script>alert(\"x\")</script> & 'y'";
+        let shown = node("p").attr("title", evil).text(evil).child(node("br")).to_string();
+        assert_eq!(shown.matches('<').count(), 3, "{shown}");
+        assert!(shown.starts_with("<p title=\"&lt;/p&gt;") && shown.ends_with("&amp; &#39;y&#39;<br></p>"), "{shown}");
+        assert!(!shown.contains("\"x\""));
+    }
+}

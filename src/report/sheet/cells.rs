@@ -1,0 +1,161 @@
+//! The cells of a contact sheet: the picture under its keypoints, and the 3D pose on a grid of decimetres, from the
+//! front or from the left, always at the same scale. Where cells stand on a page is decided in `sheet`.
+
+use crate::animate::draw::figure::{INK, PAPER, View, draw_pose, mix};
+use crate::animate::draw::overlay;
+use crate::animate::draw::overlay::Place;
+use crate::external::ffmpeg::frames::FrameReader;
+use crate::external::opencv::{draw, warp};
+use crate::types::image::Image;
+use crate::types::pose2d::Keypoints;
+use anyhow::{Context, Result};
+use ndarray::ArrayView2;
+
+/// Side of a cell, px.
+pub const CELL_PX: usize = 340;
+/// Scale of the 3D cells, and where the neck stands in them.
+const PX_PER_METRE: f32 = 270.0;
+const NECK_PX: [f32; 2] = [CELL_PX as f32 / 2.0, 125.0];
+/// The part of the picture shown is this much larger than what was found in it.
+const MARGIN: f32 = 1.15;
+/// A picture is not enlarged further than this.
+const MAX_ENLARGED: f32 = 4.0;
+
+/// The square of the picture that is shown in every cell of a clip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crop {
+    /// Size in px of the whole picture after scaling.
+    scaled: [usize; 2],
+    place: Place,
+}
+
+impl Crop {
+    /// The square around all that was found in the clip, in a picture of `image_size` px; the whole picture where
+    /// nothing was.
+    pub fn of(keypoints: &Keypoints, image_size: [usize; 2]) -> Self {
+        let whole = image_size.map(|px| px as f32);
+        let found = overlay::extent(keypoints).unwrap_or([0.0, 0.0, whole[0], whole[1]]);
+        let [left, top, right, bottom] = found;
+        let side = (MARGIN * (right - left).max(bottom - top)).clamp(16.0, whole[0].max(whole[1]) * MARGIN);
+        let scale = (CELL_PX as f32 / side).min(MAX_ENLARGED);
+        let scaled = whole.map(|px| ((px * scale).round() as usize).clamp(1, 8 * CELL_PX));
+        let scale = [0, 1].map(|axis| scaled[axis] as f32 / whole[axis]);
+        let middle = [(left + right) / 2.0, (top + bottom) / 2.0];
+        let shift = [0, 1].map(|axis| CELL_PX as f32 / 2.0 - scale[axis] * middle[axis].clamp(0.0, whole[axis]));
+        Self { scaled, place: Place { scale, shift: shift.map(f32::round) } }
+    }
+
+    /// The frame the reader shows, cropped, under its keypoints.
+    pub fn cell(&self, reader: &mut FrameReader, keypoints: &Keypoints, frame_idx: usize) -> Result<Image> {
+        let picture = reader.picture(Some(self.scaled))?;
+        let mut cell = Image::filled(CELL_PX, CELL_PX, PAPER);
+        let shift = self.place.shift.map(f64::from);
+        let src_from_dst = warp::SrcFromDst([[1.0, 0.0, -shift[0]], [0.0, 1.0, -shift[1]]]);
+        warp::warp(&picture, &src_from_dst, &mut cell).context("cutting out a part of a frame")?;
+        overlay::draw_keypoints(&mut cell, keypoints, frame_idx, self.place, 3.0)?;
+        Ok(cell)
+    }
+}
+
+/// From where a 3D cell is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum From {
+    Front,
+    /// The speaker's left: forward is to the left of the cell.
+    Left,
+}
+
+/// One pose [49, 3] on its grid, without perspective.
+pub fn pose_cell(joints: ArrayView2<f32>, from: From) -> Result<Image> {
+    let mut cell = Image::filled(CELL_PX, CELL_PX, PAPER);
+    let view = View {
+        yaw_degrees: if from == From::Left { 90.0 } else { 0.0 },
+        camera_metres: f32::INFINITY,
+        trunk: 0.0,
+        ..View::front(NECK_PX, PX_PER_METRE)
+    };
+    draw_grid(&mut cell)?;
+    draw_head(&mut cell, from)?;
+    draw_pose(&mut cell, joints, &view)?;
+    let words = match from {
+        From::Front => "front",
+        From::Left => "side, from the left;  <-- faces this way",
+    };
+    draw::text(&mut cell, words, [6.0, 16.0], 9.0, INK)?;
+    Ok(cell)
+}
+
+/// A line every 0.1 m, a stronger one every 0.5 m, the strongest through the neck.
+fn draw_grid(cell: &mut Image) -> Result<()> {
+    let end = CELL_PX as f32;
+    for decimetre in -15..=15_i32 {
+        let rgb = match decimetre {
+            0 => mix(INK, PAPER, 0.3),
+            _ if decimetre % 5 == 0 => mix(INK, PAPER, 0.65),
+            _ => mix(INK, PAPER, 0.88),
+        };
+        let at = NECK_PX.map(|px| (px + decimetre as f32 * 0.1 * PX_PER_METRE).round());
+        draw::line(cell, [at[0], 0.0], [at[0], end], 1.0, rgb)?;
+        draw::line(cell, [0.0, at[1]], [end, at[1]], 1.0, rgb)?;
+        if decimetre % 5 == 0 && (0.0..end).contains(&at[0]) {
+            let words = format!("{:.1}", f64::from(decimetre) / 10.0);
+            draw::text(cell, &words, [at[0] + 3.0, end - 4.0], 8.0, mix(INK, PAPER, 0.3))?;
+        }
+    }
+    Ok(())
+}
+
+/// The outline of a head above the neck, upright whatever the speaker does: it is in no data.
+fn draw_head(cell: &mut Image, from: From) -> Result<()> {
+    let rgb = mix(INK, PAPER, 0.6);
+    let at = |across: f32, down: f32| [NECK_PX[0] + across * PX_PER_METRE, NECK_PX[1] + down * PX_PER_METRE];
+    let ahead = if from == From::Left { -1.0 } else { 0.0 };
+    draw::circle_outline(cell, at(0.03 * ahead, -0.20), 0.10 * PX_PER_METRE, 1.0, rgb)?;
+    draw::circle(cell, at(0.13 * ahead, -0.19), 0.015 * PX_PER_METRE, rgb)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::animate::draw::figure::{LEFT, RIGHT};
+    use crate::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, N_JOINTS};
+    use crate::types::time::FrameRate;
+    use ndarray::{Array2, Array3, s};
+
+    #[test]
+    fn forward_is_left_in_the_side_view_and_the_left_arm_is_in_its_colour() {
+        let mut joints = Array2::from_elem((N_JOINTS, 3), f32::NAN);
+        joints.row_mut(0).fill(0.0);
+        for (joint, place) in
+            [(L_SHOULDER, [0.17, 0.0, 0.0]), (L_ELBOW, [0.17, 0.3, 0.0]), (L_WRIST, [0.17, 0.3, -0.4])]
+        {
+            joints.slice_mut(s![joint, ..]).assign(&ndarray::arr1(&place));
+        }
+        let cell = pose_cell(joints.view(), From::Left).unwrap();
+        let teal = |x: usize, y: usize| {
+            let [r, g, b] = cell.pixel(x, y).map(i32::from);
+            b > r + 40 && g > r + 20
+        };
+        let (elbow_y, elbow_x) = ((125.0 + 0.3 * PX_PER_METRE) as usize, 170);
+        assert!(teal(elbow_x - 60, elbow_y) && !teal(elbow_x + 60, elbow_y));
+        assert!(LEFT[2] > LEFT[0] && RIGHT[0] > RIGHT[2]);
+    }
+
+    #[test]
+    fn the_crop_holds_what_was_found() {
+        let mut body = Array3::zeros((10, 17, 3));
+        for t in 0..10 {
+            body.slice_mut(s![t, 5, ..]).assign(&ndarray::arr1(&[800.0, 300.0, 1.0]));
+            body.slice_mut(s![t, 6, ..]).assign(&ndarray::arr1(&[600.0, 400.0, 1.0]));
+        }
+        let hand = Array3::zeros((10, 21, 3));
+        let (fps, image_size) = (FrameRate::new(15, 1), [1280, 720]);
+        let keypoints = Keypoints { fps, image_size, body, left_hand: hand.clone(), right_hand: hand };
+        let Place { scale, shift } = Crop::of(&keypoints, [1280, 720]).place;
+        let at = |x: f32, y: f32| [scale[0] * x + shift[0], scale[1] * y + shift[1]];
+        assert!((at(700.0, 350.0)[0] - 170.0).abs() < 1.0 && (at(700.0, 350.0)[1] - 170.0).abs() < 1.0);
+        assert!((20.0..30.0).contains(&at(600.0, 350.0)[0]));
+        let nothing = Keypoints { body: Array3::zeros((10, 17, 3)), ..keypoints };
+        assert!(Crop::of(&nothing, [1280, 720]).place.scale[0] < 0.3);
+    }
+}

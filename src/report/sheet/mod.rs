@@ -1,0 +1,5 @@
+//! Contact sheets of lifted clips: picture, keypoints, and joints from the front and the side.
+
+pub mod cells;
+pub mod sheet;
+pub mod strip;

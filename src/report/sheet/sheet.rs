@@ -1,0 +1,190 @@
+//! Contact sheets of a lifted clip: at regular moments the picture with its keypoints, the 3D pose from the front and
+//! from the left, and, if asked for, the animated figure beside it, page after page, each with a strip of the wrists' way. The video is streamed; only the page at work
+//! is in memory.
+
+use super::cells::{CELL_PX, Crop, From, pose_cell};
+use super::strip::{STRIP_PX, draw_strip};
+use crate::animate::draw::figure::{INK, LEFT, PAPER, RIGHT};
+use crate::external::ffmpeg::frames::FrameReader;
+use crate::external::opencv::draw;
+use crate::pipeline::lift::quality::jitter_around;
+use crate::stage::progress::Progress;
+use crate::types::image::Image;
+use crate::types::pose2d::Keypoints;
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::{L_HAND, L_WRIST, N_HAND_JOINTS, R_HAND, R_WRIST};
+use anyhow::{Context, Result, ensure};
+use ndarray::Axis;
+use std::path::Path;
+
+/// Rows of moments on a page.
+const ROWS: usize = 5;
+/// A moment: a line of words over its cells, then a gap.
+const WORDS_PX: usize = 22;
+const GAP_PX: usize = 16;
+const MOMENT_HIGH_PX: usize = WORDS_PX + CELL_PX + 6;
+const TITLE_PX: usize = 36;
+
+/// What a sheet is drawn of.
+pub struct Clip<'a> {
+    pub title: &'a str,
+    pub video: &'a Path,
+    pub keypoints: &'a Keypoints,
+    pub motion: &'a Motion,
+    /// What the animation makes of it, if that is to be seen too, frame by frame the motion's.
+    pub figure: Option<&'a Motion>,
+}
+
+impl Clip<'_> {
+    /// Draws a moment every `every_secs` and hands out page after page (page, number of pages, picture). Errors: no
+    /// frames; keypoints, motion and video of unequal lengths or rates; a moment every less than a frame.
+    pub fn pages(
+        &self,
+        every_secs: f64,
+        progress: &dyn Progress,
+        mut page_done: impl FnMut(usize, usize, &Image) -> Result<()>,
+    ) -> Result<()> {
+        let moments = self.moments(every_secs)?;
+        let mut reader = FrameReader::open_with(self.video, self.motion.fps, 0)?;
+        self.check_length(&reader)?;
+        let crop = Crop::of(self.keypoints, reader.image_size());
+        let task = progress.begin("drawing", moments.len() as u64);
+        let pages: Vec<&[usize]> = moments.chunks(self.n_columns() * ROWS).collect();
+        for (number, moments) in pages.iter().enumerate() {
+            let end = pages.get(number + 1).and_then(|next| next.first()).copied().unwrap_or(self.motion.n_frames());
+            let n_rows = moments.len().div_ceil(self.n_columns());
+            let strip_top = TITLE_PX + n_rows * MOMENT_HIGH_PX;
+            let mut page =
+                Image::filled(self.n_columns() * self.moment_wide_px() - GAP_PX, strip_top + STRIP_PX, PAPER);
+            self.draw_title(&mut page, number, pages.len())?;
+            for (n, &moment) in moments.iter().enumerate() {
+                let (column, row) = (n % self.n_columns(), n / self.n_columns());
+                let corner = [column * self.moment_wide_px(), TITLE_PX + row * MOMENT_HIGH_PX];
+                self.draw_moment(&mut page, corner, moment, &mut reader, &crop)?;
+                task.advance(1);
+            }
+            let frames = moments.first().copied().unwrap_or(0)..end;
+            draw_strip(&mut page, strip_top, self.motion, frames, moments)?;
+            page_done(number, pages.len(), &page)?;
+        }
+        Ok(())
+    }
+
+    /// Moments side by side.
+    fn n_columns(&self) -> usize {
+        if self.figure.is_some() { 1 } else { 2 }
+    }
+
+    fn moment_wide_px(&self) -> usize {
+        let n_cells = if self.figure.is_some() { 5 } else { 3 };
+        n_cells * CELL_PX + GAP_PX
+    }
+
+    /// The frames drawn.
+    fn moments(&self, every_secs: f64) -> Result<Vec<usize>> {
+        let (n_frames, fps) = (self.motion.n_frames(), self.motion.fps);
+        ensure!(n_frames > 0, "the motion has no frames: nothing to draw");
+        let n_keypoints = self.keypoints.n_frames();
+        ensure!(
+            n_frames == n_keypoints,
+            "the motion has {n_frames} frames, the keypoints have {n_keypoints}: they are not of the same clip, or one \
+             was made before the other changed; lift the keypoints again"
+        );
+        let other = self.keypoints.fps;
+        ensure!(fps == other, "the motion runs at {fps}, the keypoints at {other}: lift the keypoints again");
+        let step = every_secs * fps.per_sec();
+        ensure!(
+            step.is_finite() && step >= 1.0,
+            "a moment every {every_secs} s: at {fps} it must be at least {:.3} s",
+            fps.secs(1)
+        );
+        let moments = (0..).map(|n| (f64::from(n) * step).round() as usize).take_while(|&frame| frame < n_frames);
+        Ok(moments.collect())
+    }
+
+    /// That the video is as long as the motion, as far as its headers tell.
+    fn check_length(&self, reader: &FrameReader) -> Result<()> {
+        let (n_frames, fps) = (self.motion.n_frames(), self.motion.fps);
+        let Some(expected) = reader.expected_frames() else { return Ok(()) };
+        let apart = fps.secs(n_frames.abs_diff(expected));
+        ensure!(
+            apart <= 1.0,
+            "the motion has {n_frames} frames at {fps}, {:.2} s, the video {} lasts {:.2} s: they are not of the same clip, \
+             or the keypoints' `fps` is wrong",
+            fps.secs(n_frames),
+            self.video.display(),
+            fps.secs(expected)
+        );
+        Ok(())
+    }
+
+    fn draw_title(&self, page: &mut Image, number: usize, n_pages: usize) -> Result<()> {
+        let words =
+            if n_pages > 1 { format!("{}   {}/{n_pages}", self.title, number + 1) } else { self.title.to_owned() };
+        draw::text(page, &words, [8.0, 25.0], 12.0, INK)?;
+        let right = page.width as f32;
+        draw::text(page, "speaker's right", [right - 330.0, 25.0], 11.0, RIGHT)?;
+        draw::text(page, "speaker's left", [right - 160.0, 25.0], 11.0, LEFT)
+    }
+
+    fn draw_moment(
+        &self,
+        page: &mut Image,
+        [left, top]: [usize; 2],
+        frame_idx: usize,
+        reader: &mut FrameReader,
+        crop: &Crop,
+    ) -> Result<()> {
+        loop {
+            let time = reader.advance()?.with_context(|| {
+                let secs = self.motion.fps.secs(frame_idx);
+                format!("{} ends before {secs:.2} s, the motion does not: not the same clip", self.video.display())
+            })?;
+            if time.frame_idx == frame_idx {
+                break;
+            }
+        }
+        let joints = self.motion.joints.index_axis(Axis(0), frame_idx);
+        let mut cells = vec![
+            crop.cell(reader, self.keypoints, frame_idx)?,
+            pose_cell(joints, From::Front)?,
+            pose_cell(joints, From::Left)?,
+        ];
+        if let Some(figure) = self.figure.filter(|figure| frame_idx < figure.n_frames()) {
+            let joints = figure.joints.index_axis(Axis(0), frame_idx);
+            for from in [From::Front, From::Left] {
+                let mut cell = pose_cell(joints, from)?;
+                draw::text(&mut cell, "animated", [6.0, 30.0], 9.0, INK)?;
+                cells.push(cell);
+            }
+        }
+        for (column, cell) in cells.iter().enumerate() {
+            draw::paste(page, cell, [left + column * CELL_PX, top + WORDS_PX]);
+        }
+        draw::text(page, &self.words(frame_idx), [left as f32 + 6.0, (top + WORDS_PX - 6) as f32], 10.0, INK)
+    }
+
+    /// `3.0 s   wrists shake L 2.1 R 0.9 mm   not seen: left hand`
+    fn words(&self, frame_idx: usize) -> String {
+        let mask = self.motion.mask.row(frame_idx);
+        let half_seen = |root: usize| (1..N_HAND_JOINTS).filter(|j| mask[root + j]).count() * 2 >= N_HAND_JOINTS;
+        let unseen = [
+            ("right wrist", mask[R_WRIST]),
+            ("left wrist", mask[L_WRIST]),
+            ("right hand", half_seen(R_HAND)),
+            ("left hand", half_seen(L_HAND)),
+        ];
+        let unseen: Vec<&str> = unseen.iter().filter(|(_, seen)| !seen).map(|(name, _)| *name).collect();
+        let shake = |joint: usize| jitter_around(self.motion, joint, frame_idx);
+        let mut words = format!(
+            "{:.1} s   wrists shake L {:.1} R {:.1} mm",
+            self.motion.fps.secs(frame_idx),
+            shake(L_WRIST),
+            shake(R_WRIST)
+        );
+        if !unseen.is_empty() {
+            words += &format!("   not seen: {}", unseen.join(", "));
+        }
+        words
+    }
+}

@@ -1,0 +1,136 @@
+//! The curves of a training from the lines of its log.
+
+use crate::report::html::chart::lines::{Chart, Level, Line};
+use serde_json::Value;
+
+/// Most points of a curve; neighbours of a longer one are averaged.
+const MOST_POINTS: usize = 240;
+
+/// What the log of a training tells.
+pub struct Told<'a> {
+    /// Lines of steps.
+    steps: Vec<&'a Value>,
+    /// Lines of validations.
+    pub epochs: Vec<&'a Value>,
+    /// The validation with the best (least) score.
+    pub best: Option<&'a Value>,
+}
+
+impl<'a> Told<'a> {
+    pub fn of(lines: &'a [Value]) -> Self {
+        let (epochs, steps): (Vec<&Value>, Vec<&Value>) = lines.iter().partition(|line| line["validation"].is_object());
+        let score = |line: &Value| line["validation"]["score"].as_f64().unwrap_or(f64::INFINITY);
+        let best = epochs.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b)));
+        Self { steps, epochs, best }
+    }
+
+    /// All curves that are not 0 throughout.
+    pub fn charts(&self) -> Vec<Chart> {
+        let made = |name: &str, colour, of: &str| self.validated(name, colour, &format!("/validation/generator/{of}"));
+        let still = |name: &str, colour, of: &str| self.level(name, colour, &format!("/validation/mean_pose/{of}"));
+        let level = |name: &str, colour, value| Level { name: name.to_owned(), colour, value };
+        let chart = |title: &str, says: &str, lines: Vec<Line>, levels: Vec<Level>| Chart {
+            title: title.to_owned(),
+            says: says.to_owned(),
+            lines,
+            levels,
+            marked: self.best.and_then(|line| line["step"].as_f64()),
+        };
+        let charts = vec![
+            chart(
+                "L1 error",
+                "Of normalised coordinates; lower is better.",
+                vec![self.trained("training", 2, "l1"), made("held out", 0, "l1")],
+                vec![still("mean pose, held out", 0, "l1")],
+            ),
+            chart(
+                "Correct keypoints (PCK 0.2)",
+                "Share within a fifth of the pose's extent; higher is better.",
+                vec![made("arms", 0, "pck_body"), made("fingers", 1, "pck_hands")],
+                vec![still("arms, mean pose", 0, "pck_body"), still("fingers, mean pose", 1, "pck_hands")],
+            ),
+            chart(
+                "Frechet distance, cm\u{b2}",
+                "Of single held-out poses; lower is better, and few poses make it too large.",
+                vec![made("held out", 0, "frechet")],
+                vec![still("mean pose", 0, "frechet")],
+            ),
+            chart(
+                "Motion energy",
+                "As a share of the data's: 1 moves as much as the speaker, 0 stands still.",
+                vec![made("held out", 0, "energy")],
+                vec![level("the data's", 2, 1.0), level("collapse alarm", 1, 0.3)],
+            ),
+            chart(
+                "Score",
+                "What chooses the best checkpoint, which the dashed line marks; lower is better.",
+                vec![self.validated("held out", 0, "/validation/score")],
+                vec![],
+            ),
+            chart(
+                "Adversarial losses",
+                "Of the generator against the discriminator, and of the discriminator itself.",
+                vec![self.trained("generator", 0, "adversarial"), self.trained("discriminator", 1, "discriminator")],
+                vec![],
+            ),
+            chart(
+                "Bone and velocity losses",
+                "",
+                vec![self.trained("bone lengths", 0, "bone"), self.trained("velocity", 1, "velocity")],
+                vec![],
+            ),
+            chart("Gradient norm", "Before clipping.", vec![self.trained("generator", 0, "gradient_norm")], vec![]),
+        ];
+        let says_something =
+            |chart: &Chart| chart.lines.iter().flat_map(|line| &line.places).any(|[_, value]| *value != 0.0);
+        charts.into_iter().filter(says_something).collect()
+    }
+
+    /// The curve of a number of the training lines.
+    fn trained(&self, name: &str, colour: usize, of: &str) -> Line {
+        let places = self.steps.iter().filter_map(|line| Some([line["step"].as_f64()?, line[of].as_f64()?]));
+        Line { name: name.to_owned(), colour, places: thinned(&places.collect::<Vec<_>>()) }
+    }
+
+    /// The curve of a number of the validations.
+    fn validated(&self, name: &str, colour: usize, at: &str) -> Line {
+        let places = self.epochs.iter().filter_map(|line| Some([line["step"].as_f64()?, line.pointer(at)?.as_f64()?]));
+        Line { name: name.to_owned(), colour, places: thinned(&places.collect::<Vec<_>>()) }
+    }
+
+    /// A number that is the same in all validations.
+    fn level(&self, name: &str, colour: usize, at: &str) -> Level {
+        let last = self.epochs.last().and_then(|line| line.pointer(at)).and_then(Value::as_f64);
+        Level { name: name.to_owned(), colour, value: last.unwrap_or(f64::NAN) }
+    }
+}
+
+fn thinned(places: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let together = places.len().div_ceil(MOST_POINTS).max(1);
+    let mean = |places: &[[f64; 2]]| [0, 1].map(|k| places.iter().map(|p| p[k]).sum::<f64>() / places.len() as f64);
+    places.chunks(together).map(mean).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn the_best_epoch_is_found_and_long_curves_are_thinned() {
+        let mut lines: Vec<Value> = (1..=1000).map(|i| json!({"step": 10 * i, "l1": 1.0, "bone": 0.0})).collect();
+        for (step, score) in [(5000, 2.0), (7000, 1.5), (10_000, 1.7)] {
+            let still = json!({"l1": 0.8});
+            let validation = json!({"score": score, "generator": {"l1": score / 2.0}, "mean_pose": still});
+            lines.push(json!({"step": step, "epoch": 1, "validation": validation}));
+        }
+        let told = Told::of(&lines);
+        assert_eq!(told.best.unwrap()["step"], 7000);
+        let charts = told.charts();
+        let titles: Vec<&str> = charts.iter().map(|chart| chart.title.as_str()).collect();
+        assert_eq!(titles, ["L1 error", "Score"]);
+        assert!(charts[0].lines[0].places.len() <= MOST_POINTS && charts[0].lines[1].places.len() == 3);
+        assert_eq!((charts[0].levels[0].value, charts[0].marked), (0.8, Some(7000.0)));
+        assert!(Told::of(&[]).charts().is_empty());
+    }
+}

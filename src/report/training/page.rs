@@ -1,0 +1,112 @@
+//! How a training went, on one page beside its checkpoints: the curves of its log with the best epoch marked, the best
+//! epoch's figures beside the mean pose's, and generated against true poses.
+
+use super::charts::Told;
+use super::picture::picture;
+use super::strip::{Pair, strip};
+use crate::external::ffmpeg::jpeg;
+use crate::external::opencv::png;
+use crate::report::html::numbers::{counted, number};
+use crate::report::html::picture as page_picture;
+use crate::report::html::{Node, Page, Section, node};
+use crate::stage::workdir;
+use crate::train::log;
+use anyhow::{Context, Result};
+use serde_json::Value;
+use std::path::Path;
+
+/// The page, and the same as a picture.
+pub const PAGE: &str = "training.html";
+pub const PICTURE: &str = "training.png";
+
+/// A figure of a validation: name, where it stands, in percent.
+const FIGURES: [(&str, &str, bool); 6] = [
+    ("L1 error (normalised)", "l1", false),
+    ("PCK 0.2", "pck", true),
+    ("PCK 0.2, arms", "pck_body", true),
+    ("PCK 0.2, fingers", "pck_hands", true),
+    ("Frechet distance of single poses, cm\u{b2}", "frechet", false),
+    ("Motion energy as a share of the data's", "energy", true),
+];
+
+/// Writes `training.html` and `training.png` into the training's folder, from the log there and poses of held-out
+/// intervals, which may be none. The same log and poses give the same bytes.
+pub fn write(folder: &Path, speaker: &str, pairs: &[Pair]) -> Result<()> {
+    let lines = log::read(folder)?;
+    let told = Told::of(&lines);
+    let charts = told.charts();
+    let title = format!("Training of {speaker}");
+    let strip = strip(pairs)?;
+    let whole = picture(&title, &charts, &strip)?;
+    workdir::replace(&folder.join(PICTURE), |path| png::write(path, &whole))?;
+
+    let mut poses = vec![node("p").text(
+        "Intervals that were not trained on: what the speaker did, and under it what the best checkpoint makes of the \
+         sound alone. The lines are the height of the wrists: grey the speaker's, in colour the generated one.",
+    )];
+    if pairs.is_empty() {
+        poses = vec![node("p").class("empty").text("The dataset has no interval to show.")];
+    } else {
+        let names: Vec<&str> = pairs.iter().map(|pair| pair.name.as_str()).collect();
+        let says = format!("True and generated poses of {}", names.join(", "));
+        let image = page_picture::jpeg(&jpeg::encode(&strip)?, [strip.width, strip.height], &says);
+        poses.push(node("div").class("scroll").child(image.class("strip")));
+    }
+    let section = |id, title, body| Section { id, title, body };
+    let page = Page {
+        title,
+        lead: lead(&told),
+        sections: vec![
+            section("best", "Best epoch", best(&told)),
+            section("curves", "Curves", vec![node("div").class("grid").children(charts.iter().map(|c| c.card()))]),
+            section("poses", "Generated against true poses", poses),
+        ],
+        style: include_str!("page.css"),
+        script: "",
+        data: Value::Null,
+    };
+    workdir::write_file(&folder.join(PAGE), page.html().as_bytes()).context("writing the page of the training")
+}
+
+fn lead(told: &Told) -> String {
+    let Some(best) = told.best else { return "No validation yet.".to_owned() };
+    let step = |line: &Value| line["step"].as_u64().unwrap_or(0);
+    let last = told.epochs.last().map_or(0, |line| step(line));
+    let windows = best["validation"]["n_windows"].as_u64().unwrap_or(0) as usize;
+    format!(
+        "{last} steps. Of {} validations the one at step {} has the best score, measured on {} of the {} split.",
+        told.epochs.len(),
+        step(best),
+        counted(windows, "window"),
+        best["validation"]["split"].as_str().unwrap_or("validation"),
+    )
+}
+
+/// The table of the best epoch, and the alarm where there is one.
+fn best(told: &Told) -> Vec<Node> {
+    let Some(best) = told.best.map(|line| &line["validation"]) else {
+        return vec![node("p").class("empty").text("The log has no validation.")];
+    };
+    let shown = |value: &Value, in_percent: bool| match value.as_f64() {
+        Some(value) if in_percent => format!("{:.1} %", 100.0 * value),
+        Some(value) => number(value),
+        None => "too few poses".to_owned(),
+    };
+    let row = |(name, of, in_percent): (&str, &str, bool)| {
+        let cells = ["generator", "mean_pose"].map(|who| shown(&best[who][of], in_percent));
+        let cells = cells.into_iter().map(|text| node("td").class("num").text(text));
+        node("tr").child(node("th").attr("scope", "row").text(name)).children(cells)
+    };
+    let head = ["", "generator", "mean pose"].map(|name| node("th").attr("scope", "col").class("num").text(name));
+    let table = node("table")
+        .child(node("thead").child(node("tr").children(head)))
+        .child(node("tbody").children(FIGURES.into_iter().map(row)));
+    let poses = best["n_poses"].as_u64().unwrap_or(0) as usize;
+    let about = format!(
+        "The mean pose never moves. Behind each Frechet distance are {}; the smaller that count, the larger it is.",
+        counted(poses, "pose")
+    );
+    let alarm = best["alarm"].as_str().map(|alarm| node("p").class("note").text(format!("Alarm: {alarm}.")));
+    let table = node("div").class("scroll figures").child(table);
+    [table, node("p").class("small").text(about)].into_iter().chain(alarm).collect()
+}

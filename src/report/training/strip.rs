@@ -1,0 +1,126 @@
+//! Generated against true poses of held-out intervals: for each the figure at a few moments, true above generated, and
+//! the height of both wrists over time.
+
+use crate::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, View, draw_pose, mix};
+use crate::external::opencv::draw;
+use crate::types::image::Image;
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::{L_WRIST, R_WRIST};
+use anyhow::Result;
+use ndarray::Axis;
+use std::ops::Range;
+
+/// A held-out interval: what is true, and what was made for its sound; the same rate and, but for rounding, length.
+pub struct Pair {
+    pub name: String,
+    /// Where in the interval they begin.
+    pub start_secs: f64,
+    pub real: Motion,
+    pub made: Motion,
+}
+
+const N_MOMENTS: usize = 8;
+const EVERY_SECS: f64 = 0.5;
+const CELL: [usize; 2] = [136, 150];
+/// Room for the words at the left, and for the name above.
+const MARGIN: usize = 84;
+const NAME_PX: usize = 24;
+const LANE_PX: usize = 64;
+const PAIR_PX: usize = NAME_PX + 2 * CELL[1] + 2 * LANE_PX + 14;
+/// Least height a lane shows from bottom to top.
+const LANE_METRES: f32 = 0.15;
+
+/// Width of a strip, px.
+pub const WIDTH: usize = MARGIN + N_MOMENTS * CELL[0];
+
+/// Draws the pairs one below the other.
+pub fn strip(pairs: &[Pair]) -> Result<Image> {
+    let mut image = Image::filled(WIDTH, (pairs.len() * PAIR_PX).max(1), PAPER);
+    for (row, pair) in pairs.iter().enumerate() {
+        draw_pair(&mut image, row * PAIR_PX, pair)?;
+    }
+    Ok(image)
+}
+
+fn draw_pair(image: &mut Image, top: usize, pair: &Pair) -> Result<()> {
+    let fps = pair.real.fps;
+    let n_frames = pair.real.n_frames().min(pair.made.n_frames());
+    let span = ((N_MOMENTS as f64 * EVERY_SECS * fps.per_sec()).round() as usize).clamp(1, n_frames.max(1));
+    // from the middle: the beginning of an interval is often a rest
+    let first = n_frames.saturating_sub(span) / 2;
+    let frame_of = |moment: usize| first + (2 * moment + 1) * span / (2 * N_MOMENTS);
+    let words = format!("{}, from {:.1} s", pair.name, pair.start_secs + fps.secs(first));
+    draw::text(image, &words, [8.0, top as f32 + 17.0], 10.0, INK)?;
+    for (row, (name, motion)) in [("true", &pair.real), ("generated", &pair.made)].into_iter().enumerate() {
+        let row_top = top + NAME_PX + row * CELL[1];
+        draw::text(image, name, [8.0, row_top as f32 + 62.0], 9.0, INK)?;
+        for moment in (0..N_MOMENTS).filter(|moment| frame_of(*moment) < n_frames) {
+            let mut cell = Image::filled(CELL[0], CELL[1], PAPER);
+            let view = View::front([CELL[0] as f32 / 2.0, 52.0], 104.0);
+            draw_pose(&mut cell, motion.joints.index_axis(Axis(0), frame_of(moment)), &view)?;
+            draw::paste(image, &cell, [MARGIN + moment * CELL[0], row_top]);
+        }
+    }
+    for (lane, (name, joint, rgb)) in
+        [("right wrist", R_WRIST, RIGHT), ("left wrist", L_WRIST, LEFT)].into_iter().enumerate()
+    {
+        let lane_top = (top + NAME_PX + 2 * CELL[1] + lane * LANE_PX) as f32;
+        let [above, below] = range(pair, joint, first..(first + span).min(n_frames));
+        let y = |metres: f32| {
+            lane_top + 6.0 + (LANE_PX as f32 - 12.0) * ((metres - above) / (below - above)).clamp(0.0, 1.0)
+        };
+        let width = (N_MOMENTS * CELL[0]) as f32 - 8.0;
+        let x = |frame: usize| MARGIN as f32 + width * (frame - first) as f32 / span as f32;
+        draw::text(image, name, [8.0, lane_top + 24.0], 8.0, rgb)?;
+        draw::text(image, &format!("{:.0} cm tall", 100.0 * (below - above)), [8.0, lane_top + 40.0], 7.0, INK)?;
+        for edge in [above, below] {
+            draw::line(image, [x(first), y(edge)], [x(first) + width, y(edge)], 1.0, mix(INK, PAPER, 0.85))?;
+        }
+        for (motion, rgb, wide) in [(&pair.real, mix(INK, PAPER, 0.35), 2.0), (&pair.made, rgb, 2.0)] {
+            for frame in first + 1..(first + span).min(n_frames) {
+                let place = |frame: usize| [x(frame), y(motion.joints[[frame, joint, 1]])];
+                draw::line(image, place(frame - 1), place(frame), wide, rgb)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Highest and lowest place of a wrist in either motion, metres below the neck.
+fn range(pair: &Pair, joint: usize, frames: Range<usize>) -> [f32; 2] {
+    let heights = [&pair.real, &pair.made].into_iter().flat_map(|motion| {
+        frames.clone().map(|frame| motion.joints[[frame, joint, 1]]).filter(|height| height.is_finite())
+    });
+    let [above, below] =
+        heights.fold([f32::INFINITY, f32::NEG_INFINITY], |[above, below], h| [above.min(h), below.max(h)]);
+    if above > below {
+        return [0.0, LANE_METRES];
+    }
+    let more = (LANE_METRES - (below - above)).max(0.0) / 2.0;
+    [above - more, below + more]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::skeleton::N_JOINTS;
+    use crate::types::time::FrameRate;
+    use ndarray::Array3;
+
+    #[test]
+    fn any_length_is_drawn() {
+        let motion = |n_frames: usize, shift: f32| {
+            let place =
+                |(t, joint, k): (usize, usize, usize)| (t as f32 * 0.01 + joint as f32 * 0.01 + shift) * k as f32;
+            Motion::from_joints(FrameRate::new(15, 1), Array3::from_shape_fn((n_frames, N_JOINTS, 3), place))
+        };
+        for (n_real, n_made) in [(0, 3), (1, 1), (3, 5), (90, 89)] {
+            let pair =
+                Pair { name: "a".to_owned(), start_secs: 0.0, real: motion(n_real, 0.0), made: motion(n_made, 0.1) };
+            let image = strip(&[pair]).unwrap();
+            assert_eq!((image.width, image.height), (WIDTH, PAIR_PX));
+            assert!(image.data.iter().any(|v| *v < 100), "{n_real}");
+        }
+        assert_eq!(strip(&[]).unwrap().height, 1);
+    }
+}

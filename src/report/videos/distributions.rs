@@ -1,0 +1,42 @@
+//! How often each value was measured, beside its threshold.
+
+use super::spread::{Shown, Spread};
+use crate::config::Segment;
+use crate::report::html::chart::histogram::histogram;
+use crate::report::html::numbers::{counted, percent};
+use crate::report::html::{Node, node};
+
+/// A card a measure.
+pub fn distributions(spread: &Spread, rules: &Segment, per_sec: f64) -> Vec<Node> {
+    let about = "Of all frames of all videos, also the refused ones. The side that does not pass is in the other colour; \
+                 heights go with the square root of the share, so that rare values can be seen; what lies beyond an end is in \
+                 the last bar.";
+    let cards = spread.shown(rules, per_sec).into_iter().map(|shown| card(&shown));
+    vec![node("p").text(about), node("div").class("grid").children(cards)]
+}
+
+fn card(shown: &Shown) -> Node {
+    let counts = shown.counts;
+    let title = node("h3").text(shown.title);
+    let key = node("code").text(shown.key);
+    let card = node("div").class("card distribution").child(title).child(node("small").child(key));
+    if counts.total() == 0 {
+        let unknown = if counts.unknown > 0 { "It was known of no frame." } else { "Nothing was measured." };
+        return card.child(node("p").class("empty").text(unknown));
+    }
+    let (total, unknown) = (counts.total() as f64, counts.unknown as f64);
+    let threshold = shown.threshold;
+    let beyond = (0..counts.bins.len()).filter(|bin| {
+        let middle = (counts.edge(*bin) + counts.edge(bin + 1)) / 2.0;
+        if threshold.is_least { middle < threshold.value } else { middle > threshold.value }
+    });
+    let beyond: u64 = beyond.map(|bin| counts.bins[bin]).sum();
+    let mut says = format!("about {} beyond the threshold", percent(beyond as f64, total));
+    if unknown > 0.0 {
+        says += &format!("; not known of {}", percent(unknown, total + unknown));
+    }
+    let what = counted(counts.total() as usize, shown.of);
+    let label = format!("{}, {what}: {says}", shown.title);
+    card.child(histogram(&label, counts, shown.unit, Some(threshold)))
+        .child(node("small").text(format!("{what}, {says}")))
+}

@@ -1,0 +1,125 @@
+//! Goes through the videos once, one at a time, and adds each to the sums. Of a video only its ledger is kept.
+
+use super::movement::Movement;
+use super::spread::Spread;
+use super::thresholds::THRESHOLDS;
+use super::video::Video;
+use super::what_if::{Judged, Kept, refused_by_lift};
+use super::worst::Worst;
+use crate::config::Settings;
+use crate::config::videos::Videos;
+use crate::formats::joints_npz;
+use crate::formats::npz::Npz;
+use crate::pipeline::segment;
+use crate::pipeline::segment::Measures;
+use crate::stage::Unit;
+use crate::stage::progress::Progress;
+use crate::stage::runner::place;
+use crate::types::interval::Intervals;
+use anyhow::{Context, Result, ensure};
+use std::path::Path;
+
+/// All the numbers of a report.
+pub struct Gathered {
+    pub videos: Vec<Video>,
+    /// By video; `None`: nothing to judge.
+    pub kept: Vec<Option<Kept>>,
+    pub spread: Spread,
+    pub movement: Movement,
+    pub worst: Worst,
+    /// Entries of the configuration that lead to no video.
+    pub missing: Vec<String>,
+}
+
+/// Gathers of all `videos`; at most `n_pictures` moments a rule.
+pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progress: &dyn Progress) -> Gathered {
+    let missing = videos.iter().flat_map(|of| of.missing.iter().map(move |text| format!("{}: {text}", of.speaker)));
+    let mut all = Gathered {
+        videos: Vec::new(),
+        kept: Vec::new(),
+        spread: Spread::new(),
+        movement: Movement::new(),
+        worst: Worst::new(n_pictures),
+        missing: missing.collect(),
+    };
+    let units: Vec<&Unit> = videos.iter().flat_map(|of| &of.units).collect();
+    let task = progress.begin("reading", units.len() as u64);
+    for unit in units {
+        task.detail(&unit.video);
+        let mut video = Video::read(&settings.work.dir, unit);
+        let kept = if video.ledger.failed.is_empty() && video.ledger.duration_secs > 0.0 {
+            all.add(settings, &mut video)
+        } else {
+            None
+        };
+        all.kept.push(kept);
+        all.videos.push(video);
+        task.advance(1);
+    }
+    all
+}
+
+impl Gathered {
+    /// Adds what was measured of a video; what cannot be read becomes a note.
+    fn add(&mut self, settings: &Settings, video: &mut Video) -> Option<Kept> {
+        let rules = &settings.segment;
+        let (work, unit) = (&settings.work.dir, video.unit.clone());
+        self.spread.add_kept(&video.ledger);
+        let (measures, judged) = match measured(work, &unit) {
+            Ok(found) => found,
+            Err(error) => {
+                video.note(&format!("It is in no histogram and under no slider: {error:#}"));
+                return None;
+            }
+        };
+        self.spread.add_frames(&measures);
+        let bones = if video.is_lifted { bone_change(&place(work, "lift", &unit)) } else { Ok(Vec::new()) };
+        let bone_change = bones.unwrap_or_else(|error| {
+            video.note(&format!("{error:#}"));
+            Vec::new()
+        });
+        self.spread.add_bones(&bone_change);
+        self.worst.add(self.videos.len(), &video.ledger, (&measures, &bone_change), &judged, rules);
+        if video.is_lifted {
+            match motion(&place(work, "lift", &unit)) {
+                Ok((motion, intervals)) => self.movement.add(&motion, &intervals.intervals),
+                Err(error) => video.note(&format!("Its motion is not shown: {error:#}")),
+            }
+        }
+        let refused = refused_by_lift(&video.ledger, &judged);
+        let judged = Judged { measures: &measures, video: &judged, refused_by_lift: &refused };
+        let now = judged.kept_secs(rules);
+        if (now - video.ledger.kept_secs()).abs() > 1e-6 {
+            video.note(
+                "The thresholds have changed since it was judged; the sliders begin with the new ones: orator run.",
+            );
+        }
+        let kept = judged.table(rules);
+        debug_assert_eq!(kept.len(), THRESHOLDS.len());
+        Some(kept)
+    }
+}
+
+fn measured(work: &Path, unit: &Unit) -> Result<(Measures, segment::Video)> {
+    let judged = segment::Video::read(&place(work, "extract", unit).join("media.json"))?;
+    let measures = Measures::read(&place(work, "segment", unit).join("measures.npz"))?;
+    ensure!(
+        measures.n_frames() == judged.n_frames,
+        "{} frames were measured of {}: run the stage segment again",
+        measures.n_frames(),
+        judged.n_frames
+    );
+    Ok((measures, judged))
+}
+
+fn bone_change(lifted: &Path) -> Result<Vec<f32>> {
+    let values = Npz::open(&lifted.join("measures.npz"))?.floats("bone_change", &[None])?;
+    Ok(values.into_iter().collect())
+}
+
+fn motion(lifted: &Path) -> Result<(crate::types::pose3d::Motion, Intervals)> {
+    let path = lifted.join("intervals.json");
+    let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    let intervals = serde_json::from_slice(&bytes).with_context(|| format!("{} holds no intervals", path.display()))?;
+    Ok((joints_npz::read(&lifted.join("joints.npz"))?, intervals))
+}

@@ -1,0 +1,78 @@
+//! Where the joints go and how fast.
+
+use super::movement::{Movement, PAIRS};
+use crate::report::html::chart::profile::profile;
+use crate::report::html::chart::ranges::{Range, ranges};
+use crate::report::html::numbers::{counted, number};
+use crate::report::html::{Node, node};
+
+/// Axis: what it is, and what lies at its ends.
+const AXES: [(&str, [&str; 2]); 3] = [
+    ("across", ["speaker's right", "speaker's left"]),
+    ("height", ["up", "down"]),
+    ("depth", ["to the camera", "away"]),
+];
+const SIDES: [&str; 2] = ["left", "right"];
+
+/// Charts of ranges and of speeds.
+pub fn motion(movement: &Movement) -> Vec<Node> {
+    if movement.n_frames == 0 {
+        return vec![node("p").class("empty").text("No frame is kept and lifted, so there is no motion to show.")];
+    }
+    let about = format!(
+        "Of the {} that are kept: arms from the neck, finger tips from their wrist, in metres. A thin line goes from the lowest to the \
+         highest place, the box holds nine tenths of them, the notch is the median.",
+        counted(movement.n_frames, "frame")
+    );
+    let key = |side: &str| {
+        node("li")
+            .child(node("span").class(format!("swatch side {side}")))
+            .child(node("span").text(format!("speaker's {side}")))
+    };
+    let legend = node("ul").class("legend").children(SIDES.map(key));
+    let charts = [("Arms", true), ("Finger tips", false)].into_iter().flat_map(|(name, is_arm)| {
+        AXES.iter()
+            .enumerate()
+            .map(move |(axis, (along, ends))| range_card(movement, name, is_arm, (axis, along, *ends)))
+    });
+    let speeds = movement.pairs.iter().zip(PAIRS).map(|(joints, pair)| {
+        let medians: Vec<String> = SIDES
+            .iter()
+            .zip(joints)
+            .map(|(side, joint)| format!("{side} {} m/s", number((joint.speeds.quantile(0.5) * 100.0).round() / 100.0)))
+            .collect();
+        let medians = format!("median {}", medians.join(", "));
+        let lines: Vec<_> = SIDES.iter().zip(joints).map(|(side, joint)| (*side, &joint.speeds)).collect();
+        let label = format!("Speed of the {}: {medians}", pair.name);
+        node("div")
+            .class("card speed")
+            .child(node("h3").text(format!("Speed of the {}", pair.name)))
+            .child(profile(&label, "m/s", &lines))
+            .child(node("small").text(medians))
+    });
+    vec![
+        node("p").text(about),
+        legend,
+        node("div").class("grid").children(charts),
+        node("div").class("grid").children(speeds),
+    ]
+}
+
+fn range_card(movement: &Movement, name: &str, is_arm: bool, (axis, along, ends): (usize, &str, [&str; 2])) -> Node {
+    let pairs = || movement.pairs.iter().zip(PAIRS).filter(move |(_, pair)| pair.is_arm == is_arm);
+    let rows: Vec<Range> = pairs()
+        .flat_map(|(joints, pair)| {
+            joints.iter().zip(SIDES).map(move |(joint, side)| Range {
+                name: format!("{} {}", &side[..1].to_uppercase(), pair.name),
+                class: side,
+                marks: joint.marks(axis),
+            })
+        })
+        .collect();
+    // one scale for the three axes, so that they compare
+    let all = pairs().flat_map(|(joints, _)| joints).flat_map(|joint| [0, 1, 2].map(|axis| joint.marks(axis)));
+    let farthest = all.flatten().filter(|mark| mark.is_finite()).fold(0.05, |a: f64, b| a.max(b.abs()));
+    let end = (farthest * 20.0).ceil() / 20.0;
+    let title = format!("{name}: {along}");
+    node("div").class("card range").child(node("h3").text(&title)).child(ranges(&title, &rows, [-end, end], ends))
+}

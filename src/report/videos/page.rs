@@ -1,0 +1,94 @@
+//! The whole report: gathered, drawn, put on one page.
+
+use super::gallery::{Pictures, gallery};
+use super::gather::{Gathered, gather};
+use super::summary;
+use super::summary::Sums;
+use super::{distributions, motion, pictures, sliders, timelines};
+use crate::config::Settings;
+use crate::config::videos::Videos;
+use crate::report::html::numbers::counted;
+use crate::report::html::{Page, Section};
+use crate::stage::progress::Progress;
+use serde_json::json;
+
+/// What is to be reported on.
+pub struct Wanted<'a> {
+    pub settings: &'a Settings,
+    pub videos: &'a [Videos],
+    /// Most pictures of a rule; 0: no video is opened.
+    pub n_pictures: usize,
+}
+
+/// A report.
+pub struct Made {
+    pub html: String,
+    pub sums: Sums,
+    /// The same as numbers, for programs.
+    pub facts: serde_json::Value,
+}
+
+/// Makes the report. What is missing is said on the page.
+pub fn make(wanted: &Wanted, progress: &dyn Progress) -> Made {
+    let Wanted { settings, videos, n_pictures } = *wanted;
+    let mut gathered = gather(settings, videos, n_pictures, progress);
+    let pictures = draw(settings, &mut gathered, progress);
+    let sums = Sums::of(&gathered.videos);
+    let facts = json!({
+        "n_videos": gathered.videos.len(),
+        "n_stretches": gathered.videos.iter().map(|v| v.ledger.kept.len() + v.ledger.refused.len() + v.ledger.failed.len()).sum::<usize>(),
+        "n_pictures": pictures.len(),
+        "duration_secs": sums.whole,
+        "kept_secs": sums.kept,
+        "refused_secs": sums.refused,
+        "failed_secs": sums.failed,
+        "waiting_secs": sums.waiting,
+        "missing": gathered.missing,
+    });
+    Made { html: page(wanted, &gathered, &pictures, &sums).html(), sums, facts }
+}
+
+fn draw(settings: &Settings, gathered: &mut Gathered, progress: &dyn Progress) -> Pictures {
+    let mut found = Pictures::new();
+    let wanted: Vec<usize> =
+        (0..gathered.videos.len()).filter(|video| !gathered.worst.frames_of(*video).is_empty()).collect();
+    let task = progress.begin("pictures", wanted.len() as u64);
+    for number in wanted {
+        let video = &mut gathered.videos[number];
+        task.detail(&video.unit.video);
+        match pictures::of(&settings.work.dir, &video.unit, number, &gathered.worst) {
+            Ok(pictures) => found.extend(pictures.into_iter().map(|(frames, picture)| ((number, frames), picture))),
+            Err(error) => video.note(&format!("No pictures of it: {error:#}")),
+        }
+        task.advance(1);
+    }
+    found
+}
+
+fn page(wanted: &Wanted, gathered: &Gathered, pictures: &Pictures, sums: &Sums) -> Page {
+    let rules = &wanted.settings.segment;
+    let per_sec = wanted.settings.extract.rate().per_sec();
+    let Gathered { videos, kept, spread, movement, worst, missing } = gathered;
+    let names: Vec<&str> = wanted.videos.iter().map(|videos| videos.speaker.as_str()).collect();
+    let section = |id, title, body| Section { id, title, body };
+    Page {
+        title: format!("Report on {}", names.join(", ")),
+        lead: format!(
+            "What became of every second of {}: kept for the dataset, refused for a reason, or lost to a failure.",
+            counted(videos.len(), "video")
+        ),
+        sections: vec![
+            section("totals", "Totals", summary::totals(sums, videos, missing)),
+            section("reasons", "By reason", summary::by_reason(sums)),
+            section("videos", "Videos", summary::table(videos)),
+            section("timelines", "Timelines", timelines::lines(videos)),
+            section("thresholds", "Thresholds", sliders::sliders(kept, rules)),
+            section("frames", "Worst frames", gallery(worst, pictures, videos)),
+            section("distributions", "Distributions", distributions::distributions(spread, rules, per_sec)),
+            section("motion", "Motion", motion::motion(movement)),
+        ],
+        style: include_str!("page.css"),
+        script: include_str!("page.js"),
+        data: sliders::data(kept, videos, rules),
+    }
+}

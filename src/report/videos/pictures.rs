@@ -1,0 +1,81 @@
+//! Thumbnails of the chosen moments: frames of the video, small, under their keypoints. A video is read once, and no further
+//! than its last moment.
+
+use super::worst::Worst;
+use crate::animate::draw::overlay;
+use crate::animate::draw::overlay::Place;
+use crate::external::ffmpeg::frames::FrameReader;
+use crate::external::ffmpeg::jpeg;
+use crate::external::opencv::draw;
+use crate::formats::keypoints_npz;
+use crate::stage::Unit;
+use crate::stage::runner::place;
+use crate::types::image::Image;
+use crate::types::pose2d::Keypoints;
+use anyhow::{Context, Result, ensure};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Largest width and height of a thumbnail, px.
+const MOST_PX: [f64; 2] = [400.0, 260.0];
+const GAP_PX: usize = 4;
+const GAP_RGB: [u8; 3] = [255; 3];
+
+/// A thumbnail.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    pub jpeg: Vec<u8>,
+    pub size: [usize; 2],
+}
+
+/// The pictures of video number `video`, by the frames of their moments.
+pub fn of(work: &Path, unit: &Unit, video: usize, worst: &Worst) -> Result<BTreeMap<Vec<usize>, Picture>> {
+    let keypoints = keypoints_npz::read(&place(work, "pose2d", unit).join("keypoints.npz"))?;
+    let moments: Vec<&Vec<usize>> =
+        worst.rules.values().flatten().filter(|m| m.video == video).map(|m| &m.frames).collect();
+    let frames = worst.frames_of(video);
+    let mut reader = FrameReader::open_with(&unit.source, keypoints.fps, 0)?;
+    let n_wide = |frame: &usize| if moments.iter().any(|m| m.len() > 1 && m.contains(frame)) { 2 } else { 1 };
+    let mut thumbs = BTreeMap::new();
+    for frame_idx in &frames {
+        ensure!(*frame_idx < keypoints.n_frames(), "the keypoints end before frame {frame_idx}");
+        loop {
+            let time = reader.advance()?.with_context(|| {
+                format!("{} ends before frame {frame_idx}: it is not the video that was judged", unit.source.display())
+            })?;
+            if time.frame_idx == *frame_idx {
+                break;
+            }
+        }
+        thumbs.insert(*frame_idx, thumb(&mut reader, &keypoints, *frame_idx, n_wide(frame_idx))?);
+    }
+    let picture = |frames: &Vec<usize>| -> Result<Picture> {
+        let image = side_by_side(frames.iter().filter_map(|frame| thumbs.get(frame)));
+        Ok(Picture { size: [image.width, image.height], jpeg: jpeg::encode(&image)? })
+    };
+    moments.into_iter().map(|frames| Ok((frames.clone(), picture(frames)?))).collect()
+}
+
+/// The frame on show under its keypoints, `n_wide` of which stand side by side.
+fn thumb(reader: &mut FrameReader, keypoints: &Keypoints, frame_idx: usize, n_wide: usize) -> Result<Image> {
+    let size = reader.image_size();
+    let whole = size.map(|px| px.max(1) as f64);
+    let scale = (MOST_PX[0] / n_wide as f64 / whole[0]).min(MOST_PX[1] / whole[1]).min(1.0);
+    let small = whole.map(|px| ((px * scale).round() as usize).max(2));
+    let mut image = reader.picture(Some(small))?;
+    let scale = [0, 1].map(|axis| small[axis] as f32 / keypoints.image_size[axis].max(1) as f32);
+    overlay::draw_keypoints(&mut image, keypoints, frame_idx, Place { scale, shift: [0.0; 2] }, 2.0)?;
+    Ok(image)
+}
+
+fn side_by_side<'a>(images: impl Iterator<Item = &'a Image> + Clone) -> Image {
+    let width: usize = images.clone().map(|image| image.width + GAP_PX).sum();
+    let height = images.clone().map(|image| image.height).max().unwrap_or(1);
+    let mut all = Image::filled(width.saturating_sub(GAP_PX).max(1), height, GAP_RGB);
+    let mut left = 0;
+    for image in images {
+        draw::paste(&mut all, image, [left, 0]);
+        left += image.width + GAP_PX;
+    }
+    all
+}

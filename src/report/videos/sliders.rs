@@ -1,0 +1,109 @@
+//! A slider a threshold, and the table it picks from; `report.js` moves what is built here.
+
+use super::thresholds::{THRESHOLDS, Threshold};
+use super::video::Video;
+use super::what_if::Kept;
+use crate::config::Segment;
+use crate::report::html::chart::curve::curve;
+use crate::report::html::numbers::{length, with_unit};
+use crate::report::html::{Node, node};
+use serde_json::{Value, json};
+
+/// Seconds kept of all videos: by threshold, by value.
+fn sums(kept: &[Option<Kept>], rules: &Segment) -> Kept {
+    let zeros = || THRESHOLDS.iter().map(|threshold| vec![0.0; threshold.grid(rules).0.len()]).collect::<Kept>();
+    kept.iter().flatten().fold(zeros(), |mut sums, of| {
+        for (sums, of) in sums.iter_mut().zip(of) {
+            sums.iter_mut().zip(of).for_each(|(sum, secs)| *sum += secs);
+        }
+        sums
+    })
+}
+
+/// What the script reads: thresholds with their values and sums, videos with their seconds (in tenths, by threshold).
+pub fn data(kept: &[Option<Kept>], videos: &[Video], rules: &Segment) -> Value {
+    let milli = |secs: f64| (secs * 1000.0).round() / 1000.0;
+    let row = |(threshold, sums): (&Threshold, &Vec<f64>)| {
+        let (grid, now) = threshold.grid(rules);
+        json!({
+            "key": threshold.key,
+            "unit": threshold.unit,
+            "now": now,
+            "values": grid.iter().map(|value| threshold.written(*value)).collect::<Vec<_>>(),
+            "secs": sums.iter().map(|secs| milli(*secs)).collect::<Vec<_>>(),
+        })
+    };
+    let thresholds: Vec<Value> = THRESHOLDS.iter().zip(&sums(kept, rules)).map(row).collect();
+    let tenths = |row: &Vec<f64>| row.iter().map(|secs| (secs * 10.0).round() as u64).collect::<Vec<_>>();
+    let judged = videos.iter().zip(kept).filter_map(|(video, kept)| {
+        let rows = kept.as_ref()?.iter().map(tenths).collect::<Vec<_>>();
+        Some(json!({ "name": video.file, "id": video.anchor(), "tenths": rows }))
+    });
+    json!({ "thresholds": thresholds, "videos": judged.collect::<Vec<_>>() })
+}
+
+/// The sliders.
+pub fn sliders(kept: &[Option<Kept>], rules: &Segment) -> Vec<Node> {
+    if kept.iter().all(Option::is_none) {
+        return vec![node("p").class("empty").text("No video has been judged yet: orator run.")];
+    }
+    let about = "Each slider changes one threshold and leaves the others as they are configured. The seconds are exact: for \
+                 every step the rules were applied again to what was measured of all videos. What lifting refused (bones, open) \
+                 stays refused, and frames that were never lifted count as good ones; max_bone_change has no slider.";
+    let sums = sums(kept, rules);
+    let most = sums.iter().flatten().copied().fold(0.0, f64::max);
+    let cards =
+        THRESHOLDS.iter().zip(&sums).enumerate().map(|(i, (threshold, sums))| card(i, threshold, sums, most, rules));
+    let now = sums.first().map_or(0.0, |row| row[THRESHOLDS[0].grid(rules).1]);
+    let toml = node("pre").child(node("code").id("toml").text("# as configured"));
+    let result = node("div")
+        .class("result")
+        .attr("role", "status")
+        .child(
+            node("p")
+                .child(node("b").id("now").attr("data-secs", format!("{now:.3}")).text(length(now)))
+                .text(" kept, ")
+                .child(node("span").id("change").text("as configured")),
+        )
+        .child(
+            node("div").class("toml").child(toml).child(node("button").attr("type", "button").id("copy").text("Copy")),
+        )
+        .child(
+            node("details")
+                .child(node("summary").text("By video"))
+                .child(node("div").class("scroll").child(node("table").id("by-video").child(node("tbody")))),
+        );
+    vec![
+        node("p").text(about),
+        node("div").class("sliding").child(node("div").class("grid knobs").children(cards)).child(result),
+    ]
+}
+
+fn card(i: usize, threshold: &Threshold, sums: &[f64], most: f64, rules: &Segment) -> Node {
+    let (grid, now) = threshold.grid(rules);
+    let id = format!("slider-{}", threshold.key);
+    let label = node("label").attr("for", &id).child(node("code").text(threshold.key));
+    let configured = with_unit(grid[now], threshold.unit);
+    let slider = node("input")
+        .attr("type", "range")
+        .id(&id)
+        .attr("data-threshold", i)
+        .attr("min", 0)
+        .attr("max", grid.len() - 1)
+        .attr("step", 1)
+        .attr("value", now)
+        .attr("autocomplete", "off")
+        .attr("aria-valuetext", &configured);
+    let says = format!("{}: seconds kept by value of the threshold", threshold.key);
+    let values = node("p")
+        .class("values")
+        .child(node("output").class("value").attr("for", &id).text(&configured))
+        .child(node("output").class("secs").attr("for", &id).text(length(sums[now])));
+    node("div")
+        .class("card knob")
+        .child(node("h3").child(label))
+        .child(node("small").text(threshold.says))
+        .child(curve(&says, sums, most, now))
+        .child(slider)
+        .child(values)
+}

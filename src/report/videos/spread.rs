@@ -1,0 +1,151 @@
+//! How often each value was measured, over all frames of all videos, and how long the kept stretches are.
+
+use crate::config::Segment;
+use crate::pipeline::segment::Measures;
+use crate::report::html::chart::histogram::{Counts, Threshold};
+use crate::stage::ledger::Ledger;
+
+/// A measure: its array, what it says, its unit, the ends and the number of its bins, its threshold, and whether
+/// that is the least value.
+struct Row {
+    name: &'static str,
+    title: &'static str,
+    unit: &'static str,
+    ends: [f64; 2],
+    n_bins: usize,
+    threshold: (&'static str, fn(&Segment) -> f64, bool),
+}
+
+const fn row(
+    name: &'static str,
+    title: &'static str,
+    unit: &'static str,
+    ends: [f64; 2],
+    n_bins: usize,
+    threshold: (&'static str, fn(&Segment) -> f64, bool),
+) -> Row {
+    Row { name, title, unit, ends, n_bins, threshold }
+}
+
+const SCORE: (&str, fn(&Segment) -> f64, bool) = ("joint_score", |r| r.joint_score, true);
+const ONE: [f64; 2] = [0.0, 1.0];
+/// Names of what is not in `measures.npz` of the segment stage.
+const BONES: &str = "bone_change";
+const LENGTHS: &str = "interval_secs";
+
+const ROWS: [Row; 15] = [
+    row("sound_db", "Loudness of the second", "dB", [-100.0, 0.0], 50, ("min_sound_db", |r| r.min_sound_db, true)),
+    row("still", "Change of the picture", "8-bit steps", [0.0, 4.0], 80, ("min_change", |r| r.min_change, true)),
+    row("person", "Best score of face and arms", "", ONE, 40, SCORE),
+    row(
+        "shoulder_px",
+        "Between the shoulders",
+        "px",
+        [0.0, 600.0],
+        60,
+        ("min_shoulder_px", |r| r.min_shoulder_px, true),
+    ),
+    row("face", "Score of nose and eyes", "", ONE, 40, SCORE),
+    row("facing", "Width of the shoulders", "neck-nose", [-2.0, 4.0], 60, ("min_facing", |r| r.min_facing, true)),
+    row(
+        "nose_off",
+        "Nose beside the neck",
+        "half shoulders",
+        [0.0, 3.0],
+        60,
+        ("max_nose_off", |r| r.max_nose_off, false),
+    ),
+    row("arms", "Lowest score of shoulders and elbows", "", ONE, 40, SCORE),
+    row("left_hand", "Score of the left hand", "", ONE, 40, SCORE),
+    row("right_hand", "Score of the right hand", "", ONE, 40, SCORE),
+    row("jump", "Step of the neck", "shoulder widths", [0.0, 1.5], 60, ("max_jump", |r| r.max_jump, false)),
+    row("shot_score", "Shot score", "", ONE, 50, ("shot_threshold", |r| r.shot_threshold, false)),
+    row("n_people", "People in view", "people", [-0.5, 10.5], 11, ("max_people", |r| f64::from(r.max_people), false)),
+    row(
+        BONES,
+        "Lifted bone off its length",
+        "of its length",
+        [0.0, 1.5],
+        60,
+        ("max_bone_change", |r| r.max_bone_change, false),
+    ),
+    row(LENGTHS, "Length of kept stretches", "s", [0.0, 60.0], 60, ("min_frames", |r| r.min_frames as f64, true)),
+];
+
+/// The counts of all rows.
+pub struct Spread(Vec<Counts>);
+
+/// A row to be shown.
+pub struct Shown<'a> {
+    pub title: &'static str,
+    pub key: &'static str,
+    pub unit: &'static str,
+    pub counts: &'a Counts,
+    pub threshold: Threshold,
+    /// What is counted.
+    pub of: &'static str,
+}
+
+impl Spread {
+    pub fn new() -> Self {
+        Self(ROWS.iter().map(|row| Counts::new(row.ends[0], row.ends[1], row.n_bins)).collect())
+    }
+
+    fn add(&mut self, name: &str, values: impl Iterator<Item = f64>) {
+        if let Some((counts, _)) = self.0.iter_mut().zip(&ROWS).find(|(_, row)| row.name == name) {
+            values.for_each(|value| counts.add(value));
+        }
+    }
+
+    /// Counts the frames of a video.
+    pub fn add_frames(&mut self, measures: &Measures) {
+        for (name, values) in measures.arrays() {
+            self.add(name, values.iter().map(|value| f64::from(*value)));
+        }
+    }
+
+    /// Counts what lifting measured of a video's frames.
+    pub fn add_bones(&mut self, bone_change: &[f32]) {
+        self.add(BONES, bone_change.iter().map(|value| f64::from(*value)));
+    }
+
+    /// Counts the stretches a video keeps.
+    pub fn add_kept(&mut self, ledger: &Ledger) {
+        self.add(LENGTHS, ledger.kept.iter().map(|kept| kept.end_secs - kept.start_secs));
+    }
+
+    /// Every row, with its threshold under `rules` for frames that come `per_sec` a second.
+    pub fn shown(&self, rules: &Segment, per_sec: f64) -> Vec<Shown<'_>> {
+        let shown = self.0.iter().zip(&ROWS).map(|(counts, row)| {
+            let (key, value, is_least) = row.threshold;
+            let is_length = row.name == LENGTHS;
+            let value = if is_length { value(rules) / per_sec.max(1e-9) } else { value(rules) };
+            let of = if is_length { "stretch" } else { "frame" };
+            let threshold = Threshold { value, is_least };
+            Shown { title: row.title, key, unit: row.unit, counts, threshold, of }
+        });
+        shown.collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stage::ledger::Kept;
+
+    #[test]
+    fn every_measure_is_counted_but_the_two_that_are_yes_or_no() {
+        let names = Measures::default().arrays().map(|(name, _)| name);
+        let missing: Vec<&str> = names.into_iter().filter(|name| ROWS.iter().all(|row| row.name != *name)).collect();
+        assert_eq!(missing, ["sound", "identity"]);
+        let mut spread = Spread::new();
+        let measures = Measures { jump: vec![0.1, 0.7, f32::NAN], ..Measures::default() };
+        spread.add_frames(&measures);
+        spread.add_kept(&Ledger { kept: vec![Kept { start_secs: 1.0, end_secs: 9.0 }], ..Ledger::default() });
+        let shown = spread.shown(&Segment::default(), 15.0);
+        let of = |key: &str| shown.iter().find(|row| row.key == key).unwrap();
+        assert_eq!((of("max_jump").counts.total(), of("max_jump").counts.unknown), (2, 1));
+        assert!((of("min_frames").threshold.value - 64.0 / 15.0).abs() < 1e-9);
+        assert_eq!(of("min_frames").counts.bins[8], 1);
+    }
+}

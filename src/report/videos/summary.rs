@@ -1,0 +1,133 @@
+//! The first sections: the sums, the seconds by reason, and a row a video.
+
+use super::reasons;
+use super::reasons::WAITING;
+use super::video::Video;
+use crate::report::html::chart::bars::{Bar, bars};
+use crate::report::html::numbers::{counted, length, percent};
+use crate::report::html::{Node, node};
+use std::collections::BTreeMap;
+
+/// Seconds of all videos together.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sums {
+    pub whole: f64,
+    pub kept: f64,
+    pub failed: f64,
+    pub waiting: f64,
+    pub refused: BTreeMap<String, f64>,
+    pub n_kept: usize,
+}
+
+impl Sums {
+    pub fn of(videos: &[Video]) -> Self {
+        let mut sums = Self::default();
+        for ledger in videos.iter().map(|video| &video.ledger) {
+            sums.whole += ledger.duration_secs;
+            sums.kept += ledger.kept_secs();
+            sums.n_kept += ledger.kept.len();
+            for failed in &ledger.failed {
+                let sum = if failed.stage == WAITING { &mut sums.waiting } else { &mut sums.failed };
+                *sum += failed.end_secs - failed.start_secs;
+            }
+            for (reason, secs) in ledger.refused_secs() {
+                *sums.refused.entry(reason).or_default() += secs;
+            }
+        }
+        sums
+    }
+
+    pub fn refused_secs(&self) -> f64 {
+        self.refused.values().sum()
+    }
+}
+
+/// The sums as tiles, and what is to be known of them.
+pub fn totals(sums: &Sums, videos: &[Video], missing: &[String]) -> Vec<Node> {
+    let tile = |name: &str, id: &str, secs: f64, says: String| {
+        let value = node("b").id(id).attr("data-secs", format!("{secs:.3}")).text(length(secs));
+        node("div").class("tile").text(name).child(value).child(node("small").text(says))
+    };
+    let share = |secs: f64| percent(secs, sums.whole);
+    let n_failed = videos.iter().filter(|video| video.has_failed).count();
+    let mut tiles = vec![
+        tile("Kept", "kept-secs", sums.kept, format!("{} in {}", share(sums.kept), counted(sums.n_kept, "stretch"))),
+        tile("Refused", "refused-secs", sums.refused_secs(), share(sums.refused_secs())),
+        tile("Failed", "failed-secs", sums.failed, counted(n_failed, "video")),
+        tile("All", "all-secs", sums.whole, counted(videos.len(), "video")),
+    ];
+    if sums.waiting > 0.0 {
+        tiles.insert(3, tile("Not done yet", "waiting-secs", sums.waiting, share(sums.waiting)));
+    }
+    let notes = missing.iter().map(|text| node("p").class("note").text(text));
+    std::iter::once(node("div").class("tiles").children(tiles)).chain(notes).collect()
+}
+
+/// A bar a reason, the longest first.
+pub fn by_reason(sums: &Sums) -> Vec<Node> {
+    let bar = |(reason, secs): (&String, &f64)| Bar {
+        name: reason.clone(),
+        class: reasons::class(reason),
+        secs: *secs,
+        says: reasons::says(reason).to_owned(),
+    };
+    let mut parts: Vec<Bar> = sums.refused.iter().map(bar).collect();
+    parts.sort_by(|a, b| b.secs.total_cmp(&a.secs).then(a.name.cmp(&b.name)));
+    let other = |name: &str, class: &str, secs: f64, says: &str| Bar {
+        name: name.into(),
+        class: class.into(),
+        secs,
+        says: says.into(),
+    };
+    parts.insert(0, other("kept", "kept", sums.kept, "worth learning from"));
+    if sums.failed > 0.0 {
+        parts.push(other("failed", "failed", sums.failed, "a stage failed"));
+    }
+    if sums.waiting > 0.0 {
+        parts.push(other(WAITING, "waiting", sums.waiting, "no verdict yet"));
+    }
+    vec![bars("Seconds kept, refused by reason, and failed", &parts, sums.whole)]
+}
+
+/// A row a video, with a link to its line.
+pub fn table(videos: &[Video]) -> Vec<Node> {
+    let heads = [("Video", ""), ("Length", "num"), ("Kept", "num"), ("", "num"), ("Most refused for", "")];
+    let head = heads.into_iter().map(|(name, class)| node("th").class(class).attr("scope", "col").text(name));
+    let row = |video: &Video| {
+        let link = node("a").attr("href", format!("#{}", video.anchor())).text(&video.file);
+        let ledger = &video.ledger;
+        let mut refused: Vec<(String, f64)> = ledger.refused_secs().into_iter().collect();
+        refused.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let why = refused.iter().take(3).map(|(reason, secs)| {
+            let swatch = node("span").class(format!("swatch {}", reasons::class(reason)));
+            node("li").child(swatch).child(node("span").text(format!("{reason} {}", length(*secs))))
+        });
+        let why = node("ul").class("legend").children(why);
+        let state = match ledger.failed.first() {
+            Some(failed) if failed.stage == WAITING => node("span").text("not done yet"),
+            Some(failed) => node("span").text(format!("failed at {}", failed.stage)),
+            None if ledger.duration_secs == 0.0 => {
+                node("span").text(if video.has_failed { "failed" } else { "not done yet" })
+            }
+            None => why,
+        };
+        node("tr")
+            .child(node("th").attr("scope", "row").class("name").child(link))
+            .child(node("td").class("num").text(length(ledger.duration_secs)))
+            .child(node("td").class("num").text(length(ledger.kept_secs())))
+            .child(node("td").class("num").text(percent(ledger.kept_secs(), ledger.duration_secs)))
+            .child(node("td").child(state))
+    };
+    let table = node("table")
+        .class("videos")
+        .child(node("thead").child(node("tr").children(head)))
+        .child(node("tbody").children(videos.iter().map(row)));
+    vec![
+        node("div")
+            .class("scroll")
+            .attr("tabindex", "0")
+            .attr("role", "region")
+            .attr("aria-label", "Videos")
+            .child(table),
+    ]
+}

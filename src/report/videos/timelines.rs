@@ -1,0 +1,110 @@
+//! A line a video: which of its seconds are kept, and why the others are not.
+
+use super::reasons;
+use super::reasons::WAITING;
+use super::video::Video;
+use crate::report::html::chart::timeline::{Stretch, timeline};
+use crate::report::html::numbers::{clock, counted, length, number, with_unit};
+use crate::report::html::{Node, node};
+use std::collections::BTreeSet;
+
+/// Stretches that are drawn of all videos together, and the least of each: the page must not grow too large.
+const MOST: usize = 40_000;
+const LEAST: usize = 50;
+/// No line is narrower than this share of the longest one's.
+const NARROWEST: f64 = 0.05;
+
+/// The lines of all videos under their legend.
+pub fn lines(videos: &[Video]) -> Vec<Node> {
+    let longest = videos.iter().map(|video| video.ledger.duration_secs).fold(0.0, f64::max).max(1e-9);
+    let most = (MOST / videos.len().max(1)).max(LEAST);
+    let wide = node("label")
+        .class("wide small")
+        .child(node("input").attr("type", "checkbox").id("wide"))
+        .text(" every line at full width");
+    let mut shown = vec![
+        node("p").text(
+            "Lines are as long as their videos. Point at a stretch, or walk a line with the arrow keys, to read what was \
+             measured.",
+        ),
+        legend(videos),
+        wide,
+    ];
+    shown.extend(videos.iter().map(|video| {
+        let ledger = &video.ledger;
+        let about = format!(
+            "{} kept of {} in {}",
+            length(ledger.kept_secs()),
+            length(ledger.duration_secs),
+            counted(ledger.kept.len(), "stretch")
+        );
+        let share = (ledger.duration_secs / longest).max(NARROWEST);
+        let title = node("h3").child(node("span").text(&video.file)).child(node("small").text(about));
+        let line = if ledger.duration_secs > 0.0 {
+            timeline(&format!("Timeline of {}", video.file), ledger.duration_secs, &stretches(video), most)
+        } else {
+            node("p").class("empty").text("Nothing is known of its seconds.")
+        };
+        let line = node("div").class("line").attr("style", format!("--share:{:.2}%", 100.0 * share)).child(line);
+        let notes = video.notes.iter().map(|text| node("p").class("note small").text(text));
+        node("article").class("video").id(video.anchor()).child(title).child(line).children(notes)
+    }));
+    shown
+}
+
+/// Every stretch of a ledger, in order.
+fn stretches(video: &Video) -> Vec<Stretch> {
+    let ledger = &video.ledger;
+    let stretch = |start_secs: f64, end_secs: f64, class: String, word: &str, says: String| Stretch {
+        start_secs,
+        end_secs,
+        class,
+        word: word.to_owned(),
+        says: format!(
+            "{} to {} ({} s): {word}\n{says}",
+            clock(start_secs),
+            clock(end_secs),
+            number((10.0 * (end_secs - start_secs)).round() / 10.0)
+        )
+        .trim_end()
+        .to_owned(),
+    };
+    let kept = ledger
+        .kept
+        .iter()
+        .map(|kept| stretch(kept.start_secs, kept.end_secs, "kept".to_owned(), "kept", String::new()));
+    let refused = ledger.refused.iter().map(|refused| {
+        let (measured, threshold) = (refused.measured, with_unit(refused.threshold, &refused.unit));
+        let says = format!("{}\nmeasured {}, threshold {threshold}", refused.says, with_unit(measured, &refused.unit));
+        stretch(refused.start_secs, refused.end_secs, reasons::class(&refused.reason), &refused.reason, says)
+    });
+    let failed = ledger.failed.iter().map(|failed| {
+        let (class, word) = if failed.stage == WAITING { ("waiting", WAITING) } else { ("failed", "failed") };
+        let says = video.notes.first().cloned().unwrap_or_default();
+        stretch(failed.start_secs, failed.end_secs, class.to_owned(), word, says)
+    });
+    let mut all: Vec<Stretch> = kept.chain(refused).chain(failed).collect();
+    all.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+    all
+}
+
+/// What the colours on the lines mean.
+fn legend(videos: &[Video]) -> Node {
+    let ledgers = || videos.iter().map(|video| &video.ledger);
+    let found: BTreeSet<(usize, &str)> = ledgers()
+        .flat_map(|ledger| &ledger.refused)
+        .map(|refused| (reasons::order(&refused.reason), refused.reason.as_str()))
+        .collect();
+    let stages: BTreeSet<&str> = ledgers().flat_map(|ledger| &ledger.failed).map(|f| f.stage.as_str()).collect();
+    let mut entries = vec![("kept".to_owned(), "kept")];
+    entries.extend(found.iter().map(|(_, reason)| (reasons::class(reason), *reason)));
+    if stages.iter().any(|stage| *stage != WAITING) {
+        entries.push(("failed".to_owned(), "failed"));
+    }
+    if stages.contains(WAITING) {
+        entries.push(("waiting".to_owned(), WAITING));
+    }
+    node("ul").class("legend").attr("aria-label", "Legend").children(entries.into_iter().map(|(class, name)| {
+        node("li").child(node("span").class(format!("swatch {class}"))).child(node("span").text(name))
+    }))
+}

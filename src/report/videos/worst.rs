@@ -1,0 +1,209 @@
+//! The frames that show best what a rule refuses: of each refused stretch the frame farthest from the threshold, of each rule
+//! the stretches that break it most. Equal ones come in the order of the videos, so the choice is always the same.
+
+use super::reasons;
+use crate::config::Segment;
+use crate::pipeline::segment;
+use crate::pipeline::segment::table::{Bound, frame_rules, piece_rules};
+use crate::pipeline::segment::{Measures, Refusal};
+use crate::report::html::numbers::number;
+use crate::stage::ledger::{Ledger, Refused};
+use std::collections::BTreeMap;
+
+/// A moment worth a picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moment {
+    /// The video's place in the report.
+    pub video: usize,
+    /// The frame, and before it the one it differs from, where a rule compares the two.
+    pub frames: Vec<usize>,
+    pub secs: f64,
+    /// How far beyond the threshold.
+    beyond: f64,
+    /// The stretch's sentence.
+    pub says: String,
+    /// What was measured in this very frame; empty where the rule is not on frames.
+    pub here: String,
+}
+
+/// A rule's place in the order, its reason and its unit: `turned` and `hands` are two rules each.
+type Rule = (usize, String, String);
+
+/// The worst moments of every rule.
+pub struct Worst {
+    pub rules: BTreeMap<Rule, Vec<Moment>>,
+    /// Most moments of a rule.
+    most: usize,
+}
+
+impl Worst {
+    pub fn new(most: usize) -> Self {
+        Self { rules: BTreeMap::new(), most }
+    }
+
+    /// Looks at a video's refused stretches; `bone_change` may be empty.
+    pub fn add(
+        &mut self,
+        video: usize,
+        ledger: &Ledger,
+        (measures, bone_change): (&Measures, &[f32]),
+        judged: &segment::Video,
+        rules: &Segment,
+    ) {
+        for stretch in &ledger.refused {
+            let Some(moment) = moment(video, stretch, (measures, bone_change), judged, rules) else { continue };
+            let rule = (reasons::order(&stretch.reason), stretch.reason.clone(), stretch.unit.clone());
+            let moments = self.rules.entry(rule).or_default();
+            let at = moments.partition_point(|other| other.beyond >= moment.beyond);
+            moments.insert(at, moment);
+            moments.truncate(self.most);
+        }
+        self.rules.retain(|_, moments| !moments.is_empty());
+    }
+
+    /// The frames wanted of a video, rising.
+    pub fn frames_of(&self, video: usize) -> Vec<usize> {
+        let moments = self.rules.values().flatten().filter(|moment| moment.video == video);
+        let mut frames: Vec<usize> = moments.flat_map(|moment| moment.frames.iter().copied()).collect();
+        frames.sort_unstable();
+        frames.dedup();
+        frames
+    }
+}
+
+fn moment(
+    video: usize,
+    stretch: &Refused,
+    (measures, bone_change): (&Measures, &[f32]),
+    judged: &segment::Video,
+    rules: &Segment,
+) -> Option<Moment> {
+    let n_frames = measures.n_frames();
+    let frame = |secs: f64| (secs * judged.fps.per_sec()).round() as usize;
+    let start = frame(stretch.start_secs).min(n_frames.checked_sub(1)?);
+    let end = frame(stretch.end_secs).clamp(start + 1, n_frames);
+    let mean = (stretch.measured - stretch.threshold).abs();
+    let refusal = Refusal::ALL.into_iter().find(|r| r.reason() == stretch.reason && r.unit() == stretch.unit);
+    let (t, beyond, here) = match refusal {
+        Some(refusal @ (Refusal::Cut | Refusal::Identity)) => {
+            let score = if refusal == Refusal::Cut { &measures.shot_score } else { &measures.identity };
+            let ends = [start, end.min(n_frames - 1)].into_iter().filter(|t| *t > 0);
+            let t = ends.max_by(|a, b| score[*a].total_cmp(&score[*b]).then(b.cmp(a)))?;
+            (t, mean, said(refusal, f64::from(score[t])))
+        }
+        Some(refusal) => match farthest(refusal, measures, rules, start..end) {
+            Some((t, value, bound, is_mean)) => {
+                (t, if is_mean { (value - bound.threshold()).abs() } else { mean }, said(refusal, value))
+            }
+            None => (start.midpoint(end - 1), mean, String::new()),
+        },
+        None if stretch.reason == "bones" && bone_change.len() == n_frames => {
+            let (t, value) = extreme(bone_change, start..end, false);
+            (t, (value - stretch.threshold).abs(), format!("{} off its length here", number(value)))
+        }
+        None => (start.midpoint(end - 1), mean, String::new()),
+    };
+    let compares = matches!(refusal, Some(Refusal::Cut | Refusal::Identity | Refusal::Jump)) && t > 0;
+    let frames = if compares { vec![t - 1, t] } else { vec![t] };
+    let beyond = if beyond.is_finite() { beyond } else { 0.0 };
+    Some(Moment { video, frames, secs: judged.fps.secs(t), beyond, says: stretch.says.clone(), here })
+}
+
+/// The frame that breaks the refusal's rules most: its number, value, bound, and whether the ledger means that value.
+fn farthest(
+    refusal: Refusal,
+    measures: &Measures,
+    rules: &Segment,
+    frames: std::ops::Range<usize>,
+) -> Option<(usize, f64, Bound, bool)> {
+    let on_frames = frame_rules(rules).into_iter().filter(|rule| rule.refusal == refusal);
+    let on_frames = on_frames.map(|rule| (rule.values, rule.bound, !rule.says_secs));
+    // Of a share that must be reached, frames that do not count are the bad ones; of one that must not, those that do.
+    let on_pieces = piece_rules(rules).into_iter().filter(|rule| rule.refusal == refusal).map(|rule| {
+        let bad = match rule.share {
+            Bound::AtLeast(_) => rule.counted,
+            Bound::AtMost(_) => Bound::AtMost(rule.counted.threshold()),
+        };
+        (rule.values, bad, false)
+    });
+    let found = on_frames.chain(on_pieces).map(|(values, bound, is_mean)| {
+        let is_least = matches!(bound, Bound::AtLeast(_));
+        let (t, value) = extreme(values(measures), frames.clone(), is_least);
+        let beyond = if is_least { bound.threshold() - value } else { value - bound.threshold() };
+        (beyond, (t, value, bound, is_mean))
+    });
+    let known = found.filter(|(beyond, _)| beyond.is_finite());
+    known.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, found)| found)
+}
+
+/// The lowest (or highest) known value of the frames; of equal ones that nearest the middle.
+fn extreme(values: &[f32], frames: std::ops::Range<usize>, lowest: bool) -> (usize, f64) {
+    let middle = frames.start.midpoint(frames.end.saturating_sub(1));
+    let known = frames.filter(|t| !values[*t].is_nan());
+    let key = |t: usize| if lowest { values[t] } else { -values[t] };
+    let t = known.min_by(|a, b| key(*a).total_cmp(&key(*b)).then(a.abs_diff(middle).cmp(&b.abs_diff(middle))));
+    t.map_or((middle, f64::NAN), |t| (t, f64::from(values[t])))
+}
+
+/// What a frame's value is, in words.
+fn said(refusal: Refusal, value: f64) -> String {
+    let value = number(value);
+    match refusal {
+        Refusal::Quiet => format!("{value} dB here"),
+        Refusal::Still => format!("change of {value} steps here"),
+        Refusal::Small => format!("{value} px here"),
+        Refusal::Turned => format!("{value} neck-nose distances here"),
+        Refusal::NoseOff => format!("{value} half shoulder widths here"),
+        Refusal::Jump => format!("{value} shoulder widths from the left picture to the right one"),
+        Refusal::HandGap | Refusal::HandShare => format!("the hand scores {value} here"),
+        Refusal::Crowd => format!("{value} people here"),
+        Refusal::Cut => format!("shot score {value} at the right picture"),
+        Refusal::Identity => "before and after".to_owned(),
+        Refusal::NoSound | Refusal::TooShort => String::new(),
+        Refusal::NoPerson | Refusal::Face | Refusal::Arms => format!("scores {value} here"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::time::FrameRate;
+
+    #[test]
+    fn the_worst_frame_of_the_worst_stretches_is_taken() {
+        let of = |value: f32| vec![value; 100];
+        let mut measures = Measures { person: of(0.9), left_hand: of(0.9), right_hand: of(0.9), ..Measures::default() };
+        measures.jump = of(0.1);
+        (measures.jump[20], measures.jump[50]) = (0.8, 1.8);
+        measures.right_hand[70..90].fill(0.2);
+        measures.right_hand[74] = 0.1;
+        let stretch = |start: f64, end: f64, refusal: Refusal, measured: f64| Refused {
+            start_secs: start,
+            end_secs: end,
+            reason: refusal.reason().to_owned(),
+            measured,
+            threshold: 0.5,
+            unit: refusal.unit().to_owned(),
+            says: refusal.says(measured, 0.5),
+        };
+        let refused = vec![
+            stretch(2.0, 2.1, Refusal::Jump, 0.8),
+            stretch(5.0, 5.1, Refusal::Jump, 1.8),
+            stretch(7.0, 9.0, Refusal::HandGap, 2.0),
+            stretch(9.0, 9.5, Refusal::TooShort, 0.5),
+        ];
+        let ledger = Ledger { duration_secs: 10.0, refused, ..Ledger::default() };
+        let judged = segment::Video { duration_secs: 10.0, n_frames: 100, fps: FrameRate::new(10, 1) };
+        let mut worst = Worst::new(1);
+        worst.add(0, &ledger, (&measures, &[]), &judged, &Segment::default());
+        let frames: Vec<(&str, Vec<usize>)> =
+            worst.rules.iter().map(|((_, reason, _), of)| (reason.as_str(), of[0].frames.clone())).collect();
+        assert_eq!(frames, [("hands", vec![74]), ("jump", vec![49, 50]), ("too short", vec![92])]);
+        assert_eq!(worst.frames_of(0), [49, 50, 74, 92]);
+        worst.add(1, &ledger, (&measures, &[]), &judged, &Segment::default());
+        assert!(worst.frames_of(1).is_empty(), "equal ones: the first video's");
+        let mut none = Worst::new(0);
+        none.add(0, &ledger, (&measures, &[]), &judged, &Segment::default());
+        assert!(none.rules.is_empty());
+    }
+}

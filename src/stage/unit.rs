@@ -1,0 +1,67 @@
+//! How any step of the road runs, is recorded, and resumes. This room knows no concrete step: a step is a `Stage`, a
+//! thing to do is a `Unit`, and what was done is a `record::Record` written last.
+
+use super::progress::Progress;
+use anyhow::Context;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// One thing a stage works on: a video of a speaker, or (for `shard`) a whole speaker.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Unit {
+    pub speaker: String,
+    /// Work folder name of the video: slug of its stem, `-`, 8 hex digits of its path; empty for a whole speaker.
+    pub video: String,
+    /// The video file; for a whole speaker the configuration file.
+    pub source: PathBuf,
+}
+
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.video.is_empty() { write!(f, "{}", self.speaker) } else { write!(f, "{}/{}", self.speaker, self.video) }
+    }
+}
+
+/// A file a stage reads: its role (`video`, `keypoints`, `model:body`) and where it is.
+#[derive(Clone, Debug)]
+pub struct Input {
+    pub role: String,
+    pub path: PathBuf,
+}
+
+/// One line of a stage's report on a unit, for people; and the numbers behind it, for programs.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    pub line: String,
+    pub facts: serde_json::Map<String, serde_json::Value>,
+}
+
+/// A step of the road. The same inputs and settings give the same bytes, whatever else runs beside it.
+pub trait Stage: Sync {
+    /// Its name, an argument of `--from`.
+    fn name(&self) -> &'static str;
+    /// Its folder under `work/`.
+    fn folder(&self) -> &'static str {
+        self.name()
+    }
+    /// Goes up when the bytes it writes change their meaning.
+    fn version(&self) -> u32;
+    /// Every setting that has a say in the bytes made of `unit`, and the versions of the tools that have.
+    fn settings(&self, unit: &Unit) -> serde_json::Value;
+    /// The files it reads for `unit`; their contents are part of the fingerprint.
+    fn inputs(&self, unit: &Unit) -> anyhow::Result<Vec<Input>>;
+    /// Does the work: writes its files into the empty folder `out` and nowhere else.
+    fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> anyhow::Result<Report>;
+}
+
+/// Writes a file of a stage into its `out` folder as JSON for people.
+pub fn write_json(path: &Path, value: &impl serde::Serialize) -> anyhow::Result<()> {
+    let mut bytes = serde_json::to_vec_pretty(value)?;
+    bytes.push(b'\n');
+    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// `1 video`, `2 videos`.
+pub fn counted(n: usize, what: &str) -> String {
+    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
+}

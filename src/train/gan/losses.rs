@@ -1,0 +1,191 @@
+//! What the networks are trained to make small: pure functions of tensors.
+
+use crate::generate::normalisation::{N_NUMBERS, Normalisation};
+use crate::nn::gan::discriminator::motion;
+use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WRIST, is_duplicate, parent};
+use candle_core::{DType, Device, Result, Tensor};
+
+/// Mean absolute difference over the numbers whose mask is 1; all three of one shape.
+pub fn l1(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
+    let n = mask.sum_all()?.maximum(1.0)?;
+    ((made - real)?.abs()? * mask)?.sum_all()? / n
+}
+
+/// Mean absolute difference of the frame-to-frame differences, over the numbers whose mask is 1 in both frames; all
+/// three [B, C, T].
+pub fn velocity(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
+    l1(&motion(made)?, &motion(real)?, &both_seen(mask)?)
+}
+
+/// 1 where the mask is 1 in a frame and in the one before: [B, C, T] to [B, C, T - 1].
+pub fn both_seen(mask: &Tensor) -> Result<Tensor> {
+    let n = mask.dim(2)?.saturating_sub(1);
+    mask.narrow(2, 1, n)? * mask.narrow(2, 0, n)?
+}
+
+/// The game between generator and discriminator, on the discriminator's scores of any shape.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Adversarial {
+    /// Least squares (Mao et al. 2017), as in the code the paper descends from: real scores towards 1, made ones towards 0.
+    LeastSquares,
+    /// Cross entropy of the scores as logits (Goodfellow et al. 2014, the paper's equation); the generator's in its
+    /// non-saturating form, -log D(made) instead of log(1 - D(made)).
+    Log,
+}
+
+impl std::str::FromStr for Adversarial {
+    type Err = anyhow::Error;
+
+    fn from_str(name: &str) -> anyhow::Result<Self> {
+        match name {
+            "least-squares" => Ok(Self::LeastSquares),
+            "log" => Ok(Self::Log),
+            _ => anyhow::bail!("the adversarial loss is `least-squares` or `log`, not `{name}`"),
+        }
+    }
+}
+
+impl Adversarial {
+    /// What the discriminator makes small.
+    pub fn discriminator(self, real_scores: &Tensor, made_scores: &Tensor) -> Result<Tensor> {
+        match self {
+            Self::LeastSquares => (real_scores - 1.0)?.sqr()?.mean_all()? + made_scores.sqr()?.mean_all()?,
+            Self::Log => softplus(&real_scores.neg()?)?.mean_all()? + softplus(made_scores)?.mean_all()?,
+        }
+    }
+
+    /// What the generator makes small.
+    pub fn generator(self, made_scores: &Tensor) -> Result<Tensor> {
+        match self {
+            Self::LeastSquares => (made_scores - 1.0)?.sqr()?.mean_all(),
+            Self::Log => softplus(&made_scores.neg()?)?.mean_all(),
+        }
+    }
+}
+
+/// log(1 + e^x), without overflow.
+fn softplus(x: &Tensor) -> Result<Tensor> {
+    x.relu()? + (x.abs()?.neg()?.exp()? + 1.0)?.log()?
+}
+
+/// Constancy of bone lengths (Rebol et al. 2021, eq. 1): how much each bone changes its length from frame to frame,
+/// as a share of the speaker's length of that bone. Holds the tables it needs.
+pub struct BoneConstancy {
+    mean: Tensor,
+    std: Tensor,
+    /// Rows of joint coordinates (the neck's included) at the two ends of the bones.
+    children: Tensor,
+    parents: Tensor,
+    /// 1 / length, [1, n_bones, 1].
+    inverse_lengths: Tensor,
+}
+
+impl BoneConstancy {
+    /// For the bones that were measured, without those to the hand roots, which are the wrists.
+    pub fn new(normal: &Normalisation, dtype: DType, device: &Device) -> Result<Self> {
+        let (mut children, mut parents, mut inverse) = (Vec::new(), Vec::new(), Vec::new());
+        for joint in 1..N_JOINTS {
+            let length = f64::from(normal.bone_lengths.get(joint - 1).copied().unwrap_or(0.0));
+            if is_duplicate(joint) || length < 1e-3 {
+                continue;
+            }
+            let from = match parent(joint).unwrap_or(NECK) {
+                L_HAND => L_WRIST,
+                R_HAND => R_WRIST,
+                other => other,
+            };
+            children.extend((0..3).map(|k| (3 * joint + k) as u32));
+            parents.extend((0..3).map(|k| (3 * from + k) as u32));
+            inverse.push(1.0 / length);
+        }
+        let column = |values: &[f32]| Tensor::new(values, device)?.to_dtype(dtype)?.reshape((1, (), 1));
+        Ok(Self {
+            mean: column(&normal.mean)?,
+            std: column(&normal.std)?,
+            children: Tensor::new(children, device)?,
+            parents: Tensor::new(parents, device)?,
+            inverse_lengths: Tensor::new(inverse, device)?.to_dtype(dtype)?.reshape((1, (), 1))?,
+        })
+    }
+
+    /// The loss of normalised poses [B, 144, T].
+    pub fn loss(&self, poses: &Tensor) -> Result<Tensor> {
+        let (batch, n_numbers, n_frames) = poses.dims3()?;
+        let n_bones = self.inverse_lengths.dim(1)?;
+        if n_bones == 0 || n_frames < 2 || n_numbers != N_NUMBERS {
+            return poses.zeros_like()?.mean_all();
+        }
+        let metres = poses.broadcast_mul(&self.std)?.broadcast_add(&self.mean)?;
+        let neck = Tensor::zeros((batch, 3, n_frames), poses.dtype(), poses.device())?;
+        let joints = Tensor::cat(&[neck, metres], 1)?;
+        let bones = (joints.index_select(&self.children, 1)? - joints.index_select(&self.parents, 1)?)?;
+        let squares = bones.reshape((batch, n_bones, 3, n_frames))?.sqr()?.sum(2)?;
+        // The root has no slope at 0; a bone of 0.1 mm is as good as none.
+        let lengths = (squares + 1e-8)?.sqrt()?.broadcast_mul(&self.inverse_lengths)?;
+        let change = (lengths.narrow(2, 1, n_frames - 1)? - lengths.narrow(2, 0, n_frames - 1)?)?;
+        change.abs()?.mean_all()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nn::ops::gradcheck::{pattern, worst};
+    use ndarray::Array2;
+
+    fn normal() -> Normalisation {
+        let table = |value: f32| Array2::from_shape_fn((N_JOINTS, 3), |(j, k)| value + 0.01 * (j + 2 * k) as f32);
+        Normalisation::new(&table(0.1), &table(0.3), vec![0.2; N_JOINTS - 1])
+    }
+
+    #[test]
+    fn gradients_are_right() -> Result<()> {
+        let shape = [2, 3, 4];
+        let (made, real) = (pattern(&shape, 0.0)?, pattern(&shape, 3.0)?);
+        let mask = pattern(&shape, 9.0)?.gt(0.0)?.to_dtype(DType::F64)?;
+        assert!(worst(std::slice::from_ref(&made), |v| l1(&v[0], &real, &mask))? < 1e-7);
+        assert!(worst(std::slice::from_ref(&made), |v| velocity(&v[0], &real, &mask))? < 1e-7);
+        for game in [Adversarial::LeastSquares, Adversarial::Log] {
+            assert!(worst(&[made.clone(), real.clone()], |v| game.discriminator(&v[0], &v[1]))? < 1e-7);
+            assert!(worst(std::slice::from_ref(&made), |v| game.generator(&v[0]))? < 1e-7);
+        }
+        let bones = BoneConstancy::new(&normal(), DType::F64, &Device::Cpu)?;
+        assert!(worst(&[pattern(&[2, N_NUMBERS, 3], 0.0)?], |v| bones.loss(&v[0]))? < 1e-6);
+        Ok(())
+    }
+
+    #[test]
+    fn masked_numbers_have_no_say() -> Result<()> {
+        let row = |values: [f64; 4]| Tensor::new(&values, &Device::Cpu);
+        let (made, real) = (row([1.0, 2.0, 3.0, 4.0])?, row([1.0, 4.0, 100.0, 5.0])?);
+        let loss = |mask| -> Result<f64> { l1(&made, &real, &row(mask)?)?.to_scalar() };
+        assert_eq!(loss([1.0, 1.0, 0.0, 1.0])?, 1.0);
+        assert_eq!(loss([0.0; 4])?, 0.0);
+        Ok(())
+    }
+
+    #[test]
+    fn losses_are_what_their_formulas_say() -> Result<()> {
+        let row = |values: [f64; 3]| Tensor::new(&[[values]], &Device::Cpu);
+        let number = |loss: Result<Tensor>| loss?.to_scalar::<f64>();
+        let (real, made) = (row([0.5, -1.0, 90.0])?, row([2.0, 0.0, -90.0])?);
+        let log = |x: f64| -(1.0 / (1.0 + (-x).exp())).ln();
+        let expected = (log(0.5) + log(-1.0)) / 3.0 + (log(-2.0) + log(0.0)) / 3.0;
+        assert!((number(Adversarial::Log.discriminator(&real, &made))? - expected).abs() < 1e-12);
+        assert!((number(Adversarial::Log.generator(&made))? - (log(2.0) + log(0.0) + 90.0) / 3.0).abs() < 1e-12);
+        assert_eq!(number(Adversarial::LeastSquares.generator(&row([2.0, 0.0, 1.0])?))?, 2.0 / 3.0);
+        // Speeds 1, -2 against 0, 3, of which the second is not seen.
+        let loss = velocity(&row([1.0, 2.0, 0.0])?, &row([1.0, 1.0, 4.0])?, &row([1.0, 1.0, 0.0])?);
+        assert_eq!(number(loss)?, 1.0);
+        Ok(())
+    }
+
+    #[test]
+    fn only_changing_bones_cost() -> Result<()> {
+        let bones = BoneConstancy::new(&normal(), DType::F64, &Device::Cpu)?;
+        let still = pattern(&[1, N_NUMBERS, 1], 0.0)?.broadcast_as((1, N_NUMBERS, 5))?.contiguous()?;
+        assert!(bones.loss(&still)?.to_scalar::<f64>()? < 1e-12);
+        assert!(bones.loss(&pattern(&[1, N_NUMBERS, 5], 0.0)?)?.to_scalar::<f64>()? > 0.01);
+        Ok(())
+    }
+}

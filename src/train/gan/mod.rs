@@ -1,0 +1,9 @@
+//! Training of the speech-to-gesture GAN: `windows` (data) -> `step` (networks, `losses`, optimiser) -> `validate` and
+//! `score` (which checkpoint is best); `train` is the loop.
+
+pub mod losses;
+pub mod score;
+pub mod step;
+pub mod train;
+pub mod validate;
+pub mod windows;

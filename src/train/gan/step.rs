@@ -1,0 +1,251 @@
+//! A generator and its discriminator in training: one step, and all of it to a checkpoint and back.
+
+use super::losses;
+use super::losses::{Adversarial, BoneConstancy};
+use super::score::Validation;
+use super::windows::Batch;
+use crate::config::Gan;
+use crate::formats::checkpoint;
+use crate::formats::checkpoint::Contents;
+use crate::generate::model::{Facts, GENERATOR};
+use crate::generate::normalisation::N_NUMBERS;
+use crate::generate::representation::Decoder;
+use crate::nn::device;
+use crate::nn::gan::discriminator::{Discriminator, motion};
+use crate::nn::gan::generator::Generator;
+use crate::nn::params::Params;
+use crate::train::optim::adam;
+use crate::train::optim::adam::Adam;
+use anyhow::{Context, Result, ensure};
+use candle_core::{DType, Device, Tensor};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+const DISCRIMINATOR: &str = "discriminator.";
+const ADAM_G: &str = "adam.generator.";
+const ADAM_D: &str = "adam.discriminator.";
+/// Gradients are clipped to this norm; a loss beyond the limit is a training that has exploded.
+const MAX_NORM: f64 = 10.0;
+const LOSS_LIMIT: f64 = 1e4;
+/// The best checkpoint by the validation's score: the generator alone, to generate with.
+pub const BEST: &str = "best.safetensors";
+/// Settings that may change between two runs of one training; of the others the checkpoint's count.
+const FREE: [&str; 5] = ["steps", "patience", "checkpoint_every", "keep_checkpoints", "device"];
+
+/// Losses of one step, unweighted, and the norm of the generator's gradient.
+#[derive(Clone, Copy, Debug)]
+pub struct Losses {
+    pub l1: f64,
+    pub velocity: f64,
+    pub bone: f64,
+    pub adversarial: f64,
+    pub discriminator: f64,
+    pub gradient_norm: f64,
+}
+
+/// What a checkpoint says beside its tensors.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct Stored {
+    pub speaker: Facts,
+    pub settings: Gan,
+    /// Steps done.
+    pub step: usize,
+    /// Step and score of the best validation so far.
+    pub best: Option<(usize, f32)>,
+}
+
+/// Networks, optimisers and where they are.
+pub struct Training {
+    pub facts: Facts,
+    pub settings: Gan,
+    pub generator: Generator,
+    pub decoder: Decoder,
+    generator_params: Params,
+    discriminator: Discriminator,
+    discriminator_params: Params,
+    adam_g: Adam,
+    adam_d: Adam,
+    bones: BoneConstancy,
+    adversarial: Adversarial,
+    /// Steps done.
+    pub step: usize,
+    /// Step and score of the best validation so far.
+    pub best: Option<(usize, f32)>,
+}
+
+impl Training {
+    /// Networks as the seed makes them.
+    pub fn new(facts: Facts, settings: Gan) -> Result<Self> {
+        let device = device::named(&settings.device)?;
+        let mut generator_params = Params::new(settings.seed).on(&device);
+        let generator = Generator::new(&mut generator_params, &facts.network)?;
+        // Another seed, or tensors of the same name would begin alike.
+        let mut discriminator_params = Params::new(!settings.seed).on(&device);
+        let discriminator = Discriminator::new(&mut discriminator_params, N_NUMBERS)?;
+        let adam = adam::Config { max_norm: Some(MAX_NORM), ..adam::Config::default() };
+        Ok(Self {
+            decoder: facts.representation.decoder(&facts.normalisation, DType::F32, &device)?,
+            bones: BoneConstancy::new(&facts.normalisation, DType::F32, &device)?,
+            adversarial: settings.adversarial.parse()?,
+            adam_g: Adam::new(&generator_params, adam)?,
+            adam_d: Adam::new(&discriminator_params, adam)?,
+            generator_params,
+            generator,
+            discriminator_params,
+            discriminator,
+            facts,
+            settings,
+            step: 0,
+            best: None,
+        })
+    }
+
+    /// Numbers the optimiser moves in the generator.
+    pub fn n_parameters(&self) -> usize {
+        self.generator_params.n_parameters()
+    }
+
+    /// Where the tensors are.
+    pub fn device(&self) -> &Device {
+        self.generator_params.device()
+    }
+
+    /// One step of the discriminator, then one of the generator, on the same windows.
+    pub fn step(&mut self, batch: &Batch) -> Result<Losses> {
+        let batch = batch.on(self.device())?;
+        let Gan { lambda_l1, lambda_velocity, lambda_gan, lambda_bone, learning_rate, .. } = self.settings;
+        let raw = self.generator.forward(&batch.mels, self.settings.window_frames, true)?;
+        let made = self.decoder.poses(&raw)?;
+        // Differences count where both frames do, so that a missing joint looks the same in both.
+        let mask = losses::both_seen(&batch.mask)?;
+        let made_motion = (motion(&made)? * &mask)?;
+
+        let mut of_discriminator = 0.0;
+        if lambda_gan > 0.0 {
+            let real = self.discriminator.forward(&(motion(&batch.poses)? * &mask)?, true)?;
+            let fake = self.discriminator.forward(&made_motion.detach(), true)?;
+            let loss = self.adversarial.discriminator(&real, &fake)?;
+            of_discriminator = number(&loss)?;
+            self.adam_d.step(&loss.backward()?, learning_rate)?;
+        }
+
+        let l1 = losses::l1(&made, &batch.poses, &batch.mask)?;
+        let mut total = (&l1 * lambda_l1)?;
+        let (mut velocity, mut bone, mut adversarial) = (0.0, 0.0, 0.0);
+        let mut add = |loss: Tensor, weight: f64| -> Result<f64> {
+            total = (&total + (&loss * weight)?)?;
+            number(&loss)
+        };
+        if lambda_velocity > 0.0 {
+            velocity = add(losses::velocity(&made, &batch.poses, &batch.mask)?, lambda_velocity)?;
+        }
+        if lambda_bone > 0.0 && !self.facts.representation.keeps_lengths() {
+            bone = add(self.bones.loss(&made)?, lambda_bone)?;
+        }
+        if lambda_gan > 0.0 {
+            let scores = self.discriminator.forward(&made_motion, true)?;
+            adversarial = add(self.adversarial.generator(&scores)?, lambda_gan)?;
+        }
+        let gradient_norm = self.adam_g.step(&total.backward()?, learning_rate)?;
+        self.step += 1;
+        let l1 = number(&l1)?;
+        Ok(Losses { l1, velocity, bone, adversarial, discriminator: of_discriminator, gradient_norm })
+    }
+
+    /// Writes the checkpoint of this step; old ones go.
+    pub fn save(&self, folder: &Path) -> Result<()> {
+        let mut contents = Contents { facts: self.stored()?, tensors: BTreeMap::new() };
+        contents.add(GENERATOR, self.generator_params.tensors()?);
+        contents.add(DISCRIMINATOR, self.discriminator_params.tensors()?);
+        contents.add("", self.adam_g.tensors(ADAM_G)?);
+        contents.add("", self.adam_d.tensors(ADAM_D)?);
+        contents.write(&checkpoint::path(folder, self.step))?;
+        checkpoint::prune(folder, self.settings.keep_checkpoints)
+    }
+
+    /// Writes the generator of this step as the best.
+    pub fn save_best(&self, folder: &Path, validation: &Validation) -> Result<()> {
+        let mut facts = self.stored()?;
+        facts["validation"] = serde_json::to_value(validation)?;
+        let mut contents = Contents { facts, tensors: BTreeMap::new() };
+        contents.add(GENERATOR, self.generator_params.tensors()?);
+        contents.write(&folder.join(BEST))
+    }
+
+    fn stored(&self) -> Result<Value> {
+        let (speaker, settings) = (self.facts.clone(), self.settings.clone());
+        Ok(serde_json::to_value(Stored { speaker, settings, step: self.step, best: self.best })?)
+    }
+
+    /// Takes up the tensors and the place of a checkpoint.
+    pub fn load(&mut self, stored: &Stored, contents: &Contents) -> Result<()> {
+        self.generator_params.load(&contents.part(GENERATOR))?;
+        self.discriminator_params.load(&contents.part(DISCRIMINATOR))?;
+        self.adam_g.load(ADAM_G, &contents.tensors)?;
+        self.adam_d.load(ADAM_D, &contents.tensors)?;
+        (self.step, self.best) = (stored.step, stored.best);
+        Ok(())
+    }
+}
+
+impl Stored {
+    /// What a checkpoint of a training says. Errors when it is none, or of another program's version.
+    pub fn of(contents: &Contents) -> Result<Self> {
+        ensure!(
+            contents.facts["settings"].is_object(),
+            "it is no checkpoint that this version can go on from; choose another --out, or move that folder away"
+        );
+        serde_json::from_value(contents.facts.clone()).context("its facts are not those of this program's version")
+    }
+
+    /// The settings to go on with: the checkpoint's, but for those that may change; and a line for each difference.
+    pub fn settings(&self, wanted: &Gan) -> Result<(Gan, Vec<String>)> {
+        let (mut kept, wanted) = (serde_json::to_value(&self.settings)?, serde_json::to_value(wanted)?);
+        let mut differences = Vec::new();
+        for (key, value) in wanted.as_object().into_iter().flatten() {
+            if FREE.contains(&key.as_str()) {
+                kept[key] = value.clone();
+            } else if kept[key] != *value {
+                differences.push(format!("gan.{key} is {value} now, {} in the checkpoint, which counts", kept[key]));
+            }
+        }
+        Ok((serde_json::from_value(kept)?, differences))
+    }
+}
+
+impl Losses {
+    /// Errors, saying all of them, when one is not finite or has exploded.
+    pub fn check(&self, step: usize) -> Result<()> {
+        let all = [self.l1, self.velocity, self.bone, self.adversarial, self.discriminator];
+        ensure!(
+            all.iter().all(|loss| loss.is_finite() && loss.abs() < LOSS_LIMIT) && self.gradient_norm.is_finite(),
+            "the training broke at step {step}: L1 {}, velocity {}, bone {}, adversarial {}, discriminator {}, norm of the \
+             gradient {}",
+            self.l1,
+            self.velocity,
+            self.bone,
+            self.adversarial,
+            self.discriminator,
+            self.gradient_norm
+        );
+        Ok(())
+    }
+
+    /// A line of the log.
+    pub fn line(&self, step: usize) -> Value {
+        json!({
+            "step": step,
+            "l1": self.l1,
+            "velocity": self.velocity,
+            "bone": self.bone,
+            "adversarial": self.adversarial,
+            "discriminator": self.discriminator,
+            "gradient_norm": self.gradient_norm,
+        })
+    }
+}
+
+fn number(scalar: &Tensor) -> Result<f64> {
+    Ok(f64::from(scalar.to_scalar::<f32>()?))
+}

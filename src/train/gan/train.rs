@@ -1,0 +1,260 @@
+//! Training a speaker's generator against the motion discriminator: one straight loop. The same dataset, settings and
+//! seed give the same checkpoints, also when the training was interrupted: the windows of a step depend on the seed
+//! and the step alone (the place of the loader is the step), everything else is in the checkpoint.
+
+use super::score::Validation;
+pub use super::step::BEST;
+use super::step::{Losses, Stored, Training};
+use super::validate::HeldOut;
+use super::windows::Examples;
+use crate::config::Gan;
+use crate::dataset::{Dataset, Split};
+use crate::formats::checkpoint;
+use crate::formats::checkpoint::Contents;
+use crate::generate::model::Facts;
+use crate::generate::normalisation::{N_NUMBERS, Normalisation};
+use crate::generate::representation::Representation;
+use crate::motion::bones;
+use crate::nn::cpu::thread_team::awake;
+use crate::nn::device;
+use crate::nn::gan::generator::{Config, FRAMES_MULTIPLE};
+use crate::stage::progress::{Progress, Task};
+use crate::stage::workdir;
+use crate::train::log::Log;
+use crate::types::skeleton::N_BONES;
+use anyhow::{Context, Result, bail, ensure};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Steps between two lines of the log.
+const LOG_EVERY: usize = 10;
+
+/// How a training ended.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Steps of this training altogether, and the step this run began at.
+    pub steps: usize,
+    pub began_at: usize,
+    /// Whether it ended before its last step since the score had not become better for `gan.patience` epochs.
+    pub stopped_early: bool,
+    pub n_windows: usize,
+    pub n_parameters: usize,
+    /// Of the newest checkpoint.
+    pub validation: Validation,
+    pub newest: PathBuf,
+    /// Best by the validation's score.
+    pub best: PathBuf,
+    pub best_step: usize,
+    /// Share of the steps' time spent on putting batches together, 0..1.
+    pub waiting: f64,
+}
+
+/// Trains on `dataset` until `wanted.steps`, going on from the newest checkpoint in `folder`; what the settings of that
+/// checkpoint say counts, and is told where it differs.
+///
+/// # Errors
+/// No window to train on; a checkpoint of another speaker or version; another training at work in `folder`; a loss that
+/// is not finite or explodes (the last good checkpoint stays).
+pub fn train(dataset: &Dataset, wanted: &Gan, folder: &Path, progress: &dyn Progress) -> Result<Outcome> {
+    check(wanted)?;
+    let _lock = workdir::lock(folder)?;
+    let resumed = resume(dataset, wanted, folder, progress)?;
+    let (settings, normal) = match &resumed {
+        Some((stored, _)) => (stored.settings.clone(), stored.speaker.normalisation.clone()),
+        None => (wanted.clone(), normalisation(dataset)?),
+    };
+    let examples = Examples::load(dataset, Split::Train, &normal, settings.window_frames, settings.stride_frames)?;
+    ensure!(
+        !examples.is_empty(),
+        "{}: no interval of the training split is as long as a window of {} frames; more footage, or a smaller \
+         gan.window_frames",
+        dataset.dir().display(),
+        settings.window_frames
+    );
+    let held_out = HeldOut::load(dataset, &settings, &normal, progress)?;
+    let mut training = match &resumed {
+        Some((stored, _)) => Training::new(stored.speaker.clone(), settings)?,
+        None => {
+            let representation = match settings.representation.as_str() {
+                "positions" => Representation::Positions,
+                _ => Representation::bones(&normal, examples.poses()),
+            };
+            let network = Config::of(settings.preset.parse()?, N_NUMBERS);
+            let (info, hash) = (dataset.info(), dataset.hash()?);
+            let facts = Facts::new(&info.speaker, info.fps, &hash, network, normal, representation);
+            Training::new(facts, settings)?
+        }
+    };
+    if let Some((stored, contents)) = &resumed {
+        training.load(stored, contents)?;
+    }
+    awake(|| run(&mut training, &examples, &held_out, folder, progress))
+}
+
+/// The loop: steps, and at the end of each epoch a validation.
+fn run(
+    training: &mut Training,
+    examples: &Examples,
+    held_out: &HeldOut,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<Outcome> {
+    let settings = training.settings.clone();
+    let began_at = training.step;
+    let mut log = Log::open(folder, began_at)?;
+    let task = progress.begin(&format!("train {}", training.facts.name), settings.steps as u64);
+    task.advance(began_at.min(settings.steps) as u64);
+    let (start, mut waiting) = (Instant::now(), Duration::ZERO);
+    let mut last = None;
+    while training.step < settings.steps && !is_over(training) {
+        let before = Instant::now();
+        let batch = examples.batch(&draw(settings.seed, training.step, settings.batch, examples.len()))?;
+        waiting += before.elapsed();
+        let losses = training.step(&batch)?;
+        let step = training.step;
+        losses.check(step).with_context(|| kept(folder))?;
+        task.advance(1);
+        if step.is_multiple_of(LOG_EVERY) {
+            show(&*task, &losses, (step - began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9));
+            log.write(&losses.line(step))?;
+        }
+        let is_last = step == settings.steps;
+        let ends_epoch = step.is_multiple_of(settings.epoch_steps);
+        if ends_epoch || is_last {
+            let validation = held_out.validate(training)?;
+            log.write(
+                &json!({ "step": step, "epoch": step.div_ceil(settings.epoch_steps), "validation": validation }),
+            )?;
+            if let (Some(alarm), true) = (&validation.alarm, step > settings.epoch_steps) {
+                progress.say(&format!("step {step}: {alarm}"));
+            }
+            // In f32, whose decimals come back exactly from JSON.
+            let score = validation.score as f32;
+            if training.best.is_none_or(|(_, best)| score < best) {
+                training.best = Some((step, score));
+                training.save_best(folder, &validation)?;
+            }
+            last = Some(validation);
+        }
+        if ends_epoch || is_last || step.is_multiple_of(settings.checkpoint_every) {
+            training.save(folder)?;
+        }
+    }
+    let elapsed = start.elapsed().as_secs_f64().max(1e-9);
+    let Some((_, newest)) = checkpoint::list(folder)?.pop() else {
+        bail!("gan.steps is 0: nothing to train");
+    };
+    let validation = match last {
+        Some(validation) => validation,
+        None => held_out.validate(training)?,
+    };
+    Ok(Outcome {
+        steps: training.step,
+        began_at,
+        stopped_early: training.step < settings.steps,
+        n_windows: examples.len(),
+        n_parameters: training.n_parameters(),
+        validation,
+        newest,
+        best: folder.join(BEST),
+        best_step: training.best.map_or(training.step, |(step, _)| step),
+        waiting: waiting.as_secs_f64() / elapsed,
+    })
+}
+
+/// The newest checkpoint, and what it says with the settings that count now. Tells where these differ from `wanted`.
+fn resume(
+    dataset: &Dataset,
+    wanted: &Gan,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<Option<(Stored, Contents)>> {
+    let Some((step, newest)) = checkpoint::list(folder)?.pop() else { return Ok(None) };
+    let contents = Contents::read(&newest)?;
+    let read = || -> Result<(Stored, Vec<String>)> {
+        let mut stored = Stored::of(&contents)?;
+        let (settings, mut differences) = stored.settings(wanted)?;
+        stored.settings = settings;
+        let (info, facts) = (dataset.info(), &mut stored.speaker);
+        ensure!(
+            facts.name == info.speaker && facts.fps == info.fps,
+            "it is of {} at {}, the dataset of {} at {}; choose another --out",
+            facts.name,
+            facts.fps,
+            info.speaker,
+            info.fps
+        );
+        let hash = dataset.hash()?;
+        if facts.dataset != hash {
+            differences.push(
+                "the dataset is another now: its windows are trained on, with the checkpoint's mean, deviation and bones"
+                    .to_owned(),
+            );
+            facts.dataset = hash;
+        }
+        Ok((stored, differences))
+    };
+    let (stored, differences) = read().with_context(|| format!("cannot go on from {}", newest.display()))?;
+    progress.say(&format!("going on from {} (step {step})", newest.display()));
+    differences.iter().for_each(|line| progress.say(line));
+    Ok(Some((stored, contents)))
+}
+
+/// Whether the score has not become better for as many epochs as `gan.patience` allows.
+fn is_over(training: &Training) -> bool {
+    let Gan { patience, epoch_steps, .. } = training.settings;
+    let since = training.step - training.best.map_or(training.step, |(step, _)| step.min(training.step));
+    patience > 0 && since >= patience * epoch_steps
+}
+
+fn kept(folder: &Path) -> String {
+    let advice = "a smaller gan.learning_rate may help";
+    match checkpoint::list(folder).ok().and_then(|mut all| all.pop()) {
+        Some((step, path)) => format!("the checkpoint of step {step} is kept: {}; {advice}", path.display()),
+        None => format!("there is no checkpoint yet; {advice}"),
+    }
+}
+
+fn show(task: &dyn Task, losses: &Losses, steps_per_sec: f64) {
+    task.detail(&format!(
+        "L1 {:.3} adv {:.3} D {:.3}  {steps_per_sec:.2} steps/s",
+        losses.l1, losses.adversarial, losses.discriminator
+    ));
+}
+
+fn check(settings: &Gan) -> Result<()> {
+    ensure!(
+        settings.window_frames > 0 && settings.window_frames.is_multiple_of(FRAMES_MULTIPLE),
+        "gan.window_frames is {}: it must be a multiple of {FRAMES_MULTIPLE}",
+        settings.window_frames
+    );
+    ensure!(settings.batch > 1, "gan.batch is {}: batch norm needs at least 2 windows", settings.batch);
+    ensure!(
+        settings.checkpoint_every > 0 && settings.epoch_steps > 0 && settings.stride_frames > 0,
+        "gan.checkpoint_every, gan.epoch_steps and gan.stride_frames must be at least 1"
+    );
+    device::named(&settings.device)?;
+    Ok(())
+}
+
+/// Statistics of the training split; bone lengths where the dataset does not state them are measured.
+pub fn normalisation(dataset: &Dataset) -> Result<Normalisation> {
+    let stated = &dataset.info().bone_lengths_metres;
+    let mut lengths: Vec<f32> = (0..N_BONES).map(|bone| stated.get(bone).map_or(0.0, |v| *v as f32)).collect();
+    if lengths.iter().all(|length| *length == 0.0) {
+        let longest = dataset.samples(Split::Train).into_iter().max_by_key(|sample| sample.n_frames);
+        let longest = longest.context("the training split of the dataset is empty")?;
+        lengths = bones::measure(&dataset.read(&longest)?.motion).to_vec();
+    }
+    Ok(Normalisation::new(&dataset.stats().mean(), &dataset.stats().std(), lengths))
+}
+
+/// The windows of a step, drawn with replacement.
+fn draw(seed: u64, step: usize, n: usize, n_windows: usize) -> Vec<usize> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(step as u64 + 1);
+    (0..n).map(|_| rng.random_range(0..n_windows as u64) as usize).collect()
+}

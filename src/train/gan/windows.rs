@@ -1,0 +1,148 @@
+//! What training reads: the intervals of a split as normalised poses and log-mels in memory, and windows of them as
+//! batches. The spectrogram of an interval is computed once; a window takes the frames of its own seconds.
+
+use crate::audio::mel;
+use crate::dataset::{Dataset, Split};
+use crate::generate::normalisation::{N_NUMBERS, Normalisation};
+use crate::motion::bones;
+use crate::types::interval::Interval as Span;
+use crate::types::sync;
+use crate::types::time::FrameRate;
+use anyhow::{Result, ensure};
+use candle_core::{Device, Tensor};
+use ndarray::{Array2, ArrayView2, Axis, Slice};
+use rayon::prelude::*;
+
+/// Spectrogram frames that span `n_frames` frames of motion: the nearest whole number of 10 ms hops.
+pub fn mel_frames(fps: FrameRate, n_frames: usize) -> usize {
+    let rate = crate::types::sound::SAMPLE_RATE;
+    (sync::sample_at(fps, rate, n_frames) + mel::HOP / 2) / mel::HOP
+}
+
+/// One interval.
+struct Interval {
+    /// [144, T]
+    numbers: Array2<f32>,
+    /// [48, T]: whether the joint (all but the neck) is to be learnt there.
+    mask: Array2<bool>,
+    /// [64, at least the mel frames of T]
+    mels: Array2<f32>,
+}
+
+/// All windows of a split.
+pub struct Examples {
+    fps: FrameRate,
+    n_frames: usize,
+    intervals: Vec<Interval>,
+    /// Interval and first frame of every window.
+    starts: Vec<(usize, usize)>,
+}
+
+/// Windows side by side, f32.
+pub struct Batch {
+    /// [B, 64, mel frames]
+    pub mels: Tensor,
+    /// [B, 144, n_frames], normalised; 0 where missing.
+    pub poses: Tensor,
+    /// [B, 144, n_frames], 1 where the number is to be learnt.
+    pub mask: Tensor,
+}
+
+impl Batch {
+    /// The same on this device.
+    pub fn on(&self, device: &Device) -> Result<Self> {
+        let on = |tensor: &Tensor| tensor.to_device(device);
+        Ok(Self { mels: on(&self.mels)?, poses: on(&self.poses)?, mask: on(&self.mask)? })
+    }
+}
+
+impl Examples {
+    /// Reads the intervals of `split` that hold a window of `n_frames`; one begins every `stride` frames.
+    pub fn load(
+        dataset: &Dataset,
+        split: Split,
+        normal: &Normalisation,
+        n_frames: usize,
+        stride: usize,
+    ) -> Result<Self> {
+        ensure!(n_frames > 0 && stride > 0, "a window needs at least one frame, and a stride of at least one");
+        let fps = dataset.info().fps;
+        let long: Vec<_> = dataset.samples(split).into_iter().filter(|sample| sample.n_frames >= n_frames).collect();
+        let lengths = std::array::from_fn(|bone| normal.bone_lengths.get(bone).copied().unwrap_or(0.0));
+        let read = |sample| -> Result<Interval> {
+            let mut sample = dataset.read(sample)?;
+            // Every video has its own constant lengths; the generator learns one body.
+            bones::with_lengths(&mut sample.motion, &lengths);
+            let (numbers, mask) = normal.numbers(&sample.motion);
+            // Rounding may ask for one spectrogram frame more than the sound has windows for.
+            let enough = mel::n_samples(mel_frames(fps, sample.motion.n_frames()) + 1);
+            let mut samples = sample.sound.samples;
+            samples.resize(enough.max(samples.len()), 0.0);
+            let mels = mel::log_mel(&samples).reversed_axes().as_standard_layout().into_owned();
+            Ok(Interval { numbers, mask, mels })
+        };
+        let intervals: Vec<Interval> = long.par_iter().map(read).collect::<Result<_>>()?;
+        let of_interval = |(i, interval): (usize, &Interval)| {
+            let n_windows = Span { start: 0, end: interval.numbers.ncols() }.n_windows(n_frames, stride);
+            (0..n_windows).map(move |window| (i, window * stride)).collect::<Vec<_>>()
+        };
+        let starts = intervals.iter().enumerate().flat_map(of_interval).collect();
+        Ok(Self { fps, n_frames, intervals, starts })
+    }
+
+    /// All poses as normalised numbers [144, T] with the joints seen [48, T], interval by interval.
+    pub fn poses(&self) -> impl Iterator<Item = (ArrayView2<'_, f32>, ArrayView2<'_, bool>)> {
+        self.intervals.iter().map(|interval| (interval.numbers.view(), interval.mask.view()))
+    }
+
+    /// Number of windows.
+    pub fn len(&self) -> usize {
+        self.starts.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.starts.is_empty()
+    }
+
+    /// The windows of these numbers (each below `len`) as one batch.
+    pub fn batch(&self, which: &[usize]) -> Result<Batch> {
+        ensure!(!which.is_empty() && which.iter().all(|i| *i < self.len()), "windows {which:?} of {}", self.len());
+        let n_mels = mel_frames(self.fps, self.n_frames);
+        let (mut mels, mut poses, mut mask) = (Vec::new(), Vec::new(), Vec::new());
+        for (interval, start) in which.iter().map(|i| self.starts[*i]) {
+            let interval = &self.intervals[interval];
+            let first_mel = mel_frames(self.fps, start);
+            take(&mut mels, &interval.mels, first_mel, n_mels);
+            take(&mut poses, &interval.numbers, start, self.n_frames);
+            for seen in interval.mask.slice_axis(Axis(1), Slice::from(start..start + self.n_frames)).rows() {
+                (0..3).for_each(|_| mask.extend(seen.iter().map(|seen| f32::from(*seen))));
+            }
+        }
+        let tensor = |values, rows, columns| Tensor::from_vec(values, (which.len(), rows, columns), &Device::Cpu);
+        Ok(Batch {
+            mels: tensor(mels, mel::N_MELS, n_mels)?,
+            poses: tensor(poses, N_NUMBERS, self.n_frames)?,
+            mask: tensor(mask, N_NUMBERS, self.n_frames)?,
+        })
+    }
+}
+
+fn take(to: &mut Vec<f32>, from: &Array2<f32>, first: usize, n: usize) {
+    to.extend(from.slice_axis(Axis(1), Slice::from(first..first + n)).iter());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mel_frames_keep_step_with_the_motion() {
+        let fps = FrameRate::new(15, 1);
+        assert_eq!(mel_frames(fps, 64), 427);
+        assert_eq!(mel_frames(fps, 1_500), 10_000);
+        for (start, n) in [(0, 64), (5, 64), (7, 96), (1_001, 64)] {
+            let total = mel_frames(fps, start + n) + 1;
+            assert!(mel_frames(fps, start) + mel_frames(fps, n) <= total);
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! What the body lifter learns: windows of captured motion and of motion made by rule, filmed by random cameras.
+
+use super::errors::of_method;
+use crate::mocap::upper_body::{Set, Take};
+use crate::motion::upper_body::N_POINTS;
+use crate::motion::view::body::{N_IN, N_OUT, View};
+use crate::nn::Mode;
+use crate::nn::lifter::body::BodyLifter;
+use crate::nn::lifter::temporal::Config;
+use crate::nn::params::Params;
+use crate::train::scene::body::{Filming, Scene, scenes};
+use crate::train::supervised::Lesson;
+use anyhow::Result;
+use candle_core::Tensor;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::{Value, json};
+
+/// Weight of each point in the loss: nose, arms, hips.
+const WEIGHTS: [f32; N_POINTS] = [1.0, 1.0, 1.2, 1.5, 1.0, 1.2, 1.5, 0.4, 0.4];
+/// Share of scenes of captured motion, where there is any.
+const CAPTURED: f64 = 0.5;
+/// Share of those in which one arm comes from another take.
+const MIXED: f64 = 0.35;
+/// Frames of a scene, from and to, and the windows that are cut from it.
+const SCENE_FRAMES: std::ops::RangeInclusive<usize> = 30..=84;
+const WINDOWS: usize = 4;
+/// Scenes that errors are measured on, and on the way.
+const MEASURED: usize = 120;
+const MEASURED_BRIEFLY: usize = 40;
+
+/// The lesson.
+pub struct BodyLesson {
+    params: Params,
+    lifter: BodyLifter,
+    takes: Vec<Take>,
+    /// Sum of the seconds of `takes` up to and with each: longer takes are drawn more often.
+    ends: Vec<f64>,
+    /// Takes that are only measured on.
+    held_out: Vec<Set>,
+}
+
+impl BodyLesson {
+    /// A network with first values from `seed` that learns from `takes`; `held_out` takes are only measured on.
+    pub fn new(mut takes: Vec<Take>, held_out: Vec<Set>, config: &Config, seed: u64) -> Result<Self> {
+        takes.sort_by(|a, b| a.name.cmp(&b.name));
+        let mut params = Params::new(seed);
+        let lifter = BodyLifter::new(&mut params, config)?;
+        let ends = takes.iter().scan(0.0, |end, take| {
+            *end += take.poses.len() as f64 / take.fps;
+            Some(*end)
+        });
+        let ends = ends.collect();
+        Ok(Self { params, lifter, takes, ends, held_out })
+    }
+
+    fn take(&self, rng: &mut ChaCha8Rng) -> Option<&Take> {
+        let at = rng.random_range(0.0..*self.ends.last()?);
+        self.takes.get(self.ends.partition_point(|&end| end <= at))
+    }
+
+    fn scene(&self, rng: &mut ChaCha8Rng) -> Scene {
+        let n_frames = rng.random_range(SCENE_FRAMES);
+        if let (true, Some(take)) = (rng.random_bool(CAPTURED), self.take(rng)) {
+            let other = if rng.random_bool(MIXED) { self.take(rng) } else { None };
+            // a short take lasts for as long as it goes slowly
+            for n_frames in [n_frames, *SCENE_FRAMES.start()] {
+                if let Some(scene) = Scene::of_take(take, other, Filming::Training, n_frames, rng) {
+                    return scene;
+                }
+            }
+        }
+        Scene::of_rule(Filming::Training, n_frames, rng)
+    }
+}
+
+impl Lesson for BodyLesson {
+    fn kind(&self) -> &'static str {
+        "body-lifter"
+    }
+
+    fn facts(&self) -> Value {
+        let mut hash = blake3::Hasher::new();
+        for take in &self.takes {
+            hash.update(take.name.as_bytes());
+            for value in take.poses.iter().flatten().flatten() {
+                hash.update(&value.to_le_bytes());
+            }
+        }
+        json!({
+            "config": self.lifter.net().config(),
+            "takes": self.takes.len(), "frames": self.takes.iter().map(|t| t.poses.len()).sum::<usize>(),
+            "held_out": self.held_out.iter().map(|(set, _)| set).collect::<Vec<_>>(),
+            "motion": hash.finalize().to_hex().as_str(),
+        })
+    }
+
+    fn params(&self) -> &Params {
+        &self.params
+    }
+
+    fn shape_in(&self) -> Vec<usize> {
+        vec![N_IN, self.lifter.net().config().receptive_field()]
+    }
+
+    fn weights(&self) -> Vec<f32> {
+        WEIGHTS.to_vec()
+    }
+
+    fn group(&self) -> usize {
+        WINDOWS
+    }
+
+    fn draw(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
+        let window = self.lifter.net().config().receptive_field();
+        let mut scene = self.scene(rng);
+        for (x, y) in x.chunks_exact_mut(N_IN * window).zip(y.chunks_exact_mut(N_OUT)) {
+            // where the shoulders are not seen another scene is drawn; it is rare
+            let (t, view) = loop {
+                let t = rng.random_range(0..scene.seen.len());
+                match View::around(&scene.seen, t, window, 1.0) {
+                    Some(view) => break (t, view),
+                    None => scene = self.scene(rng),
+                }
+            };
+            x.copy_from_slice(&view.numbers);
+            let grow = scene.px_per_metre / f64::from(view.scale);
+            for (j, p) in scene.truth[t].iter().enumerate() {
+                let [seen_x, seen_y] = view.middle(j);
+                y[3 * j] = (p[0] * grow) as f32 - seen_x;
+                y[3 * j + 1] = (p[1] * grow) as f32 - seen_y;
+                y[3 * j + 2] = (p[2] * grow) as f32;
+            }
+        }
+    }
+
+    fn forward(&self, x: &Tensor, mode: &mut Mode) -> candle_core::Result<Tensor> {
+        debug_assert_eq!(N_OUT, 3 * N_POINTS);
+        self.lifter.net().forward_windows(x, mode)
+    }
+
+    fn set_momentum(&mut self, momentum: f64) {
+        self.lifter.net_mut().set_momentum(momentum);
+    }
+
+    fn errors(&self, brief: bool) -> Result<Vec<String>> {
+        let n = if brief { MEASURED_BRIEFLY } else { MEASURED };
+        let mut lines = Vec::new();
+        let by_rule = ("made by rule".to_owned(), Vec::new());
+        for (set, takes) in self.held_out.iter().chain([&by_rule]) {
+            for (filming, input) in [(Filming::Drop, "drop "), (Filming::Clean, "clean")] {
+                let scenes = scenes(takes, filming, n);
+                if scenes.is_empty() {
+                    continue;
+                }
+                lines.push(format!(
+                    "{set:30} {input}  {}",
+                    of_method(&scenes, |scene| Ok(self.lifter.poses(&scene.seen, 1.0)?))?
+                ));
+                if brief {
+                    break;
+                }
+            }
+        }
+        Ok(lines)
+    }
+}

@@ -1,0 +1,76 @@
+//! What the hand lifter learns: hands made by rule, seen from every side.
+
+use crate::motion::view::hand::{HandView, N_IN, N_OUT};
+use crate::nn::Mode;
+use crate::nn::lifter::hand::{Config, HandLifter, NAME};
+use crate::nn::params::Params;
+use crate::train::scene::hand::{errors, sample};
+use crate::train::supervised::Lesson;
+use crate::types::pose2d::N_HAND;
+use crate::types::skeleton::Side;
+use anyhow::Result;
+use candle_core::Tensor;
+use rand_chacha::ChaCha8Rng;
+use serde_json::{Value, json};
+
+/// Hands that errors are measured on.
+const MEASURED: usize = 4000;
+
+/// The lesson.
+pub struct HandLesson {
+    params: Params,
+    lifter: HandLifter,
+}
+
+impl HandLesson {
+    /// A network with `hidden` numbers in its layers and first values from `seed`.
+    pub fn new(hidden: usize, seed: u64) -> Result<Self> {
+        let mut params = Params::new(seed);
+        let config = Config { n_in: N_IN, n_out: N_OUT, hidden, dropout: 0.0 };
+        let lifter = HandLifter::new(&mut params, NAME, &config)?;
+        Ok(Self { params, lifter })
+    }
+}
+
+impl Lesson for HandLesson {
+    fn kind(&self) -> &'static str {
+        "hand-lifter"
+    }
+
+    fn facts(&self) -> Value {
+        json!({ "config": self.lifter.config() })
+    }
+
+    fn params(&self) -> &Params {
+        &self.params
+    }
+
+    fn shape_in(&self) -> Vec<usize> {
+        vec![N_IN]
+    }
+
+    fn weights(&self) -> Vec<f32> {
+        vec![1.0; N_HAND]
+    }
+
+    fn draw(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
+        let (drawn, view) = loop {
+            let drawn = sample(rng);
+            if let Some(view) = HandView::of(&drawn.seen, Side::Right) {
+                break (drawn, view);
+            }
+        };
+        x.copy_from_slice(&view.numbers);
+        y.copy_from_slice(&view.wanted(&drawn.truth));
+    }
+
+    fn forward(&self, x: &Tensor, mode: &mut Mode) -> candle_core::Result<Tensor> {
+        self.lifter.forward(x, mode)
+    }
+
+    fn set_momentum(&mut self, _momentum: f64) {}
+
+    fn errors(&self, brief: bool) -> Result<Vec<String>> {
+        errors(|seen| Ok(self.lifter.lift(seen, Side::Right)?), MEASURED, brief)
+    }
+}

@@ -1,0 +1,119 @@
+//! What the heat-map lifter learns (Zimmermann & Brox 2017): score maps of hands made by rule to the hand in its own
+//! frame and that frame's turn. The same hands as the coordinate network's, all of them right ones.
+
+use crate::motion::view::heatmaps::{Crop, PLACES, canonical, score_maps};
+use crate::nn::Mode;
+use crate::nn::lifter::heatmap::{HeatmapLifter, NAME, right_sides};
+use crate::nn::params::Params;
+use crate::train::scene::hand::{errors, sample};
+use crate::train::scene::hand_shape::normal;
+use crate::train::supervised::Lesson;
+use crate::types::pose2d::N_HAND;
+use crate::types::skeleton::Side;
+use anyhow::Result;
+use candle_core::Tensor;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::{Value, json};
+
+/// Kind of the weights file.
+pub const KIND: &str = "hand-heatmap-lifter";
+/// What comes out, three numbers each: the points, then the rows of the turn.
+const N_ROWS: usize = N_HAND + 3;
+
+/// Hands that errors are measured on, few since each takes long.
+const MEASURED: usize = 300;
+
+/// The lesson.
+pub struct HeatmapLesson {
+    params: Params,
+    lifter: HeatmapLifter,
+}
+
+impl HeatmapLesson {
+    /// The networks with first values from `seed`.
+    pub fn new(seed: u64) -> Result<Self> {
+        let mut params = Params::new(seed);
+        let lifter = HeatmapLifter::new(&mut params, NAME)?;
+        Ok(Self { params, lifter })
+    }
+
+    pub fn lifter(&self) -> &HeatmapLifter {
+        &self.lifter
+    }
+}
+
+impl Lesson for HeatmapLesson {
+    fn kind(&self) -> &'static str {
+        KIND
+    }
+
+    fn facts(&self) -> Value {
+        json!({ "config": { "places": PLACES, "points": N_HAND } })
+    }
+
+    fn params(&self) -> &Params {
+        &self.params
+    }
+
+    fn shape_in(&self) -> Vec<usize> {
+        vec![PLACES, PLACES, N_HAND]
+    }
+
+    fn weights(&self) -> Vec<f32> {
+        vec![1.0; N_ROWS]
+    }
+
+    /// The crop is up to 1.2 times as large as it need be and its centre off by 10 px (sd) of its 256.
+    fn draw(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
+        let (drawn, crop, (own, axes)) = loop {
+            let drawn = sample(rng);
+            if let (Some(crop), Some(target)) = (Crop::of(&drawn.seen), canonical(&drawn.truth, true)) {
+                break (drawn, crop, target);
+            }
+        };
+        let side = crop.side * rng.random_range(1.0..1.2);
+        let centre = crop.centre.map(|c| c + 10.0 / 256.0 * side * normal(rng));
+        score_maps(&drawn.seen, Crop { centre, side }, x);
+        let numbers = own.iter().chain(&axes).flatten();
+        y.iter_mut().zip(numbers).for_each(|(y, v)| *y = *v as f32);
+    }
+
+    fn forward(&self, x: &Tensor, mode: &mut Mode) -> candle_core::Result<Tensor> {
+        self.lifter.forward(x, &right_sides(x.dim(0)?, x)?, mode)
+    }
+
+    /// Mean squared error of the points plus that of the turn.
+    fn loss(&self, out: &Tensor, wanted: &Tensor, _weights: &Tensor) -> candle_core::Result<Tensor> {
+        let off = (out - wanted)?.sqr()?;
+        off.narrow(1, 0, N_HAND)?.mean_all()? + off.narrow(1, N_HAND, 3)?.mean_all()?
+    }
+
+    fn set_momentum(&mut self, _momentum: f64) {}
+
+    fn errors(&self, brief: bool) -> Result<Vec<String>> {
+        errors(|seen| Ok(self.lifter.lift(seen, Side::Right)?), MEASURED, brief)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::view::heatmaps::N_MAPS;
+    use candle_core::Device;
+    use rand::SeedableRng;
+
+    #[test]
+    fn targets_are_hands_in_their_own_frame_and_a_right_answer_costs_nothing() -> Result<()> {
+        let lesson = HeatmapLesson::new(1)?;
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let (mut x, mut y) = (vec![0.0; N_MAPS], vec![0.0; 3 * N_ROWS]);
+        lesson.draw(&mut rng, &mut x, &mut y);
+        assert!(x.iter().all(|v| (0.0..=1.0).contains(v)) && x.iter().any(|v| *v > 0.9));
+        assert!(y[3 * 9].abs() + y[3 * 9 + 2].abs() + y[3 * 17 + 2].abs() < 1e-6 && y[3 * 9 + 1] > 0.5);
+        let y = Tensor::from_vec(y, (1, N_ROWS, 3), &Device::Cpu)?;
+        let weights = Tensor::from_vec(lesson.weights(), (1, N_ROWS), &Device::Cpu)?;
+        assert_eq!(lesson.loss(&y, &y, &weights)?.to_scalar::<f32>()?, 0.0);
+        Ok(())
+    }
+}

@@ -1,0 +1,343 @@
+//! Adam (Kingma & Ba 2015), optionally AMSGrad (Reddi 2018), with moments that can be saved, and clipping of the
+//! gradient's norm. One pass over the memory of each tensor; the same bits for any number of threads.
+
+use super::adam_fallback;
+use crate::nn::cpu::thread_team::each;
+use crate::nn::params::Params;
+use anyhow::{Context, ensure};
+use candle_core::backprop::GradStore;
+use candle_core::{CpuStorage, Device, InplaceOp2, Layout, Result, Tensor, Var};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::sync::{Mutex, OnceLock};
+
+/// Numbers one task updates.
+const GRAIN: usize = 32 * 1024;
+
+/// The optimiser's settings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config {
+    pub beta1: f64,
+    pub beta2: f64,
+    pub eps: f64,
+    /// Divide by the largest second moment seen so far instead of the present one.
+    pub amsgrad: bool,
+    /// Gradients with a larger Euclidean norm, over all tensors together, are scaled down to it.
+    pub max_norm: Option<f64>,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self { beta1: 0.9, beta2: 0.999, eps: 1e-8, amsgrad: false, max_norm: None }
+    }
+}
+
+/// Moves the trainable tensors of one [`Params`].
+pub struct Adam {
+    config: Config,
+    /// Updates done.
+    step: u64,
+    slots: Vec<Slot>,
+}
+
+struct Slot {
+    name: String,
+    var: Var,
+    moments: Place,
+}
+
+/// Where the moments are.
+enum Place {
+    Cpu(RefCell<Moments>),
+    /// Elsewhere, beside their tensor.
+    Device(adam_fallback::Moments),
+}
+
+/// First moment, second moment, largest second moment (empty without AMSGrad).
+#[derive(Clone, Default)]
+struct Moments {
+    first: Vec<f32>,
+    second: Vec<f32>,
+    largest: Vec<f32>,
+}
+
+impl Adam {
+    /// Moments of zero for every trainable tensor (f32).
+    pub fn new(params: &Params, config: Config) -> Result<Self> {
+        let moments = |var: &Var| -> Result<Place> {
+            if !var.device().is_cpu() {
+                return Ok(Place::Device(adam_fallback::Moments::zeros(var, config.amsgrad)?));
+            }
+            let zeros = vec![0.0; var.elem_count()];
+            let largest = if config.amsgrad { zeros.clone() } else { Vec::new() };
+            Ok(Place::Cpu(RefCell::new(Moments { first: zeros.clone(), second: zeros, largest })))
+        };
+        let slot = |(name, var): (&str, &Var)| -> Result<Slot> {
+            Ok(Slot { name: name.to_owned(), var: var.clone(), moments: moments(var)? })
+        };
+        Ok(Self { config, step: 0, slots: params.trainables().map(slot).collect::<Result<_>>()? })
+    }
+
+    /// One update at this learning rate. A tensor without gradient stays. Returns the gradient's norm before
+    /// clipping; when that is not finite nothing is changed.
+    pub fn step(&mut self, gradients: &GradStore, learning_rate: f64) -> Result<f64> {
+        let gradients: Vec<Option<Tensor>> = self
+            .slots
+            .iter()
+            .map(|slot| gradients.get(&slot.var).map(Tensor::contiguous).transpose())
+            .collect::<Result<_>>()?;
+        let mut squares = 0.0;
+        for gradient in gradients.iter().flatten() {
+            squares += match gradient.device().is_cpu() {
+                true => crate::nn::cpu::tensor::read::<f32, _>(gradient, |g| Ok(sum_of_squares(g)))?,
+                false => adam_fallback::sum_of_squares(gradient)?,
+            };
+        }
+        let norm = squares.sqrt();
+        if !norm.is_finite() {
+            return Ok(norm);
+        }
+        self.step += 1;
+        let Config { beta1, beta2, eps, max_norm, .. } = self.config;
+        let age = self.step.min(i32::MAX as u64) as i32;
+        let scale = max_norm.map_or(1.0, |max| if norm > max { max / norm } else { 1.0 });
+        let numbers = Numbers {
+            beta1: beta1 as f32,
+            beta2: beta2 as f32,
+            eps: eps as f32,
+            scale: scale as f32,
+            rate: (learning_rate / (1.0 - beta1.powi(age))) as f32,
+            correction: (1.0 / (1.0 - beta2.powi(age))).sqrt() as f32,
+        };
+        for (slot, gradient) in self.slots.iter_mut().zip(&gradients) {
+            let Some(gradient) = gradient else { continue };
+            match &mut slot.moments {
+                Place::Cpu(moments) => slot.var.inplace_op2(gradient, &Update { moments, numbers })?,
+                Place::Device(moments) => moments.update(&slot.var, gradient, &numbers)?,
+            }
+        }
+        Ok(norm)
+    }
+
+    /// Moments and step count, to save: `<prefix><tensor>.first`, `.second`, `.largest`, and `<prefix>step`.
+    pub fn tensors(&self, prefix: &str) -> Result<BTreeMap<String, Tensor>> {
+        let mut tensors = BTreeMap::new();
+        // Two halves of 24 bits are exact in f32, the one type of a checkpoint.
+        let halves = [(self.step >> 24) as f32, (self.step & 0xff_ffff) as f32];
+        tensors.insert(format!("{prefix}step"), Tensor::new(&halves, &Device::Cpu)?);
+        for slot in &self.slots {
+            for (kind, tensor) in slot.kinds()? {
+                tensors.insert(format!("{prefix}{}.{kind}", slot.name), tensor);
+            }
+        }
+        Ok(tensors)
+    }
+
+    /// Takes up where [`Adam::tensors`] left off. Errors, naming the tensor, when one is missing or does not fit.
+    pub fn load(&mut self, prefix: &str, tensors: &BTreeMap<String, Tensor>) -> anyhow::Result<()> {
+        let values = |name: String, n: usize| -> anyhow::Result<Vec<f32>> {
+            let tensor = tensors.get(&name).with_context(|| format!("tensor {name} is missing"))?;
+            ensure!(tensor.elem_count() == n, "tensor {name} has {} numbers, expected {n}", tensor.elem_count());
+            Ok(tensor.flatten_all()?.to_vec1()?)
+        };
+        let halves = values(format!("{prefix}step"), 2)?;
+        for slot in &mut self.slots {
+            let of_kind = |kind: &str, n: usize| match n {
+                0 => Ok(Vec::new()),
+                n => values(format!("{prefix}{}.{kind}", slot.name), n),
+            };
+            match &mut slot.moments {
+                Place::Cpu(moments) => {
+                    let moments = moments.get_mut();
+                    *moments = Moments {
+                        first: of_kind("first", moments.first.len())?,
+                        second: of_kind("second", moments.second.len())?,
+                        largest: of_kind("largest", moments.largest.len())?,
+                    };
+                }
+                Place::Device(moments) => moments.load(of_kind)?,
+            }
+        }
+        self.step = ((halves[0] as u64) << 24) + halves[1] as u64;
+        Ok(())
+    }
+}
+
+impl Slot {
+    /// The moments that there are, by kind, on the CPU.
+    fn kinds(&self) -> Result<Vec<(&'static str, Tensor)>> {
+        let moments = match &self.moments {
+            Place::Cpu(moments) => moments.borrow(),
+            Place::Device(moments) => return moments.tensors(),
+        };
+        let kinds = [("first", &moments.first), ("second", &moments.second), ("largest", &moments.largest)];
+        let there = kinds.into_iter().filter(|(_, values)| !values.is_empty());
+        there.map(|(kind, values)| Ok((kind, Tensor::from_slice(values, self.var.shape(), &Device::Cpu)?))).collect()
+    }
+}
+
+/// In pieces of fixed size, so that the order of summing does not depend on the threads.
+fn sum_of_squares(values: &[f32]) -> f64 {
+    let of_piece = |piece: &[f32]| {
+        let mut lanes = [0.0f32; 16];
+        for chunk in piece.chunks(16) {
+            lanes.iter_mut().zip(chunk).for_each(|(lane, v)| *lane += v * v);
+        }
+        lanes.iter().map(|lane| f64::from(*lane)).sum::<f64>()
+    };
+    let pieces: Vec<&[f32]> = values.chunks(GRAIN).collect();
+    let sums: Vec<OnceLock<f64>> = pieces.iter().map(|_| OnceLock::new()).collect();
+    each(pieces.len(), |piece| {
+        let _ = sums[piece].set(of_piece(pieces[piece]));
+    });
+    sums.iter().filter_map(OnceLock::get).sum()
+}
+
+/// The numbers of one update.
+#[derive(Clone, Copy)]
+pub struct Numbers {
+    pub beta1: f32,
+    pub beta2: f32,
+    pub eps: f32,
+    /// What gradients are multiplied with, to clip them.
+    pub scale: f32,
+    /// Learning rate over the first moment's bias correction.
+    pub rate: f32,
+    /// Square root of the second moment's bias correction.
+    pub correction: f32,
+}
+
+struct Update<'a> {
+    moments: &'a RefCell<Moments>,
+    numbers: Numbers,
+}
+
+impl InplaceOp2 for Update<'_> {
+    fn name(&self) -> &'static str {
+        "adam"
+    }
+
+    fn cpu_fwd(&self, values: &mut CpuStorage, layout: &Layout, grad: &CpuStorage, grad_layout: &Layout) -> Result<()> {
+        let CpuStorage::F32(values) = values else { candle_core::bail!("adam moves f32 tensors only") };
+        let Some((start, end)) = layout.contiguous_offsets() else { candle_core::bail!("adam: variable in pieces") };
+        let grad = crate::nn::cpu::tensor::slice::<f32>(grad, grad_layout)?;
+        let moments = &mut *self.moments.borrow_mut();
+        let Numbers { beta1, beta2, eps, scale, rate, correction } = self.numbers;
+        let update = |value: &mut f32, grad: &f32, first: &mut f32, second: &mut f32, largest: Option<&mut f32>| {
+            let grad = grad * scale;
+            *first = beta1 * *first + (1.0 - beta1) * grad;
+            *second = beta2 * *second + (1.0 - beta2) * grad * grad;
+            let spread = match largest {
+                Some(largest) => {
+                    *largest = largest.max(*second);
+                    *largest
+                }
+                None => *second,
+            };
+            *value -= rate * *first / (spread.sqrt() * correction + eps);
+        };
+        let values = values[start..end].chunks_mut(GRAIN).zip(grad.chunks(GRAIN));
+        let both = values.zip(moments.first.chunks_mut(GRAIN)).zip(moments.second.chunks_mut(GRAIN));
+        let mut largest = moments.largest.chunks_mut(GRAIN);
+        let pieces: Vec<_> = both.map(|piece| Mutex::new((piece, largest.next()))).collect();
+        each(pieces.len(), |piece| {
+            // Every piece is taken once: the lock is free.
+            let Ok(mut piece) = pieces[piece].lock() else { return };
+            let piece = &mut *piece;
+            let (((values, grad), first), second) = &mut piece.0;
+            let numbers = values.iter_mut().zip(grad.iter()).zip(first.iter_mut().zip(second.iter_mut()));
+            match &mut piece.1 {
+                Some(largest) => {
+                    numbers.zip(largest.iter_mut()).for_each(|(((v, g), (f, s)), l)| update(v, g, f, s, Some(l)));
+                }
+                None => numbers.for_each(|((v, g), (f, s))| update(v, g, f, s, None)),
+            }
+        });
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nn::params::Init;
+
+    /// The update as written in the papers, one number, f64.
+    fn by_the_book(gradients: &[f64], rate: f64, amsgrad: bool) -> f64 {
+        let (mut x, mut m, mut v, mut largest) = (1.0, 0.0, 0.0, 0.0f64);
+        for (t, g) in (1..).zip(gradients) {
+            m = 0.9 * m + 0.1 * g;
+            v = 0.999 * v + 0.001 * g * g;
+            largest = largest.max(v);
+            let spread: f64 = if amsgrad { largest } else { v };
+            x -= rate * (m / (1.0 - 0.9f64.powi(t))) / ((spread / (1.0 - 0.999f64.powi(t))).sqrt() + 1e-8);
+        }
+        x
+    }
+
+    fn descend(config: Config, gradients: &[f64], resume_at: Option<usize>) -> anyhow::Result<f32> {
+        let mut params = Params::new(0);
+        let w = params.trainable("w", &[3], Init::Constant(1.0))?;
+        let mut adam = Adam::new(&params, config)?;
+        for (i, gradient) in gradients.iter().enumerate() {
+            if resume_at == Some(i) {
+                let saved = adam.tensors("adam.")?;
+                adam = Adam::new(&params, config)?;
+                adam.load("adam.", &saved)?;
+            }
+            adam.step(&(&w * *gradient)?.sum_all()?.backward()?, 0.1)?;
+        }
+        Ok(w.to_vec1::<f32>()?[1])
+    }
+
+    #[test]
+    fn agrees_with_the_papers_and_resumes_exactly() -> anyhow::Result<()> {
+        let gradients = [1.0, -3.0, 0.2, 0.1, 0.4, -0.3];
+        for amsgrad in [false, true] {
+            let config = Config { amsgrad, ..Config::default() };
+            let w = descend(config, &gradients, None)?;
+            assert!((f64::from(w) - by_the_book(&gradients, 0.1, amsgrad)).abs() < 1e-5);
+            assert_eq!(w.to_bits(), descend(config, &gradients, Some(3))?.to_bits());
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn the_composed_update_is_the_own_one() -> anyhow::Result<()> {
+        for amsgrad in [false, true] {
+            let config = Config { amsgrad, max_norm: Some(2.0), ..Config::default() };
+            let walk = |composed: bool| -> anyhow::Result<Vec<f32>> {
+                let mut params = Params::new(3);
+                let w = params.trainable("w", &[5, 4], Init::Glorot)?;
+                let mut adam = Adam::new(&params, config)?;
+                for step in 0..6 {
+                    if composed && step % 3 == 0 {
+                        // Elsewhere from the beginning, and again from what was saved.
+                        let saved = adam.tensors("")?;
+                        adam.slots[0].moments = Place::Device(adam_fallback::Moments::zeros(&w, amsgrad)?);
+                        adam.load("", &saved)?;
+                    }
+                    adam.step(&(&w * (f64::from(step) - 2.5))?.sqr()?.sum_all()?.backward()?, 0.1)?;
+                }
+                Ok(w.flatten_all()?.to_vec1()?)
+            };
+            let (own, composed) = (walk(false)?, walk(true)?);
+            assert!(own.iter().zip(&composed).all(|(a, b)| (a - b).abs() < 1e-6), "{own:?} {composed:?}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn large_gradients_are_clipped_and_broken_ones_change_nothing() -> anyhow::Result<()> {
+        let mut params = Params::new(0);
+        let w = params.trainable("w", &[4], Init::Constant(1.0))?;
+        let mut adam = Adam::new(&params, Config { max_norm: Some(1.0), ..Config::default() })?;
+        let norm = adam.step(&(&w * 5.0)?.sum_all()?.backward()?, 0.1)?;
+        assert!((norm - 10.0).abs() < 1e-5);
+        assert!((adam.tensors("")?["w.first"].to_vec1::<f32>()?[0] - 0.05).abs() < 1e-6);
+        let before = w.to_vec1::<f32>()?;
+        assert!(adam.step(&(&w * f64::NAN)?.sum_all()?.backward()?, 0.1)?.is_nan());
+        assert_eq!(w.to_vec1::<f32>()?, before);
+        Ok(())
+    }
+}

@@ -1,0 +1,7 @@
+//! Synthetic bodies and hands before random cameras: what the lifters learn from.
+
+pub mod body;
+pub mod body_motion;
+pub mod hand;
+pub mod hand_motion;
+pub mod hand_shape;

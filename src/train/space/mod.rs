@@ -1,0 +1,5 @@
+//! Training of the fixed spaces of movement: the linear basis and the embedding, on a corpus of captured motion.
+
+pub mod basis;
+pub mod corpus;
+pub mod embedding;

@@ -1,0 +1,267 @@
+//! Joints to animation: what a body cannot do is not done, both sides are alike, gaps and rates do no harm, and what is
+//! asked for nothing is changed.
+
+use crate::fixtures::figures::swinging;
+use ndarray::{Array3, s};
+use orator::animate::rig::constraints::Tally;
+use orator::animate::rig::limits::{CURL_COHERENCE, ELBOW, FINGERS, Limit, SUPINATION, WRIST};
+use orator::animate::solve::arm_pose::ArmPose;
+use orator::animate::{Constraints, Face, Options, Performance, Smoothing, Yaw, perform};
+use orator::formats::bvh::write::Clip;
+use orator::math::one_euro::OneEuro;
+use orator::math::rotation::Rotation;
+use orator::types::pose3d::Motion;
+use orator::types::skeleton;
+use orator::types::skeleton::{L_HAND, L_SHOULDER, N_JOINTS, R_SHOULDER};
+use orator::types::time::FrameRate;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const UNTOUCHED: Options =
+    Options { smoothing: Smoothing::None, constraints: Constraints::NONE, yaw: Yaw::Spine, fps: None };
+
+fn random_rotation(random: &mut ChaCha8Rng) -> Rotation {
+    let [z, x, y] = [180.0, 90.0, 180.0].map(|reach: f64| random.random_range(-reach..reach));
+    Rotation::from_euler_zxy_degrees([z, x, y])
+}
+
+fn is_within(pose: &ArmPose) -> bool {
+    let inside = |[low, high]: [f64; 2], angle: f64| (low - 1e-6..=high + 1e-6).contains(&angle);
+    let bend = |limit: Limit, bend: orator::animate::rig::hinge::Bend| {
+        inside(limit.flexion, bend.flexion) && inside(limit.side, bend.side)
+    };
+    let fingers = FINGERS.iter().zip(&pose.fingers).all(|(limits, bends)| (0..3).all(|k| bend(limits[k], bends[k])));
+    let coherent = (0..3).all(|k| {
+        let curls = [1, 2, 3, 4].map(|finger: usize| pose.fingers[finger][k].flexion);
+        let mean = curls.iter().sum::<f64>() / 4.0;
+        curls.iter().all(|curl| (curl - mean).abs() <= CURL_COHERENCE + 1e-6)
+    });
+    bend(ELBOW, pose.elbow) && inside(SUPINATION, pose.supination) && bend(WRIST, pose.wrist) && fingers && coherent
+}
+
+#[test]
+fn random_rotations_come_out_within_the_limits_and_what_is_within_stays() {
+    let figure = perform(&swinging(0, 4), None, &UNTOUCHED).figure;
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let mut tally = Tally::default();
+    for n in 0..2_000 {
+        let mut frame: Vec<Rotation> = figure.skeleton.joints.iter().map(|_| random_rotation(&mut random)).collect();
+        Constraints::default().apply(&figure, &mut frame, &mut tally);
+        for arm in &figure.arms {
+            let pose = ArmPose::of(arm, &frame);
+            assert!(is_within(&pose), "{n}: {pose:?}");
+        }
+        let mut again = frame.clone();
+        Constraints::default().apply(&figure, &mut again, &mut Tally::default());
+        for (joint, (a, b)) in frame.iter().zip(&again).enumerate() {
+            assert!((a.inverse() * *b).angle() < 1e-6, "{n}: {} moves again", figure.skeleton.joints[joint].name);
+        }
+    }
+    let clamps = tally.clamps();
+    assert!(clamps.iter().all(|kind| kind.joint_frames > 0 && (0.0..=1.0).contains(&kind.share)), "{clamps:?}");
+    assert!(clamps.iter().all(|kind| kind.largest_excess_degrees <= 180.0 && kind.mean_excess_degrees > 0.0));
+}
+
+#[test]
+fn constraints_do_not_make_an_even_motion_jump() {
+    let figure = perform(&swinging(0, 4), None, &UNTOUCHED).figure;
+    let mut random = ChaCha8Rng::seed_from_u64(4);
+    for _ in 0..20 {
+        // Fingers pass through every impossible place; elbows and hands through what they could nearly do.
+        let limbs: Vec<usize> = figure.arms.iter().flat_map(|arm| [arm.fore, arm.hand]).collect();
+        let ends: [Vec<Rotation>; 2] = [0, 1].map(|_| {
+            let end = |joint| {
+                let share = if limbs.contains(&joint) { 0.25 } else { 1.0 };
+                Rotation::IDENTITY.slerp(random_rotation(&mut random), share)
+            };
+            (0..figure.skeleton.joints.len()).map(end).collect()
+        });
+        let mut last: Option<Vec<Rotation>> = None;
+        for step in 0..=4_000 {
+            let share = f64::from(step) / 4_000.0;
+            let between = |joint: usize| ends[0][joint].slerp(ends[1][joint], share);
+            let mut frame: Vec<Rotation> = (0..figure.skeleton.joints.len()).map(between).collect();
+            Constraints::default().apply(&figure, &mut frame, &mut Tally::default());
+            for arm in &figure.arms {
+                for &joint in arm.fingers.iter().flatten().chain([&arm.fore, &arm.hand]) {
+                    let turned = last.as_ref().map_or(0.0, |last| (last[joint].inverse() * frame[joint]).angle());
+                    assert!(turned.to_degrees() < 6.0, "{}: {turned}", figure.skeleton.joints[joint].name);
+                }
+            }
+            last = Some(frame);
+        }
+    }
+}
+
+fn mirrored(motion: &Motion) -> Motion {
+    let mut other = motion.clone();
+    for joint in 0..N_JOINTS {
+        let twin = motion.joints.slice(s![.., skeleton::mirror(joint), ..]);
+        other.joints.slice_mut(s![.., joint, ..]).assign(&twin);
+    }
+    other.joints.slice_mut(s![.., .., 0]).mapv_inplace(|x| -x);
+    Motion::from_joints(motion.fps, other.joints)
+}
+
+/// The greatest difference between a clip and the mirror image of another.
+fn asymmetry(clip: &Clip, other: &Clip) -> f64 {
+    let mut worst = 0.0f64;
+    for (joint, bone) in clip.skeleton.joints.iter().enumerate() {
+        let swapped = match (bone.name.strip_prefix("Left"), bone.name.strip_prefix("Right")) {
+            (Some(rest), _) => format!("Right{rest}"),
+            (_, Some(rest)) => format!("Left{rest}"),
+            _ => bone.name.clone(),
+        };
+        if bone.end {
+            continue;
+        }
+        let twin = other.skeleton.find(&swapped).unwrap();
+        for (a, b) in clip.local.iter().zip(&other.local) {
+            let (a, b) = (a[joint], b[twin].mirrored());
+            let sign = if a.w * b.w + (0..3).map(|k| a.v[k] * b.v[k]).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
+            worst = worst.max((a.w - sign * b.w).abs());
+            (0..3).for_each(|k| worst = worst.max((a.v[k] - sign * b.v[k]).abs()));
+        }
+    }
+    worst
+}
+
+/// Motion whose joints are missing here and there, for a frame or for long.
+fn with_gaps(seed: u64, n_frames: usize) -> Motion {
+    let mut motion = swinging(seed, n_frames);
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    for _ in 0..60 {
+        let (joint, start) = (random.random_range(1..N_JOINTS), random.random_range(0..n_frames));
+        let end = (start + random.random_range(1..20)).min(n_frames);
+        motion.joints.slice_mut(s![start..end, joint, ..]).fill(f32::NAN);
+    }
+    let noise = |v: f32| v + random.random_range(-0.02..0.02);
+    motion.joints.mapv_inplace(noise);
+    motion.joints.slice_mut(s![.., 0, ..]).fill(0.0);
+    Motion::from_joints(motion.fps, motion.joints)
+}
+
+#[test]
+fn a_mirrored_motion_gives_the_mirrored_performance() {
+    let one_euro = Options { smoothing: Smoothing::OneEuro(OneEuro { rest_hz: 1.5, beta: 0.5 }), ..Options::default() };
+    let faster = Options { fps: Some(FrameRate::new(60, 1)), yaw: Yaw::Removed, ..Options::default() };
+    for seed in 0..6 {
+        let motion = with_gaps(seed, 80);
+        for options in [Options::default(), UNTOUCHED, one_euro, faster] {
+            let clips = [&motion, &mirrored(&motion)].map(|motion| perform(motion, None, &options).clip);
+            let apart = asymmetry(&clips[0], &clips[1]);
+            assert!(apart < 1e-9, "seed {seed}, {options:?}: {apart}");
+        }
+    }
+}
+
+fn apart_mm(a: &Motion, b: &Motion) -> f64 {
+    let squares = (&a.joints - &b.joints).mapv(|v| f64::from(v).powi(2)).sum_axis(ndarray::Axis(2));
+    1000.0 * squares.into_iter().fold(0.0, f64::max).sqrt()
+}
+
+#[test]
+fn untouched_joints_with_rigid_palms_come_back_and_performing_twice_is_performing_once() {
+    for seed in 0..3 {
+        let rigid = perform(&swinging(seed, 40), None, &UNTOUCHED).motion();
+        let apart = apart_mm(&perform(&rigid, None, &UNTOUCHED).motion(), &rigid);
+        assert!(apart < 0.1, "seed {seed}: {apart} mm");
+        let limited = Options { smoothing: Smoothing::None, ..Options::default() };
+        let once = perform(&rigid, None, &limited);
+        assert!(once.told.clamps.iter().any(|kind| kind.joint_frames > 0));
+        let twice = perform(&once.motion(), None, &limited);
+        let apart = apart_mm(&twice.motion(), &once.motion());
+        assert!(apart < 0.1, "seed {seed}: {apart} mm");
+    }
+}
+
+#[test]
+fn smoothing_calms_and_bones_keep_their_length() {
+    let motion = with_gaps(1, 150);
+    let Performance { told, clip, figure } = perform(&motion, None, &Options::default());
+    let fall = |jerk: orator::animate::performance::Jerk| jerk.after.unwrap() / jerk.before.unwrap();
+    assert!(fall(told.arms) < 0.4 && fall(told.hands) < 0.5, "{told:?}");
+    for frame in 0..clip.n_frames() {
+        let places = clip.positions(frame);
+        for (joint, bone) in figure.skeleton.joints.iter().enumerate() {
+            let Some(parent) = bone.parent else { continue };
+            let square = |k: usize| (places[joint][k] - places[parent][k]).powi(2);
+            let length = (0..3).map(|k| bone.offset[k].powi(2)).sum::<f64>().sqrt();
+            assert!(((0..3).map(square).sum::<f64>().sqrt() - length).abs() < 1e-9);
+        }
+    }
+    let as_it_is = perform(&motion, None, &Options { smoothing: Smoothing::None, ..Options::default() }).told;
+    assert!(as_it_is.arms.after.unwrap() > 2.0 * told.arms.after.unwrap());
+}
+
+#[test]
+fn another_rate_passes_through_the_frames_without_corners() {
+    let motion = swinging(2, 40);
+    let limited = Options { smoothing: Smoothing::None, ..Options::default() };
+    let at = |rate: u32| perform(&motion, None, &Options { fps: Some(FrameRate::new(rate, 1)), ..limited });
+    let (given, fast) = (perform(&motion, None, &limited), at(60));
+    assert_eq!((fast.clip.n_frames(), fast.clip.fps), (160, FrameRate::new(60, 1)));
+    for frame in 0..40 {
+        for (a, b) in given.clip.local[frame].iter().zip(&fast.clip.local[4 * frame]) {
+            assert!((a.inverse() * *b).angle() < 1e-6);
+        }
+    }
+    // Speed before and after a frame differs no more than it does between frames.
+    let upper = fast.figure.arms[0].upper;
+    let clip = perform(&motion, None, &UNTOUCHED).clip.resampled(FrameRate::new(1500, 1));
+    let turn = |t: usize| (clip.local[t - 1][upper].inverse() * clip.local[t][upper]).angle();
+    let change = |t: usize| (turn(t + 1) - turn(t)).abs();
+    let corner = (1..38).map(|frame| change(100 * frame)).fold(0.0, f64::max);
+    let between = (1..38).map(|frame| change(100 * frame + 50)).fold(0.0, f64::max);
+    assert!(corner < 2.0 * between + 1e-6, "{corner} {between}");
+}
+
+#[test]
+fn removed_yaw_faces_ahead_and_keeps_the_shape() {
+    let mut motion = swinging(4, 60);
+    // The whole body swings about the vertical.
+    for (t, mut frame) in motion.joints.outer_iter_mut().enumerate() {
+        let (sin, cos) = (0.8 * (t as f32 * 0.1).sin()).sin_cos();
+        for mut place in frame.outer_iter_mut() {
+            let (x, z) = (place[0], place[2]);
+            (place[0], place[2]) = (cos * x + sin * z, cos * z - sin * x);
+        }
+    }
+    let yaw = |motion: &Motion| {
+        let line = |t: usize, k: usize| motion.joints[[t, L_SHOULDER, k]] - motion.joints[[t, R_SHOULDER, k]];
+        (0..60).map(|t| line(t, 2).atan2(line(t, 0)).abs().to_degrees()).fold(0.0, f32::max)
+    };
+    let [kept, removed] =
+        [Yaw::Spine, Yaw::Removed].map(|yaw| perform(&motion, None, &Options { yaw, ..UNTOUCHED }).motion());
+    assert!(yaw(&kept) > 30.0 && yaw(&removed) < 1e-2, "{} {}", yaw(&kept), yaw(&removed));
+    for t in 0..60 {
+        let length = |motion: &Motion| (0..3).map(|k| motion.joints[[t, L_HAND, k]].powi(2)).sum::<f32>().sqrt();
+        assert!((length(&kept) - length(&removed)).abs() < 1e-4);
+    }
+}
+
+#[test]
+fn the_head_turns_with_the_face_and_rests_without() {
+    let motion = swinging(3, 90);
+    // For 45 frames a face that looks to the person's left, 500 px a metre; then none.
+    let points = [[0.0, 0.02, 0.1], [0.03, -0.03, 0.08], [-0.03, -0.03, 0.08], [0.075, 0.0, 0.0], [-0.075, 0.0, 0.0]];
+    let mut body = Array3::zeros((90, 17, 3));
+    for t in 0..45 {
+        let yaw = 0.6f32;
+        for (k, [x, y, z]) in points.into_iter().enumerate() {
+            let place = [640.0 + 500.0 * (yaw.cos() * x + yaw.sin() * z), 300.0 + 500.0 * y, 0.95];
+            body.slice_mut(s![t, k, ..]).assign(&ndarray::arr1(&place));
+        }
+    }
+    let performance = perform(&motion, Some(&Face { body }), &Options::default());
+    assert_eq!(performance.told.face_frames, Some(45));
+    let (figure, clip) = (&performance.figure, &performance.clip);
+    let ahead = |t: usize| figure.skeleton.world(&clip.local[t])[figure.head].turn([0.0, 0.0, 1.0]);
+    for t in [5, 20, 40] {
+        let [x, y, _] = ahead(t);
+        assert!((x - 0.6f64.sin()).abs() < 0.12 && y.abs() < 0.15, "frame {t}: {:?}", ahead(t));
+    }
+    for joint in [figure.neck, figure.head] {
+        assert!(clip.local[70][joint].angle() < 1e-6 && clip.local[20][joint].angle() > 0.1);
+    }
+}

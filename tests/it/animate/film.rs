@@ -1,0 +1,201 @@
+//! The drawn figure: left is left, everything fits, gaps do no harm, and the mp4 has its frames and its sound.
+
+use crate::fixtures::figures::{FPS, swinging};
+use crate::fixtures::sync_clips::{Kind, PLAIN, chirp, chirp_begins, make};
+use ndarray::s;
+use orator::animate::draw::figure::{LEFT, PAPER, RIGHT};
+use orator::animate::export::film;
+use orator::animate::export::film::{Beside, Film, SIZE};
+use orator::external::ffmpeg::frames::FrameReader;
+use orator::external::ffmpeg::{audio, probe};
+use orator::formats::npy;
+use orator::stage::progress::Silent;
+use orator::types::image::Image;
+use orator::types::sound::Sound;
+use std::path::Path;
+use std::process::Command;
+
+/// Mean column of the pixels that are more of one hue than of the other.
+fn middle(image: &Image, columns: std::ops::Range<usize>, hue: [u8; 3]) -> f64 {
+    let warm = |rgb: [u8; 3]| i32::from(rgb[0]) - i32::from(rgb[2]);
+    let (mut sum, mut n) = (0.0, 0.0);
+    for y in 60..600 {
+        for x in columns.clone() {
+            let found = warm(image.pixel(x, y));
+            if found.abs() > 60 && (found > 0) == (warm(hue) > 0) {
+                (sum, n) = (sum + x as f64, n + 1.0);
+            }
+        }
+    }
+    assert!(n > 200.0, "only {n} pixels of {hue:?}");
+    sum / n
+}
+
+#[test]
+fn the_speakers_left_is_at_the_right_of_the_front_view_and_nothing_is_cut() {
+    let motion = swinging(4, 20);
+    let film = Film::new(&motion, None, Beside::Itself);
+    for frame in [0, 7, 19] {
+        let image = film.frame(frame).unwrap();
+        assert_eq!([image.width, image.height], SIZE);
+        assert!(middle(&image, 0..850, LEFT) > middle(&image, 0..850, RIGHT));
+        assert!((0..SIZE[0]).all(|x| image.pixel(x, 0) == PAPER && image.pixel(x, SIZE[1] - 1) == PAPER));
+        assert!((0..SIZE[1]).all(|y| image.pixel(0, y) == PAPER && image.pixel(SIZE[0] - 1, y) == PAPER));
+        assert_eq!(image, film.frame(frame).unwrap(), "the same frame twice is the same picture");
+    }
+}
+
+#[test]
+fn missing_joints_and_wild_ones_are_left_out() {
+    let mut motion = swinging(4, 4);
+    motion.joints.slice_mut(s![0, 7.., ..]).fill(f32::NAN);
+    motion.joints.slice_mut(s![1, .., ..]).fill(f32::NAN);
+    motion.joints.slice_mut(s![2, 3, ..]).fill(1e30);
+    motion.joints.slice_mut(s![3, .., ..]).fill(0.0);
+    let film = Film::new(&motion, Some(&Sound { rate: 16_000, samples: vec![] }), Beside::Itself);
+    let blank = film.frame(1).unwrap();
+    for frame in 0..4 {
+        assert!(frame == 1 || film.frame(frame).unwrap() != blank);
+    }
+}
+
+#[test]
+fn the_mp4_has_every_frame_and_the_sound() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("talk.mp4");
+    let motion = swinging(6, 15);
+    let samples = (0..16_000).map(|n| (n as f32 * 0.17).sin() * (n as f32 / 16_000.0)).collect();
+    film::write(&path, &motion, Some(&Sound { rate: 16_000, samples }), Beside::Itself, &Silent).unwrap();
+    let info = probe::probe(&path).unwrap();
+    let secs = info.duration_secs.unwrap();
+    assert!((secs - 15.0 / FPS.per_sec()).abs() < 0.1, "{secs} s");
+    let sound = audio::read_mono(&path, 16_000).unwrap().expect("a sound track");
+    assert!((sound.secs() - 1.0).abs() < 0.1);
+    let frames = orator::external::ffmpeg::frames::FrameReader::open(&path, FPS).unwrap().count();
+    assert_eq!(frames, 15);
+}
+
+/// Streams of a file as ffprobe (another program than ours) sees them: kind, start and duration in seconds.
+fn streams(path: &Path) -> Vec<(String, f64, f64)> {
+    let entries = "stream=codec_type,start_time,duration";
+    let output = Command::new("ffprobe")
+        .args(["-v", "error", "-of", "csv=p=0", "-show_entries", entries])
+        .arg(path)
+        .output()
+        .expect("ffprobe");
+    let line = |line: &str| {
+        let words: Vec<&str> = line.split(',').collect();
+        (words[0].to_owned(), words[1].parse().unwrap(), words[2].parse().unwrap())
+    };
+    String::from_utf8(output.stdout).unwrap().lines().map(line).collect()
+}
+
+#[test]
+fn a_click_at_a_second_stands_at_the_picture_of_that_second() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("clicks.mp4");
+    // The arms are thrown up at seconds 1, 2 and 3 and fall half a second later.
+    let mut motion = swinging(6, 60);
+    let still = motion.joints.slice(s![0, .., ..]).to_owned();
+    for (frame, mut joints) in motion.joints.outer_iter_mut().enumerate() {
+        joints.assign(&still);
+        if frame >= 15 && frame % 15 < 7 {
+            joints.slice_mut(s![1.., 1]).mapv_inplace(|y| -y);
+        }
+    }
+    let rate = 16_000;
+    let sample = |n: usize| (1..4).map(|k| chirp(n as f64 / f64::from(rate) - f64::from(k))).sum::<f64>() as f32;
+    let sound = Sound { rate, samples: (0..4 * rate as usize).map(sample).collect() };
+    film::write(&path, &motion, Some(&sound), Beside::Itself, &Silent).unwrap();
+
+    let streams = streams(&path);
+    let of = |kind: &str| streams.iter().find(|stream| stream.0 == kind).unwrap_or_else(|| panic!("no {kind}"));
+    let (picture, heard) = (of("video"), of("audio"));
+    eprintln!("pictures {:.4} s from {:.4} s, sound {:.4} s from {:.4} s", picture.2, picture.1, heard.2, heard.1);
+    assert!((picture.2 - 4.0).abs() < 1e-3 && (picture.2 - heard.2).abs() < FPS.secs(1));
+    assert!((picture.1 - heard.1).abs() < 1e-3);
+
+    let read = audio::read_mono(&path, rate).unwrap().expect("a sound track");
+    let frames: Vec<Image> = FrameReader::open(&path, FPS).unwrap().map(|frame| frame.unwrap().image).collect();
+    // How much of the figure is above its shoulders.
+    let high = |image: &Image| {
+        let coloured = |x, y| {
+            let [r, g, b] = image.pixel(x, y).map(i32::from);
+            (r - b).abs() > 50 || (g - r).abs() > 50
+        };
+        (0..850)
+            .step_by(3)
+            .flat_map(|x| (70..250).step_by(3).map(move |y| (x, y)))
+            .filter(|&(x, y)| coloured(x, y))
+            .count()
+    };
+    let up: Vec<bool> = frames.iter().map(|image| high(image) > high(&frames[0]) + 40).collect();
+    for k in 1..4 {
+        let shown = (15 * k - 7..15 * k + 7).find(|&n| up[n]).expect("the arms go up");
+        let heard = chirp_begins(&read.samples, rate, k as f64);
+        eprintln!("second {k}: shown at {:.4} s, heard at {heard:.4} s", FPS.secs(shown));
+        assert_eq!(shown, 15 * k);
+        assert!((heard - k as f64).abs() < 0.002, "{heard}");
+    }
+}
+
+#[test]
+fn the_video_beside_the_figure_is_in_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(clip) = make(folder.path(), &Kind { secs: 6.0, ..PLAIN }) else { return };
+    let path = folder.path().join("beside.mp4");
+    let motion = swinging(6, 30);
+    let beside = Beside::Video { path: &clip.path, from_secs: 2.0 };
+    film::write(&path, &motion, None, beside, &Silent).unwrap();
+    // A picture of the clip fills the left half: 64 x 48 px become 600 x 450.
+    let read = |image: &Image| {
+        let bit = |block: usize| {
+            let (x, y) = (4.0 + 8.0 * (block % 8) as f64, 24.0 + 6.0 + 12.0 * (block / 8) as f64);
+            usize::from(image.pixel((30.0 + x * 9.375) as usize, (113.0 + y * 9.375) as usize)[1] > 128) << block
+        };
+        (0..16).map(bit).sum::<usize>()
+    };
+    let film = FrameReader::open(&path, FPS).unwrap();
+    for (n, frame) in film.enumerate() {
+        assert_eq!(read(&frame.unwrap().image), 60 + 2 * n, "frame {n}");
+    }
+    let late = Beside::Video { path: &clip.path, from_secs: 60.0 };
+    let error = format!("{:#}", film::write(&path, &motion, None, late, &Silent).unwrap_err());
+    assert!(error.contains("lasts 6.0 s"), "{error}");
+}
+
+#[test]
+fn another_motion_is_drawn_beside_in_the_same_size_until_it_ends() {
+    let (motion, mut other) = (swinging(6, 30), swinging(7, 20));
+    other.fps = orator::types::time::FrameRate::new(30, 1);
+    let film = Film::new(&motion, None, Beside::Motion { motion: &other, labels: ["truth", "prediction"] });
+    let half = |image: &Image, from: usize| {
+        let coloured = |x, y| {
+            let [r, _, b] = image.pixel(x, y).map(i32::from);
+            (r - b).abs() > 60
+        };
+        (from..from + 600).flat_map(|x| (70..610).map(move |y| (x, y))).filter(|&(x, y)| coloured(x, y)).count()
+    };
+    // 20 frames at 30 a second end before frame 10 at 15.
+    let (early, late) = (film.frame(5).unwrap(), film.frame(12).unwrap());
+    assert!(half(&early, 30) > 500 && half(&early, 660) > 500);
+    assert!(half(&late, 30) > 500 && half(&late, 660) == 0);
+}
+
+#[test]
+fn a_film_beside_its_video_has_the_videos_sound_from_there_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(clip) = make(folder.path(), &Kind { secs: 6.0, ..PLAIN }) else { return };
+    let [motion, film] = ["motion.npy", "film.mp4"].map(|name| folder.path().join(name));
+    npy::write(&motion, &swinging(6, 30)).unwrap();
+    let mut orator = Command::new(env!("CARGO_BIN_EXE_orator"));
+    orator.arg("animate").arg(&motion).arg("--out").arg(&film).arg("--beside").arg(&clip.path);
+    let output = orator.args(["--beside-from", "2"]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let lengths: Vec<f64> = streams(&film).into_iter().map(|stream| stream.2).collect();
+    assert!(lengths.len() == 2 && lengths.iter().all(|secs| (secs - 2.0).abs() < FPS.secs(1)), "{lengths:?}");
+    let sound = audio::read_mono(&film, 16_000).unwrap().expect("a sound track");
+    let flash = clip.flashes.iter().find(|flash| (2.1..3.8).contains(&flash.on_secs)).expect("a flash in the film");
+    let heard = chirp_begins(&sound.samples, 16_000, flash.on_secs - 2.0);
+    assert!((heard - (flash.on_secs - 2.0)).abs() < 0.002, "{heard}");
+}

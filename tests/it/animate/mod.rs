@@ -1,0 +1,8 @@
+//! Rotations and animation files.
+
+pub mod animate;
+pub mod animate_verb;
+pub mod bvh;
+pub mod film;
+pub mod gltf;
+pub mod motion_files;

@@ -1,0 +1,101 @@
+//! Every kind of motion file holds the same joints: those of the performance; names change, nothing else.
+
+use super::bvh::Bvh;
+use crate::fixtures::figures::{FPS, swinging};
+use orator::animate::export::file::{Format, Sources};
+use orator::animate::rig::names::Names;
+use orator::animate::{Options, Performance, perform};
+use orator::formats::{authors_txt, npy};
+use orator::math::rotation::Rotation;
+use orator::math::vec3::{Vec3, add, norm, sub};
+use orator::stage::progress::Silent;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+fn write(folder: &Path, performance: &Performance, file: &str, names: Names) -> PathBuf {
+    let path = folder.join(file);
+    let sources = Sources { names, ..Sources::default() };
+    Format::of(&path).unwrap().write(&path, performance, &sources, &Silent).unwrap();
+    path
+}
+
+fn vec3(value: &Value) -> Vec3 {
+    std::array::from_fn(|k| value[k].as_f64().unwrap())
+}
+
+#[test]
+fn json_tells_joints_and_rotations_that_belong_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let performance = perform(&swinging(2, 15), None, &Options::default());
+    let expected = performance.motion();
+    let path = write(folder.path(), &performance, "motion.json", Names::Own);
+    let file: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+    assert_eq!(
+        (&file["format"], &file["version"], &file["units"]),
+        (&"orator motion".into(), &1.into(), &"metres".into())
+    );
+    assert_eq!((file["fps"][0].as_u64(), file["n_frames"].as_u64()), (Some(15), Some(15)));
+    let parents: Vec<Option<usize>> =
+        file["parents"].as_array().unwrap().iter().map(|p| p.as_u64().map(|p| p as usize)).collect();
+    assert_eq!(file["names"].as_array().unwrap().len(), parents.len());
+    let (mut worst_fk, mut worst): (f64, f64) = (0.0, 0.0);
+    for frame in 0..15 {
+        let (places, turns) = (&file["positions"][frame], &file["rotations"][frame]);
+        let mut world: Vec<(Rotation, Vec3)> = Vec::new();
+        for (joint, parent) in parents.iter().enumerate() {
+            let q = &turns[joint];
+            let local = Rotation { w: q[3].as_f64().unwrap(), v: vec3(q) };
+            world.push(match parent {
+                None => (local, vec3(&places[joint])),
+                Some(parent) => {
+                    let (turn, place) = world[*parent];
+                    (turn * local, add(place, turn.turn(vec3(&file["offsets"][joint]))))
+                }
+            });
+            worst_fk = worst_fk.max(1e3 * norm(sub(world[joint].1, vec3(&places[joint]))));
+        }
+        let of = |joint: usize| vec3(&places[file["joints49"][joint].as_u64().unwrap() as usize]);
+        for joint in 0..49 {
+            let [x, y, z] = sub(of(joint), of(0));
+            let apart: Vec3 =
+                [(0, x), (1, -y), (2, -z)].map(|(k, v)| v - f64::from(expected.joints[[frame, joint, k]]));
+            worst = worst.max(1e3 * norm(apart));
+        }
+    }
+    eprintln!("JSON: rotations give the positions within {worst_fk:.4} mm, these the joints within {worst:.4} mm");
+    assert!(worst_fk < 0.1 && worst < 0.1);
+}
+
+#[test]
+fn files_of_joints_hold_the_joints_of_the_performance() {
+    let folder = tempfile::tempdir().unwrap();
+    let performance = perform(&swinging(2, 12), None, &Options::default());
+    let expected = performance.motion();
+    let read = [
+        npy::read(&write(folder.path(), &performance, "motion.npy", Names::Own), FPS).unwrap(),
+        authors_txt::read(&write(folder.path(), &performance, "motion.txt", Names::Own), FPS).unwrap(),
+    ];
+    for motion in read {
+        assert_eq!(motion.joints.dim(), expected.joints.dim());
+        assert!(motion.joints.iter().zip(&expected.joints).all(|(a, b)| (a - b).abs() < 1e-4));
+    }
+}
+
+#[test]
+fn a_preset_changes_the_names_of_a_bvh_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let performance = perform(&swinging(2, 5), None, &Options::default());
+    let text = |names: Names| {
+        let path = write(folder.path(), &performance, &format!("{}.bvh", names.label()), names);
+        std::fs::read_to_string(path).unwrap()
+    };
+    let own = text(Names::Own);
+    for names in Names::ALL {
+        let text = text(names);
+        assert_eq!(text.split_once("MOTION").unwrap().1, own.split_once("MOTION").unwrap().1);
+        let bvh = Bvh::parse(&text);
+        let expected = ["Hips", "mixamorig:Hips", "Hips", "hips"][Names::ALL.iter().position(|n| *n == names).unwrap()];
+        assert_eq!(bvh.names[0], expected);
+        assert_eq!(bvh.frames.len(), 5);
+    }
+}

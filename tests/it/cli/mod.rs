@@ -1,0 +1,4 @@
+//! Verbs of the program.
+
+pub mod demo;
+pub mod models_verb;

@@ -1,0 +1,106 @@
+//! `dataset verify`: whatever single bit flips, whatever file is cut short, missing or strange, is found, and no damage
+//! makes it panic.
+
+use super::dataset::random_sample;
+use crate::fixtures::support::files_under;
+use orator::dataset::verify::verify::verify;
+use orator::dataset::{Sample, Split, write_dataset};
+use orator::motion::bones::with_lengths;
+use orator::stage::progress::Silent;
+use orator::types::time::FrameRate;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::fs;
+use std::path::Path;
+
+/// A sample of random motion whose bones have one length each.
+pub fn constant_sample(key: &str, n_frames: usize, seed: u64) -> Sample {
+    let mut sample = random_sample(key, n_frames, seed);
+    with_lengths(&mut sample.motion, &std::array::from_fn(|bone| 0.05 + bone as f32 / 500.0));
+    sample
+}
+
+fn write(dir: &Path) {
+    let samples = [
+        (Split::Train, constant_sample("talk-0a1b2c3d-000000", 4, 1)),
+        (Split::Train, constant_sample("talk-0a1b2c3d-000102", 3, 2)),
+        (Split::Test, constant_sample("walk-99999999-000007", 5, 3)),
+    ];
+    write_dataset(dir, "host", FrameRate::new(15, 1), &samples).unwrap();
+}
+
+fn n_wrong(dir: &Path, deep: bool) -> usize {
+    verify(dir, deep, &Silent).map_or(1, |found| found.problems.len())
+}
+
+#[test]
+fn a_thousand_flipped_bits_and_cuts_are_all_found() {
+    let dir = tempfile::tempdir().unwrap();
+    write(dir.path());
+    assert_eq!(verify(dir.path(), true, &Silent).unwrap().problems, []);
+    let files = files_under(dir.path());
+    assert_eq!(files.len(), 11, "{files:?}");
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    for round in 0..1_000 {
+        let (name, path) = &files[rng.random_range(0..files.len())];
+        let whole = fs::read(path).unwrap();
+        let at = rng.random_range(0..whole.len());
+        let mut damaged = whole.clone();
+        if round % 2 == 0 {
+            damaged[at] ^= 1 << rng.random_range(0..8);
+        } else {
+            damaged.truncate(at);
+        }
+        fs::write(path, damaged).unwrap();
+        assert!(n_wrong(dir.path(), true) > 0, "round {round}: {name} at {at}");
+        let small = !name.ends_with(".tar");
+        assert!(!small || n_wrong(dir.path(), false) > 0, "round {round}, fast: {name} at {at}");
+        fs::write(path, whole).unwrap();
+    }
+    assert_eq!(n_wrong(dir.path(), true), 0);
+}
+
+#[test]
+fn missing_and_strange_files_are_named() {
+    let dir = tempfile::tempdir().unwrap();
+    write(dir.path());
+    for (name, path) in files_under(dir.path()) {
+        let bytes = fs::read(&path).unwrap();
+        fs::remove_file(&path).unwrap();
+        let found = verify(dir.path(), false, &Silent).unwrap();
+        assert!(found.problems.iter().any(|p| format!("{p:?}").contains(&name)), "{name}: {:?}", found.problems);
+        fs::write(&path, bytes).unwrap();
+    }
+    fs::write(dir.path().join("notes.txt"), "mine").unwrap();
+    let found = verify(dir.path(), false, &Silent).unwrap();
+    assert_eq!(found.problems[0].what, "it does not belong to the dataset");
+    assert!(verify(&dir.path().join("nothing"), false, &Silent).unwrap_err().to_string().contains("is no dataset"));
+}
+
+/// What it says, and how to bring it about.
+type Spoilt = (&'static str, fn(&mut Sample));
+
+/// Numbers that cannot be, in files whose hashes are right.
+#[test]
+fn numbers_that_cannot_be_are_found() {
+    let spoilt: [Spoilt; 4] = [
+        ("the bone to joint 5", |sample| sample.motion.joints[[2, 5, 1]] += 0.01),
+        ("the mask says it was seen", |sample| {
+            sample.motion.joints.slice_mut(ndarray::s![1, 20, ..]).fill(f32::NAN);
+            sample.motion.mask[[1, 20]] = true;
+        }),
+        ("a keypoint is not finite", |sample| sample.pose2d[[0, 3, 0]] = f32::INFINITY),
+        ("a keypoint's score", |sample| sample.pose2d[[0, 3, 2]] = 2.0),
+    ];
+    for (expected, spoil) in spoilt {
+        let dir = tempfile::tempdir().unwrap();
+        // a long good sample keeps the video's median lengths
+        let mut bad = constant_sample("talk-0a1b2c3d-000102", 4, 2);
+        spoil(&mut bad);
+        let samples = [(Split::Train, constant_sample("talk-0a1b2c3d-000000", 40, 1)), (Split::Train, bad)];
+        write_dataset(dir.path(), "host", FrameRate::new(15, 1), &samples).unwrap();
+        assert_eq!(verify(dir.path(), false, &Silent).unwrap().problems, []);
+        let found = verify(dir.path(), true, &Silent).unwrap();
+        assert!(format!("{:?}", found.problems).contains(expected), "{expected}: {:?}", found.problems);
+    }
+}

@@ -1,0 +1,150 @@
+//! `orator forget`: what was derived from a video is gone, the others' stays byte for byte, and a kill is finished by the
+//! next forget.
+
+use crate::fixtures::support::{Project, files_under};
+use orator::dataset::forget::removal::PENDING;
+use orator::dataset::verify::verify::verify;
+use orator::stage::progress::Silent;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+/// Every file under a folder, and its bytes.
+fn bytes_under(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    files_under(folder).into_iter().map(|(name, path)| (name, fs::read(path).unwrap())).collect()
+}
+
+fn problems(project: &Project) -> usize {
+    verify(&project.work().join("dataset/host"), true, &Silent).unwrap().problems.len()
+}
+
+#[test]
+fn a_forgotten_video_leaves_nothing_and_the_others_are_untouched() {
+    let project = Project::with_clips("forget", 2, 6.0);
+    assert_eq!(project.run(&[]).code, 0);
+    let clips = project.clips();
+    let (gone, stays) = (&clips[0], &clips[1]);
+    let name = gone.file_name().unwrap().to_str().unwrap();
+    let stem = stays.file_stem().unwrap().to_str().unwrap().replace('_', "-");
+    let before = bytes_under(&project.work());
+    fs::create_dir_all(project.work().join("gan/host")).unwrap();
+    fs::write(project.work().join("gan/host/step-0000001.safetensors"), "weights").unwrap();
+
+    let report = project.work().join("report.html");
+    fs::write(&report, format!("<p>{name}</p>")).unwrap();
+    let plan = project.answer(&["forget", "--video", name, "--dry-run"]);
+    assert_eq!(plan.code, 0, "{}", plan.errors);
+    assert!(plan.json["would_remove"].as_array().unwrap().len() > 8, "{}", plan.json);
+    assert!(before.iter().all(|(name, bytes)| fs::read(project.work().join(name)).unwrap() == *bytes));
+    for (wanted, says) in [("gone.mp4", "there are:"), ("", "there are:")] {
+        let answer = project.answer(&["forget", "--video", wanted]);
+        assert!(answer.code == 1 && answer.errors.contains(says) && answer.errors.contains(name), "{}", answer.errors);
+    }
+
+    let answer = project.answer(&["forget", "--video", name]);
+    assert_eq!(answer.code, 0, "{} {}", answer.json, answer.errors);
+    assert!(answer.json["found"].as_array().unwrap().is_empty());
+    assert!(answer.json["searched"]["files"].as_u64().unwrap() > 20, "{}", answer.json);
+    let advice = answer.json["advice"].to_string();
+    assert!(advice.contains("exclude = ["), "{advice}");
+    assert!(!project.work().join("gan/host").exists(), "a model cannot unlearn");
+    assert!(!report.exists(), "a report that shows it");
+    assert_eq!(problems(&project), 0);
+    // no name of it is left, and what was made of the other is what it was
+    let after = bytes_under(&project.work());
+    let own = |(file, _): &(&String, &Vec<u8>)| file.contains(&stem) && !file.contains("dataset/host/videos");
+    let kept: Vec<_> = before.iter().filter(own).collect();
+    assert!(kept.len() > 10, "{kept:?}");
+    for (file, bytes) in kept {
+        assert!(after.get(file) == Some(bytes), "{file}");
+    }
+    let told = |bytes: &[u8]| bytes.windows(name.len()).any(|window| window == name.as_bytes());
+    assert!(!after.iter().any(|(file, bytes)| file.contains(name) || told(bytes)));
+
+    let again = project.answer(&["forget", "--video", name]);
+    assert_eq!((again.code, again.json["removed"].as_array().unwrap().len()), (0, 0), "{}", again.json);
+    assert!(
+        again.json["searched"]["marks"].as_u64().unwrap() >= 6,
+        "the proof knows its content still: {}",
+        again.json
+    );
+
+    // the line it printed keeps the video away
+    let config = project.dir().join("pipeline.toml");
+    let line = advice.split("exclude = ").nth(1).unwrap().split(']').next().unwrap().replace("\\\"", "\"");
+    let text = fs::read_to_string(&config).unwrap();
+    let text = text.replace("[[speaker]]", &format!("[[speaker]]\nexclude = {line}]"));
+    fs::write(&config, text).unwrap();
+    let run = project.run(&[]);
+    assert_eq!(run.code, 0, "{} {}", run.json, run.errors);
+    assert_eq!(run.json["stages"]["shard"]["done"].as_u64(), Some(1));
+    assert!(!bytes_under(&project.work()).iter().any(|(file, _)| file.contains(name.trim_end_matches(".mp4"))));
+    let shards = |all: &BTreeMap<String, Vec<u8>>| -> BTreeMap<String, Vec<u8>> {
+        all.iter().filter(|(file, _)| file.ends_with(".tar")).map(|(f, b)| (f.clone(), b.clone())).collect()
+    };
+    assert_eq!(shards(&bytes_under(&project.work())), shards(&after));
+    assert_eq!(problems(&project), 0);
+
+    let all = project.answer(&["forget", "--speaker", "host"]);
+    assert_eq!(all.code, 0, "{} {}", all.json, all.errors);
+    let left: Vec<String> = files_under(&project.work()).into_iter().map(|(file, _)| file).collect();
+    assert_eq!(left, [".lock", "hashes.json"]);
+}
+
+#[test]
+fn a_kill_in_the_middle_is_seen_and_finished() {
+    let project = Project::with_clips("forget-kill", 2, 6.0);
+    assert_eq!(project.run(&[]).code, 0);
+    let dataset = project.work().join("dataset/host");
+    let clip = project.clips()[1].clone();
+    let stem = clip.file_stem().unwrap().to_str().unwrap().to_owned();
+    // the stages' files of one video went, the dataset still has it
+    fs::write(dataset.join(PENDING), "half").unwrap();
+    fs::remove_dir_all(project.work().join("extract/host")).unwrap();
+    fs::remove_file(project.work().join("dataset/host.record.json")).unwrap();
+    assert!(problems(&project) > 0, "half forgotten is not sound");
+    let answer = project.answer(&["forget", "--video", &stem]);
+    assert_eq!(answer.code, 0, "{} {}", answer.json, answer.errors);
+    assert!(!dataset.join(PENDING).exists() && problems(&project) == 0);
+    assert!(files_under(&project.work()).iter().all(|(file, _)| !file.contains(&stem.replace('_', "-"))));
+
+    // between the two renames of the new dataset: the old one is put back and is whole
+    let stem = project.clips()[0].file_stem().unwrap().to_str().unwrap().to_owned();
+    fs::rename(&dataset, project.work().join("dataset/.host.old")).unwrap();
+    let answer = project.answer(&["forget", "--video", &stem, "--keep-models"]);
+    assert_eq!(answer.code, 0, "{} {}", answer.json, answer.errors);
+    assert!(!dataset.exists() && !project.work().join("dataset/.host.old").exists(), "it was the last video");
+}
+
+#[test]
+fn a_dataset_alone_forgets_too_and_a_hidden_copy_is_found() {
+    let project = Project::with_clips("forget-dataset", 2, 6.0);
+    assert_eq!(project.run(&[]).code, 0);
+    let name = project.clips()[0].file_name().unwrap().to_str().unwrap().to_owned();
+    // someone put a copy of the truth where nobody expects it
+    fs::write(project.work().join("notes.txt"), format!("see {name}")).unwrap();
+    let answer = project.answer(&["forget", "--video", &name, "--keep-models"]);
+    assert_eq!(answer.code, 1, "{} {}", answer.json, answer.errors);
+    let found = answer.json["found"].as_array().unwrap();
+    assert!(found.len() == 1 && found[0]["file"].as_str().unwrap().ends_with("notes.txt"), "{found:?}");
+
+    let other = project.clips()[1].file_name().unwrap().to_str().unwrap().to_owned();
+    assert_eq!(project.run(&[]).code, 0, "the forgotten one comes back");
+    let parts = files_under(&project.work().join("dataset/host/videos"));
+    let (_, part) = parts.iter().find(|(_, path)| fs::read_to_string(path).is_ok_and(|t| t.contains(&other))).unwrap();
+    let sound = fs::read_to_string(part).unwrap();
+    fs::write(part, sound.replacen("0.", "1.", 1)).unwrap();
+    let answer = project.answer(&["forget", "--video", &name, "--keep-models"]);
+    assert!(answer.code == 1 && answer.errors.contains("nothing was removed"), "{}", answer.errors);
+    fs::write(part, sound).unwrap();
+    fs::write(project.work().join("notes.txt"), "").unwrap();
+    assert_eq!(project.answer(&["forget", "--video", &name, "--keep-models"]).code, 0);
+    fs::write(project.dir().join("pipeline.toml"), "").unwrap();
+    let dataset = project.work().join("dataset/host");
+    let folder = dataset.to_str().unwrap();
+    let answer = project.answer(&["forget", "--dataset", folder, "--video", "none.mp4"]);
+    assert!(answer.code == 1 && answer.errors.contains(&other), "{}", answer.errors);
+    let answer = project.answer(&["forget", "--dataset", folder, "--video", &other]);
+    assert_eq!(answer.code, 0, "{} {}", answer.json, answer.errors);
+    assert!(!dataset.exists(), "it was the last video");
+}

@@ -1,0 +1,282 @@
+//! `orator import`: datasets from captured motion and from other datasets, and what becomes of what cannot come in.
+
+use crate::fixtures::support::{files_under, shared};
+use orator::dataset::import::find::Kind;
+use orator::dataset::import::take::Limits;
+use orator::dataset::import::{Imported, Plan, import, shards};
+use orator::dataset::info::About;
+use orator::dataset::verify::verify::{accounts, verify};
+use orator::dataset::{Dataset, Sample};
+use orator::external::ffmpeg::audio;
+use orator::mocap::captured::Captured;
+use orator::motion::bones;
+use orator::motion::resample;
+use orator::stage::progress::Silent;
+use orator::types::pose3d::Motion;
+use orator::types::skeleton::{L_HAND, R_HAND};
+use orator::types::sound::Sound;
+use orator::types::time::FrameRate;
+use rand::{Rng, SeedableRng};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const FPS: FrameRate = FrameRate::new(15, 1);
+
+/// A BVH take of `n_frames` at 30 fps: the reference's nine frames to and fro.
+fn bvh(n_frames: usize) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/reference/bvh_take.bvh");
+    let text = fs::read_to_string(path).unwrap();
+    let (head, frames) = text.split_once("Frames: 9\nFrame Time: 0.0333333\n").unwrap();
+    let frames: Vec<&str> = frames.lines().collect();
+    let swing = |t: usize| frames[if t % 16 < 8 { t % 8 } else { 8 - t % 8 }];
+    let frames: String = (0..n_frames).map(|t| format!("{}\n", swing(t))).collect();
+    format!("{head}Frames: {n_frames}\nFrame Time: 0.0333333\n{frames}")
+}
+
+/// Noise of a seed.
+fn wav(path: &Path, secs: f64, seed: u64) {
+    let mut noise = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let samples = (0..(secs * 22_050.0) as usize).map(|_| noise.random_range(-0.5f32..0.5)).collect();
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    audio::write_wav(path, &Sound { rate: 22_050, samples }).unwrap();
+}
+
+fn write(path: PathBuf, text: &str) {
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    fs::write(path, text).unwrap();
+}
+
+fn plan(sources: &[&Path]) -> Plan {
+    Plan {
+        sources: sources.iter().map(|path| path.to_path_buf()).collect(),
+        kind: None,
+        about: About::new("host", FPS),
+        limits: Limits { fps: FPS, min_frames: 64, max_apart_secs: 0.5 },
+        shard: orator::config::Shard { validation: 0.0, test: 0.0, ..Default::default() },
+    }
+}
+
+/// Imports into the new folder `out`, which must then be a sound dataset.
+fn imported(sources: &[&Path], out: &Path) -> Imported {
+    fs::create_dir_all(out).unwrap();
+    let imported = import(&plan(sources), out, &Silent).unwrap();
+    assert_eq!(verify(out, true, &Silent).unwrap().problems, []);
+    imported
+}
+
+/// The samples as they lie in a dataset's shards, and their JSON.
+fn samples(dir: &Path) -> BTreeMap<String, (Sample, Vec<u8>)> {
+    let tars: Vec<PathBuf> = files_under(dir).into_iter().map(|(_, path)| path).filter(|path| is_tar(path)).collect();
+    let loose = shards::open(&tars);
+    let waiting = loose.videos.into_iter().flat_map(|video| video.samples);
+    waiting.map(|waiting| (waiting.key.clone(), waiting.read().unwrap())).collect()
+}
+
+fn is_tar(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending == "tar")
+}
+
+/// What the dataset must hold of a take: the source's joints at 15 fps, its own bones on every frame.
+fn expected(captured: &Captured, n_frames: usize) -> Motion {
+    let lengths = bones::measure(&captured.motion);
+    let mut motion = resample::at_rate(&captured.motion, FPS);
+    motion.joints = motion.joints.slice(ndarray::s![..n_frames, .., ..]).to_owned();
+    motion.mask = motion.mask.slice(ndarray::s![..n_frames, ..]).to_owned();
+    bones::with_lengths(&mut motion, &lengths);
+    motion
+}
+
+fn furthest(a: &Motion, b: &Motion) -> f32 {
+    assert_eq!((a.joints.shape(), &a.mask), (b.joints.shape(), &b.mask));
+    let off = a.joints.iter().zip(&b.joints).map(|(a, b)| if a.is_nan() && b.is_nan() { 0.0 } else { (a - b).abs() });
+    off.fold(0.0, f32::max)
+}
+
+#[test]
+fn a_folder_of_bvh_and_sound_becomes_a_dataset() {
+    let dir = tempfile::tempdir().unwrap();
+    let source = dir.path().join("trn");
+    let file = |name: &str| source.join(name);
+    write(file("bvh/talk.bvh"), &bvh(301));
+    wav(&file("wav/talk.wav"), 9.7, 1);
+    write(file("tsv/talk.tsv"), "0.50\t0.75\tso\n9.9\t10.0\tlate\n");
+    write(file("bvh/short.bvh"), &bvh(100));
+    wav(&file("wav/short.wav"), 3.333, 2);
+    write(file("bvh/silent.bvh"), &bvh(200));
+    write(file("bvh/apart.bvh"), &bvh(200));
+    wav(&file("wav/apart.wav"), 8.0, 3);
+    write(file("bvh/broken.bvh"), &bvh(200)[..9000]);
+    let out = dir.path().join("out");
+    let answer = imported(&[&source], &out);
+    let ended: BTreeMap<&str, (&str, &str)> = answer
+        .lines
+        .iter()
+        .map(|line| (Path::new(&line.file).file_stem().unwrap().to_str().unwrap(), (line.ended, line.reason.as_str())))
+        .collect();
+    let all = [
+        ("apart", ("refused", "out of step")),
+        ("broken", ("failed", "error")),
+        ("short", ("refused", "too short")),
+        ("silent", ("refused", "no sound")),
+        ("talk", ("kept", "")),
+    ];
+    assert_eq!(ended, all.into());
+    let says = |stem: &str| answer.lines.iter().find(|line| line.file.contains(stem)).unwrap().says.clone();
+    assert!(says("broken").contains("broken.bvh"), "{}", says("broken"));
+    assert!(says("apart").contains("1.333 s apart"), "{}", says("apart"));
+    for account in accounts(&out).unwrap().iter().filter(|account| account.failure.is_none()) {
+        assert!(account.ledger.is_whole(), "{account:?}");
+    }
+
+    let samples = samples(&out);
+    let (sample, _) = samples.values().next().unwrap();
+    assert_eq!((samples.len(), sample.n_frames()), (1, 145), "9.7 s of sound");
+    let captured = Captured::read(Kind::Bvh, &file("bvh/talk.bvh")).unwrap();
+    assert!(furthest(&sample.motion, &expected(&captured, 145)) < 1e-6);
+    assert_eq!(sample.sound.samples.len(), 154_667);
+    let facts = &sample.meta["imported"];
+    assert_eq!((facts["motion"].as_str(), facts["sound"].as_str()), (Some("talk.bvh"), Some("talk.wav")));
+    assert!((facts["sound_secs"].as_f64().unwrap() - 9.7).abs() < 1e-3);
+    // 301 frames end at 10.0 s, where frame 150 of the dataset begins
+    assert!((facts["motion_secs"].as_f64().unwrap() - 151.0 / 15.0).abs() < 1e-9);
+    assert_eq!((sample.meta["text"].as_str(), sample.meta["words"][0]["start_secs"].as_f64()), (Some("so"), Some(0.5)));
+    let dataset = Dataset::open(&out).unwrap();
+    assert!(dataset.info().notes.iter().any(|note| note.contains("faces the camera")));
+    // the same sources give the same bytes
+    let again = dir.path().join("again");
+    imported(&[&source], &again);
+    let bytes = |dir: &Path| files_under(dir).into_iter().map(|(name, path)| (name, fs::read(path).unwrap())).collect();
+    let (first, second): (Vec<_>, Vec<(String, Vec<u8>)>) = (bytes(&out), bytes(&again));
+    assert!(first == second);
+}
+
+#[test]
+fn datasets_are_merged_byte_for_byte_and_come_back_from_other_hands() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    for (name, n_frames, seed) in [("a", 160, 1), ("b", 200, 2)] {
+        write(path(&format!("{name}/{name}.bvh")), &bvh(n_frames));
+        wav(&path(&format!("{name}/{name}.wav")), n_frames as f64 / 30.0, seed);
+        imported(&[&path(name)], &path(&format!("dataset-{name}")));
+    }
+    let both = [path("dataset-a"), path("dataset-b")];
+    let merged = imported(&[&both[0], &both[1]], &path("merged"));
+    assert_eq!((merged.lines.len(), merged.info.videos.len()), (2, 2));
+    for from in &both {
+        for (name, file) in files_under(from).into_iter().filter(|(name, _)| name.contains("tar") || name.contains('/'))
+        {
+            assert!(fs::read(file).unwrap() == fs::read(path("merged").join(&name)).unwrap(), "{name}");
+        }
+    }
+
+    // taken apart and put together again by someone else: other order, other names, something added
+    fs::create_dir(path("loose")).unwrap();
+    let mut tar = tar::Builder::new(fs::File::create(path("loose/train-000007.tar")).unwrap());
+    let mut members: Vec<(String, Vec<u8>)> = Vec::new();
+    for (key, (sample, json)) in samples(&path("merged")) {
+        let endings = orator::dataset::sample::EXTENSIONS.iter();
+        members.extend(endings.zip(sample.members().unwrap()).map(|(e, bytes)| (format!("./{key}.{e}"), bytes)));
+        members.iter_mut().rev().find(|(name, _)| name.ends_with("json")).unwrap().1 = json;
+        members.push((format!("{key}.txt"), b"a note of theirs".to_vec()));
+    }
+    members.reverse();
+    for (name, bytes) in &members {
+        let mut header = tar::Header::new_gnu();
+        header.set_size(bytes.len() as u64);
+        header.set_mode(0o600);
+        tar.append_data(&mut header, name, bytes.as_slice()).unwrap();
+    }
+    tar.finish().unwrap();
+    let back = imported(&[&path("loose")], &path("back"));
+    assert!(back.notes.iter().any(|note| note.contains("2 x .txt left out")), "{:?}", back.notes);
+    let (before, after) = (samples(&path("merged")), samples(&path("back")));
+    assert_eq!(before.keys().collect::<Vec<_>>(), after.keys().collect::<Vec<_>>());
+    for (key, (sample, json)) in &before {
+        let (again, json_again) = &after[key];
+        assert!(sample.members().unwrap()[1..] == again.members().unwrap()[1..] && json == json_again, "{key}");
+    }
+
+    // a sample that lost a member fails, the other comes in; another rate fails
+    let mut tar = tar::Builder::new(fs::File::create(path("loose/train-000007.tar")).unwrap());
+    for (name, bytes) in members.iter().filter(|(name, _)| !(name.contains("/a-") && name.ends_with("wav"))) {
+        let mut header = tar::Header::new_gnu();
+        header.set_size(bytes.len() as u64);
+        tar.append_data(&mut header, name, bytes.as_slice()).unwrap();
+    }
+    tar.finish().unwrap();
+    let half = imported(&[&path("loose")], &path("half"));
+    let failed: Vec<_> = half.lines.iter().filter(|line| line.ended == "failed").collect();
+    assert!(failed.len() == 1 && failed[0].says.contains("has no a-"), "{failed:?}");
+    let mut other_rate = plan(&[&both[0]]);
+    (other_rate.limits.fps, other_rate.about.fps) = (FrameRate::new(30, 1), FrameRate::new(30, 1));
+    fs::create_dir(path("none")).unwrap();
+    let text = format!("{:#}", import(&other_rate, &path("none"), &Silent).unwrap_err());
+    assert!(text.contains("15 fps") && text.contains("30 fps"), "{text}");
+}
+
+#[test]
+fn the_same_take_twice_comes_in_once() {
+    let dir = tempfile::tempdir().unwrap();
+    for folder in ["one", "two"] {
+        write(dir.path().join(folder).join("a.bvh"), &bvh(160));
+        wav(&dir.path().join(folder).join("a.wav"), 5.3, 1);
+    }
+    let answer = imported(&[dir.path()], &dir.path().join("out"));
+    let ended: Vec<(&str, &str)> = answer.lines.iter().map(|line| (line.ended, line.reason.as_str())).collect();
+    assert_eq!(ended, [("kept", ""), ("refused", "duplicate")]);
+}
+
+#[test]
+fn the_authors_clips_and_ted_become_datasets() {
+    let Some(data) = shared("data") else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let clips = imported(&[&data.join("released_clips")], &dir.path().join("clips"));
+    let count = |imported: &Imported, reason: &str| imported.lines.iter().filter(|l| l.reason == reason).count();
+    assert_eq!([count(&clips, ""), count(&clips, "no sound"), count(&clips, "prediction")], [3, 1, 4]);
+    for (key, (sample, _)) in samples(&dir.path().join("clips")) {
+        let name = sample.meta["imported"]["motion"].as_str().unwrap().to_owned();
+        let captured = Captured::read(Kind::Authors, &data.join("released_clips").join(name)).unwrap();
+        assert_eq!(furthest(&sample.motion, &expected(&captured, sample.n_frames())), 0.0, "{key}");
+    }
+    let ted = imported(&[&data.join("speech_motion/ted_expressive")], &dir.path().join("ted"));
+    assert_eq!((count(&ted, ""), ted.lines.len()), (14, 14));
+    for (key, (sample, _)) in samples(&dir.path().join("ted")) {
+        let name = sample.meta["imported"]["motion"].as_str().unwrap().to_owned();
+        let mut source =
+            Captured::read(Kind::Ted, &data.join("speech_motion/ted_expressive").join(name)).unwrap().motion;
+        source.joints = source.joints.slice(ndarray::s![..sample.n_frames(), .., ..]).to_owned();
+        source.mask = source.mask.slice(ndarray::s![..sample.n_frames(), ..]).to_owned();
+        assert!(furthest(&sample.motion, &source) < 1e-6, "{key}");
+        let there = |root: usize| (0..21).filter(|k| sample.motion.mask[[0, root + k]]).count();
+        assert_eq!((there(L_HAND), there(R_HAND)), (16, 16), "three joints a finger, no tips");
+        assert!(!sample.meta["text"].as_str().unwrap().is_empty());
+    }
+}
+
+#[test]
+fn the_verb_says_what_failed_and_replaces_only_datasets() {
+    let dir = tempfile::tempdir().unwrap();
+    write(dir.path().join("in/good.bvh"), &bvh(160));
+    wav(&dir.path().join("in/good.wav"), 5.3, 1);
+    write(dir.path().join("in/bad.bvh"), "no bvh");
+    let run = |args: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_orator"));
+        let output =
+            command.current_dir(dir.path()).args(["--json", "import", "--speaker", "host"]).args(args).output();
+        let output = output.unwrap();
+        (output.status.code(), serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap_or_default())
+    };
+    let (code, json) = run(&["in", "--out", "out"]);
+    assert_eq!((code, json["kept"].as_u64(), json["failed"].as_u64()), (Some(2), Some(1), Some(1)));
+    assert_eq!(run(&["in", "--out", "out"]).0, Some(1), "it is not empty");
+    let ledger = fs::read_to_string(dir.path().join("out/ledger.jsonl")).unwrap();
+    assert!(ledger.contains("bad.bvh is no readable") && !ledger.contains("in/"), "{ledger}");
+    assert_eq!(run(&["in/good.bvh", "--out", "out", "--force"]).0, Some(0));
+    assert_eq!(run(&["in", "out", "--out", "out", "--force"]).0, Some(1), "it would be read while it is replaced");
+    let (code, json) = run(&["in", "--out", "in", "--force"]);
+    assert!(code == Some(1) && json["error"].as_str().unwrap().contains("no dataset"), "{json}");
+    let (code, json) = run(&["in/bad.bvh", "--out", "none"]);
+    assert!(code == Some(1) && json["error"].as_str().unwrap().contains("bad.bvh"), "{json}");
+    assert!(!dir.path().join("none").exists() && !dir.path().join(".none.attempt").exists());
+}

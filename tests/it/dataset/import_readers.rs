@@ -1,0 +1,131 @@
+//! Readers of captured motion: joints as the source has them, in house axes.
+
+use crate::fixtures::support::shared;
+use orator::dataset::import::find::Kind;
+use orator::mocap::captured::Captured;
+use orator::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, R_HAND, R_SHOULDER, R_WRIST, authors_from_house};
+use orator::types::time::FrameRate;
+use std::path::Path;
+
+fn reference(name: &str) -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/reference").join(name)
+}
+
+#[test]
+fn a_bvh_take_is_where_the_reference_puts_it() {
+    let take = Captured::read(Kind::Bvh, &reference("bvh_take.bvh")).unwrap();
+    let golden: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(reference("bvh_golden.json")).unwrap()).unwrap();
+    assert_eq!(take.motion.fps, FrameRate::new(30, 1));
+    assert_eq!(
+        (take.facts["source_unit"].as_str(), take.facts["source_up"].as_str()),
+        (Some("centimetre"), Some("+y"))
+    );
+    assert!(take.facts["joints_missing"].as_array().unwrap().is_empty());
+    let mut worst = 0f64;
+    for ((t, j, k), &v) in take.motion.joints.indexed_iter() {
+        worst = worst.max((golden["joints"][t][j][k].as_f64().unwrap() - f64::from(v)).abs());
+    }
+    assert!(worst < 1e-6, "{worst} m");
+    assert_eq!(take.motion.n_frames(), 9);
+    // the speaker's right is image left, up is up, and they face the camera
+    assert!(take.motion.joints[[0, R_SHOULDER, 0]] < -0.1 && take.motion.joints[[0, L_WRIST, 0]] > 0.2);
+}
+
+#[test]
+fn z_up_inches_and_a_lost_hand_are_the_same_speaker() {
+    let text = std::fs::read_to_string(reference("bvh_take.bvh")).unwrap();
+    let whole = Captured::read(Kind::Bvh, &reference("bvh_take.bvh")).unwrap().motion;
+    let dir = tempfile::tempdir().unwrap();
+    // a root above all that turns y up into z up; every length in inches
+    let (head, frames) = text.split_once("Frame Time: 0.0333333\n").unwrap();
+    let inches = |line: &str| match line.trim_start().strip_prefix("OFFSET ") {
+        Some(offset) => {
+            let scaled = offset.split(' ').map(|v| format!("{:.7}", v.parse::<f64>().unwrap() / 2.54));
+            format!("OFFSET {}", scaled.collect::<Vec<_>>().join(" "))
+        }
+        None => line.replace("LeftHand", "Tail"),
+    };
+    let head: Vec<String> = head.lines().map(inches).collect();
+    let head = head.join("\n").replacen(
+        "ROOT Hips",
+        "ROOT Stage {\nOFFSET 0 0 0\nCHANNELS 3 Zrotation Xrotation Yrotation\nJOINT Hips",
+        1,
+    );
+    let head = head.replacen("MOTION", "}\nMOTION", 1);
+    let frames: Vec<String> = frames
+        .lines()
+        .map(|line| {
+            let mut values: Vec<f64> = line.split(' ').map(|v| v.parse().unwrap()).collect();
+            values[..3].iter_mut().for_each(|v| *v /= 2.54);
+            format!("0 90 0 {}", values.iter().map(f64::to_string).collect::<Vec<_>>().join(" "))
+        })
+        .collect();
+    let path = dir.path().join("other.bvh");
+    std::fs::write(&path, format!("{head}\nFrame Time: 0.0333333\n{}\n", frames.join("\n"))).unwrap();
+    let take = Captured::read(Kind::Bvh, &path).unwrap();
+    assert_eq!((take.facts["source_unit"].as_str(), take.facts["source_up"].as_str()), (Some("inch"), Some("+z")));
+    assert_eq!(take.facts["joints_missing"].as_array().unwrap().len(), 22, "the left wrist and its hand");
+    for ((t, j, k), &v) in take.motion.joints.indexed_iter() {
+        let lost = (L_HAND..R_HAND).contains(&j) || j == L_WRIST;
+        let off = (v - whole.joints[[t, j, k]]).abs();
+        assert!(if lost { v.is_nan() && !take.motion.mask[[t, j]] } else { off < 2e-6 }, "{t} {j} {k}: {off}");
+    }
+}
+
+#[test]
+fn what_is_no_speaker_is_an_error_that_says_why() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("b.bvh");
+    let text = std::fs::read_to_string(reference("bvh_take.bvh")).unwrap();
+    let said = |text: &str| {
+        std::fs::write(&path, text).unwrap();
+        format!("{:#}", Captured::read(Kind::Bvh, &path).unwrap_err())
+    };
+    let named = said(&text.replace("Neck", "Pole"));
+    assert!(named.contains("b.bvh") && named.contains("neck") && named.contains("LeftForeArm"), "{named}");
+    let huge = said(&text.replace("28.5", "9000"));
+    assert!(huge.contains("centimetre"), "{huge}");
+    let broken = said(&text[..text.len() - 30]);
+    assert!(broken.contains("b.bvh") && broken.contains("9 frames"), "{broken}");
+}
+
+#[test]
+fn ted_joints_stay_where_they_are() {
+    let Some(folder) = shared("data/speech_motion/ted_expressive") else { return };
+    let take = Captured::read(Kind::Ted, &folder.join("_3IOjpSGFqY_164_0_12.npz")).unwrap();
+    let mut npz = orator::formats::npz::Npz::open(&folder.join("_3IOjpSGFqY_164_0_12.npz")).unwrap();
+    let theirs = npz.numbers("human_joints", &[None, Some(43), Some(3)]).unwrap();
+    // (ours, theirs): arms, then base and inter of the left index, left little, right thumb
+    let pairs = [(1, 3), (2, 5), (3, 7), (4, 2), (5, 4), (6, 6), (12, 8), (13, 9), (24, 14), (29, 35), (31, 37)];
+    for t in 0..take.motion.n_frames() {
+        for (ours, j) in pairs {
+            for k in 0..3 {
+                let truth = theirs[[t, j, k]] - theirs[[t, 1, k]];
+                assert!((f64::from(take.motion.joints[[t, ours, k]]) - truth).abs() < 1e-6);
+            }
+        }
+        for root in [L_HAND, R_HAND] {
+            assert!((0..5).all(|finger| !take.motion.mask[[t, root + 4 + 4 * finger]]), "tips are not there");
+        }
+    }
+    assert_eq!(take.motion.n_frames(), 92);
+    assert!(take.text.unwrap().starts_with("una risposta  a  questa"));
+}
+
+#[test]
+fn the_authors_clips_are_permuted_and_nothing_else() {
+    let Some(folder) = shared("data/released_clips") else { return };
+    let path = folder.join("gt_interval_3821.txt");
+    let take = Captured::read(Kind::Authors, &path).unwrap();
+    let text = std::fs::read_to_string(path).unwrap();
+    for (t, line) in text.lines().enumerate() {
+        let numbers: Vec<f32> = line.split_whitespace().map(|v| v.parse().unwrap()).collect();
+        for j in 0..N_JOINTS {
+            for k in 0..3 {
+                assert_eq!(take.motion.joints[[t, j, k]], numbers[3 * authors_from_house(j) + k]);
+            }
+        }
+    }
+    assert!(take.motion.joints[[0, R_WRIST, 0]].is_finite());
+}

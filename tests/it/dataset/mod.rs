@@ -1,0 +1,9 @@
+//! The dataset: written, read, verified, imported, forgotten.
+
+pub mod dataset;
+pub mod dataset_verify;
+pub mod forget;
+pub mod import;
+pub mod import_readers;
+pub mod shard;
+pub mod shared_sound;

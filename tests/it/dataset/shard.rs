@@ -1,0 +1,288 @@
+//! The shard stage over a made-up work folder: what is in the dataset, and what has no say in its bytes.
+
+use crate::fixtures::footage::{FPS, good, write};
+use crate::fixtures::support::files_under;
+use ndarray::{Array2, Array3, s};
+use orator::config;
+use orator::config::Settings;
+use orator::config::videos::Videos;
+use orator::dataset::split::of_content;
+use orator::dataset::verify::verify::{accounts, verify};
+use orator::dataset::write::part::SplitBy;
+use orator::dataset::{Dataset, Split};
+use orator::formats::joints_npz;
+use orator::motion::bones::with_lengths;
+use orator::pipeline::segment::SegmentStage;
+use orator::pipeline::shard::stage::ShardStage;
+use orator::stage::progress::Silent;
+use orator::stage::runner::place;
+use orator::stage::{Report, Stage, Unit};
+use orator::types::pose3d::Motion;
+use orator::types::skeleton::{L_HAND, N_BONES, R_HAND, parent};
+use orator::types::sync;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn unit(root: &Path, name: &str) -> Unit {
+    let source = root.join("videos").join(format!("{name}.mp4"));
+    Unit { speaker: "host".into(), video: format!("{name}-00000000"), source }
+}
+
+/// What the stages before shard leave of a video of `n_frames`: a cut in the middle, random motion.
+fn video(root: &Path, name: &str, n_frames: usize, seed: u64) -> Unit {
+    video_with(root, name, n_frames, seed, seed)
+}
+
+/// The same, with noise of another seed as its sound.
+fn video_with(root: &Path, name: &str, n_frames: usize, seed: u64, sound_seed: u64) -> Unit {
+    let (work, unit) = (root.join("work"), unit(root, name));
+    let mut footage = good(n_frames);
+    footage.shot[n_frames / 2..].fill(1);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    if let Some(sound) = &mut footage.sound {
+        let mut noise = ChaCha8Rng::seed_from_u64(1000 + sound_seed);
+        sound.iter_mut().for_each(|sample| *sample = noise.random());
+        sound.pop();
+    }
+    write(&work, &unit, &footage, &format!("film {seed}"));
+    let segment = place(&work, "segment", &unit);
+    fs::create_dir_all(&segment).unwrap();
+    SegmentStage::new(&config::Segment::default(), &work).run(&unit, &segment, &Silent).unwrap();
+
+    let lift = place(&work, "lift", &unit);
+    fs::create_dir_all(&lift).unwrap();
+    for file in ["intervals.json", "ledger.json"] {
+        fs::copy(segment.join(file), lift.join(file)).unwrap();
+    }
+    let mut joints = Array3::from_shape_fn((n_frames, 49, 3), |_| rng.random_range(-0.5f32..0.5));
+    joints.slice_mut(s![.., 0, ..]).fill(0.0);
+    let mask = Array2::from_elem((n_frames, 49), true);
+    let mut lengths = vec![0.1 + seed as f64 / 100.0; N_BONES];
+    (lengths[L_HAND - 1], lengths[R_HAND - 1]) = (0.0, 0.0);
+    let mut motion = Motion { fps: FPS, joints, mask };
+    with_lengths(&mut motion, &std::array::from_fn(|bone| lengths[bone] as f32));
+    joints_npz::write(&lift.join("joints.npz"), &motion).unwrap();
+    let bones = serde_json::json!({ "lengths_metres": lengths, "n_frames": n_frames });
+    fs::write(lift.join("bones.json"), bones.to_string()).unwrap();
+    unit
+}
+
+fn settings(root: &Path) -> Settings {
+    let mut settings = Settings::default();
+    settings.work.dir = root.join("work");
+    settings.shard.max_mb = 1;
+    settings
+}
+
+fn shard(root: &Path, videos: &[Unit], out: &str) -> (anyhow::Result<Report>, PathBuf) {
+    shard_with(root, videos, &[], out)
+}
+
+/// The same; `named` puts videos into splits.
+fn shard_with(root: &Path, videos: &[Unit], named: &[(&Unit, Split)], out: &str) -> (anyhow::Result<Report>, PathBuf) {
+    let speaker = Unit { speaker: "host".into(), video: String::new(), source: root.join("pipeline.toml") };
+    let splits = named.iter().map(|(unit, split)| (unit.video.clone(), *split)).collect();
+    let all = Videos { speaker: "host".into(), units: videos.to_vec(), splits, missing: Vec::new() };
+    let stage = ShardStage::new(&settings(root), videos).with_videos(vec![all]);
+    let out = root.join(out);
+    fs::create_dir_all(&out).unwrap();
+    assert!(stage.inputs(&speaker).unwrap().iter().all(|input| input.path.exists()));
+    (stage.run(&speaker, &out, &Silent), out)
+}
+
+fn bytes(dir: &Path) -> Vec<(String, Vec<u8>)> {
+    files_under(dir).into_iter().map(|(name, file)| (name, fs::read(file).unwrap())).collect()
+}
+
+fn sound(dir: &Path) {
+    let found = verify(dir, true, &Silent).unwrap();
+    assert!(found.problems.is_empty() && found.n_samples > 0, "{found:?}");
+}
+
+#[test]
+fn neither_the_order_of_videos_nor_their_folder_changes_a_byte() {
+    let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let names = ["b-roll", "a_Talk", "c"];
+    let videos = |root: &Path| -> Vec<Unit> {
+        names.iter().enumerate().map(|(seed, name)| video(root, name, 150 + seed, seed as u64)).collect()
+    };
+    let mut units = videos(one.path());
+    let (report, first) = shard(one.path(), &units, "first");
+    assert!(report.unwrap().line.contains("6 intervals"));
+    units.reverse();
+    let (_, second) = shard(one.path(), &units, "second");
+    let (_, third) = shard(two.path(), &videos(two.path()), "third");
+    assert_eq!(bytes(&first), bytes(&second));
+    assert_eq!(bytes(&first), bytes(&third));
+    let text: String = bytes(&first).iter().map(|(_, bytes)| String::from_utf8_lossy(bytes).into_owned()).collect();
+    assert!(!text.contains(&*one.path().to_string_lossy()));
+}
+
+#[test]
+fn samples_hold_the_frames_and_the_sound_of_their_interval() {
+    let dir = tempfile::tempdir().unwrap();
+    let units = [video(dir.path(), "long", 200, 3), video(dir.path(), "short", 140, 9)];
+    let (report, out) = shard(dir.path(), &units, "out");
+    let dataset = Dataset::open(&out).unwrap();
+    sound(&out);
+    // the longer video's bones are the weighted median
+    let lengths = &dataset.info().bone_lengths_metres;
+    assert!(!out.join("videos/none.json").exists());
+    assert!((lengths[0] - 0.13).abs() < 1e-6 && lengths[L_HAND - 1] == 0.0, "{lengths:?}");
+    let refs: Vec<_> = Split::ALL.iter().flat_map(|&split| dataset.samples(split)).collect();
+    assert_eq!(refs.len(), 4);
+    for sample_ref in &refs {
+        let sample = dataset.read(sample_ref).unwrap();
+        let (name, unit) = if sample.key.starts_with("long") { ("long", &units[0]) } else { ("short", &units[1]) };
+        let source = blake3::hash(&fs::read(&unit.source).unwrap()).to_hex();
+        let start = sample.meta["first_frame"].as_u64().unwrap() as usize;
+        assert_eq!(sample.key, format!("{name}-{}-{start:06}", &source[..8]));
+        let audio = place(&dir.path().join("work"), "extract", unit).join("audio.wav");
+        let whole: Vec<i16> = hound::WavReader::open(audio).unwrap().samples().map(Result::unwrap).collect();
+        let range = sync::samples_of(FPS, 16_000, start..start + sample.n_frames());
+        let mut expected: Vec<f32> =
+            whole[range.start..range.end.min(whole.len())].iter().map(|&s| f32::from(s) / 32_768.0).collect();
+        expected.resize(range.len(), 0.0);
+        assert_eq!(sample.sound.samples, expected);
+        let keypoints = good(start + sample.n_frames()).keypoints;
+        assert_eq!(sample.pose2d.slice(s![.., 17..38, ..]), keypoints.left_hand.slice(s![start.., .., ..]));
+        for joint in 1..49 {
+            let (a, b) = (parent(joint).unwrap(), joint);
+            let bone = &sample.motion.joints.slice(s![0, b, ..]) - &sample.motion.joints.slice(s![0, a, ..]);
+            let own = if name == "long" { 0.13 } else { 0.19 };
+            let wanted = if lengths[joint - 1] == 0.0 { 0.0 } else { own };
+            assert!((f64::from(bone.mapv(|v| v * v).sum().sqrt()) - wanted).abs() < 1e-5);
+        }
+    }
+    let footage = &dataset.stats().footage;
+    assert_eq!((footage.n_videos, footage.n_intervals, footage.secs), (2, 4, 340.0 / 15.0));
+    // each wav lacks its last sample, and frames are rounded to samples
+    assert!(footage.padded_sound_secs > 0.0 && footage.padded_sound_secs < 5.0 / 16_000.0);
+    assert_eq!(dataset.stats().n_seen[5], dataset.info().splits["train"].frames as u64);
+    assert_eq!((footage.kept_secs, footage.failed_secs), (340.0 / 15.0, 0.0));
+    assert!(report.unwrap().facts.contains_key("windows"));
+}
+
+#[test]
+fn a_new_video_moves_no_other_to_another_split() {
+    let dir = tempfile::tempdir().unwrap();
+    let units: Vec<Unit> = (0..14).map(|n| video(dir.path(), &format!("talk{n}"), 130, n)).collect();
+    let split_of = |out: &Path| {
+        let info = Dataset::open(out).unwrap().info().clone();
+        info.splits
+            .into_iter()
+            .flat_map(|(split, info)| info.videos.into_iter().map(move |v| (v, split.clone())))
+            .collect()
+    };
+    let few: std::collections::BTreeMap<String, String> = split_of(&shard(dir.path(), &units[..8], "few").1);
+    let many: std::collections::BTreeMap<String, String> = split_of(&shard(dir.path(), &units, "many").1);
+    assert_eq!((few.len(), many.len()), (8, 14));
+    assert!(few.iter().all(|(video, split)| many[video] == *split));
+    assert!(many.values().collect::<std::collections::BTreeSet<_>>().len() > 1);
+}
+
+/// A name whose content ("film SEED") goes to this split.
+fn seed_of(split: Split, from: u64) -> u64 {
+    let content = |seed: u64| blake3::hash(format!("film {seed}").as_bytes()).to_hex().to_string();
+    (from..).find(|&seed| of_content(&content(seed), 0.15, 0.15) == split).unwrap()
+}
+
+#[test]
+fn a_new_video_costs_itself_and_changes_no_shard() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut units: Vec<Unit> = (0..3).map(|n| video(dir.path(), &format!("talk{n}"), 130, n)).collect();
+    let (_, first) = shard(dir.path(), &units, "first");
+    let place = dir.path().join("work/dataset/host");
+    fs::create_dir_all(place.parent().unwrap()).unwrap();
+    fs::rename(&first, &place).unwrap();
+    let before = bytes(&place);
+    units.push(video(dir.path(), "another", 140, 77));
+    let (report, grown) = shard(dir.path(), &units, "grown");
+    let line = report.unwrap().line;
+    assert!(line.contains("3 videos taken over as they were"), "{line}");
+    sound(&grown);
+    let after = bytes(&grown);
+    let of_video = |name: &str| name.ends_with(".tar") || name.starts_with("videos/");
+    let same = before.iter().filter(|(name, _)| of_video(name)).filter(|file| after.contains(file)).count();
+    assert_eq!(same, before.iter().filter(|(name, _)| of_video(name)).count());
+    // a damaged shard is not taken over but written anew
+    let tar = fs::read_dir(&place)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .find(|path| path.extension().is_some_and(|e| e == "tar"));
+    let tar = tar.unwrap();
+    let mut damaged = fs::read(&tar).unwrap();
+    damaged[5_000] ^= 1;
+    fs::remove_file(&tar).unwrap();
+    fs::write(&tar, damaged).unwrap();
+    let (report, mended) = shard(dir.path(), &units, "mended");
+    assert!(report.unwrap().line.contains("2 videos taken over as they were"));
+    assert_eq!(bytes(&mended), after);
+    // all at once gives the same bytes
+    fs::remove_dir_all(&place).unwrap();
+    assert_eq!(bytes(&shard(dir.path(), &units, "at-once").1), after);
+}
+
+#[test]
+fn shared_sound_keeps_videos_in_one_split() {
+    let dir = tempfile::tempdir().unwrap();
+    let (train, test) = (seed_of(Split::Train, 0), seed_of(Split::Test, 0));
+    let old = video(dir.path(), "old", 150, test);
+    let lone = video(dir.path(), "lone", 150, train);
+    let (_, first) = shard(dir.path(), &[old.clone(), lone.clone()], "first");
+    let place = dir.path().join("work/dataset/host");
+    fs::create_dir_all(place.parent().unwrap()).unwrap();
+    fs::rename(&first, &place).unwrap();
+    let copy_seed = seed_of(Split::Train, train + 1);
+    let copy = video_with(dir.path(), "copy", 140, copy_seed, test);
+    let videos = [old.clone(), lone.clone(), copy.clone()];
+    let (_, out) = shard(dir.path(), &videos, "second");
+    let info = Dataset::open(&out).unwrap().info().clone();
+    let of = |name: &str| info.videos.iter().find(|video| video.file == format!("{name}.mp4")).unwrap();
+    assert_eq!((of("old").split, of("lone").split), (Some(Split::Test), Some(Split::Train)));
+    assert_eq!(
+        (of("copy").split, &of("copy").split_by),
+        (Some(Split::Test), &SplitBy::SoundOf(of("old").name.clone()))
+    );
+    sound(&out);
+    // a name in the configuration wins, and the leak is said
+    let (report, out) = shard_with(dir.path(), &videos, &[(&copy, Split::Train)], "named");
+    let line = report.unwrap().line;
+    assert!(line.contains("s of sound: put them into one split"), "{line}");
+    let leakage = fs::read_to_string(out.join("leakage.json")).unwrap();
+    let leakage: serde_json::Value = serde_json::from_str(&leakage).unwrap();
+    assert_eq!(leakage["leaks"].as_array().unwrap().len(), 1, "{leakage}");
+    assert!(leakage["shared"][0]["secs"].as_f64().unwrap() > 8.0);
+    sound(&out);
+}
+
+#[test]
+fn what_is_not_there_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let good = video(dir.path(), "good", 150, 1);
+    let twin = video(dir.path(), "twin", 150, 2);
+    fs::write(&twin.source, "film 1").unwrap();
+    let named = [(&good, Split::Train), (&twin, Split::Train)];
+    let (report, out) = shard_with(dir.path(), &[twin.clone(), unit(dir.path(), "never"), good.clone()], &named, "out");
+    let line = report.unwrap().line;
+    let add = "no video for validation (a video's content chooses its split): add under [[speaker]] the line  validation = [\"";
+    assert!(line.contains(add), "{line}");
+    assert!(line.contains("1 video left out, a stage before failed"), "{line}");
+    assert!(line.contains("1 video left out, the same content is there already"), "{line}");
+    assert_eq!(Dataset::open(&out).unwrap().info().splits["train"].videos.len(), 1);
+    let accounts = accounts(&out).unwrap();
+    let of = |name: &str| accounts.iter().find(|account| account.file == format!("{name}.mp4")).unwrap();
+    assert_eq!(of("never").failure.as_deref(), Some("run: not every stage is done"));
+    let twice = if of("twin").split.is_none() { of("twin") } else { of("good") };
+    assert_eq!(twice.ledger.refused_secs()["duplicate"], 10.0);
+    sound(&out);
+
+    let short = video(dir.path(), "short", 100, 5);
+    let error = shard(dir.path(), &[short], "none").0.unwrap_err().to_string();
+    assert!(error.starts_with("no interval worth keeping in 1 video of 6.7 s"), "{error}");
+    assert!(error.contains("refused: cut 6.7 s"), "{error}");
+    let error = shard(dir.path(), &[], "nothing").0.unwrap_err().to_string();
+    assert!(error.starts_with("none of the videos of host came through"), "{error}");
+}

@@ -1,0 +1,112 @@
+//! A trained speaker measured on held-out sound, and the page of its training, as the program makes them; and the
+//! predictor that copies, on a dataset where the right copy is known.
+
+use crate::fixtures::browser::Browser;
+use crate::fixtures::support::Project;
+use crate::train::gan::{dataset, sample};
+use ndarray::s;
+use orator::dataset::{Dataset, Split, write_dataset};
+use orator::evaluate::baseline::baselines::Made;
+use orator::evaluate::clips::clips::{Clip, Clips};
+use orator::evaluate::clips::held_out;
+use orator::evaluate::clips::of_speaker::copied;
+use orator::evaluate::clips::sound_features::of_samples;
+use orator::train::gan::train::normalisation;
+use orator::types::time::FrameRate;
+use std::path::Path;
+
+#[test]
+fn a_training_ends_with_its_page_and_its_speaker_is_measured() {
+    let project = Project::with_clips("measured", 0, 1.0);
+    let (data, out) = (project.dir().join("data"), project.dir().join("gan"));
+    dataset(&data);
+    let [data, out] = [&data, &out].map(|path| path.to_string_lossy().into_owned());
+    let sets = ["gan.batch=2", "gan.epoch_steps=2", "gan.checkpoint_every=2"].map(|set| ["--set", set]).concat();
+    let train = [&["train", "gan", "--dataset", &data, "--out", &out, "--steps", "4"], &sets[..]].concat();
+    let answer = project.answer(&train);
+    assert_eq!(answer.code, 0, "{}", answer.errors);
+    let page = project.dir().join("gan/training.html");
+    assert_eq!(answer.json["page"], page.to_string_lossy().as_ref());
+    let bytes =
+        ["training.html", "training.png"].map(|file| std::fs::read(project.dir().join("gan").join(file)).unwrap());
+    look(&page);
+    // the same again: nothing is left to train, and the page is the same
+    assert_eq!(project.answer(&train).code, 0);
+    let again =
+        ["training.html", "training.png"].map(|file| std::fs::read(project.dir().join("gan").join(file)).unwrap());
+    assert!(bytes == again, "another page of the same training");
+
+    let answer = project.answer(&["evaluate", "--dataset", &data, "--checkpoint", &out]);
+    assert_eq!(answer.code, 0, "{}", answer.errors);
+    let result = &answer.json;
+    assert_eq!((&result["n_clips"], &result["n_blocks"]), (&1.into(), &2.into()));
+    let names: Vec<&str> =
+        result["predictors"].as_array().unwrap().iter().map(|row| row["name"].as_str().unwrap()).collect();
+    let expected = [
+        "prediction",
+        "mean_pose",
+        "median_pose",
+        "nearest_neighbour",
+        "mismatched_prediction",
+        "mismatched_truth",
+        "truth_halves",
+        "truth",
+    ];
+    assert_eq!(names, expected);
+    let metrics = result["metrics"].as_array().unwrap();
+    let metric = |name: &str| metrics.iter().find(|metric| metric["name"] == name).unwrap();
+    let value = |name: &str, who: &str| metric(name)["values"][who]["value"].as_f64().unwrap();
+    for who in expected.iter().filter(|who| **who != "truth_halves") {
+        assert!((0.0..=1.0).contains(&value("pck_3d", who)) && value("mpjpe", who) >= 0.0, "{who}");
+    }
+    assert_eq!((value("pck_3d", "truth"), value("mpjpe", "truth")), (1.0, 0.0));
+    let sentence = result["better_than_nothing"]["sentence"].as_str().unwrap();
+    assert!(sentence.contains("2 blocks of about 4 s are too few"), "{sentence}");
+    let wrong = project.answer(&["evaluate", "--dataset", &data, "--checkpoint", &out, "--split", "test"]);
+    assert!(wrong.code == 1 && wrong.errors.contains("it has train, validation"), "{}", wrong.errors);
+}
+
+/// What a browser sees of the page.
+fn look(page: &Path) {
+    let Some(mut browser) = Browser::open(page, [1200, 900]) else { return };
+    let mut count = |selector: &str| browser.value(&format!("document.querySelectorAll('{selector}').length"));
+    assert_eq!((count(".chart svg"), count("#best tbody tr"), count("img.strip")), (5.into(), 6.into(), 1.into()));
+    let flat =
+        "[...document.querySelectorAll('svg, .chart path')].filter(e => !(e.getBoundingClientRect().width > 0)).length";
+    assert_eq!(browser.value(flat), 0);
+    for (width, scheme) in [(360, "dark"), (1200, "light")] {
+        browser.resize([width, 800]);
+        browser.colours(scheme);
+        let wide = browser.value("document.documentElement.scrollWidth").as_u64().unwrap();
+        assert!(wide <= u64::from(width), "{wide} px wide in a window of {width} px");
+    }
+    assert!(browser.problems.is_empty(), "{:?}", browser.problems);
+}
+
+#[test]
+fn the_neighbour_by_sound_is_found_where_it_was_taken_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let fps = FrameRate::new(15, 1);
+    let source = sample("b-00000000-000000", 200, 2.0);
+    // frames 40 to 140 of a training interval, held out as well
+    let mut copy = sample("c-00000000-000000", 100, 0.0);
+    copy.motion.joints = source.motion.joints.slice(s![40..140, .., ..]).to_owned();
+    copy.motion.mask.fill(true);
+    copy.motion.joints[[60, 5, 0]] = copy.motion.joints[[59, 5, 0]];
+    copy.sound.samples = source.sound.samples[40 * 16_000 / 15..][..copy.sound.samples.len()].to_vec();
+    let samples =
+        [(Split::Train, sample("a-00000000-000000", 120, 0.0)), (Split::Train, source), (Split::Validation, copy)];
+    write_dataset(folder.path(), "host", fps, &samples).unwrap();
+    let dataset = Dataset::open(folder.path()).unwrap();
+    let normal = normalisation(&dataset).unwrap();
+    let real = held_out::read(&dataset, &held_out::samples(&dataset, Split::Validation).unwrap(), &normal).unwrap();
+    let held_out::HeldOut { key, real, sound } = real.into_iter().next().unwrap();
+    let heard = Some(of_samples(&sound.samples, fps, real.n_frames()));
+    let clip =
+        Clip { name: key, made: real.joints.clone(), real: real.joints.clone(), mask: real.mask, heard, voice: None };
+    let clips = Clips { fps, clips: vec![clip], notes: Vec::new(), learnt: false };
+    let found = copied(&dataset, &normal, &clips, Split::Validation).unwrap().unwrap();
+    let Made::Moves(found) = &found[0] else { panic!("it stands still") };
+    let apart = found.iter().zip(&real.joints).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
+    assert!(apart < found.len() / 20, "{apart} of {} numbers are others", found.len());
+}

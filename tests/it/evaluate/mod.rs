@@ -1,0 +1,7 @@
+//! Metrics and evaluation.
+
+pub mod evaluate;
+pub mod evaluate_files;
+pub mod evaluate_speaker;
+pub mod golden_metrics;
+pub mod metrics;

@@ -1,0 +1,101 @@
+//! BVH and GLB opened by Blender show the joints of the motion, the GLB also its skin. Blender is a Python module for
+//! Python 3.11 (`make blender`; ORATOR_BLENDER names its folder, else `target/blender`).
+
+use crate::animate::bvh::{Bvh, worst_mm};
+use crate::animate::gltf::{Glb, written};
+use crate::fixtures::figures::{FPS, swinging};
+use orator::animate::rig::names::Names;
+use orator::animate::{Options, perform};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// A Python to which Blender's module is known, for which test.
+fn blender(test: &str) -> Option<Command> {
+    let named = std::env::var_os("ORATOR_BLENDER").map(PathBuf::from);
+    let folder = named.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("target/blender"));
+    let python = |name: &str| {
+        let mut command = Command::new(name);
+        command.env("PYTHONPATH", &folder).stdin(Stdio::null());
+        command
+    };
+    let found = ["python3.11", "python3", "/usr/bin/python3"].into_iter().find(|name| {
+        let ask = python(name).args(["-c", "import bpy"]).stdout(Stdio::null()).stderr(Stdio::null()).status();
+        ask.is_ok_and(|status| status.success())
+    });
+    if found.is_none() {
+        eprintln!("SKIPPED: {test}: no Python 3.11 with Blender's module in {} (make blender)", folder.display());
+    }
+    found.map(python)
+}
+
+fn seen(mut python: Command, file: &Path) -> Value {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/reference/blender_joints.py");
+    let output = python.arg(script).arg(file).arg(FPS.num.to_string()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn blender_sees_the_joints_of_the_motion() {
+    let Some(python) = blender("blender_sees_the_joints_of_the_motion") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("swinging.bvh");
+    let performance = perform(&swinging(1, 20), None, &Options::default());
+    let (motion, text) = (performance.motion(), performance.clip.to_bvh());
+    std::fs::write(&file, &text).unwrap();
+    let seen = seen(python, &file);
+    assert!((seen["fps"].as_f64().unwrap() - FPS.per_sec()).abs() < 1e-3);
+    assert_eq!(seen["frames"].as_array().unwrap().len(), motion.n_frames());
+
+    let written = Bvh::parse(&text);
+    let places = |frame: usize| {
+        let bone = |name: &String| {
+            // The end of a bone is the tail of the joint before it.
+            let (name, end) = name.strip_suffix("End").map_or((name.as_str(), 0), |name| (name, 1));
+            std::array::from_fn(|k| seen["frames"][frame][name][end][k].as_f64().unwrap_or(f64::NAN))
+        };
+        written.names.iter().map(bone).collect()
+    };
+    let worst = worst_mm(&motion, &written, places);
+    eprintln!("BVH: Blender's joints lie within {worst:.4} mm of the motion's");
+    assert!(worst < 0.1, "{worst} mm");
+}
+
+#[test]
+fn blender_sees_the_joints_of_the_glb_and_its_skin_around_them() {
+    let Some(python) = blender("blender_sees_the_joints_of_the_glb_and_its_skin_around_them") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (performance, path) = written(folder.path(), 12, Names::Mixamo);
+    let seen = seen(python, &path);
+    let expected = performance.motion();
+    assert_eq!(seen["frames"].as_array().unwrap().len(), expected.n_frames());
+    let names = Names::Mixamo.of(&performance.clip.skeleton);
+    let mut worst: f64 = 0.0;
+    for (frame, bones) in seen["frames"].as_array().unwrap().iter().enumerate() {
+        let head = |node: usize| -> [f64; 3] {
+            std::array::from_fn(|k| bones[&names[node]][0][k].as_f64().unwrap_or(f64::NAN))
+        };
+        let neck = head(performance.figure.places[0]);
+        for (joint, &node) in performance.figure.places.iter().enumerate() {
+            let place = head(node);
+            for (k, sign) in [1.0, -1.0, -1.0].into_iter().enumerate() {
+                let apart = sign * (place[k] - neck[k]) - f64::from(expected.joints[[frame, joint, k]]);
+                assert!(apart.is_finite(), "no bone {}", names[node]);
+                worst = worst.max(1e3 * apart.abs());
+            }
+        }
+    }
+    eprintln!("GLB: Blender's joints lie within {worst:.4} mm of the motion's, along any axis");
+    assert!(worst < 0.1, "{worst} mm");
+
+    // Blender's own skinning against plain linear skinning of the file.
+    let glb = Glb::read(&path);
+    let skinned = glb.skinned(expected.n_frames() - 1);
+    assert_eq!(seen["n_vertices"].as_u64(), Some(skinned.len() as u64));
+    for k in 0..3 {
+        let bound = |n: usize| seen["mesh"][n][k].as_f64().unwrap();
+        let (low, high) = skinned.iter().fold((f64::MAX, f64::MIN), |(low, high), p| (low.min(p[k]), high.max(p[k])));
+        assert!((bound(0) - low).abs() < 1e-4 && (bound(1) - high).abs() < 1e-4, "{k}: {} {low}", bound(0));
+    }
+}

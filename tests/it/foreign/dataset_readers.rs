@@ -1,0 +1,114 @@
+//! What programs of others read in a dataset: the Python `webdataset` reader and Hugging Face `datasets`. Both come from
+//! PyPI (`make readers`); ORATOR_READERS names the folder they are in.
+
+use crate::dataset::dataset_verify::constant_sample;
+use orator::dataset::{Sample, Split, write_dataset};
+use orator::types::time::FrameRate;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The folder of the Python packages; `None`, with a loud line, where they are not.
+pub fn readers(package: &str) -> Option<PathBuf> {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/readers");
+    let folder = std::env::var_os("ORATOR_READERS").map_or(here, PathBuf::from);
+    let there = folder.join(package).exists();
+    if !there {
+        eprintln!("SKIPPED: no Python package {package} in {} (`make readers`)", folder.display());
+    }
+    there.then_some(folder)
+}
+
+fn written(dir: &Path) -> Vec<(Split, Sample)> {
+    let samples = vec![
+        (Split::Train, constant_sample("my-talk-0a1b2c3d-000000", 20, 1)),
+        (Split::Train, constant_sample("my-talk-0a1b2c3d-000102", 15, 2)),
+        (Split::Train, constant_sample("b_2-77777777-000000", 12, 5)),
+        (Split::Test, constant_sample("walk-99999999-000007", 18, 3)),
+    ];
+    write_dataset(dir, "host", FrameRate::new(15, 1), &samples).unwrap();
+    samples
+}
+
+/// Key, shapes, and sums of what is in a sample, as the Python side prints them.
+fn line(sample: &Sample) -> String {
+    let n = sample.n_frames();
+    let pcm: i64 = sample.sound.samples.iter().map(|s| (s * 32_768.0) as i64).sum();
+    let seen = sample.motion.mask.iter().filter(|m| **m).count();
+    let sum = |values: &mut dyn Iterator<Item = f64>| values.filter(|v| v.is_finite()).sum::<f64>();
+    let pose3d = sum(&mut sample.motion.joints.iter().map(|v| f64::from(*v)));
+    let pose2d = sum(&mut sample.pose2d.iter().map(|v| f64::from(*v)));
+    let first = sample.meta["first_frame"].as_i64().unwrap();
+    format!(
+        "{} {n} 49 3 {n} 59 3 {n} 49 {seen} {} {pcm} {first} {pose3d:.4} {pose2d:.4}",
+        sample.key,
+        sample.sound.samples.len()
+    )
+}
+
+const SUMS: &str = r#"
+import glob, io, json, os, sys, wave
+import numpy as np
+def line(key, pose3d, pose2d, mask, wav, meta):
+    assert (pose3d.dtype, pose2d.dtype, mask.dtype) == (np.float32, np.float32, np.bool_)
+    sound = wave.open(io.BytesIO(wav)); assert sound.getframerate() == 16000
+    pcm = np.frombuffer(sound.readframes(sound.getnframes()), '<i2').astype(np.int64)
+    total = lambda a: float(np.nansum(a.astype(np.float64)))
+    print(key, *pose3d.shape, *pose2d.shape, *mask.shape, mask.sum(), len(pcm), pcm.sum(), meta['first_frame'],
+          f"{total(pose3d):.4f} {total(pose2d):.4f}")
+"#;
+
+const WEBDATASET: &str = r#"
+import webdataset as wds
+for sample in wds.WebDataset(sorted(glob.glob('train-*.tar')), shardshuffle=False):
+    array = lambda name: np.load(io.BytesIO(sample[name]))
+    line(sample['__key__'], array('pose3d.npy'), array('pose2d.npy'), array('mask.npy'), sample['wav'], json.loads(sample['json']))
+"#;
+
+const DATASETS: &str = r#"
+from datasets import Audio, load_dataset
+# datasets wants torchcodec (and torch) at hand even to store the bytes of a sound as they are
+Audio.encode_example = lambda self, value: value
+rows = load_dataset(os.getcwd(), split='train', cache_dir=sys.argv[1])
+if isinstance(rows.features.get('wav'), Audio): rows = rows.cast_column('wav', Audio(decode=False))
+for row in rows:
+    wav = row['wav']['bytes'] if isinstance(row['wav'], dict) else row['wav']
+    def array(name, dtype):
+        value = row[name]
+        return np.load(io.BytesIO(value)) if isinstance(value, bytes) else np.array(value, dtype=dtype)
+    line(row['__key__'], array('pose3d.npy', np.float32), array('pose2d.npy', np.float32), array('mask.npy', bool), wav, row['json'])
+assert load_dataset(os.getcwd(), split='test', cache_dir=sys.argv[1]).num_rows == 1
+"#;
+
+fn read_with(package: &str, program: &str) {
+    let Some(packages) = readers(package) else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let cache = tempfile::tempdir().unwrap();
+    let samples = written(dir.path());
+    let output = Command::new("python3")
+        .args(["-c", &format!("{SUMS}{program}")])
+        .arg(cache.path())
+        .current_dir(dir.path())
+        .env("PYTHONPATH", &packages)
+        .env("HF_HOME", cache.path())
+        .env("HF_HUB_OFFLINE", "1")
+        .env("HF_DATASETS_OFFLINE", "1")
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let mut read: Vec<String> = String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect();
+    let train = samples.iter().filter(|(split, _)| *split == Split::Train);
+    let mut expected: Vec<String> = train.map(|(_, sample)| line(sample)).collect();
+    read.sort();
+    expected.sort();
+    assert_eq!(read, expected);
+}
+
+#[test]
+fn webdataset_reads_the_same_numbers() {
+    read_with("webdataset", WEBDATASET);
+}
+
+#[test]
+fn hugging_face_datasets_reads_the_same_numbers() {
+    read_with("datasets", DATASETS);
+}

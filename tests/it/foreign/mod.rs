@@ -1,0 +1,5 @@
+//! Our files opened by programs that others wrote.
+
+pub mod blender;
+pub mod dataset_readers;
+pub mod training_readers;

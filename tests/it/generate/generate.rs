@@ -1,0 +1,232 @@
+//! `orator generate` from the command line with an untrained speaker: every kind of file, from every kind of sound;
+//! and what it is given wrong it says clearly, with exit code 1, and writes nothing.
+
+use crate::animate::bvh::{Bvh, worst_mm};
+use crate::fixtures::clips;
+use crate::fixtures::figures::{FPS, swinging};
+use crate::train::networks::value;
+use candle_core::{Device, Tensor};
+use ndarray::{Axis, s};
+use orator::animate::rig::rig::bone_metres;
+use orator::animate::{Options, perform};
+use orator::audio::mel;
+use orator::external::ffmpeg::{audio, probe};
+use orator::formats::checkpoint;
+use orator::formats::checkpoint::Contents;
+use orator::formats::{authors_txt, npy};
+use orator::generate::Speaker;
+use orator::generate::model::{Facts, GENERATOR, TrainedSpeaker};
+use orator::generate::normalisation::{N_NUMBERS, Normalisation};
+use orator::generate::representation::Representation;
+use orator::nn::gan::generator::{Config, Generator, Preset};
+use orator::nn::params::Params;
+use orator::train::gan::windows::mel_frames;
+use orator::types::sound::Sound;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// A checkpoint whose network knows nothing: it moves about the mean pose of a made-up motion.
+pub fn write_untrained_speaker(file: &Path) {
+    let motion = swinging(1, 40);
+    let mean = motion.joints.mean_axis(Axis(0)).unwrap();
+    let lengths: Vec<f32> = bone_metres(&motion)[1..].iter().map(|&metres| metres as f32).collect();
+    let network = Config { width: 16, ..Config::of(Preset::Light, N_NUMBERS) };
+    let mut params = Params::new(7);
+    Generator::new(&mut params, &network).unwrap();
+    let normal = Normalisation::new(&mean, &motion.joints.std_axis(Axis(0), 0.0), lengths);
+    let facts = Facts::new("host", FPS, "", network, normal, Representation::Positions);
+    let mut contents = Contents { facts: serde_json::json!({ "speaker": facts }), tensors: BTreeMap::new() };
+    contents.add(GENERATOR, params.tensors().unwrap());
+    contents.write(file).unwrap();
+}
+
+pub fn generate(dir: &Path, args: &str) -> Output {
+    let words = args.split_whitespace();
+    Command::new(env!("CARGO_BIN_EXE_orator")).arg("generate").args(words).current_dir(dir).output().unwrap()
+}
+
+#[test]
+fn one_sound_becomes_every_kind_of_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    std::fs::create_dir(dir.join("training")).unwrap();
+    write_untrained_speaker(&checkpoint::path(&dir.join("training"), 20));
+    audio::write_wav(&dir.join("speech.wav"), &clips::tone(16_000, 2.05, 220.0)).unwrap();
+
+    let outs = "--out made/a.npy made/a.txt --out made/a.bvh --out made/a.mp4";
+    let output = generate(dir, &format!("--json --checkpoint training --audio speech.wav {outs}"));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let facts: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((facts["n_frames"].as_u64(), facts["speaker"].as_str()), (Some(30), Some("host")));
+    assert_eq!(facts["checkpoint"], "training/step-0000020.safetensors");
+    assert_eq!(facts["outputs"].as_array().unwrap().len(), 4);
+
+    let made = dir.join("made");
+    let motion = npy::read(&made.join("a.npy"), FPS).unwrap();
+    assert_eq!(authors_txt::read(&made.join("a.txt"), FPS).unwrap(), motion);
+    let bvh = Bvh::parse(&std::fs::read_to_string(made.join("a.bvh")).unwrap());
+    let performed = perform(&motion, None, &Options::default()).motion();
+    let worst = worst_mm(&performed, &bvh, |frame| bvh.places(frame));
+    assert!(worst < 0.1, "{worst} mm");
+    let film = probe::probe(&made.join("a.mp4")).unwrap();
+    assert!((film.duration_secs.unwrap() - 2.05).abs() < 0.1);
+    assert_eq!(std::fs::read_dir(&made).unwrap().count(), 4, "no attempt is left behind");
+
+    // Another kind of sound: a telephone's mp3, a video's track.
+    for command in ["-i speech.wav -ar 8000 phone.mp3", "-i made/a.mp4 -c copy talk.mov"] {
+        if clips::ffmpeg(dir, command) {
+            let sound = command.rsplit(' ').next().unwrap();
+            let output = generate(dir, &format!("--checkpoint training --audio {sound} --out {sound}.bvh"));
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+            assert!(String::from_utf8_lossy(&output.stdout).contains("next: orator generate --checkpoint training"));
+            let n_frames = Bvh::parse(&std::fs::read_to_string(dir.join(format!("{sound}.bvh"))).unwrap()).frames.len();
+            assert!((29..=32).contains(&n_frames), "{sound}: {n_frames} frames");
+        }
+    }
+}
+
+#[test]
+fn wrong_input_is_named_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    write_untrained_speaker(&dir.join("host.safetensors"));
+    audio::write_wav(&dir.join("speech.wav"), &clips::tone(16_000, 0.5, 220.0)).unwrap();
+    audio::write_wav(&dir.join("click.wav"), &clips::tone(16_000, 0.03, 220.0)).unwrap();
+    clips::write_numbered(dir, "silent.mp4", 4, FPS, None);
+    std::fs::write(dir.join("broken.safetensors"), "no weights").unwrap();
+    std::fs::write(dir.join("notes.mp3"), "no sound").unwrap();
+    std::fs::write(dir.join("empty.wav"), "").unwrap();
+    std::fs::create_dir(dir.join("nothing")).unwrap();
+
+    let cases = [
+        ("--checkpoint host.safetensors --audio speech.wav --out a.mov", ".npy (joints), .txt"),
+        ("--checkpoint host.safetensors --audio speech.wav --out noending", "noending"),
+        ("--checkpoint host.safetensors --audio speech.wav --out a.bvh --out a.bvh", "asked for twice"),
+        ("--checkpoint host.safetensors --audio silent.mp4 --out silent.mp4", "speech itself"),
+        ("--checkpoint host.safetensors --audio silent.mp4 --out a.bvh", "silent.mp4 has no sound track"),
+        ("--checkpoint host.safetensors --audio gone.wav --out a.bvh", "gone.wav is not there"),
+        ("--checkpoint host.safetensors --audio nothing --out a.bvh", "nothing is no file"),
+        ("--checkpoint host.safetensors --audio notes.mp3 --out a.bvh", "notes.mp3"),
+        ("--checkpoint host.safetensors --audio empty.wav --out a.bvh", "empty.wav"),
+        ("--checkpoint host.safetensors --audio click.wav --out a.bvh", "too short"),
+        (
+            "--checkpoint host.safetensors --audio speech.wav --out speech.wav/a.bvh",
+            "cannot make the folder speech.wav",
+        ),
+        ("--checkpoint gone.safetensors --audio speech.wav --out a.bvh", "gone.safetensors is not there"),
+        ("--checkpoint nothing --audio speech.wav --out a.bvh", "nothing holds no checkpoint"),
+        ("--checkpoint broken.safetensors --audio speech.wav --out a.bvh", "broken.safetensors"),
+        ("--checkpoint host.safetensors --audio speech.wav", "--out"),
+    ];
+    for (args, expected) in cases {
+        let output = generate(dir, args);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{args}: {said}");
+        assert!(said.contains(expected), "{args}: {said}");
+        assert!(!said.contains("panicked"), "{args}: {said}");
+    }
+    assert!(!dir.join("a.bvh").exists() && !dir.join("a.mov").exists());
+
+    let output = generate(dir, "--json --checkpoint host.safetensors --audio gone.wav --out a.bvh");
+    let said: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(said["error"].as_str().unwrap().contains("gone.wav"));
+}
+
+#[test]
+fn a_checkpoint_alone_generates_wherever_it_lies() {
+    let folder = tempfile::tempdir().unwrap();
+    let (training, elsewhere) = (folder.path().join("training"), folder.path().join("elsewhere"));
+    std::fs::create_dir(&training).unwrap();
+    std::fs::create_dir(&elsewhere).unwrap();
+    write_untrained_speaker(&checkpoint::path(&training, 20));
+    audio::write_wav(&training.join("speech.wav"), &clips::tone(16_000, 1.0, 220.0)).unwrap();
+    let output = generate(&training, "--checkpoint step-0000020.safetensors --audio speech.wav --out made.npy");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let made = std::fs::read(training.join("made.npy")).unwrap();
+
+    std::fs::rename(checkpoint::path(&training, 20), elsewhere.join("host.safetensors")).unwrap();
+    std::fs::rename(training.join("speech.wav"), elsewhere.join("speech.wav")).unwrap();
+    std::fs::remove_dir_all(&training).unwrap();
+    let output = generate(&elsewhere, "--checkpoint host.safetensors --audio speech.wav --out again.npy");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(std::fs::read(elsewhere.join("again.npy")).unwrap(), made);
+}
+
+/// A speaker of a preset's full size, its weights and running statistics as good as random.
+fn random_speaker(preset: Preset) -> anyhow::Result<TrainedSpeaker> {
+    let network = Config::of(preset, N_NUMBERS);
+    let mut params = Params::frozen();
+    let generator = Generator::new(&mut params, &network)?;
+    let tensors = params.all().map(|(name, var)| Ok((name.to_owned(), value(name, var.dims())?)));
+    params.load(&tensors.collect::<candle_core::Result<_>>()?)?;
+    let motion = swinging(1, 40);
+    let mean = motion.joints.mean_axis(Axis(0)).unwrap();
+    let normal = Normalisation::new(&mean, &mean, vec![0.1; N_NUMBERS / 3]);
+    Ok(TrainedSpeaker { facts: Facts::new("host", FPS, "", network, normal, Representation::Positions), generator })
+}
+
+/// What the network makes of a whole sound at once, [144, T].
+fn one_pass(speaker: &TrainedSpeaker, sound: &Sound, n_frames: usize) -> anyhow::Result<ndarray::Array2<f32>> {
+    let padded = (n_frames / 32 + 1) * 32;
+    let n_samples = mel::n_samples(mel_frames(FPS, padded));
+    // Continued by its mirror image, back and forth.
+    let there_and_back = sound.samples.iter().chain(sound.samples.iter().rev().skip(1).take(sound.samples.len() - 2));
+    let samples: Vec<f32> = there_and_back.cycle().take(n_samples).copied().collect();
+    let mels = mel::log_mel(&samples);
+    let (n, bands) = mels.dim();
+    let mels = Tensor::from_vec(mels.iter().copied().collect(), (1, n, bands), &Device::Cpu)?.t()?.contiguous()?;
+    let poses = speaker.generator.forward(&mels, padded, false)?.flatten_all()?.to_vec1()?;
+    Ok(ndarray::Array2::from_shape_vec((N_NUMBERS, padded), poses)?.slice_move(s![.., ..n_frames]))
+}
+
+/// Sounds of so many seconds in chunks of 64 frames are the same as in one pass.
+fn chunks_are_one_pass(preset: Preset, lengths: &[f64]) -> anyhow::Result<()> {
+    let speaker = random_speaker(preset)?;
+    let sounds = lengths.iter().map(|secs| clips::tone(16_000, *secs, 220.0)).collect::<Vec<_>>();
+    let n_frames = |sound: &Sound| (sound.secs() * 15.0 + 1e-6) as usize;
+    let wholes = sounds.iter().map(|sound| one_pass(&speaker, sound, n_frames(sound)));
+    let wholes = wholes.collect::<anyhow::Result<Vec<_>>>()?;
+    let speaker = Speaker::from(speaker);
+    for (sound, whole) in sounds.iter().zip(wholes) {
+        let most = whole.iter().fold(0.0f32, |most, v| most.max(v.abs()));
+        let mut first = 0;
+        for part in speaker.numbers(sound, 64)? {
+            let part = part?;
+            let off = &part - &whole.slice(s![.., first..first + part.ncols()]);
+            let off = off.iter().fold(0.0f32, |most, v| most.max(v.abs()));
+            assert!(off < 1e-5 * most.max(1.0), "{:.1} s, from frame {first}: {off:e} of {most}", sound.secs());
+            first += part.ncols();
+        }
+        assert_eq!(first, n_frames(sound));
+    }
+    assert_eq!(speaker.motion(&sounds[0])?.n_frames(), n_frames(&sounds[0]));
+    assert!(speaker.motion_with_chunk(&sounds[0], 33).is_err());
+    Ok(())
+}
+
+#[test]
+fn long_and_short_sound_in_chunks_is_one_pass_with_the_light_network() -> anyhow::Result<()> {
+    chunks_are_one_pass(Preset::Light, &[0.2, 5.03, 21.7])
+}
+
+#[test]
+fn long_and_short_sound_in_chunks_is_one_pass_with_the_published_network() -> anyhow::Result<()> {
+    chunks_are_one_pass(Preset::Paper, &[0.1, 9.1])
+}
+
+#[test]
+fn the_benchmark_measures_and_refuses_what_makes_no_sense() {
+    let bench = |args: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+        command.args(["--json", "bench", "generate"]).args(args.split_whitespace()).output().unwrap()
+    };
+    let facts: serde_json::Value = serde_json::from_slice(&bench("--secs 2 --preset light").stdout).unwrap();
+    let light = &facts["light"];
+    assert!(light["times_real_time"].as_f64().unwrap() > 0.0 && light["peak_mib"].as_f64().unwrap() > 1.0, "{facts}");
+    for (args, words) in [("--secs 0", "--secs"), ("--rounds 0", "nothing to measure"), ("--secs 2 --chunk 33", "32")] {
+        let output = bench(args);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(1) && said.contains(words), "{args}: {said}");
+    }
+}

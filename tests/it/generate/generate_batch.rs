@@ -1,0 +1,95 @@
+//! Many sounds in one call of `orator generate`: what fails does not stop the others, what was made is not made again, and
+//! every motion is that of its sound alone.
+
+use super::generate::{generate, write_untrained_speaker};
+use crate::fixtures::clips;
+use orator::external::ffmpeg::audio::write_wav;
+use serde_json::Value;
+use std::path::Path;
+
+/// A folder with two sounds, one that is none, and a speaker.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    std::fs::create_dir_all(dir.join("talks/sub")).unwrap();
+    write_untrained_speaker(&dir.join("host.safetensors"));
+    write_wav(&dir.join("talks/a.wav"), &clips::tone(16_000, 1.5, 220.0)).unwrap();
+    write_wav(&dir.join("talks/sub/b.wav"), &clips::tone(8_000, 1.0, 330.0)).unwrap();
+    std::fs::write(dir.join("talks/notes.mp3"), "no sound").unwrap();
+    std::fs::write(dir.join("talks/read.me"), "no sound either").unwrap();
+    folder
+}
+
+/// Made, fresh, failed, and the whole answer.
+fn run(dir: &Path, args: &str) -> ([u64; 3], Value) {
+    let output = generate(dir, &format!("--json {args}"));
+    let facts: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let counts = ["made", "fresh", "failed"].map(|key| facts[key].as_u64().unwrap_or(99));
+    assert_eq!(output.status.code(), Some(if counts[2] > 0 { 2 } else { 0 }), "{facts}");
+    (counts, facts)
+}
+
+#[test]
+fn a_folder_is_made_once_and_goes_on_after_a_bad_file() {
+    let folder = folder();
+    let dir = folder.path();
+    let args = "--checkpoint host.safetensors --audio-folder talks --out-folder made --format npy,bvh";
+    let (counts, facts) = run(dir, args);
+    assert_eq!(counts, [2, 0, 1]);
+    let failed = facts["sounds"].as_array().unwrap().iter().find(|sound| sound["ended"] == "failed").unwrap();
+    assert!(failed["error"].as_str().unwrap().contains("notes.mp3"), "{failed}");
+    let telephone = facts["sounds"].as_array().unwrap().iter().find(|sound| sound["out"] == "sub/b").unwrap();
+    assert!(telephone["note"].as_str().unwrap().contains("4000 Hz"), "{telephone}");
+    assert!(generate(dir, "--checkpoint host.safetensors --audio talks/a.wav --out one.npy").status.success());
+    let bytes = |file: &str| std::fs::read(dir.join(file)).unwrap();
+    assert_eq!(bytes("one.npy"), bytes("made/a.npy"));
+
+    assert_eq!(run(dir, args).0, [0, 2, 1]);
+    assert_eq!(run(dir, &format!("{args} --again")).0, [2, 0, 1]);
+    std::fs::remove_file(dir.join("made/a.bvh")).unwrap();
+    assert_eq!(run(dir, args).0, [1, 1, 1]);
+    let before = bytes("made/sub/b.npy");
+    write_wav(&dir.join("talks/sub/b.wav"), &clips::tone(16_000, 1.0, 500.0)).unwrap();
+    assert_eq!(run(dir, args).0, [1, 1, 1]);
+    assert_ne!(bytes("made/sub/b.npy"), before);
+    assert_eq!(run(dir, &args.replace("npy,bvh", "txt")).0, [2, 0, 1]);
+}
+
+#[test]
+fn a_table_names_its_motions_and_speakers() {
+    let folder = folder();
+    let dir = folder.path();
+    let table = "audio,out,checkpoint\na.wav,first,../host.safetensors\nsub/b.wav,deep/second.npy,gone.safetensors\n\
+                 sub/b.wav,third,\n";
+    std::fs::write(dir.join("talks/list.csv"), table).unwrap();
+    let args = "--batch talks/list.csv --out-folder made --format npy";
+    let output = generate(dir, args);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && said.contains("b.wav; give --checkpoint"), "{said}");
+    let (counts, facts) = run(dir, &format!("{args} --checkpoint host.safetensors"));
+    assert_eq!(counts, [2, 0, 1], "{facts}");
+    assert!(facts["sounds"][1]["error"].as_str().unwrap().contains("gone.safetensors"));
+    assert!(dir.join("made/first.npy").is_file() && dir.join("made/third.npy").is_file());
+
+    for (table, words) in [
+        ("audio,out\na.wav,x\nsub/b.wav,X\n", "would both be written to `X`"),
+        ("audio,out\na.wav,../x\n", "line 2"),
+        ("sound\na.wav\n", "`sound` is unknown"),
+    ] {
+        std::fs::write(dir.join("talks/list.csv"), table).unwrap();
+        let output = generate(dir, &format!("{args} --checkpoint host.safetensors"));
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(1) && said.contains("list.csv") && said.contains(words), "{said}");
+    }
+    for (args, words) in [
+        ("--audio-folder talks --out-folder made", "--checkpoint"),
+        ("--checkpoint host.safetensors --audio-folder talks", "--out-folder"),
+        ("--checkpoint host.safetensors --audio-folder talks --out-folder made --format mov", ".npy (joints)"),
+        ("--checkpoint host.safetensors --audio-folder none --out-folder made", "none is no folder"),
+        ("--checkpoint host.safetensors", "--audio"),
+    ] {
+        let output = generate(dir, args);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(1) && said.contains(words), "{args}: {said}");
+    }
+}

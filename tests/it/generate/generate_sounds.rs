@@ -1,0 +1,79 @@
+//! Sounds of every kind for `orator generate`: streamed ones give the motion of whole ones, those of a telephone are
+//! told of, those without a sample are named.
+
+use super::generate::{generate, write_untrained_speaker};
+use crate::fixtures::clips;
+use crate::fixtures::figures::FPS;
+use orator::external::ffmpeg::audio::{read_mono, write_wav};
+use orator::external::ffmpeg::sound_stream::{SoundStream, n_samples};
+use orator::formats::npy;
+use orator::generate::Speaker;
+use orator::types::sound::Sound;
+
+#[test]
+fn a_streamed_sound_gives_the_motion_of_the_whole_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    write_untrained_speaker(&dir.join("host.safetensors"));
+    let speaker = Speaker::open(&dir.join("host.safetensors")).unwrap();
+    // more than a chunk of frames; less than the mirrored end; another rate
+    for (rate, secs) in [(16_000, 150.0), (16_000, 1.3), (44_100, 3.7)] {
+        let mut sound = clips::tone(rate, secs, 220.0);
+        for (i, sample) in sound.samples.iter_mut().enumerate() {
+            *sample *= ((i * 7919) % 100_003) as f32 / 100_003.0;
+        }
+        let path = dir.join("speech.wav");
+        write_wav(&path, &sound).unwrap();
+        let whole = read_mono(&path, 16_000).unwrap().unwrap();
+        let n = n_samples(&path, 16_000).unwrap().unwrap();
+        assert_eq!(n, whole.samples.len());
+        let mut n_made = 0;
+        let streamed = speaker.motion_of_pieces(SoundStream::open(&path, 16_000), n, &mut |n| n_made += n).unwrap();
+        assert_eq!(streamed, speaker.motion(&whole).unwrap());
+        assert_eq!(n_made, streamed.n_frames());
+        assert!(generate(dir, "--checkpoint host.safetensors --audio speech.wav --out a.npy").status.success());
+        assert_eq!(npy::read(&dir.join("a.npy"), FPS).unwrap(), streamed);
+    }
+    let mut pieces = SoundStream::open(&dir.join("speech.wav"), 16_000);
+    assert!(pieces.next().unwrap().is_ok(), "a stream may be left in the middle");
+    drop(pieces);
+    assert!(SoundStream::open(&dir.join("gone.wav"), 16_000).next().unwrap().is_err());
+}
+
+#[test]
+fn a_telephone_is_told_of_and_nothing_is_said_of_better_sound() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    write_untrained_speaker(&dir.join("host.safetensors"));
+    for (rate, is_narrow) in [(8_000, true), (22_050, false)] {
+        write_wav(&dir.join("speech.wav"), &clips::tone(rate, 1.0, 220.0)).unwrap();
+        let output = generate(dir, "--checkpoint host.safetensors --audio speech.wav --out a.bvh");
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success() && said.contains("nothing above 4000 Hz") == is_narrow, "{said}");
+    }
+}
+
+#[test]
+fn sounds_without_a_sample_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    write_untrained_speaker(&dir.join("host.safetensors"));
+    write_wav(&dir.join("empty.wav"), &Sound { rate: 16_000, samples: Vec::new() }).unwrap();
+    std::fs::write(dir.join("nothing.mp3"), "").unwrap();
+    std::fs::write(dir.join("text.mp3"), "this is no sound, whatever its name says\n".repeat(50)).unwrap();
+    // a tag without music behind it
+    let mut tag = b"ID3\x04\x00\x00\x00\x00\x00\x40".to_vec();
+    tag.extend([0; 64]);
+    std::fs::write(dir.join("tag.mp3"), tag).unwrap();
+    let mut files = vec!["empty.wav", "nothing.mp3", "text.mp3", "tag.mp3"];
+    if clips::ffmpeg(dir, "-f lavfi -i anullsrc=r=16000:cl=mono -t 0 zero.mp3") {
+        files.push("zero.mp3");
+    }
+    for file in files {
+        let output = generate(dir, &format!("--checkpoint host.safetensors --audio {file} --out a.bvh"));
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        eprintln!("{said}");
+        assert!(output.status.code() == Some(1) && said.contains(file), "{file}: {said}");
+        assert!(!dir.join("a.bvh").exists());
+    }
+}

@@ -1,0 +1,5 @@
+//! Speech to motion.
+
+pub mod generate;
+pub mod generate_batch;
+pub mod generate_sounds;

@@ -1,0 +1,365 @@
+//! Lifting against known truth: bodies and hands made by rule, filmed, lifted with the built-in weights.
+
+use ndarray::{Array3, s};
+use ndarray_npy::{NpzWriter, read_npy};
+use orator::config;
+use orator::formats::keypoints_npz::Extras;
+use orator::formats::{joints_npz, keypoints_npz};
+use orator::mocap::upper_body;
+use orator::motion::upper_body::{
+    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, NOSE, Pose, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, metres_per_unit,
+};
+use orator::pipeline::lift::{LiftStage, Lifter};
+use orator::stage::ledger::{Kept, Ledger};
+use orator::stage::progress::Silent;
+use orator::stage::runner::place;
+use orator::stage::{Stage, Unit};
+use orator::train::scene::body::{Filming, Scene};
+use orator::train::scene::hand_shape;
+use orator::types::interval::{Interval, Intervals};
+use orator::types::pose2d::Keypoints;
+use orator::types::pose3d::Motion;
+use orator::types::skeleton;
+use orator::types::skeleton::{L_HAND, N_JOINTS, R_HAND};
+use orator::types::time::FrameRate;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Of the nine points: COCO's index and the arm joint, if it is one.
+pub const POINTS: [(usize, usize, Option<usize>); 9] = [
+    (NOSE, 0, None),
+    (R_SHOULDER, 6, Some(skeleton::R_SHOULDER)),
+    (R_ELBOW, 8, Some(skeleton::R_ELBOW)),
+    (R_WRIST, 10, Some(skeleton::R_WRIST)),
+    (L_SHOULDER, 5, Some(skeleton::L_SHOULDER)),
+    (L_ELBOW, 7, Some(skeleton::L_ELBOW)),
+    (L_WRIST, 9, Some(skeleton::L_WRIST)),
+    (R_HIP, 12, None),
+    (L_HIP, 11, None),
+];
+
+pub fn lifter() -> Lifter {
+    Lifter::new(&config::Lift::default()).unwrap()
+}
+
+/// The scene's keypoints, and hands of one shape turned slowly at both wrists.
+pub fn keypoints(scene: &Scene, rng: &mut ChaCha8Rng) -> Keypoints {
+    let n = scene.seen.len();
+    let mut k = Keypoints {
+        fps: FrameRate::new(15, 1),
+        image_size: [4000, 3000],
+        body: Array3::zeros((n, 17, 3)),
+        left_hand: Array3::zeros((n, 21, 3)),
+        right_hand: Array3::zeros((n, 21, 3)),
+    };
+    let shape = hand_shape::draw(rng);
+    for (t, seen) in scene.seen.iter().enumerate() {
+        let seen = seen.map(|p| p.map(|[x, y]| [x + 2000.0, y + 1500.0]));
+        for (point, coco, _) in POINTS {
+            if let Some([x, y]) = seen[point] {
+                k.body.slice_mut(s![t, coco, ..]).assign(&ndarray::arr1(&[x, y, 0.9]));
+            }
+        }
+        for (hand, wrist, flip) in [(&mut k.right_hand, R_WRIST, 1.0), (&mut k.left_hand, L_WRIST, -1.0)] {
+            let Some([x, y]) = seen[wrist] else { continue };
+            for (j, p) in shape.iter().enumerate() {
+                let (dx, dy) = (flip * p[0] * scene.px_per_metre, p[1] * scene.px_per_metre);
+                hand.slice_mut(s![t, j, ..]).assign(&ndarray::arr1(&[x + dx as f32, y + dy as f32, 0.9]));
+            }
+        }
+    }
+    k
+}
+
+/// Mean distance of shoulders, elbows and wrists in mm, both scaled to the reference size.
+fn error_mm(motion: &Motion, truth: &[Pose]) -> f64 {
+    let grow = metres_per_unit(truth);
+    let (mut sum, mut n) = (0.0, 0);
+    for (t, pose) in truth.iter().enumerate() {
+        for (point, _, joint) in POINTS {
+            let Some(joint) = joint else { continue };
+            let square = |k: usize| (f64::from(motion.joints[[t, joint, k]]) - grow * pose[point][k]).powi(2);
+            let apart = (0..3).map(square).sum::<f64>().sqrt();
+            if apart.is_finite() {
+                sum += 1000.0 * apart;
+                n += 1;
+            }
+        }
+    }
+    assert!(n > truth.len() * 3, "most joints are told");
+    sum / f64::from(u32::try_from(n).unwrap())
+}
+
+#[test]
+fn known_motion_is_found_again() {
+    let mut rng = ChaCha8Rng::seed_from_u64(77);
+    let lifter = lifter();
+    let (mut sum, mut mean_sum, n) = (0.0, 0.0, 20);
+    for _ in 0..n {
+        let scene = Scene::of_rule(Filming::Drop, 90, &mut rng);
+        let motion = lifter.lift(&keypoints(&scene, &mut rng)).unwrap();
+        sum += error_mm(&motion, &scene.truth);
+        // a constant pose for comparison: the truth's first frame, better than any mean of strangers
+        let mut constant = motion.clone();
+        let grow = metres_per_unit(&scene.truth);
+        for (point, _, joint) in POINTS {
+            let Some(joint) = joint else { continue };
+            let place = scene.truth[0][point].map(|v| (v * grow) as f32);
+            constant.joints.slice_mut(s![.., joint, ..]).assign(&ndarray::arr1(&place));
+        }
+        mean_sum += error_mm(&constant, &scene.truth);
+    }
+    let (error, constant) = (sum / f64::from(n), mean_sum / f64::from(n));
+    eprintln!("lifted {error:.0} mm, standing still as at first {constant:.0} mm");
+    assert!(error < 80.0 && error < 0.8 * constant, "{error} {constant}");
+}
+
+#[test]
+fn hands_hang_on_the_wrists_and_bones_keep_their_length() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let scene = Scene::of_rule(Filming::Clean, 60, &mut rng);
+    let mut keypoints = keypoints(&scene, &mut rng);
+    keypoints.left_hand.slice_mut(s![10..20, .., ..]).fill(0.0); // a short gap: filled
+    keypoints.right_hand.slice_mut(s![30.., .., ..]).fill(0.0); // a long one: missing
+    let motion = lifter().lift(&keypoints).unwrap();
+    for t in 0..60 {
+        for (hand, wrist) in [(L_HAND, skeleton::L_WRIST), (R_HAND, skeleton::R_WRIST)] {
+            assert_eq!(motion.joints.slice(s![t, hand, ..]), motion.joints.slice(s![t, wrist, ..]));
+        }
+        assert_eq!(motion.joints.slice(s![t, 0, ..]).to_vec(), [0.0; 3]);
+        assert_eq!(motion.joints[[t, R_HAND + 8, 0]].is_nan(), t >= 30);
+        assert!(motion.joints[[t, L_HAND + 8, 0]].is_finite());
+        assert_eq!(motion.mask[[t, L_HAND + 8]], !(10..20).contains(&t));
+    }
+    for joint in 1..N_JOINTS {
+        let parent = skeleton::parent(joint).unwrap();
+        let bone = |t: usize| {
+            let step = &motion.joints.slice(s![t, joint, ..]) - &motion.joints.slice(s![t, parent, ..]);
+            step.mapv(|v| v * v).sum().sqrt()
+        };
+        assert!((0..30).all(|t| (bone(t) - bone(0)).abs() < 1e-5), "{}", skeleton::name(joint));
+    }
+    // the shape was upright and open: fingers above the wrist, the thumb of each hand towards the other side
+    let at = |joint: usize, k: usize| motion.joints[[5, joint, k]];
+    for (root, inward) in [(R_HAND, 1.0), (L_HAND, -1.0)] {
+        assert!(at(root + 9, 1) < at(root, 1) - 0.04, "the middle knuckle is above the wrist");
+        assert!(inward * (at(root + 5, 0) - at(root + 17, 0)) > 0.0, "the index is on the inner side");
+    }
+}
+
+#[test]
+fn intervals_are_lifted_apart_and_outside_is_nothing() {
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let keypoints = keypoints(&Scene::of_rule(Filming::Training, 80, &mut rng), &mut rng);
+    let intervals = [Interval { start: 5, end: 30 }, Interval { start: 40, end: 80 }];
+    let lifter = lifter();
+    let lifted = lifter.lift_intervals(&keypoints, &intervals).unwrap();
+    for t in 0..80 {
+        let inside = intervals.iter().any(|i| (i.start..i.end).contains(&t));
+        assert_eq!(lifted.motion.joints[[t, 0, 0]].is_nan(), !inside, "frame {t}");
+        assert!(inside || lifted.motion.mask.slice(s![t, ..]).iter().all(|m| !m));
+    }
+    assert_eq!(lifted.n_frames, 65);
+    assert_eq!(lifted.extra.dim(), (80, 3, 3));
+    let nose = |t: usize| lifted.extra[[t, 0, 1]];
+    assert!(nose(2).is_nan() && (5..30).all(|t| (-0.4..0.0).contains(&nose(t))), "a nose above the neck");
+    let again = lifter.lift_intervals(&keypoints, &intervals).unwrap();
+    assert!(lifted.motion.joints.iter().zip(&again.motion.joints).all(|(a, b)| a.to_bits() == b.to_bits()));
+    assert!(lifter.lift_intervals(&keypoints, &[Interval { start: 70, end: 81 }]).is_err());
+    let none = lifter.lift_intervals(&keypoints, &[]).unwrap();
+    assert_eq!((none.n_frames, none.lengths[skeleton::R_HAND]), (0, 0.0));
+}
+
+#[test]
+fn a_finger_tip_never_seen_is_lifted_all_the_same() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut k = keypoints(&Scene::of_rule(Filming::Clean, 40, &mut rng), &mut rng);
+    k.left_hand.slice_mut(s![.., 20, 2]).fill(0.0);
+    k.right_hand.slice_mut(s![.., 20, 2]).fill(0.0);
+    let lifted = lifter().lift_intervals(&k, &[Interval { start: 0, end: 40 }]).unwrap();
+    for root in [L_HAND, R_HAND] {
+        for joint in root + 1..root + 21 {
+            let length = lifted.lengths[joint - 1];
+            assert!((0.003..0.18).contains(&length), "{} is {length} m", skeleton::name(joint));
+        }
+        assert!(!lifted.motion.mask[[20, root + 20]] && lifted.motion.mask[[20, root + 19]]);
+    }
+}
+
+/// A talker with swinging arms, 6 s at `fps`.
+fn swinging(fps: u32) -> Keypoints {
+    let n = 6 * fps as usize;
+    let mut body = Array3::zeros((n, 17, 3));
+    for t in 0..n {
+        let swing = |hertz: f32, by: f32| by * (std::f32::consts::TAU * hertz * t as f32 / fps as f32).sin();
+        let (elbow, wrist) = (swing(0.4, 20.0), swing(0.7, 60.0));
+        let points = [
+            (0, 640.0, 180.0),
+            (6, 560.0, 260.0),
+            (8, 530.0 + elbow, 390.0),
+            (10, 570.0 + wrist, 470.0 - wrist),
+            (5, 720.0, 260.0),
+            (7, 750.0 + elbow, 390.0),
+            (9, 710.0 - wrist, 460.0 + elbow),
+            (12, 590.0, 500.0),
+            (11, 690.0, 500.0),
+        ];
+        for (point, x, y) in points {
+            body.slice_mut(s![t, point, ..]).assign(&ndarray::arr1(&[x, y, 0.9]));
+        }
+    }
+    let hand = Array3::zeros((n, 21, 3));
+    Keypoints { fps: FrameRate::new(fps, 1), image_size: [1280, 720], body, left_hand: hand.clone(), right_hand: hand }
+}
+
+#[test]
+fn the_frame_rate_does_not_change_the_motion() {
+    let lifter = lifter();
+    let motion = |fps| lifter.lift(&swinging(fps)).unwrap().joints;
+    let expected = motion(15);
+    for fps in [10, 20, 30] {
+        let joints = motion(fps);
+        // every fifth of a second is a frame at all these rates
+        let apart = |fifth: usize, joint: usize| {
+            let a = joints.slice(s![fifth * fps as usize / 5, joint, ..]);
+            let square = (&a - &expected.slice(s![fifth * 3, joint, ..])).mapv(|v| v * v);
+            square.sum().sqrt()
+        };
+        let most = (0..30).flat_map(|fifth| (1..7).map(move |joint| (fifth, joint)));
+        let most = most.map(|(fifth, joint)| apart(fifth, joint)).fold(0.0, f32::max);
+        eprintln!("{fps} frames a second: at most {:.1} mm from 15", 1000.0 * most);
+        assert!(most < 0.010, "{fps} frames a second: {most} m");
+    }
+}
+
+#[test]
+fn odd_keypoints_do_no_harm() {
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let mut k = keypoints(&Scene::of_rule(Filming::Clean, 40, &mut rng), &mut rng);
+    k.body.slice_mut(s![3..6, .., 0]).fill(f32::NAN);
+    k.body.slice_mut(s![10..12, .., ..2]).fill(7.0);
+    k.left_hand.fill(f32::INFINITY);
+    k.right_hand.slice_mut(s![.., 3.., ..]).fill(1.0);
+    let motion = lifter().lift(&k).unwrap();
+    assert!(motion.joints.slice(s![.., L_HAND + 1.., 0]).iter().take(20).all(|v| v.is_nan()));
+    assert!(motion.joints.slice(s![.., ..7, ..]).iter().all(|v| v.is_finite()));
+    k.body.slice_mut(s![.., .., 2]).fill(0.0);
+    let nobody = lifter().lift(&k).unwrap();
+    assert!(nobody.joints.iter().all(|v| v.is_nan()) && nobody.mask.iter().all(|m| !m));
+    k.body = Array3::zeros((0, 17, 3));
+    assert!(lifter().lift(&k).is_err(), "arrays of unequal length");
+    (k.left_hand, k.right_hand) = (Array3::zeros((0, 21, 3)), Array3::zeros((0, 21, 3)));
+    assert_eq!(lifter().lift(&k).unwrap().n_frames(), 0);
+}
+
+fn orator(args: &[&Path]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_orator")).arg("lift").args(args).output().unwrap()
+}
+
+#[test]
+fn the_verb_lifts_a_bare_body_and_says_what_is_wrong() {
+    let dir = tempfile::tempdir().unwrap();
+    let (npz, out) = (dir.path().join("k.npz"), dir.path().join("j.npy"));
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let k = keypoints(&Scene::of_rule(Filming::Clean, 40, &mut rng), &mut rng);
+    let write = |name: &str, array: &Array3<f32>| {
+        let mut file = NpzWriter::new(std::fs::File::create(&npz).unwrap());
+        file.add_array(name, array).unwrap();
+        file.finish().unwrap();
+    };
+    write("body", &k.body);
+    let done = orator(&[&npz, Path::new("--out"), &out]);
+    let said = String::from_utf8_lossy(&done.stdout).into_owned() + &String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success() && said.contains("40 frames") && said.contains("no `fps`"), "{said}");
+    let joints: Array3<f32> = read_npy(&out).unwrap();
+    let before = std::fs::read(&out).unwrap();
+    assert_eq!(joints.shape(), [40, 49, 3]);
+
+    let fails = |args: &[&Path], says: &str| {
+        let failed = orator(args);
+        let said = String::from_utf8_lossy(&failed.stderr).into_owned();
+        assert!(failed.status.code() == Some(1) && said.contains(says), "{said}");
+    };
+    let to = Path::new("--out");
+    fails(&[&npz, to, &dir.path().join("j.bvh")], ".npy");
+    fails(&[&dir.path().join("none.npz"), to, &out], "none.npz");
+    write("bodies", &k.body);
+    fails(&[&npz, to, &out], "no array `body`");
+    write("body", &k.left_hand);
+    fails(&[&npz, to, &out], "[40, 21, 3]");
+    write("body", &Array3::zeros((0, 17, 3)));
+    fails(&[&npz, to, &out], "no frames");
+    std::fs::write(&npz, b"no zip").unwrap();
+    fails(&[&npz, to, &out], "k.npz");
+    assert_eq!(std::fs::read(&out).unwrap(), before, "what was there stays");
+}
+
+#[test]
+fn the_stage_writes_joints_and_bones() {
+    let dir = tempfile::tempdir().unwrap();
+    let unit = Unit { speaker: "host".into(), video: "clip-00000000".into(), source: "clip.mp4".into() };
+    let mut rng = ChaCha8Rng::seed_from_u64(12);
+    let keypoints = keypoints(&Scene::of_rule(Filming::Training, 70, &mut rng), &mut rng);
+    let extras = Extras {
+        time_secs: ndarray::Array1::linspace(0.0, 4.6, 70),
+        person: ndarray::Array2::zeros((70, 5)),
+        n_people: ndarray::Array1::ones(70),
+        identity: ndarray::Array1::zeros(70),
+    };
+    let [extract, pose2d, segment] = ["extract", "pose2d", "segment"].map(|stage| place(dir.path(), stage, &unit));
+    [&extract, &pose2d, &segment].into_iter().for_each(|folder| std::fs::create_dir_all(folder).unwrap());
+    let mut timeline = NpzWriter::new(std::fs::File::create(extract.join("timeline.npz")).unwrap());
+    timeline.add_array("repeated", &ndarray::Array1::from_shape_fn(70, |t| t % 3 == 2)).unwrap();
+    timeline.finish().unwrap();
+    keypoints_npz::write(&pose2d.join("keypoints.npz"), &keypoints, &extras).unwrap();
+    let intervals = |n_frames| Intervals::new(keypoints.fps, n_frames, vec![Interval { start: 2, end: 68 }]);
+    std::fs::write(segment.join("intervals.json"), serde_json::to_vec(&intervals(70)).unwrap()).unwrap();
+    let kept = Kept { start_secs: 0.0, end_secs: 4.4 };
+    let ledger = Ledger { duration_secs: 4.4, kept: vec![kept], ..Ledger::default() };
+    std::fs::write(segment.join("ledger.json"), serde_json::to_vec(&ledger).unwrap()).unwrap();
+
+    let stage = LiftStage::new(&config::Lift::default(), &config::Segment::default(), dir.path()).unwrap();
+    assert!(stage.inputs(&unit).unwrap().iter().all(|input| input.path.exists()));
+    let report = stage.run(&unit, dir.path(), &Silent).unwrap();
+    assert!(report.line.starts_with("66 frames in 1 interval"), "{}", report.line);
+    let motion = joints_npz::read(&dir.path().join("joints.npz")).unwrap();
+    assert!(motion.joints[[1, 0, 0]].is_nan() && motion.joints[[2, 0, 0]] == 0.0);
+    for t in 2..68 {
+        let known = motion.mask.slice(s![t, ..]).iter().any(|m| *m);
+        assert_eq!(known, t % 3 != 2, "a repeated frame is masked: {t}");
+    }
+    assert_eq!(Ledger::read(&dir.path().join("ledger.json")).unwrap(), ledger);
+    let bones: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(dir.path().join("bones.json")).unwrap()).unwrap();
+    let lengths: Vec<f64> = serde_json::from_value(bones["lengths_metres"].clone()).unwrap();
+    assert_eq!((lengths.len(), bones["n_frames"].as_u64()), (48, Some(66)));
+    assert!((lengths[0] * 2.0 + lengths[1] + lengths[2] - 0.90).abs() < 1e-3, "the reference size");
+    let phalanx = lengths[skeleton::L_HAND + 9] / lengths[2];
+    assert!((0.15..0.25).contains(&phalanx), "a phalanx a fifth of the forearm: {phalanx}");
+
+    std::fs::write(segment.join("intervals.json"), serde_json::to_vec(&intervals(71)).unwrap()).unwrap();
+    let text = format!("{:#}", stage.run(&unit, dir.path(), &Silent).unwrap_err());
+    assert!(text.contains("segment again"), "{text}");
+}
+
+#[test]
+fn the_captured_gestures_face_forward_upright() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/mocap/cmu_gestures_joints38_mm.npz");
+    if !file.exists() {
+        eprintln!("SKIPPED: {} is not there", file.display());
+        return;
+    }
+    let takes = upper_body::read_all(&[file]).unwrap();
+    let (mut upright, mut ahead, mut n) = (0, 0, 0);
+    for pose in takes.iter().flat_map(|take| take.poses.iter().step_by(60)) {
+        n += 1;
+        upright += usize::from(pose[NOSE][1] < 0.0 && pose[R_HIP][1] > 0.2);
+        // the face lies before the line of the shoulders, seen from above
+        let [x, _, z] = [0, 1, 2].map(|k| pose[L_SHOULDER][k] - pose[R_SHOULDER][k]);
+        ahead += usize::from(pose[NOSE][0] * z - pose[NOSE][2] * x > 0.0);
+    }
+    assert!(takes.len() >= 13 && n > 300, "{} takes, {n} frames", takes.len());
+    assert!(upright * 20 > n * 19 && ahead * 20 > n * 19, "{upright} {ahead} of {n}");
+}

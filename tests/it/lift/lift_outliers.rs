@@ -1,0 +1,89 @@
+//! What lifting refuses after the rules: bones far off their length, joints that stay open; and that ledger and intervals
+//! go with it.
+
+use crate::fixtures::footage::{FPS, Footage, good, write};
+use ndarray::s;
+use orator::config;
+use orator::formats::joints_npz;
+use orator::pipeline::lift::LiftStage;
+use orator::pipeline::segment::SegmentStage;
+use orator::stage::ledger::Ledger;
+use orator::stage::progress::Silent;
+use orator::stage::runner::place;
+use orator::stage::{Stage, Unit};
+use orator::types::interval::Intervals;
+use orator::types::pose2d::coco;
+use orator::types::pose3d::Motion;
+use orator::types::skeleton::{L_WRIST, R_WRIST};
+
+/// Judged and lifted: intervals, ledger and joints.
+fn lifted(footage: &Footage) -> (Vec<(usize, usize)>, Ledger, Motion) {
+    let dir = tempfile::tempdir().unwrap();
+    let work = dir.path().join("work");
+    let unit = Unit { speaker: "host".into(), video: "talk-00000000".into(), source: dir.path().join("talk.mp4") };
+    write(&work, &unit, footage, "a");
+    let rules = config::Segment::default();
+    let segment = SegmentStage::new(&rules, &work);
+    let lift = LiftStage::new(&config::Lift::default(), &rules, &work).unwrap();
+    for stage in [&segment as &dyn Stage, &lift] {
+        let out = place(&work, stage.name(), &unit);
+        std::fs::create_dir_all(&out).unwrap();
+        stage.run(&unit, &out, &Silent).unwrap();
+    }
+    let out = place(&work, "lift", &unit);
+    let intervals: Intervals = serde_json::from_slice(&std::fs::read(out.join("intervals.json")).unwrap()).unwrap();
+    let ledger = Ledger::read(&out.join("ledger.json")).unwrap();
+    assert_eq!(ledger.kept.len(), intervals.intervals.len());
+    let motion = joints_npz::read(&out.join("joints.npz")).unwrap();
+    let kept = |t: usize| intervals.intervals.iter().any(|i| (i.start..i.end).contains(&t));
+    for (t, joints) in motion.joints.outer_iter().enumerate() {
+        assert!(joints.iter().all(|v| v.is_finite() == kept(t)), "frame {t}");
+    }
+    (intervals.intervals.iter().map(|i| (i.start, i.end)).collect(), ledger, motion)
+}
+
+/// The left forearm grows far out of the picture, its hand with it.
+fn stretch_arm(footage: &mut Footage, frames: std::ops::Range<usize>) {
+    footage.keypoints.body.slice_mut(s![frames.clone(), coco::L_WRIST, 0]).mapv_inplace(|x| x + 400.0);
+    footage.keypoints.left_hand.slice_mut(s![frames, .., 0]).mapv_inplace(|x| x + 400.0);
+}
+
+#[test]
+fn a_good_video_passes_whole() {
+    let (intervals, ledger, _) = lifted(&good(200));
+    assert_eq!(intervals, [(0, 200)]);
+    assert!(ledger.refused.is_empty());
+}
+
+#[test]
+fn a_bone_off_its_length_is_refused_and_a_short_slip_is_filled_and_masked() {
+    let mut footage = good(300);
+    stretch_arm(&mut footage, 100..130);
+    let (intervals, ledger, _) = lifted(&footage);
+    let (bones, others): (Vec<_>, Vec<_>) = ledger.refused.iter().partition(|r| r.reason == "bones");
+    assert!(others.is_empty() && bones.len() == 1 && intervals.len() == 2, "{ledger:?}");
+    let bones = bones[0];
+    assert!((bones.start_secs - FPS.secs(100)).abs() < 0.15 && (bones.end_secs - FPS.secs(130)).abs() < 0.15);
+    assert!(bones.measured > bones.threshold && bones.unit == "bone lengths" && bones.says.contains("bone"));
+
+    let mut footage = good(200);
+    footage.keypoints.left_hand.slice_mut(s![99..105, .., ..]).fill(0.0);
+    stretch_arm(&mut footage, 100..104);
+    let (intervals, _, motion) = lifted(&footage);
+    assert_eq!(intervals, [(0, 200)]);
+    assert!((100..104).all(|t| !motion.mask[[t, L_WRIST]] && motion.mask[[t, R_WRIST]]));
+    let x = |t: usize| motion.joints[[t, L_WRIST, 0]];
+    assert!((x(102) - x(95)).abs() < 0.1, "{} {}", x(102), x(95));
+}
+
+#[test]
+fn gaps_that_add_up_to_more_than_lifting_fills_are_refused() {
+    let mut footage = good(300);
+    // each let through by itself: the hand's score, then single points
+    footage.keypoints.left_hand.slice_mut(s![100..112, .., 2]).fill(0.0);
+    footage.keypoints.left_hand.slice_mut(s![112..124, ..12, 2]).fill(0.0);
+    let (intervals, ledger, _) = lifted(&footage);
+    assert_eq!(intervals, [(0, 100), (124, 300)], "{ledger:?}");
+    assert_eq!(ledger.refused[0].reason, "open");
+    assert!(ledger.refused[0].says.starts_with("21 of the joints"), "{}", ledger.refused[0].says);
+}

@@ -1,0 +1,7 @@
+//! Sound and pictures of a file, in step; shots.
+
+pub mod extract;
+pub mod media_frames;
+pub mod media_sound;
+pub mod shots;
+pub mod sync;

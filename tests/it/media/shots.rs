@@ -1,0 +1,122 @@
+//! Where shots begin, on films put together here of the synthetic speaker and test pictures: what ends a shot, where,
+//! and what does not.
+
+use crate::fixtures::clips::ffmpeg;
+use crate::fixtures::support::{shared, speaker_clip};
+use ndarray::Array1;
+use ndarray_npy::NpzReader;
+use orator::config;
+use orator::pipeline::extract::Extract;
+use orator::stage::progress::Silent;
+use orator::stage::{Stage, Unit};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// Frames that begin a shot, at `fps`.
+fn cuts(video: &Path, fps: u32) -> Vec<usize> {
+    let out = video.with_extension(fps.to_string());
+    std::fs::create_dir(&out).unwrap();
+    let unit = Unit { speaker: "host".into(), video: "clip".into(), source: video.to_owned() };
+    let settings = config::Extract { fps, ..Default::default() };
+    Extract::new(&settings).run(&unit, &out, &Silent).unwrap();
+    let mut npz = NpzReader::new(File::open(out.join("timeline.npz")).unwrap()).unwrap();
+    let scores: Array1<f64> = npz.by_name("shot_score").unwrap();
+    let threshold = config::Segment::default().shot_threshold;
+    (0..scores.len()).filter(|n| scores[*n] >= threshold).collect()
+}
+
+/// A film of `inputs` through a filter graph whose result is `[v]`, in `dir`.
+fn film(dir: &Path, name: &str, inputs: &str, graph: &str) -> PathBuf {
+    let out = dir.join(format!("{name}.mp4"));
+    let args = format!(
+        "{inputs} -filter_complex {graph} -map [v] -c:v libx264 -preset ultrafast -crf 20 -pix_fmt yuv420p {}",
+        out.display()
+    );
+    assert!(ffmpeg(dir, &args), "{name}");
+    out
+}
+
+/// Films of one picture turning into another within `secs`, from 2 s on: by each kind, and at each rate.
+fn transitions(dir: &Path, inputs: &str, kinds: &[(&str, f64)], rates: &[u32]) {
+    let same = "fps=30,scale=320:240,setsar=1,settb=1/30,setpts=PTS-STARTPTS";
+    for (kind, secs) in kinds {
+        let graph = format!(
+            "[0:v]{same},trim=0:6[a];[1:v]{same},trim=0:6[b];[a][b]xfade=transition={kind}:duration={secs}:offset=2[v]"
+        );
+        let video = film(dir, &format!("{kind}-{secs}"), inputs, &graph);
+        for &fps in rates {
+            let found = cuts(&video, fps);
+            let [first, last] = [2.0, 2.0 + secs].map(|at| at * f64::from(fps));
+            let slack = f64::from(fps) * (0.25 * secs + 0.15);
+            eprintln!("{kind} of {secs} s at {fps}: shots begin at {found:?}, it goes from {first:.0} to {last:.0}");
+            assert!(!found.is_empty(), "{kind} of {secs} s at {fps}");
+            let inside = |n: &usize| (first - slack..=last + slack + 1.0).contains(&(*n as f64));
+            assert!(found.iter().all(inside), "{kind} of {secs} s at {fps}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn dissolves_wipes_and_fades_end_a_shot_where_they_are() {
+    let dir = tempfile::tempdir().unwrap();
+    let speaker = speaker_clip(dir.path(), 5.0, 3);
+    let inputs = format!("-i {} -f lavfi -i testsrc2=size=320x240:rate=30:duration=5", speaker.display());
+    let kinds =
+        [("fade", 0.4), ("fade", 1.0), ("dissolve", 0.6), ("wipeleft", 0.6), ("circleopen", 0.6), ("fadeblack", 1.0)];
+    transitions(dir.path(), &inputs, &kinds, &[15, 10]);
+}
+
+#[test]
+fn real_pictures_that_turn_into_others_end_a_shot() {
+    let Some(videos) = shared("data/videos") else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let clip = |name: &str, from: f64| format!("-ss {from} -t 5 -i {}", videos.join(name).display());
+    let tyson = clip("talk_tyson_2cam_17s_720p.mp4", 1.0);
+    let phone = clip("talk_phoneman_33s_1080p_UNSURE.mp4", 4.0);
+    let seth = clip("generated/mdd_showcase_seth1.mp4", 1.0);
+    let kinds = [("fade", 0.5), ("fade", 2.0), ("wipeleft", 1.0), ("fadeblack", 1.0)];
+    for (n, pair) in [[&tyson, &phone], [&phone, &seth], [&seth, &tyson]].into_iter().enumerate() {
+        let dir = dir.path().join(n.to_string());
+        std::fs::create_dir(&dir).unwrap();
+        transitions(&dir, &format!("{} {}", pair[0], pair[1]), &kinds[n..n + 2], &[15]);
+    }
+}
+
+/// What a camera and a lamp do without ending a shot.
+const MOVES: [(&str, &str); 9] = [
+    ("pan", "scale=1280:960,crop=640:480:x=t*100:y=200,scale=320:240"),
+    ("fast-pan", "scale=1280:960,crop=640:480:x=t*200:y=100+t*50,scale=320:240"),
+    ("shake", "scale=1280:960,crop=1000:750:x=140+100*sin(t*9):y=100+80*cos(t*13),scale=320:240"),
+    ("zoom", "scale=1280:960,zoompan=z=1+0.012*in:d=1:x=iw/2-iw/zoom/2:y=ih/2-ih/zoom/2:s=320x240:fps=30"),
+    ("scroll", "scale=320:240,scroll=h=0.008"),
+    ("brighter-and-darker", "scale=320:240,eq=brightness=0.2*sin(t*2):eval=frame"),
+    ("lamp", "scale=320:240,eq=brightness=0.2*gte(t\\,1.5):eval=frame"),
+    ("contrast", "scale=320:240,eq=contrast=1-0.6*clip((t-1)*2\\,0\\,1):eval=frame"),
+    ("flash", "scale=320:240,eq=brightness=0.9*between(mod(n\\,30)\\,14\\,16):eval=frame"),
+];
+
+fn moves(dir: &Path, input: &str, rates: &[u32]) {
+    for (name, filter) in MOVES {
+        let video = film(dir, name, input, &format!("[0:v]fps=30,{filter},setsar=1[v]"));
+        for &fps in rates {
+            let found = cuts(&video, fps);
+            assert!(found.is_empty(), "{name} of {input} at {fps}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn a_camera_that_moves_and_another_light_end_no_shot() {
+    let dir = tempfile::tempdir().unwrap();
+    let speaker = speaker_clip(dir.path(), 3.0, 3);
+    moves(dir.path(), &format!("-i {}", speaker.display()), &[15, 10]);
+}
+
+#[test]
+fn real_pictures_that_pan_or_lighten_end_no_shot() {
+    let Some(videos) = shared("data/videos") else { return };
+    for name in ["talk_tyson_2cam_17s_720p.mp4", "talk_oliver_wan_3.5s_1080p.mp4", "talk_kim_7s_1080p.mp4"] {
+        let dir = tempfile::tempdir().unwrap();
+        moves(dir.path(), &format!("-ss 1 -t 2.4 -i {}", videos.join(name).display()), &[15]);
+    }
+}

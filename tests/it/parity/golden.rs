@@ -1,0 +1,96 @@
+//! Every model of the shared folder gives the numbers written down for it.
+
+use orator::external::onnx::{Axes, Manifest, Model, Role, Runtime};
+use std::path::{Path, PathBuf};
+
+/// The shared models, if they and the ONNX Runtime library are there.
+pub fn models() -> Option<(PathBuf, Runtime)> {
+    let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/models");
+    if !dir.is_dir() {
+        eprintln!("SKIPPED: no pose models at {}", dir.display());
+        return None;
+    }
+    match Runtime::load(Path::new(""), &dir) {
+        Ok(runtime) => Some((dir, runtime)),
+        Err(error) => {
+            eprintln!("SKIPPED: {error:#}");
+            None
+        }
+    }
+}
+
+#[test]
+fn every_model_gives_its_golden_numbers() {
+    let Some((dir, runtime)) = models() else { return };
+    let golden = std::fs::read_to_string(dir.join("golden.json")).unwrap();
+    let golden: serde_json::Value = serde_json::from_str(&golden).unwrap();
+    let close = |found: f64, expected: f64| (found - expected).abs() <= 1e-3_f64.max(1e-4 * expected.abs());
+    let mut n_checked = 0;
+    for entry in &Manifest::builtin().unwrap().models {
+        let Some(expected) = golden.get(&entry.file) else { continue };
+        let mut model = Model::open(&runtime, entry, &dir).unwrap();
+        for (k, value) in model.input_mut().iter_mut().enumerate() {
+            let byte = ((k as u64).wrapping_mul(2_654_435_761) >> 13) & 255;
+            *value = match (entry.role, entry.picture.axes) {
+                _ if entry.id.contains("yolox") => byte as f32,
+                (_, Axes::Nchw) => ((byte as f64 / 255.0 - 0.45) / 0.225) as f32,
+                _ if entry.id == "pose-detection-mediapipe" => (byte as f64 / 127.5 - 1.0) as f32,
+                _ => (byte as f64 / 255.0) as f32,
+            };
+        }
+        let outputs = model.run().unwrap();
+        for (name, expected) in expected["outputs"].as_object().unwrap() {
+            let (shape, numbers) = match outputs.floats(name) {
+                Ok((shape, numbers)) => (shape, numbers.iter().map(|n| f64::from(*n)).collect::<Vec<_>>()),
+                Err(_) => {
+                    let (shape, numbers) = outputs.integers(name).unwrap();
+                    (shape, numbers.iter().map(|n| *n as f64).collect())
+                }
+            };
+            let place = format!("{} {name}", entry.id);
+            assert_eq!(serde_json::json!(shape), expected["shape"], "{place}");
+            for (found, expected) in numbers.iter().zip(expected["first8"].as_array().unwrap()) {
+                assert!(close(*found, expected.as_f64().unwrap()), "{place}: {found} {expected}");
+            }
+            let (mut sum, mut largest) = (0.0, (0.0, 0));
+            for (k, number) in numbers.iter().enumerate() {
+                sum += number;
+                largest = if number.abs() > largest.0 { (number.abs(), k) } else { largest };
+            }
+            assert!(close(sum, expected["sum"].as_f64().unwrap()), "{place}: sum {sum} {}", expected["sum"]);
+            assert!(close(largest.0, expected["absmax"].as_f64().unwrap()), "{place}: absmax {}", largest.0);
+        }
+        n_checked += 1;
+    }
+    assert_eq!(n_checked, golden.as_object().unwrap().len());
+}
+
+#[test]
+fn a_model_that_is_missing_wrong_or_different_says_so() {
+    let Some((dir, runtime)) = models() else { return };
+    let manifest = Manifest::builtin().unwrap();
+    let entry = manifest.get_as("hand-mediapipe-lite", Role::Hand).unwrap();
+    let empty = tempfile::tempdir().unwrap();
+    let said = |entry, dir: &Path| Model::open(&runtime, entry, dir).err().map(|error| error.to_string()).unwrap();
+    let missing = said(entry, empty.path());
+    assert!(
+        missing.contains("missing") && missing.contains(&entry.file) && missing.contains("models fetch"),
+        "{missing}"
+    );
+
+    std::fs::write(empty.path().join(&entry.file), b"not these bytes").unwrap();
+    let wrong = said(entry, empty.path());
+    assert!(wrong.contains("sha256") && wrong.contains(&entry.sha256), "{wrong}");
+
+    let mut junk = entry.clone();
+    junk.sha256 = orator::external::onnx::sha256_of(&empty.path().join(&entry.file)).unwrap();
+    assert!(said(&junk, empty.path()).contains("no ONNX model"));
+
+    let mut narrow = entry.clone();
+    narrow.outputs[0].shape = vec![1, 21];
+    let layout = said(&narrow, &dir);
+    assert!(layout.contains("[1, 21]") && layout.contains("[1, 63]") && layout.contains("landmarks"), "{layout}");
+    let mut renamed = entry.clone();
+    renamed.inputs[0].name = "picture".into();
+    assert!(said(&renamed, &dir).contains("picture"));
+}

@@ -1,0 +1,32 @@
+//! The heat-map hand lifter gives what the same networks in PyTorch give (`fixtures/reference/heatmap_reference.py`),
+//! weights and input being filled by one formula on both sides.
+
+use crate::train::networks::fill;
+use candle_core::{DType, Device, Tensor};
+use orator::nn::Mode;
+use orator::nn::lifter::heatmap::{HeatmapLifter, NAME};
+use orator::nn::ops::gradcheck::pattern;
+use orator::nn::params::Params;
+
+#[derive(serde::Deserialize)]
+struct Golden {
+    shape: Vec<usize>,
+    values: Vec<f32>,
+}
+
+#[test]
+fn the_heatmap_lifter_agrees_with_pytorch() -> anyhow::Result<()> {
+    let golden: Golden = serde_json::from_str(include_str!("../../../fixtures/reference/heatmap_golden.json"))?;
+    let mut params = Params::new(0);
+    let net = HeatmapLifter::new(&mut params, NAME)?;
+    fill(&params)?;
+    let maps = pattern(&[2, 32, 32, 21], 1.0)?.to_dtype(DType::F32)?;
+    let sides = Tensor::new(&[[1f32, 0.0], [0.0, 1.0]], &Device::Cpu)?;
+    let y = net.forward(&maps, &sides, &mut Mode::Eval)?;
+    assert_eq!(y.dims(), golden.shape);
+    let scale = golden.values.iter().fold(1.0f32, |most, v| most.max(v.abs()));
+    for (i, (y, expected)) in y.flatten_all()?.to_vec1::<f32>()?.iter().zip(&golden.values).enumerate() {
+        assert!((y - expected).abs() < 1e-5 * scale, "value {i}: {y}, expected {expected}");
+    }
+    Ok(())
+}

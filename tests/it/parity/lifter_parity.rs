@@ -1,0 +1,100 @@
+//! The lifters give what the same networks in PyTorch give (`fixtures/reference/lifter_reference.py`), both forms of the
+//! temporal network in f32 as they are used, and its training pass with gradients in f64. The networks are small and
+//! filled by the formula: the built-in weights do not matter here.
+
+use crate::train::networks::fill;
+use candle_core::{DType, Device, Result, Tensor};
+use orator::nn::Mode;
+use orator::nn::lifter::hand;
+use orator::nn::lifter::hand::HandLifter;
+use orator::nn::lifter::temporal::{Config, TemporalLifter};
+use orator::nn::ops::gradcheck::pattern;
+use orator::nn::params::Params;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::collections::BTreeMap;
+
+#[derive(serde::Deserialize)]
+struct Golden {
+    shape: Vec<usize>,
+    values: Vec<f64>,
+}
+
+fn agree(name: &str, y: &Tensor) -> anyhow::Result<()> {
+    let text = include_str!("../../../fixtures/reference/lifter_golden.json");
+    let golden = serde_json::from_str::<BTreeMap<String, Golden>>(text)?.remove(name).unwrap();
+    assert_eq!(y.dims(), golden.shape, "{name}");
+    let y = y.to_dtype(DType::F64)?.flatten_all()?.to_vec1::<f64>()?;
+    let scale = golden.values.iter().fold(1.0f64, |most, v| most.max(v.abs()));
+    assert_eq!(y.len(), golden.values.len());
+    for (i, (y, expected)) in y.iter().zip(&golden.values).enumerate() {
+        assert!((y - expected).abs() < 1e-5 * scale, "{name}, value {i}: {y}, expected {expected}");
+    }
+    Ok(())
+}
+
+fn network(dtype: DType) -> anyhow::Result<(Params, TemporalLifter)> {
+    let mut params = Params::with_dtype(0, dtype);
+    let config = Config { n_in: 8, n_out: 9, channels: 12, widths: vec![3, 5, 3], dropout: 0.0 };
+    let net = TemporalLifter::new(&mut params, "l", &config)?;
+    fill(&params)?;
+    Ok((params, net))
+}
+
+#[test]
+fn both_forms_of_the_temporal_lifter_agree_with_pytorch() -> anyhow::Result<()> {
+    let (_params, net) = network(DType::F32)?;
+    let input = |shape: &[usize], phase: f64| -> Result<Tensor> { pattern(shape, phase)?.to_dtype(DType::F32) };
+    agree("dilated", &net.forward(&input(&[2, 8, 53], 3.0)?, &mut Mode::Eval)?)?;
+    agree("strided", &net.forward_windows(&input(&[4, 8, 45], 4.0)?, &mut Mode::Eval)?)
+}
+
+#[test]
+fn a_training_pass_agrees_with_pytorch() -> anyhow::Result<()> {
+    let (params, net) = network(DType::F64)?;
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let y = net.forward_windows(&pattern(&[4, 8, 45], 4.0)?, &mut Mode::Train(&mut rng))?;
+    agree("train", &y)?;
+    let off = (y.reshape((4, 3, 3))? - pattern(&[4, 3, 3], 5.0)?)?;
+    let weights = Tensor::new(&[[0.5, 1.0, 1.5]], &Device::Cpu)?;
+    let loss = (off.sqr()?.sum(2)? + 1e-8)?.sqrt()?.broadcast_mul(&weights)?.mean_all()?;
+    agree("loss", &loss.reshape(1)?)?;
+    let gradients = loss.backward()?;
+    let of = |name: &str| params.all().find(|(own, _)| *own == name).map(|(_, var)| var.clone()).unwrap();
+    for name in ["l.expand.conv.weight", "l.block1.over_time.norm.weight", "l.shrink.bias"] {
+        agree(&format!("gradient {name}"), gradients.get(&of(name)).unwrap())?;
+    }
+    let moved = "l.block0.mix.norm.running_var";
+    agree(&format!("after {moved}"), of(moved).as_tensor())
+}
+
+#[test]
+fn the_hand_perceptron_agrees_with_pytorch() -> anyhow::Result<()> {
+    let mut params = Params::new(0);
+    let config = hand::Config { n_in: 6, n_out: 5, hidden: 10, dropout: 0.0 };
+    let net = HandLifter::new(&mut params, "h", &config)?;
+    fill(&params)?;
+    agree("hand", &net.forward(&pattern(&[7, 6], 6.0)?.to_dtype(DType::F32)?, &mut Mode::Eval)?)
+}
+
+#[test]
+fn the_training_benchmark_runs_without_python_and_says_when_python_fails() {
+    let bench = |widths: &str, batch: &str, more: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_orator"));
+        command.args(["--json", "bench", "lifter", "--channels", "4", "--steps", "2", "--rounds", "1"]);
+        command.args(["--widths", widths, "--batch", batch]).args(more).output().unwrap()
+    };
+    let facts: serde_json::Value = serde_json::from_slice(&bench("3,3", "4", &[]).stdout).unwrap();
+    assert!(facts["secs_a_step"].as_f64().unwrap() > 0.0 && facts["window"] == 9, "{facts}");
+    let wrong = [
+        ("3,3", "4", &["--python", "gone.py"][..], "gone.py did not start"),
+        ("2,3", "4", &[], "odd"),
+        ("101,101", "4", &[], "more than 10000 frames"),
+        ("3,3", "1", &[], "two windows"),
+    ];
+    for (widths, batch, more, words) in wrong {
+        let output = bench(widths, batch, more);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(1) && said.contains(words), "{words}: {said}");
+    }
+}

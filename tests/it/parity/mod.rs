@@ -1,0 +1,8 @@
+//! Numbers held to independent references: golden values from committed scripts, and real clips.
+
+pub mod generator_parity;
+pub mod golden;
+pub mod heatmap_parity;
+pub mod lifter_parity;
+pub mod pose_parity;
+pub mod real;

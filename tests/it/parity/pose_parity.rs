@@ -1,0 +1,120 @@
+//! The 2D chain gives the keypoints of the Python reference on real clips, on the frames the reference looked at and
+//! with its person detector. Needs the shared folder and a Python with onnxruntime and cv2 (ORATOR_REFERENCE_PYTHON
+//! names one).
+
+use super::golden;
+use orator::config;
+use orator::external::ffmpeg::frames::FrameReader;
+use orator::external::onnx::Manifest;
+use orator::formats::keypoints_npz;
+use orator::formats::npz::Npz;
+use orator::pipeline::pose2d::Chain;
+use orator::types::pose2d::{Keypoint, Pose2d};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const MAX_BODY_PX: f32 = 1.5;
+const MAX_HAND_PX: f32 = 2.0;
+/// A body point both are at least this sure of is compared.
+const MIN_SCORE: f32 = 0.3;
+/// Least share of frames in which both find a hand, or both do not.
+const MIN_AGREEMENT: f64 = 0.95;
+
+/// A Python that can run the reference.
+fn python() -> Option<String> {
+    let named = std::env::var("ORATOR_REFERENCE_PYTHON").ok();
+    let candidates = named.map_or_else(|| vec!["python3".to_owned()], |named| vec![named]);
+    let works = |python: &String| {
+        let tried = Command::new(python).args(["-c", "import onnxruntime, cv2, numpy"]).output();
+        tried.is_ok_and(|output| output.status.success())
+    };
+    let found = candidates.into_iter().find(works);
+    if found.is_none() {
+        eprintln!(
+            "SKIPPED: no Python with onnxruntime, opencv-python-headless and numpy (ORATOR_REFERENCE_PYTHON names one)"
+        );
+    }
+    found
+}
+
+/// The first `secs` of a shared clip, if it is there.
+fn clip(name: &str, secs: u32, dir: &Path) -> Option<PathBuf> {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/videos").join(name);
+    if !source.is_file() {
+        eprintln!("SKIPPED: no clip at {}", source.display());
+        return None;
+    }
+    let cut = dir.join("clip.mp4");
+    let command = ["-v", "error", "-y", "-t", &secs.to_string(), "-i"].map(str::to_owned);
+    let done = Command::new("ffmpeg").args(command).arg(&source).args(["-c:v", "copy", "-an"]).arg(&cut).status();
+    assert!(done.unwrap().success());
+    Some(cut)
+}
+
+fn median(mut numbers: Vec<f32>) -> f32 {
+    assert!(!numbers.is_empty(), "nothing to compare");
+    numbers.sort_by(f32::total_cmp);
+    numbers[numbers.len() / 2]
+}
+
+fn compare(name: &str, secs: u32) {
+    let (Some((models, runtime)), Some(python)) = (golden::models(), python()) else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let Some(clip) = clip(name, secs, dir.path()) else { return };
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/reference/pose_chain_reference.py");
+    let written = dir.path().join("reference.npz");
+    let mut command = Command::new(python);
+    command.arg(script).arg(&clip).arg(&written).env("MODELS", &models).env("OMP_NUM_THREADS", "1");
+    assert!(command.status().unwrap().success());
+    let reference = keypoints_npz::read(&written).unwrap();
+    let times = Npz::open(&written).unwrap().numbers("time_secs", &[None]).unwrap();
+
+    let settings = config::Pose2d { person: "person-yolox-nano".into(), ..config::Pose2d::default() };
+    let mut chain = Chain::new(&runtime, &Manifest::builtin().unwrap(), &models, &settings).unwrap();
+    let rate = FrameReader::open(&clip, orator::types::time::FrameRate::new(1, 1)).unwrap();
+    let rate = rate.info().video.as_ref().and_then(|video| video.fps).unwrap();
+    let wanted: Vec<usize> = times.iter().map(|secs| (secs * rate.per_sec()).round() as usize).collect();
+    let frames = FrameReader::open(&clip, rate).unwrap().map(Result::unwrap);
+    let chosen = frames.filter(|frame| wanted.contains(&frame.frame_idx));
+    let poses: Vec<Pose2d> = chosen.map(|frame| chain.frame(&frame.image).unwrap()).collect();
+    assert_eq!(poses.len(), reference.n_frames());
+
+    let at = |array: &ndarray::Array3<f32>, t: usize, k: usize| [0, 1, 2].map(|part| array[[t, k, part]]);
+    let away = |mine: &Keypoint, other: [f32; 3]| (mine.x - other[0]).hypot(mine.y - other[1]);
+    let (mut body, mut hands) = (Vec::new(), Vec::new());
+    let (mut n_agree, mut n_both) = (0, 0);
+    for (t, pose) in poses.iter().enumerate() {
+        for (k, mine) in pose.body.iter().enumerate() {
+            let other = at(&reference.body, t, k);
+            if mine.score.min(other[2]) >= MIN_SCORE {
+                body.push(away(mine, other));
+            }
+        }
+        for (mine, other) in [(&pose.left_hand, &reference.left_hand), (&pose.right_hand, &reference.right_hand)] {
+            let (found, there) = (mine[0].score > 0.0, other[[t, 0, 2]] > 0.0);
+            n_agree += usize::from(found == there);
+            n_both += usize::from(found && there);
+            if found && there {
+                hands.extend(mine.iter().enumerate().map(|(k, mine)| away(mine, at(other, t, k))));
+            }
+        }
+    }
+    let agreement = n_agree as f64 / (2 * poses.len()) as f64;
+    let (body, hands) = (median(body), median(hands));
+    eprintln!(
+        "{name}: {} frames, median body {body:.3} px, hands {hands:.3} px (found by both {n_both} times, agreement {:.1} %)",
+        poses.len(),
+        100.0 * agreement
+    );
+    assert!(body <= MAX_BODY_PX && hands <= MAX_HAND_PX && agreement >= MIN_AGREEMENT);
+}
+
+#[test]
+fn keypoints_equal_the_references_on_a_seated_speaker() {
+    compare("talk_tyson_2cam_17s_720p.mp4", 3);
+}
+
+#[test]
+fn keypoints_equal_the_references_at_1080p() {
+    compare("talk_oliver_wan_3.5s_1080p.mp4", 3);
+}

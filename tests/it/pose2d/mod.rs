@@ -1,0 +1,3 @@
+//! The chain of 2D models.
+
+pub mod pose_chain;

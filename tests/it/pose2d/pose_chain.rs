@@ -1,0 +1,123 @@
+//! The 2D chain and its stage on what real life brings: odd sizes, nobody there, shots, repeated frames.
+
+use crate::fixtures::clips;
+use crate::parity::golden;
+use ndarray::Array1;
+use ndarray_npy::NpzWriter;
+use orator::config;
+use orator::config::Settings;
+use orator::external::onnx::Manifest;
+use orator::formats::keypoints_npz;
+use orator::pipeline::pose2d::{Chain, Pose2dStage};
+use orator::stage::progress::Silent;
+use orator::stage::{Stage, Unit};
+use orator::types::image::Image;
+use orator::types::time::FrameRate;
+use std::fs::File;
+use std::path::Path;
+
+fn noise(width: usize, height: usize) -> Image {
+    let byte = |k: usize| (k.wrapping_mul(2_654_435_761) >> 13) as u8;
+    Image { width, height, data: (0..3 * width * height).map(byte).collect() }
+}
+
+#[test]
+fn any_picture_gives_finite_numbers() {
+    let Some((models, runtime)) = golden::models() else { return };
+    let manifest = Manifest::builtin().unwrap();
+    // Without a person detector the whole picture is the person, so that every model runs on nonsense.
+    for person in ["person-rtmdet-nano", "person-yolox-nano", ""] {
+        let settings = config::Pose2d {
+            person: person.into(),
+            joint_score: 0.0,
+            hand_score: 0.0,
+            palm_every: 1,
+            ..config::Pose2d::default()
+        };
+        let mut chain = Chain::new(&runtime, &manifest, &models, &settings).unwrap();
+        for (width, height) in [(1, 1), (3, 200), (641, 7), (320, 241)] {
+            for image in [noise(width, height), Image::filled(width, height, [0; 3])] {
+                let pose = chain.frame(&image).unwrap();
+                let points = pose.body.iter().chain(&pose.left_hand).chain(&pose.right_hand);
+                assert!(points.clone().all(|p| [p.x, p.y, p.score].iter().all(|number| number.is_finite())));
+                assert!(person.is_empty() || pose.person.score.is_finite());
+            }
+        }
+        chain.begin_shot();
+        assert!(chain.secs_inside() > 0.0);
+    }
+}
+
+#[test]
+fn settings_that_name_no_right_model_say_which() {
+    let Some((models, runtime)) = golden::models() else { return };
+    let manifest = Manifest::builtin().unwrap();
+    let said =
+        |settings: config::Pose2d| format!("{:#}", Chain::new(&runtime, &manifest, &models, &settings).err().unwrap());
+    let unknown = said(config::Pose2d { body: "nothing".into(), ..config::Pose2d::default() });
+    assert!(unknown.contains("pose2d.body") && unknown.contains("body-tinypose-256x192"), "{unknown}");
+    assert!(
+        said(config::Pose2d { person: "hand-mediapipe-lite".into(), ..config::Pose2d::default() }).contains("Hand")
+    );
+    assert!(said(config::Pose2d { hand: String::new(), ..config::Pose2d::default() }).contains("gives no hands"));
+}
+
+/// A unit with a video of `n` frames at 30 fps, its timeline at 15 fps, and the settings of a run in `dir`.
+fn unit(dir: &Path, n: usize, models: &Path) -> (Unit, Settings) {
+    let source = clips::write_sized(dir, "nobody.mp4", n, FrameRate::new(30, 1), [160, 96], None);
+    let unit = Unit { speaker: "host".into(), video: "nobody-00000000".into(), source };
+    let mut settings = Settings::default();
+    settings.work.dir = dir.join("work");
+    settings.models.dir = models.to_owned();
+    (unit, settings)
+}
+
+fn write_timeline(settings: &Settings, unit: &Unit, restart: Vec<bool>) {
+    let folder = settings.work.dir.join("extract").join(&unit.speaker).join(&unit.video);
+    std::fs::create_dir_all(&folder).unwrap();
+    let mut npz = NpzWriter::new(File::create(folder.join("timeline.npz")).unwrap());
+    npz.add_array("restart", &Array1::from(restart)).unwrap();
+    npz.finish().unwrap();
+}
+
+#[test]
+fn a_video_without_a_person_is_zeros_and_no_failure() {
+    let Some((models, _)) = golden::models() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let (unit, settings) = unit(dir.path(), 20, &models);
+    write_timeline(&settings, &unit, (0..10).map(|t| t == 6).collect());
+    let stage = Pose2dStage::new(&settings).unwrap();
+    let roles: Vec<_> = stage.inputs(&unit).unwrap().into_iter().map(|input| input.role).collect();
+    assert_eq!(roles, ["video", "timeline", "model:person", "model:body", "model:hand", "model:palm"]);
+    assert!(stage.settings(&unit)["models"]["body"]["sha256"].is_string());
+    let written: Vec<_> = ["a", "b"]
+        .iter()
+        .map(|name| {
+            let out = dir.path().join(name);
+            std::fs::create_dir(&out).unwrap();
+            let report = stage.run(&unit, &out, &Silent).unwrap();
+            assert!(report.line.starts_with("10 frames: person in 0 %"), "{}", report.line);
+            let path = out.join("keypoints.npz");
+            let keypoints = keypoints_npz::read(&path).unwrap();
+            assert_eq!((keypoints.n_frames(), keypoints.image_size), (10, [160, 96]));
+            assert!(keypoints.body.iter().chain(&keypoints.left_hand).all(|number| *number == 0.0));
+            std::fs::read(path).unwrap()
+        })
+        .collect();
+    assert_eq!(written[0], written[1]);
+}
+
+#[test]
+fn a_timeline_of_another_video_and_a_missing_model_are_errors() {
+    let Some((models, _)) = golden::models() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let (unit, mut settings) = unit(dir.path(), 20, &models);
+    for n_frames in [3, 12] {
+        write_timeline(&settings, &unit, vec![false; n_frames]);
+        let said = Pose2dStage::new(&settings).unwrap().run(&unit, dir.path(), &Silent).unwrap_err().to_string();
+        assert!(said.contains(&format!("its timeline has {n_frames}")), "{said}");
+    }
+    settings.models.dir = dir.path().to_owned();
+    let said = Pose2dStage::new(&settings).unwrap().inputs(&unit).unwrap_err().to_string();
+    assert!(said.contains("person_rtmdet_nano_320.onnx") && said.contains("orator models fetch"), "{said}");
+}

@@ -1,0 +1,5 @@
+//! Pages for people.
+
+pub mod evaluate_page;
+pub mod report;
+pub mod sheet;

@@ -1,0 +1,109 @@
+//! The report on a run: its numbers are those of the ledgers, no name becomes markup, a browser opens it without a complaint,
+//! and a slider says what a run with that threshold then keeps.
+
+use crate::fixtures::browser::Browser;
+use crate::fixtures::support::{Answer, Project};
+use serde_json::Value;
+use std::path::Path;
+
+const NAME: &str = "a <b> & \"c\" 'd'.mp4";
+/// Strict enough to refuse parts of what the synthetic speaker does.
+const STRICT: [&str; 4] = ["--set", "segment.max_body_gap_secs=0.1", "--set", "segment.min_frames=20"];
+
+fn report(project: &Project, args: &[&str]) -> (Answer, String) {
+    let answer = project.answer(&[&["report", "--out", "deep/r.html"], args].concat());
+    assert_eq!(answer.code, 0, "{}", answer.errors);
+    let html = std::fs::read_to_string(project.dir().join("deep/r.html")).unwrap();
+    (answer, html)
+}
+
+fn secs(value: &Value) -> f64 {
+    value.as_f64().or_else(|| value.as_str()?.parse().ok()).unwrap()
+}
+
+#[test]
+fn a_page_opens_draws_and_its_sliders_tell_what_a_run_then_keeps() {
+    let project = Project::with_clips("report", 1, 8.0);
+    std::fs::rename(&project.clips()[0], project.video(NAME)).unwrap();
+    std::fs::write(project.video("broken.mp4"), "no video").unwrap();
+    assert_eq!(project.run(&[&["--to", "lift"], &STRICT[..]].concat()).code, 2);
+    let (answer, html) = report(&project, &STRICT);
+    let facts = &answer.json;
+    assert_eq!((&facts["n_videos"], &facts["bytes"]), (&2.into(), &html.len().into()));
+    let refused: f64 = facts["refused_secs"].as_object().unwrap().values().map(secs).sum();
+    let kept = secs(&facts["kept_secs"]);
+    assert!(refused > 0.0 && kept > 0.0 && (refused + kept - secs(&facts["duration_secs"])).abs() < 1e-6, "{facts}");
+    assert!(html.len() < 1_000_000 && !html.contains("<b>") && !html.contains("://"));
+    assert!(!html.contains(&*project.dir().to_string_lossy()), "a folder of this machine is told");
+    assert_eq!(html, report(&project, &STRICT).1, "the same again");
+    look(&project, facts);
+}
+
+/// What a browser sees of the page.
+fn look(project: &Project, facts: &Value) {
+    let Some(mut browser) = Browser::open(&project.dir().join("deep/r.html"), [1200, 900]) else { return };
+    let mut count = |selector: &str| browser.value(&format!("document.querySelectorAll('{selector}').length"));
+    assert_eq!(count(".timeline > li"), facts["n_stretches"]);
+    assert_eq!(count(".shot img"), facts["n_pictures"]);
+    assert_eq!(count("#reasons tbody tr"), facts["refused_secs"].as_object().unwrap().len() + 1);
+    assert_eq!(
+        (count("input[type=range]"), count(".distribution svg"), count(".range svg")),
+        (16.into(), 15.into(), 6.into())
+    );
+    assert!(facts["n_pictures"].as_u64().unwrap() > 0);
+    let flat = "[...document.querySelectorAll('svg, .timeline > li, .bar')].filter(e => { const b = e.getBoundingClientRect(); \
+                return !(b.width > 0 && b.height > 0) }).length";
+    let unread =
+        "[...document.querySelectorAll('.shot img')].map(i => { i.loading = 'eager'; return i.decode() }).length";
+    let named = "[...document.querySelectorAll('.videos th a')].map(a => a.textContent).join('|')";
+    assert_eq!((browser.value(flat), browser.value(unread)), (0.into(), facts["n_pictures"].clone()));
+    assert_eq!(browser.value(named), format!("{NAME}|broken.mp4"));
+    for (width, scheme) in [(360, "dark"), (768, "light"), (1200, "light")] {
+        browser.resize([width, 800]);
+        browser.colours(scheme);
+        let wide = browser.value("document.documentElement.scrollWidth");
+        assert!(wide.as_u64().unwrap() <= u64::from(width), "{wide} px wide in a window of {width} px");
+    }
+    // the keys walk a line, and what a stretch says is shown
+    browser.value("document.querySelector('.timeline').focus()");
+    browser.press("ArrowRight");
+    let tip = browser.value("document.getElementById('tip').hidden ? '' : document.getElementById('tip').textContent");
+    assert!(tip.as_str().unwrap().starts_with("0:00.0 to "), "{tip}");
+    let now = secs(&browser.value("document.getElementById('now').dataset.secs"));
+    assert!((now - secs(&facts["kept_secs"])).abs() < 1e-3, "{now}");
+    let moved = "(() => { const s = document.getElementById('slider-max_body_gap_secs'); s.value = 4; \
+                 s.dispatchEvent(new Event('input', { bubbles: true })); \
+                 return [document.getElementById('now').dataset.secs, document.getElementById('toml').textContent, \
+                 document.querySelector('#by-video td.num').textContent].join('|') })()";
+    let moved = browser.value(moved);
+    let [then, toml, video] = moved.as_str().unwrap().split('|').collect::<Vec<_>>()[..] else { panic!("{moved}") };
+    let then: f64 = then.parse().unwrap();
+    assert!(then > now && video == format!("{then:.1} s"), "{moved}, {now} s before");
+    assert!(browser.problems.is_empty(), "{:?}", browser.problems);
+    // a run with the line that the page gives keeps what the page says
+    let set = toml.replace("[segment]\n", "segment.").replace(" = ", "=");
+    assert!(set.starts_with("segment.max_body_gap_secs=0.2"), "{toml}");
+    let set = ["--set", STRICT[3], "--set", &set];
+    project.run(&[&["--to", "lift"], &set[..]].concat());
+    let kept = secs(&report(project, &set).0.json["kept_secs"]);
+    assert!((kept - then).abs() < 1e-3, "the page says {then} s, the run keeps {kept} s");
+}
+
+#[test]
+fn what_is_missing_is_said_on_the_page() {
+    let project = Project::with_clips("nothing-done", 1, 1.0);
+    let clip = project.clips().remove(0);
+    let gone = project.video("gone.mp4");
+    project.name_videos(&[&clip.to_string_lossy(), &gone.to_string_lossy(), "none-*.mp4"]);
+    let (answer, html) = report(&project, &[]);
+    assert_eq!((&answer.json["n_videos"], &answer.json["kept_secs"]), (&2.into(), &0.0.into()));
+    for words in ["The file is gone", "No verdict yet: orator run.", "none-*.mp4: no file matches", "no motion to show"]
+    {
+        assert!(html.contains(words), "{words}");
+    }
+    if let Some(browser) = Browser::open(Path::new(&project.dir().join("deep/r.html")), [800, 600]) {
+        assert!(browser.problems.is_empty(), "{:?}", browser.problems);
+    }
+    let wrong = project.answer(&["report", "--speaker", "nobody"]);
+    assert!(wrong.code == 1 && wrong.errors.contains("no speaker is called nobody"), "{}", wrong.errors);
+}

@@ -1,0 +1,75 @@
+//! A run that is killed anywhere and resumed ends in the same bytes, and does nothing twice. `ORATOR_KILLS` says how
+//! often it is killed (`make prove`: 20).
+
+use crate::fixtures::support::{Project, files_under};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::{Duration, Instant, SystemTime};
+
+/// Every record under `work` with its time of change: done, and when.
+fn records(work: &Path) -> BTreeMap<String, SystemTime> {
+    let files = files_under(work).into_iter().filter(|(name, _)| name.ends_with(".record.json"));
+    files.filter_map(|(name, path)| Some((name, path.metadata().ok()?.modified().ok()?))).collect()
+}
+
+fn dataset(work: &Path) -> BTreeMap<String, Vec<u8>> {
+    let files = files_under(&work.join("dataset")).into_iter();
+    files
+        .filter(|(name, _)| !name.contains("attempt"))
+        .map(|(name, path)| (name, std::fs::read(path).unwrap()))
+        .collect()
+}
+
+#[test]
+fn killed_anywhere_a_run_resumes_to_the_same_bytes() {
+    let n_kills: u32 = std::env::var("ORATOR_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(4);
+    let calm = Project::with_clips("calm", 2, 6.0);
+    let begun = Instant::now();
+    assert_eq!(calm.run(&[]).code, 0);
+    let whole = begun.elapsed();
+    let expected = dataset(&calm.work());
+    assert!(expected.keys().any(|name| name.ends_with(".tar")));
+
+    let killed = Project::with_clips("killed", 2, 6.0);
+    let (mut before, mut n_killed, mut random) = (BTreeMap::new(), 0, 0x9e37_79b9_7f4a_7c15_u64);
+    // A run that ended before its kill is no kill: it is checked, wiped away, and another begun.
+    for _ in 0..20 * n_kills {
+        if n_killed == n_kills {
+            break;
+        }
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let share = (random >> 33) as f64 / f64::from(1u32 << 31);
+        let mut child = killed.start(&["run"]);
+        std::thread::sleep(Duration::from_secs_f64(0.02 + share * whole.as_secs_f64()));
+        n_killed += u32::from(child.try_wait().unwrap().is_none());
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let now = records(&killed.work());
+        for (name, time) in &before {
+            assert_eq!(now.get(name), Some(time), "{name} was done again");
+        }
+        before = now;
+        if before.keys().any(|name| name.starts_with("dataset")) {
+            assert!(dataset(&killed.work()) == expected, "the dataset differs after {n_killed} kills");
+            std::fs::remove_dir_all(killed.work()).unwrap();
+            before.clear();
+        }
+    }
+    assert_eq!(n_killed, n_kills, "runs killed at work");
+    assert_eq!(killed.run(&[]).code, 0);
+    let after = records(&killed.work());
+    for (name, time) in &before {
+        assert_eq!(after.get(name), Some(time), "{name} was done again by the last run");
+    }
+    assert!(dataset(&killed.work()) == expected, "the dataset differs after {n_killed} kills");
+    eprintln!("killed {n_killed} runs at work; the dataset is the same to the byte");
+}
+
+#[test]
+fn the_number_of_workers_changes_no_byte() {
+    let one = Project::with_clips("one-worker", 2, 5.0);
+    let two = Project::with_clips("two-workers", 2, 5.0);
+    assert_eq!(one.run(&["--jobs", "1"]).code, 0);
+    assert_eq!(two.run(&["--jobs", "2"]).code, 0);
+    assert!(dataset(&one.work()) == dataset(&two.work()));
+}

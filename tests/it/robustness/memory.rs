@@ -1,0 +1,109 @@
+//! Peak memory does not grow with the length of a video, and lifting holds no more than its arrays. `ORATOR_LONG=1`
+//! (`make prove`) compares a 10-minute video with a 1-minute one, and an hour of keypoints with a minute; otherwise short
+//! twins.
+
+use crate::fixtures::clips;
+use crate::fixtures::clips::ffmpeg;
+use crate::fixtures::support::Project;
+use crate::generate::generate::write_untrained_speaker;
+use crate::lift::lift::keypoints;
+use ndarray::{Array3, s};
+use ndarray_npy::NpzWriter;
+use orator::external::ffmpeg::audio::write_wav;
+use orator::train::scene::body::{Filming, Scene};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+/// Peak resident memory in MiB of a program until it ends, well.
+fn peak_mib(mut child: Child) -> f64 {
+    let status = format!("/proc/{}/status", child.id());
+    let mut peak = 0.0_f64;
+    while child.try_wait().unwrap().is_none() {
+        let text = std::fs::read_to_string(&status).unwrap_or_default();
+        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let kib = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
+        peak = peak.max(kib.unwrap_or(0.0) / 1024.0);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(child.wait().unwrap().success());
+    peak
+}
+
+/// Peak resident memory in MiB of a whole run over one video.
+fn peak_of_run(project: &Project) -> f64 {
+    peak_mib(project.start(&["run", "--jobs", "1", "--to", "lift"]))
+}
+
+#[test]
+fn peak_memory_stays_with_a_longer_video() {
+    let (secs, times) = if std::env::var("ORATOR_LONG").is_ok() { (60.0, 10) } else { (4.0, 6) };
+    let short = Project::with_clips("short", 1, secs);
+    let long = Project::with_clips("long", 0, 0.0);
+    let clip = short.clips().remove(0);
+    let (clip, out) = (clip.to_string_lossy(), long.video("long.mp4"));
+    assert!(ffmpeg(long.dir(), &format!("-stream_loop {} -i {clip} -c copy {}", times - 1, out.display())));
+    let (short, long) = (peak_of_run(&short), peak_of_run(&long));
+    eprintln!(
+        "peak memory {short:.0} MiB at {secs} s, {long:.0} MiB at {} s: ratio {:.2}",
+        secs * f64::from(times),
+        long / short
+    );
+    assert!(short > 10.0 && long <= 1.2 * short, "{short:.0} MiB became {long:.0} MiB");
+}
+
+/// Peak resident memory in MiB of `orator lift` of so many frames, and of the arrays that it reads and writes.
+fn peak_of_lift(n_frames: usize) -> (f64, f64) {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let minute = keypoints(&Scene::of_rule(Filming::Training, 900, &mut rng), &mut rng);
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("k.npz");
+    let mut npz = NpzWriter::new(std::fs::File::create(&path).unwrap());
+    for (name, points) in [("body", &minute.body), ("left_hand", &minute.left_hand), ("right_hand", &minute.right_hand)]
+    {
+        let mut all = Array3::<f32>::zeros((n_frames, points.dim().1, 3));
+        all.outer_iter_mut().enumerate().for_each(|(t, mut frame)| frame.assign(&points.slice(s![t % 900, .., ..])));
+        npz.add_array(name, &all).unwrap();
+    }
+    npz.finish().unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+    command.arg("lift").arg(&path).arg("--out").arg(dir.path().join("j.npy"));
+    let peak = peak_mib(command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
+    let bytes_a_frame = 4 * 3 * (17 + 21 + 21 + 49 + 3) + 49;
+    (peak, (n_frames * bytes_a_frame) as f64 / f64::from(1 << 20))
+}
+
+#[test]
+fn lifting_holds_its_arrays_and_little_more() {
+    let n_frames = if std::env::var("ORATOR_LONG").is_ok() { 54_000 } else { 9_000 };
+    let ((short, short_arrays), (long, long_arrays)) = (peak_of_lift(900), peak_of_lift(n_frames));
+    let (grown, arrays) = (long - short, long_arrays - short_arrays);
+    eprintln!(
+        "900 frames {short:.0} MiB, {n_frames} frames {long:.0} MiB: {grown:.0} MiB more, the arrays {arrays:.0}"
+    );
+    assert!(short > 10.0 && grown <= 1.4 * arrays + 32.0, "{grown:.0} MiB more for {arrays:.0} MiB of arrays");
+}
+
+/// Peak resident memory in MiB of `orator generate` from so many seconds of sound to joints, and of these joints.
+fn peak_of_generate(secs: f64) -> (f64, f64) {
+    let dir = tempfile::tempdir().unwrap();
+    write_untrained_speaker(&dir.path().join("host.safetensors"));
+    write_wav(&dir.path().join("speech.wav"), &clips::tone(16_000, secs, 220.0)).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+    command.args(["generate", "--checkpoint", "host.safetensors", "--audio", "speech.wav", "--out", "a.npy"]);
+    let peak = peak_mib(command.current_dir(dir.path()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
+    (peak, secs * 15.0 * 49.0 * 3.0 * 4.0 / f64::from(1 << 20))
+}
+
+#[test]
+fn a_long_sound_takes_no_memory_but_for_its_motion() {
+    let secs = if std::env::var("ORATOR_LONG").is_ok() { 10_800.0 } else { 900.0 };
+    let ((short, short_joints), (long, long_joints)) = (peak_of_generate(150.0), peak_of_generate(secs));
+    let (grown, joints) = (long - short, long_joints - short_joints);
+    let sound = (secs - 150.0) * 16_000.0 * 4.0 / f64::from(1 << 20);
+    eprintln!(
+        "150 s {short:.0} MiB, {secs} s {long:.0} MiB: {grown:.0} MiB more, joints {joints:.0}, sound {sound:.0}"
+    );
+    assert!(short > 10.0 && grown <= 2.2 * joints + 24.0, "{grown:.0} MiB more for {joints:.0} MiB of joints");
+}

@@ -1,0 +1,6 @@
+//! Kills, memory, bad input.
+
+pub mod bad_input;
+pub mod kill;
+pub mod memory;
+pub mod runner;

@@ -1,0 +1,4 @@
+//! What is kept and what is refused.
+
+pub mod redecide;
+pub mod segment;

@@ -1,0 +1,248 @@
+//! The generator's training end to end on a small made-up speaker whose arms follow the pitch of a tone: it learns,
+//! resumes exactly, stops when it breaks, and its checkpoint generates.
+
+use ndarray::{Array2, Array3};
+use orator::config::Gan;
+use orator::dataset::{Dataset, Sample, Split, write_dataset};
+use orator::generate::Speaker;
+use orator::stage::progress::{Progress, Silent, Task};
+use orator::train::gan::train::{BEST, train};
+use orator::types::pose3d::Motion;
+use orator::types::skeleton::{N_JOINTS, R_HAND, R_WRIST, parent};
+use orator::types::sound::Sound;
+use orator::types::sync;
+use orator::types::time::FrameRate;
+use std::f64::consts::TAU;
+use std::panic::AssertUnwindSafe;
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+
+pub const FPS: FrameRate = FrameRate::new(15, 1);
+
+/// An interval whose tone and pose follow one slow curve.
+pub fn sample(key: &str, n_frames: usize, phase: f64) -> Sample {
+    let curve = |secs: f64| (TAU * 0.23 * secs + phase).sin() + 0.5 * (TAU * 0.61 * secs + 2.0 * phase).sin();
+    let mut joints = Array3::<f32>::zeros((n_frames, N_JOINTS, 3));
+    for t in 0..n_frames {
+        for joint in 1..N_JOINTS {
+            let from = parent(joint).unwrap_or(0);
+            let angle = 0.4 * joint as f64 + 0.8 * curve(FPS.secs(t));
+            let length = if joint == 7 || joint == R_HAND { 0.0 } else { 0.05 + 0.002 * joint as f64 };
+            for (k, direction) in [angle.cos(), angle.sin(), 0.2].into_iter().enumerate() {
+                joints[[t, joint, k]] = joints[[t, from, k]] + (length * direction) as f32;
+            }
+        }
+    }
+    let mut turn = 0.0;
+    let samples = (0..sync::sample_at(FPS, 16_000, n_frames)).map(|i| {
+        turn += TAU * (600.0 + 250.0 * curve(i as f64 / 16_000.0)) / 16_000.0;
+        0.3 * turn.sin() as f32
+    });
+    let sound = Sound { rate: 16_000, samples: samples.collect() };
+    let mut mask = Array2::from_elem((n_frames, N_JOINTS), true);
+    mask.row_mut(n_frames / 2).fill(false);
+    joints[[n_frames / 2, 5, 0]] = f32::NAN;
+    let pose2d = Array3::zeros((n_frames, 59, 3));
+    Sample { key: key.into(), motion: Motion { fps: FPS, joints, mask }, pose2d, sound, meta: serde_json::json!({}) }
+}
+
+pub fn dataset(folder: &Path) -> Dataset {
+    let samples = [
+        (Split::Train, sample("a-00000000-000000", 99, 0.0)),
+        (Split::Train, sample("b-00000000-000000", 64, 2.0)),
+        (Split::Validation, sample("c-00000000-000000", 128, 4.0)),
+    ];
+    write_dataset(folder, "host", FPS, &samples).unwrap();
+    Dataset::open(folder).unwrap()
+}
+
+fn settings() -> Gan {
+    Gan { batch: 2, steps: 6, epoch_steps: 3, checkpoint_every: 2, keep_checkpoints: 2, ..Gan::default() }
+}
+
+/// Every file of a training but its lock.
+fn bytes(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
+    files.retain(|path| name(path) != ".lock");
+    files.iter().map(|path| (name(path), std::fs::read(path).unwrap())).collect()
+}
+
+/// Ends the training by a panic once so many steps are done: as a kill does, between any two writes.
+struct Stop {
+    at: u64,
+    done: AtomicU64,
+    said: Mutex<Vec<String>>,
+}
+
+impl Stop {
+    fn at(step: u64) -> Arc<Self> {
+        Arc::new(Self { at: step, done: AtomicU64::new(0), said: Mutex::new(Vec::new()) })
+    }
+}
+
+struct Shared(Arc<Stop>);
+
+impl Progress for Shared {
+    fn begin(&self, _label: &str, _total: u64) -> Box<dyn Task> {
+        Box::new(Shared(self.0.clone()))
+    }
+    fn say(&self, line: &str) {
+        self.0.said.lock().unwrap().push(line.to_owned());
+    }
+}
+
+impl Task for Shared {
+    fn advance(&self, steps: u64) {
+        let done = self.0.done.fetch_add(steps, Ordering::Relaxed) + steps;
+        assert!(done != self.0.at, "stopped by the test");
+    }
+    fn detail(&self, _text: &str) {}
+}
+
+#[test]
+fn a_training_stopped_at_any_step_ends_with_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let dataset = dataset(&folder.path().join("dataset"));
+    for (name, stops, settings) in [
+        ("bones", vec![1, 2, 3, 4, 5, 6], settings()),
+        (
+            "positions",
+            vec![4],
+            Gan { representation: "positions".into(), adversarial: "log".into(), lambda_velocity: 0.5, ..settings() },
+        ),
+    ] {
+        let place = |part: &str| folder.path().join(format!("{name}-{part}"));
+        let outcome = train(&dataset, &settings, &place("whole"), &Silent).unwrap();
+        assert_eq!((outcome.steps, outcome.n_windows, outcome.validation.n_windows), (6, 9, 2));
+        assert_eq!(outcome.validation.split, "validation");
+        let whole = bytes(&place("whole"));
+        let names: Vec<&str> = whole.iter().map(|(name, _)| name.as_str()).collect();
+        assert!(
+            ["metrics.jsonl", BEST, "step-0000004.safetensors", "step-0000006.safetensors"]
+                .iter()
+                .all(|n| names.contains(n))
+        );
+        for stop in stops {
+            let parts = place(&stop.to_string());
+            let progress = Shared(Stop::at(stop));
+            let stopped = std::panic::catch_unwind(AssertUnwindSafe(|| train(&dataset, &settings, &parts, &progress)));
+            assert!(stopped.is_err());
+            let resumed = train(&dataset, &settings, &parts, &Silent).unwrap();
+            assert_eq!((resumed.began_at, resumed.steps), ([0, 0, 2, 3, 4, 4][stop as usize - 1], 6));
+            for ((name, whole), (_, parts)) in whole.iter().zip(bytes(&parts)) {
+                assert!(*whole == parts, "{name} differs after a stop at step {stop}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_checkpoints_settings_win_and_differences_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let dataset = dataset(&folder.path().join("dataset"));
+    let out = folder.path().join("out");
+    train(&dataset, &Gan { steps: 3, ..settings() }, &out, &Silent).unwrap();
+    let stop = Stop::at(u64::MAX);
+    let other = Gan { learning_rate: 1e-3, preset: "paper".into(), representation: "positions".into(), ..settings() };
+    train(&dataset, &other, &out, &Shared(stop.clone())).unwrap();
+    let said = stop.said.lock().unwrap().join("\n");
+    for key in ["gan.learning_rate", "gan.preset", "gan.representation"] {
+        assert!(said.contains(key), "{said}");
+    }
+    let whole = folder.path().join("whole");
+    train(&dataset, &settings(), &whole, &Silent).unwrap();
+    let last = |folder: &Path| std::fs::read(orator::formats::checkpoint::path(folder, 6)).unwrap();
+    assert!(last(&out) == last(&whole), "the checkpoint's settings did not count");
+
+    // Another speaker's dataset is refused, a grown one of the same speaker is told.
+    let grown = [
+        (Split::Train, sample("d-00000000-000000", 99, 1.0)),
+        (Split::Validation, sample("e-00000000-000000", 64, 4.0)),
+    ];
+    let second = folder.path().join("second");
+    write_dataset(&second, "host", FPS, &grown).unwrap();
+    let stop = Stop::at(u64::MAX);
+    let longer = Gan { steps: 7, ..settings() };
+    train(&Dataset::open(&second).unwrap(), &longer, &out, &Shared(stop.clone())).unwrap();
+    assert!(stop.said.lock().unwrap().join("\n").contains("the dataset is another now"));
+    let third = folder.path().join("third");
+    write_dataset(&third, "guest", FPS, &grown).unwrap();
+    let error = train(&Dataset::open(&third).unwrap(), &longer, &out, &Silent).unwrap_err();
+    assert!(format!("{error:#}").contains("guest"), "{error:#}");
+}
+
+#[test]
+fn patience_ends_a_training_whose_score_does_not_fall() {
+    let folder = tempfile::tempdir().unwrap();
+    let dataset = dataset(&folder.path().join("dataset"));
+    let out = folder.path().join("out");
+    // Steps too small to change anything: the first score is never beaten.
+    let settings = Gan { steps: 40, epoch_steps: 1, patience: 3, learning_rate: 1e-30, lambda_gan: 0.0, ..settings() };
+    let outcome = train(&dataset, &settings, &out, &Silent).unwrap();
+    assert!(outcome.stopped_early && outcome.steps < 40, "{outcome:?}");
+    assert_eq!(outcome.steps, outcome.best_step + 3);
+    let again = train(&dataset, &settings, &out, &Silent).unwrap();
+    assert!(again.stopped_early && again.began_at == outcome.steps);
+}
+
+#[test]
+fn a_few_windows_are_learnt_by_heart_and_spoken() {
+    let folder = tempfile::tempdir().unwrap();
+    let dataset_folder = folder.path().join("dataset");
+    let long = sample("a-00000000-000000", 64 + 7 * 5, 0.0);
+    write_dataset(&dataset_folder, "host", FPS, &[(Split::Train, long.clone())]).unwrap();
+    let dataset = Dataset::open(&dataset_folder).unwrap();
+    let settings = Gan {
+        batch: 4,
+        steps: 60,
+        learning_rate: 2e-3,
+        lambda_gan: 0.0,
+        epoch_steps: 1_000,
+        checkpoint_every: 1_000,
+        ..Gan::default()
+    };
+    let out = folder.path().join("out");
+    let outcome = train(&dataset, &settings, &out, &Silent).unwrap();
+    let validation = outcome.validation;
+    let (made, still) = (validation.generator, validation.mean_pose);
+    assert_eq!((validation.split.as_str(), outcome.n_windows), ("train", 8));
+    let log = std::fs::read_to_string(out.join("metrics.jsonl")).unwrap();
+    let l1 = |line: &str| serde_json::from_str::<serde_json::Value>(line).unwrap()["l1"].as_f64();
+    assert!(log.lines().filter_map(l1).any(|l1| l1 < 0.1), "{log}");
+    assert!(made.l1 < 0.3 * still.l1 && made.pck > still.pck, "{validation:?}");
+    assert!((0.7..1.3).contains(&made.energy) && made.frechet < still.frechet, "{validation:?}");
+    assert!(validation.bone_change_mm < 0.01 && validation.alarm.is_none(), "{validation:?}");
+
+    let speaker = Speaker::open(&out).unwrap();
+    let motion = speaker.motion(&long.sound).unwrap();
+    assert_eq!((speaker.name(), motion.n_frames()), ("host", 99));
+    assert!(motion.joints.iter().all(|v| v.is_finite()));
+    for t in 0..99 {
+        for k in 0..3 {
+            assert_eq!(motion.joints[[t, 0, k]], 0.0);
+            assert_eq!(motion.joints[[t, R_HAND, k]], motion.joints[[t, R_WRIST, k]]);
+        }
+    }
+    let short = Sound { rate: 16_000, samples: long.sound.samples[..3_000].to_vec() };
+    assert_eq!(speaker.motion(&short).unwrap().n_frames(), 2);
+    let nothing = Sound { rate: 16_000, samples: Vec::new() };
+    assert!(speaker.motion(&nothing).is_err());
+    assert!(speaker.motion(&Sound { rate: 8_000, ..short }).is_err());
+    assert!(Speaker::open(&dataset_folder.join("info.json")).is_err());
+}
+
+#[test]
+fn a_training_that_explodes_keeps_its_last_good_checkpoint() {
+    let folder = tempfile::tempdir().unwrap();
+    let dataset = dataset(&folder.path().join("dataset"));
+    let out = folder.path().join("out");
+    let wild = Gan { learning_rate: 1e30, checkpoint_every: 1, steps: 50, ..settings() };
+    let error = format!("{:#}", train(&dataset, &wild, &out, &Silent).unwrap_err());
+    assert!(error.contains("the training broke") && error.contains("learning_rate"), "{error}");
+    let none = Gan { window_frames: 128, ..settings() };
+    assert!(format!("{:#}", train(&dataset, &none, &out, &Silent).unwrap_err()).contains("window"));
+    assert!(train(&dataset, &Gan { window_frames: 50, ..settings() }, &out, &Silent).is_err());
+}

@@ -1,0 +1,107 @@
+//! Training by the program itself: killed anywhere and resumed, it ends with the weights of a training that was left
+//! alone; and with two speakers each has a model of its own, which needs nothing but its file to generate.
+//! `ORATOR_KILLS` says how often it is killed (`make prove`: 20).
+
+use super::gan::{FPS, sample};
+use crate::fixtures::clips;
+use orator::dataset::{Split, write_dataset};
+use orator::external::ffmpeg::audio;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+const CONFIG: &str = r#"
+[[speaker]]
+name = "anna"
+videos = ["videos/anna/*.mp4"]
+[[speaker]]
+name = "ben"
+videos = ["videos/ben/*.mp4"]
+[gan]
+batch = 2
+epoch_steps = 4
+checkpoint_every = 3
+"#;
+
+/// A project of two speakers with a small dataset each.
+fn project(dir: &Path) {
+    std::fs::write(dir.join("pipeline.toml"), CONFIG).unwrap();
+    for (speaker, phase) in [("anna", 0.0), ("ben", 1.5)] {
+        let samples = [
+            (Split::Train, sample("a-00000000-000000", 99, phase)),
+            (Split::Validation, sample("c-00000000-000000", 64, phase + 4.0)),
+        ];
+        write_dataset(&dir.join("work/dataset").join(speaker), speaker, FPS, &samples).unwrap();
+    }
+}
+
+fn orator(dir: &Path, args: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+    command.args(args.split_whitespace()).current_dir(dir).stdout(Stdio::null()).stderr(Stdio::null());
+    command
+}
+
+fn train(dir: &Path, out: &str, steps: usize) -> Child {
+    orator(dir, &format!("train gan --speaker anna --out {out} --steps {steps}")).spawn().unwrap()
+}
+
+#[test]
+fn killed_anywhere_a_training_resumes_to_the_same_weights() {
+    let n_kills: u32 = std::env::var("ORATOR_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(3);
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    project(dir);
+    let steps = 12;
+    let begun = Instant::now();
+    assert!(train(dir, "calm", steps).wait().unwrap().success());
+    let whole = begun.elapsed();
+    let read = |out: &str, file: &str| std::fs::read(dir.join(out).join(file)).unwrap();
+    let last = "step-0000012.safetensors";
+    let (mut n_killed, mut random, mut round) = (0, 0x9e37_79b9_7f4a_7c15_u64, 0);
+    while n_killed < n_kills {
+        let out = format!("killed-{round}");
+        loop {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let share = (random >> 33) as f64 / f64::from(1u32 << 31);
+            let mut child = train(dir, &out, steps);
+            std::thread::sleep(Duration::from_secs_f64(0.1 + share * whole.as_secs_f64()));
+            let ended = n_killed == n_kills || child.try_wait().unwrap().is_some();
+            if ended {
+                assert!(child.wait().unwrap().success());
+                break;
+            }
+            child.kill().unwrap();
+            child.wait().unwrap();
+            n_killed += 1;
+        }
+        for file in [last, "best.safetensors", "metrics.jsonl"] {
+            assert!(read(&out, file) == read("calm", file), "{file} differs after {n_killed} kills");
+        }
+        round += 1;
+    }
+    eprintln!("killed {n_killed} trainings at work; weights, best and log are the same to the byte");
+}
+
+#[test]
+fn each_speaker_has_a_model_that_needs_only_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    project(dir);
+    let run = |args: &str| orator(dir, args).status().unwrap().success();
+    assert!(!run("train gan --steps 2"), "which speaker?");
+    assert!(!run("train gan --steps 2 --speaker carl"));
+    for speaker in ["anna", "ben"] {
+        assert!(run(&format!("train gan --steps 2 --speaker {speaker}")));
+    }
+    let models = ["anna", "ben"]
+        .map(|speaker| std::fs::read(dir.join("work/gan").join(speaker).join("best.safetensors")).unwrap());
+    assert!(models[0] != models[1]);
+    // Far from its project, the one file generates.
+    let elsewhere = tempfile::tempdir().unwrap();
+    std::fs::write(elsewhere.path().join("ben.safetensors"), &models[1]).unwrap();
+    audio::write_wav(&elsewhere.path().join("speech.wav"), &clips::tone(16_000, 2.0, 220.0)).unwrap();
+    drop(folder);
+    let generate = "generate --checkpoint ben.safetensors --audio speech.wav --out motion.npy";
+    assert!(orator(elsewhere.path(), generate).status().unwrap().success());
+    assert!(elsewhere.path().join("motion.npy").is_file());
+}

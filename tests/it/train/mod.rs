@@ -1,0 +1,7 @@
+//! Operators, networks, training.
+
+pub mod gan;
+pub mod gan_program;
+pub mod networks;
+pub mod operators;
+pub mod rule;

@@ -1,0 +1,110 @@
+//! The networks give what the same networks in PyTorch give (`fixtures/reference/networks_reference.py`), weights and
+//! inputs being filled by one formula on both sides.
+
+use candle_core::{DType, Device, Result, Tensor};
+use orator::nn::Mode;
+use orator::nn::gan::discriminator::Discriminator;
+use orator::nn::gan::generator;
+use orator::nn::gan::generator::{Config, Generator, Preset};
+use orator::nn::lifter::temporal;
+use orator::nn::lifter::temporal::TemporalLifter;
+use orator::nn::motion_encoder;
+use orator::nn::motion_encoder::AutoEncoder;
+use orator::nn::ops::gradcheck::pattern;
+use orator::nn::params::Params;
+use std::collections::BTreeMap;
+
+#[derive(serde::Deserialize)]
+struct Golden {
+    shape: Vec<usize>,
+    values: Vec<f64>,
+}
+
+fn golden(name: &str) -> Golden {
+    let text = include_str!("../../../fixtures/reference/networks_golden.json");
+    let mut all: BTreeMap<String, Golden> = serde_json::from_str(text).unwrap();
+    all.remove(name).unwrap()
+}
+
+/// The formula's number of a name.
+pub fn phase(name: &str) -> f64 {
+    (name.bytes().enumerate().map(|(k, c)| (k + 1) * usize::from(c)).sum::<usize>() % 1009) as f64
+}
+
+/// The formula of the references: a tensor by its name and shape.
+pub fn value(name: &str, shape: &[usize]) -> Result<Tensor> {
+    let p = pattern(shape, phase(name))?;
+    match name {
+        _ if name.ends_with("running_var") => p.affine(0.5, 1.0),
+        _ if name.ends_with("norm.weight") => p.affine(0.2, 1.0),
+        _ if shape.len() == 1 => p * 0.1,
+        _ => p * (3.0 / shape[1..].iter().product::<usize>() as f64).sqrt(),
+    }
+}
+
+/// Every tensor by the formula.
+pub fn fill(params: &Params) -> anyhow::Result<()> {
+    let filled = params.all().map(|(name, var)| Ok((name.to_owned(), value(name, var.dims())?)));
+    params.load(&filled.collect::<Result<_>>()?)
+}
+
+fn agree(name: &str, y: &Tensor) -> anyhow::Result<()> {
+    let golden = golden(name);
+    assert_eq!(y.dims(), golden.shape, "{name}");
+    let y = y.flatten_all()?.to_vec1::<f64>()?;
+    let step = (y.len() / 60).max(1);
+    for (i, (y, expected)) in y.iter().step_by(step).zip(&golden.values).enumerate() {
+        assert!((y - expected).abs() < 1e-5, "{name}, value {i}: {y}, expected {expected}");
+    }
+    Ok(())
+}
+
+#[test]
+fn generator_discriminator_and_lifter_agree_with_pytorch() -> anyhow::Result<()> {
+    let mut params = Params::with_dtype(0, DType::F64);
+    let config = Config { width: 16, ..Config::of(Preset::Light, 6) };
+    let net = Generator::new(&mut params, &config)?;
+    fill(&params)?;
+    agree("light", &net.forward(&pattern(&[2, 64, 427], 1.0)?, 2 * generator::FRAMES_MULTIPLE, false)?)?;
+
+    let mut params = Params::with_dtype(0, DType::F64);
+    let net = Discriminator::new(&mut params, 12)?;
+    fill(&params)?;
+    agree("discriminator", &net.forward(&pattern(&[2, 12, 63], 2.0)?, false)?)?;
+
+    let mut params = Params::with_dtype(0, DType::F64);
+    let config = temporal::Config { n_in: 8, n_out: 9, channels: 12, widths: vec![3, 3, 3], dropout: 0.25 };
+    let net = TemporalLifter::new(&mut params, "lifter", &config)?;
+    fill(&params)?;
+    agree("temporal_lifter", &net.forward(&pattern(&[2, 8, 31], 3.0)?, &mut Mode::Eval)?)
+}
+
+#[test]
+fn the_motion_encoder_agrees_with_pytorch_on_windows_and_on_whole_stretches() -> anyhow::Result<()> {
+    let config = motion_encoder::Config { n_in: 12, channels: [10, 8, 6], hidden: [16, 12] };
+    let mut params = Params::with_dtype(0, DType::F64);
+    let net = AutoEncoder::new(&mut params, &config)?;
+    fill(&params)?;
+    let mean: Vec<f32> = (0..12).map(|i| 0.01 * i as f32).collect();
+    let std: Vec<f32> = (0..12).map(|i| 1.0 + 0.1 * i as f32).collect();
+    net.encoder.set_statistics(&mean, &std)?;
+    let x = net.encoder.normalised(&pattern(&[2, 12, 34], 4.0)?)?;
+    agree("motion_code", &net.encoder.forward(&x, &Mode::Eval)?)?;
+    agree("motion_back", &net.forward(&x, &Mode::Eval)?)?;
+
+    let mut params = Params::with_dtype(0, DType::F32);
+    let net = AutoEncoder::new(&mut params, &config)?;
+    fill(&params)?;
+    net.encoder.set_statistics(&mean, &std)?;
+    let frames = ndarray::Array2::from_shape_fn((91, 12), |(t, i)| ((t * 12 + i) as f32 * 0.37).sin());
+    let codes = net.encoder.codes(frames.view(), 4)?;
+    assert_eq!(codes.dim(), (15, 32));
+    for (n, code) in codes.outer_iter().enumerate() {
+        let window = frames.slice(ndarray::s![4 * n..4 * n + 34, ..]);
+        let window = Tensor::from_vec(window.t().iter().copied().collect(), (1, 12, 34), &Device::Cpu)?;
+        let own =
+            net.encoder.forward(&net.encoder.normalised(&window)?, &Mode::Eval)?.flatten_all()?.to_vec1::<f32>()?;
+        assert!(code.iter().zip(&own).all(|(a, b)| (a - b).abs() < 1e-4), "window {n}");
+    }
+    Ok(())
+}
