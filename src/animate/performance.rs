@@ -2,7 +2,7 @@
 //! and held within what a body can do. Every file is written from what comes out; what was done on the way is told.
 
 use super::rig::constraints::{Clamps, Constraints, Tally};
-use super::rig::rig::Figure;
+use super::rig::rig::{CM, Figure};
 use super::solve::arm::Means;
 use super::solve::head;
 use super::solve::head::Face;
@@ -12,6 +12,7 @@ use super::solve::smoothing::Smoothing;
 use super::solve::track::Track;
 use crate::formats::bvh::write::Clip;
 use crate::math::rotation::Rotation;
+use crate::math::vec3::{Vec3, scale};
 use crate::motion::jerk;
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::{L_HAND, L_SHOULDER, N_HAND_JOINTS, N_JOINTS, NECK, R_HAND, R_SHOULDER};
@@ -119,7 +120,7 @@ pub fn perform(motion: &Motion, face: Option<&Face>, options: &Options) -> Perfo
     let mut places = Places::of(motion);
     if options.constraints != Constraints::NONE {
         let as_it_is = rotations(&places, &figure, &Means::of(Smoothing::None, motion.fps));
-        places = places.moved(&figure, &constrained(clip_of(&as_it_is), &mut tally));
+        places = moved(&places, &figure, &constrained(clip_of(&as_it_is), &mut tally));
     }
     let means = Means::of(options.smoothing, motion.fps);
     let mut tracks = rotations(&places, &figure, &means);
@@ -176,4 +177,13 @@ fn joints(figure: &Figure, clip: &Clip) -> Array3<f32> {
 /// [T, 49]: where there are numbers, seen or filled.
 fn seen(motion: &Motion) -> Array2<bool> {
     motion.joints.map_axis(ndarray::Axis(2), |place| place.iter().all(|v| v.is_finite()))
+}
+
+/// Where a clip of the figure has these joints; what was missing stays missing.
+fn moved(places: &Places, figure: &Figure, clip: &Clip) -> Places {
+    let moved = |(t, frame): (usize, &[Option<Vec3>; N_JOINTS])| {
+        let positions = clip.positions(t);
+        std::array::from_fn(|joint| frame[joint].map(|_| scale(positions[figure.places[joint]], 1.0 / CM)))
+    };
+    Places(places.0.iter().enumerate().map(moved).collect())
 }

@@ -3,7 +3,7 @@
 use super::index::Shard;
 use super::sample::N_KEYPOINTS;
 use super::split::Split;
-use super::write::part::SplitBy;
+use super::split::SplitBy;
 use crate::types::skeleton;
 use crate::types::skeleton::{N_JOINTS, Side};
 use crate::types::time::FrameRate;

@@ -3,7 +3,8 @@
 //! same intro) are kept together: the later one goes where the earlier one is.
 
 use super::shared_sound::Shared;
-use super::write::part::SplitBy;
+use serde::{Deserialize, Serialize};
+
 pub use crate::types::split::Split;
 use std::collections::BTreeMap;
 
@@ -79,6 +80,19 @@ pub fn place(videos: &[Waiting], shared: &[Shared], validation: f64, test: f64) 
         placed[at] = Some(answer);
     }
     placed.into_iter().map(|answer| answer.unwrap_or(Placed::Nowhere(Vec::new()))).collect()
+}
+
+/// Why a video is in its split.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SplitBy {
+    /// The hash of its content.
+    #[default]
+    Content,
+    /// Whoever made the dataset.
+    Name,
+    /// It shares sound with the video of this name, and goes where that one goes.
+    SoundOf(String),
 }
 
 #[cfg(test)]

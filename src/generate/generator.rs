@@ -1,13 +1,13 @@
 //! Speech to motion with a trained speaker, chunk by chunk: memory does not grow with the sound.
 
 use super::mel_stream::Heard;
+use super::mel_stream::mel_frames;
 use super::model;
+use super::model::BEST;
 use super::model::{Facts, TrainedSpeaker};
 use super::normalisation::N_NUMBERS;
 use crate::nn::gan::generator::FRAMES_MULTIPLE;
 use crate::nn::gan::streaming::Chunks;
-use crate::train::gan::train::BEST;
-use crate::train::gan::windows::mel_frames;
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::{SAMPLE_RATE, Sound};

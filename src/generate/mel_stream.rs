@@ -3,6 +3,8 @@
 //! which the tail is kept.
 
 use crate::audio::mel;
+use crate::types::sync;
+use crate::types::time::FrameRate;
 use anyhow::Result;
 use candle_core::{Device, Tensor};
 use std::ops::Range;
@@ -63,6 +65,12 @@ impl<I: Iterator<Item = Result<Vec<f32>>>> Heard<I> {
 /// Samples after which a sound and its mirror image begin anew.
 fn period(n_samples: usize) -> usize {
     (2 * n_samples).saturating_sub(2).max(1)
+}
+
+/// Spectrogram frames that span `n_frames` frames of motion: the nearest whole number of 10 ms hops.
+pub fn mel_frames(fps: FrameRate, n_frames: usize) -> usize {
+    let rate = crate::types::sound::SAMPLE_RATE;
+    (sync::sample_at(fps, rate, n_frames) + mel::HOP / 2) / mel::HOP
 }
 
 #[cfg(test)]

@@ -131,6 +131,9 @@ fn build(contents: &Contents) -> Result<TrainedSpeaker> {
     Ok(TrainedSpeaker { facts, generator })
 }
 
+/// The best checkpoint by the validation's score: the generator alone, to generate with.
+pub const BEST: &str = "best.safetensors";
+
 #[cfg(test)]
 mod tests {
     use super::*;

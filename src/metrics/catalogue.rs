@@ -4,39 +4,21 @@
 use super::convention;
 use super::definition::Metric;
 use super::pair::Pair;
+use super::settings::Settings;
 use super::sums;
 use super::sums::{Blocks, Costly};
 use crate::types::time::FrameRate;
 use anyhow::ensure;
 use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
-use serde::Serialize;
 
-pub use super::convention::Convention;
 pub use super::definition::{Better, Definition};
 pub use super::pair::Interval;
+pub use super::settings::Convention;
 pub use super::sums::Sums;
 
 /// Numbers that stand before the cheap sums: made joints that are not finite, frames of another rate.
 const N_FACTS: usize = 2;
-
-/// What the numbers are set to.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Settings {
-    pub convention: Convention,
-    /// Shares of the pose's largest extent for PCK, each > 0.
-    pub alphas: Vec<f64>,
-    /// Frame rate of all motion.
-    pub fps: FrameRate,
-    /// Whether errors and speeds are also given over 49 joints, the neck included.
-    pub with_neck: bool,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self { convention: Convention::default(), alphas: vec![0.2, 0.1], fps: FrameRate::new(15, 1), with_neck: false }
-    }
-}
 
 /// All numbers of one convention.
 pub struct Catalogue {

@@ -13,7 +13,6 @@
 
 use super::beat::{aist, angles, consistency};
 use super::body_part::Part;
-use super::catalogue::Settings;
 use super::definition::Metric;
 use super::distribution::pairwise;
 use super::distribution::{diversity, frechet_metrics};
@@ -22,39 +21,8 @@ use super::movement::{bone_change, cca, derivatives};
 use super::position::acceleration;
 use super::position::pck::Axes;
 use super::position::{l1, mpjpe, p_mpjpe, pck};
-use serde::{Deserialize, Serialize};
-
-/// Whose definitions.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Convention {
-    /// This project's own.
-    #[default]
-    Orator,
-    Speech2gesture,
-    Genea,
-    Emage,
-    Trimodal,
-    Aist,
-}
-
-impl Convention {
-    /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Orator, Self::Speech2gesture, Self::Genea, Self::Emage, Self::Trimodal, Self::Aist];
-
-    /// As on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Orator => "orator",
-            Self::Speech2gesture => "speech2gesture",
-            Self::Genea => "genea",
-            Self::Emage => "emage",
-            Self::Trimodal => "trimodal",
-            Self::Aist => "aist",
-        }
-    }
-}
+use super::settings::Convention;
+use super::settings::Settings;
 
 /// The metrics of the settings' convention.
 pub(crate) fn metrics(settings: &Settings) -> Vec<Box<dyn Metric>> {

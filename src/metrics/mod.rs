@@ -13,5 +13,6 @@ pub mod movement;
 pub mod pair;
 pub mod per_frame;
 pub mod position;
+pub mod settings;
 pub mod space;
 pub mod sums;

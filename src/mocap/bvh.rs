@@ -1,8 +1,8 @@
 //! A take from a BVH file: the joints of the 49 that its skeleton has, found by their names, at the file's own rate.
 
-use super::captured::Captured;
 use super::facing::{Bearings, House};
 use super::fingers::bvh;
+use super::take::Captured;
 use crate::formats::bvh::joint_names;
 use crate::formats::bvh::read::{Bvh, Positions};
 use crate::formats::npz;

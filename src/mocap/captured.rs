@@ -1,40 +1,50 @@
 //! Captured motion as its source holds it, in house order and axes but at the source's own rate and with its own
 //! bones; and which reader a file needs.
 
+use super::take::Captured;
 use super::{bvh, ted};
-use crate::dataset::import::find::Kind;
 use crate::formats::authors_txt;
-use crate::types::pose3d::Motion;
 use crate::types::time::FrameRate;
 use anyhow::{Result, bail};
-use serde_json::{Map, Value};
+use serde_json::Map;
 use std::path::Path;
 
 /// The authors' clips do not name their rate.
 const AUTHORS_FPS: FrameRate = FrameRate::new(15, 1);
 
-/// One continuous take.
-#[derive(Clone, Debug)]
-pub struct Captured {
-    /// At the source's rate; a joint that the source does not have is NaN.
-    pub motion: Motion,
-    /// What is said, where the motion's own file says it.
-    pub text: Option<String>,
-    /// What was done to the joints, for the sample's facts.
-    pub facts: Map<String, Value>,
+/// What a file of motion is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// The authors' text clips: 147 numbers a line.
+    Authors,
+    /// TED Expressive: `.npz` with `human_joints`.
+    Ted,
+    Bvh,
+    /// WebDataset tar shards of ours, or a dataset's folder.
+    Shards,
 }
 
-impl Captured {
-    /// Reads the motion file of a take of that kind.
-    pub fn read(kind: Kind, path: &Path) -> Result<Self> {
-        match kind {
-            Kind::Authors => {
-                let motion = authors_txt::read(path, AUTHORS_FPS)?;
-                Ok(Self { motion, text: None, facts: Map::new() })
-            }
-            Kind::Ted => ted::read(path),
-            Kind::Bvh => bvh::read(path),
-            Kind::Shards => bail!("{} holds samples, no captured motion", path.display()),
+impl Kind {
+    /// Its name on the command line and in facts.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Authors => "authors",
+            Self::Ted => "ted",
+            Self::Bvh => "bvh",
+            Self::Shards => "shards",
         }
+    }
+}
+
+/// Reads the motion file of a take of that kind.
+pub fn read(kind: Kind, path: &Path) -> Result<Captured> {
+    match kind {
+        Kind::Authors => {
+            let motion = authors_txt::read(path, AUTHORS_FPS)?;
+            Ok(Captured { motion, text: None, facts: Map::new() })
+        }
+        Kind::Ted => ted::read(path),
+        Kind::Bvh => bvh::read(path),
+        Kind::Shards => bail!("{} holds samples, no captured motion", path.display()),
     }
 }

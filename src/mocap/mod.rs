@@ -5,5 +5,6 @@ pub mod captured;
 pub mod facing;
 pub mod fingers;
 pub mod motion_file;
+pub mod take;
 pub mod ted;
 pub mod upper_body;

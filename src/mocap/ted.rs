@@ -1,8 +1,8 @@
 //! TED Expressive: `human_joints` [T, 43, 3] in camera axes (y down), metres, of a regressor; `fps`; `sentence`.
 //! Joint 1 is the neck, joint 0 the spine below it; left arm 2 4 6, right arm 3 5 7; three joints a finger and no tips.
 
-use super::captured::Captured;
 use super::fingers::npz;
+use super::take::Captured;
 use crate::formats::npz::Npz;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;

@@ -2,6 +2,7 @@
 
 use anyhow::{Result, bail};
 use candle_core::Device;
+use candle_core::Tensor;
 
 /// `cpu` or `cuda`. Errors, saying what to do, on another name, when the program was built without CUDA, and when there
 /// is no card.
@@ -25,6 +26,11 @@ fn cuda() -> Result<Device> {
         "this program was built without CUDA: build it with `cargo build --release --features cuda`, or set gan.device = \
          \"cpu\""
     )
+}
+
+/// Whether the tensor lives where this room's own operators do not run.
+pub fn needed(x: &Tensor) -> bool {
+    !x.device().is_cpu()
 }
 
 #[cfg(test)]

@@ -2,8 +2,6 @@
 //! missing one `None`. The right side is looked at in a mirror, so that everything about arms and hands is said once,
 //! for the left, and the two sides cannot differ.
 
-use crate::animate::rig::rig::{CM, Figure};
-use crate::formats::bvh::write::Clip;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, across, add, scale, sub, unit};
 use crate::types::pose3d::Motion;
@@ -14,7 +12,7 @@ use crate::types::skeleton::{L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, R_SHOULDER};
 const LEAST_METRES: f64 = 1e-5;
 
 /// Joints over time.
-pub struct Places(Vec<[Option<Vec3>; N_JOINTS]>);
+pub struct Places(pub(crate) Vec<[Option<Vec3>; N_JOINTS]>);
 
 impl Places {
     pub fn of(motion: &Motion) -> Self {
@@ -31,15 +29,6 @@ impl Places {
             std::array::from_fn(|joint| frame[skeleton::mirror(joint)].map(|[x, y, z]| [-x, y, z]))
         };
         Self(self.0.iter().map(image).collect())
-    }
-
-    /// Where a clip of the figure has these joints; what was missing stays missing.
-    pub fn moved(&self, figure: &Figure, clip: &Clip) -> Self {
-        let moved = |(t, frame): (usize, &[Option<Vec3>; N_JOINTS])| {
-            let places = clip.positions(t);
-            std::array::from_fn(|joint| frame[joint].map(|_| scale(places[figure.places[joint]], 1.0 / CM)))
-        };
-        Self(self.0.iter().enumerate().map(moved).collect())
     }
 
     pub fn n_frames(&self) -> usize {

@@ -12,7 +12,7 @@ use orator::evaluate::clips::clips::{Clip, Clips, Voice, compared, pcm};
 use orator::evaluate::clips::sound_features;
 use orator::evaluate::table::{result, table};
 use orator::evaluate::verdict::text;
-use orator::metrics::catalogue::Settings;
+use orator::metrics::settings::Settings;
 use orator::report::evaluation::page;
 use orator::stage::progress::{Progress as _, Task};
 use orator::types::sound::Sound;

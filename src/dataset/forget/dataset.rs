@@ -4,9 +4,10 @@
 
 use crate::dataset::info::Info;
 use crate::dataset::leakage::Leakage;
+use crate::dataset::split::SplitBy;
 use crate::dataset::write::assemble::assemble;
 use crate::dataset::write::part;
-use crate::dataset::write::part::{Part, SplitBy};
+use crate::dataset::write::part::Part;
 use crate::dataset::{INFO, LEAKAGE};
 use crate::stage::workdir;
 use anyhow::{Context, Result, ensure};

@@ -4,34 +4,11 @@
 use crate::dataset::INFO;
 use crate::dataset::write::part;
 use crate::formats::npz::Npz;
+use crate::mocap::captured::Kind;
 use anyhow::{Context, Result, ensure};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
-
-/// What a file of motion is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
-    /// The authors' text clips: 147 numbers a line.
-    Authors,
-    /// TED Expressive: `.npz` with `human_joints`.
-    Ted,
-    Bvh,
-    /// WebDataset tar shards of ours, or a dataset's folder.
-    Shards,
-}
-
-impl Kind {
-    /// Its name on the command line and in facts.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Authors => "authors",
-            Self::Ted => "ted",
-            Self::Bvh => "bvh",
-            Self::Shards => "shards",
-        }
-    }
-}
 
 /// A motion file with what belongs to it.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -6,13 +6,14 @@
 //! a refusal) -> `write` (the dataset). Shards come in by `shards`, their members as they are.
 
 pub mod find;
+pub mod plan;
 pub mod shards;
 pub mod source;
 pub mod take;
 pub mod transcript;
 pub mod write;
 
+pub use super::import::plan::Plan;
 pub use take::Take;
 pub use write::Imported;
-pub use write::Plan;
 pub use write::import;

@@ -2,17 +2,18 @@
 //! (kept or not, its account, its sound's codes), and written when its split is known.
 
 use super::find::{Found, Sources};
+use super::plan::{Line, Plan};
 use super::shards;
 use super::shards::LooseVideo;
 use super::take::{Ended, Refusal, Take};
-use super::write::{Line, Plan};
 use crate::audio::fingerprint::Fingerprinter;
 use crate::config::videos::slug;
 use crate::dataset::bones::{VideoBones, of_speaker};
 use crate::dataset::info::Info;
 use crate::dataset::shared_sound::Shared;
+use crate::dataset::split::SplitBy;
 use crate::dataset::write::part;
-use crate::dataset::write::part::{Part, Source, SplitBy};
+use crate::dataset::write::part::{Part, Source};
 use crate::dataset::write::writer::DatasetWriter;
 use crate::dataset::{INFO, Split};
 use crate::motion::bones;

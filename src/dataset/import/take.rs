@@ -1,12 +1,14 @@
 //! One take on its way to a sample: its motion at the dataset's rate with constant bones, its sound, and the cut to
 //! what both have; or the reason why it is refused. A take is one continuous interval.
 
-use super::find::{Found, Kind};
+use super::find::Found;
 use super::transcript::Transcript;
 use crate::config::videos::slug;
 use crate::dataset::sample::{N_KEYPOINTS, Sample};
 use crate::external::ffmpeg::audio;
-use crate::mocap::captured::Captured;
+use crate::mocap::captured;
+use crate::mocap::captured::Kind;
+use crate::mocap::take::Captured;
 use crate::motion::bones;
 use crate::motion::resample;
 use crate::stage::fingerprint::hash_file;
@@ -77,7 +79,7 @@ impl Take {
         let content = hash_file(&found.motion)?;
         let stem = found.motion.file_stem().unwrap_or_default().to_string_lossy();
         let name = format!("{}-{}", slug(&stem), content.get(..8).unwrap_or(&content));
-        let captured = Captured::read(found.kind, &found.motion)?;
+        let captured = captured::read(found.kind, &found.motion)?;
         let motion = resample::at_rate(&captured.motion, limits.fps);
         let n_frames = motion.n_frames();
         let sound = match &found.sound {

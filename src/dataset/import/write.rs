@@ -2,11 +2,11 @@
 //! splits can be chosen without leaks; then it is read again and written. Memory: one take, and the codes of all sound.
 
 use super::find;
-use super::find::{Found, Kind};
+use super::find::Found;
+use super::plan::{Line, Plan};
 use super::source::{Look, Origin};
-use super::take::Limits;
 use crate::config;
-use crate::dataset::info::{About, Info};
+use crate::dataset::info::Info;
 use crate::dataset::leakage::Compared;
 use crate::dataset::split;
 use crate::dataset::split::{Placed, Waiting};
@@ -14,36 +14,11 @@ use crate::dataset::stats::Stats;
 use crate::dataset::write::part;
 use crate::dataset::write::writer::DatasetWriter;
 use crate::dataset::{INFO, shared_sound};
+use crate::mocap::captured::Kind;
 use crate::stage::progress::Progress;
 use anyhow::{Context, Result, ensure};
-use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-
-/// What is wanted.
-#[derive(Clone, Debug)]
-pub struct Plan {
-    pub sources: Vec<PathBuf>,
-    /// Only sources of this kind; `None`: of every kind.
-    pub kind: Option<Kind>,
-    /// The dataset; `about.fps` and `limits.fps` agree.
-    pub about: About,
-    pub limits: Limits,
-    /// Shares of the splits, seconds of shared sound, size of shards.
-    pub shard: config::Shard,
-}
-
-/// What became of a take, or of a video of other shards.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Line {
-    pub file: String,
-    /// `kept`, `refused` or `failed`.
-    pub ended: &'static str,
-    /// Seconds in the dataset.
-    pub kept_secs: f64,
-    pub reason: String,
-    pub says: String,
-}
 
 /// The dataset that was written.
 #[derive(Clone, Debug)]

@@ -7,6 +7,7 @@ use crate::dataset::bones::VideoBones;
 use crate::dataset::index::{SampleRef, Shard};
 use crate::dataset::joint_stats::Moments;
 use crate::dataset::sample::Sample;
+use crate::dataset::split::SplitBy;
 use crate::stage::fingerprint::hash_file;
 use crate::stage::ledger::Ledger;
 use crate::types::split::Split;
@@ -47,19 +48,6 @@ pub struct Part {
     /// Silence appended where the sound ended before the motion, seconds.
     pub padded_sound_secs: f64,
     pub moments: Moments,
-}
-
-/// Why a video is in its split.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SplitBy {
-    /// The hash of its content.
-    #[default]
-    Content,
-    /// Whoever made the dataset.
-    Name,
-    /// It shares sound with the video of this name, and goes where that one goes.
-    SoundOf(String),
 }
 
 /// What a writer of a video knows beforehand.

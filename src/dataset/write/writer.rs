@@ -1,12 +1,13 @@
 //! Writing a dataset's folder: video by video, then all that is put together from them.
 
 use super::assemble::assemble;
-use super::part::{PartWriter, Source, SplitBy};
+use super::part::{PartWriter, Source};
 use crate::dataset::bones::VideoBones;
 use crate::dataset::info::{About, Info};
 use crate::dataset::leakage::Compared;
 use crate::dataset::sample::Sample;
 use crate::dataset::split::Split;
+use crate::dataset::split::SplitBy;
 use crate::dataset::stats::Stats;
 use crate::motion::bones;
 use crate::stage::ledger::{Kept, Ledger};

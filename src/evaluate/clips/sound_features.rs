@@ -4,7 +4,7 @@
 use crate::audio::mel;
 use crate::audio::onset::{Loudest, Onsets};
 use crate::external::ffmpeg::sound_stream::SoundStream;
-use crate::train::gan::windows::mel_frames;
+use crate::generate::mel_stream::mel_frames;
 use crate::types::sound::SAMPLE_RATE;
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result};

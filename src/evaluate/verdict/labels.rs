@@ -137,7 +137,8 @@ pub fn bracketed(definition: &Definition, estimate: &Estimate) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metrics::catalogue::{Catalogue, Settings};
+    use crate::metrics::catalogue::Catalogue;
+    use crate::metrics::settings::Settings;
     use std::collections::BTreeSet;
 
     #[test]

@@ -89,3 +89,30 @@ impl Windows {
         (n.max(1) - 1) * self.step + self.taps.len()
     }
 }
+
+/// How a kernel walks over the frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Walk {
+    pub stride: usize,
+    pub dilation: usize,
+    /// Zero frames put before and after the input.
+    pub pad: (usize, usize),
+}
+
+impl Walk {
+    /// Every frame, no padding.
+    pub const VALID: Self = Self { stride: 1, dilation: 1, pad: (0, 0) };
+
+    /// TensorFlow's "same": ceil(n_frames / stride) frames come out; the smaller half of the padding goes first.
+    pub fn same(n_frames: usize, kernel: usize, stride: usize) -> Self {
+        let total = ((n_frames.div_ceil(stride).max(1) - 1) * stride + kernel).saturating_sub(n_frames);
+        Self { stride, dilation: 1, pad: (total / 2, total - total / 2) }
+    }
+
+    /// Frames that come out of `n_frames`; `None` when the kernel does not fit.
+    pub fn n_out(&self, n_frames: usize, kernel: usize) -> Option<usize> {
+        let reach = self.dilation * kernel.checked_sub(1)? + 1;
+        let padded = n_frames + self.pad.0 + self.pad.1;
+        Some(padded.checked_sub(reach)? / self.stride.max(1) + 1)
+    }
+}

@@ -51,7 +51,7 @@ impl BatchNorm {
 
     /// [B, C, ...] to the same shape. Training moves the running statistics.
     pub fn forward(&self, x: &Tensor, train: bool) -> Result<Tensor> {
-        if fallback::needed(x) {
+        if crate::nn::device::needed(x) {
             return self.forward_composed(x, train);
         }
         let statistics = Arc::new(OnceLock::new());

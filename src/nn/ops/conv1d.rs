@@ -3,43 +3,17 @@
 //! matrix product; sums run in a fixed order, so results do not depend on the number of threads.
 
 use super::fallback;
+use crate::nn::cpu::axis::Walk;
 use crate::nn::cpu::tensor::{GRAIN, Matrix, Real, is_f64, matmul, read, scratch, slice, sum};
 use crate::nn::params::{Init, Params};
 use candle_core::backend::BackendStorage;
 use candle_core::{CpuStorage, CustomOp3, Layout, Result, Shape, Tensor};
 use rayon::prelude::*;
 
-/// How a kernel walks over the frames.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Walk {
-    pub stride: usize,
-    pub dilation: usize,
-    /// Zero frames put before and after the input.
-    pub pad: (usize, usize),
-}
-
-impl Walk {
-    /// Every frame, no padding.
-    pub const VALID: Self = Self { stride: 1, dilation: 1, pad: (0, 0) };
-
-    /// TensorFlow's "same": ceil(n_frames / stride) frames come out; the smaller half of the padding goes first.
-    pub fn same(n_frames: usize, kernel: usize, stride: usize) -> Self {
-        let total = ((n_frames.div_ceil(stride).max(1) - 1) * stride + kernel).saturating_sub(n_frames);
-        Self { stride, dilation: 1, pad: (total / 2, total - total / 2) }
-    }
-
-    /// Frames that come out of `n_frames`; `None` when the kernel does not fit.
-    pub fn n_out(&self, n_frames: usize, kernel: usize) -> Option<usize> {
-        let reach = self.dilation * kernel.checked_sub(1)? + 1;
-        let padded = n_frames + self.pad.0 + self.pad.1;
-        Some(padded.checked_sub(reach)? / self.stride.max(1) + 1)
-    }
-}
-
 /// Convolves `x` [B, C, T] with `weight` [O, C, K] and adds `bias` [O]: [B, O, T'], T' = `walk.n_out(T, K)`. f32 or
 /// f64.
 pub fn conv1d(x: &Tensor, weight: &Tensor, bias: &Tensor, walk: Walk) -> Result<Tensor> {
-    if fallback::needed(x) {
+    if crate::nn::device::needed(x) {
         return fallback::conv1d(x, weight, bias, walk);
     }
     x.contiguous()?.apply_op3(&weight.contiguous()?, &bias.contiguous()?, Op { walk })

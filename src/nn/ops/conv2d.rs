@@ -84,7 +84,7 @@ impl Conv {
 
 /// The convolution of these sizes, on any device.
 pub fn conv(x: &Tensor, weight: &Tensor, bias: &Tensor, sizes: Sizes) -> Result<Tensor> {
-    if fallback::needed(x) {
+    if crate::nn::device::needed(x) {
         return fallback::conv(x, weight, bias, &sizes);
     }
     x.contiguous()?.apply_op3(weight, bias, Op { sizes })

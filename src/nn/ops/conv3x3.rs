@@ -1,7 +1,7 @@
 //! Convolution of pictures with kernels of 3 x 3, padding "same", channels last: every output place's patch becomes a
 //! row, and the layer one matrix product. Own forward and backward for the patches.
 
-use super::conv1d::Walk;
+use crate::nn::cpu::axis::Walk;
 use crate::nn::cpu::tensor::{Real, is_f64, read, slice};
 use crate::nn::params::{Init, Params};
 use candle_core::backend::BackendStorage;

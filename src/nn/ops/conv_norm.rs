@@ -24,8 +24,8 @@ pub fn conv_norm(
     sizes: Sizes,
     train: bool,
 ) -> Result<Tensor> {
-    if fallback::needed(x) {
-        return fallback::conv_norm(x, weight, bias, norm, &sizes, train);
+    if crate::nn::device::needed(x) {
+        return fallback_conv_norm(x, weight, bias, norm, &sizes, train);
     }
     let x = x.contiguous()?;
     let channels = Tensor::cat(&[bias, &norm.weight, &norm.bias], 0)?;
@@ -184,6 +184,18 @@ impl CustomOp3 for Op {
             _ => candle_core::bail!("a layer's way back can be gone once only"),
         }
     }
+}
+
+/// What [`conv_norm`] gives, on devices without the kernels.
+pub fn fallback_conv_norm(
+    x: &Tensor,
+    weight: &Tensor,
+    bias: &Tensor,
+    norm: &BatchNorm,
+    s: &Sizes,
+    train: bool,
+) -> Result<Tensor> {
+    fallback::last(&norm.forward_composed(&fallback::conv_first(x, weight, bias, s)?, train)?, x.rank())
 }
 
 #[cfg(test)]

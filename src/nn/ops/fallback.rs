@@ -2,16 +2,10 @@
 //! a gradient that finite differences confirm, and runs wherever the framework does. On the CPU they are only tested:
 //! they give what the room's own operators give.
 
-use super::batch_norm::BatchNorm;
-use super::conv1d::Walk;
 use crate::nn::cpu::axis::Axis;
+use crate::nn::cpu::axis::Walk;
 use crate::nn::cpu::direct_conv::Sizes;
 use candle_core::{D, Result, Tensor};
-
-/// Whether the tensor lives where this room's own operators do not run.
-pub fn needed(x: &Tensor) -> bool {
-    !x.device().is_cpu()
-}
 
 /// Pads axis `dim` of `x` by `before`, and on the other side pads or cuts it to `reach` places in all, so that a kernel
 /// walks to the very last one: with some left over the framework's backward pass fails.
@@ -23,7 +17,7 @@ fn fitted(x: &Tensor, dim: usize, before: usize, reach: usize) -> Result<Tensor>
     x.pad_with_zeros(dim, before, end - n)
 }
 
-/// As [`super::conv1d::conv1d`]: a convolution of pictures one place high.
+/// A convolution of pictures one place high.
 pub fn conv1d(x: &Tensor, weight: &Tensor, bias: &Tensor, walk: Walk) -> Result<Tensor> {
     let (n, kernel) = (x.dim(2)?, weight.dim(2)?);
     let Some(n_out) = walk.n_out(n, kernel) else {
@@ -38,7 +32,7 @@ pub fn conv1d(x: &Tensor, weight: &Tensor, bias: &Tensor, walk: Walk) -> Result<
 
 /// A convolution of `x` [B, T, C] or [B, T, F, C] with `weight` [O, C, K] or [O, C, K, K'], and `bias` [O]: channels
 /// first, [B, O, T', F'].
-fn conv_first(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &Sizes) -> Result<Tensor> {
+pub fn conv_first(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &Sizes) -> Result<Tensor> {
     let (x, weight) = match x.rank() {
         3 => (x.unsqueeze(2)?, weight.unsqueeze(3)?),
         _ => (x.clone(), weight.clone()),
@@ -58,7 +52,7 @@ fn conv_first(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &Sizes) -> Result<T
 }
 
 /// From channels first to channels last, and to the rank that the input had.
-fn last(y: &Tensor, rank: usize) -> Result<Tensor> {
+pub fn last(y: &Tensor, rank: usize) -> Result<Tensor> {
     let y = y.permute((0, 2, 3, 1))?;
     if rank == 3 { y.squeeze(2)?.contiguous() } else { y.contiguous() }
 }
@@ -66,18 +60,6 @@ fn last(y: &Tensor, rank: usize) -> Result<Tensor> {
 /// A convolution, channels last: as [`super::conv2d::Conv`].
 pub fn conv(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &Sizes) -> Result<Tensor> {
     last(&conv_first(x, weight, bias, s)?, x.rank())
-}
-
-/// As [`super::conv_norm::conv_norm`].
-pub fn conv_norm(
-    x: &Tensor,
-    weight: &Tensor,
-    bias: &Tensor,
-    norm: &BatchNorm,
-    s: &Sizes,
-    train: bool,
-) -> Result<Tensor> {
-    last(&norm.forward_composed(&conv_first(x, weight, bias, s)?, train)?, x.rank())
 }
 
 /// As [`super::resize::twice`].
@@ -121,8 +103,10 @@ pub fn normalise(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::nn::ops::batch_norm::BatchNorm;
+    use crate::nn::ops::conv_norm::{self, fallback_conv_norm};
     use crate::nn::ops::gradcheck::{pattern, worst};
-    use crate::nn::ops::{conv_norm, conv1d as own, conv2d, resize};
+    use crate::nn::ops::{conv1d as own, conv2d, resize};
     use crate::nn::params::Params;
     use candle_core::{DType, Var};
 
@@ -201,7 +185,7 @@ mod tests {
             let s = conv2d::same(&inputs[0], &inputs[1], stride)?;
             let norm = |slope| BatchNorm::new(&mut Params::with_dtype(0, DType::F64), "n", 3, 1e-3, 0.1, slope);
             let (mine, own) = (norm(0.2)?, norm(0.2)?);
-            let composed = |v: &[Tensor]| conv_norm(&v[0], &v[1], &v[2], &mine, &s, train);
+            let composed = |v: &[Tensor]| fallback_conv_norm(&v[0], &v[1], &v[2], &mine, &s, train);
             let off = apart(&inputs, composed, |v| conv_norm::conv_norm(&v[0], &v[1], &v[2], &own, s, train))?;
             assert!(off < 1e-11, "{shape:?} {kernel:?} {train}: {off:e}");
             let (mine, own) = (mine.running()?, own.running()?);

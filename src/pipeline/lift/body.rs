@@ -1,8 +1,8 @@
 //! Arms in 3D: what is seen of the upper body, through the body lifter, to joints of about the reference size.
 
 use super::gaps::long_gaps;
+use super::interval_view::Stretch;
 use super::lengths::median;
-use super::lifter::Stretch;
 use super::observed::Sight;
 use crate::motion::upper_body::{ARMS, L_HIP, L_SHOULDER, NOSE, Pose, R_HIP, R_SHOULDER, REFERENCE_SIZE, Seen, size};
 use crate::nn::lifter::body::BodyLifter;

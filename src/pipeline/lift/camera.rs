@@ -4,8 +4,8 @@
 //! lifter was trained with rolls of up to 4) roll was 2.4 and pitch 6.2 degrees off (median, `tests/it/lift_camera.rs`);
 //! torsos that leaned 15.5 degrees as seen leaned 1.7 after levelling. Guessed hips tell no more than no estimate at all.
 
+use super::interval_view::Stretch;
 use super::lengths::median;
-use super::lifter::Stretch;
 use crate::math::rotation::Rotation;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;

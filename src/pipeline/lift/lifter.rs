@@ -8,6 +8,7 @@
 
 use super::body::TRAINED_FPS;
 use super::camera::Camera;
+use super::interval_view::Stretch;
 use super::{body, hands, lengths, weights};
 use crate::config;
 use crate::math::gaussian;
@@ -20,7 +21,7 @@ use crate::types::pose3d::Motion;
 use crate::types::skeleton;
 use crate::types::skeleton::{L_HAND, N_BONES, N_JOINTS, R_HAND, Side};
 use anyhow::{Result, ensure};
-use ndarray::{Array2, Array3, ArrayViewMut2, ArrayViewMut3, s};
+use ndarray::{Array2, Array3, s};
 
 /// A gap up to this long is filled; a longer one stays open. `config` lets `[segment]` keep no longer ones.
 pub(crate) const MAX_GAP_SECS: f64 = 1.0;
@@ -46,13 +47,6 @@ pub struct Lifted {
     pub cameras: Vec<Camera>,
     /// Frames that have arms.
     pub n_frames: usize,
-}
-
-/// The frames of one interval of a `Lifted`.
-pub struct Stretch<'a> {
-    pub joints: ArrayViewMut3<'a, f32>,
-    pub extra: ArrayViewMut3<'a, f32>,
-    pub mask: ArrayViewMut2<'a, bool>,
 }
 
 impl Lifter {

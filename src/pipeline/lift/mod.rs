@@ -11,6 +11,7 @@ pub mod camera;
 pub mod gaps;
 pub mod hand_depth;
 pub mod hands;
+pub mod interval_view;
 pub mod lengths;
 pub mod lifter;
 pub mod missing;

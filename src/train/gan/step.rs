@@ -7,6 +7,7 @@ use super::windows::Batch;
 use crate::config::Gan;
 use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
+use crate::generate::model::BEST;
 use crate::generate::model::{Facts, GENERATOR};
 use crate::generate::normalisation::N_NUMBERS;
 use crate::generate::representation::Decoder;
@@ -28,8 +29,7 @@ const ADAM_D: &str = "adam.discriminator.";
 /// Gradients are clipped to this norm; a loss beyond the limit is a training that has exploded.
 const MAX_NORM: f64 = 10.0;
 const LOSS_LIMIT: f64 = 1e4;
-/// The best checkpoint by the validation's score: the generator alone, to generate with.
-pub const BEST: &str = "best.safetensors";
+
 /// Settings that may change between two runs of one training; of the others the checkpoint's count.
 const FREE: [&str; 5] = ["steps", "patience", "checkpoint_every", "keep_checkpoints", "device"];
 

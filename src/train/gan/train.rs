@@ -3,7 +3,6 @@
 //! and the step alone (the place of the loader is the step), everything else is in the checkpoint.
 
 use super::score::Validation;
-pub use super::step::BEST;
 use super::step::{Losses, Stored, Training};
 use super::validate::HeldOut;
 use super::windows::Examples;
@@ -11,6 +10,7 @@ use crate::config::Gan;
 use crate::dataset::{Dataset, Split};
 use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
+pub use crate::generate::model::BEST;
 use crate::generate::model::Facts;
 use crate::generate::normalisation::{N_NUMBERS, Normalisation};
 use crate::generate::representation::Representation;

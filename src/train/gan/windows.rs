@@ -3,21 +3,15 @@
 
 use crate::audio::mel;
 use crate::dataset::{Dataset, Split};
+use crate::generate::mel_stream::mel_frames;
 use crate::generate::normalisation::{N_NUMBERS, Normalisation};
 use crate::motion::bones;
 use crate::types::interval::Interval as Span;
-use crate::types::sync;
 use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
 use candle_core::{Device, Tensor};
 use ndarray::{Array2, ArrayView2, Axis, Slice};
 use rayon::prelude::*;
-
-/// Spectrogram frames that span `n_frames` frames of motion: the nearest whole number of 10 ms hops.
-pub fn mel_frames(fps: FrameRate, n_frames: usize) -> usize {
-    let rate = crate::types::sound::SAMPLE_RATE;
-    (sync::sample_at(fps, rate, n_frames) + mel::HOP / 2) / mel::HOP
-}
 
 /// One interval.
 struct Interval {

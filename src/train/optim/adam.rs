@@ -2,6 +2,7 @@
 //! gradient's norm. One pass over the memory of each tensor; the same bits for any number of threads.
 
 use super::adam_fallback;
+use super::adam_fallback::Numbers;
 use crate::nn::cpu::thread_team::each;
 use crate::nn::params::Params;
 use anyhow::{Context, ensure};
@@ -191,20 +192,6 @@ fn sum_of_squares(values: &[f32]) -> f64 {
         let _ = sums[piece].set(of_piece(pieces[piece]));
     });
     sums.iter().filter_map(OnceLock::get).sum()
-}
-
-/// The numbers of one update.
-#[derive(Clone, Copy)]
-pub struct Numbers {
-    pub beta1: f32,
-    pub beta2: f32,
-    pub eps: f32,
-    /// What gradients are multiplied with, to clip them.
-    pub scale: f32,
-    /// Learning rate over the first moment's bias correction.
-    pub rate: f32,
-    /// Square root of the second moment's bias correction.
-    pub correction: f32,
 }
 
 struct Update<'a> {

@@ -1,7 +1,6 @@
 //! The update of Adam made of the framework's operators, for tensors that are not on the CPU: the same numbers but for
 //! rounding, several passes over the memory instead of one.
 
-use super::adam::Numbers;
 use candle_core::{Device, Result, Tensor, Var};
 
 /// First moment, second moment, largest second moment (with AMSGrad), each of the tensor's shape and on its device.
@@ -57,4 +56,18 @@ impl Moments {
 /// The sum of the squares of a gradient.
 pub fn sum_of_squares(grad: &Tensor) -> Result<f64> {
     grad.sqr()?.sum_all()?.to_scalar::<f32>().map(f64::from)
+}
+
+/// The numbers of one update.
+#[derive(Clone, Copy)]
+pub struct Numbers {
+    pub beta1: f32,
+    pub beta2: f32,
+    pub eps: f32,
+    /// What gradients are multiplied with, to clip them.
+    pub scale: f32,
+    /// Learning rate over the first moment's bias correction.
+    pub rate: f32,
+    /// Square root of the second moment's bias correction.
+    pub correction: f32,
 }

@@ -1,14 +1,16 @@
 //! `orator import`: datasets from captured motion and from other datasets, and what becomes of what cannot come in.
 
 use crate::fixtures::support::{files_under, shared};
-use orator::dataset::import::find::Kind;
+use orator::dataset::import::plan::Plan;
 use orator::dataset::import::take::Limits;
-use orator::dataset::import::{Imported, Plan, import, shards};
+use orator::dataset::import::{Imported, import, shards};
 use orator::dataset::info::About;
 use orator::dataset::verify::verify::{accounts, verify};
 use orator::dataset::{Dataset, Sample};
 use orator::external::ffmpeg::audio;
-use orator::mocap::captured::Captured;
+use orator::mocap::captured;
+use orator::mocap::captured::Kind;
+use orator::mocap::take::Captured;
 use orator::motion::bones;
 use orator::motion::resample;
 use orator::stage::progress::Silent;
@@ -132,7 +134,7 @@ fn a_folder_of_bvh_and_sound_becomes_a_dataset() {
     let samples = samples(&out);
     let (sample, _) = samples.values().next().unwrap();
     assert_eq!((samples.len(), sample.n_frames()), (1, 145), "9.7 s of sound");
-    let captured = Captured::read(Kind::Bvh, &file("bvh/talk.bvh")).unwrap();
+    let captured = captured::read(Kind::Bvh, &file("bvh/talk.bvh")).unwrap();
     assert!(furthest(&sample.motion, &expected(&captured, 145)) < 1e-6);
     assert_eq!(sample.sound.samples.len(), 154_667);
     let facts = &sample.meta["imported"];
@@ -236,7 +238,7 @@ fn the_authors_clips_and_ted_become_datasets() {
     assert_eq!([count(&clips, ""), count(&clips, "no sound"), count(&clips, "prediction")], [3, 1, 4]);
     for (key, (sample, _)) in samples(&dir.path().join("clips")) {
         let name = sample.meta["imported"]["motion"].as_str().unwrap().to_owned();
-        let captured = Captured::read(Kind::Authors, &data.join("released_clips").join(name)).unwrap();
+        let captured = captured::read(Kind::Authors, &data.join("released_clips").join(name)).unwrap();
         assert_eq!(furthest(&sample.motion, &expected(&captured, sample.n_frames())), 0.0, "{key}");
     }
     let ted = imported(&[&data.join("speech_motion/ted_expressive")], &dir.path().join("ted"));
@@ -244,7 +246,7 @@ fn the_authors_clips_and_ted_become_datasets() {
     for (key, (sample, _)) in samples(&dir.path().join("ted")) {
         let name = sample.meta["imported"]["motion"].as_str().unwrap().to_owned();
         let mut source =
-            Captured::read(Kind::Ted, &data.join("speech_motion/ted_expressive").join(name)).unwrap().motion;
+            captured::read(Kind::Ted, &data.join("speech_motion/ted_expressive").join(name)).unwrap().motion;
         source.joints = source.joints.slice(ndarray::s![..sample.n_frames(), .., ..]).to_owned();
         source.mask = source.mask.slice(ndarray::s![..sample.n_frames(), ..]).to_owned();
         assert!(furthest(&sample.motion, &source) < 1e-6, "{key}");

@@ -3,8 +3,9 @@
 
 use ndarray::{Array2, Array3, Axis, concatenate, s};
 use orator::formats::authors_txt;
-use orator::metrics::catalogue::{Catalogue, Interval, Settings};
+use orator::metrics::catalogue::{Catalogue, Interval};
 use orator::metrics::position::pck::{Axes, Correct};
+use orator::metrics::settings::Settings;
 use orator::types::skeleton::{L_SHOULDER, N_JOINTS, R_SHOULDER};
 use orator::types::time::FrameRate;
 use std::path::{Path, PathBuf};

@@ -4,9 +4,9 @@
 
 use crate::train::networks::{phase, value};
 use candle_core::{DType, Result, Tensor, Var};
+use orator::nn::cpu::axis::Walk;
 use orator::nn::gan::discriminator::Discriminator;
 use orator::nn::gan::generator::{Config, Generator, Preset};
-use orator::nn::ops::conv1d::Walk;
 use orator::nn::ops::gradcheck::pattern;
 use orator::nn::params::Params;
 use std::collections::BTreeMap;

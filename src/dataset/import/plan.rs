@@ -1,0 +1,33 @@
+//! What an import is asked for, and what became of each take.
+
+use crate::config;
+use crate::dataset::import::take::Limits;
+use crate::dataset::info::About;
+use crate::mocap::captured::Kind;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// What is wanted.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    pub sources: Vec<PathBuf>,
+    /// Only sources of this kind; `None`: of every kind.
+    pub kind: Option<Kind>,
+    /// The dataset; `about.fps` and `limits.fps` agree.
+    pub about: About,
+    pub limits: Limits,
+    /// Shares of the splits, seconds of shared sound, size of shards.
+    pub shard: config::Shard,
+}
+
+/// What became of a take, or of a video of other shards.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Line {
+    pub file: String,
+    /// `kept`, `refused` or `failed`.
+    pub ended: &'static str,
+    /// Seconds in the dataset.
+    pub kept_secs: f64,
+    pub reason: String,
+    pub says: String,
+}

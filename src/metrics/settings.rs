@@ -1,0 +1,55 @@
+//! Under which convention metrics are taken, and their parameters.
+
+use crate::types::time::FrameRate;
+use serde::Deserialize;
+use serde::Serialize;
+
+/// What the numbers are set to.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Settings {
+    pub convention: Convention,
+    /// Shares of the pose's largest extent for PCK, each > 0.
+    pub alphas: Vec<f64>,
+    /// Frame rate of all motion.
+    pub fps: FrameRate,
+    /// Whether errors and speeds are also given over 49 joints, the neck included.
+    pub with_neck: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { convention: Convention::default(), alphas: vec![0.2, 0.1], fps: FrameRate::new(15, 1), with_neck: false }
+    }
+}
+
+/// Whose definitions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Convention {
+    /// This project's own.
+    #[default]
+    Orator,
+    Speech2gesture,
+    Genea,
+    Emage,
+    Trimodal,
+    Aist,
+}
+
+impl Convention {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::Orator, Self::Speech2gesture, Self::Genea, Self::Emage, Self::Trimodal, Self::Aist];
+
+    /// As on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Orator => "orator",
+            Self::Speech2gesture => "speech2gesture",
+            Self::Genea => "genea",
+            Self::Emage => "emage",
+            Self::Trimodal => "trimodal",
+            Self::Aist => "aist",
+        }
+    }
+}
