@@ -9,10 +9,12 @@ pub mod demo;
 pub mod evaluate;
 pub mod generate;
 pub mod motion;
+pub mod outcome;
 pub mod pipeline;
 pub mod program;
 pub mod setup;
 pub mod train;
 pub mod ui;
 
-pub use program::{Outcome, main};
+pub use outcome::Outcome;
+pub use program::main;

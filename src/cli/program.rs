@@ -3,6 +3,7 @@
 
 use super::dataset::{forget, import, verify as dataset};
 use super::motion::{lift, sheet};
+use super::outcome::Outcome;
 use super::pipeline::{init, report, run, status};
 use super::setup::{doctor, models};
 use super::{animate, bench, demo, evaluate, generate, train, ui};
@@ -39,17 +40,6 @@ enum Verb {
     Animate(animate::Args),
     Bench(bench::Args),
     Demo(demo::Args),
-}
-
-/// How a verb ended, when it ended well enough to say so itself.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// Everything asked for is done.
-    Done,
-    /// Some units failed (each was reported); the others are done.
-    SomeFailed,
-    /// What was looked at (the set-up, a dataset) is not as it must be; what is wrong was said.
-    Wrong,
 }
 
 /// Parses the command line, runs the verb, reports an error, and gives the exit code.

@@ -16,3 +16,4 @@ mod report;
 mod robustness;
 mod segment;
 mod train;
+mod wording;
