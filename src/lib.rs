@@ -13,7 +13,7 @@
 //! | floor | room | what lives there | may import |
 //! |---|---|---|---|
 //! | 1 | `types` | plain values: time, sync of sound and frames, picture, keypoints, joints, sound, interval, split | nothing |
-//! | 1 | `math` | vectors, rotations, Procrustes, eigenvalues, filters | nothing |
+//! | 1 | `math` | vectors, rotations, Procrustes, eigenvalues, filters, median and quantiles | nothing |
 //! | 1 | `stage` | how any step runs, is recorded and resumes; the ledger | nothing |
 //! | 2 | `config` | `pipeline.toml`, as written and resolved | `types stage` |
 //! | 2 | `external` | one door each for the foreign libraries: ffmpeg, OpenCV, ONNX Runtime | `types` |
@@ -25,7 +25,7 @@
 //! | 4 | `metrics` | how good predicted motion is, as pure sums | `types math nn` |
 //! | 4 | `generate` | what a trained speaker is, and speech to motion with it | `types audio motion formats nn` |
 //! | 4 | `animate` | joints to rotations on a rig, avatar, export, drawing | `types math stage motion formats external` |
-//! | 5 | `dataset` | the dataset on disk: write, read, verify, import, forget | `types stage config audio motion formats external mocap` |
+//! | 5 | `dataset` | the dataset on disk: write, read, verify, import, forget | `types math stage config audio motion formats external mocap` |
 //! | 6 | `pipeline` | the five stages, their order, and the files in which they meet | `types math stage config external audio motion formats nn dataset` |
 //! | 6 | `train` | optimiser, GAN, lifters, synthetic scenes, spaces of movement | `types math stage config audio motion formats nn mocap dataset metrics generate` |
 //! | 6 | `demo` | the synthetic speaker: drawn, with a known rule, and the checks against it | `types math stage audio motion formats external animate dataset metrics generate` |

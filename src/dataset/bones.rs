@@ -1,6 +1,7 @@
 //! Bone lengths: constant in the shards of a video (`bones.json`, written by the lift stage), and the speaker's one set
 //! for readers: the median of the videos' sets, each weighing as many frames as it was measured on.
 
+use crate::math::order::weighted_median;
 use crate::types::skeleton::N_BONES;
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
@@ -40,18 +41,6 @@ pub fn of_speaker(videos: &[VideoBones]) -> [f32; N_BONES] {
         });
         weighted_median(lengths.collect()).unwrap_or(0.0) as f32
     })
-}
-
-/// The first value, from the smallest, at which half of the weight is reached.
-fn weighted_median(mut values: Vec<(f64, u64)>) -> Option<f64> {
-    values.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let total: u64 = values.iter().map(|(_, weight)| weight).sum();
-    let mut reached = 0;
-    let half = values.into_iter().find(|(_, weight)| {
-        reached += weight;
-        2 * reached >= total
-    });
-    half.map(|(value, _)| value)
 }
 
 #[cfg(test)]

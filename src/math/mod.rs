@@ -1,8 +1,9 @@
-//! Vectors, rotations, Procrustes alignment, eigenvalues and filters. Knows no body and no file.
+//! Vectors, rotations, Procrustes alignment, eigenvalues, filters, median and quantiles. Knows no body and no file.
 
 pub mod eigen;
 pub mod gaussian;
 pub mod one_euro;
+pub mod order;
 pub mod procrustes;
 pub mod rotation;
 pub mod savitzky_golay;

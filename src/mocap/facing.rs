@@ -2,6 +2,7 @@
 //! at the origin, and the speaker turned about the vertical so that over the take they face the camera. Files say
 //! neither unit nor axes: the arms tell the unit, the spine the vertical, the shoulders the front.
 
+use crate::math::order::upper_median;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use anyhow::{Context, Result, bail, ensure};
@@ -93,10 +94,8 @@ impl Bearings {
 }
 
 /// The unit in which the median arm is most like an adult's.
-fn unit(mut arms: Vec<f64>) -> Result<(&'static str, f64)> {
-    arms.retain(|arm| arm.is_finite());
-    arms.sort_by(f64::total_cmp);
-    let arm = *arms.get(arms.len() / 2).context("no frame has an arm whose length would tell the unit")?;
+fn unit(arms: Vec<f64>) -> Result<(&'static str, f64)> {
+    let arm = upper_median(arms).context("no frame has an arm whose length would tell the unit")?;
     let unlikely = |metres: f64| (arm * metres / ARM_METRES).ln().abs();
     let fits = |metres: f64| ARM_RANGE.contains(&(arm * metres));
     let best = UNITS.into_iter().filter(|u| fits(u.1)).min_by(|a, b| unlikely(a.1).total_cmp(&unlikely(b.1)));

@@ -8,6 +8,7 @@ use crate::formats::bvh::joint_names;
 use crate::formats::bvh::read::{Bvh, Positions};
 use crate::formats::npz::Npz;
 use crate::formats::search;
+use crate::math::order::upper_median;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::motion::upper_body::{N_POINTS, Pose};
@@ -116,10 +117,8 @@ fn y_up(bodies: &mut [[Vec3; 10]]) {
 fn in_metres(bodies: &mut [[Vec3; 10]]) -> Result<()> {
     let bone = |p: &[Vec3; 10], a: usize, b: usize| vec3::norm(vec3::sub(p[a], p[b]));
     let arm = |p: &[Vec3; 10]| (bone(p, 2, 3) + bone(p, 3, 4) + bone(p, 5, 6) + bone(p, 6, 7)) / 2.0;
-    let mut arms: Vec<f64> = bodies.iter().map(arm).collect();
-    arms.sort_by(f64::total_cmp);
-    let Some(arm) = arms.get(arms.len() / 2) else { return Ok(()) };
-    ensure!(*arm > 1e-6, "its arms have no length");
+    let Some(arm) = upper_median(bodies.iter().map(arm)) else { return Ok(()) };
+    ensure!(arm > 1e-6, "its arms have no length");
     let grow = ARM_METRES / arm;
     bodies.iter_mut().for_each(|p| *p = p.map(|q| vec3::scale(q, grow)));
     Ok(())

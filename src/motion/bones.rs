@@ -1,5 +1,6 @@
 //! Bone lengths of a motion: measuring one robust set, and giving a motion exactly that set.
 
+use crate::math::order::lower_median;
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::{L_HAND, N_BONES, N_JOINTS, NECK, R_HAND, parent};
 
@@ -16,9 +17,7 @@ pub fn measure(motion: &Motion) -> [f32; N_BONES] {
         let over = |seen_only: bool| {
             let frames =
                 (0..motion.n_frames()).filter(|&t| !seen_only || (motion.mask[[t, joint]] && motion.mask[[t, parent]]));
-            median(
-                frames.map(|t| length(at(motion, t, parent), at(motion, t, joint))).filter(|l| l.is_finite()).collect(),
-            )
+            lower_median(frames.map(|t| length(at(motion, t, parent), at(motion, t, joint))))
         };
         lengths[joint - 1] = over(true).or_else(|| over(false)).unwrap_or(0.0);
     }
@@ -59,15 +58,6 @@ pub fn with_lengths(motion: &mut Motion, lengths: &[f32; N_BONES]) {
             }
         }
     }
-}
-
-/// The middle value (the lower of two); `None` of nothing. Values must be finite.
-pub fn median(mut values: Vec<f32>) -> Option<f32> {
-    if values.is_empty() {
-        return None;
-    }
-    let middle = (values.len() - 1) / 2;
-    Some(*values.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
 fn at(motion: &Motion, t: usize, joint: usize) -> [f32; 3] {

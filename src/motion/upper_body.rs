@@ -1,5 +1,6 @@
 //! The nine points of the upper body that the body lifter sees, and the size they are given.
 
+use crate::math::order::upper_median;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::types::pose2d::coco;
@@ -63,9 +64,7 @@ pub fn size(pose: &Pose) -> f64 {
 
 /// Metres a unit of `poses`, such that their median size is `REFERENCE_SIZE`; 1 when there is nothing to measure.
 pub fn metres_per_unit(poses: &[Pose]) -> f64 {
-    let mut sizes: Vec<f64> = poses.iter().map(size).filter(|s| s.is_finite() && *s > 0.0).collect();
-    sizes.sort_by(f64::total_cmp);
-    sizes.get(sizes.len() / 2).map_or(1.0, |s| REFERENCE_SIZE / s)
+    upper_median(poses.iter().map(size).filter(|s| *s > 0.0)).map_or(1.0, |s| REFERENCE_SIZE / s)
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 
 use super::figure::{INK, LEFT, RIGHT};
 use crate::external::opencv::draw;
+use crate::math::order::Ordered;
 use crate::types::image::Image;
 use crate::types::pose2d::{Keypoints, N_HAND};
 use anyhow::Result;
@@ -66,13 +67,11 @@ pub fn extent(keypoints: &Keypoints) -> Option<[f32; 4]> {
     let arrays = [(&keypoints.body, N_UPPER), (&keypoints.left_hand, N_HAND), (&keypoints.right_hand, N_HAND)];
     for (points, point) in arrays.into_iter().flat_map(|(points, n)| (0..n).map(move |point| (points, point))) {
         let found = points.outer_iter().filter(|frame| frame[[point, 2]] > FOUND_SCORE);
-        let [mut x, mut y]: [Vec<f32>; 2] =
-            [0, 1].map(|axis| found.clone().map(|frame| frame[[point, axis]]).collect());
-        x.sort_by(f32::total_cmp);
-        y.sort_by(f32::total_cmp);
-        let rest = x.len() / 50;
-        let ends = |v: &[f32]| Some([*v.get(rest)?, *v.get(v.len().checked_sub(rest + 1)?)?]);
-        let (Some([left, right]), Some([top, bottom])) = (ends(&x), ends(&y)) else { continue };
+        let ends = |axis: usize| {
+            let places = Ordered::new(found.clone().map(|frame| frame[[point, axis]]));
+            Some([places.low_end(50)?, places.high_end(50)?])
+        };
+        let (Some([left, right]), Some([top, bottom])) = (ends(0), ends(1)) else { continue };
         let [l, t, r, b] = extent.unwrap_or([left, top, right, bottom]);
         extent = Some([l.min(left), t.min(top), r.max(right), b.max(bottom)]);
     }

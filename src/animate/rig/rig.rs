@@ -5,6 +5,7 @@
 
 use super::hinge::Hinge;
 use crate::animate::solve::positions::{Places, palm_frame};
+use crate::math::order::upper_median;
 use crate::math::vec3::{Vec3, across, cross, norm, scale};
 use crate::motion::fk::Skeleton;
 use crate::types::pose3d::Motion;
@@ -152,8 +153,7 @@ pub fn finger_hinge(finger: usize) -> Hinge {
 /// Medians over the frames of the bases of the left hand's fingers in its frame; `None` if they are never seen.
 fn median_palm(places: &Places) -> Option<[Vec3; 5]> {
     let seen: Vec<_> = (0..places.n_frames()).filter_map(|t| places.palm(t)).collect();
-    let middle =
-        |finger: usize, axis: usize| median(seen.iter().filter_map(|palm| Some(palm[finger]?[axis])).collect());
+    let middle = |finger: usize, axis: usize| upper_median(seen.iter().filter_map(|palm| Some(palm[finger]?[axis])));
     let mut palm = [[0.0; 3]; 5];
     for (finger, base) in palm.iter_mut().enumerate() {
         for (axis, place) in base.iter_mut().enumerate() {
@@ -173,11 +173,6 @@ fn default_palm(metres: &[f64; N_JOINTS]) -> [Vec3; 5] {
     })
 }
 
-fn median(mut numbers: Vec<f64>) -> Option<f64> {
-    let middle = numbers.len() / 2;
-    (!numbers.is_empty()).then(|| *numbers.select_nth_unstable_by(middle, f64::total_cmp).1)
-}
-
 /// Median length over the frames of the bone to each joint, metres; that of the other side where never seen, else a
 /// default.
 pub fn bone_metres(motion: &Motion) -> [f64; N_JOINTS] {
@@ -187,7 +182,7 @@ pub fn bone_metres(motion: &Motion) -> [f64; N_JOINTS] {
             let square = |k| (f64::from(frame[[joint, k]]) - f64::from(frame[[parent, k]])).powi(2);
             (0..3).map(square).sum::<f64>().sqrt()
         });
-        median(lengths.filter(|length| length.is_finite()).collect())
+        upper_median(lengths)
     });
     std::array::from_fn(|joint| seen[joint].or(seen[skeleton::mirror(joint)]).unwrap_or_else(|| default_metres(joint)))
 }

@@ -5,6 +5,7 @@
 use super::arm::Means;
 use super::track::{Seen, Track, filled};
 use crate::animate::rig::rig::Figure;
+use crate::math::order::upper_median;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::Vec3;
 use crate::types::pose2d::coco;
@@ -46,15 +47,15 @@ pub fn turn(face: &Face, figure: &Figure, means: &Means, local: &mut [Track]) ->
     let frame = |t: usize| Points::of(face.body.index_axis(ndarray::Axis(0), t));
     let points: Vec<Option<Points>> =
         (0..n_frames).map(|t| if t < face.body.shape()[0] { frame(t) } else { None }).collect();
-    let Some(scale) = median(points.iter().flatten().filter_map(|points| points.shoulder_scale).collect())
-        .or_else(|| median(points.iter().flatten().map(|points| points.spread() / 0.1).collect()))
+    let Some(scale) = upper_median(points.iter().flatten().filter_map(|points| points.shoulder_scale))
+        .or_else(|| upper_median(points.iter().flatten().map(|points| points.spread() / 0.1)))
     else {
         return 0;
     };
     let fitted = |scale: f64, nod: f64, usual: f64| -> Vec<Option<[f64; 4]>> {
         points.iter().map(|points| Some(points.as_ref()?.fit([0.0, nod, 0.0, scale.ln()], usual))).collect()
     };
-    let middle = |fits: &[Option<[f64; 4]>], k: usize| median(fits.iter().flatten().map(|fit| fit[k]).collect());
+    let middle = |fits: &[Option<[f64; 4]>], k: usize| upper_median(fits.iter().flatten().map(|fit| fit[k]));
     let first = fitted(scale, 0.0, USUAL_SCALE[0]);
     let (nod, log_scale) = (middle(&first, 1).unwrap_or(0.0), middle(&first, 3).unwrap_or(scale.ln()));
     let second = fitted(log_scale.exp(), nod, USUAL_SCALE[1]);
@@ -186,11 +187,6 @@ fn solved(mut matrix: [[f64; 4]; 4], mut right: [f64; 4]) -> [f64; 4] {
         found[row] = (right[row] - known) / matrix[row][row];
     }
     found
-}
-
-fn median(mut numbers: Vec<f64>) -> Option<f64> {
-    let middle = numbers.len() / 2;
-    (!numbers.is_empty()).then(|| *numbers.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use orator::animate::Face;
 use orator::dataset::index::SampleRef;
 use orator::dataset::{Dataset, Split};
 use orator::formats::{authors_txt, joints_npz, keypoints_npz, npy};
+use orator::math::order;
 use orator::types::pose2d::N_BODY;
 use orator::types::pose3d::Motion;
 use orator::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
@@ -189,10 +190,8 @@ fn check(motion: &Motion) -> Result<()> {
             lengths.push((0..3).map(|k| (frame[[a, k]] - frame[[b, k]]).powi(2)).sum::<f32>().sqrt());
         }
     }
-    lengths.retain(|length| length.is_finite());
-    ensure!(!lengths.is_empty(), "no arm is seen in any of its {} frames: every joint is NaN", motion.n_frames());
-    let middle = lengths.len() / 2;
-    let length = *lengths.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let length = order::median(lengths)
+        .with_context(|| format!("no arm is seen in any of its {} frames: every joint is NaN", motion.n_frames()))?;
     ensure!(
         (0.02..=2.0).contains(&length),
         "its arm bones are {length} long; joints must be in metres about the neck, x image right, y down, z away"

@@ -6,6 +6,7 @@ use super::transcript::Transcript;
 use crate::config::videos::slug;
 use crate::dataset::sample::{N_KEYPOINTS, Sample};
 use crate::external::ffmpeg::audio;
+use crate::math::order::Ordered;
 use crate::mocap::captured;
 use crate::mocap::captured::Kind;
 use crate::mocap::take::Captured;
@@ -196,12 +197,10 @@ fn keep(name: &str, found: &Found, captured: &Captured, mut motion: Motion, mut 
 
 /// By how much the joints were moved to give every bone one length: the median and the largest, mm to a hundredth.
 fn moved_mm(before: &Array3<f32>, after: &Array3<f32>) -> [f64; 2] {
-    let mut moved: Vec<f32> = (0..before.shape()[0])
+    let moved = (0..before.shape()[0])
         .flat_map(|t| (1..N_JOINTS).map(move |joint| (t, joint)))
-        .map(|(t, joint)| (0..3).map(|k| (after[[t, joint, k]] - before[[t, joint, k]]).powi(2)).sum::<f32>().sqrt())
-        .filter(|distance| distance.is_finite())
-        .collect();
-    moved.sort_by(f32::total_cmp);
-    let mm = |metres: Option<&f32>| metres.map_or(0.0, |m| (f64::from(*m) * 1e5).round() / 100.0);
-    [mm(moved.get(moved.len() / 2)), mm(moved.last())]
+        .map(|(t, joint)| (0..3).map(|k| (after[[t, joint, k]] - before[[t, joint, k]]).powi(2)).sum::<f32>().sqrt());
+    let moved = Ordered::new(moved);
+    let mm = |metres: Option<f32>| metres.map_or(0.0, |m| (f64::from(m) * 1e5).round() / 100.0);
+    [mm(moved.upper_median()), mm(moved.lower_quantile(1.0))]
 }

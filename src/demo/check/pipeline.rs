@@ -8,6 +8,7 @@ use crate::dataset::{Dataset, Split};
 use crate::demo::drawn::folder::DATASET_FPS;
 use crate::demo::drawn::truth::Truth;
 use crate::formats::keypoints_npz;
+use crate::math::order::{Ordered, upper_median};
 use crate::types::skeleton::{
     L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_ELBOW, R_HAND, R_SHOULDER, R_WRIST, parent,
 };
@@ -169,31 +170,23 @@ impl Distances {
         }
     }
 
-    fn summary(mut self) -> Pixels {
-        self.px.sort_by(f64::total_cmp);
-        let at = |share: f64| {
-            let place = (share * self.px.len().saturating_sub(1) as f64).round() as usize;
-            self.px.get(place).copied().unwrap_or(f64::INFINITY)
-        };
+    fn summary(self) -> Pixels {
         let found = self.px.len() as f64 / self.n_points.max(1) as f64;
+        let px = Ordered::new(self.px);
+        let at = |share: f64| px.quantile(share).unwrap_or(f64::INFINITY);
         Pixels { median: at(0.5), p90: at(0.9), found }
     }
 }
 
 /// The segment scaled to `ARM_METRES`.
 fn scaled(segment: ArrayView3<f32>) -> Array3<f32> {
-    let mut sizes: Vec<f32> = segment
-        .outer_iter()
-        .map(|frame| {
-            let bone = |a: usize, b: usize| (0..3).map(|k| (frame[[a, k]] - frame[[b, k]]).powi(2)).sum::<f32>().sqrt();
-            let upper = bone(L_SHOULDER, L_ELBOW) + bone(R_SHOULDER, R_ELBOW);
-            let lower = bone(L_ELBOW, L_WRIST) + bone(R_ELBOW, R_WRIST);
-            bone(L_SHOULDER, R_SHOULDER) + (upper + lower) / 2.0
-        })
-        .filter(|size| size.is_finite())
-        .collect();
-    sizes.sort_by(f32::total_cmp);
-    let size = sizes.get(sizes.len() / 2).copied().unwrap_or(ARM_METRES).max(1e-3);
+    let sizes = segment.outer_iter().map(|frame| {
+        let bone = |a: usize, b: usize| (0..3).map(|k| (frame[[a, k]] - frame[[b, k]]).powi(2)).sum::<f32>().sqrt();
+        let upper = bone(L_SHOULDER, L_ELBOW) + bone(R_SHOULDER, R_ELBOW);
+        let lower = bone(L_ELBOW, L_WRIST) + bone(R_ELBOW, R_WRIST);
+        bone(L_SHOULDER, R_SHOULDER) + (upper + lower) / 2.0
+    });
+    let size = upper_median(sizes).unwrap_or(ARM_METRES).max(1e-3);
     segment.mapv(|v| v * ARM_METRES / size)
 }
 

@@ -7,11 +7,11 @@
 //! size. The wrist itself, and points that a source does not have, count nowhere.
 
 use crate::formats::checkpoint::Contents;
+use crate::math::order::median;
 use crate::math::procrustes;
 use crate::math::vec3;
 use crate::mocap::fingers::files::FingerSet;
 use crate::mocap::fingers::take::Truth;
-use crate::motion::bones::median;
 use crate::motion::hand_bones::relaxed;
 use crate::motion::view::hand::{Hand, SeenHand, parent};
 use crate::nn::lifter::hand::HandLifter;

@@ -1,6 +1,7 @@
 //! How sure a figure is: the same figure of blocks drawn with replacement (Efron 1979; blocks, since neighbouring frames
 //! say the same: Kuensch 1989).
 
+use crate::math::order::Ordered;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
@@ -29,16 +30,8 @@ impl Estimate {
     /// `value` of all blocks, with the spread of `drawn` around its median: moved so that the median is the value, since a
     /// distance between distributions grows when blocks are repeated. Draws that are no number are left out.
     pub fn of(value: f64, drawn: &[f64]) -> Self {
-        let mut drawn: Vec<f64> = drawn.iter().copied().filter(|v| v.is_finite()).collect();
-        drawn.sort_by(f64::total_cmp);
-        let at = |share: f64| {
-            let place = share * drawn.len().saturating_sub(1) as f64;
-            let (below, above) = (drawn.get(place.floor() as usize), drawn.get(place.ceil() as usize));
-            match (below, above) {
-                (Some(below), Some(above)) => below + (above - below) * place.fract(),
-                _ => f64::NAN,
-            }
-        };
+        let drawn = Ordered::new(drawn.iter().copied());
+        let at = |share: f64| drawn.quantile(share).unwrap_or(f64::NAN);
         let median = at(0.5);
         Self { value, low: value + at(TAIL) - median, high: value + at(1.0 - TAIL) - median }
     }

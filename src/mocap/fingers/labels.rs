@@ -2,9 +2,9 @@
 //! a right hand, no knuckles) and of ICVL (16 points, a left hand), told apart by how many numbers a line holds.
 
 use super::take::{FingerTake, Fingers, Size};
+use crate::math::order::{lower_median, lower_quantile};
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
-use crate::motion::bones::median;
 use crate::motion::hand_bones::BONES;
 use crate::types::pose2d::N_HAND;
 use crate::types::skeleton::Side;
@@ -78,11 +78,9 @@ fn icvl(rows: &[Vec<f64>], name: String) -> Result<FingerTake> {
     let mut hands: Vec<Fingers> = vec![[None; N_HAND]; frames.len()];
     for (finger, [_, one, two, _]) in BONES.into_iter().enumerate() {
         let [first, second, third] = [1, 2, 3].map(|k| 3 * finger + k);
-        let apart: Vec<f64> = frames.iter().map(|p| vec3::norm(vec3::sub(p[second], p[first]))).collect();
-        let mut sorted = apart.clone();
-        sorted.sort_by(f64::total_cmp);
+        let apart = frames.iter().map(|p| vec3::norm(vec3::sub(p[second], p[first])));
         // half the two bones together: most frames are of straight fingers, and labels err to both sides
-        let together = sorted[sorted.len() * 7 / 10];
+        let together = lower_quantile(apart, 0.7).context("no frame")?;
         let a = together * one / (one + two);
         for (p, hand) in frames.iter().zip(&mut hands) {
             let joint = meeting(p[first], p[second], p[third], a, together - a);
@@ -95,7 +93,7 @@ fn icvl(rows: &[Vec<f64>], name: String) -> Result<FingerTake> {
         }
     }
     let size = |hand: &Fingers| Some(vec3::norm(vec3::sub(hand[10]?, hand[9]?)) as f32);
-    let phalanx = f64::from(median(hands.iter().filter_map(size).collect()).context("no frame")?);
+    let phalanx = f64::from(lower_median(hands.iter().filter_map(size)).context("no frame")?);
     ensure!(phalanx > 1e-3, "all points of the middle finger lie in one place");
     let palm = phalanx * BONES[2][0] / BONES[2][1];
     for (p, hand) in frames.iter().zip(&mut hands) {

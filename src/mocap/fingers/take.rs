@@ -1,9 +1,9 @@
 //! Captured or labelled fingers of one hand over time, and how they become hands of one size that errors are measured
 //! on. Where they come from is `finger_files`'.
 
+use crate::math::order::lower_median;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
-use crate::motion::bones::median;
 use crate::motion::hand_bones::{BONES, METRES};
 use crate::motion::view::hand::Hand;
 use crate::types::pose2d::N_HAND;
@@ -87,8 +87,8 @@ impl FingerTake {
     /// All frames with a wrist as right hands of the reference size. Errors: the stretch that gives the size is
     /// nowhere, or of no length.
     pub fn truths(&self) -> Result<Vec<Truth>> {
-        let lengths: Vec<f32> = self.frames.iter().filter_map(|f| self.size.of(f)).map(|l| l as f32).collect();
-        let length = median(lengths.into_iter().filter(|l| l.is_finite() && *l > 0.0).collect());
+        let lengths = self.frames.iter().filter_map(|f| self.size.of(f)).map(|l| l as f32);
+        let length = lower_median(lengths.filter(|l| *l > 0.0));
         let length = length.with_context(|| format!("{}: no frame has its {}", self.name, self.size.text()))?;
         let grow = self.size.reference() / f64::from(length);
         let flip = if self.side == Side::Left { -1.0 } else { 1.0 };

@@ -3,6 +3,7 @@
 //! largest apparent bone of the stretch (a shoulder width would collapse where the speaker turns); the longest
 //! appearance of each kind of bone tells the body's proportions, and with them how far a bone points at the camera.
 
+use crate::math::order::Ordered;
 use crate::math::vec3;
 use crate::motion::upper_body::{BONES, L_HIP, L_SHOULDER, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, Seen};
 
@@ -153,20 +154,19 @@ fn longest(frames: &[Seen]) -> [f32; N_KINDS] {
     let apart = |a: Option<[f32; 2]>, b: Option<[f32; 2]>| Some((a?[0] - b?[0]).hypot(a?[1] - b?[1]));
     let middle = |a: Option<[f32; 2]>, b: Option<[f32; 2]>| Some([(a?[0] + b?[0]) / 2.0, (a?[1] + b?[1]) / 2.0]);
     let neck = |f: &Seen| middle(f[R_SHOULDER], f[L_SHOULDER]);
-    let bone = |(a, b): (usize, usize)| large(frames.iter().filter_map(|f| apart(f[a], f[b])).collect());
+    let bone = |(a, b): (usize, usize)| large(frames.iter().filter_map(|f| apart(f[a], f[b])));
     [
         bone(BONES[0]),
         bone(BONES[1]).max(bone(BONES[2])),
         bone(BONES[3]).max(bone(BONES[4])),
-        large(frames.iter().filter_map(|f| apart(f[NOSE], neck(f))).collect()),
-        large(frames.iter().filter_map(|f| apart(middle(f[R_HIP], f[L_HIP]), neck(f))).collect()),
+        large(frames.iter().filter_map(|f| apart(f[NOSE], neck(f)))),
+        large(frames.iter().filter_map(|f| apart(middle(f[R_HIP], f[L_HIP]), neck(f)))),
     ]
 }
 
 /// The value that a tenth of the values exceed; 0 of none.
-fn large(mut lengths: Vec<f32>) -> f32 {
-    lengths.sort_by(f32::total_cmp);
-    lengths.len().checked_sub(1 + lengths.len() / 10).map_or(0.0, |i| lengths[i])
+fn large(lengths: impl Iterator<Item = f32>) -> f32 {
+    Ordered::new(lengths).high_end(10).unwrap_or(0.0)
 }
 
 #[cfg(test)]

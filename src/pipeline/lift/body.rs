@@ -2,8 +2,8 @@
 
 use super::gaps::long_gaps;
 use super::interval_view::Stretch;
-use super::lengths::median;
 use super::observed::Sight;
+use crate::math::order::lower_median;
 use crate::motion::upper_body::{ARMS, L_HIP, L_SHOULDER, NOSE, Pose, R_HIP, R_SHOULDER, REFERENCE_SIZE, Seen, size};
 use crate::nn::lifter::body::BodyLifter;
 use crate::types::interval::Interval;
@@ -79,7 +79,7 @@ fn place(pose: &Pose, t: usize, into: &mut Stretch) {
 fn to_reference(sizes: &[f32], reach: usize, into: &mut Stretch) {
     for t in 0..sizes.len() {
         let around = sizes[t.saturating_sub(reach)..sizes.len().min(t + reach + 1)].to_vec();
-        let grow = median(around).map_or(f32::NAN, |size| REFERENCE_SIZE as f32 / size);
+        let grow = lower_median(around).map_or(f32::NAN, |size| REFERENCE_SIZE as f32 / size);
         into.joints.slice_mut(s![t, NECK.., ..]).mapv_inplace(|v| v * grow);
         into.extra.slice_mut(s![t, .., ..]).mapv_inplace(|v| v * grow);
     }

@@ -5,7 +5,7 @@
 //! torsos that leaned 15.5 degrees as seen leaned 1.7 after levelling. Guessed hips tell no more than no estimate at all.
 
 use super::interval_view::Stretch;
-use super::lengths::median;
+use crate::math::order::lower_median;
 use crate::math::rotation::Rotation;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
@@ -69,7 +69,7 @@ fn up_by_hips(lifted: &Stretch) -> Option<Vec3> {
     if (torsos.len() as f64) < HIPS_SHARE * lifted.extra.len_of(Axis(0)) as f64 {
         return None;
     }
-    let along = |k: usize| median(torsos.iter().map(|up| up[k] as f32).collect());
+    let along = |k: usize| lower_median(torsos.iter().map(|up| up[k] as f32));
     vec3::unit([along(0)?.into(), along(1)?.into(), along(2)?.into()], 1e-6)
 }
 
@@ -80,7 +80,7 @@ fn roll_by_shoulders(lifted: &Stretch) -> Option<f64> {
     };
     let [x, y, z] = [0, 1, 2].map(across);
     let angle = |(a, b): (&f32, &f32)| a.atan2(b.abs());
-    let turned = median(z.iter().zip(&x).map(|(z, x)| z.abs().atan2(x.abs())).collect())?;
-    let roll = median(y.iter().zip(&x).map(angle).collect())?;
+    let turned = lower_median(z.iter().zip(&x).map(|(z, x)| z.abs().atan2(x.abs())))?;
+    let roll = lower_median(y.iter().zip(&x).map(angle))?;
     (turned < FRONTAL).then_some(roll.into())
 }

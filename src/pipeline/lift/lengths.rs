@@ -1,6 +1,7 @@
 //! The bone lengths of a video: one set over all its intervals, from what was lifted and smoothed. Sizes are a convention,
 //! as no picture tells them: the body is of the reference size, a hand has the size its forearm sets.
 
+use crate::math::order::{lower_median, lower_quantile};
 use crate::motion::upper_body::REFERENCE_SIZE;
 use crate::motion::view::hand::parent;
 use crate::types::pose2d::N_HAND;
@@ -49,9 +50,9 @@ fn arms(motion: &Motion) -> [f64; 3] {
     ];
     let mut lengths = [0.0; 3];
     for (i, bones) in sides.iter().enumerate() {
-        let all = bones.iter().flat_map(|&(a, b)| seen_lengths(motion, a, b)).collect();
+        let all = bones.iter().flat_map(|&(a, b)| seen_lengths(motion, a, b));
         let [least, most] = [BELIEVED.0, BELIEVED.1].map(|ratio| ratio * COMMON[i]);
-        lengths[i] = quantile(all, QUANTILE).map_or(COMMON[i], |length| f64::from(length).clamp(least, most));
+        lengths[i] = lower_quantile(all, QUANTILE).map_or(COMMON[i], |length| f64::from(length).clamp(least, most));
     }
     let grow = REFERENCE_SIZE / lengths.iter().sum::<f64>();
     lengths.map(|length| length * grow)
@@ -63,10 +64,11 @@ fn hands(motion: &Motion, forearm: f64) -> Option<[f64; N_HAND]> {
     let mut lengths = [0.0; N_HAND];
     for (j, length) in lengths.iter_mut().enumerate().skip(1) {
         let of_roots = |lengths: fn(&Motion, usize, usize) -> Vec<f32>| {
-            [L_HAND, R_HAND].into_iter().flat_map(|root| lengths(motion, root + parent(j), root + j)).collect()
+            let both = [L_HAND, R_HAND].into_iter();
+            lower_median(both.flat_map(|root| lengths(motion, root + parent(j), root + j)))
         };
         // A bone that is never seen (a detector may leave points out) is as long as it was lifted.
-        *length = median(of_roots(seen_lengths)).or_else(|| median(of_roots(lifted_lengths)))?.into();
+        *length = of_roots(seen_lengths).or_else(|| of_roots(lifted_lengths))?.into();
     }
     let usual = PHALANX_OF_HAND * lengths.iter().sum::<f64>();
     let phalanx = lengths[10].clamp(PHALANX_BELIEVED.0 * usual, PHALANX_BELIEVED.1 * usual);
@@ -77,28 +79,15 @@ fn hands(motion: &Motion, forearm: f64) -> Option<[f64; N_HAND]> {
 fn seen_lengths(motion: &Motion, from: usize, to: usize) -> Vec<f32> {
     let is_root = from == L_HAND || from == R_HAND;
     let seen = |t: usize| motion.mask[[t, to]] && (is_root || motion.mask[[t, from]]);
-    (0..motion.n_frames()).filter(|&t| seen(t)).map(|t| bone(motion, t, from, to)).filter(|l| l.is_finite()).collect()
+    (0..motion.n_frames()).filter(|&t| seen(t)).map(|t| bone(motion, t, from, to)).collect()
 }
 
 fn lifted_lengths(motion: &Motion, from: usize, to: usize) -> Vec<f32> {
-    (0..motion.n_frames()).map(|t| bone(motion, t, from, to)).filter(|l| l.is_finite()).collect()
+    (0..motion.n_frames()).map(|t| bone(motion, t, from, to)).collect()
 }
 
 /// Metres between two joints of a frame.
 pub fn bone(motion: &Motion, t: usize, from: usize, to: usize) -> f32 {
     let square = |k: usize| (motion.joints[[t, to, k]] - motion.joints[[t, from, k]]).powi(2);
     (0..3).map(square).sum::<f32>().sqrt()
-}
-
-/// The middle of the finite values, the lower of two.
-pub fn median(values: Vec<f32>) -> Option<f32> {
-    quantile(values, 0.5)
-}
-
-/// The finite value that `share` of them do not exceed.
-fn quantile(mut values: Vec<f32>, share: f64) -> Option<f32> {
-    values.retain(|v| v.is_finite());
-    let last = values.len().checked_sub(1)?;
-    let at = (share * last as f64).floor() as usize;
-    Some(*values.select_nth_unstable_by(at, f32::total_cmp).1)
 }

@@ -2,7 +2,7 @@
 //! gaps bridged.
 
 use super::gaps;
-use super::lengths::median;
+use crate::math::order::{lower_median, median};
 use crate::motion::upper_body::{
     COCO, L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, Seen,
 };
@@ -101,7 +101,7 @@ fn remove_strays(points: &mut Array3<f32>, reach: usize) {
     let mut around = Vec::with_capacity(2 * reach);
     for t in 0..n_frames {
         let frames = t.saturating_sub(reach)..n_frames.min(t + reach + 1);
-        let Some(largest) = median(largest[frames.clone()].to_vec()) else { continue };
+        let Some(largest) = lower_median(largest[frames.clone()].iter().copied()) else { continue };
         for j in 0..N_POINTS {
             let Some(own) = at(points, t, j) else { continue };
             around.clear();
@@ -111,7 +111,8 @@ fn remove_strays(points: &mut Array3<f32>, reach: usize) {
             if n_before == 0 || around.len() == n_before {
                 continue;
             }
-            let usual = [0, 1].map(|k| mean_median(around.iter().map(|p| p[k])));
+            // No direction is preferred: of an even number the mean of the two in the middle.
+            let usual = [0, 1].map(|k| median(around.iter().map(|p| p[k])).unwrap_or(f32::NAN));
             let away = |p: &[f32; 2]| (p[0] - usual[0]).hypot(p[1] - usual[1]);
             if away(&own) > STRAY * largest + STRAY_SPREAD * around.iter().map(away).fold(0.0, f32::max) {
                 strays.push((t, j));
@@ -135,14 +136,6 @@ fn largest_bone(points: &Array3<f32>, t: usize) -> f32 {
         Some((a[0] - b[0]).hypot(a[1] - b[1]))
     };
     BONES.iter().filter_map(bone).fold(f32::NAN, f32::max)
-}
-
-/// The median, of an even number the mean of the two in the middle: no direction is preferred.
-fn mean_median(values: impl Iterator<Item = f32>) -> f32 {
-    let mut values: Vec<f32> = values.collect();
-    values.sort_unstable_by(f32::total_cmp);
-    let (n, half) = (values.len(), values.len() / 2);
-    if n % 2 == 1 { values[half] } else { (values[half - 1] + values[half]) / 2.0 }
 }
 
 #[cfg(test)]

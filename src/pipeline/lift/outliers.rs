@@ -3,8 +3,9 @@
 //! intervals and ledger is `amend`'s.
 
 use super::gaps::long_gaps;
-use super::lengths::{bone, median};
+use super::lengths::bone;
 use super::refuse::Mark;
+use crate::math::order::lower_median;
 use crate::types::interval::Interval;
 use crate::types::pose2d::{Keypoints, coco};
 use crate::types::pose3d::Motion;
@@ -37,7 +38,7 @@ impl BoneChange {
             let seen = |t: usize| raw.mask[[t, from]] && raw.mask[[t, to]];
             let length = |t: usize| if seen(t) { bone(raw, t, from, to) } else { f32::NAN };
             let lengths: Vec<f32> = (0..raw.n_frames()).map(length).collect();
-            let usual = median(lengths.clone()).unwrap_or(f32::NAN);
+            let usual = lower_median(lengths.iter().copied()).unwrap_or(f32::NAN);
             changes.column_mut(i).iter_mut().zip(lengths).for_each(|(change, length)| *change = length / usual - 1.0);
         }
         Self { changes }

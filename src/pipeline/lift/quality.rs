@@ -2,6 +2,7 @@
 //! whether the pose agrees with the picture it was lifted from. A forearm that looks longer in the picture than it is
 //! in 3D was shortened; the ratio of the two lengths says so (perspective alone makes it 0.8 to 0.9 at arm's length).
 
+use crate::math::order::{self, Ordered};
 use crate::types::pose2d::{Keypoints, coco};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton;
@@ -80,7 +81,7 @@ pub fn measure(motion: &Motion, keypoints: &Keypoints) -> Result<ClipFigures> {
 pub fn jitter_around(motion: &Motion, joint: usize, frame_idx: usize) -> f64 {
     let half = (motion.fps.per_sec() / 2.0).round() as usize;
     let range = frame_idx.saturating_sub(half)..(frame_idx + half + 1).min(motion.n_frames());
-    median(range.filter_map(|t| second_difference(motion, joint, t)).collect())
+    median(range.filter_map(|t| second_difference(motion, joint, t)))
 }
 
 fn arm(chain: &Chain, motion: &Motion, keypoints: &Keypoints, fits: &[Option<Fit>]) -> ArmFigures {
@@ -96,9 +97,8 @@ fn arm(chain: &Chain, motion: &Motion, keypoints: &Keypoints, fits: &[Option<Fit
             let seen = distance(&from, &to) / fit.scale;
             (seen > 0.02).then(|| length(chain.joints[bone], chain.joints[bone + 1], t) / seen)
         };
-        let mut ratios = all(&|t| in_picture(t).unwrap_or(f64::NAN));
-        ratios.sort_by(f64::total_cmp);
-        [ratios.len() / 2, ratios.len() / 20].map(|at| ratios.get(at).copied().unwrap_or(f64::NAN))
+        let ratios = Ordered::new((0..n_frames).filter_map(in_picture));
+        [ratios.median(), ratios.low_end(20)].map(|ratio| ratio.unwrap_or(f64::NAN))
     };
     let off = |t: usize| -> Option<f64> {
         let (seen, fit) = (found(keypoints, chain.points[2], t)?, fits[t].as_ref()?);
@@ -116,13 +116,13 @@ fn arm(chain: &Chain, motion: &Motion, keypoints: &Keypoints, fits: &[Option<Fit
         forearm_metres: median(all(&|t| length(elbow, wrist, t))),
         upper_arm_spread: spread(&all(&|t| length(shoulder, elbow, t))),
         forearm_spread: spread(&all(&|t| length(elbow, wrist, t))),
-        jitter_mm: median((0..n_frames).filter_map(|t| second_difference(motion, wrist, t)).collect()),
+        jitter_mm: median((0..n_frames).filter_map(|t| second_difference(motion, wrist, t))),
         still_jitter_mm: still_jitter(motion, wrist),
         elbow_z_mm: depth(elbow),
         wrist_z_mm: depth(wrist),
         upper_arm_ratio: ratio(0),
         forearm_ratio: ratio(1),
-        wrist_off_mm: median(all(&|t| off(t).unwrap_or(f64::NAN))),
+        wrist_off_mm: median((0..n_frames).filter_map(off)),
         missing: frames(&|t| !place(motion, wrist, t)[0].is_finite()),
         masked: frames(&|t| !motion.mask[[t, wrist]]),
         hand_there: share(hand.len(), n_hand),
@@ -177,7 +177,7 @@ fn still_jitter(motion: &Motion, joint: usize) -> f64 {
     let starts = 0..(motion.n_frames() + 1).saturating_sub(second);
     let stillest = starts.filter(|start| moves(start).is_finite()).min_by(|a, b| moves(a).total_cmp(&moves(b)));
     let Some(start) = stillest else { return f64::NAN };
-    median((start + 1..start + second - 1).filter_map(|t| second_difference(motion, joint, t)).collect())
+    median((start + 1..start + second - 1).filter_map(|t| second_difference(motion, joint, t)))
 }
 
 /// |x(t - 1) - 2 x(t) + x(t + 1)| in mm, where all three are told.
@@ -213,9 +213,8 @@ fn spread(values: &[f64]) -> f64 {
     100.0 * (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt() / mean
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+fn median(values: impl IntoIterator<Item = f64>) -> f64 {
+    order::median(values).unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]

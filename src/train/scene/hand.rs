@@ -1,9 +1,9 @@
 //! Hands made by rule before a camera, as the hand lifters learn them, and the errors on such hands.
 
 use super::hand_shape::{any_turn, draw, normal};
+use crate::math::order;
 use crate::math::procrustes;
 use crate::math::vec3;
-use crate::motion::bones::median;
 use crate::motion::hand_bones::PHALANX;
 use crate::motion::view::hand::{Hand, SeenHand, parent};
 use crate::types::pose2d::N_HAND;
@@ -123,7 +123,7 @@ impl Errors {
             }
         }
         let above_30 = plain.iter().filter(|e| **e > 30.0).count() as f64 / plain.len().max(1) as f64;
-        Self { median: median(plain).unwrap_or(0.0), aligned: median(aligned).unwrap_or(0.0), above_30 }
+        Self { median: order::median(plain).unwrap_or(0.0), aligned: order::median(aligned).unwrap_or(0.0), above_30 }
     }
 }
 
