@@ -1,7 +1,7 @@
 //! What makes the description of a model sound: names that exist, a role that fits the decoding, keypoint maps that are
 //! complete. The file itself is checked in `model`.
 
-use super::{Axes, Decode, Fit, ModelEntry, Points, Role};
+use super::{Decode, Fit, KeypointOutputs, ModelEntry, ModelRole, TensorAxes};
 use anyhow::{Result, bail, ensure};
 
 impl ModelEntry {
@@ -9,8 +9,8 @@ impl ModelEntry {
     pub fn input_size(&self) -> Result<[usize; 2]> {
         let shape = self.inputs.first().map(|port| port.shape.as_slice());
         let (size, channels) = match (self.picture.axes, shape) {
-            (Axes::Nchw, Some([1, channels, height, width])) => ([*height, *width], *channels),
-            (Axes::Nhwc, Some([1, height, width, channels])) => ([*height, *width], *channels),
+            (TensorAxes::Nchw, Some([1, channels, height, width])) => ([*height, *width], *channels),
+            (TensorAxes::Nhwc, Some([1, height, width, channels])) => ([*height, *width], *channels),
             _ => {
                 bail!("the input's shape must be [1, 3, height, width] or [1, height, width, 3], as picture.axes says")
             }
@@ -65,13 +65,15 @@ impl ModelEntry {
         }
         self.decode.check()?;
         let fits = match (self.role, &self.fit, &self.decode) {
-            (Role::Person, Fit::Letterbox { .. }, Decode::Detections { .. } | Decode::YoloxGrid { .. }) => true,
-            (Role::Body, Fit::Box { margin }, Decode::Heatmap { .. } | Decode::Simcc { .. }) => *margin > 0.0,
-            (Role::Hand, Fit::Region, Decode::Heatmap { .. } | Decode::Simcc { .. } | Decode::Regression { .. }) => {
-                height == width
-            }
-            (Role::Palm, Fit::Letterbox { .. }, Decode::SsdAnchors { .. }) => height == width,
-            (Role::Other, _, _) => true,
+            (ModelRole::Person, Fit::Letterbox { .. }, Decode::Detections { .. } | Decode::YoloxGrid { .. }) => true,
+            (ModelRole::Body, Fit::Box { margin }, Decode::Heatmap { .. } | Decode::Simcc { .. }) => *margin > 0.0,
+            (
+                ModelRole::Hand,
+                Fit::Region,
+                Decode::Heatmap { .. } | Decode::Simcc { .. } | Decode::Regression { .. },
+            ) => height == width,
+            (ModelRole::Palm, Fit::Letterbox { .. }, Decode::SsdAnchors { .. }) => height == width,
+            (ModelRole::Other, _, _) => true,
             _ => false,
         };
         ensure!(
@@ -82,12 +84,12 @@ impl ModelEntry {
         );
         let whole = |points: &[usize], n: usize| points.len() == n;
         let maps = match self.role {
-            Role::Body => {
+            ModelRole::Body => {
                 let hands = [&self.points.left_hand, &self.points.right_hand];
                 let none = hands.iter().all(|points| points.is_empty());
                 whole(&self.points.body, 17) && (none || hands.iter().all(|points| whole(points, 21)))
             }
-            Role::Hand => whole(&self.points.hand, 21),
+            ModelRole::Hand => whole(&self.points.hand, 21),
             _ => true,
         };
         ensure!(
@@ -95,7 +97,7 @@ impl ModelEntry {
             "points: a body model names 17 `body` points (and 21 `left_hand` and `right_hand`, or neither), a hand model 21 `hand` points"
         );
         if let Some(n_points) = self.n_points() {
-            let Points { body, hand, left_hand, right_hand } = &self.points;
+            let KeypointOutputs { body, hand, left_hand, right_hand } = &self.points;
             let all = [body, hand, left_hand, right_hand].into_iter().flatten();
             if let Some(beyond) = all.clone().find(|point| **point >= n_points) {
                 bail!("points: there is no output {beyond}, the model gives {n_points}");

@@ -10,7 +10,7 @@ pub struct ModelEntry {
     pub id: String,
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub about: String,
-    pub role: Role,
+    pub role: ModelRole,
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub file: String,
     /// 64 hex digits of the file's content.
@@ -26,19 +26,19 @@ pub struct ModelEntry {
     pub conversion: Option<String>,
     pub inputs: Vec<Port>,
     pub outputs: Vec<Port>,
-    pub picture: Picture,
+    pub picture: InputPicture,
     pub fit: Fit,
     pub decode: Decode,
-    #[serde(default, skip_serializing_if = "Points::is_empty")]
-    pub points: Points,
+    #[serde(default, skip_serializing_if = "KeypointOutputs::is_empty")]
+    pub points: KeypointOutputs,
     #[serde(default)]
-    pub origin: Origin,
+    pub origin: ModelOrigin,
 }
 
 /// What a model is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Role {
+pub enum ModelRole {
     Person,
     Body,
     Hand,
@@ -49,7 +49,7 @@ pub enum Role {
 /// Where the weights come from and under which terms.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Origin {
+pub struct ModelOrigin {
     pub repository: String,
     pub commit: String,
     pub path: String,
@@ -69,9 +69,9 @@ pub struct Port {
 /// Pixel to tensor: `(pixel * scale - mean) / std`, in the order of `channels`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Picture {
+pub struct InputPicture {
     pub channels: Channels,
-    pub axes: Axes,
+    pub axes: TensorAxes,
     #[serde(default = "one")]
     pub scale: f64,
     #[serde(default)]
@@ -89,7 +89,7 @@ pub enum Channels {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Axes {
+pub enum TensorAxes {
     Nchw,
     Nhwc,
 }
@@ -173,7 +173,7 @@ pub enum Refine {
 /// Which output is which keypoint; empty: the model does not give it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Points {
+pub struct KeypointOutputs {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub body: Vec<usize>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -184,7 +184,7 @@ pub struct Points {
     pub right_hand: Vec<usize>,
 }
 
-impl Points {
+impl KeypointOutputs {
     fn is_empty(&self) -> bool {
         *self == Self::default()
     }

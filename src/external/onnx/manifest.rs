@@ -1,7 +1,7 @@
 //! `manifest.toml`: the models known, built in and beside the model files. One model's description is in `entry`, what
 //! makes it sound in `check`; `model` opens what is described here.
 
-use super::{ModelEntry, Role};
+use super::{ModelEntry, ModelRole};
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -72,14 +72,14 @@ impl Manifest {
     }
 
     /// The model of that id, which must have the role.
-    pub fn get_as(&self, id: &str, role: Role) -> Result<&ModelEntry> {
+    pub fn get_as(&self, id: &str, role: ModelRole) -> Result<&ModelEntry> {
         let entry = self.get(id)?;
         ensure!(entry.role == role, "the model {id:?} is a {:?} model; a {role:?} model is wanted here", entry.role);
         Ok(entry)
     }
 }
 
-/// Puts `entry` in the place of the one with its id, else at the end.
+/// Replaces the entry of the same id by `entry`, which else comes at the end.
 fn put(entries: &mut Vec<ModelEntry>, entry: ModelEntry) {
     match entries.iter_mut().find(|known| known.id == entry.id) {
         Some(known) => *known = entry,
@@ -103,15 +103,16 @@ mod tests {
 
     #[test]
     fn mistakes_are_named() {
-        let said = |from: &str, to: &str| format!("{:#}", Manifest::parse(&BUILTIN.replacen(from, to, 1)).unwrap_err());
-        assert!(said("role = \"person\"", "rolle = \"person\"").contains("rolle"));
-        assert!(said("min_score = 0.3", "min_scores = 0.3").contains("min_score"));
-        assert!(said("boxes = \"dets\"", "boxes = \"det\"").contains("output \"det\""));
-        assert!(said("sha256 = \"4720", "sha256 = \"x720").contains("64 hex"));
-        assert!(said("[1, 3, 320, 320]", "[1, 320, 320]").contains("shape"));
-        assert!(said("body = [0, ", "body = [99, ").contains("no output 99"));
-        assert!(said("margin = 1.25", "margin = 0.0").contains("go together"));
-        assert!(said("person-yolox-nano", "person-rtmdet-nano").contains("twice"));
+        let message =
+            |from: &str, to: &str| format!("{:#}", Manifest::parse(&BUILTIN.replacen(from, to, 1)).unwrap_err());
+        assert!(message("role = \"person\"", "rolle = \"person\"").contains("rolle"));
+        assert!(message("min_score = 0.3", "min_scores = 0.3").contains("min_score"));
+        assert!(message("boxes = \"dets\"", "boxes = \"det\"").contains("output \"det\""));
+        assert!(message("sha256 = \"4720", "sha256 = \"x720").contains("64 hex"));
+        assert!(message("[1, 3, 320, 320]", "[1, 320, 320]").contains("shape"));
+        assert!(message("body = [0, ", "body = [99, ").contains("no output 99"));
+        assert!(message("margin = 1.25", "margin = 0.0").contains("go together"));
+        assert!(message("person-yolox-nano", "person-rtmdet-nano").contains("twice"));
     }
 
     #[test]
@@ -124,6 +125,6 @@ mod tests {
         let manifest = Manifest::load(dir.path()).unwrap();
         assert_eq!((manifest.models.len(), manifest.get("person-mine").unwrap()), (14, &own));
         assert!(manifest.get("nobody").unwrap_err().to_string().contains("known are"));
-        assert!(manifest.get_as("person-mine", Role::Hand).is_err());
+        assert!(manifest.get_as("person-mine", ModelRole::Hand).is_err());
     }
 }

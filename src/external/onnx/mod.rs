@@ -1,19 +1,22 @@
 //! The only room that knows ONNX Runtime: finding its library, sessions, the manifest that describes the models, checks
-//! of hashes, names and shapes. What the numbers of an output mean is written in the manifest and read in `pose2d`.
+//! of hashes, names and shapes, and the folder of models. What the numbers of an output mean is written in the manifest and
+//! read in `pose2d`.
 
 pub mod check;
 pub mod entry;
 pub mod manifest;
 pub mod model;
 pub mod runtime;
+pub mod store;
 
 pub use entry::*;
 pub use manifest::MANIFEST_FILE;
 pub use manifest::Manifest;
 pub use model::Model;
-pub use model::OpenError;
+pub use model::ModelError;
 pub use model::Outputs;
 pub use model::sha256_of;
 pub use runtime::LIBRARY;
 pub use runtime::Runtime;
 pub use runtime::find_library;
+pub use store::{FetchSource, ModelState, ModelStore};

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 /// Why a model cannot be used.
 #[derive(Debug, thiserror::Error)]
-pub enum OpenError {
+pub enum ModelError {
     #[error(
         "the model {id} is missing: {path} is not there; `orator models fetch` gets it, models.dir names another folder"
     )]
@@ -29,10 +29,10 @@ pub enum OpenError {
     #[error("the model {id} is no ONNX model this ONNX Runtime can open: {path}: {error}")]
     NotOnnx { id: String, path: PathBuf, error: String },
     #[error(
-        "the model {id} has another layout than described: {path}: {place}: expected {expected}, found {found}; describe it in \
+        "the model {id} has another layout than described: {path}: {port}: expected {expected}, found {found}; describe it in \
          manifest.toml (`orator models add FILE --like ID`)"
     )]
-    WrongLayout { id: String, path: PathBuf, place: String, expected: String, found: String },
+    WrongLayout { id: String, path: PathBuf, port: String, expected: String, found: String },
 }
 
 /// A model ready to run, on one thread.
@@ -49,30 +49,30 @@ impl Model {
     /// Opens the file of `entry` in the folder `dir`.
     ///
     /// # Errors
-    /// Each an `OpenError`: missing, unreadable, wrong hash, not ONNX, wrong layout.
-    pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self, OpenError> {
+    /// Each an `ModelError`: missing, unreadable, wrong hash, not ONNX, wrong layout.
+    pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self, ModelError> {
         let path = dir.join(&entry.file);
         let id = || entry.id.clone();
         if !path.exists() {
-            return Err(OpenError::Missing { id: id(), path });
+            return Err(ModelError::Missing { id: id(), path });
         }
         let bytes = match std::fs::read(&path) {
             Ok(bytes) => bytes,
-            Err(error) => return Err(OpenError::Unreadable { id: id(), path, error: error.to_string() }),
+            Err(error) => return Err(ModelError::Unreadable { id: id(), path, error: error.to_string() }),
         };
         let found = hex(&Sha256::digest(&bytes));
         if !found.eq_ignore_ascii_case(&entry.sha256) {
-            return Err(OpenError::WrongHash { id: id(), path, expected: entry.sha256.clone(), found });
+            return Err(ModelError::WrongHash { id: id(), path, expected: entry.sha256.clone(), found });
         }
-        let session = session(runtime, &bytes).map_err(|error| OpenError::NotOnnx {
+        let session = session(runtime, &bytes).map_err(|error| ModelError::NotOnnx {
             id: id(),
             path: path.clone(),
             error: error.to_string(),
         })?;
         let differs = mismatch("input", session.inputs(), &entry.inputs, true)
             .or_else(|| mismatch("output", session.outputs(), &entry.outputs, false));
-        if let Some((place, expected, found)) = differs {
-            return Err(OpenError::WrongLayout { id: id(), path, place, expected, found });
+        if let Some((port, expected, found)) = differs {
+            return Err(ModelError::WrongLayout { id: id(), path, port, expected, found });
         }
         let shape = entry.inputs.first().map(|port| port.shape.clone()).unwrap_or_default();
         let size = shape.iter().map(|side| usize::try_from(*side).unwrap_or(0)).product();
@@ -180,7 +180,7 @@ fn session(runtime: &Runtime, bytes: &[u8]) -> Result<Session> {
         .map_err(plain)
 }
 
-/// The first difference between what the file has and what the manifest says: place, expected, found.
+/// The first difference between what the file has and what the manifest says: which port, expected, found.
 fn mismatch(what: &str, found: &[Outlet], expected: &[Port], all: bool) -> Option<(String, String, String)> {
     let names = |ports: &mut dyn Iterator<Item = &str>| ports.collect::<Vec<_>>().join(", ");
     if all && found.len() != expected.len() {
@@ -188,13 +188,13 @@ fn mismatch(what: &str, found: &[Outlet], expected: &[Port], all: bool) -> Optio
         return Some((format!("its {what}s"), expected, names(&mut found.iter().map(Outlet::name))));
     }
     for port in expected {
-        let place = || format!("{what} {:?}", port.name);
+        let named = || format!("{what} {:?}", port.name);
         let Some(outlet) = found.iter().find(|outlet| outlet.name() == port.name) else {
-            return Some((place(), "that name".into(), names(&mut found.iter().map(Outlet::name))));
+            return Some((named(), "that name".into(), names(&mut found.iter().map(Outlet::name))));
         };
         let (element, shape) = match outlet.dtype() {
             ValueType::Tensor { ty, shape, .. } => (*ty, shape.to_vec()),
-            other => return Some((place(), "a tensor".into(), format!("{other:?}"))),
+            other => return Some((named(), "a tensor".into(), format!("{other:?}"))),
         };
         let usable = if all {
             element == TensorElementType::Float32
@@ -202,11 +202,11 @@ fn mismatch(what: &str, found: &[Outlet], expected: &[Port], all: bool) -> Optio
             matches!(element, TensorElementType::Float32 | TensorElementType::Int64)
         };
         if !usable {
-            return Some((place(), "float32".into(), format!("{element:?}")));
+            return Some((named(), "float32".into(), format!("{element:?}")));
         }
         let same = |(a, b): (&i64, &i64)| *a < 0 || *b < 0 || a == b;
         if shape.len() != port.shape.len() || !shape.iter().zip(&port.shape).all(same) {
-            return Some((place(), format!("{:?}", port.shape), format!("{shape:?}")));
+            return Some((named(), format!("{:?}", port.shape), format!("{shape:?}")));
         }
     }
     None

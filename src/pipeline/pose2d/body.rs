@@ -2,7 +2,7 @@
 
 use super::decode::{Point, heatmap, simcc};
 use super::model_input::Feed;
-use crate::external::onnx::{Decode, Fit, ModelEntry, Outputs, Points, Refine, Runtime};
+use crate::external::onnx::{Decode, Fit, KeypointOutputs, ModelEntry, Outputs, Refine, Runtime};
 use crate::external::opencv::blur::Gaussian;
 use crate::external::opencv::warp::SrcFromDst;
 use crate::types::image::Image;
@@ -55,7 +55,7 @@ pub struct BodyModel {
     feed: Feed,
     reader: PointReader,
     margin: f64,
-    map: Points,
+    map: KeypointOutputs,
 }
 
 impl BodyModel {

@@ -9,7 +9,7 @@ use super::person::Detector;
 use super::region;
 use super::speaker::Speaker;
 use crate::config;
-use crate::external::onnx::{Manifest, Role, Runtime};
+use crate::external::onnx::{Manifest, ModelRole, Runtime};
 use crate::external::opencv::warp::Region;
 use crate::types::image::Image;
 use crate::types::pose2d::{Keypoint, Pose2d, coco};
@@ -43,15 +43,15 @@ impl Chain {
     /// An id that is not in the manifest or has another role; a model that cannot be opened (`onnx::OpenError`).
     pub fn new(runtime: &Runtime, manifest: &Manifest, models_dir: &Path, settings: &config::Pose2d) -> Result<Self> {
         let entry =
-            |key: &str, id: &str, role: Role| manifest.get_as(id, role).with_context(|| format!("pose2d.{key}"));
+            |key: &str, id: &str, role: ModelRole| manifest.get_as(id, role).with_context(|| format!("pose2d.{key}"));
         let named = |id: &str| !id.is_empty();
-        let body = BodyModel::open(runtime, entry("body", &settings.body, Role::Body)?, models_dir)?;
+        let body = BodyModel::open(runtime, entry("body", &settings.body, ModelRole::Body)?, models_dir)?;
         let person = named(&settings.person)
-            .then(|| Detector::open(runtime, entry("person", &settings.person, Role::Person)?, models_dir));
+            .then(|| Detector::open(runtime, entry("person", &settings.person, ModelRole::Person)?, models_dir));
         let hand = named(&settings.hand)
-            .then(|| HandModel::open(runtime, entry("hand", &settings.hand, Role::Hand)?, models_dir));
+            .then(|| HandModel::open(runtime, entry("hand", &settings.hand, ModelRole::Hand)?, models_dir));
         let palm = (named(&settings.palm) && named(&settings.hand))
-            .then(|| PalmDetector::open(runtime, entry("palm", &settings.palm, Role::Palm)?, models_dir));
+            .then(|| PalmDetector::open(runtime, entry("palm", &settings.palm, ModelRole::Palm)?, models_dir));
         ensure!(
             hand.is_some() || body.gives_hands(),
             "pose2d.hand is empty, but the model {:?} gives no hands: name a hand model",

@@ -1,7 +1,7 @@
 //! A model with the picture it is fed: the crop or letterbox goes into a canvas that is kept, and from there, made
 //! numbers as the manifest says, into the model's input.
 
-use crate::external::onnx::{Anchor, Axes, Channels, Fit, Model, ModelEntry, Outputs, Runtime};
+use crate::external::onnx::{Anchor, Channels, Fit, Model, ModelEntry, Outputs, Runtime, TensorAxes};
 use crate::external::opencv::tensor::Normaliser;
 use crate::external::opencv::warp;
 use crate::external::opencv::warp::SrcFromDst;
@@ -19,7 +19,7 @@ impl Feed {
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
         let [height, width] = entry.input_size()?;
         let picture = &entry.picture;
-        let (bgr, planar) = (picture.channels == Channels::Bgr, picture.axes == Axes::Nchw);
+        let (bgr, planar) = (picture.channels == Channels::Bgr, picture.axes == TensorAxes::Nchw);
         Ok(Self {
             model: Model::open(runtime, entry, dir)?,
             canvas: Image::filled(width, height, [0; 3]),

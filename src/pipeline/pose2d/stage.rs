@@ -10,7 +10,7 @@ use crate::config::Settings;
 use crate::external::ffmpeg;
 use crate::external::ffmpeg::ahead;
 use crate::external::ffmpeg::frames::{FrameReader, FrameTime};
-use crate::external::onnx::{Manifest, ModelEntry, OpenError, Runtime};
+use crate::external::onnx::{Manifest, ModelEntry, ModelError, Runtime};
 use crate::external::opencv;
 use crate::formats::npz::Npz;
 use crate::stage::progress::Progress;
@@ -111,7 +111,7 @@ impl Stage for Pose2dStage {
         for (key, entry) in self.used()? {
             let path = self.models.dir.join(&entry.file);
             if !path.exists() {
-                return Err(OpenError::Missing { id: entry.id.clone(), path }.into());
+                return Err(ModelError::Missing { id: entry.id.clone(), path }.into());
             }
             inputs.push(input(format!("model:{key}"), path));
         }

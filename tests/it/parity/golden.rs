@@ -1,6 +1,6 @@
 //! Every model of the shared folder gives the numbers written down for it.
 
-use orator::external::onnx::{Axes, Manifest, Model, Role, Runtime};
+use orator::external::onnx::{Manifest, Model, ModelRole, Runtime, TensorAxes};
 use std::path::{Path, PathBuf};
 
 /// The shared models, if they and the ONNX Runtime library are there.
@@ -33,7 +33,7 @@ fn every_model_gives_its_golden_numbers() {
             let byte = ((k as u64).wrapping_mul(2_654_435_761) >> 13) & 255;
             *value = match (entry.role, entry.picture.axes) {
                 _ if entry.id.contains("yolox") => byte as f32,
-                (_, Axes::Nchw) => ((byte as f64 / 255.0 - 0.45) / 0.225) as f32,
+                (_, TensorAxes::Nchw) => ((byte as f64 / 255.0 - 0.45) / 0.225) as f32,
                 _ if entry.id == "pose-detection-mediapipe" => (byte as f64 / 127.5 - 1.0) as f32,
                 _ => (byte as f64 / 255.0) as f32,
             };
@@ -69,7 +69,7 @@ fn every_model_gives_its_golden_numbers() {
 fn a_model_that_is_missing_wrong_or_different_says_so() {
     let Some((dir, runtime)) = models() else { return };
     let manifest = Manifest::builtin().unwrap();
-    let entry = manifest.get_as("hand-mediapipe-lite", Role::Hand).unwrap();
+    let entry = manifest.get_as("hand-mediapipe-lite", ModelRole::Hand).unwrap();
     let empty = tempfile::tempdir().unwrap();
     let said = |entry, dir: &Path| Model::open(&runtime, entry, dir).err().map(|error| error.to_string()).unwrap();
     let missing = said(entry, empty.path());
