@@ -2,7 +2,6 @@
 //! `--help`. Exit codes: 0 all done; 1 usage, configuration, or a check that did not pass; 2 some units failed, the others are done.
 
 pub mod animate;
-pub mod bench;
 pub mod config_args;
 pub mod dataset;
 pub mod demo;

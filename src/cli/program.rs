@@ -6,7 +6,7 @@ use super::motion::{lift, sheet};
 use super::outcome::Outcome;
 use super::pipeline::{init, report, run, status};
 use super::setup::{doctor, models};
-use super::{animate, bench, demo, evaluate, generate, train, ui};
+use super::{animate, demo, evaluate, generate, train, ui};
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -38,7 +38,6 @@ enum Verb {
     Evaluate(evaluate::Args),
     Generate(generate::Args),
     Animate(animate::Args),
-    Bench(bench::Args),
     Demo(demo::Args),
 }
 
@@ -68,7 +67,6 @@ pub fn main() -> ExitCode {
         Verb::Evaluate(args) => evaluate::run(args, &ui),
         Verb::Generate(args) => generate::run(args, &ui),
         Verb::Animate(args) => animate::run(args, &ui),
-        Verb::Bench(args) => bench::run(args, &ui),
         Verb::Demo(args) => demo::run(args, &ui),
     };
     match outcome {

@@ -1,6 +1,10 @@
 //! The integration tests: one binary, a module a concern.
 
 mod animate;
+/// The benchmark's own modules, so that its parts are tested without a release build.
+#[path = "../bench/main.rs"]
+#[allow(dead_code)]
+mod bench;
 mod cli;
 mod dataset;
 mod evaluate;

@@ -26,8 +26,9 @@ use std::path::Path;
 const DISCRIMINATOR: &str = "discriminator.";
 const ADAM_G: &str = "adam.generator.";
 const ADAM_D: &str = "adam.discriminator.";
-/// Gradients are clipped to this norm; a loss beyond the limit is a training that has exploded.
-const MAX_NORM: f64 = 10.0;
+/// Norm to which the gradient of each network is clipped.
+pub const MAX_NORM: f64 = 10.0;
+/// Loss beyond which a training has exploded.
 const LOSS_LIMIT: f64 = 1e4;
 
 /// Settings that may change between two runs of one training; of the others the checkpoint's count.
@@ -113,6 +114,11 @@ impl Training {
 
     /// One step of the discriminator, then one of the generator, on the same windows.
     pub fn step(&mut self, batch: &Batch) -> Result<Losses> {
+        self.step_in_phases(batch, &mut |_| ())
+    }
+
+    /// `step`, with a call at the end of each phase, by its name: for measuring where the time goes.
+    pub fn step_in_phases(&mut self, batch: &Batch, phase: &mut dyn FnMut(&'static str)) -> Result<Losses> {
         let batch = batch.on(self.device())?;
         let Gan { lambda_l1, lambda_velocity, lambda_gan, lambda_bone, learning_rate, .. } = self.settings;
         let raw = self.generator.forward(&batch.mels, self.settings.window_frames, true)?;
@@ -120,6 +126,7 @@ impl Training {
         // Differences count where both frames do, so that a missing joint looks the same in both.
         let mask = losses::both_seen(&batch.mask)?;
         let made_motion = (motion(&made)? * &mask)?;
+        phase("generator forward");
 
         let mut of_discriminator = 0.0;
         if lambda_gan > 0.0 {
@@ -129,6 +136,7 @@ impl Training {
             of_discriminator = number(&loss)?;
             self.adam_d.step(&loss.backward()?, learning_rate)?;
         }
+        phase("discriminator's step");
 
         let l1 = losses::l1(&made, &batch.poses, &batch.mask)?;
         let mut total = (&l1 * lambda_l1)?;
@@ -147,7 +155,11 @@ impl Training {
             let scores = self.discriminator.forward(&made_motion, true)?;
             adversarial = add(self.adversarial.generator(&scores)?, lambda_gan)?;
         }
-        let gradient_norm = self.adam_g.step(&total.backward()?, learning_rate)?;
+        phase("generator's losses");
+        let gradients = total.backward()?;
+        phase("generator backward");
+        let gradient_norm = self.adam_g.step(&gradients, learning_rate)?;
+        phase("generator's Adam");
         self.step += 1;
         let l1 = number(&l1)?;
         Ok(Losses { l1, velocity, bone, adversarial, discriminator: of_discriminator, gradient_norm })

@@ -48,7 +48,7 @@ pub struct Outcome {
     /// Best by the validation's score.
     pub best: PathBuf,
     pub best_step: usize,
-    /// Share of the steps' time spent on putting batches together, 0..1.
+    /// Share of the time of the steps that they waited for their batch, 0..1; validation and checkpoints do not count.
     pub waiting: f64,
 }
 
@@ -107,13 +107,14 @@ fn run(
     let mut log = Log::open(folder, began_at)?;
     let task = progress.begin(&format!("train {}", training.facts.name), settings.steps as u64);
     task.advance(began_at.min(settings.steps) as u64);
-    let (start, mut waiting) = (Instant::now(), Duration::ZERO);
+    let (start, mut waiting, mut stepping) = (Instant::now(), Duration::ZERO, Duration::ZERO);
     let mut last = None;
     while training.step < settings.steps && !is_over(training) {
         let before = Instant::now();
         let batch = examples.batch(&draw(settings.seed, training.step, settings.batch, examples.len()))?;
         waiting += before.elapsed();
         let losses = training.step(&batch)?;
+        stepping += before.elapsed();
         let step = training.step;
         losses.check(step).with_context(|| kept(folder))?;
         task.advance(1);
@@ -143,7 +144,6 @@ fn run(
             training.save(folder)?;
         }
     }
-    let elapsed = start.elapsed().as_secs_f64().max(1e-9);
     let Some((_, newest)) = checkpoint::list(folder)?.pop() else {
         bail!("gan.steps is 0: nothing to train");
     };
@@ -161,7 +161,7 @@ fn run(
         newest,
         best: folder.join(BEST),
         best_step: training.best.map_or(training.step, |(step, _)| step),
-        waiting: waiting.as_secs_f64() / elapsed,
+        waiting: waiting.as_secs_f64() / stepping.as_secs_f64().max(1e-9),
     })
 }
 

@@ -76,25 +76,3 @@ fn the_hand_perceptron_agrees_with_pytorch() -> anyhow::Result<()> {
     fill(&params)?;
     agree("hand", &net.forward(&pattern(&[7, 6], 6.0)?.to_dtype(DType::F32)?, &mut Mode::Eval)?)
 }
-
-#[test]
-fn the_training_benchmark_runs_without_python_and_says_when_python_fails() {
-    let bench = |widths: &str, batch: &str, more: &[&str]| {
-        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_orator"));
-        command.args(["--json", "bench", "lifter", "--channels", "4", "--steps", "2", "--rounds", "1"]);
-        command.args(["--widths", widths, "--batch", batch]).args(more).output().unwrap()
-    };
-    let facts: serde_json::Value = serde_json::from_slice(&bench("3,3", "4", &[]).stdout).unwrap();
-    assert!(facts["secs_a_step"].as_f64().unwrap() > 0.0 && facts["window"] == 9, "{facts}");
-    let wrong = [
-        ("3,3", "4", &["--python", "gone.py"][..], "gone.py did not start"),
-        ("2,3", "4", &[], "odd"),
-        ("101,101", "4", &[], "more than 10000 frames"),
-        ("3,3", "1", &[], "two windows"),
-    ];
-    for (widths, batch, more, words) in wrong {
-        let output = bench(widths, batch, more);
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.code() == Some(1) && said.contains(words), "{words}: {said}");
-    }
-}

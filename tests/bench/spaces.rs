@@ -1,15 +1,13 @@
-//! `orator bench spaces`.
+//! `cargo bench -- spaces`.
 
-use super::median;
-use crate::cli::Outcome;
-use crate::cli::ui::Ui;
+use super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
 use ndarray::{ArrayView3, Axis, concatenate};
 use orator::dataset::Dataset;
 use orator::demo::check::disturbed;
 use orator::demo::check::disturbed::Disturbance;
 use orator::metrics::space::{basis, embedding};
-use orator::stage::progress::Progress as _;
+use orator::stage::progress::Progress;
 use orator::types::pose3d::Motion;
 use orator::types::split::Split;
 use serde_json::json;
@@ -32,10 +30,10 @@ pub struct Args {
     rounds: usize,
 }
 
-pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!((2..=600).contains(&args.minutes), "--minutes is {}, expected 2 to 600", args.minutes);
     ensure!(args.rounds > 0, "--rounds is 0, expected at least 1");
-    let task = ui.begin("bench spaces", 0);
+    let task = progress.begin("spaces", 0);
     let motions = match &args.dataset {
         None => disturbed::unseen(args.minutes)?,
         Some(folder) => {
@@ -88,8 +86,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         "basis": basis::hash(), "embedding": embedding::hash(),
     });
     drop(task);
-    ui.summary(&text, None, facts);
-    Ok(Outcome::Done)
+    Ok(Report { text, facts })
 }
 
 /// Motion goes on until there is an hour of it.

@@ -1,8 +1,6 @@
-//! `orator bench lift`.
+//! `cargo bench -- lift`.
 
-use super::median;
-use crate::cli::Outcome;
-use crate::cli::ui::Ui;
+use super::report::{Report, median};
 use anyhow::{Result, ensure};
 use candle_core::{DType, Device, Tensor};
 use ndarray::{Array3, s};
@@ -45,7 +43,7 @@ pub struct Args {
 /// Windows and hands that go through the networks together, as the lifters do it.
 const BATCH: (usize, usize) = (512, 1024);
 
-pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.frames > 0 && args.rounds > 0, "nothing to measure: there must be frames and rounds");
     let settings = config::Lift {
         body_weights: args.body_weights.clone().unwrap_or_default(),
@@ -53,7 +51,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         ..Default::default()
     };
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let task = ui.begin("bench lift", args.rounds as u64);
+    let task = progress.begin("lift", args.rounds as u64);
     let (mut whole, mut inside) = (Vec::new(), Vec::new());
     one_thread.install(|| -> Result<()> {
         let lifter = Lifter::new(&settings)?;
@@ -87,8 +85,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         "n_frames": args.frames, "frames_a_second": frames_a_second, "frames_a_second_networks": of_networks,
         "ratio": ratio,
     });
-    ui.summary(&text, None, facts);
-    Ok(Outcome::Done)
+    Ok(Report { text, facts })
 }
 
 /// What the networks do for so many frames: a window and its mirror image, and two hands.

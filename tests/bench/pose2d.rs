@@ -1,8 +1,6 @@
-//! `orator bench pose2d`.
+//! `cargo bench -- pose2d`.
 
-use super::median;
-use crate::cli::Outcome;
-use crate::cli::ui::Ui;
+use super::report::{Report, median};
 use anyhow::{Context, Result, bail, ensure};
 use orator::config::Settings;
 use orator::external::ffmpeg::frames::FrameReader;
@@ -98,7 +96,7 @@ fn rate(settings: &Settings) -> FrameRate {
     settings.extract.rate()
 }
 
-pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let mut settings = Settings::default();
     if let Some(person) = &args.person {
         settings.pose2d.person.clone_from(person);
@@ -117,7 +115,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     };
     let mut chains = [bench.chain()?, bench.chain()?];
     let n_frames = bench.images.len() as f64;
-    let task = ui.begin("bench pose2d", args.rounds as u64);
+    let task = progress.begin("pose2d", args.rounds as u64);
     bench.decoded(&mut chains[0])?;
     let (mut one, mut streamed, mut two, mut two_streamed, mut python) = (vec![], vec![], vec![], vec![], vec![]);
     for _ in 0..args.rounds {
@@ -167,8 +165,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         facts["python_ms_a_frame"] = json!(theirs);
         facts["against_python"] = json!(against);
     }
-    ui.summary(&text, None, facts);
-    Ok(Outcome::Done)
+    Ok(Report { text, facts })
 }
 
 /// Milliseconds a frame of the Python reference, as it prints them, held to one processor core: its decoder and OpenCV

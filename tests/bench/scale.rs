@@ -1,19 +1,19 @@
-//! `orator bench scale`.
+//! `cargo bench -- scale`.
 
 use super::child::{Child, measure};
-use crate::cli::Outcome;
-use crate::cli::pipeline::steps::Step;
-use crate::cli::ui::Ui;
+use super::report::Report;
 use anyhow::{Context, Result, ensure};
 use orator::config;
 use orator::demo::drawn::folder;
 use orator::demo::drawn::folder::Plan;
 use orator::external::ffmpeg::audio;
-use orator::stage::Unit;
+use orator::pipeline::extract::Extract;
+use orator::pipeline::pose2d::Pose2dStage;
 use orator::stage::fingerprint::{Fingerprint, HashCache};
 use orator::stage::progress::{Progress, Silent};
 use orator::stage::record::{Output, Record};
 use orator::stage::runner::place;
+use orator::stage::{Stage, Unit};
 use orator::types::sound::{SAMPLE_RATE, Sound};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -47,11 +47,11 @@ const VERBS: [(&str, &[&str]); 6] = [
     ("status", &["status", "--why"]),
 ];
 
-pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let (few, many) = (args.hours[0], args.hours[1]);
     ensure!(few > 0 && many > few, "--hours takes two numbers, the second one larger, not {few} and {many}");
     let root = std::path::absolute(args.dir.join(format!("bench-{}", std::process::id())))?;
-    let measured = both(&root, few, many, ui);
+    let measured = both(&root, few, many, progress);
     fs::remove_dir_all(&root).with_context(|| format!("removing {}", root.display()))?;
     let measured = measured?;
 
@@ -73,17 +73,16 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
             }),
         );
     }
-    ui.summary(&lines.join("\n"), None, json!({ "hours": [few, many], "verbs": facts }));
-    Ok(Outcome::Done)
+    Ok(Report { text: lines.join("\n"), facts: json!({ "hours": [few, many], "verbs": facts }) })
 }
 
 /// Every verb of `VERBS`, for the few hours and for the many.
-fn both(root: &Path, few: usize, many: usize, ui: &Ui) -> Result<Vec<[Child; 2]>> {
+fn both(root: &Path, few: usize, many: usize, progress: &dyn Progress) -> Result<Vec<[Child; 2]>> {
     let clip = root.join("clip");
     let plan = Plan { n_videos: 1, secs: CLIP_SECS, ..Plan::default() };
     folder::draw(&clip, &plan, &Silent)?;
     measure(&clip, &["run", "--to", "pose2d"])?;
-    let task = ui.begin("bench scale", 2 * VERBS.len() as u64);
+    let task = progress.begin("scale", 2 * VERBS.len() as u64);
     let of_hours = |hours: usize| -> Result<Vec<Child>> {
         let dir = root.join(format!("{hours}-hours"));
         task.detail(&format!("{hours} h"));
@@ -115,17 +114,19 @@ fn make(clip: &Path, dir: &Path, n_videos: usize) -> Result<()> {
     let (pattern, (config, units)) = (units(clip)?.1, units(dir)?);
     let [pattern] = &pattern[..] else { anyhow::bail!("the pattern has {} videos", pattern.len()) };
     let hashes = HashCache::open(&config.settings.work.dir.join("hashes.json"));
-    for step in [Step::Extract, Step::Pose2d] {
-        let stage = step.stage(&config, &[])?;
+    let extract = Extract::new(&config.settings.extract);
+    let pose2d = Pose2dStage::new(&config.settings)?;
+    let stages: [(&dyn Stage, bool); 2] = [(&extract, true), (&pose2d, false)];
+    for (stage, writes_sound) in stages {
         let from = place(&clip.join("work"), stage.folder(), pattern);
         let record = Record::read(&from).with_context(|| format!("{} was not made", from.display()))?;
         for (n, unit) in units.iter().enumerate() {
             let to = place(&config.settings.work.dir, stage.folder(), unit);
             copy_all(&from, &to)?;
-            if step == Step::Extract {
+            if writes_sound {
                 audio::write_wav(&to.join("audio.wav"), &noise(n as u64))?;
             }
-            let fingerprint = Fingerprint::now(&*stage, unit, &hashes)?;
+            let fingerprint = Fingerprint::now(stage, unit, &hashes)?;
             Record { fingerprint, outputs: Output::list(&to)?, ..record.clone() }.write(&to)?;
         }
     }

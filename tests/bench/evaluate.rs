@@ -1,8 +1,7 @@
-//! `orator bench evaluate`.
+//! `cargo bench -- evaluate`.
 
 use super::child;
-use crate::cli::Outcome;
-use crate::cli::ui::Ui;
+use super::report::Report;
 use anyhow::{Result, ensure};
 use ndarray::{Array2, Array3};
 use orator::demo::rule::dataset::{Clip as Rule, RULE};
@@ -14,7 +13,7 @@ use orator::evaluate::table::{result, table};
 use orator::evaluate::verdict::text;
 use orator::metrics::settings::Settings;
 use orator::report::evaluation::page;
-use orator::stage::progress::{Progress as _, Task};
+use orator::stage::progress::{Progress, Task};
 use orator::types::sound::Sound;
 use orator::types::split::Split;
 use orator::types::time::FrameRate;
@@ -53,13 +52,13 @@ impl Task for Stopwatch {
     }
 }
 
-pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.hours > 0.0 && args.hours <= 24.0, "--hours is {}, expected up to 24", args.hours);
     ensure!(args.clips > 0 && args.threads > 0, "nothing to measure: there must be clips and threads");
     let n_frames = (args.hours * 3600.0 * FPS.per_sec()) as usize / args.clips;
     ensure!(n_frames > 15, "{} clips of {n_frames} frames are too short", args.clips);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build()?;
-    let task = ui.begin("bench evaluate", 0);
+    let task = progress.begin("evaluate", 0);
     task.detail("making the speaker");
     let speaker = pool.install(|| speaker(args.clips, n_frames));
     let (before_mib, before_cpu) = (child::own_peak_mib(), child::own_cpu_secs());
@@ -98,8 +97,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         "n_blocks": table.n_blocks,
         "n_figures": table.definitions.len(),
     });
-    ui.summary(&lines.join("\n"), None, facts);
-    Ok(Outcome::Done)
+    Ok(Report { text: lines.join("\n"), facts })
 }
 
 /// A clip that is still to be heard.

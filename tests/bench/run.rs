@@ -1,9 +1,7 @@
-//! `orator bench run`.
+//! `cargo bench -- run`.
 
 use super::child::{Child, measure};
-use super::median;
-use crate::cli::Outcome;
-use crate::cli::ui::Ui;
+use super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
 use orator::config;
 use orator::stage::progress::Progress;
@@ -22,13 +20,13 @@ pub struct Args {
     rounds: usize,
 }
 
-pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.rounds > 0, "nothing to measure: there must be a round");
     let config = config::load(&args.config, &[])?;
     let folder = config.file.parent().context("a configuration lies in a folder")?;
     let work = folder.join(format!("bench-{}", std::process::id()));
     let (file, set) = (config.file.display().to_string(), format!("work.dir={}", work.display()));
-    let task = ui.begin("bench run", args.rounds as u64);
+    let task = progress.begin("run", args.rounds as u64);
     let mut rounds: Vec<Child> = Vec::new();
     for _ in 0..args.rounds {
         let measured = measure(folder, &["run", "-c", &file, "--set", &set]);
@@ -48,6 +46,5 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         100.0 * used,
         100.0 * busy
     );
-    ui.summary(&text, None, json!({ "secs": secs, "used": used, "busy": busy, "cores": n_cores }));
-    Ok(Outcome::Done)
+    Ok(Report { text, facts: json!({ "secs": secs, "used": used, "busy": busy, "cores": n_cores }) })
 }

@@ -1,8 +1,6 @@
-//! `orator bench dataset`.
+//! `cargo bench -- dataset`.
 
-use super::median;
-use crate::cli::Outcome;
-use crate::cli::ui::Ui;
+use super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3};
 use orator::config;
@@ -51,23 +49,23 @@ const INTERVAL_SECS: usize = 20;
 /// Intervals of a video.
 const PER_VIDEO: usize = 15;
 
-pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let n_intervals = args.secs / INTERVAL_SECS;
     ensure!(args.rounds > 0 && args.steps > 1, "nothing to measure: there must be rounds and at least 2 steps");
     ensure!(n_intervals > 2 * PER_VIDEO, "{} s are too few: the bench needs more than two videos of 300 s", args.secs);
     let place = args.dir.join(format!("bench-{}", std::process::id()));
     fs::create_dir_all(&place).with_context(|| format!("making the folder {}", place.display()))?;
-    let measured = measure(args, n_intervals, &place, ui);
+    let measured = measure(args, n_intervals, &place, progress);
     fs::remove_dir_all(&place).with_context(|| format!("removing {}", place.display()))?;
     measured
 }
 
-fn measure(args: &Args, n_intervals: usize, place: &Path, ui: &Ui) -> Result<Outcome> {
+fn measure(args: &Args, n_intervals: usize, place: &Path, progress: &dyn Progress) -> Result<Report> {
     let mut samples: Vec<Sample> = (0..16).map(random_interval).collect();
     let (written, copied) = (place.join("written"), place.join("copied"));
     let (mut write, mut copy, mut read, mut plain) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut bytes = 0;
-    let task = ui.begin("bench dataset", args.rounds as u64);
+    let task = progress.begin("dataset", args.rounds as u64);
     for _ in 0..args.rounds {
         for folder in [&written, &copied] {
             let _ = fs::remove_dir_all(folder);
@@ -112,8 +110,7 @@ fn measure(args: &Args, n_intervals: usize, place: &Path, ui: &Ui) -> Result<Out
         "windows_a_second": windows_a_second, "trained_windows_a_second": trained_a_second,
         "loader_ratio": of_training, "loader_ratio_first_epoch": epoch, "load_secs": load_secs,
     });
-    ui.summary(&text, None, facts);
-    Ok(Outcome::Done)
+    Ok(Report { text, facts })
 }
 
 /// An interval of noise: its bytes are as hard to write as any.

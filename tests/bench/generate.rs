@@ -1,8 +1,7 @@
-//! `orator bench generate`.
+//! `cargo bench -- generate`.
 
-use super::{child, median};
-use crate::cli::Outcome;
-use crate::cli::ui::Ui;
+use super::child;
+use super::report::{Report, median};
 use anyhow::{Result, ensure};
 use orator::demo::drawn::speech::Speech;
 use orator::generate::Speaker;
@@ -11,7 +10,7 @@ use orator::generate::normalisation::{N_NUMBERS, Normalisation};
 use orator::generate::representation::Representation;
 use orator::nn::gan::generator::{Config, Generator, Preset};
 use orator::nn::params::Params;
-use orator::stage::progress::Progress as _;
+use orator::stage::progress::Progress;
 use orator::types::skeleton::{N_BONES, N_JOINTS};
 use orator::types::sound::Sound;
 use orator::types::time::FrameRate;
@@ -45,14 +44,14 @@ pub struct Args {
 /// Motion is made at this rate.
 const FPS: FrameRate = FrameRate::new(15, 1);
 
-pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.secs >= 1.0 && args.secs < 1e6, "--secs is {}, expected 1 to a million", args.secs);
     ensure!(args.rounds > 0 && args.threads > 0, "nothing to measure: there must be rounds and threads");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build()?;
     let presets = [("light", Preset::Light), ("paper", Preset::Paper)];
     let presets: Vec<_> = presets.into_iter().filter(|(_, p)| args.preset.is_none_or(|only| only == *p)).collect();
     let sound = speech(args.secs);
-    let task = ui.begin("bench generate", (args.rounds * presets.len()) as u64);
+    let task = progress.begin("generate", (args.rounds * presets.len()) as u64);
     // One after the other, the smaller first: the peak of memory is that of the whole program until then.
     let measured = presets.iter().map(|(name, preset)| {
         task.detail(name);
@@ -86,8 +85,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         lines.push(format!("{name:6} {secs:8.2} s  {speed:6.0} x real time  peak memory {peak_mib:.0} MiB"));
         facts[name] = json!({ "secs": secs, "times_real_time": speed, "peak_mib": peak_mib });
     }
-    ui.summary(&lines.join("\n"), None, facts);
-    Ok(Outcome::Done)
+    Ok(Report { text: lines.join("\n"), facts })
 }
 
 fn speech(secs: f64) -> Sound {

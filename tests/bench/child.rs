@@ -1,5 +1,5 @@
-//! This program once more, as a program of its own that is watched while it runs: how long it took, how much memory it
-//! had at most, how busy it kept the processor.
+//! The program `orator` as a child process, watched while it runs: how long it took, how much memory it had at most, how
+//! busy it kept the processor; and memory and processor time of the benchmark itself.
 
 use anyhow::{Result, ensure};
 use std::fs;
@@ -31,7 +31,7 @@ pub struct Child {
 /// It cannot be started, or fails: with its own words.
 pub fn measure(dir: &Path, args: &[&str]) -> Result<Child> {
     let n_cores = std::thread::available_parallelism().map_or(1, |n| n.get());
-    let mut command = Command::new(std::env::current_exe()?);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     let log = fs::File::create(dir.join("bench.log"))?;
     command.current_dir(dir).args(args).stdin(Stdio::null()).stdout(Stdio::null()).stderr(log);
     let (start, mut child) = (Instant::now(), command.spawn()?);
@@ -71,28 +71,15 @@ pub fn high_water_mib(status: &str) -> Option<f64> {
 }
 
 /// Fields 14 and 15 of `stat`, counted behind the name in brackets.
-fn ticks(stat: &str) -> Option<f64> {
+pub fn ticks(stat: &str) -> Option<f64> {
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
     Some(fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?)
 }
 
 /// Threads that run or wait for a core.
-fn n_running(folder: &str) -> usize {
+pub fn n_running(folder: &str) -> usize {
     let threads = fs::read_dir(Path::new(folder).join("task")).into_iter().flatten().flatten();
     let state = |stat: String| stat.rsplit_once(')').and_then(|(_, rest)| rest.trim_start().chars().next());
     let states = threads.filter_map(|thread| fs::read_to_string(thread.path().join("stat")).ok().and_then(state));
     states.filter(|state| *state == 'R').count()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn proc_is_read() {
-        assert_eq!(high_water_mib("VmPeak:\t9 kB\nVmHWM:\t  2048 kB\n"), Some(2.0));
-        let stat = "7 (a (b) c) R 1 7 7 0 -1 4194304 100 0 0 0 12 30 0 0 20 0 1 0 5 6 7";
-        assert_eq!(ticks(stat), Some(42.0));
-        assert!(n_running("/proc/self") >= 1);
-    }
 }

@@ -1,8 +1,6 @@
-//! `orator bench animate`.
+//! `cargo bench -- animate`.
 
-use super::median;
-use crate::cli::Outcome;
-use crate::cli::ui::Ui;
+use super::report::{Report, median};
 use anyhow::{Result, ensure};
 use orator::animate::avatar::Avatar;
 use orator::animate::export::glb_scene;
@@ -10,7 +8,7 @@ use orator::animate::rig::names::Names;
 use orator::animate::{Options, perform};
 use orator::demo::drawn::speech::Speech;
 use orator::demo::rule::rule::Gestures;
-use orator::stage::progress::Progress as _;
+use orator::stage::progress::Progress;
 use orator::types::time::FrameRate;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -34,7 +32,7 @@ pub struct Args {
 
 const FPS: FrameRate = FrameRate::new(15, 1);
 
-pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.secs >= 1.0 && args.secs < 1e5, "--secs is {}, expected 1 to a hundred thousand", args.secs);
     ensure!(args.rounds > 0 && args.fps > 0, "nothing to measure: there must be rounds and frames a second");
     let mut dice = ChaCha8Rng::seed_from_u64(1337);
@@ -46,7 +44,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         }
     }
     let options = Options { fps: Some(FrameRate::new(args.fps, 1)), ..Options::default() };
-    let task = ui.begin("bench animate", args.rounds as u64);
+    let task = progress.begin("animate", args.rounds as u64);
     let one_core = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut secs: [Vec<f64>; 4] = Default::default();
     let mut n_bytes = [0; 2];
@@ -97,6 +95,5 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         "glb_times_real_time": speed(glb_secs),
         "glb_with_avatar_times_real_time": speed(avatar_secs + glb_secs),
     });
-    ui.summary(&text, None, facts);
-    Ok(Outcome::Done)
+    Ok(Report { text, facts })
 }

@@ -1,9 +1,8 @@
-//! `orator bench lifter`: a training step of the temporal lifter, one thread, in turns with PyTorch's for the same
+//! `cargo bench -- lifter`: a training step of the temporal lifter, one thread, in turns with PyTorch's for the same
 //! network, the same batch and the same optimiser; and how far apart the two networks' outputs are.
 
 use super::reference::Reference;
-use crate::cli::Outcome;
-use crate::cli::ui::Ui;
+use super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
 use orator::formats::checkpoint::Contents;
@@ -159,7 +158,7 @@ impl Lesson for Fixed {
     }
 }
 
-pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(
         args.rounds > 0 && args.steps > 0 && args.batch > 1 && args.channels > 0,
         "nothing to measure: there must be rounds, steps, channels, and two windows a batch at least"
@@ -170,14 +169,12 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let folder = std::env::temp_dir().join(format!("orator-bench-{}", std::process::id()));
     std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let measured = pool.install(|| measure(args, &config, &folder, ui));
+    let measured = pool.install(|| measure(args, &config, &folder, progress));
     let _ = std::fs::remove_dir_all(&folder);
-    let (text, facts) = measured?;
-    ui.summary(&text, None, facts);
-    Ok(Outcome::Done)
+    measured
 }
 
-fn measure(args: &Args, config: &Config, folder: &Path, ui: &Ui) -> Result<(String, Value)> {
+fn measure(args: &Args, config: &Config, folder: &Path, progress: &dyn Progress) -> Result<Report> {
     let mut ours = Fixed::new(config, args.batch)?;
     let scratch = folder.join("trained.safetensors");
     // running statistics that are not the first ones
@@ -187,7 +184,7 @@ fn measure(args: &Args, config: &Config, folder: &Path, ui: &Ui) -> Result<(Stri
         None => None,
     };
     let apart = theirs.as_mut().map(|theirs| ours.apart(theirs)).transpose()?;
-    let task = ui.begin("bench lifter", args.rounds as u64);
+    let task = progress.begin("lifter", args.rounds as u64);
     let (mut own, mut conv, mut linear) = (vec![], vec![], vec![]);
     for _ in 0..args.rounds {
         own.push(ours.train(args.steps, &scratch)? / args.steps as f64);
@@ -201,7 +198,7 @@ fn measure(args: &Args, config: &Config, folder: &Path, ui: &Ui) -> Result<(Stri
     }
     drop(task);
     let epoch = |secs: f64| secs * (args.epoch as f64 / args.batch as f64);
-    let secs = super::median(own.clone());
+    let secs = median(own.clone());
     let mut text = format!(
         "{} parameters, window {} frames, batch {}, one thread, median of {} rounds of {} steps\n\
          this program          {:8.1} ms a step, {:6.1} s an epoch of {} windows",
@@ -218,8 +215,8 @@ fn measure(args: &Args, config: &Config, folder: &Path, ui: &Ui) -> Result<(Stri
         "batch": args.batch, "secs_a_step": secs, "epoch_windows": args.epoch, "secs_an_epoch": epoch(secs) });
     if let (Some(theirs), Some(apart)) = (theirs, apart) {
         for (form, name, times) in [("conv", "strided conv1d", conv), ("linear", "reshape and linear", linear)] {
-            let ratio = super::median(own.iter().zip(&times).map(|(own, their)| own / their).collect());
-            let secs = super::median(times);
+            let ratio = median(own.iter().zip(&times).map(|(own, their)| own / their).collect());
+            let secs = median(times);
             text += &format!(
                 "\nPyTorch, {name:19}{:6.1} ms a step, {:6.1} s an epoch: this program takes {ratio:.2} of it",
                 1e3 * secs,
@@ -232,5 +229,5 @@ fn measure(args: &Args, config: &Config, folder: &Path, ui: &Ui) -> Result<(Stri
         facts["outputs_apart"] = json!(apart);
         facts["pytorch"] = json!(theirs.version());
     }
-    Ok((text, facts))
+    Ok(Report { text, facts })
 }

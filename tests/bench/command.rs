@@ -1,0 +1,84 @@
+//! The command line of the benchmark: which part is measured, and how the result is shown.
+
+use super::report::{Bars, Report};
+use super::{animate, dataset, evaluate, generate, lift, lifter, pose2d, run, scale, spaces, train};
+use anyhow::{Context, Result};
+use clap::{CommandFactory, Parser, Subcommand};
+use orator::stage::progress::Progress;
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+/// Measure the speed of a part of the pipeline.
+#[derive(Parser)]
+#[command(name = "cargo bench --", help_expected = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    part: Option<Part>,
+    /// Print one JSON object on standard output instead of text for people.
+    #[arg(long, global = true)]
+    json: bool,
+    /// Passed by `cargo bench`; without effect.
+    #[arg(long, global = true, hide = true)]
+    bench: bool,
+}
+
+#[derive(Subcommand)]
+enum Part {
+    Animate(animate::Args),
+    Pose2d(pose2d::Args),
+    Dataset(dataset::Args),
+    Evaluate(evaluate::Args),
+    Generate(generate::Args),
+    Lift(lift::Args),
+    Lifter(lifter::Args),
+    Run(run::Args),
+    Scale(scale::Args),
+    Spaces(spaces::Args),
+    Train(train::Args),
+}
+
+impl Part {
+    fn measure(&self, progress: &dyn Progress) -> Result<Report> {
+        match self {
+            Part::Animate(args) => animate::run(args, progress),
+            Part::Pose2d(args) => pose2d::run(args, progress),
+            Part::Dataset(args) => dataset::run(args, progress),
+            Part::Evaluate(args) => evaluate::run(args, progress),
+            Part::Generate(args) => generate::run(args, progress),
+            Part::Lift(args) => lift::run(args, progress),
+            Part::Lifter(args) => lifter::run(args, progress),
+            Part::Run(args) => run::run(args, progress),
+            Part::Scale(args) => scale::run(args, progress),
+            Part::Spaces(args) => spaces::run(args, progress),
+            Part::Train(args) => train::run(args, progress),
+        }
+    }
+}
+
+/// Measures the part that a command line names, for callers other than `main`.
+///
+/// # Errors
+/// An unknown argument, no part, or a measurement that failed.
+pub fn measure(words: impl IntoIterator<Item = impl Into<OsString>>, progress: &dyn Progress) -> Result<Report> {
+    let program = OsString::from("bench");
+    let cli = Cli::try_parse_from(std::iter::once(program).chain(words.into_iter().map(Into::into)))?;
+    cli.part.context("no part to measure")?.measure(progress)
+}
+
+/// Parses the command line, measures, prints the result. Exit code 1 after an error.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let Some(part) = &cli.part else {
+        println!("{}", Cli::command().render_help());
+        return ExitCode::SUCCESS;
+    };
+    match part.measure(&Bars::default()) {
+        Ok(report) if cli.json => println!("{}", report.facts),
+        Ok(report) => println!("{}", report.text.trim_end()),
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            return ExitCode::FAILURE;
+        }
+    }
+    ExitCode::SUCCESS
+}

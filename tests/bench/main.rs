@@ -1,0 +1,22 @@
+//! The benchmark: `cargo bench -- PART`, one file a part. The variants of a part take turns, round after round, and the
+//! median round counts, so that a noisy machine favours none of them. Without a part it lists them and ends.
+
+pub mod animate;
+pub mod child;
+pub mod command;
+pub mod dataset;
+pub mod evaluate;
+pub mod generate;
+pub mod lift;
+pub mod lifter;
+pub mod pose2d;
+pub mod reference;
+pub mod report;
+pub mod run;
+pub mod scale;
+pub mod spaces;
+pub mod train;
+
+fn main() -> std::process::ExitCode {
+    command::main()
+}

@@ -1,0 +1,50 @@
+//! What a part gives back, and progress bars on standard error while it is measured.
+
+use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use orator::math::order;
+use orator::stage::progress::{Progress, Task};
+
+/// A measurement: as text for people and as one JSON object.
+pub struct Report {
+    pub text: String,
+    pub facts: serde_json::Value,
+}
+
+/// The median of the rounds: the larger one of the two in the middle; NaN of none.
+pub fn median(rounds: Vec<f64>) -> f64 {
+    order::upper_median(rounds).unwrap_or(f64::NAN)
+}
+
+/// Progress bars on standard error, hidden where that is no terminal.
+#[derive(Default)]
+pub struct Bars(MultiProgress);
+
+impl Progress for Bars {
+    fn begin(&self, label: &str, total: u64) -> Box<dyn Task> {
+        let bar = if total == 0 { ProgressBar::new_spinner() } else { ProgressBar::new(total) };
+        let style = ProgressStyle::with_template("{prefix:24!} {pos}/{len} {elapsed} {wide_msg}");
+        let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
+        Box::new(Bar(self.0.add(bar.with_style(style).with_prefix(label.to_owned()))))
+    }
+
+    fn say(&self, line: &str) {
+        self.0.suspend(|| eprintln!("{line}"));
+    }
+}
+
+struct Bar(ProgressBar);
+
+impl Task for Bar {
+    fn advance(&self, steps: u64) {
+        self.0.inc(steps);
+    }
+    fn detail(&self, text: &str) {
+        self.0.set_message(text.to_owned());
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}

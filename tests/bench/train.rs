@@ -1,0 +1,226 @@
+//! `cargo bench -- train`: a step of the GAN trainer in turns with PyTorch's, for the same networks, batch, losses and
+//! optimiser; peak memory of both; how far apart they are; and where the time of a step goes.
+
+use super::child::own_peak_mib;
+use super::reference::Reference;
+use super::report::{Report, median};
+use anyhow::{Context, Result, ensure};
+use candle_core::{Device, Tensor};
+use orator::audio::mel::N_MELS;
+use orator::config::Gan;
+use orator::formats::checkpoint::{self, Contents};
+use orator::generate::mel_stream::mel_frames;
+use orator::generate::model::Facts;
+use orator::generate::normalisation::{N_NUMBERS, Normalisation};
+use orator::generate::representation::Representation;
+use orator::nn::cpu::thread_team::awake;
+use orator::nn::gan::generator::Config;
+use orator::stage::progress::Progress;
+use orator::train::gan::step::{Losses, MAX_NORM, Training};
+use orator::train::gan::windows::Batch;
+use orator::types::skeleton::{N_BONES, N_JOINTS, NECK, is_duplicate, parent};
+use orator::types::time::FrameRate;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+const FPS: FrameRate = FrameRate::new(15, 1);
+/// Share of the joints that are missing in the batch.
+const MISSING: f64 = 0.1;
+/// Every how many outputs are compared.
+const EVERY: usize = 97;
+
+/// A step of the GAN trainer on all cores: seconds, peak memory, where the time goes and, with `--python`, the step of
+/// PyTorch. Both train the same networks on the same batch: forward kinematics of the bones, L1 over the joints that
+/// are not missing, the least-squares adversarial loss, clipping of the gradient, Adam.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The network: `light` or `paper`.
+    #[arg(long, default_value = "light", value_name = "NAME")]
+    preset: String,
+    /// Windows of a step.
+    #[arg(long, default_value_t = 32, value_name = "N")]
+    batch: usize,
+    /// Steps of a turn.
+    #[arg(long, default_value_t = 3, value_name = "N")]
+    steps: usize,
+    /// Rounds; each measures every variant once.
+    #[arg(long, default_value_t = 5, value_name = "N")]
+    rounds: usize,
+    /// The PyTorch reference, started as `REFERENCE.py serve FILE`; ORATOR_REFERENCE_PYTHON names its Python.
+    #[arg(long, value_name = "FILE")]
+    python: Option<PathBuf>,
+}
+
+/// The trainer with a batch that stays.
+struct Fixed {
+    trainer: Training,
+    batch: Batch,
+}
+
+impl Fixed {
+    fn new(args: &Args) -> Result<Self> {
+        let settings = Gan { preset: args.preset.clone(), batch: args.batch, ..Gan::default() };
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let table = |value: f32| ndarray::Array2::from_elem((N_JOINTS, 3), value);
+        let length = |joint: usize| if is_duplicate(joint) { 0.0 } else { 0.1 };
+        let normalisation = Normalisation::new(&table(0.1), &table(0.3), (1..N_JOINTS).map(length).collect());
+        let mut numbers = |low: f32, high: f32, n: usize| (0..n).map(|_| rng.random_range(low..high)).collect();
+        let representation =
+            Representation::Bones { mean: numbers(-0.5, 0.5, N_NUMBERS), std: numbers(0.1, 0.4, N_NUMBERS) };
+        // Running statistics are no part of what is compared: one momentum for both networks.
+        let network = Config { norm_momentum: 0.1, ..Config::of(args.preset.parse()?, N_NUMBERS) };
+        let (n_mels, n_frames) = (mel_frames(FPS, settings.window_frames), settings.window_frames);
+        let tensor = |values: Vec<f32>, rows: usize, columns: usize| {
+            Tensor::from_vec(values, (args.batch, rows, columns), &Device::Cpu)
+        };
+        let mels = tensor(numbers(-1.0, 1.0, args.batch * N_MELS * n_mels), N_MELS, n_mels)?;
+        let poses: Vec<f32> = numbers(-1.0, 1.0, args.batch * N_NUMBERS * n_frames);
+        let mut is_learnt = |i: usize| !is_duplicate(i / n_frames % N_BONES + 1) && rng.random_bool(1.0 - MISSING);
+        let joints: Vec<bool> = (0..args.batch * N_BONES * n_frames).map(&mut is_learnt).collect();
+        let rows = joints.chunks_exact(n_frames).flat_map(|row| [row; 3]).flatten();
+        let mask: Vec<f32> = rows.map(|learnt| f32::from(*learnt)).collect();
+        let poses = poses.iter().zip(&mask).map(|(number, mask)| number * mask).collect();
+        let batch =
+            Batch { mels, poses: tensor(poses, N_NUMBERS, n_frames)?, mask: tensor(mask, N_NUMBERS, n_frames)? };
+        let facts = Facts::new("benchmark", FPS, "", network, normalisation, representation);
+        Ok(Self { trainer: Training::new(facts, settings)?, batch })
+    }
+
+    /// Weights, batch and settings for the reference.
+    fn contents(&self, folder: &Path) -> Result<Contents> {
+        self.trainer.save(folder)?;
+        let mut contents = Contents::read(&checkpoint::path(folder, 0))?;
+        let Training { facts: Facts { normalisation, representation, .. }, settings, .. } = &self.trainer;
+        let Representation::Bones { mean, std } = representation else { anyhow::bail!("no bones to compare") };
+        let parents: Vec<f32> = (1..N_JOINTS).map(|joint| parent(joint).unwrap_or(NECK) as f32).collect();
+        let numbers = [settings.lambda_l1, settings.lambda_gan, settings.learning_rate, MAX_NORM];
+        let vectors = [
+            ("direction_mean", mean),
+            ("direction_std", std),
+            ("pose_mean", &normalisation.mean),
+            ("pose_std", &normalisation.std),
+            ("bone_lengths", &normalisation.bone_lengths),
+            ("parents", &parents),
+            ("settings", &numbers.map(|v| v as f32).to_vec()),
+        ];
+        for (name, values) in vectors {
+            contents.tensors.insert(name.to_owned(), Tensor::new(&values[..], &Device::Cpu)?);
+        }
+        for (name, tensor) in [("mels", &self.batch.mels), ("poses", &self.batch.poses), ("mask", &self.batch.mask)] {
+            contents.tensors.insert(name.to_owned(), tensor.clone());
+        }
+        Ok(contents)
+    }
+
+    /// Seconds of `steps` steps, and the last one's losses.
+    fn train(&mut self, steps: usize) -> Result<(f64, Losses)> {
+        awake(|| {
+            let start = Instant::now();
+            for _ in 1..steps {
+                self.trainer.step(&self.batch)?;
+            }
+            let losses = self.trainer.step(&self.batch)?;
+            Ok((start.elapsed().as_secs_f64(), losses))
+        })
+    }
+
+    /// Seconds of the phases of a step.
+    fn phases(&mut self) -> Result<Vec<(&'static str, f64)>> {
+        let (mut phases, mut last) = (Vec::new(), Instant::now());
+        let mut phase = |name| {
+            phases.push((name, last.elapsed().as_secs_f64()));
+            last = Instant::now();
+        };
+        awake(|| self.trainer.step_in_phases(&self.batch, &mut phase))?;
+        Ok(phases)
+    }
+
+    /// Largest difference of the generator's poses, over the largest of them, and of losses and gradient norm of the
+    /// first step, each over its own size.
+    fn apart(&mut self, theirs: &mut Reference) -> Result<(f64, f64)> {
+        let their: Vec<f64> = serde_json::from_value(theirs.ask("forward")?["poses"].clone())?;
+        let raw = self.trainer.generator.forward(&self.batch.mels, self.trainer.settings.window_frames, true)?;
+        let own = self.trainer.decoder.poses(&raw)?.flatten_all()?.to_vec1::<f32>()?;
+        let n = own.len().div_ceil(EVERY);
+        ensure!(their.len() == n, "the reference gave {} outputs, expected {n}", their.len());
+        let most = their.iter().fold(1e-9f64, |most, v| most.max(v.abs()));
+        let outputs = own.iter().step_by(EVERY).zip(&their).map(|(own, their)| (f64::from(*own) - their).abs() / most);
+        let their: Vec<f64> = serde_json::from_value(theirs.ask("step 1")?["losses"].clone())?;
+        let Losses { l1, adversarial, discriminator, gradient_norm, .. } = self.train(1)?.1;
+        let own = [l1, adversarial, discriminator, gradient_norm];
+        let losses = own.iter().zip(&their).map(|(own, their)| (own - their).abs() / their.abs());
+        Ok((outputs.fold(0.0, f64::max), losses.fold(0.0, f64::max)))
+    }
+}
+
+pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+    ensure!(
+        args.rounds > 0 && args.steps > 0 && args.batch > 1,
+        "nothing to measure: there must be rounds, steps and two windows a batch at least"
+    );
+    let folder = std::env::temp_dir().join(format!("orator-bench-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let measured = measure(args, &folder, progress);
+    let _ = std::fs::remove_dir_all(&folder);
+    measured
+}
+
+fn measure(args: &Args, folder: &Path, progress: &dyn Progress) -> Result<Report> {
+    let n_threads = rayon::current_num_threads();
+    let mut ours = Fixed::new(args)?;
+    let start =
+        |script| Reference::start(script, n_threads, &ours.contents(folder)?, &folder.join("given.safetensors"));
+    let mut theirs = args.python.as_deref().map(start).transpose()?;
+    let apart = theirs.as_mut().map(|theirs| ours.apart(theirs)).transpose()?;
+
+    let task = progress.begin("train", args.rounds as u64);
+    let (mut own, mut their) = (vec![], vec![]);
+    for _ in 0..args.rounds {
+        own.push(ours.train(args.steps)?.0 / args.steps as f64);
+        if let Some(theirs) = &mut theirs {
+            their.push(theirs.secs(&format!("step {}", args.steps))? / args.steps as f64);
+        }
+        task.advance(1);
+    }
+    drop(task);
+    let peak = own_peak_mib();
+    let phases = ours.phases()?;
+
+    let secs = median(own.clone());
+    let mut text = format!(
+        "{}: {} parameters, batch {}, {n_threads} threads, median of {} rounds of {} steps\n\
+         this program     {:9.1} ms a step, peak memory {peak:6.0} MiB",
+        args.preset,
+        ours.trainer.n_parameters(),
+        args.batch,
+        args.rounds,
+        args.steps,
+        1e3 * secs
+    );
+    let mut facts = json!({ "preset": args.preset, "batch": args.batch, "threads": n_threads, "secs_a_step": secs,
+        "peak_mib": peak });
+    if let (Some(theirs), Some((outputs, losses))) = (&mut theirs, apart) {
+        let memory = theirs.ask("memory")?["peak_mib"].as_f64().unwrap_or(f64::NAN);
+        let ratio = median(own.iter().zip(&their).map(|(own, their)| own / their).collect());
+        text += &format!(
+            "\nPyTorch {:9}{:9.1} ms a step, peak memory {memory:6.0} MiB\n\
+             this program takes {ratio:.2} of PyTorch's time and {:.2} of its memory\n\
+             poses at most {outputs:.1e} apart, over the largest; losses and gradient norm after one step {losses:.1e}",
+            theirs.version(),
+            1e3 * median(their.clone()),
+            peak / memory
+        );
+        facts["pytorch"] = json!({ "version": theirs.version(), "secs_a_step": median(their),
+            "peak_mib": memory, "ratio": ratio, "memory_ratio": peak / memory, "outputs_apart": outputs,
+            "losses_apart": losses, "parts": theirs.ask("parts")? });
+    }
+    let whole: f64 = phases.iter().map(|(_, secs)| secs).sum();
+    for (name, secs) in &phases {
+        text += &format!("\n  {name:22}{:9.1} ms {:5.1} %", 1e3 * secs, 100.0 * secs / whole);
+    }
+    facts["parts"] = phases.into_iter().map(|(name, secs)| (name.to_owned(), json!(secs))).collect();
+    Ok(Report { text, facts })
+}
