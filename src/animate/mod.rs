@@ -7,9 +7,9 @@ pub mod performance;
 pub mod rig;
 pub mod solve;
 
-pub use draw::figure::View;
+pub use draw::figure::FigureView;
 pub use draw::figure::draw_pose;
-pub use performance::Options;
+pub use performance::AnimationOptions;
 pub use performance::Performance;
 pub use performance::Yaw;
 pub use performance::perform;

@@ -1,15 +1,15 @@
 //! The road from joints to animation: motion is smoothed, put on a figure as rotations, brought to the rate asked for
 //! and held within what a body can do. Every file is written from what comes out; what was done on the way is told.
 
-use super::rig::constraints::{Clamps, Constraints, Tally};
-use super::rig::rig::{CM, Figure};
-use super::solve::arm::Means;
+use super::rig::constraints::{ClampTally, Clamps, Constraints};
+use super::rig::rig::{CM, Rig};
+use super::solve::arm::SolveFilters;
 use super::solve::head;
 use super::solve::head::Face;
-use super::solve::positions::Places;
+use super::solve::positions::JointPositions;
 use super::solve::rotations::rotations;
 use super::solve::smoothing::Smoothing;
-use super::solve::track::Track;
+use super::solve::track::RotationTrack;
 use crate::formats::bvh::write::Clip;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, scale};
@@ -23,7 +23,7 @@ use std::ops::Range;
 
 /// How motion becomes an animation; the default is what a user wants.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Options {
+pub struct AnimationOptions {
     pub smoothing: Smoothing,
     pub constraints: Constraints,
     pub yaw: Yaw,
@@ -43,7 +43,7 @@ pub enum Yaw {
 
 /// What was done to the motion.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Told {
+pub struct AnimationReport {
     pub n_frames: usize,
     /// Jerk at the motion's own rate, over the frames that were seen.
     pub arms: Jerk,
@@ -53,12 +53,12 @@ pub struct Told {
     pub clamps: Vec<Clamps>,
     /// Frames in which the face was seen; `None` without keypoints of it.
     pub face_frames: Option<usize>,
-    pub seen: Seen,
+    pub seen: SeenFrames,
 }
 
 /// Frames, at the motion's own rate, in which a part of the body was seen; in the others it is bridged or held.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Seen {
+pub struct SeenFrames {
     /// Shoulder, elbow and wrist.
     pub left_arm: usize,
     pub right_arm: usize,
@@ -67,8 +67,8 @@ pub struct Seen {
     pub right_hand: usize,
 }
 
-impl Seen {
-    fn of(motion: &Motion) -> Self {
+impl SeenFrames {
+    fn count(motion: &Motion) -> Self {
         let there = seen(motion);
         let is_seen =
             |t: usize, joint: usize| there[[t, joint]] && motion.mask.get([t, joint]).is_none_or(|&seen| seen);
@@ -97,32 +97,32 @@ pub struct Jerk {
 /// A motion on its figure.
 #[derive(Clone, Debug)]
 pub struct Performance {
-    pub figure: Figure,
+    pub figure: Rig,
     pub clip: Clip,
-    pub told: Told,
+    pub told: AnimationReport,
 }
 
 /// Puts a motion on the figure of its own bone lengths; with a `face` the head turns.
 ///
 /// What no body can do is clamped before smoothing, so that a joint found on the wrong side pulls no other frame with
 /// it, and once more behind it and at the rate that is written, so that the limits hold in every frame of the file.
-pub fn perform(motion: &Motion, face: Option<&Face>, options: &Options) -> Performance {
-    let figure = Figure::of(motion);
-    let clip_of = |tracks: &[Track]| {
+pub fn perform(motion: &Motion, face: Option<&Face>, options: &AnimationOptions) -> Performance {
+    let figure = Rig::from_motion(motion);
+    let clip_of = |tracks: &[RotationTrack]| {
         let local = (0..motion.n_frames()).map(|t| tracks.iter().map(|track| track[t]).collect()).collect();
         Clip { root: figure.root, skeleton: figure.skeleton.clone(), fps: motion.fps, local }
     };
-    let constrained = |mut clip: Clip, tally: &mut Tally| {
+    let constrained = |mut clip: Clip, tally: &mut ClampTally| {
         clip.local.iter_mut().for_each(|frame| options.constraints.apply(&figure, frame, tally));
         clip
     };
-    let mut tally = Tally::default();
-    let mut places = Places::of(motion);
+    let mut tally = ClampTally::default();
+    let mut places = JointPositions::from_motion(motion);
     if options.constraints != Constraints::NONE {
-        let as_it_is = rotations(&places, &figure, &Means::of(Smoothing::None, motion.fps));
+        let as_it_is = rotations(&places, &figure, &SolveFilters::new(Smoothing::None, motion.fps));
         places = moved(&places, &figure, &constrained(clip_of(&as_it_is), &mut tally));
     }
-    let means = Means::of(options.smoothing, motion.fps);
+    let means = SolveFilters::new(options.smoothing, motion.fps);
     let mut tracks = rotations(&places, &figure, &means);
     let face_frames = face.map(|face| head::turn(face, &figure, &means, &mut tracks));
     if options.yaw == Yaw::Removed {
@@ -132,8 +132,8 @@ pub fn perform(motion: &Motion, face: Option<&Face>, options: &Options) -> Perfo
     }
     let free = clip_of(&tracks);
     let resampled = options.fps.filter(|&fps| fps != motion.fps).map(|fps| free.resampled(fps));
-    let resampled = resampled.map(|clip| constrained(clip, &mut Tally::default()));
-    let clip = constrained(free, &mut Tally::default());
+    let resampled = resampled.map(|clip| constrained(clip, &mut ClampTally::default()));
+    let clip = constrained(free, &mut ClampTally::default());
 
     let after = joints(&figure, &clip);
     let jerk = |joints: &[(usize, usize)]| {
@@ -142,13 +142,13 @@ pub fn perform(motion: &Motion, face: Option<&Face>, options: &Options) -> Perfo
     };
     let arms = [R_SHOULDER, L_SHOULDER].into_iter().flat_map(|shoulder| (shoulder..shoulder + 3).map(|j| (j, NECK)));
     let hands = [R_HAND, L_HAND].into_iter().flat_map(|root| (root + 1..root + 21).map(move |j| (j, root)));
-    let told = Told {
+    let told = AnimationReport {
         n_frames: motion.n_frames(),
         arms: jerk(&arms.collect::<Vec<_>>()),
         hands: jerk(&hands.collect::<Vec<_>>()),
         clamps: if options.constraints == Constraints::NONE { Vec::new() } else { tally.clamps() },
         face_frames,
-        seen: Seen::of(motion),
+        seen: SeenFrames::count(motion),
     };
     Performance { clip: resampled.unwrap_or(clip), figure, told }
 }
@@ -160,7 +160,7 @@ impl Performance {
     }
 }
 
-fn joints(figure: &Figure, clip: &Clip) -> Array3<f32> {
+fn joints(figure: &Rig, clip: &Clip) -> Array3<f32> {
     let mut joints = Array3::zeros((clip.n_frames(), N_JOINTS, 3));
     for (frame_idx, mut frame) in joints.outer_iter_mut().enumerate() {
         let places = clip.positions(frame_idx);
@@ -180,10 +180,10 @@ fn seen(motion: &Motion) -> Array2<bool> {
 }
 
 /// Where a clip of the figure has these joints; what was missing stays missing.
-fn moved(places: &Places, figure: &Figure, clip: &Clip) -> Places {
+fn moved(places: &JointPositions, figure: &Rig, clip: &Clip) -> JointPositions {
     let moved = |(t, frame): (usize, &[Option<Vec3>; N_JOINTS])| {
         let positions = clip.positions(t);
         std::array::from_fn(|joint| frame[joint].map(|_| scale(positions[figure.places[joint]], 1.0 / CM)))
     };
-    Places(places.0.iter().enumerate().map(moved).collect())
+    JointPositions(places.0.iter().enumerate().map(moved).collect())
 }

@@ -10,7 +10,7 @@ use orator::demo::check::pipeline;
 use orator::demo::check::pipeline::{LEAST_FOUND, LEAST_FRAMES, LEAST_JOINTS, MOST_MM, MOST_PX, Millimetres};
 use orator::demo::check::{learned, sheet, traces};
 use orator::demo::drawn::folder;
-use orator::demo::drawn::folder::Plan;
+use orator::demo::drawn::folder::DemoPlan;
 use orator::demo::rule::dataset;
 use orator::external::opencv::png;
 use orator::formats::npy;
@@ -35,16 +35,16 @@ enum Part {
         /// The demo's folder; made if it is not there.
         dir: PathBuf,
         /// How many videos.
-        #[arg(long, default_value_t = Plan::default().n_videos)]
+        #[arg(long, default_value_t = DemoPlan::default().n_videos)]
         videos: usize,
         /// Seconds of each video.
-        #[arg(long, default_value_t = Plan::default().secs)]
+        #[arg(long, default_value_t = DemoPlan::default().secs)]
         secs: f64,
         /// Frames a second.
         #[arg(long, default_value_t = 30)]
         fps: u32,
         /// Another seed is another speech with other gestures.
-        #[arg(long, default_value_t = Plan::default().seed)]
+        #[arg(long, default_value_t = DemoPlan::default().seed)]
         seed: u64,
     },
     /// Hold the keypoints and the dataset of a run in DIR against the truth; exit code 2 where a target is missed.
@@ -93,7 +93,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.part {
         Part::Draw { dir, videos, secs, fps, seed } => {
             let fps = FrameRate::new(fps.clamp(1, 120), 1);
-            let plan = Plan { n_videos: videos, secs, fps, seed, ..Plan::default() };
+            let plan = DemoPlan { n_videos: videos, secs, fps, seed, ..DemoPlan::default() };
             draw(&dir, &plan, ui)
         }
         Part::Measure { dir } => measure(&dir, ui),
@@ -105,7 +105,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     }
 }
 
-fn draw(dir: &Path, plan: &Plan, ui: &Ui) -> Result<Outcome> {
+fn draw(dir: &Path, plan: &DemoPlan, ui: &Ui) -> Result<Outcome> {
     let videos = folder::draw(dir, plan, ui)?;
     let next = format!("orator run -c {}", dir.join("pipeline.toml").display());
     let text = format!("drew {} videos of {} s into {}", videos.len(), plan.secs, dir.join("videos/host").display());

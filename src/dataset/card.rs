@@ -1,13 +1,13 @@
 //! The dataset card `README.md`: a YAML header as the hubs read it, and what a stranger needs to use the numbers.
 
-use super::info::Info;
+use super::info::DatasetInfo;
 use super::leakage::Leakage;
 use super::split::Split;
-use super::stats::Stats;
+use super::stats::DatasetStats;
 use std::fmt::Write;
 
 /// The card.
-pub fn text(info: &Info, stats: &Stats, leakage: &Leakage) -> String {
+pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> String {
     let mut text = header(info);
     let speaker = &info.speaker;
     let _ = write!(
@@ -76,7 +76,7 @@ pub fn text(info: &Info, stats: &Stats, leakage: &Leakage) -> String {
 }
 
 /// The YAML header. Values are quoted as JSON, which YAML reads.
-fn header(info: &Info) -> String {
+fn header(info: &DatasetInfo) -> String {
     let quoted = |text: &str| serde_json::Value::from(text).to_string();
     let licence = if info.licence.is_empty() { "unknown" } else { &info.licence };
     let samples: usize = info.splits.values().map(|split| split.samples).sum();

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// One tar file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Shard {
+pub struct ShardRef {
     pub file: String,
     pub bytes: u64,
     pub n_samples: usize,
@@ -26,16 +26,16 @@ pub struct SampleRef {
     pub n_frames: usize,
     /// Of the `size` bytes at `offset`.
     pub blake3: String,
-    pub json: Span,
-    pub mask: Span,
-    pub pose2d: Span,
-    pub pose3d: Span,
-    pub wav: Span,
+    pub json: ByteRange,
+    pub mask: ByteRange,
+    pub pose2d: ByteRange,
+    pub pose3d: ByteRange,
+    pub wav: ByteRange,
 }
 
 /// Bytes of a shard.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Span {
+pub struct ByteRange {
     pub offset: u64,
     pub size: u64,
 }

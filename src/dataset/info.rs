@@ -1,6 +1,6 @@
 //! `info.json`: what the numbers mean. Everything a reader needs who has never seen this project.
 
-use super::index::Shard;
+use super::index::ShardRef;
 use super::sample::N_KEYPOINTS;
 use super::split::Split;
 use super::split::SplitBy;
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 /// The whole file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Info {
+pub struct DatasetInfo {
     pub schema: u32,
     pub speaker: String,
     /// The program that wrote it, with its version.
@@ -23,8 +23,8 @@ pub struct Info {
     /// The members of a sample, by extension.
     pub members: BTreeMap<String, Member>,
     /// What the coordinates of `pose3d.npy` are.
-    pub axes: Axes,
-    pub joints: Vec<Joint>,
+    pub axes: JointAxes,
+    pub joints: Vec<SkeletonJoint>,
     /// Length of the bone from joint `n + 1` to its parent, metres: the median of the videos. In a video's samples the
     /// bones have the constant lengths of that video, see `videos/<name>.json`.
     pub bone_lengths_metres: Vec<f64>,
@@ -40,12 +40,12 @@ pub struct Info {
     pub notes: Vec<String>,
     pub splits: BTreeMap<String, SplitInfo>,
     /// Sorted by name; those without a sample too.
-    pub videos: Vec<VideoInfo>,
+    pub videos: Vec<DatasetVideo>,
 }
 
 /// A video of the dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct VideoInfo {
+pub struct DatasetVideo {
     pub name: String,
     pub file: String,
     /// BLAKE3 of the file.
@@ -67,7 +67,7 @@ pub struct Member {
 
 /// Directions and unit of joint coordinates.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Axes {
+pub struct JointAxes {
     pub x: String,
     pub y: String,
     pub z: String,
@@ -77,7 +77,7 @@ pub struct Axes {
 
 /// A joint of the skeleton; `parent` is its number in the list.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Joint {
+pub struct SkeletonJoint {
     pub name: String,
     pub parent: Option<usize>,
     pub side: String,
@@ -94,7 +94,7 @@ pub struct ModelUsed {
 /// How much a split holds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SplitInfo {
-    pub shards: Vec<Shard>,
+    pub shards: Vec<ShardRef>,
     pub videos: Vec<String>,
     pub samples: usize,
     pub frames: usize,
@@ -131,9 +131,9 @@ impl About {
     }
 }
 
-impl Info {
+impl DatasetInfo {
     /// The description of a dataset `about` with these videos and bones (48 lengths, metres).
-    pub fn new(about: &About, bones: &[f32], splits: BTreeMap<Split, SplitInfo>, videos: Vec<VideoInfo>) -> Self {
+    pub fn new(about: &About, bones: &[f32], splits: BTreeMap<Split, SplitInfo>, videos: Vec<DatasetVideo>) -> Self {
         let About { speaker, tool, fps, models, licence, consent, source, notes } = about.clone();
         Self {
             schema: super::SCHEMA,
@@ -142,7 +142,7 @@ impl Info {
             fps,
             sound_rate: crate::types::sound::SAMPLE_RATE,
             members: members(),
-            axes: Axes {
+            axes: JointAxes {
                 x: "image right".into(),
                 y: "down".into(),
                 z: "away from the camera".into(),
@@ -164,12 +164,12 @@ impl Info {
 
     /// What it was made from, beside the videos.
     pub fn about(&self) -> About {
-        let Info { speaker, tool, fps, models, licence, consent, source, notes, .. } = self.clone();
+        let DatasetInfo { speaker, tool, fps, models, licence, consent, source, notes, .. } = self.clone();
         About { speaker, tool, fps, models, licence, consent, source, notes }
     }
 
     /// The shards of all splits.
-    pub fn shards(&self) -> impl Iterator<Item = &Shard> {
+    pub fn shards(&self) -> impl Iterator<Item = &ShardRef> {
         self.splits.values().flat_map(|split| &split.shards)
     }
 }
@@ -198,13 +198,13 @@ fn members() -> BTreeMap<String, Member> {
     rows.map(member).into()
 }
 
-fn joint(joint: usize) -> Joint {
+fn joint(joint: usize) -> SkeletonJoint {
     let side = match skeleton::side(joint) {
         Side::Centre => "centre",
         Side::Left => "left",
         Side::Right => "right",
     };
-    Joint { name: skeleton::name(joint), parent: skeleton::parent(joint), side: side.to_owned() }
+    SkeletonJoint { name: skeleton::name(joint), parent: skeleton::parent(joint), side: side.to_owned() }
 }
 
 /// Names of the 59 keypoints of a shard, in their order.

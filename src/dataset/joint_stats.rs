@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// Sums over the frames in which a joint was seen; rows are joints, columns x, y, z in metres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Moments {
+pub struct JointMoments {
     pub n_seen: Vec<u64>,
     pub mean: Vec<[f64; 3]>,
     /// Sums of the squared distances from the mean.
@@ -17,14 +17,14 @@ pub struct Moments {
     pub max: Vec<[f64; 3]>,
 }
 
-impl Default for Moments {
+impl Default for JointMoments {
     fn default() -> Self {
         let rows = || vec![[0.0; 3]; N_JOINTS];
         Self { n_seen: vec![0; N_JOINTS], mean: rows(), squares: rows(), min: rows(), max: rows() }
     }
 }
 
-impl Moments {
+impl JointMoments {
     /// Takes in the joints that were seen.
     pub fn learn(&mut self, motion: &Motion) {
         for (frame, seen) in motion.joints.outer_iter().zip(motion.mask.outer_iter()) {
@@ -48,7 +48,7 @@ impl Moments {
     }
 
     /// Takes in what was learnt from other frames. Rows that `other` lacks count as never seen.
-    pub fn merge(&mut self, other: &Moments) {
+    pub fn merge(&mut self, other: &JointMoments) {
         let rows = other.mean.iter().zip(&other.squares).zip(other.min.iter().zip(&other.max));
         for (joint, ((mean, squares), (min, max))) in rows.enumerate().take(N_JOINTS) {
             let (n, m) = (self.n_seen[joint] as f64, other.n_seen.get(joint).copied().unwrap_or(0) as f64);
@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn masked_and_missing_joints_have_no_say() {
-        let mut moments = Moments::default();
+        let mut moments = JointMoments::default();
         moments.learn(&motion(&[1.0, 2.0, 6.0, 1000.0], &[3]));
         assert_eq!((moments.n_seen[1], moments.n_seen[2], moments.n_seen[0]), (3, 0, 4));
         assert!((moments.mean[1][0] - 3.0).abs() < 1e-12);
@@ -102,11 +102,11 @@ mod tests {
     #[test]
     fn parts_together_are_the_whole() {
         let xs = [0.5, -1.0, 7.0, 7.5, 8.0, -30.0, 2.0];
-        let mut whole = Moments::default();
+        let mut whole = JointMoments::default();
         whole.learn(&motion(&xs, &[]));
-        let mut merged = Moments::default();
+        let mut merged = JointMoments::default();
         for part in [&xs[..2], &[], &xs[2..3], &xs[3..]] {
-            let mut moments = Moments::default();
+            let mut moments = JointMoments::default();
             moments.learn(&motion(part, &[]));
             merged.merge(&moments);
         }

@@ -1,6 +1,6 @@
 //! `leakage.json`: which videos share sound, and whether any of them stand in different splits.
 
-use super::shared_sound::Shared;
+use super::shared_sound::SharedSound;
 use super::split::Split;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -13,7 +13,7 @@ pub struct Leakage {
     /// Videos with samples whose sound was compared.
     pub n_compared: usize,
     /// Every two videos that share sound.
-    pub shared: Vec<Shared>,
+    pub shared: Vec<SharedSound>,
     /// Those of them that stand in different splits: a test on one has seen the other. Only names in the configuration
     /// bring this about.
     pub leaks: Vec<Leak>,
@@ -31,17 +31,17 @@ pub struct Leak {
 
 /// What was found out by comparing the sound of all videos.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Compared {
+pub struct SoundComparison {
     pub duplicate_secs: f64,
-    pub shared: Vec<Shared>,
+    pub shared: Vec<SharedSound>,
 }
 
 impl Leakage {
     /// The report on videos of these splits.
-    pub fn new(compared: &Compared, splits: &BTreeMap<String, Split>) -> Self {
-        let leak = |shared: &Shared| {
+    pub fn new(compared: &SoundComparison, splits: &BTreeMap<String, Split>) -> Self {
+        let leak = |shared: &SharedSound| {
             let (a_split, b_split) = (*splits.get(&shared.a)?, *splits.get(&shared.b)?);
-            let Shared { a, b, secs, .. } = shared.clone();
+            let SharedSound { a, b, secs, .. } = shared.clone();
             (a_split != b_split).then_some(Leak { a, a_split, b, b_split, secs })
         };
         Self {
@@ -53,7 +53,7 @@ impl Leakage {
     }
 
     /// What it was made from, beside the splits.
-    pub fn compared(&self) -> Compared {
-        Compared { duplicate_secs: self.duplicate_secs, shared: self.shared.clone() }
+    pub fn compared(&self) -> SoundComparison {
+        SoundComparison { duplicate_secs: self.duplicate_secs, shared: self.shared.clone() }
     }
 }

@@ -1,11 +1,11 @@
 //! Reading a dataset's folder: opened once, then any sample or any stretch of one by its place. Damaged, missing or
 //! foreign files are errors that name the file and what to do; nothing here panics on what is in a file.
 
-use super::index::{SampleRef, Span};
-use super::info::Info;
+use super::index::{ByteRange, SampleRef};
+use super::info::DatasetInfo;
 use super::sample::{N_KEYPOINTS, Sample};
 use super::split::Split;
-use super::stats::Stats;
+use super::stats::DatasetStats;
 use super::{CHECKSUMS, INDEX, INFO, STATS};
 use crate::formats::npy_slice;
 use crate::formats::npy_slice::{Element, Layout};
@@ -25,8 +25,8 @@ use std::path::{Path, PathBuf};
 /// An open dataset. Reading needs no lock: threads may share it.
 pub struct Dataset {
     dir: PathBuf,
-    info: Info,
-    stats: Stats,
+    info: DatasetInfo,
+    stats: DatasetStats,
     samples: Vec<SampleRef>,
     shards: BTreeMap<String, File>,
 }
@@ -50,13 +50,13 @@ impl Dataset {
             schema.schema,
             super::SCHEMA
         );
-        let info: Info = read_json(&dir.join(INFO))?;
+        let info: DatasetInfo = read_json(&dir.join(INFO))?;
         ensure!(
             info.sound_rate == SAMPLE_RATE && info.fps.num > 0 && info.fps.den > 0 && info.joints.len() == N_JOINTS,
             "{}: expected sound at {SAMPLE_RATE} Hz, a frame rate and {N_JOINTS} joints",
             dir.join(INFO).display()
         );
-        let stats: Stats = read_json(&dir.join(STATS))?;
+        let stats: DatasetStats = read_json(&dir.join(STATS))?;
         ensure!(stats.is_whole(), "{}: its tables do not have 49 rows", dir.join(STATS).display());
         let mut shards = BTreeMap::new();
         for shard in info.shards() {
@@ -101,12 +101,12 @@ impl Dataset {
     }
 
     /// What the numbers mean.
-    pub fn info(&self) -> &Info {
+    pub fn info(&self) -> &DatasetInfo {
         &self.info
     }
 
     /// What the numbers are like.
-    pub fn stats(&self) -> &Stats {
+    pub fn stats(&self) -> &DatasetStats {
         &self.stats
     }
 
@@ -117,7 +117,7 @@ impl Dataset {
 
     /// Reads a whole sample and checks its hash.
     pub fn read(&self, sample: &SampleRef) -> Result<Sample> {
-        let hash = blake3::hash(&self.bytes(sample, Span { offset: sample.offset, size: sample.size })?);
+        let hash = blake3::hash(&self.bytes(sample, ByteRange { offset: sample.offset, size: sample.size })?);
         ensure!(
             hash.to_hex().as_str() == sample.blake3,
             "{}: the sample {} is damaged (its hash is not the one written): run the shard stage again with --force",
@@ -151,10 +151,10 @@ impl Dataset {
     fn sound(&self, sample: &SampleRef, range: Range<usize>) -> Result<Sound> {
         let place = || format!("reading {}.wav in {}", sample.key, self.dir.join(&sample.shard).display());
         let (rate, at) = (self.info.sound_rate, sample.wav.offset + wav::HEADER_BYTES as u64);
-        let head = Span { offset: sample.wav.offset, size: sample.wav.size.min(wav::HEADER_BYTES as u64) };
+        let head = ByteRange { offset: sample.wav.offset, size: sample.wav.size.min(wav::HEADER_BYTES as u64) };
         let n_samples = wav::n_samples(&self.bytes(sample, head)?, sample.wav.size, rate).with_context(place)?;
         ensure!(range.end <= n_samples, "{}: it holds {n_samples} samples, not {}", place(), range.end);
-        let span = Span { offset: at + 2 * range.start as u64, size: 2 * range.len() as u64 };
+        let span = ByteRange { offset: at + 2 * range.start as u64, size: 2 * range.len() as u64 };
         Ok(Sound { rate, samples: wav::samples(&self.bytes(sample, span)?) })
     }
 
@@ -162,13 +162,13 @@ impl Dataset {
     fn rows(
         &self,
         sample: &SampleRef,
-        span: Span,
+        span: ByteRange,
         element: Element,
         row: &[usize],
         frames: Range<usize>,
     ) -> Result<Vec<u8>> {
         let place = || format!("reading an array of {} in {}", sample.key, self.dir.join(&sample.shard).display());
-        let head = Span { offset: span.offset, size: span.size.min(npy_slice::HEADER_BYTES as u64) };
+        let head = ByteRange { offset: span.offset, size: span.size.min(npy_slice::HEADER_BYTES as u64) };
         let layout = Layout::parse(&self.bytes(sample, head)?, span.size, element, row).with_context(place)?;
         ensure!(
             frames.start <= frames.end && frames.end <= layout.n_rows,
@@ -179,10 +179,10 @@ impl Dataset {
             frames.end
         );
         let offset = span.offset + (layout.data_at + frames.start * layout.row_bytes) as u64;
-        self.bytes(sample, Span { offset, size: (frames.len() * layout.row_bytes) as u64 })
+        self.bytes(sample, ByteRange { offset, size: (frames.len() * layout.row_bytes) as u64 })
     }
 
-    fn bytes(&self, sample: &SampleRef, span: Span) -> Result<Vec<u8>> {
+    fn bytes(&self, sample: &SampleRef, span: ByteRange) -> Result<Vec<u8>> {
         let place = || format!("reading {} in {}", sample.key, self.dir.join(&sample.shard).display());
         let file = self.shards.get(&sample.shard).with_context(|| format!("{}: no such shard", place()))?;
         // spans lie inside the file (checked when it was opened, and by the layouts), so this allocation is honest

@@ -21,7 +21,7 @@ const MAX_PLACES: usize = 64;
 
 /// A stretch of sound that two videos share.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Shared {
+pub struct SharedSound {
     /// Names of the videos, in alphabetical order.
     pub a: String,
     pub b: String,
@@ -32,7 +32,7 @@ pub struct Shared {
     pub secs: f64,
 }
 
-impl Shared {
+impl SharedSound {
     /// The other video of the pair, if `name` is one of them.
     pub fn other(&self, name: &str) -> Option<&str> {
         if self.a == name {
@@ -55,7 +55,7 @@ type Landmark = (u32, u32, u32);
 
 /// The stretches of at least `min_secs` that two of the videos share, the longest of each pair, in the order of the names.
 /// `names` are sorted; `codes` gives those of the n-th video.
-pub fn find(names: &[String], codes: impl Fn(usize) -> Result<Vec<u32>>, min_secs: f64) -> Result<Vec<Shared>> {
+pub fn find(names: &[String], codes: impl Fn(usize) -> Result<Vec<u32>>, min_secs: f64) -> Result<Vec<SharedSound>> {
     let mut landmarks: Vec<Landmark> = Vec::new();
     for video in 0..names.len() {
         let chosen = |code: u32| code != 0 && code.wrapping_mul(0x9E37_79B1) >> 30 == 0;
@@ -78,7 +78,7 @@ pub fn find(names: &[String], codes: impl Fn(usize) -> Result<Vec<u32>>, min_sec
             if secs >= min_secs {
                 let at = |place: i64| place as f64 / PER_SEC;
                 let (a_secs, b_secs) = (at(start), at(start + offset));
-                found.push(Shared { a: names[a].clone(), b: names[b].clone(), a_secs, b_secs, secs });
+                found.push(SharedSound { a: names[a].clone(), b: names[b].clone(), a_secs, b_secs, secs });
             }
         }
         at_hand = Some((a, first));

@@ -2,7 +2,7 @@
 //! name in the configuration, so that adding videos moves none of the others. Videos that share sound (a re-upload, the
 //! same intro) are kept together: the later one goes where the earlier one is.
 
-use super::shared_sound::Shared;
+use super::shared_sound::SharedSound;
 use serde::{Deserialize, Serialize};
 
 pub use crate::types::split::Split;
@@ -24,7 +24,7 @@ pub fn of_content(content_hash: &str, validation: f64, test: f64) -> Split {
 
 /// A video that waits for its split.
 #[derive(Clone, Debug)]
-pub struct Waiting<'a> {
+pub struct Unassigned<'a> {
     pub name: &'a str,
     pub content: &'a str,
     /// The split the configuration names.
@@ -35,16 +35,16 @@ pub struct Waiting<'a> {
 
 /// Where a video goes.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Placed {
+pub enum Assignment {
     In(Split, SplitBy),
     /// It shares sound with these videos of different splits, so that it would leak in any: the longest first.
-    Nowhere(Vec<Shared>),
+    Nowhere(Vec<SharedSound>),
 }
 
 /// The places of the videos, in their order. Those named come first, then those that were there before, then the new
 /// ones in the order of their content's hash: the order in which they are given has no say.
-pub fn place(videos: &[Waiting], shared: &[Shared], validation: f64, test: f64) -> Vec<Placed> {
-    let rank = |video: &Waiting| match (video.named, video.before) {
+pub fn assign(videos: &[Unassigned], shared: &[SharedSound], validation: f64, test: f64) -> Vec<Assignment> {
+    let rank = |video: &Unassigned| match (video.named, video.before) {
         (Some(_), _) => 0,
         (None, Some(SplitBy::Content)) => 1,
         (None, Some(SplitBy::SoundOf(_))) => 2,
@@ -53,33 +53,33 @@ pub fn place(videos: &[Waiting], shared: &[Shared], validation: f64, test: f64) 
     let mut order: Vec<usize> = (0..videos.len()).collect();
     order.sort_by_key(|&at| (rank(&videos[at]), videos[at].content));
     let mut splits: BTreeMap<&str, Split> = BTreeMap::new();
-    let mut placed: Vec<Option<Placed>> = vec![None; videos.len()];
+    let mut placed: Vec<Option<Assignment>> = vec![None; videos.len()];
     for at in order {
         let video = &videos[at];
-        let partners = || -> Vec<(&Shared, Split)> {
+        let partners = || -> Vec<(&SharedSound, Split)> {
             let mut partners: Vec<_> =
                 shared.iter().filter_map(|s| Some((s, *splits.get(s.other(video.name)?)?))).collect();
             partners.sort_by(|a, b| b.0.secs.total_cmp(&a.0.secs).then(a.0.cmp_names(b.0)));
             partners
         };
-        let by_content = || Placed::In(of_content(video.content, validation, test), SplitBy::Content);
+        let by_content = || Assignment::In(of_content(video.content, validation, test), SplitBy::Content);
         let answer = match (rank(video), video.named) {
-            (_, Some(split)) => Placed::In(split, SplitBy::Name),
+            (_, Some(split)) => Assignment::In(split, SplitBy::Name),
             (1, _) => by_content(),
             _ => match partners().as_slice() {
                 [] => by_content(),
                 [(first, split), rest @ ..] if rest.iter().all(|(_, other)| other == split) => {
-                    Placed::In(*split, SplitBy::SoundOf(first.other(video.name).unwrap_or_default().to_owned()))
+                    Assignment::In(*split, SplitBy::SoundOf(first.other(video.name).unwrap_or_default().to_owned()))
                 }
-                several => Placed::Nowhere(several.iter().map(|(shared, _)| (*shared).clone()).collect()),
+                several => Assignment::Nowhere(several.iter().map(|(shared, _)| (*shared).clone()).collect()),
             },
         };
-        if let Placed::In(split, _) = &answer {
+        if let Assignment::In(split, _) = &answer {
             splits.insert(video.name, *split);
         }
         placed[at] = Some(answer);
     }
-    placed.into_iter().map(|answer| answer.unwrap_or(Placed::Nowhere(Vec::new()))).collect()
+    placed.into_iter().map(|answer| answer.unwrap_or(Assignment::Nowhere(Vec::new()))).collect()
 }
 
 /// Why a video is in its split.
@@ -108,12 +108,12 @@ mod tests {
         assert!((share(Split::Test) - 0.1).abs() < 0.02);
     }
 
-    fn new<'a>(name: &'a str) -> Waiting<'a> {
-        Waiting { name, content: name, named: None, before: None }
+    fn new<'a>(name: &'a str) -> Unassigned<'a> {
+        Unassigned { name, content: name, named: None, before: None }
     }
 
-    fn shared(a: &str, b: &str, secs: f64) -> Shared {
-        Shared { a: a.into(), b: b.into(), a_secs: 0.0, b_secs: 0.0, secs }
+    fn shared(a: &str, b: &str, secs: f64) -> SharedSound {
+        SharedSound { a: a.into(), b: b.into(), a_secs: 0.0, b_secs: 0.0, secs }
     }
 
     /// Names whose content gives these splits, sorted by content.
@@ -126,35 +126,39 @@ mod tests {
         let (test, train) = (named(3, Split::Test), named(3, Split::Train));
         let content = SplitBy::Content;
         // the new video would train by itself; it goes to the one that was there
-        let old = Waiting { before: Some(&content), ..new(&test[1]) };
+        let old = Unassigned { before: Some(&content), ..new(&test[1]) };
         let both = [new(&train[0]), old.clone(), new(&train[1])];
         let pairs = [shared(&train[0], &test[1], 9.0)];
-        let answer = place(&both, &pairs, 0.3, 0.3);
-        assert_eq!(answer[0], Placed::In(Split::Test, SplitBy::SoundOf(test[1].clone())));
-        assert_eq!(answer[1..], [Placed::In(Split::Test, content.clone()), Placed::In(Split::Train, content.clone())]);
+        let answer = assign(&both, &pairs, 0.3, 0.3);
+        assert_eq!(answer[0], Assignment::In(Split::Test, SplitBy::SoundOf(test[1].clone())));
+        assert_eq!(
+            answer[1..],
+            [Assignment::In(Split::Test, content.clone()), Assignment::In(Split::Train, content.clone())]
+        );
         // from then on it stays there
         let follows = SplitBy::SoundOf(test[1].clone());
-        let again = [Waiting { before: Some(&follows), ..new(&train[0]) }, old.clone()];
-        assert_eq!(place(&again, &pairs, 0.3, 0.3)[0], answer[0]);
+        let again = [Unassigned { before: Some(&follows), ..new(&train[0]) }, old.clone()];
+        assert_eq!(assign(&again, &pairs, 0.3, 0.3)[0], answer[0]);
         // one that shares sound with two splits would leak in any of them
-        let old_train = Waiting { before: Some(&content), ..new(&train[2]) };
+        let old_train = Unassigned { before: Some(&content), ..new(&train[2]) };
         let bridge = [old, old_train, new(&train[1])];
         let pairs = [shared(&train[1], &test[1], 6.0), shared(&train[2], &train[1], 20.0)];
-        let answer = place(&bridge, &pairs, 0.3, 0.3);
-        assert_eq!(answer[2], Placed::Nowhere(vec![pairs[1].clone(), pairs[0].clone()]));
-        assert_eq!(answer[1], Placed::In(Split::Train, content));
+        let answer = assign(&bridge, &pairs, 0.3, 0.3);
+        assert_eq!(answer[2], Assignment::Nowhere(vec![pairs[1].clone(), pairs[0].clone()]));
+        assert_eq!(answer[1], Assignment::In(Split::Train, content));
     }
 
     #[test]
     fn a_name_in_the_configuration_wins_and_the_order_has_no_say() {
         let (test, train) = (named(2, Split::Test), named(2, Split::Train));
         let pairs = [shared(&train[0], &test[0], 9.0), shared(&train[0], &train[1], 7.0)];
-        let mut videos = vec![new(&train[0]), new(&train[1]), Waiting { named: Some(Split::Train), ..new(&test[0]) }];
-        let first = place(&videos, &pairs, 0.3, 0.3);
-        assert_eq!(first[2], Placed::In(Split::Train, SplitBy::Name));
-        assert!(first.iter().all(|answer| matches!(answer, Placed::In(Split::Train, _))));
+        let mut videos =
+            vec![new(&train[0]), new(&train[1]), Unassigned { named: Some(Split::Train), ..new(&test[0]) }];
+        let first = assign(&videos, &pairs, 0.3, 0.3);
+        assert_eq!(first[2], Assignment::In(Split::Train, SplitBy::Name));
+        assert!(first.iter().all(|answer| matches!(answer, Assignment::In(Split::Train, _))));
         videos.reverse();
-        let mut second = place(&videos, &pairs, 0.3, 0.3);
+        let mut second = assign(&videos, &pairs, 0.3, 0.3);
         second.reverse();
         assert_eq!(first, second);
     }

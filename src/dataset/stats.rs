@@ -1,8 +1,8 @@
 //! `stats.json`: what the numbers are like. Means and deviations come from the training split alone, from joints that
 //! were seen; hours, windows and refused seconds are of everything.
 
-use super::joint_stats::Moments;
-use super::write::part::Part;
+use super::joint_stats::JointMoments;
+use super::write::part::VideoEntry;
 use super::{STRIDE_FRAMES, WINDOW_FRAMES};
 use crate::types::interval::Interval;
 use crate::types::skeleton::N_JOINTS;
@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 /// The whole file. Rows are joints, columns x, y, z in metres; a joint never seen has zeros.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Stats {
+pub struct DatasetStats {
     /// Frames of the training split in which each joint was seen.
     pub n_seen: Vec<u64>,
     pub mean: Vec<[f64; 3]>,
@@ -22,7 +22,7 @@ pub struct Stats {
     pub min: Vec<[f64; 3]>,
     pub max: Vec<[f64; 3]>,
     pub windows: WindowCount,
-    pub footage: Footage,
+    pub footage: FootageCount,
 }
 
 /// Windows in each split: drawn at the training stride, and side by side without overlap.
@@ -36,7 +36,7 @@ pub struct WindowCount {
 
 /// What became of the speaker's footage, in seconds; `kept_secs`, `refused_secs` and `failed_secs` add up to `secs`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Footage {
+pub struct FootageCount {
     pub n_videos: usize,
     pub n_intervals: usize,
     pub secs: f64,
@@ -50,7 +50,7 @@ pub struct Footage {
     pub padded_sound_secs: f64,
 }
 
-impl Stats {
+impl DatasetStats {
     /// Mean of each joint coordinate, [49, 3], metres.
     pub fn mean(&self) -> Array2<f32> {
         table(&self.mean)
@@ -73,24 +73,24 @@ fn table(rows: &[[f64; 3]]) -> Array2<f32> {
 }
 
 /// Adds up the videos of a dataset.
-pub struct Gatherer {
-    moments: Moments,
+pub struct StatsCollector {
+    moments: JointMoments,
     windows: WindowCount,
-    footage: Footage,
+    footage: FootageCount,
 }
 
-impl Default for Gatherer {
+impl Default for StatsCollector {
     fn default() -> Self {
         let nothing = || Split::ALL.map(|split| (split.name().to_owned(), 0)).into();
         let (strided, apart) = (nothing(), nothing());
         let windows = WindowCount { n_frames: WINDOW_FRAMES, stride: STRIDE_FRAMES, strided, apart };
-        Self { moments: Moments::default(), windows, footage: Footage::default() }
+        Self { moments: JointMoments::default(), windows, footage: FootageCount::default() }
     }
 }
 
-impl Gatherer {
+impl StatsCollector {
     /// Takes in a video.
-    pub fn push(&mut self, part: &Part) {
+    pub fn push(&mut self, part: &VideoEntry) {
         if part.split == Some(Split::Train) {
             self.moments.merge(&part.moments);
         }
@@ -116,9 +116,9 @@ impl Gatherer {
     }
 
     /// The finished statistics.
-    pub fn finish(self) -> Stats {
+    pub fn finish(self) -> DatasetStats {
         let std = self.moments.std();
-        let Moments { n_seen, mean, min, max, .. } = self.moments;
-        Stats { n_seen, mean, std, min, max, windows: self.windows, footage: self.footage }
+        let JointMoments { n_seen, mean, min, max, .. } = self.moments;
+        DatasetStats { n_seen, mean, std, min, max, windows: self.windows, footage: self.footage }
     }
 }

@@ -12,7 +12,7 @@ pub mod sheet;
 pub mod training;
 pub mod videos;
 
-pub use videos::page::Made;
-pub use videos::page::Wanted;
+pub use videos::page::ReportPage;
+pub use videos::page::ReportRequest;
 pub use videos::page::make;
-pub use videos::summary::Sums;
+pub use videos::summary::ReportTotals;

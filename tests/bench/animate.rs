@@ -5,9 +5,9 @@ use anyhow::{Result, ensure};
 use orator::animate::avatar::Avatar;
 use orator::animate::export::glb_scene;
 use orator::animate::rig::names::Names;
-use orator::animate::{Options, perform};
+use orator::animate::{AnimationOptions, perform};
 use orator::demo::drawn::speech::Speech;
-use orator::demo::rule::rule::Gestures;
+use orator::demo::rule::rule::RuleGestures;
 use orator::stage::progress::Progress;
 use orator::types::time::FrameRate;
 use rand::SeedableRng;
@@ -37,13 +37,13 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.rounds > 0 && args.fps > 0, "nothing to measure: there must be rounds and frames a second");
     let mut dice = ChaCha8Rng::seed_from_u64(1337);
     let speech = Speech::new(args.secs, &mut dice);
-    let mut motion = Gestures::with_whims(&speech, args.secs, &mut dice).motion(FPS.frames_in(args.secs), FPS);
+    let mut motion = RuleGestures::with_whims(&speech, args.secs, &mut dice).motion(FPS.frames_in(args.secs), FPS);
     for (t, mut frame) in motion.joints.outer_iter_mut().enumerate() {
         if t % 100 < 10 {
             frame.slice_mut(ndarray::s![8..28, ..]).fill(f32::NAN);
         }
     }
-    let options = Options { fps: Some(FrameRate::new(args.fps, 1)), ..Options::default() };
+    let options = AnimationOptions { fps: Some(FrameRate::new(args.fps, 1)), ..AnimationOptions::default() };
     let task = progress.begin("animate", args.rounds as u64);
     let one_core = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut secs: [Vec<f64>; 4] = Default::default();
@@ -56,7 +56,7 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         n_bytes[0] = performance.clip.to_bvh().len();
         secs[1].push(start.elapsed().as_secs_f64());
         let start = Instant::now();
-        let avatar = one_core.install(|| Avatar::of(&performance.figure));
+        let avatar = one_core.install(|| Avatar::new(&performance.figure));
         secs[2].push(start.elapsed().as_secs_f64());
         let start = Instant::now();
         n_bytes[1] = glb_scene::file(&performance.figure, &performance.clip, &avatar, Names::Own).len();

@@ -6,7 +6,7 @@ use ndarray::{Array2, Array3};
 use orator::config;
 use orator::dataset::info::About;
 use orator::dataset::split::SplitBy;
-use orator::dataset::write::part::Source;
+use orator::dataset::write::part::VideoSource;
 use orator::dataset::write::writer::DatasetWriter;
 use orator::dataset::{Dataset, Sample, Split};
 use orator::stage::progress::{Progress, Silent, Task};
@@ -137,7 +137,7 @@ fn write_all(dir: &Path, samples: &mut [Sample], n_intervals: usize) -> Result<(
     for first in (0..n_intervals).step_by(PER_VIDEO) {
         let name = format!("video-{first:08x}");
         let split = if first == PER_VIDEO { Split::Validation } else { Split::Train };
-        let source = Source { name: name.clone(), ..Source::default() };
+        let source = VideoSource { name: name.clone(), ..VideoSource::default() };
         let mut video = writer.video(source, split, SplitBy::Name)?;
         for n in first..n_intervals.min(first + PER_VIDEO) {
             let at = n % samples.len();

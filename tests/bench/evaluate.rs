@@ -4,10 +4,10 @@ use super::child;
 use super::report::Report;
 use anyhow::{Result, ensure};
 use ndarray::{Array2, Array3};
-use orator::demo::rule::dataset::{Clip as Rule, RULE};
+use orator::demo::rule::dataset::{RULE, SpokenClip as Rule};
 use orator::evaluate::baseline::baselines;
 use orator::evaluate::baseline::baselines::Predictor;
-use orator::evaluate::clips::clips::{Clip, Clips, Voice, compared, pcm};
+use orator::evaluate::clips::clips::{ClipAudio, EvalClip, EvalClips, compared, pcm};
 use orator::evaluate::clips::sound_features;
 use orator::evaluate::table::{result, table};
 use orator::evaluate::verdict::text;
@@ -124,11 +124,11 @@ fn evaluate(speaker: Vec<Unheard>, watch: &Stopwatch) -> Result<(table::Table, S
         let Unheard { real, mask, mut made, sound } = unheard;
         let heard = Some(sound_features::of_samples(&sound.samples, FPS, real.shape()[0]));
         let (mask, _) = compared(&real, &mask, &mut made);
-        let voice = Some(Voice::Kept(sound.samples.into_iter().map(pcm).collect()));
-        Clip { name: format!("clip {number}"), real, made, mask, heard, voice }
+        let voice = Some(ClipAudio::Kept(sound.samples.into_iter().map(pcm).collect()));
+        EvalClip { name: format!("clip {number}"), real, made, mask, heard, voice }
     };
     let clips = speaker.into_par_iter().enumerate().map(clip).collect();
-    let clips = Clips { fps: FPS, clips, notes: Vec::new(), learnt: false };
+    let clips = EvalClips { fps: FPS, clips, notes: Vec::new(), learnt: false };
     watch.detail("making the baselines");
     let mut predictors = vec![Predictor::prediction(&clips, "what the rule alone would do")];
     predictors.extend(baselines::of_files(&clips)?.0);

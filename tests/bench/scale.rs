@@ -5,7 +5,7 @@ use super::report::Report;
 use anyhow::{Context, Result, ensure};
 use orator::config;
 use orator::demo::drawn::folder;
-use orator::demo::drawn::folder::Plan;
+use orator::demo::drawn::folder::DemoPlan;
 use orator::external::ffmpeg::audio;
 use orator::pipeline::extract::Extract;
 use orator::pipeline::pose2d::Pose2dStage;
@@ -79,7 +79,7 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
 /// Every verb of `VERBS`, for the few hours and for the many.
 fn both(root: &Path, few: usize, many: usize, progress: &dyn Progress) -> Result<Vec<[Child; 2]>> {
     let clip = root.join("clip");
-    let plan = Plan { n_videos: 1, secs: CLIP_SECS, ..Plan::default() };
+    let plan = DemoPlan { n_videos: 1, secs: CLIP_SECS, ..DemoPlan::default() };
     folder::draw(&clip, &plan, &Silent)?;
     measure(&clip, &["run", "--to", "pose2d"])?;
     let task = progress.begin("scale", 2 * VERBS.len() as u64);

@@ -1,13 +1,13 @@
 //! The avatar: a skinned figure of our own, made from the figure's bones. Its form is a distance field around the
 //! bones in a stance near to what speakers do; surfaces, weights, and the way back to the T-pose follow from it.
 
-use super::body::Body;
+use super::body::BodyForm;
 use super::field::Form;
-use super::hand::Hand;
+use super::hand::HandForm;
 use super::skin::Weights;
 use super::stance::Stance;
 use super::surface::Surface;
-use crate::animate::rig::rig::Figure;
+use crate::animate::rig::rig::Rig;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, add, cross, dot, sub, unit};
 
@@ -31,7 +31,7 @@ pub enum Material {
 
 /// Triangles of one material in the T-pose (cm, in the figure's axes, the soles at y = 0), with their joints.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct AvatarMesh {
     pub material: Material,
     pub points: Vec<Vec3>,
     pub normals: Vec<Vec3>,
@@ -43,21 +43,21 @@ pub struct Part {
 /// The skin of a figure.
 #[derive(Clone, Debug)]
 pub struct Avatar {
-    pub parts: Vec<Part>,
+    pub parts: Vec<AvatarMesh>,
 }
 
 impl Avatar {
-    pub fn of(figure: &Figure) -> Self {
-        let stance = Stance::of(figure);
-        let hands = [0, 1].map(|side| Hand::new(figure, &stance, side));
-        let body = Body::new(figure, &stance, hands.each_ref().map(|hand| hand.scale));
+    pub fn new(figure: &Rig) -> Self {
+        let stance = Stance::new(figure);
+        let hands = [0, 1].map(|side| HandForm::new(figure, &stance, side));
+        let body = BodyForm::new(figure, &stance, hands.each_ref().map(|hand| hand.scale));
         let cm = stance.scale;
-        let [mut skin, mut shirt, mut trousers, mut shoes] = [(); 4].map(|()| Built::default());
-        let surface_of = |form: &Form, cell: f64| Surface::of(&|at| form.distance(at), form.bounds(), cell);
+        let [mut skin, mut shirt, mut trousers, mut shoes] = [(); 4].map(|()| PosedMesh::default());
+        let surface_of = |form: &Form, cell: f64| Surface::from_field(&|at| form.distance(at), form.bounds(), cell);
 
         let surface = surface_of(&body.head(), HEAD_CELL * cm);
         skin.add(body.head_weights(&surface), surface);
-        let surface = Surface::of(&body.shirt(), body.shirt_bounds(), SHIRT_CELL * cm);
+        let surface = Surface::from_field(&body.shirt(), body.shirt_bounds(), SHIRT_CELL * cm);
         shirt.add(body.shirt_weights(&surface), surface);
         let surface = surface_of(&body.trousers(), LEGS_CELL * cm);
         trousers.add(body.leg_weights(&surface), surface);
@@ -65,11 +65,12 @@ impl Avatar {
             let size = hand.scale;
             let light = |at: Vec3| hand.whole(at);
             let palm = PALM_CELL * size;
-            let surface = Surface::of(&|at| hand.palm(at), hand.bounds(None), palm).lit(&light, palm);
+            let surface = Surface::from_field(&|at| hand.palm(at), hand.bounds(None), palm).lit(&light, palm);
             skin.add(body.palm_weights(side, size, &surface), surface);
             for n in 1..5 {
                 let finger = FINGER_CELL * size;
-                let surface = Surface::of(&|at| hand.finger(n, at), hand.bounds(Some(n)), finger).lit(&light, finger);
+                let surface =
+                    Surface::from_field(&|at| hand.finger(n, at), hand.bounds(Some(n)), finger).lit(&light, finger);
                 skin.add(body.finger_weights(side, n, size, &surface), surface);
             }
             let surface = surface_of(&body.cuff(side), CUFF_CELL * size);
@@ -89,12 +90,12 @@ impl Avatar {
 
 /// Surfaces of one material in the stance.
 #[derive(Default)]
-struct Built {
+struct PosedMesh {
     surface: Surface,
     weights: Vec<Weights>,
 }
 
-impl Built {
+impl PosedMesh {
     fn add(&mut self, weights: Vec<Weights>, surface: Surface) {
         let first = self.surface.points.len() as u32;
         self.surface.points.extend(surface.points);
@@ -104,20 +105,20 @@ impl Built {
     }
 
     /// The part in the T-pose: linear skinning brings it exactly into the stance.
-    fn rested(self, material: Material, stance: &Stance) -> Part {
+    fn rested(self, material: Material, stance: &Stance) -> AvatarMesh {
         let Surface { points, normals, triangles } = self.surface;
         let (points, normals) = points
             .into_iter()
             .zip(normals)
             .zip(&self.weights)
             .map(|((point, normal), weights)| {
-                let turn = Blend::of(stance, weights);
+                let turn = Blend::new(stance, weights);
                 // point = sum of w (R (rest - rest joint) + joint)
                 let rest = turn.back(sub(point, turn.shift));
                 (rest, unit(turn.back(normal), 1e-9).unwrap_or(normal))
             })
             .unzip();
-        Part { material, points, normals, triangles, weights: self.weights }
+        AvatarMesh { material, points, normals, triangles, weights: self.weights }
     }
 }
 
@@ -129,7 +130,7 @@ struct Blend {
 }
 
 impl Blend {
-    fn of(stance: &Stance, weights: &Weights) -> Self {
+    fn new(stance: &Stance, weights: &Weights) -> Self {
         let mut blend = Self { columns: [[0.0; 3]; 3], shift: [0.0; 3] };
         for &(joint, weight) in weights {
             let turn: Rotation = stance.world[joint];
@@ -158,24 +159,24 @@ mod tests {
     use crate::types::skeleton::N_JOINTS;
     use crate::types::time::FrameRate;
 
-    fn figure() -> Figure {
+    fn figure() -> Rig {
         let unseen = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
-        Figure::of(&Motion::from_joints(FrameRate::new(15, 1), unseen))
+        Rig::from_motion(&Motion::from_joints(FrameRate::new(15, 1), unseen))
     }
 
     #[test]
     fn skinning_brings_the_rest_into_the_stance_and_both_sides_are_alike() {
         let figure = figure();
-        let (avatar, stance) = (Avatar::of(&figure), Stance::of(&figure));
+        let (avatar, stance) = (Avatar::new(&figure), Stance::new(&figure));
         let shirt = &avatar.parts[1];
-        let hands = [0, 1].map(|side| Hand::new(&figure, &stance, side).scale);
-        let body = Body::new(&figure, &stance, hands);
+        let hands = [0, 1].map(|side| HandForm::new(&figure, &stance, side).scale);
+        let body = BodyForm::new(&figure, &stance, hands);
         let form = body.shirt();
         let cuffs = [0, 1].map(|side| body.cuff(side));
         let mut far = 0;
         for (&point, weights) in shirt.points.iter().zip(&shirt.weights) {
             assert!((weights.iter().map(|w| w.1).sum::<f64>() - 1.0).abs() < 1e-9);
-            let turn = Blend::of(&stance, weights);
+            let turn = Blend::new(&stance, weights);
             let mut at = turn.shift;
             (0..3).for_each(|k| at = add(at, turn.columns[k].map(|v| v * point[k])));
             let off = cuffs.iter().map(|cuff| cuff.distance(at).abs()).fold(form(at).abs(), f64::min);
@@ -191,7 +192,7 @@ mod tests {
     fn bent_joints_do_not_collapse() {
         // The thinnest place around a finger's middle joint and around an elbow, straight and bent by 90 degrees.
         let figure = figure();
-        let avatar = Avatar::of(&figure);
+        let avatar = Avatar::new(&figure);
         let arm = &figure.arms[0];
         let finger = super::super::stance::finger_joints(&figure, 0, 2);
         for (part, joint, next, axis) in [

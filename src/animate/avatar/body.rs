@@ -1,9 +1,9 @@
 //! The form of the body in its stance: head and neck, shirt, trousers, shoes. A calm mannequin; hands are elsewhere.
 //! Numbers are cm of a body of 1.78 m, in the axes of the joint they hang on (x to its left, y up, z forward).
 
-use super::field::{Form, Limb, around, joined};
+use super::field::{Form, RoundCone, around, joined};
 use super::stance::{Stance, Trunk};
-use crate::animate::rig::rig::{Arm, Figure};
+use crate::animate::rig::rig::{Rig, RigArm};
 use crate::math::vec3::{Vec3, add, dot, norm, scale, sub, unit};
 
 /// Half the distance of the shoulders the numbers below are for.
@@ -13,8 +13,8 @@ const BARE: f64 = 1.9;
 const SLEEVE: f64 = 3.05;
 
 /// Forms on the figure in its stance.
-pub struct Body<'a> {
-    pub figure: &'a Figure,
+pub struct BodyForm<'a> {
+    pub figure: &'a Rig,
     pub stance: &'a Stance,
     pub trunk: Trunk,
     /// Width of the shoulders against the form's.
@@ -23,17 +23,17 @@ pub struct Body<'a> {
     hands: [f64; 2],
 }
 
-impl<'a> Body<'a> {
-    pub fn new(figure: &'a Figure, stance: &'a Stance, hands: [f64; 2]) -> Self {
-        let half = |arm: &Arm| norm(figure.skeleton.joints[arm.upper].offset) / 2.0;
+impl<'a> BodyForm<'a> {
+    pub fn new(figure: &'a Rig, stance: &'a Stance, hands: [f64; 2]) -> Self {
+        let half = |arm: &RigArm| norm(figure.skeleton.joints[arm.upper].offset) / 2.0;
         let half: f64 = figure.arms.iter().map(half).sum();
         let broad = (half / SHOULDERS / stance.scale).clamp(0.75, 1.3);
-        Self { figure, stance, trunk: Trunk::of(figure), broad, hands }
+        Self { figure, stance, trunk: Trunk::find(figure), broad, hands }
     }
 
     /// A limb from point to point of the form's size; `joint` gives the axes.
-    fn limb(&self, joint: usize, ends: [Vec3; 2], radii: [f64; 2]) -> Limb {
-        Limb::new(ends.map(|end| self.stance.at(joint, end)), radii.map(|r| r * self.stance.scale))
+    fn limb(&self, joint: usize, ends: [Vec3; 2], radii: [f64; 2]) -> RoundCone {
+        RoundCone::new(ends.map(|end| self.stance.at(joint, end)), radii.map(|r| r * self.stance.scale))
     }
 
     fn cm(&self, cm: f64) -> f64 {
@@ -95,7 +95,7 @@ impl<'a> Body<'a> {
         let wider = (self.cm(4.0) - SLEEVE * hand).max(0.0) * (2.6 + BARE) * hand
             / (0.7 * self.cm(self.length(arm.fore, arm.hand)));
         Form::default()
-            .with(Limb::new([near, far], [(SLEEVE + 0.32) * hand + wider, (SLEEVE + 0.2) * hand]), 0.0)
+            .with(RoundCone::new([near, far], [(SLEEVE + 0.32) * hand + wider, (SLEEVE + 0.2) * hand]), 0.0)
             .cut(far, along, 0.35 * hand)
             .cut(near, scale(along, -1.0), 0.35 * hand)
     }

@@ -5,14 +5,14 @@ use crate::math::vec3::{Vec3, add, dot, norm, scale, sub};
 
 /// A rounded limb between two points with a radius at each.
 #[derive(Clone, Copy, Debug)]
-pub struct Limb {
+pub struct RoundCone {
     ends: [Vec3; 2],
     radii: [f64; 2],
     /// Along this unit vector the limb is thinner (or thicker) by this factor.
     flat: Option<(Vec3, f64)>,
 }
 
-impl Limb {
+impl RoundCone {
     pub fn new(ends: [Vec3; 2], radii: [f64; 2]) -> Self {
         Self { ends, radii, flat: None }
     }
@@ -54,14 +54,14 @@ pub fn joined(a: f64, b: f64, blend: f64) -> f64 {
 #[derive(Clone, Debug, Default)]
 pub struct Form {
     /// Each with the width over which it grows into those before it.
-    limbs: Vec<(Limb, f64)>,
+    limbs: Vec<(RoundCone, f64)>,
     /// A point, the outward unit normal, the roundness of the edge.
     cuts: Vec<(Vec3, Vec3, f64)>,
 }
 
 impl Form {
     #[must_use]
-    pub fn with(mut self, limb: Limb, blend: f64) -> Self {
+    pub fn with(mut self, limb: RoundCone, blend: f64) -> Self {
         self.limbs.push((limb, blend));
         self
     }
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn distances_are_those_of_the_form() {
-        let limb = Limb::new([[0.0; 3], [4.0, 0.0, 0.0]], [1.0, 1.0]);
+        let limb = RoundCone::new([[0.0; 3], [4.0, 0.0, 0.0]], [1.0, 1.0]);
         assert!((limb.distance([2.0, 3.0, 0.0]) - 2.0).abs() < 1e-12);
         assert!((limb.distance([6.0, 0.0, 0.0]) - 1.0).abs() < 1e-12);
         let flat = limb.flat([0.0, 0.0, 1.0], 0.5);

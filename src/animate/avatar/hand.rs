@@ -1,9 +1,9 @@
 //! The form of a hand in its stance, on the speaker's own bones: a palm grown from its metacarpals, five fingers that
 //! grow into the palm but not into each other, and the wrist inside the sleeve.
 
-use super::field::{Form, Limb, around, joined};
+use super::field::{Form, RoundCone, around, joined};
 use super::stance::{Stance, finger_joints};
-use crate::animate::rig::rig::Figure;
+use crate::animate::rig::rig::Rig;
 use crate::math::vec3::{Vec3, add, cross, norm, scale, sub, unit};
 
 /// Mean length of the four metacarpals of the hand the numbers are for, cm.
@@ -18,15 +18,15 @@ const THUMB_ALONG: [f64; 4] = [1.10, 1.0, 0.93, 0.74];
 const CROWDED: f64 = 0.47;
 
 /// One hand.
-pub struct Hand {
+pub struct HandForm {
     palm: Form,
     fingers: [Form; 5],
     /// Size of the hand against the form's.
     pub scale: f64,
 }
 
-impl Hand {
-    pub fn new(figure: &Figure, stance: &Stance, side: usize) -> Self {
+impl HandForm {
+    pub fn new(figure: &Rig, stance: &Stance, side: usize) -> Self {
         let arm = &figure.arms[side];
         let fingers: [[usize; 4]; 5] = std::array::from_fn(|finger| finger_joints(figure, side, finger));
         let wrist = stance.places[arm.hand];
@@ -54,23 +54,23 @@ impl Hand {
         for (finger, radius) in radius.iter().enumerate().skip(1) {
             let end = inwards(knuckle(finger), 0.12);
             let start = mix(inwards(wrist, 0.1), end, 0.16);
-            palm = palm.with(Limb::new([start, end], [cm(1.25), radius * 1.08]), cm(0.9));
+            palm = palm.with(RoundCone::new([start, end], [cm(1.25), radius * 1.08]), cm(0.9));
         }
         let thumb = fingers[0].map(|joint| stance.places[joint]);
         // The balls of the thumb and of the little finger; the web between thumb and index finger.
         let thumb_ball = [inwards(mix(wrist, thumb[0], 0.7), 0.2), mix(thumb[0], thumb[1], 0.7)];
         let little_ball = [0.3, 0.8].map(|share| inwards(mix(wrist, knuckle(4), share), 0.42));
         palm = palm
-            .with(Limb::new(thumb_ball, [cm(1.3), cm(1.15)]), cm(1.5))
-            .with(Limb::new(little_ball, [cm(1.1), cm(0.85)]), cm(1.2));
+            .with(RoundCone::new(thumb_ball, [cm(1.3), cm(1.15)]), cm(1.5))
+            .with(RoundCone::new(little_ball, [cm(1.1), cm(0.85)]), cm(1.2));
         for (on_thumb, on_index) in [(0.1, 0.35), (0.4, 0.55), (0.7, 0.75)] {
             let web = [mix(thumb[0], thumb[1], on_thumb), inwards(mix(wrist, knuckle(1), on_index), 0.2)];
-            palm = palm.with(Limb::new(web, [cm(0.85), cm(0.85)]), cm(1.6));
+            palm = palm.with(RoundCone::new(web, [cm(0.85), cm(0.85)]), cm(1.6));
         }
         // The wrist, wider than thick, goes on into the sleeve.
         let elbow = stance.places[arm.fore];
         let stub = [mix(wrist, elbow, 0.30), mix(wrist, elbow, -0.03)];
-        palm = palm.with(Limb::new(stub, [cm(2.5), cm(2.4)]).flat(back, 0.76), cm(2.0));
+        palm = palm.with(RoundCone::new(stub, [cm(2.5), cm(2.4)]).flat(back, 0.76), cm(2.0));
 
         let fingers = std::array::from_fn(|finger| {
             let places = fingers[finger].map(|joint| stance.places[joint]);
@@ -79,7 +79,7 @@ impl Hand {
                 // The joint of the tip lies under the nail.
                 let end = if k == 2 { mix(places[3], places[2], 0.12) } else { places[k + 1] };
                 let radii = [radius[finger] * shares[k], radius[finger] * shares[k + 1]];
-                form.with(Limb::new([places[k], end], radii), cm(0.25))
+                form.with(RoundCone::new([places[k], end], radii), cm(0.25))
             })
         });
         Self { palm, fingers, scale: size }

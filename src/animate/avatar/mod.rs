@@ -10,6 +10,6 @@ pub mod stance;
 pub mod surface;
 
 pub use avatar::Avatar;
+pub use avatar::AvatarMesh;
 pub use avatar::Material;
-pub use avatar::Part;
 pub use skin::Weights;

@@ -1,7 +1,7 @@
 //! Which joints carry a vertex: along every chain of joints a vertex passes smoothly from one to the next where the
 //! bone bends, between chains it belongs to the nearer, and all is smoothed over the surface.
 
-use super::body::Body;
+use super::body::BodyForm;
 use super::stance::finger_joints;
 use super::surface::Surface;
 use crate::math::vec3::{Vec3, dot, norm, sub};
@@ -13,13 +13,13 @@ pub type Weights = [(usize, f64); 4];
 type Shares = Vec<(usize, f64)>;
 
 /// The joints of a chain and where a vertex passes from each to the next.
-struct Chain {
+struct WeightChain {
     joints: Vec<usize>,
     /// For each joint but the first: its place, the normal of the plane of passing, half the width of passing.
     passes: Vec<(Vec3, Vec3, f64)>,
 }
 
-impl Chain {
+impl WeightChain {
     fn shares(&self, at: Vec3, whole: f64, into: &mut Shares) {
         let mut left = whole;
         for (k, &joint) in self.joints.iter().enumerate() {
@@ -45,9 +45,9 @@ fn rise(at: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
-impl Body<'_> {
+impl BodyForm<'_> {
     /// A chain whose passes lie across the bisector of the bones at each joint; `halves` in cm of the figure.
-    fn chain(&self, before: usize, joints: &[usize], after: usize, halves: &[f64]) -> Chain {
+    fn chain(&self, before: usize, joints: &[usize], after: usize, halves: &[f64]) -> WeightChain {
         let stance = self.stance;
         let at = |k: usize| joints.get(k).copied().unwrap_or(after);
         let passes = (1..joints.len()).map(|k| {
@@ -57,17 +57,17 @@ impl Body<'_> {
             let length = norm(normal).max(1e-6);
             (stance.places[at(k)], normal.map(|v| v / length), halves[k - 1])
         });
-        Chain { joints: joints.to_vec(), passes: passes.collect() }
+        WeightChain { joints: joints.to_vec(), passes: passes.collect() }
     }
 
     /// Hips, spine, chest; up to the head.
-    fn spine(&self) -> Chain {
+    fn spine(&self) -> WeightChain {
         let t = &self.trunk;
         let cm = self.stance.scale;
         let up = |joint: usize, higher: f64, half: f64| {
             (self.stance.at(joint, [0.0, higher, 0.0]), [0.0, 1.0, 0.0], half * cm)
         };
-        Chain {
+        WeightChain {
             joints: vec![t.hips, t.spine, t.chest, t.neck, t.head],
             passes: vec![up(t.spine, 0.0, 7.0), up(t.chest, 0.0, 8.0), up(t.neck, 5.0, 3.5), up(t.head, 1.0, 4.0)],
         }
@@ -134,7 +134,7 @@ impl Body<'_> {
         settled(surface, 1, |at, shares| chain.shares(at, 1.0, shares))
     }
 
-    fn finger(&self, side: usize, finger: usize, scale: f64) -> Chain {
+    fn finger(&self, side: usize, finger: usize, scale: f64) -> WeightChain {
         let arm = &self.figure.arms[side];
         let [a, b, c, tip] = finger_joints(self.figure, side, finger);
         let halves = if finger == 0 { [1.5, 0.9, 0.8] } else { [0.9, 0.75, 0.65] };

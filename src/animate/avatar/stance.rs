@@ -2,7 +2,7 @@
 //! the middle of what speakers do, so that skinning bends the form little either way; the T-pose gets what the inverse
 //! of the skinning gives it.
 
-use crate::animate::rig::rig::Figure;
+use crate::animate::rig::rig::Rig;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, add, scale, sub, unit};
 use crate::types::skeleton::{L_HAND, R_HAND};
@@ -37,7 +37,7 @@ pub struct Trunk {
 }
 
 impl Trunk {
-    pub fn of(figure: &Figure) -> Self {
+    pub fn find(figure: &Rig) -> Self {
         let bones = &figure.skeleton;
         let find = |name: &str| bones.find(name).unwrap_or_default();
         let legs = ["Left", "Right"].map(|side| {
@@ -49,13 +49,13 @@ impl Trunk {
 }
 
 /// Joints of a finger of the arm, knuckle to tip.
-pub fn finger_joints(figure: &Figure, side: usize, finger: usize) -> [usize; 4] {
+pub fn finger_joints(figure: &Rig, side: usize, finger: usize) -> [usize; 4] {
     let base = [L_HAND, R_HAND][side] + 1 + 4 * finger;
     std::array::from_fn(|k| figure.places[base + k])
 }
 
 impl Stance {
-    pub fn of(figure: &Figure) -> Self {
+    pub fn new(figure: &Rig) -> Self {
         let still = vec![Rotation::IDENTITY; figure.skeleton.joints.len()];
         let mut local = still.clone();
         for (side, arm) in figure.arms.iter().enumerate() {
@@ -72,7 +72,7 @@ impl Stance {
                 local[joints[0]] = fan * local[joints[0]];
             }
         }
-        let trunk = Trunk::of(figure);
+        let trunk = Trunk::find(figure);
         let rest = figure.skeleton.positions(figure.root, &still);
         Self {
             places: figure.skeleton.positions(figure.root, &local),

@@ -32,8 +32,8 @@ struct Grid {
 
 impl Surface {
     /// The surface of `field` inside the box `bounds`, with cells of `cell`.
-    pub fn of(field: &(dyn Fn(Vec3) -> f64 + Sync), bounds: [Vec3; 2], cell: f64) -> Self {
-        let grid = Grid::of(field, bounds, cell);
+    pub fn from_field(field: &(dyn Fn(Vec3) -> f64 + Sync), bounds: [Vec3; 2], cell: f64) -> Self {
+        let grid = Grid::sample(field, bounds, cell);
         let mut surface = Self::default();
         let mut vertex_of = vec![u32::MAX; grid.values.len()];
         for z in 0..grid.n[2] - 1 {
@@ -134,7 +134,7 @@ fn gradient(field: &(dyn Fn(Vec3) -> f64 + Sync), at: Vec3, cell: f64) -> Vec3 {
 }
 
 impl Grid {
-    fn of(field: &(dyn Fn(Vec3) -> f64 + Sync), [low, high]: [Vec3; 2], cell: f64) -> Self {
+    fn sample(field: &(dyn Fn(Vec3) -> f64 + Sync), [low, high]: [Vec3; 2], cell: f64) -> Self {
         let low = low.map(|v| v - 1.5 * cell);
         let n = [0, 1, 2].map(|k| (((high[k] + 1.5 * cell - low[k]) / cell).ceil().max(1.0) as usize) + 1);
         let layer = n[0] * n[1];
@@ -214,12 +214,12 @@ impl Grid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::animate::avatar::field::Limb;
+    use crate::animate::avatar::field::RoundCone;
 
     #[test]
     fn a_ball_is_round_closed_and_faces_outwards() {
-        let ball = Limb::new([[0.3, -0.2, 0.1]; 2], [2.0; 2]);
-        let surface = Surface::of(&|at| ball.distance(at), [[-1.7, -2.2, -1.9], [2.3, 1.8, 2.1]], 0.3);
+        let ball = RoundCone::new([[0.3, -0.2, 0.1]; 2], [2.0; 2]);
+        let surface = Surface::from_field(&|at| ball.distance(at), [[-1.7, -2.2, -1.9], [2.3, 1.8, 2.1]], 0.3);
         assert!((surface.volume6() / 6.0 - 4.0 / 3.0 * std::f64::consts::PI * 8.0).abs() < 0.6);
         for (&point, &normal) in surface.points.iter().zip(&surface.normals) {
             assert!(ball.distance(point).abs() < 1e-3);

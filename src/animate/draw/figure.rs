@@ -1,5 +1,5 @@
 //! The figure in a picture: arms and hands as tapered limbs, left and right in two colours, darker where nearer, over
-//! a plain trunk and head that are in no data. `View` says from where; joints that are missing are left out.
+//! a plain trunk and head that are in no data. `FigureView` says from where; joints that are missing are left out.
 
 use crate::external::opencv::draw;
 use crate::types::image::Image;
@@ -24,7 +24,7 @@ const SHADE_METRES: f32 = 0.45;
 
 /// From where a figure is seen, and where it stands in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
+pub struct FigureView {
     /// Where the neck is.
     pub neck_px: [f32; 2],
     pub px_per_metre: f32,
@@ -38,7 +38,7 @@ pub struct View {
     pub seam: Option<[u8; 3]>,
 }
 
-impl View {
+impl FigureView {
     /// A view on paper from the front with the neck in the middle of the picture's width.
     pub fn front(neck_px: [f32; 2], px_per_metre: f32) -> Self {
         Self { neck_px, px_per_metre, yaw_degrees: 0.0, camera_metres: 3.0, trunk: 1.0, seam: Some(PAPER) }
@@ -59,16 +59,16 @@ impl View {
 }
 
 /// Draws one frame [49, 3] (metres, house order and axes).
-pub fn draw_pose(image: &mut Image, joints: ArrayView2<f32>, view: &View) -> anyhow::Result<()> {
+pub fn draw_pose(image: &mut Image, joints: ArrayView2<f32>, view: &FigureView) -> anyhow::Result<()> {
     let place = |joint: usize| -> [f32; 3] { std::array::from_fn(|k| joints[[joint, k]]) };
-    let mut limbs: Vec<Limb> = (1..N_JOINTS).flat_map(|joint| limbs_to(joint, place)).collect();
+    let mut limbs: Vec<DrawnLimb> = (1..N_JOINTS).flat_map(|joint| limbs_to(joint, place)).collect();
     limbs.retain(|limb| limb.ends.iter().flatten().all(|v| v.is_finite()));
-    let depth = |limb: &Limb| limb.ends.iter().map(|&end| view.project(end).1).sum::<f32>() / 2.0;
+    let depth = |limb: &DrawnLimb| limb.ends.iter().map(|&end| view.project(end).1).sum::<f32>() / 2.0;
     limbs.sort_by(|a, b| depth(b).total_cmp(&depth(a)));
     // Only an arm whose shoulder is on the far side can be behind the trunk.
     let far = |shoulder: usize| view.project(place(shoulder)).1 > 0.08;
     let (left_far, right_far) = (far(L_SHOULDER), far(R_SHOULDER));
-    let behind = |limb: &&Limb| depth(limb) > 0.1 && if limb.left { left_far } else { right_far };
+    let behind = |limb: &&DrawnLimb| depth(limb) > 0.1 && if limb.left { left_far } else { right_far };
     for limb in limbs.iter().filter(behind) {
         limb.draw(image, view)?;
     }
@@ -82,7 +82,7 @@ pub fn draw_pose(image: &mut Image, joints: ArrayView2<f32>, view: &View) -> any
 }
 
 /// A piece of a bone: two ends in metres, their radii, a colour at mean depth.
-struct Limb {
+struct DrawnLimb {
     ends: [[f32; 3]; 2],
     radii: [f32; 2],
     left: bool,
@@ -92,7 +92,7 @@ struct Limb {
 }
 
 /// The pieces of the bone to `joint`, radii in metres.
-fn limbs_to(joint: usize, place: impl Fn(usize) -> [f32; 3]) -> Vec<Limb> {
+fn limbs_to(joint: usize, place: impl Fn(usize) -> [f32; 3]) -> Vec<DrawnLimb> {
     let Some(parent) = skeleton::parent(joint) else { return Vec::new() };
     let left = skeleton::side(joint) == Side::Left;
     let rgb = if left { LEFT } else { RIGHT };
@@ -126,7 +126,7 @@ fn limbs_to(joint: usize, place: impl Fn(usize) -> [f32; 3]) -> Vec<Limb> {
                 2..=10 => 0.0,
                 _ => 1.0,
             };
-            Limb { ends: shares.map(at), radii: shares.map(radius), left, rgb, seam_from }
+            DrawnLimb { ends: shares.map(at), radii: shares.map(radius), left, rgb, seam_from }
         })
         .collect()
 }
@@ -134,8 +134,8 @@ fn limbs_to(joint: usize, place: impl Fn(usize) -> [f32; 3]) -> Vec<Limb> {
 /// Where the seam of a finger's four bones begins.
 const SEAM_FROM: [f32; 4] = [1.0, 0.15, 0.2, 0.2];
 
-impl Limb {
-    fn draw(&self, image: &mut Image, view: &View) -> anyhow::Result<()> {
+impl DrawnLimb {
+    fn draw(&self, image: &mut Image, view: &FigureView) -> anyhow::Result<()> {
         let [(a, near), (b, far)] = self.ends.map(|end| view.project(end));
         let radius = |k: usize, depth: f32| (self.radii[k] * view.px_per_metre * view.nearness(depth)).max(1.0);
         let (ra, rb) = (radius(0, near), radius(1, far));
@@ -168,7 +168,7 @@ pub fn mix(a: [u8; 3], b: [u8; 3], share: f32) -> [u8; 3] {
 }
 
 /// Trunk, neck and head, upright under and over the neck joint, turned with the shoulders.
-fn draw_trunk(image: &mut Image, view: &View, left: [f32; 3], right: [f32; 3]) -> anyhow::Result<()> {
+fn draw_trunk(image: &mut Image, view: &FigureView, left: [f32; 3], right: [f32; 3]) -> anyhow::Result<()> {
     let size = view.trunk;
     let seen = left.iter().chain(&right).all(|v| v.is_finite());
     let [left, right] =
@@ -179,7 +179,7 @@ fn draw_trunk(image: &mut Image, view: &View, left: [f32; 3], right: [f32; 3]) -
     let ahead = |metres: f32, down: f32| [dz / width * metres * size, down * size, -dx / width * metres * size];
 
     // The hem without perspective: seen from the side it is one level line.
-    let plain = View { camera_metres: f32::INFINITY, ..*view };
+    let plain = FigureView { camera_metres: f32::INFINITY, ..*view };
     let hem = [side(-0.115 * size, 0.52), side(0.115 * size, 0.52)].map(|corner| plain.project(corner).0);
     let corners = [view.project(left).0, view.project(right).0, hem[0], hem[1]];
     let px = |metres: f32| metres * size * view.px_per_metre;

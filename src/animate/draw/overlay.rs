@@ -17,7 +17,7 @@ const BONES: [(usize, usize); 10] =
 
 /// Where the video's pixels are in the picture drawn on: `scale * px + shift`, by axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
+pub struct ImageTransform {
     pub scale: [f32; 2],
     pub shift: [f32; 2],
 }
@@ -27,7 +27,7 @@ pub fn draw_keypoints(
     image: &mut Image,
     keypoints: &Keypoints,
     frame_idx: usize,
-    place: Place,
+    place: ImageTransform,
     width_px: f32,
 ) -> Result<()> {
     let at = |points: ArrayView2<f32>, point: usize| -> Option<[f32; 2]> {

@@ -15,17 +15,17 @@ use std::path::Path;
 
 /// What else goes into a file than the performance.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Sources<'a> {
+pub struct ExportContent<'a> {
     pub sound: Option<&'a Sound>,
     /// What the bones are called where they have names.
     pub names: Names,
     /// What a film shows beside the figure.
-    pub beside: film::Beside<'a>,
+    pub beside: film::SecondPanel<'a>,
 }
 
 /// What a motion can be written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub enum ExportFormat {
     /// Joints [T, 49, 3] f32.
     Npy,
     /// The layout of Rebol et al. 2021.
@@ -40,9 +40,9 @@ pub enum Format {
     Mp4,
 }
 
-impl Format {
+impl ExportFormat {
     /// The format of a file by its extension, upper or lower case.
-    pub fn of(path: &Path) -> anyhow::Result<Self> {
+    pub fn from_path(path: &Path) -> anyhow::Result<Self> {
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         match extension.as_str() {
             "npy" => Ok(Self::Npy),
@@ -69,7 +69,7 @@ impl Format {
         self,
         path: &Path,
         performance: &Performance,
-        sources: &Sources,
+        sources: &ExportContent,
         progress: &dyn Progress,
     ) -> anyhow::Result<()> {
         match self {
@@ -79,7 +79,7 @@ impl Format {
                 streamed(path, |text| performance.clip.write_bvh(&named, text))
             }
             Self::Glb => {
-                let avatar = Avatar::of(&performance.figure);
+                let avatar = Avatar::new(&performance.figure);
                 let bytes = glb_scene::file(&performance.figure, &performance.clip, &avatar, sources.names);
                 workdir::write_file(path, &bytes)
             }
@@ -116,11 +116,11 @@ mod tests {
 
     #[test]
     fn the_extension_chooses() {
-        assert_eq!(Format::of(Path::new("a/b.BVH")).unwrap(), Format::Bvh);
-        assert_eq!(Format::of(Path::new("a.Glb")).unwrap(), Format::Glb);
-        assert_eq!(Format::of(Path::new("a.b/c.npy")).unwrap(), Format::Npy);
+        assert_eq!(ExportFormat::from_path(Path::new("a/b.BVH")).unwrap(), ExportFormat::Bvh);
+        assert_eq!(ExportFormat::from_path(Path::new("a.Glb")).unwrap(), ExportFormat::Glb);
+        assert_eq!(ExportFormat::from_path(Path::new("a.b/c.npy")).unwrap(), ExportFormat::Npy);
         for wrong in ["a.mov", "mp4", "a", ""] {
-            assert!(Format::of(Path::new(wrong)).unwrap_err().to_string().contains(".glb or .mp4"));
+            assert!(ExportFormat::from_path(Path::new(wrong)).unwrap_err().to_string().contains(".glb or .mp4"));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Motion as a film: the figure from the front, beside it the figure from its left, the video it was taken from, or
 //! another motion; under them the sound's wave with a mark that runs along it.
 
-use crate::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, View, draw_pose, mix};
+use crate::animate::draw::figure::{FigureView, INK, LEFT, PAPER, RIGHT, draw_pose, mix};
 use crate::animate::rig::rig::bone_metres;
 use crate::external::ffmpeg::encode::VideoWriter;
 use crate::external::ffmpeg::frames::FrameReader;
@@ -28,7 +28,7 @@ const WORDS_PX: f32 = 11.0;
 
 /// What is seen beside the figure.
 #[derive(Clone, Copy, Debug, Default)]
-pub enum Beside<'a> {
+pub enum SecondPanel<'a> {
     /// The figure from its left.
     #[default]
     Itself,
@@ -41,15 +41,15 @@ pub enum Beside<'a> {
 /// Draws the frames of one motion.
 pub struct Film<'a> {
     motion: &'a Motion,
-    panels: Vec<Panel<'a>>,
+    panels: Vec<FilmPanel<'a>>,
     /// Loudness of each column of the wave, 0..1; empty without sound.
     wave: Vec<f32>,
 }
 
 /// One figure in the picture.
-struct Panel<'a> {
+struct FilmPanel<'a> {
     motion: &'a Motion,
-    view: View,
+    view: FigureView,
     label: &'a str,
     /// Where the label begins, px from the left.
     label_px: f32,
@@ -57,21 +57,23 @@ struct Panel<'a> {
 
 impl<'a> Film<'a> {
     /// One view for the whole film: everything the motion does fits in.
-    pub fn new(motion: &'a Motion, sound: Option<&Sound>, beside: Beside<'a>) -> Self {
+    pub fn new(motion: &'a Motion, sound: Option<&Sound>, beside: SecondPanel<'a>) -> Self {
         let trunk = trunk_of(motion);
-        let panel = |motion, view, label, label_px| Panel { motion, view, label, label_px };
+        let panel = |motion, view, label, label_px| FilmPanel { motion, view, label, label_px };
         let panels = match beside {
-            Beside::Itself => vec![
+            SecondPanel::Itself => vec![
                 panel(motion, fitting(&[motion], SIDE, 90.0, trunk), "from the left", SIDE[0] + 20.0),
                 panel(motion, fitting(&[motion], FRONT, 0.0, trunk), "", FRONT[0]),
             ],
-            Beside::Video { .. } => vec![panel(motion, fitting(&[motion], HALVES[1], 0.0, trunk), "", HALVES[1][0])],
-            Beside::Motion { motion: other, labels } => [(motion, labels[0]), (other, labels[1])]
+            SecondPanel::Video { .. } => {
+                vec![panel(motion, fitting(&[motion], HALVES[1], 0.0, trunk), "", HALVES[1][0])]
+            }
+            SecondPanel::Motion { motion: other, labels } => [(motion, labels[0]), (other, labels[1])]
                 .into_iter()
                 .zip(HALVES)
                 .map(|((shown, label), area)| {
                     let view = fitting(&[motion, other], area, 0.0, trunk);
-                    panel(shown, View { trunk: trunk_of(shown), ..view }, label, (area[0] + area[2]) / 2.0 - 40.0)
+                    panel(shown, FigureView { trunk: trunk_of(shown), ..view }, label, (area[0] + area[2]) / 2.0 - 40.0)
                 })
                 .collect(),
         };
@@ -83,7 +85,7 @@ impl<'a> Film<'a> {
     pub fn frame(&self, frame_idx: usize) -> anyhow::Result<Image> {
         let mut image = Image::filled(SIZE[0], SIZE[1], PAPER);
         let secs = self.motion.fps.secs(frame_idx);
-        for Panel { motion, view, label, label_px } in &self.panels {
+        for FilmPanel { motion, view, label, label_px } in &self.panels {
             // The other motion's frame nearest in time; after its end it is gone.
             let shown =
                 if motion.fps == self.motion.fps { frame_idx } else { (secs * motion.fps.per_sec()).round() as usize };
@@ -123,12 +125,12 @@ pub fn write(
     path: &Path,
     motion: &Motion,
     sound: Option<&Sound>,
-    beside: Beside,
+    beside: SecondPanel,
     progress: &dyn Progress,
 ) -> anyhow::Result<()> {
     let film = Film::new(motion, sound, beside);
     let mut footage = match beside {
-        Beside::Video { path, from_secs } => Some(Footage::open(path, motion, from_secs)?),
+        SecondPanel::Video { path, from_secs } => Some(FilmFootage::open(path, motion, from_secs)?),
         _ => None,
     };
     let task = progress.begin("drawing", motion.n_frames() as u64);
@@ -145,14 +147,14 @@ pub fn write(
 }
 
 /// The pictures of a video in step with a motion.
-struct Footage {
+struct FilmFootage {
     frames: FrameReader,
     /// Width and height of its pictures in the film, px.
     size: [usize; 2],
     ended: bool,
 }
 
-impl Footage {
+impl FilmFootage {
     fn open(path: &Path, motion: &Motion, from_secs: f64) -> anyhow::Result<Self> {
         ensure!(from_secs.is_finite() && from_secs >= 0.0, "a video cannot be shown from second {from_secs} on");
         let mut frames = FrameReader::open(path, motion.fps)?;
@@ -213,8 +215,8 @@ fn loudness(sound: &Sound, secs: f64) -> Vec<f32> {
 }
 
 /// The view from `yaw_degrees` in which trunk, head and every frame's joints of all motions fit into `area`.
-fn fitting(motions: &[&Motion], [left, top, right, bottom]: Area, yaw_degrees: f32, trunk: f32) -> View {
-    let plain = View { yaw_degrees, trunk, ..View::front([0.0, 0.0], 1.0) };
+fn fitting(motions: &[&Motion], [left, top, right, bottom]: Area, yaw_degrees: f32, trunk: f32) -> FigureView {
+    let plain = FigureView { yaw_degrees, trunk, ..FigureView::front([0.0, 0.0], 1.0) };
     // Head, trunk and, at least, the arms hanging beside it.
     let (mut x, mut y) = ([-0.30 * trunk, 0.30 * trunk], [-0.33 * trunk, 0.60 * trunk]);
     for frame in motions.iter().flat_map(|motion| motion.joints.outer_iter()) {
@@ -229,7 +231,7 @@ fn fitting(motions: &[&Motion], [left, top, right, bottom]: Area, yaw_degrees: f
     }
     let px_per_metre = ((right - left) / (x[1] - x[0])).min((bottom - top) / (y[1] - y[0]));
     let middle = |area: [f32; 2], figure: [f32; 2]| (area[0] + area[1] - px_per_metre * (figure[0] + figure[1])) / 2.0;
-    View { neck_px: [middle([left, right], x), middle([top, bottom], y)], px_per_metre, ..plain }
+    FigureView { neck_px: [middle([left, right], x), middle([top, bottom], y)], px_per_metre, ..plain }
 }
 
 /// `1:05.3`

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 /// What a run of numbers is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Use {
+pub enum BufferUse {
     Vertices = 34_962,
     Indices = 34_963,
     /// Matrices and animation.
@@ -14,16 +14,16 @@ pub enum Use {
 
 /// The numbers of a file so far.
 #[derive(Debug, Default)]
-pub struct Buffer {
+pub struct GlbBuffer {
     bytes: Vec<u8>,
     views: Vec<Value>,
     accessors: Vec<Value>,
 }
 
-impl Buffer {
+impl GlbBuffer {
     /// Adds vectors of `N` floats with their smallest and greatest values; gives the accessor's index. `kind`: `SCALAR`,
     /// `VEC3`, `VEC4`, `MAT4`.
-    pub fn floats<const N: usize>(&mut self, values: &[[f32; N]], kind: &str, purpose: Use) -> usize {
+    pub fn floats<const N: usize>(&mut self, values: &[[f32; N]], kind: &str, purpose: BufferUse) -> usize {
         let view = self.view(values.iter().flatten().flat_map(|v| v.to_le_bytes()), purpose);
         let bound = |pick: fn(f32, f32) -> f32| -> Vec<f32> {
             (0..N).map(|k| values.iter().map(|value| value[k]).reduce(pick).unwrap_or(0.0)).collect()
@@ -37,7 +37,7 @@ impl Buffer {
 
     /// Adds vectors of four bytes (joints).
     pub fn bytes4(&mut self, values: &[[u8; 4]]) -> usize {
-        let view = self.view(values.iter().flatten().copied(), Use::Vertices);
+        let view = self.view(values.iter().flatten().copied(), BufferUse::Vertices);
         self.accessors
             .push(json!({ "bufferView": view, "componentType": 5121, "count": values.len(), "type": "VEC4" }));
         self.accessors.len() - 1
@@ -45,7 +45,7 @@ impl Buffer {
 
     /// Adds vectors of four shares of 65535 (weights).
     pub fn shares4(&mut self, values: &[[u16; 4]]) -> usize {
-        let view = self.view(values.iter().flatten().flat_map(|v| v.to_le_bytes()), Use::Vertices);
+        let view = self.view(values.iter().flatten().flat_map(|v| v.to_le_bytes()), BufferUse::Vertices);
         self.accessors.push(json!({
             "bufferView": view, "componentType": 5123, "normalized": true, "count": values.len(), "type": "VEC4",
         }));
@@ -57,9 +57,9 @@ impl Buffer {
         let flat = || triangles.iter().flatten();
         let small = flat().all(|&v| v < u32::from(u16::MAX));
         let view = if small {
-            self.view(flat().flat_map(|&v| (v as u16).to_le_bytes()), Use::Indices)
+            self.view(flat().flat_map(|&v| (v as u16).to_le_bytes()), BufferUse::Indices)
         } else {
-            self.view(flat().flat_map(|&v| v.to_le_bytes()), Use::Indices)
+            self.view(flat().flat_map(|&v| v.to_le_bytes()), BufferUse::Indices)
         };
         self.accessors.push(json!({
             "bufferView": view, "componentType": if small { 5123 } else { 5125 },
@@ -68,12 +68,12 @@ impl Buffer {
         self.accessors.len() - 1
     }
 
-    fn view(&mut self, bytes: impl Iterator<Item = u8>, purpose: Use) -> usize {
+    fn view(&mut self, bytes: impl Iterator<Item = u8>, purpose: BufferUse) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let offset = self.bytes.len();
         self.bytes.extend(bytes);
         let mut view = json!({ "buffer": 0, "byteOffset": offset, "byteLength": self.bytes.len() - offset });
-        if purpose != Use::Other {
+        if purpose != BufferUse::Other {
             view["target"] = json!(purpose as u32);
         }
         self.views.push(view);

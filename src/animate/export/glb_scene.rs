@@ -1,10 +1,10 @@
 //! A performance as a glTF scene: the figure's joints as nodes in T-pose (metres, y up, facing +z), the avatar as one
 //! skinned mesh on them, the clip as one animation. A joint that does not turn has one key.
 
-use super::glb::{Buffer, Use};
-use crate::animate::avatar::{Avatar, Material, Part};
+use super::glb::{BufferUse, GlbBuffer};
+use crate::animate::avatar::{Avatar, AvatarMesh, Material};
 use crate::animate::rig::names::Names;
-use crate::animate::rig::rig::Figure;
+use crate::animate::rig::rig::Rig;
 use crate::formats::bvh::write::Clip;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::Vec3;
@@ -17,8 +17,8 @@ const STILL: f64 = 1e-7;
 const VRM_LICENSE: &str = "https://vrm.dev/licenses/1.0/";
 
 /// The bytes of the file of a clip on its figure, which wears `avatar`.
-pub fn file(figure: &Figure, clip: &Clip, avatar: &Avatar, names: Names) -> Vec<u8> {
-    let mut buffer = Buffer::default();
+pub fn file(figure: &Rig, clip: &Clip, avatar: &Avatar, names: Names) -> Vec<u8> {
+    let mut buffer = GlbBuffer::default();
     let bones = &figure.skeleton.joints;
     let own = Names::Own.of(&figure.skeleton);
     let called = names.of(&figure.skeleton);
@@ -82,14 +82,14 @@ fn material(material: Material) -> Value {
     })
 }
 
-fn primitive(buffer: &mut Buffer, part: &Part, material: usize) -> Value {
+fn primitive(buffer: &mut GlbBuffer, part: &AvatarMesh, material: usize) -> Value {
     let points: Vec<[f32; 3]> = part.points.iter().map(|&point| metres(point)).collect();
     let normals: Vec<[f32; 3]> = part.normals.iter().map(|normal| normal.map(|v| v as f32)).collect();
     let (joints, weights): (Vec<[u8; 4]>, Vec<[u16; 4]>) = part.weights.iter().map(whole_shares).unzip();
     json!({
         "attributes": {
-            "POSITION": buffer.floats(&points, "VEC3", Use::Vertices),
-            "NORMAL": buffer.floats(&normals, "VEC3", Use::Vertices),
+            "POSITION": buffer.floats(&points, "VEC3", BufferUse::Vertices),
+            "NORMAL": buffer.floats(&normals, "VEC3", BufferUse::Vertices),
             "JOINTS_0": buffer.bytes4(&joints),
             "WEIGHTS_0": buffer.shares4(&weights),
         },
@@ -107,7 +107,7 @@ fn whole_shares(weights: &crate::animate::avatar::Weights) -> ([u8; 4], [u16; 4]
     (joints, shares)
 }
 
-fn inverse_binds(buffer: &mut Buffer, figure: &Figure, root: Vec3) -> usize {
+fn inverse_binds(buffer: &mut GlbBuffer, figure: &Rig, root: Vec3) -> usize {
     let still = vec![Rotation::IDENTITY; figure.skeleton.joints.len()];
     let rest = figure.skeleton.positions(root, &still);
     let matrices: Vec<[f32; 16]> = rest
@@ -117,25 +117,25 @@ fn inverse_binds(buffer: &mut Buffer, figure: &Figure, root: Vec3) -> usize {
             [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, x, y, z, 1.0]
         })
         .collect();
-    buffer.floats(&matrices, "MAT4", Use::Other)
+    buffer.floats(&matrices, "MAT4", BufferUse::Other)
 }
 
-fn animation(buffer: &mut Buffer, clip: &Clip) -> Value {
+fn animation(buffer: &mut GlbBuffer, clip: &Clip) -> Value {
     let times: Vec<[f32; 1]> = (0..clip.n_frames()).map(|frame| [clip.fps.secs(frame) as f32]).collect();
-    let once = buffer.floats(&times[..1], "SCALAR", Use::Other);
+    let once = buffer.floats(&times[..1], "SCALAR", BufferUse::Other);
     let mut every = None;
     let mut samplers =
-        vec![json!({ "input": once, "output": buffer.floats(&[metres(clip.root)], "VEC3", Use::Other) })];
+        vec![json!({ "input": once, "output": buffer.floats(&[metres(clip.root)], "VEC3", BufferUse::Other) })];
     let mut channels = vec![json!({ "sampler": 0, "target": { "node": 0, "path": "translation" } })];
     for joint in (0..clip.skeleton.joints.len()).filter(|&joint| !clip.skeleton.joints[joint].end) {
         let track = quaternions(clip, joint);
         let moves = track.iter().any(|q| (0..4).any(|k| (f64::from(q[k]) - f64::from(track[0][k])).abs() > STILL));
         let (input, output) = if moves {
-            (*every.get_or_insert_with(|| buffer.floats(&times, "SCALAR", Use::Other)), &track[..])
+            (*every.get_or_insert_with(|| buffer.floats(&times, "SCALAR", BufferUse::Other)), &track[..])
         } else {
             (once, &track[..1])
         };
-        let output = buffer.floats(output, "VEC4", Use::Other);
+        let output = buffer.floats(output, "VEC4", BufferUse::Other);
         channels.push(json!({ "sampler": samplers.len(), "target": { "node": joint, "path": "rotation" } }));
         samplers.push(json!({ "input": input, "output": output, "interpolation": "LINEAR" }));
     }

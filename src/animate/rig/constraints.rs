@@ -5,7 +5,7 @@
 use super::hinge::Bend;
 use super::limits;
 use super::limits::{CURL_COHERENCE, Limit, turn, within};
-use super::rig::Figure;
+use super::rig::Rig;
 use crate::animate::solve::arm_pose::ArmPose;
 use crate::animate::solve::track::smoothstep;
 use crate::math::rotation::Rotation;
@@ -70,13 +70,13 @@ pub struct Clamps {
 
 /// Counts clamps.
 #[derive(Clone, Debug, Default)]
-pub struct Tally {
+pub struct ClampTally {
     n_frames: usize,
     /// For each kind: how many, sum and largest of the excess.
     kinds: [(usize, f64, f64); KINDS.len()],
 }
 
-impl Tally {
+impl ClampTally {
     fn changed(&mut self, kind: usize, from: f64, to: f64) -> f64 {
         let excess = turn(from - to).abs();
         if excess > LEAST_DEGREES {
@@ -105,13 +105,13 @@ impl Tally {
 
 impl Constraints {
     /// Constrains one frame of local rotations.
-    pub fn apply(self, figure: &Figure, local: &mut [Rotation], tally: &mut Tally) {
+    pub fn apply(self, figure: &Rig, local: &mut [Rotation], tally: &mut ClampTally) {
         if self == Self::NONE {
             return;
         }
         tally.n_frames += 1;
         for arm in &figure.arms {
-            let mut pose = ArmPose::of(arm, local);
+            let mut pose = ArmPose::from_rotations(arm, local);
             if self.limits {
                 limit(&mut pose, tally);
             }
@@ -123,7 +123,7 @@ impl Constraints {
     }
 }
 
-fn limit(pose: &mut ArmPose, tally: &mut Tally) {
+fn limit(pose: &mut ArmPose, tally: &mut ClampTally) {
     pose.elbow = bend(pose.elbow, limits::ELBOW, ELBOW, tally);
     // Followed beyond half a turn it is still beyond the same end.
     let [pronated, supinated] = limits::SUPINATION;
@@ -141,7 +141,7 @@ fn limit(pose: &mut ArmPose, tally: &mut Tally) {
 }
 
 /// The bend within its limits; `kind` counts the flexion, the next one the side.
-fn bend(given: Bend, limit: Limit, kind: usize, tally: &mut Tally) -> Bend {
+fn bend(given: Bend, limit: Limit, kind: usize, tally: &mut ClampTally) -> Bend {
     let middle = (limit.flexion[0] + limit.flexion[1]) / 2.0;
     let flexion = middle + told(given.side) * (within(limit.flexion, given.flexion) - middle);
     Bend {
@@ -157,7 +157,7 @@ fn told(side: f64) -> f64 {
 
 /// Brings the four fingers' flexion, level by level, within reach of their mean. That is the mean of what comes out, so
 /// that nothing is left to do.
-fn cohere(pose: &mut ArmPose, tally: &mut Tally) {
+fn cohere(pose: &mut ArmPose, tally: &mut ClampTally) {
     for k in 0..3 {
         let given = [1, 2, 3, 4].map(|finger: usize| pose.fingers[finger][k].flexion);
         let mean = coherent_mean(given);

@@ -103,7 +103,7 @@ fn humanoid(own: &str, thumb: [&str; 3]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::animate::rig::rig::Figure;
+    use crate::animate::rig::rig::Rig;
     use std::collections::BTreeSet;
 
     const FINGERS: [&str; 5] = ["Thumb", "Index", "Middle", "Ring", "Little"];
@@ -113,7 +113,7 @@ mod tests {
             crate::types::time::FrameRate::new(15, 1),
             ndarray::Array3::from_elem((1, crate::types::skeleton::N_JOINTS, 3), f32::NAN),
         );
-        Figure::of(&motion).skeleton
+        Rig::from_motion(&motion).skeleton
     }
 
     fn called(names: Names) -> BTreeSet<String> {

@@ -4,7 +4,7 @@
 //! joint of ours tells of, are in proportion to the arms. Lengths in cm.
 
 use super::hinge::Hinge;
-use crate::animate::solve::positions::{Places, palm_frame};
+use crate::animate::solve::positions::{JointPositions, palm_frame};
 use crate::math::order::upper_median;
 use crate::math::vec3::{Vec3, across, cross, norm, scale};
 use crate::motion::fk::Skeleton;
@@ -35,7 +35,7 @@ const X: Vec3 = [1.0, 0.0, 0.0];
 
 /// One arm: indices of its joints in the skeleton.
 #[derive(Clone, Debug)]
-pub struct Arm {
+pub struct RigArm {
     /// +1 left, -1 right: the sign of x.
     pub sign: f64,
     pub clavicle: usize,
@@ -48,7 +48,7 @@ pub struct Arm {
 
 /// The skeleton with the meaning of its joints.
 #[derive(Clone, Debug)]
-pub struct Figure {
+pub struct Rig {
     pub skeleton: Skeleton,
     /// Where the hips stand, cm; the soles at y = 0.
     pub root: Vec3,
@@ -57,15 +57,15 @@ pub struct Figure {
     pub neck: usize,
     pub head: usize,
     /// Left, right.
-    pub arms: [Arm; 2],
+    pub arms: [RigArm; 2],
     /// For each of the 49 joints of a motion the joint of the skeleton at its place (ends of bones included).
     pub places: [usize; N_JOINTS],
 }
 
-impl Figure {
+impl Rig {
     /// The figure for a motion: lengths and palms are medians over its frames.
-    pub fn of(motion: &Motion) -> Self {
-        let (places, metres) = (Places::of(motion), bone_metres(motion));
+    pub fn from_motion(motion: &Motion) -> Self {
+        let (places, metres) = (JointPositions::from_motion(motion), bone_metres(motion));
         let [left, right] = [median_palm(&places), median_palm(&places.mirrored())];
         let palms = [left.or(right), right.or(left)].map(|palm| palm.unwrap_or_else(|| default_palm(&metres)));
         Self::with_measures(&metres, &palms)
@@ -107,7 +107,7 @@ fn push_arm(
     chest: usize,
     neck: Vec3,
     sign: f64,
-) -> Arm {
+) -> RigArm {
     let (side, shoulder, hand_root) =
         if sign > 0.0 { ("Left", L_SHOULDER, L_HAND) } else { ("Right", skeleton::R_SHOULDER, R_HAND) };
     let on_side = |[x, y, z]: Vec3| [sign * x, y, z];
@@ -136,7 +136,7 @@ fn push_arm(
             }
         }
     }
-    Arm { sign, clavicle, upper, fore, hand, fingers }
+    RigArm { sign, clavicle, upper, fore, hand, fingers }
 }
 
 /// How a finger's joints bend, in the axes of the left hand: the four along x about the line through the knuckles, the
@@ -151,7 +151,7 @@ pub fn finger_hinge(finger: usize) -> Hinge {
 }
 
 /// Medians over the frames of the bases of the left hand's fingers in its frame; `None` if they are never seen.
-fn median_palm(places: &Places) -> Option<[Vec3; 5]> {
+fn median_palm(places: &JointPositions) -> Option<[Vec3; 5]> {
     let seen: Vec<_> = (0..places.n_frames()).filter_map(|t| places.palm(t)).collect();
     let middle = |finger: usize, axis: usize| upper_median(seen.iter().filter_map(|palm| Some(palm[finger]?[axis])));
     let mut palm = [[0.0; 3]; 5];

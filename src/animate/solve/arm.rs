@@ -4,12 +4,12 @@
 //! twist.
 
 use super::arm_pose::{ArmPose, elbow};
-use super::positions::Places;
+use super::positions::JointPositions;
 use super::roll::elbow_axes;
 use super::smoothing::{Filter, Smoothing};
-use super::track::{Seen, Track, filled, world};
+use super::track::{ObservedTrack, RotationTrack, filled, world};
 use crate::animate::rig::hinge::Bend;
-use crate::animate::rig::rig::{Arm, finger_hinge};
+use crate::animate::rig::rig::{RigArm, finger_hinge};
 use crate::math::rotation::Rotation;
 use crate::math::vec3::Vec3;
 use crate::types::skeleton::{L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, NECK};
@@ -26,14 +26,14 @@ const RELAXED: [[f64; 3]; 5] =
 const FOLLOWED: f64 = 60.0;
 
 /// Frames a second and the filters for them.
-pub struct Means {
+pub struct SolveFilters {
     pub fps: f64,
     pub arms: Filter,
     pub hands: Filter,
 }
 
-impl Means {
-    pub fn of(smoothing: Smoothing, fps: FrameRate) -> Self {
+impl SolveFilters {
+    pub fn new(smoothing: Smoothing, fps: FrameRate) -> Self {
         Self { fps: fps.per_sec(), arms: smoothing.arms(fps), hands: smoothing.hands(fps) }
     }
 }
@@ -41,10 +41,16 @@ impl Means {
 type Directions = Vec<Option<Vec3>>;
 
 /// Solves the arm and writes its tracks into `local` (one a joint of the skeleton), as a left arm whatever `arm` is.
-pub fn solve(places: &Places, arm: &Arm, chest: &Track, means: &Means, local: &mut [Track]) {
+pub fn solve(
+    places: &JointPositions,
+    arm: &RigArm,
+    chest: &RotationTrack,
+    means: &SolveFilters,
+    local: &mut [RotationTrack],
+) {
     let n_frames = places.n_frames();
     let relax_frames = Some(RELAX_SECS * means.fps);
-    let smooth = |parent: &Track, from: usize, to: usize| -> Directions {
+    let smooth = |parent: &RotationTrack, from: usize, to: usize| -> Directions {
         let seen = |t: usize| Some(parent[t].inverse().turn(places.direction(t, from, to)?));
         let mut track: Directions = (0..n_frames).map(seen).collect();
         means.arms.directions(&mut track);
@@ -55,22 +61,22 @@ pub fn solve(places: &Places, arm: &Arm, chest: &Track, means: &Means, local: &m
     let clavicle = world(chest, &local[arm.clavicle]);
 
     let (along, fore) = (smooth(&clavicle, L_SHOULDER, L_ELBOW), smooth(&clavicle, L_ELBOW, L_WRIST));
-    let upper: Seen = elbow_axes(&along, &fore);
+    let upper: ObservedTrack = elbow_axes(&along, &fore);
     let hanging = Rotation::between(X, [0.17, -0.985, 0.0]);
     local[arm.upper] = filled(upper, hanging, None);
     let bent = |(upper, fore): (&Rotation, &Option<Vec3>)| {
         Some(elbow().rotation(elbow().bend(upper.inverse().turn((*fore)?))))
     };
-    let bent: Seen = local[arm.upper].iter().zip(&fore).map(bent).collect();
+    let bent: ObservedTrack = local[arm.upper].iter().zip(&fore).map(bent).collect();
     let relaxed_elbow = elbow().rotation(Bend { flexion: 17.0, side: 0.0 });
     let fore = filled(bent, relaxed_elbow, None);
     let forearm = world(&world(&clavicle, &local[arm.upper]), &fore);
 
-    let frames: Seen = (0..n_frames).map(|t| places.hand_frame(t)).collect();
+    let frames: ObservedTrack = (0..n_frames).map(|t| places.hand_frame(t)).collect();
     let hand = filled(smooth_hand(&forearm, &frames, &means.hands), Rotation::IDENTITY, relax_frames);
     let mut followed = 0.0;
     for t in 0..n_frames {
-        let (supination, wrist) = ArmPose::of_hand(hand[t], followed, FOLLOWED);
+        let (supination, wrist) = ArmPose::hand_angles(hand[t], followed, FOLLOWED);
         followed = supination;
         (local[arm.fore][t], local[arm.hand][t]) = ArmPose::shared(fore[t], supination, wrist);
     }
@@ -85,10 +91,10 @@ pub fn solve(places: &Places, arm: &Arm, chest: &Track, means: &Means, local: &m
 
 /// The hand's rotations against the untwisted forearm, smoothed by their three angles: within its limits a hand has no
 /// two sets of them, and between a palm up and a palm down lies a hand on edge, where directions would cancel out.
-fn smooth_hand(forearm: &Track, frames: &Seen, filter: &Filter) -> Seen {
+fn smooth_hand(forearm: &RotationTrack, frames: &ObservedTrack, filter: &Filter) -> ObservedTrack {
     let mut followed = 0.0;
     let mut angle = |(hand, fore): (&Option<Rotation>, &Rotation)| {
-        let (supination, wrist) = ArmPose::of_hand(fore.inverse() * (*hand)?, followed, FOLLOWED);
+        let (supination, wrist) = ArmPose::hand_angles(fore.inverse() * (*hand)?, followed, FOLLOWED);
         followed = supination;
         Some([supination, wrist.flexion, wrist.side])
     };
@@ -100,9 +106,9 @@ fn smooth_hand(forearm: &Track, frames: &Seen, filter: &Filter) -> Seen {
 
 /// Local rotations of a finger's three joints. Bones are smoothed in the axes of the hand as it was seen: what shakes
 /// the whole hand does not shake them.
-fn solve_finger(places: &Places, frames: &Seen, finger: usize, filter: &Filter) -> [Seen; 3] {
+fn solve_finger(places: &JointPositions, frames: &ObservedTrack, finger: usize, filter: &Filter) -> [ObservedTrack; 3] {
     let (hinge, base) = (finger_hinge(finger), L_HAND + 1 + 4 * finger);
-    let mut parent: Seen = vec![Some(Rotation::IDENTITY); frames.len()];
+    let mut parent: ObservedTrack = vec![Some(Rotation::IDENTITY); frames.len()];
     [0, 1, 2].map(|k| {
         let seen = |t: usize| Some(frames[t]?.inverse().turn(places.direction(t, base + k, base + k + 1)?));
         let mut track: Directions = (0..frames.len()).map(seen).collect();
@@ -110,7 +116,7 @@ fn solve_finger(places: &Places, frames: &Seen, finger: usize, filter: &Filter) 
         let bone = |(parent, to): (&Option<Rotation>, Option<Vec3>)| {
             Some(hinge.rotation(hinge.bend((*parent)?.inverse().turn(to?))))
         };
-        let bones: Seen = parent.iter().zip(track).map(bone).collect();
+        let bones: ObservedTrack = parent.iter().zip(track).map(bone).collect();
         parent = parent.iter().zip(&bones).map(|(parent, bone)| Some((*parent)? * (*bone)?)).collect();
         bones
     })

@@ -3,7 +3,7 @@
 
 use crate::animate::rig::hinge::{Bend, Hinge, flexed, sideways};
 use crate::animate::rig::limits::turn;
-use crate::animate::rig::rig::{Arm, finger_hinge};
+use crate::animate::rig::rig::{RigArm, finger_hinge};
 use crate::math::rotation::Rotation;
 use crate::math::vec3::Vec3;
 
@@ -28,13 +28,13 @@ pub fn elbow() -> Hinge {
 
 impl ArmPose {
     /// The angles of the arm in a frame's local rotations. A finger's twist, which no joint tells, is left out.
-    pub fn of(arm: &Arm, local: &[Rotation]) -> Self {
+    pub fn from_rotations(arm: &RigArm, local: &[Rotation]) -> Self {
         let of = |joint: usize| on_left(arm, local[joint]);
         let (fore, hand) = (of(arm.fore), of(arm.hand));
         let elbow_bend = elbow().bend(fore.turn(X));
         let untwisted = elbow().rotation(elbow_bend).inverse() * fore;
         let (_, half) = untwisted.swing_twist(X);
-        let (supination, wrist) = Self::of_hand(untwisted * hand, -2.0 * half.to_degrees(), 0.0);
+        let (supination, wrist) = Self::hand_angles(untwisted * hand, -2.0 * half.to_degrees(), 0.0);
         let fingers = std::array::from_fn(|finger| {
             let hinge = finger_hinge(finger);
             arm.fingers[finger].map(|joint| hinge.bend(of(joint).turn(hinge.along())))
@@ -43,7 +43,7 @@ impl ArmPose {
     }
 
     /// Puts the angles into a frame's local rotations.
-    pub fn write(&self, arm: &Arm, local: &mut [Rotation]) {
+    pub fn write(&self, arm: &RigArm, local: &mut [Rotation]) {
         let mut put = |joint: usize, rotation: Rotation| local[joint] = on_left(arm, rotation);
         let (fore, hand) = Self::shared(elbow().rotation(self.elbow), self.supination, self.wrist);
         put(arm.fore, fore);
@@ -57,7 +57,7 @@ impl ArmPose {
 
     /// Supination and wrist of a hand given against the untwisted forearm. The turn is the one nearest to `followed`,
     /// unless that is more than half a turn and `leave` from the palm along the elbow's axis.
-    pub fn of_hand(hand: Rotation, followed: f64, leave: f64) -> (f64, Bend) {
+    pub fn hand_angles(hand: Rotation, followed: f64, leave: f64) -> (f64, Bend) {
         // hand = about x (supination) * sideways * flexed: the flexion's axis -z shows the first two.
         let [x, y, z] = hand.turn([0.0, 0.0, 1.0]);
         let pronation = (-y).atan2(z).to_degrees();
@@ -86,6 +86,6 @@ fn about_x(degrees: f64) -> Rotation {
 }
 
 /// A rotation of this arm as one of a left arm, and back.
-fn on_left(arm: &Arm, rotation: Rotation) -> Rotation {
+fn on_left(arm: &RigArm, rotation: Rotation) -> Rotation {
     if arm.sign < 0.0 { rotation.mirrored() } else { rotation }
 }

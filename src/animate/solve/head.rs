@@ -2,9 +2,9 @@
 //! (weak perspective, least squares with what is usual as prior). The clip's median nod counts as looking ahead, since
 //! no face is built like the rigid one. Neck and head share the turn; where no face is seen they rest.
 
-use super::arm::Means;
-use super::track::{Seen, Track, filled};
-use crate::animate::rig::rig::Figure;
+use super::arm::SolveFilters;
+use super::track::{ObservedTrack, RotationTrack, filled};
+use crate::animate::rig::rig::Rig;
 use crate::math::order::upper_median;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::Vec3;
@@ -42,10 +42,10 @@ const RELAX_SECS: f64 = 0.5;
 const STEPS: usize = 8;
 
 /// Turns neck and head; gives the number of frames in which the face was seen.
-pub fn turn(face: &Face, figure: &Figure, means: &Means, local: &mut [Track]) -> usize {
+pub fn turn(face: &Face, figure: &Rig, means: &SolveFilters, local: &mut [RotationTrack]) -> usize {
     let n_frames = local[figure.head].len();
-    let frame = |t: usize| Points::of(face.body.index_axis(ndarray::Axis(0), t));
-    let points: Vec<Option<Points>> =
+    let frame = |t: usize| FacePoints::from_keypoints(face.body.index_axis(ndarray::Axis(0), t));
+    let points: Vec<Option<FacePoints>> =
         (0..n_frames).map(|t| if t < face.body.shape()[0] { frame(t) } else { None }).collect();
     let Some(scale) = upper_median(points.iter().flatten().filter_map(|points| points.shoulder_scale))
         .or_else(|| upper_median(points.iter().flatten().map(|points| points.spread() / 0.1)))
@@ -64,7 +64,7 @@ pub fn turn(face: &Face, figure: &Figure, means: &Means, local: &mut [Track]) ->
     let mut angles: Vec<Option<Vec3>> =
         second.iter().map(|fit| fit.map(|[yaw, pitch, roll, _]| [yaw, pitch - nod, roll])).collect();
     means.hands.runs(&mut angles);
-    let halves: Seen = angles
+    let halves: ObservedTrack = angles
         .into_iter()
         .enumerate()
         .map(|(t, angles)| {
@@ -92,15 +92,15 @@ fn rotation([yaw, pitch, roll]: Vec3) -> Rotation {
 
 /// The face's keypoints in one frame: places in px (y up) with weights, those unseen 0. An ear behind the head is
 /// guessed with a somewhat lower score; its fourth power makes that tell.
-struct Points {
+struct FacePoints {
     places: [[f64; 2]; 5],
     weights: [f64; 5],
     /// px a metre by the width of the shoulders.
     shoulder_scale: Option<f64>,
 }
 
-impl Points {
-    fn of(body: ArrayView2<f32>) -> Option<Self> {
+impl FacePoints {
+    fn from_keypoints(body: ArrayView2<f32>) -> Option<Self> {
         let at = |point: usize| [f64::from(body[[point, 0]]), -f64::from(body[[point, 1]])];
         let seen = |point: usize| (0..3).all(|k| body[[point, k]].is_finite()) && body[[point, 2]] >= LEAST_SCORE;
         let weights: [f64; 5] =
@@ -194,13 +194,13 @@ mod tests {
     use super::*;
 
     /// A face of another size than the rigid one, 400 px a metre.
-    fn drawn(angles: Vec3, hidden: &[usize]) -> Points {
+    fn drawn(angles: Vec3, hidden: &[usize]) -> FacePoints {
         let place = |point: Vec3| {
             let [x, y, _] = rotation(angles).turn(point.map(|v| 1.05 * v));
             [640.0 + 400.0 * x, -200.0 + 400.0 * y]
         };
         let weights = std::array::from_fn(|n| if hidden.contains(&n) { 0.0 } else { 0.9 });
-        Points { places: FACE.map(place), weights, shoulder_scale: None }
+        FacePoints { places: FACE.map(place), weights, shoulder_scale: None }
     }
 
     #[test]

@@ -12,10 +12,10 @@ use crate::types::skeleton::{L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, R_SHOULDER};
 const LEAST_METRES: f64 = 1e-5;
 
 /// Joints over time.
-pub struct Places(pub(crate) Vec<[Option<Vec3>; N_JOINTS]>);
+pub struct JointPositions(pub(crate) Vec<[Option<Vec3>; N_JOINTS]>);
 
-impl Places {
-    pub fn of(motion: &Motion) -> Self {
+impl JointPositions {
+    pub fn from_motion(motion: &Motion) -> Self {
         let place = |frame: &ndarray::ArrayView2<f32>, joint: usize| {
             let place = [0, 1, 2].map(|k| f64::from(frame[[joint, k]]) * if k == 0 { 1.0 } else { -1.0 });
             place.iter().all(|v| v.is_finite()).then_some(place)

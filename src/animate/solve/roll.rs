@@ -2,7 +2,7 @@
 //! the axis is carried along with the upper arm without roll, the elbow's plane is measured against it where the arm
 //! is bent, and between such stretches the roll passes evenly from one to the other; before and after them it is held.
 
-use super::track::{Seen, smoothstep};
+use super::track::{ObservedTrack, smoothstep};
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, across, cross, dot, unit};
 
@@ -17,7 +17,7 @@ const CARRIED: f64 = 1e-9;
 
 /// Rotations of the upper arm from the directions of upper arm and forearm in the clavicle's axes; none where the upper
 /// arm is not seen.
-pub fn elbow_axes(upper: &[Option<Vec3>], fore: &[Option<Vec3>]) -> Seen {
+pub fn elbow_axes(upper: &[Option<Vec3>], fore: &[Option<Vec3>]) -> ObservedTrack {
     // Carried along, and the measured roll against it with its weight.
     let mut carried = REST;
     let mut frames: Vec<(usize, (Vec3, Vec3))> = Vec::with_capacity(upper.len());

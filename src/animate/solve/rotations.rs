@@ -4,24 +4,24 @@
 //! for what was smoothed.
 
 use super::arm;
-use super::arm::Means;
-use super::positions::Places;
-use super::track::{Track, filled, mirrored};
-use crate::animate::rig::rig::Figure;
+use super::arm::SolveFilters;
+use super::positions::JointPositions;
+use super::track::{RotationTrack, filled, mirrored};
+use crate::animate::rig::rig::Rig;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::Vec3;
 
 /// Local rotations of the figure's joints, joint by joint, in the figure's axes (x, -y, -z of the motion's). Hips,
 /// neck, head and legs rest.
-pub fn rotations(places: &Places, figure: &Figure, means: &Means) -> Vec<Track> {
+pub fn rotations(places: &JointPositions, figure: &Rig, means: &SolveFilters) -> Vec<RotationTrack> {
     let n_frames = places.n_frames();
-    let mut local: Vec<Track> = vec![vec![Rotation::IDENTITY; n_frames]; figure.skeleton.joints.len()];
+    let mut local: Vec<RotationTrack> = vec![vec![Rotation::IDENTITY; n_frames]; figure.skeleton.joints.len()];
 
     let mut line: Vec<Option<Vec3>> = (0..n_frames).map(|t| places.shoulder_line(t)).collect();
     means.arms.directions(&mut line);
     let half_yaw = |[x, _, z]: Vec3| Rotation::about([0.0, 1.0, 0.0], (-z).atan2(x) / 2.0);
     let half_yaw = filled(line.into_iter().map(|line| line.map(half_yaw)).collect(), Rotation::IDENTITY, None);
-    let chest: Track = half_yaw.iter().map(|&half| half * half).collect();
+    let chest: RotationTrack = half_yaw.iter().map(|&half| half * half).collect();
     local[figure.spine].clone_from(&half_yaw);
     local[figure.chest] = half_yaw;
 

@@ -4,26 +4,26 @@
 use crate::math::rotation::Rotation;
 
 /// Rotations of one joint, frame by frame.
-pub type Track = Vec<Rotation>;
+pub type RotationTrack = Vec<Rotation>;
 /// The same where not every frame tells.
-pub type Seen = Vec<Option<Rotation>>;
+pub type ObservedTrack = Vec<Option<Rotation>>;
 
 /// World rotations of a joint from its parent's and its own local ones.
-pub fn world(parent: &Track, local: &Track) -> Track {
+pub fn world(parent: &RotationTrack, local: &RotationTrack) -> RotationTrack {
     parent.iter().zip(local).map(|(&parent, &local)| parent * local).collect()
 }
 
 /// The mirror image of a track.
-pub fn mirrored(mut track: Track) -> Track {
+pub fn mirrored(mut track: RotationTrack) -> RotationTrack {
     track.iter_mut().for_each(|rotation| *rotation = rotation.mirrored());
     track
 }
 
 /// A track without gaps; `rest` if nothing is seen. With `relax_frames` it moves to `rest` within that many frames of
 /// the nearest seen one.
-pub fn filled(seen: Seen, rest: Rotation, relax_frames: Option<f64>) -> Track {
+pub fn filled(seen: ObservedTrack, rest: Rotation, relax_frames: Option<f64>) -> RotationTrack {
     let (mut before, mut after) = (None, next_seen(&seen, 0));
-    let mut track = Track::with_capacity(seen.len());
+    let mut track = RotationTrack::with_capacity(seen.len());
     for (t, now) in seen.iter().enumerate() {
         if let Some(rotation) = *now {
             before = Some((t, rotation));
@@ -48,7 +48,7 @@ pub fn filled(seen: Seen, rest: Rotation, relax_frames: Option<f64>) -> Track {
 }
 
 /// The first seen frame from `start` on. Asked only where a gap begins or a frame is seen: next to it, mostly.
-fn next_seen(seen: &Seen, start: usize) -> Option<(usize, Rotation)> {
+fn next_seen(seen: &ObservedTrack, start: usize) -> Option<(usize, Rotation)> {
     seen[start..].iter().position(Option::is_some).and_then(|ahead| Some((start + ahead, seen[start + ahead]?)))
 }
 

@@ -4,12 +4,12 @@ use super::input::{Input, Take, inputs, is_motion, read_motion};
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
-use orator::animate::export::file::{Format, Sources};
-use orator::animate::export::film::Beside;
-use orator::animate::performance::{Jerk, Seen, Told};
+use orator::animate::export::file::{ExportContent, ExportFormat};
+use orator::animate::export::film::SecondPanel;
+use orator::animate::performance::{AnimationReport, Jerk, SeenFrames};
 use orator::animate::rig::names::Names;
 use orator::animate::solve::smoothing::ONE_EURO;
-use orator::animate::{Constraints, Options, Performance, Smoothing, Yaw, perform};
+use orator::animate::{AnimationOptions, Constraints, Performance, Smoothing, Yaw, perform};
 use orator::dataset::Split;
 use orator::external::ffmpeg::audio;
 use orator::math::one_euro::OneEuro;
@@ -145,11 +145,11 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 }
 
 /// Every motion of a folder or dataset; one that fails does not stop the others.
-fn whole_folder(args: &Args, inputs: &[Input], options: &Options, ui: &Ui) -> Result<Outcome> {
+fn whole_folder(args: &Args, inputs: &[Input], options: &AnimationOptions, ui: &Ui) -> Result<Outcome> {
     let [folder] = args.out.as_slice() else { bail!("--format writes into one folder; give one --out") };
     ensure!(!folder.is_file(), "{} is a file; with --format --out is a folder", folder.display());
     let endings: Vec<&str> = args.format.iter().map(|ending| ending.trim_start_matches('.')).collect();
-    endings.iter().try_for_each(|ending| Format::of(&folder.join(format!("x.{ending}"))).map(drop))?;
+    endings.iter().try_for_each(|ending| ExportFormat::from_path(&folder.join(format!("x.{ending}"))).map(drop))?;
     let task = ui.begin("animating", inputs.len() as u64);
     let (mut text, mut facts, mut n_failed, mut n_files) = (String::new(), Vec::new(), 0, 0);
     for input in inputs {
@@ -157,7 +157,7 @@ fn whole_folder(args: &Args, inputs: &[Input], options: &Options, ui: &Ui) -> Re
         let named = |ending: &&str| {
             let path = folder.join(format!("{}.{ending}", input.name));
             ensure!(!input.is_at(&path), "{} is the motion itself; write to another folder", path.display());
-            Ok((path.clone(), Format::of(&path)?))
+            Ok((path.clone(), ExportFormat::from_path(&path)?))
         };
         let outputs: Result<Vec<_>> = endings.iter().map(named).collect();
         match outputs.and_then(|outputs| animate(args, input, None, &outputs, options, ui)) {
@@ -193,8 +193,8 @@ fn animate(
     args: &Args,
     input: &Input,
     sound: Option<Sound>,
-    outputs: &[(PathBuf, Format)],
-    options: &Options,
+    outputs: &[(PathBuf, ExportFormat)],
+    options: &AnimationOptions,
     ui: &Ui,
 ) -> Result<Done> {
     let Take { motion, face, sound: own } = input.read(args.in_fps, args.keypoints.as_deref())?;
@@ -212,13 +212,13 @@ fn animate(
         _ => [input.name.clone(), args.beside.as_deref().map(stem).unwrap_or_default()],
     };
     let beside = match (&args.beside, &other) {
-        (None, _) => Beside::Itself,
-        (Some(_), Some(motion)) => Beside::Motion { motion, labels: labels.each_ref().map(String::as_str) },
-        (Some(path), None) => Beside::Video { path, from_secs: args.beside_from },
+        (None, _) => SecondPanel::Itself,
+        (Some(_), Some(motion)) => SecondPanel::Motion { motion, labels: labels.each_ref().map(String::as_str) },
+        (Some(path), None) => SecondPanel::Video { path, from_secs: args.beside_from },
     };
-    let is_film = outputs.iter().any(|&(_, format)| format == Format::Mp4);
+    let is_film = outputs.iter().any(|&(_, format)| format == ExportFormat::Mp4);
     let sound = match (sound, beside) {
-        (None, Beside::Video { path, from_secs }) if is_film => audio::read_mono(path, SAMPLE_RATE)?
+        (None, SecondPanel::Video { path, from_secs }) if is_film => audio::read_mono(path, SAMPLE_RATE)?
             .map(|whole| part(&whole, from_secs, motion.fps.secs(motion.n_frames()))),
         (sound, _) => sound,
     };
@@ -233,7 +233,7 @@ fn animate(
         (true, true) => "the film is without sound: give --audio\n",
         (true, false) => "the film is without sound\n",
     };
-    let sources = Sources { sound: sound.as_ref(), names: args.names, beside };
+    let sources = ExportContent { sound: sound.as_ref(), names: args.names, beside };
     for (path, format) in outputs {
         format.write(path, &performance, &sources, ui).with_context(|| format!("cannot write {}", path.display()))?;
     }
@@ -261,7 +261,7 @@ fn animate(
     Ok(Done { text, facts })
 }
 
-fn words(told: &Told) -> String {
+fn words(told: &AnimationReport) -> String {
     let number = |jerk: Option<f64>| jerk.map_or("-".to_owned(), |jerk| format!("{jerk:.0}"));
     let jerk = |jerk: Jerk| format!("{} -> {}", number(jerk.before), number(jerk.after));
     let mut text = format!("jerk, m/s3: arms {}, hands {}\n", jerk(told.arms), jerk(told.hands));
@@ -290,8 +290,8 @@ fn words(told: &Told) -> String {
 }
 
 /// What was not seen in all frames; nothing when all was.
-fn seen(told: &Told) -> String {
-    let Seen { left_arm, right_arm, left_hand, right_hand } = told.seen;
+fn seen(told: &AnimationReport) -> String {
+    let SeenFrames { left_arm, right_arm, left_hand, right_hand } = told.seen;
     let arms = match left_arm == right_arm {
         true => vec![("arms", left_arm)],
         false => vec![("left arm", left_arm), ("right arm", right_arm)],
@@ -304,7 +304,7 @@ fn seen(told: &Told) -> String {
     format!("seen, of {} frames: {}; the rest is bridged or held\n", told.n_frames, parts.join(", "))
 }
 
-fn options(args: &Args) -> Result<Options> {
+fn options(args: &Args) -> Result<AnimationOptions> {
     let smoothing = match args.smoothing {
         Kind::None => Smoothing::None,
         Kind::SavitzkyGolay => Smoothing::SavitzkyGolay,
@@ -320,18 +320,18 @@ fn options(args: &Args) -> Result<Options> {
         false => Constraints { limits: true, curl_coherence: args.curl_coherence == Switch::On },
     };
     let yaw = if args.shoulder_yaw == ShoulderYaw::Removed { Yaw::Removed } else { Yaw::Spine };
-    Ok(Options { smoothing, constraints, yaw, fps: args.fps })
+    Ok(AnimationOptions { smoothing, constraints, yaw, fps: args.fps })
 }
 
 /// Output files with their formats; none may be an input or another output.
-fn outputs(args: &Args, input: &Input) -> Result<Vec<(PathBuf, Format)>> {
+fn outputs(args: &Args, input: &Input) -> Result<Vec<(PathBuf, ExportFormat)>> {
     for (n, path) in args.out.iter().enumerate() {
         let is_read = [&args.audio, &args.beside].into_iter().flatten().any(|read| read == path);
         ensure!(!input.is_at(path) && !is_read, "{} is what is read; write to another file", path.display());
         ensure!(!args.out[..n].contains(path), "{} is asked for twice", path.display());
         ensure!(!path.is_dir(), "{} is a folder; name a file in it, or give --format bvh", path.display());
     }
-    args.out.iter().map(|path| Ok((path.clone(), Format::of(path)?))).collect()
+    args.out.iter().map(|path| Ok((path.clone(), ExportFormat::from_path(path)?))).collect()
 }
 
 fn read_sound(path: &Path) -> Result<Sound> {
@@ -348,13 +348,13 @@ fn part(whole: &Sound, from_secs: f64, secs: f64) -> Sound {
     Sound { rate: whole.rate, samples: whole.samples[at(from_secs)..at(from_secs + secs)].to_vec() }
 }
 
-fn names(outputs: &[(PathBuf, Format)]) -> Vec<String> {
+fn names(outputs: &[(PathBuf, ExportFormat)]) -> Vec<String> {
     outputs.iter().map(|(path, _)| path.display().to_string()).collect()
 }
 
 /// The same again as a film, or for an animation program; nothing when both are there.
-fn next_command(args: &Args, outputs: &[(PathBuf, Format)]) -> Option<String> {
-    let missing = [(Format::Mp4, "mp4"), (Format::Bvh, "bvh")]
+fn next_command(args: &Args, outputs: &[(PathBuf, ExportFormat)]) -> Option<String> {
+    let missing = [(ExportFormat::Mp4, "mp4"), (ExportFormat::Bvh, "bvh")]
         .into_iter()
         .find(|&(format, _)| outputs.iter().all(|&(_, written)| written != format));
     let (_, ending) = missing?;

@@ -6,7 +6,7 @@ use crate::cli::ui::Ui;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use orator::config::{Config, videos};
 use orator::dataset::forget::known;
-use orator::dataset::forget::known::Known;
+use orator::dataset::forget::known::KnownVideo;
 use orator::dataset::forget::removal::Removal;
 use orator::dataset::forget::search::{Searched, search};
 use orator::stage::workdir;
@@ -105,7 +105,7 @@ fn of_dataset(dir: &Path, wanted: &str, dry_run: bool) -> Result<Task> {
     }
     let all = known::of_dataset(&dir)?;
     let video = known::one(&all, wanted, None)?;
-    let others: Vec<&Known> = all.iter().filter(|k| *k != video).collect();
+    let others: Vec<&KnownVideo> = all.iter().filter(|k| *k != video).collect();
     let removal = Removal::of_dataset(&dir, &[video], &others);
     let mut folders = vec![dir.clone()];
     folders.extend(workdir::left_over(&dir));
@@ -137,7 +137,7 @@ fn of_project(args: &Args) -> Result<(Task, Option<File>)> {
         (None, None) => bail!("say --video or --speaker"),
     };
     let speaker = videos.first().map(|video| video.speaker.clone()).unwrap_or_default();
-    let others: Vec<&Known> = all.iter().filter(|k| !videos.contains(k)).collect();
+    let others: Vec<&KnownVideo> = all.iter().filter(|k| !videos.contains(k)).collect();
     let removal = Removal::of_work(work, &speaker, &videos, &others, whole)?;
     let mut advice: Vec<String> = Vec::new();
     for video in &videos {
@@ -152,7 +152,7 @@ fn of_project(args: &Args) -> Result<(Task, Option<File>)> {
 }
 
 /// What keeps the next run from bringing the videos back; nothing, where it would not.
-fn how_to_keep_away(config: &Config, speaker: &str, gone: &[&Known], whole: bool) -> Option<String> {
+fn how_to_keep_away(config: &Config, speaker: &str, gone: &[&KnownVideo], whole: bool) -> Option<String> {
     let named =
         videos::of(config).into_iter().filter(|videos| videos.speaker == speaker).flat_map(|videos| videos.units);
     let back: Vec<PathBuf> =

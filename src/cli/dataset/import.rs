@@ -5,9 +5,9 @@ use crate::cli::ui::Ui;
 use anyhow::{Result, ensure};
 use clap::ValueEnum;
 use orator::config;
-use orator::dataset::import::plan::Line;
-use orator::dataset::import::plan::Plan;
-use orator::dataset::import::take::Limits;
+use orator::dataset::import::plan::ImportOutcome;
+use orator::dataset::import::plan::ImportPlan;
+use orator::dataset::import::take::TakeLimits;
 use orator::dataset::import::write::rate_of;
 use orator::dataset::import::{Imported, import};
 use orator::dataset::info::About;
@@ -103,7 +103,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     close(&imported?, &args.out, ui)
 }
 
-fn plan(args: &Args) -> Result<Plan> {
+fn plan(args: &Args) -> Result<ImportPlan> {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     let name = &args.speaker;
     ensure!(!name.is_empty() && name.chars().all(plain), "--speaker {name:?}: expected letters, digits, - and _");
@@ -118,7 +118,7 @@ fn plan(args: &Args) -> Result<Plan> {
         None => rate_of(&args.sources).unwrap_or(FrameRate::new(15, 1)),
     };
     let (licence, consent, source) = (args.licence.clone(), args.consent.clone(), args.source.clone());
-    Ok(Plan {
+    Ok(ImportPlan {
         sources: args.sources.clone(),
         kind: match args.kind {
             Kind::Auto => None,
@@ -128,7 +128,7 @@ fn plan(args: &Args) -> Result<Plan> {
             Kind::Shards => Some(Found::Shards),
         },
         about: About { licence, consent, source, ..About::new(name, fps) },
-        limits: Limits { fps, min_frames: args.min_frames.max(1), max_apart_secs: args.max_apart },
+        limits: TakeLimits { fps, min_frames: args.min_frames.max(1), max_apart_secs: args.max_apart },
         shard: config::Shard { validation: args.validation, test: args.test, ..config::Shard::default() },
     })
 }
@@ -152,8 +152,8 @@ fn close(imported: &Imported, out: &Path, ui: &Ui) -> Result<Outcome> {
     Ok(if failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
 }
 
-fn said(line: &Line) -> String {
-    let Line { file, ended, reason, says, .. } = line;
+fn said(line: &ImportOutcome) -> String {
+    let ImportOutcome { file, ended, reason, says, .. } = line;
     match *ended {
         "kept" => format!("kept     {file}: {says}"),
         "failed" => format!("failed   {file}: {says}"),

@@ -4,7 +4,7 @@ use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Result, bail};
 use orator::evaluate::table::compare;
-use orator::evaluate::table::result::Stored;
+use orator::evaluate::table::result::StoredResult;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -23,7 +23,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
-    let compared = compare::compare(&Stored::read(&args.a)?, &Stored::read(&args.b)?);
+    let compared = compare::compare(&StoredResult::read(&args.a)?, &StoredResult::read(&args.b)?);
     let is_refused = !compared.refused.is_empty();
     if compared.beside.is_empty() && !is_refused {
         bail!("{} and {} have no metric in common", args.a.display(), args.b.display());

@@ -8,7 +8,7 @@ use orator::dataset::{Dataset, Split};
 use orator::evaluate::baseline::baselines;
 use orator::evaluate::baseline::baselines::Predictor;
 use orator::evaluate::clips::clips;
-use orator::evaluate::clips::clips::Clips;
+use orator::evaluate::clips::clips::EvalClips;
 use orator::evaluate::clips::{of_speaker, pairs};
 use orator::evaluate::table::result;
 use orator::evaluate::table::table;
@@ -154,7 +154,7 @@ fn title(args: &MotionArgs) -> String {
 }
 
 /// What is measured, from files or from a dataset.
-fn material(args: &MotionArgs, task: &dyn Task) -> Result<(Clips, Vec<Predictor>)> {
+fn material(args: &MotionArgs, task: &dyn Task) -> Result<(EvalClips, Vec<Predictor>)> {
     if let (Some(dataset), Some(checkpoint)) = (&args.dataset, &args.checkpoint) {
         let made = of_speaker::material(&Dataset::open(dataset)?, &Speaker::open(checkpoint)?, args.split, task)?;
         return Ok((made.clips, made.predictors));

@@ -8,8 +8,8 @@ use super::verb::{Args, checkpoint_at};
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, ensure};
-use orator::animate::Options;
-use orator::animate::export::file::Format;
+use orator::animate::AnimationOptions;
+use orator::animate::export::file::ExportFormat;
 use orator::external::ffmpeg::probe;
 use orator::generate::Speaker;
 use orator::stage::fingerprint::{Fingerprint, HashCache, hash_file};
@@ -38,7 +38,7 @@ enum Ended {
 /// Everything the rows share.
 struct Batch<'a> {
     folder: &'a Path,
-    formats: Vec<(String, Format)>,
+    formats: Vec<(String, ExportFormat)>,
     checkpoint: Option<PathBuf>,
     speakers: BTreeMap<PathBuf, Rc<Speaker>>,
     hashes: HashCache,
@@ -97,11 +97,11 @@ fn stated_secs(path: &Path) -> u64 {
 }
 
 /// The formats by their endings.
-fn formats(endings: &[String]) -> Result<Vec<(String, Format)>> {
-    let mut formats: Vec<(String, Format)> = Vec::new();
+fn formats(endings: &[String]) -> Result<Vec<(String, ExportFormat)>> {
+    let mut formats: Vec<(String, ExportFormat)> = Vec::new();
     for ending in endings {
         let ending = ending.trim().trim_start_matches('.').to_lowercase();
-        let format = Format::of(Path::new(&format!("motion.{ending}"))).context("--format")?;
+        let format = ExportFormat::from_path(Path::new(&format!("motion.{ending}"))).context("--format")?;
         ensure!(formats.iter().all(|(known, _)| *known != ending), "--format names {ending} twice");
         formats.push((ending, format));
     }
@@ -125,7 +125,7 @@ impl Batch<'_> {
         let now = Fingerprint {
             stage: "generate".to_owned(),
             version: VERSION,
-            settings: json!({ "formats": endings, "animation": format!("{:?}", Options::default()) }),
+            settings: json!({ "formats": endings, "animation": format!("{:?}", AnimationOptions::default()) }),
             inputs: BTreeMap::from([
                 ("sound".to_owned(), self.hashes.hash(&row.audio)?),
                 ("checkpoint".to_owned(), self.hashes.hash(&checkpoint)?),
@@ -139,7 +139,7 @@ impl Batch<'_> {
         }
         let speaker = self.speaker(&checkpoint)?;
         let file = |ending: &str| format!("{}.{ending}", row.name);
-        let outputs: Vec<(PathBuf, Format)> =
+        let outputs: Vec<(PathBuf, ExportFormat)> =
             self.formats.iter().map(|(ending, format)| (self.folder.join(file(ending)), *format)).collect();
         let is_itself =
             |path: &PathBuf| path.canonicalize().is_ok_and(|p| row.audio.canonicalize().is_ok_and(|a| a == p));

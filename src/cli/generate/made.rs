@@ -2,8 +2,8 @@
 //! holds the sound, reads it whole.
 
 use anyhow::{Context as _, Result, bail, ensure};
-use orator::animate::export::file::{Format, Sources};
-use orator::animate::{Options, perform};
+use orator::animate::export::file::{ExportContent, ExportFormat};
+use orator::animate::{AnimationOptions, perform};
 use orator::audio::mel;
 use orator::external::ffmpeg::sound_stream;
 use orator::external::ffmpeg::sound_stream::SoundStream;
@@ -25,7 +25,12 @@ pub struct Made {
 }
 
 /// Makes the motion of `speaker` for the sound of `audio` and writes it to `outputs`. Errors name the sound.
-pub fn make(speaker: &Speaker, audio: &Path, outputs: &[(PathBuf, Format)], progress: &dyn Progress) -> Result<Made> {
+pub fn make(
+    speaker: &Speaker,
+    audio: &Path,
+    outputs: &[(PathBuf, ExportFormat)],
+    progress: &dyn Progress,
+) -> Result<Made> {
     let started = Instant::now();
     let task = progress.begin("speech to motion", 0);
     task.detail("listening");
@@ -47,11 +52,11 @@ pub fn make(speaker: &Speaker, audio: &Path, outputs: &[(PathBuf, Format)], prog
         format.write_joints(path, &motion)?;
     }
     if !figures.is_empty() {
-        let performance = perform(&motion, None, &Options::default());
+        let performance = perform(&motion, None, &AnimationOptions::default());
         drop(motion);
-        let is_film = figures.iter().any(|(_, format)| *format == Format::Mp4);
+        let is_film = figures.iter().any(|(_, format)| *format == ExportFormat::Mp4);
         let sound = if is_film { audio::read_mono(audio, SAMPLE_RATE)? } else { None };
-        let sources = Sources { sound: sound.as_ref(), ..Sources::default() };
+        let sources = ExportContent { sound: sound.as_ref(), ..ExportContent::default() };
         for (path, format) in figures {
             format.write(path, &performance, &sources, progress)?;
         }

@@ -2,7 +2,7 @@
 //! semicolons and tabs are understood too).
 
 use anyhow::{Context, Result, bail, ensure};
-use orator::animate::export::file::Format;
+use orator::animate::export::file::ExportFormat;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
@@ -107,7 +107,7 @@ fn parse(text: &str, folder: &Path) -> Result<Vec<Row>> {
 /// A motion's name as given: relative, below the folder of outputs, without the ending of a format.
 fn named(out: &str) -> Result<String> {
     let path = Path::new(out);
-    let path = if Format::of(path).is_ok() { path.with_extension("") } else { path.to_owned() };
+    let path = if ExportFormat::from_path(path).is_ok() { path.with_extension("") } else { path.to_owned() };
     let parts: Option<Vec<String>> = path
         .components()
         .filter(|part| *part != Component::CurDir)

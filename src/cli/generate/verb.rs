@@ -5,7 +5,7 @@ use super::{batch, made};
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, ensure};
-use orator::animate::export::file::Format;
+use orator::animate::export::file::ExportFormat;
 use orator::formats::checkpoint;
 use orator::generate::Speaker;
 use orator::stage::progress::Progress as _;
@@ -89,14 +89,14 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 }
 
 /// Output files with their formats; none may be the input or another output.
-fn outputs(out: &[PathBuf], audio: &Path) -> Result<Vec<(PathBuf, Format)>> {
+fn outputs(out: &[PathBuf], audio: &Path) -> Result<Vec<(PathBuf, ExportFormat)>> {
     let same = |a: &Path, b: &Path| a == b || a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
     for (n, path) in out.iter().enumerate() {
         ensure!(!same(path, audio), "{} is the speech itself; write to another file", path.display());
         ensure!(!out[..n].contains(path), "{} is asked for twice", path.display());
         ensure!(!path.is_dir(), "{} is a folder; name a file in it", path.display());
     }
-    out.iter().map(|path| Ok((path.clone(), Format::of(path)?))).collect()
+    out.iter().map(|path| Ok((path.clone(), ExportFormat::from_path(path)?))).collect()
 }
 
 /// The checkpoint file meant by a file or a training's folder.
@@ -116,8 +116,8 @@ pub(crate) fn checkpoint_at(path: &Path) -> Result<PathBuf> {
 }
 
 /// The same again as a film, or for an animation program; nothing when both are there.
-fn next_command(checkpoint: &Path, audio: &Path, outputs: &[(PathBuf, Format)]) -> Option<String> {
-    let missing = [(Format::Mp4, "mp4"), (Format::Bvh, "bvh")]
+fn next_command(checkpoint: &Path, audio: &Path, outputs: &[(PathBuf, ExportFormat)]) -> Option<String> {
+    let missing = [(ExportFormat::Mp4, "mp4"), (ExportFormat::Bvh, "bvh")]
         .into_iter()
         .find(|&(format, _)| outputs.iter().all(|&(_, written)| written != format));
     let (_, extension) = missing?;

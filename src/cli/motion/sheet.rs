@@ -5,12 +5,12 @@ use crate::cli::config_args::ConfigArgs;
 use crate::cli::pipeline::steps;
 use crate::cli::ui::Ui;
 use anyhow::{Result, bail, ensure};
-use orator::animate::{Options, perform};
+use orator::animate::{AnimationOptions, perform};
 use orator::external::opencv::png;
 use orator::formats::{joints_npz, keypoints_npz, npy};
 use orator::pipeline::lift::quality;
 use orator::pipeline::lift::quality::{ArmFigures, ClipFigures};
-use orator::report::sheet::sheet::Clip;
+use orator::report::sheet::sheet::SheetClip;
 use orator::stage::progress::Progress as _;
 use orator::stage::runner::place;
 use orator::stage::{Unit, workdir};
@@ -135,9 +135,9 @@ fn draw(files: &Files, every_secs: f64, figure: bool, ui: &Ui) -> Result<(Vec<Pa
     let (keypoints, notes) = keypoints_npz::read_noting(&files.keypoints)?;
     notes.iter().for_each(|note| ui.say(&format!("{}: {note}", files.keypoints.display())));
     let motion = read_motion(&files.joints, keypoints.fps)?;
-    let figure = figure.then(|| perform(&motion, None, &Options::default()).motion());
+    let figure = figure.then(|| perform(&motion, None, &AnimationOptions::default()).motion());
     let figure = figure.as_ref();
-    let clip = Clip { title: &files.title, video: &files.video, keypoints: &keypoints, motion: &motion, figure };
+    let clip = SheetClip { title: &files.title, video: &files.video, keypoints: &keypoints, motion: &motion, figure };
     let mut written = Vec::new();
     clip.pages(every_secs, ui, |number, n_pages, page| {
         let path = if n_pages == 1 { files.out.clone() } else { numbered(&files.out, number) };

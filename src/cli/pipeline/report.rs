@@ -6,7 +6,7 @@ use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator::report;
-use orator::report::Wanted;
+use orator::report::ReportRequest;
 use orator::report::html::numbers::{length, percent};
 use orator::stage::workdir;
 use serde_json::json;
@@ -35,7 +35,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let config = args.config.load()?;
     let videos = steps::speakers(&config, &args.speaker)?;
     let out = args.out.unwrap_or_else(|| config.settings.work.dir.join("report.html"));
-    let wanted = Wanted { settings: &config.settings, videos: &videos, n_pictures: args.pictures };
+    let wanted = ReportRequest { settings: &config.settings, videos: &videos, n_pictures: args.pictures };
     let made = report::make(&wanted, ui);
     workdir::write_file(&out, made.html.as_bytes())?;
     let (sums, mut facts) = (made.sums, made.facts);

@@ -2,7 +2,7 @@
 
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
-use orator::demo::drawn::figure::Figure;
+use orator::demo::drawn::figure::DrawnFigure;
 use orator::demo::drawn::gesture;
 use orator::demo::drawn::speech::Speech;
 use orator::demo::rule::dataset;
@@ -59,9 +59,9 @@ pub fn gather(args: &MotionArgs, ui: &Ui) -> Result<Corpus> {
 fn gestures(seed: u64) -> Motion {
     let mut dice = ChaCha8Rng::seed_from_u64(seed);
     let speech = Speech::new(CLIP_SECS, &mut dice);
-    let gestures = gesture::Gestures::new(&speech, &mut dice);
-    let figures: Vec<Figure> =
-        (0..FPS.frames_in(CLIP_SECS)).map(|t| Figure::new(&gestures.controls(FPS.secs(t)))).collect();
+    let gestures = gesture::DrawnGestures::new(&speech, &mut dice);
+    let figures: Vec<DrawnFigure> =
+        (0..FPS.frames_in(CLIP_SECS)).map(|t| DrawnFigure::new(&gestures.controls(FPS.secs(t)))).collect();
     let joints = ndarray::Array3::from_shape_fn((figures.len(), N_JOINTS, 3), |(t, joint, k)| {
         vec3::sub(figures[t].joints[joint], figures[t].joints[NECK])[k] as f32
     });

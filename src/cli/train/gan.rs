@@ -8,10 +8,10 @@ use orator::config::Config;
 use orator::dataset::{Dataset, Split};
 use orator::evaluate::baseline::predictor;
 use orator::evaluate::clips::held_out;
-use orator::evaluate::clips::held_out::HeldOut;
+use orator::evaluate::clips::held_out::HeldOutInterval;
 use orator::generate::Speaker;
 use orator::report::training::page;
-use orator::report::training::strip::Pair;
+use orator::report::training::strip::HeldOutPair;
 use orator::stage::progress::Progress as _;
 use orator::train::gan::score::{Figures, Validation};
 use orator::train::gan::train;
@@ -136,19 +136,19 @@ fn page(dataset: &Dataset, best: &Path, folder: &Path, ui: &Ui) -> Option<PathBu
 }
 
 /// True and generated poses of a few intervals that were not trained on; of the training split where there are no others.
-fn pairs(dataset: &Dataset, speaker: &Speaker) -> Result<Vec<Pair>> {
+fn pairs(dataset: &Dataset, speaker: &Speaker) -> Result<Vec<HeldOutPair>> {
     let splits = [Split::Validation, Split::Train].map(|split| dataset.samples(split));
     let samples = splits.into_iter().find(|samples| !samples.is_empty()).unwrap_or_default();
     let n = samples.len().min(N_PAIRS);
     let chosen: Vec<_> = (0..n).map(|i| samples[i * samples.len() / n].clone()).collect();
     let intervals = held_out::read(dataset, &chosen, &speaker.facts().normalisation)?;
-    let pair = |interval: HeldOut| {
+    let pair = |interval: HeldOutInterval| {
         let n_frames = interval.real.n_frames();
         let span = ((PAIR_SECS * speaker.fps().per_sec()) as usize).min(n_frames);
         let first = (n_frames - span) / 2;
-        let HeldOut { key, real, sound } = interval.cut(first..first + span);
+        let HeldOutInterval { key, real, sound } = interval.cut(first..first + span);
         let made = predictor::motion(speaker, &sound, span)?;
-        Ok(Pair { name: key, start_secs: speaker.fps().secs(first), real, made })
+        Ok(HeldOutPair { name: key, start_secs: speaker.fps().secs(first), real, made })
     };
     intervals.into_iter().map(pair).collect()
 }

@@ -2,12 +2,12 @@
 //! said of the forgotten ones in them is taken out, the rest is put together again, and the new folder takes the old
 //! one's place.
 
-use crate::dataset::info::Info;
+use crate::dataset::info::DatasetInfo;
 use crate::dataset::leakage::Leakage;
 use crate::dataset::split::SplitBy;
 use crate::dataset::write::assemble::assemble;
 use crate::dataset::write::part;
-use crate::dataset::write::part::Part;
+use crate::dataset::write::part::VideoEntry;
 use crate::dataset::{INFO, LEAKAGE};
 use crate::stage::workdir;
 use anyhow::{Context, Result, ensure};
@@ -19,7 +19,7 @@ const FORGOTTEN: &str = "a video that was forgotten";
 
 /// Whether the video of this name has samples in the dataset; one whose file is damaged may have.
 pub fn has_samples(dir: &Path, name: &str) -> bool {
-    Part::read(&Part::path(dir, name)).map_or(true, |part| !part.samples.is_empty())
+    VideoEntry::read(&VideoEntry::path(dir, name)).map_or(true, |part| !part.samples.is_empty())
 }
 
 /// Whether what stays of `dir` without the videos `names` is as it was written: putting it together again would give
@@ -33,7 +33,7 @@ pub fn ensure_sound_without(dir: &Path, names: &BTreeSet<String>) -> Result<()> 
     }
     let stated = part::stated_hashes(dir);
     for name in part::names(dir)?.into_iter().filter(|name| !names.contains(name)) {
-        let is_sound = Part::read(&Part::path(dir, &name)).is_ok_and(|part| part.is_sound(dir, &stated));
+        let is_sound = VideoEntry::read(&VideoEntry::path(dir, &name)).is_ok_and(|part| part.is_sound(dir, &stated));
         ensure!(
             is_sound,
             "{name}, which stays, is damaged in the dataset {}: nothing was removed. Make it anew with `orator run` \
@@ -61,17 +61,17 @@ pub fn without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
     }
     let attempt = workdir::attempt_folder(dir)?;
     let made = || -> Result<()> {
-        let info: Info = read_json(dir, INFO)?;
+        let info: DatasetInfo = read_json(dir, INFO)?;
         let leakage: Leakage = read_json(dir, LEAKAGE)?;
         let mut compared = leakage.compared();
         compared.shared.retain(|shared| !names.contains(&shared.a) && !names.contains(&shared.b));
         for name in &left {
-            let part = Part::read(&Part::path(dir, name))?;
+            let part = VideoEntry::read(&VideoEntry::path(dir, name))?;
             let silent = silenced(&part, names);
             part.take_over(dir, &attempt)?;
             if silent != part {
                 // a new file: the old one is linked into the old dataset
-                workdir::write_file(&Part::path(&attempt, name), &pretty(&silent)?)?;
+                workdir::write_file(&VideoEntry::path(&attempt, name), &pretty(&silent)?)?;
             }
         }
         assemble(&attempt, &info.about(), &compared)?;
@@ -85,7 +85,7 @@ pub fn without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
 }
 
 /// The part without the names of the forgotten.
-fn silenced(part: &Part, names: &BTreeSet<String>) -> Part {
+fn silenced(part: &VideoEntry, names: &BTreeSet<String>) -> VideoEntry {
     let mut part = part.clone();
     if matches!(&part.split_by, SplitBy::SoundOf(other) if names.contains(other)) {
         // it stays where it is
@@ -97,7 +97,7 @@ fn silenced(part: &Part, names: &BTreeSet<String>) -> Part {
     part
 }
 
-fn pretty(part: &Part) -> Result<Vec<u8>> {
+fn pretty(part: &VideoEntry) -> Result<Vec<u8>> {
     let mut bytes = serde_json::to_vec_pretty(part)?;
     bytes.push(b'\n');
     Ok(bytes)

@@ -3,7 +3,7 @@
 
 use crate::config::{Config, videos};
 use crate::dataset::write::part;
-use crate::dataset::write::part::Part;
+use crate::dataset::write::part::VideoEntry;
 use crate::stage::fingerprint::hash_file;
 use crate::stage::record::Record;
 use anyhow::{Result, bail, ensure};
@@ -15,7 +15,7 @@ pub const STAGES: [&str; 4] = ["extract", "pose2d", "segment", "lift"];
 
 /// A video and the names it goes by.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Known {
+pub struct KnownVideo {
     pub speaker: String,
     /// Its work name; `None`: only a dataset knows it.
     pub work: Option<String>,
@@ -29,7 +29,7 @@ pub struct Known {
     pub parts: BTreeSet<String>,
 }
 
-impl Known {
+impl KnownVideo {
     /// For people.
     pub fn title(&self) -> String {
         let name = self.work.as_ref().or(self.parts.first()).cloned().unwrap_or_else(|| self.file.clone());
@@ -56,16 +56,16 @@ impl Known {
 ///
 /// # Errors
 /// A folder that cannot be listed.
-pub fn of_project(config: &Config) -> Result<Vec<Known>> {
+pub fn of_project(config: &Config) -> Result<Vec<KnownVideo>> {
     let work = &config.settings.work.dir;
     let mut all = config.clone();
     all.settings.speaker.iter_mut().for_each(|speaker| speaker.exclude.clear());
-    let mut known: Vec<Known> = Vec::new();
+    let mut known: Vec<KnownVideo> = Vec::new();
     for unit in videos::of(&all).into_iter().flat_map(|videos| videos.units) {
         let content = content(work, &unit.speaker, &unit.video);
         let file = unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let (speaker, work, source) = (unit.speaker, Some(unit.video), Some(unit.source));
-        known.push(Known { speaker, work, source, content, file, parts: BTreeSet::new() });
+        known.push(KnownVideo { speaker, work, source, content, file, parts: BTreeSet::new() });
     }
     for stage in STAGES {
         for speaker in folders(&work.join(stage)) {
@@ -73,7 +73,12 @@ pub fn of_project(config: &Config) -> Result<Vec<Known>> {
                 let there = known.iter().any(|k| k.speaker == speaker && k.work.as_ref() == Some(&video));
                 if !there {
                     let content = content(work, &speaker, &video);
-                    known.push(Known { speaker: speaker.clone(), work: Some(video), content, ..Known::default() });
+                    known.push(KnownVideo {
+                        speaker: speaker.clone(),
+                        work: Some(video),
+                        content,
+                        ..KnownVideo::default()
+                    });
                 }
             }
         }
@@ -89,7 +94,7 @@ pub fn of_project(config: &Config) -> Result<Vec<Known>> {
 ///
 /// # Errors
 /// No dataset is there.
-pub fn of_dataset(dir: &Path) -> Result<Vec<Known>> {
+pub fn of_dataset(dir: &Path) -> Result<Vec<KnownVideo>> {
     ensure!(dir.join(part::FOLDER).is_dir(), "{} is no dataset: it has no folder {}", dir.display(), part::FOLDER);
     let mut known = Vec::new();
     add_dataset(dir, "", &mut known)?;
@@ -97,15 +102,15 @@ pub fn of_dataset(dir: &Path) -> Result<Vec<Known>> {
 }
 
 /// A video of a dataset is the known one with its content, or with its name.
-fn add_dataset(dir: &Path, speaker: &str, known: &mut Vec<Known>) -> Result<()> {
+fn add_dataset(dir: &Path, speaker: &str, known: &mut Vec<KnownVideo>) -> Result<()> {
     if !dir.join(part::FOLDER).is_dir() {
         return Ok(());
     }
     for name in part::names(dir)? {
         // a damaged file still has a name to be forgotten by
-        let part = Part::read(&Part::path(dir, &name)).ok();
+        let part = VideoEntry::read(&VideoEntry::path(dir, &name)).ok();
         let (content, file) = part.map(|part| (part.content, part.file)).unwrap_or_default();
-        let own = |k: &&mut Known| k.speaker == speaker && k.work.is_some();
+        let own = |k: &&mut KnownVideo| k.speaker == speaker && k.work.is_some();
         let called = known.iter_mut().filter(own).find(|k| k.work.as_ref() == Some(&name));
         let called = called.map(|k| k.parts.insert(name.clone()));
         if called.is_some() {
@@ -115,7 +120,7 @@ fn add_dataset(dir: &Path, speaker: &str, known: &mut Vec<Known>) -> Result<()> 
         for k in known.iter_mut().filter(own).filter(|k| k.content.is_none() && k.file == file) {
             k.content = k.source.as_ref().and_then(|source| hash_file(source).ok());
         }
-        let same = |k: &Known| {
+        let same = |k: &KnownVideo| {
             k.speaker == speaker && k.work.is_some() && !content.is_empty() && k.content.as_ref() == Some(&content)
         };
         let exact = known.iter().position(|k| same(k) && k.file == file);
@@ -127,7 +132,7 @@ fn add_dataset(dir: &Path, speaker: &str, known: &mut Vec<Known>) -> Result<()> 
             None => {
                 let content = Some(content).filter(|content| !content.is_empty());
                 let (speaker, parts) = (speaker.to_owned(), [name].into());
-                known.push(Known { speaker, work: None, source: None, content, file, parts });
+                known.push(KnownVideo { speaker, work: None, source: None, content, file, parts });
             }
         }
     }
@@ -164,16 +169,16 @@ fn entries(dir: &Path) -> BTreeSet<String> {
 ///
 /// # Errors
 /// None, or several; the message lists them.
-pub fn one<'a>(known: &'a [Known], wanted: &str, speaker: Option<&str>) -> Result<&'a Known> {
-    let all: Vec<&Known> = known.iter().filter(|k| speaker.is_none_or(|speaker| k.speaker == speaker)).collect();
-    let list = |videos: &[&Known]| {
-        let line = |k: &&Known| match &k.source {
+pub fn one<'a>(known: &'a [KnownVideo], wanted: &str, speaker: Option<&str>) -> Result<&'a KnownVideo> {
+    let all: Vec<&KnownVideo> = known.iter().filter(|k| speaker.is_none_or(|speaker| k.speaker == speaker)).collect();
+    let list = |videos: &[&KnownVideo]| {
+        let line = |k: &&KnownVideo| match &k.source {
             Some(source) => format!("\n  {}  {}", k.title(), source.display()),
             None => format!("\n  {}  {}", k.title(), k.file),
         };
         videos.iter().map(line).collect::<String>()
     };
-    let called: Vec<&Known> = all.iter().copied().filter(|k| k.is_called(wanted)).collect();
+    let called: Vec<&KnownVideo> = all.iter().copied().filter(|k| k.is_called(wanted)).collect();
     match called.as_slice() {
         [one] => Ok(one),
         [] => bail!("no video is called {wanted}; there are:{}", list(&all)),
@@ -185,8 +190,8 @@ pub fn one<'a>(known: &'a [Known], wanted: &str, speaker: Option<&str>) -> Resul
 ///
 /// # Errors
 /// Nobody is called so; the message lists the speakers.
-pub fn of_speaker<'a>(known: &'a [Known], speaker: &str) -> Result<Vec<&'a Known>> {
-    let own: Vec<&Known> = known.iter().filter(|k| k.speaker == speaker).collect();
+pub fn of_speaker<'a>(known: &'a [KnownVideo], speaker: &str) -> Result<Vec<&'a KnownVideo>> {
+    let own: Vec<&KnownVideo> = known.iter().filter(|k| k.speaker == speaker).collect();
     let names: BTreeSet<&str> = known.iter().map(|k| k.speaker.as_str()).collect();
     let names = names.into_iter().collect::<Vec<_>>().join(", ");
     ensure!(!own.is_empty(), "no speaker is called {speaker}; there are: {names}");

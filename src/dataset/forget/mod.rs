@@ -9,5 +9,5 @@ pub mod known;
 pub mod removal;
 pub mod search;
 
-pub use known::Known;
+pub use known::KnownVideo;
 pub use removal::Removal;

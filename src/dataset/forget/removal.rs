@@ -3,8 +3,8 @@
 //! in one step. A kill anywhere leaves something that a second run finishes.
 
 use super::dataset;
-use super::known::{Known, STAGES};
-use super::search::Mark;
+use super::known::{KnownVideo, STAGES};
+use super::search::SearchTerm;
 use crate::stage::fingerprint::hash_file;
 use crate::stage::{record, workdir};
 use anyhow::{Context, Result};
@@ -28,7 +28,7 @@ pub struct Removal {
     /// The table of known hashes, and how many of its entries go.
     pub hashes: Option<(PathBuf, usize)>,
     /// What the videos are known by.
-    pub marks: Vec<Mark>,
+    pub marks: Vec<SearchTerm>,
 }
 
 impl Removal {
@@ -36,7 +36,13 @@ impl Removal {
     ///
     /// # Errors
     /// A folder that cannot be listed.
-    pub fn of_work(work: &Path, speaker: &str, videos: &[&Known], others: &[&Known], whole: bool) -> Result<Self> {
+    pub fn of_work(
+        work: &Path,
+        speaker: &str,
+        videos: &[&KnownVideo],
+        others: &[&KnownVideo],
+        whole: bool,
+    ) -> Result<Self> {
         let mut removal = Self { speaker: speaker.to_owned(), marks: marks(videos, others), ..Self::default() };
         for stage in STAGES.into_iter().chain(["sheets"]) {
             let folder = work.join(stage).join(speaker);
@@ -75,7 +81,7 @@ impl Removal {
     }
 
     /// What is there of `videos` in a dataset's folder without a work folder.
-    pub fn of_dataset(dir: &Path, videos: &[&Known], others: &[&Known]) -> Self {
+    pub fn of_dataset(dir: &Path, videos: &[&KnownVideo], others: &[&KnownVideo]) -> Self {
         let names = videos.iter().flat_map(|video| video.parts.iter().cloned()).collect();
         let paths = workdir::left_over(dir);
         Self { dataset: Some((dir.to_owned(), names)), marks: marks(videos, others), paths, ..Self::default() }
@@ -190,21 +196,21 @@ fn remove(path: &Path) -> Result<()> {
 }
 
 /// The names and hashes of `videos` that no other video shares.
-fn marks(videos: &[&Known], others: &[&Known]) -> Vec<Mark> {
-    let mut marks: Vec<Mark> = Vec::new();
+fn marks(videos: &[&KnownVideo], others: &[&KnownVideo]) -> Vec<SearchTerm> {
+    let mut marks: Vec<SearchTerm> = Vec::new();
     for video in videos {
-        marks.extend(video.work.iter().map(|name| Mark::name("work name", name)));
-        marks.extend(video.parts.iter().map(|name| Mark::name("dataset name", name)));
+        marks.extend(video.work.iter().map(|name| SearchTerm::name("work name", name)));
+        marks.extend(video.parts.iter().map(|name| SearchTerm::name("dataset name", name)));
         if !video.file.is_empty() && others.iter().all(|other| other.file != video.file) {
-            marks.push(Mark::name("file name", &video.file));
+            marks.push(SearchTerm::name("file name", &video.file));
         }
         let source = video.source.as_ref().map(|source| source.to_string_lossy().into_owned());
-        marks.extend(source.iter().map(|path| Mark::name("path", path)));
+        marks.extend(source.iter().map(|path| SearchTerm::name("path", path)));
         let hashed = || video.source.as_ref().and_then(|source| hash_file(source).ok());
         let content = video.content.clone().or_else(hashed);
         if let Some(content) = content.filter(|c| others.iter().all(|other| other.content.as_ref() != Some(c))) {
-            marks.extend(Mark::hash("content hash", &content));
-            marks.extend(content.get(..8).map(|key| Mark::hash("key", key)).into_iter().flatten());
+            marks.extend(SearchTerm::hash("content hash", &content));
+            marks.extend(content.get(..8).map(|key| SearchTerm::hash("key", key)).into_iter().flatten());
         }
     }
     marks

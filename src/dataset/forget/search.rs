@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// Something that must not be found.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Mark {
+pub struct SearchTerm {
     /// What it is, for people.
     pub what: String,
     pub bytes: Vec<u8>,
@@ -16,7 +16,7 @@ pub struct Mark {
     pub whole: bool,
 }
 
-impl Mark {
+impl SearchTerm {
     /// A name, found only as a whole.
     pub fn name(what: &str, name: &str) -> Self {
         Self { what: format!("{what} {name}"), bytes: name.as_bytes().to_vec(), whole: true }
@@ -37,7 +37,7 @@ impl Mark {
 
 /// A place where a mark was found.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct SearchHit {
     /// The file, with the archive's entry behind a `!`.
     pub file: String,
     /// `None`: in the name.
@@ -52,7 +52,7 @@ pub struct Searched {
     /// Of the files, and of what was inside archives.
     pub bytes: u64,
     pub inside_bytes: u64,
-    pub places: Vec<Place>,
+    pub places: Vec<SearchHit>,
 }
 
 /// Bytes read at a time.
@@ -62,9 +62,9 @@ const PIECE: usize = 1 << 20;
 ///
 /// # Errors
 /// A file that cannot be read: what was not searched proves nothing.
-pub fn search(folders: &[PathBuf], marks: &[Mark]) -> Result<Searched> {
+pub fn search(folders: &[PathBuf], marks: &[SearchTerm]) -> Result<Searched> {
     let mut searched = Searched::default();
-    let marks: Vec<&Mark> = marks.iter().filter(|mark| mark.bytes.len() >= 2).collect();
+    let marks: Vec<&SearchTerm> = marks.iter().filter(|mark| mark.bytes.len() >= 2).collect();
     for folder in folders {
         walk(folder, folder, &marks, &mut searched)?;
     }
@@ -72,14 +72,14 @@ pub fn search(folders: &[PathBuf], marks: &[Mark]) -> Result<Searched> {
 }
 
 /// Whether one of the marks is in the bytes.
-pub fn is_in(bytes: &[u8], marks: &[Mark]) -> bool {
-    let marks: Vec<&Mark> = marks.iter().filter(|mark| mark.bytes.len() >= 2).collect();
+pub fn is_in(bytes: &[u8], marks: &[SearchTerm]) -> bool {
+    let marks: Vec<&SearchTerm> = marks.iter().filter(|mark| mark.bytes.len() >= 2).collect();
     let mut scan = Scan::new(&marks);
     scan.piece(bytes);
     !scan.found.is_empty()
 }
 
-fn walk(root: &Path, path: &Path, marks: &[&Mark], searched: &mut Searched) -> Result<()> {
+fn walk(root: &Path, path: &Path, marks: &[&SearchTerm], searched: &mut Searched) -> Result<()> {
     let reading = || format!("cannot search {}", path.display());
     if !path.exists() && !path.is_symlink() {
         return Ok(());
@@ -88,7 +88,8 @@ fn walk(root: &Path, path: &Path, marks: &[&Mark], searched: &mut Searched) -> R
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut scan = Scan::new(marks);
         scan.piece(name.as_bytes());
-        let found = scan.found.into_iter().map(|(_, what)| Place { file: path.display().to_string(), at: None, what });
+        let found =
+            scan.found.into_iter().map(|(_, what)| SearchHit { file: path.display().to_string(), at: None, what });
         searched.places.extend(found);
     }
     if path.is_dir() && !path.is_symlink() {
@@ -100,7 +101,7 @@ fn walk(root: &Path, path: &Path, marks: &[&Mark], searched: &mut Searched) -> R
     searched.n_files += 1;
     let (bytes, found) = scan(File::open(path).with_context(reading)?, marks).with_context(reading)?;
     searched.bytes += bytes;
-    let place = |file: &str, (at, what)| Place { file: file.to_owned(), at: Some(at), what };
+    let place = |file: &str, (at, what)| SearchHit { file: file.to_owned(), at: Some(at), what };
     let file = path.display().to_string();
     searched.places.extend(found.into_iter().map(|found| place(&file, found)));
     if path.extension().is_some_and(|ending| ending == "npz" || ending == "zip") {
@@ -118,7 +119,7 @@ fn walk(root: &Path, path: &Path, marks: &[&Mark], searched: &mut Searched) -> R
 }
 
 /// The bytes read, and the offset and description of each mark found.
-fn scan(mut from: impl Read, marks: &[&Mark]) -> Result<(u64, Vec<(u64, String)>)> {
+fn scan(mut from: impl Read, marks: &[&SearchTerm]) -> Result<(u64, Vec<(u64, String)>)> {
     let mut scan = Scan::new(marks);
     let mut piece = vec![0; PIECE];
     loop {
@@ -135,7 +136,7 @@ fn scan(mut from: impl Read, marks: &[&Mark]) -> Result<(u64, Vec<(u64, String)>
 
 /// A search through bytes that come in pieces.
 struct Scan<'a> {
-    marks: &'a [&'a Mark],
+    marks: &'a [&'a SearchTerm],
     /// Whether a mark begins with these two bytes.
     begins: Vec<bool>,
     longest: usize,
@@ -147,7 +148,7 @@ struct Scan<'a> {
 }
 
 impl<'a> Scan<'a> {
-    fn new(marks: &'a [&'a Mark]) -> Self {
+    fn new(marks: &'a [&'a SearchTerm]) -> Self {
         let mut begins = vec![false; 1 << 16];
         marks.iter().for_each(|mark| begins[pair(&mark.bytes)] = true);
         let longest = marks.iter().map(|mark| mark.bytes.len()).max().unwrap_or(0);
@@ -193,9 +194,9 @@ mod tests {
     use super::*;
     use std::io::Write as _;
 
-    fn marks() -> Vec<Mark> {
+    fn marks() -> Vec<SearchTerm> {
         let hash = blake3::hash(b"a").to_hex().to_string();
-        [vec![Mark::name("file", "a.mp4")], Mark::hash("content", &hash)].concat()
+        [vec![SearchTerm::name("file", "a.mp4")], SearchTerm::hash("content", &hash)].concat()
     }
 
     #[test]
@@ -226,7 +227,7 @@ mod tests {
     #[test]
     fn a_mark_across_two_pieces_is_found_once() {
         let marks = marks();
-        let marks: Vec<&Mark> = marks.iter().collect();
+        let marks: Vec<&SearchTerm> = marks.iter().collect();
         let text: Vec<u8> = [&[b' '; 300][..], b"a.mp4", &[b' '; 300]].concat();
         for step in [1, 2, 3, 7, 64, 305, 1000] {
             let mut scan = Scan::new(&marks);

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// A motion file with what belongs to it.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Found {
+pub struct TakeFiles {
     pub kind: Kind,
     pub motion: PathBuf,
     pub sound: Option<PathBuf>,
@@ -21,9 +21,9 @@ pub struct Found {
 
 /// What the sources hold.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Sources {
+pub struct ImportSources {
     /// In the order of their paths.
-    pub takes: Vec<Found>,
+    pub takes: Vec<TakeFiles>,
     /// Folders of datasets of ours.
     pub datasets: Vec<PathBuf>,
     /// Tar files elsewhere, and why each of the other files that look like motion was left out.
@@ -41,8 +41,8 @@ const TRANSCRIPT_FOLDERS: [&str; 8] = ["tsv", "transcript", "transcripts", "text
 ///
 /// # Errors
 /// A source that is not there, or sources in which nothing is motion.
-pub fn find(sources: &[PathBuf], only: Option<Kind>) -> Result<Sources> {
-    let (mut files, mut found) = (Vec::new(), Sources::default());
+pub fn find(sources: &[PathBuf], only: Option<Kind>) -> Result<ImportSources> {
+    let (mut files, mut found) = (Vec::new(), ImportSources::default());
     for source in sources {
         ensure!(source.exists(), "{} is not there", source.display());
         walk(source, &mut files, &mut found.datasets)
@@ -122,14 +122,14 @@ fn has_147_numbers(path: &Path) -> bool {
     read.is_ok() && line.split_whitespace().count() == 147 && line.split_whitespace().all(|w| w.parse::<f64>().is_ok())
 }
 
-fn with_company(kind: Kind, motion: PathBuf) -> Found {
+fn with_company(kind: Kind, motion: PathBuf) -> TakeFiles {
     let stem = motion.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut stems = vec![stem.as_str()];
     // gt_interval_3821.txt is said in 3821.wav
     stems.extend(["gt_interval_", "prediction_interval_"].iter().filter_map(|prefix| stem.strip_prefix(prefix)));
     let sound = beside(&motion, &stems, &SOUND, &SOUND_FOLDERS);
     let transcript = beside(&motion, &stems, &TRANSCRIPT, &TRANSCRIPT_FOLDERS);
-    Found { kind, sound, transcript, motion }
+    TakeFiles { kind, sound, transcript, motion }
 }
 
 /// The file of one of these names and endings in the motion's own folder, or in a folder of those names beside it.
@@ -181,7 +181,7 @@ mod tests {
         let broken = file("d.npz", "no zip");
         let tar = file("train-000.tar", "");
         let found = find(&[dir.path().to_owned()], None).unwrap();
-        let take = |kind, motion: &PathBuf, sound: Option<PathBuf>, transcript: Option<PathBuf>| Found {
+        let take = |kind, motion: &PathBuf, sound: Option<PathBuf>, transcript: Option<PathBuf>| TakeFiles {
             kind,
             motion: motion.clone(),
             sound,

@@ -13,7 +13,7 @@ pub mod take;
 pub mod transcript;
 pub mod write;
 
-pub use super::import::plan::Plan;
-pub use take::Take;
+pub use super::import::plan::ImportPlan;
+pub use take::ImportedTake;
 pub use write::Imported;
 pub use write::import;

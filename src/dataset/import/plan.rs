@@ -1,7 +1,7 @@
 //! What an import is asked for, and what became of each take.
 
 use crate::config;
-use crate::dataset::import::take::Limits;
+use crate::dataset::import::take::TakeLimits;
 use crate::dataset::info::About;
 use crate::mocap::captured::Kind;
 use serde::Serialize;
@@ -9,20 +9,20 @@ use std::path::PathBuf;
 
 /// What is wanted.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct ImportPlan {
     pub sources: Vec<PathBuf>,
     /// Only sources of this kind; `None`: of every kind.
     pub kind: Option<Kind>,
     /// The dataset; `about.fps` and `limits.fps` agree.
     pub about: About,
-    pub limits: Limits,
+    pub limits: TakeLimits,
     /// Shares of the splits, seconds of shared sound, size of shards.
     pub shard: config::Shard,
 }
 
 /// What became of a take, or of a video of other shards.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Line {
+pub struct ImportOutcome {
     pub file: String,
     /// `kept`, `refused` or `failed`.
     pub ended: &'static str,

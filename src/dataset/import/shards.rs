@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 
 /// Where a member lies.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct Place {
+struct MemberLocation {
     tar: PathBuf,
     offset: u64,
     bytes: u64,
@@ -29,9 +29,9 @@ struct Place {
 
 /// A sample that waits to be read: its members in the order of `EXTENSIONS`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Waiting {
+pub struct LooseSample {
     pub key: String,
-    members: [Option<Place>; 5],
+    members: [Option<MemberLocation>; 5],
 }
 
 /// The samples whose keys differ only behind the last dash.
@@ -41,7 +41,7 @@ pub struct LooseVideo {
     /// By the names of the tars; `None`: they do not tell.
     pub split: Option<Split>,
     /// In the order of their keys.
-    pub samples: Vec<Waiting>,
+    pub samples: Vec<LooseSample>,
 }
 
 /// What tars hold.
@@ -64,7 +64,7 @@ impl LooseVideo {
 /// Looks through the tars; no member is read yet.
 pub fn open(tars: &[PathBuf]) -> Loose {
     let mut loose = Loose::default();
-    let mut samples: BTreeMap<String, Waiting> = BTreeMap::new();
+    let mut samples: BTreeMap<String, LooseSample> = BTreeMap::new();
     for tar in tars {
         let mut unknown = BTreeMap::<String, usize>::new();
         if let Err(error) = list(tar, &mut samples, &mut unknown) {
@@ -86,7 +86,7 @@ pub fn open(tars: &[PathBuf]) -> Loose {
     loose
 }
 
-fn list(tar: &Path, samples: &mut BTreeMap<String, Waiting>, unknown: &mut BTreeMap<String, usize>) -> Result<()> {
+fn list(tar: &Path, samples: &mut BTreeMap<String, LooseSample>, unknown: &mut BTreeMap<String, usize>) -> Result<()> {
     let reading = || format!("cannot read {} as a tar file", tar.display());
     let file = File::open(tar).with_context(reading)?;
     let length = file.metadata().with_context(reading)?.len();
@@ -103,9 +103,9 @@ fn list(tar: &Path, samples: &mut BTreeMap<String, Waiting>, unknown: &mut BTree
             *unknown.entry(ending.to_owned()).or_default() += 1;
             continue;
         };
-        let place = Place { tar: tar.to_owned(), offset: entry.raw_file_position(), bytes: entry.size() };
+        let place = MemberLocation { tar: tar.to_owned(), offset: entry.raw_file_position(), bytes: entry.size() };
         ensure!(place.offset.saturating_add(place.bytes) <= length, "{}: {name} is cut off", reading());
-        let fresh = || Waiting { key: key.to_owned(), members: Default::default() };
+        let fresh = || LooseSample { key: key.to_owned(), members: Default::default() };
         let sample = samples.entry(key.to_owned()).or_insert_with(fresh);
         if let Some(first) = &sample.members[member] {
             let same = read_place(first)? == read_place(&place)?;
@@ -122,7 +122,7 @@ fn split_of(tar: &Path) -> Option<Split> {
     Split::ALL.into_iter().find(|split| name.starts_with(&format!("{}-", split.name())))
 }
 
-fn read_place(place: &Place) -> Result<Vec<u8>> {
+fn read_place(place: &MemberLocation) -> Result<Vec<u8>> {
     let read = || -> std::io::Result<Vec<u8>> {
         let mut file = File::open(&place.tar)?;
         file.seek(SeekFrom::Start(place.offset))?;
@@ -133,7 +133,7 @@ fn read_place(place: &Place) -> Result<Vec<u8>> {
     read().with_context(|| format!("cannot read {}", place.tar.display()))
 }
 
-impl Waiting {
+impl LooseSample {
     /// The sample, and the bytes of its JSON as they are.
     ///
     /// # Errors

@@ -1,19 +1,19 @@
 //! What is imported: a take, a video of another dataset, or the samples of a video in loose tars. Each is looked at
 //! (kept or not, its account, its sound's codes), and written when its split is known.
 
-use super::find::{Found, Sources};
-use super::plan::{Line, Plan};
+use super::find::{ImportSources, TakeFiles};
+use super::plan::{ImportOutcome, ImportPlan};
 use super::shards;
 use super::shards::LooseVideo;
-use super::take::{Ended, Refusal, Take};
+use super::take::{ImportedTake, TakeOutcome, TakeRefusal};
 use crate::audio::fingerprint::Fingerprinter;
 use crate::config::videos::slug;
 use crate::dataset::bones::{VideoBones, of_speaker};
-use crate::dataset::info::Info;
-use crate::dataset::shared_sound::Shared;
+use crate::dataset::info::DatasetInfo;
+use crate::dataset::shared_sound::SharedSound;
 use crate::dataset::split::SplitBy;
 use crate::dataset::write::part;
-use crate::dataset::write::part::{Part, Source};
+use crate::dataset::write::part::{VideoEntry, VideoSource};
 use crate::dataset::write::writer::DatasetWriter;
 use crate::dataset::{INFO, Split};
 use crate::motion::bones;
@@ -28,8 +28,8 @@ const MUCH_MOVED_MM: f64 = 5.0;
 
 /// Something to import.
 #[derive(Clone, Debug)]
-pub enum Origin {
-    Take(Found),
+pub enum ImportItem {
+    Take(TakeFiles),
     /// The video of this name in the dataset's folder.
     Part(PathBuf, String),
     Loose(LooseVideo),
@@ -39,8 +39,8 @@ pub enum Origin {
 
 /// What was found out about it.
 #[derive(Clone, Debug, Default)]
-pub struct Look {
-    pub source: Source,
+pub struct InspectedItem {
+    pub source: VideoSource,
     /// The split it comes with, then the one it is given.
     pub split: Option<(Split, SplitBy)>,
     pub codes: Option<Vec<u32>>,
@@ -50,9 +50,9 @@ pub struct Look {
     pub sound: Option<String>,
 }
 
-impl Origin {
+impl ImportItem {
     /// Everything in the sources, and what was left out of their tars.
-    pub fn all(sources: &Sources) -> (Vec<Self>, Vec<String>) {
+    pub fn all(sources: &ImportSources) -> (Vec<Self>, Vec<String>) {
         let mut origins: Vec<Self> = sources.takes.iter().cloned().map(Self::Take).collect();
         for dir in &sources.datasets {
             match part::names(dir) {
@@ -70,7 +70,7 @@ impl Origin {
     /// Its name for people.
     pub fn file(&self) -> String {
         match self {
-            Self::Take(Found { motion: path, .. }) | Self::Unknown(path, _) => path.display().to_string(),
+            Self::Take(TakeFiles { motion: path, .. }) | Self::Unknown(path, _) => path.display().to_string(),
             Self::Part(dir, name) => format!("{} of {}", name, dir.display()),
             Self::Loose(video) => video.name.clone(),
         }
@@ -93,7 +93,7 @@ impl Origin {
     }
 
     /// Looks at it; what cannot be read is a failure.
-    pub fn look(&self, plan: &Plan) -> Look {
+    pub fn look(&self, plan: &ImportPlan) -> InspectedItem {
         let look = match self {
             Self::Take(found) => look_at_take(found, plan),
             Self::Part(dir, name) => look_at_part(dir, name, plan),
@@ -103,9 +103,9 @@ impl Origin {
         look.unwrap_or_else(|error| self.failed(&format!("{error:#}")))
     }
 
-    fn failed(&self, error: &str) -> Look {
+    fn failed(&self, error: &str) -> InspectedItem {
         let (path, name) = match self {
-            Self::Take(Found { motion: path, .. }) | Self::Unknown(path, _) => (path.clone(), None),
+            Self::Take(TakeFiles { motion: path, .. }) | Self::Unknown(path, _) => (path.clone(), None),
             Self::Part(dir, name) => (dir.clone(), Some(name.clone())),
             Self::Loose(video) => (PathBuf::from(&video.name), Some(video.name.clone())),
         };
@@ -115,29 +115,29 @@ impl Origin {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let marks =
             if content.is_empty() { blake3::hash(stem.as_bytes()).to_hex().to_string() } else { content.clone() };
-        let source = Source {
+        let source = VideoSource {
             name: name.unwrap_or_else(|| format!("{}-{}", slug(&stem), marks.get(..8).unwrap_or_default())),
             file: file_name(&path),
             content,
             failure: Some(format!("import: {error}")),
-            ..Source::default()
+            ..VideoSource::default()
         };
-        Look { source, ..Look::default() }
+        InspectedItem { source, ..InspectedItem::default() }
     }
 
     /// Writes it into the dataset in `out` as `look` says.
-    pub fn write(&self, look: &Look, plan: &Plan, writer: &DatasetWriter, out: &Path) -> Result<()> {
+    pub fn write(&self, look: &InspectedItem, plan: &ImportPlan, writer: &DatasetWriter, out: &Path) -> Result<()> {
         let Some((split, by)) = look.split.clone().filter(|_| look.is_kept()) else {
             writer.video(look.source.clone(), Split::Train, SplitBy::Content)?.finish(None)?;
             return Ok(());
         };
         if let Self::Part(dir, name) = self {
-            return Part::read(&Part::path(dir, name))?.take_over(dir, out);
+            return VideoEntry::read(&VideoEntry::path(dir, name))?.take_over(dir, out);
         }
         let mut part = writer.video(look.source.clone(), split, by)?;
         match self {
             Self::Take(found) => {
-                let Ended::Kept(kept) = Take::read(found, &plan.limits)?.ended else {
+                let TakeOutcome::Kept(kept) = ImportedTake::read(found, &plan.limits)?.ended else {
                     anyhow::bail!("{} changed while it was imported", found.motion.display());
                 };
                 part.push(&kept.sample, 0.0)?;
@@ -155,29 +155,29 @@ impl Origin {
     }
 }
 
-fn look_at_take(found: &Found, plan: &Plan) -> Result<Look> {
-    let take = Take::read(found, &plan.limits)?;
+fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
+    let take = ImportedTake::read(found, &plan.limits)?;
     let duration_secs = plan.limits.fps.secs(take.n_frames);
-    let mut source = Source {
+    let mut source = VideoSource {
         name: take.name,
         file: file_name(&found.motion),
         content: take.content,
         made_from: made_from(found, plan)?,
         ledger: Ledger { duration_secs, ..Ledger::default() },
-        ..Source::default()
+        ..VideoSource::default()
     };
     match take.ended {
-        Ended::Refused(refusal) => {
+        TakeOutcome::Refused(refusal) => {
             source.ledger.refused.push(refused(0.0, duration_secs, &refusal));
-            Ok(Look { source, ..Look::default() })
+            Ok(InspectedItem { source, ..InspectedItem::default() })
         }
-        Ended::Kept(kept) => {
+        TakeOutcome::Kept(kept) => {
             let n_frames = kept.sample.n_frames();
             let end_secs = plan.limits.fps.secs(n_frames);
             source.ledger.kept.push(Kept { start_secs: 0.0, end_secs });
             if end_secs < duration_secs {
                 let says = "the sound ends here".to_owned();
-                let refusal = Refusal { reason: "no sound", measured: 0.0, threshold: 0.0, unit: "s", says };
+                let refusal = TakeRefusal { reason: "no sound", measured: 0.0, threshold: 0.0, unit: "s", says };
                 source.ledger.refused.push(refused(end_secs, duration_secs, &refusal));
             }
             source.bones = VideoBones { lengths_metres: kept.lengths.map(f64::from).to_vec(), n_frames };
@@ -187,27 +187,27 @@ fn look_at_take(found: &Found, plan: &Plan) -> Result<Look> {
                 }
                 _ => String::new(),
             };
-            Ok(Look { source, remark, codes: Some(codes([&kept.sample.sound])), ..Look::default() })
+            Ok(InspectedItem { source, remark, codes: Some(codes([&kept.sample.sound])), ..InspectedItem::default() })
         }
     }
 }
 
 /// Of the files and of what is made of them.
-fn made_from(found: &Found, plan: &Plan) -> Result<String> {
+fn made_from(found: &TakeFiles, plan: &ImportPlan) -> Result<String> {
     let files = [Some(&found.motion), found.sound.as_ref(), found.transcript.as_ref()];
     let hashes = files.into_iter().flatten().map(|path| hash_file(path)).collect::<Result<Vec<_>>>()?;
     let all = serde_json::json!([env!("CARGO_PKG_VERSION"), hashes, plan.limits.fps, plan.shard.max_mb]);
     Ok(blake3::hash(all.to_string().as_bytes()).to_hex().to_string())
 }
 
-fn refused(start_secs: f64, end_secs: f64, refusal: &Refusal) -> Refused {
-    let Refusal { reason, measured, threshold, unit, says } = refusal.clone();
+fn refused(start_secs: f64, end_secs: f64, refusal: &TakeRefusal) -> Refused {
+    let TakeRefusal { reason, measured, threshold, unit, says } = refusal.clone();
     Refused { start_secs, end_secs, reason: reason.to_owned(), measured, threshold, unit: unit.to_owned(), says }
 }
 
-fn look_at_part(dir: &Path, name: &str, plan: &Plan) -> Result<Look> {
+fn look_at_part(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedItem> {
     let info = std::fs::read(dir.join(INFO)).with_context(|| format!("cannot read {}", dir.join(INFO).display()))?;
-    let info: Info =
+    let info: DatasetInfo =
         serde_json::from_slice(&info).with_context(|| format!("{} is damaged", dir.join(INFO).display()))?;
     let fps = plan.limits.fps;
     ensure!(
@@ -216,19 +216,24 @@ fn look_at_part(dir: &Path, name: &str, plan: &Plan) -> Result<Look> {
         dir.display(),
         info.fps
     );
-    let part = Part::read(&Part::path(dir, name))?;
+    let part = VideoEntry::read(&VideoEntry::path(dir, name))?;
     ensure!(
         part.is_sound(dir, &part::stated_hashes(dir)),
         "{name}: its files are not what was written; orator dataset verify says what is wrong"
     );
     let codes = part.codes(dir)?;
     let split = part.split.map(|split| (split, part.split_by.clone()));
-    let Part { name, file, content, made_from, ledger, bones, failure, .. } = part;
-    let source = Source { name, file, content, made_from, ledger, bones, failure };
-    Ok(Look { source, split, codes: Some(codes).filter(|codes| !codes.is_empty()), ..Look::default() })
+    let VideoEntry { name, file, content, made_from, ledger, bones, failure, .. } = part;
+    let source = VideoSource { name, file, content, made_from, ledger, bones, failure };
+    Ok(InspectedItem {
+        source,
+        split,
+        codes: Some(codes).filter(|codes| !codes.is_empty()),
+        ..InspectedItem::default()
+    })
 }
 
-fn look_at_loose(video: &LooseVideo, plan: &Plan) -> Result<Look> {
+fn look_at_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem> {
     let fps = plan.limits.fps;
     let (mut stretches, mut measured, mut fingerprinter) = (Vec::new(), Vec::new(), Fingerprinter::default());
     let mut content = String::new();
@@ -245,7 +250,7 @@ fn look_at_loose(video: &LooseVideo, plan: &Plan) -> Result<Look> {
             content = said.to_owned();
         }
     }
-    let source = Source {
+    let source = VideoSource {
         name: video.name.clone(),
         file: video.name.clone(),
         content,
@@ -254,13 +259,13 @@ fn look_at_loose(video: &LooseVideo, plan: &Plan) -> Result<Look> {
             lengths_metres: of_speaker(&measured).map(f64::from).to_vec(),
             n_frames: measured.iter().map(|bones| bones.n_frames).sum(),
         },
-        ..Source::default()
+        ..VideoSource::default()
     };
-    Ok(Look {
+    Ok(InspectedItem {
         source,
         split: video.split.map(|split| (split, SplitBy::Name)),
         codes: Some(fingerprinter.finish()),
-        ..Look::default()
+        ..InspectedItem::default()
     })
 }
 
@@ -270,7 +275,7 @@ fn codes<'a>(sounds: impl IntoIterator<Item = &'a Sound>) -> Vec<u32> {
     fingerprinter.finish()
 }
 
-impl Look {
+impl InspectedItem {
     /// Whether it has a sample.
     pub fn is_kept(&self) -> bool {
         !self.source.ledger.kept.is_empty() && self.source.failure.is_none()
@@ -288,7 +293,7 @@ impl Look {
     }
 
     /// It shares sound with videos of different splits.
-    pub fn refuse_shared(&mut self, with: &[Shared], threshold: f64) {
+    pub fn refuse_shared(&mut self, with: &[SharedSound], threshold: f64) {
         let name = self.source.name.clone();
         let others: Vec<&str> = with.iter().filter_map(|shared| shared.other(&name)).collect();
         let secs = with.first().map_or(0.0, |shared| shared.secs);
@@ -316,14 +321,14 @@ impl Look {
     }
 
     /// What became of it, in a line.
-    pub fn line(&self, file: &str) -> Line {
+    pub fn line(&self, file: &str) -> ImportOutcome {
         let (ended, reason, says) = match (&self.source.failure, self.source.ledger.refused.first()) {
             (Some(error), _) => ("failed", "error".to_owned(), error.clone()),
             (None, _) if self.is_kept() => ("kept", String::new(), self.remark.clone()),
             (None, Some(refused)) => ("refused", refused.reason.clone(), refused.says.clone()),
             (None, None) => ("refused", "empty".to_owned(), "it holds nothing".to_owned()),
         };
-        Line { file: file.to_owned(), ended, kept_secs: self.source.ledger.kept_secs(), reason, says }
+        ImportOutcome { file: file.to_owned(), ended, kept_secs: self.source.ledger.kept_secs(), reason, says }
     }
 }
 

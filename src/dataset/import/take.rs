@@ -1,7 +1,7 @@
 //! One take on its way to a sample: its motion at the dataset's rate with constant bones, its sound, and the cut to
 //! what both have; or the reason why it is refused. A take is one continuous interval.
 
-use super::find::Found;
+use super::find::TakeFiles;
 use super::transcript::Transcript;
 use crate::config::videos::slug;
 use crate::dataset::sample::{N_KEYPOINTS, Sample};
@@ -25,7 +25,7 @@ use std::path::Path;
 
 /// What a take must be.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
+pub struct TakeLimits {
     /// The dataset's rate.
     pub fps: FrameRate,
     /// Shortest take, in frames of the dataset.
@@ -36,26 +36,26 @@ pub struct Limits {
 
 /// A take that was read.
 #[derive(Clone, Debug)]
-pub struct Take {
+pub struct ImportedTake {
     /// `<slug of the file's name>-<8 hex of its content>`.
     pub name: String,
     /// BLAKE3 of the motion file.
     pub content: String,
     /// Frames at the dataset's rate that the motion has, before the cut.
     pub n_frames: usize,
-    pub ended: Ended,
+    pub ended: TakeOutcome,
 }
 
 /// What became of it.
 #[derive(Clone, Debug)]
-pub enum Ended {
-    Kept(Box<Kept>),
-    Refused(Refusal),
+pub enum TakeOutcome {
+    Kept(Box<KeptTake>),
+    Refused(TakeRefusal),
 }
 
 /// A sample, and the bones its motion was given (metres; 0: not there).
 #[derive(Clone, Debug)]
-pub struct Kept {
+pub struct KeptTake {
     /// By how much the joints moved when every bone was given one length: the median, mm.
     pub moved_mm: f64,
     pub sample: Sample,
@@ -64,7 +64,7 @@ pub struct Kept {
 
 /// Why a take is left out.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Refusal {
+pub struct TakeRefusal {
     /// A word or two, for programs.
     pub reason: &'static str,
     pub measured: f64,
@@ -74,9 +74,9 @@ pub struct Refusal {
     pub says: String,
 }
 
-impl Take {
+impl ImportedTake {
     /// Reads the files of a take. Errors: one of them is not what it should be; the message names it.
-    pub fn read(found: &Found, limits: &Limits) -> Result<Self> {
+    pub fn read(found: &TakeFiles, limits: &TakeLimits) -> Result<Self> {
         let content = hash_file(&found.motion)?;
         let stem = found.motion.file_stem().unwrap_or_default().to_string_lossy();
         let name = format!("{}-{}", slug(&stem), content.get(..8).unwrap_or(&content));
@@ -88,24 +88,24 @@ impl Take {
             None => None,
         };
         let ended = match (refusal(n_frames, sound.as_ref(), found, limits), sound) {
-            (None, Some(sound)) => Ended::Kept(Box::new(keep(&name, found, &captured, motion, sound)?)),
-            (refusal, _) => Ended::Refused(refusal.unwrap_or_else(|| no_sound(found))),
+            (None, Some(sound)) => TakeOutcome::Kept(Box::new(keep(&name, found, &captured, motion, sound)?)),
+            (refusal, _) => TakeOutcome::Refused(refusal.unwrap_or_else(|| no_sound(found))),
         };
         Ok(Self { name, content, n_frames, ended })
     }
 }
 
-fn refusal(n_frames: usize, sound: Option<&Sound>, found: &Found, limits: &Limits) -> Option<Refusal> {
+fn refusal(n_frames: usize, sound: Option<&Sound>, found: &TakeFiles, limits: &TakeLimits) -> Option<TakeRefusal> {
     let stem = found.motion.file_stem().unwrap_or_default().to_string_lossy();
     if found.kind == Kind::Authors && stem.starts_with("prediction") {
         let says = "it is what a model predicted, not how a person moved".to_owned();
-        return Some(Refusal { reason: "prediction", measured: 0.0, threshold: 0.0, unit: "", says });
+        return Some(TakeRefusal { reason: "prediction", measured: 0.0, threshold: 0.0, unit: "", says });
     }
     let Some(sound) = sound else { return Some(no_sound(found)) };
     let (motion_secs, sound_secs) = (limits.fps.secs(n_frames), sound.secs());
     let apart = sound_secs - motion_secs;
     if apart.abs() > limits.max_apart_secs {
-        return Some(Refusal {
+        return Some(TakeRefusal {
             reason: "out of step",
             measured: apart.abs(),
             threshold: limits.max_apart_secs,
@@ -118,7 +118,7 @@ fn refusal(n_frames: usize, sound: Option<&Sound>, found: &Found, limits: &Limit
         });
     }
     let n_common = n_common(n_frames, sound, limits.fps);
-    (n_common < limits.min_frames).then(|| Refusal {
+    (n_common < limits.min_frames).then(|| TakeRefusal {
         reason: "too short",
         measured: n_common as f64,
         threshold: limits.min_frames as f64,
@@ -127,13 +127,13 @@ fn refusal(n_frames: usize, sound: Option<&Sound>, found: &Found, limits: &Limit
     })
 }
 
-fn no_sound(found: &Found) -> Refusal {
+fn no_sound(found: &TakeFiles) -> TakeRefusal {
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let says = match &found.sound {
         Some(sound) => format!("{} holds no sound", name(sound)),
         None => format!("no sound file has the name of {}", name(&found.motion)),
     };
-    Refusal { reason: "no sound", measured: 0.0, threshold: 0.0, unit: "s", says }
+    TakeRefusal { reason: "no sound", measured: 0.0, threshold: 0.0, unit: "s", says }
 }
 
 /// Frames that lie in the motion and wholly in the sound.
@@ -141,7 +141,7 @@ fn n_common(n_frames: usize, sound: &Sound, fps: FrameRate) -> usize {
     n_frames.min((sound.secs() * fps.per_sec() + 1e-6).floor() as usize)
 }
 
-fn keep(name: &str, found: &Found, captured: &Captured, mut motion: Motion, mut sound: Sound) -> Result<Kept> {
+fn keep(name: &str, found: &TakeFiles, captured: &Captured, mut motion: Motion, mut sound: Sound) -> Result<KeptTake> {
     let (fps, n_before) = (motion.fps, motion.n_frames());
     let lengths = bones::measure(&captured.motion);
     let n_frames = n_common(n_before, &sound, fps);
@@ -192,7 +192,7 @@ fn keep(name: &str, found: &Found, captured: &Captured, mut motion: Motion, mut 
     let key = format!("{name}-{:06}", 0);
     let sample = Sample { key, motion, pose2d, sound, meta };
     sample.members().with_context(|| format!("{} makes no sample", found.motion.display()))?;
-    Ok(Kept { moved_mm: moved[0], sample, lengths })
+    Ok(KeptTake { moved_mm: moved[0], sample, lengths })
 }
 
 /// By how much the joints were moved to give every bone one length: the median and the largest, mm to a hundredth.

@@ -2,15 +2,15 @@
 //! splits can be chosen without leaks; then it is read again and written. Memory: one take, and the codes of all sound.
 
 use super::find;
-use super::find::Found;
-use super::plan::{Line, Plan};
-use super::source::{Look, Origin};
+use super::find::TakeFiles;
+use super::plan::{ImportOutcome, ImportPlan};
+use super::source::{ImportItem, InspectedItem};
 use crate::config;
-use crate::dataset::info::Info;
-use crate::dataset::leakage::Compared;
+use crate::dataset::info::DatasetInfo;
+use crate::dataset::leakage::SoundComparison;
 use crate::dataset::split;
-use crate::dataset::split::{Placed, Waiting};
-use crate::dataset::stats::Stats;
+use crate::dataset::split::{Assignment, Unassigned};
+use crate::dataset::stats::DatasetStats;
 use crate::dataset::write::part;
 use crate::dataset::write::writer::DatasetWriter;
 use crate::dataset::{INFO, shared_sound};
@@ -23,31 +23,31 @@ use std::path::{Path, PathBuf};
 /// The dataset that was written.
 #[derive(Clone, Debug)]
 pub struct Imported {
-    pub lines: Vec<Line>,
+    pub lines: Vec<ImportOutcome>,
     /// What was left out of tars.
     pub notes: Vec<String>,
-    pub info: Info,
-    pub stats: Stats,
+    pub info: DatasetInfo,
+    pub stats: DatasetStats,
 }
 
 /// The rate of the first dataset folder among the sources: what an import without a rate of its own takes.
 pub fn rate_of(sources: &[PathBuf]) -> Option<crate::types::time::FrameRate> {
     let info = sources.iter().find_map(|source| std::fs::read(source.join(INFO)).ok())?;
-    serde_json::from_slice::<Info>(&info).ok().map(|info| info.fps)
+    serde_json::from_slice::<DatasetInfo>(&info).ok().map(|info| info.fps)
 }
 
 /// Imports into the empty folder `out`.
 ///
 /// # Errors
 /// Nothing to import, or nothing of it kept; files that cannot be written. A take that fails is a line.
-pub fn import(plan: &Plan, out: &Path, progress: &dyn Progress) -> Result<Imported> {
+pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<Imported> {
     let sources = find::find(&plan.sources, plan.kind)?;
     let (mut about, notes) = (plan.about.clone(), notes(&sources.takes));
     about.notes.extend(notes);
-    let (origins, left_out) = Origin::all(&sources);
+    let (origins, left_out) = ImportItem::all(&sources);
     let task = progress.begin("look", origins.len() as u64);
     let mut names = BTreeSet::new();
-    let mut looks: Vec<Look> = Vec::new();
+    let mut looks: Vec<InspectedItem> = Vec::new();
     for origin in &origins {
         task.detail(&origin.file());
         let mut look = origin.look(plan);
@@ -68,8 +68,8 @@ pub fn import(plan: &Plan, out: &Path, progress: &dyn Progress) -> Result<Import
     let compared = compare(&looks, &kept, out, plan.shard.duplicate_secs)?;
     for (&at, placed) in kept.iter().zip(place(&looks, &kept, &compared, &plan.shard)) {
         match placed {
-            Placed::In(split, by) => looks[at].split = Some((split, by)),
-            Placed::Nowhere(with) => {
+            Assignment::In(split, by) => looks[at].split = Some((split, by)),
+            Assignment::Nowhere(with) => {
                 part::remove_sound(out, &looks[at].source.name)?;
                 looks[at].refuse_shared(&with, plan.shard.duplicate_secs);
             }
@@ -89,35 +89,40 @@ pub fn import(plan: &Plan, out: &Path, progress: &dyn Progress) -> Result<Import
     Ok(Imported { lines, notes: left_out, info, stats })
 }
 
-fn compare(looks: &[Look], kept: &[usize], out: &Path, duplicate_secs: f64) -> Result<Compared> {
+fn compare(looks: &[InspectedItem], kept: &[usize], out: &Path, duplicate_secs: f64) -> Result<SoundComparison> {
     if duplicate_secs <= 0.0 {
-        return Ok(Compared::default());
+        return Ok(SoundComparison::default());
     }
     let audible = kept.iter().filter(|&&at| looks[at].sound.is_some());
     let mut names: Vec<String> = audible.map(|&at| looks[at].source.name.clone()).collect();
     names.sort();
     let shared = shared_sound::find(&names, |n| part::read_sound(out, &names[n]), duplicate_secs)?;
-    Ok(Compared { duplicate_secs, shared })
+    Ok(SoundComparison { duplicate_secs, shared })
 }
 
 /// Where each kept video goes; one that comes from a dataset stays in its split.
-fn place(looks: &[Look], kept: &[usize], compared: &Compared, shard: &config::Shard) -> Vec<Placed> {
+fn place(
+    looks: &[InspectedItem],
+    kept: &[usize],
+    compared: &SoundComparison,
+    shard: &config::Shard,
+) -> Vec<Assignment> {
     let waiting = kept.iter().map(|&at| {
-        let Look { source, split, .. } = &looks[at];
+        let InspectedItem { source, split, .. } = &looks[at];
         // what has no content of its own is placed by its name
         let content = if source.content.is_empty() { &source.name } else { &source.content };
-        Waiting { name: &source.name, content, named: split.as_ref().map(|(split, _)| *split), before: None }
+        Unassigned { name: &source.name, content, named: split.as_ref().map(|(split, _)| *split), before: None }
     });
-    let placed = split::place(&waiting.collect::<Vec<_>>(), &compared.shared, shard.validation, shard.test);
-    let as_before = |(at, placed): (&usize, Placed)| match (&looks[*at].split, placed) {
-        (Some((split, by)), _) => Placed::In(*split, by.clone()),
+    let placed = split::assign(&waiting.collect::<Vec<_>>(), &compared.shared, shard.validation, shard.test);
+    let as_before = |(at, placed): (&usize, Assignment)| match (&looks[*at].split, placed) {
+        (Some((split, by)), _) => Assignment::In(*split, by.clone()),
         (None, placed) => placed,
     };
     kept.iter().zip(placed).map(as_before).collect()
 }
 
 /// What a reader of the dataset must know about the kinds in it.
-fn notes(takes: &[Found]) -> Vec<String> {
+fn notes(takes: &[TakeFiles]) -> Vec<String> {
     let there: BTreeSet<Kind> = takes.iter().map(|take| take.kind).collect();
     let mut notes: Vec<String> = there
         .into_iter()
@@ -147,7 +152,7 @@ fn notes(takes: &[Found]) -> Vec<String> {
 }
 
 /// The first few reasons why nothing is kept.
-fn first_reasons(origins: &[Origin], looks: &[Look]) -> String {
+fn first_reasons(origins: &[ImportItem], looks: &[InspectedItem]) -> String {
     let mut reasons: BTreeMap<String, usize> = BTreeMap::new();
     let lines = origins.iter().zip(looks).map(|(origin, look)| look.line(&origin.file()));
     let mut said: Vec<String> = Vec::new();

@@ -5,12 +5,12 @@
 //! what the videos add up to is found whichever file holds it.
 
 use super::sample::check_sample;
-use crate::dataset::info::Info;
+use crate::dataset::info::DatasetInfo;
 use crate::dataset::leakage::Leakage;
 use crate::dataset::read::Dataset;
-use crate::dataset::write::assemble::{Account, assemble_into};
+use crate::dataset::write::assemble::{LedgerLine, assemble_into};
 use crate::dataset::write::part;
-use crate::dataset::write::part::Part;
+use crate::dataset::write::part::VideoEntry;
 use crate::dataset::{CHECKSUMS, INFO, LEAKAGE};
 use crate::stage::fingerprint::hash_file;
 use crate::stage::progress::Progress;
@@ -24,7 +24,7 @@ use std::rc::Rc;
 
 /// Something that is not as it was written.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Problem {
+pub struct DatasetProblem {
     /// Path in the dataset's folder.
     pub file: String,
     pub what: String,
@@ -33,7 +33,7 @@ pub struct Problem {
 /// What was looked at, and found wrong.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Verified {
-    pub problems: Vec<Problem>,
+    pub problems: Vec<DatasetProblem>,
     pub n_files: usize,
     pub n_videos: usize,
     pub n_samples: usize,
@@ -45,7 +45,7 @@ pub struct Verified {
 
 impl Verified {
     fn wrong(&mut self, file: &str, what: impl Into<String>) {
-        self.problems.push(Problem { file: file.to_owned(), what: what.into() });
+        self.problems.push(DatasetProblem { file: file.to_owned(), what: what.into() });
     }
 
     fn note(&mut self, file: &str, result: Result<()>) {
@@ -84,11 +84,11 @@ pub fn verify(dir: &Path, deep: bool, progress: &dyn Progress) -> Result<Verifie
 
 /// Assembles the dataset again: the hash that every file must have, by its path.
 fn assembled(dir: &Path, there: &BTreeMap<String, u64>, found: &mut Verified) -> Result<BTreeMap<String, String>> {
-    let info: Info = read_json(dir, INFO)?;
+    let info: DatasetInfo = read_json(dir, INFO)?;
     let leakage: Leakage = read_json(dir, LEAKAGE)?;
     let written: Rc<RefCell<Vec<u8>>> = Rc::default();
     let mut open = |name: &str| -> Result<Box<dyn Write>> {
-        Ok(if name == CHECKSUMS { Box::new(Kept(written.clone())) } else { Box::new(std::io::sink()) })
+        Ok(if name == CHECKSUMS { Box::new(SharedBuffer(written.clone())) } else { Box::new(std::io::sink()) })
     };
     assemble_into(dir, &info.about(), &leakage.compared(), &mut open)?;
     let text = String::from_utf8(written.borrow().clone()).context("checksums are text")?;
@@ -114,9 +114,9 @@ fn assembled(dir: &Path, there: &BTreeMap<String, u64>, found: &mut Verified) ->
 }
 
 /// A file kept in memory.
-struct Kept(Rc<RefCell<Vec<u8>>>);
+struct SharedBuffer(Rc<RefCell<Vec<u8>>>);
 
-impl Write for Kept {
+impl Write for SharedBuffer {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         self.0.borrow_mut().extend_from_slice(bytes);
         Ok(bytes.len())
@@ -139,11 +139,11 @@ fn listed(there: &BTreeMap<String, u64>, wanted: &BTreeMap<String, String>, foun
 
 /// Sizes and sums of each video.
 fn videos(dir: &Path, found: &mut Verified) -> Result<()> {
-    let fps = read_json::<Info>(dir, INFO)?.fps;
+    let fps = read_json::<DatasetInfo>(dir, INFO)?.fps;
     let mut keys = BTreeSet::new();
     for name in part::names(dir)? {
         let file = format!("{}/{name}.json", part::FOLDER);
-        let part = match Part::read(&Part::path(dir, &name)) {
+        let part = match VideoEntry::read(&VideoEntry::path(dir, &name)) {
             Ok(part) => part,
             Err(error) => {
                 found.wrong(&file, format!("{error:#}"));
@@ -176,7 +176,7 @@ fn videos(dir: &Path, found: &mut Verified) -> Result<()> {
 }
 
 /// Every second of a video is in its ledger, and what was kept is in its samples, to a frame each.
-fn account(part: &Part, fps: FrameRate) -> Result<()> {
+fn account(part: &VideoEntry, fps: FrameRate) -> Result<()> {
     let ledger = &part.ledger;
     let unknown = ledger.duration_secs == 0.0 && part.failure.is_some();
     ensure!(ledger.is_whole() || unknown, "its ledger does not fill {} s end to end", ledger.duration_secs);
@@ -221,7 +221,7 @@ fn samples(dir: &Path, found: &mut Verified, progress: &dyn Progress) {
     };
     let task = progress.begin("samples", found.n_samples as u64);
     for name in part::names(dir).unwrap_or_default() {
-        let Ok(part) = Part::read(&Part::path(dir, &name)) else { continue };
+        let Ok(part) = VideoEntry::read(&VideoEntry::path(dir, &name)) else { continue };
         for sample in &part.samples {
             let checked = dataset.read(sample).and_then(|read| check_sample(&read, &part.bones.lengths_metres));
             found.note(&sample.shard, checked.with_context(|| sample.key.clone()));
@@ -256,7 +256,7 @@ fn read_json<T: serde::de::DeserializeOwned>(dir: &Path, name: &str) -> Result<T
 }
 
 /// The accounts of all videos of the dataset in `dir`.
-pub fn accounts(dir: &Path) -> Result<Vec<Account>> {
+pub fn accounts(dir: &Path) -> Result<Vec<LedgerLine>> {
     let path = dir.join(crate::dataset::LEDGER);
     let text = std::fs::read_to_string(&path).with_context(|| format!("reading {}", path.display()))?;
     let parse = |line: &str| serde_json::from_str(line).with_context(|| format!("{} is damaged", path.display()));

@@ -4,12 +4,12 @@
 //! verified by assembling it again. Memory: one video, and a line for each.
 
 use super::part;
-use super::part::Part;
+use super::part::VideoEntry;
 use crate::dataset::bones::{VideoBones, of_speaker};
-use crate::dataset::info::{About, Info, SplitInfo, VideoInfo};
-use crate::dataset::leakage::{Compared, Leakage};
+use crate::dataset::info::{About, DatasetInfo, DatasetVideo, SplitInfo};
+use crate::dataset::leakage::{Leakage, SoundComparison};
 use crate::dataset::split::Split;
-use crate::dataset::stats::{Gatherer, Stats};
+use crate::dataset::stats::{DatasetStats, StatsCollector};
 use crate::dataset::{CHECKSUMS, INDEX, INFO, LEAKAGE, LEDGER, README, STATS, card};
 use crate::stage::ledger::Ledger;
 use anyhow::{Context, Result};
@@ -21,7 +21,7 @@ use std::path::Path;
 
 /// A line of `ledger.jsonl`: what became of every second of a video.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Account {
+pub struct LedgerLine {
     pub name: String,
     pub file: String,
     pub split: Option<Split>,
@@ -35,7 +35,7 @@ pub struct Account {
 pub type Open<'a> = dyn FnMut(&str) -> Result<Box<dyn Write>> + 'a;
 
 /// Assembles the dataset in `dir` in place.
-pub fn assemble(dir: &Path, about: &About, compared: &Compared) -> Result<(Info, Stats)> {
+pub fn assemble(dir: &Path, about: &About, compared: &SoundComparison) -> Result<(DatasetInfo, DatasetStats)> {
     assemble_into(dir, about, compared, &mut |name| {
         let path = dir.join(name);
         let file = File::create(&path).with_context(|| format!("writing {}", path.display()))?;
@@ -44,15 +44,20 @@ pub fn assemble(dir: &Path, about: &About, compared: &Compared) -> Result<(Info,
 }
 
 /// Assembles the dataset in `dir`, whose files `open` takes.
-pub fn assemble_into(dir: &Path, about: &About, compared: &Compared, open: &mut Open) -> Result<(Info, Stats)> {
+pub fn assemble_into(
+    dir: &Path,
+    about: &About,
+    compared: &SoundComparison,
+    open: &mut Open,
+) -> Result<(DatasetInfo, DatasetStats)> {
     let mut checksums = BTreeMap::new();
-    let mut index = Hashed::new(open(INDEX)?);
-    let mut ledger = Hashed::new(open(LEDGER)?);
+    let mut index = HashedFile::new(open(INDEX)?);
+    let mut ledger = HashedFile::new(open(LEDGER)?);
     let mut splits: BTreeMap<Split, SplitInfo> = Split::ALL.map(|split| (split, SplitInfo::default())).into();
-    let (mut videos, mut bones, mut gatherer) = (Vec::new(), Vec::<VideoBones>::new(), Gatherer::default());
+    let (mut videos, mut bones, mut gatherer) = (Vec::new(), Vec::<VideoBones>::new(), StatsCollector::default());
     for name in part::names(dir)? {
-        let path = Part::path(dir, &name);
-        let part = Part::read(&path)?;
+        let path = VideoEntry::path(dir, &name);
+        let part = VideoEntry::read(&path)?;
         checksums.extend(part.files());
         checksums.insert(format!("{}/{name}.json", part::FOLDER), crate::stage::fingerprint::hash_file(&path)?);
         gatherer.push(&part);
@@ -67,7 +72,7 @@ pub fn assemble_into(dir: &Path, about: &About, compared: &Compared, open: &mut 
             info.frames += n_frames;
             info.secs = about.fps.secs(info.frames);
         }
-        videos.push(VideoInfo {
+        videos.push(DatasetVideo {
             name: name.clone(),
             file: part.file.clone(),
             content: part.content,
@@ -77,13 +82,13 @@ pub fn assemble_into(dir: &Path, about: &About, compared: &Compared, open: &mut 
             secs: about.fps.secs(n_frames),
         });
         let (file, split, failure, of_video) = (part.file, part.split, part.failure, part.ledger);
-        ledger.line(&Account { name, file, split, failure, ledger: of_video })?;
+        ledger.line(&LedgerLine { name, file, split, failure, ledger: of_video })?;
     }
     checksums.insert(INDEX.to_owned(), index.finish()?);
     checksums.insert(LEDGER.to_owned(), ledger.finish()?);
     let of_video = videos.iter().filter_map(|video| Some((video.name.clone(), video.split?))).collect();
     let leakage = Leakage::new(compared, &of_video);
-    let info = Info::new(about, &of_speaker(&bones), splits, videos);
+    let info = DatasetInfo::new(about, &of_speaker(&bones), splits, videos);
     let stats = gatherer.finish();
     let texts = [
         (INFO, pretty(&info)?),
@@ -92,11 +97,11 @@ pub fn assemble_into(dir: &Path, about: &About, compared: &Compared, open: &mut 
         (README, card::text(&info, &stats, &leakage).into_bytes()),
     ];
     for (name, bytes) in texts {
-        let mut file = Hashed::new(open(name)?);
+        let mut file = HashedFile::new(open(name)?);
         file.write(&bytes)?;
         checksums.insert(name.to_owned(), file.finish()?);
     }
-    let mut file = Hashed::new(open(CHECKSUMS)?);
+    let mut file = HashedFile::new(open(CHECKSUMS)?);
     for (name, hash) in &checksums {
         file.write(format!("{hash}  {name}\n").as_bytes())?;
     }
@@ -111,12 +116,12 @@ fn pretty(value: &impl Serialize) -> Result<Vec<u8>> {
 }
 
 /// A file being written, and its hash.
-struct Hashed {
+struct HashedFile {
     to: Box<dyn Write>,
     hasher: blake3::Hasher,
 }
 
-impl Hashed {
+impl HashedFile {
     fn new(to: Box<dyn Write>) -> Self {
         Self { to, hasher: blake3::Hasher::new() }
     }

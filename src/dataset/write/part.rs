@@ -2,10 +2,10 @@
 //! `videos/<name>.json`, which says where it comes from and adds up what is in them. All other files of a dataset are
 //! put together from these (`assemble`), so that a video is added or forgotten without touching another.
 
-use super::tar::Writer;
+use super::tar::ShardWriter;
 use crate::dataset::bones::VideoBones;
-use crate::dataset::index::{SampleRef, Shard};
-use crate::dataset::joint_stats::Moments;
+use crate::dataset::index::{SampleRef, ShardRef};
+use crate::dataset::joint_stats::JointMoments;
 use crate::dataset::sample::Sample;
 use crate::dataset::split::SplitBy;
 use crate::stage::fingerprint::hash_file;
@@ -22,7 +22,7 @@ pub const FOLDER: &str = "videos";
 
 /// A video of a dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Part {
+pub struct VideoEntry {
     pub schema: u32,
     /// `<slug of the file's name>-<8 hex of its content>`: the beginning of its samples' keys.
     pub name: String,
@@ -43,16 +43,16 @@ pub struct Part {
     pub bones: VideoBones,
     /// BLAKE3 of the codes of its sound; `None`: it has none.
     pub sound: Option<String>,
-    pub shards: Vec<Shard>,
+    pub shards: Vec<ShardRef>,
     pub samples: Vec<SampleRef>,
     /// Silence appended where the sound ended before the motion, seconds.
     pub padded_sound_secs: f64,
-    pub moments: Moments,
+    pub moments: JointMoments,
 }
 
 /// What a writer of a video knows beforehand.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Source {
+pub struct VideoSource {
     /// [a-z0-9_-] only.
     pub name: String,
     pub file: String,
@@ -64,23 +64,23 @@ pub struct Source {
 }
 
 /// Writes one video into a dataset's folder.
-pub struct PartWriter {
+pub struct EntryWriter {
     dir: PathBuf,
-    part: Part,
-    shards: Writer,
+    part: VideoEntry,
+    shards: ShardWriter,
 }
 
-impl PartWriter {
+impl EntryWriter {
     /// Begins a video of the dataset in `dir`. A shard is closed before it would grow past `max_shard_bytes`.
-    pub fn new(dir: &Path, source: Source, split: Split, split_by: SplitBy, max_shard_bytes: u64) -> Result<Self> {
-        let Source { name, file, content, made_from, ledger, bones, failure } = source;
+    pub fn new(dir: &Path, source: VideoSource, split: Split, split_by: SplitBy, max_shard_bytes: u64) -> Result<Self> {
+        let VideoSource { name, file, content, made_from, ledger, bones, failure } = source;
         let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
         ensure!(
             !name.is_empty() && name.len() <= 64 && name.chars().all(plain),
             "{name:?} is no name of a video in a dataset: expected 1 to 64 of a-z, 0-9, - and _"
         );
-        let shards = Writer::new(dir, &name, split, max_shard_bytes);
-        let part = Part {
+        let shards = ShardWriter::new(dir, &name, split, max_shard_bytes);
+        let part = VideoEntry {
             schema: crate::dataset::SCHEMA,
             name,
             file,
@@ -95,7 +95,7 @@ impl PartWriter {
             shards: Vec::new(),
             samples: Vec::new(),
             padded_sound_secs: 0.0,
-            moments: Moments::default(),
+            moments: JointMoments::default(),
         };
         Ok(Self { dir: dir.to_owned(), part, shards })
     }
@@ -124,7 +124,7 @@ impl PartWriter {
 
     /// Closes the shards and writes the video's JSON; `sound` is what `write_sound` gave, if it has sound. A video without
     /// a sample is in no split.
-    pub fn finish(mut self, sound: Option<String>) -> Result<Part> {
+    pub fn finish(mut self, sound: Option<String>) -> Result<VideoEntry> {
         let (shards, samples) = self.shards.finish()?;
         self.part.split = self.part.split.filter(|_| !samples.is_empty());
         (self.part.shards, self.part.samples) = (shards, samples);
@@ -136,7 +136,7 @@ impl PartWriter {
     }
 }
 
-impl Part {
+impl VideoEntry {
     /// `videos/<name>.json` of the dataset in `dir`.
     pub fn path(dir: &Path, name: &str) -> PathBuf {
         dir.join(FOLDER).join(format!("{name}.json"))

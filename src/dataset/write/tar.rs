@@ -1,7 +1,7 @@
 //! Tar shards: the same samples give the same bytes on any machine (ustar, no times, no owners), a sample is never
 //! divided, and every sample's place and hash are noted while writing.
 
-use crate::dataset::index::{SampleRef, Shard, Span};
+use crate::dataset::index::{ByteRange, SampleRef, ShardRef};
 use crate::dataset::sample::{EXTENSIONS, Sample};
 use crate::dataset::split::Split;
 use anyhow::{Context, Result};
@@ -12,13 +12,13 @@ use std::path::{Path, PathBuf};
 const BLOCK: usize = 512;
 
 /// Writes the samples of one video into `<split>-<video>-0000.tar`, `<split>-<video>-0001.tar`, ... of a folder.
-pub struct Writer {
+pub struct ShardWriter {
     dir: PathBuf,
     video: String,
     split: Split,
     max_bytes: u64,
     open: Option<OpenShard>,
-    shards: Vec<Shard>,
+    shards: Vec<ShardRef>,
     samples: Vec<SampleRef>,
 }
 
@@ -29,7 +29,7 @@ struct OpenShard {
     n_samples: usize,
 }
 
-impl Writer {
+impl ShardWriter {
     /// A shard is closed before it would grow past `max_bytes`; a longer sample is a shard by itself.
     pub fn new(dir: &Path, video: &str, split: Split, max_bytes: u64) -> Self {
         let (dir, video) = (dir.to_owned(), video.to_owned());
@@ -67,14 +67,14 @@ impl Writer {
             let header = header(&format!("{}.{extension}", sample.key), member.len())?;
             let padding = [0; BLOCK];
             let padding = &padding[..member.len().next_multiple_of(BLOCK) - member.len()];
-            spans.push(Span { offset: open.bytes + BLOCK as u64, size: member.len() as u64 });
+            spans.push(ByteRange { offset: open.bytes + BLOCK as u64, size: member.len() as u64 });
             for part in [header.as_bytes().as_slice(), member, padding] {
                 hasher.update(part);
                 open.push(part).with_context(|| format!("writing {}", path.display()))?;
             }
         }
         open.n_samples += 1;
-        let [json, mask, pose2d, pose3d, wav] = spans.try_into().unwrap_or([Span::default(); 5]);
+        let [json, mask, pose2d, pose3d, wav] = spans.try_into().unwrap_or([ByteRange::default(); 5]);
         self.samples.push(SampleRef {
             key: sample.key.clone(),
             split: self.split,
@@ -100,7 +100,7 @@ impl Writer {
         let shard = written.with_context(|| format!("writing {}", self.dir.join(&file).display()))?;
         // Whoever puts the folder in place flushes every file; this only lets the disk begin while the next is made.
         drop(std::thread::spawn(move || shard.sync_all()));
-        self.shards.push(Shard {
+        self.shards.push(ShardRef {
             file,
             bytes: open.bytes,
             n_samples: open.n_samples,
@@ -110,7 +110,7 @@ impl Writer {
     }
 
     /// Closes and flushes the last shard; what was written, in order.
-    pub fn finish(mut self) -> Result<(Vec<Shard>, Vec<SampleRef>)> {
+    pub fn finish(mut self) -> Result<(Vec<ShardRef>, Vec<SampleRef>)> {
         self.close()?;
         Ok((self.shards, self.samples))
     }

@@ -1,14 +1,14 @@
 //! Writing a dataset's folder: video by video, then all that is put together from them.
 
 use super::assemble::assemble;
-use super::part::{PartWriter, Source};
+use super::part::{EntryWriter, VideoSource};
 use crate::dataset::bones::VideoBones;
-use crate::dataset::info::{About, Info};
-use crate::dataset::leakage::Compared;
+use crate::dataset::info::{About, DatasetInfo};
+use crate::dataset::leakage::SoundComparison;
 use crate::dataset::sample::Sample;
 use crate::dataset::split::Split;
 use crate::dataset::split::SplitBy;
-use crate::dataset::stats::Stats;
+use crate::dataset::stats::DatasetStats;
 use crate::motion::bones;
 use crate::stage::ledger::{Kept, Ledger};
 use crate::types::time::FrameRate;
@@ -20,28 +20,28 @@ pub struct DatasetWriter {
     dir: PathBuf,
     about: About,
     max_shard_bytes: u64,
-    compared: Compared,
+    compared: SoundComparison,
 }
 
 impl DatasetWriter {
     /// Begins a dataset in the existing, empty folder `dir`. A shard is closed before it would grow past
     /// `max_shard_bytes`.
     pub fn new(dir: &Path, about: About, max_shard_bytes: u64) -> Self {
-        Self { dir: dir.to_owned(), about, max_shard_bytes, compared: Compared::default() }
+        Self { dir: dir.to_owned(), about, max_shard_bytes, compared: SoundComparison::default() }
     }
 
     /// Says which videos share sound.
-    pub fn with_compared(self, compared: Compared) -> Self {
+    pub fn with_compared(self, compared: SoundComparison) -> Self {
         Self { compared, ..self }
     }
 
     /// Begins a video; `finish` of what comes back ends it. Videos may be written in any order.
-    pub fn video(&self, source: Source, split: Split, split_by: SplitBy) -> Result<PartWriter> {
-        PartWriter::new(&self.dir, source, split, split_by, self.max_shard_bytes)
+    pub fn video(&self, source: VideoSource, split: Split, split_by: SplitBy) -> Result<EntryWriter> {
+        EntryWriter::new(&self.dir, source, split, split_by, self.max_shard_bytes)
     }
 
     /// Puts the dataset together from its videos.
-    pub fn finish(self) -> Result<(Info, Stats)> {
+    pub fn finish(self) -> Result<(DatasetInfo, DatasetStats)> {
         assemble(&self.dir, &self.about, &self.compared)
     }
 }
@@ -49,7 +49,12 @@ impl DatasetWriter {
 /// A whole dataset from samples in memory, in the folder `dir` (made if it is not there): what tests and small
 /// experiments need. Samples whose keys differ only behind the last dash are of one video, and stand side by side. Their
 /// motion is left as it is; the video's bones are its median lengths.
-pub fn write_dataset(dir: &Path, speaker: &str, fps: FrameRate, samples: &[(Split, Sample)]) -> Result<(Info, Stats)> {
+pub fn write_dataset(
+    dir: &Path,
+    speaker: &str,
+    fps: FrameRate,
+    samples: &[(Split, Sample)],
+) -> Result<(DatasetInfo, DatasetStats)> {
     std::fs::create_dir_all(dir).with_context(|| format!("making the folder {}", dir.display()))?;
     let writer = DatasetWriter::new(dir, About::new(speaker, fps), 256 << 20);
     let video_of =
@@ -70,13 +75,13 @@ pub fn write_dataset(dir: &Path, speaker: &str, fps: FrameRate, samples: &[(Spli
         let kept: Vec<Kept> = kept.collect();
         let duration_secs = fps.secs(n_frames);
         let name = video_of(first);
-        let source = Source {
+        let source = VideoSource {
             file: format!("{name}.mp4"),
             content: blake3::hash(name.as_bytes()).to_hex().to_string(),
             name,
             ledger: Ledger { duration_secs, kept, ..Ledger::default() },
             bones: VideoBones { lengths_metres: lengths.map(f64::from).to_vec(), n_frames },
-            ..Source::default()
+            ..VideoSource::default()
         };
         let mut video = writer.video(source, *split, SplitBy::Name)?;
         of_video.iter().try_for_each(|(_, sample)| video.push(sample, 0.0))?;

@@ -71,7 +71,7 @@ impl std::fmt::Display for Disturbance {
 
 impl Disturbance {
     /// The motion made worse; the same dice give the same. The neck stays where it is.
-    pub fn of(self, motion: &Motion, dice: &mut ChaCha8Rng) -> Motion {
+    pub fn apply(self, motion: &Motion, dice: &mut ChaCha8Rng) -> Motion {
         let joints = &motion.joints;
         let n = motion.n_frames();
         let mut worse = match self {
@@ -122,14 +122,14 @@ fn stiff(joints: &Array3<f32>) -> Array3<f32> {
 
 /// Distances of a disturbed half from the other half.
 #[derive(Clone, Copy, Debug)]
-pub struct Row {
+pub struct DisturbanceRow {
     pub disturbance: Disturbance,
     /// Raw poses (cm²), basis, embedding.
     pub distances: [f64; 3],
 }
 
 /// The table over `motions`: every second one is disturbed, and its distance from the others taken.
-pub fn table(motions: &[Motion]) -> Vec<Row> {
+pub fn table(motions: &[Motion]) -> Vec<DisturbanceRow> {
     let joints: Vec<usize> = (1..N_JOINTS).filter(|joint| !is_duplicate(*joint)).collect();
     let spaces = |motions: &mut dyn Iterator<Item = Motion>| {
         let mut sets: [Gaussian; 3] = Default::default();
@@ -144,8 +144,8 @@ pub fn table(motions: &[Motion]) -> Vec<Row> {
     let others = spaces(&mut motions.iter().skip(1).step_by(2).cloned());
     let row = |disturbance: Disturbance| {
         let mut dice = ChaCha8Rng::seed_from_u64(7);
-        let own = spaces(&mut motions.iter().step_by(2).map(|motion| disturbance.of(motion, &mut dice)));
-        Row { disturbance, distances: [0, 1, 2].map(|space| frechet(&own[space], &others[space])) }
+        let own = spaces(&mut motions.iter().step_by(2).map(|motion| disturbance.apply(motion, &mut dice)));
+        DisturbanceRow { disturbance, distances: [0, 1, 2].map(|space| frechet(&own[space], &others[space])) }
     };
     TABLE.into_iter().map(row).collect()
 }
@@ -155,7 +155,7 @@ pub fn unseen(n_minutes: usize) -> Result<Vec<Motion>> {
     const FIRST_SEED: u64 = 900_000;
     let minute = |n: usize| -> Result<Motion> {
         let clips = dataset::clips(1.0 / 60.0, FIRST_SEED + n as u64)?;
-        let motion = clips.first().map(dataset::Clip::motion);
+        let motion = clips.first().map(dataset::SpokenClip::motion);
         Ok(motion.unwrap_or(Motion::from_joints(fixed_rate::FPS, Array3::zeros((0, N_JOINTS, 3)))))
     };
     (0..n_minutes).map(minute).collect()

@@ -3,8 +3,8 @@
 
 use super::traces;
 use crate::dataset::{Dataset, Sample, Split};
-use crate::demo::rule::dataset::Clip;
-use crate::demo::rule::listener::{Listener, sound_of_frames, wrist_speeds};
+use crate::demo::rule::dataset::SpokenClip;
+use crate::demo::rule::listener::{SoundRegression, sound_of_frames, wrist_speeds};
 use crate::demo::rule::ridge::correlation;
 use crate::generate::Speaker;
 use crate::metrics::movement::energy::MotionEnergy;
@@ -18,18 +18,18 @@ use serde::Serialize;
 
 /// A predictor on the whole test split.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct LearnedRow {
     pub predictor: &'static str,
     /// Pearson's correlation of the speed of the left and of the right wrist with the predictable part's, all clips one
     /// after the other, a number a frame, no smoothing.
     pub speed_correlation: [f64; 2],
     /// The other figures; `None`: it predicts no poses.
-    pub poses: Option<Poses>,
+    pub poses: Option<PoseQuality>,
 }
 
 /// How near the poses are to what the speaker did.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Poses {
+pub struct PoseQuality {
     /// Share of keypoints within 0.2 of the pose's extent, 48 joints.
     pub pck: f64,
     /// Mean squared speed of the joints, as a share of the data's.
@@ -46,14 +46,14 @@ pub struct Poses {
 pub struct Learned {
     pub n_clips: usize,
     pub secs: f64,
-    pub rows: Vec<Row>,
+    pub rows: Vec<LearnedRow>,
     /// Penalties of the ridge regressions to speeds and to poses.
     pub ridge_strengths: [f64; 2],
     /// Whether the generator reaches the targets; `None`: there is none.
     pub good: Option<bool>,
     /// The first clip, to look at.
     #[serde(skip)]
-    pub first: Option<traces::Clip>,
+    pub first: Option<traces::TraceClip>,
 }
 
 /// What the generator has to reach: correlation of each wrist's speed, PCK as a multiple of the mean pose's and of the
@@ -66,7 +66,7 @@ pub const ENERGY: std::ops::RangeInclusive<f64> = 0.7..=1.3;
 const HELD: f64 = 0.05;
 
 /// A clip of the test split.
-struct Test {
+struct TestClip {
     sample: Sample,
     predictable: Array3<f32>,
     sound: Array2<f64>,
@@ -74,15 +74,15 @@ struct Test {
 
 /// Measures `speaker` on the test split of the synthetic speaker's `dataset`; without one, the others alone.
 pub fn measure(dataset: &Dataset, speaker: Option<&Speaker>, progress: &dyn Progress) -> Result<Learned> {
-    let tests: Vec<Test> =
-        dataset.samples(Split::Test).iter().map(|s| Test::of(dataset.read(s)?)).collect::<Result<_>>()?;
+    let tests: Vec<TestClip> =
+        dataset.samples(Split::Test).iter().map(|s| TestClip::new(dataset.read(s)?)).collect::<Result<_>>()?;
     ensure!(tests.len() > 1, "{}: the test split needs two clips at least", dataset.dir().display());
     let fps = dataset.info().fps;
     let judge = Judge { tests: &tests, std: dataset.stats().std(), fps };
     let task = progress.begin("listen", 0);
-    let listener = Listener::learn(dataset)?;
+    let listener = SoundRegression::learn(dataset)?;
     let row = |predictor, made: Vec<Array3<f32>>| judge.row(predictor, &made);
-    let each = |predict: &dyn Fn(&Test) -> Array3<f32>| tests.iter().map(predict).collect::<Vec<_>>();
+    let each = |predict: &dyn Fn(&TestClip) -> Array3<f32>| tests.iter().map(predict).collect::<Vec<_>>();
     let (mut rows, mut first) = (Vec::new(), None);
     if let Some(speaker) = speaker {
         task.detail("generating");
@@ -91,7 +91,7 @@ pub fn measure(dataset: &Dataset, speaker: Option<&Speaker>, progress: &dyn Prog
         for (made, test) in made.iter().zip(&tests) {
             ensure!(made.shape() == test.predictable.shape(), "the speaker has another frame rate than the dataset");
         }
-        first = made.first().zip(tests.first()).map(|(made, test)| traces::Clip {
+        first = made.first().zip(tests.first()).map(|(made, test)| traces::TraceClip {
             rule: test.predictable.clone(),
             data: test.sample.motion.joints.clone(),
             made: made.clone(),
@@ -104,7 +104,7 @@ pub fn measure(dataset: &Dataset, speaker: Option<&Speaker>, progress: &dyn Prog
     rows.push(row("mean pose", each(&|test| listener.still(test.sample.n_frames()))));
     rows.push(row("ridge of the frame, to poses", each(&|test| listener.ridge_poses(&test.sound))));
     let speeds: Vec<Array2<f64>> = tests.iter().map(|test| listener.ridge_speeds(&test.sound)).collect();
-    rows.push(Row {
+    rows.push(LearnedRow {
         predictor: "ridge of the frame, to speeds",
         speed_correlation: judge.correlation(&speeds),
         poses: None,
@@ -124,32 +124,32 @@ pub fn measure(dataset: &Dataset, speaker: Option<&Speaker>, progress: &dyn Prog
 }
 
 /// Whether the first row, the generator's, reaches the targets; the second is the mismatched one, the third the mean pose.
-fn good(rows: &[Row]) -> bool {
+fn good(rows: &[LearnedRow]) -> bool {
     let [made, others @ ..] = rows else { return false };
     let Some(poses) = made.poses else { return false };
-    let beats = |other: &Row| other.poses.is_some_and(|other| poses.pck >= LEAST_PCK * other.pck);
+    let beats = |other: &LearnedRow| other.poses.is_some_and(|other| poses.pck >= LEAST_PCK * other.pck);
     made.speed_correlation.iter().all(|correlation| *correlation >= LEAST_CORRELATION)
         && others.iter().take(2).all(beats)
         && ENERGY.contains(&poses.energy)
 }
 
-impl Test {
-    fn of(sample: Sample) -> Result<Self> {
-        let predictable = Clip::of(&sample)?.predictable().joints;
+impl TestClip {
+    fn new(sample: Sample) -> Result<Self> {
+        let predictable = SpokenClip::from_sample(&sample)?.predictable().joints;
         let sound = sound_of_frames(&sample.sound, sample.n_frames(), sample.motion.fps);
         Ok(Self { sample, predictable, sound })
     }
 }
 
 struct Judge<'a> {
-    tests: &'a [Test],
+    tests: &'a [TestClip],
     /// [49, 3] metres
     std: Array2<f32>,
     fps: FrameRate,
 }
 
 impl Judge<'_> {
-    fn row(&self, predictor: &'static str, made: &[Array3<f32>]) -> Row {
+    fn row(&self, predictor: &'static str, made: &[Array3<f32>]) -> LearnedRow {
         let mut correct = Correct::default();
         let (mut energy, mut real_energy) = (MotionEnergy::default(), MotionEnergy::default());
         let (mut pauses, mut real_pauses) = (MotionEnergy::default(), MotionEnergy::default());
@@ -166,10 +166,10 @@ impl Judge<'_> {
             errors = (errors.0 + of_clip.0, errors.1 + of_clip.1);
         }
         let speeds: Vec<Array2<f64>> = made.iter().map(|made| wrist_speeds(made.view(), self.fps)).collect();
-        Row {
+        LearnedRow {
             predictor,
             speed_correlation: self.correlation(&speeds),
-            poses: Some(Poses {
+            poses: Some(PoseQuality {
                 pck: correct.share(),
                 energy: energy.relative_to(&real_energy),
                 pauses: pauses.relative_to(&real_pauses),
@@ -204,7 +204,7 @@ impl Judge<'_> {
 
 /// The mask of the frames at whose both sides the rule moves no wrist faster than `HELD`; two such frames in a row have
 /// such a step between them.
-fn held(test: &Test, fps: FrameRate) -> Array2<bool> {
+fn held(test: &TestClip, fps: FrameRate) -> Array2<bool> {
     let speeds = wrist_speeds(test.predictable.view(), fps);
     let still = |t: usize| speeds.row(t.min(speeds.nrows() - 1)).iter().all(|speed| *speed < HELD);
     let mask = &test.sample.motion.mask;

@@ -6,7 +6,7 @@
 
 use crate::dataset::{Dataset, Split};
 use crate::demo::drawn::folder::DATASET_FPS;
-use crate::demo::drawn::truth::Truth;
+use crate::demo::drawn::truth::DrawnTruth;
 use crate::formats::keypoints_npz;
 use crate::math::order::{Ordered, upper_median};
 use crate::types::skeleton::{
@@ -53,7 +53,7 @@ pub struct Millimetres {
 
 /// Everything measured.
 #[derive(Clone, Debug, Default)]
-pub struct Measured {
+pub struct PipelineCheck {
     pub body: Pixels,
     pub hands: Pixels,
     /// Frames in the dataset, and in the videos.
@@ -70,7 +70,7 @@ pub struct Measured {
     pub bone_depth: Millimetres,
 }
 
-impl Measured {
+impl PipelineCheck {
     /// Whether every target is met.
     pub fn good(&self) -> bool {
         let px = |pixels: &Pixels| pixels.median <= MOST_PX && pixels.found >= LEAST_FOUND;
@@ -80,7 +80,7 @@ impl Measured {
 }
 
 /// Holds the keypoints and the dataset of the run in `dir` against `dir/truth`.
-pub fn measure(dir: &Path) -> Result<Measured> {
+pub fn measure(dir: &Path) -> Result<PipelineCheck> {
     let mut measured = measure_keypoints(dir)?;
     let (mut lifted, mut true_joints) = (Vec::new(), Vec::new());
     let dataset = Dataset::open(dir.join("work/dataset/host"))?;
@@ -119,8 +119,8 @@ pub fn measure(dir: &Path) -> Result<Measured> {
 }
 
 /// The keypoints' part of it.
-pub fn measure_keypoints(dir: &Path) -> Result<Measured> {
-    let mut measured = Measured::default();
+pub fn measure_keypoints(dir: &Path) -> Result<PipelineCheck> {
+    let mut measured = PipelineCheck::default();
     let (mut body, mut hands) = (Distances::default(), Distances::default());
     for unit in subfolders(&dir.join("work/pose2d/host"))? {
         let truth = truth_of(dir, &unit.file_name().unwrap_or_default().to_string_lossy())?;
@@ -135,9 +135,9 @@ pub fn measure_keypoints(dir: &Path) -> Result<Measured> {
 }
 
 /// The truth of the video whose work name, `<stem>-<8 hex digits>`, this is.
-fn truth_of(dir: &Path, work_name: &str) -> Result<Truth> {
+fn truth_of(dir: &Path, work_name: &str) -> Result<DrawnTruth> {
     let stem = work_name.rsplit_once('-').map_or(work_name, |(stem, _)| stem);
-    let truth = Truth::read(&dir.join(format!("truth/{stem}.npz")))?;
+    let truth = DrawnTruth::read(&dir.join(format!("truth/{stem}.npz")))?;
     ensure!(truth.motion.fps == DATASET_FPS, "the truth of {stem} is not at {DATASET_FPS} frames a second");
     Ok(truth)
 }
@@ -249,11 +249,11 @@ fn distances(told: &Array3<f32>, truth: &Array3<f32>) -> Millimetres {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::demo::drawn::scene::Scene;
+    use crate::demo::drawn::scene::DrawnScene;
 
     #[test]
     fn size_is_forgiven_and_a_turn_is_not() {
-        let truth = Truth::of(&Scene::new(2, 4.0, [640, 480]), DATASET_FPS).motion.joints;
+        let truth = DrawnTruth::new(&DrawnScene::new(2, 4.0, [640, 480]), DATASET_FPS).motion.joints;
         let larger = truth.mapv(|v| 1.3 * v);
         let same = distances(&scaled(larger.view()), &scaled(truth.view()));
         assert!(same.all < 1e-3 && same.fingers < 1e-3);
@@ -267,24 +267,26 @@ mod tests {
     fn a_run_that_found_little_is_not_good() {
         let pixels = Pixels { median: 0.3, p90: 1.0, found: 1.0 };
         let mm = Millimetres { all: 40.0, ..Millimetres::default() };
-        let good = Measured {
+        let good = PipelineCheck {
             body: pixels,
             hands: pixels,
             n_frames: 90,
             n_drawn: 100,
             joints: 1.0,
             lifted: mm,
-            ..Measured::default()
+            ..PipelineCheck::default()
         };
         let few = Pixels { found: 0.05, ..pixels };
         assert!(good.good());
-        assert!(!Measured { body: few, ..good.clone() }.good() && !Measured { hands: few, ..good.clone() }.good());
-        assert!(!Measured { n_frames: 1, ..good.clone() }.good() && !Measured { joints: 0.1, ..good }.good());
+        assert!(
+            !PipelineCheck { body: few, ..good.clone() }.good() && !PipelineCheck { hands: few, ..good.clone() }.good()
+        );
+        assert!(!PipelineCheck { n_frames: 1, ..good.clone() }.good() && !PipelineCheck { joints: 0.1, ..good }.good());
     }
 
     #[test]
     fn trivial_rows_count_the_joints_of_the_lifted_row_and_bones_solve_depth() {
-        let truth = Truth::of(&Scene::new(2, 4.0, [640, 480]), DATASET_FPS).motion.joints;
+        let truth = DrawnTruth::new(&DrawnScene::new(2, 4.0, [640, 480]), DATASET_FPS).motion.joints;
         let mut lifted = truth.clone();
         lifted.slice_mut(s![.., L_WRIST, ..]).fill(f32::NAN);
         let mut told = truth.clone();

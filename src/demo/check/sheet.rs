@@ -1,8 +1,8 @@
 //! The contact sheet: a few moments of a clip, each as the video shows it, with its keypoints, as the 3D figure from the
 //! front and from the left, beside a moment of generated motion.
 
-use crate::animate::draw::figure::{INK, PAPER, View, draw_pose};
-use crate::animate::draw::overlay::{Place, draw_keypoints};
+use crate::animate::draw::figure::{FigureView, INK, PAPER, draw_pose};
+use crate::animate::draw::overlay::{ImageTransform, draw_keypoints};
 use crate::external::ffmpeg::frames::FrameReader;
 use crate::external::opencv::{draw, warp};
 use crate::formats::{joints_npz, keypoints_npz};
@@ -85,13 +85,13 @@ fn overlay(image: &Image, keypoints: &Keypoints, frame_idx: usize) -> Result<Ima
         *value = ((u16::from(*value) + u16::from(*paper)) / 2) as u8;
     }
     let scale = [CELL[0] as f32 / image.width as f32, CELL[1] as f32 / image.height as f32];
-    draw_keypoints(&mut cell, keypoints, frame_idx, Place { scale, shift: [0.0; 2] }, 2.0)?;
+    draw_keypoints(&mut cell, keypoints, frame_idx, ImageTransform { scale, shift: [0.0; 2] }, 2.0)?;
     Ok(cell)
 }
 
 fn figure(joints: ArrayView2<f32>, yaw_degrees: f32) -> Result<Image> {
     let mut cell = Image::filled(CELL[0], CELL[1], PAPER);
-    let view = View { yaw_degrees, ..View::front([CELL[0] as f32 / 2.0, 92.0], 215.0) };
+    let view = FigureView { yaw_degrees, ..FigureView::front([CELL[0] as f32 / 2.0, 92.0], 215.0) };
     draw_pose(&mut cell, joints, &view)?;
     Ok(cell)
 }

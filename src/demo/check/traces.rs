@@ -1,7 +1,7 @@
 //! A picture of what was learnt: the speed of each wrist over the first half minute of a test sound, as the rule has it,
 //! as the speaker moved in fact, and as the trained speaker moves; under them a few poses of the last two.
 
-use crate::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, View, draw_pose, mix};
+use crate::animate::draw::figure::{FigureView, INK, LEFT, PAPER, RIGHT, draw_pose, mix};
 use crate::demo::rule::listener::{WRISTS, wrist_speeds};
 use crate::external::opencv::draw;
 use crate::types::image::Image;
@@ -22,14 +22,14 @@ const RULE: [u8; 3] = [40, 44, 50];
 
 /// Joints [T, 49, 3] of one clip.
 #[derive(Clone, Debug)]
-pub struct Clip {
+pub struct TraceClip {
     pub rule: Array3<f32>,
     pub data: Array3<f32>,
     pub made: Array3<f32>,
 }
 
 /// Draws the clip.
-pub fn picture(clip: &Clip, fps: FrameRate) -> Result<Image> {
+pub fn picture(clip: &TraceClip, fps: FrameRate) -> Result<Image> {
     let mut image = Image::filled(WIDTH, (2.0 * (LANE_PX + POSES_PX)) as usize, PAPER);
     let n_frames = clip.rule.shape()[0].min(fps.frames_in(SECS)).max(2);
     let x_of = |t: f32| MARGIN_PX + (WIDTH as f32 - MARGIN_PX - 10.0) * t / (n_frames - 1) as f32;
@@ -55,7 +55,7 @@ pub fn picture(clip: &Clip, fps: FrameRate) -> Result<Image> {
         draw::text(&mut image, name, [4.0, top + 80.0], 9.0, INK)?;
         for pose in 0..N_POSES {
             let t = (2 * pose + 1) * (n_frames - 1) / (2 * N_POSES);
-            let view = View::front([x_of(t as f32), top + 50.0], 150.0);
+            let view = FigureView::front([x_of(t as f32), top + 50.0], 150.0);
             draw_pose(&mut image, joints.index_axis(Axis(0), t), &view)?;
         }
     }

@@ -5,7 +5,7 @@ use crate::math::vec3::{Vec3, add};
 
 /// Looks at a point a little below the figure's neck.
 #[derive(Clone, Copy, Debug)]
-pub struct Camera {
+pub struct DemoCamera {
     pub width: usize,
     pub height: usize,
     /// Focal length, px.
@@ -17,7 +17,7 @@ pub struct Camera {
     distance: f64,
 }
 
-impl Camera {
+impl DemoCamera {
     /// `yaw` to the figure's left, `pitch` down from above, radians; `distance` in metres.
     pub fn new([width, height]: [usize; 2], yaw: f64, pitch: f64, distance: f64) -> Self {
         let axes = Rotation::about([1.0, 0.0, 0.0], pitch) * Rotation::about([0.0, 1.0, 0.0], yaw);
@@ -49,7 +49,7 @@ mod tests {
 
     #[test]
     fn from_above_what_is_nearer_is_lower_in_the_picture() {
-        let camera = Camera::new([640, 480], 0.0, 0.1, 2.0);
+        let camera = DemoCamera::new([640, 480], 0.0, 0.1, 2.0);
         let [x, y] = camera.pixel(camera.see([0.0, 0.1, 0.0]));
         assert!((x - 319.5).abs() < 1e-9 && (y - 239.5).abs() < 1e-9);
         let near = camera.pixel(camera.see([0.0, 0.1, -0.3]));

@@ -31,7 +31,7 @@ const ELBOW_POLE: [f64; 3] = [0.3, 0.95, 0.0];
 
 /// Controls of one arm, the same numbers for both sides.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Arm {
+pub struct ArmControls {
     /// Wrist from the neck in torso axes: outwards, down, away from the viewer; metres.
     pub wrist: [f64; 3],
     /// Turn about the hand's length; 0: thumb up, positive: palm down. Radians.
@@ -50,7 +50,7 @@ pub struct Arm {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Controls {
     /// Left, right.
-    pub arms: [Arm; 2],
+    pub arms: [ArmControls; 2],
     /// Turn about the vertical, lean forward, lean to the figure's left.
     pub torso: [f64; 3],
     /// The same of the head, on top of the torso's.
@@ -61,7 +61,7 @@ pub struct Controls {
 
 /// Every known point of the figure, world metres.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Figure {
+pub struct DrawnFigure {
     /// House order.
     pub joints: [Vec3; N_JOINTS],
     /// Nose, left and right eye, left and right ear.
@@ -72,7 +72,7 @@ pub struct Figure {
     pub skull: Vec3,
 }
 
-impl Figure {
+impl DrawnFigure {
     /// The figure in the posture of its controls.
     pub fn new(controls: &Controls) -> Self {
         let torso = lean(controls.torso);
@@ -117,7 +117,7 @@ fn reach(shoulder: Vec3, target: Vec3, pole: Vec3) -> (Vec3, Vec3) {
 }
 
 /// The 21 joints of a hand: wrist, then thumb to little finger, each base to tip.
-fn fingers(arm: &Arm, elbow: Vec3, wrist: Vec3, side: f64) -> [Vec3; N_HAND_JOINTS] {
+fn fingers(arm: &ArmControls, elbow: Vec3, wrist: Vec3, side: f64) -> [Vec3; N_HAND_JOINTS] {
     let forearm = direction(sub(wrist, elbow));
     let along = direction(add(forearm, [0.0, -arm.raise, 0.0]));
     let up = [0.0, -1.0, 0.6];
@@ -157,13 +157,13 @@ mod tests {
     use crate::types::skeleton::{L_ELBOW, L_WRIST, R_WRIST, mirror, parent};
 
     fn posture() -> Controls {
-        let arm = Arm { wrist: [0.2, 0.2, -0.22], roll: 0.5, raise: 0.5, curl: 0.3, index: -0.2, spread: 0.1 };
+        let arm = ArmControls { wrist: [0.2, 0.2, -0.22], roll: 0.5, raise: 0.5, curl: 0.3, index: -0.2, spread: 0.1 };
         Controls { arms: [arm; 2], ..Controls::default() }
     }
 
     #[test]
     fn bones_have_their_lengths_and_hands_hang_on_wrists() {
-        let figure = Figure::new(&posture());
+        let figure = DrawnFigure::new(&posture());
         let length = |a: usize, b: usize| norm(sub(figure.joints[a], figure.joints[b]));
         assert!((length(L_SHOULDER, L_ELBOW) - UPPER_ARM).abs() < 1e-9);
         assert!((length(L_ELBOW, L_WRIST) - FOREARM).abs() < 1e-9);
@@ -176,7 +176,7 @@ mod tests {
 
     #[test]
     fn a_symmetric_posture_gives_a_mirrored_figure() {
-        let figure = Figure::new(&posture());
+        let figure = DrawnFigure::new(&posture());
         for joint in 1..N_JOINTS {
             let ([x, y, z], [mx, my, mz]) = (figure.joints[joint], figure.joints[mirror(joint)]);
             assert!((x + mx).abs() + (y - my).abs() + (z - mz).abs() < 1e-9, "{joint} of {:?}", parent(joint));

@@ -1,8 +1,8 @@
 //! The demo's folder: clips of the synthetic speaker, what is true of them, the marker models, and the configuration
 //! that leads `orator run` through all of it.
 
-use super::scene::Scene;
-use super::truth::Truth;
+use super::scene::DrawnScene;
+use super::truth::DrawnTruth;
 use crate::external::ffmpeg::audio;
 use crate::stage::progress::Progress;
 use crate::stage::workdir;
@@ -43,7 +43,7 @@ lambda_gan = 0.15                  # 1 moves nearly three times as much as the d
 
 /// What is drawn.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct DemoPlan {
     pub n_videos: usize,
     /// Length of each video.
     pub secs: f64,
@@ -54,7 +54,7 @@ pub struct Plan {
     pub seed: u64,
 }
 
-impl Default for Plan {
+impl Default for DemoPlan {
     fn default() -> Self {
         Self { n_videos: 4, secs: 30.0, fps: FrameRate::new(30, 1), size: [960, 720], seed: 1 }
     }
@@ -62,7 +62,7 @@ impl Default for Plan {
 
 /// Writes `videos/host/clip-<n>.mp4`, `truth/clip-<n>.npz`, `speech.wav`, `models/` and `pipeline.toml` into `dir`.
 /// Gives the videos.
-pub fn draw(dir: &Path, plan: &Plan, progress: &dyn Progress) -> anyhow::Result<Vec<PathBuf>> {
+pub fn draw(dir: &Path, plan: &DemoPlan, progress: &dyn Progress) -> anyhow::Result<Vec<PathBuf>> {
     ensure!((1..=1000).contains(&plan.n_videos), "between 1 and 1000 videos can be drawn, not {}", plan.n_videos);
     ensure!((1.0..=3600.0).contains(&plan.secs), "a video lasts 1 to 3600 seconds, not {}", plan.secs);
     for (name, bytes) in MODELS {
@@ -70,13 +70,13 @@ pub fn draw(dir: &Path, plan: &Plan, progress: &dyn Progress) -> anyhow::Result<
     }
     let mut videos = Vec::new();
     for number in 1..=plan.n_videos {
-        let scene = Scene::new(plan.seed.wrapping_mul(1000).wrapping_add(number as u64), plan.secs, plan.size);
+        let scene = DrawnScene::new(plan.seed.wrapping_mul(1000).wrapping_add(number as u64), plan.secs, plan.size);
         let video = dir.join(format!("videos/host/clip-{number}.mp4"));
         workdir::replace(&video, |attempt| scene.film(attempt, plan.fps, progress))?;
-        Truth::of(&scene, DATASET_FPS).write(&dir.join(format!("truth/clip-{number}.npz")))?;
+        DrawnTruth::new(&scene, DATASET_FPS).write(&dir.join(format!("truth/clip-{number}.npz")))?;
         videos.push(video);
     }
-    let unheard = Scene::new(plan.seed.wrapping_mul(1000), UNHEARD_SECS, plan.size).sound();
+    let unheard = DrawnScene::new(plan.seed.wrapping_mul(1000), UNHEARD_SECS, plan.size).sound();
     workdir::replace(&dir.join("speech.wav"), |attempt| audio::write_wav(attempt, &unheard))?;
     workdir::write_file(&dir.join("pipeline.toml"), PIPELINE.replace("SPLITS", &splits(plan.n_videos)).as_bytes())?;
     Ok(videos)

@@ -1,7 +1,7 @@
 //! Gestures to speech: every phrase has strokes to new places in front of the body, every stressed syllable a beat of
 //! hands and head, every longer pause a rest. Time in seconds in, controls of the figure out, smooth everywhere.
 
-use super::figure::{Arm, Controls};
+use super::figure::{ArmControls, Controls};
 use super::speech::Speech;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -24,7 +24,7 @@ struct Stroke {
 
 /// A quick dip of hands and head around a stressed syllable.
 #[derive(Clone, Debug)]
-struct Beat {
+struct BeatGesture {
     at: f64,
     depth: f64,
     /// Shares of left and right hand.
@@ -33,14 +33,14 @@ struct Beat {
 
 /// The motion of a clip.
 #[derive(Clone, Debug)]
-pub struct Gestures {
+pub struct DrawnGestures {
     strokes: Vec<Stroke>,
-    beats: Vec<Beat>,
+    beats: Vec<BeatGesture>,
     /// Phases of the slow sway.
     sway: [f64; 4],
 }
 
-impl Gestures {
+impl DrawnGestures {
     /// Strokes and beats for what is said.
     pub fn new(speech: &Speech, dice: &mut ChaCha8Rng) -> Self {
         let sway = std::array::from_fn(|_| dice.random_range(0.0..2.0 * PI));
@@ -58,7 +58,7 @@ impl Gestures {
                     hands[1 - side] = 0.25;
                 }
                 let depth = dice.random_range(0.02..0.045) * syllable.stress;
-                gestures.beats.push(Beat { at: (syllable.start + syllable.end) / 2.0, depth, hands });
+                gestures.beats.push(BeatGesture { at: (syllable.start + syllable.end) / 2.0, depth, hands });
             }
             let (Some(end), next) = (said.last().map(|s| s.end), speech.phrases.get(number + 1)) else { continue };
             if next.is_none_or(|next| speech.syllables.get(next.first).is_none_or(|s| s.start - end > 0.6)) {
@@ -124,8 +124,8 @@ impl Gestures {
     }
 }
 
-fn arm([out, down, away, roll, raise, curl, index, spread]: [f64; N_ARM]) -> Arm {
-    Arm { wrist: [out, down, away], roll, raise, curl, index, spread }
+fn arm([out, down, away, roll, raise, curl, index, spread]: [f64; N_ARM]) -> ArmControls {
+    ArmControls { wrist: [out, down, away], roll, raise, curl, index, spread }
 }
 
 /// 0 to 1 over 0..1 with speed and acceleration 0 at both ends (Flash and Hogan 1985).
@@ -137,7 +137,7 @@ fn minimum_jerk(along: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::demo::drawn::figure::Figure;
+    use crate::demo::drawn::figure::DrawnFigure;
     use crate::math::vec3::{norm, sub};
     use crate::types::skeleton::{L_WRIST, R_WRIST};
     use rand::SeedableRng;
@@ -146,8 +146,9 @@ mod tests {
     fn hands_move_like_a_speakers_and_keep_apart() {
         let mut dice = ChaCha8Rng::seed_from_u64(1);
         let speech = Speech::new(20.0, &mut dice);
-        let gestures = Gestures::new(&speech, &mut dice);
-        let figures: Vec<Figure> = (0..600).map(|n| Figure::new(&gestures.controls(f64::from(n) / 30.0))).collect();
+        let gestures = DrawnGestures::new(&speech, &mut dice);
+        let figures: Vec<DrawnFigure> =
+            (0..600).map(|n| DrawnFigure::new(&gestures.controls(f64::from(n) / 30.0))).collect();
         let mut way = 0.0;
         for pair in figures.windows(2) {
             let step = norm(sub(pair[1].joints[R_WRIST], pair[0].joints[R_WRIST]));

@@ -1,7 +1,7 @@
 //! The picture of the figure: a grey mannequin on a plain ground in a marker suit, one colour a joint.
 
-use super::camera::Camera;
-use super::figure::Figure;
+use super::camera::DemoCamera;
+use super::figure::DrawnFigure;
 use super::palette::{COLOURS, N_BODY_MARKERS, N_FINGER_MARKERS};
 use crate::external::opencv::draw;
 use crate::math::vec3::{Vec3, add, norm, scale, sub};
@@ -25,7 +25,7 @@ const FACE_MARKER: f64 = 0.0145;
 const FINGER_MARKER: f64 = 0.0095;
 
 /// Draws the figure; `mouth` 0..1 is how far it is open.
-pub fn picture(figure: &Figure, camera: &Camera, mouth: f64) -> anyhow::Result<Image> {
+pub fn picture(figure: &DrawnFigure, camera: &DemoCamera, mouth: f64) -> anyhow::Result<Image> {
     let mut canvas = Canvas { image: Image::filled(camera.width, camera.height, GROUND), camera };
     canvas.floor()?;
     canvas.torso(figure)?;
@@ -41,7 +41,7 @@ pub fn picture(figure: &Figure, camera: &Camera, mouth: f64) -> anyhow::Result<I
 }
 
 /// The 13 points of COCO-17 that are in the picture, in its order.
-pub fn coco(figure: &Figure) -> [Vec3; N_BODY_MARKERS] {
+pub fn coco(figure: &DrawnFigure) -> [Vec3; N_BODY_MARKERS] {
     let [nose, l_eye, r_eye, l_ear, r_ear] = figure.head;
     let arm = [L_SHOULDER, R_SHOULDER, L_ELBOW, R_ELBOW, L_WRIST, R_WRIST].map(|joint| figure.joints[joint]);
     let [l_shoulder, r_shoulder, l_elbow, r_elbow, l_wrist, r_wrist] = arm;
@@ -51,7 +51,7 @@ pub fn coco(figure: &Figure) -> [Vec3; N_BODY_MARKERS] {
 
 struct Canvas<'a> {
     image: Image,
-    camera: &'a Camera,
+    camera: &'a DemoCamera,
 }
 
 impl Canvas<'_> {
@@ -89,7 +89,7 @@ impl Canvas<'_> {
         Ok(())
     }
 
-    fn torso(&mut self, figure: &Figure) -> anyhow::Result<()> {
+    fn torso(&mut self, figure: &DrawnFigure) -> anyhow::Result<()> {
         let [l_shoulder, r_shoulder] = [L_SHOULDER, R_SHOULDER].map(|joint| figure.joints[joint]);
         let [l_hip, r_hip] = figure.hips;
         let mid = |a: Vec3, b: Vec3| scale(add(a, b), 0.5);
@@ -116,7 +116,7 @@ impl Canvas<'_> {
         )
     }
 
-    fn head(&mut self, figure: &Figure, mouth: f64) -> anyhow::Result<()> {
+    fn head(&mut self, figure: &DrawnFigure, mouth: f64) -> anyhow::Result<()> {
         let (neck, skull) = (figure.joints[NECK], figure.skull);
         let up = sub(skull, neck);
         let up = scale(up, 1.0 / norm(up).max(1e-9));
@@ -135,12 +135,12 @@ impl Canvas<'_> {
         Ok(())
     }
 
-    fn arm(&mut self, figure: &Figure, shoulder: usize) -> anyhow::Result<()> {
+    fn arm(&mut self, figure: &DrawnFigure, shoulder: usize) -> anyhow::Result<()> {
         let [start, elbow, wrist] = [0, 1, 2].map(|k| figure.joints[shoulder + k]);
         self.limbs(&[(start, 0.05, elbow, 0.04), (elbow, 0.04, wrist, 0.03)], LIMB)
     }
 
-    fn hand(&mut self, figure: &Figure, hand: usize) -> anyhow::Result<()> {
+    fn hand(&mut self, figure: &DrawnFigure, hand: usize) -> anyhow::Result<()> {
         let joint = |k: usize| figure.joints[hand + k];
         let mut parts = Vec::with_capacity(20);
         for finger in 0..5 {
@@ -153,7 +153,7 @@ impl Canvas<'_> {
     }
 
     /// All markers, far ones first, each with a grey rim that keeps its edge away from its neighbours.
-    fn markers(&mut self, figure: &Figure) -> anyhow::Result<()> {
+    fn markers(&mut self, figure: &DrawnFigure) -> anyhow::Result<()> {
         let body = coco(figure);
         let mut all: Vec<(Vec3, f64, [u8; 3])> = Vec::with_capacity(N_BODY_MARKERS + 2 * N_FINGER_MARKERS);
         for (k, (&point, &rgb)) in body.iter().zip(COLOURS.iter()).enumerate() {

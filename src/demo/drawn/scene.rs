@@ -1,8 +1,8 @@
 //! One clip of the synthetic speaker: its speech, gestures and camera, all from one seed.
 
-use super::camera::Camera;
-use super::figure::Figure;
-use super::gesture::Gestures;
+use super::camera::DemoCamera;
+use super::figure::DrawnFigure;
+use super::gesture::DrawnGestures;
 use super::paint;
 use super::speech::Speech;
 use crate::external::ffmpeg::encode::VideoWriter;
@@ -15,21 +15,21 @@ use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 
 /// What the speaker says and does in `secs` seconds before a camera.
-pub struct Scene {
+pub struct DrawnScene {
     pub secs: f64,
-    pub camera: Camera,
+    pub camera: DemoCamera,
     seed: u64,
     speech: Speech,
-    gestures: Gestures,
+    gestures: DrawnGestures,
 }
 
-impl Scene {
+impl DrawnScene {
     /// The clip of that seed; the camera stands a little aside and above.
     pub fn new(seed: u64, secs: f64, size: [usize; 2]) -> Self {
         let mut dice = ChaCha8Rng::seed_from_u64(seed);
         let speech = Speech::new(secs, &mut dice);
-        let gestures = Gestures::new(&speech, &mut dice);
-        let camera = Camera::new(
+        let gestures = DrawnGestures::new(&speech, &mut dice);
+        let camera = DemoCamera::new(
             size,
             dice.random_range(-0.12..0.12),
             dice.random_range(0.03..0.12),
@@ -39,8 +39,8 @@ impl Scene {
     }
 
     /// The figure at a time, in world axes.
-    pub fn figure(&self, secs: f64) -> Figure {
-        Figure::new(&self.gestures.controls(secs))
+    pub fn figure(&self, secs: f64) -> DrawnFigure {
+        DrawnFigure::new(&self.gestures.controls(secs))
     }
 
     /// The picture at a time.

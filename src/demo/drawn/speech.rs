@@ -111,7 +111,7 @@ impl Speech {
         let rate = f64::from(SAMPLE_RATE);
         let mut samples = vec![0.0f32; (secs * rate).round().max(0.0) as usize];
         for syllable in &self.syllables {
-            let mut voice = Voice::new(syllable, rate);
+            let mut voice = VoiceSource::new(syllable, rate);
             let (start, end) = ((syllable.start * rate) as usize, (syllable.end * rate) as usize);
             for n in start..end.min(samples.len()) {
                 let now = n as f64 / rate;
@@ -139,13 +139,13 @@ impl Syllable {
 }
 
 /// Pulses of the voice through three resonators in a row.
-struct Voice {
+struct VoiceSource {
     phase: f64,
     pitch: f64,
     formants: [Resonator; 3],
 }
 
-impl Voice {
+impl VoiceSource {
     fn new(syllable: &Syllable, rate: f64) -> Self {
         let formants = std::array::from_fn(|k| Resonator::new(VOWELS[syllable.vowel][k], BANDWIDTHS[k], rate));
         Self { phase: 0.0, pitch: syllable.pitch, formants }

@@ -1,7 +1,7 @@
 //! What is known about a clip: every joint in 3D and its pixel, at the dataset rate, as one `.npz` file a video.
 
 use super::paint;
-use super::scene::Scene;
+use super::scene::DrawnScene;
 use crate::formats::npz::Npz;
 use crate::math::vec3::{Vec3, sub};
 use crate::types::pose3d::Motion;
@@ -14,7 +14,7 @@ use std::path::Path;
 
 /// The truth of a clip.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Truth {
+pub struct DrawnTruth {
     /// Camera axes, metres, the neck at the origin of every frame.
     pub motion: Motion,
     /// [T, 13, 2] px: COCO points 0..13.
@@ -25,9 +25,9 @@ pub struct Truth {
     pub right_hand: Array3<f32>,
 }
 
-impl Truth {
+impl DrawnTruth {
     /// The truth of a scene at the times of `fps`.
-    pub fn of(scene: &Scene, fps: FrameRate) -> Self {
+    pub fn new(scene: &DrawnScene, fps: FrameRate) -> Self {
         let n_frames = fps.frames_in(scene.secs);
         let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
         let mut pixels = Array3::zeros((n_frames, N_JOINTS, 2));
@@ -88,7 +88,7 @@ mod tests {
 
     #[test]
     fn it_reads_back_and_the_neck_is_the_middle_of_the_shoulders() {
-        let truth = Truth::of(&Scene::new(3, 1.0, [640, 480]), FrameRate::new(15, 1));
+        let truth = DrawnTruth::new(&DrawnScene::new(3, 1.0, [640, 480]), FrameRate::new(15, 1));
         assert_eq!(truth.motion.n_frames(), 15);
         let joints = &truth.motion.joints;
         assert!((0..3).all(|k| (joints[[7, 1, k]] + joints[[7, 4, k]]).abs() < 1e-5));
@@ -96,6 +96,6 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.npz");
         truth.write(&path).unwrap();
-        assert_eq!(Truth::read(&path).unwrap(), truth);
+        assert_eq!(DrawnTruth::read(&path).unwrap(), truth);
     }
 }

@@ -2,12 +2,12 @@
 //! `orator run` write, gestured by `rule`. Every clip is made from the seed, its split and its number alone, so the splits
 //! share no speech and no whim, and the predictable part of a clip is made again when it is needed.
 
-use super::rule::Gestures;
+use super::rule::RuleGestures;
 use crate::dataset::bones::VideoBones;
-use crate::dataset::info::{About, Info};
+use crate::dataset::info::{About, DatasetInfo};
 use crate::dataset::sample::{N_KEYPOINTS, Sample};
 use crate::dataset::split::SplitBy;
-use crate::dataset::write::part::Source;
+use crate::dataset::write::part::VideoSource;
 use crate::dataset::write::writer::DatasetWriter;
 use crate::demo::drawn::speech::Speech;
 use crate::motion::bones;
@@ -41,7 +41,7 @@ const SHARD_BYTES: u64 = 256 << 20;
 
 /// A clip: what it is made from. It stands in its sample's json under `rule`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Clip {
+pub struct SpokenClip {
     pub rule: u32,
     pub seed: u64,
     pub split: Split,
@@ -49,7 +49,7 @@ pub struct Clip {
     pub n_frames: usize,
 }
 
-impl Clip {
+impl SpokenClip {
     fn secs(&self) -> f64 {
         FPS.secs(self.n_frames)
     }
@@ -81,16 +81,24 @@ impl Clip {
 
     /// What the speaker does, whims and all.
     pub fn motion(&self) -> Motion {
-        Gestures::with_whims(&self.speech(), self.secs(), &mut self.dice("whims")).motion(self.n_frames, FPS)
+        RuleGestures::with_whims(&self.speech(), self.secs(), &mut self.dice("whims")).motion(self.n_frames, FPS)
     }
 
     /// What the rule alone would have it do.
     pub fn predictable(&self) -> Motion {
-        Gestures::of(&self.speech()).motion(self.n_frames, FPS)
+        RuleGestures::new(&self.speech()).motion(self.n_frames, FPS)
+    }
+
+    /// BLAKE3 of the clip's parameters, in a text that the first datasets of this speaker fixed.
+    fn content_hash(&self) -> String {
+        let Self { rule, seed, split, number, n_frames } = self;
+        let text =
+            format!("Clip {{ rule: {rule}, seed: {seed}, split: {split:?}, number: {number}, n_frames: {n_frames} }}");
+        blake3::hash(text.as_bytes()).to_hex().to_string()
     }
 
     /// The clip that a sample of the dataset was made from.
-    pub fn of(sample: &Sample) -> Result<Self> {
+    pub fn from_sample(sample: &Sample) -> Result<Self> {
         let clip: Self =
             serde_json::from_value(sample.meta.get("rule").cloned().unwrap_or_default()).with_context(|| {
                 format!("{} is not of the synthetic speaker; `orator demo speaker` writes one", sample.key)
@@ -115,35 +123,35 @@ impl Clip {
         }
     }
 
-    fn source(&self, sample: &Sample) -> Source {
+    fn source(&self, sample: &Sample) -> VideoSource {
         let secs = self.secs();
         let lengths = bones::measure(&sample.motion).map(f64::from).to_vec();
-        Source {
+        VideoSource {
             name: self.name(),
             file: format!("{}.mp4", self.name()),
-            content: blake3::hash(format!("{self:?}").as_bytes()).to_hex().to_string(),
+            content: self.content_hash(),
             ledger: Ledger {
                 duration_secs: secs,
                 kept: vec![Kept { start_secs: 0.0, end_secs: secs }],
                 ..Ledger::default()
             },
             bones: VideoBones { lengths_metres: lengths, n_frames: self.n_frames },
-            ..Source::default()
+            ..VideoSource::default()
         }
     }
 }
 
 /// The clips of `hours` of training, and ten minutes each to validate and to test.
-pub fn clips(hours: f64, seed: u64) -> Result<Vec<Clip>> {
+pub fn clips(hours: f64, seed: u64) -> Result<Vec<SpokenClip>> {
     ensure!((0.01..=100.0).contains(&hours), "--hours {hours}: expected 0.01 to 100");
     let n_train = (hours * 3600.0 / FPS.secs(CLIP_FRAMES)).ceil() as usize;
-    let of = |split, n| (0..n).map(move |number| Clip { rule: RULE, seed, split, number, n_frames: CLIP_FRAMES });
+    let of = |split, n| (0..n).map(move |number| SpokenClip { rule: RULE, seed, split, number, n_frames: CLIP_FRAMES });
     let held_out = [Split::Validation, Split::Test].into_iter().flat_map(|split| of(split, HELD_OUT_CLIPS));
     Ok(of(Split::Train, n_train).chain(held_out).collect())
 }
 
 /// Writes `clips` as a dataset into the existing, empty folder `dir`.
-pub fn write(dir: &Path, clips: &[Clip], progress: &dyn Progress) -> Result<Info> {
+pub fn write(dir: &Path, clips: &[SpokenClip], progress: &dyn Progress) -> Result<DatasetInfo> {
     let about = About {
         licence: "cc0-1.0".to_owned(),
         consent: "none needed: nobody is shown".to_owned(),
@@ -154,7 +162,7 @@ pub fn write(dir: &Path, clips: &[Clip], progress: &dyn Progress) -> Result<Info
     let writer = DatasetWriter::new(dir, about, SHARD_BYTES);
     let task = progress.begin("speak", clips.len() as u64);
     for some in clips.chunks(16) {
-        let samples: Vec<Sample> = some.par_iter().map(Clip::sample).collect();
+        let samples: Vec<Sample> = some.par_iter().map(SpokenClip::sample).collect();
         for (clip, sample) in some.iter().zip(&samples) {
             let mut video = writer.video(clip.source(sample), clip.split, SplitBy::Name)?;
             video.push(sample, 0.0)?;
@@ -172,14 +180,14 @@ mod tests {
     use crate::dataset::verify::verify::verify;
     use crate::stage::progress::Silent;
 
-    fn two(split: Split) -> Vec<Clip> {
-        (0..2).map(|number| Clip { rule: RULE, seed: 7, split, number, n_frames: 90 }).collect()
+    fn two(split: Split) -> Vec<SpokenClip> {
+        (0..2).map(|number| SpokenClip { rule: RULE, seed: 7, split, number, n_frames: 90 }).collect()
     }
 
     #[test]
     fn a_dataset_is_sound_and_its_predictable_part_is_made_again() {
         let dir = tempfile::tempdir().unwrap();
-        let clips: Vec<Clip> = Split::ALL.into_iter().flat_map(two).collect();
+        let clips: Vec<SpokenClip> = Split::ALL.into_iter().flat_map(two).collect();
         let info = write(dir.path(), &clips, &Silent).unwrap();
         assert_eq!(info.splits.values().map(|split| split.samples).collect::<Vec<_>>(), [2, 2, 2]);
         let verified = verify(dir.path(), true, &Silent).unwrap();
@@ -187,7 +195,7 @@ mod tests {
         let dataset = Dataset::open(dir.path()).unwrap();
         for sample in dataset.samples(Split::Test) {
             let sample = dataset.read(&sample).unwrap();
-            let clip = Clip::of(&sample).unwrap();
+            let clip = SpokenClip::from_sample(&sample).unwrap();
             assert_eq!(clip.motion(), sample.motion);
             assert_ne!(clip.predictable(), sample.motion);
         }

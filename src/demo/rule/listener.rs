@@ -1,7 +1,7 @@
 //! Predictors that a trained speaker is held against, all learnt from the training split: the ridge regression from the
 //! sound of the same frame (`ridge`), the motion of the training window that sounds most alike, and the mean pose.
 
-use super::ridge::{Ridge, Sums};
+use super::ridge::{Ridge, RidgeSums};
 use crate::audio::mel;
 use crate::dataset::{Dataset, Sample, Split};
 use crate::types::pose3d::Motion;
@@ -44,7 +44,7 @@ pub fn wrist_speeds(joints: ArrayView3<f32>, fps: FrameRate) -> Array2<f64> {
 }
 
 /// What was learnt from the training split.
-pub struct Listener {
+pub struct SoundRegression {
     fps: FrameRate,
     /// To the speeds of both wrists, m/s.
     speed: Ridge,
@@ -58,26 +58,27 @@ pub struct Listener {
 }
 
 /// Sound [T, 64] and joints [T, 49, 3] of a clip.
-struct Heard {
+struct TrainingClip {
     sound: Array2<f64>,
     joints: Array3<f32>,
 }
 
-impl Listener {
+impl SoundRegression {
     /// Learns from the training split, the penalties from the validation split.
     pub fn learn(dataset: &Dataset) -> Result<Self> {
         let fps = dataset.info().fps;
         let (train, validation) = (heard(dataset, Split::Train)?, heard(dataset, Split::Validation)?);
         ensure!(!train.is_empty() && !validation.is_empty(), "{}: a split is empty", dataset.dir().display());
-        let mut sums = [Sums::new(mel::N_MELS, 2), Sums::new(mel::N_MELS, 3 * N_JOINTS)];
+        let mut sums = [RidgeSums::new(mel::N_MELS, 2), RidgeSums::new(mel::N_MELS, 3 * N_JOINTS)];
         for clip in &train {
             let targets = clip.targets(fps);
             sums.iter_mut().zip(&targets).for_each(|(sums, target)| sums.add(clip.inputs(), target.view()));
         }
         let best = |which: usize| {
             let error = |ridge: &Ridge| -> f64 {
-                let of =
-                    |clip: &Heard| (ridge.predict(clip.inputs()) - &clip.targets(fps)[which]).mapv(|e| e * e).sum();
+                let of = |clip: &TrainingClip| {
+                    (ridge.predict(clip.inputs()) - &clip.targets(fps)[which]).mapv(|e| e * e).sum()
+                };
                 validation.iter().map(of).sum()
             };
             let tried = STRENGTHS.map(|strength| (error(&sums[which].ridge(strength)), strength));
@@ -141,7 +142,7 @@ impl Listener {
     }
 }
 
-impl Heard {
+impl TrainingClip {
     /// All frames but the last: the sound from a frame to the next.
     fn inputs(&self) -> ndarray::ArrayView2<'_, f64> {
         self.sound.slice(s![..self.sound.nrows().saturating_sub(1), ..])
@@ -155,8 +156,8 @@ impl Heard {
     }
 }
 
-fn heard(dataset: &Dataset, split: Split) -> Result<Vec<Heard>> {
-    let hear = |sample: Sample| Heard {
+fn heard(dataset: &Dataset, split: Split) -> Result<Vec<TrainingClip>> {
+    let hear = |sample: Sample| TrainingClip {
         sound: sound_of_frames(&sample.sound, sample.n_frames(), sample.motion.fps),
         joints: sample.motion.joints,
     };

@@ -4,7 +4,7 @@
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
 
 /// Sums over frames, from which a regression of any strength follows.
-pub struct Sums {
+pub struct RidgeSums {
     /// [n + 1, n + 1] of the inputs and a 1.
     inputs: Array2<f64>,
     /// [n + 1, m]
@@ -14,7 +14,7 @@ pub struct Sums {
 /// [n + 1, m]; the last row is the offset.
 pub struct Ridge(Array2<f64>);
 
-impl Sums {
+impl RidgeSums {
     /// Of `n` inputs and `m` outputs.
     pub fn new(n: usize, m: usize) -> Self {
         Self { inputs: Array2::zeros((n + 1, n + 1)), products: Array2::zeros((n + 1, m)) }
@@ -91,7 +91,7 @@ mod tests {
     fn it_finds_a_line_and_shrinks_with_strength() {
         let inputs = Array2::from_shape_fn((50, 2), |(t, k)| ((t * (k + 3)) as f64 * 0.7).sin());
         let outputs = Array2::from_shape_fn((50, 1), |(t, _)| 2.0 * inputs[[t, 0]] - inputs[[t, 1]] + 5.0);
-        let mut sums = Sums::new(2, 1);
+        let mut sums = RidgeSums::new(2, 1);
         sums.add(inputs.slice(ndarray::s![..20, ..]), outputs.slice(ndarray::s![..20, ..]));
         sums.add(inputs.slice(ndarray::s![20.., ..]), outputs.slice(ndarray::s![20.., ..]));
         let exact = sums.ridge(0.0).predict(inputs.view());

@@ -18,7 +18,7 @@
 //! Whims (of a seed of their own, no part of the predictable part): accents that are passed over, strokes without an accent,
 //! strokes early or late and places missed, and a sway of arms and torso.
 
-use crate::demo::drawn::figure::{Arm, Controls, Figure};
+use crate::demo::drawn::figure::{ArmControls, Controls, DrawnFigure};
 use crate::demo::drawn::speech::{Speech, Syllable};
 use crate::math::vec3::sub;
 use crate::types::pose3d::Motion;
@@ -73,26 +73,26 @@ const SWAY_HZ: std::ops::Range<f64> = 0.3..1.5;
 
 /// From `start` on, for `secs`, a hand goes to `goal`.
 #[derive(Clone, Debug)]
-struct Move {
+struct WristMove {
     start: f64,
     secs: f64,
     goal: Place,
 }
 
 /// All that the speaker does while it says something.
-pub struct Gestures<'a> {
+pub struct RuleGestures<'a> {
     speech: &'a Speech,
     /// Left, right; in order of time.
-    moves: [Vec<Move>; 2],
-    sway: Option<Sway>,
+    moves: [Vec<WristMove>; 2],
+    sway: Option<Variation>,
 }
 
 /// Two waves a number: left wrist 0..3, right wrist 3..6, torso 6..9; frequency (Hz) and phase.
-struct Sway([[[f64; 2]; 2]; 9]);
+struct Variation([[[f64; 2]; 2]; 9]);
 
-impl<'a> Gestures<'a> {
+impl<'a> RuleGestures<'a> {
     /// The predictable part: what the rule makes of `speech`.
-    pub fn of(speech: &'a Speech) -> Self {
+    pub fn new(speech: &'a Speech) -> Self {
         let strokes = std::array::from_fn(|hand| {
             let accents = speech.syllables.iter().filter(|syllable| syllable.stress > ACCENT);
             let stroke = accents.filter_map(|accent| {
@@ -131,7 +131,7 @@ impl<'a> Gestures<'a> {
         }
         strokes.iter_mut().for_each(|strokes| strokes.sort_by(|a, b| a.0.total_cmp(&b.0)));
         let mut wave = || [dice.random_range(SWAY_HZ), dice.random_range(0.0..TAU)];
-        let sway = Sway(std::array::from_fn(|_| [wave(), wave()]));
+        let sway = Variation(std::array::from_fn(|_| [wave(), wave()]));
         Self { speech, moves: strokes.map(with_returns), sway: Some(sway) }
     }
 
@@ -148,7 +148,7 @@ impl<'a> Gestures<'a> {
             place[1] -= lift;
             (0..3).for_each(|k| place[k] += SWAY * sway(3 * hand + k));
             let [out, down, away, roll, raise, curl, index, spread] = place;
-            Arm { wrist: [out, down, away], roll, raise, curl, index, spread }
+            ArmControls { wrist: [out, down, away], roll, raise, curl, index, spread }
         };
         let torso = [0, 1, 2].map(|k| TORSO * sway(6 + k));
         Controls { arms: [arm(0), arm(1)], torso, ..Controls::default() }
@@ -158,7 +158,7 @@ impl<'a> Gestures<'a> {
     pub fn motion(&self, n_frames: usize, fps: FrameRate) -> Motion {
         let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
         for frame_idx in 0..n_frames {
-            let figure = Figure::new(&self.controls(fps.secs(frame_idx)));
+            let figure = DrawnFigure::new(&self.controls(fps.secs(frame_idx)));
             for (joint, &place) in figure.joints.iter().enumerate() {
                 let place = sub(place, figure.joints[NECK]);
                 (0..3).for_each(|k| joints[[frame_idx, joint, k]] = place[k] as f32);
@@ -179,20 +179,20 @@ impl<'a> Gestures<'a> {
     }
 }
 
-impl Sway {
+impl Variation {
     fn at(&self, number: usize, secs: f64) -> f64 {
         self.0[number].iter().map(|[hz, phase]| (TAU * hz * secs + phase).sin()).sum()
     }
 }
 
 /// Strokes (start and goal, in order of time) with the returns between them.
-fn with_returns(strokes: Vec<(f64, Place)>) -> Vec<Move> {
+fn with_returns(strokes: Vec<(f64, Place)>) -> Vec<WristMove> {
     let mut moves = Vec::with_capacity(2 * strokes.len());
     for (n, (start, goal)) in strokes.iter().enumerate() {
-        moves.push(Move { start: *start, secs: STROKE, goal: *goal });
+        moves.push(WristMove { start: *start, secs: STROKE, goal: *goal });
         let back = start + STROKE + HOLD;
         if strokes.get(n + 1).is_none_or(|next| next.0 > back) {
-            moves.push(Move { start: back, secs: RETURN, goal: REST });
+            moves.push(WristMove { start: back, secs: RETURN, goal: REST });
         }
     }
     moves
@@ -241,7 +241,7 @@ mod tests {
     fn delay(hand: usize) -> f64 {
         let speech = speech(1);
         let n_frames = FPS.frames_in(SECS);
-        let speeds = wrist_speeds(Gestures::of(&speech).motion(n_frames, FPS).joints.view(), FPS);
+        let speeds = wrist_speeds(RuleGestures::new(&speech).motion(n_frames, FPS).joints.view(), FPS);
         let accents = speech.syllables.iter().filter(|s| s.stress > ACCENT && PLACES[s.vowel][hand].is_some());
         let onsets: Vec<f64> = accents.map(|accent| accent.start).collect();
         let at = |delay: f64| {
@@ -266,20 +266,21 @@ mod tests {
     fn the_same_dice_give_the_same_whims_and_others_do_not() {
         let speech = speech(2);
         let with = |seed| {
-            Gestures::with_whims(&speech, SECS, &mut ChaCha8Rng::seed_from_u64(seed)).motion(300, FrameRate::new(15, 1))
+            RuleGestures::with_whims(&speech, SECS, &mut ChaCha8Rng::seed_from_u64(seed))
+                .motion(300, FrameRate::new(15, 1))
         };
         assert_eq!(with(1), with(1));
         assert_ne!(with(1), with(2));
-        let rule = Gestures::of(&speech).motion(300, FrameRate::new(15, 1));
+        let rule = RuleGestures::new(&speech).motion(300, FrameRate::new(15, 1));
         assert_ne!(with(1), rule);
-        assert_eq!(rule, Gestures::of(&speech).motion(300, FrameRate::new(15, 1)));
+        assert_eq!(rule, RuleGestures::new(&speech).motion(300, FrameRate::new(15, 1)));
     }
 
     #[test]
     fn bones_are_constant_and_silence_is_rest() {
         let speech = speech(3);
         let dice = &mut ChaCha8Rng::seed_from_u64(3);
-        let motion = Gestures::with_whims(&speech, SECS, dice).motion(900, FrameRate::new(15, 1));
+        let motion = RuleGestures::with_whims(&speech, SECS, dice).motion(900, FrameRate::new(15, 1));
         let lengths = crate::motion::bones::measure(&motion);
         for (t, frame) in motion.joints.outer_iter().enumerate() {
             for joint in 1..N_JOINTS {
@@ -289,7 +290,7 @@ mod tests {
             }
         }
         let silent = Speech::default();
-        let still = Gestures::of(&silent).motion(30, FrameRate::new(15, 1));
+        let still = RuleGestures::new(&silent).motion(30, FrameRate::new(15, 1));
         assert!(wrist_speeds(still.joints.view(), still.fps).iter().all(|speed| *speed == 0.0));
     }
 }

@@ -2,10 +2,10 @@
 //! nothing; the nearest neighbour copies; another clip's motion is as good as motion can be that did not listen; the
 //! truth beside itself is where every figure ends.
 
-use super::constant_pose::Stills;
+use super::constant_pose::ConstantPoses;
 use super::neighbour;
-use super::neighbour::{Asked, Library};
-use crate::evaluate::clips::clips::{Clip, Clips};
+use super::neighbour::{Library, Query};
+use crate::evaluate::clips::clips::{EvalClip, EvalClips};
 use anyhow::Result;
 use ndarray::{Array2, Array3, ArrayView3, s};
 use serde::Serialize;
@@ -16,7 +16,7 @@ const LEAST_SHIFT_SECS: f64 = 3.0;
 /// Who made the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Who {
+pub enum PredictorKind {
     Prediction,
     MeanPose,
     MedianPose,
@@ -30,7 +30,7 @@ pub enum Who {
     Truth,
 }
 
-impl Who {
+impl PredictorKind {
     /// For people.
     pub const fn name(self) -> &'static str {
         match self {
@@ -49,7 +49,7 @@ impl Who {
 
 /// The motion of one clip.
 #[derive(Clone, Debug)]
-pub enum Made {
+pub enum ClipMotion {
     /// The clip's own prediction.
     Own,
     /// The clip's own truth.
@@ -63,43 +63,47 @@ pub enum Made {
 /// A motion for every clip.
 #[derive(Clone, Debug)]
 pub struct Predictor {
-    pub who: Who,
+    pub who: PredictorKind,
     /// What it is, in a sentence.
     pub says: String,
     /// One a clip.
-    pub motions: Vec<Made>,
+    pub motions: Vec<ClipMotion>,
 }
 
 impl Predictor {
     /// The motion for a clip, as long as it.
-    pub fn motion<'a>(&'a self, clips: &'a Clips, clip: usize) -> Option<ArrayView3<'a, f32>> {
+    pub fn motion<'a>(&'a self, clips: &'a EvalClips, clip: usize) -> Option<ArrayView3<'a, f32>> {
         let of = clips.clips.get(clip)?;
         match self.motions.get(clip)? {
-            Made::Own => Some(of.made.view()),
-            Made::Real => Some(of.real.view()),
-            Made::Still(pose) => pose.broadcast((of.n_frames(), pose.nrows(), 3)),
-            Made::Moves(joints) => Some(joints.view()),
+            ClipMotion::Own => Some(of.made.view()),
+            ClipMotion::Real => Some(of.real.view()),
+            ClipMotion::Still(pose) => pose.broadcast((of.n_frames(), pose.nrows(), 3)),
+            ClipMotion::Moves(joints) => Some(joints.view()),
         }
     }
 
-    pub fn prediction(clips: &Clips, says: &str) -> Self {
-        Self { who: Who::Prediction, says: says.to_owned(), motions: vec![Made::Own; clips.clips.len()] }
+    pub fn prediction(clips: &EvalClips, says: &str) -> Self {
+        Self {
+            who: PredictorKind::Prediction,
+            says: says.to_owned(),
+            motions: vec![ClipMotion::Own; clips.clips.len()],
+        }
     }
 
-    pub fn truth(clips: &Clips) -> Self {
+    pub fn truth(clips: &EvalClips) -> Self {
         let says = "the real motion beside itself: what its own figures are, and where the others end".to_owned();
-        Self { who: Who::Truth, says, motions: vec![Made::Real; clips.clips.len()] }
+        Self { who: PredictorKind::Truth, says, motions: vec![ClipMotion::Real; clips.clips.len()] }
     }
 }
 
 /// All baselines that files alone allow, and a sentence for each that is left out.
-pub fn of_files(clips: &Clips) -> Result<(Vec<Predictor>, Vec<String>)> {
+pub fn of_files(clips: &EvalClips) -> Result<(Vec<Predictor>, Vec<String>)> {
     let (mut all, mut left_out) = (stills(clips), Vec::new());
     match neighbours(clips, &all[0])? {
         Some(predictor) => all.push(predictor),
         None => left_out.push(format!(
             "{}: left out, since {}",
-            Who::NearestNeighbour.name(),
+            PredictorKind::NearestNeighbour.name(),
             match (clips.have_sound(), clips.clips.len()) {
                 (false, _) => "it listens, and no sound is given (--audio)",
                 (true, 1) => "there is no other clip to copy from",
@@ -108,12 +112,12 @@ pub fn of_files(clips: &Clips) -> Result<(Vec<Predictor>, Vec<String>)> {
             }
         )),
     }
-    for who in [Who::MismatchedPrediction, Who::MismatchedTruth] {
+    for who in [PredictorKind::MismatchedPrediction, PredictorKind::MismatchedTruth] {
         match mismatched(clips, who, &all[0]) {
             Some(predictor) => all.push(predictor),
             None => left_out.push(too_short(who)),
         }
-        if who == Who::MismatchedPrediction && clips.clips.len() > 1 {
+        if who == PredictorKind::MismatchedPrediction && clips.clips.len() > 1 {
             all.push(late(clips, &all[0]));
         }
     }
@@ -122,25 +126,26 @@ pub fn of_files(clips: &Clips) -> Result<(Vec<Predictor>, Vec<String>)> {
 
 /// Each clip's own prediction, half of the clip later and from the beginning again: it knows where the speaker of the clip
 /// holds the arms, which another clip's motion does not, and only the sound's moment is wrong.
-fn late(clips: &Clips, still: &Predictor) -> Predictor {
-    let of = |clip: &Clip| {
+fn late(clips: &EvalClips, still: &Predictor) -> Predictor {
+    let of = |clip: &EvalClip| {
         let n_frames = clip.n_frames();
-        Made::Moves(taken(&clip.made, (0..n_frames).map(|t| (t + n_frames / 2) % n_frames)))
+        ClipMotion::Moves(taken(&clip.made, (0..n_frames).map(|t| (t + n_frames / 2) % n_frames)))
     };
     let says = "the clip's own prediction half of the clip later, and from the beginning again".to_owned();
-    let mut predictor = Predictor { who: Who::LatePrediction, says, motions: clips.clips.iter().map(of).collect() };
+    let mut predictor =
+        Predictor { who: PredictorKind::LatePrediction, says, motions: clips.clips.iter().map(of).collect() };
     fill(&mut predictor, still);
     predictor
 }
 
 /// Why a mismatched motion is left out.
-pub fn too_short(who: Who) -> String {
+pub fn too_short(who: PredictorKind) -> String {
     format!("{}: left out, since the only clip is shorter than {:.0} s", who.name(), 2.0 * LEAST_SHIFT_SECS)
 }
 
 /// Mean and median pose: of the other clips, or, of a single one, its own (which no predictor can know).
-fn stills(clips: &Clips) -> Vec<Predictor> {
-    let mut all = Stills::default();
+fn stills(clips: &EvalClips) -> Vec<Predictor> {
+    let mut all = ConstantPoses::default();
     clips.clips.iter().for_each(|clip| all.add(clip.real.view(), clip.mask.view()));
     let is_alone = clips.clips.len() == 1;
     let (mut means, mut medians) = (Vec::new(), Vec::new());
@@ -155,8 +160,8 @@ fn stills(clips: &Clips) -> Vec<Predictor> {
             complete(&mut mean, || all.mean());
             complete(&mut median, || all.median());
         }
-        means.push(Made::Still(mean));
-        medians.push(Made::Still(median));
+        means.push(ClipMotion::Still(mean));
+        medians.push(ClipMotion::Still(median));
     }
     let says = |what: &str| match is_alone {
         true => {
@@ -165,8 +170,8 @@ fn stills(clips: &Clips) -> Vec<Predictor> {
         false => format!("the {what} of the other clips' truths in every frame, which never moves"),
     };
     vec![
-        Predictor { who: Who::MeanPose, says: says("mean pose"), motions: means },
-        Predictor { who: Who::MedianPose, says: says("median pose"), motions: medians },
+        Predictor { who: PredictorKind::MeanPose, says: says("mean pose"), motions: means },
+        Predictor { who: PredictorKind::MedianPose, says: says("median pose"), motions: medians },
     ]
 }
 
@@ -179,7 +184,7 @@ fn complete(pose: &mut Array2<f32>, from: impl FnOnce() -> Array2<f32>) {
 /// Puts the poses of `still` where the motion has no number.
 pub fn fill(predictor: &mut Predictor, still: &Predictor) {
     for (made, still) in predictor.motions.iter_mut().zip(&still.motions) {
-        if let (Made::Moves(joints), Made::Still(pose)) = (made, still) {
+        if let (ClipMotion::Moves(joints), ClipMotion::Still(pose)) = (made, still) {
             for mut frame in joints.outer_iter_mut() {
                 frame.zip_mut_with(pose, |v, still| *v = if v.is_finite() { *v } else { *still });
             }
@@ -188,9 +193,9 @@ pub fn fill(predictor: &mut Predictor, still: &Predictor) {
 }
 
 /// The other clips as a library.
-struct Others<'a>(&'a Clips);
+struct OtherClips<'a>(&'a EvalClips);
 
-impl Library for Others<'_> {
+impl Library for OtherClips<'_> {
     fn len(&self) -> usize {
         self.0.clips.len()
     }
@@ -209,34 +214,34 @@ impl Library for Others<'_> {
     }
 }
 
-fn neighbours(clips: &Clips, still: &Predictor) -> Result<Option<Predictor>> {
-    let asked: Option<Vec<Asked>> = clips
+fn neighbours(clips: &EvalClips, still: &Predictor) -> Result<Option<Predictor>> {
+    let asked: Option<Vec<Query>> = clips
         .clips
         .iter()
-        .map(|clip| clip.heard.as_ref().map(|heard| Asked { rows: &heard.rows, n_frames: clip.n_frames() }))
+        .map(|clip| clip.heard.as_ref().map(|heard| Query { rows: &heard.rows, n_frames: clip.n_frames() }))
         .collect();
     let Some(asked) = asked.filter(|asked| asked.len() > 1) else { return Ok(None) };
-    let Some(made) = neighbour::motions(&asked, &Others(clips), clips.fps)? else { return Ok(None) };
+    let Some(made) = neighbour::motions(&asked, &OtherClips(clips), clips.fps)? else { return Ok(None) };
     let says = "for each 4 s of sound the motion of the stretch of another clip that sounds most alike".to_owned();
-    let motions = made.into_iter().map(Made::Moves).collect();
-    let mut predictor = Predictor { who: Who::NearestNeighbour, says, motions };
+    let motions = made.into_iter().map(ClipMotion::Moves).collect();
+    let mut predictor = Predictor { who: PredictorKind::NearestNeighbour, says, motions };
     fill(&mut predictor, still);
     Ok(Some(predictor))
 }
 
 /// For each clip the motion (`Prediction` or `Truth`, mismatched) of another, played back and forth where it is shorter;
 /// of a single clip its own, half of it later and from the beginning again. `still` stands in where there is no number.
-pub fn mismatched(clips: &Clips, who: Who, still: &Predictor) -> Option<Predictor> {
+pub fn mismatched(clips: &EvalClips, who: PredictorKind, still: &Predictor) -> Option<Predictor> {
     let of = |clip: usize| match who {
-        Who::MismatchedTruth => &clips.clips[clip].real,
+        PredictorKind::MismatchedTruth => &clips.clips[clip].real,
         _ => &clips.clips[clip].made,
     };
     let n = clips.clips.len();
-    let lengths = clips.clips.iter().map(Clip::n_frames);
-    let (motions, says): (Vec<Made>, String) = if n > 1 {
+    let lengths = clips.clips.iter().map(EvalClip::n_frames);
+    let (motions, says): (Vec<ClipMotion>, String) = if n > 1 {
         let motions = lengths.enumerate().map(|(i, n_frames)| {
             let from = of((i + n / 2) % n);
-            Made::Moves(taken(from, (0..n_frames).map(|t| back_and_forth(t, from.shape()[0]))))
+            ClipMotion::Moves(taken(from, (0..n_frames).map(|t| back_and_forth(t, from.shape()[0]))))
         });
         (motions.collect(), "the same of another clip, played back and forth where that is shorter".to_owned())
     } else {
@@ -246,7 +251,7 @@ pub fn mismatched(clips: &Clips, who: Who, still: &Predictor) -> Option<Predicto
             return None;
         }
         let says = format!("the same {:.1} s later, and from the beginning again", clips.fps.secs(shift));
-        (vec![Made::Moves(taken(of(0), (0..n_frames).map(|t| (t + shift) % n_frames)))], says)
+        (vec![ClipMotion::Moves(taken(of(0), (0..n_frames).map(|t| (t + shift) % n_frames)))], says)
     };
     let mut predictor = Predictor { who, says, motions };
     fill(&mut predictor, still);

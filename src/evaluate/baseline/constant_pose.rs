@@ -11,20 +11,20 @@ const N_BINS: usize = 12_000;
 
 /// Poses counted so far.
 #[derive(Clone)]
-pub struct Stills {
+pub struct ConstantPoses {
     n: Vec<u64>,
     sum: Vec<f64>,
     /// [147, `N_BINS`]
     bins: Vec<u32>,
 }
 
-impl Default for Stills {
+impl Default for ConstantPoses {
     fn default() -> Self {
         Self { n: vec![0; N_NUMBERS], sum: vec![0.0; N_NUMBERS], bins: vec![0; N_NUMBERS * N_BINS] }
     }
 }
 
-impl Stills {
+impl ConstantPoses {
     /// Counts the joints [T, 49, 3], metres, that the mask [T, 49] says are seen.
     pub fn add(&mut self, joints: ArrayView3<f32>, mask: ArrayView2<bool>) {
         self.count(joints, mask, true);
@@ -99,7 +99,7 @@ mod tests {
         });
         let mut mask = Array2::from_elem((101, N_JOINTS), true);
         mask.column_mut(9).fill(false);
-        let mut stills = Stills::default();
+        let mut stills = ConstantPoses::default();
         stills.add(joints.view(), mask.view());
         let (mean, median) = (stills.mean(), stills.median());
         let values: Vec<f64> = (0..101).map(|t| f64::from(t * t) * 1e-4 + 0.005).collect();
@@ -108,7 +108,7 @@ mod tests {
         assert!(mean[[9, 0]].is_nan() && median[[9, 2]].is_nan());
         let part = s![40.., .., ..];
         stills.take_away(joints.slice(part), mask.slice(s![40.., ..]));
-        let mut rest = Stills::default();
+        let mut rest = ConstantPoses::default();
         rest.add(joints.slice(s![..40, .., ..]), mask.slice(s![..40, ..]));
         assert!((&stills.mean() - &rest.mean()).iter().all(|v| v.is_nan() || v.abs() < 1e-6));
         assert!((&stills.median() - &rest.median()).iter().all(|v| v.is_nan() || v.abs() < 1e-6));

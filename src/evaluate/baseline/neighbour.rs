@@ -17,7 +17,7 @@ const STRIDE: usize = 2;
 
 /// A sound to find poses for: rows of pooled spectrogram (`hearing::Heard`), and how many frames of motion it has.
 #[derive(Clone, Copy, Debug)]
-pub struct Asked<'a> {
+pub struct Query<'a> {
     pub rows: &'a [f32],
     pub n_frames: usize,
 }
@@ -42,23 +42,23 @@ pub trait Library: Sync {
 }
 
 /// A stretch to find poses for.
-struct Wanted {
+struct QueryWindow {
     asked: usize,
     frames: Range<usize>,
     rows: Vec<f32>,
 }
 
 /// The best place so far: squared distance, entry of the library, first frame.
-type Found = (f32, usize, usize);
+type NearestMatch = (f32, usize, usize);
 
 /// Motion [T, 49, 3] for each sound, NaN where the library's is; `None` where a stretch finds nothing long enough.
-pub fn motions(asked: &[Asked], library: &dyn Library, fps: FrameRate) -> Result<Option<Vec<Array3<f32>>>> {
-    let wanted: Vec<Wanted> = asked.iter().enumerate().flat_map(|(i, asked)| stretches(i, asked, fps)).collect();
+pub fn motions(asked: &[Query], library: &dyn Library, fps: FrameRate) -> Result<Option<Vec<Array3<f32>>>> {
+    let wanted: Vec<QueryWindow> = asked.iter().enumerate().flat_map(|(i, asked)| stretches(i, asked, fps)).collect();
     let best = (0..library.len())
         .into_par_iter()
-        .map(|entry| -> Result<Vec<Option<Found>>> {
+        .map(|entry| -> Result<Vec<Option<NearestMatch>>> {
             let Some((rows, n_frames)) = library.heard(entry)? else { return Ok(vec![None; wanted.len()]) };
-            let find = |wanted: &Wanted| {
+            let find = |wanted: &QueryWindow| {
                 library.may_answer(wanted.asked, entry).then(|| nearest(&rows, n_frames, wanted, entry)).flatten()
             };
             Ok(wanted.par_iter().map(find).collect())
@@ -69,7 +69,7 @@ pub fn motions(asked: &[Asked], library: &dyn Library, fps: FrameRate) -> Result
         )?;
     let mut made: Vec<Array3<f32>> = asked.iter().map(|a| Array3::zeros((a.n_frames, N_JOINTS, 3))).collect();
     // entry by entry, so that each is read once
-    let mut places: Vec<(usize, usize, &Wanted)> = Vec::with_capacity(wanted.len());
+    let mut places: Vec<(usize, usize, &QueryWindow)> = Vec::with_capacity(wanted.len());
     for (wanted, found) in wanted.iter().zip(best) {
         let Some((_, entry, first)) = found else { return Ok(None) };
         places.push((entry, first, wanted));
@@ -86,19 +86,19 @@ pub fn motions(asked: &[Asked], library: &dyn Library, fps: FrameRate) -> Result
 }
 
 /// The sound cut into stretches, the last one shorter.
-fn stretches(asked: usize, sound: &Asked, fps: FrameRate) -> Vec<Wanted> {
+fn stretches(asked: usize, sound: &Query, fps: FrameRate) -> Vec<QueryWindow> {
     let window = (((WINDOW_SECS * fps.per_sec()) as usize) / POOLED * POOLED).max(POOLED);
     let stretch = |first: usize| {
         let frames = first..(first + window).min(sound.n_frames);
         let from = first / POOLED * mel::N_MELS;
         let to = (from + frames.len().div_ceil(POOLED) * mel::N_MELS).min(sound.rows.len());
-        Wanted { asked, frames, rows: sound.rows.get(from..to).unwrap_or_default().to_vec() }
+        QueryWindow { asked, frames, rows: sound.rows.get(from..to).unwrap_or_default().to_vec() }
     };
     (0..sound.n_frames).step_by(window).map(stretch).collect()
 }
 
 /// The place in an entry whose sound is nearest.
-fn nearest(rows: &[f32], n_frames: usize, wanted: &Wanted, entry: usize) -> Option<Found> {
+fn nearest(rows: &[f32], n_frames: usize, wanted: &QueryWindow, entry: usize) -> Option<NearestMatch> {
     let places = (0..).step_by(STRIDE).take_while(|row| row * POOLED + wanted.frames.len() <= n_frames);
     let of_place = |row: usize| {
         let sound = rows.get(row * mel::N_MELS..)?.get(..wanted.rows.len())?;
@@ -119,7 +119,7 @@ fn distance(a: &[f32], b: &[f32]) -> f32 {
 }
 
 /// The nearer of two; of equals the one that comes first in the library.
-fn nearer(a: Option<Found>, b: Option<Found>) -> Option<Found> {
-    let order = |a: &Found, b: &Found| a.0.total_cmp(&b.0).then_with(|| (a.1, a.2).cmp(&(b.1, b.2)));
+fn nearer(a: Option<NearestMatch>, b: Option<NearestMatch>) -> Option<NearestMatch> {
+    let order = |a: &NearestMatch, b: &NearestMatch| a.0.total_cmp(&b.0).then_with(|| (a.1, a.2).cmp(&(b.1, b.2)));
     a.into_iter().chain(b).min_by(order)
 }

@@ -1,9 +1,9 @@
 //! What is measured: clips of one rate, each the real motion, the made one of the same frames, and what was heard. Here
 //! files become clips; a dataset and a speaker become them in `speaker`.
 
-use super::pairs::Pair;
+use super::pairs::FilePair;
 use super::sound_features;
-use super::sound_features::Heard;
+use super::sound_features::SoundFeatures;
 use crate::external::ffmpeg::sound_stream::SoundStream;
 use crate::mocap::motion_file;
 use crate::motion::bones;
@@ -29,27 +29,27 @@ const OTHER_UNIT: f64 = 2.5;
 
 /// One clip.
 #[derive(Clone, Debug)]
-pub struct Clip {
+pub struct EvalClip {
     pub name: String,
     /// [T, 49, 3], metres, the neck at the origin.
     pub real: Array3<f32>,
     pub made: Array3<f32>,
     /// [T, 49]: what is compared: seen in the real motion.
     pub mask: Array2<bool>,
-    pub heard: Option<Heard>,
+    pub heard: Option<SoundFeatures>,
     /// Where its sound is, for whoever wants to hear it.
-    pub voice: Option<Voice>,
+    pub voice: Option<ClipAudio>,
 }
 
 /// A sound that can be heard again.
 #[derive(Clone, Debug)]
-pub enum Voice {
+pub enum ClipAudio {
     File(PathBuf),
     /// 16 kHz.
     Kept(Vec<i16>),
 }
 
-impl Voice {
+impl ClipAudio {
     /// The 16 kHz samples from second `start` to `end`, fewer where the sound ends before.
     pub fn samples(&self, start: f64, end: f64) -> Result<Vec<i16>> {
         let at = |secs: f64| (secs.max(0.0) * f64::from(SAMPLE_RATE)).round() as usize;
@@ -78,7 +78,7 @@ pub fn pcm(sample: f32) -> i16 {
     (sample * 32_768.0).round().clamp(-32_768.0, 32_767.0) as i16
 }
 
-impl Clip {
+impl EvalClip {
     pub fn n_frames(&self) -> usize {
         self.mask.nrows()
     }
@@ -86,18 +86,18 @@ impl Clip {
 
 /// Clips of one rate.
 #[derive(Clone, Debug)]
-pub struct Clips {
+pub struct EvalClips {
     pub fps: FrameRate,
-    pub clips: Vec<Clip>,
+    pub clips: Vec<EvalClip>,
     /// What had to be assumed, changed or left out, in sentences.
     pub notes: Vec<String>,
     /// Whether the prediction's maker learnt from these very clips: then it can show nothing.
     pub learnt: bool,
 }
 
-impl Clips {
+impl EvalClips {
     pub fn n_frames(&self) -> usize {
-        self.clips.iter().map(Clip::n_frames).sum()
+        self.clips.iter().map(EvalClip::n_frames).sum()
     }
 
     pub fn secs(&self) -> f64 {
@@ -129,16 +129,16 @@ impl Clips {
 /// # Errors
 /// A file that is no motion; a prediction much longer or shorter than its truth, or with many missing joints. The
 /// message names the clip and what to do.
-pub fn read(pairs: &[Pair], fps: Option<FrameRate>) -> Result<Clips> {
+pub fn read(pairs: &[FilePair], fps: Option<FrameRate>) -> Result<EvalClips> {
     let first = pairs.first().context("there is no pair to measure")?;
     let rate = motion_file::read(&first.truth, fps)?.motion.fps;
-    let clip = |pair: &Pair| clip(pair, fps, rate).with_context(|| format!("clip {}", pair.name));
-    let read: Vec<(Clip, Vec<String>)> = pairs.par_iter().map(clip).collect::<Result<_>>()?;
-    let (clips, notes): (Vec<Clip>, Vec<Vec<String>>) = read.into_iter().unzip();
-    Ok(Clips { fps: rate, clips, notes: notes.into_iter().flatten().collect(), learnt: false })
+    let clip = |pair: &FilePair| clip(pair, fps, rate).with_context(|| format!("clip {}", pair.name));
+    let read: Vec<(EvalClip, Vec<String>)> = pairs.par_iter().map(clip).collect::<Result<_>>()?;
+    let (clips, notes): (Vec<EvalClip>, Vec<Vec<String>>) = read.into_iter().unzip();
+    Ok(EvalClips { fps: rate, clips, notes: notes.into_iter().flatten().collect(), learnt: false })
 }
 
-fn clip(pair: &Pair, given: Option<FrameRate>, fps: FrameRate) -> Result<(Clip, Vec<String>)> {
+fn clip(pair: &FilePair, given: Option<FrameRate>, fps: FrameRate) -> Result<(EvalClip, Vec<String>)> {
     let mut notes = Vec::new();
     let mut side = |path: &PathBuf, what: &str| -> Result<Motion> {
         let read = motion_file::read(path, given)?;
@@ -203,8 +203,8 @@ fn clip(pair: &Pair, given: Option<FrameRate>, fps: FrameRate) -> Result<(Clip, 
             ),
         }
     }
-    let voice = pair.sound.clone().filter(|_| heard.is_some()).map(Voice::File);
-    Ok((Clip { name: pair.name.clone(), real: real_joints, made: made_joints, mask, heard, voice }, notes))
+    let voice = pair.sound.clone().filter(|_| heard.is_some()).map(ClipAudio::File);
+    Ok((EvalClip { name: pair.name.clone(), real: real_joints, made: made_joints, mask, heard, voice }, notes))
 }
 
 fn cut(joints: Array3<f32>, n_frames: usize) -> Array3<f32> {

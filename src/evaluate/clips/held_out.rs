@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// One interval.
-pub struct HeldOut {
+pub struct HeldOutInterval {
     pub key: String,
     /// With the bone lengths of the speaker, as in training: every video has its own.
     pub real: Motion,
@@ -37,17 +37,17 @@ pub fn samples(dataset: &Dataset, split: Split) -> Result<Vec<SampleRef>> {
 }
 
 /// Reads them.
-pub fn read(dataset: &Dataset, samples: &[SampleRef], normal: &Normalisation) -> Result<Vec<HeldOut>> {
+pub fn read(dataset: &Dataset, samples: &[SampleRef], normal: &Normalisation) -> Result<Vec<HeldOutInterval>> {
     let lengths = std::array::from_fn(|bone| normal.bone_lengths.get(bone).copied().unwrap_or(0.0));
-    let interval = |sample| -> Result<HeldOut> {
+    let interval = |sample| -> Result<HeldOutInterval> {
         let mut sample = dataset.read(sample)?;
         bones::with_lengths(&mut sample.motion, &lengths);
-        Ok(HeldOut { key: sample.key, real: sample.motion, sound: sample.sound })
+        Ok(HeldOutInterval { key: sample.key, real: sample.motion, sound: sample.sound })
     };
     samples.par_iter().map(interval).collect()
 }
 
-impl HeldOut {
+impl HeldOutInterval {
     /// Only these frames of it.
     pub fn cut(&self, frames: Range<usize>) -> Self {
         let real = &self.real;

@@ -1,18 +1,18 @@
 //! Clips and baselines of a trained speaker on a split of a dataset: what is true is in the dataset, what is made comes
 //! from the sound alone, and all that a baseline knows is of the training split.
 
-use super::clips::{Clip, Clips, Voice, compared, pcm};
+use super::clips::{ClipAudio, EvalClip, EvalClips, compared, pcm};
 use super::held_out;
-use super::held_out::HeldOut;
+use super::held_out::HeldOutInterval;
 use super::sound_features;
-use super::sound_features::Listener;
+use super::sound_features::SoundFeatureExtractor;
 use crate::dataset::index::SampleRef;
 use crate::dataset::{Dataset, Split};
 use crate::evaluate::baseline::baselines;
-use crate::evaluate::baseline::baselines::{Made, Predictor, Who};
-use crate::evaluate::baseline::constant_pose::Stills;
+use crate::evaluate::baseline::baselines::{ClipMotion, Predictor, PredictorKind};
+use crate::evaluate::baseline::constant_pose::ConstantPoses;
 use crate::evaluate::baseline::neighbour;
-use crate::evaluate::baseline::neighbour::{Asked, Library};
+use crate::evaluate::baseline::neighbour::{Library, Query};
 use crate::evaluate::baseline::predictor;
 use crate::generate::Speaker;
 use crate::generate::normalisation::{N_NUMBERS, Normalisation};
@@ -25,8 +25,8 @@ use ndarray::{Array2, Array3, s};
 use rayon::prelude::*;
 
 /// What is measured: the clips, and the predictors beside each other, the speaker's own motion first.
-pub struct Material {
-    pub clips: Clips,
+pub struct SpeakerEvaluation {
+    pub clips: EvalClips,
     pub predictors: Vec<Predictor>,
 }
 
@@ -34,7 +34,7 @@ pub struct Material {
 ///
 /// # Errors
 /// A dataset of another frame rate; a split without intervals.
-pub fn material(dataset: &Dataset, speaker: &Speaker, split: Split, task: &dyn Task) -> Result<Material> {
+pub fn material(dataset: &Dataset, speaker: &Speaker, split: Split, task: &dyn Task) -> Result<SpeakerEvaluation> {
     let (of_dataset, of_speaker) = (dataset.info().fps, speaker.fps());
     ensure!(
         of_dataset == of_speaker,
@@ -48,9 +48,9 @@ pub fn material(dataset: &Dataset, speaker: &Speaker, split: Split, task: &dyn T
     let made = generated(speaker, &held_out, |sounds, i| sounds[i].clone())?;
     let other = generated(speaker, &held_out, predictor::turned)?;
     task.detail("listening");
-    let clips: Vec<Clip> =
+    let clips: Vec<EvalClip> =
         held_out.into_par_iter().zip(made).map(|(held_out, made)| clip(held_out, made, of_dataset)).collect();
-    let mut clips = Clips { fps: of_dataset, clips, notes: Vec::new(), learnt: split == Split::Train };
+    let mut clips = EvalClips { fps: of_dataset, clips, notes: Vec::new(), learnt: split == Split::Train };
     if clips.learnt {
         clips
             .notes
@@ -70,28 +70,28 @@ pub fn material(dataset: &Dataset, speaker: &Speaker, split: Split, task: &dyn T
     match copied(dataset, normal, &clips, split)? {
         Some(motions) => {
             let says = "for each 4 s of sound the motion of the stretch of the training split that sounds most alike";
-            let mut predictor = Predictor { who: Who::NearestNeighbour, says: says.to_owned(), motions };
+            let mut predictor = Predictor { who: PredictorKind::NearestNeighbour, says: says.to_owned(), motions };
             baselines::fill(&mut predictor, &all[1]);
             all.push(predictor);
         }
         None => clips.notes.push(format!(
             "{}: left out, since no interval of the training split is long enough to copy from",
-            Who::NearestNeighbour.name()
+            PredictorKind::NearestNeighbour.name()
         )),
     }
     let says = "the same speaker hearing another sound: what is said half of the split later".to_owned();
-    let motions = other.into_iter().map(Made::Moves).collect();
-    all.push(Predictor { who: Who::MismatchedPrediction, says, motions });
-    match baselines::mismatched(&clips, Who::MismatchedTruth, &all[1]) {
+    let motions = other.into_iter().map(ClipMotion::Moves).collect();
+    all.push(Predictor { who: PredictorKind::MismatchedPrediction, says, motions });
+    match baselines::mismatched(&clips, PredictorKind::MismatchedTruth, &all[1]) {
         Some(predictor) => all.push(predictor),
-        None => clips.notes.push(baselines::too_short(Who::MismatchedTruth)),
+        None => clips.notes.push(baselines::too_short(PredictorKind::MismatchedTruth)),
     }
-    Ok(Material { clips, predictors: all })
+    Ok(SpeakerEvaluation { clips, predictors: all })
 }
 
 fn generated(
     speaker: &Speaker,
-    held_out: &[HeldOut],
+    held_out: &[HeldOutInterval],
     heard: impl Fn(&[&Sound], usize) -> Sound,
 ) -> Result<Vec<Array3<f32>>> {
     let sounds: Vec<&Sound> = held_out.iter().map(|interval| &interval.sound).collect();
@@ -102,18 +102,18 @@ fn generated(
     made.collect()
 }
 
-fn clip(held_out: HeldOut, made: Array3<f32>, fps: FrameRate) -> Clip {
-    let HeldOut { key, real, sound } = held_out;
+fn clip(held_out: HeldOutInterval, made: Array3<f32>, fps: FrameRate) -> EvalClip {
+    let HeldOutInterval { key, real, sound } = held_out;
     let heard = Some(sound_features::of_samples(&sound.samples, fps, real.n_frames()));
     let mut made = made;
     let (mask, _) = compared(&real.joints, &real.mask, &mut made);
-    let voice = Some(Voice::Kept(sound.samples.into_iter().map(pcm).collect()));
-    Clip { name: key, real: real.joints, made, mask, heard, voice }
+    let voice = Some(ClipAudio::Kept(sound.samples.into_iter().map(pcm).collect()));
+    EvalClip { name: key, real: real.joints, made, mask, heard, voice }
 }
 
 /// Mean and median pose of the training split.
 fn stills(dataset: &Dataset, normal: &Normalisation, n_clips: usize) -> Result<Vec<Predictor>> {
-    let mut stills = Stills::default();
+    let mut stills = ConstantPoses::default();
     for sample in dataset.samples(Split::Train) {
         let interval = held_out::read(dataset, &[sample], normal)?.remove(0);
         stills.add(interval.real.joints.view(), interval.real.mask.view());
@@ -121,16 +121,16 @@ fn stills(dataset: &Dataset, normal: &Normalisation, n_clips: usize) -> Result<V
     let mean: Array2<f32> = normal.joints(Array2::zeros((N_NUMBERS, 1)).view()).slice(s![0, .., ..]).to_owned();
     let mut median = stills.median();
     median.zip_mut_with(&mean, |v, mean| *v = if v.is_finite() { *v } else { *mean });
-    let predictor = |who: Who, pose: Array2<f32>| Predictor {
+    let predictor = |who: PredictorKind, pose: Array2<f32>| Predictor {
         who,
         says: format!("the {} of the training split in every frame, which never moves", who.name()),
-        motions: vec![Made::Still(pose); n_clips],
+        motions: vec![ClipMotion::Still(pose); n_clips],
     };
-    Ok(vec![predictor(Who::MeanPose, mean), predictor(Who::MedianPose, median)])
+    Ok(vec![predictor(PredictorKind::MeanPose, mean), predictor(PredictorKind::MedianPose, median)])
 }
 
 /// The training split as a library, read anew for every question, so that its length costs no memory.
-struct Training<'a> {
+struct TrainingLibrary<'a> {
     dataset: &'a Dataset,
     normal: &'a Normalisation,
     samples: Vec<SampleRef>,
@@ -138,21 +138,21 @@ struct Training<'a> {
     asks_itself: bool,
 }
 
-impl Training<'_> {
-    fn read(&self, entry: usize) -> Result<HeldOut> {
+impl TrainingLibrary<'_> {
+    fn read(&self, entry: usize) -> Result<HeldOutInterval> {
         let sample = self.samples.get(entry).context("no such interval")?;
         held_out::read(self.dataset, std::slice::from_ref(sample), self.normal)?.pop().context("no such interval")
     }
 }
 
-impl Library for Training<'_> {
+impl Library for TrainingLibrary<'_> {
     fn len(&self) -> usize {
         self.samples.len()
     }
 
     fn heard(&self, entry: usize) -> Result<Option<(Vec<f32>, usize)>> {
         let interval = self.read(entry)?;
-        let mut listener = Listener::new(interval.real.fps, None);
+        let mut listener = SoundFeatureExtractor::new(interval.real.fps, None);
         listener.push(&interval.sound.samples);
         let n_frames = interval.real.n_frames();
         Ok(Some((listener.finish(n_frames).rows, n_frames)))
@@ -168,14 +168,19 @@ impl Library for Training<'_> {
 }
 
 /// The nearest neighbours' motion; what is missing where it was copied from is NaN.
-pub fn copied(dataset: &Dataset, normal: &Normalisation, clips: &Clips, split: Split) -> Result<Option<Vec<Made>>> {
-    let rows = |clip: &Clip| clip.heard.as_ref().map(|heard| heard.rows.clone()).unwrap_or_default();
+pub fn copied(
+    dataset: &Dataset,
+    normal: &Normalisation,
+    clips: &EvalClips,
+    split: Split,
+) -> Result<Option<Vec<ClipMotion>>> {
+    let rows = |clip: &EvalClip| clip.heard.as_ref().map(|heard| heard.rows.clone()).unwrap_or_default();
     let rows: Vec<Vec<f32>> = clips.clips.iter().map(rows).collect();
-    let asked: Vec<Asked> =
-        clips.clips.iter().zip(&rows).map(|(clip, rows)| Asked { rows, n_frames: clip.n_frames() }).collect();
+    let asked: Vec<Query> =
+        clips.clips.iter().zip(&rows).map(|(clip, rows)| Query { rows, n_frames: clip.n_frames() }).collect();
     let asks_itself = split == Split::Train;
-    let library = Training { dataset, normal, samples: dataset.samples(Split::Train), asks_itself };
+    let library = TrainingLibrary { dataset, normal, samples: dataset.samples(Split::Train), asks_itself };
     let made = neighbour::motions(&asked, &library, clips.fps)?;
     debug_assert!(made.iter().flatten().all(|joints| joints.shape()[1..] == [N_JOINTS, 3]));
-    Ok(made.map(|made| made.into_iter().map(Made::Moves).collect()))
+    Ok(made.map(|made| made.into_iter().map(ClipMotion::Moves).collect()))
 }

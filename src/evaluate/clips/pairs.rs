@@ -13,7 +13,7 @@ const SOUND: [&str; 11] = ["wav", "flac", "mp3", "m4a", "ogg", "opus", "aac", "m
 
 /// A clip's files.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Pair {
+pub struct FilePair {
     pub name: String,
     pub truth: PathBuf,
     pub prediction: PathBuf,
@@ -22,8 +22,8 @@ pub struct Pair {
 
 /// The pairs in the order of their names, and a sentence for each file that has no partner.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Found {
-    pub pairs: Vec<Pair>,
+pub struct FilePairs {
+    pub pairs: Vec<FilePair>,
     pub notes: Vec<String>,
 }
 
@@ -32,7 +32,7 @@ pub struct Found {
 ///
 /// # Errors
 /// A path that is not there, a file beside a folder, two files of one name, or no pair at all.
-pub fn find(truth: &Path, prediction: &Path, audio: Option<&Path>) -> Result<Found> {
+pub fn find(truth: &Path, prediction: &Path, audio: Option<&Path>) -> Result<FilePairs> {
     for path in [Some(truth), Some(prediction), audio].into_iter().flatten() {
         ensure!(path.exists(), "{} is not there", path.display());
     }
@@ -44,8 +44,8 @@ pub fn find(truth: &Path, prediction: &Path, audio: Option<&Path>) -> Result<Fou
                 truth.display()
             );
             let pair =
-                Pair { name: key(truth), truth: truth.to_owned(), prediction: prediction.to_owned(), sound: None };
-            Found { pairs: vec![pair], notes: Vec::new() }
+                FilePair { name: key(truth), truth: truth.to_owned(), prediction: prediction.to_owned(), sound: None };
+            FilePairs { pairs: vec![pair], notes: Vec::new() }
         }
         (true, true) => folders(truth, prediction)?,
         (is_folder, _) => {
@@ -73,7 +73,7 @@ fn same(a: &Path, b: &Path) -> bool {
     a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
 }
 
-fn folders(truth: &Path, prediction: &Path) -> Result<Found> {
+fn folders(truth: &Path, prediction: &Path) -> Result<FilePairs> {
     let one = same(truth, prediction);
     let side = |folder: &Path, own: &[&str]| -> Result<BTreeMap<String, PathBuf>> {
         let files = files(folder, &motion_file::ENDINGS)?;
@@ -81,10 +81,10 @@ fn folders(truth: &Path, prediction: &Path) -> Result<Found> {
         by_key(files)
     };
     let (truths, mut predictions) = (side(truth, &TRUTH)?, side(prediction, &PREDICTION)?);
-    let mut found = Found::default();
+    let mut found = FilePairs::default();
     for (name, truth) in truths {
         match predictions.remove(&name) {
-            Some(prediction) => found.pairs.push(Pair { name, truth, prediction, sound: None }),
+            Some(prediction) => found.pairs.push(FilePair { name, truth, prediction, sound: None }),
             None => found.notes.push(format!("{} has no prediction of its name: left out", told(&truth))),
         }
     }
@@ -103,7 +103,7 @@ fn folders(truth: &Path, prediction: &Path) -> Result<Found> {
     Ok(found)
 }
 
-fn by_name(found: &mut Found, audio: &Path) -> Result<()> {
+fn by_name(found: &mut FilePairs, audio: &Path) -> Result<()> {
     let mut sounds = by_key(files(audio, &SOUND)?)?;
     for pair in &mut found.pairs {
         pair.sound = sounds.remove(&pair.name);

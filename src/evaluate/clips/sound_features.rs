@@ -17,7 +17,7 @@ const PIECE: usize = 10 * SAMPLE_RATE as usize;
 
 /// What was heard of one sound.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Heard {
+pub struct SoundFeatures {
     pub secs: f64,
     /// Seconds from the start.
     pub onsets: Vec<f64>,
@@ -26,7 +26,7 @@ pub struct Heard {
 }
 
 /// Takes in a sound of 16 kHz.
-pub struct Listener {
+pub struct SoundFeatureExtractor {
     fps: FrameRate,
     n_samples: usize,
     onsets: Option<Onsets>,
@@ -39,7 +39,7 @@ pub struct Listener {
     rows: Vec<f32>,
 }
 
-impl Listener {
+impl SoundFeatureExtractor {
     /// For motion of `fps`. Onsets are only found where it is known how loud the sound ever gets (`onset::Loudest`).
     pub fn new(fps: FrameRate, loudest_db: Option<f32>) -> Self {
         Self {
@@ -67,7 +67,7 @@ impl Listener {
     }
 
     /// The rest of a sound, heard up to `n_frames` of motion: as many rows as they begin, silence where it has ended.
-    pub fn finish(mut self, n_frames: usize) -> Heard {
+    pub fn finish(mut self, n_frames: usize) -> SoundFeatures {
         let secs = self.n_samples as f64 / f64::from(SAMPLE_RATE);
         let n_rows = n_frames.div_ceil(POOLED);
         let wanted = mel::n_samples(mel_frames(self.fps, n_rows * POOLED) + 1);
@@ -78,7 +78,7 @@ impl Listener {
         let until = self.fps.secs(n_frames);
         let mut onsets = self.onsets.map(Onsets::finish).unwrap_or_default();
         onsets.retain(|onset| *onset < until);
-        Heard { secs, onsets, rows: self.rows }
+        SoundFeatures { secs, onsets, rows: self.rows }
     }
 
     fn pool(&mut self) {
@@ -102,17 +102,17 @@ impl Listener {
 }
 
 /// Hears a sound of 16 kHz beside `n_frames` of motion.
-pub fn of_samples(samples: &[f32], fps: FrameRate, n_frames: usize) -> Heard {
+pub fn of_samples(samples: &[f32], fps: FrameRate, n_frames: usize) -> SoundFeatures {
     let mut loudest = Loudest::default();
     loudest.push(samples);
-    let mut listener = Listener::new(fps, Some(loudest.finish()));
+    let mut listener = SoundFeatureExtractor::new(fps, Some(loudest.finish()));
     listener.push(samples);
     listener.finish(n_frames)
 }
 
 /// Hears the file beside `n_frames` of motion, twice from its beginning; what goes on behind them is not decoded. `None`:
 /// it holds no sound.
-pub fn hear(path: &Path, fps: FrameRate, n_frames: usize) -> Result<Option<Heard>> {
+pub fn hear(path: &Path, fps: FrameRate, n_frames: usize) -> Result<Option<SoundFeatures>> {
     // a second more, so that an onset at the end stands out from what follows
     let n_wanted = ((fps.secs(n_frames) + 1.0) * f64::from(SAMPLE_RATE)).ceil() as usize;
     let listen = |sink: &mut dyn FnMut(&[f32])| -> Result<usize> {
@@ -131,7 +131,7 @@ pub fn hear(path: &Path, fps: FrameRate, n_frames: usize) -> Result<Option<Heard
     if listen(&mut |samples| loudest.push(samples))? == 0 {
         return Ok(None);
     }
-    let mut listener = Listener::new(fps, Some(loudest.finish()));
+    let mut listener = SoundFeatureExtractor::new(fps, Some(loudest.finish()));
     listen(&mut |samples| listener.push(samples))?;
     Ok(Some(listener.finish(n_frames)))
 }
@@ -149,7 +149,7 @@ mod tests {
         loudest.push(&sound);
         let loudest = loudest.finish();
         let heard = |piece: usize| {
-            let mut listener = Listener::new(fps, Some(loudest));
+            let mut listener = SoundFeatureExtractor::new(fps, Some(loudest));
             sound.chunks(piece).for_each(|samples| listener.push(samples));
             listener.finish(375)
         };
@@ -173,12 +173,12 @@ mod tests {
     #[test]
     fn sound_that_ends_early_is_silence_and_sound_that_goes_on_is_cut() {
         let fps = FrameRate::new(15, 1);
-        let mut listener = Listener::new(fps, None);
+        let mut listener = SoundFeatureExtractor::new(fps, None);
         listener.push(&[0.1; 16_000]);
         assert_eq!(listener.finish(60).rows.len(), 30 * mel::N_MELS);
-        let mut listener = Listener::new(fps, None);
+        let mut listener = SoundFeatureExtractor::new(fps, None);
         listener.push(&[0.1; 64_000]);
         assert_eq!(listener.finish(15).rows.len(), 8 * mel::N_MELS);
-        assert_eq!(Listener::new(fps, None).finish(0), Heard::default());
+        assert_eq!(SoundFeatureExtractor::new(fps, None).finish(0), SoundFeatures::default());
     }
 }

@@ -42,7 +42,7 @@ impl Lifters {
 
 /// One method's errors on one set.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct BodyRow {
     pub set: String,
     pub method: &'static str,
     /// What the method was given: "drop" or "clean" keypoints.
@@ -56,7 +56,7 @@ pub struct Row {
 
 /// The table: for each set the lifter, its network alone, and three methods without a network. Errors: a set whose takes
 /// are all shorter than a scene.
-pub fn table(lifters: &Lifters, sets: &[Set], n_scenes: usize) -> Result<Vec<Row>> {
+pub fn table(lifters: &Lifters, sets: &[Set], n_scenes: usize) -> Result<Vec<BodyRow>> {
     let mut rows = Vec::new();
     for (set, takes) in sets {
         let (drop, clean) = (scenes(takes, Filming::Drop, n_scenes), scenes(takes, Filming::Clean, n_scenes));
@@ -66,10 +66,13 @@ pub fn table(lifters: &Lifters, sets: &[Set], n_scenes: usize) -> Result<Vec<Row
         rows.extend([
             row(set, "orator lift", &drop, |scene| whole(&lifters.whole, scene))?,
             row(set, "network alone", &drop, network)?,
-            Row { input: "clean", ..row(set, "orator lift", &clean, |scene| whole(&lifters.whole, scene))? },
-            Row { input: "clean", ..row(set, "bone-length depth", &clean, |s| Ok(with_bone_depth(s)))? },
-            Row { input: "clean", ..row(set, "mean depth per joint", &clean, |s| Ok(with_mean_depth(s, &mean)))? },
-            Row { input: "clean", ..row(set, "constant mean pose", &clean, |s| Ok(vec![Some(mean); s.truth.len()]))? },
+            BodyRow { input: "clean", ..row(set, "orator lift", &clean, |scene| whole(&lifters.whole, scene))? },
+            BodyRow { input: "clean", ..row(set, "bone-length depth", &clean, |s| Ok(with_bone_depth(s)))? },
+            BodyRow { input: "clean", ..row(set, "mean depth per joint", &clean, |s| Ok(with_mean_depth(s, &mean)))? },
+            BodyRow {
+                input: "clean",
+                ..row(set, "constant mean pose", &clean, |s| Ok(vec![Some(mean); s.truth.len()]))?
+            },
         ]);
     }
     Ok(rows)
@@ -80,7 +83,7 @@ fn row(
     method: &'static str,
     scenes: &[Scene],
     lift: impl Fn(&Scene) -> Result<Vec<Option<Pose>>>,
-) -> Result<Row> {
+) -> Result<BodyRow> {
     let lifted = scenes.iter().map(|scene| Ok((scene, lift(scene)?))).collect::<Result<Vec<_>>>()?;
     let errors = of_lifted(lifted.iter().map(|(scene, poses)| (*scene, &poses[..])));
     let band = |&(low, high): &(f64, f64)| {
@@ -90,7 +93,7 @@ fn row(
     let by_yaw = BANDS.iter().map(band).collect();
     let n_frames: usize = scenes.iter().map(|s| s.truth.len()).sum();
     let told = errors.n_frames as f64 / n_frames.max(1) as f64;
-    Ok(Row { set: set.to_owned(), method, input: "drop", errors, by_yaw, told })
+    Ok(BodyRow { set: set.to_owned(), method, input: "drop", errors, by_yaw, told })
 }
 
 /// A scene through the whole of `orator lift`.
@@ -123,7 +126,7 @@ fn whole(lifter: &Lifter, scene: &Scene) -> Result<Vec<Option<Pose>>> {
 }
 
 /// The table for people.
-pub fn text(rows: &[Row]) -> String {
+pub fn text(rows: &[BodyRow]) -> String {
     let mut text = format!(
         "{:22} {:6} {:>6} {:>8} {:>6} {:>7} {:>9} {:>6}   MPJPE by yaw {}\n",
         "mm",
@@ -138,7 +141,7 @@ pub fn text(rows: &[Row]) -> String {
     );
     for same in rows.chunk_by(|a, b| a.set == b.set) {
         text += &format!("{}\n", same[0].set);
-        for Row { method, input, errors: e, by_yaw, told, .. } in same {
+        for BodyRow { method, input, errors: e, by_yaw, told, .. } in same {
             let bands: Vec<String> = by_yaw.iter().map(|e| format!("{:5.0}", e.mpjpe)).collect();
             text += &format!(
                 "  {method:20} {input:6} {:6.0} {:8.0} {:6.0} {:7.0} {:9.0} {:4.0} %               {}\n",

@@ -42,7 +42,7 @@ pub type Lift<'a> = dyn Fn(&[SeenHand]) -> Result<Vec<Option<Hand>>> + 'a;
 
 /// Errors in mm, medians over all counted points of all hands.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Errors {
+pub struct HandErrors {
     /// As it is; none for hands without knuckles.
     pub median_mm: Option<f32>,
     /// Each hand after the similarity that fits it best.
@@ -53,28 +53,28 @@ pub struct Errors {
 
 /// One set's errors: of the lifter, and of what needs no network.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct HandRow {
     pub set: String,
     /// What gave the hands their size.
     pub size: &'static str,
     pub n_hands: usize,
     /// Share of the hands that were lifted.
     pub lifted: f64,
-    pub lifter: Errors,
+    pub lifter: HandErrors,
     /// The keypoints without depth, at the true scale.
-    pub flat: Errors,
+    pub flat: HandErrors,
     /// A constant hand at rest, turned within the picture, palm or back towards the viewer, whichever fits better.
-    pub relaxed: Errors,
+    pub relaxed: HandErrors,
 }
 
 /// A hand before the camera: the truth in metres in the camera's axes, and its keypoints in px.
-struct Shot {
+struct ProjectedHand {
     truth: Truth,
     seen: SeenHand,
 }
 
 /// The error table of `lift` on `sets`, `MEASURED` hands each, drawn with `seed`.
-pub fn evaluate(lift: &Lift, sets: &[FingerSet], n_hands: usize, seed: u64) -> Result<Vec<Row>> {
+pub fn evaluate(lift: &Lift, sets: &[FingerSet], n_hands: usize, seed: u64) -> Result<Vec<HandRow>> {
     sets.iter().map(|set| row(lift, set, n_hands, seed)).collect()
 }
 
@@ -89,7 +89,7 @@ pub fn lifter_of(path: &Path) -> Result<Box<Lift<'static>>> {
     Ok(Box::new(move |seen| Ok(lifter.lift(seen, Side::Right)?)))
 }
 
-fn row(lift: &Lift, set: &FingerSet, n_hands: usize, seed: u64) -> Result<Row> {
+fn row(lift: &Lift, set: &FingerSet, n_hands: usize, seed: u64) -> Result<HandRow> {
     let mut truths = Vec::new();
     for take in &set.takes {
         truths.extend(take.truths()?);
@@ -97,14 +97,15 @@ fn row(lift: &Lift, set: &FingerSet, n_hands: usize, seed: u64) -> Result<Row> {
     truths.retain(|t| t.counted.iter().filter(|c| **c).count() >= 3);
     ensure!(!truths.is_empty(), "{}: no frame holds a wrist and three points of fingers", set.name);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let shots: Vec<Shot> = (0..n_hands).map(|_| shot(&truths[rng.random_range(0..truths.len())], &mut rng)).collect();
+    let shots: Vec<ProjectedHand> =
+        (0..n_hands).map(|_| shot(&truths[rng.random_range(0..truths.len())], &mut rng)).collect();
     let seen: Vec<SeenHand> = shots.iter().map(|s| s.seen).collect();
     let lifted = lift(&seen)?;
     let whole = set.takes.iter().all(|take| take.has_knuckles());
     let sized: Vec<Option<Hand>> =
         shots.iter().zip(&lifted).map(|(s, h)| Some(to_size(&s.truth, h.as_ref()?))).collect();
     let of = |hands: &[Option<Hand>]| errors(&shots, hands, whole);
-    Ok(Row {
+    Ok(HandRow {
         set: set.name.clone(),
         size: set.takes.first().map_or("", |take| take.size.text()),
         n_hands,
@@ -115,7 +116,7 @@ fn row(lift: &Lift, set: &FingerSet, n_hands: usize, seed: u64) -> Result<Row> {
     })
 }
 
-fn shot(truth: &Truth, rng: &mut ChaCha8Rng) -> Shot {
+fn shot(truth: &Truth, rng: &mut ChaCha8Rng) -> ProjectedHand {
     let turn = any_turn(rng);
     let hand = truth.hand.map(|p| turn.turn(p));
     let distance = 0.19 * rng.random_range(5.0..20.0);
@@ -125,7 +126,7 @@ fn shot(truth: &Truth, rng: &mut ChaCha8Rng) -> Shot {
         let at = [0, 1].map(|k| (PX * (hand[j][k] * grow + NOISE * palm * normal(rng))) as f32);
         truth.there[j].then_some(at)
     });
-    Shot { truth: Truth { hand, ..truth.clone() }, seen }
+    ProjectedHand { truth: Truth { hand, ..truth.clone() }, seen }
 }
 
 /// The lifted hand with the true hand's bones, all counted together.
@@ -159,7 +160,7 @@ fn at_rest(seen: &SeenHand) -> Hand {
     if palm_fit >= back_fit { palm } else { back }
 }
 
-fn errors(shots: &[Shot], hands: &[Option<Hand>], whole: bool) -> Errors {
+fn errors(shots: &[ProjectedHand], hands: &[Option<Hand>], whole: bool) -> HandErrors {
     let (mut plain, mut aligned, mut above, mut n) = (Vec::new(), Vec::new(), 0, 0);
     for (shot, hand) in shots.iter().zip(hands).filter_map(|(s, h)| Some((s, h.as_ref()?))) {
         let counted: Vec<usize> = (1..N_HAND).filter(|&j| shot.truth.counted[j]).collect();
@@ -173,7 +174,7 @@ fn errors(shots: &[Shot], hands: &[Option<Hand>], whole: bool) -> Errors {
             aligned.extend(counted.iter().map(|&j| off(fit.apply(hand[j]), j)));
         }
     }
-    Errors {
+    HandErrors {
         median_mm: median(plain).filter(|_| whole),
         aligned_mm: median(aligned).unwrap_or(f32::NAN),
         above_30: whole.then_some(above as f64 / f64::from(n.max(1))),
@@ -181,9 +182,9 @@ fn errors(shots: &[Shot], hands: &[Option<Hand>], whole: bool) -> Errors {
 }
 
 /// The table as text, a line a set.
-pub fn text(rows: &[Row]) -> String {
+pub fn text(rows: &[HandRow]) -> String {
     let number = |value: Option<f32>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.1}"));
-    let one = |e: &Errors| format!("{:>5} /{:>5.1}", number(e.median_mm), e.aligned_mm);
+    let one = |e: &HandErrors| format!("{:>5} /{:>5.1}", number(e.median_mm), e.aligned_mm);
     let mut lines = vec![format!(
         "{:<44} {:>13} {:>8} {:>14} {:>14}   size",
         "hands: median / aligned, mm", "lifter", ">30 mm", "flat", "at rest"
@@ -218,7 +219,7 @@ mod tests {
         let set = resting(Size::Phalanx, |j| j != 4);
         let truths = set.takes[0].truths()?;
         let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let shots: Vec<Shot> = (0..60).map(|_| shot(&truths[0], &mut rng)).collect();
+        let shots: Vec<ProjectedHand> = (0..60).map(|_| shot(&truths[0], &mut rng)).collect();
         let wrong_tip: Vec<Option<Hand>> = shots
             .iter()
             .map(|s| {
@@ -237,7 +238,7 @@ mod tests {
         let lift = lifter_of(Path::new(""))?;
         let sets = [resting(Size::Phalanx, |_| true), resting(Size::MiddleEnd, |j| j == 0 || j % 4 != 1 || j == 9)];
         let rows = evaluate(&*lift, &sets, 300, 5)?;
-        let median = |e: Errors| e.median_mm.unwrap_or(f32::NAN);
+        let median = |e: HandErrors| e.median_mm.unwrap_or(f32::NAN);
         assert!(median(rows[0].lifter) < 20.0, "{rows:?}");
         assert!(median(rows[0].lifter) < 0.5 * median(rows[0].flat), "{rows:?}");
         assert!(rows[1].lifter.aligned_mm < 20.0 && rows[0].lifted == 1.0, "{rows:?}");

@@ -2,7 +2,7 @@
 //! up to the whole.
 
 use crate::evaluate::baseline::baselines::Predictor;
-use crate::evaluate::clips::clips::Clips;
+use crate::evaluate::clips::clips::EvalClips;
 use crate::metrics::catalogue::{Catalogue, Interval, Measured};
 use ndarray::{Array2, s};
 use rayon::prelude::*;
@@ -17,17 +17,17 @@ const MOST_SECS: f64 = 3600.0;
 const PIECE_SECS: f64 = 600.0;
 
 /// Length of the blocks of these clips, seconds.
-pub fn block_secs(clips: &Clips) -> f64 {
+pub fn block_secs(clips: &EvalClips) -> f64 {
     BLOCK_SECS * (clips.secs() / MOST_SECS).ceil().max(1.0)
 }
 
 /// The same in frames.
-fn block_frames(clips: &Clips) -> usize {
+fn block_frames(clips: &EvalClips) -> usize {
     ((block_secs(clips) * clips.fps.per_sec()).round() as usize).max(1)
 }
 
 /// A predictor's sums over all clips and their blocks. The same whatever the number of threads.
-pub fn measure(catalogue: &Catalogue, clips: &Clips, predictor: &Predictor) -> Measured {
+pub fn measure(catalogue: &Catalogue, clips: &EvalClips, predictor: &Predictor) -> Measured {
     let all: Vec<Measured> = pieces(clips)
         .into_par_iter()
         .map(|(clip, frames)| {
@@ -52,7 +52,7 @@ pub fn measure(catalogue: &Catalogue, clips: &Clips, predictor: &Predictor) -> M
 }
 
 /// Clips with their frames, long ones in equal pieces.
-fn pieces(clips: &Clips) -> Vec<(usize, Range<usize>)> {
+fn pieces(clips: &EvalClips) -> Vec<(usize, Range<usize>)> {
     let of_clip = |clip: usize| {
         let n_frames = clips.clips[clip].n_frames();
         let n = (clips.fps.secs(n_frames) / PIECE_SECS).ceil().max(1.0) as usize;
@@ -63,7 +63,7 @@ fn pieces(clips: &Clips) -> Vec<(usize, Range<usize>)> {
 
 /// One half of the truth beside the other: every second stretch of a block's length as if it were made, beside the one
 /// before it.
-pub fn halves(catalogue: &Catalogue, clips: &Clips) -> Measured {
+pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> Measured {
     let length = block_frames(clips);
     let stretches = |clip: usize| (0..clips.clips[clip].n_frames() / length).map(move |i| (clip, i * length));
     let all: Vec<(usize, usize)> = (0..clips.clips.len()).flat_map(stretches).collect();

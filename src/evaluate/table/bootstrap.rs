@@ -29,7 +29,7 @@ pub fn draws(n_blocks: usize, n_draws: usize) -> Vec<Vec<usize>> {
 impl Estimate {
     /// `value` of all blocks, with the spread of `drawn` around its median: moved so that the median is the value, since a
     /// distance between distributions grows when blocks are repeated. Draws that are no number are left out.
-    pub fn of(value: f64, drawn: &[f64]) -> Self {
+    pub fn from_draws(value: f64, drawn: &[f64]) -> Self {
         let drawn = Ordered::new(drawn.iter().copied());
         let at = |share: f64| drawn.quantile(share).unwrap_or(f64::NAN);
         let median = at(0.5);
@@ -52,13 +52,13 @@ mod tests {
         let mean = |blocks: &[usize]| blocks.iter().map(|i| values[*i]).sum::<f64>() / blocks.len() as f64;
         let all: Vec<usize> = (0..200).collect();
         let drawn: Vec<f64> = draws(200, 1000).iter().map(|blocks| mean(blocks)).collect();
-        let estimate = Estimate::of(mean(&all), &drawn);
+        let estimate = Estimate::from_draws(mean(&all), &drawn);
         let variance = values.iter().map(|v| (v - estimate.value).powi(2)).sum::<f64>() / 200.0;
         let expected = 2.0 * 1.96 * (variance / 200.0).sqrt();
         let width = estimate.high - estimate.low;
         assert!((width / expected - 1.0).abs() < 0.1, "{width} {expected}");
         assert!(estimate.low < estimate.value && estimate.value < estimate.high && estimate.is_apart_from_zero());
-        let none = Estimate::of(1.0, &[f64::NAN]);
+        let none = Estimate::from_draws(1.0, &[f64::NAN]);
         assert!(none.value == 1.0 && none.low.is_nan() && !none.is_apart_from_zero());
     }
 }

@@ -2,15 +2,15 @@
 //! parameter; where they differ, it is said in what, and nothing is compared.
 
 use super::bootstrap::Estimate;
-use super::result::{Metric, Stored};
-use crate::evaluate::baseline::baselines::Who;
+use super::result::{StoredMetric, StoredResult};
+use crate::evaluate::baseline::baselines::PredictorKind;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeSet;
 
 /// A metric that both have.
 #[derive(Clone, Debug, Serialize)]
-pub struct Beside {
+pub struct MetricPair {
     pub name: String,
     pub unit: String,
     pub hash: String,
@@ -20,10 +20,10 @@ pub struct Beside {
 
 /// What came of it.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Compared {
+pub struct Comparison {
     /// Said where the figures are of different real motion.
     pub warning: Option<String>,
-    pub beside: Vec<Beside>,
+    pub beside: Vec<MetricPair>,
     /// A sentence for each metric of one name whose definitions differ.
     pub refused: Vec<String>,
     /// Metrics that one of them has, and which.
@@ -32,24 +32,24 @@ pub struct Compared {
 }
 
 /// Compares the predictions of two results.
-pub fn compare(a: &Stored, b: &Stored) -> Compared {
+pub fn compare(a: &StoredResult, b: &StoredResult) -> Comparison {
     let warning = format!(
         "A is of {} clips and B of {}, and their real motion is not the same: a better figure may be an easier clip",
         a.n_clips, b.n_clips
     );
-    let mut compared = Compared { warning: (a.truth != b.truth).then_some(warning), ..Compared::default() };
-    let mut rest: Vec<&Metric> = b.metrics.iter().collect();
-    let mut alone: Vec<&Metric> = Vec::new();
+    let mut compared = Comparison { warning: (a.truth != b.truth).then_some(warning), ..Comparison::default() };
+    let mut rest: Vec<&StoredMetric> = b.metrics.iter().collect();
+    let mut alone: Vec<&StoredMetric> = Vec::new();
     for metric in &a.metrics {
         match rest.iter().position(|other| other.hash == metric.hash) {
             Some(at) => {
                 let other = rest.remove(at);
-                compared.beside.push(Beside {
+                compared.beside.push(MetricPair {
                     name: metric.plain_name.clone(),
                     unit: metric.unit.clone(),
                     hash: metric.hash.clone(),
-                    a: metric.value(Who::Prediction),
-                    b: other.value(Who::Prediction),
+                    a: metric.value(PredictorKind::Prediction),
+                    b: other.value(PredictorKind::Prediction),
                 });
             }
             None => alone.push(metric),
@@ -66,7 +66,7 @@ pub fn compare(a: &Stored, b: &Stored) -> Compared {
 }
 
 /// `mpjpe (all), joint error, is not comparable: fps is 15.0 in A and 30.0 in B (hash ... and ...)`
-fn refusal(a: &Metric, b: &Metric) -> String {
+fn refusal(a: &StoredMetric, b: &StoredMetric) -> String {
     let mut differ = Vec::new();
     differences("", &a.parameters, &b.parameters, &mut differ);
     if a.definition != b.definition {
@@ -105,7 +105,7 @@ fn shown(value: &Value) -> String {
 }
 
 /// Side by side as text.
-pub fn text(compared: &Compared) -> String {
+pub fn text(compared: &Comparison) -> String {
     let cell = |estimate: &Option<Estimate>| match estimate {
         Some(e) if e.low.is_finite() => format!("  {:.4} [{:.4}, {:.4}]", e.value, e.low, e.high),
         Some(e) => format!("{:.4}", e.value),

@@ -3,7 +3,7 @@
 
 use super::bootstrap::Estimate;
 use super::table::Table;
-use crate::evaluate::baseline::baselines::Who;
+use crate::evaluate::baseline::baselines::PredictorKind;
 use crate::evaluate::verdict::labels;
 use crate::evaluate::verdict::verdict::{better_than_nothing, hears};
 use anyhow::{Context, Result, ensure};
@@ -66,7 +66,7 @@ fn metric(table: &Table, index: usize) -> Value {
 
 /// One metric of a result that was read.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct Metric {
+pub struct StoredMetric {
     pub name: String,
     pub part: String,
     pub plain_name: String,
@@ -79,15 +79,15 @@ pub struct Metric {
 
 /// Metrics of a result.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct Stored {
+pub struct StoredResult {
     evaluation: u64,
     /// Hash of the real motion behind the figures, and how many clips it has.
     pub truth: String,
     pub n_clips: usize,
-    pub metrics: Vec<Metric>,
+    pub metrics: Vec<StoredMetric>,
 }
 
-impl Stored {
+impl StoredResult {
     /// Reads what `orator evaluate --json` wrote.
     ///
     /// # Errors
@@ -107,9 +107,9 @@ impl Stored {
     }
 }
 
-impl Metric {
+impl StoredMetric {
     /// The value of a predictor, with its interval where it has one.
-    pub fn value(&self, who: Who) -> Option<Estimate> {
+    pub fn value(&self, who: PredictorKind) -> Option<Estimate> {
         let name = serde_json::to_value(who).ok()?;
         let value = self.values.get(name.as_str()?)?;
         let number = |key: &str| value.get(key).and_then(Value::as_f64);

@@ -2,8 +2,8 @@
 
 use super::blocks;
 use super::bootstrap::{Estimate, draws};
-use crate::evaluate::baseline::baselines::{Predictor, Who};
-use crate::evaluate::clips::clips::Clips;
+use crate::evaluate::baseline::baselines::{Predictor, PredictorKind};
+use crate::evaluate::clips::clips::EvalClips;
 use crate::metrics::catalogue::{Better, Catalogue, Definition, Measured};
 use crate::metrics::settings::Settings;
 use crate::stage::progress::Task;
@@ -18,8 +18,8 @@ pub const FEW_BLOCKS: usize = 10;
 
 /// One predictor's figures.
 #[derive(Clone, Debug)]
-pub struct Row {
-    pub who: Who,
+pub struct PredictorRow {
+    pub who: PredictorKind,
     /// What it is, in a sentence.
     pub says: String,
     /// One a definition.
@@ -49,7 +49,7 @@ pub struct Table {
     /// Hash of the real motion and of what of it is compared.
     pub truth: String,
     /// The prediction first, the truth last.
-    pub rows: Vec<Row>,
+    pub rows: Vec<PredictorRow>,
     pub notes: Vec<String>,
 }
 
@@ -58,7 +58,7 @@ pub struct Table {
 ///
 /// # Errors
 /// Settings that the catalogue does not take; no frame to measure.
-pub fn measure(clips: &Clips, settings: &Settings, predictors: &[Predictor], task: &dyn Task) -> Result<Table> {
+pub fn measure(clips: &EvalClips, settings: &Settings, predictors: &[Predictor], task: &dyn Task) -> Result<Table> {
     let settings = Settings { fps: clips.fps, ..settings.clone() };
     let catalogue = Catalogue::new(&settings)?;
     ensure!(clips.n_frames() > 0, "there is no frame to measure");
@@ -75,7 +75,7 @@ pub fn measure(clips: &Clips, settings: &Settings, predictors: &[Predictor], tas
     let truth = Predictor::truth(clips);
     // without its blocks: nothing is drawn of it
     let whole = blocks::measure(&catalogue, clips, &truth).whole;
-    rows.push(row(&catalogue, Who::Truth, &truth.says, &Measured { whole, blocks: Vec::new() }));
+    rows.push(row(&catalogue, PredictorKind::Truth, &truth.says, &Measured { whole, blocks: Vec::new() }));
     task.advance(1);
     let definitions = catalogue.definitions().to_vec();
     let truth_of = (0..definitions.len()).map(|index| catalogue.truth_of(index)).collect();
@@ -97,14 +97,14 @@ pub fn measure(clips: &Clips, settings: &Settings, predictors: &[Predictor], tas
 }
 
 /// One half of the truth beside the other: figures of whole sets of frames alone, since no frame has a partner.
-fn halves(catalogue: &Catalogue, clips: &Clips) -> Option<Row> {
+fn halves(catalogue: &Catalogue, clips: &EvalClips) -> Option<PredictorRow> {
     let measured = blocks::halves(catalogue, clips);
     if measured.blocks.is_empty() {
         return None;
     }
     let says = "every second block of the truth beside the others: how far apart two sets of real motion are that have half \
                 the frames; only for figures of whole sets";
-    let mut row = row(catalogue, Who::TruthHalves, says, &measured);
+    let mut row = row(catalogue, PredictorKind::TruthHalves, says, &measured);
     for (index, definition) in catalogue.definitions().iter().enumerate().filter(|(_, d)| !is_of_sets(d)) {
         row.values[index] = Estimate { value: f64::NAN, low: f64::NAN, high: f64::NAN };
         row.reasons[index] = format!("{} needs two motions of the same seconds", definition.name);
@@ -117,7 +117,7 @@ fn is_of_sets(definition: &Definition) -> bool {
     ["frechet", "hellinger"].iter().any(|start| definition.name.starts_with(start))
 }
 
-fn row(catalogue: &Catalogue, who: Who, says: &str, measured: &Measured) -> Row {
+fn row(catalogue: &Catalogue, who: PredictorKind, says: &str, measured: &Measured) -> PredictorRow {
     let values = catalogue.values(&measured.whole);
     let n_blocks = measured.blocks.len();
     let drawn = if n_blocks == 0 {
@@ -134,7 +134,7 @@ fn row(catalogue: &Catalogue, who: Who, says: &str, measured: &Measured) -> Row 
         drawn
     };
     let estimate = |(index, value): (usize, &f64)| {
-        let estimate = Estimate::of(*value, &drawn.column(index).to_vec());
+        let estimate = Estimate::from_draws(*value, &drawn.column(index).to_vec());
         // no figure is below 0
         Estimate { low: estimate.low.max(0.0 * estimate.low), ..estimate }
     };
@@ -142,7 +142,7 @@ fn row(catalogue: &Catalogue, who: Who, says: &str, measured: &Measured) -> Row 
         true => String::new(),
         false => catalogue.reason(&measured.whole, index),
     };
-    Row {
+    PredictorRow {
         who,
         says: says.to_owned(),
         reasons: values.iter().enumerate().map(reason).collect(),
@@ -153,13 +153,13 @@ fn row(catalogue: &Catalogue, who: Who, says: &str, measured: &Measured) -> Row 
 
 impl Table {
     /// The figures of a predictor, where it was measured.
-    pub fn row(&self, who: Who) -> Option<&Row> {
+    pub fn row(&self, who: PredictorKind) -> Option<&PredictorRow> {
         self.rows.iter().find(|row| row.who == who)
     }
 
     /// By how much `a` is better than `b` in a figure, in its unit: above 0 where it is better, with the interval of the
     /// same draws of both. NaN where the figure knows no better.
-    pub fn gain(&self, a: &Row, b: &Row, index: usize) -> Estimate {
+    pub fn gain(&self, a: &PredictorRow, b: &PredictorRow, index: usize) -> Estimate {
         let good = |value: f64, truth: f64| match self.definitions.get(index).map(|d| d.better) {
             Some(Better::Higher) => value,
             Some(Better::Lower) => -value,
@@ -168,10 +168,10 @@ impl Table {
             Some(Better::Neither) | None => f64::NAN,
         };
         let truth = self.truth_of.get(index).copied().flatten().unwrap_or(index);
-        let of_values = |row: &Row| good(row.values[index].value, row.values[truth].value);
-        let of_draw = |row: &Row, draw: usize| good(row.drawn[[draw, index]], row.drawn[[draw, truth]]);
+        let of_values = |row: &PredictorRow| good(row.values[index].value, row.values[truth].value);
+        let of_draw = |row: &PredictorRow, draw: usize| good(row.drawn[[draw, index]], row.drawn[[draw, truth]]);
         let n = a.drawn.nrows().min(b.drawn.nrows());
         let drawn: Vec<f64> = (0..n).map(|draw| of_draw(a, draw) - of_draw(b, draw)).collect();
-        Estimate::of(of_values(a) - of_values(b), &drawn)
+        Estimate::from_draws(of_values(a) - of_values(b), &drawn)
     }
 }

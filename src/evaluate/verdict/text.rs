@@ -2,23 +2,23 @@
 
 use super::labels;
 use super::verdict::{better_than_nothing, hears};
-use crate::evaluate::baseline::baselines::Who;
-use crate::evaluate::table::table::{FEW_BLOCKS, N_COSTLY_DRAWS, N_DRAWS, Row, Table};
+use crate::evaluate::baseline::baselines::PredictorKind;
+use crate::evaluate::table::table::{FEW_BLOCKS, N_COSTLY_DRAWS, N_DRAWS, PredictorRow, Table};
 use crate::metrics::catalogue::Better;
 use std::fmt::Write as _;
 
 /// Column heads, two lines each.
-const fn heads(who: Who) -> [&'static str; 2] {
+const fn heads(who: PredictorKind) -> [&'static str; 2] {
     match who {
-        Who::Prediction => ["", "prediction"],
-        Who::MeanPose => ["mean", "pose"],
-        Who::MedianPose => ["median", "pose"],
-        Who::NearestNeighbour => ["nearest", "neighbour"],
-        Who::MismatchedPrediction => ["mismatched", "prediction"],
-        Who::LatePrediction => ["late", "prediction"],
-        Who::MismatchedTruth => ["mismatched", "truth"],
-        Who::TruthHalves => ["truth", "halves"],
-        Who::Truth => ["", "truth"],
+        PredictorKind::Prediction => ["", "prediction"],
+        PredictorKind::MeanPose => ["mean", "pose"],
+        PredictorKind::MedianPose => ["median", "pose"],
+        PredictorKind::NearestNeighbour => ["nearest", "neighbour"],
+        PredictorKind::MismatchedPrediction => ["mismatched", "prediction"],
+        PredictorKind::LatePrediction => ["late", "prediction"],
+        PredictorKind::MismatchedTruth => ["mismatched", "truth"],
+        PredictorKind::TruthHalves => ["truth", "halves"],
+        PredictorKind::Truth => ["", "truth"],
     }
 }
 
@@ -73,7 +73,7 @@ pub fn text(table: &Table, all: bool) -> String {
 /// Figures that nobody has a value of, with the reason; those of one reason together.
 pub fn undefined(table: &Table) -> Vec<String> {
     let mut by_reason: Vec<(String, Vec<String>)> = Vec::new();
-    let Some(own) = table.row(Who::Prediction) else { return Vec::new() };
+    let Some(own) = table.row(PredictorKind::Prediction) else { return Vec::new() };
     let hidden = (0..table.definitions.len()).filter(|i| table.definitions[*i].better != Better::Neither);
     for index in hidden.filter(|i| !own.values[*i].value.is_finite()) {
         let (reason, name) = (own.reasons[index].clone(), labels::name(&table.definitions[index]));
@@ -113,11 +113,11 @@ fn named(table: &Table, index: usize) -> String {
 }
 
 /// Two heads and a cell for each figure; the prediction's with their intervals.
-fn column(table: &Table, row: &Row, shown: &[usize]) -> Vec<String> {
+fn column(table: &Table, row: &PredictorRow, shown: &[usize]) -> Vec<String> {
     let cell = |index: &usize| {
         let (definition, estimate) = (&table.definitions[*index], &row.values[*index]);
         match row.who {
-            Who::Prediction => labels::bracketed(definition, estimate),
+            PredictorKind::Prediction => labels::bracketed(definition, estimate),
             _ => labels::number(definition, estimate.value),
         }
     };

@@ -3,9 +3,9 @@
 //! has many correct keypoints).
 
 use super::labels;
-use crate::evaluate::baseline::baselines::Who;
+use crate::evaluate::baseline::baselines::PredictorKind;
 use crate::evaluate::table::bootstrap::Estimate;
-use crate::evaluate::table::table::{FEW_BLOCKS, Row, Table};
+use crate::evaluate::table::table::{FEW_BLOCKS, PredictorRow, Table};
 use crate::metrics::catalogue::Better;
 use serde::Serialize;
 
@@ -38,7 +38,7 @@ pub struct Vote {
     pub figure: String,
     pub aspect: Aspect,
     /// Who it was held against.
-    pub against: Who,
+    pub against: PredictorKind,
     pub answer: Answer,
     /// How much better, in the figure's unit; below 0: worse.
     pub gain: Estimate,
@@ -58,7 +58,7 @@ pub struct Verdict {
 /// Is it better than the better of the poses that never move?
 pub fn better_than_nothing(table: &Table) -> Verdict {
     let question = "Is it better than doing nothing?";
-    let Some(own) = table.row(Who::Prediction) else { return nothing(question) };
+    let Some(own) = table.row(PredictorKind::Prediction) else { return nothing(question) };
     let asked = [Aspect::Place, Aspect::Poses, Aspect::Movement];
     let votes = votes(table, own, &asked, |index| better_still(table, index));
     let of = |aspect: Aspect| summed(votes.iter().filter(|vote| vote.aspect == aspect));
@@ -124,22 +124,22 @@ pub fn better_than_nothing(table: &Table) -> Verdict {
             ("undecided", "no figure tells it apart from a pose that never moves")
         }
     };
-    let oracle = table.row(Who::MeanPose).is_some_and(|row| row.says.contains("oracle"));
+    let oracle = table.row(PredictorKind::MeanPose).is_some_and(|row| row.says.contains("oracle"));
     let oracle =
         if oracle { " (The pose is taken from the truth itself, which no predictor knows: a hard rival.)" } else { "" };
     Verdict { word, sentence: format!("{question} {}: {says}.{oracle}", capital(word)), votes }
 }
 
 /// The better of the poses that never move, in a figure.
-fn better_still(table: &Table, index: usize) -> Option<&Row> {
-    let better = |a: &Row, b: &Row| table.gain(a, b, index).value >= 0.0;
-    let stills = [Who::MeanPose, Who::MedianPose].into_iter().filter_map(|who| table.row(who));
+fn better_still(table: &Table, index: usize) -> Option<&PredictorRow> {
+    let better = |a: &PredictorRow, b: &PredictorRow| table.gain(a, b, index).value >= 0.0;
+    let stills = [PredictorKind::MeanPose, PredictorKind::MedianPose].into_iter().filter_map(|who| table.row(who));
     stills.reduce(|a, b| if better(a, b) { a } else { b })
 }
 
 /// Whether the prediction is better in one figure than the better of the poses that never move, whatever that says.
 pub fn against_nothing(table: &Table, index: usize) -> Option<Answer> {
-    let gain = table.gain(table.row(Who::Prediction)?, better_still(table, index)?, index);
+    let gain = table.gain(table.row(PredictorKind::Prediction)?, better_still(table, index)?, index);
     (gain.value.is_finite() && table.n_blocks >= FEW_BLOCKS).then(|| answer(&gain))
 }
 
@@ -155,8 +155,8 @@ fn answer(gain: &Estimate) -> Answer {
 /// another clip's motion is made for another posture too.
 pub fn hears(table: &Table) -> Verdict {
     let question = "Does it hear?";
-    let other = table.row(Who::LatePrediction).or_else(|| table.row(Who::MismatchedPrediction));
-    let own = table.row(Who::Prediction).zip(other);
+    let other = table.row(PredictorKind::LatePrediction).or_else(|| table.row(PredictorKind::MismatchedPrediction));
+    let own = table.row(PredictorKind::Prediction).zip(other);
     let Some((own, other)) = own else { return nothing(question) };
     let votes = votes(table, own, &[Aspect::Place, Aspect::Beat], |_| Some(other));
     let (word, says) = match summed(votes.iter()) {
@@ -200,7 +200,12 @@ fn too_few(question: &str, table: &Table) -> Verdict {
 }
 
 /// What the figures of these aspects say, each against a row of its own.
-fn votes<'a>(table: &'a Table, own: &Row, aspects: &[Aspect], against: impl Fn(usize) -> Option<&'a Row>) -> Vec<Vote> {
+fn votes<'a>(
+    table: &'a Table,
+    own: &PredictorRow,
+    aspects: &[Aspect],
+    against: impl Fn(usize) -> Option<&'a PredictorRow>,
+) -> Vec<Vote> {
     let vote = |index: usize| {
         let aspect = aspect(table, index).filter(|aspect| aspects.contains(aspect))?;
         let other = against(index)?;

@@ -3,7 +3,7 @@
 //! pictures starts with its first sample. Sound more than ten minutes after the sound before it, or beyond a day, is
 //! left out as damage.
 
-use super::decode::Decode;
+use super::decode::StreamDecoder;
 use super::origin;
 use super::resample::{Resampler, first_not_finite, format_of};
 use super::source;
@@ -92,12 +92,12 @@ impl WavWriter {
 }
 
 /// What `stream_mono` handed on.
-pub(crate) struct Heard {
+pub(crate) struct StreamedSound {
     n_samples: u64,
     n_misplaced: u64,
 }
 
-impl Heard {
+impl StreamedSound {
     fn damage(&self) -> Option<String> {
         (self.n_misplaced > 0).then(|| format!("{} pieces of sound with impossible times", self.n_misplaced))
     }
@@ -105,16 +105,27 @@ impl Heard {
 
 /// Decodes the sound of `path` and hands it to `sink` piece by piece; `None` without sound. A sample that is no number is
 /// an error that names its second.
-pub(crate) fn stream_mono(path: &Path, rate: u32, sink: &mut dyn FnMut(&[f32]) -> Result<()>) -> Result<Option<Heard>> {
+pub(crate) fn stream_mono(
+    path: &Path,
+    rate: u32,
+    sink: &mut dyn FnMut(&[f32]) -> Result<()>,
+) -> Result<Option<StreamedSound>> {
     let input = source::open(path)?;
     let Some(stream) = source::audio_stream(&input) else { return Ok(None) };
     let stream_idx = stream.index();
     let latest_secs = source::latest_secs(&input, &stream);
     let mut zero_secs = origin::first_picture_secs(path)?;
-    let mut decode = Decode::new(path, input, stream_idx, 1)?;
+    let mut decode = StreamDecoder::new(path, input, stream_idx, 1)?;
     let secs_per_tick = f64::from(decode.time_base());
-    let mut timeline =
-        Timeline { rate, n_written: 0, n_skip: 0, run: None, ahead: Ahead::default(), ready: Vec::new(), sink };
+    let mut timeline = SoundTimeline {
+        rate,
+        n_written: 0,
+        n_skip: 0,
+        run: None,
+        ahead: ClockDrift::default(),
+        ready: Vec::new(),
+        sink,
+    };
     let mut frame = frame::Audio::empty();
     let (mut n_frames, mut n_misplaced) = (0u64, 0u64);
     while decode.next(&mut frame)? {
@@ -140,22 +151,22 @@ pub(crate) fn stream_mono(path: &Path, rate: u32, sink: &mut dyn FnMut(&[f32]) -
         }
     }
     if n_frames == 0 {
-        let misplaced = Heard { n_samples: 0, n_misplaced }.damage();
+        let misplaced = StreamedSound { n_samples: 0, n_misplaced }.damage();
         let Some(damage) = misplaced.or_else(|| decode.damage()) else { return Ok(None) };
         bail!("no sound of {} can be decoded ({damage}): copy or download it again", path.display());
     }
     timeline.end_run()?;
-    Ok(Some(Heard { n_samples: timeline.n_written, n_misplaced }))
+    Ok(Some(StreamedSound { n_samples: timeline.n_written, n_misplaced }))
 }
 
 /// How far timestamps are ahead of the count of samples.
 #[derive(Default)]
-struct Ahead {
+struct ClockDrift {
     sum: f64,
     secs: f64,
 }
 
-impl Ahead {
+impl ClockDrift {
     /// Takes in a frame of `secs` whose timestamp is `ahead` seconds late; the mean at the end of each `MEAN_SECS`.
     fn mean(&mut self, ahead: f64, secs: f64) -> Option<f64> {
         self.sum += ahead * secs;
@@ -169,19 +180,19 @@ impl Ahead {
 }
 
 /// Lays runs of continuous sound at their places in time.
-struct Timeline<'a> {
+struct SoundTimeline<'a> {
     rate: u32,
     n_written: u64,
     /// Samples at the start of the run that are before time 0, or that were heard already.
     n_skip: u64,
     /// The run at hand, and its start in seconds.
     run: Option<(Resampler, f64)>,
-    ahead: Ahead,
+    ahead: ClockDrift,
     ready: Vec<f32>,
     sink: &'a mut dyn FnMut(&[f32]) -> Result<()>,
 }
 
-impl Timeline<'_> {
+impl SoundTimeline<'_> {
     /// Second at which the sound so far ends.
     fn end_secs(&self) -> f64 {
         let written = self.n_written as f64 / f64::from(self.rate);
@@ -223,7 +234,7 @@ impl Timeline<'_> {
         let late = place.saturating_sub(i64::try_from(self.n_written)?);
         self.n_skip = late.min(0).unsigned_abs();
         self.run = Some((run, at));
-        self.ahead = Ahead::default();
+        self.ahead = ClockDrift::default();
         const SILENCE: [f32; 4096] = [0.0; 4096];
         let mut n_silent = late.max(0) as u64;
         while n_silent > 0 {
@@ -262,17 +273,17 @@ mod tests {
     #[test]
     fn a_jump_in_time_is_believed_up_to_ten_minutes_and_a_day() {
         let mut sink = |_: &[f32]| Ok(());
-        let mut timeline = Timeline {
+        let mut timeline = SoundTimeline {
             rate: 10,
             n_written: 50,
             n_skip: 0,
             run: None,
-            ahead: Ahead::default(),
+            ahead: ClockDrift::default(),
             ready: Vec::new(),
             sink: &mut sink,
         };
         let reaches =
-            |timeline: &Timeline| [None, Some(-1e12), Some(604.0), Some(606.0)].map(|at| timeline.reaches(at));
+            |timeline: &SoundTimeline| [None, Some(-1e12), Some(604.0), Some(606.0)].map(|at| timeline.reaches(at));
         assert_eq!(reaches(&timeline), [true, true, true, false]);
         timeline.n_written = 864_000;
         assert_eq!(reaches(&timeline), [false, true, true, true]);

@@ -7,7 +7,7 @@ use ffmpeg_next::{Frame, Packet, Rational, codec, decoder, format, media};
 use std::path::{Path, PathBuf};
 
 /// A decoder with its place in the file.
-pub(crate) struct Decode {
+pub(crate) struct StreamDecoder {
     path: PathBuf,
     input: format::context::Input,
     stream_idx: usize,
@@ -19,7 +19,7 @@ pub(crate) struct Decode {
     stopped: Option<ffmpeg::Error>,
 }
 
-impl Decode {
+impl StreamDecoder {
     /// A decoder of `input`'s stream `stream_idx`; `threads` decoder threads (0: one a core). The other streams are
     /// not read.
     pub fn new(path: &Path, mut input: format::context::Input, stream_idx: usize, threads: usize) -> Result<Self> {

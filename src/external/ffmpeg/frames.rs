@@ -5,7 +5,7 @@
 //! Time 0 is the first source frame that decodes. The last frame lasts as long as its packet says (else one source
 //! frame, ten minutes at most), which ends the video at `duration_secs`; there are `FrameRate::frames_in(duration_secs)` output frames.
 
-use super::decode::Decode;
+use super::decode::StreamDecoder;
 use super::picture::{Converter, Orientation};
 use super::probe;
 use super::probe::MediaInfo;
@@ -38,7 +38,7 @@ pub struct FrameTime {
 }
 
 /// A source frame and its time in ticks from the first one.
-struct Source {
+struct SourceFrame {
     frame: frame::Video,
     ticks: i64,
 }
@@ -48,7 +48,7 @@ struct Source {
 pub struct FrameReader {
     path: PathBuf,
     fps: FrameRate,
-    decode: Decode,
+    decode: StreamDecoder,
     info: MediaInfo,
     orientation: Orientation,
     image_size: [usize; 2],
@@ -56,8 +56,8 @@ pub struct FrameReader {
     /// Ticks of the stream's clock at the first frame.
     origin: i64,
     /// The frame on show and the one after it.
-    shown: Source,
-    following: Option<Source>,
+    shown: SourceFrame,
+    following: Option<SourceFrame>,
     next_idx: usize,
     last_shown: Option<i64>,
     /// No time after this is believed.
@@ -78,10 +78,10 @@ impl FrameReader {
         let info = probe::describe(&input);
         let stream = source::video_stream(&input)
             .with_context(|| format!("{} has no pictures: expected a video, not sound alone", path.display()))?;
-        let orientation = Orientation::of(&stream);
+        let orientation = Orientation::from_stream(&stream);
         let latest_secs = source::latest_secs(&input, &stream);
         let stream_idx = stream.index();
-        let mut decode = Decode::new(path, input, stream_idx, threads)?;
+        let mut decode = StreamDecoder::new(path, input, stream_idx, threads)?;
         let mut first = frame::Video::empty();
         if !decode.next(&mut first)? {
             let why = decode.damage().unwrap_or_else(|| "it holds no complete one".to_owned());
@@ -90,7 +90,7 @@ impl FrameReader {
         let size = [first.width() as usize, first.height() as usize];
         let image_size = orientation.upright_size(probe::square_pixels(size, first.aspect_ratio()));
         let origin = first.timestamp().unwrap_or(0);
-        let shown = Source { frame: first, ticks: 0 };
+        let shown = SourceFrame { frame: first, ticks: 0 };
         let mut reader = Self {
             path: path.to_owned(),
             fps,
@@ -188,7 +188,7 @@ impl FrameReader {
     }
 
     /// The next source frame later than `ticks`.
-    fn decode_after(&mut self, ticks: i64) -> Result<Option<Source>> {
+    fn decode_after(&mut self, ticks: i64) -> Result<Option<SourceFrame>> {
         let mut frame = frame::Video::empty();
         while self.decode.next(&mut frame)? {
             // A frame without a time follows the one before by that one's length.
@@ -196,7 +196,7 @@ impl FrameReader {
             let at = own.unwrap_or_else(|| ticks.saturating_add(frame.packet().duration.max(1)));
             let is_near = self.secs(at.saturating_sub(ticks)) <= LONGEST_GAP_SECS;
             if at > ticks && is_near && self.secs(at) < self.latest_secs {
-                return Ok(Some(Source { frame, ticks: at }));
+                return Ok(Some(SourceFrame { frame, ticks: at }));
             }
             self.n_misplaced += 1;
         }
@@ -208,7 +208,7 @@ impl FrameReader {
     }
 
     /// How long a source frame lasts, as the file says.
-    fn secs_of(&self, source: &Source) -> f64 {
+    fn secs_of(&self, source: &SourceFrame) -> f64 {
         let stated = self.secs(source.frame.packet().duration);
         if stated > 0.0 {
             return stated;

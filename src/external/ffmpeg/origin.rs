@@ -1,7 +1,7 @@
 //! Time 0 of a file: when its first picture that decodes is shown, on the container's own clock. Pictures count from
 //! there by themselves; sound must be told.
 
-use super::decode::Decode;
+use super::decode::StreamDecoder;
 use super::source;
 use anyhow::Result;
 use ffmpeg_next::{Packet, Rational, frame};
@@ -15,7 +15,7 @@ pub(crate) fn first_picture_secs(path: &Path) -> Result<Option<f64>> {
     let input = source::open(path)?;
     let has_edits = input.format().name().contains("mp4");
     let Some(stream_idx) = source::video_stream(&input).map(|stream| stream.index()) else { return Ok(None) };
-    let mut decode = Decode::new(path, input, stream_idx, 1)?;
+    let mut decode = StreamDecoder::new(path, input, stream_idx, 1)?;
     let mut first = frame::Video::empty();
     if !decode.next(&mut first)? {
         return Ok(None);

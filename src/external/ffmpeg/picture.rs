@@ -22,7 +22,7 @@ impl Orientation {
 
     /// From the display matrix of a stream (nine 16.16 numbers; the first two rows hold the images of the axes),
     /// snapped to right angles.
-    pub fn of(stream: &Stream) -> Self {
+    pub fn from_stream(stream: &Stream) -> Self {
         let matrix = stream.side_data().find(|side| side.kind() == SideData::DisplayMatrix);
         let Some(numbers) = matrix.filter(|side| side.data().len() >= 36).map(|side| {
             side.data().as_chunks::<4>().0.iter().map(|bytes| i32::from_ne_bytes(*bytes)).collect::<Vec<i32>>()

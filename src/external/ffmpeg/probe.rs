@@ -80,7 +80,7 @@ fn describe_video(stream: &Stream) -> VideoInfo {
         ((*parameters).width, (*parameters).height, (*parameters).sample_aspect_ratio)
     };
     let coded_size = [width, height].map(|n| usize::try_from(n).unwrap_or(0));
-    let orientation = Orientation::of(stream);
+    let orientation = Orientation::from_stream(stream);
     let fps = [stream.avg_frame_rate(), stream.rate()].into_iter().find_map(frame_rate);
     VideoInfo {
         codec: codec_name(stream),

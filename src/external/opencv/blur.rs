@@ -1,9 +1,9 @@
 //! Gaussian blur of a small map of numbers, at single cells: a heat-map is only looked at around its peak.
 
 /// A Gaussian of odd width, its weights summing to 1; the widths 1 to 7 are OpenCV's fixed tables.
-pub struct Gaussian(Vec<f32>);
+pub struct GaussianBlur(Vec<f32>);
 
-impl Gaussian {
+impl GaussianBlur {
     /// `width` cells (made odd), the standard deviation OpenCV takes for it.
     pub fn new(width: usize) -> Self {
         match width | 1 {
@@ -62,7 +62,7 @@ mod tests {
             let mut dst = Mat::default();
             opencv::imgproc::gaussian_blur_def(&src, &mut dst, Size::new(size, size), 0.0).unwrap();
             assert_eq!(BORDER_DEFAULT, 4);
-            let gaussian = Gaussian::new(size as usize);
+            let gaussian = GaussianBlur::new(size as usize);
             for y in 0..height {
                 for x in 0..width {
                     let expected = *dst.at_2d::<f32>(y as i32, x as i32).unwrap();

@@ -3,7 +3,7 @@
 use super::decode::{Point, heatmap, simcc};
 use super::model_input::Feed;
 use crate::external::onnx::{Decode, Fit, KeypointOutputs, ModelEntry, Outputs, Refine, Runtime};
-use crate::external::opencv::blur::Gaussian;
+use crate::external::opencv::blur::GaussianBlur;
 use crate::external::opencv::warp::SrcFromDst;
 use crate::types::image::Image;
 use anyhow::{Result, bail};
@@ -12,13 +12,13 @@ use std::path::Path;
 /// Reads the outputs that give one place a keypoint: heat-maps or SimCC.
 pub struct PointReader {
     decode: Decode,
-    gaussian: Gaussian,
+    gaussian: GaussianBlur,
 }
 
 impl PointReader {
     pub fn new(decode: &Decode) -> Self {
         let width = if let Decode::Heatmap { blur, refine: Refine::Dark, .. } = decode { *blur } else { 1 };
-        Self { decode: decode.clone(), gaussian: Gaussian::new(width) }
+        Self { decode: decode.clone(), gaussian: GaussianBlur::new(width) }
     }
 
     /// All points the model gives, in px of its input, `size` its height and width.

@@ -2,10 +2,10 @@
 
 use super::video::Video;
 use crate::config;
-use crate::dataset::info::Info;
+use crate::dataset::info::DatasetInfo;
 use crate::dataset::leakage::Leakage;
 use crate::dataset::split::Split;
-use crate::dataset::stats::Stats;
+use crate::dataset::stats::DatasetStats;
 use crate::dataset::{INFO, LEAKAGE};
 use crate::stage::{Report, counted};
 use anyhow::{Context, Result};
@@ -16,7 +16,7 @@ use std::path::Path;
 pub struct Outcome<'a> {
     pub shard: &'a config::Shard,
     pub videos: &'a [Video],
-    pub stats: &'a Stats,
+    pub stats: &'a DatasetStats,
     pub n_failed: usize,
     pub n_left_out: usize,
     pub n_taken_over: usize,
@@ -25,7 +25,7 @@ pub struct Outcome<'a> {
 impl Outcome<'_> {
     /// The stage's report on the dataset in `out`.
     pub fn report(&self, out: &Path) -> Result<Report> {
-        let info: Info = serde_json::from_slice(&std::fs::read(out.join(INFO))?).context(INFO)?;
+        let info: DatasetInfo = serde_json::from_slice(&std::fs::read(out.join(INFO))?).context(INFO)?;
         let leakage: Leakage = serde_json::from_slice(&std::fs::read(out.join(LEAKAGE))?).context(LEAKAGE)?;
         let warnings = self.warnings(&leakage);
         let part = |split: Split| {
@@ -39,7 +39,7 @@ impl Outcome<'_> {
         }
         warnings.iter().for_each(|warning| line += &format!("; warning: {warning}"));
         let secs: BTreeMap<_, _> = info.splits.iter().map(|(name, split)| (name, split.secs)).collect();
-        let Stats { windows, footage, .. } = self.stats;
+        let DatasetStats { windows, footage, .. } = self.stats;
         let facts = serde_json::json!({ "secs": secs, "windows": windows, "footage": footage, "warnings": warnings });
         Ok(Report { line, facts: facts.as_object().cloned().unwrap_or_default() })
     }
@@ -84,6 +84,6 @@ impl Outcome<'_> {
     }
 }
 
-fn windows(stats: &Stats, split: Split) -> usize {
+fn windows(stats: &DatasetStats, split: Split) -> usize {
     stats.windows.strided.get(split.name()).copied().unwrap_or(0)
 }

@@ -7,12 +7,12 @@ use crate::config;
 use crate::config::Settings;
 use crate::config::videos::Videos;
 use crate::dataset::info::{About, ModelUsed};
-use crate::dataset::leakage::Compared;
+use crate::dataset::leakage::SoundComparison;
 use crate::dataset::shared_sound;
 use crate::dataset::split::SplitBy;
-use crate::dataset::split::{Placed, Split, Waiting, place as place_in_splits};
+use crate::dataset::split::{Assignment, Split, Unassigned, assign as place_in_splits};
 use crate::dataset::write::part;
-use crate::dataset::write::part::{Part, Source};
+use crate::dataset::write::part::{VideoEntry, VideoSource};
 use crate::dataset::write::writer::DatasetWriter;
 use crate::stage::ledger::{Ledger, Refused, longest_first};
 use crate::stage::progress::Progress;
@@ -68,7 +68,7 @@ impl ShardStage {
     }
 
     /// The videos of which nothing can come, as parts with their failures.
-    fn failures(&self, speaker: &Unit, ready: &[&Unit]) -> Vec<Source> {
+    fn failures(&self, speaker: &Unit, ready: &[&Unit]) -> Vec<VideoSource> {
         let mut failed: Vec<&Unit> = self.ready.iter().filter(|video| video.speaker == speaker.speaker).collect();
         failed.extend(self.videos(speaker).into_iter().flat_map(|videos| &videos.units));
         failed.retain(|unit| !ready.contains(unit));
@@ -86,19 +86,19 @@ impl ShardStage {
 }
 
 /// A video that failed at a stage, or that no stage has finished.
-fn failure(work: &Path, unit: &Unit) -> Source {
+fn failure(work: &Path, unit: &Unit) -> VideoSource {
     let stages = ["extract", "pose2d", "segment", "lift"];
     let error = stages.into_iter().find_map(|stage| Some((stage, Failure::read(&place(work, stage, unit))?.error)));
     let (stage, error) = error.unwrap_or(("run", "not every stage is done".to_owned()));
     let media = std::fs::read(place(work, "extract", unit).join("media.json")).unwrap_or_default();
     let media: serde_json::Value = serde_json::from_slice(&media).unwrap_or_default();
     let duration_secs = media["duration_secs"].as_f64().filter(|secs| secs.is_finite() && *secs > 0.0);
-    Source {
+    VideoSource {
         name: unit.video.clone(),
         file: unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         ledger: duration_secs.map_or_else(Ledger::default, |secs| Ledger::of_failure(secs, stage, &error)),
         failure: Some(format!("{stage}: {error}")),
-        ..Source::default()
+        ..VideoSource::default()
     }
 }
 
@@ -151,7 +151,7 @@ impl Stage for ShardStage {
 
         let old = place(&self.work, self.folder(), unit);
         let mut run = Run { stage: self, out, old: &old, before: parts_of(&old), n_taken_over: 0, progress };
-        let (mut kept, mut left_out): (Vec<&Video>, Vec<(&Video, Source)>) = (Vec::new(), Vec::new());
+        let (mut kept, mut left_out): (Vec<&Video>, Vec<(&Video, VideoSource)>) = (Vec::new(), Vec::new());
         for video in &videos {
             match kept.iter().find(|first| first.content == video.content) {
                 Some(first) => left_out.push((video, run.duplicate(video, &first.name, video.ledger.duration_secs))),
@@ -168,8 +168,8 @@ impl Stage for ShardStage {
         for (video, placed) in kept.iter().zip(placed) {
             task.detail(&video.name);
             match placed {
-                Placed::In(split, by) => run.write(&writer, video, split, by, &sounds)?,
-                Placed::Nowhere(with) => {
+                Assignment::In(split, by) => run.write(&writer, video, split, by, &sounds)?,
+                Assignment::Nowhere(with) => {
                     part::remove_sound(out, &video.name)?;
                     let secs = with.first().map_or(0.0, |shared| shared.secs);
                     let others: Vec<&str> = with.iter().filter_map(|shared| shared.other(&video.name)).collect();
@@ -223,10 +223,10 @@ fn check(unit: &Unit, work: &Path, videos: &[Video]) -> Result<()> {
 }
 
 /// The videos of the dataset that is there; one with a damaged file is as good as not there.
-fn parts_of(dir: &Path) -> BTreeMap<String, Part> {
+fn parts_of(dir: &Path) -> BTreeMap<String, VideoEntry> {
     let stated = part::stated_hashes(dir);
     let parts = part::names(dir).unwrap_or_default().into_iter();
-    let parts = parts.filter_map(|name| Part::read(&Part::path(dir, &name)).ok().map(|part| (name, part)));
+    let parts = parts.filter_map(|name| VideoEntry::read(&VideoEntry::path(dir, &name)).ok().map(|part| (name, part)));
     parts.filter(|(_, part)| part.is_sound(dir, &stated)).collect()
 }
 
@@ -239,7 +239,7 @@ struct Run<'a> {
     out: &'a Path,
     /// The dataset that is there, and its videos.
     old: &'a Path,
-    before: BTreeMap<String, Part>,
+    before: BTreeMap<String, VideoEntry>,
     n_taken_over: usize,
     progress: &'a dyn Progress,
 }
@@ -263,31 +263,31 @@ impl Run<'_> {
         Ok(hashes)
     }
 
-    fn compare(&self, videos: &[&Video], sounds: &Sounds) -> Result<Compared> {
+    fn compare(&self, videos: &[&Video], sounds: &Sounds) -> Result<SoundComparison> {
         let duplicate_secs = self.stage.shard.duplicate_secs;
         if duplicate_secs <= 0.0 {
-            return Ok(Compared::default());
+            return Ok(SoundComparison::default());
         }
         let audible = videos.iter().filter(|v| !v.intervals.intervals.is_empty() && sounds.contains_key(&v.name));
         let names: Vec<String> = audible.map(|video| video.name.clone()).collect();
         let shared = shared_sound::find(&names, |n| part::read_sound(self.out, &names[n]), duplicate_secs)?;
-        Ok(Compared { duplicate_secs, shared })
+        Ok(SoundComparison { duplicate_secs, shared })
     }
 
-    fn place(&self, videos: &[&Video], compared: &Compared) -> Vec<Placed> {
+    fn place(&self, videos: &[&Video], compared: &SoundComparison) -> Vec<Assignment> {
         let named: BTreeMap<&str, Split> = self
             .stage
             .all
             .iter()
             .flat_map(|videos| videos.splits.iter().map(|(video, split)| (video.as_str(), *split)))
             .collect();
-        let waiting = videos.iter().map(|video| Waiting {
+        let waiting = videos.iter().map(|video| Unassigned {
             name: &video.name,
             content: &video.content,
             named: named.get(video.unit.video.as_str()).copied(),
             before: self.before.get(&video.name).filter(|part| part.split.is_some()).map(|part| &part.split_by),
         });
-        let waiting: Vec<Waiting> = waiting.collect();
+        let waiting: Vec<Unassigned> = waiting.collect();
         place_in_splits(&waiting, &compared.shared, self.stage.shard.validation, self.stage.shard.test)
     }
 
@@ -314,7 +314,7 @@ impl Run<'_> {
             self.n_taken_over += 1;
             return part.take_over(self.old, self.out);
         }
-        let source = Source {
+        let source = VideoSource {
             name: video.name.clone(),
             file: video.file.clone(),
             content: video.content.clone(),
@@ -335,7 +335,7 @@ impl Run<'_> {
     }
 
     /// A video that is left out, since what it shows is there already: what was kept of it is refused.
-    fn duplicate(&self, video: &Video, of: &str, secs: f64) -> Source {
+    fn duplicate(&self, video: &Video, of: &str, secs: f64) -> VideoSource {
         let threshold = self.stage.shard.duplicate_secs;
         let mut ledger = video.ledger.clone();
         let refused = ledger.kept.drain(..).map(|kept| Refused {
@@ -351,6 +351,6 @@ impl Run<'_> {
         ledger.refused.extend(refused);
         ledger.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
         let (name, file, content) = (video.unit.video.clone(), video.file.clone(), video.content.clone());
-        Source { name, file, content, ledger, ..Source::default() }
+        VideoSource { name, file, content, ledger, ..VideoSource::default() }
     }
 }

@@ -1,9 +1,9 @@
 //! Pictures of an evaluation: the share of correct keypoints of every joint on a figure, and how often each speed and jerk
 //! is made and real.
 
-use crate::evaluate::clips::clips::{Clip, Clips};
+use crate::evaluate::clips::clips::{EvalClip, EvalClips};
 use crate::evaluate::table::table::Table;
-use crate::report::html::chart::dots::{Dot, Label, dots};
+use crate::report::html::chart::dots::{AxisLabel, ChartDot, dots};
 use crate::report::html::chart::histogram::Counts;
 use crate::report::html::chart::profile::profile;
 use crate::report::html::{Node, node};
@@ -12,7 +12,7 @@ use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER
 use ndarray::ArrayView3;
 
 /// What a joint is called beside what share of its frames is correct, on a body and two hands.
-pub fn joints(table: &Table, clips: &Clips) -> Vec<Node> {
+pub fn joints(table: &Table, clips: &EvalClips) -> Vec<Node> {
     let alpha = table.settings.alphas.first().copied().unwrap_or(0.2);
     let shares = shares(clips, alpha);
     let body = |joint: usize| joint <= L_WRIST;
@@ -31,13 +31,13 @@ pub fn joints(table: &Table, clips: &Clips) -> Vec<Node> {
             false => format!("{}: {:.0} %", skeleton::name(joint), 100.0 * shares[joint]),
         };
         let radius = if body(joint) { 9.0 } else { 6.0 };
-        all.push(Dot { at: place(joint), share: shares[joint], radius, says });
+        all.push(ChartDot { at: place(joint), share: shares[joint], radius, says });
     }
     let mean = |joints: &mut dyn Iterator<Item = usize>| {
         let known: Vec<f64> = joints.map(|joint| shares[joint]).filter(|share| share.is_finite()).collect();
         known.iter().sum::<f64>() / known.len() as f64
     };
-    let label = |at: [f64; 2], what: &str, share: f64| Label { at, text: format!("{what} {:.0} %", 100.0 * share) };
+    let label = |at: [f64; 2], what: &str, share: f64| AxisLabel { at, text: format!("{what} {:.0} %", 100.0 * share) };
     let hand = |root: usize| mean(&mut (root + 1..root + skeleton::N_HAND_JOINTS));
     let labels = [
         label([180.0, 268.0], "arms", mean(&mut (R_SHOULDER..=L_WRIST))),
@@ -58,7 +58,7 @@ pub fn joints(table: &Table, clips: &Clips) -> Vec<Node> {
 }
 
 /// The share of each joint, NaN where it is never seen.
-fn shares(clips: &Clips, alpha: f64) -> Vec<f64> {
+fn shares(clips: &EvalClips, alpha: f64) -> Vec<f64> {
     let (mut right, mut seen) = (vec![0.0; N_JOINTS], vec![0.0; N_JOINTS]);
     for clip in &clips.clips {
         for t in 0..clip.n_frames() {
@@ -102,7 +102,7 @@ fn hand_place(joint: usize) -> [f64; 2] {
 }
 
 /// How often each speed and jerk of wrists and finger tips is made and real.
-pub fn speeds(clips: &Clips) -> Vec<Node> {
+pub fn speeds(clips: &EvalClips) -> Vec<Node> {
     let wrists = [skeleton::R_WRIST, L_WRIST];
     let tips: Vec<usize> = [L_HAND, R_HAND].iter().flat_map(|root| (1..=5).map(move |k| root + 4 * k)).collect();
     let charts = [
@@ -112,7 +112,7 @@ pub fn speeds(clips: &Clips) -> Vec<Node> {
         ("Jerk of the finger tips", "m/s\u{b3}", &tips[..], 3, 1500.0),
     ];
     let card = |(title, unit, joints, order, most): (&str, &str, &[usize], usize, f64)| {
-        let count = |of: fn(&Clip) -> ArrayView3<f32>| {
+        let count = |of: fn(&EvalClip) -> ArrayView3<f32>| {
             let mut counts = Counts::new(0.0, most, 48);
             for clip in &clips.clips {
                 for &joint in joints {
@@ -140,7 +140,7 @@ pub fn speeds(clips: &Clips) -> Vec<Node> {
 
 /// The norms of the differences of that order of a joint, per second to that power, where it is seen throughout.
 fn derivative<'a>(
-    clip: &'a Clip,
+    clip: &'a EvalClip,
     joints: ArrayView3<'a, f32>,
     joint: usize,
     order: usize,

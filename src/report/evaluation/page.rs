@@ -5,7 +5,7 @@ use super::charts::{joints, speeds};
 use super::player;
 use super::player::Excerpt;
 use super::table;
-use crate::evaluate::clips::clips::Clips;
+use crate::evaluate::clips::clips::EvalClips;
 use crate::evaluate::table::table::Table;
 use crate::evaluate::verdict::text;
 use crate::evaluate::verdict::verdict::{Answer, Verdict, better_than_nothing, hears};
@@ -15,7 +15,7 @@ use anyhow::Result;
 use serde_json::json;
 
 /// The whole file.
-pub fn html(table: &Table, clips: &Clips, title: &str) -> Result<String> {
+pub fn html(table: &Table, clips: &EvalClips, title: &str) -> Result<String> {
     let excerpts = player::choose(clips)?;
     let section = |id, title, body| Section { id, title, body };
     let verdicts = [better_than_nothing(table), hears(table)];

@@ -3,7 +3,7 @@
 //! millimetre, so that the page stays small.
 
 use super::charts::legend;
-use crate::evaluate::clips::clips::{Clip, Clips};
+use crate::evaluate::clips::clips::{EvalClip, EvalClips};
 use crate::evaluate::table::table::Table;
 use crate::metrics::beat::consistency;
 use crate::report::html::chart::tracks::{Lane, lanes};
@@ -40,7 +40,7 @@ pub struct Excerpt {
 }
 
 /// The excerpts: of all stretches of at most `MOST_SECS` that with the least, the median and the largest error.
-pub fn choose(clips: &Clips) -> Result<Vec<Excerpt>> {
+pub fn choose(clips: &EvalClips) -> Result<Vec<Excerpt>> {
     let mut stretches: Vec<(f64, usize, Range<usize>)> = Vec::new();
     for (i, clip) in clips.clips.iter().enumerate() {
         let n = (clips.fps.secs(clip.n_frames()) / MOST_SECS).ceil().max(1.0) as usize;
@@ -68,7 +68,7 @@ pub fn choose(clips: &Clips) -> Result<Vec<Excerpt>> {
 }
 
 /// Mean error of the joints, mm; NaN where nothing is seen.
-fn error_mm(clip: &Clip, frames: Range<usize>) -> f64 {
+fn error_mm(clip: &EvalClip, frames: Range<usize>) -> f64 {
     let (mut sum, mut n) = (0.0, 0.0);
     for t in frames {
         for joint in (1..N_JOINTS).filter(|joint| clip.mask[[t, *joint]]) {
@@ -80,7 +80,7 @@ fn error_mm(clip: &Clip, frames: Range<usize>) -> f64 {
     sum / n
 }
 
-fn excerpt(word: &str, error: f64, clip: &Clip, frames: Range<usize>, fps: f64) -> Result<Excerpt> {
+fn excerpt(word: &str, error: f64, clip: &EvalClip, frames: Range<usize>, fps: f64) -> Result<Excerpt> {
     let (start, end) = (frames.start as f64 / fps, frames.end as f64 / fps);
     let step = (fps / MOST_FPS).ceil().max(1.0) as usize;
     let samples = clip.voice.as_ref().map(|voice| voice.samples(start, end)).transpose()?;
@@ -124,7 +124,7 @@ fn wav(samples: &[i16]) -> Vec<u8> {
 }
 
 /// Heights and speeds of the wrists over time, the loudness with its onsets, and the beats of the motion.
-fn lanes_of(clip: &Clip, frames: Range<usize>, fps: f64, samples: Option<&[i16]>) -> Vec<Lane> {
+fn lanes_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[i16]>) -> Vec<Lane> {
     let secs = |t: usize| (t - frames.start) as f64 / fps;
     let both: [(&str, ArrayView3<f32>); 2] = [("real", clip.real.view()), ("made", clip.made.view())];
     let height = |name: &str, joint: usize| Lane {
@@ -175,7 +175,7 @@ fn lanes_of(clip: &Clip, frames: Range<usize>, fps: f64, samples: Option<&[i16]>
 }
 
 /// Mean speed of the two wrists by central differences, m/s.
-fn wrist_speed(clip: &Clip, joints: ArrayView3<f32>, frames: &Range<usize>, t: usize, fps: f64) -> f64 {
+fn wrist_speed(clip: &EvalClip, joints: ArrayView3<f32>, frames: &Range<usize>, t: usize, fps: f64) -> f64 {
     let (before, after) = (t.saturating_sub(1).max(frames.start), (t + 1).min(frames.end - 1));
     let of = |joint: usize| {
         if !(clip.mask[[before, joint]] && clip.mask[[after, joint]]) {

@@ -1,6 +1,6 @@
 //! The figures of an evaluation as a table, and their exact definitions.
 
-use crate::evaluate::baseline::baselines::Who;
+use crate::evaluate::baseline::baselines::PredictorKind;
 use crate::evaluate::table::table::{N_COSTLY_DRAWS, N_DRAWS, Table};
 use crate::evaluate::verdict::labels;
 use crate::evaluate::verdict::verdict::{Answer, against_nothing};
@@ -80,14 +80,18 @@ fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
     };
     let cells = table.rows.iter().map(|row| {
         let estimate = &row.values[index];
-        let cell = node("td").class(if row.who == Who::Prediction { "num own" } else { "num" });
+        let cell = node("td").class(if row.who == PredictorKind::Prediction { "num own" } else { "num" });
         let cell = cell.text(labels::number(definition, estimate.value));
         if !(estimate.low.is_finite() && estimate.high.is_finite()) {
             return cell;
         }
         let [low, high] = [estimate.low, estimate.high].map(|value| labels::number(definition, value));
         let interval = format!("[{low}, {high}]");
-        if row.who == Who::Prediction { cell.child(node("small").text(interval)) } else { cell.attr("title", interval) }
+        if row.who == PredictorKind::Prediction {
+            cell.child(node("small").text(interval))
+        } else {
+            cell.attr("title", interval)
+        }
     });
     let against = node("td").class(format!("against {}", against.0)).text(against.1);
     Some(node("tr").child(name).child(against).children(cells))

@@ -1,9 +1,9 @@
 //! The cells of a contact sheet: the picture under its keypoints, and the 3D pose on a grid of decimetres, from the
 //! front or from the left, always at the same scale. Where cells stand on a page is decided in `sheet`.
 
-use crate::animate::draw::figure::{INK, PAPER, View, draw_pose, mix};
+use crate::animate::draw::figure::{FigureView, INK, PAPER, draw_pose, mix};
 use crate::animate::draw::overlay;
-use crate::animate::draw::overlay::Place;
+use crate::animate::draw::overlay::ImageTransform;
 use crate::external::ffmpeg::frames::FrameReader;
 use crate::external::opencv::{draw, warp};
 use crate::types::image::Image;
@@ -23,16 +23,16 @@ const MAX_ENLARGED: f32 = 4.0;
 
 /// The square of the picture that is shown in every cell of a clip.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Crop {
+pub struct SheetCrop {
     /// Size in px of the whole picture after scaling.
     scaled: [usize; 2],
-    place: Place,
+    place: ImageTransform,
 }
 
-impl Crop {
+impl SheetCrop {
     /// The square around all that was found in the clip, in a picture of `image_size` px; the whole picture where
     /// nothing was.
-    pub fn of(keypoints: &Keypoints, image_size: [usize; 2]) -> Self {
+    pub fn around(keypoints: &Keypoints, image_size: [usize; 2]) -> Self {
         let whole = image_size.map(|px| px as f32);
         let found = overlay::extent(keypoints).unwrap_or([0.0, 0.0, whole[0], whole[1]]);
         let [left, top, right, bottom] = found;
@@ -42,7 +42,7 @@ impl Crop {
         let scale = [0, 1].map(|axis| scaled[axis] as f32 / whole[axis]);
         let middle = [(left + right) / 2.0, (top + bottom) / 2.0];
         let shift = [0, 1].map(|axis| CELL_PX as f32 / 2.0 - scale[axis] * middle[axis].clamp(0.0, whole[axis]));
-        Self { scaled, place: Place { scale, shift: shift.map(f32::round) } }
+        Self { scaled, place: ImageTransform { scale, shift: shift.map(f32::round) } }
     }
 
     /// The frame the reader shows, cropped, under its keypoints.
@@ -59,27 +59,27 @@ impl Crop {
 
 /// From where a 3D cell is seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum From {
+pub enum CellView {
     Front,
     /// The speaker's left: forward is to the left of the cell.
     Left,
 }
 
 /// One pose [49, 3] on its grid, without perspective.
-pub fn pose_cell(joints: ArrayView2<f32>, from: From) -> Result<Image> {
+pub fn pose_cell(joints: ArrayView2<f32>, from: CellView) -> Result<Image> {
     let mut cell = Image::filled(CELL_PX, CELL_PX, PAPER);
-    let view = View {
-        yaw_degrees: if from == From::Left { 90.0 } else { 0.0 },
+    let view = FigureView {
+        yaw_degrees: if from == CellView::Left { 90.0 } else { 0.0 },
         camera_metres: f32::INFINITY,
         trunk: 0.0,
-        ..View::front(NECK_PX, PX_PER_METRE)
+        ..FigureView::front(NECK_PX, PX_PER_METRE)
     };
     draw_grid(&mut cell)?;
     draw_head(&mut cell, from)?;
     draw_pose(&mut cell, joints, &view)?;
     let words = match from {
-        From::Front => "front",
-        From::Left => "side, from the left;  <-- faces this way",
+        CellView::Front => "front",
+        CellView::Left => "side, from the left;  <-- faces this way",
     };
     draw::text(&mut cell, words, [6.0, 16.0], 9.0, INK)?;
     Ok(cell)
@@ -106,10 +106,10 @@ fn draw_grid(cell: &mut Image) -> Result<()> {
 }
 
 /// The outline of a head above the neck, upright whatever the speaker does: it is in no data.
-fn draw_head(cell: &mut Image, from: From) -> Result<()> {
+fn draw_head(cell: &mut Image, from: CellView) -> Result<()> {
     let rgb = mix(INK, PAPER, 0.6);
     let at = |across: f32, down: f32| [NECK_PX[0] + across * PX_PER_METRE, NECK_PX[1] + down * PX_PER_METRE];
-    let ahead = if from == From::Left { -1.0 } else { 0.0 };
+    let ahead = if from == CellView::Left { -1.0 } else { 0.0 };
     draw::circle_outline(cell, at(0.03 * ahead, -0.20), 0.10 * PX_PER_METRE, 1.0, rgb)?;
     draw::circle(cell, at(0.13 * ahead, -0.19), 0.015 * PX_PER_METRE, rgb)
 }
@@ -131,7 +131,7 @@ mod tests {
         {
             joints.slice_mut(s![joint, ..]).assign(&ndarray::arr1(&place));
         }
-        let cell = pose_cell(joints.view(), From::Left).unwrap();
+        let cell = pose_cell(joints.view(), CellView::Left).unwrap();
         let teal = |x: usize, y: usize| {
             let [r, g, b] = cell.pixel(x, y).map(i32::from);
             b > r + 40 && g > r + 20
@@ -151,11 +151,11 @@ mod tests {
         let hand = Array3::zeros((10, 21, 3));
         let (fps, image_size) = (FrameRate::new(15, 1), [1280, 720]);
         let keypoints = Keypoints { fps, image_size, body, left_hand: hand.clone(), right_hand: hand };
-        let Place { scale, shift } = Crop::of(&keypoints, [1280, 720]).place;
+        let ImageTransform { scale, shift } = SheetCrop::around(&keypoints, [1280, 720]).place;
         let at = |x: f32, y: f32| [scale[0] * x + shift[0], scale[1] * y + shift[1]];
         assert!((at(700.0, 350.0)[0] - 170.0).abs() < 1.0 && (at(700.0, 350.0)[1] - 170.0).abs() < 1.0);
         assert!((20.0..30.0).contains(&at(600.0, 350.0)[0]));
         let nothing = Keypoints { body: Array3::zeros((10, 17, 3)), ..keypoints };
-        assert!(Crop::of(&nothing, [1280, 720]).place.scale[0] < 0.3);
+        assert!(SheetCrop::around(&nothing, [1280, 720]).place.scale[0] < 0.3);
     }
 }

@@ -2,7 +2,7 @@
 //! from the left, and, if asked for, the animated figure beside it, page after page, each with a strip of the wrists' way. The video is streamed; only the page at work
 //! is in memory.
 
-use super::cells::{CELL_PX, Crop, From, pose_cell};
+use super::cells::{CELL_PX, CellView, SheetCrop, pose_cell};
 use super::strip::{STRIP_PX, draw_strip};
 use crate::animate::draw::figure::{INK, LEFT, PAPER, RIGHT};
 use crate::external::ffmpeg::frames::FrameReader;
@@ -26,7 +26,7 @@ const MOMENT_HIGH_PX: usize = WORDS_PX + CELL_PX + 6;
 const TITLE_PX: usize = 36;
 
 /// What a sheet is drawn of.
-pub struct Clip<'a> {
+pub struct SheetClip<'a> {
     pub title: &'a str,
     pub video: &'a Path,
     pub keypoints: &'a Keypoints,
@@ -35,7 +35,7 @@ pub struct Clip<'a> {
     pub figure: Option<&'a Motion>,
 }
 
-impl Clip<'_> {
+impl SheetClip<'_> {
     /// Draws a moment every `every_secs` and hands out page after page (page, number of pages, picture). Errors: no
     /// frames; keypoints, motion and video of unequal lengths or rates; a moment every less than a frame.
     pub fn pages(
@@ -47,7 +47,7 @@ impl Clip<'_> {
         let moments = self.moments(every_secs)?;
         let mut reader = FrameReader::open_with(self.video, self.motion.fps, 0)?;
         self.check_length(&reader)?;
-        let crop = Crop::of(self.keypoints, reader.image_size());
+        let crop = SheetCrop::around(self.keypoints, reader.image_size());
         let task = progress.begin("drawing", moments.len() as u64);
         let pages: Vec<&[usize]> = moments.chunks(self.n_columns() * ROWS).collect();
         for (number, moments) in pages.iter().enumerate() {
@@ -133,7 +133,7 @@ impl Clip<'_> {
         [left, top]: [usize; 2],
         frame_idx: usize,
         reader: &mut FrameReader,
-        crop: &Crop,
+        crop: &SheetCrop,
     ) -> Result<()> {
         loop {
             let time = reader.advance()?.with_context(|| {
@@ -147,12 +147,12 @@ impl Clip<'_> {
         let joints = self.motion.joints.index_axis(Axis(0), frame_idx);
         let mut cells = vec![
             crop.cell(reader, self.keypoints, frame_idx)?,
-            pose_cell(joints, From::Front)?,
-            pose_cell(joints, From::Left)?,
+            pose_cell(joints, CellView::Front)?,
+            pose_cell(joints, CellView::Left)?,
         ];
         if let Some(figure) = self.figure.filter(|figure| frame_idx < figure.n_frames()) {
             let joints = figure.joints.index_axis(Axis(0), frame_idx);
-            for from in [From::Front, From::Left] {
+            for from in [CellView::Front, CellView::Left] {
                 let mut cell = pose_cell(joints, from)?;
                 draw::text(&mut cell, "animated", [6.0, 30.0], 9.0, INK)?;
                 cells.push(cell);

@@ -1,13 +1,13 @@
 //! The curves of a training from the lines of its log.
 
-use crate::report::html::chart::lines::{Chart, Level, Line};
+use crate::report::html::chart::lines::{ChartLevel, ChartLine, LineChart};
 use serde_json::Value;
 
 /// Most points of a curve; neighbours of a longer one are averaged.
 const MOST_POINTS: usize = 240;
 
 /// What the log of a training tells.
-pub struct Told<'a> {
+pub struct TrainingLog<'a> {
     /// Lines of steps.
     steps: Vec<&'a Value>,
     /// Lines of validations.
@@ -16,8 +16,8 @@ pub struct Told<'a> {
     pub best: Option<&'a Value>,
 }
 
-impl<'a> Told<'a> {
-    pub fn of(lines: &'a [Value]) -> Self {
+impl<'a> TrainingLog<'a> {
+    pub fn parse(lines: &'a [Value]) -> Self {
         let (epochs, steps): (Vec<&Value>, Vec<&Value>) = lines.iter().partition(|line| line["validation"].is_object());
         let score = |line: &Value| line["validation"]["score"].as_f64().unwrap_or(f64::INFINITY);
         let best = epochs.iter().copied().min_by(|a, b| score(a).total_cmp(&score(b)));
@@ -25,11 +25,11 @@ impl<'a> Told<'a> {
     }
 
     /// All curves that are not 0 throughout.
-    pub fn charts(&self) -> Vec<Chart> {
+    pub fn charts(&self) -> Vec<LineChart> {
         let made = |name: &str, colour, of: &str| self.validated(name, colour, &format!("/validation/generator/{of}"));
         let still = |name: &str, colour, of: &str| self.level(name, colour, &format!("/validation/mean_pose/{of}"));
-        let level = |name: &str, colour, value| Level { name: name.to_owned(), colour, value };
-        let chart = |title: &str, says: &str, lines: Vec<Line>, levels: Vec<Level>| Chart {
+        let level = |name: &str, colour, value| ChartLevel { name: name.to_owned(), colour, value };
+        let chart = |title: &str, says: &str, lines: Vec<ChartLine>, levels: Vec<ChartLevel>| LineChart {
             title: title.to_owned(),
             says: says.to_owned(),
             lines,
@@ -82,26 +82,26 @@ impl<'a> Told<'a> {
             chart("Gradient norm", "Before clipping.", vec![self.trained("generator", 0, "gradient_norm")], vec![]),
         ];
         let says_something =
-            |chart: &Chart| chart.lines.iter().flat_map(|line| &line.places).any(|[_, value]| *value != 0.0);
+            |chart: &LineChart| chart.lines.iter().flat_map(|line| &line.places).any(|[_, value]| *value != 0.0);
         charts.into_iter().filter(says_something).collect()
     }
 
     /// The curve of a number of the training lines.
-    fn trained(&self, name: &str, colour: usize, of: &str) -> Line {
+    fn trained(&self, name: &str, colour: usize, of: &str) -> ChartLine {
         let places = self.steps.iter().filter_map(|line| Some([line["step"].as_f64()?, line[of].as_f64()?]));
-        Line { name: name.to_owned(), colour, places: thinned(&places.collect::<Vec<_>>()) }
+        ChartLine { name: name.to_owned(), colour, places: thinned(&places.collect::<Vec<_>>()) }
     }
 
     /// The curve of a number of the validations.
-    fn validated(&self, name: &str, colour: usize, at: &str) -> Line {
+    fn validated(&self, name: &str, colour: usize, at: &str) -> ChartLine {
         let places = self.epochs.iter().filter_map(|line| Some([line["step"].as_f64()?, line.pointer(at)?.as_f64()?]));
-        Line { name: name.to_owned(), colour, places: thinned(&places.collect::<Vec<_>>()) }
+        ChartLine { name: name.to_owned(), colour, places: thinned(&places.collect::<Vec<_>>()) }
     }
 
     /// A number that is the same in all validations.
-    fn level(&self, name: &str, colour: usize, at: &str) -> Level {
+    fn level(&self, name: &str, colour: usize, at: &str) -> ChartLevel {
         let last = self.epochs.last().and_then(|line| line.pointer(at)).and_then(Value::as_f64);
-        Level { name: name.to_owned(), colour, value: last.unwrap_or(f64::NAN) }
+        ChartLevel { name: name.to_owned(), colour, value: last.unwrap_or(f64::NAN) }
     }
 }
 
@@ -124,13 +124,13 @@ mod tests {
             let validation = json!({"score": score, "generator": {"l1": score / 2.0}, "mean_pose": still});
             lines.push(json!({"step": step, "epoch": 1, "validation": validation}));
         }
-        let told = Told::of(&lines);
+        let told = TrainingLog::parse(&lines);
         assert_eq!(told.best.unwrap()["step"], 7000);
         let charts = told.charts();
         let titles: Vec<&str> = charts.iter().map(|chart| chart.title.as_str()).collect();
         assert_eq!(titles, ["L1 error", "Score"]);
         assert!(charts[0].lines[0].places.len() <= MOST_POINTS && charts[0].lines[1].places.len() == 3);
         assert_eq!((charts[0].levels[0].value, charts[0].marked), (0.8, Some(7000.0)));
-        assert!(Told::of(&[]).charts().is_empty());
+        assert!(TrainingLog::parse(&[]).charts().is_empty());
     }
 }

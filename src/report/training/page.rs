@@ -1,9 +1,9 @@
 //! How a training went, on one page beside its checkpoints: the curves of its log with the best epoch marked, the best
 //! epoch's figures beside the mean pose's, and generated against true poses.
 
-use super::charts::Told;
+use super::charts::TrainingLog;
 use super::picture::picture;
-use super::strip::{Pair, strip};
+use super::strip::{HeldOutPair, strip};
 use crate::external::ffmpeg::jpeg;
 use crate::external::opencv::png;
 use crate::report::html::numbers::{counted, number};
@@ -31,9 +31,9 @@ const FIGURES: [(&str, &str, bool); 6] = [
 
 /// Writes `training.html` and `training.png` into the training's folder, from the log there and poses of held-out
 /// intervals, which may be none. The same log and poses give the same bytes.
-pub fn write(folder: &Path, speaker: &str, pairs: &[Pair]) -> Result<()> {
+pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> {
     let lines = log::read(folder)?;
-    let told = Told::of(&lines);
+    let told = TrainingLog::parse(&lines);
     let charts = told.charts();
     let title = format!("Training of {speaker}");
     let strip = strip(pairs)?;
@@ -68,7 +68,7 @@ pub fn write(folder: &Path, speaker: &str, pairs: &[Pair]) -> Result<()> {
     workdir::write_file(&folder.join(PAGE), page.html().as_bytes()).context("writing the page of the training")
 }
 
-fn lead(told: &Told) -> String {
+fn lead(told: &TrainingLog) -> String {
     let Some(best) = told.best else { return "No validation yet.".to_owned() };
     let step = |line: &Value| line["step"].as_u64().unwrap_or(0);
     let last = told.epochs.last().map_or(0, |line| step(line));
@@ -83,7 +83,7 @@ fn lead(told: &Told) -> String {
 }
 
 /// The table of the best epoch, and the alarm where there is one.
-fn best(told: &Told) -> Vec<Node> {
+fn best(told: &TrainingLog) -> Vec<Node> {
     let Some(best) = told.best.map(|line| &line["validation"]) else {
         return vec![node("p").class("empty").text("The log has no validation.")];
     };

@@ -3,7 +3,7 @@
 use super::strip::WIDTH;
 use crate::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, mix};
 use crate::external::opencv::draw;
-use crate::report::html::chart::lines::Chart;
+use crate::report::html::chart::lines::LineChart;
 use crate::report::html::numbers::number;
 use crate::types::image::Image;
 use anyhow::Result;
@@ -16,7 +16,7 @@ const GAP_PX: usize = 20;
 const COLOURS: [[u8; 3]; 3] = [LEFT, RIGHT, [122, 128, 134]];
 
 /// Draws title, curves and strip.
-pub fn picture(title: &str, charts: &[Chart], strip: &Image) -> Result<Image> {
+pub fn picture(title: &str, charts: &[LineChart], strip: &Image) -> Result<Image> {
     let charts_px = charts.len().div_ceil(N_COLUMNS) * CELL[1];
     let mut image = Image::filled(WIDTH, TITLE_PX + charts_px + GAP_PX + strip.height, PAPER);
     draw::text(&mut image, title, [10.0, 27.0], 13.0, INK)?;
@@ -30,7 +30,7 @@ pub fn picture(title: &str, charts: &[Chart], strip: &Image) -> Result<Image> {
     Ok(image)
 }
 
-fn draw_chart(image: &mut Image, [left, top]: [f32; 2], chart: &Chart) -> Result<()> {
+fn draw_chart(image: &mut Image, [left, top]: [f32; 2], chart: &LineChart) -> Result<()> {
     let [[first, last], [low, high]] = chart.ranges();
     let (start, end) = (left + 46.0, left + CELL[0] as f32 - 12.0);
     let (ceiling, floor) = (top + 40.0, top + CELL[1] as f32 - 24.0);

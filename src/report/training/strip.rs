@@ -1,7 +1,7 @@
 //! Generated against true poses of held-out intervals: for each the figure at a few moments, true above generated, and
 //! the height of both wrists over time.
 
-use crate::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, View, draw_pose, mix};
+use crate::animate::draw::figure::{FigureView, INK, LEFT, PAPER, RIGHT, draw_pose, mix};
 use crate::external::opencv::draw;
 use crate::types::image::Image;
 use crate::types::pose3d::Motion;
@@ -11,7 +11,7 @@ use ndarray::Axis;
 use std::ops::Range;
 
 /// A held-out interval: what is true, and what was made for its sound; the same rate and, but for rounding, length.
-pub struct Pair {
+pub struct HeldOutPair {
     pub name: String,
     /// Where in the interval they begin.
     pub start_secs: f64,
@@ -34,7 +34,7 @@ const LANE_METRES: f32 = 0.15;
 pub const WIDTH: usize = MARGIN + N_MOMENTS * CELL[0];
 
 /// Draws the pairs one below the other.
-pub fn strip(pairs: &[Pair]) -> Result<Image> {
+pub fn strip(pairs: &[HeldOutPair]) -> Result<Image> {
     let mut image = Image::filled(WIDTH, (pairs.len() * PAIR_PX).max(1), PAPER);
     for (row, pair) in pairs.iter().enumerate() {
         draw_pair(&mut image, row * PAIR_PX, pair)?;
@@ -42,7 +42,7 @@ pub fn strip(pairs: &[Pair]) -> Result<Image> {
     Ok(image)
 }
 
-fn draw_pair(image: &mut Image, top: usize, pair: &Pair) -> Result<()> {
+fn draw_pair(image: &mut Image, top: usize, pair: &HeldOutPair) -> Result<()> {
     let fps = pair.real.fps;
     let n_frames = pair.real.n_frames().min(pair.made.n_frames());
     let span = ((N_MOMENTS as f64 * EVERY_SECS * fps.per_sec()).round() as usize).clamp(1, n_frames.max(1));
@@ -56,7 +56,7 @@ fn draw_pair(image: &mut Image, top: usize, pair: &Pair) -> Result<()> {
         draw::text(image, name, [8.0, row_top as f32 + 62.0], 9.0, INK)?;
         for moment in (0..N_MOMENTS).filter(|moment| frame_of(*moment) < n_frames) {
             let mut cell = Image::filled(CELL[0], CELL[1], PAPER);
-            let view = View::front([CELL[0] as f32 / 2.0, 52.0], 104.0);
+            let view = FigureView::front([CELL[0] as f32 / 2.0, 52.0], 104.0);
             draw_pose(&mut cell, motion.joints.index_axis(Axis(0), frame_of(moment)), &view)?;
             draw::paste(image, &cell, [MARGIN + moment * CELL[0], row_top]);
         }
@@ -87,7 +87,7 @@ fn draw_pair(image: &mut Image, top: usize, pair: &Pair) -> Result<()> {
 }
 
 /// Highest and lowest place of a wrist in either motion, metres below the neck.
-fn range(pair: &Pair, joint: usize, frames: Range<usize>) -> [f32; 2] {
+fn range(pair: &HeldOutPair, joint: usize, frames: Range<usize>) -> [f32; 2] {
     let heights = [&pair.real, &pair.made].into_iter().flat_map(|motion| {
         frames.clone().map(|frame| motion.joints[[frame, joint, 1]]).filter(|height| height.is_finite())
     });
@@ -115,8 +115,12 @@ mod tests {
             Motion::from_joints(FrameRate::new(15, 1), Array3::from_shape_fn((n_frames, N_JOINTS, 3), place))
         };
         for (n_real, n_made) in [(0, 3), (1, 1), (3, 5), (90, 89)] {
-            let pair =
-                Pair { name: "a".to_owned(), start_secs: 0.0, real: motion(n_real, 0.0), made: motion(n_made, 0.1) };
+            let pair = HeldOutPair {
+                name: "a".to_owned(),
+                start_secs: 0.0,
+                real: motion(n_real, 0.0),
+                made: motion(n_made, 0.1),
+            };
             let image = strip(&[pair]).unwrap();
             assert_eq!((image.width, image.height), (WIDTH, PAIR_PX));
             assert!(image.data.iter().any(|v| *v < 100), "{n_real}");

@@ -1,13 +1,13 @@
 //! How often each value was measured, beside its threshold.
 
-use super::spread::{Shown, Spread};
+use super::spread::{MeasureCounts, MeasureHistogram};
 use crate::config::Segment;
 use crate::report::html::chart::histogram::histogram;
 use crate::report::html::numbers::{counted, percent};
 use crate::report::html::{Node, node};
 
 /// A card a measure.
-pub fn distributions(spread: &Spread, rules: &Segment, per_sec: f64) -> Vec<Node> {
+pub fn distributions(spread: &MeasureCounts, rules: &Segment, per_sec: f64) -> Vec<Node> {
     let about = "Of all frames of all videos, also the refused ones. The side that does not pass is in the other colour; \
                  heights go with the square root of the share, so that rare values can be seen; what lies beyond an end is in \
                  the last bar.";
@@ -15,7 +15,7 @@ pub fn distributions(spread: &Spread, rules: &Segment, per_sec: f64) -> Vec<Node
     vec![node("p").text(about), node("div").class("grid").children(cards)]
 }
 
-fn card(shown: &Shown) -> Node {
+fn card(shown: &MeasureHistogram) -> Node {
     let counts = shown.counts;
     let title = node("h3").text(shown.title);
     let key = node("code").text(shown.key);

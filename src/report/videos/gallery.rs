@@ -1,18 +1,18 @@
 //! The worst frames of every rule, as pictures.
 
-use super::pictures::Picture;
+use super::pictures::MomentThumbnail;
 use super::reasons;
-use super::video::Video;
+use super::video::VideoSummary;
 use super::worst::{Moment, Worst};
 use crate::report::html::numbers::{clock, counted};
 use crate::report::html::{Node, node, picture};
 use std::collections::BTreeMap;
 
 /// Pictures by video and by the frames of their moment.
-pub type Pictures = BTreeMap<(usize, Vec<usize>), Picture>;
+pub type Pictures = BTreeMap<(usize, Vec<usize>), MomentThumbnail>;
 
 /// A row of pictures a rule.
-pub fn gallery(worst: &Worst, pictures: &Pictures, videos: &[Video]) -> Vec<Node> {
+pub fn gallery(worst: &Worst, pictures: &Pictures, videos: &[VideoSummary]) -> Vec<Node> {
     if worst.rules.is_empty() {
         return vec![node("p").class("empty").text("Nothing was refused, or no pictures were asked for.")];
     }
@@ -31,7 +31,7 @@ pub fn gallery(worst: &Worst, pictures: &Pictures, videos: &[Video]) -> Vec<Node
     shown
 }
 
-fn card(moment: &Moment, video: &Video, pictures: &Pictures) -> Node {
+fn card(moment: &Moment, video: &VideoSummary, pictures: &Pictures) -> Node {
     let at = format!("{} at {}", video.file, clock(moment.secs));
     let shown = match pictures.get(&(moment.video, moment.frames.clone())) {
         Some(found) => picture::jpeg(&found.jpeg, found.size, &format!("{at}: {}", moment.says)),

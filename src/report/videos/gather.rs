@@ -1,9 +1,9 @@
 //! Goes through the videos once, one at a time, and adds each to the sums. Of a video only its ledger is kept.
 
-use super::movement::Movement;
-use super::spread::Spread;
+use super::movement::MovementCounts;
+use super::spread::MeasureCounts;
 use super::thresholds::THRESHOLDS;
-use super::video::Video;
+use super::video::VideoSummary;
 use super::what_if::{Judged, Kept, refused_by_lift};
 use super::worst::Worst;
 use crate::config::Settings;
@@ -20,25 +20,25 @@ use anyhow::{Context, Result, ensure};
 use std::path::Path;
 
 /// All the numbers of a report.
-pub struct Gathered {
-    pub videos: Vec<Video>,
+pub struct ReportData {
+    pub videos: Vec<VideoSummary>,
     /// By video; `None`: nothing to judge.
     pub kept: Vec<Option<Kept>>,
-    pub spread: Spread,
-    pub movement: Movement,
+    pub spread: MeasureCounts,
+    pub movement: MovementCounts,
     pub worst: Worst,
     /// Entries of the configuration that lead to no video.
     pub missing: Vec<String>,
 }
 
 /// Gathers of all `videos`; at most `n_pictures` moments a rule.
-pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progress: &dyn Progress) -> Gathered {
+pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progress: &dyn Progress) -> ReportData {
     let missing = videos.iter().flat_map(|of| of.missing.iter().map(move |text| format!("{}: {text}", of.speaker)));
-    let mut all = Gathered {
+    let mut all = ReportData {
         videos: Vec::new(),
         kept: Vec::new(),
-        spread: Spread::new(),
-        movement: Movement::new(),
+        spread: MeasureCounts::new(),
+        movement: MovementCounts::new(),
         worst: Worst::new(n_pictures),
         missing: missing.collect(),
     };
@@ -46,7 +46,7 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
     let task = progress.begin("reading", units.len() as u64);
     for unit in units {
         task.detail(&unit.video);
-        let mut video = Video::read(&settings.work.dir, unit);
+        let mut video = VideoSummary::read(&settings.work.dir, unit);
         let kept = if video.ledger.failed.is_empty() && video.ledger.duration_secs > 0.0 {
             all.add(settings, &mut video)
         } else {
@@ -59,9 +59,9 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
     all
 }
 
-impl Gathered {
+impl ReportData {
     /// Adds what was measured of a video; what cannot be read becomes a note.
-    fn add(&mut self, settings: &Settings, video: &mut Video) -> Option<Kept> {
+    fn add(&mut self, settings: &Settings, video: &mut VideoSummary) -> Option<Kept> {
         let rules = &settings.segment;
         let (work, unit) = (&settings.work.dir, video.unit.clone());
         self.spread.add_kept(&video.ledger);

@@ -1,8 +1,8 @@
 //! Where the joints go and how fast.
 
-use super::movement::{Movement, PAIRS};
+use super::movement::{MovementCounts, PAIRS};
 use crate::report::html::chart::profile::profile;
-use crate::report::html::chart::ranges::{Range, ranges};
+use crate::report::html::chart::ranges::{ValueRange, ranges};
 use crate::report::html::numbers::{counted, number};
 use crate::report::html::{Node, node};
 
@@ -15,7 +15,7 @@ const AXES: [(&str, [&str; 2]); 3] = [
 const SIDES: [&str; 2] = ["left", "right"];
 
 /// Charts of ranges and of speeds.
-pub fn motion(movement: &Movement) -> Vec<Node> {
+pub fn motion(movement: &MovementCounts) -> Vec<Node> {
     if movement.n_frames == 0 {
         return vec![node("p").class("empty").text("No frame is kept and lifted, so there is no motion to show.")];
     }
@@ -58,11 +58,16 @@ pub fn motion(movement: &Movement) -> Vec<Node> {
     ]
 }
 
-fn range_card(movement: &Movement, name: &str, is_arm: bool, (axis, along, ends): (usize, &str, [&str; 2])) -> Node {
+fn range_card(
+    movement: &MovementCounts,
+    name: &str,
+    is_arm: bool,
+    (axis, along, ends): (usize, &str, [&str; 2]),
+) -> Node {
     let pairs = || movement.pairs.iter().zip(PAIRS).filter(move |(_, pair)| pair.is_arm == is_arm);
-    let rows: Vec<Range> = pairs()
+    let rows: Vec<ValueRange> = pairs()
         .flat_map(|(joints, pair)| {
-            joints.iter().zip(SIDES).map(move |(joint, side)| Range {
+            joints.iter().zip(SIDES).map(move |(joint, side)| ValueRange {
                 name: format!("{} {}", &side[..1].to_uppercase(), pair.name),
                 class: side,
                 marks: joint.marks(axis),

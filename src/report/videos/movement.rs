@@ -12,35 +12,35 @@ const FASTEST: f64 = 3.0;
 
 /// A joint of each side (left, right) and what each is measured from.
 #[derive(Clone, Copy)]
-pub struct Pair {
+pub struct JointPair {
     pub name: &'static str,
     joints: [usize; 2],
     from: [usize; 2],
     pub is_arm: bool,
 }
 
-const fn tip(name: &'static str, finger: usize) -> Pair {
+const fn tip(name: &'static str, finger: usize) -> JointPair {
     let tip = 4 * finger + 4;
-    Pair { name, joints: [L_HAND + tip, R_HAND + tip], from: [L_WRIST, R_WRIST], is_arm: false }
+    JointPair { name, joints: [L_HAND + tip, R_HAND + tip], from: [L_WRIST, R_WRIST], is_arm: false }
 }
 
-pub const PAIRS: [Pair; 5] = [
-    Pair { name: "elbow", joints: [L_ELBOW, R_ELBOW], from: [NECK; 2], is_arm: true },
-    Pair { name: "wrist", joints: [L_WRIST, R_WRIST], from: [NECK; 2], is_arm: true },
+pub const PAIRS: [JointPair; 5] = [
+    JointPair { name: "elbow", joints: [L_ELBOW, R_ELBOW], from: [NECK; 2], is_arm: true },
+    JointPair { name: "wrist", joints: [L_WRIST, R_WRIST], from: [NECK; 2], is_arm: true },
     tip("thumb tip", 0),
     tip("index tip", 1),
     tip("little tip", 4),
 ];
 
 /// One joint's places by axis (x to the speaker's left, y down, z away from the camera), and its speeds.
-pub struct Joint {
+pub struct JointMovement {
     places: [Counts; 3],
     ends: [[f64; 2]; 3],
     /// Metres a second.
     pub speeds: Counts,
 }
 
-impl Joint {
+impl JointMovement {
     fn new() -> Self {
         let places = || Counts::new(-REACH, REACH, 480);
         Self {
@@ -62,14 +62,14 @@ impl Joint {
 }
 
 /// Left and right of every pair.
-pub struct Movement {
-    pub pairs: Vec<[Joint; 2]>,
+pub struct MovementCounts {
+    pub pairs: Vec<[JointMovement; 2]>,
     pub n_frames: usize,
 }
 
-impl Movement {
+impl MovementCounts {
     pub fn new() -> Self {
-        Self { pairs: PAIRS.iter().map(|_| [Joint::new(), Joint::new()]).collect(), n_frames: 0 }
+        Self { pairs: PAIRS.iter().map(|_| [JointMovement::new(), JointMovement::new()]).collect(), n_frames: 0 }
     }
 
     /// Counts the frames of a video's kept intervals.
@@ -86,7 +86,7 @@ impl Movement {
     }
 }
 
-impl Joint {
+impl JointMovement {
     fn add(&mut self, motion: &Motion, interval: Interval, joint: usize, from: usize) {
         let mut before: Option<[f64; 3]> = None;
         for t in interval.start..interval.end {
@@ -122,7 +122,7 @@ mod tests {
         let mut joints = Array3::zeros((10, N_JOINTS, 3));
         (0..10).for_each(|t| joints[[t, L_WRIST, 0]] = t as f32 * 0.1);
         joints[[3, R_WRIST, 2]] = f32::NAN;
-        let mut movement = Movement::new();
+        let mut movement = MovementCounts::new();
         let intervals = [Interval { start: 0, end: 6 }, Interval { start: 8, end: 99 }];
         movement.add(&Motion::from_joints(fps, joints), &intervals);
         let [left, right] = &movement.pairs[1];
@@ -130,6 +130,6 @@ mod tests {
         assert!(lowest == 0.0 && (highest - 0.5).abs() < 1e-6 && (median - 0.2).abs() < 0.01, "{median}");
         assert!((left.speeds.quantile(0.5) - 1.0).abs() < 0.05);
         assert_eq!((left.speeds.total(), right.speeds.total(), movement.n_frames), (5, 3, 6));
-        assert!(Movement::new().pairs[0][0].marks(2)[0].is_nan());
+        assert!(MovementCounts::new().pairs[0][0].marks(2)[0].is_nan());
     }
 }

@@ -1,9 +1,9 @@
 //! The whole report: gathered, drawn, put on one page.
 
 use super::gallery::{Pictures, gallery};
-use super::gather::{Gathered, gather};
+use super::gather::{ReportData, gather};
 use super::summary;
-use super::summary::Sums;
+use super::summary::ReportTotals;
 use super::{distributions, motion, pictures, sliders, timelines};
 use crate::config::Settings;
 use crate::config::videos::Videos;
@@ -13,7 +13,7 @@ use crate::stage::progress::Progress;
 use serde_json::json;
 
 /// What is to be reported on.
-pub struct Wanted<'a> {
+pub struct ReportRequest<'a> {
     pub settings: &'a Settings,
     pub videos: &'a [Videos],
     /// Most pictures of a rule; 0: no video is opened.
@@ -21,19 +21,19 @@ pub struct Wanted<'a> {
 }
 
 /// A report.
-pub struct Made {
+pub struct ReportPage {
     pub html: String,
-    pub sums: Sums,
+    pub sums: ReportTotals,
     /// The same as numbers, for programs.
     pub facts: serde_json::Value,
 }
 
 /// Makes the report. What is missing is said on the page.
-pub fn make(wanted: &Wanted, progress: &dyn Progress) -> Made {
-    let Wanted { settings, videos, n_pictures } = *wanted;
+pub fn make(wanted: &ReportRequest, progress: &dyn Progress) -> ReportPage {
+    let ReportRequest { settings, videos, n_pictures } = *wanted;
     let mut gathered = gather(settings, videos, n_pictures, progress);
     let pictures = draw(settings, &mut gathered, progress);
-    let sums = Sums::of(&gathered.videos);
+    let sums = ReportTotals::sum(&gathered.videos);
     let facts = json!({
         "n_videos": gathered.videos.len(),
         "n_stretches": gathered.videos.iter().map(|v| v.ledger.kept.len() + v.ledger.refused.len() + v.ledger.failed.len()).sum::<usize>(),
@@ -45,10 +45,10 @@ pub fn make(wanted: &Wanted, progress: &dyn Progress) -> Made {
         "waiting_secs": sums.waiting,
         "missing": gathered.missing,
     });
-    Made { html: page(wanted, &gathered, &pictures, &sums).html(), sums, facts }
+    ReportPage { html: page(wanted, &gathered, &pictures, &sums).html(), sums, facts }
 }
 
-fn draw(settings: &Settings, gathered: &mut Gathered, progress: &dyn Progress) -> Pictures {
+fn draw(settings: &Settings, gathered: &mut ReportData, progress: &dyn Progress) -> Pictures {
     let mut found = Pictures::new();
     let wanted: Vec<usize> =
         (0..gathered.videos.len()).filter(|video| !gathered.worst.frames_of(*video).is_empty()).collect();
@@ -56,7 +56,7 @@ fn draw(settings: &Settings, gathered: &mut Gathered, progress: &dyn Progress) -
     for number in wanted {
         let video = &mut gathered.videos[number];
         task.detail(&video.unit.video);
-        match pictures::of(&settings.work.dir, &video.unit, number, &gathered.worst) {
+        match pictures::thumbnails(&settings.work.dir, &video.unit, number, &gathered.worst) {
             Ok(pictures) => found.extend(pictures.into_iter().map(|(frames, picture)| ((number, frames), picture))),
             Err(error) => video.note(&format!("No pictures of it: {error:#}")),
         }
@@ -65,10 +65,10 @@ fn draw(settings: &Settings, gathered: &mut Gathered, progress: &dyn Progress) -
     found
 }
 
-fn page(wanted: &Wanted, gathered: &Gathered, pictures: &Pictures, sums: &Sums) -> Page {
+fn page(wanted: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sums: &ReportTotals) -> Page {
     let rules = &wanted.settings.segment;
     let per_sec = wanted.settings.extract.rate().per_sec();
-    let Gathered { videos, kept, spread, movement, worst, missing } = gathered;
+    let ReportData { videos, kept, spread, movement, worst, missing } = gathered;
     let names: Vec<&str> = wanted.videos.iter().map(|videos| videos.speaker.as_str()).collect();
     let section = |id, title, body| Section { id, title, body };
     Page {

@@ -3,7 +3,7 @@
 
 use super::worst::Worst;
 use crate::animate::draw::overlay;
-use crate::animate::draw::overlay::Place;
+use crate::animate::draw::overlay::ImageTransform;
 use crate::external::ffmpeg::frames::FrameReader;
 use crate::external::ffmpeg::jpeg;
 use crate::external::opencv::draw;
@@ -23,13 +23,18 @@ const GAP_RGB: [u8; 3] = [255; 3];
 
 /// A thumbnail.
 #[derive(Clone, Debug)]
-pub struct Picture {
+pub struct MomentThumbnail {
     pub jpeg: Vec<u8>,
     pub size: [usize; 2],
 }
 
 /// The pictures of video number `video`, by the frames of their moments.
-pub fn of(work: &Path, unit: &Unit, video: usize, worst: &Worst) -> Result<BTreeMap<Vec<usize>, Picture>> {
+pub fn thumbnails(
+    work: &Path,
+    unit: &Unit,
+    video: usize,
+    worst: &Worst,
+) -> Result<BTreeMap<Vec<usize>, MomentThumbnail>> {
     let keypoints = keypoints_npz::read(&place(work, "pose2d", unit).join("keypoints.npz"))?;
     let moments: Vec<&Vec<usize>> =
         worst.rules.values().flatten().filter(|m| m.video == video).map(|m| &m.frames).collect();
@@ -49,9 +54,9 @@ pub fn of(work: &Path, unit: &Unit, video: usize, worst: &Worst) -> Result<BTree
         }
         thumbs.insert(*frame_idx, thumb(&mut reader, &keypoints, *frame_idx, n_wide(frame_idx))?);
     }
-    let picture = |frames: &Vec<usize>| -> Result<Picture> {
+    let picture = |frames: &Vec<usize>| -> Result<MomentThumbnail> {
         let image = side_by_side(frames.iter().filter_map(|frame| thumbs.get(frame)));
-        Ok(Picture { size: [image.width, image.height], jpeg: jpeg::encode(&image)? })
+        Ok(MomentThumbnail { size: [image.width, image.height], jpeg: jpeg::encode(&image)? })
     };
     moments.into_iter().map(|frames| Ok((frames.clone(), picture(frames)?))).collect()
 }
@@ -64,7 +69,7 @@ fn thumb(reader: &mut FrameReader, keypoints: &Keypoints, frame_idx: usize, n_wi
     let small = whole.map(|px| ((px * scale).round() as usize).max(2));
     let mut image = reader.picture(Some(small))?;
     let scale = [0, 1].map(|axis| small[axis] as f32 / keypoints.image_size[axis].max(1) as f32);
-    overlay::draw_keypoints(&mut image, keypoints, frame_idx, Place { scale, shift: [0.0; 2] }, 2.0)?;
+    overlay::draw_keypoints(&mut image, keypoints, frame_idx, ImageTransform { scale, shift: [0.0; 2] }, 2.0)?;
     Ok(image)
 }
 

@@ -1,7 +1,7 @@
 //! A slider a threshold, and the table it picks from; `report.js` moves what is built here.
 
-use super::thresholds::{THRESHOLDS, Threshold};
-use super::video::Video;
+use super::thresholds::{THRESHOLDS, ThresholdGrid};
+use super::video::VideoSummary;
 use super::what_if::Kept;
 use crate::config::Segment;
 use crate::report::html::chart::curve::curve;
@@ -21,9 +21,9 @@ fn sums(kept: &[Option<Kept>], rules: &Segment) -> Kept {
 }
 
 /// What the script reads: thresholds with their values and sums, videos with their seconds (in tenths, by threshold).
-pub fn data(kept: &[Option<Kept>], videos: &[Video], rules: &Segment) -> Value {
+pub fn data(kept: &[Option<Kept>], videos: &[VideoSummary], rules: &Segment) -> Value {
     let milli = |secs: f64| (secs * 1000.0).round() / 1000.0;
-    let row = |(threshold, sums): (&Threshold, &Vec<f64>)| {
+    let row = |(threshold, sums): (&ThresholdGrid, &Vec<f64>)| {
         let (grid, now) = threshold.grid(rules);
         json!({
             "key": threshold.key,
@@ -79,7 +79,7 @@ pub fn sliders(kept: &[Option<Kept>], rules: &Segment) -> Vec<Node> {
     ]
 }
 
-fn card(i: usize, threshold: &Threshold, sums: &[f64], most: f64, rules: &Segment) -> Node {
+fn card(i: usize, threshold: &ThresholdGrid, sums: &[f64], most: f64, rules: &Segment) -> Node {
     let (grid, now) = threshold.grid(rules);
     let id = format!("slider-{}", threshold.key);
     let label = node("label").attr("for", &id).child(node("code").text(threshold.key));

@@ -2,12 +2,12 @@
 
 use crate::config::Segment;
 use crate::pipeline::segment::Measures;
-use crate::report::html::chart::histogram::{Counts, Threshold};
+use crate::report::html::chart::histogram::{Counts, ThresholdLine};
 use crate::stage::ledger::Ledger;
 
 /// A measure: its array, what it says, its unit, the ends and the number of its bins, its threshold, and whether
 /// that is the least value.
-struct Row {
+struct Measure {
     name: &'static str,
     title: &'static str,
     unit: &'static str,
@@ -23,8 +23,8 @@ const fn row(
     ends: [f64; 2],
     n_bins: usize,
     threshold: (&'static str, fn(&Segment) -> f64, bool),
-) -> Row {
-    Row { name, title, unit, ends, n_bins, threshold }
+) -> Measure {
+    Measure { name, title, unit, ends, n_bins, threshold }
 }
 
 const SCORE: (&str, fn(&Segment) -> f64, bool) = ("joint_score", |r| r.joint_score, true);
@@ -33,7 +33,7 @@ const ONE: [f64; 2] = [0.0, 1.0];
 const BONES: &str = "bone_change";
 const LENGTHS: &str = "interval_secs";
 
-const ROWS: [Row; 15] = [
+const ROWS: [Measure; 15] = [
     row("sound_db", "Loudness of the second", "dB", [-100.0, 0.0], 50, ("min_sound_db", |r| r.min_sound_db, true)),
     row("still", "Change of the picture", "8-bit steps", [0.0, 4.0], 80, ("min_change", |r| r.min_change, true)),
     row("person", "Best score of face and arms", "", ONE, 40, SCORE),
@@ -73,20 +73,20 @@ const ROWS: [Row; 15] = [
 ];
 
 /// The counts of all rows.
-pub struct Spread(Vec<Counts>);
+pub struct MeasureCounts(Vec<Counts>);
 
 /// A row to be shown.
-pub struct Shown<'a> {
+pub struct MeasureHistogram<'a> {
     pub title: &'static str,
     pub key: &'static str,
     pub unit: &'static str,
     pub counts: &'a Counts,
-    pub threshold: Threshold,
+    pub threshold: ThresholdLine,
     /// What is counted.
     pub of: &'static str,
 }
 
-impl Spread {
+impl MeasureCounts {
     pub fn new() -> Self {
         Self(ROWS.iter().map(|row| Counts::new(row.ends[0], row.ends[1], row.n_bins)).collect())
     }
@@ -115,14 +115,14 @@ impl Spread {
     }
 
     /// Every row, with its threshold under `rules` for frames that come `per_sec` a second.
-    pub fn shown(&self, rules: &Segment, per_sec: f64) -> Vec<Shown<'_>> {
+    pub fn shown(&self, rules: &Segment, per_sec: f64) -> Vec<MeasureHistogram<'_>> {
         let shown = self.0.iter().zip(&ROWS).map(|(counts, row)| {
             let (key, value, is_least) = row.threshold;
             let is_length = row.name == LENGTHS;
             let value = if is_length { value(rules) / per_sec.max(1e-9) } else { value(rules) };
             let of = if is_length { "stretch" } else { "frame" };
-            let threshold = Threshold { value, is_least };
-            Shown { title: row.title, key, unit: row.unit, counts, threshold, of }
+            let threshold = ThresholdLine { value, is_least };
+            MeasureHistogram { title: row.title, key, unit: row.unit, counts, threshold, of }
         });
         shown.collect()
     }
@@ -138,7 +138,7 @@ mod tests {
         let names = Measures::default().arrays().map(|(name, _)| name);
         let missing: Vec<&str> = names.into_iter().filter(|name| ROWS.iter().all(|row| row.name != *name)).collect();
         assert_eq!(missing, ["sound", "identity"]);
-        let mut spread = Spread::new();
+        let mut spread = MeasureCounts::new();
         let measures = Measures { jump: vec![0.1, 0.7, f32::NAN], ..Measures::default() };
         spread.add_frames(&measures);
         spread.add_kept(&Ledger { kept: vec![Kept { start_secs: 1.0, end_secs: 9.0 }], ..Ledger::default() });

@@ -2,15 +2,15 @@
 
 use super::reasons;
 use super::reasons::WAITING;
-use super::video::Video;
-use crate::report::html::chart::bars::{Bar, bars};
+use super::video::VideoSummary;
+use crate::report::html::chart::bars::{StackedBar, bars};
 use crate::report::html::numbers::{counted, length, percent};
 use crate::report::html::{Node, node};
 use std::collections::BTreeMap;
 
 /// Seconds of all videos together.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Sums {
+pub struct ReportTotals {
     pub whole: f64,
     pub kept: f64,
     pub failed: f64,
@@ -19,8 +19,8 @@ pub struct Sums {
     pub n_kept: usize,
 }
 
-impl Sums {
-    pub fn of(videos: &[Video]) -> Self {
+impl ReportTotals {
+    pub fn sum(videos: &[VideoSummary]) -> Self {
         let mut sums = Self::default();
         for ledger in videos.iter().map(|video| &video.ledger) {
             sums.whole += ledger.duration_secs;
@@ -43,7 +43,7 @@ impl Sums {
 }
 
 /// The sums as tiles, and what is to be known of them.
-pub fn totals(sums: &Sums, videos: &[Video], missing: &[String]) -> Vec<Node> {
+pub fn totals(sums: &ReportTotals, videos: &[VideoSummary], missing: &[String]) -> Vec<Node> {
     let tile = |name: &str, id: &str, secs: f64, says: String| {
         let value = node("b").id(id).attr("data-secs", format!("{secs:.3}")).text(length(secs));
         node("div").class("tile").text(name).child(value).child(node("small").text(says))
@@ -64,16 +64,16 @@ pub fn totals(sums: &Sums, videos: &[Video], missing: &[String]) -> Vec<Node> {
 }
 
 /// A bar a reason, the longest first.
-pub fn by_reason(sums: &Sums) -> Vec<Node> {
-    let bar = |(reason, secs): (&String, &f64)| Bar {
+pub fn by_reason(sums: &ReportTotals) -> Vec<Node> {
+    let bar = |(reason, secs): (&String, &f64)| StackedBar {
         name: reason.clone(),
         class: reasons::class(reason),
         secs: *secs,
         says: reasons::says(reason).to_owned(),
     };
-    let mut parts: Vec<Bar> = sums.refused.iter().map(bar).collect();
+    let mut parts: Vec<StackedBar> = sums.refused.iter().map(bar).collect();
     parts.sort_by(|a, b| b.secs.total_cmp(&a.secs).then(a.name.cmp(&b.name)));
-    let other = |name: &str, class: &str, secs: f64, says: &str| Bar {
+    let other = |name: &str, class: &str, secs: f64, says: &str| StackedBar {
         name: name.into(),
         class: class.into(),
         secs,
@@ -90,10 +90,10 @@ pub fn by_reason(sums: &Sums) -> Vec<Node> {
 }
 
 /// A row a video, with a link to its line.
-pub fn table(videos: &[Video]) -> Vec<Node> {
+pub fn table(videos: &[VideoSummary]) -> Vec<Node> {
     let heads = [("Video", ""), ("Length", "num"), ("Kept", "num"), ("", "num"), ("Most refused for", "")];
     let head = heads.into_iter().map(|(name, class)| node("th").class(class).attr("scope", "col").text(name));
-    let row = |video: &Video| {
+    let row = |video: &VideoSummary| {
         let link = node("a").attr("href", format!("#{}", video.anchor())).text(&video.file);
         let ledger = &video.ledger;
         let mut refused: Vec<(String, f64)> = ledger.refused_secs().into_iter().collect();

@@ -6,7 +6,7 @@ use crate::config::Segment;
 const N_STEPS: u32 = 20;
 
 /// One of them.
-pub struct Threshold {
+pub struct ThresholdGrid {
     /// Its key in `[segment]`.
     pub key: &'static str,
     pub says: &'static str,
@@ -22,7 +22,7 @@ pub struct Threshold {
 /// A row: key, sentence, unit, ends, and the field.
 macro_rules! row {
     ($key:ident, $says:literal, $unit:literal, $low:literal, $high:literal) => {
-        Threshold {
+        ThresholdGrid {
             key: stringify!($key),
             says: $says,
             unit: $unit,
@@ -35,7 +35,7 @@ macro_rules! row {
 }
 
 /// All but `max_bone_change`, whose rule is lifting's.
-pub const THRESHOLDS: [Threshold; 16] = [
+pub const THRESHOLDS: [ThresholdGrid; 16] = [
     row!(min_sound_db, "least loudness of the second around a frame", "dB of full scale", -90.0, -10.0),
     row!(max_quiet_secs, "longest pause of speech that is kept", "s", 0.0, 10.0),
     row!(min_change, "a picture that changes less stands still", "steps of 8-bit colour", 0.0, 1.0),
@@ -55,7 +55,7 @@ pub const THRESHOLDS: [Threshold; 16] = [
     row!(min_hand_share, "share of a stretch in which each hand is seen", "", 0.0, 1.0),
     row!(max_jump, "farthest the neck may move between two frames", "shoulder widths", 0.1, 2.1),
     row!(shot_threshold, "shot score from which a frame begins a new shot", "", 0.0, 1.0),
-    Threshold {
+    ThresholdGrid {
         key: "max_people",
         says: "people in view that are not too many",
         unit: "people",
@@ -65,7 +65,7 @@ pub const THRESHOLDS: [Threshold; 16] = [
         set: |rules, value| rules.max_people = value as u32,
     },
     row!(max_crowd_share, "share of a stretch that may show more people", "", 0.0, 1.0),
-    Threshold {
+    ThresholdGrid {
         key: "min_frames",
         says: "shortest stretch that is kept",
         unit: "frames",
@@ -76,7 +76,7 @@ pub const THRESHOLDS: [Threshold; 16] = [
     },
 ];
 
-impl Threshold {
+impl ThresholdGrid {
     /// The values it is tried at, rising, and which of them is the configured one.
     pub fn grid(&self, rules: &Segment) -> (Vec<f64>, usize) {
         let configured = (self.get)(rules);

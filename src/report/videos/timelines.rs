@@ -2,8 +2,8 @@
 
 use super::reasons;
 use super::reasons::WAITING;
-use super::video::Video;
-use crate::report::html::chart::timeline::{Stretch, timeline};
+use super::video::VideoSummary;
+use crate::report::html::chart::timeline::{TimelineSpan, timeline};
 use crate::report::html::numbers::{clock, counted, length, number, with_unit};
 use crate::report::html::{Node, node};
 use std::collections::BTreeSet;
@@ -15,7 +15,7 @@ const LEAST: usize = 50;
 const NARROWEST: f64 = 0.05;
 
 /// The lines of all videos under their legend.
-pub fn lines(videos: &[Video]) -> Vec<Node> {
+pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
     let longest = videos.iter().map(|video| video.ledger.duration_secs).fold(0.0, f64::max).max(1e-9);
     let most = (MOST / videos.len().max(1)).max(LEAST);
     let wide = node("label")
@@ -53,9 +53,9 @@ pub fn lines(videos: &[Video]) -> Vec<Node> {
 }
 
 /// Every stretch of a ledger, in order.
-fn stretches(video: &Video) -> Vec<Stretch> {
+fn stretches(video: &VideoSummary) -> Vec<TimelineSpan> {
     let ledger = &video.ledger;
-    let stretch = |start_secs: f64, end_secs: f64, class: String, word: &str, says: String| Stretch {
+    let stretch = |start_secs: f64, end_secs: f64, class: String, word: &str, says: String| TimelineSpan {
         start_secs,
         end_secs,
         class,
@@ -83,13 +83,13 @@ fn stretches(video: &Video) -> Vec<Stretch> {
         let says = video.notes.first().cloned().unwrap_or_default();
         stretch(failed.start_secs, failed.end_secs, class.to_owned(), word, says)
     });
-    let mut all: Vec<Stretch> = kept.chain(refused).chain(failed).collect();
+    let mut all: Vec<TimelineSpan> = kept.chain(refused).chain(failed).collect();
     all.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
     all
 }
 
 /// What the colours on the lines mean.
-fn legend(videos: &[Video]) -> Node {
+fn legend(videos: &[VideoSummary]) -> Node {
     let ledgers = || videos.iter().map(|video| &video.ledger);
     let found: BTreeSet<(usize, &str)> = ledgers()
         .flat_map(|ledger| &ledger.refused)

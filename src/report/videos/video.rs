@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// A video of the report.
 #[derive(Clone, Debug)]
-pub struct Video {
+pub struct VideoSummary {
     pub unit: Unit,
     /// The file's name, as the user knows it.
     pub file: String,
@@ -25,7 +25,7 @@ pub struct Video {
     folders: [(String, &'static str); 2],
 }
 
-impl Video {
+impl VideoSummary {
     /// Reads the verdict on `unit` from the folder `work`. What cannot be read is a note.
     pub fn read(work: &Path, unit: &Unit) -> Self {
         let file = unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned();

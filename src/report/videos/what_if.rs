@@ -47,7 +47,7 @@ impl Judged<'_> {
 
     /// Seconds kept at every value of every threshold, on all cores.
     pub fn table(&self, rules: &Segment) -> Kept {
-        let row = |threshold: &super::thresholds::Threshold| -> Vec<f64> {
+        let row = |threshold: &super::thresholds::ThresholdGrid| -> Vec<f64> {
             let (grid, _) = threshold.grid(rules);
             grid.into_par_iter().map(|value| self.kept_secs(&threshold.with(rules, value))).collect()
         };

@@ -3,10 +3,10 @@
 
 use crate::fixtures::figures::swinging;
 use ndarray::{Array3, s};
-use orator::animate::rig::constraints::Tally;
+use orator::animate::rig::constraints::ClampTally;
 use orator::animate::rig::limits::{CURL_COHERENCE, ELBOW, FINGERS, Limit, SUPINATION, WRIST};
 use orator::animate::solve::arm_pose::ArmPose;
-use orator::animate::{Constraints, Face, Options, Performance, Smoothing, Yaw, perform};
+use orator::animate::{AnimationOptions, Constraints, Face, Performance, Smoothing, Yaw, perform};
 use orator::formats::bvh::write::Clip;
 use orator::math::one_euro::OneEuro;
 use orator::math::rotation::Rotation;
@@ -17,8 +17,8 @@ use orator::types::time::FrameRate;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-const UNTOUCHED: Options =
-    Options { smoothing: Smoothing::None, constraints: Constraints::NONE, yaw: Yaw::Spine, fps: None };
+const UNTOUCHED: AnimationOptions =
+    AnimationOptions { smoothing: Smoothing::None, constraints: Constraints::NONE, yaw: Yaw::Spine, fps: None };
 
 fn random_rotation(random: &mut ChaCha8Rng) -> Rotation {
     let [z, x, y] = [180.0, 90.0, 180.0].map(|reach: f64| random.random_range(-reach..reach));
@@ -43,16 +43,16 @@ fn is_within(pose: &ArmPose) -> bool {
 fn random_rotations_come_out_within_the_limits_and_what_is_within_stays() {
     let figure = perform(&swinging(0, 4), None, &UNTOUCHED).figure;
     let mut random = ChaCha8Rng::seed_from_u64(3);
-    let mut tally = Tally::default();
+    let mut tally = ClampTally::default();
     for n in 0..2_000 {
         let mut frame: Vec<Rotation> = figure.skeleton.joints.iter().map(|_| random_rotation(&mut random)).collect();
         Constraints::default().apply(&figure, &mut frame, &mut tally);
         for arm in &figure.arms {
-            let pose = ArmPose::of(arm, &frame);
+            let pose = ArmPose::from_rotations(arm, &frame);
             assert!(is_within(&pose), "{n}: {pose:?}");
         }
         let mut again = frame.clone();
-        Constraints::default().apply(&figure, &mut again, &mut Tally::default());
+        Constraints::default().apply(&figure, &mut again, &mut ClampTally::default());
         for (joint, (a, b)) in frame.iter().zip(&again).enumerate() {
             assert!((a.inverse() * *b).angle() < 1e-6, "{n}: {} moves again", figure.skeleton.joints[joint].name);
         }
@@ -81,7 +81,7 @@ fn constraints_do_not_make_an_even_motion_jump() {
             let share = f64::from(step) / 4_000.0;
             let between = |joint: usize| ends[0][joint].slerp(ends[1][joint], share);
             let mut frame: Vec<Rotation> = (0..figure.skeleton.joints.len()).map(between).collect();
-            Constraints::default().apply(&figure, &mut frame, &mut Tally::default());
+            Constraints::default().apply(&figure, &mut frame, &mut ClampTally::default());
             for arm in &figure.arms {
                 for &joint in arm.fingers.iter().flatten().chain([&arm.fore, &arm.hand]) {
                     let turned = last.as_ref().map_or(0.0, |last| (last[joint].inverse() * frame[joint]).angle());
@@ -143,11 +143,15 @@ fn with_gaps(seed: u64, n_frames: usize) -> Motion {
 
 #[test]
 fn a_mirrored_motion_gives_the_mirrored_performance() {
-    let one_euro = Options { smoothing: Smoothing::OneEuro(OneEuro { rest_hz: 1.5, beta: 0.5 }), ..Options::default() };
-    let faster = Options { fps: Some(FrameRate::new(60, 1)), yaw: Yaw::Removed, ..Options::default() };
+    let one_euro = AnimationOptions {
+        smoothing: Smoothing::OneEuro(OneEuro { rest_hz: 1.5, beta: 0.5 }),
+        ..AnimationOptions::default()
+    };
+    let faster =
+        AnimationOptions { fps: Some(FrameRate::new(60, 1)), yaw: Yaw::Removed, ..AnimationOptions::default() };
     for seed in 0..6 {
         let motion = with_gaps(seed, 80);
-        for options in [Options::default(), UNTOUCHED, one_euro, faster] {
+        for options in [AnimationOptions::default(), UNTOUCHED, one_euro, faster] {
             let clips = [&motion, &mirrored(&motion)].map(|motion| perform(motion, None, &options).clip);
             let apart = asymmetry(&clips[0], &clips[1]);
             assert!(apart < 1e-9, "seed {seed}, {options:?}: {apart}");
@@ -166,7 +170,7 @@ fn untouched_joints_with_rigid_palms_come_back_and_performing_twice_is_performin
         let rigid = perform(&swinging(seed, 40), None, &UNTOUCHED).motion();
         let apart = apart_mm(&perform(&rigid, None, &UNTOUCHED).motion(), &rigid);
         assert!(apart < 0.1, "seed {seed}: {apart} mm");
-        let limited = Options { smoothing: Smoothing::None, ..Options::default() };
+        let limited = AnimationOptions { smoothing: Smoothing::None, ..AnimationOptions::default() };
         let once = perform(&rigid, None, &limited);
         assert!(once.told.clamps.iter().any(|kind| kind.joint_frames > 0));
         let twice = perform(&once.motion(), None, &limited);
@@ -178,7 +182,7 @@ fn untouched_joints_with_rigid_palms_come_back_and_performing_twice_is_performin
 #[test]
 fn smoothing_calms_and_bones_keep_their_length() {
     let motion = with_gaps(1, 150);
-    let Performance { told, clip, figure } = perform(&motion, None, &Options::default());
+    let Performance { told, clip, figure } = perform(&motion, None, &AnimationOptions::default());
     let fall = |jerk: orator::animate::performance::Jerk| jerk.after.unwrap() / jerk.before.unwrap();
     assert!(fall(told.arms) < 0.4 && fall(told.hands) < 0.5, "{told:?}");
     for frame in 0..clip.n_frames() {
@@ -190,15 +194,16 @@ fn smoothing_calms_and_bones_keep_their_length() {
             assert!(((0..3).map(square).sum::<f64>().sqrt() - length).abs() < 1e-9);
         }
     }
-    let as_it_is = perform(&motion, None, &Options { smoothing: Smoothing::None, ..Options::default() }).told;
+    let as_it_is =
+        perform(&motion, None, &AnimationOptions { smoothing: Smoothing::None, ..AnimationOptions::default() }).told;
     assert!(as_it_is.arms.after.unwrap() > 2.0 * told.arms.after.unwrap());
 }
 
 #[test]
 fn another_rate_passes_through_the_frames_without_corners() {
     let motion = swinging(2, 40);
-    let limited = Options { smoothing: Smoothing::None, ..Options::default() };
-    let at = |rate: u32| perform(&motion, None, &Options { fps: Some(FrameRate::new(rate, 1)), ..limited });
+    let limited = AnimationOptions { smoothing: Smoothing::None, ..AnimationOptions::default() };
+    let at = |rate: u32| perform(&motion, None, &AnimationOptions { fps: Some(FrameRate::new(rate, 1)), ..limited });
     let (given, fast) = (perform(&motion, None, &limited), at(60));
     assert_eq!((fast.clip.n_frames(), fast.clip.fps), (160, FrameRate::new(60, 1)));
     for frame in 0..40 {
@@ -232,7 +237,7 @@ fn removed_yaw_faces_ahead_and_keeps_the_shape() {
         (0..60).map(|t| line(t, 2).atan2(line(t, 0)).abs().to_degrees()).fold(0.0, f32::max)
     };
     let [kept, removed] =
-        [Yaw::Spine, Yaw::Removed].map(|yaw| perform(&motion, None, &Options { yaw, ..UNTOUCHED }).motion());
+        [Yaw::Spine, Yaw::Removed].map(|yaw| perform(&motion, None, &AnimationOptions { yaw, ..UNTOUCHED }).motion());
     assert!(yaw(&kept) > 30.0 && yaw(&removed) < 1e-2, "{} {}", yaw(&kept), yaw(&removed));
     for t in 0..60 {
         let length = |motion: &Motion| (0..3).map(|k| motion.joints[[t, L_HAND, k]].powi(2)).sum::<f32>().sqrt();
@@ -253,7 +258,7 @@ fn the_head_turns_with_the_face_and_rests_without() {
             body.slice_mut(s![t, k, ..]).assign(&ndarray::arr1(&place));
         }
     }
-    let performance = perform(&motion, Some(&Face { body }), &Options::default());
+    let performance = perform(&motion, Some(&Face { body }), &AnimationOptions::default());
     assert_eq!(performance.told.face_frames, Some(45));
     let (figure, clip) = (&performance.figure, &performance.clip);
     let ahead = |t: usize| figure.skeleton.world(&clip.local[t])[figure.head].turn([0.0, 0.0, 1.0]);

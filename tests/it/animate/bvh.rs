@@ -3,8 +3,8 @@
 
 use crate::fixtures::figures::{FPS, swinging};
 use ndarray::{Array3, s};
-use orator::animate::rig::rig::Figure;
-use orator::animate::{Constraints, Options, Performance, Smoothing, perform};
+use orator::animate::rig::rig::Rig;
+use orator::animate::{AnimationOptions, Constraints, Performance, Smoothing, perform};
 use orator::formats::authors_txt;
 use orator::formats::bvh::write::Clip;
 use orator::math::rotation::Rotation;
@@ -14,7 +14,7 @@ use orator::types::skeleton::{L_HAND, N_JOINTS, R_HAND};
 use std::path::Path;
 
 fn performed(motion: &Motion) -> Performance {
-    perform(motion, None, &Options::default())
+    perform(motion, None, &AnimationOptions::default())
 }
 
 fn text(motion: &Motion) -> String {
@@ -173,7 +173,7 @@ fn the_bvh_gives_back_the_joints_within_a_tenth_of_a_millimetre() {
 
 #[test]
 fn a_t_pose_is_the_rest_pose_facing_plus_z() {
-    let figure = Figure::of(&swinging(0, 8));
+    let figure = Rig::from_motion(&swinging(0, 8));
     let local = vec![Rotation::IDENTITY; figure.skeleton.joints.len()];
     let places = figure.skeleton.positions(figure.root, &local);
     let neck = places[figure.places[skeleton::NECK]];
@@ -249,10 +249,11 @@ fn the_released_clips_keep_their_gesture() {
         return;
     }
     let motion = authors_txt::read(&folder.join("gt_interval_102571.txt"), FPS).unwrap();
-    let untouched = Options { smoothing: Smoothing::None, constraints: Constraints::NONE, ..Options::default() };
+    let untouched =
+        AnimationOptions { smoothing: Smoothing::None, constraints: Constraints::NONE, ..AnimationOptions::default() };
     let clip = perform(&motion, None, &untouched).clip;
     // The clip's bones vary by some percent of their length: the file keeps directions and gives each one length.
-    let figure = Figure::of(&motion);
+    let figure = Rig::from_motion(&motion);
     let mut apart = Vec::new();
     for frame in 0..motion.n_frames() {
         let places = clip.positions(frame);

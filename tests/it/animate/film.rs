@@ -5,7 +5,7 @@ use crate::fixtures::sync_clips::{Kind, PLAIN, chirp, chirp_begins, make};
 use ndarray::s;
 use orator::animate::draw::figure::{LEFT, PAPER, RIGHT};
 use orator::animate::export::film;
-use orator::animate::export::film::{Beside, Film, SIZE};
+use orator::animate::export::film::{Film, SIZE, SecondPanel};
 use orator::external::ffmpeg::frames::FrameReader;
 use orator::external::ffmpeg::{audio, probe};
 use orator::formats::npy;
@@ -34,7 +34,7 @@ fn middle(image: &Image, columns: std::ops::Range<usize>, hue: [u8; 3]) -> f64 {
 #[test]
 fn the_speakers_left_is_at_the_right_of_the_front_view_and_nothing_is_cut() {
     let motion = swinging(4, 20);
-    let film = Film::new(&motion, None, Beside::Itself);
+    let film = Film::new(&motion, None, SecondPanel::Itself);
     for frame in [0, 7, 19] {
         let image = film.frame(frame).unwrap();
         assert_eq!([image.width, image.height], SIZE);
@@ -52,7 +52,7 @@ fn missing_joints_and_wild_ones_are_left_out() {
     motion.joints.slice_mut(s![1, .., ..]).fill(f32::NAN);
     motion.joints.slice_mut(s![2, 3, ..]).fill(1e30);
     motion.joints.slice_mut(s![3, .., ..]).fill(0.0);
-    let film = Film::new(&motion, Some(&Sound { rate: 16_000, samples: vec![] }), Beside::Itself);
+    let film = Film::new(&motion, Some(&Sound { rate: 16_000, samples: vec![] }), SecondPanel::Itself);
     let blank = film.frame(1).unwrap();
     for frame in 0..4 {
         assert!(frame == 1 || film.frame(frame).unwrap() != blank);
@@ -65,7 +65,7 @@ fn the_mp4_has_every_frame_and_the_sound() {
     let path = folder.path().join("talk.mp4");
     let motion = swinging(6, 15);
     let samples = (0..16_000).map(|n| (n as f32 * 0.17).sin() * (n as f32 / 16_000.0)).collect();
-    film::write(&path, &motion, Some(&Sound { rate: 16_000, samples }), Beside::Itself, &Silent).unwrap();
+    film::write(&path, &motion, Some(&Sound { rate: 16_000, samples }), SecondPanel::Itself, &Silent).unwrap();
     let info = probe::probe(&path).unwrap();
     let secs = info.duration_secs.unwrap();
     assert!((secs - 15.0 / FPS.per_sec()).abs() < 0.1, "{secs} s");
@@ -106,7 +106,7 @@ fn a_click_at_a_second_stands_at_the_picture_of_that_second() {
     let rate = 16_000;
     let sample = |n: usize| (1..4).map(|k| chirp(n as f64 / f64::from(rate) - f64::from(k))).sum::<f64>() as f32;
     let sound = Sound { rate, samples: (0..4 * rate as usize).map(sample).collect() };
-    film::write(&path, &motion, Some(&sound), Beside::Itself, &Silent).unwrap();
+    film::write(&path, &motion, Some(&sound), SecondPanel::Itself, &Silent).unwrap();
 
     let streams = streams(&path);
     let of = |kind: &str| streams.iter().find(|stream| stream.0 == kind).unwrap_or_else(|| panic!("no {kind}"));
@@ -145,7 +145,7 @@ fn the_video_beside_the_figure_is_in_step() {
     let Some(clip) = make(folder.path(), &Kind { secs: 6.0, ..PLAIN }) else { return };
     let path = folder.path().join("beside.mp4");
     let motion = swinging(6, 30);
-    let beside = Beside::Video { path: &clip.path, from_secs: 2.0 };
+    let beside = SecondPanel::Video { path: &clip.path, from_secs: 2.0 };
     film::write(&path, &motion, None, beside, &Silent).unwrap();
     // A picture of the clip fills the left half: 64 x 48 px become 600 x 450.
     let read = |image: &Image| {
@@ -159,7 +159,7 @@ fn the_video_beside_the_figure_is_in_step() {
     for (n, frame) in film.enumerate() {
         assert_eq!(read(&frame.unwrap().image), 60 + 2 * n, "frame {n}");
     }
-    let late = Beside::Video { path: &clip.path, from_secs: 60.0 };
+    let late = SecondPanel::Video { path: &clip.path, from_secs: 60.0 };
     let error = format!("{:#}", film::write(&path, &motion, None, late, &Silent).unwrap_err());
     assert!(error.contains("lasts 6.0 s"), "{error}");
 }
@@ -168,7 +168,7 @@ fn the_video_beside_the_figure_is_in_step() {
 fn another_motion_is_drawn_beside_in_the_same_size_until_it_ends() {
     let (motion, mut other) = (swinging(6, 30), swinging(7, 20));
     other.fps = orator::types::time::FrameRate::new(30, 1);
-    let film = Film::new(&motion, None, Beside::Motion { motion: &other, labels: ["truth", "prediction"] });
+    let film = Film::new(&motion, None, SecondPanel::Motion { motion: &other, labels: ["truth", "prediction"] });
     let half = |image: &Image, from: usize| {
         let coloured = |x, y| {
             let [r, _, b] = image.pixel(x, y).map(i32::from);

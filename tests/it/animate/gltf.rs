@@ -2,9 +2,9 @@
 //! gives the mesh back, and the mesh is a whole skin. The Khronos validator finds nothing (`make validator`).
 
 use crate::fixtures::figures::{FPS, swinging};
-use orator::animate::export::file::{Format, Sources};
+use orator::animate::export::file::{ExportContent, ExportFormat};
 use orator::animate::rig::names::Names;
-use orator::animate::{Options, Performance, perform};
+use orator::animate::{AnimationOptions, Performance, perform};
 use orator::math::rotation::Rotation;
 use orator::math::vec3::{Vec3, add, norm, scale, sub};
 use orator::stage::progress::Silent;
@@ -127,9 +127,11 @@ fn vec3(value: &Value) -> Vec3 {
 
 /// A made-up motion performed and written under `names`.
 pub fn written(folder: &Path, n_frames: usize, names: Names) -> (Performance, PathBuf) {
-    let performance = perform(&swinging(3, n_frames), None, &Options::default());
+    let performance = perform(&swinging(3, n_frames), None, &AnimationOptions::default());
     let path = folder.join(format!("{}.glb", names.label()));
-    Format::Glb.write(&path, &performance, &Sources { names, ..Sources::default() }, &Silent).unwrap();
+    ExportFormat::Glb
+        .write(&path, &performance, &ExportContent { names, ..ExportContent::default() }, &Silent)
+        .unwrap();
     (performance, path)
 }
 
@@ -245,13 +247,13 @@ fn the_khronos_validator_finds_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let mut files: Vec<PathBuf> = Names::ALL.map(|names| written(folder.path(), 12, names).1).to_vec();
     // One frame; a speaker of whom nothing is seen.
-    let one = perform(&swinging(5, 1), None, &Options::default());
+    let one = perform(&swinging(5, 1), None, &AnimationOptions::default());
     let mut unseen = swinging(5, 4);
     unseen.joints.fill(f32::NAN);
-    let unseen = perform(&unseen, None, &Options::default());
+    let unseen = perform(&unseen, None, &AnimationOptions::default());
     for (name, performance) in [("one.glb", &one), ("unseen.glb", &unseen)] {
         files.push(folder.path().join(name));
-        Format::Glb.write(&files[files.len() - 1], performance, &Sources::default(), &Silent).unwrap();
+        ExportFormat::Glb.write(&files[files.len() - 1], performance, &ExportContent::default(), &Silent).unwrap();
     }
     let output = Command::new("node").args(["-e", VALIDATE]).arg(&module).args(&files).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

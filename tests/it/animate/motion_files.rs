@@ -2,9 +2,9 @@
 
 use super::bvh::Bvh;
 use crate::fixtures::figures::{FPS, swinging};
-use orator::animate::export::file::{Format, Sources};
+use orator::animate::export::file::{ExportContent, ExportFormat};
 use orator::animate::rig::names::Names;
-use orator::animate::{Options, Performance, perform};
+use orator::animate::{AnimationOptions, Performance, perform};
 use orator::formats::{authors_txt, npy};
 use orator::math::rotation::Rotation;
 use orator::math::vec3::{Vec3, add, norm, sub};
@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 
 fn write(folder: &Path, performance: &Performance, file: &str, names: Names) -> PathBuf {
     let path = folder.join(file);
-    let sources = Sources { names, ..Sources::default() };
-    Format::of(&path).unwrap().write(&path, performance, &sources, &Silent).unwrap();
+    let sources = ExportContent { names, ..ExportContent::default() };
+    ExportFormat::from_path(&path).unwrap().write(&path, performance, &sources, &Silent).unwrap();
     path
 }
 
@@ -26,7 +26,7 @@ fn vec3(value: &Value) -> Vec3 {
 #[test]
 fn json_tells_joints_and_rotations_that_belong_together() {
     let folder = tempfile::tempdir().unwrap();
-    let performance = perform(&swinging(2, 15), None, &Options::default());
+    let performance = perform(&swinging(2, 15), None, &AnimationOptions::default());
     let expected = performance.motion();
     let path = write(folder.path(), &performance, "motion.json", Names::Own);
     let file: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
@@ -69,7 +69,7 @@ fn json_tells_joints_and_rotations_that_belong_together() {
 #[test]
 fn files_of_joints_hold_the_joints_of_the_performance() {
     let folder = tempfile::tempdir().unwrap();
-    let performance = perform(&swinging(2, 12), None, &Options::default());
+    let performance = perform(&swinging(2, 12), None, &AnimationOptions::default());
     let expected = performance.motion();
     let read = [
         npy::read(&write(folder.path(), &performance, "motion.npy", Names::Own), FPS).unwrap(),
@@ -84,7 +84,7 @@ fn files_of_joints_hold_the_joints_of_the_performance() {
 #[test]
 fn a_preset_changes_the_names_of_a_bvh_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
-    let performance = perform(&swinging(2, 5), None, &Options::default());
+    let performance = perform(&swinging(2, 5), None, &AnimationOptions::default());
     let text = |names: Names| {
         let path = write(folder.path(), &performance, &format!("{}.bvh", names.label()), names);
         std::fs::read_to_string(path).unwrap()

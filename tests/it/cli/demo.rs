@@ -1,7 +1,7 @@
 //! The synthetic speaker: what was drawn is what is read back, and a run finds it where it is.
 
 use crate::fixtures::support::{Project, speaker_clip};
-use orator::demo::drawn::truth::Truth;
+use orator::demo::drawn::truth::DrawnTruth;
 use orator::external::ffmpeg::audio;
 use orator::external::ffmpeg::frames::FrameReader;
 use orator::types::time::FrameRate;
@@ -10,7 +10,7 @@ use orator::types::time::FrameRate;
 fn the_clip_has_its_pictures_its_sound_and_its_truth() {
     let dir = tempfile::tempdir().unwrap();
     let video = speaker_clip(dir.path(), 3.0, 5);
-    let truth = Truth::read(&dir.path().join("truth/clip-1.npz")).unwrap();
+    let truth = DrawnTruth::read(&dir.path().join("truth/clip-1.npz")).unwrap();
     let n_frames = FrameReader::open(&video, FrameRate::new(15, 1)).unwrap().map(Result::unwrap).count();
     assert_eq!((n_frames, truth.motion.n_frames()), (45, 45));
     let sound = audio::read_mono(&video, 16_000).unwrap().expect("a sound track");

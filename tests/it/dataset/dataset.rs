@@ -73,11 +73,11 @@ fn folder_bytes(dir: &Path) -> Vec<(String, Vec<u8>)> {
 
 #[test]
 fn shards_are_plain_ustar_of_bounded_size_and_the_same_twice() {
-    use orator::dataset::write::tar::Writer;
+    use orator::dataset::write::tar::ShardWriter;
     let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let samples: Vec<_> = (0..5).map(|n| random_sample(&format!("talk-0a1b2c3d-{n:06}"), 64, n)).collect();
     for dir in [&one, &two] {
-        let mut writer = Writer::new(dir.path(), "talk-0a1b2c3d", Split::Train, 512 << 10);
+        let mut writer = ShardWriter::new(dir.path(), "talk-0a1b2c3d", Split::Train, 512 << 10);
         samples.iter().for_each(|sample| writer.push(sample).unwrap());
         let (shards, refs) = writer.finish().unwrap();
         assert_eq!((shards.len(), refs.len()), (3, 5));

@@ -1,8 +1,8 @@
 //! `orator import`: datasets from captured motion and from other datasets, and what becomes of what cannot come in.
 
 use crate::fixtures::support::{files_under, shared};
-use orator::dataset::import::plan::Plan;
-use orator::dataset::import::take::Limits;
+use orator::dataset::import::plan::ImportPlan;
+use orator::dataset::import::take::TakeLimits;
 use orator::dataset::import::{Imported, import, shards};
 use orator::dataset::info::About;
 use orator::dataset::verify::verify::{accounts, verify};
@@ -49,12 +49,12 @@ fn write(path: PathBuf, text: &str) {
     fs::write(path, text).unwrap();
 }
 
-fn plan(sources: &[&Path]) -> Plan {
-    Plan {
+fn plan(sources: &[&Path]) -> ImportPlan {
+    ImportPlan {
         sources: sources.iter().map(|path| path.to_path_buf()).collect(),
         kind: None,
         about: About::new("host", FPS),
-        limits: Limits { fps: FPS, min_frames: 64, max_apart_secs: 0.5 },
+        limits: TakeLimits { fps: FPS, min_frames: 64, max_apart_secs: 0.5 },
         shard: orator::config::Shard { validation: 0.0, test: 0.0, ..Default::default() },
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::fixtures::support::shared;
 use orator::config;
-use orator::evaluate::lifter::bodies::{Lifters, Row, table, text};
+use orator::evaluate::lifter::bodies::{BodyRow, Lifters, table, text};
 use orator::mocap::upper_body;
 use orator::mocap::upper_body::{Set, Take};
 use orator::train::scene::body_motion::gesture;
@@ -19,7 +19,7 @@ fn by_rule() -> Set {
     ("by rule".to_owned(), (900..908).map(take).collect())
 }
 
-fn mpjpe(rows: &[Row], method: &str, input: &str) -> f64 {
+fn mpjpe(rows: &[BodyRow], method: &str, input: &str) -> f64 {
     rows.iter().find(|row| row.method == method && row.input == input).unwrap().errors.mpjpe
 }
 

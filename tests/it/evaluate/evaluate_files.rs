@@ -4,7 +4,7 @@
 use crate::fixtures::support::{Answer, Project, shared};
 use ndarray::{Array3, s};
 use ndarray_npy::WriteNpyExt as _;
-use orator::demo::rule::dataset::{Clip, RULE};
+use orator::demo::rule::dataset::{RULE, SpokenClip};
 use orator::external::ffmpeg::audio;
 use orator::formats::{authors_txt, joints_npz};
 use orator::types::pose3d::Motion;
@@ -15,8 +15,8 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
 /// Clip `number` of the synthetic speaker.
-pub fn spoken(number: usize, secs: usize) -> Clip {
-    Clip { rule: RULE, seed: 3, split: Split::Test, number, n_frames: 15 * secs }
+pub fn spoken(number: usize, secs: usize) -> SpokenClip {
+    SpokenClip { rule: RULE, seed: 3, split: Split::Test, number, n_frames: 15 * secs }
 }
 
 pub fn write_npy(path: &Path, joints: &Array3<f32>) {

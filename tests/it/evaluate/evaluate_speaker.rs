@@ -6,8 +6,8 @@ use crate::fixtures::support::Project;
 use crate::train::gan::{dataset, sample};
 use ndarray::s;
 use orator::dataset::{Dataset, Split, write_dataset};
-use orator::evaluate::baseline::baselines::Made;
-use orator::evaluate::clips::clips::{Clip, Clips};
+use orator::evaluate::baseline::baselines::ClipMotion;
+use orator::evaluate::clips::clips::{EvalClip, EvalClips};
 use orator::evaluate::clips::held_out;
 use orator::evaluate::clips::of_speaker::copied;
 use orator::evaluate::clips::sound_features::of_samples;
@@ -100,13 +100,19 @@ fn the_neighbour_by_sound_is_found_where_it_was_taken_from() {
     let dataset = Dataset::open(folder.path()).unwrap();
     let normal = normalisation(&dataset).unwrap();
     let real = held_out::read(&dataset, &held_out::samples(&dataset, Split::Validation).unwrap(), &normal).unwrap();
-    let held_out::HeldOut { key, real, sound } = real.into_iter().next().unwrap();
+    let held_out::HeldOutInterval { key, real, sound } = real.into_iter().next().unwrap();
     let heard = Some(of_samples(&sound.samples, fps, real.n_frames()));
-    let clip =
-        Clip { name: key, made: real.joints.clone(), real: real.joints.clone(), mask: real.mask, heard, voice: None };
-    let clips = Clips { fps, clips: vec![clip], notes: Vec::new(), learnt: false };
+    let clip = EvalClip {
+        name: key,
+        made: real.joints.clone(),
+        real: real.joints.clone(),
+        mask: real.mask,
+        heard,
+        voice: None,
+    };
+    let clips = EvalClips { fps, clips: vec![clip], notes: Vec::new(), learnt: false };
     let found = copied(&dataset, &normal, &clips, Split::Validation).unwrap().unwrap();
-    let Made::Moves(found) = &found[0] else { panic!("it stands still") };
+    let ClipMotion::Moves(found) = &found[0] else { panic!("it stands still") };
     let apart = found.iter().zip(&real.joints).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
     assert!(apart < found.len() / 20, "{apart} of {} numbers are others", found.len());
 }

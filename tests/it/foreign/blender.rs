@@ -5,7 +5,7 @@ use crate::animate::bvh::{Bvh, worst_mm};
 use crate::animate::gltf::{Glb, written};
 use crate::fixtures::figures::{FPS, swinging};
 use orator::animate::rig::names::Names;
-use orator::animate::{Options, perform};
+use orator::animate::{AnimationOptions, perform};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -41,7 +41,7 @@ fn blender_sees_the_joints_of_the_motion() {
     let Some(python) = blender("blender_sees_the_joints_of_the_motion") else { return };
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("swinging.bvh");
-    let performance = perform(&swinging(1, 20), None, &Options::default());
+    let performance = perform(&swinging(1, 20), None, &AnimationOptions::default());
     let (motion, text) = (performance.motion(), performance.clip.to_bvh());
     std::fs::write(&file, &text).unwrap();
     let seen = seen(python, &file);

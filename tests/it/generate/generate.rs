@@ -8,7 +8,7 @@ use crate::train::networks::value;
 use candle_core::{Device, Tensor};
 use ndarray::{Axis, s};
 use orator::animate::rig::rig::bone_metres;
-use orator::animate::{Options, perform};
+use orator::animate::{AnimationOptions, perform};
 use orator::audio::mel;
 use orator::external::ffmpeg::{audio, probe};
 use orator::formats::checkpoint;
@@ -66,7 +66,7 @@ fn one_sound_becomes_every_kind_of_file() {
     let motion = npy::read(&made.join("a.npy"), FPS).unwrap();
     assert_eq!(authors_txt::read(&made.join("a.txt"), FPS).unwrap(), motion);
     let bvh = Bvh::parse(&std::fs::read_to_string(made.join("a.bvh")).unwrap());
-    let performed = perform(&motion, None, &Options::default()).motion();
+    let performed = perform(&motion, None, &AnimationOptions::default()).motion();
     let worst = worst_mm(&performed, &bvh, |frame| bvh.places(frame));
     assert!(worst < 0.1, "{worst} mm");
     let film = probe::probe(&made.join("a.mp4")).unwrap();

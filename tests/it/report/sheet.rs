@@ -9,7 +9,7 @@ use orator::formats::keypoints_npz;
 use orator::formats::keypoints_npz::Extras;
 use orator::formats::{joints_npz, npy};
 use orator::pipeline::lift::quality;
-use orator::report::sheet::sheet::Clip;
+use orator::report::sheet::sheet::SheetClip;
 use orator::stage::progress::Silent;
 use orator::types::image::Image;
 use orator::types::pose2d::Keypoints;
@@ -41,7 +41,7 @@ fn keypoints(motion: &Motion) -> Keypoints {
 }
 
 fn pages(video: &Path, keypoints: &Keypoints, motion: &Motion, every_secs: f64) -> anyhow::Result<Vec<Image>> {
-    let clip = Clip { title: "a clip", video, keypoints, motion, figure: None };
+    let clip = SheetClip { title: "a clip", video, keypoints, motion, figure: None };
     let mut pages = Vec::new();
     clip.pages(every_secs, &Silent, |number, n_pages, page| {
         assert!(number == pages.len() && number < n_pages);

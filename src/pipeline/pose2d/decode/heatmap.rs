@@ -4,7 +4,7 @@
 
 use super::point::{LARGEST, Point, finite, peak};
 use crate::external::onnx::Refine;
-use crate::external::opencv::blur::Gaussian;
+use crate::external::opencv::blur::GaussianBlur;
 use anyhow::{Result, ensure};
 
 /// A Newton step further than this many cells is not believed.
@@ -16,7 +16,7 @@ pub fn decode(
     maps: &[f32],
     input_size: [usize; 2],
     refine: Refine,
-    gaussian: &Gaussian,
+    gaussian: &GaussianBlur,
 ) -> Result<Vec<Point>> {
     let &[1, _, rows @ 1..=LARGEST, columns @ 1..=LARGEST] = shape else {
         anyhow::bail!("heat-maps must have the shape [1, K, rows, columns], not {shape:?}")
@@ -57,7 +57,7 @@ fn quarter(map: &[f32], columns: usize, x: usize, y: usize) -> [f64; 2] {
 }
 
 /// The Newton step from the peak's cell; none at the edge, or where it is not believed.
-fn dark(map: &[f32], columns: usize, x: usize, y: usize, gaussian: &Gaussian) -> [f64; 2] {
+fn dark(map: &[f32], columns: usize, x: usize, y: usize, gaussian: &GaussianBlur) -> [f64; 2] {
     let rows = map.len() / columns;
     if x < 2 || y < 2 || x + 2 >= columns || y + 2 >= rows {
         return [0.0; 2];
@@ -92,7 +92,7 @@ mod tests {
     fn dark_finds_a_known_peak_between_the_cells() {
         for place in [[20.3, 30.8], [10.0, 12.5], [5.49, 40.1]] {
             let map = bell(48, 64, place);
-            let points = decode(&[1, 1, 64, 48], &map, [256, 192], Refine::Dark, &Gaussian::new(3)).unwrap();
+            let points = decode(&[1, 1, 64, 48], &map, [256, 192], Refine::Dark, &GaussianBlur::new(3)).unwrap();
             let [x, y, score] = points[0];
             assert!((x / 4.0 - place[0]).abs() <= 0.05 && (y / 4.0 - place[1]).abs() <= 0.05, "{place:?} {x} {y}");
             assert!(score > 0.8 && score <= 0.9);
@@ -102,7 +102,8 @@ mod tests {
     #[test]
     fn other_refinements_and_edges() {
         let map = bell(48, 64, [20.3, 30.8]);
-        let found = |map: &[f32], refine| decode(&[1, 1, 64, 48], map, [64, 48], refine, &Gaussian::new(3)).unwrap()[0];
+        let found =
+            |map: &[f32], refine| decode(&[1, 1, 64, 48], map, [64, 48], refine, &GaussianBlur::new(3)).unwrap()[0];
         assert_eq!(found(&map, Refine::None)[..2], [20.0, 31.0]);
         assert_eq!(found(&map, Refine::Quarter)[..2], [20.25, 30.75]);
         assert_eq!(found(&bell(48, 64, [0.2, 63.0]), Refine::Dark)[..2], [0.0, 63.0]);
@@ -110,7 +111,7 @@ mod tests {
         let mut holed = map.clone();
         holed[30 * 48 + 21] = f32::NAN;
         assert!(found(&holed, Refine::Dark).iter().all(|number| number.is_finite()));
-        assert!(decode(&[1, 1, 64], &map, [64, 48], Refine::Dark, &Gaussian::new(3)).is_err());
-        assert!(decode(&[1, 1, 60, 48], &map[1..], [64, 48], Refine::Dark, &Gaussian::new(3)).is_err());
+        assert!(decode(&[1, 1, 64], &map, [64, 48], Refine::Dark, &GaussianBlur::new(3)).is_err());
+        assert!(decode(&[1, 1, 60, 48], &map[1..], [64, 48], Refine::Dark, &GaussianBlur::new(3)).is_err());
     }
 }

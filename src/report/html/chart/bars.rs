@@ -4,7 +4,7 @@ use crate::report::html::node::{Node, node};
 use crate::report::html::numbers::{length, percent};
 
 /// A part.
-pub struct Bar {
+pub struct StackedBar {
     pub name: String,
     /// What colours it.
     pub class: String,
@@ -14,9 +14,9 @@ pub struct Bar {
 }
 
 /// A row a part, in the order given; `whole_secs` is what the shares are of.
-pub fn bars(caption: &str, parts: &[Bar], whole_secs: f64) -> Node {
+pub fn bars(caption: &str, parts: &[StackedBar], whole_secs: f64) -> Node {
     let longest = parts.iter().map(|part| part.secs).fold(0.0, f64::max).max(1e-9);
-    let row = |part: &Bar| {
+    let row = |part: &StackedBar| {
         let bar = node("div")
             .class(format!("bar {}", part.class))
             .attr("style", format!("width:{:.2}%", 100.0 * part.secs / longest));

@@ -5,7 +5,7 @@ use crate::report::html::node::{Node, node};
 
 /// A dot.
 #[derive(Clone, Debug)]
-pub struct Dot {
+pub struct ChartDot {
     pub at: [f64; 2],
     /// 0..1; NaN: not known.
     pub share: f64,
@@ -16,13 +16,13 @@ pub struct Dot {
 
 /// Words on the drawing.
 #[derive(Clone, Debug)]
-pub struct Label {
+pub struct AxisLabel {
     pub at: [f64; 2],
     pub text: String,
 }
 
 /// The drawing of `size` units.
-pub fn dots(label: &str, size: [f64; 2], edges: &[[[f64; 2]; 2]], dots: &[Dot], labels: &[Label]) -> Node {
+pub fn dots(label: &str, size: [f64; 2], edges: &[[[f64; 2]; 2]], dots: &[ChartDot], labels: &[AxisLabel]) -> Node {
     let mut svg = drawing(size[0], size[1], label).class("dots");
     for [from, to] in edges {
         svg = svg.child(line("edge", *from, *to));
@@ -50,8 +50,8 @@ mod tests {
 
     #[test]
     fn a_dot_has_its_share_and_its_words() {
-        let dot = |share| Dot { at: [3.0, 4.0], share, radius: 2.0, says: "R<Wrist>: 40 %".to_owned() };
-        let label = Label { at: [1.0, 1.0], text: "hand".to_owned() };
+        let dot = |share| ChartDot { at: [3.0, 4.0], share, radius: 2.0, says: "R<Wrist>: 40 %".to_owned() };
+        let label = AxisLabel { at: [1.0, 1.0], text: "hand".to_owned() };
         let drawn =
             dots("a", [9.0, 9.0], &[[[0.0, 0.0], [3.0, 4.0]]], &[dot(0.4), dot(f64::NAN)], &[label]).to_string();
         assert!(drawn.contains("--share:40%") && drawn.contains("<title>R&lt;Wrist&gt;: 40 %</title>"), "{drawn}");

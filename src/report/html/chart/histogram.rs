@@ -58,7 +58,7 @@ impl Counts {
 
 /// A threshold on a drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Threshold {
+pub struct ThresholdLine {
     pub value: f64,
     /// Values below it do not pass; otherwise those above.
     pub is_least: bool,
@@ -72,7 +72,7 @@ const LEFT: f64 = 8.0;
 const RIGHT: f64 = 332.0;
 
 /// The drawing. Heights go with the square root of the share, so that rare values are seen beside frequent ones.
-pub fn histogram(label: &str, counts: &Counts, unit: &str, threshold: Option<Threshold>) -> Node {
+pub fn histogram(label: &str, counts: &Counts, unit: &str, threshold: Option<ThresholdLine>) -> Node {
     let x = Scale { low: counts.low, high: counts.high, from: LEFT, to: RIGHT };
     let most = counts.bins.iter().copied().max().unwrap_or(0).max(1) as f64;
     let mut svg = drawing(WIDTH, HEIGHT, label);
@@ -98,7 +98,7 @@ pub fn histogram(label: &str, counts: &Counts, unit: &str, threshold: Option<Thr
         svg = svg.child(line("axis", [at, FLOOR], [at, FLOOR + 4.0]));
         svg = svg.child(words("tick", [at, FLOOR + 17.0], anchor, &number(tick)));
     }
-    if let Some(Threshold { value, is_least }) = threshold {
+    if let Some(ThresholdLine { value, is_least }) = threshold {
         let at = x.at(value);
         let anchor = if at > (LEFT + RIGHT) / 2.0 { "end" } else { "start" };
         let says = format!("at {} {}", if is_least { "least" } else { "most" }, with_unit(value, unit));
@@ -120,7 +120,7 @@ mod tests {
         assert_eq!((counts.total(), counts.unknown, counts.bins[0], counts.bins[9]), (102, 1, 11, 11));
         assert!((counts.quantile(0.5) - 0.45).abs() < 0.11 && counts.quantile(1.0) > 0.9);
         assert!(Counts::new(0.0, 1.0, 4).quantile(0.5).is_nan());
-        let drawn = histogram("", &counts, "s", Some(Threshold { value: 0.3, is_least: true })).to_string();
+        let drawn = histogram("", &counts, "s", Some(ThresholdLine { value: 0.3, is_least: true })).to_string();
         assert_eq!((drawn.matches("\"bin\"").count(), drawn.matches("\"bin fails\"").count()), (7, 3));
         assert!(drawn.contains("at least 0.3 s"));
     }

@@ -13,20 +13,20 @@ const RIGHT: f64 = 350.0;
 
 /// What a chart shows.
 #[derive(Clone, Debug, Default)]
-pub struct Chart {
+pub struct LineChart {
     pub title: String,
     /// What it means, in a sentence.
     pub says: String,
-    pub lines: Vec<Line>,
+    pub lines: Vec<ChartLine>,
     /// Levels across the whole width.
-    pub levels: Vec<Level>,
+    pub levels: Vec<ChartLevel>,
     /// The step that is marked.
     pub marked: Option<f64>,
 }
 
 /// A line.
 #[derive(Clone, Debug)]
-pub struct Line {
+pub struct ChartLine {
     pub name: String,
     /// Which of the colours, from 0.
     pub colour: usize,
@@ -36,13 +36,13 @@ pub struct Line {
 
 /// A level.
 #[derive(Clone, Debug)]
-pub struct Level {
+pub struct ChartLevel {
     pub name: String,
     pub colour: usize,
     pub value: f64,
 }
 
-impl Chart {
+impl LineChart {
     /// Whether there is anything to show.
     pub fn is_empty(&self) -> bool {
         self.places().next().is_none()
@@ -133,18 +133,18 @@ mod tests {
     #[test]
     fn lines_levels_and_the_mark_are_drawn() {
         let places = vec![[0.0, 4.0], [50.0, f64::NAN], [100.0, 2.0]];
-        let chart = Chart {
+        let chart = LineChart {
             title: "A < b".to_owned(),
-            lines: vec![Line { name: "made".to_owned(), colour: 0, places }],
-            levels: vec![Level { name: "mean pose".to_owned(), colour: 1, value: 1.0 }],
+            lines: vec![ChartLine { name: "made".to_owned(), colour: 0, places }],
+            levels: vec![ChartLevel { name: "mean pose".to_owned(), colour: 1, value: 1.0 }],
             marked: Some(100.0),
-            ..Chart::default()
+            ..LineChart::default()
         };
         assert_eq!(chart.ranges(), [[0.0, 100.0], [0.0, 4.0]]);
         let drawn = chart.card().to_string();
         assert!(drawn.contains("d=\"M44 12 L350 86\""), "{drawn}");
         assert!(drawn.contains("y1=\"123\" x2=\"350\" y2=\"123\"") && drawn.contains("A &lt; b"), "{drawn}");
-        let empty = Chart::default();
+        let empty = LineChart::default();
         assert!(empty.is_empty() && empty.card().to_string().contains("<svg") && !chart.is_empty());
         assert_eq!(empty.ranges(), [[0.0, 1.0], [0.0, 1.0]]);
     }

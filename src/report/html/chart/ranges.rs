@@ -5,7 +5,7 @@ use crate::report::html::node::Node;
 use crate::report::html::numbers::number;
 
 /// One row.
-pub struct Range {
+pub struct ValueRange {
     pub name: String,
     pub class: &'static str,
     /// Lowest, 5 %, median, 95 %, highest; NaN: nothing was measured.
@@ -19,7 +19,7 @@ const LEFT: f64 = 104.0;
 const RIGHT: f64 = 332.0;
 
 /// The drawing, from `low` to `high`; `ends` says what lies there.
-pub fn ranges(label: &str, rows: &[Range], [low, high]: [f64; 2], ends: [&str; 2]) -> Node {
+pub fn ranges(label: &str, rows: &[ValueRange], [low, high]: [f64; 2], ends: [&str; 2]) -> Node {
     let x = Scale { low, high, from: LEFT, to: RIGHT };
     let floor = TOP + ROW * rows.len() as f64;
     let mut svg = drawing(WIDTH, floor + 34.0, label);
@@ -56,7 +56,7 @@ mod tests {
 
     #[test]
     fn a_row_without_a_measurement_says_so() {
-        let row = |marks| Range { name: "wrist".into(), class: "left", marks };
+        let row = |marks| ValueRange { name: "wrist".into(), class: "left", marks };
         let rows = [row([-0.5, -0.2, 0.0, 0.3, 0.6]), row([f64::NAN; 5])];
         let drawn = ranges("", &rows, [-1.0, 1.0], ["left", "right"]).to_string();
         assert_eq!(drawn.matches("class=\"box left\"").count(), 1);

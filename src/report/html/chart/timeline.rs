@@ -5,7 +5,7 @@ use crate::report::html::node::{Node, node};
 
 /// One stretch.
 #[derive(Clone, Debug)]
-pub struct Stretch {
+pub struct TimelineSpan {
     pub start_secs: f64,
     pub end_secs: f64,
     /// What colours it.
@@ -18,7 +18,7 @@ pub struct Stretch {
 
 /// The line of a video of `duration_secs`, which `label` names. Of more than `most` stretches the shortest are drawn
 /// together, which leaves twice as many at most.
-pub fn timeline(label: &str, duration_secs: f64, stretches: &[Stretch], most: usize) -> Node {
+pub fn timeline(label: &str, duration_secs: f64, stretches: &[TimelineSpan], most: usize) -> Node {
     let whole = duration_secs.max(1e-9);
     let share = |secs: f64| format!("{:.3}%", 100.0 * (secs / whole).clamp(0.0, 1.0));
     let list = node("ol").class("timeline").attr("tabindex", "0").attr("aria-label", label);
@@ -32,20 +32,20 @@ pub fn timeline(label: &str, duration_secs: f64, stretches: &[Stretch], most: us
 
 /// The stretches that are drawn: all of them, or, of more than `most`, slivers side by side as one, which looks like the
 /// longest of them and says how many it is.
-fn drawn(stretches: &[Stretch], whole: f64, most: usize) -> Vec<Stretch> {
+fn drawn(stretches: &[TimelineSpan], whole: f64, most: usize) -> Vec<TimelineSpan> {
     if stretches.len() <= most {
         return stretches.to_vec();
     }
-    let secs = |stretch: &Stretch| stretch.end_secs - stretch.start_secs;
-    let narrow = |stretch: &Stretch| secs(stretch) * (most as f64) < whole;
+    let secs = |stretch: &TimelineSpan| stretch.end_secs - stretch.start_secs;
+    let narrow = |stretch: &TimelineSpan| secs(stretch) * (most as f64) < whole;
     // Each with the number of slivers in it, and the seconds of the longest.
-    let mut drawn: Vec<(Stretch, usize, f64)> = Vec::new();
+    let mut drawn: Vec<(TimelineSpan, usize, f64)> = Vec::new();
     for stretch in stretches {
         match drawn.last_mut() {
             Some((run, n, longest)) if *n > 0 && narrow(stretch) && narrow(run) => {
                 if secs(stretch) > *longest {
                     *longest = secs(stretch);
-                    *run = Stretch { start_secs: run.start_secs, ..stretch.clone() };
+                    *run = TimelineSpan { start_secs: run.start_secs, ..stretch.clone() };
                 }
                 run.end_secs = stretch.end_secs;
                 *n += 1;
@@ -55,7 +55,7 @@ fn drawn(stretches: &[Stretch], whole: f64, most: usize) -> Vec<Stretch> {
     }
     let told = drawn.into_iter().map(|(stretch, n, _)| match n {
         0 | 1 => stretch,
-        n => Stretch { says: format!("{n} short stretches, the longest: {}", stretch.says), ..stretch },
+        n => TimelineSpan { says: format!("{n} short stretches, the longest: {}", stretch.says), ..stretch },
     });
     told.collect()
 }
@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn a_line_has_every_stretch_and_very_many_are_drawn_together() {
         let of = |n: usize| {
-            let one = |i: usize| Stretch {
+            let one = |i: usize| TimelineSpan {
                 start_secs: i as f64,
                 end_secs: (i + 1) as f64,
                 class: format!("c{}", i % 2),
