@@ -21,8 +21,10 @@ impl ConfigArgs {
         self.set.iter().fold(file, |flags, set| format!("{flags} --set {set}"))
     }
 
-    /// Reads it, with every problem at once.
+    /// Reads it, with every problem at once; a key under a former name is noted on standard error.
     pub fn load(&self) -> anyhow::Result<orator::config::Config> {
-        orator::config::load(&self.config, &self.set)
+        let config = orator::config::load(&self.config, &self.set)?;
+        config.notes.iter().for_each(|note| eprintln!("note    {note}"));
+        Ok(config)
     }
 }

@@ -222,9 +222,8 @@ fn draw_sheet(dir: &Path, out: &Path, generated: Option<&Path>, ui: &Ui) -> Resu
     let Some(unit) = units.iter().flat_map(|videos| &videos.units).next() else {
         bail!("{} names no video", dir.join("pipeline.toml").display());
     };
-    let stage = |name: &str| config.settings.work.dir.join(name).join(&unit.speaker).join(&unit.video);
     let generated = generated.map(|path| -> Result<Motion> { npy::read(path, folder::DATASET_FPS) }).transpose()?;
-    let image = sheet::draw_sheet(&unit.source, &stage("pose2d"), &stage("lift"), generated.as_ref())
+    let image = sheet::draw_sheet(&config.settings.work.dir, unit, generated.as_ref())
         .with_context(|| format!("drawing a contact sheet of {}", unit.source.display()))?;
     workdir::replace(out, |attempt| png::write(attempt, &image))?;
     ui.summary(&format!("wrote {}", out.display()), None, json!({ "sheet": out }));

@@ -5,7 +5,7 @@ use super::Settings;
 use std::collections::BTreeMap;
 use std::fmt;
 use toml::de::{DeTable, DeValue};
-use toml::{Table, Value};
+use toml::{Spanned, Table, Value};
 
 /// Something wrong with one key.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,12 +24,18 @@ pub enum Place {
     CommandLine,
 }
 
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}: "),
+            Self::CommandLine => write!(f, "--set: "),
+        }
+    }
+}
+
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.place {
-            Place::Line(line) => write!(f, "line {line}: ")?,
-            Place::CommandLine => write!(f, "--set: ")?,
-        }
+        write!(f, "{}", self.place)?;
         if self.key.is_empty() { write!(f, "{}", self.message) } else { write!(f, "{}: {}", self.key, self.message) }
     }
 }
@@ -39,14 +45,23 @@ pub struct Given {
     pub settings: Settings,
     pub places: BTreeMap<String, Place>,
     pub problems: Vec<Problem>,
+    /// Keys given under a former name, a line each.
+    pub notes: Vec<String>,
 }
+
+/// Former keys and sections, and what each is called now.
+const RENAMED: [(&str, &str); 2] = [("shard", "dataset"), ("segment.max_bone_change", "lift.max_bone_change")];
 
 /// Reads the text of a `pipeline.toml` and `--set key=value` changes over the defaults.
 pub fn read(text: &str, sets: &[String]) -> Given {
-    let mut reader = Reader { places: BTreeMap::new(), problems: Vec::new() };
+    let mut reader = Reader { places: BTreeMap::new(), problems: Vec::new(), notes: Vec::new() };
     let mut table = defaults();
     match DeTable::parse(text) {
-        Ok(document) => reader.lay(document.get_ref(), &mut table, "", &|span| Place::Line(line_of(text, span))),
+        Ok(mut document) => {
+            let place_at = |span| Place::Line(line_of(text, span));
+            reader.rename(document.get_mut(), &place_at);
+            reader.lay(document.get_ref(), &mut table, "", &place_at);
+        }
         Err(error) => {
             let line = line_of(text, error.span().map_or(0, |span| span.start));
             reader.problem("", Place::Line(line), format!("not valid TOML: {}", error.message().replace('\n', ", ")));
@@ -60,7 +75,7 @@ pub fn read(text: &str, sets: &[String]) -> Given {
         reader.problem("", Place::Line(1), error.message().to_owned());
         Settings::default()
     });
-    Given { settings, places: reader.places, problems: reader.problems }
+    Given { settings, places: reader.places, problems: reader.problems, notes: reader.notes }
 }
 
 fn defaults() -> Table {
@@ -80,11 +95,42 @@ fn speaker_schema() -> Table {
 struct Reader {
     places: BTreeMap<String, Place>,
     problems: Vec<Problem>,
+    notes: Vec<String>,
 }
 
 impl Reader {
     fn problem(&mut self, key: &str, place: Place, message: String) {
         self.problems.push(Problem { key: key.to_owned(), place, message });
+    }
+
+    /// Moves what is written under former names to today's; what is there under both counts as today's says.
+    fn rename(&mut self, written: &mut DeTable<'_>, place_at: &dyn Fn(usize) -> Place) {
+        for (former, now) in RENAMED {
+            let (from, old) = former.rsplit_once('.').map_or((None, former), |(section, key)| (Some(section), key));
+            let (to, new) = now.rsplit_once('.').map_or((None, now), |(section, key)| (Some(section), key));
+            let Some((name, value)) = section(written, from).and_then(|table| table.remove_entry(old)) else {
+                continue;
+            };
+            let place = place_at(name.span().start);
+            self.notes.push(format!("{place}{former} is called {now} now; it is read as that"));
+            let spanned = |key: &'static str| Spanned::new(name.span(), key.into());
+            if let Some(to) = to
+                && !written.contains_key(to)
+            {
+                written.insert(spanned(to), Spanned::new(name.span(), DeValue::Table(DeTable::new())));
+            }
+            let Some(table) = section(written, to) else { continue };
+            match (table.get_mut(new).map(Spanned::get_mut), value.into_inner()) {
+                (Some(DeValue::Table(table)), DeValue::Table(old)) => {
+                    let missing = old.into_iter().filter(|(key, _)| !table.contains_key(key)).collect::<Vec<_>>();
+                    table.extend(missing);
+                }
+                (Some(_), _) => {}
+                (None, value) => {
+                    table.insert(spanned(new), Spanned::new(name.span(), value));
+                }
+            }
+        }
     }
 
     /// Lays what is written over `table`, key by key.
@@ -176,9 +222,23 @@ impl Reader {
         let as_toml = format!("{key} = {value}");
         let parsed = DeTable::parse(&as_toml).or_else(|_| DeTable::parse(&as_string));
         match parsed {
-            Ok(document) if is_key => self.lay(document.get_ref(), table, "", &|_| Place::CommandLine),
+            Ok(mut document) if is_key => {
+                self.rename(document.get_mut(), &|_| Place::CommandLine);
+                self.lay(document.get_ref(), table, "", &|_| Place::CommandLine);
+            }
             _ => self.problem(key, Place::CommandLine, "not a key of the configuration".to_owned()),
         }
+    }
+}
+
+/// The table of a section; the whole file's without one.
+fn section<'t, 'a>(written: &'t mut DeTable<'a>, name: Option<&str>) -> Option<&'t mut DeTable<'a>> {
+    match name {
+        None => Some(written),
+        Some(name) => match written.get_mut(name)?.get_mut() {
+            DeValue::Table(table) => Some(table),
+            _ => None,
+        },
     }
 }
 

@@ -19,6 +19,8 @@ pub struct Config {
     pub settings: Settings,
     /// The file it was read from, absolute.
     pub file: PathBuf,
+    /// Keys given under a former name, a line each.
+    pub notes: Vec<String>,
 }
 
 /// Everything wrong with a configuration, one line a problem.
@@ -46,7 +48,7 @@ pub fn load(file: &Path, sets: &[String]) -> Result<Config> {
         format!("cannot read the configuration {}; `orator init DIR` writes one, -c FILE names another", file.display())
     })?;
     let file = std::path::absolute(file)?;
-    let mut settings = resolve(&text, sets, &file)?;
+    let (mut settings, notes) = resolve(&text, sets, &file)?;
     let here = std::env::current_dir()?;
     let folder = file.parent().unwrap_or(&here).to_owned();
     let on_command_line = |key: &str| sets.iter().any(|set| set.starts_with(&format!("{key}=")));
@@ -65,16 +67,20 @@ pub fn load(file: &Path, sets: &[String]) -> Result<Config> {
     for speaker in settings.speaker.iter_mut().filter(|speaker| !speaker.reference.as_os_str().is_empty()) {
         speaker.reference = folder.join(&speaker.reference);
     }
-    Ok(Config { settings, file })
+    Ok(Config { settings, file, notes })
 }
 
 /// The settings a text gives, checked but with paths as written.
-fn resolve(text: &str, sets: &[String], file: &Path) -> Result<Settings> {
+fn resolve(text: &str, sets: &[String], file: &Path) -> Result<(Settings, Vec<String>)> {
     let given = file::read(text, sets);
     let mut problems = given.problems;
     problems.extend(rules::check(&given.settings, &given.places));
     problems.sort_by(|a, b| (a.place, &a.key).cmp(&(b.place, &b.key)));
-    if problems.is_empty() { Ok(given.settings) } else { Err(Invalid { file: file.to_owned(), problems }.into()) }
+    if problems.is_empty() {
+        Ok((given.settings, given.notes))
+    } else {
+        Err(Invalid { file: file.to_owned(), problems }.into())
+    }
 }
 
 #[cfg(test)]
@@ -92,7 +98,7 @@ mod tests {
 
     #[test]
     fn the_documented_file_is_the_default() {
-        let settings = resolve(DEFAULT_FILE, &[], Path::new("pipeline.toml")).unwrap();
+        let settings = resolve(DEFAULT_FILE, &[], Path::new("pipeline.toml")).unwrap().0;
         assert_eq!(Settings { speaker: Vec::new(), ..settings }, Settings::default());
         let one_speaker = Settings { speaker: vec![crate::config::Speaker::default()], ..Settings::default() };
         let defaults = toml::Table::try_from(one_speaker).unwrap();
@@ -114,14 +120,14 @@ mod tests {
 
     #[test]
     fn a_number_too_large_for_its_type_is_named() {
-        let text = "[extract]\nfps = 5000000000\n[shard]\ntest = 7.0\n";
+        let text = "[extract]\nfps = 5000000000\n[dataset]\ntest = 7.0\n";
         assert_eq!(
-            problems(text, &["shard.max_mb=4294967296"]),
+            problems(text, &["dataset.max_mb=4294967296"]),
             [
                 "line 2: extract.fps: 5000000000 is too large",
-                "line 4: shard.test: 7 is out of range: expected 0 to 0.9",
-                "line 4: shard.test: validation and test together leave less than 5 % to train on",
-                "--set: shard.max_mb: 4294967296 is too large",
+                "line 4: dataset.test: 7 is out of range: expected 0 to 0.9",
+                "line 4: dataset.test: validation and test together leave less than 5 % to train on",
+                "--set: dataset.max_mb: 4294967296 is too large",
             ]
         );
     }
@@ -129,8 +135,28 @@ mod tests {
     #[test]
     fn the_smallest_file_works() {
         let text = "[[speaker]]\nname = \"host\"\nvideos = [\"videos/host/*.mp4\"]\n";
-        let settings = resolve(text, &["extract.fps=10".into()], Path::new("p.toml")).unwrap();
+        let settings = resolve(text, &["extract.fps=10".into()], Path::new("p.toml")).unwrap().0;
         assert_eq!((settings.speaker[0].name.as_str(), settings.extract.fps), ("host", 10));
+    }
+
+    #[test]
+    fn former_keys_are_read_with_a_note() {
+        let text = "[segment]\nmax_bone_change = 0.3\n[lift]\nlevel = true\n[shard]\ntest = 0.2\n";
+        let (settings, notes) = resolve(text, &["shard.validation=0.1".into()], Path::new("p.toml")).unwrap();
+        assert_eq!((settings.lift.max_bone_change, settings.lift.level), (0.3, true));
+        assert_eq!((settings.dataset.validation, settings.dataset.test), (0.1, 0.2));
+        assert_eq!(
+            notes,
+            [
+                "line 5: shard is called dataset now; it is read as that",
+                "line 2: segment.max_bone_change is called lift.max_bone_change now; it is read as that",
+                "--set: shard is called dataset now; it is read as that",
+            ]
+        );
+        assert_eq!(
+            problems("[shard]\ntest = 7\n", &[])[0],
+            "line 2: dataset.test: 7 is out of range: expected 0 to 0.9"
+        );
     }
 
     #[test]

@@ -30,15 +30,15 @@ pub fn check(settings: &Settings, places: &BTreeMap<String, Place>) -> Vec<Probl
     rules.within("segment.max_people", f64::from(s.segment.max_people), 1.0, 255.0, "people");
     rules.within("segment.max_crowd_share", s.segment.max_crowd_share, 0.0, 1.0, "");
     rules.within("segment.max_jump", s.segment.max_jump, 0.01, 100.0, "shoulder widths");
-    rules.within("segment.max_bone_change", s.segment.max_bone_change, 0.01, 100.0, "bone lengths");
+    rules.within("lift.max_bone_change", s.lift.max_bone_change, 0.01, 100.0, "bone lengths");
     rules.within("lift.smooth_arms", s.lift.smooth_arms, 0.0, 30.0, "frames");
     rules.within("lift.smooth_hands", s.lift.smooth_hands, 0.0, 30.0, "frames");
-    rules.within("shard.max_mb", f64::from(s.shard.max_mb), 1.0, 100_000.0, "megabytes");
-    rules.within("shard.validation", s.shard.validation, 0.0, 0.9, "");
-    rules.within("shard.test", s.shard.test, 0.0, 0.9, "");
-    rules.within("shard.duplicate_secs", s.shard.duplicate_secs, 0.0, 3600.0, "seconds");
-    if s.shard.validation + s.shard.test > 0.95 {
-        rules.problem("shard.test", "validation and test together leave less than 5 % to train on".to_owned());
+    rules.within("dataset.max_mb", f64::from(s.dataset.max_mb), 1.0, 100_000.0, "megabytes");
+    rules.within("dataset.validation", s.dataset.validation, 0.0, 0.9, "");
+    rules.within("dataset.test", s.dataset.test, 0.0, 0.9, "");
+    rules.within("dataset.duplicate_secs", s.dataset.duplicate_secs, 0.0, 3600.0, "seconds");
+    if s.dataset.validation + s.dataset.test > 0.95 {
+        rules.problem("dataset.test", "validation and test together leave less than 5 % to train on".to_owned());
     }
     for (key, value, [one, other]) in [
         ("gan.preset", &s.gan.preset, ["light", "paper"]),

@@ -16,7 +16,7 @@ pub struct Settings {
     pub pose2d: Pose2d,
     pub segment: Segment,
     pub lift: Lift,
-    pub shard: Shard,
+    pub dataset: DatasetConfig,
     pub gan: Gan,
     pub speaker: Vec<Speaker>,
 }
@@ -176,8 +176,6 @@ pub struct Segment {
     pub max_crowd_share: f64,
     /// Largest step of the neck between two frames, in shoulder widths.
     pub max_jump: f64,
-    /// Farthest a lifted bone may be from its length in the video, as a share of it.
-    pub max_bone_change: f64,
 }
 
 impl Default for Segment {
@@ -199,7 +197,6 @@ impl Default for Segment {
             max_people: 5,
             max_crowd_share: 0.3,
             max_jump: 0.5,
-            max_bone_change: 0.4,
         }
     }
 }
@@ -218,19 +215,22 @@ pub struct Lift {
     pub smooth_hands: f64,
     /// Turn each interval as if the camera had been level and the speaker upright.
     pub level: bool,
+    /// Farthest a lifted bone may be from its length in the video, as a share of it.
+    pub max_bone_change: f64,
 }
 
 impl Default for Lift {
     fn default() -> Self {
         let none = PathBuf::new();
-        Self { body_weights: none.clone(), hand_weights: none, smooth_arms: 0.8, smooth_hands: 1.5, level: false }
+        let (smooth_arms, smooth_hands, level, max_bone_change) = (0.8, 1.5, false, 0.4);
+        Self { body_weights: none.clone(), hand_weights: none, smooth_arms, smooth_hands, level, max_bone_change }
     }
 }
 
-/// `[shard]`: the dataset on disk.
+/// `[dataset]`: the dataset on disk.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Shard {
+pub struct DatasetConfig {
     /// A shard is closed when it holds this many megabytes.
     pub max_mb: u32,
     /// Shares of the videos for validation and test, 0..1; the rest trains.
@@ -240,7 +240,7 @@ pub struct Shard {
     pub duplicate_secs: f64,
 }
 
-impl Default for Shard {
+impl Default for DatasetConfig {
     fn default() -> Self {
         Self { max_mb: 256, validation: 0.15, test: 0.15, duplicate_secs: 5.0 }
     }

@@ -1,4 +1,4 @@
-//! The dataset of one speaker on disk: written by the shard stage, read back by training. A folder holds WebDataset
+//! The dataset of one speaker on disk: written by the dataset stage, read back by training. A folder holds WebDataset
 //! tar shards of each video (`train-<video>-0000.tar`, ...), `videos/` (what is known of each video), and the files put
 //! together from these: `info.json` (what the numbers mean), `stats.json` (what they are like), `index.jsonl` (where each
 //! sample lies), `ledger.jsonl` (what became of every second), `leakage.json`, the card `README.md`, `checksums.b3`.

@@ -38,14 +38,14 @@ impl Dataset {
         let dir = dir.as_ref().to_owned();
         ensure!(
             dir.join(INFO).is_file(),
-            "{} is no dataset: it has no {}; the shard stage of `orator run` writes one to work/dataset/<speaker>",
+            "{} is no dataset: it has no {}; the dataset stage of `orator run` writes one to work/dataset/<speaker>",
             dir.display(),
             INFO
         );
         let schema: Schema = read_json(&dir.join(INFO))?;
         ensure!(
             schema.schema == super::SCHEMA,
-            "{} has layout version {}, this program reads {}: run the shard stage again",
+            "{} has layout version {}, this program reads {}: run the dataset stage again",
             dir.display(),
             schema.schema,
             super::SCHEMA
@@ -65,7 +65,7 @@ impl Dataset {
             let bytes = file.metadata().with_context(|| format!("looking at {}", path.display()))?.len();
             ensure!(
                 bytes == shard.bytes,
-                "{} has {bytes} bytes, {} were written: the file is damaged; run the shard stage again with --force",
+                "{} has {bytes} bytes, {} were written: the file is damaged; run the dataset stage again with --force",
                 path.display(),
                 shard.bytes
             );
@@ -79,7 +79,7 @@ impl Dataset {
         let n_samples: usize = info.splits.values().map(|split| split.samples).sum();
         ensure!(
             samples.len() == n_samples,
-            "{} has {} samples, {} says {n_samples}: the file is damaged; run the shard stage again with --force",
+            "{} has {} samples, {} says {n_samples}: the file is damaged; run the dataset stage again with --force",
             dir.join(INDEX).display(),
             samples.len(),
             dir.join(INFO).display()
@@ -120,7 +120,7 @@ impl Dataset {
         let hash = blake3::hash(&self.bytes(sample, ByteRange { offset: sample.offset, size: sample.size })?);
         ensure!(
             hash.to_hex().as_str() == sample.blake3,
-            "{}: the sample {} is damaged (its hash is not the one written): run the shard stage again with --force",
+            "{}: the sample {} is damaged (its hash is not the one written): run the dataset stage again with --force",
             self.dir.join(&sample.shard).display(),
             sample.key
         );
@@ -198,7 +198,7 @@ fn read_index(path: &Path) -> Result<Vec<SampleRef>> {
     let lines = std::io::BufReader::new(File::open(path).with_context(reading)?).lines();
     let parse = |(n, line): (usize, std::io::Result<String>)| {
         let wrong =
-            || format!("{}, line {}: not as the shard stage writes it; run the stage again", path.display(), n + 1);
+            || format!("{}, line {}: not as the dataset stage writes it; run the stage again", path.display(), n + 1);
         serde_json::from_str(&line.with_context(reading)?).with_context(wrong)
     };
     lines.enumerate().map(parse).collect()
@@ -212,5 +212,5 @@ struct Schema {
 fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
     let bytes = std::fs::read(path).with_context(|| format!("reading {}", path.display()))?;
     serde_json::from_slice(&bytes)
-        .with_context(|| format!("{} is not as the shard stage writes it; run the stage again", path.display()))
+        .with_context(|| format!("{} is not as the dataset stage writes it; run the stage again", path.display()))
 }

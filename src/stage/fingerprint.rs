@@ -9,6 +9,7 @@
 //! Not in it: paths, times, the number of workers. Contents are hashed once and remembered by size and time of
 //! change (`HashCache`), so that asking again costs nothing.
 
+use super::artifacts::StageName;
 use super::{Stage, Unit, workdir};
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
@@ -37,6 +38,20 @@ impl Fingerprint {
             inputs.insert(input.role, hash);
         }
         Ok(Self { stage: stage.name().to_owned(), version: stage.version(), settings: stage.settings(unit), inputs })
+    }
+
+    /// A fingerprint that stands under a former name of its stage, under today's: as the stage, and as the section of the
+    /// settings.
+    pub fn renamed(mut self) -> Self {
+        if let Some(stage) = StageName::ALL.into_iter().find(|stage| stage.former() == Some(&*self.stage)) {
+            if let Some(settings) = self.settings.as_object_mut()
+                && let Some(section) = settings.remove(&self.stage)
+            {
+                settings.insert(stage.to_string(), section);
+            }
+            self.stage = stage.to_string();
+        }
+        self
     }
 }
 

@@ -1,6 +1,7 @@
-//! How any step of the road runs, is recorded, and resumes. This room knows no concrete step: a step is a `Stage`, a
-//! thing to do is a `Unit`, and what was done is a `record::Record` written last.
+//! How any stage runs, is recorded, and resumes: a step is a `Stage`, what it works on is a `Unit`, and what was done is a
+//! `record::Record` written last. `artifacts` has the names of the five stages and of their files.
 
+pub mod artifacts;
 pub mod fingerprint;
 pub mod ledger;
 pub mod progress;

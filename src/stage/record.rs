@@ -84,7 +84,8 @@ fn beside(place: &Path, suffix: &str) -> PathBuf {
 impl Record {
     /// The record of the unit in `place`; `None` where there is none that can be read.
     pub fn read(place: &Path) -> Option<Self> {
-        serde_json::from_slice(&fs::read(record_path(place)).ok()?).ok()
+        let record: Self = serde_json::from_slice(&fs::read(record_path(place)).ok()?).ok()?;
+        Some(Self { fingerprint: record.fingerprint.renamed(), ..record })
     }
 
     /// Writes the record of the unit in `place`, and forgets an earlier failure.
@@ -141,7 +142,8 @@ fn collect(folder: &Path, prefix: &str, outputs: &mut Vec<Output>) -> Result<()>
 impl Failure {
     /// The failure of the unit in `place`, if its last attempt failed.
     pub fn read(place: &Path) -> Option<Self> {
-        serde_json::from_slice(&fs::read(failure_path(place)).ok()?).ok()
+        let failure: Self = serde_json::from_slice(&fs::read(failure_path(place)).ok()?).ok()?;
+        Some(Self { fingerprint: failure.fingerprint.map(Fingerprint::renamed), ..failure })
     }
 
     /// Keeps the failure beside what is there.

@@ -7,7 +7,7 @@ use super::record::{DirtyReason, Failure, Output, Record};
 use super::{Report, Stage, Unit, workdir};
 use anyhow::{Context, Result};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -28,28 +28,21 @@ pub enum Ended {
     Failed(String),
 }
 
-/// The folder of `unit` at the stage whose folder is `stage`: `work/<stage>/<speaker>/<video>`, for a whole speaker
-/// `work/<stage>/<speaker>`.
-pub fn place(work: &Path, stage: &str, unit: &Unit) -> PathBuf {
-    let speaker = work.join(stage).join(&unit.speaker);
-    if unit.video.is_empty() { speaker } else { speaker.join(&unit.video) }
-}
-
 /// Where `unit` stands. An unreadable input is a failure.
 pub fn state(stage: &dyn Stage, unit: &Unit, work: &Path, hashes: &HashCache) -> State {
-    let place = place(work, stage.folder(), unit);
+    let folder = unit.dir(&work.join(stage.name()));
     let now = match Fingerprint::now(stage, unit, hashes) {
         Ok(now) => now,
         Err(error) => return State::Failed(format!("{error:#}")),
     };
-    let record = Record::read(&place);
+    let record = Record::read(&folder);
     let dirty = match &record {
-        Some(record) => record.dirty(&now, &place),
+        Some(record) => record.dirty(&now, &folder),
         None => Some(DirtyReason::NeverDone),
     };
     match (dirty, record) {
         (None, Some(record)) => State::Fresh(record),
-        (dirty, _) => match Failure::read(&place) {
+        (dirty, _) => match Failure::read(&folder) {
             Some(failure) if failure.fingerprint.as_ref() == Some(&now) => State::Failed(failure.error),
             _ => State::Stale(dirty.unwrap_or(DirtyReason::NeverDone)),
         },
@@ -65,13 +58,13 @@ pub fn run(
     limits: (usize, bool),
     progress: &dyn Progress,
 ) -> Vec<Ended> {
-    run_road(&[stage], units, work, hashes, limits, progress).into_iter().flatten().collect()
+    run_stages(&[stage], units, work, hashes, limits, progress).into_iter().flatten().collect()
 }
 
 /// Runs `stages`, one after the other, for every unit on `jobs` workers (at least one). No unit waits for another at any
 /// stage, and the largest begin first, so that the workers end together. A unit that fails goes no further: its answers,
 /// one a stage, end with the failure. They stand in the order of `units`.
-pub fn run_road(
+pub fn run_stages(
     stages: &[&dyn Stage],
     units: &[Unit],
     work: &Path,
@@ -115,7 +108,7 @@ pub fn run_road(
     answers.map(whole).collect()
 }
 
-/// Places of the units, those of large files first.
+/// Indices of the units, those of large files first.
 fn largest_first(units: &[Unit]) -> Vec<usize> {
     let bytes = |unit: &Unit| std::fs::metadata(&unit.source).map_or(0, |meta| meta.len());
     let mut order: Vec<usize> = (0..units.len()).collect();
@@ -141,20 +134,20 @@ fn run_unit(
     force: bool,
     progress: &dyn Progress,
 ) -> Ended {
-    let place = place(work, stage.folder(), unit);
+    let folder = unit.dir(&work.join(stage.name()));
     let fingerprint = match guarded(|| Fingerprint::now(stage, unit, hashes)) {
         Ok(now) => now,
-        Err(error) => return failed(&place, None, error),
+        Err(error) => return failed(&folder, None, error),
     };
     if !force
-        && let Some(record) = Record::read(&place)
-        && record.dirty(&fingerprint, &place).is_none()
+        && let Some(record) = Record::read(&folder)
+        && record.dirty(&fingerprint, &folder).is_none()
     {
         return Ended::Skipped(Report { line: record.line, facts: record.facts });
     }
-    match guarded(|| attempt(stage, unit, &place, &fingerprint, progress)) {
+    match guarded(|| attempt(stage, unit, &folder, &fingerprint, progress)) {
         Ok(report) => Ended::Done(report),
-        Err(error) => failed(&place, Some(fingerprint), error),
+        Err(error) => failed(&folder, Some(fingerprint), error),
     }
 }
 
@@ -167,19 +160,19 @@ fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
 fn attempt(
     stage: &dyn Stage,
     unit: &Unit,
-    place: &Path,
+    folder: &Path,
     fingerprint: &Fingerprint,
     progress: &dyn Progress,
 ) -> Result<Report> {
-    let attempt = workdir::attempt_folder(place)?;
+    let attempt = workdir::attempt_folder(folder)?;
     let finish = || -> Result<Report> {
         let report = stage.run(unit, &attempt, progress)?;
         let outputs = Output::list(&attempt)?;
         // An old record must not speak for new files, should this run be killed before it writes its own.
-        Record::forget(place)?;
-        workdir::replace_folder(&attempt, place)?;
+        Record::forget(folder)?;
+        workdir::replace_folder(&attempt, folder)?;
         let Report { line, facts } = report.clone();
-        Record { fingerprint: fingerprint.clone(), outputs, line, facts }.write(place).context("cannot record it")?;
+        Record { fingerprint: fingerprint.clone(), outputs, line, facts }.write(folder).context("cannot record it")?;
         Ok(report)
     };
     let finished = finish();
@@ -189,10 +182,10 @@ fn attempt(
     finished
 }
 
-fn failed(place: &Path, fingerprint: Option<Fingerprint>, error: anyhow::Error) -> Ended {
+fn failed(folder: &Path, fingerprint: Option<Fingerprint>, error: anyhow::Error) -> Ended {
     let error = format!("{error:#}");
     // The failure is shown either way; where even this cannot be written the work folder itself is the trouble.
-    let _ = Failure { fingerprint, error: error.clone() }.write(place);
+    let _ = Failure { fingerprint, error: error.clone() }.write(folder);
     Ended::Failed(error)
 }
 

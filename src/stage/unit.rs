@@ -1,12 +1,11 @@
-//! How any step of the road runs, is recorded, and resumes. This room knows no concrete step: a step is a `Stage`, a
-//! thing to do is a `Unit`, and what was done is a `record::Record` written last.
+//! What a stage is, what it works on, reads and reports.
 
 use super::progress::Progress;
 use anyhow::Context;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// One thing a stage works on: a video of a speaker, or (for `shard`) a whole speaker.
+/// One thing a stage works on: a video of a speaker, or (for the dataset) a whole speaker.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Unit {
     pub speaker: String,
@@ -14,6 +13,14 @@ pub struct Unit {
     pub video: String,
     /// The video file; for a whole speaker the configuration file.
     pub source: PathBuf,
+}
+
+impl Unit {
+    /// The folder of the unit under `stage`, a stage's folder: `<speaker>/<video>`, or `<speaker>` of a whole speaker.
+    pub fn dir(&self, stage: &Path) -> PathBuf {
+        let speaker = stage.join(&self.speaker);
+        if self.video.is_empty() { speaker } else { speaker.join(&self.video) }
+    }
 }
 
 impl fmt::Display for Unit {
@@ -36,14 +43,10 @@ pub struct Report {
     pub facts: serde_json::Map<String, serde_json::Value>,
 }
 
-/// A step of the road. The same inputs and settings give the same bytes, whatever else runs beside it.
+/// A step of the pipeline. The same inputs and settings give the same bytes, whatever else runs beside it.
 pub trait Stage: Sync {
-    /// Its name, an argument of `--from`.
+    /// The name: an argument of `--from`, and the folder under `work/`.
     fn name(&self) -> &'static str;
-    /// Its folder under `work/`.
-    fn folder(&self) -> &'static str {
-        self.name()
-    }
     /// Goes up when the bytes it writes change their meaning.
     fn version(&self) -> u32;
     /// Every setting that has a say in the bytes made of `unit`, and the versions of the tools that have.

@@ -9,10 +9,10 @@ use orator::demo::drawn::folder::DemoPlan;
 use orator::external::ffmpeg::audio;
 use orator::pipeline::extract::Extract;
 use orator::pipeline::pose2d::Pose2dStage;
+use orator::stage::artifacts::{self, Artifact};
 use orator::stage::fingerprint::{Fingerprint, HashCache};
 use orator::stage::progress::{Progress, Silent};
 use orator::stage::record::{Output, Record};
-use orator::stage::runner::place;
 use orator::stage::{Stage, Unit};
 use orator::types::sound::{SAMPLE_RATE, Sound};
 use rand::{Rng, SeedableRng};
@@ -41,7 +41,7 @@ const VIDEOS_AN_HOUR: usize = 6;
 const VERBS: [(&str, &[&str]); 6] = [
     ("segment", &["run", "--only", "segment"]),
     ("lift", &["run", "--only", "lift"]),
-    ("shard", &["run", "--only", "shard"]),
+    ("dataset", &["run", "--only", "dataset"]),
     ("segment again", &["run", "--only", "segment", "--force"]),
     ("run, all fresh", &["run"]),
     ("status", &["status", "--why"]),
@@ -113,18 +113,18 @@ fn make(clip: &Path, dir: &Path, n_videos: usize) -> Result<()> {
     };
     let (pattern, (config, units)) = (units(clip)?.1, units(dir)?);
     let [pattern] = &pattern[..] else { anyhow::bail!("the pattern has {} videos", pattern.len()) };
-    let hashes = HashCache::open(&config.settings.work.dir.join("hashes.json"));
+    let hashes = HashCache::open(&artifacts::hashes(&config.settings.work.dir));
     let extract = Extract::new(&config.settings.extract);
     let pose2d = Pose2dStage::new(&config.settings)?;
     let stages: [(&dyn Stage, bool); 2] = [(&extract, true), (&pose2d, false)];
     for (stage, writes_sound) in stages {
-        let from = place(&clip.join("work"), stage.folder(), pattern);
+        let from = pattern.dir(&clip.join("work").join(stage.name()));
         let record = Record::read(&from).with_context(|| format!("{} was not made", from.display()))?;
         for (n, unit) in units.iter().enumerate() {
-            let to = place(&config.settings.work.dir, stage.folder(), unit);
+            let to = unit.dir(&config.settings.work.dir.join(stage.name()));
             copy_all(&from, &to)?;
             if writes_sound {
-                audio::write_wav(&to.join("audio.wav"), &noise(n as u64))?;
+                audio::write_wav(&Artifact::Sound.within(&to), &noise(n as u64))?;
             }
             let fingerprint = Fingerprint::now(stage, unit, &hashes)?;
             Record { fingerprint, outputs: Output::list(&to)?, ..record.clone() }.write(&to)?;

@@ -6,6 +6,7 @@ use orator::dataset::index::SampleRef;
 use orator::dataset::{Dataset, Split};
 use orator::formats::{authors_txt, joints_npz, keypoints_npz, npy};
 use orator::math::order;
+use orator::stage::artifacts::{Artifact, StageName};
 use orator::types::pose2d::N_BODY;
 use orator::types::pose3d::Motion;
 use orator::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
@@ -32,9 +33,6 @@ pub struct Take {
     pub sound: Option<Sound>,
 }
 
-/// A joints file of a run.
-const JOINTS: &str = "joints.npz";
-
 /// The motions meant by a file, a lifted video's or a speaker's folder, a folder of motions, or a dataset.
 pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result<Vec<Input>> {
     ensure!(path.exists(), "{} is not there", path.display());
@@ -54,15 +52,15 @@ pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
     if path.is_file() {
         return Ok(vec![file(path.to_owned(), path)]);
     }
-    if path.join(JOINTS).is_file() {
+    if Artifact::Joints.within(path).is_file() {
         let whole = path.canonicalize().with_context(|| format!("cannot open {}", path.display()))?;
-        return Ok(vec![file(path.join(JOINTS), &whole)]);
+        return Ok(vec![file(Artifact::Joints.within(path), &whole)]);
     }
     let mut found = Vec::new();
     for entry in std::fs::read_dir(path).with_context(|| format!("cannot open {}", path.display()))? {
         let entry = entry.with_context(|| format!("cannot read {}", path.display()))?.path();
-        if entry.join(JOINTS).is_file() {
-            found.push(file(entry.join(JOINTS), &entry));
+        if Artifact::Joints.within(&entry).is_file() {
+            found.push(file(Artifact::Joints.within(&entry), &entry));
         } else if entry.is_file() && is_motion(&entry) {
             found.push(file(entry.clone(), &entry));
         }
@@ -78,8 +76,9 @@ pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
     }
     ensure!(
         !found.is_empty(),
-        "{} holds no motion: neither .npy, .txt or .npz files nor folders with a {JOINTS}",
-        path.display()
+        "{} holds no motion: neither .npy, .txt or .npz files nor folders with a {}",
+        path.display(),
+        Artifact::Joints.file()
     );
     Ok(found)
 }
@@ -128,7 +127,7 @@ impl Input {
             Place::File(path) => Take { motion: read_motion(path, fps)?, face: None, sound: None },
         };
         check(&take.motion).with_context(|| format!("no animation of {}", self.name))?;
-        match keypoints.map(Path::to_owned).or_else(|| self.of_run("pose2d", "keypoints.npz")) {
+        match keypoints.map(Path::to_owned).or_else(|| self.of_run(Artifact::Keypoints)) {
             Some(path) => Ok(Take { face: Some(read_face(&path, &take.motion)?), ..take }),
             None => Ok(take),
         }
@@ -136,17 +135,18 @@ impl Input {
 
     /// The sound of the run that a lifted video belongs to.
     pub fn sound_of_run(&self) -> Option<PathBuf> {
-        self.of_run("extract", "audio.wav")
+        self.of_run(Artifact::Sound)
     }
 
     /// `work/lift/SPEAKER/VIDEO/joints.npz` has its keypoints at `work/pose2d/SPEAKER/VIDEO/keypoints.npz`, and so on.
-    fn of_run(&self, stage: &str, file: &str) -> Option<PathBuf> {
+    fn of_run(&self, file: Artifact) -> Option<PathBuf> {
         let Place::File(path) = &self.place else { return None };
         let folder = path.canonicalize().ok()?.parent()?.to_owned();
         let (video, speaker) = (folder.file_name()?, folder.parent()?.file_name()?);
         let lift = folder.parent()?.parent()?;
-        let found = lift.parent()?.join(stage).join(speaker).join(video).join(file);
-        (lift.file_name()? == "lift" && found.is_file()).then_some(found)
+        let folder = lift.parent()?.join(file.stage().as_str()).join(speaker).join(video);
+        let found = file.within(&folder);
+        (lift.file_name()? == StageName::Lift.as_str() && found.is_file()).then_some(found)
     }
 }
 

@@ -9,6 +9,7 @@ use orator::dataset::forget::known;
 use orator::dataset::forget::known::KnownVideo;
 use orator::dataset::forget::removal::Removal;
 use orator::dataset::forget::search::{Searched, search};
+use orator::stage::artifacts::{StageName, speaker_dir};
 use orator::stage::workdir;
 use serde_json::json;
 use std::fs::File;
@@ -123,10 +124,10 @@ fn of_project(args: &Args) -> Result<(Task, Option<File>)> {
     let work = &config.settings.work.dir;
     let lock = if args.dry_run || !work.exists() { None } else { Some(lock(work)?) };
     if !args.dry_run {
-        for entry in std::fs::read_dir(work.join("dataset")).into_iter().flatten().flatten() {
+        for entry in std::fs::read_dir(work.join(StageName::Dataset.as_str())).into_iter().flatten().flatten() {
             let name = entry.file_name().to_string_lossy().into_owned();
             if let Some(speaker) = name.strip_prefix('.').and_then(|name| name.strip_suffix(".old")) {
-                workdir::restore_folder(&work.join("dataset").join(speaker.trim_end_matches(".attempt")))?;
+                workdir::restore_folder(&speaker_dir(work, StageName::Dataset, speaker.trim_end_matches(".attempt")))?;
             }
         }
     }

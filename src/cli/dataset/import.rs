@@ -129,7 +129,11 @@ fn plan(args: &Args) -> Result<ImportPlan> {
         },
         about: About { licence, consent, source, ..About::new(name, fps) },
         limits: TakeLimits { fps, min_frames: args.min_frames.max(1), max_apart_secs: args.max_apart },
-        shard: config::Shard { validation: args.validation, test: args.test, ..config::Shard::default() },
+        dataset: config::DatasetConfig {
+            validation: args.validation,
+            test: args.test,
+            ..config::DatasetConfig::default()
+        },
     })
 }
 

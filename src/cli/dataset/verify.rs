@@ -60,7 +60,7 @@ fn check(dir: &std::path::Path, deep: bool, ui: &Ui) -> Result<Outcome> {
     let next = match (good, deep) {
         (true, false) => format!("orator dataset verify --deep {}", dir.display()),
         (true, true) => format!("orator dataset info {}", dir.display()),
-        (false, _) => "orator run --from shard --force".to_owned(),
+        (false, _) => "orator run --from dataset --force".to_owned(),
     };
     let problems: Vec<_> = found.problems.iter().map(|p| json!({ "file": p.file, "what": p.what })).collect();
     let facts = json!({

@@ -12,6 +12,7 @@ use orator::animate::AnimationOptions;
 use orator::animate::export::file::ExportFormat;
 use orator::external::ffmpeg::probe;
 use orator::generate::Speaker;
+use orator::stage::artifacts;
 use orator::stage::fingerprint::{Fingerprint, HashCache, hash_file};
 use orator::stage::progress::{Progress as _, Silent};
 use orator::stage::record::{Output, Record};
@@ -65,7 +66,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         formats,
         checkpoint,
         speakers: BTreeMap::new(),
-        hashes: HashCache::open(&folder.join(RECORDS).join("hashes.json")),
+        hashes: HashCache::open(&artifacts::hashes(&folder.join(RECORDS))),
         again: args.again,
     };
     // a checkpoint that cannot be read is no matter of one row

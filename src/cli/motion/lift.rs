@@ -67,6 +67,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         smooth_arms: args.smooth_arms,
         smooth_hands: args.smooth_hands,
         level: args.level,
+        ..config::Lift::default()
     };
     let (keypoints, mut notes) = keypoints_npz::read_noting(&args.keypoints)?;
     let lifter = Lifter::new(&settings)?;

@@ -11,8 +11,8 @@ use orator::formats::{joints_npz, keypoints_npz, npy};
 use orator::pipeline::lift::quality;
 use orator::pipeline::lift::quality::{ArmFigures, ClipFigures};
 use orator::report::sheet::sheet::SheetClip;
+use orator::stage::artifacts::Artifact;
 use orator::stage::progress::Progress as _;
-use orator::stage::runner::place;
 use orator::stage::{Unit, workdir};
 use orator::types::pose3d::Motion;
 use orator::types::time::FrameRate;
@@ -112,8 +112,8 @@ fn of_run(args: &Args) -> Result<Vec<Files>> {
         if wanted(&unit) {
             clips.push(Files {
                 title: unit.to_string(),
-                keypoints: place(work, "pose2d", &unit).join("keypoints.npz"),
-                joints: place(work, "lift", &unit).join("joints.npz"),
+                keypoints: Artifact::Keypoints.path(work, &unit),
+                joints: Artifact::Joints.path(work, &unit),
                 out: folder.join(&unit.speaker).join(format!("{}.png", unit.video)),
                 video: unit.source,
             });

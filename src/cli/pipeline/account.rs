@@ -4,8 +4,8 @@
 use orator::external::ffmpeg::probe::probe;
 use orator::pipeline::segment::Video;
 use orator::stage::Unit;
+use orator::stage::artifacts::{Artifact, StageName};
 use orator::stage::ledger::{Ledger, longest_first};
-use orator::stage::runner::place;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -41,14 +41,14 @@ pub struct Account {
 impl Account {
     /// The account of one video whose stages wrote under `work`; `extracted`: the extract stage is fresh.
     pub fn of(work: &Path, unit: &Unit, standing: Standing, extracted: bool) -> Self {
-        let media = || Video::read(&place(work, "extract", unit).join("media.json")).ok();
+        let media = || Video::read(&Artifact::MediaInfo.path(work, unit)).ok();
         let media = if extracted { media() } else { None };
         let frame_secs = media.map_or(UNKNOWN_FRAME_SECS, |media| 1.0 / media.fps.per_sec());
         let duration = || media.map(|media| media.duration_secs).or_else(|| probed(&unit.source));
         let ledger = match standing {
-            Standing::Judged => match Ledger::read(&place(work, "lift", unit).join("ledger.json")) {
+            Standing::Judged => match Ledger::read(&Artifact::LiftLedger.path(work, unit)) {
                 Ok(ledger) => Ok(Some(ledger)),
-                Err(error) => Err(("lift".to_owned(), format!("{error:#}"))),
+                Err(error) => Err((StageName::Lift.to_string(), format!("{error:#}"))),
             },
             Standing::Failed { stage, error } => Err((stage.to_owned(), error.to_owned())),
             Standing::Waiting => Ok(None),

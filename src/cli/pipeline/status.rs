@@ -2,12 +2,13 @@
 
 use super::account::{Account, Standing};
 use super::steps;
-use super::steps::{STEPS, Step};
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator::config::Config;
+use orator::stage::artifacts;
+use orator::stage::artifacts::StageName;
 use orator::stage::fingerprint::HashCache;
 use orator::stage::record::DirtyReason;
 use orator::stage::runner;
@@ -42,21 +43,21 @@ struct Cell {
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let config = args.config.load()?;
     let work = &config.settings.work.dir;
-    let hashes = HashCache::open(&work.join("hashes.json"));
+    let hashes = HashCache::open(&artifacts::hashes(work));
     let mut told = Told::default();
     for videos in steps::speakers(&config, &args.speaker)? {
         for message in &videos.missing {
             told.whys.push(format!("{}: {message}", videos.speaker));
-            let fact = json!({ "unit": videos.speaker, "stage": "extract", "state": "failed", "why": message });
+            let fact = json!({ "unit": videos.speaker, "stage": StageName::Extract.as_str(), "state": "failed", "why": message });
             told.facts.push(fact);
         }
         let ready = steps::ready(&config, &videos, &hashes).unwrap_or_default();
-        let stages: Vec<_> = STEPS.iter().map(|step| step.stage(&config, &ready)).collect();
+        let stages: Vec<_> = StageName::ALL.iter().map(|step| steps::stage(*step, &config, &ready)).collect();
         let mut speaker_waits_for = None;
         let mut total = Account::default();
         for unit in &videos.units {
             let mut waits_for = None;
-            let per_video = STEPS.into_iter().zip(&stages).take(4);
+            let per_video = StageName::ALL.into_iter().zip(&stages).take(4);
             let cells: Vec<_> = per_video
                 .map(|(step, stage)| (step, cell(step, stage, unit, &config, &hashes, &mut waits_for)))
                 .collect();
@@ -64,7 +65,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let failed = cells.iter().find(|(_, cell)| cell.word == "failed");
             speaker_waits_for = speaker_waits_for.or(waits_for.filter(|_| failed.is_none()));
             let standing = match (failed, waits_for) {
-                (Some((step, cell)), _) => Standing::Failed { stage: step.name(), error: &cell.why },
+                (Some((step, cell)), _) => Standing::Failed { stage: step.as_str(), error: &cell.why },
                 (None, Some(_)) => Standing::Waiting,
                 (None, None) => Standing::Judged,
             };
@@ -75,10 +76,10 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         }
         told.account(&videos.speaker, &total, "speaker");
         told.total.add(&total);
-        for unit in Step::Shard.units(&config, &videos) {
-            let stage = &stages[Step::Shard as usize];
-            let cell = cell(Step::Shard, stage, &unit, &config, &hashes, &mut speaker_waits_for);
-            told.cells(&unit, &[(Step::Shard, cell)]);
+        for unit in steps::units(StageName::Dataset, &config, &videos) {
+            let stage = &stages[StageName::Dataset as usize];
+            let cell = cell(StageName::Dataset, stage, &unit, &config, &hashes, &mut speaker_waits_for);
+            told.cells(&unit, &[(StageName::Dataset, cell)]);
         }
     }
     hashes.save().unwrap_or_default();
@@ -96,24 +97,24 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 #[derive(Default)]
 struct Told {
     /// Units, each with a word a stage.
-    rows: Vec<(String, [&'static str; STEPS.len()])>,
+    rows: Vec<(String, [&'static str; StageName::ALL.len()])>,
     whys: Vec<String>,
     facts: Vec<Value>,
     accounts: Vec<(String, Account)>,
     account_facts: Vec<Value>,
     total: Account,
     /// Of each stage how many units stay fresh, how many would run, and the reasons for that.
-    plan: BTreeMap<Step, (usize, usize, BTreeSet<String>)>,
+    plan: BTreeMap<StageName, (usize, usize, BTreeSet<String>)>,
     datasets_stale: bool,
 }
 
 impl Told {
-    fn cells(&mut self, unit: &Unit, cells: &[(Step, Cell)]) {
-        let word = |step: &Step| cells.iter().find(|(of, _)| of == step).map_or("", |(_, cell)| cell.word);
-        self.rows.push((unit.to_string(), STEPS.map(|step| word(&step))));
+    fn cells(&mut self, unit: &Unit, cells: &[(StageName, Cell)]) {
+        let word = |step: &StageName| cells.iter().find(|(of, _)| of == step).map_or("", |(_, cell)| cell.word);
+        self.rows.push((unit.to_string(), StageName::ALL.map(|step| word(&step))));
         for (step, cell) in cells {
-            let (unit, name) = (unit.to_string(), step.name());
-            self.datasets_stale |= cell.word != "fresh" && *step == Step::Shard;
+            let (unit, name) = (unit.to_string(), step.as_str());
+            self.datasets_stale |= cell.word != "fresh" && *step == StageName::Dataset;
             self.whys.push(format!("{unit} {name}: {}: {}", cell.word, cell.why));
             self.facts.push(json!({ "unit": unit, "stage": name, "state": cell.word, "why": cell.why }));
             let (n_fresh, n_run, reasons) = self.plan.entry(*step).or_default();
@@ -135,28 +136,28 @@ impl Told {
 
     /// A line a stage: what `orator run` would do, and why.
     fn plan_lines(&self) -> Vec<String> {
-        let line = |(step, (n_fresh, n_run, reasons)): (&Step, &(usize, usize, BTreeSet<String>))| {
+        let line = |(step, (n_fresh, n_run, reasons)): (&StageName, &(usize, usize, BTreeSet<String>))| {
             let shown: Vec<&str> = reasons.iter().map(String::as_str).take(REASONS_SHOWN).collect();
             let more = reasons.len().saturating_sub(shown.len());
             let more = if more == 0 { String::new() } else { format!("; {more} other reasons") };
             let why = if *n_run == 0 { String::new() } else { format!(": {}{more}", shown.join("; ")) };
-            format!("{:8} {n_fresh} stay fresh, {n_run} would run{why}", step.name())
+            format!("{:8} {n_fresh} stay fresh, {n_run} would run{why}", step.as_str())
         };
         self.plan.iter().map(line).collect()
     }
 
     fn plan_facts(&self) -> Vec<Value> {
-        let fact = |(step, (n_fresh, n_run, reasons)): (&Step, &(usize, usize, BTreeSet<String>))| json!({ "stage": step.name(), "stay_fresh": n_fresh, "would_run": n_run, "because": reasons });
+        let fact = |(step, (n_fresh, n_run, reasons)): (&StageName, &(usize, usize, BTreeSet<String>))| json!({ "stage": step.as_str(), "stay_fresh": n_fresh, "would_run": n_run, "because": reasons });
         self.plan.iter().map(fact).collect()
     }
 
     fn text(&self, why: bool) -> String {
         let names = self.rows.iter().map(|(name, _)| name).chain(self.accounts.iter().map(|(name, _)| name));
         let width = names.map(|name| name.chars().count()).max().unwrap_or(0).max("seconds".len());
-        let row = |name: &str, words: [&str; STEPS.len()]| {
+        let row = |name: &str, words: [&str; StageName::ALL.len()]| {
             format!("{name:width$} {}", words.map(|word| format!("{word:8}")).join(" ")).trim_end().to_owned()
         };
-        let mut lines = vec![row("", STEPS.map(Step::name))];
+        let mut lines = vec![row("", StageName::ALL.map(StageName::as_str))];
         lines.extend(self.rows.iter().map(|(name, words)| row(name, *words)));
         lines.extend([String::new(), Account::heading(width)]);
         lines.extend(self.accounts.iter().map(|(name, account)| account.row(name, width)));
@@ -173,19 +174,19 @@ impl Told {
 
 /// How `unit` stands at a stage, given the first stage before it that is not fresh.
 fn cell(
-    step: Step,
+    step: StageName,
     stage: &Result<Box<dyn Stage>>,
     unit: &Unit,
     config: &Config,
     hashes: &HashCache,
-    waits_for: &mut Option<Step>,
+    waits_for: &mut Option<StageName>,
 ) -> Cell {
     let stage = match stage {
         Ok(stage) => stage,
         Err(error) => return Cell { word: "failed", why: format!("{error:#}") },
     };
     let state = match waits_for {
-        Some(earlier) => State::Stale(DirtyReason::WaitsFor { stage: earlier.name().to_owned() }),
+        Some(earlier) => State::Stale(DirtyReason::WaitsFor { stage: earlier.as_str().to_owned() }),
         None => runner::state(&**stage, unit, &config.settings.work.dir, hashes),
     };
     if !matches!(state, State::Fresh(_)) {

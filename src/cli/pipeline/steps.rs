@@ -1,74 +1,62 @@
 //! The five stages in their order, and the units each works on.
 
 use anyhow::Result;
-use clap::ValueEnum;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use orator::config::videos::Videos;
 use orator::config::{Config, Settings};
 use orator::dataset::info::ModelUsed;
 use orator::external::onnx::{Model, Runtime};
+use orator::pipeline::dataset::stage::DatasetStage;
 use orator::pipeline::extract::Extract;
 use orator::pipeline::lift::LiftStage;
 use orator::pipeline::pose2d::Pose2dStage;
 use orator::pipeline::segment::SegmentStage;
-use orator::pipeline::shard::stage::ShardStage;
+use orator::stage::artifacts::StageName;
 use orator::stage::fingerprint::HashCache;
 use orator::stage::runner;
 use orator::stage::runner::State;
 use orator::stage::{Stage, Unit};
 
-/// A stage by its name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
-pub enum Step {
-    Extract,
-    Pose2d,
-    Segment,
-    Lift,
-    Shard,
+/// Reads a stage's name of the command line; a former name is an alias.
+pub fn stage_parser() -> impl TypedValueParser<Value = StageName> {
+    let name = |stage: StageName| PossibleValue::new(stage.as_str()).aliases(stage.former());
+    PossibleValuesParser::new(StageName::ALL.map(name)).try_map(|name| name.parse::<StageName>())
 }
 
-pub const STEPS: [Step; 5] = [Step::Extract, Step::Pose2d, Step::Segment, Step::Lift, Step::Shard];
-
-impl Step {
-    /// The stage, ready to run. `videos` are those the dataset is made of.
-    ///
-    /// # Errors
-    /// A model that is missing or not what its manifest says, weights that cannot be read.
-    pub fn stage(self, config: &Config, videos: &[Unit]) -> Result<Box<dyn Stage>> {
-        let settings = &config.settings;
-        Ok(match self {
-            Self::Extract => Box::new(Extract::new(&settings.extract)),
-            Self::Pose2d => Box::new(Pose2dStage::new(settings)?),
-            Self::Segment => Box::new(SegmentStage::new(&settings.segment, &settings.work.dir)),
-            Self::Lift => Box::new(LiftStage::new(&settings.lift, &settings.segment, &settings.work.dir)?),
-            Self::Shard => Box::new(
-                ShardStage::new(settings, videos)
-                    .with_videos(orator::config::videos::of(config))
-                    .with_models(models_used(settings)?),
-            ),
-        })
-    }
-
-    pub fn name(self) -> &'static str {
-        ["extract", "pose2d", "segment", "lift", "shard"][self as usize]
-    }
-
-    /// What the stage works on: every video, or the speaker as a whole.
-    pub fn units(self, config: &Config, videos: &Videos) -> Vec<Unit> {
-        if self != Self::Shard {
-            return videos.units.clone();
-        }
-        let speaker = videos.speaker.clone();
-        vec![Unit { speaker, video: String::new(), source: config.file.clone() }]
-    }
-}
-
-/// The videos of a speaker that are fresh at every stage before `shard`: those a dataset is made of.
+/// The stage, ready to run. `videos` are those the dataset is made of.
 ///
 /// # Errors
-/// As `Step::stage`.
+/// A model that is missing or not what its manifest says, weights that cannot be read.
+pub fn stage(name: StageName, config: &Config, videos: &[Unit]) -> Result<Box<dyn Stage>> {
+    let settings = &config.settings;
+    Ok(match name {
+        StageName::Extract => Box::new(Extract::new(&settings.extract)),
+        StageName::Pose2d => Box::new(Pose2dStage::new(settings)?),
+        StageName::Segment => Box::new(SegmentStage::new(&settings.segment, &settings.work.dir)),
+        StageName::Lift => Box::new(LiftStage::new(&settings.lift, &settings.segment, &settings.work.dir)?),
+        StageName::Dataset => Box::new(
+            DatasetStage::new(settings, videos)
+                .with_videos(orator::config::videos::of(config))
+                .with_models(models_used(settings)?),
+        ),
+    })
+}
+
+/// What a stage works on: every video, or the speaker as a whole.
+pub fn units(stage: StageName, config: &Config, videos: &Videos) -> Vec<Unit> {
+    if stage != StageName::Dataset {
+        return videos.units.clone();
+    }
+    let speaker = videos.speaker.clone();
+    vec![Unit { speaker, video: String::new(), source: config.file.clone() }]
+}
+
+/// The videos of a speaker that are fresh at every stage before the last: those a dataset is made of.
+///
+/// # Errors
+/// As those of `stage`.
 pub fn ready(config: &Config, videos: &Videos, hashes: &HashCache) -> Result<Vec<Unit>> {
-    let before = STEPS.iter().filter(|step| **step != Step::Shard);
-    let stages = before.map(|step| step.stage(config, &[])).collect::<Result<Vec<_>>>()?;
+    let stages = StageName::OF_VIDEOS.into_iter().map(|name| stage(name, config, &[])).collect::<Result<Vec<_>>>()?;
     let state = |stage: &dyn Stage, unit: &Unit| runner::state(stage, unit, &config.settings.work.dir, hashes);
     let fresh = |unit: &&Unit| stages.iter().all(|stage| matches!(state(&**stage, unit), State::Fresh(_)));
     Ok(videos.units.iter().filter(fresh).cloned().collect())

@@ -63,7 +63,7 @@ fn defaults() -> Result<Config> {
     let mut settings = Settings::default();
     settings.work.dir = here.join(&settings.work.dir);
     settings.models.dir = here.join(&settings.models.dir);
-    Ok(Config { settings, file: here.join("pipeline.toml (not there: defaults)") })
+    Ok(Config { settings, file: here.join("pipeline.toml (not there: defaults)"), notes: Vec::new() })
 }
 
 fn ok(name: &str, found: String) -> Check {

@@ -4,14 +4,12 @@
 use crate::config::{Config, videos};
 use crate::dataset::write::part;
 use crate::dataset::write::part::VideoEntry;
+use crate::stage::artifacts::{StageName, speaker_dir};
 use crate::stage::fingerprint::hash_file;
 use crate::stage::record::Record;
 use anyhow::{Result, bail, ensure};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-
-/// The folders of the stages that work video by video.
-pub const STAGES: [&str; 4] = ["extract", "pose2d", "segment", "lift"];
 
 /// A video and the names it goes by.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -67,9 +65,9 @@ pub fn of_project(config: &Config) -> Result<Vec<KnownVideo>> {
         let (speaker, work, source) = (unit.speaker, Some(unit.video), Some(unit.source));
         known.push(KnownVideo { speaker, work, source, content, file, parts: BTreeSet::new() });
     }
-    for stage in STAGES {
-        for speaker in folders(&work.join(stage)) {
-            for video in entries(&work.join(stage).join(&speaker)) {
+    for stage in StageName::OF_VIDEOS {
+        for speaker in folders(&work.join(stage.as_str())) {
+            for video in entries(&speaker_dir(work, stage, &speaker)) {
                 let there = known.iter().any(|k| k.speaker == speaker && k.work.as_ref() == Some(&video));
                 if !there {
                     let content = content(work, &speaker, &video);
@@ -83,8 +81,8 @@ pub fn of_project(config: &Config) -> Result<Vec<KnownVideo>> {
             }
         }
     }
-    for speaker in folders(&work.join("dataset")) {
-        add_dataset(&work.join("dataset").join(&speaker), &speaker, &mut known)?;
+    for speaker in folders(&work.join(StageName::Dataset.as_str())) {
+        add_dataset(&speaker_dir(work, StageName::Dataset, &speaker), &speaker, &mut known)?;
     }
     known.sort();
     Ok(known)
@@ -141,7 +139,7 @@ fn add_dataset(dir: &Path, speaker: &str, known: &mut Vec<KnownVideo>) -> Result
 
 /// The content of a video, from the record of the stage that read it.
 fn content(work: &Path, speaker: &str, video: &str) -> Option<String> {
-    let record = Record::read(&work.join("extract").join(speaker).join(video))?;
+    let record = Record::read(&speaker_dir(work, StageName::Extract, speaker).join(video))?;
     record.fingerprint.inputs.get("video").cloned()
 }
 

@@ -3,8 +3,10 @@
 //! in one step. A kill anywhere leaves something that a second run finishes.
 
 use super::dataset;
-use super::known::{KnownVideo, STAGES};
+use super::known::KnownVideo;
 use super::search::SearchTerm;
+use crate::stage::artifacts;
+use crate::stage::artifacts::{StageName, speaker_dir};
 use crate::stage::fingerprint::hash_file;
 use crate::stage::{record, workdir};
 use anyhow::{Context, Result};
@@ -44,8 +46,8 @@ impl Removal {
         whole: bool,
     ) -> Result<Self> {
         let mut removal = Self { speaker: speaker.to_owned(), marks: marks(videos, others), ..Self::default() };
-        for stage in STAGES.into_iter().chain(["sheets"]) {
-            let folder = work.join(stage).join(speaker);
+        for folder in StageName::OF_VIDEOS.map(StageName::as_str).into_iter().chain(["sheets"]) {
+            let folder = work.join(folder).join(speaker);
             if whole {
                 removal.paths.extend(Some(folder).filter(|folder| folder.exists()));
                 continue;
@@ -63,7 +65,7 @@ impl Removal {
         let names_one = |path: &PathBuf| fs::read(path).is_ok_and(|bytes| super::search::is_in(&bytes, &removal.marks));
         let reports: Vec<PathBuf> = pages(work)?.into_iter().filter(names_one).collect();
         removal.paths.extend(reports);
-        let (models, dir) = (work.join("gan").join(speaker), work.join("dataset").join(speaker));
+        let (models, dir) = (work.join("gan").join(speaker), speaker_dir(work, StageName::Dataset, speaker));
         let names: BTreeSet<String> = videos.iter().flat_map(|video| video.parts.iter().cloned()).collect();
         let has_samples = names.iter().any(|name| dataset::has_samples(&dir, name));
         removal.models.extend(Some(models).filter(|models| models.exists() && (whole || has_samples)));
@@ -76,7 +78,7 @@ impl Removal {
                 .extend([record::record_path(&dir), record::failure_path(&dir)].into_iter().filter(|p| p.exists()));
         }
         removal.paths.extend(left_over);
-        removal.hashes = hashes(&work.join("hashes.json"), &removal);
+        removal.hashes = hashes(&artifacts::hashes(work), &removal);
         Ok(removal)
     }
 

@@ -17,7 +17,7 @@ pub struct ImportPlan {
     pub about: About,
     pub limits: TakeLimits,
     /// Shares of the splits, seconds of shared sound, size of shards.
-    pub shard: config::Shard,
+    pub dataset: config::DatasetConfig,
 }
 
 /// What became of a take, or of a video of other shards.

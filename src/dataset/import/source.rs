@@ -196,7 +196,7 @@ fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
 fn made_from(found: &TakeFiles, plan: &ImportPlan) -> Result<String> {
     let files = [Some(&found.motion), found.sound.as_ref(), found.transcript.as_ref()];
     let hashes = files.into_iter().flatten().map(|path| hash_file(path)).collect::<Result<Vec<_>>>()?;
-    let all = serde_json::json!([env!("CARGO_PKG_VERSION"), hashes, plan.limits.fps, plan.shard.max_mb]);
+    let all = serde_json::json!([env!("CARGO_PKG_VERSION"), hashes, plan.limits.fps, plan.dataset.max_mb]);
     Ok(blake3::hash(all.to_string().as_bytes()).to_hex().to_string())
 }
 

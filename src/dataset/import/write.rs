@@ -65,17 +65,17 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
     drop(task);
     let kept: Vec<usize> = (0..looks.len()).filter(|&at| looks[at].is_kept()).collect();
     ensure!(!kept.is_empty(), "nothing can be imported: {}", first_reasons(&origins, &looks));
-    let compared = compare(&looks, &kept, out, plan.shard.duplicate_secs)?;
-    for (&at, placed) in kept.iter().zip(place(&looks, &kept, &compared, &plan.shard)) {
+    let compared = compare(&looks, &kept, out, plan.dataset.duplicate_secs)?;
+    for (&at, placed) in kept.iter().zip(place(&looks, &kept, &compared, &plan.dataset)) {
         match placed {
             Assignment::In(split, by) => looks[at].split = Some((split, by)),
             Assignment::Nowhere(with) => {
                 part::remove_sound(out, &looks[at].source.name)?;
-                looks[at].refuse_shared(&with, plan.shard.duplicate_secs);
+                looks[at].refuse_shared(&with, plan.dataset.duplicate_secs);
             }
         }
     }
-    let max_shard_bytes = u64::from(plan.shard.max_mb) << 20;
+    let max_shard_bytes = u64::from(plan.dataset.max_mb) << 20;
     let writer = DatasetWriter::new(out, about, max_shard_bytes).with_compared(compared);
     let task = progress.begin("write", origins.len() as u64);
     let mut lines = Vec::new();
@@ -105,7 +105,7 @@ fn place(
     looks: &[InspectedItem],
     kept: &[usize],
     compared: &SoundComparison,
-    shard: &config::Shard,
+    settings: &config::DatasetConfig,
 ) -> Vec<Assignment> {
     let waiting = kept.iter().map(|&at| {
         let InspectedItem { source, split, .. } = &looks[at];
@@ -113,7 +113,7 @@ fn place(
         let content = if source.content.is_empty() { &source.name } else { &source.content };
         Unassigned { name: &source.name, content, named: split.as_ref().map(|(split, _)| *split), before: None }
     });
-    let placed = split::assign(&waiting.collect::<Vec<_>>(), &compared.shared, shard.validation, shard.test);
+    let placed = split::assign(&waiting.collect::<Vec<_>>(), &compared.shared, settings.validation, settings.test);
     let as_before = |(at, placed): (&usize, Assignment)| match (&looks[*at].split, placed) {
         (Some((split, by)), _) => Assignment::In(*split, by.clone()),
         (None, placed) => placed,

@@ -145,7 +145,7 @@ impl VideoEntry {
     /// Reads one; its ledger must be whole, and it must be of this layout.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = fs::read(path).with_context(|| format!("reading {}", path.display()))?;
-        let wrong = || format!("{} is not as the shard stage writes it; run the stage again", path.display());
+        let wrong = || format!("{} is not as the dataset stage writes it; run the stage again", path.display());
         let part: Self = serde_json::from_slice(&bytes).with_context(wrong)?;
         ensure!(part.schema == crate::dataset::SCHEMA, "{} has layout version {}", path.display(), part.schema);
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -230,7 +230,7 @@ pub fn write_sound(dir: &Path, name: &str, codes: &[u32]) -> Result<String> {
 pub fn read_sound(dir: &Path, name: &str) -> Result<Vec<u32>> {
     let path = sound_path(dir, name);
     let bytes = fs::read(&path).with_context(|| format!("reading {}", path.display()))?;
-    ensure!(bytes.len().is_multiple_of(4), "{} is cut off: run the shard stage again with --force", path.display());
+    ensure!(bytes.len().is_multiple_of(4), "{} is cut off: run the dataset stage again with --force", path.display());
     Ok(bytes.as_chunks::<4>().0.iter().map(|code| u32::from_le_bytes(*code)).collect())
 }
 

@@ -9,6 +9,7 @@ use crate::demo::drawn::folder::DATASET_FPS;
 use crate::demo::drawn::truth::DrawnTruth;
 use crate::formats::keypoints_npz;
 use crate::math::order::{Ordered, upper_median};
+use crate::stage::artifacts::{Artifact, StageName, speaker_dir};
 use crate::types::skeleton::{
     L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_ELBOW, R_HAND, R_SHOULDER, R_WRIST, parent,
 };
@@ -83,7 +84,7 @@ impl PipelineCheck {
 pub fn measure(dir: &Path) -> Result<PipelineCheck> {
     let mut measured = measure_keypoints(dir)?;
     let (mut lifted, mut true_joints) = (Vec::new(), Vec::new());
-    let dataset = Dataset::open(dir.join("work/dataset/host"))?;
+    let dataset = Dataset::open(speaker_dir(&dir.join("work"), StageName::Dataset, "host"))?;
     for sample in Split::ALL.into_iter().flat_map(|split| dataset.samples(split)) {
         let sample = dataset.read(&sample)?;
         let (video, first) = sample.key.rsplit_once('-').with_context(|| format!("odd key {}", sample.key))?;
@@ -122,9 +123,9 @@ pub fn measure(dir: &Path) -> Result<PipelineCheck> {
 pub fn measure_keypoints(dir: &Path) -> Result<PipelineCheck> {
     let mut measured = PipelineCheck::default();
     let (mut body, mut hands) = (Distances::default(), Distances::default());
-    for unit in subfolders(&dir.join("work/pose2d/host"))? {
+    for unit in subfolders(&speaker_dir(&dir.join("work"), StageName::Pose2d, "host"))? {
         let truth = truth_of(dir, &unit.file_name().unwrap_or_default().to_string_lossy())?;
-        let seen = keypoints_npz::read(&unit.join("keypoints.npz"))?;
+        let seen = keypoints_npz::read(&Artifact::Keypoints.within(&unit))?;
         measured.n_drawn += truth.motion.n_frames();
         body.compare(seen.body.slice(s![.., ..13, ..]), truth.body.view(), FOUND);
         hands.compare(seen.left_hand.view(), truth.left_hand.view(), 0.0);

@@ -6,6 +6,8 @@ use crate::animate::draw::overlay::{ImageTransform, draw_keypoints};
 use crate::external::ffmpeg::frames::FrameReader;
 use crate::external::opencv::{draw, warp};
 use crate::formats::{joints_npz, keypoints_npz};
+use crate::stage::Unit;
+use crate::stage::artifacts::Artifact;
 use crate::types::image::Image;
 use crate::types::pose2d::Keypoints;
 use crate::types::pose3d::Motion;
@@ -19,12 +21,14 @@ const HEAD_PX: usize = 40;
 const N_ROWS: usize = 3;
 const COLUMNS: [&str; 5] =
     ["video", "2D keypoints", "3D, from the front", "3D, from the left", "generated from speech"];
-/// Draws the sheet of one video of a run: its file, the folders of its stages, and a generated motion, where there is one.
-pub fn draw_sheet(video: &Path, pose2d: &Path, lift: &Path, generated: Option<&Motion>) -> Result<Image> {
-    let keypoints = keypoints_npz::read(&pose2d.join("keypoints.npz"))?;
-    let motion = joints_npz::read(&lift.join("joints.npz"))?;
+
+/// Draws the sheet of the video `unit` of a run in the folder `work`, with a generated motion, where there is one.
+pub fn draw_sheet(work: &Path, unit: &Unit, generated: Option<&Motion>) -> Result<Image> {
+    let keypoints = keypoints_npz::read(&Artifact::Keypoints.path(work, unit))?;
+    let lifted = Artifact::Joints.path(work, unit);
+    let motion = joints_npz::read(&lifted)?;
     let moments = moments(&motion);
-    ensure!(!moments.is_empty(), "{} has no frame with a pose", lift.display());
+    ensure!(!moments.is_empty(), "{} has no frame with a pose", lifted.display());
     let width = COLUMNS.len() * CELL[0];
     let mut sheet = Image::filled(width, HEAD_PX + N_ROWS * CELL[1], PAPER);
     for (column, words) in COLUMNS.iter().enumerate() {
@@ -33,7 +37,7 @@ pub fn draw_sheet(video: &Path, pose2d: &Path, lift: &Path, generated: Option<&M
         }
     }
     let mut row = 0;
-    for frame in FrameReader::open(video, keypoints.fps)? {
+    for frame in FrameReader::open(&unit.source, keypoints.fps)? {
         let frame = frame?;
         if moments.get(row) != Some(&frame.frame_idx) {
             if row == moments.len() {

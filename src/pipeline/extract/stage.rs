@@ -12,6 +12,7 @@ use crate::external::ffmpeg;
 use crate::external::ffmpeg::audio;
 use crate::external::ffmpeg::frames::FrameReader;
 use crate::external::opencv::png;
+use crate::stage::artifacts::{Artifact, StageName};
 use crate::stage::progress::Progress;
 use crate::stage::{Input, Report, Stage, Unit};
 use crate::types::sound::SAMPLE_RATE;
@@ -44,7 +45,7 @@ struct Timeline {
 
 impl Stage for Extract {
     fn name(&self) -> &'static str {
-        "extract"
+        StageName::Extract.as_str()
     }
 
     fn version(&self) -> u32 {
@@ -63,8 +64,8 @@ impl Stage for Extract {
         let rate = self.settings.rate();
         let mut reader = FrameReader::open(&unit.source, rate)?;
         let timeline = self.timeline(&mut reader, out, progress)?;
-        write_timeline(&out.join("timeline.npz"), &timeline)?;
-        let sound = audio::extract_wav(&unit.source, &out.join("audio.wav"), SAMPLE_RATE)?;
+        write_timeline(&Artifact::Timeline.within(out), &timeline)?;
+        let sound = audio::extract_wav(&unit.source, &Artifact::Sound.within(out), SAMPLE_RATE)?;
         let audio_secs = sound.as_ref().map(|sound| sound.secs);
 
         let n_frames = timeline.source_secs.len();
@@ -84,7 +85,7 @@ impl Stage for Extract {
             "audio_secs": audio_secs,
             "damage": damage,
         });
-        let path = out.join("media.json");
+        let path = Artifact::MediaInfo.within(out);
         fs::write(&path, serde_json::to_vec_pretty(&media)?).with_context(|| path.display().to_string())?;
 
         let sound = audio_secs.map_or("no sound".to_owned(), |secs| format!("{secs:.1} s of sound"));
@@ -106,7 +107,7 @@ impl Extract {
     fn timeline(&self, reader: &mut FrameReader, out: &Path, progress: &dyn Progress) -> Result<Timeline> {
         let (mut source_secs, mut repeated, mut still) = (Vec::new(), Vec::new(), Vec::new());
         let (mut shots, mut before) = (ShotFinder::new(self.settings.rate()), None);
-        let frames = out.join("frames");
+        let frames = Artifact::Frames.within(out);
         if self.settings.keep_frames {
             fs::create_dir(&frames).with_context(|| format!("cannot make the folder {}", frames.display()))?;
         }

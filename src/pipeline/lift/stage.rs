@@ -1,6 +1,6 @@
 //! The stage: reads the keypoints of a video and the intervals worth keeping, writes `joints.npz`,
 //! `bones.json` and `camera.json` (roll and pitch of each interval), what `outliers` looked at
-//! (`measures.npz`), and the final `intervals.json` and `ledger.json`.
+//! (`bone_change.npz`), and the final `intervals.json` and `ledger.json`.
 
 use super::outliers;
 use super::outliers::BoneChange;
@@ -9,9 +9,9 @@ use super::{Lifted, Lifter};
 use crate::config;
 use crate::formats::npz::Npz;
 use crate::formats::{joints_npz, keypoints_npz};
+use crate::stage::artifacts::{Artifact, StageName};
 use crate::stage::ledger::Ledger;
 use crate::stage::progress::Progress;
-use crate::stage::runner::place;
 use crate::stage::{Input, Report, Stage, Unit, write_json};
 use crate::types::interval::Intervals;
 use crate::types::pose2d::Keypoints;
@@ -32,33 +32,25 @@ pub struct LiftStage {
 }
 
 impl LiftStage {
-    /// Lifts as `settings` say and judges the bones by `rules`; reads the earlier stages' files under the folder `work`.
+    /// Lifts and judges the bones as `settings` say; pieces and gaps are judged by `rules`. Reads the earlier stages' files under the folder `work`.
     /// Errors: weights that cannot be loaded.
     pub fn new(settings: &config::Lift, rules: &config::Segment, work: &Path) -> Result<Self> {
         let lifter = Lifter::new(settings)?;
         Ok(Self { lifter, settings: settings.clone(), rules: rules.clone(), work: work.to_owned() })
     }
 
-    fn keypoints(&self, unit: &Unit) -> PathBuf {
-        place(&self.work, "pose2d", unit).join("keypoints.npz")
-    }
-
-    fn timeline(&self, unit: &Unit) -> PathBuf {
-        place(&self.work, "extract", unit).join("timeline.npz")
-    }
-
-    fn segmented(&self, unit: &Unit, name: &str) -> PathBuf {
-        place(&self.work, "segment", unit).join(name)
+    fn file(&self, file: Artifact, unit: &Unit) -> PathBuf {
+        file.path(&self.work, unit)
     }
 }
 
 impl Stage for LiftStage {
     fn name(&self) -> &'static str {
-        "lift"
+        StageName::Lift.as_str()
     }
 
     fn version(&self) -> u32 {
-        6
+        7
     }
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
@@ -74,11 +66,11 @@ impl Stage for LiftStage {
                 "smooth_arms": self.settings.smooth_arms,
                 "smooth_hands": self.settings.smooth_hands,
                 "level": self.settings.level,
+                "max_bone_change": self.settings.max_bone_change,
             },
             "segment": {
                 "min_frames": self.rules.min_frames,
                 "max_body_gap_secs": self.rules.max_body_gap_secs,
-                "max_bone_change": self.rules.max_bone_change,
             },
         })
     }
@@ -86,10 +78,10 @@ impl Stage for LiftStage {
     fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
         let input = |role: &str, path| Input { role: role.to_owned(), path };
         let mut inputs = vec![
-            input("timeline", self.timeline(unit)),
-            input("keypoints", self.keypoints(unit)),
-            input("intervals", self.segmented(unit, "intervals.json")),
-            input("ledger", self.segmented(unit, "ledger.json")),
+            input("timeline", self.file(Artifact::Timeline, unit)),
+            input("keypoints", self.file(Artifact::Keypoints, unit)),
+            input("intervals", self.file(Artifact::SegmentIntervals, unit)),
+            input("ledger", self.file(Artifact::SegmentLedger, unit)),
         ];
         for (role, path) in
             [("body weights", &self.settings.body_weights), ("hand weights", &self.settings.hand_weights)]
@@ -102,8 +94,8 @@ impl Stage for LiftStage {
     }
 
     fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
-        let mut keypoints = keypoints_npz::read(&self.keypoints(unit))?;
-        let timeline = self.timeline(unit);
+        let mut keypoints = keypoints_npz::read(&self.file(Artifact::Keypoints, unit))?;
+        let timeline = self.file(Artifact::Timeline, unit);
         let repeated = Npz::open(&timeline)?.bools("repeated", &[None])?.into_iter().collect::<Vec<bool>>();
         ensure!(
             repeated.len() == keypoints.n_frames(),
@@ -113,7 +105,7 @@ impl Stage for LiftStage {
             repeated.len()
         );
         unsee(&mut keypoints, &repeated);
-        let path = self.segmented(unit, "intervals.json");
+        let path = self.file(Artifact::SegmentIntervals, unit);
         let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
         let intervals: Intervals =
             serde_json::from_slice(&bytes).with_context(|| format!("{} holds no intervals", path.display()))?;
@@ -124,15 +116,15 @@ impl Stage for LiftStage {
             path.display(),
             intervals.n_frames
         );
-        let ledger = Ledger::read(&self.segmented(unit, "ledger.json"))?;
+        let ledger = Ledger::read(&self.file(Artifact::SegmentLedger, unit))?;
         let (lifted, intervals, ledger) = self.lift(&mut keypoints, intervals, ledger, out)?;
-        joints_npz::write(&out.join("joints.npz"), &lifted.motion)?;
+        joints_npz::write(&Artifact::Joints.within(out), &lifted.motion)?;
         let bones = json!({ "lengths_metres": lifted.lengths.to_vec(), "n_frames": lifted.n_frames });
-        write_json(&out.join("bones.json"), &bones)?;
+        write_json(&Artifact::Bones.within(out), &bones)?;
         let camera = json!({ "levelled": self.settings.level, "intervals": lifted.cameras });
-        write_json(&out.join("camera.json"), &camera)?;
-        write_json(&out.join("intervals.json"), &intervals)?;
-        write_json(&out.join("ledger.json"), &ledger)?;
+        write_json(&Artifact::Camera.within(out), &camera)?;
+        write_json(&Artifact::LiftIntervals.within(out), &intervals)?;
+        write_json(&Artifact::LiftLedger.within(out), &ledger)?;
         let seen = lifted.motion.mask.iter().filter(|m| **m).count();
         let told = lifted.motion.joints.iter().filter(|v| v.is_finite()).count() / 3;
         let filled = 100.0 * (1.0 - seen as f64 / told.max(1) as f64);
@@ -146,7 +138,7 @@ impl Stage for LiftStage {
 }
 
 impl LiftStage {
-    /// Lifts, and takes out of intervals and ledger what lifting shows to be wrong; writes `measures.npz`.
+    /// Lifts, and takes out of intervals and ledger what lifting shows to be wrong; writes `bone_change.npz`.
     fn lift(
         &self,
         keypoints: &mut Keypoints,
@@ -154,7 +146,7 @@ impl LiftStage {
         mut ledger: Ledger,
         out: &Path,
     ) -> Result<(Lifted, Intervals, Ledger)> {
-        let (most, min_frames) = (self.rules.max_bone_change, self.rules.min_frames);
+        let (most, min_frames) = (self.settings.max_bone_change, self.rules.min_frames);
         let mut raw = self.lifter.raw(keypoints, &intervals.intervals)?;
         let change = BoneChange::of(&raw.motion);
         if change.exceeds(most) {
@@ -165,7 +157,7 @@ impl LiftStage {
         }
         let open = outliers::open(&raw.motion, &intervals.intervals);
         (intervals, ledger) = amend(&intervals, &ledger, &open, min_frames)?;
-        write_measures(&out.join("measures.npz"), change.farthest())?;
+        write_measures(&Artifact::BoneChange.within(out), change.farthest())?;
         Ok((self.lifter.finish(raw, &intervals.intervals), intervals, ledger))
     }
 }

@@ -13,8 +13,8 @@ use crate::external::ffmpeg::frames::{FrameReader, FrameTime};
 use crate::external::onnx::{Manifest, ModelEntry, ModelError, Runtime};
 use crate::external::opencv;
 use crate::formats::npz::Npz;
+use crate::stage::artifacts::{Artifact, StageName};
 use crate::stage::progress::Progress;
-use crate::stage::runner::place;
 use crate::stage::{Input, Report, Stage, Unit};
 use crate::types::pose2d::{Keypoint, Pose2d};
 use crate::types::time::FrameRate;
@@ -24,8 +24,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The file this stage writes.
-pub const KEYPOINTS_FILE: &str = "keypoints.npz";
-const TIMELINE_FILE: &str = "timeline.npz";
 
 /// Stage `pose2d`.
 pub struct Pose2dStage {
@@ -73,7 +71,7 @@ impl Pose2dStage {
 
 impl Stage for Pose2dStage {
     fn name(&self) -> &'static str {
-        "pose2d"
+        StageName::Pose2d.as_str()
     }
 
     fn version(&self) -> u32 {
@@ -103,7 +101,7 @@ impl Stage for Pose2dStage {
         let input = |role: String, path: PathBuf| Input { role, path };
         let mut inputs = vec![
             input("video".into(), unit.source.clone()),
-            input("timeline".into(), place(&self.work, "extract", unit).join(TIMELINE_FILE)),
+            input("timeline".into(), Artifact::Timeline.path(&self.work, unit)),
         ];
         if let Some(path) = self.references.get(&unit.speaker) {
             inputs.push(input("reference".into(), path.clone()));
@@ -119,7 +117,7 @@ impl Stage for Pose2dStage {
     }
 
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
-        let restarts = restarts(&place(&self.work, "extract", unit).join(TIMELINE_FILE))?;
+        let restarts = restarts(&Artifact::Timeline.path(&self.work, unit))?;
         let mut chain = Chain::new(&self.runtime()?, &self.manifest, &self.models.dir, &self.settings)?;
         if let Some(path) = self.references.get(&unit.speaker) {
             let mut reference = FrameReader::open(path, FrameRate::new(1, 1))?;
@@ -157,7 +155,7 @@ impl Stage for Pose2dStage {
         ensure!(gathered.n_frames() == restarts.len(), unlike(&unit.source, gathered.n_frames(), restarts.len()));
         let (mut keypoints, extras) = gathered.finish(self.fps, image_size)?;
         other_hand::take_out_others(&mut keypoints);
-        store::write(&out.join(KEYPOINTS_FILE), &keypoints, &extras)?;
+        store::write(&Artifact::Keypoints.within(out), &keypoints, &extras)?;
         Ok(seen.report())
     }
 }

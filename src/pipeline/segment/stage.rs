@@ -8,9 +8,9 @@ use super::sound;
 use crate::config;
 use crate::formats::keypoints_npz;
 use crate::formats::npz::Npz;
+use crate::stage::artifacts::{Artifact, StageName};
 use crate::stage::ledger::{Ledger, longest_first};
 use crate::stage::progress::Progress;
-use crate::stage::runner::place;
 use crate::stage::{Input, Report, Stage, Unit, counted, write_json};
 use crate::types::interval::Intervals;
 use anyhow::{Result, ensure};
@@ -28,14 +28,14 @@ impl SegmentStage {
         Self { rules: rules.clone(), work: work.to_owned() }
     }
 
-    fn file(&self, stage: &str, unit: &Unit, name: &str) -> PathBuf {
-        place(&self.work, stage, unit).join(name)
+    fn file(&self, file: Artifact, unit: &Unit) -> PathBuf {
+        file.path(&self.work, unit)
     }
 }
 
 impl Stage for SegmentStage {
     fn name(&self) -> &'static str {
-        "segment"
+        StageName::Segment.as_str()
     }
 
     fn version(&self) -> u32 {
@@ -43,20 +43,17 @@ impl Stage for SegmentStage {
     }
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
-        let mut rules = serde_json::json!(self.rules);
-        // `lift` judges by this one
-        rules.as_object_mut().map(|keys| keys.remove("max_bone_change"));
-        serde_json::json!({ "segment": rules })
+        serde_json::json!({ "segment": self.rules })
     }
 
     fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
         let input = |role: &str, path| Input { role: role.to_owned(), path };
         let mut inputs = vec![
-            input("media", self.file("extract", unit, "media.json")),
-            input("timeline", self.file("extract", unit, "timeline.npz")),
-            input("keypoints", self.file("pose2d", unit, "keypoints.npz")),
+            input("media", self.file(Artifact::MediaInfo, unit)),
+            input("timeline", self.file(Artifact::Timeline, unit)),
+            input("keypoints", self.file(Artifact::Keypoints, unit)),
         ];
-        let sound = self.file("extract", unit, "audio.wav");
+        let sound = self.file(Artifact::Sound, unit);
         if sound.exists() {
             inputs.push(input("sound", sound));
         }
@@ -64,19 +61,19 @@ impl Stage for SegmentStage {
     }
 
     fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
-        let video = Video::read(&self.file("extract", unit, "media.json"))?;
+        let video = Video::read(&self.file(Artifact::MediaInfo, unit))?;
         let measures = self.measures(unit, &video)?;
         let (intervals, ledger) = judge(&measures, &video, &self.rules);
-        write_json(&out.join("intervals.json"), &intervals)?;
-        write_json(&out.join("ledger.json"), &ledger)?;
-        measures.write(&out.join("measures.npz"))?;
+        write_json(&Artifact::SegmentIntervals.within(out), &intervals)?;
+        write_json(&Artifact::SegmentLedger.within(out), &ledger)?;
+        measures.write(&Artifact::Measures.within(out))?;
         Ok(report(&intervals, &ledger))
     }
 }
 
 impl SegmentStage {
     fn measures(&self, unit: &Unit, video: &Video) -> Result<Measures> {
-        let path = self.file("pose2d", unit, "keypoints.npz");
+        let path = self.file(Artifact::Keypoints, unit);
         let (keypoints, extras) = (keypoints_npz::read(&path)?, keypoints_npz::read_extras(&path)?);
         let n_frames = video.n_frames;
         ensure!(
@@ -86,11 +83,11 @@ impl SegmentStage {
             keypoints.fps,
             video.fps
         );
-        let mut timeline = Npz::open(&self.file("extract", unit, "timeline.npz"))?;
+        let mut timeline = Npz::open(&self.file(Artifact::Timeline, unit))?;
         let shot_score = timeline.floats("shot_score", &[Some(n_frames)])?.into_iter().collect();
         let still = timeline.floats("still", &[Some(n_frames)])?.into_iter().collect();
         let restart: Vec<bool> = timeline.bools("restart", &[Some(n_frames)])?.into_iter().collect();
-        let (sound, sound_db) = sound::levels(&self.file("extract", unit, "audio.wav"), video.fps, n_frames)?;
+        let (sound, sound_db) = sound::levels(&self.file(Artifact::Sound, unit), video.fps, n_frames)?;
         let of_body = Measures::of(&keypoints);
         Ok(Measures {
             sound,

@@ -1,17 +1,17 @@
 //! How often each value was measured, beside its threshold.
 
 use super::spread::{MeasureCounts, MeasureHistogram};
-use crate::config::Segment;
+use crate::config::Settings;
 use crate::report::html::chart::histogram::histogram;
 use crate::report::html::numbers::{counted, percent};
 use crate::report::html::{Node, node};
 
 /// A card a measure.
-pub fn distributions(spread: &MeasureCounts, rules: &Segment, per_sec: f64) -> Vec<Node> {
+pub fn distributions(spread: &MeasureCounts, settings: &Settings, per_sec: f64) -> Vec<Node> {
     let about = "Of all frames of all videos, also the refused ones. The side that does not pass is in the other colour; \
                  heights go with the square root of the share, so that rare values can be seen; what lies beyond an end is in \
                  the last bar.";
-    let cards = spread.shown(rules, per_sec).into_iter().map(|shown| card(&shown));
+    let cards = spread.shown(settings, per_sec).into_iter().map(|shown| card(&shown));
     vec![node("p").text(about), node("div").class("grid").children(cards)]
 }
 

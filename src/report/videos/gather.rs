@@ -13,8 +13,8 @@ use crate::formats::npz::Npz;
 use crate::pipeline::segment;
 use crate::pipeline::segment::Measures;
 use crate::stage::Unit;
+use crate::stage::artifacts::Artifact;
 use crate::stage::progress::Progress;
-use crate::stage::runner::place;
 use crate::types::interval::Intervals;
 use anyhow::{Context, Result, ensure};
 use std::path::Path;
@@ -73,7 +73,7 @@ impl ReportData {
             }
         };
         self.spread.add_frames(&measures);
-        let bones = if video.is_lifted { bone_change(&place(work, "lift", &unit)) } else { Ok(Vec::new()) };
+        let bones = if video.is_lifted { bone_change(work, &unit) } else { Ok(Vec::new()) };
         let bone_change = bones.unwrap_or_else(|error| {
             video.note(&format!("{error:#}"));
             Vec::new()
@@ -81,7 +81,7 @@ impl ReportData {
         self.spread.add_bones(&bone_change);
         self.worst.add(self.videos.len(), &video.ledger, (&measures, &bone_change), &judged, rules);
         if video.is_lifted {
-            match motion(&place(work, "lift", &unit)) {
+            match motion(work, &unit) {
                 Ok((motion, intervals)) => self.movement.add(&motion, &intervals.intervals),
                 Err(error) => video.note(&format!("Its motion is not shown: {error:#}")),
             }
@@ -101,8 +101,8 @@ impl ReportData {
 }
 
 fn measured(work: &Path, unit: &Unit) -> Result<(Measures, segment::Video)> {
-    let judged = segment::Video::read(&place(work, "extract", unit).join("media.json"))?;
-    let measures = Measures::read(&place(work, "segment", unit).join("measures.npz"))?;
+    let judged = segment::Video::read(&Artifact::MediaInfo.path(work, unit))?;
+    let measures = Measures::read(&Artifact::Measures.path(work, unit))?;
     ensure!(
         measures.n_frames() == judged.n_frames,
         "{} frames were measured of {}: run the stage segment again",
@@ -112,14 +112,14 @@ fn measured(work: &Path, unit: &Unit) -> Result<(Measures, segment::Video)> {
     Ok((measures, judged))
 }
 
-fn bone_change(lifted: &Path) -> Result<Vec<f32>> {
-    let values = Npz::open(&lifted.join("measures.npz"))?.floats("bone_change", &[None])?;
+fn bone_change(work: &Path, unit: &Unit) -> Result<Vec<f32>> {
+    let values = Npz::open(&Artifact::BoneChange.path(work, unit))?.floats("bone_change", &[None])?;
     Ok(values.into_iter().collect())
 }
 
-fn motion(lifted: &Path) -> Result<(crate::types::pose3d::Motion, Intervals)> {
-    let path = lifted.join("intervals.json");
+fn motion(work: &Path, unit: &Unit) -> Result<(crate::types::pose3d::Motion, Intervals)> {
+    let path = Artifact::LiftIntervals.path(work, unit);
     let bytes = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let intervals = serde_json::from_slice(&bytes).with_context(|| format!("{} holds no intervals", path.display()))?;
-    Ok((joints_npz::read(&lifted.join("joints.npz"))?, intervals))
+    Ok((joints_npz::read(&Artifact::Joints.path(work, unit))?, intervals))
 }

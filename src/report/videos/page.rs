@@ -84,7 +84,7 @@ fn page(wanted: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sums
             section("timelines", "Timelines", timelines::lines(videos)),
             section("thresholds", "Thresholds", sliders::sliders(kept, rules)),
             section("frames", "Worst frames", gallery(worst, pictures, videos)),
-            section("distributions", "Distributions", distributions::distributions(spread, rules, per_sec)),
+            section("distributions", "Distributions", distributions::distributions(spread, wanted.settings, per_sec)),
             section("motion", "Motion", motion::motion(movement)),
         ],
         style: include_str!("page.css"),

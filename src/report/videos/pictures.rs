@@ -9,7 +9,7 @@ use crate::external::ffmpeg::jpeg;
 use crate::external::opencv::draw;
 use crate::formats::keypoints_npz;
 use crate::stage::Unit;
-use crate::stage::runner::place;
+use crate::stage::artifacts::Artifact;
 use crate::types::image::Image;
 use crate::types::pose2d::Keypoints;
 use anyhow::{Context, Result, ensure};
@@ -35,7 +35,7 @@ pub fn thumbnails(
     video: usize,
     worst: &Worst,
 ) -> Result<BTreeMap<Vec<usize>, MomentThumbnail>> {
-    let keypoints = keypoints_npz::read(&place(work, "pose2d", unit).join("keypoints.npz"))?;
+    let keypoints = keypoints_npz::read(&Artifact::Keypoints.path(work, unit))?;
     let moments: Vec<&Vec<usize>> =
         worst.rules.values().flatten().filter(|m| m.video == video).map(|m| &m.frames).collect();
     let frames = worst.frames_of(video);

@@ -1,6 +1,6 @@
 //! How often each value was measured, over all frames of all videos, and how long the kept stretches are.
 
-use crate::config::Segment;
+use crate::config::Settings;
 use crate::pipeline::segment::Measures;
 use crate::report::html::chart::histogram::{Counts, ThresholdLine};
 use crate::stage::ledger::Ledger;
@@ -13,7 +13,7 @@ struct Measure {
     unit: &'static str,
     ends: [f64; 2],
     n_bins: usize,
-    threshold: (&'static str, fn(&Segment) -> f64, bool),
+    threshold: (&'static str, fn(&Settings) -> f64, bool),
 }
 
 const fn row(
@@ -22,20 +22,34 @@ const fn row(
     unit: &'static str,
     ends: [f64; 2],
     n_bins: usize,
-    threshold: (&'static str, fn(&Segment) -> f64, bool),
+    threshold: (&'static str, fn(&Settings) -> f64, bool),
 ) -> Measure {
     Measure { name, title, unit, ends, n_bins, threshold }
 }
 
-const SCORE: (&str, fn(&Segment) -> f64, bool) = ("joint_score", |r| r.joint_score, true);
+const SCORE: (&str, fn(&Settings) -> f64, bool) = ("joint_score", |s| s.segment.joint_score, true);
 const ONE: [f64; 2] = [0.0, 1.0];
 /// Names of what is not in `measures.npz` of the segment stage.
 const BONES: &str = "bone_change";
 const LENGTHS: &str = "interval_secs";
 
 const ROWS: [Measure; 15] = [
-    row("sound_db", "Loudness of the second", "dB", [-100.0, 0.0], 50, ("min_sound_db", |r| r.min_sound_db, true)),
-    row("still", "Change of the picture", "8-bit steps", [0.0, 4.0], 80, ("min_change", |r| r.min_change, true)),
+    row(
+        "sound_db",
+        "Loudness of the second",
+        "dB",
+        [-100.0, 0.0],
+        50,
+        ("min_sound_db", |s| s.segment.min_sound_db, true),
+    ),
+    row(
+        "still",
+        "Change of the picture",
+        "8-bit steps",
+        [0.0, 4.0],
+        80,
+        ("min_change", |s| s.segment.min_change, true),
+    ),
     row("person", "Best score of face and arms", "", ONE, 40, SCORE),
     row(
         "shoulder_px",
@@ -43,33 +57,54 @@ const ROWS: [Measure; 15] = [
         "px",
         [0.0, 600.0],
         60,
-        ("min_shoulder_px", |r| r.min_shoulder_px, true),
+        ("min_shoulder_px", |s| s.segment.min_shoulder_px, true),
     ),
     row("face", "Score of nose and eyes", "", ONE, 40, SCORE),
-    row("facing", "Width of the shoulders", "neck-nose", [-2.0, 4.0], 60, ("min_facing", |r| r.min_facing, true)),
+    row(
+        "facing",
+        "Width of the shoulders",
+        "neck-nose",
+        [-2.0, 4.0],
+        60,
+        ("min_facing", |s| s.segment.min_facing, true),
+    ),
     row(
         "nose_off",
         "Nose beside the neck",
         "half shoulders",
         [0.0, 3.0],
         60,
-        ("max_nose_off", |r| r.max_nose_off, false),
+        ("max_nose_off", |s| s.segment.max_nose_off, false),
     ),
     row("arms", "Lowest score of shoulders and elbows", "", ONE, 40, SCORE),
     row("left_hand", "Score of the left hand", "", ONE, 40, SCORE),
     row("right_hand", "Score of the right hand", "", ONE, 40, SCORE),
-    row("jump", "Step of the neck", "shoulder widths", [0.0, 1.5], 60, ("max_jump", |r| r.max_jump, false)),
-    row("shot_score", "Shot score", "", ONE, 50, ("shot_threshold", |r| r.shot_threshold, false)),
-    row("n_people", "People in view", "people", [-0.5, 10.5], 11, ("max_people", |r| f64::from(r.max_people), false)),
+    row("jump", "Step of the neck", "shoulder widths", [0.0, 1.5], 60, ("max_jump", |s| s.segment.max_jump, false)),
+    row("shot_score", "Shot score", "", ONE, 50, ("shot_threshold", |s| s.segment.shot_threshold, false)),
+    row(
+        "n_people",
+        "People in view",
+        "people",
+        [-0.5, 10.5],
+        11,
+        ("max_people", |s| f64::from(s.segment.max_people), false),
+    ),
     row(
         BONES,
         "Lifted bone off its length",
         "of its length",
         [0.0, 1.5],
         60,
-        ("max_bone_change", |r| r.max_bone_change, false),
+        ("max_bone_change", |s| s.lift.max_bone_change, false),
     ),
-    row(LENGTHS, "Length of kept stretches", "s", [0.0, 60.0], 60, ("min_frames", |r| r.min_frames as f64, true)),
+    row(
+        LENGTHS,
+        "Length of kept stretches",
+        "s",
+        [0.0, 60.0],
+        60,
+        ("min_frames", |s| s.segment.min_frames as f64, true),
+    ),
 ];
 
 /// The counts of all rows.
@@ -114,12 +149,12 @@ impl MeasureCounts {
         self.add(LENGTHS, ledger.kept.iter().map(|kept| kept.end_secs - kept.start_secs));
     }
 
-    /// Every row, with its threshold under `rules` for frames that come `per_sec` a second.
-    pub fn shown(&self, rules: &Segment, per_sec: f64) -> Vec<MeasureHistogram<'_>> {
+    /// Every row, with its threshold under `settings` for frames that come `per_sec` a second.
+    pub fn shown(&self, settings: &Settings, per_sec: f64) -> Vec<MeasureHistogram<'_>> {
         let shown = self.0.iter().zip(&ROWS).map(|(counts, row)| {
             let (key, value, is_least) = row.threshold;
             let is_length = row.name == LENGTHS;
-            let value = if is_length { value(rules) / per_sec.max(1e-9) } else { value(rules) };
+            let value = if is_length { value(settings) / per_sec.max(1e-9) } else { value(settings) };
             let of = if is_length { "stretch" } else { "frame" };
             let threshold = ThresholdLine { value, is_least };
             MeasureHistogram { title: row.title, key, unit: row.unit, counts, threshold, of }
@@ -142,7 +177,7 @@ mod tests {
         let measures = Measures { jump: vec![0.1, 0.7, f32::NAN], ..Measures::default() };
         spread.add_frames(&measures);
         spread.add_kept(&Ledger { kept: vec![Kept { start_secs: 1.0, end_secs: 9.0 }], ..Ledger::default() });
-        let shown = spread.shown(&Segment::default(), 15.0);
+        let shown = spread.shown(&Settings::default(), 15.0);
         let of = |key: &str| shown.iter().find(|row| row.key == key).unwrap();
         assert_eq!((of("max_jump").counts.total(), of("max_jump").counts.unknown), (2, 1));
         assert!((of("min_frames").threshold.value - 64.0 / 15.0).abs() < 1e-9);

@@ -2,9 +2,9 @@
 
 use super::reasons::WAITING;
 use crate::stage::Unit;
+use crate::stage::artifacts::{Artifact, StageName, dir};
 use crate::stage::ledger::Ledger;
 use crate::stage::record::Failure;
-use crate::stage::runner::place;
 use std::path::Path;
 
 /// A video of the report.
@@ -43,21 +43,21 @@ impl VideoSummary {
         if !unit.source.exists() {
             video.note("The file is gone: there are no pictures of it.");
         }
-        let failure = ["extract", "pose2d", "segment", "lift"]
+        let failure = StageName::OF_VIDEOS
             .into_iter()
-            .find_map(|stage| Some((stage, Failure::read(&place(work, stage, unit))?.error)));
+            .find_map(|stage| Some((stage, Failure::read(&dir(work, stage, unit))?.error)));
         if let Some((stage, error)) = failure {
-            video.lose(work, stage, &error);
+            video.lose(work, stage.as_str(), &error);
             return video;
         }
-        for stage in ["lift", "segment"] {
-            let path = place(work, stage, unit).join("ledger.json");
+        for file in [Artifact::LiftLedger, Artifact::SegmentLedger] {
+            let path = file.path(work, unit);
             if !path.exists() {
                 continue;
             }
             match Ledger::read(&path) {
                 Ok(ledger) => {
-                    (video.ledger, video.is_lifted) = (ledger, stage == "lift");
+                    (video.ledger, video.is_lifted) = (ledger, file == Artifact::LiftLedger);
                     if !video.is_lifted {
                         video.note("It is not lifted yet: rules on bones have not had their say.");
                     }
@@ -72,7 +72,7 @@ impl VideoSummary {
 
     /// The account of a video without a verdict.
     fn lose(&mut self, work: &Path, stage: &str, error: &str) {
-        let media = std::fs::read(place(work, "extract", &self.unit).join("media.json")).unwrap_or_default();
+        let media = std::fs::read(Artifact::MediaInfo.path(work, &self.unit)).unwrap_or_default();
         let media: serde_json::Value = serde_json::from_slice(&media).unwrap_or_default();
         let secs = media["duration_secs"].as_f64().filter(|secs| secs.is_finite() && *secs > 0.0);
         self.ledger = secs.map_or_else(Ledger::default, |secs| Ledger::of_failure(secs, stage, error));

@@ -77,7 +77,7 @@ fn a_forgotten_video_leaves_nothing_and_the_others_are_untouched() {
     fs::write(&config, text).unwrap();
     let run = project.run(&[]);
     assert_eq!(run.code, 0, "{} {}", run.json, run.errors);
-    assert_eq!(run.json["stages"]["shard"]["done"].as_u64(), Some(1));
+    assert_eq!(run.json["stages"]["dataset"]["done"].as_u64(), Some(1));
     assert!(!bytes_under(&project.work()).iter().any(|(file, _)| file.contains(name.trim_end_matches(".mp4"))));
     let shards = |all: &BTreeMap<String, Vec<u8>>| -> BTreeMap<String, Vec<u8>> {
         all.iter().filter(|(file, _)| file.ends_with(".tar")).map(|(f, b)| (f.clone(), b.clone())).collect()

@@ -55,7 +55,7 @@ fn plan(sources: &[&Path]) -> ImportPlan {
         kind: None,
         about: About::new("host", FPS),
         limits: TakeLimits { fps: FPS, min_frames: 64, max_apart_secs: 0.5 },
-        shard: orator::config::Shard { validation: 0.0, test: 0.0, ..Default::default() },
+        dataset: orator::config::DatasetConfig { validation: 0.0, test: 0.0, ..Default::default() },
     }
 }
 

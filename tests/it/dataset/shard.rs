@@ -1,4 +1,4 @@
-//! The shard stage over a made-up work folder: what is in the dataset, and what has no say in its bytes.
+//! The dataset stage over a made-up work folder: what is in the dataset, and what has no say in its bytes.
 
 use crate::fixtures::footage::{FPS, good, write};
 use crate::fixtures::support::files_under;
@@ -12,10 +12,10 @@ use orator::dataset::verify::verify::{accounts, verify};
 use orator::dataset::{Dataset, Split};
 use orator::formats::joints_npz;
 use orator::motion::bones::with_lengths;
+use orator::pipeline::dataset::stage::DatasetStage;
 use orator::pipeline::segment::SegmentStage;
-use orator::pipeline::shard::stage::ShardStage;
+use orator::stage::artifacts::{self, Artifact, StageName};
 use orator::stage::progress::Silent;
-use orator::stage::runner::place;
 use orator::stage::{Report, Stage, Unit};
 use orator::types::pose3d::Motion;
 use orator::types::skeleton::{L_HAND, N_BONES, R_HAND, parent};
@@ -47,11 +47,11 @@ fn video_with(root: &Path, name: &str, n_frames: usize, seed: u64, sound_seed: u
         sound.pop();
     }
     write(&work, &unit, &footage, &format!("film {seed}"));
-    let segment = place(&work, "segment", &unit);
+    let segment = artifacts::dir(&work, StageName::Segment, &unit);
     fs::create_dir_all(&segment).unwrap();
     SegmentStage::new(&config::Segment::default(), &work).run(&unit, &segment, &Silent).unwrap();
 
-    let lift = place(&work, "lift", &unit);
+    let lift = artifacts::dir(&work, StageName::Lift, &unit);
     fs::create_dir_all(&lift).unwrap();
     for file in ["intervals.json", "ledger.json"] {
         fs::copy(segment.join(file), lift.join(file)).unwrap();
@@ -72,7 +72,7 @@ fn video_with(root: &Path, name: &str, n_frames: usize, seed: u64, sound_seed: u
 fn settings(root: &Path) -> Settings {
     let mut settings = Settings::default();
     settings.work.dir = root.join("work");
-    settings.shard.max_mb = 1;
+    settings.dataset.max_mb = 1;
     settings
 }
 
@@ -85,7 +85,7 @@ fn shard_with(root: &Path, videos: &[Unit], named: &[(&Unit, Split)], out: &str)
     let speaker = Unit { speaker: "host".into(), video: String::new(), source: root.join("pipeline.toml") };
     let splits = named.iter().map(|(unit, split)| (unit.video.clone(), *split)).collect();
     let all = Videos { speaker: "host".into(), units: videos.to_vec(), splits, missing: Vec::new() };
-    let stage = ShardStage::new(&settings(root), videos).with_videos(vec![all]);
+    let stage = DatasetStage::new(&settings(root), videos).with_videos(vec![all]);
     let out = root.join(out);
     fs::create_dir_all(&out).unwrap();
     assert!(stage.inputs(&speaker).unwrap().iter().all(|input| input.path.exists()));
@@ -139,7 +139,7 @@ fn samples_hold_the_frames_and_the_sound_of_their_interval() {
         let source = blake3::hash(&fs::read(&unit.source).unwrap()).to_hex();
         let start = sample.meta["first_frame"].as_u64().unwrap() as usize;
         assert_eq!(sample.key, format!("{name}-{}-{start:06}", &source[..8]));
-        let audio = place(&dir.path().join("work"), "extract", unit).join("audio.wav");
+        let audio = Artifact::Sound.path(&dir.path().join("work"), unit);
         let whole: Vec<i16> = hound::WavReader::open(audio).unwrap().samples().map(Result::unwrap).collect();
         let range = sync::samples_of(FPS, 16_000, start..start + sample.n_frames());
         let mut expected: Vec<f32> =

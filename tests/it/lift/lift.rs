@@ -10,9 +10,9 @@ use orator::motion::upper_body::{
     L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, NOSE, Pose, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, metres_per_unit,
 };
 use orator::pipeline::lift::{LiftStage, Lifter};
+use orator::stage::artifacts::{self, StageName};
 use orator::stage::ledger::{Kept, Ledger};
 use orator::stage::progress::Silent;
-use orator::stage::runner::place;
 use orator::stage::{Stage, Unit};
 use orator::train::scene::body::{Filming, Scene};
 use orator::train::scene::hand_shape;
@@ -308,7 +308,8 @@ fn the_stage_writes_joints_and_bones() {
         n_people: ndarray::Array1::ones(70),
         identity: ndarray::Array1::zeros(70),
     };
-    let [extract, pose2d, segment] = ["extract", "pose2d", "segment"].map(|stage| place(dir.path(), stage, &unit));
+    let [extract, pose2d, segment] = [StageName::Extract, StageName::Pose2d, StageName::Segment]
+        .map(|stage| artifacts::dir(dir.path(), stage, &unit));
     [&extract, &pose2d, &segment].into_iter().for_each(|folder| std::fs::create_dir_all(folder).unwrap());
     let mut timeline = NpzWriter::new(std::fs::File::create(extract.join("timeline.npz")).unwrap());
     timeline.add_array("repeated", &ndarray::Array1::from_shape_fn(70, |t| t % 3 == 2)).unwrap();

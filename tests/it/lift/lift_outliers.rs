@@ -7,9 +7,9 @@ use orator::config;
 use orator::formats::joints_npz;
 use orator::pipeline::lift::LiftStage;
 use orator::pipeline::segment::SegmentStage;
+use orator::stage::artifacts::{self, StageName};
 use orator::stage::ledger::Ledger;
 use orator::stage::progress::Silent;
-use orator::stage::runner::place;
 use orator::stage::{Stage, Unit};
 use orator::types::interval::Intervals;
 use orator::types::pose2d::coco;
@@ -26,11 +26,11 @@ fn lifted(footage: &Footage) -> (Vec<(usize, usize)>, Ledger, Motion) {
     let segment = SegmentStage::new(&rules, &work);
     let lift = LiftStage::new(&config::Lift::default(), &rules, &work).unwrap();
     for stage in [&segment as &dyn Stage, &lift] {
-        let out = place(&work, stage.name(), &unit);
+        let out = unit.dir(&work.join(stage.name()));
         std::fs::create_dir_all(&out).unwrap();
         stage.run(&unit, &out, &Silent).unwrap();
     }
-    let out = place(&work, "lift", &unit);
+    let out = artifacts::dir(&work, StageName::Lift, &unit);
     let intervals: Intervals = serde_json::from_slice(&std::fs::read(out.join("intervals.json")).unwrap()).unwrap();
     let ledger = Ledger::read(&out.join("ledger.json")).unwrap();
     assert_eq!(ledger.kept.len(), intervals.intervals.len());

@@ -37,16 +37,17 @@ fn a_changed_threshold_runs_segment_and_what_follows_and_never_pose2d() {
     ];
     let mut set: Vec<String> = Vec::new();
     for (key, was, now, first, n_lifted) in changes {
-        set.extend(["--set".to_owned(), format!("segment.{key}={now}")]);
+        let section = first;
+        set.extend(["--set".to_owned(), format!("{section}.{key}={now}")]);
         let set: Vec<&str> = set.iter().map(String::as_str).collect();
         let told = plan(&project.answer(&[&["status", "--why"], &set[..]].concat()));
-        let expected = format!("segment.{key} changed from {was} to {now}");
+        let expected = format!("{section}.{key} changed from {was} to {now}");
         for fresh in ["extract", "pose2d"] {
             assert_eq!((told[fresh].0, told[fresh].1), (1, 0), "{key}: {told:?}");
         }
         assert_eq!((told[first].1, told[first].2.as_str()), (1, expected.as_str()), "{key}");
         assert_eq!(told["segment"].1, u64::from(first == "segment"), "{key}");
-        for after in ["lift", "shard"] {
+        for after in ["lift", "dataset"] {
             assert_eq!(told[after].1, 1, "{key}: {told:?}");
         }
         let answer = project.run(&set);

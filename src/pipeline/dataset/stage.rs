@@ -1,4 +1,4 @@
-//! The shard stage: all videos of a speaker, as `extract`, `pose2d`, `segment` and `lift` left them, become one dataset.
+//! The stage: all videos of a speaker, as `extract`, `pose2d`, `segment` and `lift` left them, become one dataset.
 //! What the dataset that was there has of a video already is taken over as it is, so that a new video costs itself alone.
 
 use super::outcome::Outcome;
@@ -14,18 +14,18 @@ use crate::dataset::split::{Assignment, Split, Unassigned, assign as place_in_sp
 use crate::dataset::write::part;
 use crate::dataset::write::part::{VideoEntry, VideoSource};
 use crate::dataset::write::writer::DatasetWriter;
+use crate::stage::artifacts::{Artifact, StageName, dir, speaker_dir};
 use crate::stage::ledger::{Ledger, Refused, longest_first};
 use crate::stage::progress::Progress;
 use crate::stage::record::Failure;
-use crate::stage::runner::place;
 use crate::stage::{Input, Report, Stage, Unit, counted};
 use anyhow::{Result, ensure};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// A speaker's videos to shards. Its unit is the speaker.
-pub struct ShardStage {
-    shard: config::Shard,
+pub struct DatasetStage {
+    settings: config::DatasetConfig,
     speakers: Vec<config::Speaker>,
     work: PathBuf,
     /// Videos that came through the stages before.
@@ -35,11 +35,11 @@ pub struct ShardStage {
     models: Vec<ModelUsed>,
 }
 
-impl ShardStage {
+impl DatasetStage {
     /// `ready` are the units of videos that came through the stages before, of one speaker or of several.
     pub fn new(settings: &Settings, ready: &[Unit]) -> Self {
         Self {
-            shard: settings.shard.clone(),
+            settings: settings.dataset.clone(),
             speakers: settings.speaker.clone(),
             work: settings.work.dir.clone(),
             ready: ready.to_vec(),
@@ -59,7 +59,7 @@ impl ShardStage {
     }
 
     fn ready(&self, speaker: &Unit) -> Vec<&Unit> {
-        let lifted = |video: &&Unit| place(&self.work, "lift", video).join("joints.npz").exists();
+        let lifted = |video: &&Unit| Artifact::Joints.path(&self.work, video).exists();
         self.ready.iter().filter(|video| video.speaker == speaker.speaker).filter(lifted).collect()
     }
 
@@ -87,10 +87,10 @@ impl ShardStage {
 
 /// A video that failed at a stage, or that no stage has finished.
 fn failure(work: &Path, unit: &Unit) -> VideoSource {
-    let stages = ["extract", "pose2d", "segment", "lift"];
-    let error = stages.into_iter().find_map(|stage| Some((stage, Failure::read(&place(work, stage, unit))?.error)));
+    let failure = |stage: StageName| Some((stage.as_str(), Failure::read(&dir(work, stage, unit))?.error));
+    let error = StageName::OF_VIDEOS.into_iter().find_map(failure);
     let (stage, error) = error.unwrap_or(("run", "not every stage is done".to_owned()));
-    let media = std::fs::read(place(work, "extract", unit).join("media.json")).unwrap_or_default();
+    let media = std::fs::read(Artifact::MediaInfo.path(work, unit)).unwrap_or_default();
     let media: serde_json::Value = serde_json::from_slice(&media).unwrap_or_default();
     let duration_secs = media["duration_secs"].as_f64().filter(|secs| secs.is_finite() && *secs > 0.0);
     VideoSource {
@@ -102,13 +102,9 @@ fn failure(work: &Path, unit: &Unit) -> VideoSource {
     }
 }
 
-impl Stage for ShardStage {
+impl Stage for DatasetStage {
     fn name(&self) -> &'static str {
-        "shard"
-    }
-
-    fn folder(&self) -> &'static str {
-        "dataset"
+        StageName::Dataset.as_str()
     }
 
     fn version(&self) -> u32 {
@@ -122,7 +118,7 @@ impl Stage for ShardStage {
         let others = self.failures(unit, &self.ready(unit));
         let others: BTreeMap<String, Option<String>> = others.into_iter().map(|s| (s.name, s.failure)).collect();
         serde_json::json!({
-            "shard": self.shard, "models": self.models, "tool": env!("CARGO_PKG_VERSION"),
+            "dataset": self.settings, "models": self.models, "tool": env!("CARGO_PKG_VERSION"),
             "speaker": { "licence": said.licence, "consent": said.consent, "source": said.source },
             "splits": videos.map(|videos| &videos.splits), "others": others,
         })
@@ -132,10 +128,10 @@ impl Stage for ShardStage {
         let mut inputs = Vec::new();
         for video in self.ready(unit) {
             inputs.push(Input { role: format!("{} video", video.video), path: video.source.clone() });
-            for (stage, name, optional) in FILES {
-                let path = place(&self.work, stage, video).join(name);
+            for (file, optional) in FILES {
+                let path = file.path(&self.work, video);
                 if !optional || path.exists() {
-                    inputs.push(Input { role: format!("{} {name}", video.video), path });
+                    inputs.push(Input { role: format!("{} {}", video.video, file.file()), path });
                 }
             }
         }
@@ -149,7 +145,7 @@ impl Stage for ShardStage {
         videos.sort_by(|a, b| (&a.name, &a.unit.video).cmp(&(&b.name, &b.unit.video)));
         check(unit, &self.work, &videos)?;
 
-        let old = place(&self.work, self.folder(), unit);
+        let old = dir(&self.work, StageName::Dataset, unit);
         let mut run = Run { stage: self, out, old: &old, before: parts_of(&old), n_taken_over: 0, progress };
         let (mut kept, mut left_out): (Vec<&Video>, Vec<(&Video, VideoSource)>) = (Vec::new(), Vec::new());
         for video in &videos {
@@ -162,9 +158,9 @@ impl Stage for ShardStage {
         let compared = run.compare(&kept, &sounds)?;
         let placed = run.place(&kept, &compared);
         let Some(first) = kept.first() else { anyhow::bail!("no video of {unit} is ready") };
-        let writer = DatasetWriter::new(out, self.about(unit, first), u64::from(self.shard.max_mb) << 20)
+        let writer = DatasetWriter::new(out, self.about(unit, first), u64::from(self.settings.max_mb) << 20)
             .with_compared(compared);
-        let task = progress.begin(&format!("shard {unit}"), kept.len() as u64);
+        let task = progress.begin(&format!("dataset {unit}"), kept.len() as u64);
         for (video, placed) in kept.iter().zip(placed) {
             task.detail(&video.name);
             match placed {
@@ -186,7 +182,7 @@ impl Stage for ShardStage {
         let n_taken_over = run.n_taken_over;
         let (_, stats) = writer.finish()?;
         let outcome = Outcome {
-            shard: &self.shard,
+            settings: &self.settings,
             videos: &videos,
             stats: &stats,
             n_failed: failures.len(),
@@ -212,12 +208,13 @@ fn check(unit: &Unit, work: &Path, videos: &[Video]) -> Result<()> {
     ensure!(
         videos.iter().any(|video| !video.intervals.intervals.is_empty()),
         "no interval worth keeping in {} of {:.1} s, so there is no dataset of {}; refused: {}; \
-         the ledger.json of each video under {} says where and why",
+         the {} of each video under {} says where and why",
         counted(videos.len(), "video"),
         videos.iter().map(|video| video.ledger.duration_secs).sum::<f64>(),
         unit.speaker,
         longest_first(&refused),
-        work.join("lift").join(&unit.speaker).display()
+        Artifact::LiftLedger.file(),
+        speaker_dir(work, StageName::Lift, &unit.speaker).display()
     );
     Ok(())
 }
@@ -235,7 +232,7 @@ type Sounds = BTreeMap<String, String>;
 
 /// What is at hand while a dataset is written.
 struct Run<'a> {
-    stage: &'a ShardStage,
+    stage: &'a DatasetStage,
     out: &'a Path,
     /// The dataset that is there, and its videos.
     old: &'a Path,
@@ -264,7 +261,7 @@ impl Run<'_> {
     }
 
     fn compare(&self, videos: &[&Video], sounds: &Sounds) -> Result<SoundComparison> {
-        let duplicate_secs = self.stage.shard.duplicate_secs;
+        let duplicate_secs = self.stage.settings.duplicate_secs;
         if duplicate_secs <= 0.0 {
             return Ok(SoundComparison::default());
         }
@@ -288,7 +285,7 @@ impl Run<'_> {
             before: self.before.get(&video.name).filter(|part| part.split.is_some()).map(|part| &part.split_by),
         });
         let waiting: Vec<Unassigned> = waiting.collect();
-        place_in_splits(&waiting, &compared.shared, self.stage.shard.validation, self.stage.shard.test)
+        place_in_splits(&waiting, &compared.shared, self.stage.settings.validation, self.stage.settings.test)
     }
 
     /// Writes a video, or takes it over from the old dataset.
@@ -306,7 +303,7 @@ impl Run<'_> {
             video.files_hash,
             split,
             by,
-            self.stage.shard.max_mb
+            self.stage.settings.max_mb
         ]);
         let made_from = blake3::hash(made_from.to_string().as_bytes()).to_hex().to_string();
         let same = self.before.get(&video.name).filter(|part| part.made_from == made_from);
@@ -336,7 +333,7 @@ impl Run<'_> {
 
     /// A video that is left out, since what it shows is there already: what was kept of it is refused.
     fn duplicate(&self, video: &Video, of: &str, secs: f64) -> VideoSource {
-        let threshold = self.stage.shard.duplicate_secs;
+        let threshold = self.stage.settings.duplicate_secs;
         let mut ledger = video.ledger.clone();
         let refused = ledger.kept.drain(..).map(|kept| Refused {
             start_secs: kept.start_secs,

@@ -6,10 +6,10 @@ use crate::dataset::bones::VideoBones;
 use crate::dataset::sample::Sample;
 use crate::formats::{joints_npz, keypoints_npz};
 use crate::stage::Unit;
+use crate::stage::artifacts::{Artifact, StageName, dir};
 use crate::stage::fingerprint::hash_file;
 use crate::stage::ledger::Ledger;
 use crate::stage::record::Record;
-use crate::stage::runner::place;
 use crate::types::interval::{Interval, Intervals};
 use crate::types::pose2d::Keypoints;
 use crate::types::pose3d::Motion;
@@ -42,14 +42,14 @@ pub struct Video {
     joints: PathBuf,
 }
 
-/// The files read of each video: stage, name, whether it may be missing.
-pub const FILES: [(&str, &str, bool); 6] = [
-    ("extract", "audio.wav", true),
-    ("pose2d", "keypoints.npz", false),
-    ("lift", "intervals.json", false),
-    ("lift", "ledger.json", false),
-    ("lift", "joints.npz", false),
-    ("lift", "bones.json", false),
+/// The files read of each video, and whether it may be missing.
+pub const FILES: [(Artifact, bool); 6] = [
+    (Artifact::Sound, true),
+    (Artifact::Keypoints, false),
+    (Artifact::LiftIntervals, false),
+    (Artifact::LiftLedger, false),
+    (Artifact::Joints, false),
+    (Artifact::Bones, false),
 ];
 
 /// A sample, and how much silence was appended to its sound.
@@ -61,31 +61,31 @@ pub struct Cut {
 /// Samples of sound read at a time.
 const PIECE: usize = 1 << 15;
 
-/// BLAKE3 of a file that a stage made of the video.
-fn made(work: &Path, stage: &str, unit: &Unit, name: &str) -> Result<String> {
-    let place = place(work, stage, unit);
-    let recorded =
-        Record::read(&place).and_then(|record| record.outputs.into_iter().find(|output| output.file == name));
-    recorded.map_or_else(|| hash_file(&place.join(name)), |output| Ok(output.hash))
+/// BLAKE3 of a file that a stage wrote of the video.
+fn hash_of(file: Artifact, work: &Path, unit: &Unit) -> Result<String> {
+    let record = Record::read(&dir(work, file.stage(), unit));
+    let recorded = record.and_then(|record| record.outputs.into_iter().find(|output| output.file == file.file()));
+    recorded.map_or_else(|| hash_file(&file.path(work, unit)), |output| Ok(output.hash))
 }
 
 impl Video {
     /// Reads the small files. Hashes are taken from the records of the stages, where there are any.
     pub fn open(work: &Path, unit: &Unit) -> Result<Video> {
-        let file = |stage: &str, name: &str| place(work, stage, unit).join(name);
-        let extracted = Record::read(&place(work, "extract", unit));
+        let path_of = |file: Artifact| file.path(work, unit);
+        let extracted = Record::read(&dir(work, StageName::Extract, unit));
         let content = match extracted.and_then(|record| record.fingerprint.inputs.get("video").cloned()) {
             Some(content) => content,
             None => hash_file(&unit.source)?,
         };
         let mut hasher = blake3::Hasher::new();
-        for (stage, name, optional) in FILES {
-            if !optional || file(stage, name).exists() {
-                hasher.update(format!("{stage} {name} {}\n", made(work, stage, unit, name)?).as_bytes());
+        for (file, optional) in FILES {
+            if !optional || path_of(file).exists() {
+                let line = format!("{} {} {}\n", file.stage(), file.file(), hash_of(file, work, unit)?);
+                hasher.update(line.as_bytes());
             }
         }
         let stem = unit.source.file_stem().unwrap_or_default().to_string_lossy();
-        let path = file("lift", "intervals.json");
+        let path = path_of(Artifact::LiftIntervals);
         let intervals = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
         let intervals: Intervals = serde_json::from_slice(&intervals)
             .with_context(|| format!("{} is not as the lift stage writes it", path.display()))?;
@@ -98,12 +98,12 @@ impl Video {
             name: format!("{}-{}", slug(&stem), content.get(..8).unwrap_or(&content)),
             file: unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned(),
             files_hash: hasher.finalize().to_hex().to_string(),
-            ledger: Ledger::read(&file("lift", "ledger.json"))?,
+            ledger: Ledger::read(&path_of(Artifact::LiftLedger))?,
             unit: unit.clone(),
-            bones: VideoBones::read(&file("lift", "bones.json"))?,
-            sound: file("extract", "audio.wav"),
-            keypoints: file("pose2d", "keypoints.npz"),
-            joints: file("lift", "joints.npz"),
+            bones: VideoBones::read(&path_of(Artifact::Bones))?,
+            sound: path_of(Artifact::Sound),
+            keypoints: path_of(Artifact::Keypoints),
+            joints: path_of(Artifact::Joints),
             content,
             intervals,
         })

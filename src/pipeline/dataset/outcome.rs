@@ -14,7 +14,7 @@ use std::path::Path;
 
 /// How the writing came out.
 pub struct Outcome<'a> {
-    pub shard: &'a config::Shard,
+    pub settings: &'a config::DatasetConfig,
     pub videos: &'a [Video],
     pub stats: &'a DatasetStats,
     pub n_failed: usize,
@@ -52,7 +52,8 @@ impl Outcome<'_> {
         let mut by_length: Vec<&Video> = videos.iter().filter(|video| video.ledger.kept_secs() > 0.0).collect();
         by_length.sort_by(|a, b| b.ledger.kept_secs().total_cmp(&a.ledger.kept_secs()));
         let mut others = by_length.iter().skip(1);
-        let shares = [(Split::Train, 1.0), (Split::Validation, self.shard.validation), (Split::Test, self.shard.test)];
+        let shares =
+            [(Split::Train, 1.0), (Split::Validation, self.settings.validation), (Split::Test, self.settings.test)];
         for (split, _) in shares.into_iter().filter(|(split, share)| *share > 0.0 && windows(stats, *split) == 0) {
             let name = split.name();
             let file = match split {
