@@ -21,7 +21,7 @@ const FLOORS: [(u8, &str, &str); 19] = [
     (4, "metrics", "types math nn"),
     (4, "generate", "types audio motion formats nn"),
     (4, "animate", "types math stage motion formats external"),
-    (5, "dataset", "types stage config audio motion formats external mocap"),
+    (5, "dataset", "types math stage config audio motion formats external mocap"),
     (6, "pipeline", "types math stage config external audio motion formats nn dataset"),
     (6, "train", "types math stage config audio motion formats nn mocap dataset metrics generate"),
     (6, "demo", "types math stage audio motion formats external animate dataset metrics generate"),
@@ -213,6 +213,14 @@ fn no_files_import_each_other_in_a_circle() {
         circles.retain(|group| !CIRCLES_LEFT.iter().any(|folder| group.iter().all(|file| file.starts_with(folder))));
         assert!(circles.is_empty(), "{root_file}: {circles:#?}");
     }
+}
+
+#[test]
+fn tests_import_helpers_from_fixtures_alone() {
+    let sources = Sources::read(&root().join("tests/it/main.rs"));
+    let code = imports(&sources).into_iter().filter(|(from, to)| !from.is_map() && !to.is_map());
+    let wrong = code.filter(|(_, to)| to.room() != "fixtures");
+    none(&wrong.map(|(from, to)| format!("{} imports {}", from.name, to.name)).collect::<Vec<_>>());
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! `orator animate` from the command line: a file, a folder, a dataset; and what it is given wrong it says clearly, with
 //! exit code 1, and writes nothing.
 
-use super::bvh::{Bvh, worst_mm};
+use crate::fixtures::animation::bvh::{Bvh, worst_mm};
 use crate::fixtures::figures::{FPS, swinging};
 use ndarray::{Array3, s};
 use orator::dataset::sample::N_KEYPOINTS;

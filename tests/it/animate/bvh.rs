@@ -1,7 +1,9 @@
 //! Motion to BVH: what is written, read back by a reader of this file's own and put through plain matrices, is the
 //! motion again; left is left; gaps do no harm.
 
+use crate::fixtures::animation::bvh::{Bvh, worst_mm};
 use crate::fixtures::figures::{FPS, swinging};
+use crate::fixtures::skip::real_data;
 use ndarray::{Array3, s};
 use orator::animate::rig::rig::Rig;
 use orator::animate::{AnimationOptions, Constraints, Performance, Smoothing, perform};
@@ -11,7 +13,6 @@ use orator::math::rotation::Rotation;
 use orator::types::pose3d::Motion;
 use orator::types::skeleton;
 use orator::types::skeleton::{L_HAND, N_JOINTS, R_HAND};
-use std::path::Path;
 
 fn performed(motion: &Motion) -> Performance {
     perform(motion, None, &AnimationOptions::default())
@@ -23,141 +24,6 @@ fn text(motion: &Motion) -> String {
 
 fn clip(motion: &Motion) -> Clip {
     performed(motion).clip
-}
-
-type Matrix = [[f64; 3]; 3];
-
-/// A BVH as its text tells it: joints in file order, each with parent, offset and number of channels.
-pub struct Bvh {
-    pub names: Vec<String>,
-    parents: Vec<Option<usize>>,
-    offsets: Vec<[f64; 3]>,
-    channels: Vec<usize>,
-    pub frame_secs: f64,
-    pub frames: Vec<Vec<f64>>,
-}
-
-impl Bvh {
-    pub fn parse(text: &str) -> Self {
-        let (hierarchy, motion) = text.split_once("MOTION\n").expect("a MOTION part");
-        let mut bvh =
-            Self { names: vec![], parents: vec![], offsets: vec![], channels: vec![], frame_secs: 0.0, frames: vec![] };
-        let (mut open, mut next) = (Vec::new(), String::new());
-        for line in hierarchy.lines().skip(1) {
-            let words: Vec<&str> = line.split_whitespace().collect();
-            match words[0] {
-                "ROOT" | "JOINT" => next = words[1].to_owned(),
-                "End" => next = format!("{}End", bvh.names[*open.last().unwrap()]),
-                "{" => {
-                    bvh.names.push(next.clone());
-                    bvh.parents.push(open.last().copied());
-                    bvh.channels.push(0);
-                    open.push(bvh.names.len() - 1);
-                }
-                "}" => drop(open.pop()),
-                "OFFSET" => bvh.offsets.push(std::array::from_fn(|k| words[1 + k].parse().unwrap())),
-                "CHANNELS" => {
-                    *bvh.channels.last_mut().unwrap() = words[1].parse().unwrap();
-                    assert!(line.ends_with("Zrotation Xrotation Yrotation"));
-                }
-                other => panic!("unexpected {other}"),
-            }
-        }
-        let mut lines = motion.lines();
-        let n_frames: usize = lines.next().unwrap().strip_prefix("Frames: ").unwrap().parse().unwrap();
-        bvh.frame_secs = lines.next().unwrap().strip_prefix("Frame Time: ").unwrap().parse().unwrap();
-        bvh.frames = lines.map(|line| line.split(' ').map(|word| word.parse().unwrap()).collect()).collect();
-        assert_eq!(bvh.frames.len(), n_frames);
-        assert!(bvh.frames.iter().all(|frame| frame.len() == bvh.channels.iter().sum::<usize>()));
-        bvh
-    }
-
-    /// Places of all joints in a frame, cm.
-    pub fn places(&self, frame: usize) -> Vec<[f64; 3]> {
-        let mut numbers = self.frames[frame].iter().copied();
-        let (mut places, mut turns): (Vec<[f64; 3]>, Vec<Matrix>) = (vec![], vec![]);
-        for joint in 0..self.names.len() {
-            let mut place = self.offsets[joint];
-            let mut turn = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-            if self.channels[joint] == 6 {
-                place = std::array::from_fn(|_| numbers.next().unwrap());
-            }
-            if self.channels[joint] > 0 {
-                for axis in [2, 0, 1] {
-                    turn = product(&turn, &about(axis, numbers.next().unwrap().to_radians()));
-                }
-            }
-            if let Some(parent) = self.parents[joint] {
-                let turned = apply(&turns[parent], place);
-                place = std::array::from_fn(|k| places[parent][k] + turned[k]);
-                turn = product(&turns[parent], &turn);
-            }
-            places.push(place);
-            turns.push(turn);
-        }
-        places
-    }
-
-    /// Index in this file of each of the 49 joints.
-    pub fn of_motion(&self) -> [usize; N_JOINTS] {
-        std::array::from_fn(|joint| {
-            let name = match joint {
-                skeleton::NECK => "Neck".to_owned(),
-                1..L_HAND => {
-                    let side = if joint < 4 { "Right" } else { "Left" };
-                    format!("{side}{}", ["Arm", "ForeArm", "Hand"][(joint - 1) % 3])
-                }
-                _ => {
-                    let (side, root) = if joint < R_HAND { ("Left", L_HAND) } else { ("Right", R_HAND) };
-                    let finger = |k: usize| ["Thumb", "Index", "Middle", "Ring", "Pinky"][(k - 1) / 4];
-                    match joint - root {
-                        0 => format!("{side}Hand"),
-                        k if k % 4 == 0 => format!("{side}Hand{}3End", finger(k)),
-                        k => format!("{side}Hand{}{}", finger(k), (k - 1) % 4 + 1),
-                    }
-                }
-            };
-            self.names.iter().position(|found| *found == name).unwrap_or_else(|| panic!("no {name}"))
-        })
-    }
-}
-
-fn about(axis: usize, angle: f64) -> Matrix {
-    let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
-    let mut m = [[0.0; 3]; 3];
-    m[axis][axis] = 1.0;
-    m[i][i] = angle.cos();
-    m[j][j] = angle.cos();
-    m[i][j] = -angle.sin();
-    m[j][i] = angle.sin();
-    m
-}
-
-fn product(a: &Matrix, b: &Matrix) -> Matrix {
-    std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
-}
-
-fn apply(a: &Matrix, v: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| (0..3).map(|k| a[i][k] * v[k]).sum())
-}
-
-/// The greatest distance in mm between a motion and the joints of its BVH (`places` of a frame, in the order of the
-/// file, cm), the necks laid on each other.
-pub fn worst_mm(motion: &Motion, bvh: &Bvh, places: impl Fn(usize) -> Vec<[f64; 3]>) -> f64 {
-    let of_motion = bvh.of_motion();
-    let mut worst = 0.0f64;
-    for frame in 0..motion.n_frames() {
-        let places = places(frame);
-        let neck = places[of_motion[skeleton::NECK]];
-        for joint in 0..N_JOINTS {
-            let ours: [f64; 3] = std::array::from_fn(|k| f64::from(motion.joints[[frame, joint, k]]));
-            let theirs: [f64; 3] = std::array::from_fn(|k| (places[of_motion[joint]][k] - neck[k]) / 100.0);
-            let apart = (ours[0] - theirs[0]).hypot(-ours[1] - theirs[1]).hypot(-ours[2] - theirs[2]);
-            assert!(apart.is_finite());
-            worst = worst.max(1000.0 * apart);
-        }
-    }
-    worst
 }
 
 #[test]
@@ -243,11 +109,7 @@ fn a_straightening_arm_does_not_spin() {
 
 #[test]
 fn the_released_clips_keep_their_gesture() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/released_clips");
-    if !folder.exists() {
-        eprintln!("SKIPPED: the_released_clips_keep_their_gesture: {} is not there", folder.display());
-        return;
-    }
+    let Some(folder) = real_data("data/released_clips") else { return };
     let motion = authors_txt::read(&folder.join("gt_interval_102571.txt"), FPS).unwrap();
     let untouched =
         AnimationOptions { smoothing: Smoothing::None, constraints: Constraints::NONE, ..AnimationOptions::default() };

@@ -1,139 +1,18 @@
 //! The GLB read back without any library: its nodes and animation give the joints of the performance, its skin at rest
 //! gives the mesh back, and the mesh is a whole skin. The Khronos validator finds nothing (`make validator`).
 
-use crate::fixtures::figures::{FPS, swinging};
+use crate::fixtures::animation::gltf::{Glb, vec3, written};
+use crate::fixtures::figures::swinging;
+use crate::fixtures::skip::gltf_validator;
 use orator::animate::export::file::{ExportContent, ExportFormat};
 use orator::animate::rig::names::Names;
-use orator::animate::{AnimationOptions, Performance, perform};
+use orator::animate::{AnimationOptions, perform};
 use orator::math::rotation::Rotation;
 use orator::math::vec3::{Vec3, add, norm, scale, sub};
 use orator::stage::progress::Silent;
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
-
-/// A GLB file taken apart.
-pub struct Glb {
-    pub scene: Value,
-    bytes: Vec<u8>,
-}
-
-impl Glb {
-    pub fn read(path: &Path) -> Self {
-        let file = std::fs::read(path).unwrap();
-        let word = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().unwrap()) as usize;
-        assert_eq!((&file[..4], word(4), word(8)), (b"glTF".as_slice(), 2, file.len()));
-        let json = word(12);
-        assert_eq!((&file[16..20], &file[24 + json..28 + json]), (b"JSON".as_slice(), b"BIN\0".as_slice()));
-        assert_eq!(28 + json + word(20 + json), file.len());
-        Self { scene: serde_json::from_slice(&file[20..20 + json]).unwrap(), bytes: file[28 + json..].to_vec() }
-    }
-
-    /// Numbers of an accessor, a vector each.
-    pub fn numbers(&self, accessor: &Value) -> Vec<Vec<f64>> {
-        let accessor = &self.scene["accessors"][accessor.as_u64().unwrap() as usize];
-        let view = &self.scene["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
-        let [offset, length] = ["byteOffset", "byteLength"].map(|key| view[key].as_u64().unwrap() as usize);
-        let bytes = &self.bytes[offset..offset + length];
-        let n = match accessor["type"].as_str().unwrap() {
-            "SCALAR" => 1,
-            "VEC3" => 3,
-            "VEC4" => 4,
-            "MAT4" => 16,
-            other => panic!("{other}"),
-        };
-        let flat: Vec<f64> = match accessor["componentType"].as_u64().unwrap() {
-            5121 => bytes.iter().map(|&v| f64::from(v)).collect(),
-            5123 => bytes.chunks_exact(2).map(|v| f64::from(u16::from_le_bytes(v.try_into().unwrap()))).collect(),
-            5125 => bytes.chunks_exact(4).map(|v| f64::from(u32::from_le_bytes(v.try_into().unwrap()))).collect(),
-            5126 => bytes.chunks_exact(4).map(|v| f64::from(f32::from_le_bytes(v.try_into().unwrap()))).collect(),
-            other => panic!("{other}"),
-        };
-        assert_eq!(flat.len(), n * accessor["count"].as_u64().unwrap() as usize);
-        flat.chunks_exact(n).map(<[f64]>::to_vec).collect()
-    }
-
-    fn node(&self, node: usize) -> &Value {
-        &self.scene["nodes"][node]
-    }
-
-    /// World rotation and place of every node below node 0, metres, under local rotations and the root's place.
-    pub fn world(&self, local: &[Rotation], root: Vec3) -> Vec<(Rotation, Vec3)> {
-        let mut world = vec![(Rotation::IDENTITY, [f64::NAN; 3]); self.scene["nodes"].as_array().unwrap().len()];
-        world[0] = (local[0], root);
-        let mut ahead = vec![0];
-        while let Some(node) = ahead.pop() {
-            for child in self.node(node)["children"].as_array().into_iter().flatten() {
-                let child = child.as_u64().unwrap() as usize;
-                let offset = vec3(&self.node(child)["translation"]);
-                let (turn, place) = world[node];
-                world[child] = (turn * local[child], add(place, turn.turn(offset)));
-                ahead.push(child);
-            }
-        }
-        world
-    }
-
-    /// Local rotations of all nodes in a frame, and the root's place.
-    pub fn pose(&self, frame: usize) -> (Vec<Rotation>, Vec3) {
-        let animation = &self.scene["animations"][0];
-        let mut local = vec![Rotation::IDENTITY; self.scene["nodes"].as_array().unwrap().len()];
-        let mut root = vec3(&self.node(0)["translation"]);
-        for channel in animation["channels"].as_array().unwrap() {
-            let sampler = &animation["samplers"][channel["sampler"].as_u64().unwrap() as usize];
-            let values = self.numbers(&sampler["output"]);
-            let times = self.numbers(&sampler["input"]);
-            assert_eq!(times.len(), values.len());
-            let at = frame.min(values.len() - 1);
-            let value = &values[at];
-            assert!((times[at][0] - FPS.secs(at)).abs() < 1e-6);
-            match channel["target"]["path"].as_str().unwrap() {
-                "translation" => root = [value[0], value[1], value[2]],
-                "rotation" => {
-                    let node = channel["target"]["node"].as_u64().unwrap() as usize;
-                    local[node] = Rotation { w: value[3], v: [value[0], value[1], value[2]] };
-                }
-                other => panic!("{other}"),
-            }
-        }
-        (local, root)
-    }
-
-    /// Places of all vertices in a frame by linear skinning.
-    pub fn skinned(&self, frame: usize) -> Vec<Vec3> {
-        let (local, root) = self.pose(frame);
-        let world = self.world(&local, root);
-        let binds = self.numbers(&self.scene["skins"][0]["inverseBindMatrices"]);
-        let mut places = Vec::new();
-        for part in self.scene["meshes"][0]["primitives"].as_array().unwrap() {
-            let of = |name: &str| self.numbers(&part["attributes"][name]);
-            let (points, joints, weights) = (of("POSITION"), of("JOINTS_0"), of("WEIGHTS_0"));
-            for (n, point) in points.iter().enumerate() {
-                let carried = joints[n].iter().zip(&weights[n]).map(|(&joint, &weight)| {
-                    let (turn, place) = world[joint as usize];
-                    let bound: Vec3 = std::array::from_fn(|k| point[k] + binds[joint as usize][12 + k]);
-                    scale(add(turn.turn(bound), place), weight / 65_535.0)
-                });
-                places.push(carried.fold([0.0; 3], add));
-            }
-        }
-        places
-    }
-}
-
-fn vec3(value: &Value) -> Vec3 {
-    std::array::from_fn(|k| value[k].as_f64().unwrap())
-}
-
-/// A made-up motion performed and written under `names`.
-pub fn written(folder: &Path, n_frames: usize, names: Names) -> (Performance, PathBuf) {
-    let performance = perform(&swinging(3, n_frames), None, &AnimationOptions::default());
-    let path = folder.join(format!("{}.glb", names.label()));
-    ExportFormat::Glb
-        .write(&path, &performance, &ExportContent { names, ..ExportContent::default() }, &Silent)
-        .unwrap();
-    (performance, path)
-}
 
 #[test]
 fn nodes_and_animation_give_the_joints_of_the_performance() {
@@ -224,17 +103,6 @@ fn a_joint_at_rest_has_one_key_and_no_frame_no_animation() {
     assert!(Glb::read(&path).scene.get("animations").is_none());
 }
 
-/// The validator's module: ORATOR_GLTF_VALIDATOR, or `target/validator/gltf-validator`.
-fn validator() -> Option<PathBuf> {
-    let named = std::env::var_os("ORATOR_GLTF_VALIDATOR").map(PathBuf::from);
-    let module = named.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("target/validator"));
-    let there = module.join("package.json").is_file() && Command::new("node").arg("--version").output().is_ok();
-    if !there {
-        eprintln!("SKIPPED: no node, or no glTF validator at {} (make validator)", module.display());
-    }
-    there.then_some(module)
-}
-
 const VALIDATE: &str = "
 const validator = require(process.argv[1]), fs = require('fs');
 const all = process.argv.slice(2).map(file => validator.validateBytes(new Uint8Array(fs.readFileSync(file))));
@@ -243,7 +111,7 @@ Promise.all(all).then(reports => console.log(JSON.stringify(reports.map(report =
 
 #[test]
 fn the_khronos_validator_finds_nothing() {
-    let Some(module) = validator() else { return };
+    let Some(module) = gltf_validator() else { return };
     let folder = tempfile::tempdir().unwrap();
     let mut files: Vec<PathBuf> = Names::ALL.map(|names| written(folder.path(), 12, names).1).to_vec();
     // One frame; a speaker of whom nothing is seen.

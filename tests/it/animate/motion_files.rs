@@ -1,6 +1,6 @@
 //! Every kind of motion file holds the same joints: those of the performance; names change, nothing else.
 
-use super::bvh::Bvh;
+use crate::fixtures::animation::bvh::Bvh;
 use crate::fixtures::figures::{FPS, swinging};
 use orator::animate::export::file::{ExportContent, ExportFormat};
 use orator::animate::rig::names::Names;

@@ -1,6 +1,6 @@
 //! `orator models` as a user meets it: list, fetch from a folder, check, add, and what goes wrong.
 
-use crate::parity::golden;
+use crate::fixtures::onnx_models::models;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -16,10 +16,10 @@ fn said(output: &Output) -> String {
 
 #[test]
 fn fetch_check_and_add() {
-    let Some((shared, _)) = golden::models() else { return };
+    let Some((models, _)) = models() else { return };
     let root = tempfile::tempdir().unwrap();
     let dir = root.path().join("models");
-    let mirror = shared.to_str().unwrap();
+    let mirror = models.to_str().unwrap();
     let fetched = orator(&dir, &["fetch", "hand-mediapipe-lite", "body-tinypose-128x96", "--mirror", mirror]);
     assert_eq!(fetched.status.code(), Some(0), "{}", said(&fetched));
     let checked = orator(&dir, &["check", "hand-mediapipe-lite", "body-tinypose-128x96"]);
@@ -29,7 +29,7 @@ fn fetch_check_and_add() {
     assert!(listed.contains("present") && listed.contains("missing") && listed.contains("Apache-2.0"), "{listed}");
 
     let own = root.path().join("own.onnx");
-    std::fs::copy(shared.join("body_pp_tinypose_256x192.onnx"), &own).unwrap();
+    std::fs::copy(models.join("body_pp_tinypose_256x192.onnx"), &own).unwrap();
     let own = own.to_str().unwrap();
     let unlike = orator(&dir, &["add", own, "--like", "body-tinypose-128x96"]);
     assert_eq!(unlike.status.code(), Some(1));

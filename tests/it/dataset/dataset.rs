@@ -1,10 +1,9 @@
 //! The dataset's folder: round trip, the same bytes twice, damage is an error, and what others read in it.
 
-use ndarray::{Array2, Array3, s};
+use crate::fixtures::samples::random_sample;
+use crate::fixtures::skip::python;
 use orator::dataset::{Dataset, Sample, Split, write_dataset};
 use orator::types::pose3d::Motion;
-use orator::types::sound::Sound;
-use orator::types::sync;
 use orator::types::time::FrameRate;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -12,24 +11,6 @@ use std::path::Path;
 use std::process::Command;
 
 const FPS: FrameRate = FrameRate::new(15, 1);
-
-/// An interval of random numbers; some joints are missing.
-pub fn random_sample(key: &str, n_frames: usize, seed: u64) -> Sample {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut joints = Array3::from_shape_fn((n_frames, 49, 3), |_| rng.random_range(-0.7f32..0.7));
-    joints.slice_mut(s![.., 0, ..]).fill(0.0);
-    let mask = Array2::from_shape_fn((n_frames, 49), |_| rng.random_bool(0.9));
-    joints.slice_mut(s![n_frames / 2, 28.., ..]).fill(f32::NAN);
-    let samples = 0..sync::sample_at(FPS, 16_000, n_frames);
-    let samples = samples.map(|_| f32::from(rng.random::<i16>()) / 32_768.0).collect();
-    Sample {
-        key: key.to_owned(),
-        motion: Motion { fps: FPS, joints, mask },
-        pose2d: Array3::from_shape_fn((n_frames, 59, 3), |_| rng.random_range(0.0f32..1.0)),
-        sound: Sound { rate: 16_000, samples },
-        meta: serde_json::json!({ "first_frame": 0, "n_frames": n_frames }),
-    }
-}
 
 fn three() -> Vec<(Split, Sample)> {
     vec![
@@ -169,12 +150,8 @@ fn python_reads_the_same_numbers() {
     let dir = tempfile::tempdir().unwrap();
     let written = three();
     write_dataset(dir.path(), "host", FPS, &written).unwrap();
-    let python = Command::new("python3").args(["-c", "import numpy"]).output();
-    if !python.is_ok_and(|output| output.status.success()) {
-        eprintln!("SKIPPED: python_reads_the_same_numbers needs a python3 with numpy");
-        return;
-    }
-    let output = Command::new("python3")
+    let Some(python) = python("numpy") else { return };
+    let output = Command::new(python)
         .args(["-c", PYTHON])
         .arg(dir.path().join("train-talk-0a1b2c3d-0000.tar"))
         .output()

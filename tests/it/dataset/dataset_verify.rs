@@ -1,24 +1,16 @@
 //! `dataset verify`: whatever single bit flips, whatever file is cut short, missing or strange, is found, and no damage
 //! makes it panic.
 
-use super::dataset::random_sample;
+use crate::fixtures::samples::constant_sample;
 use crate::fixtures::support::files_under;
 use orator::dataset::verify::verify::verify;
 use orator::dataset::{Sample, Split, write_dataset};
-use orator::motion::bones::with_lengths;
 use orator::stage::progress::Silent;
 use orator::types::time::FrameRate;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fs;
 use std::path::Path;
-
-/// A sample of random motion whose bones have one length each.
-pub fn constant_sample(key: &str, n_frames: usize, seed: u64) -> Sample {
-    let mut sample = random_sample(key, n_frames, seed);
-    with_lengths(&mut sample.motion, &std::array::from_fn(|bone| 0.05 + bone as f32 / 500.0));
-    sample
-}
 
 fn write(dir: &Path) {
     let samples = [

@@ -1,6 +1,7 @@
 //! `orator import`: datasets from captured motion and from other datasets, and what becomes of what cannot come in.
 
-use crate::fixtures::support::{files_under, shared};
+use crate::fixtures::skip::real_data;
+use crate::fixtures::support::files_under;
 use orator::dataset::import::plan::ImportPlan;
 use orator::dataset::import::take::TakeLimits;
 use orator::dataset::import::{Imported, import, shards};
@@ -231,7 +232,7 @@ fn the_same_take_twice_comes_in_once() {
 
 #[test]
 fn the_authors_clips_and_ted_become_datasets() {
-    let Some(data) = shared("data") else { return };
+    let Some(data) = real_data("data") else { return };
     let dir = tempfile::tempdir().unwrap();
     let clips = imported(&[&data.join("released_clips")], &dir.path().join("clips"));
     let count = |imported: &Imported, reason: &str| imported.lines.iter().filter(|l| l.reason == reason).count();

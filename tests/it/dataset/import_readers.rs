@@ -1,9 +1,10 @@
 //! Readers of captured motion: joints as the source has them, in house axes.
 
-use crate::fixtures::support::shared;
+use crate::fixtures::skip::real_data;
+use orator::formats::authors_txt;
 use orator::mocap::captured;
 use orator::mocap::captured::Kind;
-use orator::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, R_HAND, R_SHOULDER, R_WRIST, authors_from_house};
+use orator::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, R_WRIST, authors_from_house};
 use orator::types::time::FrameRate;
 use std::path::Path;
 
@@ -92,7 +93,7 @@ fn what_is_no_speaker_is_an_error_that_says_why() {
 
 #[test]
 fn ted_joints_stay_where_they_are() {
-    let Some(folder) = shared("data/speech_motion/ted_expressive") else { return };
+    let Some(folder) = real_data("data/speech_motion/ted_expressive") else { return };
     let take = captured::read(Kind::Ted, &folder.join("_3IOjpSGFqY_164_0_12.npz")).unwrap();
     let mut npz = orator::formats::npz::Npz::open(&folder.join("_3IOjpSGFqY_164_0_12.npz")).unwrap();
     let theirs = npz.numbers("human_joints", &[None, Some(43), Some(3)]).unwrap();
@@ -115,7 +116,7 @@ fn ted_joints_stay_where_they_are() {
 
 #[test]
 fn the_authors_clips_are_permuted_and_nothing_else() {
-    let Some(folder) = shared("data/released_clips") else { return };
+    let Some(folder) = real_data("data/released_clips") else { return };
     let path = folder.join("gt_interval_3821.txt");
     let take = captured::read(Kind::Authors, &path).unwrap();
     let text = std::fs::read_to_string(path).unwrap();
@@ -128,4 +129,39 @@ fn the_authors_clips_are_permuted_and_nothing_else() {
         }
     }
     assert!(take.motion.joints[[0, R_WRIST, 0]].is_finite());
+}
+
+#[test]
+fn the_authors_clips_survive_the_round_trip() {
+    let Some(folder) = real_data("data/released_clips") else { return };
+    for (name, n_frames) in [("gt_interval_3821", 242), ("gt_interval_102571", 679), ("prediction_interval_3821", 242)]
+    {
+        let path = folder.join(name).with_extension("txt");
+        let motion = authors_txt::read(&path, FrameRate::new(15, 1)).unwrap();
+        assert_eq!(motion.n_frames(), n_frames);
+        let (written, original) = (authors_txt::format(&motion), std::fs::read_to_string(&path).unwrap());
+        assert_eq!(written.len(), original.len(), "{name}: the same layout to the byte");
+        for (ours, theirs) in written.split_whitespace().zip(original.split_whitespace()) {
+            let (ours, theirs): (f64, f64) = (ours.parse().unwrap(), theirs.parse().unwrap());
+            assert!((ours - theirs).abs() < 4e-8, "{name}: {ours} for {theirs}");
+        }
+        let distance = |frame: usize, a: usize, b: usize| {
+            (0..3).map(|k| (motion.joints[[frame, a, k]] - motion.joints[[frame, b, k]]).powi(2)).sum::<f32>().sqrt()
+        };
+        let (mut tips_further, mut seen) = (0, 0);
+        for frame in 0..n_frames {
+            assert!((0..3).all(|k| motion.joints[[frame, NECK, k]] == 0.0));
+            if name.starts_with("gt") {
+                assert!(distance(frame, L_HAND, L_WRIST) < 2e-6 && distance(frame, R_HAND, R_WRIST) < 2e-6);
+            }
+            for root in [L_HAND, R_HAND] {
+                for finger in 0..5 {
+                    let base = root + 1 + 4 * finger;
+                    seen += 1;
+                    tips_further += usize::from(distance(frame, root, base + 3) > distance(frame, root, base));
+                }
+            }
+        }
+        assert!(tips_further * 10 > seen * 8, "{name}: {tips_further} of {seen} finger tips lie beyond their base");
+    }
 }

@@ -2,7 +2,8 @@
 //! speech of the same voice is not taken for it.
 
 use crate::fixtures::clips::ffmpeg;
-use crate::fixtures::support::{shared, speaker_clip};
+use crate::fixtures::skip::real_data;
+use crate::fixtures::support::speaker_clip;
 use orator::audio::fingerprint::Fingerprinter;
 use orator::dataset::shared_sound::find;
 use orator::external::ffmpeg::audio::read_mono;
@@ -49,9 +50,9 @@ fn a_reupload_is_found_and_another_speech_is_not() {
 #[test]
 fn real_speech_is_known_again() {
     let (Some(jfk), Some(scott), Some(other)) = (
-        shared("data/audio/jfk_whisper_11s.flac"),
-        shared("data/audio/beat2_2_scott_0_2_2_16k.wav"),
-        shared("data/audio/beat2_2_scott_0_3_3_16k.wav"),
+        real_data("data/audio/jfk_whisper_11s.flac"),
+        real_data("data/audio/beat2_2_scott_0_2_2_16k.wav"),
+        real_data("data/audio/beat2_2_scott_0_3_3_16k.wav"),
     ) else {
         return;
     };

@@ -1,6 +1,6 @@
 //! `orator evaluate lifter`: the error table, on motion with known truth.
 
-use crate::fixtures::support::shared;
+use crate::fixtures::skip::real_data;
 use orator::config;
 use orator::evaluate::lifter::bodies::{BodyRow, Lifters, table, text};
 use orator::mocap::upper_body;
@@ -39,7 +39,7 @@ fn the_lifter_beats_what_needs_no_network() {
 /// The targets for the clips of TED speakers, which no training saw.
 #[test]
 fn ted_speakers_are_lifted_within_the_targets() {
-    let Some(folder) = shared("data/speech_motion/ted_expressive") else { return };
+    let Some(folder) = real_data("data/speech_motion/ted_expressive") else { return };
     let sets = [("TED".to_owned(), upper_body::read_all(&[folder]).unwrap())];
     let rows = table(&Lifters::new(&config::Lift::default()).unwrap(), &sets, 56).unwrap();
     eprintln!("{}", text(&rows));

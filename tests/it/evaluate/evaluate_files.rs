@@ -1,39 +1,17 @@
 //! `orator evaluate --truth --prediction`: what it measures on files, what it says of bad ones, and that only what is
 //! comparable is compared.
 
-use crate::fixtures::support::{Answer, Project, shared};
+use crate::fixtures::motion_folders::{folders, spoken, write_npy};
+use crate::fixtures::skip::real_data;
+use crate::fixtures::support::{Answer, Project};
 use ndarray::{Array3, s};
-use ndarray_npy::WriteNpyExt as _;
-use orator::demo::rule::dataset::{RULE, SpokenClip};
 use orator::external::ffmpeg::audio;
 use orator::formats::{authors_txt, joints_npz};
 use orator::types::pose3d::Motion;
-use orator::types::split::Split;
 use orator::types::time::FrameRate;
 use serde_json::Value;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-
-/// Clip `number` of the synthetic speaker.
-pub fn spoken(number: usize, secs: usize) -> SpokenClip {
-    SpokenClip { rule: RULE, seed: 3, split: Split::Test, number, n_frames: 15 * secs }
-}
-
-pub fn write_npy(path: &Path, joints: &Array3<f32>) {
-    fs::create_dir_all(path.parent().unwrap()).unwrap();
-    joints.write_npy(File::create(path).unwrap()).unwrap();
-}
-
-/// Folders `truth`, `prediction` and `audio` with a clip of each number of seconds.
-pub fn folders(dir: &Path, secs: &[usize]) {
-    fs::create_dir_all(dir.join("audio")).unwrap();
-    for (number, secs) in secs.iter().enumerate() {
-        let clip = spoken(number, *secs);
-        write_npy(&dir.join(format!("truth/{number}.npy")), &clip.motion().joints);
-        write_npy(&dir.join(format!("prediction/{number}.npy")), &clip.predictable().joints);
-        audio::write_wav(&dir.join(format!("audio/{number}.wav")), &clip.sound()).unwrap();
-    }
-}
 
 /// A convention of one figure, which is soon measured.
 const SMALL: [&str; 2] = ["--convention", "speech2gesture"];
@@ -267,7 +245,7 @@ fn what_can_be_mended_is_measured_with_a_note() {
 
 #[test]
 fn the_released_clips_have_the_published_baselines() {
-    let Some(clips) = shared("data/released_clips") else { return };
+    let Some(clips) = real_data("data/released_clips") else { return };
     let project = Project::with_clips("released", 0, 1.0);
     let path = |name: &str| clips.join(name).to_string_lossy().into_owned();
     // PCK@0.2 in the plane: of the prediction, and of the median of the clip itself

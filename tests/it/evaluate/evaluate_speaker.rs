@@ -2,8 +2,8 @@
 //! predictor that copies, on a dataset where the right copy is known.
 
 use crate::fixtures::browser::Browser;
+use crate::fixtures::gesture_dataset::{dataset, sample};
 use crate::fixtures::support::Project;
-use crate::train::gan::{dataset, sample};
 use ndarray::s;
 use orator::dataset::{Dataset, Split, write_dataset};
 use orator::evaluate::baseline::baselines::ClipMotion;

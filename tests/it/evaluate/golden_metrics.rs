@@ -1,6 +1,7 @@
-//! The metrics on the authors' released clips give the numbers measured there with numpy (`field.md` section 3.6,
-//! `released-clips-measured.md`), to every digit that is printed.
+//! The metrics on the authors' released clips give the numbers measured there with numpy, to every
+//! digit that is printed.
 
+use crate::fixtures::skip::real_data;
 use ndarray::{Array2, Array3, Axis, concatenate, s};
 use orator::formats::authors_txt;
 use orator::metrics::catalogue::{Catalogue, Interval};
@@ -13,13 +14,9 @@ use std::path::{Path, PathBuf};
 const CLIPS: [&str; 4] = ["1845", "3821", "3838", "102571"];
 const FPS: FrameRate = FrameRate::new(15, 1);
 
+#[track_caller]
 fn folder() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/released_clips");
-    if !folder.exists() {
-        eprintln!("SKIPPED: the released clips are not in ../shared/data/released_clips");
-        return None;
-    }
-    Some(folder)
+    real_data("data/released_clips")
 }
 
 fn read(folder: &Path, kind: &str, clip: &str) -> Array3<f32> {

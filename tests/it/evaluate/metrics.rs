@@ -1,6 +1,6 @@
 //! The metrics on the authors' released clips: the share of correct keypoints in the picture's axes, as it was published.
 
-use crate::fixtures::support::shared;
+use crate::fixtures::skip::real_data;
 use orator::formats::authors_txt;
 use orator::metrics::position::pck::{Axes, Correct};
 use orator::types::time::FrameRate;
@@ -9,7 +9,7 @@ use orator::types::time::FrameRate;
 fn the_released_predictions_have_their_published_share_of_correct_keypoints() {
     for (number, expected) in [(1845, 0.3690), (3821, 0.2553), (3838, 0.1136), (102_571, 0.7294)] {
         let clip = |name: &str| {
-            let path = shared(&format!("data/released_clips/{name}_interval_{number}.txt"))?;
+            let path = real_data(&format!("data/released_clips/{name}_interval_{number}.txt"))?;
             Some(authors_txt::read(&path, FrameRate::new(15, 1)).unwrap())
         };
         let (Some(real), Some(made)) = (clip("gt"), clip("prediction")) else { return };

@@ -1,33 +1,15 @@
 //! BVH and GLB opened by Blender show the joints of the motion, the GLB also its skin. Blender is a Python module for
 //! Python 3.11 (`make blender`; ORATOR_BLENDER names its folder, else `target/blender`).
 
-use crate::animate::bvh::{Bvh, worst_mm};
-use crate::animate::gltf::{Glb, written};
+use crate::fixtures::animation::bvh::{Bvh, worst_mm};
+use crate::fixtures::animation::gltf::{Glb, written};
 use crate::fixtures::figures::{FPS, swinging};
+use crate::fixtures::skip::blender;
 use orator::animate::rig::names::Names;
 use orator::animate::{AnimationOptions, perform};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-
-/// A Python to which Blender's module is known, for which test.
-fn blender(test: &str) -> Option<Command> {
-    let named = std::env::var_os("ORATOR_BLENDER").map(PathBuf::from);
-    let folder = named.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("target/blender"));
-    let python = |name: &str| {
-        let mut command = Command::new(name);
-        command.env("PYTHONPATH", &folder).stdin(Stdio::null());
-        command
-    };
-    let found = ["python3.11", "python3", "/usr/bin/python3"].into_iter().find(|name| {
-        let ask = python(name).args(["-c", "import bpy"]).stdout(Stdio::null()).stderr(Stdio::null()).status();
-        ask.is_ok_and(|status| status.success())
-    });
-    if found.is_none() {
-        eprintln!("SKIPPED: {test}: no Python 3.11 with Blender's module in {} (make blender)", folder.display());
-    }
-    found.map(python)
-}
+use std::path::Path;
+use std::process::Command;
 
 fn seen(mut python: Command, file: &Path) -> Value {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/reference/blender_joints.py");
@@ -38,7 +20,7 @@ fn seen(mut python: Command, file: &Path) -> Value {
 
 #[test]
 fn blender_sees_the_joints_of_the_motion() {
-    let Some(python) = blender("blender_sees_the_joints_of_the_motion") else { return };
+    let Some(python) = blender() else { return };
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("swinging.bvh");
     let performance = perform(&swinging(1, 20), None, &AnimationOptions::default());
@@ -64,7 +46,7 @@ fn blender_sees_the_joints_of_the_motion() {
 
 #[test]
 fn blender_sees_the_joints_of_the_glb_and_its_skin_around_them() {
-    let Some(python) = blender("blender_sees_the_joints_of_the_glb_and_its_skin_around_them") else { return };
+    let Some(python) = blender() else { return };
     let folder = tempfile::tempdir().unwrap();
     let (performance, path) = written(folder.path(), 12, Names::Mixamo);
     let seen = seen(python, &path);

@@ -1,22 +1,12 @@
 //! What programs of others read in a dataset: the Python `webdataset` reader and Hugging Face `datasets`. Both come from
 //! PyPI (`make readers`); ORATOR_READERS names the folder they are in.
 
-use crate::dataset::dataset_verify::constant_sample;
+use crate::fixtures::samples::constant_sample;
+use crate::fixtures::skip::readers;
 use orator::dataset::{Sample, Split, write_dataset};
 use orator::types::time::FrameRate;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
-
-/// The folder of the Python packages; `None`, with a loud line, where they are not.
-pub fn readers(package: &str) -> Option<PathBuf> {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/readers");
-    let folder = std::env::var_os("ORATOR_READERS").map_or(here, PathBuf::from);
-    let there = folder.join(package).exists();
-    if !there {
-        eprintln!("SKIPPED: no Python package {package} in {} (`make readers`)", folder.display());
-    }
-    there.then_some(folder)
-}
 
 fn written(dir: &Path) -> Vec<(Split, Sample)> {
     let samples = vec![

@@ -1,7 +1,7 @@
 //! What programs of others read in a training folder: the numbers of the log in TensorBoard's own package, and a
 //! checkpoint's tensors in Python's `safetensors`. Both come from PyPI (`make readers`).
 
-use super::dataset_readers::readers;
+use crate::fixtures::skip::readers;
 use candle_core::{Device, Tensor};
 use orator::formats::checkpoint::Contents;
 use orator::train::log;

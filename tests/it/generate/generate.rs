@@ -1,50 +1,26 @@
 //! `orator generate` from the command line with an untrained speaker: every kind of file, from every kind of sound;
 //! and what it is given wrong it says clearly, with exit code 1, and writes nothing.
 
-use crate::animate::bvh::{Bvh, worst_mm};
+use crate::fixtures::animation::bvh::{Bvh, worst_mm};
 use crate::fixtures::clips;
 use crate::fixtures::figures::{FPS, swinging};
-use crate::train::networks::value;
+use crate::fixtures::networks::value;
+use crate::fixtures::untrained::{generate, write_untrained_speaker};
 use candle_core::{Device, Tensor};
 use ndarray::{Axis, s};
-use orator::animate::rig::rig::bone_metres;
 use orator::animate::{AnimationOptions, perform};
 use orator::audio::mel;
 use orator::external::ffmpeg::{audio, probe};
 use orator::formats::checkpoint;
-use orator::formats::checkpoint::Contents;
 use orator::formats::{authors_txt, npy};
 use orator::generate::Speaker;
 use orator::generate::mel_stream::mel_frames;
-use orator::generate::model::{Facts, GENERATOR, TrainedSpeaker};
+use orator::generate::model::{Facts, TrainedSpeaker};
 use orator::generate::normalisation::{N_NUMBERS, Normalisation};
 use orator::generate::representation::Representation;
 use orator::nn::gan::generator::{Config, Generator, Preset};
 use orator::nn::params::Params;
 use orator::types::sound::Sound;
-use std::collections::BTreeMap;
-use std::path::Path;
-use std::process::{Command, Output};
-
-/// A checkpoint whose network knows nothing: it moves about the mean pose of a made-up motion.
-pub fn write_untrained_speaker(file: &Path) {
-    let motion = swinging(1, 40);
-    let mean = motion.joints.mean_axis(Axis(0)).unwrap();
-    let lengths: Vec<f32> = bone_metres(&motion)[1..].iter().map(|&metres| metres as f32).collect();
-    let network = Config { width: 16, ..Config::of(Preset::Light, N_NUMBERS) };
-    let mut params = Params::new(7);
-    Generator::new(&mut params, &network).unwrap();
-    let normal = Normalisation::new(&mean, &motion.joints.std_axis(Axis(0), 0.0), lengths);
-    let facts = Facts::new("host", FPS, "", network, normal, Representation::Positions);
-    let mut contents = Contents { facts: serde_json::json!({ "speaker": facts }), tensors: BTreeMap::new() };
-    contents.add(GENERATOR, params.tensors().unwrap());
-    contents.write(file).unwrap();
-}
-
-pub fn generate(dir: &Path, args: &str) -> Output {
-    let words = args.split_whitespace();
-    Command::new(env!("CARGO_BIN_EXE_orator")).arg("generate").args(words).current_dir(dir).output().unwrap()
-}
 
 #[test]
 fn one_sound_becomes_every_kind_of_file() {

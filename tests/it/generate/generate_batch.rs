@@ -1,8 +1,8 @@
 //! Many sounds in one call of `orator generate`: what fails does not stop the others, what was made is not made again, and
 //! every motion is that of its sound alone.
 
-use super::generate::{generate, write_untrained_speaker};
 use crate::fixtures::clips;
+use crate::fixtures::untrained::{generate, write_untrained_speaker};
 use orator::external::ffmpeg::audio::write_wav;
 use serde_json::Value;
 use std::path::Path;

@@ -1,9 +1,9 @@
 //! Sounds of every kind for `orator generate`: streamed ones give the motion of whole ones, those of a telephone are
 //! told of, those without a sample are named.
 
-use super::generate::{generate, write_untrained_speaker};
 use crate::fixtures::clips;
 use crate::fixtures::figures::FPS;
+use crate::fixtures::untrained::{generate, write_untrained_speaker};
 use orator::external::ffmpeg::audio::{read_mono, write_wav};
 use orator::external::ffmpeg::sound_stream::{SoundStream, n_samples};
 use orator::formats::npy;

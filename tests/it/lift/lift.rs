@@ -1,21 +1,20 @@
 //! Lifting against known truth: bodies and hands made by rule, filmed, lifted with the built-in weights.
 
+use crate::fixtures::keypoints::{POINTS, keypoints, lifter};
+use crate::fixtures::skip::real_data;
 use ndarray::{Array3, s};
 use ndarray_npy::{NpzWriter, read_npy};
 use orator::config;
 use orator::formats::keypoints_npz::Extras;
 use orator::formats::{joints_npz, keypoints_npz};
 use orator::mocap::upper_body;
-use orator::motion::upper_body::{
-    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, NOSE, Pose, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, metres_per_unit,
-};
-use orator::pipeline::lift::{LiftStage, Lifter};
+use orator::motion::upper_body::{L_SHOULDER, NOSE, Pose, R_HIP, R_SHOULDER, metres_per_unit};
+use orator::pipeline::lift::LiftStage;
 use orator::stage::artifacts::{self, StageName};
 use orator::stage::ledger::{Kept, Ledger};
 use orator::stage::progress::Silent;
 use orator::stage::{Stage, Unit};
 use orator::train::scene::body::{Filming, Scene};
-use orator::train::scene::hand_shape;
 use orator::types::interval::{Interval, Intervals};
 use orator::types::pose2d::Keypoints;
 use orator::types::pose3d::Motion;
@@ -26,52 +25,6 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 use std::process::{Command, Output};
-
-/// Of the nine points: COCO's index and the arm joint, if it is one.
-pub const POINTS: [(usize, usize, Option<usize>); 9] = [
-    (NOSE, 0, None),
-    (R_SHOULDER, 6, Some(skeleton::R_SHOULDER)),
-    (R_ELBOW, 8, Some(skeleton::R_ELBOW)),
-    (R_WRIST, 10, Some(skeleton::R_WRIST)),
-    (L_SHOULDER, 5, Some(skeleton::L_SHOULDER)),
-    (L_ELBOW, 7, Some(skeleton::L_ELBOW)),
-    (L_WRIST, 9, Some(skeleton::L_WRIST)),
-    (R_HIP, 12, None),
-    (L_HIP, 11, None),
-];
-
-pub fn lifter() -> Lifter {
-    Lifter::new(&config::Lift::default()).unwrap()
-}
-
-/// The scene's keypoints, and hands of one shape turned slowly at both wrists.
-pub fn keypoints(scene: &Scene, rng: &mut ChaCha8Rng) -> Keypoints {
-    let n = scene.seen.len();
-    let mut k = Keypoints {
-        fps: FrameRate::new(15, 1),
-        image_size: [4000, 3000],
-        body: Array3::zeros((n, 17, 3)),
-        left_hand: Array3::zeros((n, 21, 3)),
-        right_hand: Array3::zeros((n, 21, 3)),
-    };
-    let shape = hand_shape::draw(rng);
-    for (t, seen) in scene.seen.iter().enumerate() {
-        let seen = seen.map(|p| p.map(|[x, y]| [x + 2000.0, y + 1500.0]));
-        for (point, coco, _) in POINTS {
-            if let Some([x, y]) = seen[point] {
-                k.body.slice_mut(s![t, coco, ..]).assign(&ndarray::arr1(&[x, y, 0.9]));
-            }
-        }
-        for (hand, wrist, flip) in [(&mut k.right_hand, R_WRIST, 1.0), (&mut k.left_hand, L_WRIST, -1.0)] {
-            let Some([x, y]) = seen[wrist] else { continue };
-            for (j, p) in shape.iter().enumerate() {
-                let (dx, dy) = (flip * p[0] * scene.px_per_metre, p[1] * scene.px_per_metre);
-                hand.slice_mut(s![t, j, ..]).assign(&ndarray::arr1(&[x + dx as f32, y + dy as f32, 0.9]));
-            }
-        }
-    }
-    k
-}
 
 /// Mean distance of shoulders, elbows and wrists in mm, both scaled to the reference size.
 fn error_mm(motion: &Motion, truth: &[Pose]) -> f64 {
@@ -347,11 +300,7 @@ fn the_stage_writes_joints_and_bones() {
 
 #[test]
 fn the_captured_gestures_face_forward_upright() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/mocap/cmu_gestures_joints38_mm.npz");
-    if !file.exists() {
-        eprintln!("SKIPPED: {} is not there", file.display());
-        return;
-    }
+    let Some(file) = real_data("data/mocap/cmu_gestures_joints38_mm.npz") else { return };
     let takes = upper_body::read_all(&[file]).unwrap();
     let (mut upright, mut ahead, mut n) = (0, 0, 0);
     for pose in takes.iter().flat_map(|take| take.poses.iter().step_by(60)) {

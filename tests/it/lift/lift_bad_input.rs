@@ -1,6 +1,6 @@
 //! Keypoints that are empty, wrong or odd: a clear error, or missing joints (NaN) with a note; never a pose of zeros.
 
-use super::lift::keypoints;
+use crate::fixtures::keypoints::keypoints;
 use ndarray::{Array1, Array3, s};
 use ndarray_npy::{NpzWriter, read_npy};
 use orator::train::scene::body::{Filming, Scene};

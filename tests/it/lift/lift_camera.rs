@@ -1,6 +1,6 @@
 //! Roll and pitch of the camera: found on upright speakers filmed at known angles, and taken out on request.
 
-use super::lift::POINTS;
+use crate::fixtures::keypoints::POINTS;
 use ndarray::{Array3, s};
 use orator::config;
 use orator::math::rotation::Rotation;

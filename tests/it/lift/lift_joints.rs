@@ -1,6 +1,6 @@
 //! What comes out of lifting: bones of exactly one length, hands that come and go, motion that does not flicker.
 
-use super::lift::{keypoints, lifter};
+use crate::fixtures::keypoints::{keypoints, lifter};
 use ndarray::{Array3, s};
 use orator::motion::upper_body::{L_WRIST, R_WRIST, metres_per_unit};
 use orator::train::scene::body::{Filming, Scene};

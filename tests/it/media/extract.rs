@@ -2,7 +2,8 @@
 
 use crate::fixtures::clips;
 use crate::fixtures::clips::write_numbered;
-use crate::fixtures::support::{files_under, shared};
+use crate::fixtures::skip::real_data;
+use crate::fixtures::support::files_under;
 use ndarray::Array1;
 use ndarray_npy::NpzReader;
 use orator::config;
@@ -108,7 +109,7 @@ fn a_file_that_is_no_video_is_an_error_that_names_it() {
 
 #[test]
 fn the_cuts_of_real_clips_are_found_and_no_others() {
-    let Some(videos) = shared("data/videos") else { return };
+    let Some(videos) = real_data("data/videos") else { return };
     let dir = tempfile::tempdir().unwrap();
     let clips = files_under(&videos);
     let clips: Vec<_> = clips.iter().filter(|(name, _)| name.ends_with(".mp4") || name.ends_with(".mkv")).collect();

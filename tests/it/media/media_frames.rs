@@ -2,7 +2,7 @@
 
 use crate::fixtures::clips;
 use crate::fixtures::clips::{ffmpeg, number_of, write_numbered, write_sized};
-use crate::fixtures::support::shared;
+use crate::fixtures::skip::real_data;
 use orator::external::ffmpeg::frames::FrameReader;
 use orator::external::ffmpeg::probe::probe;
 use orator::types::time::FrameRate;
@@ -254,7 +254,7 @@ fn real_clips_have_the_stated_frames() {
         ("data/videos/silent/ted_lia_2.mp4", [256, 256], 195, 65),
         ("data/videos/talk_tyson_2cam_17s_720p.mp4", [1280, 720], 259, 0),
     ] {
-        let Some(path) = shared(name) else { continue };
+        let Some(path) = real_data(name) else { continue };
         let mut reader = FrameReader::open_with(&path, DATASET, 0).unwrap();
         assert_eq!(reader.image_size(), size, "{name}");
         let (mut n, mut n_repeated) = (0, 0);

@@ -1,7 +1,7 @@
 //! Sound on the pictures' clock: rates, channels, offsets, gaps, and a flash with its beep.
 
 use crate::fixtures::clips::{ffmpeg, tone, write_numbered};
-use crate::fixtures::support::shared;
+use crate::fixtures::skip::real_data;
 use orator::external::ffmpeg::audio::{extract_wav, read_mono, write_wav};
 use orator::external::ffmpeg::encode::VideoWriter;
 use orator::external::ffmpeg::frames::FrameReader;
@@ -209,7 +209,7 @@ fn real_sound_has_its_length() {
         ("data/audio/talkshow_french.wav", f64::NAN),
         ("data/videos/talk_latentsync_demo1_1080x1920_hevc.mp4", 10.008),
     ] {
-        let Some(path) = shared(name) else { continue };
+        let Some(path) = real_data(name) else { continue };
         let sound = read_mono(&path, RATE).unwrap().unwrap();
         assert!(secs.is_nan() || (sound.secs() - secs).abs() < 0.05, "{name}: {}", sound.secs());
     }

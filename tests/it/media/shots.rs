@@ -2,7 +2,8 @@
 //! and what does not.
 
 use crate::fixtures::clips::ffmpeg;
-use crate::fixtures::support::{shared, speaker_clip};
+use crate::fixtures::skip::real_data;
+use crate::fixtures::support::speaker_clip;
 use ndarray::Array1;
 use ndarray_npy::NpzReader;
 use orator::config;
@@ -68,7 +69,7 @@ fn dissolves_wipes_and_fades_end_a_shot_where_they_are() {
 
 #[test]
 fn real_pictures_that_turn_into_others_end_a_shot() {
-    let Some(videos) = shared("data/videos") else { return };
+    let Some(videos) = real_data("data/videos") else { return };
     let dir = tempfile::tempdir().unwrap();
     let clip = |name: &str, from: f64| format!("-ss {from} -t 5 -i {}", videos.join(name).display());
     let tyson = clip("talk_tyson_2cam_17s_720p.mp4", 1.0);
@@ -114,7 +115,7 @@ fn a_camera_that_moves_and_another_light_end_no_shot() {
 
 #[test]
 fn real_pictures_that_pan_or_lighten_end_no_shot() {
-    let Some(videos) = shared("data/videos") else { return };
+    let Some(videos) = real_data("data/videos") else { return };
     for name in ["talk_tyson_2cam_17s_720p.mp4", "talk_oliver_wan_3.5s_1080p.mp4", "talk_kim_7s_1080p.mp4"] {
         let dir = tempfile::tempdir().unwrap();
         moves(dir.path(), &format!("-ss 1 -t 2.4 -i {}", videos.join(name).display()), &[15]);

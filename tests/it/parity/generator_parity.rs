@@ -2,7 +2,7 @@
 //! (`fixtures/reference/generator_reference.py`): outputs within 1e-4 and every gradient within 1e-3 in f32, as they are
 //! trained, and both within 1e-6 in f64. Weights and inputs are filled by one formula on both sides.
 
-use crate::train::networks::{phase, value};
+use crate::fixtures::networks::{phase, value};
 use candle_core::{DType, Result, Tensor, Var};
 use orator::nn::cpu::axis::Walk;
 use orator::nn::gan::discriminator::Discriminator;

@@ -1,23 +1,8 @@
-//! Every model of the shared folder gives the numbers written down for it.
+//! Every ONNX model gives the numbers written down for it.
 
-use orator::external::onnx::{Manifest, Model, ModelRole, Runtime, TensorAxes};
-use std::path::{Path, PathBuf};
-
-/// The shared models, if they and the ONNX Runtime library are there.
-pub fn models() -> Option<(PathBuf, Runtime)> {
-    let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/models");
-    if !dir.is_dir() {
-        eprintln!("SKIPPED: no pose models at {}", dir.display());
-        return None;
-    }
-    match Runtime::load(Path::new(""), &dir) {
-        Ok(runtime) => Some((dir, runtime)),
-        Err(error) => {
-            eprintln!("SKIPPED: {error:#}");
-            None
-        }
-    }
-}
+use crate::fixtures::onnx_models::models;
+use orator::external::onnx::{Manifest, Model, ModelRole, TensorAxes};
+use std::path::Path;
 
 #[test]
 fn every_model_gives_its_golden_numbers() {

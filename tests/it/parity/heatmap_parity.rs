@@ -1,7 +1,7 @@
 //! The heat-map hand lifter gives what the same networks in PyTorch give (`fixtures/reference/heatmap_reference.py`),
 //! weights and input being filled by one formula on both sides.
 
-use crate::train::networks::fill;
+use crate::fixtures::networks::fill;
 use candle_core::{DType, Device, Tensor};
 use orator::nn::Mode;
 use orator::nn::lifter::heatmap::{HeatmapLifter, NAME};

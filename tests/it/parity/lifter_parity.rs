@@ -2,7 +2,7 @@
 //! temporal network in f32 as they are used, and its training pass with gradients in f64. The networks are small and
 //! filled by the formula: the built-in weights do not matter here.
 
-use crate::train::networks::fill;
+use crate::fixtures::networks::fill;
 use candle_core::{DType, Device, Result, Tensor};
 use orator::nn::Mode;
 use orator::nn::lifter::hand;

@@ -1,8 +1,9 @@
 //! The 2D chain gives the keypoints of the Python reference on real clips, on the frames the reference looked at and
-//! with its person detector. Needs the shared folder and a Python with onnxruntime and cv2 (ORATOR_REFERENCE_PYTHON
+//! with its person detector. Needs `ORATOR_DATA` and a Python with onnxruntime and cv2 (ORATOR_REFERENCE_PYTHON
 //! names one).
 
-use super::golden;
+use crate::fixtures::onnx_models::models;
+use crate::fixtures::skip::{python, real_data};
 use orator::config;
 use orator::external::ffmpeg::frames::FrameReader;
 use orator::external::onnx::Manifest;
@@ -20,30 +21,10 @@ const MIN_SCORE: f32 = 0.3;
 /// Least share of frames in which both find a hand, or both do not.
 const MIN_AGREEMENT: f64 = 0.95;
 
-/// A Python that can run the reference.
-fn python() -> Option<String> {
-    let named = std::env::var("ORATOR_REFERENCE_PYTHON").ok();
-    let candidates = named.map_or_else(|| vec!["python3".to_owned()], |named| vec![named]);
-    let works = |python: &String| {
-        let tried = Command::new(python).args(["-c", "import onnxruntime, cv2, numpy"]).output();
-        tried.is_ok_and(|output| output.status.success())
-    };
-    let found = candidates.into_iter().find(works);
-    if found.is_none() {
-        eprintln!(
-            "SKIPPED: no Python with onnxruntime, opencv-python-headless and numpy (ORATOR_REFERENCE_PYTHON names one)"
-        );
-    }
-    found
-}
-
-/// The first `secs` of a shared clip, if it is there.
+/// The first `secs` of a real clip.
+#[track_caller]
 fn clip(name: &str, secs: u32, dir: &Path) -> Option<PathBuf> {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/videos").join(name);
-    if !source.is_file() {
-        eprintln!("SKIPPED: no clip at {}", source.display());
-        return None;
-    }
+    let source = real_data(&format!("data/videos/{name}"))?;
     let cut = dir.join("clip.mp4");
     let command = ["-v", "error", "-y", "-t", &secs.to_string(), "-i"].map(str::to_owned);
     let done = Command::new("ffmpeg").args(command).arg(&source).args(["-c:v", "copy", "-an"]).arg(&cut).status();
@@ -57,11 +38,14 @@ fn median(mut numbers: Vec<f32>) -> f32 {
     numbers[numbers.len() / 2]
 }
 
+#[track_caller]
 fn compare(name: &str, secs: u32) {
-    let (Some((models, runtime)), Some(python)) = (golden::models(), python()) else { return };
+    let (Some((models, runtime)), Some(python)) = (models(), python("onnxruntime, cv2, numpy")) else {
+        return;
+    };
     let dir = tempfile::tempdir().unwrap();
     let Some(clip) = clip(name, secs, dir.path()) else { return };
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/reference/pose_chain_reference.py");
+    let Some(script) = real_data("reference/pose_chain_reference.py") else { return };
     let written = dir.path().join("reference.npz");
     let mut command = Command::new(python);
     command.arg(script).arg(&clip).arg(&written).env("MODELS", &models).env("OMP_NUM_THREADS", "1");

@@ -1,7 +1,7 @@
 //! The 2D chain and its stage on what real life brings: odd sizes, nobody there, shots, repeated frames.
 
 use crate::fixtures::clips;
-use crate::parity::golden;
+use crate::fixtures::onnx_models::models;
 use ndarray::Array1;
 use ndarray_npy::NpzWriter;
 use orator::config;
@@ -23,7 +23,7 @@ fn noise(width: usize, height: usize) -> Image {
 
 #[test]
 fn any_picture_gives_finite_numbers() {
-    let Some((models, runtime)) = golden::models() else { return };
+    let Some((models, runtime)) = models() else { return };
     let manifest = Manifest::builtin().unwrap();
     // Without a person detector the whole picture is the person, so that every model runs on nonsense.
     for person in ["person-rtmdet-nano", "person-yolox-nano", ""] {
@@ -50,7 +50,7 @@ fn any_picture_gives_finite_numbers() {
 
 #[test]
 fn settings_that_name_no_right_model_say_which() {
-    let Some((models, runtime)) = golden::models() else { return };
+    let Some((models, runtime)) = models() else { return };
     let manifest = Manifest::builtin().unwrap();
     let said =
         |settings: config::Pose2d| format!("{:#}", Chain::new(&runtime, &manifest, &models, &settings).err().unwrap());
@@ -82,7 +82,7 @@ fn write_timeline(settings: &Settings, unit: &Unit, restart: Vec<bool>) {
 
 #[test]
 fn a_video_without_a_person_is_zeros_and_no_failure() {
-    let Some((models, _)) = golden::models() else { return };
+    let Some((models, _)) = models() else { return };
     let dir = tempfile::tempdir().unwrap();
     let (unit, settings) = unit(dir.path(), 20, &models);
     write_timeline(&settings, &unit, (0..10).map(|t| t == 6).collect());
@@ -109,7 +109,7 @@ fn a_video_without_a_person_is_zeros_and_no_failure() {
 
 #[test]
 fn a_timeline_of_another_video_and_a_missing_model_are_errors() {
-    let Some((models, _)) = golden::models() else { return };
+    let Some((models, _)) = models() else { return };
     let dir = tempfile::tempdir().unwrap();
     let (unit, mut settings) = unit(dir.path(), 20, &models);
     for n_frames in [3, 12] {

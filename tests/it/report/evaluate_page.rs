@@ -1,7 +1,7 @@
 //! The page of an evaluation, as the program makes it and a browser shows it.
 
-use crate::evaluate::evaluate_files::folders;
 use crate::fixtures::browser::Browser;
+use crate::fixtures::motion_folders::folders;
 use crate::fixtures::support::Project;
 
 #[test]

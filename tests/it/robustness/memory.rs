@@ -4,9 +4,9 @@
 
 use crate::fixtures::clips;
 use crate::fixtures::clips::ffmpeg;
+use crate::fixtures::keypoints::keypoints;
 use crate::fixtures::support::Project;
-use crate::generate::generate::write_untrained_speaker;
-use crate::lift::lift::keypoints;
+use crate::fixtures::untrained::write_untrained_speaker;
 use ndarray::{Array3, s};
 use ndarray_npy::NpzWriter;
 use orator::external::ffmpeg::audio::write_wav;

@@ -1,62 +1,19 @@
 //! The generator's training end to end on a small made-up speaker whose arms follow the pitch of a tone: it learns,
 //! resumes exactly, stops when it breaks, and its checkpoint generates.
 
-use ndarray::{Array2, Array3};
+use crate::fixtures::gesture_dataset::{FPS, dataset, sample};
 use orator::config::Gan;
-use orator::dataset::{Dataset, Sample, Split, write_dataset};
+use orator::dataset::{Dataset, Split, write_dataset};
 use orator::generate::Speaker;
 use orator::generate::model::BEST;
 use orator::stage::progress::{Progress, Silent, Task};
 use orator::train::gan::train::train;
-use orator::types::pose3d::Motion;
-use orator::types::skeleton::{N_JOINTS, R_HAND, R_WRIST, parent};
+use orator::types::skeleton::{R_HAND, R_WRIST};
 use orator::types::sound::Sound;
-use orator::types::sync;
-use orator::types::time::FrameRate;
-use std::f64::consts::TAU;
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
-
-pub const FPS: FrameRate = FrameRate::new(15, 1);
-
-/// An interval whose tone and pose follow one slow curve.
-pub fn sample(key: &str, n_frames: usize, phase: f64) -> Sample {
-    let curve = |secs: f64| (TAU * 0.23 * secs + phase).sin() + 0.5 * (TAU * 0.61 * secs + 2.0 * phase).sin();
-    let mut joints = Array3::<f32>::zeros((n_frames, N_JOINTS, 3));
-    for t in 0..n_frames {
-        for joint in 1..N_JOINTS {
-            let from = parent(joint).unwrap_or(0);
-            let angle = 0.4 * joint as f64 + 0.8 * curve(FPS.secs(t));
-            let length = if joint == 7 || joint == R_HAND { 0.0 } else { 0.05 + 0.002 * joint as f64 };
-            for (k, direction) in [angle.cos(), angle.sin(), 0.2].into_iter().enumerate() {
-                joints[[t, joint, k]] = joints[[t, from, k]] + (length * direction) as f32;
-            }
-        }
-    }
-    let mut turn = 0.0;
-    let samples = (0..sync::sample_at(FPS, 16_000, n_frames)).map(|i| {
-        turn += TAU * (600.0 + 250.0 * curve(i as f64 / 16_000.0)) / 16_000.0;
-        0.3 * turn.sin() as f32
-    });
-    let sound = Sound { rate: 16_000, samples: samples.collect() };
-    let mut mask = Array2::from_elem((n_frames, N_JOINTS), true);
-    mask.row_mut(n_frames / 2).fill(false);
-    joints[[n_frames / 2, 5, 0]] = f32::NAN;
-    let pose2d = Array3::zeros((n_frames, 59, 3));
-    Sample { key: key.into(), motion: Motion { fps: FPS, joints, mask }, pose2d, sound, meta: serde_json::json!({}) }
-}
-
-pub fn dataset(folder: &Path) -> Dataset {
-    let samples = [
-        (Split::Train, sample("a-00000000-000000", 99, 0.0)),
-        (Split::Train, sample("b-00000000-000000", 64, 2.0)),
-        (Split::Validation, sample("c-00000000-000000", 128, 4.0)),
-    ];
-    write_dataset(folder, "host", FPS, &samples).unwrap();
-    Dataset::open(folder).unwrap()
-}
 
 fn settings() -> Gan {
     Gan { batch: 2, steps: 6, epoch_steps: 3, checkpoint_every: 2, keep_checkpoints: 2, ..Gan::default() }

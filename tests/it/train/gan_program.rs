@@ -2,8 +2,8 @@
 //! alone; and with two speakers each has a model of its own, which needs nothing but its file to generate.
 //! `ORATOR_KILLS` says how often it is killed (`make prove`: 20).
 
-use super::gan::{FPS, sample};
 use crate::fixtures::clips;
+use crate::fixtures::gesture_dataset::{FPS, sample};
 use orator::dataset::{Split, write_dataset};
 use orator::external::ffmpeg::audio;
 use std::path::Path;

@@ -1,7 +1,8 @@
 //! The networks give what the same networks in PyTorch give (`fixtures/reference/networks_reference.py`), weights and
 //! inputs being filled by one formula on both sides.
 
-use candle_core::{DType, Device, Result, Tensor};
+use crate::fixtures::networks::fill;
+use candle_core::{DType, Device, Tensor};
 use orator::nn::Mode;
 use orator::nn::gan::discriminator::Discriminator;
 use orator::nn::gan::generator;
@@ -24,28 +25,6 @@ fn golden(name: &str) -> Golden {
     let text = include_str!("../../../fixtures/reference/networks_golden.json");
     let mut all: BTreeMap<String, Golden> = serde_json::from_str(text).unwrap();
     all.remove(name).unwrap()
-}
-
-/// The formula's number of a name.
-pub fn phase(name: &str) -> f64 {
-    (name.bytes().enumerate().map(|(k, c)| (k + 1) * usize::from(c)).sum::<usize>() % 1009) as f64
-}
-
-/// The formula of the references: a tensor by its name and shape.
-pub fn value(name: &str, shape: &[usize]) -> Result<Tensor> {
-    let p = pattern(shape, phase(name))?;
-    match name {
-        _ if name.ends_with("running_var") => p.affine(0.5, 1.0),
-        _ if name.ends_with("norm.weight") => p.affine(0.2, 1.0),
-        _ if shape.len() == 1 => p * 0.1,
-        _ => p * (3.0 / shape[1..].iter().product::<usize>() as f64).sqrt(),
-    }
-}
-
-/// Every tensor by the formula.
-pub fn fill(params: &Params) -> anyhow::Result<()> {
-    let filled = params.all().map(|(name, var)| Ok((name.to_owned(), value(name, var.dims())?)));
-    params.load(&filled.collect::<Result<_>>()?)
 }
 
 fn agree(name: &str, y: &Tensor) -> anyhow::Result<()> {
