@@ -12,7 +12,7 @@ const FLOORS: [(u8, &str, &str); 19] = [
     (1, "math", ""),
     (1, "stage", ""),
     (2, "config", "types stage"),
-    (2, "external", "types"),
+    (2, "external", "types stage"),
     (2, "audio", "types"),
     (2, "motion", "types math"),
     (3, "formats", "types math stage motion"),
@@ -52,7 +52,7 @@ const STILL_TWICE: &str = "Account Arm Axes Axis Band Bar Batch Beat Beside Bloc
      Extract Figure Fit Footage Format Found From Gathered Gaussian Gestures Hand Heard HeldOut Input Interval Joint \
      Kept Kernel Kind Known Lift Limb Line Listener Log Look Made Mark Material Mean Measured Metric Moments \
      MotionArgs Movement Op Order Origin Outcome Pair Panel Part Picture Place Plan Point Points Pose2d Poses Problem \
-     Refusal Row Run Sample Scene Seen Settings Shard Sizes Source Sources Span Speaker Spread Steps Stored Stretch \
+     Real Refusal Row Run Sample Scene Seen Settings Shard Sizes Source Sources Span Speaker Spread Steps Stored Stretch \
      Sums Sway Table Take Tally Task Threshold Timeline Told Track Training Truth Unit Verb Video VideoInfo View \
      Voice Waiting Wanted Window Windows Work";
 
