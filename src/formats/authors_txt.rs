@@ -83,7 +83,7 @@ fn push_number(text: &mut String, number: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::skeleton::{L_HAND, L_WRIST, NECK, R_HAND, R_WRIST};
+    use crate::types::skeleton::NECK;
 
     const FPS: FrameRate = FrameRate::new(15, 1);
 
