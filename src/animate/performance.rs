@@ -97,9 +97,9 @@ pub struct Jerk {
 /// A motion on its figure.
 #[derive(Clone, Debug)]
 pub struct Performance {
-    pub figure: Rig,
+    pub rig: Rig,
     pub clip: Clip,
-    pub told: AnimationReport,
+    pub report: AnimationReport,
 }
 
 /// Puts a motion on the figure of its own bone lengths; with a `face` the head turns.
@@ -107,26 +107,26 @@ pub struct Performance {
 /// What no body can do is clamped before smoothing, so that a joint found on the wrong side pulls no other frame with
 /// it, and once more behind it and at the rate that is written, so that the limits hold in every frame of the file.
 pub fn perform(motion: &Motion, face: Option<&Face>, options: &AnimationOptions) -> Performance {
-    let figure = Rig::from_motion(motion);
+    let rig = Rig::from_motion(motion);
     let clip_of = |tracks: &[RotationTrack]| {
         let local = (0..motion.n_frames()).map(|t| tracks.iter().map(|track| track[t]).collect()).collect();
-        Clip { root: figure.root, skeleton: figure.skeleton.clone(), fps: motion.fps, local }
+        Clip { root: rig.root, skeleton: rig.skeleton.clone(), fps: motion.fps, local }
     };
     let constrained = |mut clip: Clip, tally: &mut ClampTally| {
-        clip.local.iter_mut().for_each(|frame| options.constraints.apply(&figure, frame, tally));
+        clip.local.iter_mut().for_each(|frame| options.constraints.apply(&rig, frame, tally));
         clip
     };
     let mut tally = ClampTally::default();
-    let mut places = JointPositions::from_motion(motion);
+    let mut positions = JointPositions::from_motion(motion);
     if options.constraints != Constraints::NONE {
-        let as_it_is = rotations(&places, &figure, &SolveFilters::new(Smoothing::None, motion.fps));
-        places = moved(&places, &figure, &constrained(clip_of(&as_it_is), &mut tally));
+        let as_it_is = rotations(&positions, &rig, &SolveFilters::new(Smoothing::None, motion.fps));
+        positions = moved(&positions, &rig, &constrained(clip_of(&as_it_is), &mut tally));
     }
     let means = SolveFilters::new(options.smoothing, motion.fps);
-    let mut tracks = rotations(&places, &figure, &means);
-    let face_frames = face.map(|face| head::turn(face, &figure, &means, &mut tracks));
+    let mut tracks = rotations(&positions, &rig, &means);
+    let face_frames = face.map(|face| head::turn(face, &rig, &means, &mut tracks));
     if options.yaw == Yaw::Removed {
-        for joint in [figure.spine, figure.chest] {
+        for joint in [rig.spine, rig.chest] {
             tracks[joint].fill(Rotation::IDENTITY);
         }
     }
@@ -135,14 +135,15 @@ pub fn perform(motion: &Motion, face: Option<&Face>, options: &AnimationOptions)
     let resampled = resampled.map(|clip| constrained(clip, &mut ClampTally::default()));
     let clip = constrained(free, &mut ClampTally::default());
 
-    let after = joints(&figure, &clip);
+    let after = joints(&rig, &clip);
     let jerk = |joints: &[(usize, usize)]| {
-        let of = |places: &Array3<f32>| jerk::mean(places.view(), seen(motion).view(), motion.fps.per_sec(), joints);
+        let of =
+            |positions: &Array3<f32>| jerk::mean(positions.view(), seen(motion).view(), motion.fps.per_sec(), joints);
         Jerk { before: of(&motion.joints), after: of(&after) }
     };
     let arms = [R_SHOULDER, L_SHOULDER].into_iter().flat_map(|shoulder| (shoulder..shoulder + 3).map(|j| (j, NECK)));
     let hands = [R_HAND, L_HAND].into_iter().flat_map(|root| (root + 1..root + 21).map(move |j| (j, root)));
-    let told = AnimationReport {
+    let report = AnimationReport {
         n_frames: motion.n_frames(),
         arms: jerk(&arms.collect::<Vec<_>>()),
         hands: jerk(&hands.collect::<Vec<_>>()),
@@ -150,24 +151,24 @@ pub fn perform(motion: &Motion, face: Option<&Face>, options: &AnimationOptions)
         face_frames,
         seen: SeenFrames::count(motion),
     };
-    Performance { clip: resampled.unwrap_or(clip), figure, told }
+    Performance { clip: resampled.unwrap_or(clip), rig, report }
 }
 
 impl Performance {
     /// The joints [T, 49, 3] of the figure (metres, house axes, the neck at the origin) at the clip's rate.
     pub fn motion(&self) -> Motion {
-        Motion::from_joints(self.clip.fps, joints(&self.figure, &self.clip))
+        Motion::from_joints(self.clip.fps, joints(&self.rig, &self.clip))
     }
 }
 
-fn joints(figure: &Rig, clip: &Clip) -> Array3<f32> {
+fn joints(rig: &Rig, clip: &Clip) -> Array3<f32> {
     let mut joints = Array3::zeros((clip.n_frames(), N_JOINTS, 3));
     for (frame_idx, mut frame) in joints.outer_iter_mut().enumerate() {
-        let places = clip.positions(frame_idx);
-        let neck = places[figure.places[NECK]];
-        for (joint, &place) in figure.places.iter().enumerate() {
+        let positions = clip.positions(frame_idx);
+        let neck = positions[rig.positions[NECK]];
+        for (joint, &place) in rig.positions.iter().enumerate() {
             for (axis, sign) in [1.0, -1.0, -1.0].into_iter().enumerate() {
-                frame[[joint, axis]] = (sign * (places[place][axis] - neck[axis]) / 100.0) as f32;
+                frame[[joint, axis]] = (sign * (positions[place][axis] - neck[axis]) / 100.0) as f32;
             }
         }
     }
@@ -180,10 +181,10 @@ fn seen(motion: &Motion) -> Array2<bool> {
 }
 
 /// Where a clip of the figure has these joints; what was missing stays missing.
-fn moved(places: &JointPositions, figure: &Rig, clip: &Clip) -> JointPositions {
+fn moved(positions: &JointPositions, rig: &Rig, clip: &Clip) -> JointPositions {
     let moved = |(t, frame): (usize, &[Option<Vec3>; N_JOINTS])| {
         let positions = clip.positions(t);
-        std::array::from_fn(|joint| frame[joint].map(|_| scale(positions[figure.places[joint]], 1.0 / CM)))
+        std::array::from_fn(|joint| frame[joint].map(|_| scale(positions[rig.positions[joint]], 1.0 / CM)))
     };
-    JointPositions(places.0.iter().enumerate().map(moved).collect())
+    JointPositions(positions.0.iter().enumerate().map(moved).collect())
 }

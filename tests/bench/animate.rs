@@ -37,7 +37,7 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.rounds > 0 && args.fps > 0, "nothing to measure: there must be rounds and frames a second");
     let mut dice = ChaCha8Rng::seed_from_u64(1337);
     let speech = Speech::new(args.secs, &mut dice);
-    let mut motion = RuleGestures::with_whims(&speech, args.secs, &mut dice).motion(FPS.frames_in(args.secs), FPS);
+    let mut motion = RuleGestures::with_variation(&speech, args.secs, &mut dice).motion(FPS.frames_in(args.secs), FPS);
     for (t, mut frame) in motion.joints.outer_iter_mut().enumerate() {
         if t % 100 < 10 {
             frame.slice_mut(ndarray::s![8..28, ..]).fill(f32::NAN);
@@ -56,10 +56,10 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         n_bytes[0] = performance.clip.to_bvh().len();
         secs[1].push(start.elapsed().as_secs_f64());
         let start = Instant::now();
-        let avatar = one_core.install(|| Avatar::new(&performance.figure));
+        let avatar = one_core.install(|| Avatar::new(&performance.rig));
         secs[2].push(start.elapsed().as_secs_f64());
         let start = Instant::now();
-        n_bytes[1] = glb_scene::file(&performance.figure, &performance.clip, &avatar, Names::Own).len();
+        n_bytes[1] = glb_scene::file(&performance.rig, &performance.clip, &avatar, Names::Own).len();
         secs[3].push(start.elapsed().as_secs_f64());
         task.advance(1);
     }

@@ -102,9 +102,9 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
 
 /// A clip that is still to be heard.
 struct Unheard {
-    real: Array3<f32>,
+    ground_truth: Array3<f32>,
     mask: Array2<bool>,
-    made: Array3<f32>,
+    predicted: Array3<f32>,
     sound: Sound,
 }
 
@@ -112,8 +112,13 @@ struct Unheard {
 fn speaker(n_clips: usize, n_frames: usize) -> Vec<Unheard> {
     let clip = |number: usize| {
         let rule = Rule { rule: RULE, seed: 1, split: Split::Validation, number, n_frames };
-        let real = rule.motion();
-        Unheard { mask: real.mask, real: real.joints, made: rule.predictable().joints, sound: rule.sound() }
+        let ground_truth = rule.motion();
+        Unheard {
+            mask: ground_truth.mask,
+            ground_truth: ground_truth.joints,
+            predicted: rule.predictable().joints,
+            sound: rule.sound(),
+        }
     };
     (0..n_clips).into_par_iter().map(clip).collect()
 }
@@ -121,11 +126,11 @@ fn speaker(n_clips: usize, n_frames: usize) -> Vec<Unheard> {
 fn evaluate(speaker: Vec<Unheard>, watch: &Stopwatch) -> Result<(table::Table, String)> {
     watch.detail("listening");
     let clip = |(number, unheard): (usize, Unheard)| {
-        let Unheard { real, mask, mut made, sound } = unheard;
-        let heard = Some(sound_features::of_samples(&sound.samples, FPS, real.shape()[0]));
-        let (mask, _) = compared(&real, &mask, &mut made);
+        let Unheard { ground_truth, mask, mut predicted, sound } = unheard;
+        let features = Some(sound_features::of_samples(&sound.samples, FPS, ground_truth.shape()[0]));
+        let (mask, _) = compared(&ground_truth, &mask, &mut predicted);
         let voice = Some(ClipAudio::Kept(sound.samples.into_iter().map(pcm).collect()));
-        EvalClip { name: format!("clip {number}"), real, made, mask, heard, voice }
+        EvalClip { name: format!("clip {number}"), ground_truth, predicted, mask, features, voice }
     };
     let clips = speaker.into_par_iter().enumerate().map(clip).collect();
     let clips = EvalClips { fps: FPS, clips, notes: Vec::new(), learnt: false };

@@ -47,10 +47,10 @@ pub struct Avatar {
 }
 
 impl Avatar {
-    pub fn new(figure: &Rig) -> Self {
-        let stance = Stance::new(figure);
-        let hands = [0, 1].map(|side| HandForm::new(figure, &stance, side));
-        let body = BodyForm::new(figure, &stance, hands.each_ref().map(|hand| hand.scale));
+    pub fn new(rig: &Rig) -> Self {
+        let stance = Stance::new(rig);
+        let hands = [0, 1].map(|side| HandForm::new(rig, &stance, side));
+        let body = BodyForm::new(rig, &stance, hands.each_ref().map(|hand| hand.scale));
         let cm = stance.scale;
         let [mut skin, mut shirt, mut trousers, mut shoes] = [(); 4].map(|()| PosedMesh::default());
         let surface_of = |form: &Form, cell: f64| Surface::from_field(&|at| form.distance(at), form.bounds(), cell);
@@ -138,7 +138,7 @@ impl Blend {
             for (column, axis) in blend.columns.iter_mut().zip(turn.axes()) {
                 *column = add(*column, part(axis));
             }
-            blend.shift = add(blend.shift, part(sub(stance.places[joint], turn.turn(stance.rest[joint]))));
+            blend.shift = add(blend.shift, part(sub(stance.positions[joint], turn.turn(stance.rest[joint]))));
         }
         blend
     }
@@ -159,18 +159,18 @@ mod tests {
     use crate::types::skeleton::N_JOINTS;
     use crate::types::time::FrameRate;
 
-    fn figure() -> Rig {
+    fn rig() -> Rig {
         let unseen = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
         Rig::from_motion(&Motion::from_joints(FrameRate::new(15, 1), unseen))
     }
 
     #[test]
     fn skinning_brings_the_rest_into_the_stance_and_both_sides_are_alike() {
-        let figure = figure();
-        let (avatar, stance) = (Avatar::new(&figure), Stance::new(&figure));
+        let rig = rig();
+        let (avatar, stance) = (Avatar::new(&rig), Stance::new(&rig));
         let shirt = &avatar.parts[1];
-        let hands = [0, 1].map(|side| HandForm::new(&figure, &stance, side).scale);
-        let body = BodyForm::new(&figure, &stance, hands);
+        let hands = [0, 1].map(|side| HandForm::new(&rig, &stance, side).scale);
+        let body = BodyForm::new(&rig, &stance, hands);
         let form = body.shirt();
         let cuffs = [0, 1].map(|side| body.cuff(side));
         let mut far = 0;
@@ -191,20 +191,20 @@ mod tests {
     #[test]
     fn bent_joints_do_not_collapse() {
         // The thinnest place around a finger's middle joint and around an elbow, straight and bent by 90 degrees.
-        let figure = figure();
-        let avatar = Avatar::new(&figure);
-        let arm = &figure.arms[0];
-        let finger = super::super::stance::finger_joints(&figure, 0, 2);
+        let rig = rig();
+        let avatar = Avatar::new(&rig);
+        let arm = &rig.arms[0];
+        let finger = super::super::stance::finger_joints(&rig, 0, 2);
         for (part, joint, next, axis) in [
             (&avatar.parts[0], finger[1], finger[2], [0.0, 0.0, -1.0]),
             (&avatar.parts[1], arm.fore, arm.hand, [0.0, -1.0, 0.0]),
         ] {
             let thickness = |degrees: f64| {
-                let mut local = vec![Rotation::IDENTITY; figure.skeleton.joints.len()];
+                let mut local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
                 local[joint] = Rotation::about(axis, f64::to_radians(degrees));
-                let world = figure.skeleton.world(&local);
-                let places = figure.skeleton.positions(figure.root, &local);
-                let rest = figure.skeleton.positions(figure.root, &vec![Rotation::IDENTITY; local.len()]);
+                let world = rig.skeleton.world(&local);
+                let positions = rig.skeleton.positions(rig.root, &local);
+                let rest = rig.skeleton.positions(rig.root, &vec![Rotation::IDENTITY; local.len()]);
                 // On the side that the bend stretches, how far the skin is from the joint.
                 let half = Rotation::about(axis, f64::to_radians(degrees / 2.0));
                 let along = unit(sub(rest[next], rest[joint]), 0.0).unwrap();
@@ -212,9 +212,9 @@ mod tests {
                 let mut reach: f64 = 0.0;
                 for (&point, weights) in part.points.iter().zip(&part.weights) {
                     let at = weights.iter().fold([0.0; 3], |sum, &(j, w)| {
-                        add(sum, scale(add(world[j].turn(sub(point, rest[j])), places[j]), w))
+                        add(sum, scale(add(world[j].turn(sub(point, rest[j])), positions[j]), w))
                     });
-                    let from = sub(at, places[joint]);
+                    let from = sub(at, positions[joint]);
                     if norm(from) < 8.0 && norm(sub(from, scale(out, dot(from, out)))) < 0.7 * dot(from, out) {
                         reach = reach.max(dot(from, out));
                     }

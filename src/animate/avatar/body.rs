@@ -14,7 +14,7 @@ const SLEEVE: f64 = 3.05;
 
 /// Forms on the figure in its stance.
 pub struct BodyForm<'a> {
-    pub figure: &'a Rig,
+    pub rig: &'a Rig,
     pub stance: &'a Stance,
     pub trunk: Trunk,
     /// Width of the shoulders against the form's.
@@ -24,11 +24,11 @@ pub struct BodyForm<'a> {
 }
 
 impl<'a> BodyForm<'a> {
-    pub fn new(figure: &'a Rig, stance: &'a Stance, hands: [f64; 2]) -> Self {
-        let half = |arm: &RigArm| norm(figure.skeleton.joints[arm.upper].offset) / 2.0;
-        let half: f64 = figure.arms.iter().map(half).sum();
+    pub fn new(rig: &'a Rig, stance: &'a Stance, hands: [f64; 2]) -> Self {
+        let half = |arm: &RigArm| norm(rig.skeleton.joints[arm.upper].offset) / 2.0;
+        let half: f64 = rig.arms.iter().map(half).sum();
         let broad = (half / SHOULDERS / stance.scale).clamp(0.75, 1.3);
-        Self { figure, stance, trunk: Trunk::find(figure), broad, hands }
+        Self { rig, stance, trunk: Trunk::find(rig), broad, hands }
     }
 
     /// A limb from point to point of the form's size; `joint` gives the axes.
@@ -71,7 +71,7 @@ impl<'a> BodyForm<'a> {
 
     /// One sleeve, open at the wrist.
     pub fn sleeve(&self, side: usize) -> Form {
-        let arm = &self.figure.arms[side];
+        let arm = &self.rig.arms[side];
         let (out, end) = (arm.sign, self.sleeve_end(side));
         let (upper, fore) = (self.length(arm.upper, arm.fore), self.length(arm.fore, arm.hand));
         let wrist = SLEEVE * self.hands[side] / self.stance.scale;
@@ -87,7 +87,7 @@ impl<'a> BodyForm<'a> {
 
     /// The band at a sleeve's end.
     pub fn cuff(&self, side: usize) -> Form {
-        let arm = &self.figure.arms[side];
+        let arm = &self.rig.arms[side];
         let along = self.stance.direction(arm.fore, arm.hand);
         let (end, hand) = (self.sleeve_end(side), self.hands[side]);
         let [near, far] = [-2.6 * hand, 0.25 * hand].map(|cm| add(end, scale(along, cm)));
@@ -101,9 +101,9 @@ impl<'a> BodyForm<'a> {
     }
 
     fn sleeve_end(&self, side: usize) -> Vec3 {
-        let arm = &self.figure.arms[side];
+        let arm = &self.rig.arms[side];
         let along = self.stance.direction(arm.fore, arm.hand);
-        sub(self.stance.places[arm.hand], scale(along, BARE * self.hands[side]))
+        sub(self.stance.positions[arm.hand], scale(along, BARE * self.hands[side]))
     }
 
     /// The whole shirt.
@@ -161,6 +161,6 @@ impl<'a> BodyForm<'a> {
 
     /// Distance of two joints in the form's size.
     fn length(&self, from: usize, to: usize) -> f64 {
-        norm(scale(sub(self.stance.places[to], self.stance.places[from]), 1.0 / self.stance.scale))
+        norm(scale(sub(self.stance.positions[to], self.stance.positions[from]), 1.0 / self.stance.scale))
     }
 }

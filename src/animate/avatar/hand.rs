@@ -26,14 +26,14 @@ pub struct HandForm {
 }
 
 impl HandForm {
-    pub fn new(figure: &Rig, stance: &Stance, side: usize) -> Self {
-        let arm = &figure.arms[side];
-        let fingers: [[usize; 4]; 5] = std::array::from_fn(|finger| finger_joints(figure, side, finger));
-        let wrist = stance.places[arm.hand];
-        let knuckle = |finger: usize| stance.places[fingers[finger][0]];
+    pub fn new(rig: &Rig, stance: &Stance, side: usize) -> Self {
+        let arm = &rig.arms[side];
+        let fingers: [[usize; 4]; 5] = std::array::from_fn(|finger| finger_joints(rig, side, finger));
+        let wrist = stance.positions[arm.hand];
+        let knuckle = |finger: usize| stance.positions[fingers[finger][0]];
         let metacarpals = (1..5).map(|f| norm(sub(knuckle(f), wrist))).sum::<f64>() / 4.0;
         let middle: f64 =
-            fingers[2].windows(2).map(|bone| norm(sub(stance.places[bone[1]], stance.places[bone[0]]))).sum();
+            fingers[2].windows(2).map(|bone| norm(sub(stance.positions[bone[1]], stance.positions[bone[0]]))).sum();
         let size = (metacarpals + middle) / (METACARPAL + MIDDLE);
         let along = unit(sub(scale(add(knuckle(2), knuckle(3)), 0.5), wrist), 1e-6).unwrap_or([arm.sign, 0.0, 0.0]);
         let to_thumb = sub(knuckle(1), knuckle(4));
@@ -56,7 +56,7 @@ impl HandForm {
             let start = mix(inwards(wrist, 0.1), end, 0.16);
             palm = palm.with(RoundCone::new([start, end], [cm(1.25), radius * 1.08]), cm(0.9));
         }
-        let thumb = fingers[0].map(|joint| stance.places[joint]);
+        let thumb = fingers[0].map(|joint| stance.positions[joint]);
         // The balls of the thumb and of the little finger; the web between thumb and index finger.
         let thumb_ball = [inwards(mix(wrist, thumb[0], 0.7), 0.2), mix(thumb[0], thumb[1], 0.7)];
         let little_ball = [0.3, 0.8].map(|share| inwards(mix(wrist, knuckle(4), share), 0.42));
@@ -68,18 +68,18 @@ impl HandForm {
             palm = palm.with(RoundCone::new(web, [cm(0.85), cm(0.85)]), cm(1.6));
         }
         // The wrist, wider than thick, goes on into the sleeve.
-        let elbow = stance.places[arm.fore];
+        let elbow = stance.positions[arm.fore];
         let stub = [mix(wrist, elbow, 0.30), mix(wrist, elbow, -0.03)];
         palm = palm.with(RoundCone::new(stub, [cm(2.5), cm(2.4)]).flat(back, 0.76), cm(2.0));
 
         let fingers = std::array::from_fn(|finger| {
-            let places = fingers[finger].map(|joint| stance.places[joint]);
+            let positions = fingers[finger].map(|joint| stance.positions[joint]);
             let shares = if finger == 0 { THUMB_ALONG } else { ALONG };
             (0..3).fold(Form::default(), |form, k| {
                 // The joint of the tip lies under the nail.
-                let end = if k == 2 { mix(places[3], places[2], 0.12) } else { places[k + 1] };
+                let end = if k == 2 { mix(positions[3], positions[2], 0.12) } else { positions[k + 1] };
                 let radii = [radius[finger] * shares[k], radius[finger] * shares[k + 1]];
-                form.with(RoundCone::new([places[k], end], radii), cm(0.25))
+                form.with(RoundCone::new([positions[k], end], radii), cm(0.25))
             })
         });
         Self { palm, fingers, scale: size }

@@ -51,11 +51,11 @@ impl BodyForm<'_> {
         let stance = self.stance;
         let at = |k: usize| joints.get(k).copied().unwrap_or(after);
         let passes = (1..joints.len()).map(|k| {
-            let previous = if stance.places[at(k)] == stance.places[at(k - 1)] { before } else { at(k - 1) };
+            let previous = if stance.positions[at(k)] == stance.positions[at(k - 1)] { before } else { at(k - 1) };
             let (a, b) = (stance.direction(previous, at(k)), stance.direction(at(k), at(k + 1)));
             let normal = [0, 1, 2].map(|i| a[i] + b[i]);
             let length = norm(normal).max(1e-6);
-            (stance.places[at(k)], normal.map(|v| v / length), halves[k - 1])
+            (stance.positions[at(k)], normal.map(|v| v / length), halves[k - 1])
         });
         WeightChain { joints: joints.to_vec(), passes: passes.collect() }
     }
@@ -88,7 +88,7 @@ impl BodyForm<'_> {
         spine.passes.truncate(2);
         let trunk = self.trunk();
         let arms = [0, 1].map(|side| {
-            let arm = &self.figure.arms[side];
+            let arm = &self.rig.arms[side];
             let chain = self.chain(arm.clavicle, &[arm.upper, arm.fore], arm.hand, &[4.2 * cm]);
             (arm, self.sleeve(side), chain)
         });
@@ -96,7 +96,7 @@ impl BodyForm<'_> {
             let mut left = 1.0;
             let on_trunk = trunk.distance(at);
             for (arm, sleeve, chain) in &arms {
-                let shoulder = self.stance.places[arm.upper];
+                let shoulder = self.stance.positions[arm.upper];
                 let out = arm.sign * (at[0] - shoulder[0]) / cm;
                 let on_arm = rise((on_trunk - sleeve.distance(at)) / (1.5 * cm) - 0.6) * rise((out + 1.0) / 3.0);
                 // The shoulder's own bone carries the top of the trunk, more and more towards the shoulder.
@@ -112,7 +112,7 @@ impl BodyForm<'_> {
 
     /// Weights of a cuff: it stays with the forearm.
     pub fn cuff_weights(&self, side: usize, surface: &Surface) -> Vec<Weights> {
-        let fore = self.figure.arms[side].fore;
+        let fore = self.rig.arms[side].fore;
         vec![[(fore, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)]; surface.points.len()]
     }
 
@@ -135,24 +135,24 @@ impl BodyForm<'_> {
     }
 
     fn finger(&self, side: usize, finger: usize, scale: f64) -> WeightChain {
-        let arm = &self.figure.arms[side];
-        let [a, b, c, tip] = finger_joints(self.figure, side, finger);
+        let arm = &self.rig.arms[side];
+        let [a, b, c, tip] = finger_joints(self.rig, side, finger);
         let halves = if finger == 0 { [1.5, 0.9, 0.8] } else { [0.9, 0.75, 0.65] };
         self.chain(arm.fore, &[arm.hand, a, b, c], tip, &halves.map(|half| half * scale))
     }
 
     /// Weights of a palm with its thumb and wrist; `scale` is the hand's size.
     pub fn palm_weights(&self, side: usize, scale: f64, surface: &Surface) -> Vec<Weights> {
-        let arm = &self.figure.arms[side];
+        let arm = &self.rig.arms[side];
         let thumb = self.finger(side, 0, scale);
-        let knuckles: [usize; 5] = std::array::from_fn(|finger| finger_joints(self.figure, side, finger)[0]);
+        let knuckles: [usize; 5] = std::array::from_fn(|finger| finger_joints(self.rig, side, finger)[0]);
         let wrist = self.chain(arm.upper, &[arm.fore, arm.hand], knuckles[2], &[2.6 * scale]);
-        let places = &self.stance.places;
-        let thumb_line = finger_joints(self.figure, side, 0).map(|joint| places[joint]);
+        let positions = &self.stance.positions;
+        let thumb_line = finger_joints(self.rig, side, 0).map(|joint| positions[joint]);
         settled(surface, 4, |at, shares| {
             let on_thumb = thumb_line.windows(2).map(|ends| to_segment(at, ends[0], ends[1]));
             let on_thumb = on_thumb.fold(f64::INFINITY, f64::min);
-            let on_palm = knuckles[1..].iter().map(|&knuckle| to_segment(at, places[arm.hand], places[knuckle]));
+            let on_palm = knuckles[1..].iter().map(|&knuckle| to_segment(at, positions[arm.hand], positions[knuckle]));
             let on_palm = on_palm.fold(f64::INFINITY, f64::min);
             let mut on_hand = Shares::new();
             wrist.shares(at, 1.0, &mut on_hand);

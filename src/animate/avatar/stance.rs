@@ -17,7 +17,7 @@ const FAN: [f64; 5] = [0.0, 4.0, 1.0, -2.0, -5.0];
 
 /// The figure in that stance: places (cm) and rotations of its joints.
 pub struct Stance {
-    pub places: Vec<Vec3>,
+    pub positions: Vec<Vec3>,
     pub world: Vec<Rotation>,
     /// Places in the T-pose.
     pub rest: Vec<Vec3>,
@@ -37,34 +37,34 @@ pub struct Trunk {
 }
 
 impl Trunk {
-    pub fn find(figure: &Rig) -> Self {
-        let bones = &figure.skeleton;
+    pub fn find(rig: &Rig) -> Self {
+        let bones = &rig.skeleton;
         let find = |name: &str| bones.find(name).unwrap_or_default();
         let legs = ["Left", "Right"].map(|side| {
             let [upper, lower, foot] = ["UpLeg", "Leg", "Foot"].map(|part| find(&format!("{side}{part}")));
             [upper, lower, foot, bones.children(foot).next().unwrap_or(foot)]
         });
-        Self { hips: 0, spine: figure.spine, chest: figure.chest, neck: figure.places[0], head: find("Head"), legs }
+        Self { hips: 0, spine: rig.spine, chest: rig.chest, neck: rig.positions[0], head: find("Head"), legs }
     }
 }
 
 /// Joints of a finger of the arm, knuckle to tip.
-pub fn finger_joints(figure: &Rig, side: usize, finger: usize) -> [usize; 4] {
+pub fn finger_joints(rig: &Rig, side: usize, finger: usize) -> [usize; 4] {
     let base = [L_HAND, R_HAND][side] + 1 + 4 * finger;
-    std::array::from_fn(|k| figure.places[base + k])
+    std::array::from_fn(|k| rig.positions[base + k])
 }
 
 impl Stance {
-    pub fn new(figure: &Rig) -> Self {
-        let still = vec![Rotation::IDENTITY; figure.skeleton.joints.len()];
+    pub fn new(rig: &Rig) -> Self {
+        let still = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
         let mut local = still.clone();
-        for (side, arm) in figure.arms.iter().enumerate() {
+        for (side, arm) in rig.arms.iter().enumerate() {
             let curl = [0.0, 0.0, -arm.sign];
             local[arm.upper] = Rotation::about(curl, ARM.to_radians());
             local[arm.fore] = Rotation::about([0.0, -arm.sign, 0.0], ELBOW.to_radians());
             for (finger, fan) in FAN.into_iter().enumerate() {
                 let degrees = if finger == 0 { THUMB } else { FINGER };
-                let joints = finger_joints(figure, side, finger);
+                let joints = finger_joints(rig, side, finger);
                 for (&joint, degrees) in joints.iter().zip(degrees) {
                     local[joint] = Rotation::about(curl, degrees.to_radians());
                 }
@@ -72,11 +72,11 @@ impl Stance {
                 local[joints[0]] = fan * local[joints[0]];
             }
         }
-        let trunk = Trunk::find(figure);
-        let rest = figure.skeleton.positions(figure.root, &still);
+        let trunk = Trunk::find(rig);
+        let rest = rig.skeleton.positions(rig.root, &still);
         Self {
-            places: figure.skeleton.positions(figure.root, &local),
-            world: figure.skeleton.world(&local),
+            positions: rig.skeleton.positions(rig.root, &local),
+            world: rig.skeleton.world(&local),
             scale: (rest[trunk.neck][1] - rest[trunk.hips][1]) / 50.0,
             rest,
         }
@@ -84,11 +84,11 @@ impl Stance {
 
     /// The point `cm` away from a joint, in the joint's axes and the form's size.
     pub fn at(&self, joint: usize, cm: Vec3) -> Vec3 {
-        add(self.places[joint], self.world[joint].turn(scale(cm, self.scale)))
+        add(self.positions[joint], self.world[joint].turn(scale(cm, self.scale)))
     }
 
     /// Unit vector from one joint to another.
     pub fn direction(&self, from: usize, to: usize) -> Vec3 {
-        unit(sub(self.places[to], self.places[from]), 1e-6).unwrap_or([0.0, 1.0, 0.0])
+        unit(sub(self.positions[to], self.positions[from]), 1e-6).unwrap_or([0.0, 1.0, 0.0])
     }
 }

@@ -79,8 +79,8 @@ impl ExportFormat {
                 streamed(path, |text| performance.clip.write_bvh(&named, text))
             }
             Self::Glb => {
-                let avatar = Avatar::new(&performance.figure);
-                let bytes = glb_scene::file(&performance.figure, &performance.clip, &avatar, sources.names);
+                let avatar = Avatar::new(&performance.rig);
+                let bytes = glb_scene::file(&performance.rig, &performance.clip, &avatar, sources.names);
                 workdir::write_file(path, &bytes)
             }
             Self::Json => streamed(path, |text| json::write(text, performance, sources.names)),

@@ -230,7 +230,7 @@ fn fitting(motions: &[&Motion], [left, top, right, bottom]: Area, yaw_degrees: f
         }
     }
     let px_per_metre = ((right - left) / (x[1] - x[0])).min((bottom - top) / (y[1] - y[0]));
-    let middle = |area: [f32; 2], figure: [f32; 2]| (area[0] + area[1] - px_per_metre * (figure[0] + figure[1])) / 2.0;
+    let middle = |area: [f32; 2], span: [f32; 2]| (area[0] + area[1] - px_per_metre * (span[0] + span[1])) / 2.0;
     FigureView { neck_px: [middle([left, right], x), middle([top, bottom], y)], px_per_metre, ..plain }
 }
 

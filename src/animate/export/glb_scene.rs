@@ -17,11 +17,11 @@ const STILL: f64 = 1e-7;
 const VRM_LICENSE: &str = "https://vrm.dev/licenses/1.0/";
 
 /// The bytes of the file of a clip on its figure, which wears `avatar`.
-pub fn file(figure: &Rig, clip: &Clip, avatar: &Avatar, names: Names) -> Vec<u8> {
+pub fn file(rig: &Rig, clip: &Clip, avatar: &Avatar, names: Names) -> Vec<u8> {
     let mut buffer = GlbBuffer::default();
-    let bones = &figure.skeleton.joints;
-    let own = Names::Own.of(&figure.skeleton);
-    let called = names.of(&figure.skeleton);
+    let bones = &rig.skeleton.joints;
+    let own = Names::Own.of(&rig.skeleton);
+    let called = names.of(&rig.skeleton);
     let mut nodes: Vec<Value> = bones
         .iter()
         .zip(&called)
@@ -29,7 +29,7 @@ pub fn file(figure: &Rig, clip: &Clip, avatar: &Avatar, names: Names) -> Vec<u8>
         .map(|(joint, (bone, name))| {
             let at = bone.parent.map_or(clip.root, |_| bone.offset);
             let mut node = json!({ "name": name, "translation": metres(at) });
-            let children: Vec<usize> = figure.skeleton.children(joint).collect();
+            let children: Vec<usize> = rig.skeleton.children(joint).collect();
             if !children.is_empty() {
                 node["children"] = json!(children);
             }
@@ -48,7 +48,7 @@ pub fn file(figure: &Rig, clip: &Clip, avatar: &Avatar, names: Names) -> Vec<u8>
             "primitives": avatar.parts.iter().enumerate().map(|(n, part)| primitive(&mut buffer, part, n)).collect::<Vec<_>>(),
         }],
         "skins": [{
-            "inverseBindMatrices": inverse_binds(&mut buffer, figure, clip.root),
+            "inverseBindMatrices": inverse_binds(&mut buffer, rig, clip.root),
             "skeleton": 0,
             "joints": (0..bones.len()).collect::<Vec<_>>(),
         }],
@@ -107,9 +107,9 @@ fn whole_shares(weights: &crate::animate::avatar::Weights) -> ([u8; 4], [u16; 4]
     (joints, shares)
 }
 
-fn inverse_binds(buffer: &mut GlbBuffer, figure: &Rig, root: Vec3) -> usize {
-    let still = vec![Rotation::IDENTITY; figure.skeleton.joints.len()];
-    let rest = figure.skeleton.positions(root, &still);
+fn inverse_binds(buffer: &mut GlbBuffer, rig: &Rig, root: Vec3) -> usize {
+    let still = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
+    let rest = rig.skeleton.positions(root, &still);
     let matrices: Vec<[f32; 16]> = rest
         .into_iter()
         .map(|place| {

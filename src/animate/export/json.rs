@@ -26,7 +26,7 @@ pub fn write(text: &mut impl Write, performance: &Performance, names: Names) -> 
         "names": names.of(&clip.skeleton),
         "parents": bones.iter().map(|bone| bone.parent).collect::<Vec<_>>(),
         "offsets": bones.iter().map(|bone| bone.offset.map(|cm| (cm * 1e4).round() / 1e6)).collect::<Vec<_>>(),
-        "joints49": performance.figure.places.to_vec(),
+        "joints49": performance.rig.positions.to_vec(),
     });
     let head = head.to_string();
     write!(text, "{},\n\"positions\":[", head.trim_end_matches('}'))?;

@@ -105,12 +105,12 @@ impl ClampTally {
 
 impl Constraints {
     /// Constrains one frame of local rotations.
-    pub fn apply(self, figure: &Rig, local: &mut [Rotation], tally: &mut ClampTally) {
+    pub fn apply(self, rig: &Rig, local: &mut [Rotation], tally: &mut ClampTally) {
         if self == Self::NONE {
             return;
         }
         tally.n_frames += 1;
-        for arm in &figure.arms {
+        for arm in &rig.arms {
             let mut pose = ArmPose::from_rotations(arm, local);
             if self.limits {
                 limit(&mut pose, tally);
@@ -129,7 +129,7 @@ fn limit(pose: &mut ArmPose, tally: &mut ClampTally) {
     let [pronated, supinated] = limits::SUPINATION;
     let turned = pose.supination.clamp(pronated, supinated);
     // A hand that lies across the forearm, whatever its turn: the turn and the flexion cannot be told apart.
-    let turned = turned * told(pose.wrist.side);
+    let turned = turned * report(pose.wrist.side);
     pose.supination = tally.changed(TURN, pose.supination, turned);
     pose.wrist = bend(pose.wrist, limits::WRIST, WRIST, tally);
     for (finger, limits) in limits::FINGERS.iter().enumerate() {
@@ -143,7 +143,7 @@ fn limit(pose: &mut ArmPose, tally: &mut ClampTally) {
 /// The bend within its limits; `kind` counts the flexion, the next one the side.
 fn bend(given: Bend, limit: Limit, kind: usize, tally: &mut ClampTally) -> Bend {
     let middle = (limit.flexion[0] + limit.flexion[1]) / 2.0;
-    let flexion = middle + told(given.side) * (within(limit.flexion, given.flexion) - middle);
+    let flexion = middle + report(given.side) * (within(limit.flexion, given.flexion) - middle);
     Bend {
         flexion: tally.changed(kind, given.flexion, flexion),
         side: tally.changed(kind + 1, given.side, given.side.clamp(limit.side[0], limit.side[1])),
@@ -151,7 +151,7 @@ fn bend(given: Bend, limit: Limit, kind: usize, tally: &mut ClampTally) -> Bend 
 }
 
 /// How well a flexion is defined: 1, and from 60 degrees to the side on less, down to 0 straight to the side.
-fn told(side: f64) -> f64 {
+fn report(side: f64) -> f64 {
     1.0 - smoothstep([60.0, 90.0], side.abs())
 }
 

@@ -59,14 +59,14 @@ pub struct Rig {
     /// Left, right.
     pub arms: [RigArm; 2],
     /// For each of the 49 joints of a motion the joint of the skeleton at its place (ends of bones included).
-    pub places: [usize; N_JOINTS],
+    pub positions: [usize; N_JOINTS],
 }
 
 impl Rig {
     /// The figure for a motion: lengths and palms are medians over its frames.
     pub fn from_motion(motion: &Motion) -> Self {
-        let (places, metres) = (JointPositions::from_motion(motion), bone_metres(motion));
-        let [left, right] = [median_palm(&places), median_palm(&places.mirrored())];
+        let (positions, metres) = (JointPositions::from_motion(motion), bone_metres(motion));
+        let [left, right] = [median_palm(&positions), median_palm(&positions.mirrored())];
         let palms = [left.or(right), right.or(left)].map(|palm| palm.unwrap_or_else(|| default_palm(&metres)));
         Self::with_measures(&metres, &palms)
     }
@@ -77,7 +77,7 @@ impl Rig {
         let arm = |shoulder: usize| metres[shoulder + 1] + metres[shoulder + 2];
         let body = (arm(L_SHOULDER) + arm(skeleton::R_SHOULDER)) / 2.0 / ARM_METRES * CM;
         let mut bones = Skeleton::default();
-        let mut places = [0; N_JOINTS];
+        let mut positions = [0; N_JOINTS];
         let up = |share: f64| [0.0, share * body, 0.0];
 
         let hips = bones.push("Hips", None, [0.0; 3], false);
@@ -86,9 +86,9 @@ impl Rig {
         let neck = bones.push("Neck", Some(chest), up(0.21), false);
         let head = bones.push("Head", Some(neck), up(0.11), false);
         bones.push("", Some(head), up(0.20), true);
-        places[NECK] = neck;
+        positions[NECK] = neck;
         let arms = [(1.0, &palms[0]), (-1.0, &palms[1])]
-            .map(|(sign, palm)| push_arm(&mut bones, &mut places, (metres, palm), chest, up(0.21), sign));
+            .map(|(sign, palm)| push_arm(&mut bones, &mut positions, (metres, palm), chest, up(0.21), sign));
         for (sign, side) in [(1.0, "Left"), (-1.0, "Right")] {
             let from_hips = [sign * 0.09 * body, -0.04 * body, 0.0];
             let upper = bones.push(&format!("{side}UpLeg"), Some(hips), from_hips, false);
@@ -96,13 +96,13 @@ impl Rig {
             let foot = bones.push(&format!("{side}Foot"), Some(lower), up(-0.42), false);
             bones.push("", Some(foot), [0.0, -0.08 * body, 0.16 * body], true);
         }
-        Self { skeleton: bones, root: up(0.04 + 0.42 + 0.42 + 0.08), spine, chest, neck, head, arms, places }
+        Self { skeleton: bones, root: up(0.04 + 0.42 + 0.42 + 0.08), spine, chest, neck, head, arms, positions }
     }
 }
 
 fn push_arm(
     bones: &mut Skeleton,
-    places: &mut [usize; N_JOINTS],
+    positions: &mut [usize; N_JOINTS],
     (metres, palm): (&[f64; N_JOINTS], &[Vec3; 5]),
     chest: usize,
     neck: Vec3,
@@ -116,10 +116,10 @@ fn push_arm(
     let upper = bones.push(&format!("{side}Arm"), Some(clavicle), bone(shoulder, X), false);
     let fore = bones.push(&format!("{side}ForeArm"), Some(upper), bone(shoulder + 1, X), false);
     let hand = bones.push(&format!("{side}Hand"), Some(fore), bone(shoulder + 2, X), false);
-    places[shoulder] = upper;
-    places[shoulder + 1] = fore;
-    places[shoulder + 2] = hand;
-    places[hand_root] = hand;
+    positions[shoulder] = upper;
+    positions[shoulder + 1] = fore;
+    positions[shoulder + 2] = hand;
+    positions[hand_root] = hand;
     let mut fingers = [[0; 3]; 5];
     for (finger, name) in FINGERS.iter().enumerate() {
         let base = hand_root + 1 + 4 * finger;
@@ -130,7 +130,7 @@ fn push_arm(
             let end = k == 3;
             let label = if end { String::new() } else { format!("{side}Hand{name}{}", k + 1) };
             parent = bones.push(&label, Some(parent), offset, end);
-            places[base + k] = parent;
+            positions[base + k] = parent;
             if !end {
                 fingers[finger][k] = parent;
             }
@@ -151,8 +151,8 @@ pub fn finger_hinge(finger: usize) -> Hinge {
 }
 
 /// Medians over the frames of the bases of the left hand's fingers in its frame; `None` if they are never seen.
-fn median_palm(places: &JointPositions) -> Option<[Vec3; 5]> {
-    let seen: Vec<_> = (0..places.n_frames()).filter_map(|t| places.palm(t)).collect();
+fn median_palm(positions: &JointPositions) -> Option<[Vec3; 5]> {
+    let seen: Vec<_> = (0..positions.n_frames()).filter_map(|t| positions.palm(t)).collect();
     let middle = |finger: usize, axis: usize| upper_median(seen.iter().filter_map(|palm| Some(palm[finger]?[axis])));
     let mut palm = [[0.0; 3]; 5];
     for (finger, base) in palm.iter_mut().enumerate() {

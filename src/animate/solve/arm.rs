@@ -42,16 +42,16 @@ type Directions = Vec<Option<Vec3>>;
 
 /// Solves the arm and writes its tracks into `local` (one a joint of the skeleton), as a left arm whatever `arm` is.
 pub fn solve(
-    places: &JointPositions,
+    positions: &JointPositions,
     arm: &RigArm,
     chest: &RotationTrack,
     means: &SolveFilters,
     local: &mut [RotationTrack],
 ) {
-    let n_frames = places.n_frames();
+    let n_frames = positions.n_frames();
     let relax_frames = Some(RELAX_SECS * means.fps);
     let smooth = |parent: &RotationTrack, from: usize, to: usize| -> Directions {
-        let seen = |t: usize| Some(parent[t].inverse().turn(places.direction(t, from, to)?));
+        let seen = |t: usize| Some(parent[t].inverse().turn(positions.direction(t, from, to)?));
         let mut track: Directions = (0..n_frames).map(seen).collect();
         means.arms.directions(&mut track);
         track
@@ -72,7 +72,7 @@ pub fn solve(
     let fore = filled(bent, relaxed_elbow, None);
     let forearm = world(&world(&clavicle, &local[arm.upper]), &fore);
 
-    let frames: ObservedTrack = (0..n_frames).map(|t| places.hand_frame(t)).collect();
+    let frames: ObservedTrack = (0..n_frames).map(|t| positions.hand_frame(t)).collect();
     let hand = filled(smooth_hand(&forearm, &frames, &means.hands), Rotation::IDENTITY, relax_frames);
     let mut followed = 0.0;
     for t in 0..n_frames {
@@ -81,7 +81,7 @@ pub fn solve(
         (local[arm.fore][t], local[arm.hand][t]) = ArmPose::shared(fore[t], supination, wrist);
     }
     for (finger, joints) in arm.fingers.iter().enumerate() {
-        let bones = solve_finger(places, &frames, finger, &means.hands);
+        let bones = solve_finger(positions, &frames, finger, &means.hands);
         for ((&joint, bone), relaxed) in joints.iter().zip(bones).zip(RELAXED[finger]) {
             let rest = finger_hinge(finger).rotation(Bend { flexion: relaxed, side: 0.0 });
             local[joint] = filled(bone, rest, relax_frames);
@@ -106,11 +106,16 @@ fn smooth_hand(forearm: &RotationTrack, frames: &ObservedTrack, filter: &Filter)
 
 /// Local rotations of a finger's three joints. Bones are smoothed in the axes of the hand as it was seen: what shakes
 /// the whole hand does not shake them.
-fn solve_finger(places: &JointPositions, frames: &ObservedTrack, finger: usize, filter: &Filter) -> [ObservedTrack; 3] {
+fn solve_finger(
+    positions: &JointPositions,
+    frames: &ObservedTrack,
+    finger: usize,
+    filter: &Filter,
+) -> [ObservedTrack; 3] {
     let (hinge, base) = (finger_hinge(finger), L_HAND + 1 + 4 * finger);
     let mut parent: ObservedTrack = vec![Some(Rotation::IDENTITY); frames.len()];
     [0, 1, 2].map(|k| {
-        let seen = |t: usize| Some(frames[t]?.inverse().turn(places.direction(t, base + k, base + k + 1)?));
+        let seen = |t: usize| Some(frames[t]?.inverse().turn(positions.direction(t, base + k, base + k + 1)?));
         let mut track: Directions = (0..frames.len()).map(seen).collect();
         filter.directions(&mut track);
         let bone = |(parent, to): (&Option<Rotation>, Option<Vec3>)| {

@@ -42,8 +42,8 @@ const RELAX_SECS: f64 = 0.5;
 const STEPS: usize = 8;
 
 /// Turns neck and head; gives the number of frames in which the face was seen.
-pub fn turn(face: &Face, figure: &Rig, means: &SolveFilters, local: &mut [RotationTrack]) -> usize {
-    let n_frames = local[figure.head].len();
+pub fn turn(face: &Face, rig: &Rig, means: &SolveFilters, local: &mut [RotationTrack]) -> usize {
+    let n_frames = local[rig.head].len();
     let frame = |t: usize| FacePoints::from_keypoints(face.body.index_axis(ndarray::Axis(0), t));
     let points: Vec<Option<FacePoints>> =
         (0..n_frames).map(|t| if t < face.body.shape()[0] { frame(t) } else { None }).collect();
@@ -68,7 +68,7 @@ pub fn turn(face: &Face, figure: &Rig, means: &SolveFilters, local: &mut [Rotati
         .into_iter()
         .enumerate()
         .map(|(t, angles)| {
-            let chest = local[figure.spine][t] * local[figure.chest][t];
+            let chest = local[rig.spine][t] * local[rig.chest][t];
             let body_yaw = 2.0 * chest.v[1].atan2(chest.w);
             let [yaw, pitch, roll] = angles?;
             let limits = LIMITS.map(f64::to_radians);
@@ -78,8 +78,8 @@ pub fn turn(face: &Face, figure: &Rig, means: &SolveFilters, local: &mut [Rotati
         .collect();
     let n_seen = halves.iter().flatten().count();
     let halves = filled(halves, Rotation::IDENTITY, Some(RELAX_SECS * means.fps));
-    local[figure.neck].clone_from(&halves);
-    local[figure.head] = halves;
+    local[rig.neck].clone_from(&halves);
+    local[rig.head] = halves;
     n_seen
 }
 
@@ -93,7 +93,7 @@ fn rotation([yaw, pitch, roll]: Vec3) -> Rotation {
 /// The face's keypoints in one frame: places in px (y up) with weights, those unseen 0. An ear behind the head is
 /// guessed with a somewhat lower score; its fourth power makes that tell.
 struct FacePoints {
-    places: [[f64; 2]; 5],
+    positions: [[f64; 2]; 5],
     weights: [f64; 5],
     /// px a metre by the width of the shoulders.
     shoulder_scale: Option<f64>,
@@ -113,7 +113,7 @@ impl FacePoints {
         let width = (lx - rx).hypot(ly - ry) / SHOULDERS_METRES;
         let shoulder_scale = (shoulders && width > 1.0).then_some(width);
         Some(Self {
-            places: std::array::from_fn(|point| if seen(point) { at(point) } else { [0.0; 2] }),
+            positions: std::array::from_fn(|point| if seen(point) { at(point) } else { [0.0; 2] }),
             weights,
             shoulder_scale,
         })
@@ -122,7 +122,7 @@ impl FacePoints {
     /// How wide the seen points lie, px.
     fn spread(&self) -> f64 {
         let seen =
-            || self.places.iter().zip(self.weights).filter(|(_, weight)| *weight > 0.0).map(|(place, _)| place[0]);
+            || self.positions.iter().zip(self.weights).filter(|(_, weight)| *weight > 0.0).map(|(place, _)| place[0]);
         (seen().fold(f64::MIN, f64::max) - seen().fold(f64::MAX, f64::min)).max(1.0)
     }
 
@@ -164,7 +164,7 @@ impl FacePoints {
         let (turned, scale) = (rotation([yaw, pitch, roll]), log_scale.exp());
         let apart: [[f64; 2]; 5] = std::array::from_fn(|n| {
             let [x, y, _] = turned.turn(FACE[n]);
-            [x - self.places[n][0] / scale, y - self.places[n][1] / scale]
+            [x - self.positions[n][0] / scale, y - self.positions[n][1] / scale]
         });
         let total: f64 = self.weights.iter().sum();
         let middle = [0, 1].map(|axis| (0..5).map(|n| self.weights[n] * apart[n][axis]).sum::<f64>() / total);
@@ -200,7 +200,7 @@ mod tests {
             [640.0 + 400.0 * x, -200.0 + 400.0 * y]
         };
         let weights = std::array::from_fn(|n| if hidden.contains(&n) { 0.0 } else { 0.9 });
-        FacePoints { places: FACE.map(place), weights, shoulder_scale: None }
+        FacePoints { positions: FACE.map(place), weights, shoulder_scale: None }
     }
 
     #[test]
@@ -217,9 +217,9 @@ mod tests {
                 assert!((fit[k] - angles[k]).abs() < 0.12, "{angles:?} {fit:?}");
             }
             let mut other = drawn(angles, hidden);
-            other.places.iter_mut().for_each(|place| place[0] *= -1.0);
-            other.places.swap(1, 2);
-            other.places.swap(3, 4);
+            other.positions.iter_mut().for_each(|place| place[0] *= -1.0);
+            other.positions.swap(1, 2);
+            other.positions.swap(3, 4);
             other.weights.swap(1, 2);
             other.weights.swap(3, 4);
             let twin = other.fit([0.0, 0.0, 0.0, 420f64.ln()], 0.08);

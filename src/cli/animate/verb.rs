@@ -238,14 +238,14 @@ fn animate(
         format.write(path, &performance, &sources, ui).with_context(|| format!("cannot write {}", path.display()))?;
     }
     let motion_secs = motion.fps.secs(motion.n_frames());
-    let Performance { told, clip, .. } = &performance;
+    let Performance { report, clip, .. } = &performance;
     let text = format!(
         "{} frames at {}, {motion_secs:.1} s; written: {} frames at {}\n{}{silence}",
         motion.n_frames(),
         motion.fps,
         clip.n_frames(),
         clip.fps,
-        words(told)
+        words(report)
     );
     let facts = json!({
         "name": input.name,
@@ -254,24 +254,24 @@ fn animate(
         "written_frames": clip.n_frames(),
         "written_fps": clip.fps,
         "times_real_time": motion_secs / secs.max(1e-9),
-        "told": told,
+        "told": report,
         "film_has_sound": is_film.then_some(sound.is_some()),
         "outputs": names(outputs),
     });
     Ok(Done { text, facts })
 }
 
-fn words(told: &AnimationReport) -> String {
+fn words(report: &AnimationReport) -> String {
     let number = |jerk: Option<f64>| jerk.map_or("-".to_owned(), |jerk| format!("{jerk:.0}"));
     let jerk = |jerk: Jerk| format!("{} -> {}", number(jerk.before), number(jerk.after));
-    let mut text = format!("jerk, m/s3: arms {}, hands {}\n", jerk(told.arms), jerk(told.hands));
-    text += &match told.face_frames {
-        Some(n) => format!("head: seen in {n} of {} frames\n", told.n_frames),
+    let mut text = format!("jerk, m/s3: arms {}, hands {}\n", jerk(report.arms), jerk(report.hands));
+    text += &match report.face_frames {
+        Some(n) => format!("head: seen in {n} of {} frames\n", report.n_frames),
         None => "head: at rest\n".to_owned(),
     };
-    text += &seen(told);
-    let clamped: Vec<_> = told.clamps.iter().filter(|clamps| clamps.joint_frames > 0).collect();
-    match (told.clamps.is_empty(), clamped.is_empty()) {
+    text += &seen(report);
+    let clamped: Vec<_> = report.clamps.iter().filter(|clamps| clamps.joint_frames > 0).collect();
+    match (report.clamps.is_empty(), clamped.is_empty()) {
         (true, _) => text += "no constraints\n",
         (_, true) => text += "nothing had to be clamped\n",
         _ => text += "clamped                      angles   share    by, mean and most, degrees\n",
@@ -290,18 +290,18 @@ fn words(told: &AnimationReport) -> String {
 }
 
 /// What was not seen in all frames; nothing when all was.
-fn seen(told: &AnimationReport) -> String {
-    let SeenFrames { left_arm, right_arm, left_hand, right_hand } = told.seen;
+fn seen(report: &AnimationReport) -> String {
+    let SeenFrames { left_arm, right_arm, left_hand, right_hand } = report.seen;
     let arms = match left_arm == right_arm {
         true => vec![("arms", left_arm)],
         false => vec![("left arm", left_arm), ("right arm", right_arm)],
     };
     let parts = || arms.iter().copied().chain([("left hand", left_hand), ("right hand", right_hand)]);
-    if parts().all(|(_, n)| n == told.n_frames) {
+    if parts().all(|(_, n)| n == report.n_frames) {
         return String::new();
     }
     let parts: Vec<_> = parts().map(|(part, n)| format!("{part} in {n}")).collect();
-    format!("seen, of {} frames: {}; the rest is bridged or held\n", told.n_frames, parts.join(", "))
+    format!("seen, of {} frames: {}; the rest is bridged or held\n", report.n_frames, parts.join(", "))
 }
 
 fn options(args: &Args) -> Result<AnimationOptions> {

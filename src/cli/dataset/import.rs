@@ -139,7 +139,7 @@ fn plan(args: &Args) -> Result<ImportPlan> {
 
 fn close(imported: &Imported, out: &Path, ui: &Ui) -> Result<Outcome> {
     let count = |ended: &str| imported.lines.iter().filter(|line| line.ended == ended).count();
-    let mut text: Vec<String> = imported.lines.iter().filter(|line| !line.says.is_empty()).map(said).collect();
+    let mut text: Vec<String> = imported.lines.iter().filter(|line| !line.message.is_empty()).map(said).collect();
     text.extend(imported.notes.iter().cloned());
     let secs: BTreeMap<&str, f64> =
         imported.info.splits.iter().map(|(split, info)| (split.as_str(), info.secs)).collect();
@@ -157,10 +157,10 @@ fn close(imported: &Imported, out: &Path, ui: &Ui) -> Result<Outcome> {
 }
 
 fn said(line: &ImportOutcome) -> String {
-    let ImportOutcome { file, ended, reason, says, .. } = line;
+    let ImportOutcome { file, ended, reason, message, .. } = line;
     match *ended {
-        "kept" => format!("kept     {file}: {says}"),
-        "failed" => format!("failed   {file}: {says}"),
-        _ => format!("{ended}  {file}: {reason}: {says}"),
+        "kept" => format!("kept     {file}: {message}"),
+        "failed" => format!("failed   {file}: {message}"),
+        _ => format!("{ended}  {file}: {reason}: {message}"),
     }
 }

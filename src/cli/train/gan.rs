@@ -100,16 +100,16 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 
 /// The last validation as a table, and the alarm where there is one.
 fn figures(validation: &Validation) -> String {
-    let (made, still) = (&validation.generator, &validation.mean_pose);
-    let row = |name: &str, made: f64, still: f64| format!("{name:24}{made:9.3}   {still:9.3}\n");
+    let (predicted, still) = (&validation.generator, &validation.mean_pose);
+    let row = |name: &str, predicted: f64, still: f64| format!("{name:24}{predicted:9.3}   {still:9.3}\n");
     let distance = |figures: &Figures| figures.frechet.unwrap_or(f64::NAN);
     let mut text = format!("on {} {} windows    generator   mean pose\n", validation.n_windows, validation.split);
-    text += &row("L1 (normalised)", made.l1, still.l1);
-    text += &row("PCK 0.2", made.pck, still.pck);
-    text += &row("PCK 0.2, arms", made.pck_body, still.pck_body);
-    text += &row("PCK 0.2, fingers", made.pck_hands, still.pck_hands);
-    text += &row(&format!("Frechet cm2 ({})", validation.n_poses), distance(made), distance(still));
-    text += &row("motion energy / data's", made.energy, still.energy);
+    text += &row("L1 (normalised)", predicted.l1, still.l1);
+    text += &row("PCK 0.2", predicted.pck, still.pck);
+    text += &row("PCK 0.2, arms", predicted.pck_body, still.pck_body);
+    text += &row("PCK 0.2, fingers", predicted.pck_hands, still.pck_hands);
+    text += &row(&format!("Frechet cm2 ({})", validation.n_poses), distance(predicted), distance(still));
+    text += &row("motion energy / data's", predicted.energy, still.energy);
     text += &format!(
         "bones change by {:.4} mm a frame in the network's own output (the paper's released predictions: 2 to 5 mm)",
         validation.bone_change_mm
@@ -143,12 +143,12 @@ fn pairs(dataset: &Dataset, speaker: &Speaker) -> Result<Vec<HeldOutPair>> {
     let chosen: Vec<_> = (0..n).map(|i| samples[i * samples.len() / n].clone()).collect();
     let intervals = held_out::read(dataset, &chosen, &speaker.facts().normalisation)?;
     let pair = |interval: HeldOutInterval| {
-        let n_frames = interval.real.n_frames();
+        let n_frames = interval.ground_truth.n_frames();
         let span = ((PAIR_SECS * speaker.fps().per_sec()) as usize).min(n_frames);
         let first = (n_frames - span) / 2;
-        let HeldOutInterval { key, real, sound } = interval.cut(first..first + span);
-        let made = predictor::motion(speaker, &sound, span)?;
-        Ok(HeldOutPair { name: key, start_secs: speaker.fps().secs(first), real, made })
+        let HeldOutInterval { key, ground_truth, sound } = interval.cut(first..first + span);
+        let predicted = predictor::motion(speaker, &sound, span)?;
+        Ok(HeldOutPair { name: key, start_secs: speaker.fps().secs(first), ground_truth, predicted })
     };
     intervals.into_iter().map(pair).collect()
 }

@@ -29,5 +29,6 @@ pub struct ImportOutcome {
     /// Seconds in the dataset.
     pub kept_secs: f64,
     pub reason: String,
-    pub says: String,
+    #[serde(rename = "says")]
+    pub message: String,
 }

@@ -176,8 +176,8 @@ fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
             let end_secs = plan.limits.fps.secs(n_frames);
             source.ledger.kept.push(Kept { start_secs: 0.0, end_secs });
             if end_secs < duration_secs {
-                let says = "the sound ends here".to_owned();
-                let refusal = TakeRefusal { reason: "no sound", measured: 0.0, threshold: 0.0, unit: "s", says };
+                let message = "the sound ends here".to_owned();
+                let refusal = TakeRefusal { reason: "no sound", measured: 0.0, threshold: 0.0, unit: "s", message };
                 source.ledger.refused.push(refused(end_secs, duration_secs, &refusal));
             }
             source.bones = VideoBones { lengths_metres: kept.lengths.map(f64::from).to_vec(), n_frames };
@@ -201,8 +201,16 @@ fn made_from(found: &TakeFiles, plan: &ImportPlan) -> Result<String> {
 }
 
 fn refused(start_secs: f64, end_secs: f64, refusal: &TakeRefusal) -> Refused {
-    let TakeRefusal { reason, measured, threshold, unit, says } = refusal.clone();
-    Refused { start_secs, end_secs, reason: reason.to_owned(), measured, threshold, unit: unit.to_owned(), says }
+    let TakeRefusal { reason, measured, threshold, unit, message } = refusal.clone();
+    Refused {
+        start_secs,
+        end_secs,
+        reason: reason.to_owned(),
+        measured,
+        threshold,
+        unit: unit.to_owned(),
+        says: message,
+    }
 }
 
 fn look_at_part(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedItem> {
@@ -284,8 +292,8 @@ impl InspectedItem {
     /// The same name was there before: it is refused, under a name of its own.
     pub fn twice(mut self, nth: usize) -> Self {
         let first = self.source.name.clone();
-        let says = format!("{first} is there already");
-        self.refuse("duplicate", self.source.ledger.kept_secs(), 0.0, &says);
+        let message = format!("{first} is there already");
+        self.refuse("duplicate", self.source.ledger.kept_secs(), 0.0, &message);
         let mark = blake3::hash(format!("{first} {nth}").as_bytes()).to_hex();
         let stem = first.rsplit_once('-').map_or(first.as_str(), |(stem, _)| stem);
         self.source.name = format!("{stem}-{}", &mark[..8]);
@@ -297,13 +305,13 @@ impl InspectedItem {
         let name = self.source.name.clone();
         let others: Vec<&str> = with.iter().filter_map(|shared| shared.other(&name)).collect();
         let secs = with.first().map_or(0.0, |shared| shared.secs);
-        let says =
+        let message =
             format!("the same {secs:.1} s of sound are in {}, which are in different splits", others.join(" and "));
-        self.refuse("duplicate", secs, threshold, &says);
+        self.refuse("duplicate", secs, threshold, &message);
         (self.sound, self.split) = (None, None);
     }
 
-    fn refuse(&mut self, reason: &str, measured: f64, threshold: f64, says: &str) {
+    fn refuse(&mut self, reason: &str, measured: f64, threshold: f64, message: &str) {
         let ledger = &mut self.source.ledger;
         let refused = |kept: Kept| Refused {
             start_secs: kept.start_secs,
@@ -312,7 +320,7 @@ impl InspectedItem {
             measured,
             threshold,
             unit: "s".to_owned(),
-            says: says.to_owned(),
+            says: message.to_owned(),
         };
         let all: Vec<Refused> = ledger.kept.drain(..).map(refused).collect();
         ledger.refused.extend(all);
@@ -322,13 +330,13 @@ impl InspectedItem {
 
     /// What became of it, in a line.
     pub fn line(&self, file: &str) -> ImportOutcome {
-        let (ended, reason, says) = match (&self.source.failure, self.source.ledger.refused.first()) {
+        let (ended, reason, message) = match (&self.source.failure, self.source.ledger.refused.first()) {
             (Some(error), _) => ("failed", "error".to_owned(), error.clone()),
             (None, _) if self.is_kept() => ("kept", String::new(), self.remark.clone()),
             (None, Some(refused)) => ("refused", refused.reason.clone(), refused.says.clone()),
             (None, None) => ("refused", "empty".to_owned(), "it holds nothing".to_owned()),
         };
-        ImportOutcome { file: file.to_owned(), ended, kept_secs: self.source.ledger.kept_secs(), reason, says }
+        ImportOutcome { file: file.to_owned(), ended, kept_secs: self.source.ledger.kept_secs(), reason, message }
     }
 }
 

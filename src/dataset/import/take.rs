@@ -71,7 +71,7 @@ pub struct TakeRefusal {
     pub threshold: f64,
     pub unit: &'static str,
     /// The same as a sentence, for people.
-    pub says: String,
+    pub message: String,
 }
 
 impl ImportedTake {
@@ -98,8 +98,8 @@ impl ImportedTake {
 fn refusal(n_frames: usize, sound: Option<&Sound>, found: &TakeFiles, limits: &TakeLimits) -> Option<TakeRefusal> {
     let stem = found.motion.file_stem().unwrap_or_default().to_string_lossy();
     if found.kind == Kind::Authors && stem.starts_with("prediction") {
-        let says = "it is what a model predicted, not how a person moved".to_owned();
-        return Some(TakeRefusal { reason: "prediction", measured: 0.0, threshold: 0.0, unit: "", says });
+        let message = "it is what a model predicted, not how a person moved".to_owned();
+        return Some(TakeRefusal { reason: "prediction", measured: 0.0, threshold: 0.0, unit: "", message });
     }
     let Some(sound) = sound else { return Some(no_sound(found)) };
     let (motion_secs, sound_secs) = (limits.fps.secs(n_frames), sound.secs());
@@ -110,7 +110,7 @@ fn refusal(n_frames: usize, sound: Option<&Sound>, found: &TakeFiles, limits: &T
             measured: apart.abs(),
             threshold: limits.max_apart_secs,
             unit: "s",
-            says: format!(
+            message: format!(
                 "the sound has {sound_secs:.3} s, the motion {motion_secs:.3} s: {:.3} s apart, at most {} s are believed",
                 apart.abs(),
                 limits.max_apart_secs
@@ -123,17 +123,17 @@ fn refusal(n_frames: usize, sound: Option<&Sound>, found: &TakeFiles, limits: &T
         measured: n_common as f64,
         threshold: limits.min_frames as f64,
         unit: "frames",
-        says: format!("{n_common} frames have motion and sound, at least {} are needed", limits.min_frames),
+        message: format!("{n_common} frames have motion and sound, at least {} are needed", limits.min_frames),
     })
 }
 
 fn no_sound(found: &TakeFiles) -> TakeRefusal {
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let says = match &found.sound {
+    let message = match &found.sound {
         Some(sound) => format!("{} holds no sound", name(sound)),
         None => format!("no sound file has the name of {}", name(&found.motion)),
     };
-    TakeRefusal { reason: "no sound", measured: 0.0, threshold: 0.0, unit: "s", says }
+    TakeRefusal { reason: "no sound", measured: 0.0, threshold: 0.0, unit: "s", message }
 }
 
 /// Frames that lie in the motion and wholly in the sound.

@@ -160,7 +160,7 @@ fn first_reasons(origins: &[ImportItem], looks: &[InspectedItem]) -> String {
         let n = reasons.entry(line.reason.clone()).or_default();
         *n += 1;
         if *n <= 2 {
-            said.push(format!("{}: {}", line.file, line.says));
+            said.push(format!("{}: {}", line.file, line.message));
         }
     }
     said.join("; ")

@@ -71,15 +71,15 @@ impl std::fmt::Display for Disturbance {
 
 impl Disturbance {
     /// The motion made worse; the same dice give the same. The neck stays where it is.
-    pub fn apply(self, motion: &Motion, dice: &mut ChaCha8Rng) -> Motion {
+    pub fn apply(self, motion: &Motion, rng: &mut ChaCha8Rng) -> Motion {
         let joints = &motion.joints;
         let n = motion.n_frames();
         let mut worse = match self {
             Self::None => joints.clone(),
-            Self::NoiseMm(mm) => joints.mapv(|v| v + 1e-3 * mm * dice.sample::<f32, _>(StandardNormal)),
+            Self::NoiseMm(mm) => joints.mapv(|v| v + 1e-3 * mm * rng.sample::<f32, _>(StandardNormal)),
             Self::Scrambled(together) => {
                 let mut order: Vec<usize> = (0..n).collect();
-                order.chunks_mut(together).for_each(|part| part.shuffle(dice));
+                order.chunks_mut(together).for_each(|part| part.shuffle(rng));
                 joints.select(Axis(0), &order)
             }
             Self::Smoothed(width) => Array3::from_shape_fn(joints.raw_dim(), |(t, joint, k)| {
@@ -143,8 +143,8 @@ pub fn table(motions: &[Motion]) -> Vec<DisturbanceRow> {
     };
     let others = spaces(&mut motions.iter().skip(1).step_by(2).cloned());
     let row = |disturbance: Disturbance| {
-        let mut dice = ChaCha8Rng::seed_from_u64(7);
-        let own = spaces(&mut motions.iter().step_by(2).map(|motion| disturbance.apply(motion, &mut dice)));
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let own = spaces(&mut motions.iter().step_by(2).map(|motion| disturbance.apply(motion, &mut rng)));
         DisturbanceRow { disturbance, distances: [0, 1, 2].map(|space| frechet(&own[space], &others[space])) }
     };
     TABLE.into_iter().map(row).collect()

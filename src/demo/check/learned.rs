@@ -3,8 +3,8 @@
 
 use super::traces;
 use crate::dataset::{Dataset, Sample, Split};
+use crate::demo::rule::baselines::{RuleBaselines, sound_of_frames, wrist_speeds};
 use crate::demo::rule::dataset::SpokenClip;
-use crate::demo::rule::listener::{SoundRegression, sound_of_frames, wrist_speeds};
 use crate::demo::rule::ridge::correlation;
 use crate::generate::Speaker;
 use crate::metrics::movement::energy::MotionEnergy;
@@ -80,36 +80,39 @@ pub fn measure(dataset: &Dataset, speaker: Option<&Speaker>, progress: &dyn Prog
     let fps = dataset.info().fps;
     let judge = Judge { tests: &tests, std: dataset.stats().std(), fps };
     let task = progress.begin("listen", 0);
-    let listener = SoundRegression::learn(dataset)?;
-    let row = |predictor, made: Vec<Array3<f32>>| judge.row(predictor, &made);
+    let baselines = RuleBaselines::learn(dataset)?;
+    let row = |predictor, predicted: Vec<Array3<f32>>| judge.row(predictor, &predicted);
     let each = |predict: &dyn Fn(&TestClip) -> Array3<f32>| tests.iter().map(predict).collect::<Vec<_>>();
     let (mut rows, mut first) = (Vec::new(), None);
     if let Some(speaker) = speaker {
         task.detail("generating");
-        let made: Vec<Array3<f32>> =
+        let predicted: Vec<Array3<f32>> =
             tests.iter().map(|test| Ok(speaker.motion(&test.sample.sound)?.joints)).collect::<Result<_>>()?;
-        for (made, test) in made.iter().zip(&tests) {
-            ensure!(made.shape() == test.predictable.shape(), "the speaker has another frame rate than the dataset");
+        for (predicted, test) in predicted.iter().zip(&tests) {
+            ensure!(
+                predicted.shape() == test.predictable.shape(),
+                "the speaker has another frame rate than the dataset"
+            );
         }
-        first = made.first().zip(tests.first()).map(|(made, test)| traces::TraceClip {
+        first = predicted.first().zip(tests.first()).map(|(predicted, test)| traces::TraceClip {
             rule: test.predictable.clone(),
             data: test.sample.motion.joints.clone(),
-            made: made.clone(),
+            predicted: predicted.clone(),
         });
-        rows.push(row("generator", made.clone()));
-        let mut other = made;
+        rows.push(row("generator", predicted.clone()));
+        let mut other = predicted;
         other.rotate_left(1);
         rows.push(row("generator, another test sound", other));
     }
-    rows.push(row("mean pose", each(&|test| listener.still(test.sample.n_frames()))));
-    rows.push(row("ridge of the frame, to poses", each(&|test| listener.ridge_poses(&test.sound))));
-    let speeds: Vec<Array2<f64>> = tests.iter().map(|test| listener.ridge_speeds(&test.sound)).collect();
+    rows.push(row("mean pose", each(&|test| baselines.still(test.sample.n_frames()))));
+    rows.push(row("ridge of the frame, to poses", each(&|test| baselines.ridge_poses(&test.sound))));
+    let speeds: Vec<Array2<f64>> = tests.iter().map(|test| baselines.ridge_speeds(&test.sound)).collect();
     rows.push(LearnedRow {
         predictor: "ridge of the frame, to speeds",
         speed_correlation: judge.correlation(&speeds),
         poses: None,
     });
-    rows.push(row("nearest training window by sound", each(&|test| listener.nearest(&test.sound))));
+    rows.push(row("nearest training window by sound", each(&|test| baselines.nearest(&test.sound))));
     rows.push(row("the data itself", each(&|test| test.sample.motion.joints.clone())));
     rows.push(row("the rule without whims", each(&|test| test.predictable.clone())));
     let n_frames: usize = tests.iter().map(|test| test.sample.n_frames()).sum();
@@ -118,17 +121,17 @@ pub fn measure(dataset: &Dataset, speaker: Option<&Speaker>, progress: &dyn Prog
         secs: fps.secs(n_frames),
         good: speaker.map(|_| good(&rows)),
         rows,
-        ridge_strengths: listener.strengths,
+        ridge_strengths: baselines.strengths,
         first,
     })
 }
 
 /// Whether the first row, the generator's, reaches the targets; the second is the mismatched one, the third the mean pose.
 fn good(rows: &[LearnedRow]) -> bool {
-    let [made, others @ ..] = rows else { return false };
-    let Some(poses) = made.poses else { return false };
+    let [predicted, others @ ..] = rows else { return false };
+    let Some(poses) = predicted.poses else { return false };
     let beats = |other: &LearnedRow| other.poses.is_some_and(|other| poses.pck >= LEAST_PCK * other.pck);
-    made.speed_correlation.iter().all(|correlation| *correlation >= LEAST_CORRELATION)
+    predicted.speed_correlation.iter().all(|correlation| *correlation >= LEAST_CORRELATION)
         && others.iter().take(2).all(beats)
         && ENERGY.contains(&poses.energy)
 }
@@ -149,30 +152,31 @@ struct Judge<'a> {
 }
 
 impl Judge<'_> {
-    fn row(&self, predictor: &'static str, made: &[Array3<f32>]) -> LearnedRow {
+    fn row(&self, predictor: &'static str, predicted: &[Array3<f32>]) -> LearnedRow {
         let mut correct = Correct::default();
-        let (mut energy, mut real_energy) = (MotionEnergy::default(), MotionEnergy::default());
-        let (mut pauses, mut real_pauses) = (MotionEnergy::default(), MotionEnergy::default());
+        let (mut energy, mut reference_energy) = (MotionEnergy::default(), MotionEnergy::default());
+        let (mut pauses, mut reference_pauses) = (MotionEnergy::default(), MotionEnergy::default());
         let mut errors = (0.0, 0.0);
-        for (made, test) in made.iter().zip(self.tests) {
-            let real = &test.sample.motion;
-            correct.count(made.view(), real.joints.view(), real.mask.view());
-            energy.add(made.view(), real.mask.view(), self.fps);
-            real_energy.add(real.joints.view(), real.mask.view(), self.fps);
+        for (predicted, test) in predicted.iter().zip(self.tests) {
+            let ground_truth = &test.sample.motion;
+            correct.count(predicted.view(), ground_truth.joints.view(), ground_truth.mask.view());
+            energy.add(predicted.view(), ground_truth.mask.view(), self.fps);
+            reference_energy.add(ground_truth.joints.view(), ground_truth.mask.view(), self.fps);
             let held = held(test, self.fps);
-            pauses.add(made.view(), held.view(), self.fps);
-            real_pauses.add(real.joints.view(), held.view(), self.fps);
-            let of_clip = self.error(made.view(), real.joints.view());
+            pauses.add(predicted.view(), held.view(), self.fps);
+            reference_pauses.add(ground_truth.joints.view(), held.view(), self.fps);
+            let of_clip = self.error(predicted.view(), ground_truth.joints.view());
             errors = (errors.0 + of_clip.0, errors.1 + of_clip.1);
         }
-        let speeds: Vec<Array2<f64>> = made.iter().map(|made| wrist_speeds(made.view(), self.fps)).collect();
+        let speeds: Vec<Array2<f64>> =
+            predicted.iter().map(|predicted| wrist_speeds(predicted.view(), self.fps)).collect();
         LearnedRow {
             predictor,
             speed_correlation: self.correlation(&speeds),
             poses: Some(PoseQuality {
                 pck: correct.share(),
-                energy: energy.relative_to(&real_energy),
-                pauses: pauses.relative_to(&real_pauses),
+                energy: energy.relative_to(&reference_energy),
+                pauses: pauses.relative_to(&reference_pauses),
                 l1: errors.0 / f64::max(errors.1, 1.0),
             }),
         }
@@ -185,16 +189,16 @@ impl Judge<'_> {
             let views: Vec<ArrayView2<f64>> = parts.iter().map(|part| part.view()).collect();
             concatenate(Axis(0), &views).unwrap_or_default()
         };
-        let (made, truth) = (joined(speeds), joined(&truth));
-        std::array::from_fn(|hand| correlation(made.column(hand), truth.column(hand)))
+        let (predicted, truth) = (joined(speeds), joined(&truth));
+        std::array::from_fn(|hand| correlation(predicted.column(hand), truth.column(hand)))
     }
 
     /// Sum of normalised errors, and how many.
-    fn error(&self, made: ArrayView3<f32>, real: ArrayView3<f32>) -> (f64, f64) {
+    fn error(&self, predicted: ArrayView3<f32>, ground_truth: ArrayView3<f32>) -> (f64, f64) {
         let mut sum = (0.0, 0.0);
-        for ((t, joint, k), real) in real.indexed_iter() {
+        for ((t, joint, k), ground_truth) in ground_truth.indexed_iter() {
             if joint != NECK && !is_duplicate(joint) {
-                sum.0 += f64::from((made[[t, joint, k]] - real).abs() / self.std[[joint, k]].max(0.01));
+                sum.0 += f64::from((predicted[[t, joint, k]] - ground_truth).abs() / self.std[[joint, k]].max(0.01));
                 sum.1 += 1.0;
             }
         }

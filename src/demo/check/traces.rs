@@ -2,7 +2,7 @@
 //! as the speaker moved in fact, and as the trained speaker moves; under them a few poses of the last two.
 
 use crate::animate::draw::figure::{FigureView, INK, LEFT, PAPER, RIGHT, draw_pose, mix};
-use crate::demo::rule::listener::{WRISTS, wrist_speeds};
+use crate::demo::rule::baselines::{WRISTS, wrist_speeds};
 use crate::external::opencv::draw;
 use crate::types::image::Image;
 use crate::types::time::FrameRate;
@@ -25,7 +25,7 @@ const RULE: [u8; 3] = [40, 44, 50];
 pub struct TraceClip {
     pub rule: Array3<f32>,
     pub data: Array3<f32>,
-    pub made: Array3<f32>,
+    pub predicted: Array3<f32>,
 }
 
 /// Draws the clip.
@@ -33,12 +33,13 @@ pub fn picture(clip: &TraceClip, fps: FrameRate) -> Result<Image> {
     let mut image = Image::filled(WIDTH, (2.0 * (LANE_PX + POSES_PX)) as usize, PAPER);
     let n_frames = clip.rule.shape()[0].min(fps.frames_in(SECS)).max(2);
     let x_of = |t: f32| MARGIN_PX + (WIDTH as f32 - MARGIN_PX - 10.0) * t / (n_frames - 1) as f32;
-    let [rule, data, made] = [&clip.rule, &clip.data, &clip.made].map(|joints| wrist_speeds(joints.view(), fps));
+    let [rule, data, predicted] =
+        [&clip.rule, &clip.data, &clip.predicted].map(|joints| wrist_speeds(joints.view(), fps));
     for (lane, colour) in [LEFT, RIGHT].into_iter().enumerate() {
         let floor = (lane + 1) as f32 * LANE_PX - 20.0;
         let y_of = |speed: f64| floor - (LANE_PX - 40.0) * (speed as f32 / TOP_SPEED).min(1.0);
         draw::line(&mut image, [x_of(0.0), floor], [x_of((n_frames - 1) as f32), floor], 1.0, INK)?;
-        for (speeds, rgb, px) in [(&data, mix(INK, PAPER, 0.6), 1.5), (&rule, RULE, 1.5), (&made, colour, 2.5)] {
+        for (speeds, rgb, px) in [(&data, mix(INK, PAPER, 0.6), 1.5), (&rule, RULE, 1.5), (&predicted, colour, 2.5)] {
             for t in 1..n_frames - 1 {
                 let at = |t: usize| [x_of(t as f32 + 0.5), y_of(speeds[[t, lane]])];
                 draw::line(&mut image, at(t - 1), at(t), px, rgb)?;
@@ -50,7 +51,7 @@ pub fn picture(clip: &TraceClip, fps: FrameRate) -> Result<Image> {
     }
     let words = "black: the rule   grey: the speaker (rule and whims)   coloured: made for the sound";
     draw::text(&mut image, words, [MARGIN_PX, 16.0], 9.0, INK)?;
-    for (row, (joints, name)) in [(&clip.data, "speaker"), (&clip.made, "made")].into_iter().enumerate() {
+    for (row, (joints, name)) in [(&clip.data, "speaker"), (&clip.predicted, "made")].into_iter().enumerate() {
         let top = 2.0 * LANE_PX + row as f32 * POSES_PX;
         draw::text(&mut image, name, [4.0, top + 80.0], 9.0, INK)?;
         for pose in 0..N_POSES {

@@ -42,22 +42,22 @@ pub struct DrawnGestures {
 
 impl DrawnGestures {
     /// Strokes and beats for what is said.
-    pub fn new(speech: &Speech, dice: &mut ChaCha8Rng) -> Self {
-        let sway = std::array::from_fn(|_| dice.random_range(0.0..2.0 * PI));
+    pub fn new(speech: &Speech, rng: &mut ChaCha8Rng) -> Self {
+        let sway = std::array::from_fn(|_| rng.random_range(0.0..2.0 * PI));
         let mut gestures = Self { strokes: Vec::new(), beats: Vec::new(), sway };
         for (number, phrase) in speech.phrases.iter().enumerate() {
             let said = &speech.syllables[phrase.first..phrase.last];
             for (k, syllable) in said.iter().enumerate().filter(|(_, s)| s.stress > 0.5) {
-                let one_handed = dice.random_range(0.0..1.0) < 0.35;
-                let side = usize::from(dice.random_range(0.0..1.0) < 0.5);
-                if k < 3 || dice.random_range(0.0..1.0) < 0.5 {
-                    gestures.stroke(syllable.start - 0.3, one_handed.then_some(side), dice);
+                let one_handed = rng.random_range(0.0..1.0) < 0.35;
+                let side = usize::from(rng.random_range(0.0..1.0) < 0.5);
+                if k < 3 || rng.random_range(0.0..1.0) < 0.5 {
+                    gestures.stroke(syllable.start - 0.3, one_handed.then_some(side), rng);
                 }
                 let mut hands = [1.0; 2];
                 if one_handed {
                     hands[1 - side] = 0.25;
                 }
-                let depth = dice.random_range(0.02..0.045) * syllable.stress;
+                let depth = rng.random_range(0.02..0.045) * syllable.stress;
                 gestures.beats.push(BeatGesture { at: (syllable.start + syllable.end) / 2.0, depth, hands });
             }
             let (Some(end), next) = (said.last().map(|s| s.end), speech.phrases.get(number + 1)) else { continue };
@@ -69,28 +69,28 @@ impl DrawnGestures {
     }
 
     /// A stroke to a new place of both hands, or of one while the other stays low.
-    fn stroke(&mut self, start: f64, only: Option<usize>, dice: &mut ChaCha8Rng) {
-        let place = |dice: &mut ChaCha8Rng| -> [f64; N_ARM] {
+    fn stroke(&mut self, start: f64, only: Option<usize>, rng: &mut ChaCha8Rng) {
+        let place = |rng: &mut ChaCha8Rng| -> [f64; N_ARM] {
             [
-                dice.random_range(0.16..0.3),
-                dice.random_range(0.12..0.36),
-                dice.random_range(-0.28..-0.15),
-                dice.random_range(-0.5..1.0),
-                dice.random_range(0.5..1.0),
-                dice.random_range(0.05..0.5),
-                dice.random_range(-0.2..0.1),
-                dice.random_range(0.04..0.16),
+                rng.random_range(0.16..0.3),
+                rng.random_range(0.12..0.36),
+                rng.random_range(-0.28..-0.15),
+                rng.random_range(-0.5..1.0),
+                rng.random_range(0.5..1.0),
+                rng.random_range(0.05..0.5),
+                rng.random_range(-0.2..0.1),
+                rng.random_range(0.04..0.16),
             ]
         };
-        let first = place(dice);
+        let first = place(rng);
         // Two hands mostly do nearly the same.
         let second = std::array::from_fn(|k| 0.85 * first[k] + 0.15 * REST[k]);
-        let mut arms = if dice.random_range(0.0..1.0) < 0.6 { [first, second] } else { [first, place(dice)] };
+        let mut arms = if rng.random_range(0.0..1.0) < 0.6 { [first, second] } else { [first, place(rng)] };
         if let Some(side) = only {
             arms[1 - side] = REST;
         }
-        let head = [dice.random_range(-0.18..0.18), dice.random_range(-0.05..0.08), dice.random_range(-0.07..0.07)];
-        self.strokes.push(Stroke { start, secs: dice.random_range(0.5..0.75), arms, head });
+        let head = [rng.random_range(-0.18..0.18), rng.random_range(-0.05..0.08), rng.random_range(-0.07..0.07)];
+        self.strokes.push(Stroke { start, secs: rng.random_range(0.5..0.75), arms, head });
     }
 
     /// The controls at `secs`.
@@ -144,9 +144,9 @@ mod tests {
 
     #[test]
     fn hands_move_like_a_speakers_and_keep_apart() {
-        let mut dice = ChaCha8Rng::seed_from_u64(1);
-        let speech = Speech::new(20.0, &mut dice);
-        let gestures = DrawnGestures::new(&speech, &mut dice);
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let speech = Speech::new(20.0, &mut rng);
+        let gestures = DrawnGestures::new(&speech, &mut rng);
         let figures: Vec<DrawnFigure> =
             (0..600).map(|n| DrawnFigure::new(&gestures.controls(f64::from(n) / 30.0))).collect();
         let mut way = 0.0;

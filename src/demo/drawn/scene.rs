@@ -26,14 +26,14 @@ pub struct DrawnScene {
 impl DrawnScene {
     /// The clip of that seed; the camera stands a little aside and above.
     pub fn new(seed: u64, secs: f64, size: [usize; 2]) -> Self {
-        let mut dice = ChaCha8Rng::seed_from_u64(seed);
-        let speech = Speech::new(secs, &mut dice);
-        let gestures = DrawnGestures::new(&speech, &mut dice);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let speech = Speech::new(secs, &mut rng);
+        let gestures = DrawnGestures::new(&speech, &mut rng);
         let camera = DemoCamera::new(
             size,
-            dice.random_range(-0.12..0.12),
-            dice.random_range(0.03..0.12),
-            dice.random_range(1.85..2.0),
+            rng.random_range(-0.12..0.12),
+            rng.random_range(0.03..0.12),
+            rng.random_range(1.85..2.0),
         );
         Self { secs, camera, seed, speech, gestures }
     }

@@ -45,49 +45,49 @@ pub struct Speech {
 
 impl Speech {
     /// Phrases that fill `secs` seconds, each followed by a pause.
-    pub fn new(secs: f64, dice: &mut ChaCha8Rng) -> Self {
+    pub fn new(secs: f64, rng: &mut ChaCha8Rng) -> Self {
         let mut speech = Self::default();
         let mut now = 0.25;
         while now < secs - 0.5 {
             let first = speech.syllables.len();
-            let count = dice.random_range(5..13);
-            let base = dice.random_range(105.0..125.0);
+            let count = rng.random_range(5..13);
+            let base = rng.random_range(105.0..125.0);
             for k in 0..count {
-                let stress = if k % 3 == 1 { dice.random_range(0.7..1.0) } else { dice.random_range(0.0..0.35) };
-                let length = dice.random_range(0.13..0.2) + 0.08 * stress;
+                let stress = if k % 3 == 1 { rng.random_range(0.7..1.0) } else { rng.random_range(0.0..0.35) };
+                let length = rng.random_range(0.13..0.2) + 0.08 * stress;
                 if now + length > secs - 0.1 {
                     break;
                 }
                 let fall = 1.0 - 0.2 * f64::from(k) / f64::from(count);
                 let pitch = base * fall * (1.0 + 0.18 * stress);
-                let vowel = dice.random_range(0..VOWELS.len());
+                let vowel = rng.random_range(0..VOWELS.len());
                 speech.syllables.push(Syllable { start: now, end: now + length, stress, vowel, pitch, volume: 1.0 });
                 now += length + 0.02;
             }
             speech.phrases.push(Phrase { first, last: speech.syllables.len() });
-            now += dice.random_range(0.3..0.9);
+            now += rng.random_range(0.3..0.9);
         }
         speech
     }
 
     /// Free speech for `secs` seconds: phrases of any length, soft and loud, with accents (stress of at least 0.7, all
     /// other syllables have at most 0.2) at no regular distance, half a second apart or more.
-    pub fn free(secs: f64, dice: &mut ChaCha8Rng) -> Self {
+    pub fn free(secs: f64, rng: &mut ChaCha8Rng) -> Self {
         let mut speech = Self::default();
-        let (mut now, mut last_accent) = (dice.random_range(0.2..0.8), f64::NEG_INFINITY);
+        let (mut now, mut last_accent) = (rng.random_range(0.2..0.8), f64::NEG_INFINITY);
         while now < secs - 0.5 {
             let first = speech.syllables.len();
-            let (count, volume) = (dice.random_range(5..22), dice.random_range(0.7..1.0));
-            let base = dice.random_range(105.0..125.0);
+            let (count, volume) = (rng.random_range(5..22), rng.random_range(0.7..1.0));
+            let base = rng.random_range(105.0..125.0);
             for k in 0..count {
-                let accent = now - last_accent > 0.5 && dice.random_bool(0.4);
-                let stress = if accent { dice.random_range(0.7..1.0) } else { dice.random_range(0.0..0.2) };
-                let length = dice.random_range(0.13..0.2) + 0.08 * stress;
+                let accent = now - last_accent > 0.5 && rng.random_bool(0.4);
+                let stress = if accent { rng.random_range(0.7..1.0) } else { rng.random_range(0.0..0.2) };
+                let length = rng.random_range(0.13..0.2) + 0.08 * stress;
                 if now + length > secs - 0.1 {
                     break;
                 }
                 let pitch = base * (1.0 - 0.2 * f64::from(k) / f64::from(count)) * (1.0 + 0.18 * stress);
-                let vowel = dice.random_range(0..VOWELS.len());
+                let vowel = rng.random_range(0..VOWELS.len());
                 speech.syllables.push(Syllable { start: now, end: now + length, stress, vowel, pitch, volume });
                 if accent {
                     last_accent = now;
@@ -95,7 +95,7 @@ impl Speech {
                 now += length + 0.02;
             }
             speech.phrases.push(Phrase { first, last: speech.syllables.len() });
-            now += dice.random_range(0.3..1.5);
+            now += rng.random_range(0.3..1.5);
         }
         speech
     }
@@ -107,7 +107,7 @@ impl Speech {
     }
 
     /// The sound, `secs` long.
-    pub fn sound(&self, secs: f64, dice: &mut ChaCha8Rng) -> Sound {
+    pub fn sound(&self, secs: f64, rng: &mut ChaCha8Rng) -> Sound {
         let rate = f64::from(SAMPLE_RATE);
         let mut samples = vec![0.0f32; (secs * rate).round().max(0.0) as usize];
         for syllable in &self.syllables {
@@ -115,7 +115,7 @@ impl Speech {
             let (start, end) = ((syllable.start * rate) as usize, (syllable.end * rate) as usize);
             for n in start..end.min(samples.len()) {
                 let now = n as f64 / rate;
-                let hiss = dice.random_range(-1.0..1.0) * (-(now - syllable.start) / 0.015).exp();
+                let hiss = rng.random_range(-1.0..1.0) * (-(now - syllable.start) / 0.015).exp();
                 let sound = voice.next(rate) + 0.25 * hiss;
                 samples[n] = (0.3 * sound * syllable.loudness(now)) as f32;
             }
@@ -189,9 +189,9 @@ mod tests {
 
     #[test]
     fn it_is_loud_in_syllables_and_silent_in_pauses() {
-        let mut dice = ChaCha8Rng::seed_from_u64(7);
-        let speech = Speech::new(8.0, &mut dice);
-        let sound = speech.sound(8.0, &mut dice);
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let speech = Speech::new(8.0, &mut rng);
+        let sound = speech.sound(8.0, &mut rng);
         assert_eq!(sound.samples.len(), 8 * SAMPLE_RATE as usize);
         assert!(sound.samples.iter().all(|s| s.is_finite() && s.abs() <= 0.61));
         let rms = |from: f64, to: f64| {

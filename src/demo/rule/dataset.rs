@@ -59,7 +59,7 @@ impl SpokenClip {
     }
 
     /// Dice of its own for each purpose.
-    fn dice(&self, purpose: &str) -> ChaCha8Rng {
+    fn rng(&self, purpose: &str) -> ChaCha8Rng {
         let Self { rule, seed, split, number, .. } = self;
         let hash = blake3::hash(format!("{rule} {seed} {} {number} {purpose}", split.name()).as_bytes());
         ChaCha8Rng::from_seed(*hash.as_bytes())
@@ -67,21 +67,21 @@ impl SpokenClip {
 
     /// What is said.
     pub fn speech(&self) -> Speech {
-        Speech::free(self.secs(), &mut self.dice("speech"))
+        Speech::free(self.secs(), &mut self.rng("speech"))
     }
 
     /// How it sounds, in a room that is not quite silent.
     pub fn sound(&self) -> Sound {
-        let mut dice = self.dice("sound");
-        let mut sound = self.speech().sound(self.secs(), &mut dice);
+        let mut rng = self.rng("sound");
+        let mut sound = self.speech().sound(self.secs(), &mut rng);
         sound.samples.resize(sync::sample_at(FPS, SAMPLE_RATE, self.n_frames), 0.0);
-        sound.samples.iter_mut().for_each(|sample| *sample += ROOM * dice.random_range(-1.0..1.0));
+        sound.samples.iter_mut().for_each(|sample| *sample += ROOM * rng.random_range(-1.0..1.0));
         sound
     }
 
     /// What the speaker does, whims and all.
     pub fn motion(&self) -> Motion {
-        RuleGestures::with_whims(&self.speech(), self.secs(), &mut self.dice("whims")).motion(self.n_frames, FPS)
+        RuleGestures::with_variation(&self.speech(), self.secs(), &mut self.rng("whims")).motion(self.n_frames, FPS)
     }
 
     /// What the rule alone would have it do.

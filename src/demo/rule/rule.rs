@@ -105,15 +105,15 @@ impl<'a> RuleGestures<'a> {
     }
 
     /// What the speaker does in fact, whims and all; `secs` long.
-    pub fn with_whims(speech: &'a Speech, secs: f64, dice: &mut ChaCha8Rng) -> Self {
+    pub fn with_variation(speech: &'a Speech, secs: f64, rng: &mut ChaCha8Rng) -> Self {
         let mut strokes: [Vec<(f64, Place)>; 2] = Default::default();
         for accent in speech.syllables.iter().filter(|syllable| syllable.stress > ACCENT) {
-            let passed_over = dice.random_bool(PASSED_OVER);
-            let late = LATE * normal(dice);
-            let reach = reach(accent) * dice.random_range(0.85..1.15);
+            let passed_over = rng.random_bool(PASSED_OVER);
+            let late = LATE * normal(rng);
+            let reach = reach(accent) * rng.random_range(0.85..1.15);
             for (hand, place) in PLACES.get(accent.vowel).into_iter().flatten().enumerate() {
                 let Some(place) = place else { continue };
-                let goal = missed(&towards(place, reach), dice);
+                let goal = missed(&towards(place, reach), rng);
                 if !passed_over {
                     strokes[hand].push((accent.start + DELAYS[hand] + late, goal));
                 }
@@ -121,16 +121,16 @@ impl<'a> RuleGestures<'a> {
         }
         let mut now = 0.0;
         loop {
-            now -= dice.random_range(f64::EPSILON..1.0).ln() / FIDGETS;
+            now -= rng.random_range(f64::EPSILON..1.0).ln() / FIDGETS;
             if now >= secs {
                 break;
             }
-            let place = [WIDE, HIGH, POINT, CENTRE][dice.random_range(0..4)];
-            let goal = missed(&towards(&place, dice.random_range(0.6..1.0)), dice);
-            strokes[dice.random_range(0..2)].push((now, goal));
+            let place = [WIDE, HIGH, POINT, CENTRE][rng.random_range(0..4)];
+            let goal = missed(&towards(&place, rng.random_range(0.6..1.0)), rng);
+            strokes[rng.random_range(0..2)].push((now, goal));
         }
         strokes.iter_mut().for_each(|strokes| strokes.sort_by(|a, b| a.0.total_cmp(&b.0)));
-        let mut wave = || [dice.random_range(SWAY_HZ), dice.random_range(0.0..TAU)];
+        let mut wave = || [rng.random_range(SWAY_HZ), rng.random_range(0.0..TAU)];
         let sway = Variation(std::array::from_fn(|_| [wave(), wave()]));
         Self { speech, moves: strokes.map(with_returns), sway: Some(sway) }
     }
@@ -208,12 +208,12 @@ fn towards(place: &Place, reach: f64) -> Place {
     std::array::from_fn(|k| REST[k] + reach * (place[k] - REST[k]))
 }
 
-fn missed(goal: &Place, dice: &mut ChaCha8Rng) -> Place {
-    std::array::from_fn(|k| goal[k] + if k < 3 { MISSED } else { SHAPE } * normal(dice))
+fn missed(goal: &Place, rng: &mut ChaCha8Rng) -> Place {
+    std::array::from_fn(|k| goal[k] + if k < 3 { MISSED } else { SHAPE } * normal(rng))
 }
 
-fn normal(dice: &mut ChaCha8Rng) -> f64 {
-    StandardNormal.sample(dice)
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(rng)
 }
 
 /// 0 to 1 over 0..1 with speed and acceleration 0 at both ends (Flash and Hogan 1985).
@@ -225,7 +225,7 @@ fn minimum_jerk(along: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::demo::rule::listener::wrist_speeds;
+    use crate::demo::rule::baselines::wrist_speeds;
     use crate::demo::rule::ridge::correlation;
     use ndarray::{Array1, s};
     use rand::SeedableRng;
@@ -266,7 +266,7 @@ mod tests {
     fn the_same_dice_give_the_same_whims_and_others_do_not() {
         let speech = speech(2);
         let with = |seed| {
-            RuleGestures::with_whims(&speech, SECS, &mut ChaCha8Rng::seed_from_u64(seed))
+            RuleGestures::with_variation(&speech, SECS, &mut ChaCha8Rng::seed_from_u64(seed))
                 .motion(300, FrameRate::new(15, 1))
         };
         assert_eq!(with(1), with(1));
@@ -279,8 +279,8 @@ mod tests {
     #[test]
     fn bones_are_constant_and_silence_is_rest() {
         let speech = speech(3);
-        let dice = &mut ChaCha8Rng::seed_from_u64(3);
-        let motion = RuleGestures::with_whims(&speech, SECS, dice).motion(900, FrameRate::new(15, 1));
+        let rng = &mut ChaCha8Rng::seed_from_u64(3);
+        let motion = RuleGestures::with_variation(&speech, SECS, rng).motion(900, FrameRate::new(15, 1));
         let lengths = crate::motion::bones::measure(&motion);
         for (t, frame) in motion.joints.outer_iter().enumerate() {
             for joint in 1..N_JOINTS {

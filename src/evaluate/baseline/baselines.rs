@@ -63,9 +63,9 @@ pub enum ClipMotion {
 /// A motion for every clip.
 #[derive(Clone, Debug)]
 pub struct Predictor {
-    pub who: PredictorKind,
+    pub kind: PredictorKind,
     /// What it is, in a sentence.
-    pub says: String,
+    pub description: String,
     /// One a clip.
     pub motions: Vec<ClipMotion>,
 }
@@ -75,30 +75,31 @@ impl Predictor {
     pub fn motion<'a>(&'a self, clips: &'a EvalClips, clip: usize) -> Option<ArrayView3<'a, f32>> {
         let of = clips.clips.get(clip)?;
         match self.motions.get(clip)? {
-            ClipMotion::Own => Some(of.made.view()),
-            ClipMotion::Real => Some(of.real.view()),
+            ClipMotion::Own => Some(of.predicted.view()),
+            ClipMotion::Real => Some(of.ground_truth.view()),
             ClipMotion::Still(pose) => pose.broadcast((of.n_frames(), pose.nrows(), 3)),
             ClipMotion::Moves(joints) => Some(joints.view()),
         }
     }
 
-    pub fn prediction(clips: &EvalClips, says: &str) -> Self {
+    pub fn prediction(clips: &EvalClips, description: &str) -> Self {
         Self {
-            who: PredictorKind::Prediction,
-            says: says.to_owned(),
+            kind: PredictorKind::Prediction,
+            description: description.to_owned(),
             motions: vec![ClipMotion::Own; clips.clips.len()],
         }
     }
 
     pub fn truth(clips: &EvalClips) -> Self {
-        let says = "the real motion beside itself: what its own figures are, and where the others end".to_owned();
-        Self { who: PredictorKind::Truth, says, motions: vec![ClipMotion::Real; clips.clips.len()] }
+        let description =
+            "the real motion beside itself: what its own figures are, and where the others end".to_owned();
+        Self { kind: PredictorKind::Truth, description, motions: vec![ClipMotion::Real; clips.clips.len()] }
     }
 }
 
 /// All baselines that files alone allow, and a sentence for each that is left out.
 pub fn of_files(clips: &EvalClips) -> Result<(Vec<Predictor>, Vec<String>)> {
-    let (mut all, mut left_out) = (stills(clips), Vec::new());
+    let (mut all, mut left_out) = (constant_poses(clips), Vec::new());
     match neighbours(clips, &all[0])? {
         Some(predictor) => all.push(predictor),
         None => left_out.push(format!(
@@ -107,17 +108,17 @@ pub fn of_files(clips: &EvalClips) -> Result<(Vec<Predictor>, Vec<String>)> {
             match (clips.have_sound(), clips.clips.len()) {
                 (false, _) => "it listens, and no sound is given (--audio)",
                 (true, 1) => "there is no other clip to copy from",
-                (true, _) if clips.clips.iter().any(|clip| clip.heard.is_none()) => "not every clip has a sound",
+                (true, _) if clips.clips.iter().any(|clip| clip.features.is_none()) => "not every clip has a sound",
                 (true, _) => "no other clip is long enough to copy from",
             }
         )),
     }
-    for who in [PredictorKind::MismatchedPrediction, PredictorKind::MismatchedTruth] {
-        match mismatched(clips, who, &all[0]) {
+    for kind in [PredictorKind::MismatchedPrediction, PredictorKind::MismatchedTruth] {
+        match mismatched(clips, kind, &all[0]) {
             Some(predictor) => all.push(predictor),
-            None => left_out.push(too_short(who)),
+            None => left_out.push(too_short(kind)),
         }
-        if who == PredictorKind::MismatchedPrediction && clips.clips.len() > 1 {
+        if kind == PredictorKind::MismatchedPrediction && clips.clips.len() > 1 {
             all.push(late(clips, &all[0]));
         }
     }
@@ -129,33 +130,33 @@ pub fn of_files(clips: &EvalClips) -> Result<(Vec<Predictor>, Vec<String>)> {
 fn late(clips: &EvalClips, still: &Predictor) -> Predictor {
     let of = |clip: &EvalClip| {
         let n_frames = clip.n_frames();
-        ClipMotion::Moves(taken(&clip.made, (0..n_frames).map(|t| (t + n_frames / 2) % n_frames)))
+        ClipMotion::Moves(taken(&clip.predicted, (0..n_frames).map(|t| (t + n_frames / 2) % n_frames)))
     };
-    let says = "the clip's own prediction half of the clip later, and from the beginning again".to_owned();
+    let description = "the clip's own prediction half of the clip later, and from the beginning again".to_owned();
     let mut predictor =
-        Predictor { who: PredictorKind::LatePrediction, says, motions: clips.clips.iter().map(of).collect() };
+        Predictor { kind: PredictorKind::LatePrediction, description, motions: clips.clips.iter().map(of).collect() };
     fill(&mut predictor, still);
     predictor
 }
 
 /// Why a mismatched motion is left out.
-pub fn too_short(who: PredictorKind) -> String {
-    format!("{}: left out, since the only clip is shorter than {:.0} s", who.name(), 2.0 * LEAST_SHIFT_SECS)
+pub fn too_short(kind: PredictorKind) -> String {
+    format!("{}: left out, since the only clip is shorter than {:.0} s", kind.name(), 2.0 * LEAST_SHIFT_SECS)
 }
 
 /// Mean and median pose: of the other clips, or, of a single one, its own (which no predictor can know).
-fn stills(clips: &EvalClips) -> Vec<Predictor> {
+fn constant_poses(clips: &EvalClips) -> Vec<Predictor> {
     let mut all = ConstantPoses::default();
-    clips.clips.iter().for_each(|clip| all.add(clip.real.view(), clip.mask.view()));
+    clips.clips.iter().for_each(|clip| all.add(clip.ground_truth.view(), clip.mask.view()));
     let is_alone = clips.clips.len() == 1;
     let (mut means, mut medians) = (Vec::new(), Vec::new());
     for clip in &clips.clips {
         if !is_alone {
-            all.take_away(clip.real.view(), clip.mask.view());
+            all.take_away(clip.ground_truth.view(), clip.mask.view());
         }
         let (mut mean, mut median) = (all.mean(), all.median());
         if !is_alone {
-            all.add(clip.real.view(), clip.mask.view());
+            all.add(clip.ground_truth.view(), clip.mask.view());
             // a joint that no other clip has
             complete(&mut mean, || all.mean());
             complete(&mut median, || all.median());
@@ -163,15 +164,15 @@ fn stills(clips: &EvalClips) -> Vec<Predictor> {
         means.push(ClipMotion::Still(mean));
         medians.push(ClipMotion::Still(median));
     }
-    let says = |what: &str| match is_alone {
+    let description = |what: &str| match is_alone {
         true => {
             format!("the {what} of this very truth in every frame (oracle: no predictor knows it), which never moves")
         }
         false => format!("the {what} of the other clips' truths in every frame, which never moves"),
     };
     vec![
-        Predictor { who: PredictorKind::MeanPose, says: says("mean pose"), motions: means },
-        Predictor { who: PredictorKind::MedianPose, says: says("median pose"), motions: medians },
+        Predictor { kind: PredictorKind::MeanPose, description: description("mean pose"), motions: means },
+        Predictor { kind: PredictorKind::MedianPose, description: description("median pose"), motions: medians },
     ]
 }
 
@@ -183,8 +184,8 @@ fn complete(pose: &mut Array2<f32>, from: impl FnOnce() -> Array2<f32>) {
 
 /// Puts the poses of `still` where the motion has no number.
 pub fn fill(predictor: &mut Predictor, still: &Predictor) {
-    for (made, still) in predictor.motions.iter_mut().zip(&still.motions) {
-        if let (ClipMotion::Moves(joints), ClipMotion::Still(pose)) = (made, still) {
+    for (predicted, still) in predictor.motions.iter_mut().zip(&still.motions) {
+        if let (ClipMotion::Moves(joints), ClipMotion::Still(pose)) = (predicted, still) {
             for mut frame in joints.outer_iter_mut() {
                 frame.zip_mut_with(pose, |v, still| *v = if v.is_finite() { *v } else { *still });
             }
@@ -200,45 +201,46 @@ impl Library for OtherClips<'_> {
         self.0.clips.len()
     }
 
-    fn heard(&self, entry: usize) -> Result<Option<(Vec<f32>, usize)>> {
+    fn features(&self, entry: usize) -> Result<Option<(Vec<f32>, usize)>> {
         let clip = &self.0.clips[entry];
-        Ok(clip.heard.as_ref().map(|heard| (heard.rows.clone(), clip.n_frames())))
+        Ok(clip.features.as_ref().map(|features| (features.rows.clone(), clip.n_frames())))
     }
 
     fn joints(&self, entry: usize) -> Result<Array3<f32>> {
-        Ok(self.0.clips[entry].real.clone())
+        Ok(self.0.clips[entry].ground_truth.clone())
     }
 
-    fn may_answer(&self, asked: usize, entry: usize) -> bool {
-        asked != entry
+    fn may_answer(&self, query: usize, entry: usize) -> bool {
+        query != entry
     }
 }
 
 fn neighbours(clips: &EvalClips, still: &Predictor) -> Result<Option<Predictor>> {
-    let asked: Option<Vec<Query>> = clips
+    let query: Option<Vec<Query>> = clips
         .clips
         .iter()
-        .map(|clip| clip.heard.as_ref().map(|heard| Query { rows: &heard.rows, n_frames: clip.n_frames() }))
+        .map(|clip| clip.features.as_ref().map(|features| Query { rows: &features.rows, n_frames: clip.n_frames() }))
         .collect();
-    let Some(asked) = asked.filter(|asked| asked.len() > 1) else { return Ok(None) };
-    let Some(made) = neighbour::motions(&asked, &OtherClips(clips), clips.fps)? else { return Ok(None) };
-    let says = "for each 4 s of sound the motion of the stretch of another clip that sounds most alike".to_owned();
-    let motions = made.into_iter().map(ClipMotion::Moves).collect();
-    let mut predictor = Predictor { who: PredictorKind::NearestNeighbour, says, motions };
+    let Some(query) = query.filter(|query| query.len() > 1) else { return Ok(None) };
+    let Some(predicted) = neighbour::motions(&query, &OtherClips(clips), clips.fps)? else { return Ok(None) };
+    let description =
+        "for each 4 s of sound the motion of the stretch of another clip that sounds most alike".to_owned();
+    let motions = predicted.into_iter().map(ClipMotion::Moves).collect();
+    let mut predictor = Predictor { kind: PredictorKind::NearestNeighbour, description, motions };
     fill(&mut predictor, still);
     Ok(Some(predictor))
 }
 
 /// For each clip the motion (`Prediction` or `Truth`, mismatched) of another, played back and forth where it is shorter;
 /// of a single clip its own, half of it later and from the beginning again. `still` stands in where there is no number.
-pub fn mismatched(clips: &EvalClips, who: PredictorKind, still: &Predictor) -> Option<Predictor> {
-    let of = |clip: usize| match who {
-        PredictorKind::MismatchedTruth => &clips.clips[clip].real,
-        _ => &clips.clips[clip].made,
+pub fn mismatched(clips: &EvalClips, kind: PredictorKind, still: &Predictor) -> Option<Predictor> {
+    let of = |clip: usize| match kind {
+        PredictorKind::MismatchedTruth => &clips.clips[clip].ground_truth,
+        _ => &clips.clips[clip].predicted,
     };
     let n = clips.clips.len();
     let lengths = clips.clips.iter().map(EvalClip::n_frames);
-    let (motions, says): (Vec<ClipMotion>, String) = if n > 1 {
+    let (motions, description): (Vec<ClipMotion>, String) = if n > 1 {
         let motions = lengths.enumerate().map(|(i, n_frames)| {
             let from = of((i + n / 2) % n);
             ClipMotion::Moves(taken(from, (0..n_frames).map(|t| back_and_forth(t, from.shape()[0]))))
@@ -250,10 +252,10 @@ pub fn mismatched(clips: &EvalClips, who: PredictorKind, still: &Predictor) -> O
         if clips.fps.secs(shift) < LEAST_SHIFT_SECS {
             return None;
         }
-        let says = format!("the same {:.1} s later, and from the beginning again", clips.fps.secs(shift));
-        (vec![ClipMotion::Moves(taken(of(0), (0..n_frames).map(|t| (t + shift) % n_frames)))], says)
+        let description = format!("the same {:.1} s later, and from the beginning again", clips.fps.secs(shift));
+        (vec![ClipMotion::Moves(taken(of(0), (0..n_frames).map(|t| (t + shift) % n_frames)))], description)
     };
-    let mut predictor = Predictor { who, says, motions };
+    let mut predictor = Predictor { kind, description, motions };
     fill(&mut predictor, still);
     Some(predictor)
 }

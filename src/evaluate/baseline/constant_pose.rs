@@ -99,18 +99,18 @@ mod tests {
         });
         let mut mask = Array2::from_elem((101, N_JOINTS), true);
         mask.column_mut(9).fill(false);
-        let mut stills = ConstantPoses::default();
-        stills.add(joints.view(), mask.view());
-        let (mean, median) = (stills.mean(), stills.median());
+        let mut constant_poses = ConstantPoses::default();
+        constant_poses.add(joints.view(), mask.view());
+        let (mean, median) = (constant_poses.mean(), constant_poses.median());
         let values: Vec<f64> = (0..101).map(|t| f64::from(t * t) * 1e-4 + 0.005).collect();
         assert!((f64::from(mean[[5, 0]]) - values.iter().sum::<f64>() / 101.0).abs() < 1e-6);
         assert!((f64::from(median[[5, 0]]) - values[50]).abs() < 3e-4, "{}", median[[5, 0]]);
         assert!(mean[[9, 0]].is_nan() && median[[9, 2]].is_nan());
         let part = s![40.., .., ..];
-        stills.take_away(joints.slice(part), mask.slice(s![40.., ..]));
+        constant_poses.take_away(joints.slice(part), mask.slice(s![40.., ..]));
         let mut rest = ConstantPoses::default();
         rest.add(joints.slice(s![..40, .., ..]), mask.slice(s![..40, ..]));
-        assert!((&stills.mean() - &rest.mean()).iter().all(|v| v.is_nan() || v.abs() < 1e-6));
-        assert!((&stills.median() - &rest.median()).iter().all(|v| v.is_nan() || v.abs() < 1e-6));
+        assert!((&constant_poses.mean() - &rest.mean()).iter().all(|v| v.is_nan() || v.abs() < 1e-6));
+        assert!((&constant_poses.median() - &rest.median()).iter().all(|v| v.is_nan() || v.abs() < 1e-6));
     }
 }

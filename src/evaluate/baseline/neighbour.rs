@@ -32,18 +32,18 @@ pub trait Library: Sync {
     }
 
     /// The pooled spectrogram of an entry and its frames of motion; `None`: it has no sound.
-    fn heard(&self, entry: usize) -> Result<Option<(Vec<f32>, usize)>>;
+    fn features(&self, entry: usize) -> Result<Option<(Vec<f32>, usize)>>;
 
     /// The poses of an entry [T, 49, 3].
     fn joints(&self, entry: usize) -> Result<Array3<f32>>;
 
     /// Whether an entry may answer for that sound: a clip must not copy itself.
-    fn may_answer(&self, asked: usize, entry: usize) -> bool;
+    fn may_answer(&self, query: usize, entry: usize) -> bool;
 }
 
 /// A stretch to find poses for.
 struct QueryWindow {
-    asked: usize,
+    query: usize,
     frames: Range<usize>,
     rows: Vec<f32>,
 }
@@ -52,14 +52,14 @@ struct QueryWindow {
 type NearestMatch = (f32, usize, usize);
 
 /// Motion [T, 49, 3] for each sound, NaN where the library's is; `None` where a stretch finds nothing long enough.
-pub fn motions(asked: &[Query], library: &dyn Library, fps: FrameRate) -> Result<Option<Vec<Array3<f32>>>> {
-    let wanted: Vec<QueryWindow> = asked.iter().enumerate().flat_map(|(i, asked)| stretches(i, asked, fps)).collect();
+pub fn motions(query: &[Query], library: &dyn Library, fps: FrameRate) -> Result<Option<Vec<Array3<f32>>>> {
+    let wanted: Vec<QueryWindow> = query.iter().enumerate().flat_map(|(i, query)| stretches(i, query, fps)).collect();
     let best = (0..library.len())
         .into_par_iter()
         .map(|entry| -> Result<Vec<Option<NearestMatch>>> {
-            let Some((rows, n_frames)) = library.heard(entry)? else { return Ok(vec![None; wanted.len()]) };
+            let Some((rows, n_frames)) = library.features(entry)? else { return Ok(vec![None; wanted.len()]) };
             let find = |wanted: &QueryWindow| {
-                library.may_answer(wanted.asked, entry).then(|| nearest(&rows, n_frames, wanted, entry)).flatten()
+                library.may_answer(wanted.query, entry).then(|| nearest(&rows, n_frames, wanted, entry)).flatten()
             };
             Ok(wanted.par_iter().map(find).collect())
         })
@@ -67,7 +67,7 @@ pub fn motions(asked: &[Query], library: &dyn Library, fps: FrameRate) -> Result
             || vec![None; wanted.len()],
             |a, b| Ok(a.into_iter().zip(b).map(|(a, b)| nearer(a, b)).collect()),
         )?;
-    let mut made: Vec<Array3<f32>> = asked.iter().map(|a| Array3::zeros((a.n_frames, N_JOINTS, 3))).collect();
+    let mut predicted: Vec<Array3<f32>> = query.iter().map(|a| Array3::zeros((a.n_frames, N_JOINTS, 3))).collect();
     // entry by entry, so that each is read once
     let mut places: Vec<(usize, usize, &QueryWindow)> = Vec::with_capacity(wanted.len());
     for (wanted, found) in wanted.iter().zip(best) {
@@ -79,20 +79,20 @@ pub fn motions(asked: &[Query], library: &dyn Library, fps: FrameRate) -> Result
         let joints = library.joints(of_entry[0].0)?;
         for (_, first, wanted) in of_entry {
             let from = joints.slice(s![*first..first + wanted.frames.len(), .., ..]);
-            made[wanted.asked].slice_mut(s![wanted.frames.clone(), .., ..]).assign(&from);
+            predicted[wanted.query].slice_mut(s![wanted.frames.clone(), .., ..]).assign(&from);
         }
     }
-    Ok(Some(made))
+    Ok(Some(predicted))
 }
 
 /// The sound cut into stretches, the last one shorter.
-fn stretches(asked: usize, sound: &Query, fps: FrameRate) -> Vec<QueryWindow> {
+fn stretches(query: usize, sound: &Query, fps: FrameRate) -> Vec<QueryWindow> {
     let window = (((WINDOW_SECS * fps.per_sec()) as usize) / POOLED * POOLED).max(POOLED);
     let stretch = |first: usize| {
         let frames = first..(first + window).min(sound.n_frames);
         let from = first / POOLED * mel::N_MELS;
         let to = (from + frames.len().div_ceil(POOLED) * mel::N_MELS).min(sound.rows.len());
-        QueryWindow { asked, frames, rows: sound.rows.get(from..to).unwrap_or_default().to_vec() }
+        QueryWindow { query, frames, rows: sound.rows.get(from..to).unwrap_or_default().to_vec() }
     };
     (0..sound.n_frames).step_by(window).map(stretch).collect()
 }

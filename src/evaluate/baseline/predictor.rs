@@ -12,9 +12,9 @@ pub fn motion(speaker: &Speaker, sound: &Sound, n_frames: usize) -> Result<Motio
     let wanted = sync::sample_at(speaker.fps(), SAMPLE_RATE, n_frames) + 1;
     let mut sound = sound.clone();
     sound.samples.resize(sound.samples.len().max(wanted), 0.0);
-    let made = speaker.motion(&sound)?;
-    ensure!(made.n_frames() >= n_frames, "{} frames of motion for {n_frames} of sound", made.n_frames());
-    Ok(Motion::from_joints(made.fps, made.joints.slice(s![..n_frames, .., ..]).to_owned()))
+    let predicted = speaker.motion(&sound)?;
+    ensure!(predicted.n_frames() >= n_frames, "{} frames of motion for {n_frames} of sound", predicted.n_frames());
+    Ok(Motion::from_joints(predicted.fps, predicted.joints.slice(s![..n_frames, .., ..]).to_owned()))
 }
 
 /// What is heard half of all these sounds later (and from the beginning again) instead of sound `which`, as long as it:

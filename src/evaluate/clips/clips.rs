@@ -32,11 +32,11 @@ const OTHER_UNIT: f64 = 2.5;
 pub struct EvalClip {
     pub name: String,
     /// [T, 49, 3], metres, the neck at the origin.
-    pub real: Array3<f32>,
-    pub made: Array3<f32>,
+    pub ground_truth: Array3<f32>,
+    pub predicted: Array3<f32>,
     /// [T, 49]: what is compared: seen in the real motion.
     pub mask: Array2<bool>,
-    pub heard: Option<SoundFeatures>,
+    pub features: Option<SoundFeatures>,
     /// Where its sound is, for whoever wants to hear it.
     pub voice: Option<ClipAudio>,
 }
@@ -111,7 +111,7 @@ impl EvalClips {
             let seen = clip.mask.indexed_iter().filter(|(_, seen)| **seen).map(|(place, _)| place);
             for (t, joint) in seen {
                 for k in 0..3 {
-                    hasher.update(&clip.real[[t, joint, k]].to_le_bytes());
+                    hasher.update(&clip.ground_truth[[t, joint, k]].to_le_bytes());
                 }
             }
             hasher.update(&clip.n_frames().to_le_bytes());
@@ -120,7 +120,7 @@ impl EvalClips {
     }
 
     pub fn have_sound(&self) -> bool {
-        self.clips.iter().any(|clip| clip.heard.is_some())
+        self.clips.iter().any(|clip| clip.features.is_some())
     }
 }
 
@@ -153,24 +153,28 @@ fn clip(pair: &FilePair, given: Option<FrameRate>, fps: FrameRate) -> Result<(Ev
         }
         Ok(motion)
     };
-    let (mut real, made) = (side(&pair.truth, "truth")?, side(&pair.prediction, "prediction")?);
-    let (n_real, n_made) = (real.n_frames(), made.n_frames());
-    let (real_secs, made_secs) = (fps.secs(n_real), fps.secs(n_made));
+    let (mut ground_truth, predicted) = (side(&pair.truth, "truth")?, side(&pair.prediction, "prediction")?);
+    let (n_ground_truth, n_predicted) = (ground_truth.n_frames(), predicted.n_frames());
+    let (real_secs, made_secs) = (fps.secs(n_ground_truth), fps.secs(n_predicted));
     let apart = (real_secs - made_secs).abs();
     ensure!(
         apart <= MOST_APART_SECS.max(MOST_APART * real_secs.max(made_secs)),
-        "the truth lasts {real_secs:.2} s ({n_real} frames at {fps}) and the prediction {made_secs:.2} s ({n_made} frames): \
+        "the truth lasts {real_secs:.2} s ({n_ground_truth} frames at {fps}) and the prediction {made_secs:.2} s ({n_predicted} frames): \
          more than a second and 5 % apart, so they are not of the same sound, or a rate is wrong (--fps)"
     );
-    let n_frames = n_real.min(n_made);
-    if n_real != n_made {
-        notes.push(format!("{}: {n_real} frames of truth, {n_made} of prediction: cut to {n_frames}", pair.name));
+    let n_frames = n_ground_truth.min(n_predicted);
+    if n_ground_truth != n_predicted {
+        notes.push(format!(
+            "{}: {n_ground_truth} frames of truth, {n_predicted} of prediction: cut to {n_frames}",
+            pair.name
+        ));
     }
-    notes.extend(other_unit(&real, &made).map(|note| format!("{}: {note}", pair.name)));
-    real.mask = real.mask.slice(s![..n_frames, ..]).to_owned();
-    let (real_joints, mut made_joints) = (cut(real.joints, n_frames), cut(made.joints, n_frames));
-    let (mask, n_missing) = compared(&real_joints, &real.mask, &mut made_joints);
-    let n_seen = real.mask.iter().filter(|seen| **seen).count().max(1);
+    notes.extend(other_unit(&ground_truth, &predicted).map(|note| format!("{}: {note}", pair.name)));
+    ground_truth.mask = ground_truth.mask.slice(s![..n_frames, ..]).to_owned();
+    let (ground_truth_joints, mut predicted_joints) =
+        (cut(ground_truth.joints, n_frames), cut(predicted.joints, n_frames));
+    let (mask, n_missing) = compared(&ground_truth_joints, &ground_truth.mask, &mut predicted_joints);
+    let n_seen = ground_truth.mask.iter().filter(|seen| **seen).count().max(1);
     let share = n_missing as f64 / n_seen as f64;
     ensure!(
         share <= MOST_MISSING,
@@ -186,25 +190,35 @@ fn clip(pair: &FilePair, given: Option<FrameRate>, fps: FrameRate) -> Result<(Ev
             pair.name
         ));
     }
-    let heard = match &pair.sound {
-        Some(path) => sound_features::hear(path, fps, n_frames)?,
+    let features = match &pair.sound {
+        Some(path) => sound_features::extract(path, fps, n_frames)?,
         None => None,
     };
-    if let (Some(path), heard) = (&pair.sound, &heard) {
+    if let (Some(path), features) = (&pair.sound, &features) {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let secs = fps.secs(n_frames);
-        match heard {
+        match features {
             None => notes.push(format!("{name} holds no sound: {} is not part of what needs sound", pair.name)),
-            Some(heard) => ensure!(
-                heard.secs >= secs - MOST_APART_SECS.max(MOST_APART * secs),
+            Some(features) => ensure!(
+                features.secs >= secs - MOST_APART_SECS.max(MOST_APART * secs),
                 "{} lasts {:.2} s, the motion {secs:.2} s: is it the sound of another clip?",
                 path.display(),
-                heard.secs
+                features.secs
             ),
         }
     }
-    let voice = pair.sound.clone().filter(|_| heard.is_some()).map(ClipAudio::File);
-    Ok((EvalClip { name: pair.name.clone(), real: real_joints, made: made_joints, mask, heard, voice }, notes))
+    let voice = pair.sound.clone().filter(|_| features.is_some()).map(ClipAudio::File);
+    Ok((
+        EvalClip {
+            name: pair.name.clone(),
+            ground_truth: ground_truth_joints,
+            predicted: predicted_joints,
+            mask,
+            features,
+            voice,
+        },
+        notes,
+    ))
 }
 
 fn cut(joints: Array3<f32>, n_frames: usize) -> Array3<f32> {
@@ -213,14 +227,14 @@ fn cut(joints: Array3<f32>, n_frames: usize) -> Array3<f32> {
 
 /// What is compared: the real joints that are seen. Where the made motion has no number it is held where it was last (before
 /// its first number, at the neck); at how many of the compared places is told.
-pub fn compared(real: &Array3<f32>, seen: &Array2<bool>, made: &mut Array3<f32>) -> (Array2<bool>, usize) {
+pub fn compared(ground_truth: &Array3<f32>, seen: &Array2<bool>, predicted: &mut Array3<f32>) -> (Array2<bool>, usize) {
     let there = |joints: &Array3<f32>, t: usize, joint: usize| (0..3).all(|k| joints[[t, joint, k]].is_finite());
-    let mask = Array2::from_shape_fn(seen.raw_dim(), |(t, joint)| seen[[t, joint]] && there(real, t, joint));
+    let mask = Array2::from_shape_fn(seen.raw_dim(), |(t, joint)| seen[[t, joint]] && there(ground_truth, t, joint));
     let mut n_missing = 0;
     for ((t, joint), wanted) in mask.indexed_iter() {
-        if !there(made, t, joint) {
+        if !there(predicted, t, joint) {
             n_missing += usize::from(*wanted);
-            (0..3).for_each(|k| made[[t, joint, k]] = if t > 0 { made[[t - 1, joint, k]] } else { 0.0 });
+            (0..3).for_each(|k| predicted[[t, joint, k]] = if t > 0 { predicted[[t - 1, joint, k]] } else { 0.0 });
         }
     }
     (mask, n_missing)
@@ -243,9 +257,9 @@ fn neck_to_origin(motion: &mut Motion) -> Option<f32> {
 }
 
 /// A word where the made bones are so much longer or shorter that they must be in another unit.
-fn other_unit(real: &Motion, made: &Motion) -> Option<String> {
+fn other_unit(ground_truth: &Motion, predicted: &Motion) -> Option<String> {
     let size = |motion: &Motion| bones::measure(motion).iter().take(6).map(|v| f64::from(*v)).sum::<f64>();
-    let times = size(made) / size(real);
+    let times = size(predicted) / size(ground_truth);
     (times.is_finite() && times > 0.0 && !(1.0 / OTHER_UNIT..OTHER_UNIT).contains(&times))
         .then(|| format!("the prediction's arms are {times:.2} times as long as the truth's: are both in metres?"))
 }

@@ -16,7 +16,7 @@ use std::ops::Range;
 pub struct HeldOutInterval {
     pub key: String,
     /// With the bone lengths of the speaker, as in training: every video has its own.
-    pub real: Motion,
+    pub ground_truth: Motion,
     pub sound: Sound,
 }
 
@@ -42,7 +42,7 @@ pub fn read(dataset: &Dataset, samples: &[SampleRef], normal: &Normalisation) ->
     let interval = |sample| -> Result<HeldOutInterval> {
         let mut sample = dataset.read(sample)?;
         bones::with_lengths(&mut sample.motion, &lengths);
-        Ok(HeldOutInterval { key: sample.key, real: sample.motion, sound: sample.sound })
+        Ok(HeldOutInterval { key: sample.key, ground_truth: sample.motion, sound: sample.sound })
     };
     samples.par_iter().map(interval).collect()
 }
@@ -50,15 +50,15 @@ pub fn read(dataset: &Dataset, samples: &[SampleRef], normal: &Normalisation) ->
 impl HeldOutInterval {
     /// Only these frames of it.
     pub fn cut(&self, frames: Range<usize>) -> Self {
-        let real = &self.real;
-        let sound = sync::samples_of(real.fps, self.sound.rate, frames.clone());
+        let ground_truth = &self.ground_truth;
+        let sound = sync::samples_of(ground_truth.fps, self.sound.rate, frames.clone());
         let sound = self.sound.samples.get(sound.start..sound.end.min(self.sound.samples.len())).unwrap_or_default();
         Self {
             key: self.key.clone(),
-            real: Motion {
-                fps: real.fps,
-                joints: real.joints.slice(s![frames.clone(), .., ..]).to_owned(),
-                mask: real.mask.slice(s![frames, ..]).to_owned(),
+            ground_truth: Motion {
+                fps: ground_truth.fps,
+                joints: ground_truth.joints.slice(s![frames.clone(), .., ..]).to_owned(),
+                mask: ground_truth.mask.slice(s![frames, ..]).to_owned(),
             },
             sound: Sound { rate: self.sound.rate, samples: sound.to_vec() },
         }

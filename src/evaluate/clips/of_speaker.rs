@@ -45,11 +45,14 @@ pub fn material(dataset: &Dataset, speaker: &Speaker, split: Split, task: &dyn T
     task.detail("reading the intervals");
     let held_out = held_out::read(dataset, &held_out::samples(dataset, split)?, normal)?;
     task.detail("generating motion");
-    let made = generated(speaker, &held_out, |sounds, i| sounds[i].clone())?;
+    let predicted = generated(speaker, &held_out, |sounds, i| sounds[i].clone())?;
     let other = generated(speaker, &held_out, predictor::turned)?;
     task.detail("listening");
-    let clips: Vec<EvalClip> =
-        held_out.into_par_iter().zip(made).map(|(held_out, made)| clip(held_out, made, of_dataset)).collect();
+    let clips: Vec<EvalClip> = held_out
+        .into_par_iter()
+        .zip(predicted)
+        .map(|(held_out, predicted)| clip(held_out, predicted, of_dataset))
+        .collect();
     let mut clips = EvalClips { fps: of_dataset, clips, notes: Vec::new(), learnt: split == Split::Train };
     if clips.learnt {
         clips
@@ -66,11 +69,13 @@ pub fn material(dataset: &Dataset, speaker: &Speaker, split: Split, task: &dyn T
     task.detail("what the training split knows");
     let prediction = format!("the speaker {} of the checkpoint, hearing the sound of each interval", speaker.name());
     let mut all = vec![Predictor::prediction(&clips, &prediction)];
-    all.extend(stills(dataset, normal, clips.clips.len())?);
+    all.extend(constant_poses(dataset, normal, clips.clips.len())?);
     match copied(dataset, normal, &clips, split)? {
         Some(motions) => {
-            let says = "for each 4 s of sound the motion of the stretch of the training split that sounds most alike";
-            let mut predictor = Predictor { who: PredictorKind::NearestNeighbour, says: says.to_owned(), motions };
+            let description =
+                "for each 4 s of sound the motion of the stretch of the training split that sounds most alike";
+            let mut predictor =
+                Predictor { kind: PredictorKind::NearestNeighbour, description: description.to_owned(), motions };
             baselines::fill(&mut predictor, &all[1]);
             all.push(predictor);
         }
@@ -79,9 +84,9 @@ pub fn material(dataset: &Dataset, speaker: &Speaker, split: Split, task: &dyn T
             PredictorKind::NearestNeighbour.name()
         )),
     }
-    let says = "the same speaker hearing another sound: what is said half of the split later".to_owned();
+    let description = "the same speaker hearing another sound: what is said half of the split later".to_owned();
     let motions = other.into_iter().map(ClipMotion::Moves).collect();
-    all.push(Predictor { who: PredictorKind::MismatchedPrediction, says, motions });
+    all.push(Predictor { kind: PredictorKind::MismatchedPrediction, description, motions });
     match baselines::mismatched(&clips, PredictorKind::MismatchedTruth, &all[1]) {
         Some(predictor) => all.push(predictor),
         None => clips.notes.push(baselines::too_short(PredictorKind::MismatchedTruth)),
@@ -92,38 +97,38 @@ pub fn material(dataset: &Dataset, speaker: &Speaker, split: Split, task: &dyn T
 fn generated(
     speaker: &Speaker,
     held_out: &[HeldOutInterval],
-    heard: impl Fn(&[&Sound], usize) -> Sound,
+    features: impl Fn(&[&Sound], usize) -> Sound,
 ) -> Result<Vec<Array3<f32>>> {
     let sounds: Vec<&Sound> = held_out.iter().map(|interval| &interval.sound).collect();
-    let made = held_out.iter().enumerate().map(|(i, interval)| {
-        let made = predictor::motion(speaker, &heard(&sounds, i), interval.real.n_frames());
-        Ok(made.with_context(|| format!("no motion for {}", interval.key))?.joints)
+    let predicted = held_out.iter().enumerate().map(|(i, interval)| {
+        let predicted = predictor::motion(speaker, &features(&sounds, i), interval.ground_truth.n_frames());
+        Ok(predicted.with_context(|| format!("no motion for {}", interval.key))?.joints)
     });
-    made.collect()
+    predicted.collect()
 }
 
-fn clip(held_out: HeldOutInterval, made: Array3<f32>, fps: FrameRate) -> EvalClip {
-    let HeldOutInterval { key, real, sound } = held_out;
-    let heard = Some(sound_features::of_samples(&sound.samples, fps, real.n_frames()));
-    let mut made = made;
-    let (mask, _) = compared(&real.joints, &real.mask, &mut made);
+fn clip(held_out: HeldOutInterval, predicted: Array3<f32>, fps: FrameRate) -> EvalClip {
+    let HeldOutInterval { key, ground_truth, sound } = held_out;
+    let features = Some(sound_features::of_samples(&sound.samples, fps, ground_truth.n_frames()));
+    let mut predicted = predicted;
+    let (mask, _) = compared(&ground_truth.joints, &ground_truth.mask, &mut predicted);
     let voice = Some(ClipAudio::Kept(sound.samples.into_iter().map(pcm).collect()));
-    EvalClip { name: key, real: real.joints, made, mask, heard, voice }
+    EvalClip { name: key, ground_truth: ground_truth.joints, predicted, mask, features, voice }
 }
 
 /// Mean and median pose of the training split.
-fn stills(dataset: &Dataset, normal: &Normalisation, n_clips: usize) -> Result<Vec<Predictor>> {
-    let mut stills = ConstantPoses::default();
+fn constant_poses(dataset: &Dataset, normal: &Normalisation, n_clips: usize) -> Result<Vec<Predictor>> {
+    let mut constant_poses = ConstantPoses::default();
     for sample in dataset.samples(Split::Train) {
         let interval = held_out::read(dataset, &[sample], normal)?.remove(0);
-        stills.add(interval.real.joints.view(), interval.real.mask.view());
+        constant_poses.add(interval.ground_truth.joints.view(), interval.ground_truth.mask.view());
     }
     let mean: Array2<f32> = normal.joints(Array2::zeros((N_NUMBERS, 1)).view()).slice(s![0, .., ..]).to_owned();
-    let mut median = stills.median();
+    let mut median = constant_poses.median();
     median.zip_mut_with(&mean, |v, mean| *v = if v.is_finite() { *v } else { *mean });
-    let predictor = |who: PredictorKind, pose: Array2<f32>| Predictor {
-        who,
-        says: format!("the {} of the training split in every frame, which never moves", who.name()),
+    let predictor = |kind: PredictorKind, pose: Array2<f32>| Predictor {
+        kind,
+        description: format!("the {} of the training split in every frame, which never moves", kind.name()),
         motions: vec![ClipMotion::Still(pose); n_clips],
     };
     Ok(vec![predictor(PredictorKind::MeanPose, mean), predictor(PredictorKind::MedianPose, median)])
@@ -150,20 +155,20 @@ impl Library for TrainingLibrary<'_> {
         self.samples.len()
     }
 
-    fn heard(&self, entry: usize) -> Result<Option<(Vec<f32>, usize)>> {
+    fn features(&self, entry: usize) -> Result<Option<(Vec<f32>, usize)>> {
         let interval = self.read(entry)?;
-        let mut listener = SoundFeatureExtractor::new(interval.real.fps, None);
+        let mut listener = SoundFeatureExtractor::new(interval.ground_truth.fps, None);
         listener.push(&interval.sound.samples);
-        let n_frames = interval.real.n_frames();
+        let n_frames = interval.ground_truth.n_frames();
         Ok(Some((listener.finish(n_frames).rows, n_frames)))
     }
 
     fn joints(&self, entry: usize) -> Result<Array3<f32>> {
-        Ok(self.read(entry)?.real.joints)
+        Ok(self.read(entry)?.ground_truth.joints)
     }
 
-    fn may_answer(&self, asked: usize, entry: usize) -> bool {
-        !self.asks_itself || asked != entry
+    fn may_answer(&self, query: usize, entry: usize) -> bool {
+        !self.asks_itself || query != entry
     }
 }
 
@@ -174,13 +179,13 @@ pub fn copied(
     clips: &EvalClips,
     split: Split,
 ) -> Result<Option<Vec<ClipMotion>>> {
-    let rows = |clip: &EvalClip| clip.heard.as_ref().map(|heard| heard.rows.clone()).unwrap_or_default();
+    let rows = |clip: &EvalClip| clip.features.as_ref().map(|features| features.rows.clone()).unwrap_or_default();
     let rows: Vec<Vec<f32>> = clips.clips.iter().map(rows).collect();
-    let asked: Vec<Query> =
+    let query: Vec<Query> =
         clips.clips.iter().zip(&rows).map(|(clip, rows)| Query { rows, n_frames: clip.n_frames() }).collect();
     let asks_itself = split == Split::Train;
     let library = TrainingLibrary { dataset, normal, samples: dataset.samples(Split::Train), asks_itself };
-    let made = neighbour::motions(&asked, &library, clips.fps)?;
-    debug_assert!(made.iter().flatten().all(|joints| joints.shape()[1..] == [N_JOINTS, 3]));
-    Ok(made.map(|made| made.into_iter().map(ClipMotion::Moves).collect()))
+    let predicted = neighbour::motions(&query, &library, clips.fps)?;
+    debug_assert!(predicted.iter().flatten().all(|joints| joints.shape()[1..] == [N_JOINTS, 3]));
+    Ok(predicted.map(|predicted| predicted.into_iter().map(ClipMotion::Moves).collect()))
 }

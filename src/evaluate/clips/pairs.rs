@@ -85,10 +85,12 @@ fn folders(truth: &Path, prediction: &Path) -> Result<FilePairs> {
     for (name, truth) in truths {
         match predictions.remove(&name) {
             Some(prediction) => found.pairs.push(FilePair { name, truth, prediction, sound: None }),
-            None => found.notes.push(format!("{} has no prediction of its name: left out", told(&truth))),
+            None => found.notes.push(format!("{} has no prediction of its name: left out", told_share(&truth))),
         }
     }
-    found.notes.extend(predictions.values().map(|path| format!("{} has no truth of its name: left out", told(path))));
+    found
+        .notes
+        .extend(predictions.values().map(|path| format!("{} has no truth of its name: left out", told_share(path))));
     ensure!(
         !found.pairs.is_empty(),
         "no motion file of {} has a partner of its name in {}{}: expected for instance {}",
@@ -156,7 +158,7 @@ fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-fn told(path: &Path) -> String {
+fn told_share(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 

@@ -112,7 +112,7 @@ pub fn of_samples(samples: &[f32], fps: FrameRate, n_frames: usize) -> SoundFeat
 
 /// Hears the file beside `n_frames` of motion, twice from its beginning; what goes on behind them is not decoded. `None`:
 /// it holds no sound.
-pub fn hear(path: &Path, fps: FrameRate, n_frames: usize) -> Result<Option<SoundFeatures>> {
+pub fn extract(path: &Path, fps: FrameRate, n_frames: usize) -> Result<Option<SoundFeatures>> {
     // a second more, so that an onset at the end stands out from what follows
     let n_wanted = ((fps.secs(n_frames) + 1.0) * f64::from(SAMPLE_RATE)).ceil() as usize;
     let listen = |sink: &mut dyn FnMut(&[f32])| -> Result<usize> {
@@ -148,17 +148,17 @@ mod tests {
         let mut loudest = Loudest::default();
         loudest.push(&sound);
         let loudest = loudest.finish();
-        let heard = |piece: usize| {
+        let features = |piece: usize| {
             let mut listener = SoundFeatureExtractor::new(fps, Some(loudest));
             sound.chunks(piece).for_each(|samples| listener.push(samples));
             listener.finish(375)
         };
-        let whole = heard(sound.len());
+        let whole = features(sound.len());
         assert_eq!(whole.rows.len(), 188 * mel::N_MELS);
         assert_eq!(whole, of_samples(&sound, fps, 375));
         assert!(whole.secs == 25.0 && whole.onsets.len() > 15, "{:?}", whole.onsets);
         for piece in [701, 16_000, 160_001] {
-            let pieces = heard(piece);
+            let pieces = features(piece);
             assert_eq!(pieces.onsets, whole.onsets);
             let apart = pieces.rows.iter().zip(&whole.rows).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             assert!(pieces.rows.len() == whole.rows.len() && apart < 1e-4, "{piece}: {apart}");

@@ -51,7 +51,8 @@ pub struct BodyRow {
     /// The same by |yaw|: 0 to 20, 20 to 40, 40 to 60 degrees.
     pub by_yaw: Vec<Errors>,
     /// Share of the frames in which the method gave all points.
-    pub told: f64,
+    #[serde(rename = "told")]
+    pub complete_share: f64,
 }
 
 /// The table: for each set the lifter, its network alone, and three methods without a network. Errors: a set whose takes
@@ -92,8 +93,8 @@ fn row(
     };
     let by_yaw = BANDS.iter().map(band).collect();
     let n_frames: usize = scenes.iter().map(|s| s.truth.len()).sum();
-    let told = errors.n_frames as f64 / n_frames.max(1) as f64;
-    Ok(BodyRow { set: set.to_owned(), method, input: "drop", errors, by_yaw, told })
+    let complete_share = errors.n_frames as f64 / n_frames.max(1) as f64;
+    Ok(BodyRow { set: set.to_owned(), method, input: "drop", errors, by_yaw, complete_share })
 }
 
 /// A scene through the whole of `orator lift`.
@@ -141,7 +142,7 @@ pub fn text(rows: &[BodyRow]) -> String {
     );
     for same in rows.chunk_by(|a, b| a.set == b.set) {
         text += &format!("{}\n", same[0].set);
-        for BodyRow { method, input, errors: e, by_yaw, told, .. } in same {
+        for BodyRow { method, input, errors: e, by_yaw, complete_share, .. } in same {
             let bands: Vec<String> = by_yaw.iter().map(|e| format!("{:5.0}", e.mpjpe)).collect();
             text += &format!(
                 "  {method:20} {input:6} {:6.0} {:8.0} {:6.0} {:7.0} {:9.0} {:4.0} %               {}\n",
@@ -150,7 +151,7 @@ pub fn text(rows: &[BodyRow]) -> String {
                 e.wrist,
                 e.wrist_depth,
                 e.wrist_velocity,
-                100.0 * told,
+                100.0 * complete_share,
                 bands.join(" ")
             );
         }

@@ -31,16 +31,21 @@ pub fn measure(catalogue: &Catalogue, clips: &EvalClips, predictor: &Predictor) 
     let all: Vec<Measured> = pieces(clips)
         .into_par_iter()
         .map(|(clip, frames)| {
-            let (of, Some(made)) = (&clips.clips[clip], predictor.motion(clips, clip)) else {
+            let (of, Some(predicted)) = (&clips.clips[clip], predictor.motion(clips, clip)) else {
                 return Measured::default();
             };
-            let onsets: Option<Vec<f64>> = of.heard.as_ref().map(|heard| {
+            let onsets: Option<Vec<f64>> = of.features.as_ref().map(|features| {
                 let (start, end) = (clips.fps.secs(frames.start), clips.fps.secs(frames.end));
-                heard.onsets.iter().filter(|onset| (start..end).contains(*onset)).map(|onset| onset - start).collect()
+                features
+                    .onsets
+                    .iter()
+                    .filter(|onset| (start..end).contains(*onset))
+                    .map(|onset| onset - start)
+                    .collect()
             });
             let interval = Interval {
-                made: made.slice(s![frames.clone(), .., ..]),
-                real: of.real.slice(s![frames.clone(), .., ..]),
+                made: predicted.slice(s![frames.clone(), .., ..]),
+                real: of.ground_truth.slice(s![frames.clone(), .., ..]),
                 mask: of.mask.slice(s![frames, ..]),
                 fps: clips.fps,
                 onsets: onsets.as_deref(),
@@ -70,12 +75,13 @@ pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> Measured {
     let beside = |pair: &[(usize, usize)]| {
         let part = |(clip, start): (usize, usize)| {
             let (clip, frames) = (&clips.clips[clip], start..start + length);
-            (clip.real.slice(s![frames.clone(), .., ..]), clip.mask.slice(s![frames, ..]))
+            (clip.ground_truth.slice(s![frames.clone(), .., ..]), clip.mask.slice(s![frames, ..]))
         };
-        let ((real, seen), (made, also)) = (part(pair[0]), part(pair[1]));
+        let ((ground_truth, seen), (predicted, also)) = (part(pair[0]), part(pair[1]));
         let mut mask = seen.to_owned();
         mask.zip_mut_with(&also, |seen, also| *seen &= also);
-        let interval = Interval { made, real, mask: mask.view(), fps: clips.fps, onsets: None };
+        let interval =
+            Interval { made: predicted, real: ground_truth, mask: mask.view(), fps: clips.fps, onsets: None };
         catalogue.measure_blocks(&interval, length)
     };
     together(all.par_chunks_exact(2).map(beside).collect())

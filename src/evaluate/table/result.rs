@@ -17,7 +17,7 @@ pub const VERSION: u64 = 1;
 /// The whole result.
 pub fn json(table: &Table) -> Value {
     let metrics = (0..table.definitions.len()).map(|index| metric(table, index));
-    let predictors = table.rows.iter().map(|row| json!({ "name": row.who, "says": row.says }));
+    let predictors = table.rows.iter().map(|row| json!({ "name": row.kind, "says": row.description }));
     json!({
         "evaluation": VERSION,
         "convention": table.settings.convention,
@@ -43,7 +43,7 @@ fn metric(table: &Table, index: usize) -> Value {
     let mut values = Map::new();
     for row in &table.rows {
         let estimate = &row.values[index];
-        let name = serde_json::to_value(row.who).ok().and_then(|name| name.as_str().map(str::to_owned));
+        let name = serde_json::to_value(row.kind).ok().and_then(|name| name.as_str().map(str::to_owned));
         let value = match (estimate.value.is_finite(), row.reasons[index].as_str()) {
             (true, _) => json!(estimate),
             (false, "") => json!({ "value": null }),
@@ -109,8 +109,8 @@ impl StoredResult {
 
 impl StoredMetric {
     /// The value of a predictor, with its interval where it has one.
-    pub fn value(&self, who: PredictorKind) -> Option<Estimate> {
-        let name = serde_json::to_value(who).ok()?;
+    pub fn value(&self, kind: PredictorKind) -> Option<Estimate> {
+        let name = serde_json::to_value(kind).ok()?;
         let value = self.values.get(name.as_str()?)?;
         let number = |key: &str| value.get(key).and_then(Value::as_f64);
         let (low, high) = (number("low").unwrap_or(f64::NAN), number("high").unwrap_or(f64::NAN));

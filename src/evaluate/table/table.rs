@@ -19,9 +19,9 @@ pub const FEW_BLOCKS: usize = 10;
 /// One predictor's figures.
 #[derive(Clone, Debug)]
 pub struct PredictorRow {
-    pub who: PredictorKind,
+    pub kind: PredictorKind,
     /// What it is, in a sentence.
-    pub says: String,
+    pub description: String,
     /// One a definition.
     pub values: Vec<Estimate>,
     /// Why a value is none; empty where there is one.
@@ -64,10 +64,10 @@ pub fn measure(clips: &EvalClips, settings: &Settings, predictors: &[Predictor],
     ensure!(clips.n_frames() > 0, "there is no frame to measure");
     let (mut rows, mut n_blocks) = (Vec::new(), 0);
     for predictor in predictors {
-        task.detail(predictor.who.name());
+        task.detail(predictor.kind.name());
         let measured = blocks::measure(&catalogue, clips, predictor);
         n_blocks = measured.blocks.len();
-        rows.push(row(&catalogue, predictor.who, &predictor.says, &measured));
+        rows.push(row(&catalogue, predictor.kind, &predictor.description, &measured));
         task.advance(1);
     }
     task.detail("truth");
@@ -75,7 +75,7 @@ pub fn measure(clips: &EvalClips, settings: &Settings, predictors: &[Predictor],
     let truth = Predictor::truth(clips);
     // without its blocks: nothing is drawn of it
     let whole = blocks::measure(&catalogue, clips, &truth).whole;
-    rows.push(row(&catalogue, PredictorKind::Truth, &truth.says, &Measured { whole, blocks: Vec::new() }));
+    rows.push(row(&catalogue, PredictorKind::Truth, &truth.description, &Measured { whole, blocks: Vec::new() }));
     task.advance(1);
     let definitions = catalogue.definitions().to_vec();
     let truth_of = (0..definitions.len()).map(|index| catalogue.truth_of(index)).collect();
@@ -102,9 +102,9 @@ fn halves(catalogue: &Catalogue, clips: &EvalClips) -> Option<PredictorRow> {
     if measured.blocks.is_empty() {
         return None;
     }
-    let says = "every second block of the truth beside the others: how far apart two sets of real motion are that have half \
+    let description = "every second block of the truth beside the others: how far apart two sets of real motion are that have half \
                 the frames; only for figures of whole sets";
-    let mut row = row(catalogue, PredictorKind::TruthHalves, says, &measured);
+    let mut row = row(catalogue, PredictorKind::TruthHalves, description, &measured);
     for (index, definition) in catalogue.definitions().iter().enumerate().filter(|(_, d)| !is_of_sets(d)) {
         row.values[index] = Estimate { value: f64::NAN, low: f64::NAN, high: f64::NAN };
         row.reasons[index] = format!("{} needs two motions of the same seconds", definition.name);
@@ -117,7 +117,7 @@ fn is_of_sets(definition: &Definition) -> bool {
     ["frechet", "hellinger"].iter().any(|start| definition.name.starts_with(start))
 }
 
-fn row(catalogue: &Catalogue, who: PredictorKind, says: &str, measured: &Measured) -> PredictorRow {
+fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: &Measured) -> PredictorRow {
     let values = catalogue.values(&measured.whole);
     let n_blocks = measured.blocks.len();
     let drawn = if n_blocks == 0 {
@@ -143,8 +143,8 @@ fn row(catalogue: &Catalogue, who: PredictorKind, says: &str, measured: &Measure
         false => catalogue.reason(&measured.whole, index),
     };
     PredictorRow {
-        who,
-        says: says.to_owned(),
+        kind,
+        description: description.to_owned(),
         reasons: values.iter().enumerate().map(reason).collect(),
         values: values.iter().enumerate().map(estimate).collect(),
         drawn,
@@ -153,8 +153,8 @@ fn row(catalogue: &Catalogue, who: PredictorKind, says: &str, measured: &Measure
 
 impl Table {
     /// The figures of a predictor, where it was measured.
-    pub fn row(&self, who: PredictorKind) -> Option<&PredictorRow> {
-        self.rows.iter().find(|row| row.who == who)
+    pub fn row(&self, kind: PredictorKind) -> Option<&PredictorRow> {
+        self.rows.iter().find(|row| row.kind == kind)
     }
 
     /// By how much `a` is better than `b` in a figure, in its unit: above 0 where it is better, with the interval of the

@@ -8,8 +8,8 @@ use crate::metrics::catalogue::Better;
 use std::fmt::Write as _;
 
 /// Column heads, two lines each.
-const fn heads(who: PredictorKind) -> [&'static str; 2] {
-    match who {
+const fn heads(kind: PredictorKind) -> [&'static str; 2] {
+    match kind {
         PredictorKind::Prediction => ["", "prediction"],
         PredictorKind::MeanPose => ["mean", "pose"],
         PredictorKind::MedianPose => ["median", "pose"],
@@ -58,7 +58,7 @@ pub fn text(table: &Table, all: bool) -> String {
         text += "--all shows the other figures of arms, fingers and wrists too\n";
     }
     for row in &table.rows {
-        let _ = writeln!(text, "{}: {}", row.who.name(), row.says);
+        let _ = writeln!(text, "{}: {}", row.kind.name(), row.description);
     }
     for note in &table.notes {
         let _ = writeln!(text, "note: {note}");
@@ -116,12 +116,12 @@ fn named(table: &Table, index: usize) -> String {
 fn column(table: &Table, row: &PredictorRow, shown: &[usize]) -> Vec<String> {
     let cell = |index: &usize| {
         let (definition, estimate) = (&table.definitions[*index], &row.values[*index]);
-        match row.who {
+        match row.kind {
             PredictorKind::Prediction => labels::bracketed(definition, estimate),
             _ => labels::number(definition, estimate.value),
         }
     };
-    heads(row.who).iter().map(|head| (*head).to_owned()).chain(shown.iter().map(cell)).collect()
+    heads(row.kind).iter().map(|head| (*head).to_owned()).chain(shown.iter().map(cell)).collect()
 }
 
 fn pad(text: &str, width: usize) -> String {

@@ -35,7 +35,8 @@ pub enum Answer {
 /// A figure that was asked.
 #[derive(Clone, Debug, Serialize)]
 pub struct Vote {
-    pub figure: String,
+    #[serde(rename = "figure")]
+    pub metric: String,
     pub aspect: Aspect,
     /// Who it was held against.
     pub against: PredictorKind,
@@ -59,8 +60,8 @@ pub struct Verdict {
 pub fn better_than_nothing(table: &Table) -> Verdict {
     let question = "Is it better than doing nothing?";
     let Some(own) = table.row(PredictorKind::Prediction) else { return nothing(question) };
-    let asked = [Aspect::Place, Aspect::Poses, Aspect::Movement];
-    let votes = votes(table, own, &asked, |index| better_still(table, index));
+    let query = [Aspect::Place, Aspect::Poses, Aspect::Movement];
+    let votes = votes(table, own, &query, |index| better_still(table, index));
     let of = |aspect: Aspect| summed(votes.iter().filter(|vote| vote.aspect == aspect));
     let asks = |aspect: Aspect| votes.iter().any(|vote| vote.aspect == aspect);
     let rest = match summed(votes.iter().filter(|vote| vote.aspect != Aspect::Place)) {
@@ -69,7 +70,7 @@ pub fn better_than_nothing(table: &Table) -> Verdict {
         rest => rest,
     };
     let n_place = votes.iter().filter(|vote| vote.aspect == Aspect::Place).count();
-    let (word, says) = match (of(Aspect::Place), rest) {
+    let (word, description) = match (of(Aspect::Place), rest) {
         _ if table.learnt => return by_heart(question),
         _ if votes.is_empty() => return no_figure(question),
         _ if table.n_blocks < FEW_BLOCKS => return too_few(question, table),
@@ -124,17 +125,18 @@ pub fn better_than_nothing(table: &Table) -> Verdict {
             ("undecided", "no figure tells it apart from a pose that never moves")
         }
     };
-    let oracle = table.row(PredictorKind::MeanPose).is_some_and(|row| row.says.contains("oracle"));
+    let oracle = table.row(PredictorKind::MeanPose).is_some_and(|row| row.description.contains("oracle"));
     let oracle =
         if oracle { " (The pose is taken from the truth itself, which no predictor knows: a hard rival.)" } else { "" };
-    Verdict { word, sentence: format!("{question} {}: {says}.{oracle}", capital(word)), votes }
+    Verdict { word, sentence: format!("{question} {}: {description}.{oracle}", capital(word)), votes }
 }
 
 /// The better of the poses that never move, in a figure.
 fn better_still(table: &Table, index: usize) -> Option<&PredictorRow> {
     let better = |a: &PredictorRow, b: &PredictorRow| table.gain(a, b, index).value >= 0.0;
-    let stills = [PredictorKind::MeanPose, PredictorKind::MedianPose].into_iter().filter_map(|who| table.row(who));
-    stills.reduce(|a, b| if better(a, b) { a } else { b })
+    let constant_poses =
+        [PredictorKind::MeanPose, PredictorKind::MedianPose].into_iter().filter_map(|kind| table.row(kind));
+    constant_poses.reduce(|a, b| if better(a, b) { a } else { b })
 }
 
 /// Whether the prediction is better in one figure than the better of the poses that never move, whatever that says.
@@ -159,7 +161,7 @@ pub fn hears(table: &Table) -> Verdict {
     let own = table.row(PredictorKind::Prediction).zip(other);
     let Some((own, other)) = own else { return nothing(question) };
     let votes = votes(table, own, &[Aspect::Place, Aspect::Beat], |_| Some(other));
-    let (word, says) = match summed(votes.iter()) {
+    let (word, description) = match summed(votes.iter()) {
         _ if table.learnt => return by_heart(question),
         _ if votes.is_empty() => return no_figure(question),
         _ if table.n_blocks < FEW_BLOCKS => return too_few(question, table),
@@ -173,7 +175,7 @@ pub fn hears(table: &Table) -> Verdict {
             "its motion is not shown to fit its own sound better than a motion made for another sound or moment",
         ),
     };
-    Verdict { word, sentence: format!("{question} {}: {says}.", capital(word)), votes }
+    Verdict { word, sentence: format!("{question} {}: {description}.", capital(word)), votes }
 }
 
 fn nothing(question: &str) -> Verdict {
@@ -211,8 +213,8 @@ fn votes<'a>(
         let other = against(index)?;
         let gain = table.gain(own, other, index);
         let answer = answer(&gain);
-        let figure = labels::name(&table.definitions[index]);
-        gain.value.is_finite().then_some(Vote { figure, aspect, against: other.who, answer, gain })
+        let metric = labels::name(&table.definitions[index]);
+        gain.value.is_finite().then_some(Vote { metric, aspect, against: other.kind, answer, gain })
     };
     (0..table.definitions.len()).filter_map(vote).collect()
 }
@@ -257,7 +259,7 @@ impl Verdict {
     pub fn text(&self) -> String {
         let of = |answer: Answer| {
             let names: Vec<&str> =
-                self.votes.iter().filter(|v| v.answer == answer).map(|v| v.figure.as_str()).collect();
+                self.votes.iter().filter(|v| v.answer == answer).map(|v| v.metric.as_str()).collect();
             names.join("; ")
         };
         let parts = [(Answer::Yes, "better"), (Answer::No, "worse"), (Answer::Undecided, "not told apart")];

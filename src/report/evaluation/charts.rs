@@ -26,12 +26,12 @@ pub fn joints(table: &Table, clips: &EvalClips) -> Vec<Node> {
         if joint == NECK {
             continue;
         }
-        let says = match shares[joint].is_nan() {
+        let description = match shares[joint].is_nan() {
             true => format!("{}: never seen", skeleton::name(joint)),
             false => format!("{}: {:.0} %", skeleton::name(joint), 100.0 * shares[joint]),
         };
         let radius = if body(joint) { 9.0 } else { 6.0 };
-        all.push(ChartDot { at: place(joint), share: shares[joint], radius, says });
+        all.push(ChartDot { at: place(joint), share: shares[joint], radius, description });
     }
     let mean = |joints: &mut dyn Iterator<Item = usize>| {
         let known: Vec<f64> = joints.map(|joint| shares[joint]).filter(|share| share.is_finite()).collect();
@@ -64,14 +64,15 @@ fn shares(clips: &EvalClips, alpha: f64) -> Vec<f64> {
         for t in 0..clip.n_frames() {
             let joints: Vec<usize> = (NECK + 1..N_JOINTS).filter(|joint| clip.mask[[t, *joint]]).collect();
             let side = |k: usize| {
-                let values = joints.iter().map(|joint| clip.real[[t, *joint, k]]);
+                let values = joints.iter().map(|joint| clip.ground_truth[[t, *joint, k]]);
                 let (low, high) =
                     values.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
                 f64::from(high - low)
             };
             let radius = alpha * (0..3).map(side).fold(0.0, f64::max);
             for joint in joints {
-                let apart = |k: usize| f64::from(clip.made[[t, joint, k]] - clip.real[[t, joint, k]]).powi(2);
+                let apart =
+                    |k: usize| f64::from(clip.predicted[[t, joint, k]] - clip.ground_truth[[t, joint, k]]).powi(2);
                 seen[joint] += 1.0;
                 right[joint] += f64::from(u8::from((0..3).map(apart).sum::<f64>().sqrt() <= radius));
             }
@@ -121,16 +122,16 @@ pub fn speeds(clips: &EvalClips) -> Vec<Node> {
             }
             counts
         };
-        let (real, made) = (count(|clip| clip.real.view()), count(|clip| clip.made.view()));
+        let (ground_truth, predicted) = (count(|clip| clip.ground_truth.view()), count(|clip| clip.predicted.view()));
         let medians = format!(
             "median: truth {}, prediction {} {unit}",
-            crate::report::html::numbers::number(real.quantile(0.5)),
-            crate::report::html::numbers::number(made.quantile(0.5))
+            crate::report::html::numbers::number(ground_truth.quantile(0.5)),
+            crate::report::html::numbers::number(predicted.quantile(0.5))
         );
         node("div")
             .class("card speed")
             .child(node("h3").text(title))
-            .child(profile(&format!("{title}: {medians}"), unit, &[("real", &real), ("made", &made)]))
+            .child(profile(&format!("{title}: {medians}"), unit, &[("real", &ground_truth), ("made", &predicted)]))
             .child(node("small").text(medians))
     };
     let about = "How often each value occurs (heights go with the square root of the share, so that rare values are seen; the \

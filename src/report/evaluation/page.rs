@@ -61,16 +61,16 @@ fn meaning(table: &Table, verdicts: &[Verdict; 2]) -> Vec<Node> {
                 Answer::No => ("worse", "worse than"),
                 Answer::Undecided => ("undecided", "not told apart from"),
             };
-            let says = format!("{}: {words} {}", vote.figure, vote.against.name());
-            node("li").class(format!("vote {class}")).text(says)
+            let description = format!("{}: {words} {}", vote.metric, vote.against.name());
+            node("li").class(format!("vote {class}")).text(description)
         });
         let card = node("div").class(class).child(node("p").text(&verdict.sentence));
         card.child(node("ul").class("votes").children(votes))
     };
     let mut body = vec![node("div").class("verdicts").children(verdicts.iter().map(card))];
     let rows = table.rows.iter().map(|row| {
-        let name = node("th").attr("scope", "row").text(row.who.name());
-        node("tr").child(name).child(node("td").text(&row.says))
+        let name = node("th").attr("scope", "row").text(row.kind.name());
+        node("tr").child(name).child(node("td").text(&row.description))
     });
     body.push(node("h3").text("What is measured beside each other"));
     body.push(node("table").class("who").child(node("tbody").children(rows)));

@@ -32,8 +32,8 @@ pub struct Excerpt {
     pub secs: f64,
     fps: f64,
     /// i16 millimetres [T, 49, 3], little endian.
-    real: Vec<u8>,
-    made: Vec<u8>,
+    ground_truth: Vec<u8>,
+    predicted: Vec<u8>,
     /// A wav file.
     sound: Option<Vec<u8>>,
     lanes: Vec<Lane>,
@@ -72,7 +72,7 @@ fn error_mm(clip: &EvalClip, frames: Range<usize>) -> f64 {
     let (mut sum, mut n) = (0.0, 0.0);
     for t in frames {
         for joint in (1..N_JOINTS).filter(|joint| clip.mask[[t, *joint]]) {
-            let apart = |k: usize| f64::from(clip.made[[t, joint, k]] - clip.real[[t, joint, k]]).powi(2);
+            let apart = |k: usize| f64::from(clip.predicted[[t, joint, k]] - clip.ground_truth[[t, joint, k]]).powi(2);
             sum += 1000.0 * (0..3).map(apart).sum::<f64>().sqrt();
             n += 1.0;
         }
@@ -89,8 +89,8 @@ fn excerpt(word: &str, error: f64, clip: &EvalClip, frames: Range<usize>, fps: f
         name: format!("{word}: {} from {} to {} ({error:.0} mm)", clip.name, clock(start), clock(end)),
         secs: end - start,
         fps: fps / step as f64,
-        real: millimetres(clip.real.view(), &shown),
-        made: millimetres(clip.made.view(), &shown),
+        ground_truth: millimetres(clip.ground_truth.view(), &shown),
+        predicted: millimetres(clip.predicted.view(), &shown),
         lanes: lanes_of(clip, frames, fps, samples.as_deref()),
         sound: samples.map(|samples| wav(&samples)),
     })
@@ -126,7 +126,7 @@ fn wav(samples: &[i16]) -> Vec<u8> {
 /// Heights and speeds of the wrists over time, the loudness with its onsets, and the beats of the motion.
 fn lanes_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[i16]>) -> Vec<Lane> {
     let secs = |t: usize| (t - frames.start) as f64 / fps;
-    let both: [(&str, ArrayView3<f32>); 2] = [("real", clip.real.view()), ("made", clip.made.view())];
+    let both: [(&str, ArrayView3<f32>); 2] = [("real", clip.ground_truth.view()), ("made", clip.predicted.view())];
     let height = |name: &str, joint: usize| Lane {
         name: name.to_owned(),
         lines: both
@@ -158,9 +158,9 @@ fn lanes_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[i
         lines.push((class, speeds.iter().enumerate().map(|(i, speed)| [i as f64 / fps, *speed]).collect()));
     }
     all.push(Lane { name: "speed of the wrists".to_owned(), lines, marks: Vec::new() });
-    if let Some(heard) = clip.heard.as_ref().filter(|_| samples.is_some()) {
+    if let Some(features) = clip.features.as_ref().filter(|_| samples.is_some()) {
         let (start, end) = (frames.start as f64 / fps, frames.end as f64 / fps);
-        let onsets = heard.onsets.iter().filter(|onset| (start..end).contains(*onset)).map(|onset| onset - start);
+        let onsets = features.onsets.iter().filter(|onset| (start..end).contains(*onset)).map(|onset| onset - start);
         marks.push(("onset", onsets.collect()));
     }
     let name =
@@ -193,8 +193,8 @@ impl Excerpt {
         json!({
             "secs": self.secs,
             "fps": self.fps,
-            "real": base64(&self.real),
-            "made": base64(&self.made),
+            "real": base64(&self.ground_truth),
+            "made": base64(&self.predicted),
             "sound": self.sound.as_deref().map(base64),
         })
     }

@@ -18,7 +18,7 @@ const GROUPS: [(&str, &[&str]); 4] = [
 /// The table.
 pub fn body(table: &Table) -> Vec<Node> {
     let head = |text: &str| node("th").attr("scope", "col").class("num").text(text);
-    let heads = table.rows.iter().map(|row| head(row.who.name()));
+    let heads = table.rows.iter().map(|row| head(row.kind.name()));
     let first = node("th").attr("scope", "col").text("");
     let against = node("th").attr("scope", "col").class("against").text("against doing nothing");
     let width = table.rows.len() + 2;
@@ -80,14 +80,14 @@ fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
     };
     let cells = table.rows.iter().map(|row| {
         let estimate = &row.values[index];
-        let cell = node("td").class(if row.who == PredictorKind::Prediction { "num own" } else { "num" });
+        let cell = node("td").class(if row.kind == PredictorKind::Prediction { "num own" } else { "num" });
         let cell = cell.text(labels::number(definition, estimate.value));
         if !(estimate.low.is_finite() && estimate.high.is_finite()) {
             return cell;
         }
         let [low, high] = [estimate.low, estimate.high].map(|value| labels::number(definition, value));
         let interval = format!("[{low}, {high}]");
-        if row.who == PredictorKind::Prediction {
+        if row.kind == PredictorKind::Prediction {
             cell.child(node("small").text(interval))
         } else {
             cell.attr("title", interval)

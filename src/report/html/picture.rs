@@ -5,12 +5,12 @@ use super::node::{Node, node};
 const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
 /// A JPEG of `width` x `height` px, loaded when it comes into view; `says` stands in for it.
-pub fn jpeg(bytes: &[u8], [width, height]: [usize; 2], says: &str) -> Node {
+pub fn jpeg(bytes: &[u8], [width, height]: [usize; 2], description: &str) -> Node {
     node("img")
         .attr("src", format!("data:image/jpeg;base64,{}", base64(bytes)))
         .attr("width", width)
         .attr("height", height)
-        .attr("alt", says)
+        .attr("alt", description)
         .attr("loading", "lazy")
 }
 

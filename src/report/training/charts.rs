@@ -29,9 +29,9 @@ impl<'a> TrainingLog<'a> {
         let made = |name: &str, colour, of: &str| self.validated(name, colour, &format!("/validation/generator/{of}"));
         let still = |name: &str, colour, of: &str| self.level(name, colour, &format!("/validation/mean_pose/{of}"));
         let level = |name: &str, colour, value| ChartLevel { name: name.to_owned(), colour, value };
-        let chart = |title: &str, says: &str, lines: Vec<ChartLine>, levels: Vec<ChartLevel>| LineChart {
+        let chart = |title: &str, description: &str, lines: Vec<ChartLine>, levels: Vec<ChartLevel>| LineChart {
             title: title.to_owned(),
-            says: says.to_owned(),
+            description: description.to_owned(),
             lines,
             levels,
             marked: self.best.and_then(|line| line["step"].as_f64()),

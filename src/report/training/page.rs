@@ -48,8 +48,8 @@ pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> 
         poses = vec![node("p").class("empty").text("The dataset has no interval to show.")];
     } else {
         let names: Vec<&str> = pairs.iter().map(|pair| pair.name.as_str()).collect();
-        let says = format!("True and generated poses of {}", names.join(", "));
-        let image = page_picture::jpeg(&jpeg::encode(&strip)?, [strip.width, strip.height], &says);
+        let description = format!("True and generated poses of {}", names.join(", "));
+        let image = page_picture::jpeg(&jpeg::encode(&strip)?, [strip.width, strip.height], &description);
         poses.push(node("div").class("scroll").child(image.class("strip")));
     }
     let section = |id, title, body| Section { id, title, body };

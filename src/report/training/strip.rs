@@ -15,8 +15,8 @@ pub struct HeldOutPair {
     pub name: String,
     /// Where in the interval they begin.
     pub start_secs: f64,
-    pub real: Motion,
-    pub made: Motion,
+    pub ground_truth: Motion,
+    pub predicted: Motion,
 }
 
 const N_MOMENTS: usize = 8;
@@ -43,15 +43,16 @@ pub fn strip(pairs: &[HeldOutPair]) -> Result<Image> {
 }
 
 fn draw_pair(image: &mut Image, top: usize, pair: &HeldOutPair) -> Result<()> {
-    let fps = pair.real.fps;
-    let n_frames = pair.real.n_frames().min(pair.made.n_frames());
+    let fps = pair.ground_truth.fps;
+    let n_frames = pair.ground_truth.n_frames().min(pair.predicted.n_frames());
     let span = ((N_MOMENTS as f64 * EVERY_SECS * fps.per_sec()).round() as usize).clamp(1, n_frames.max(1));
     // from the middle: the beginning of an interval is often a rest
     let first = n_frames.saturating_sub(span) / 2;
     let frame_of = |moment: usize| first + (2 * moment + 1) * span / (2 * N_MOMENTS);
     let words = format!("{}, from {:.1} s", pair.name, pair.start_secs + fps.secs(first));
     draw::text(image, &words, [8.0, top as f32 + 17.0], 10.0, INK)?;
-    for (row, (name, motion)) in [("true", &pair.real), ("generated", &pair.made)].into_iter().enumerate() {
+    for (row, (name, motion)) in [("true", &pair.ground_truth), ("generated", &pair.predicted)].into_iter().enumerate()
+    {
         let row_top = top + NAME_PX + row * CELL[1];
         draw::text(image, name, [8.0, row_top as f32 + 62.0], 9.0, INK)?;
         for moment in (0..N_MOMENTS).filter(|moment| frame_of(*moment) < n_frames) {
@@ -76,7 +77,7 @@ fn draw_pair(image: &mut Image, top: usize, pair: &HeldOutPair) -> Result<()> {
         for edge in [above, below] {
             draw::line(image, [x(first), y(edge)], [x(first) + width, y(edge)], 1.0, mix(INK, PAPER, 0.85))?;
         }
-        for (motion, rgb, wide) in [(&pair.real, mix(INK, PAPER, 0.35), 2.0), (&pair.made, rgb, 2.0)] {
+        for (motion, rgb, wide) in [(&pair.ground_truth, mix(INK, PAPER, 0.35), 2.0), (&pair.predicted, rgb, 2.0)] {
             for frame in first + 1..(first + span).min(n_frames) {
                 let place = |frame: usize| [x(frame), y(motion.joints[[frame, joint, 1]])];
                 draw::line(image, place(frame - 1), place(frame), wide, rgb)?;
@@ -88,7 +89,7 @@ fn draw_pair(image: &mut Image, top: usize, pair: &HeldOutPair) -> Result<()> {
 
 /// Highest and lowest place of a wrist in either motion, metres below the neck.
 fn range(pair: &HeldOutPair, joint: usize, frames: Range<usize>) -> [f32; 2] {
-    let heights = [&pair.real, &pair.made].into_iter().flat_map(|motion| {
+    let heights = [&pair.ground_truth, &pair.predicted].into_iter().flat_map(|motion| {
         frames.clone().map(|frame| motion.joints[[frame, joint, 1]]).filter(|height| height.is_finite())
     });
     let [above, below] =
@@ -114,16 +115,16 @@ mod tests {
                 |(t, joint, k): (usize, usize, usize)| (t as f32 * 0.01 + joint as f32 * 0.01 + shift) * k as f32;
             Motion::from_joints(FrameRate::new(15, 1), Array3::from_shape_fn((n_frames, N_JOINTS, 3), place))
         };
-        for (n_real, n_made) in [(0, 3), (1, 1), (3, 5), (90, 89)] {
+        for (n_ground_truth, n_predicted) in [(0, 3), (1, 1), (3, 5), (90, 89)] {
             let pair = HeldOutPair {
                 name: "a".to_owned(),
                 start_secs: 0.0,
-                real: motion(n_real, 0.0),
-                made: motion(n_made, 0.1),
+                ground_truth: motion(n_ground_truth, 0.0),
+                predicted: motion(n_predicted, 0.1),
             };
             let image = strip(&[pair]).unwrap();
             assert_eq!((image.width, image.height), (WIDTH, PAIR_PX));
-            assert!(image.data.iter().any(|v| *v < 100), "{n_real}");
+            assert!(image.data.iter().any(|v| *v < 100), "{n_ground_truth}");
         }
         assert_eq!(strip(&[]).unwrap().height, 1);
     }

@@ -31,12 +31,12 @@ fn card(shown: &MeasureHistogram) -> Node {
         if threshold.is_least { middle < threshold.value } else { middle > threshold.value }
     });
     let beyond: u64 = beyond.map(|bin| counts.bins[bin]).sum();
-    let mut says = format!("about {} beyond the threshold", percent(beyond as f64, total));
+    let mut description = format!("about {} beyond the threshold", percent(beyond as f64, total));
     if unknown > 0.0 {
-        says += &format!("; not known of {}", percent(unknown, total + unknown));
+        description += &format!("; not known of {}", percent(unknown, total + unknown));
     }
     let what = counted(counts.total() as usize, shown.of);
-    let label = format!("{}, {what}: {says}", shown.title);
+    let label = format!("{}, {what}: {description}", shown.title);
     card.child(histogram(&label, counts, shown.unit, Some(threshold)))
-        .child(node("small").text(format!("{what}, {says}")))
+        .child(node("small").text(format!("{what}, {description}")))
 }

@@ -34,13 +34,17 @@ pub fn gallery(worst: &Worst, pictures: &Pictures, videos: &[VideoSummary]) -> V
 fn card(moment: &Moment, video: &VideoSummary, pictures: &Pictures) -> Node {
     let at = format!("{} at {}", video.file, clock(moment.secs));
     let shown = match pictures.get(&(moment.video, moment.frames.clone())) {
-        Some(found) => picture::jpeg(&found.jpeg, found.size, &format!("{at}: {}", moment.says)),
+        Some(found) => picture::jpeg(&found.jpeg, found.size, &format!("{at}: {}", moment.description)),
         None => node("p").class("empty nopicture").text("The picture cannot be read."),
     };
     let link = node("a").attr("href", format!("#{}", video.anchor())).text(at);
-    let says = if moment.here.is_empty() { moment.says.clone() } else { format!("{}; {}", moment.says, moment.here) };
+    let description = if moment.here.is_empty() {
+        moment.description.clone()
+    } else {
+        format!("{}; {}", moment.description, moment.here)
+    };
     node("figure")
         .class(if moment.frames.len() > 1 { "card shot pair" } else { "card shot" })
         .child(shown)
-        .child(node("figcaption").child(link).child(node("small").text(says)))
+        .child(node("figcaption").child(link).child(node("small").text(description)))
 }

@@ -30,8 +30,8 @@ pub fn order(reason: &str) -> usize {
 }
 
 /// The sentence; empty for unknown ones.
-pub fn says(reason: &str) -> &'static str {
-    REASONS.iter().find(|(known, _)| *known == reason).map_or("", |(_, says)| says)
+pub fn description(reason: &str) -> &'static str {
+    REASONS.iter().find(|(known, _)| *known == reason).map_or("", |(_, description)| description)
 }
 
 /// The class of its colour.
@@ -49,7 +49,7 @@ mod tests {
     fn every_reason_has_its_sentence_and_its_colour() {
         let style = include_str!("page.css");
         for reason in Refusal::ALL.map(Refusal::reason).into_iter().chain(["bones", "open"]) {
-            assert!(!says(reason).is_empty(), "{reason}");
+            assert!(!description(reason).is_empty(), "{reason}");
             assert!(style.contains(&format!(".{} ", class(reason))), "{reason} has no colour");
         }
         assert_eq!((class("<b>").as_str(), order("new")), ("r-unknown", REASONS.len()));

@@ -94,7 +94,7 @@ fn card(i: usize, threshold: &ThresholdGrid, sums: &[f64], most: f64, rules: &Se
         .attr("value", now)
         .attr("autocomplete", "off")
         .attr("aria-valuetext", &configured);
-    let says = format!("{}: seconds kept by value of the threshold", threshold.key);
+    let description = format!("{}: seconds kept by value of the threshold", threshold.key);
     let values = node("p")
         .class("values")
         .child(node("output").class("value").attr("for", &id).text(&configured))
@@ -102,8 +102,8 @@ fn card(i: usize, threshold: &ThresholdGrid, sums: &[f64], most: f64, rules: &Se
     node("div")
         .class("card knob")
         .child(node("h3").child(label))
-        .child(node("small").text(threshold.says))
-        .child(curve(&says, sums, most, now))
+        .child(node("small").text(threshold.description))
+        .child(curve(&description, sums, most, now))
         .child(slider)
         .child(values)
 }

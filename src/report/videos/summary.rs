@@ -44,9 +44,9 @@ impl ReportTotals {
 
 /// The sums as tiles, and what is to be known of them.
 pub fn totals(sums: &ReportTotals, videos: &[VideoSummary], missing: &[String]) -> Vec<Node> {
-    let tile = |name: &str, id: &str, secs: f64, says: String| {
+    let tile = |name: &str, id: &str, secs: f64, description: String| {
         let value = node("b").id(id).attr("data-secs", format!("{secs:.3}")).text(length(secs));
-        node("div").class("tile").text(name).child(value).child(node("small").text(says))
+        node("div").class("tile").text(name).child(value).child(node("small").text(description))
     };
     let share = |secs: f64| percent(secs, sums.whole);
     let n_failed = videos.iter().filter(|video| video.has_failed).count();
@@ -69,15 +69,15 @@ pub fn by_reason(sums: &ReportTotals) -> Vec<Node> {
         name: reason.clone(),
         class: reasons::class(reason),
         secs: *secs,
-        says: reasons::says(reason).to_owned(),
+        description: reasons::description(reason).to_owned(),
     };
     let mut parts: Vec<StackedBar> = sums.refused.iter().map(bar).collect();
     parts.sort_by(|a, b| b.secs.total_cmp(&a.secs).then(a.name.cmp(&b.name)));
-    let other = |name: &str, class: &str, secs: f64, says: &str| StackedBar {
+    let other = |name: &str, class: &str, secs: f64, description: &str| StackedBar {
         name: name.into(),
         class: class.into(),
         secs,
-        says: says.into(),
+        description: description.into(),
     };
     parts.insert(0, other("kept", "kept", sums.kept, "worth learning from"));
     if sums.failed > 0.0 {

@@ -9,7 +9,7 @@ const N_STEPS: u32 = 20;
 pub struct ThresholdGrid {
     /// Its key in `[segment]`.
     pub key: &'static str,
-    pub says: &'static str,
+    pub description: &'static str,
     /// Empty: a score or a share, 0 to 1.
     pub unit: &'static str,
     /// Ends of what is tried.
@@ -21,10 +21,10 @@ pub struct ThresholdGrid {
 
 /// A row: key, sentence, unit, ends, and the field.
 macro_rules! row {
-    ($key:ident, $says:literal, $unit:literal, $low:literal, $high:literal) => {
+    ($key:ident, $description:literal, $unit:literal, $low:literal, $high:literal) => {
         ThresholdGrid {
             key: stringify!($key),
-            says: $says,
+            description: $description,
             unit: $unit,
             low: $low,
             high: $high,
@@ -57,7 +57,7 @@ pub const THRESHOLDS: [ThresholdGrid; 16] = [
     row!(shot_threshold, "shot score from which a frame begins a new shot", "", 0.0, 1.0),
     ThresholdGrid {
         key: "max_people",
-        says: "people in view that are not too many",
+        description: "people in view that are not too many",
         unit: "people",
         low: 1.0,
         high: 21.0,
@@ -67,7 +67,7 @@ pub const THRESHOLDS: [ThresholdGrid; 16] = [
     row!(max_crowd_share, "share of a stretch that may show more people", "", 0.0, 1.0),
     ThresholdGrid {
         key: "min_frames",
-        says: "shortest stretch that is kept",
+        description: "shortest stretch that is kept",
         unit: "frames",
         low: 16.0,
         high: 176.0,

@@ -55,13 +55,13 @@ pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
 /// Every stretch of a ledger, in order.
 fn stretches(video: &VideoSummary) -> Vec<TimelineSpan> {
     let ledger = &video.ledger;
-    let stretch = |start_secs: f64, end_secs: f64, class: String, word: &str, says: String| TimelineSpan {
+    let stretch = |start_secs: f64, end_secs: f64, class: String, word: &str, description: String| TimelineSpan {
         start_secs,
         end_secs,
         class,
         word: word.to_owned(),
-        says: format!(
-            "{} to {} ({} s): {word}\n{says}",
+        description: format!(
+            "{} to {} ({} s): {word}\n{description}",
             clock(start_secs),
             clock(end_secs),
             number((10.0 * (end_secs - start_secs)).round() / 10.0)
@@ -75,13 +75,14 @@ fn stretches(video: &VideoSummary) -> Vec<TimelineSpan> {
         .map(|kept| stretch(kept.start_secs, kept.end_secs, "kept".to_owned(), "kept", String::new()));
     let refused = ledger.refused.iter().map(|refused| {
         let (measured, threshold) = (refused.measured, with_unit(refused.threshold, &refused.unit));
-        let says = format!("{}\nmeasured {}, threshold {threshold}", refused.says, with_unit(measured, &refused.unit));
-        stretch(refused.start_secs, refused.end_secs, reasons::class(&refused.reason), &refused.reason, says)
+        let description =
+            format!("{}\nmeasured {}, threshold {threshold}", refused.says, with_unit(measured, &refused.unit));
+        stretch(refused.start_secs, refused.end_secs, reasons::class(&refused.reason), &refused.reason, description)
     });
     let failed = ledger.failed.iter().map(|failed| {
         let (class, word) = if failed.stage == WAITING { ("waiting", WAITING) } else { ("failed", "failed") };
-        let says = video.notes.first().cloned().unwrap_or_default();
-        stretch(failed.start_secs, failed.end_secs, class.to_owned(), word, says)
+        let description = video.notes.first().cloned().unwrap_or_default();
+        stretch(failed.start_secs, failed.end_secs, class.to_owned(), word, description)
     });
     let mut all: Vec<TimelineSpan> = kept.chain(refused).chain(failed).collect();
     all.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));

@@ -21,7 +21,7 @@ pub struct Moment {
     /// How far beyond the threshold.
     beyond: f64,
     /// The stretch's sentence.
-    pub says: String,
+    pub description: String,
     /// What was measured in this very frame; empty where the rule is not on frames.
     pub here: String,
 }
@@ -106,7 +106,7 @@ fn moment(
     let compares = matches!(refusal, Some(Refusal::Cut | Refusal::Identity | Refusal::Jump)) && t > 0;
     let frames = if compares { vec![t - 1, t] } else { vec![t] };
     let beyond = if beyond.is_finite() { beyond } else { 0.0 };
-    Some(Moment { video, frames, secs: judged.fps.secs(t), beyond, says: stretch.says.clone(), here })
+    Some(Moment { video, frames, secs: judged.fps.secs(t), beyond, description: stretch.says.clone(), here })
 }
 
 /// The frame that breaks the refusal's rules most: its number, value, bound, and whether the ledger means that value.

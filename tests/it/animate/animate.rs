@@ -41,20 +41,20 @@ fn is_within(pose: &ArmPose) -> bool {
 
 #[test]
 fn random_rotations_come_out_within_the_limits_and_what_is_within_stays() {
-    let figure = perform(&swinging(0, 4), None, &UNTOUCHED).figure;
+    let rig = perform(&swinging(0, 4), None, &UNTOUCHED).rig;
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let mut tally = ClampTally::default();
     for n in 0..2_000 {
-        let mut frame: Vec<Rotation> = figure.skeleton.joints.iter().map(|_| random_rotation(&mut random)).collect();
-        Constraints::default().apply(&figure, &mut frame, &mut tally);
-        for arm in &figure.arms {
+        let mut frame: Vec<Rotation> = rig.skeleton.joints.iter().map(|_| random_rotation(&mut random)).collect();
+        Constraints::default().apply(&rig, &mut frame, &mut tally);
+        for arm in &rig.arms {
             let pose = ArmPose::from_rotations(arm, &frame);
             assert!(is_within(&pose), "{n}: {pose:?}");
         }
         let mut again = frame.clone();
-        Constraints::default().apply(&figure, &mut again, &mut ClampTally::default());
+        Constraints::default().apply(&rig, &mut again, &mut ClampTally::default());
         for (joint, (a, b)) in frame.iter().zip(&again).enumerate() {
-            assert!((a.inverse() * *b).angle() < 1e-6, "{n}: {} moves again", figure.skeleton.joints[joint].name);
+            assert!((a.inverse() * *b).angle() < 1e-6, "{n}: {} moves again", rig.skeleton.joints[joint].name);
         }
     }
     let clamps = tally.clamps();
@@ -64,28 +64,28 @@ fn random_rotations_come_out_within_the_limits_and_what_is_within_stays() {
 
 #[test]
 fn constraints_do_not_make_an_even_motion_jump() {
-    let figure = perform(&swinging(0, 4), None, &UNTOUCHED).figure;
+    let rig = perform(&swinging(0, 4), None, &UNTOUCHED).rig;
     let mut random = ChaCha8Rng::seed_from_u64(4);
     for _ in 0..20 {
         // Fingers pass through every impossible place; elbows and hands through what they could nearly do.
-        let limbs: Vec<usize> = figure.arms.iter().flat_map(|arm| [arm.fore, arm.hand]).collect();
+        let limbs: Vec<usize> = rig.arms.iter().flat_map(|arm| [arm.fore, arm.hand]).collect();
         let ends: [Vec<Rotation>; 2] = [0, 1].map(|_| {
             let end = |joint| {
                 let share = if limbs.contains(&joint) { 0.25 } else { 1.0 };
                 Rotation::IDENTITY.slerp(random_rotation(&mut random), share)
             };
-            (0..figure.skeleton.joints.len()).map(end).collect()
+            (0..rig.skeleton.joints.len()).map(end).collect()
         });
         let mut last: Option<Vec<Rotation>> = None;
         for step in 0..=4_000 {
             let share = f64::from(step) / 4_000.0;
             let between = |joint: usize| ends[0][joint].slerp(ends[1][joint], share);
-            let mut frame: Vec<Rotation> = (0..figure.skeleton.joints.len()).map(between).collect();
-            Constraints::default().apply(&figure, &mut frame, &mut ClampTally::default());
-            for arm in &figure.arms {
+            let mut frame: Vec<Rotation> = (0..rig.skeleton.joints.len()).map(between).collect();
+            Constraints::default().apply(&rig, &mut frame, &mut ClampTally::default());
+            for arm in &rig.arms {
                 for &joint in arm.fingers.iter().flatten().chain([&arm.fore, &arm.hand]) {
                     let turned = last.as_ref().map_or(0.0, |last| (last[joint].inverse() * frame[joint]).angle());
-                    assert!(turned.to_degrees() < 6.0, "{}: {turned}", figure.skeleton.joints[joint].name);
+                    assert!(turned.to_degrees() < 6.0, "{}: {turned}", rig.skeleton.joints[joint].name);
                 }
             }
             last = Some(frame);
@@ -172,7 +172,7 @@ fn untouched_joints_with_rigid_palms_come_back_and_performing_twice_is_performin
         assert!(apart < 0.1, "seed {seed}: {apart} mm");
         let limited = AnimationOptions { smoothing: Smoothing::None, ..AnimationOptions::default() };
         let once = perform(&rigid, None, &limited);
-        assert!(once.told.clamps.iter().any(|kind| kind.joint_frames > 0));
+        assert!(once.report.clamps.iter().any(|kind| kind.joint_frames > 0));
         let twice = perform(&once.motion(), None, &limited);
         let apart = apart_mm(&twice.motion(), &once.motion());
         assert!(apart < 0.1, "seed {seed}: {apart} mm");
@@ -182,12 +182,12 @@ fn untouched_joints_with_rigid_palms_come_back_and_performing_twice_is_performin
 #[test]
 fn smoothing_calms_and_bones_keep_their_length() {
     let motion = with_gaps(1, 150);
-    let Performance { told, clip, figure } = perform(&motion, None, &AnimationOptions::default());
+    let Performance { report, clip, rig } = perform(&motion, None, &AnimationOptions::default());
     let fall = |jerk: orator::animate::performance::Jerk| jerk.after.unwrap() / jerk.before.unwrap();
-    assert!(fall(told.arms) < 0.4 && fall(told.hands) < 0.5, "{told:?}");
+    assert!(fall(report.arms) < 0.4 && fall(report.hands) < 0.5, "{report:?}");
     for frame in 0..clip.n_frames() {
         let places = clip.positions(frame);
-        for (joint, bone) in figure.skeleton.joints.iter().enumerate() {
+        for (joint, bone) in rig.skeleton.joints.iter().enumerate() {
             let Some(parent) = bone.parent else { continue };
             let square = |k: usize| (places[joint][k] - places[parent][k]).powi(2);
             let length = (0..3).map(|k| bone.offset[k].powi(2)).sum::<f64>().sqrt();
@@ -195,8 +195,8 @@ fn smoothing_calms_and_bones_keep_their_length() {
         }
     }
     let as_it_is =
-        perform(&motion, None, &AnimationOptions { smoothing: Smoothing::None, ..AnimationOptions::default() }).told;
-    assert!(as_it_is.arms.after.unwrap() > 2.0 * told.arms.after.unwrap());
+        perform(&motion, None, &AnimationOptions { smoothing: Smoothing::None, ..AnimationOptions::default() }).report;
+    assert!(as_it_is.arms.after.unwrap() > 2.0 * report.arms.after.unwrap());
 }
 
 #[test]
@@ -212,7 +212,7 @@ fn another_rate_passes_through_the_frames_without_corners() {
         }
     }
     // Speed before and after a frame differs no more than it does between frames.
-    let upper = fast.figure.arms[0].upper;
+    let upper = fast.rig.arms[0].upper;
     let clip = perform(&motion, None, &UNTOUCHED).clip.resampled(FrameRate::new(1500, 1));
     let turn = |t: usize| (clip.local[t - 1][upper].inverse() * clip.local[t][upper]).angle();
     let change = |t: usize| (turn(t + 1) - turn(t)).abs();
@@ -259,14 +259,14 @@ fn the_head_turns_with_the_face_and_rests_without() {
         }
     }
     let performance = perform(&motion, Some(&Face { body }), &AnimationOptions::default());
-    assert_eq!(performance.told.face_frames, Some(45));
-    let (figure, clip) = (&performance.figure, &performance.clip);
-    let ahead = |t: usize| figure.skeleton.world(&clip.local[t])[figure.head].turn([0.0, 0.0, 1.0]);
+    assert_eq!(performance.report.face_frames, Some(45));
+    let (rig, clip) = (&performance.rig, &performance.clip);
+    let ahead = |t: usize| rig.skeleton.world(&clip.local[t])[rig.head].turn([0.0, 0.0, 1.0]);
     for t in [5, 20, 40] {
         let [x, y, _] = ahead(t);
         assert!((x - 0.6f64.sin()).abs() < 0.12 && y.abs() < 0.15, "frame {t}: {:?}", ahead(t));
     }
-    for joint in [figure.neck, figure.head] {
+    for joint in [rig.neck, rig.head] {
         assert!(clip.local[70][joint].angle() < 1e-6 && clip.local[20][joint].angle() > 0.1);
     }
 }

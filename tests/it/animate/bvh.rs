@@ -39,13 +39,13 @@ fn the_bvh_gives_back_the_joints_within_a_tenth_of_a_millimetre() {
 
 #[test]
 fn a_t_pose_is_the_rest_pose_facing_plus_z() {
-    let figure = Rig::from_motion(&swinging(0, 8));
-    let local = vec![Rotation::IDENTITY; figure.skeleton.joints.len()];
-    let places = figure.skeleton.positions(figure.root, &local);
-    let neck = places[figure.places[skeleton::NECK]];
+    let rig = Rig::from_motion(&swinging(0, 8));
+    let local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
+    let places = rig.skeleton.positions(rig.root, &local);
+    let neck = places[rig.positions[skeleton::NECK]];
     let joints = Array3::from_shape_fn((2, N_JOINTS, 3), |(_, joint, k)| {
         let sign = if k == 0 { 1.0 } else { -1.0 };
-        (sign * (places[figure.places[joint]][k] - neck[k]) / 100.0) as f32
+        (sign * (places[rig.positions[joint]][k] - neck[k]) / 100.0) as f32
     });
     assert!(joints[[0, skeleton::L_WRIST, 0]] > 0.5, "the left wrist is at the right of the picture");
     let clip = clip(&Motion::from_joints(FPS, joints));
@@ -115,13 +115,13 @@ fn the_released_clips_keep_their_gesture() {
         AnimationOptions { smoothing: Smoothing::None, constraints: Constraints::NONE, ..AnimationOptions::default() };
     let clip = perform(&motion, None, &untouched).clip;
     // The clip's bones vary by some percent of their length: the file keeps directions and gives each one length.
-    let figure = Rig::from_motion(&motion);
+    let rig = Rig::from_motion(&motion);
     let mut apart = Vec::new();
     for frame in 0..motion.n_frames() {
         let places = clip.positions(frame);
-        let neck = places[figure.places[0]];
+        let neck = places[rig.positions[0]];
         for joint in 1..N_JOINTS {
-            let place = places[figure.places[joint]];
+            let place = places[rig.positions[joint]];
             let along =
                 |k: usize, sign: f64| (place[k] - neck[k]) / 100.0 - sign * f64::from(motion.joints[[frame, joint, k]]);
             apart.push(along(0, 1.0).hypot(along(1, -1.0)).hypot(along(2, -1.0)));
@@ -130,7 +130,7 @@ fn the_released_clips_keep_their_gesture() {
     let mean = apart.iter().sum::<f64>() / apart.len() as f64;
     assert!(mean < 0.03, "{mean} m");
     let jumps = (1..motion.n_frames())
-        .flat_map(|t| figure.arms.iter().flat_map(move |arm| [arm.upper, arm.fore].map(|joint| (t, joint))))
+        .flat_map(|t| rig.arms.iter().flat_map(move |arm| [arm.upper, arm.fore].map(|joint| (t, joint))))
         .filter(|&(t, joint)| (clip.local[t - 1][joint].inverse() * clip.local[t][joint]).angle() > 1.2)
         .count();
     assert!(jumps < 8, "{jumps} sudden turns of an arm in {} frames", motion.n_frames());

@@ -24,8 +24,8 @@ fn nodes_and_animation_give_the_joints_of_the_performance() {
     for frame in 0..expected.n_frames() {
         let (local, root) = glb.pose(frame);
         let world = glb.world(&local, root);
-        let neck = world[performance.figure.places[0]].1;
-        for (joint, &node) in performance.figure.places.iter().enumerate() {
+        let neck = world[performance.rig.positions[0]].1;
+        for (joint, &node) in performance.rig.positions.iter().enumerate() {
             let [x, y, z] = sub(world[node].1, neck);
             let place = [x, -y, -z];
             let apart = (0..3).map(|k| (place[k] - f64::from(expected.joints[[frame, joint, k]])).powi(2)).sum::<f64>();
@@ -34,8 +34,8 @@ fn nodes_and_animation_give_the_joints_of_the_performance() {
     }
     eprintln!("forward kinematics of the GLB: {worst:.5} mm");
     assert!(worst < 0.1, "{worst} mm");
-    let rest = glb.world(&vec![Rotation::IDENTITY; performance.figure.skeleton.joints.len() + 1], [0.0; 3]);
-    let hand = performance.figure.arms[0].hand;
+    let rest = glb.world(&vec![Rotation::IDENTITY; performance.rig.skeleton.joints.len() + 1], [0.0; 3]);
+    let hand = performance.rig.arms[0].hand;
     assert!(rest[hand].1[0] > 0.4 && rest[hand].1[2].abs() < 0.05, "left is at +x in the T-pose");
 }
 
@@ -44,7 +44,7 @@ fn the_skin_at_rest_is_the_mesh_and_every_vertex_hangs_on_its_joints() {
     let folder = tempfile::tempdir().unwrap();
     let (performance, path) = written(folder.path(), 3, Names::Own);
     let glb = Glb::read(&path);
-    let n_joints = performance.figure.skeleton.joints.len();
+    let n_joints = performance.rig.skeleton.joints.len();
     let inverse_binds = glb.numbers(&glb.scene["skins"][0]["inverseBindMatrices"]);
     assert_eq!(inverse_binds.len(), n_joints);
     let root = vec3(&glb.node(0)["translation"]);
@@ -78,7 +78,7 @@ fn the_skin_at_rest_is_the_mesh_and_every_vertex_hangs_on_its_joints() {
     // The soles on the floor, the head above, as wide as the arms are long, facing +z with its feet.
     assert!(low[1].abs() < 0.02 && (1.2..2.4).contains(&high[1]) && (low[0] + high[0]).abs() < 0.05);
     assert!(high[2] > -low[2]);
-    for (joint, bone) in performance.figure.skeleton.joints.iter().enumerate() {
+    for (joint, bone) in performance.rig.skeleton.joints.iter().enumerate() {
         assert!(bone.end || carried[joint] > 5.0, "{} carries {} vertices", bone.name, carried[joint]);
     }
 }
@@ -97,8 +97,8 @@ fn a_joint_at_rest_has_one_key_and_no_frame_no_animation() {
             .find(|channel| channel["target"]["node"] == node && channel["target"]["path"] == "rotation");
         glb.numbers(&animation["samplers"][channel.unwrap()["sampler"].as_u64().unwrap() as usize]["output"]).len()
     };
-    let leg = performance.figure.skeleton.find("LeftLeg").unwrap();
-    assert_eq!((keys(leg), keys(performance.figure.arms[0].fore)), (1, 20));
+    let leg = performance.rig.skeleton.find("LeftLeg").unwrap();
+    assert_eq!((keys(leg), keys(performance.rig.arms[0].fore)), (1, 20));
     let (_, path) = written(folder.path(), 0, Names::Own);
     assert!(Glb::read(&path).scene.get("animations").is_none());
 }

@@ -125,7 +125,7 @@ fn a_folder_of_bvh_and_sound_becomes_a_dataset() {
         ("talk", ("kept", "")),
     ];
     assert_eq!(ended, all.into());
-    let says = |stem: &str| answer.lines.iter().find(|line| line.file.contains(stem)).unwrap().says.clone();
+    let says = |stem: &str| answer.lines.iter().find(|line| line.file.contains(stem)).unwrap().message.clone();
     assert!(says("broken").contains("broken.bvh"), "{}", says("broken"));
     assert!(says("apart").contains("1.333 s apart"), "{}", says("apart"));
     for account in accounts(&out).unwrap().iter().filter(|account| account.failure.is_none()) {
@@ -210,7 +210,7 @@ fn datasets_are_merged_byte_for_byte_and_come_back_from_other_hands() {
     tar.finish().unwrap();
     let half = imported(&[&path("loose")], &path("half"));
     let failed: Vec<_> = half.lines.iter().filter(|line| line.ended == "failed").collect();
-    assert!(failed.len() == 1 && failed[0].says.contains("has no a-"), "{failed:?}");
+    assert!(failed.len() == 1 && failed[0].message.contains("has no a-"), "{failed:?}");
     let mut other_rate = plan(&[&both[0]]);
     (other_rate.limits.fps, other_rate.about.fps) = (FrameRate::new(30, 1), FrameRate::new(30, 1));
     fs::create_dir(path("none")).unwrap();

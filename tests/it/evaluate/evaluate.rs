@@ -32,7 +32,7 @@ fn the_lifter_beats_what_needs_no_network() {
     for baseline in ["bone-length depth", "mean depth per joint", "constant mean pose"] {
         assert!(lifted < 0.8 * mpjpe(&rows, baseline, "clean"), "{}", text(&rows));
     }
-    assert!(rows.iter().all(|row| row.told > 0.97 && row.by_yaw.len() == 3));
+    assert!(rows.iter().all(|row| row.complete_share > 0.97 && row.by_yaw.len() == 3));
     assert_eq!(text(&rows), text(&table(&lifters, &[by_rule()], 16).unwrap()), "the same scenes each time");
 }
 

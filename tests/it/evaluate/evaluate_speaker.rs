@@ -99,20 +99,21 @@ fn the_neighbour_by_sound_is_found_where_it_was_taken_from() {
     write_dataset(folder.path(), "host", fps, &samples).unwrap();
     let dataset = Dataset::open(folder.path()).unwrap();
     let normal = normalisation(&dataset).unwrap();
-    let real = held_out::read(&dataset, &held_out::samples(&dataset, Split::Validation).unwrap(), &normal).unwrap();
-    let held_out::HeldOutInterval { key, real, sound } = real.into_iter().next().unwrap();
-    let heard = Some(of_samples(&sound.samples, fps, real.n_frames()));
+    let ground_truth =
+        held_out::read(&dataset, &held_out::samples(&dataset, Split::Validation).unwrap(), &normal).unwrap();
+    let held_out::HeldOutInterval { key, ground_truth, sound } = ground_truth.into_iter().next().unwrap();
+    let features = Some(of_samples(&sound.samples, fps, ground_truth.n_frames()));
     let clip = EvalClip {
         name: key,
-        made: real.joints.clone(),
-        real: real.joints.clone(),
-        mask: real.mask,
-        heard,
+        predicted: ground_truth.joints.clone(),
+        ground_truth: ground_truth.joints.clone(),
+        mask: ground_truth.mask,
+        features,
         voice: None,
     };
     let clips = EvalClips { fps, clips: vec![clip], notes: Vec::new(), learnt: false };
     let found = copied(&dataset, &normal, &clips, Split::Validation).unwrap().unwrap();
     let ClipMotion::Moves(found) = &found[0] else { panic!("it stands still") };
-    let apart = found.iter().zip(&real.joints).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
+    let apart = found.iter().zip(&ground_truth.joints).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
     assert!(apart < found.len() / 20, "{apart} of {} numbers are others", found.len());
 }

@@ -58,8 +58,8 @@ fn blender_sees_the_joints_of_the_glb_and_its_skin_around_them() {
         let head = |node: usize| -> [f64; 3] {
             std::array::from_fn(|k| bones[&names[node]][0][k].as_f64().unwrap_or(f64::NAN))
         };
-        let neck = head(performance.figure.places[0]);
-        for (joint, &node) in performance.figure.places.iter().enumerate() {
+        let neck = head(performance.rig.positions[0]);
+        for (joint, &node) in performance.rig.positions.iter().enumerate() {
             let place = head(node);
             for (k, sign) in [1.0, -1.0, -1.0].into_iter().enumerate() {
                 let apart = sign * (place[k] - neck[k]) - f64::from(expected.joints[[frame, joint, k]]);

@@ -11,7 +11,7 @@ pub struct ChartDot {
     pub share: f64,
     pub radius: f64,
     /// What is shown under the pointer and read out.
-    pub says: String,
+    pub description: String,
 }
 
 /// Words on the drawing.
@@ -28,7 +28,7 @@ pub fn dots(label: &str, size: [f64; 2], edges: &[[[f64; 2]; 2]], dots: &[ChartD
         svg = svg.child(line("edge", *from, *to));
     }
     for dot in dots {
-        let circle = node("g").child(node("title").text(&dot.says)).child(
+        let circle = node("g").child(node("title").text(&dot.description)).child(
             node("circle")
                 .class(if dot.share.is_nan() { "share unknown" } else { "share" })
                 .attr("cx", px(dot.at[0]))
@@ -50,7 +50,7 @@ mod tests {
 
     #[test]
     fn a_dot_has_its_share_and_its_words() {
-        let dot = |share| ChartDot { at: [3.0, 4.0], share, radius: 2.0, says: "R<Wrist>: 40 %".to_owned() };
+        let dot = |share| ChartDot { at: [3.0, 4.0], share, radius: 2.0, description: "R<Wrist>: 40 %".to_owned() };
         let label = AxisLabel { at: [1.0, 1.0], text: "hand".to_owned() };
         let drawn =
             dots("a", [9.0, 9.0], &[[[0.0, 0.0], [3.0, 4.0]]], &[dot(0.4), dot(f64::NAN)], &[label]).to_string();

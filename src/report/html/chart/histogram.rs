@@ -101,9 +101,14 @@ pub fn histogram(label: &str, counts: &Counts, unit: &str, threshold: Option<Thr
     if let Some(ThresholdLine { value, is_least }) = threshold {
         let at = x.at(value);
         let anchor = if at > (LEFT + RIGHT) / 2.0 { "end" } else { "start" };
-        let says = format!("at {} {}", if is_least { "least" } else { "most" }, with_unit(value, unit));
+        let description = format!("at {} {}", if is_least { "least" } else { "most" }, with_unit(value, unit));
         svg = svg.child(line("threshold", [at, TOP - 8.0], [at, FLOOR]).attr("data-x", px(at)));
-        svg = svg.child(words("mark", [if anchor == "end" { at - 4.0 } else { at + 4.0 }, TOP - 9.0], anchor, &says));
+        svg = svg.child(words(
+            "mark",
+            [if anchor == "end" { at - 4.0 } else { at + 4.0 }, TOP - 9.0],
+            anchor,
+            &description,
+        ));
     }
     svg
 }

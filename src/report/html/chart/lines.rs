@@ -16,7 +16,7 @@ const RIGHT: f64 = 350.0;
 pub struct LineChart {
     pub title: String,
     /// What it means, in a sentence.
-    pub says: String,
+    pub description: String,
     pub lines: Vec<ChartLine>,
     /// Levels across the whole width.
     pub levels: Vec<ChartLevel>,
@@ -70,8 +70,8 @@ impl LineChart {
     /// The card: title, drawing, what the colours are.
     pub fn card(&self) -> Node {
         let mut card = node("div").class("card chart").child(node("h3").text(&self.title));
-        if !self.says.is_empty() {
-            card = card.child(node("p").class("small").text(&self.says));
+        if !self.description.is_empty() {
+            card = card.child(node("p").class("small").text(&self.description));
         }
         let key = |class: &str, colour: usize, name: &str| {
             node("li")

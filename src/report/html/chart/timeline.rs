@@ -13,7 +13,7 @@ pub struct TimelineSpan {
     /// A word shown where there is room.
     pub word: String,
     /// All there is to say of it.
-    pub says: String,
+    pub description: String,
 }
 
 /// The line of a video of `duration_secs`, which `label` names. Of more than `most` stretches the shortest are drawn
@@ -26,7 +26,7 @@ pub fn timeline(label: &str, duration_secs: f64, stretches: &[TimelineSpan], mos
         let place =
             format!("left:{};width:{}", share(stretch.start_secs), share(stretch.end_secs - stretch.start_secs));
         let word = node("span").text(&stretch.word);
-        node("li").class(&stretch.class).attr("style", place).attr("title", &stretch.says).child(word)
+        node("li").class(&stretch.class).attr("style", place).attr("title", &stretch.description).child(word)
     }))
 }
 
@@ -55,7 +55,10 @@ fn drawn(stretches: &[TimelineSpan], whole: f64, most: usize) -> Vec<TimelineSpa
     }
     let told = drawn.into_iter().map(|(stretch, n, _)| match n {
         0 | 1 => stretch,
-        n => TimelineSpan { says: format!("{n} short stretches, the longest: {}", stretch.says), ..stretch },
+        n => TimelineSpan {
+            description: format!("{n} short stretches, the longest: {}", stretch.description),
+            ..stretch
+        },
     });
     told.collect()
 }
@@ -72,7 +75,7 @@ mod tests {
                 end_secs: (i + 1) as f64,
                 class: format!("c{}", i % 2),
                 word: String::new(),
-                says: "<one>".to_owned(),
+                description: "<one>".to_owned(),
             };
             timeline("a \"b\"", n as f64, &(0..n).map(one).collect::<Vec<_>>(), 500).to_string()
         };

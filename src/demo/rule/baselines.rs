@@ -44,7 +44,7 @@ pub fn wrist_speeds(joints: ArrayView3<f32>, fps: FrameRate) -> Array2<f64> {
 }
 
 /// What was learnt from the training split.
-pub struct SoundRegression {
+pub struct RuleBaselines {
     fps: FrameRate,
     /// To the speeds of both wrists, m/s.
     speed: Ridge,
@@ -63,11 +63,11 @@ struct TrainingClip {
     joints: Array3<f32>,
 }
 
-impl SoundRegression {
+impl RuleBaselines {
     /// Learns from the training split, the penalties from the validation split.
     pub fn learn(dataset: &Dataset) -> Result<Self> {
         let fps = dataset.info().fps;
-        let (train, validation) = (heard(dataset, Split::Train)?, heard(dataset, Split::Validation)?);
+        let (train, validation) = (clips(dataset, Split::Train)?, clips(dataset, Split::Validation)?);
         ensure!(!train.is_empty() && !validation.is_empty(), "{}: a split is empty", dataset.dir().display());
         let mut sums = [RidgeSums::new(mel::N_MELS, 2), RidgeSums::new(mel::N_MELS, 3 * N_JOINTS)];
         for clip in &train {
@@ -122,10 +122,10 @@ impl SoundRegression {
     }
 
     fn nearest_window(&self, sound: &Array2<f64>, t: usize) -> Array3<f32> {
-        let heard = sound.slice(s![t..sound.nrows().min(t + WINDOW), ..]);
-        let n = heard.nrows();
-        let distance = |window: &Array2<f64>| -> f64 {
-            heard.iter().zip(window.slice(s![..n, ..])).map(|(a, b)| (a - b).powi(2)).sum()
+        let window = sound.slice(s![t..sound.nrows().min(t + WINDOW), ..]);
+        let n = window.nrows();
+        let distance = |other: &Array2<f64>| -> f64 {
+            window.iter().zip(other.slice(s![..n, ..])).map(|(a, b)| (a - b).powi(2)).sum()
         };
         let nearest = self.windows.iter().min_by(|a, b| distance(&a.0).total_cmp(&distance(&b.0)));
         nearest.map_or_else(|| self.still(n), |(_, joints)| joints.slice(s![..n, .., ..]).to_owned())
@@ -156,10 +156,10 @@ impl TrainingClip {
     }
 }
 
-fn heard(dataset: &Dataset, split: Split) -> Result<Vec<TrainingClip>> {
-    let hear = |sample: Sample| TrainingClip {
+fn clips(dataset: &Dataset, split: Split) -> Result<Vec<TrainingClip>> {
+    let clip = |sample: Sample| TrainingClip {
         sound: sound_of_frames(&sample.sound, sample.n_frames(), sample.motion.fps),
         joints: sample.motion.joints,
     };
-    dataset.samples(split).par_iter().map(|sample| Ok(hear(dataset.read(sample)?))).collect()
+    dataset.samples(split).par_iter().map(|sample| Ok(clip(dataset.read(sample)?))).collect()
 }
