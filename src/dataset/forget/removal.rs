@@ -149,9 +149,9 @@ impl Removal {
     }
 }
 
-type Table = serde_json::Map<String, serde_json::Value>;
+type JsonObject = serde_json::Map<String, serde_json::Value>;
 
-fn read_table(path: &Path) -> Table {
+fn read_table(path: &Path) -> JsonObject {
     fs::read(path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default()
 }
 

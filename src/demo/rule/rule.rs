@@ -44,15 +44,15 @@ const ACCENT: f64 = 0.5;
 
 /// Numbers of an arm: wrist out, down, away (metres), roll, raise, curl, index, spread (`figure::Arm`).
 const N_ARM: usize = 8;
-type Place = [f64; N_ARM];
+type ArmTarget = [f64; N_ARM];
 /// Hands in the lap.
-const REST: Place = [0.16, 0.36, -0.2, 0.9, 0.3, 0.45, 0.0, 0.05];
-const WIDE: Place = [0.42, 0.16, -0.24, -0.4, 0.6, 0.1, 0.0, 0.16];
-const HIGH: Place = [0.26, -0.06, -0.26, 0.2, 1.0, 0.15, -0.1, 0.12];
-const POINT: Place = [0.04, 0.1, -0.38, 0.6, 0.5, 0.8, -0.8, 0.02];
-const CENTRE: Place = [0.1, 0.14, -0.36, -0.2, 0.8, 0.3, 0.0, 0.1];
+const REST: ArmTarget = [0.16, 0.36, -0.2, 0.9, 0.3, 0.45, 0.0, 0.05];
+const WIDE: ArmTarget = [0.42, 0.16, -0.24, -0.4, 0.6, 0.1, 0.0, 0.16];
+const HIGH: ArmTarget = [0.26, -0.06, -0.26, 0.2, 1.0, 0.15, -0.1, 0.12];
+const POINT: ArmTarget = [0.04, 0.1, -0.38, 0.6, 0.5, 0.8, -0.8, 0.02];
+const CENTRE: ArmTarget = [0.1, 0.14, -0.36, -0.2, 0.8, 0.3, 0.0, 0.1];
 /// Where each vowel of `speech` sends the left and the right hand.
-const PLACES: [[Option<Place>; 2]; 5] = [
+const PLACES: [[Option<ArmTarget>; 2]; 5] = [
     [Some(WIDE), Some(WIDE)],
     [None, Some(HIGH)],
     [None, Some(POINT)],
@@ -76,7 +76,7 @@ const SWAY_HZ: std::ops::Range<f64> = 0.3..1.5;
 struct WristMove {
     start: f64,
     secs: f64,
-    goal: Place,
+    goal: ArmTarget,
 }
 
 /// All that the speaker does while it says something.
@@ -106,7 +106,7 @@ impl<'a> RuleGestures<'a> {
 
     /// What the speaker does in fact, whims and all; `secs` long.
     pub fn with_variation(speech: &'a Speech, secs: f64, rng: &mut ChaCha8Rng) -> Self {
-        let mut strokes: [Vec<(f64, Place)>; 2] = Default::default();
+        let mut strokes: [Vec<(f64, ArmTarget)>; 2] = Default::default();
         for accent in speech.syllables.iter().filter(|syllable| syllable.stress > ACCENT) {
             let passed_over = rng.random_bool(PASSED_OVER);
             let late = LATE * normal(rng);
@@ -186,7 +186,7 @@ impl Variation {
 }
 
 /// Strokes (start and goal, in order of time) with the returns between them.
-fn with_returns(strokes: Vec<(f64, Place)>) -> Vec<WristMove> {
+fn with_returns(strokes: Vec<(f64, ArmTarget)>) -> Vec<WristMove> {
     let mut moves = Vec::with_capacity(2 * strokes.len());
     for (n, (start, goal)) in strokes.iter().enumerate() {
         moves.push(WristMove { start: *start, secs: STROKE, goal: *goal });
@@ -204,11 +204,11 @@ fn reach(accent: &Syllable) -> f64 {
 }
 
 /// The share `reach` of the way from the lap to a place.
-fn towards(place: &Place, reach: f64) -> Place {
+fn towards(place: &ArmTarget, reach: f64) -> ArmTarget {
     std::array::from_fn(|k| REST[k] + reach * (place[k] - REST[k]))
 }
 
-fn missed(goal: &Place, rng: &mut ChaCha8Rng) -> Place {
+fn missed(goal: &ArmTarget, rng: &mut ChaCha8Rng) -> ArmTarget {
     std::array::from_fn(|k| goal[k] + if k < 3 { MISSED } else { SHAPE } * normal(rng))
 }
 

@@ -38,7 +38,7 @@ const PALM: f64 = 0.093;
 const PX: f64 = 1000.0;
 
 /// Something that lifts: keypoints of right hands to hands in any unit, the wrist at 0; `None`: not lifted.
-pub type Lift<'a> = dyn Fn(&[SeenHand]) -> Result<Vec<Option<Hand>>> + 'a;
+pub type LiftHands<'a> = dyn Fn(&[SeenHand]) -> Result<Vec<Option<Hand>>> + 'a;
 
 /// Errors in mm, medians over all counted points of all hands.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -74,12 +74,12 @@ struct ProjectedHand {
 }
 
 /// The error table of `lift` on `sets`, `MEASURED` hands each, drawn with `seed`.
-pub fn evaluate(lift: &Lift, sets: &[FingerSet], n_hands: usize, seed: u64) -> Result<Vec<HandRow>> {
+pub fn evaluate(lift: &LiftHands, sets: &[FingerSet], n_hands: usize, seed: u64) -> Result<Vec<HandRow>> {
     sets.iter().map(|set| row(lift, set, n_hands, seed)).collect()
 }
 
 /// What the weights of a file (the built-in ones where `path` is empty) lift, of either network.
-pub fn lifter_of(path: &Path) -> Result<Box<Lift<'static>>> {
+pub fn lifter_of(path: &Path) -> Result<Box<LiftHands<'static>>> {
     if !path.as_os_str().is_empty() && Contents::read(path)?.facts["kind"] == heatmaps::KIND {
         let lesson = HeatmapLesson::new(0)?;
         start_from(&lesson, path)?;
@@ -89,7 +89,7 @@ pub fn lifter_of(path: &Path) -> Result<Box<Lift<'static>>> {
     Ok(Box::new(move |seen| Ok(lifter.lift(seen, Side::Right)?)))
 }
 
-fn row(lift: &Lift, set: &FingerSet, n_hands: usize, seed: u64) -> Result<HandRow> {
+fn row(lift: &LiftHands, set: &FingerSet, n_hands: usize, seed: u64) -> Result<HandRow> {
     let mut truths = Vec::new();
     for take in &set.takes {
         truths.extend(take.truths()?);
