@@ -26,7 +26,7 @@
 //! | 4 | `generate` | what a trained speaker is, and speech to motion with it | `types audio motion formats nn` |
 //! | 4 | `animate` | joints to rotations on a rig, avatar, export, drawing | `types math stage motion formats external` |
 //! | 5 | `dataset` | the dataset on disk: write, read, verify, import, forget | `types math stage config audio motion formats external mocap` |
-//! | 6 | `pipeline` | the five stages, their order, and the files in which they meet | `types math stage config external audio motion formats nn dataset` |
+//! | 6 | `pipeline` | the five stages, their order, the files in which they meet; batches of speech to motion | `types math stage config external audio motion formats nn generate animate dataset` |
 //! | 6 | `train` | optimiser, GAN, lifters, synthetic scenes, spaces of movement | `types math stage config audio motion formats nn mocap dataset metrics generate` |
 //! | 6 | `demo` | the synthetic speaker: drawn, with a known rule, and the checks against it | `types math stage audio motion formats external animate dataset metrics generate` |
 //! | 7 | `evaluate` | clips, baselines, table, verdict; the lifters' errors | `types math stage config external audio motion formats nn mocap metrics generate animate dataset pipeline train` |

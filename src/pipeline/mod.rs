@@ -1,7 +1,21 @@
-//! The five stages. They never import each other: they meet in the files that they write.
+//! The pipeline as a value (`pipeline`, run by `run`, looked at by `status`), its five stages, and speech to motion files in
+//! batches. The stages never import each other: they meet in the files that they write.
 
+pub mod account;
+pub mod batch;
 pub mod dataset;
 pub mod extract;
 pub mod lift;
+pub mod pipeline;
 pub mod pose2d;
+pub mod run;
 pub mod segment;
+pub mod selection;
+pub mod stages;
+pub mod status;
+
+pub use account::{AccountKind, TimeAccount};
+pub use pipeline::Pipeline;
+pub use run::{RunReport, RunState, StageCounts, UnitFailure, UnitReport};
+pub use selection::Selection;
+pub use status::{StagePlan, StatusReport, UnitState, UnitStatus};

@@ -6,6 +6,40 @@ pub trait Progress: Send + Sync {
     fn begin(&self, label: &str, total: u64) -> Box<dyn Task>;
     /// A line the user should see while work goes on (a warning, a milestone).
     fn say(&self, line: &str);
+    /// Something happened to a unit; says its message unless overridden.
+    fn event(&self, event: &Event<'_>) {
+        if let Some(message) = event.message() {
+            self.say(&message);
+        }
+    }
+}
+
+/// Something that happened to a unit of a run. Units are `speaker/video`, or `speaker` of a dataset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event<'a> {
+    /// A stage worked on the unit; `line` is the stage's report.
+    Done { stage: &'a str, unit: &'a str, line: &'a str },
+    /// A stage skipped the unit.
+    Fresh { stage: &'a str, unit: &'a str },
+    /// The unit failed at a stage.
+    Failed { stage: &'a str, unit: &'a str, error: &'a str },
+    /// An entry of the configuration leads to no video.
+    NoVideo { speaker: &'a str, error: &'a str },
+    /// The dataset is made without this video, which is not fresh at every stage before.
+    LeftOut { unit: &'a str },
+}
+
+impl Event<'_> {
+    /// A line for people; none where there is nothing to say.
+    pub fn message(&self) -> Option<String> {
+        match self {
+            Self::Fresh { .. } | Self::Done { line: "", .. } => None,
+            Self::Done { stage, unit, line } => Some(format!("done    {stage} {unit}: {line}")),
+            Self::Failed { stage, unit, error } => Some(format!("failed  {stage} {unit}: {error}")),
+            Self::NoVideo { speaker, error } => Some(format!("failed  {speaker}: {error}")),
+            Self::LeftOut { unit } => Some(format!("left out of the dataset: {unit} (`orator status --why` says why)")),
+        }
+    }
 }
 
 /// One piece of work under way.

@@ -2,14 +2,14 @@
 //! stop the others. What a unit makes does not depend on who made it.
 
 use super::fingerprint::{Fingerprint, HashCache};
-use super::progress::Progress;
+use super::progress::{Event, Progress};
 use super::record::{DirtyReason, Failure, Output, Record};
 use super::{Report, Stage, Unit, workdir};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 /// Where a unit stands at a stage.
 #[derive(Clone, Debug)]
@@ -25,7 +25,7 @@ pub enum Ended {
     /// It was fresh already.
     Skipped(Report),
     Done(Report),
-    Failed(String),
+    Failed(Arc<anyhow::Error>),
 }
 
 /// Where `unit` stands. An unreadable input is a failure.
@@ -37,7 +37,7 @@ pub fn state(stage: &dyn Stage, unit: &Unit, work: &Path, hashes: &HashCache) ->
     };
     let record = Record::read(&folder);
     let dirty = match &record {
-        Some(record) => record.dirty(&now, &folder),
+        Some(record) => record.dirty(&now, stage.common_folder().unwrap_or(&folder)),
         None => Some(DirtyReason::NeverDone),
     };
     match (dirty, record) {
@@ -101,7 +101,7 @@ pub fn run_stages(
     let answers = ended.into_iter().map(|answers| answers.into_inner().unwrap_or_default());
     let whole = |mut answers: Vec<Ended>| {
         if answers.len() < stages.len() && !matches!(answers.last(), Some(Ended::Failed(_))) {
-            answers.push(Ended::Failed("the worker was lost".to_owned()));
+            answers.push(Ended::Failed(Arc::new(anyhow!("the worker was lost"))));
         }
         answers
     };
@@ -117,12 +117,11 @@ fn largest_first(units: &[Unit]) -> Vec<usize> {
 }
 
 fn report(answer: &Ended, stage: &dyn Stage, unit: &Unit, progress: &dyn Progress) {
+    let (stage, unit) = (stage.name(), unit.to_string());
     match answer {
-        Ended::Failed(error) => progress.say(&format!("failed  {} {unit}: {error}", stage.name())),
-        Ended::Done(report) if !report.line.is_empty() => {
-            progress.say(&format!("done    {} {unit}: {}", stage.name(), report.line));
-        }
-        Ended::Done(_) | Ended::Skipped(_) => {}
+        Ended::Failed(error) => progress.event(&Event::Failed { stage, unit: &unit, error: &format!("{error:#}") }),
+        Ended::Done(report) => progress.event(&Event::Done { stage, unit: &unit, line: &report.line }),
+        Ended::Skipped(_) => progress.event(&Event::Fresh { stage, unit: &unit }),
     }
 }
 
@@ -141,7 +140,7 @@ fn run_unit(
     };
     if !force
         && let Some(record) = Record::read(&folder)
-        && record.dirty(&fingerprint, &folder).is_none()
+        && record.dirty(&fingerprint, stage.common_folder().unwrap_or(&folder)).is_none()
     {
         return Ended::Skipped(Report { line: record.line, facts: record.facts });
     }
@@ -154,7 +153,7 @@ fn run_unit(
 /// Runs a stage's code. A panic is a defect, but one video must not take the night's run with it.
 fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
     let caught = catch_unwind(AssertUnwindSafe(work));
-    caught.unwrap_or_else(|panic| Err(anyhow::anyhow!("internal error: {}", panic_text(&*panic))))
+    caught.unwrap_or_else(|panic| Err(anyhow!("internal error: {}", panic_text(&*panic))))
 }
 
 fn attempt(
@@ -166,11 +165,14 @@ fn attempt(
 ) -> Result<Report> {
     let attempt = workdir::attempt_folder(folder)?;
     let finish = || -> Result<Report> {
-        let report = stage.run(unit, &attempt, progress)?;
+        let report = stage.run(unit, &attempt, progress).map_err(workdir::full_disk)?;
         let outputs = Output::list(&attempt)?;
         // An old record must not speak for new files, should this run be killed before it writes its own.
         Record::forget(folder)?;
-        workdir::replace_folder(&attempt, folder)?;
+        match stage.common_folder() {
+            Some(common) => workdir::move_files(&attempt, common, outputs.iter().map(|output| output.file.as_str()))?,
+            None => workdir::replace_folder(&attempt, folder)?,
+        }
         let Report { line, facts } = report.clone();
         Record { fingerprint: fingerprint.clone(), outputs, line, facts }.write(folder).context("cannot record it")?;
         Ok(report)
@@ -183,10 +185,9 @@ fn attempt(
 }
 
 fn failed(folder: &Path, fingerprint: Option<Fingerprint>, error: anyhow::Error) -> Ended {
-    let error = format!("{error:#}");
     // The failure is shown either way; where even this cannot be written the work folder itself is the trouble.
-    let _ = Failure { fingerprint, error: error.clone() }.write(folder);
-    Ended::Failed(error)
+    let _ = Failure { fingerprint, error: format!("{error:#}") }.write(folder);
+    Ended::Failed(Arc::new(error))
 }
 
 fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 /// One thing a stage works on: a video of a speaker, or (for the dataset) a whole speaker.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Unit {
+    /// Name of the speaker; empty where a unit belongs to none.
     pub speaker: String,
     /// Work folder name of the video: slug of its stem, `-`, 8 hex digits of its path; empty for a whole speaker.
     pub video: String,
@@ -25,7 +26,10 @@ impl Unit {
 
 impl fmt::Display for Unit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.video.is_empty() { write!(f, "{}", self.speaker) } else { write!(f, "{}/{}", self.speaker, self.video) }
+        match (self.speaker.as_str(), self.video.as_str()) {
+            (name, "") | ("", name) => write!(f, "{name}"),
+            (speaker, video) => write!(f, "{speaker}/{video}"),
+        }
     }
 }
 
@@ -53,6 +57,10 @@ pub trait Stage: Sync {
     fn settings(&self, unit: &Unit) -> serde_json::Value;
     /// The files it reads for `unit`; their contents are part of the fingerprint.
     fn inputs(&self, unit: &Unit) -> anyhow::Result<Vec<Input>>;
+    /// The folder into which the files of all units go side by side; none: each unit's own folder under the stage's.
+    fn common_folder(&self) -> Option<&Path> {
+        None
+    }
     /// Does the work: writes its files into the empty folder `out` and nowhere else.
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> anyhow::Result<Report>;
 }

@@ -3,8 +3,21 @@
 
 use anyhow::{Context, Result};
 use std::fs::{self, File};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+
+/// Another program works in the folder.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("another run is at work in {}; wait for it to end", folder.display())]
+pub struct BusyFolder {
+    /// The folder with the lock.
+    pub folder: PathBuf,
+}
+
+/// The disk is full, or a quota is used up.
+#[derive(Debug, thiserror::Error)]
+#[error(transparent)]
+pub struct NoSpace(anyhow::Error);
 
 /// Writes `bytes` to `path` atomically; its folder is made if missing.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
@@ -24,7 +37,14 @@ pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<(
     if written.is_err() {
         let _ = fs::remove_file(&attempt);
     }
-    written.with_context(|| format!("cannot write {}", path.display()))
+    written.map_err(full_disk).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// An error that comes of a full disk becomes `NoSpace` with the same text; any other stays.
+pub(super) fn full_disk(error: anyhow::Error) -> anyhow::Error {
+    let is_full = |error: &std::io::Error| matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded);
+    let full = error.chain().filter_map(|cause| cause.downcast_ref()).any(is_full);
+    if full { NoSpace(error).into() } else { error }
 }
 
 /// One program at a time writes in `folder`, made if missing: the lock goes with the process, however it ends. Errors
@@ -32,8 +52,7 @@ pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<(
 pub fn lock(folder: &Path) -> Result<File> {
     let made = fs::create_dir_all(folder).and_then(|()| File::create(folder.join(".lock")));
     let file = made.with_context(|| format!("cannot write in {}", folder.display()))?;
-    file.try_lock()
-        .map_err(|_| anyhow::anyhow!("another run is at work in {}; wait for it to end", folder.display()))?;
+    file.try_lock().map_err(|_| BusyFolder { folder: folder.to_owned() })?;
     Ok(file)
 }
 
@@ -41,7 +60,7 @@ pub fn lock(folder: &Path) -> Result<File> {
 pub fn remove_file(path: &Path) -> Result<()> {
     match fs::remove_file(path) {
         Ok(()) => flush(&parent(path)),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
         Err(error) => Err(error.into()),
     }
     .with_context(|| format!("cannot remove {}", path.display()))
@@ -62,7 +81,23 @@ pub fn replace_folder(attempt: &Path, place: &Path) -> Result<()> {
         }
         flush(&parent(place))
     };
-    moved().with_context(|| format!("cannot put {} in its place", place.display()))
+    moved().map_err(full_disk).with_context(|| format!("cannot put {} in its place", place.display()))
+}
+
+/// Moves finished files, named with `/` between folders, from the folder `attempt` into `folder`, beside what is there;
+/// `attempt` goes.
+pub fn move_files<'f>(attempt: &Path, folder: &Path, files: impl Iterator<Item = &'f str>) -> Result<()> {
+    for file in files {
+        let (from, to) = (attempt.join(file), folder.join(file));
+        let moved = || -> Result<()> {
+            fs::create_dir_all(parent(&to))?;
+            flush(&from)?;
+            fs::rename(&from, &to)?;
+            flush(&parent(&to))
+        };
+        moved().map_err(full_disk).with_context(|| format!("cannot write {}", to.display()))?;
+    }
+    fs::remove_dir_all(attempt).with_context(|| format!("cannot remove {}", attempt.display()))
 }
 
 /// Puts back what `replace_folder` had moved aside when it was killed between its two renames.
@@ -86,13 +121,15 @@ pub fn attempt_folder(place: &Path) -> Result<PathBuf> {
     let made = || -> std::io::Result<()> {
         for stale in [attempt.clone(), attempt.with_extension("old")] {
             match fs::remove_dir_all(&stale) {
-                Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+                Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
                 _ => {}
             }
         }
         fs::create_dir_all(&attempt)
     };
-    made().with_context(|| format!("cannot write in the work folder {}", parent(place).display()))?;
+    made()
+        .map_err(|error| full_disk(error.into()))
+        .with_context(|| format!("cannot write in the work folder {}", parent(place).display()))?;
     Ok(attempt)
 }
 
@@ -141,6 +178,16 @@ mod tests {
         assert!(failed.is_err());
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_full_disk_is_found_beneath_any_context() {
+        let io = std::io::Error::from(ErrorKind::StorageFull);
+        let error = anyhow::Error::from(io).context("cannot write a");
+        let text = format!("{error:#}");
+        let found = full_disk(error);
+        assert!(found.is::<NoSpace>() && format!("{found:#}") == text, "{found:#}");
+        assert!(!full_disk(anyhow::anyhow!("other")).is::<NoSpace>());
     }
 
     #[test]

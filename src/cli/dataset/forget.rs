@@ -3,7 +3,7 @@
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
-use anyhow::{Context, Result, anyhow, bail, ensure};
+use anyhow::{Context, Result, bail};
 use orator::config::{Config, videos};
 use orator::dataset::forget::known;
 use orator::dataset::forget::known::KnownVideo;
@@ -122,7 +122,7 @@ fn of_dataset(dir: &Path, wanted: &str, dry_run: bool) -> Result<Task> {
 fn of_project(args: &Args) -> Result<(Task, Option<File>)> {
     let config = args.config.load()?;
     let work = &config.settings.work.dir;
-    let lock = if args.dry_run || !work.exists() { None } else { Some(lock(work)?) };
+    let lock = if args.dry_run || !work.exists() { None } else { Some(workdir::lock(work)?) };
     if !args.dry_run {
         for entry in std::fs::read_dir(work.join(StageName::Dataset.as_str())).into_iter().flatten().flatten() {
             let name = entry.file_name().to_string_lossy().into_owned();
@@ -177,12 +177,4 @@ fn how_to_keep_away(config: &Config, speaker: &str, gone: &[&KnownVideo], whole:
          else the next run brings it back",
         config.file.display()
     ))
-}
-
-/// No run may be at work meanwhile.
-fn lock(work: &Path) -> Result<File> {
-    let file = File::create(work.join(".lock")).with_context(|| format!("cannot write in {}", work.display()))?;
-    file.try_lock().map_err(|_| anyhow!("a run is at work in {}; wait for it to end", work.display()))?;
-    ensure!(work.is_dir(), "{} is no folder", work.display());
-    Ok(file)
 }

@@ -13,11 +13,11 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]
-    verb: Verb,
+    verb: DatasetVerb,
 }
 
 #[derive(clap::Subcommand)]
-enum Verb {
+enum DatasetVerb {
     /// Check the dataset: files, sizes, counts, sums, and that every second of every video is accounted for.
     ///
     /// Exit code 1 says that something is not as it was written.
@@ -37,8 +37,8 @@ enum Verb {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.verb {
-        Verb::Verify { dir, deep } => check(&dir, deep, ui),
-        Verb::Info { dir } => info(&dir, ui),
+        DatasetVerb::Verify { dir, deep } => check(&dir, deep, ui),
+        DatasetVerb::Info { dir } => info(&dir, ui),
     }
 }
 

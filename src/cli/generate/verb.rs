@@ -1,13 +1,13 @@
-//! `orator generate`: one sound to files (here), or a folder or table of sounds (`batch`, `table`); what both do with a
-//! sound is in `made`.
+//! `orator generate`: one sound to files (here), or a folder or table of sounds (`batch`).
 
-use super::{batch, made};
+use super::batch;
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Result, bail, ensure};
 use orator::animate::export::file::ExportFormat;
-use orator::formats::checkpoint;
 use orator::generate::Speaker;
+use orator::pipeline::batch::motion_files::{checkpoint_file, write_motion};
+use orator::pipeline::batch::{SpeechBatch, sounds};
 use orator::stage::progress::Progress as _;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -27,65 +27,76 @@ use std::path::{Path, PathBuf};
 pub struct Args {
     /// A checkpoint of `orator train gan`, or its folder (the best checkpoint, else the newest, is taken).
     #[arg(long, value_name = "FILE|FOLDER", required_unless_present = "batch")]
-    pub(crate) checkpoint: Option<PathBuf>,
+    checkpoint: Option<PathBuf>,
     /// The speech.
     #[arg(long, value_name = "FILE", required_unless_present_any = ["audio_folder", "batch"], requires = "out")]
-    pub(crate) audio: Option<PathBuf>,
+    audio: Option<PathBuf>,
     /// What to write; may be given several times.
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "audio")]
-    pub(crate) out: Vec<PathBuf>,
+    out: Vec<PathBuf>,
     /// Speech in every file below this folder.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["audio", "batch"], requires = "out_folder")]
-    pub(crate) audio_folder: Option<PathBuf>,
+    audio_folder: Option<PathBuf>,
     /// A table (.csv) of speech.
     #[arg(long, value_name = "FILE", conflicts_with = "audio", requires = "out_folder")]
-    pub(crate) batch: Option<PathBuf>,
+    batch: Option<PathBuf>,
     /// Where many motions go.
     #[arg(long, value_name = "DIR", conflicts_with = "audio")]
-    pub(crate) out_folder: Option<PathBuf>,
+    out_folder: Option<PathBuf>,
     /// What many motions are written as: endings, divided by commas.
     #[arg(long, value_name = "ENDINGS", value_delimiter = ',', default_value = "bvh", conflicts_with = "audio")]
-    pub(crate) format: Vec<String>,
+    format: Vec<String>,
     /// Make many motions again even where nothing changed.
     #[arg(long, conflicts_with = "audio")]
-    pub(crate) again: bool,
+    again: bool,
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    let Some(audio) = &args.audio else { return batch::run(&args, ui) };
-    let Some(given) = &args.checkpoint else { anyhow::bail!("give --checkpoint") };
+    let Some(audio) = &args.audio else { return batch::run(&batch(args)?, ui) };
+    let Some(given) = &args.checkpoint else { bail!("give --checkpoint") };
     let outputs = outputs(&args.out, audio)?;
-    let checkpoint = checkpoint_at(given)?;
+    let checkpoint = checkpoint_file(given)?;
     if checkpoint != *given {
         ui.say(&format!("checkpoint {}", checkpoint.display()));
     }
     let speaker = Speaker::open(&checkpoint)?;
-    let made = made::make(&speaker, audio, &outputs, ui)?;
-    let speed = made.secs / made.motion_secs.max(1e-6);
+    let written = write_motion(&speaker, audio, &outputs, ui)?;
+    let speed = written.secs / written.motion_secs.max(1e-6);
     let names: Vec<String> = outputs.iter().map(|(path, _)| path.display().to_string()).collect();
-    let note = made.note.as_ref().map_or(String::new(), |note| format!("note: {note}\n"));
+    let note = written.note.as_ref().map_or(String::new(), |note| format!("note: {note}\n"));
     let text = format!(
         "{:.1} s of speech, {} frames of {} at {}, {speed:.0} x real time\n{note}wrote {}",
-        made.secs,
-        made.n_frames,
+        written.secs,
+        written.n_frames,
         speaker.name(),
         speaker.fps(),
         names.join(", ")
     );
     let next = next_command(given, audio, &outputs);
     let facts = json!({
-        "audio_secs": made.secs,
-        "n_frames": made.n_frames,
+        "audio_secs": written.secs,
+        "n_frames": written.n_frames,
         "fps": speaker.fps(),
         "times_real_time": speed,
         "checkpoint": checkpoint,
         "speaker": speaker.name(),
         "outputs": names,
-        "note": made.note,
+        "note": written.note,
         "next": next,
     });
     ui.summary(&text, next.as_deref(), facts);
     Ok(Outcome::Done)
+}
+
+/// The batch that the arguments describe.
+fn batch(args: Args) -> Result<SpeechBatch> {
+    let folder = args.out_folder.context("give --out-folder, where the motions go")?;
+    let sounds = match (&args.batch, &args.audio_folder) {
+        (Some(table), _) => sounds::of_table(table)?,
+        (None, Some(sounds)) => sounds::of_folder(sounds, &folder)?,
+        (None, None) => bail!("give --audio, --audio-folder or --batch"),
+    };
+    Ok(SpeechBatch { sounds, folder, formats: args.format, checkpoint: args.checkpoint, again: args.again })
 }
 
 /// Output files with their formats; none may be the input or another output.
@@ -97,22 +108,6 @@ fn outputs(out: &[PathBuf], audio: &Path) -> Result<Vec<(PathBuf, ExportFormat)>
         ensure!(!path.is_dir(), "{} is a folder; name a file in it", path.display());
     }
     out.iter().map(|path| Ok((path.clone(), ExportFormat::from_path(path)?))).collect()
-}
-
-/// The checkpoint file meant by a file or a training's folder.
-pub(crate) fn checkpoint_at(path: &Path) -> Result<PathBuf> {
-    ensure!(path.exists(), "{} is not there; `orator train gan` makes checkpoints", path.display());
-    if !path.is_dir() {
-        return Ok(path.to_owned());
-    }
-    let best = path.join("best.safetensors");
-    if best.is_file() {
-        return Ok(best);
-    }
-    let newest = checkpoint::list(path)?.pop();
-    newest
-        .map(|(_, file)| file)
-        .with_context(|| format!("{} holds no checkpoint (best.safetensors or step-*.safetensors)", path.display()))
 }
 
 /// The same again as a film, or for an animation program; nothing when both are there.

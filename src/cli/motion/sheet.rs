@@ -2,12 +2,12 @@
 
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
-use crate::cli::pipeline::steps;
 use crate::cli::ui::Ui;
 use anyhow::{Result, bail, ensure};
 use orator::animate::{AnimationOptions, perform};
 use orator::external::opencv::png;
 use orator::formats::{joints_npz, keypoints_npz, npy};
+use orator::pipeline::Pipeline;
 use orator::pipeline::lift::quality;
 use orator::pipeline::lift::quality::{ArmFigures, ClipFigures};
 use orator::report::sheet::sheet::SheetClip;
@@ -98,7 +98,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 
 /// The lifted clips of a run that are asked for.
 fn of_run(args: &Args) -> Result<Vec<Files>> {
-    let config = args.config.load()?;
+    let pipeline = Pipeline::open(args.config.load()?)?;
+    let config = pipeline.config();
     let work = &config.settings.work.dir;
     let folder = args.out.clone().unwrap_or_else(|| work.join("sheets"));
     let wanted = |unit: &Unit| {
@@ -107,7 +108,7 @@ fn of_run(args: &Args) -> Result<Vec<Files>> {
     };
     let mut clips = Vec::new();
     let mut names = Vec::new();
-    for unit in steps::speakers(&config, &args.speaker)?.into_iter().flat_map(|videos| videos.units) {
+    for unit in pipeline.videos(&args.speaker)?.into_iter().flat_map(|videos| videos.units) {
         names.push(unit.video.clone());
         if wanted(&unit) {
             clips.push(Files {

@@ -1,8 +1,6 @@
 //! The verbs of a project folder: `init`, `run`, `status`, `report`.
 
-pub mod account;
 pub mod init;
 pub mod report;
 pub mod run;
 pub mod status;
-pub mod steps;

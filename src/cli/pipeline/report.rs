@@ -1,10 +1,10 @@
 //! `orator report`.
 
-use super::steps;
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
 use anyhow::Result;
+use orator::pipeline::Pipeline;
 use orator::report;
 use orator::report::ReportRequest;
 use orator::report::html::numbers::{length, percent};
@@ -32,10 +32,10 @@ pub struct Args {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    let config = args.config.load()?;
-    let videos = steps::speakers(&config, &args.speaker)?;
-    let out = args.out.unwrap_or_else(|| config.settings.work.dir.join("report.html"));
-    let wanted = ReportRequest { settings: &config.settings, videos: &videos, n_pictures: args.pictures };
+    let pipeline = Pipeline::open(args.config.load()?)?;
+    let (videos, settings) = (pipeline.videos(&args.speaker)?, &pipeline.config().settings);
+    let out = args.out.unwrap_or_else(|| settings.work.dir.join("report.html"));
+    let wanted = ReportRequest { settings, videos: &videos, n_pictures: args.pictures };
     let made = report::make(&wanted, ui);
     workdir::write_file(&out, made.html.as_bytes())?;
     let (sums, mut facts) = (made.sums, made.facts);

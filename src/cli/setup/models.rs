@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]
-    verb: Verb,
+    verb: ModelsVerb,
     /// The folder of the models, instead of the configuration's.
     #[arg(long, global = true, value_name = "DIR")]
     models_dir: Option<PathBuf>,
@@ -26,7 +26,7 @@ pub struct Args {
 }
 
 #[derive(clap::Subcommand)]
-enum Verb {
+enum ModelsVerb {
     /// Show every model: what it is for, where it comes from, its licence, and whether it is there.
     List,
     /// Get the models that are missing: from their address where one serves exactly the pinned bytes, else from a
@@ -69,18 +69,18 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let runtime = || Runtime::load(&models.onnxruntime, &models.dir);
     let chosen = [pose2d.person, pose2d.body, pose2d.hand, pose2d.palm];
     match &args.verb {
-        Verb::List => list(&store, &chosen, ui),
-        Verb::Fetch { ids, all, mirror } => {
+        ModelsVerb::List => list(&store, &chosen, ui),
+        ModelsVerb::Fetch { ids, all, mirror } => {
             let mut entries = store.entries(ids)?;
             entries.retain(|entry| *all || !ids.is_empty() || chosen.contains(&entry.id));
             let fetched = store.fetch(&entries, mirror.as_deref(), ui)?;
             let lines = entries.iter().zip(fetched).map(|(entry, source)| match source {
-                Ok(source) => Line::new(entry, "had", true, source.to_string()),
-                Err(error) => Line::new(entry, "had", false, format!("NOT HAD: {error:#}")),
+                Ok(source) => ModelLine::new(entry, "had", true, source.to_string()),
+                Err(error) => ModelLine::new(entry, "had", false, format!("NOT HAD: {error:#}")),
             });
             close(&lines.collect::<Vec<_>>(), ["orator models check", "orator models fetch --mirror DIR"], &store, ui)
         }
-        Verb::Add { file, like, id, licence } => {
+        ModelsVerb::Add { file, like, id, licence } => {
             let entry = store.add(&runtime()?, file, like, id.as_deref(), licence)?;
             let key = format!("{:?}", entry.role).to_lowercase();
             let manifest = store.dir().join(MANIFEST_FILE);
@@ -89,17 +89,17 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             ui.summary(&text, Some(&next), json!({ "added": entry }));
             Ok(Outcome::Done)
         }
-        Verb::Check { ids } => {
+        ModelsVerb::Check { ids } => {
             let runtime = runtime()?;
             let lines = store.entries(ids)?.into_iter().map(|entry| {
                 let required = !ids.is_empty() || chosen.contains(&entry.id);
                 match store.check(&runtime, entry) {
-                    Ok(_) => Line::new(entry, "right", true, "right: bytes, names and shapes".to_owned()),
-                    Err(ModelError::Missing { .. }) if !required => Line {
+                    Ok(_) => ModelLine::new(entry, "right", true, "right: bytes, names and shapes".to_owned()),
+                    Err(ModelError::Missing { .. }) if !required => ModelLine {
                         is_failure: false,
-                        ..Line::new(entry, "right", false, "missing (not chosen)".to_owned())
+                        ..ModelLine::new(entry, "right", false, "missing (not chosen)".to_owned())
                     },
-                    Err(error) => Line::new(entry, "right", false, error.to_string()),
+                    Err(error) => ModelLine::new(entry, "right", false, error.to_string()),
                 }
             });
             close(&lines.collect::<Vec<_>>(), ["", "orator models fetch"], &store, ui)
@@ -121,13 +121,13 @@ fn settings(args: &Args) -> Result<Settings> {
 }
 
 /// What is printed of a model that was fetched or checked.
-struct Line {
+struct ModelLine {
     text: String,
     facts: Value,
     is_failure: bool,
 }
 
-impl Line {
+impl ModelLine {
     /// `key` is the name of the flag `good` for programs.
     fn new(entry: &ModelEntry, key: &str, good: bool, message: String) -> Self {
         let text = format!("{:<26} {message}", entry.id);
@@ -136,7 +136,7 @@ impl Line {
 }
 
 /// Prints the lines; `next` is the command to type after success and after a failure, empty: none.
-fn close(lines: &[Line], next: [&str; 2], store: &ModelStore, ui: &Ui) -> Result<Outcome> {
+fn close(lines: &[ModelLine], next: [&str; 2], store: &ModelStore, ui: &Ui) -> Result<Outcome> {
     let has_failed = lines.iter().any(|line| line.is_failure);
     let text: Vec<&str> = lines.iter().map(|line| line.text.as_str()).collect();
     let facts: Vec<&Value> = lines.iter().map(|line| &line.facts).collect();

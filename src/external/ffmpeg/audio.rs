@@ -7,7 +7,7 @@ use super::decode::StreamDecoder;
 use super::origin;
 use super::resample::{Resampler, first_not_finite, format_of};
 use super::source;
-use super::source::{LONGEST_GAP_SECS, LONGEST_SECS};
+use super::source::{LONGEST_GAP_SECS, LONGEST_SECS, UnreadableMedia};
 use crate::types::sound::Sound;
 use anyhow::{Context, Result, bail};
 use ffmpeg_next::frame;
@@ -153,7 +153,9 @@ pub(crate) fn stream_mono(
     if n_frames == 0 {
         let misplaced = StreamedSound { n_samples: 0, n_misplaced }.damage();
         let Some(damage) = misplaced.or_else(|| decode.damage()) else { return Ok(None) };
-        bail!("no sound of {} can be decoded ({damage}): copy or download it again", path.display());
+        let name = path.display();
+        let problem = format!("no sound of {name} can be decoded ({damage}): copy or download it again");
+        return Err(UnreadableMedia(problem).into());
     }
     timeline.end_run()?;
     Ok(Some(StreamedSound { n_samples: timeline.n_written, n_misplaced }))

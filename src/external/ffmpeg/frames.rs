@@ -10,7 +10,7 @@ use super::picture::{Converter, Orientation};
 use super::probe;
 use super::probe::MediaInfo;
 use super::source;
-use super::source::LONGEST_GAP_SECS;
+use super::source::{LONGEST_GAP_SECS, UnreadableMedia};
 use crate::types::image::Image;
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result};
@@ -76,8 +76,9 @@ impl FrameReader {
     pub fn open_with(path: &Path, fps: FrameRate, threads: usize) -> Result<Self> {
         let input = source::open(path)?;
         let info = probe::describe(&input);
-        let stream = source::video_stream(&input)
-            .with_context(|| format!("{} has no pictures: expected a video, not sound alone", path.display()))?;
+        let stream = source::video_stream(&input).ok_or_else(|| {
+            UnreadableMedia(format!("{} has no pictures: expected a video, not sound alone", path.display()))
+        })?;
         let orientation = Orientation::from_stream(&stream);
         let latest_secs = source::latest_secs(&input, &stream);
         let stream_idx = stream.index();
@@ -85,7 +86,9 @@ impl FrameReader {
         let mut first = frame::Video::empty();
         if !decode.next(&mut first)? {
             let why = decode.damage().unwrap_or_else(|| "it holds no complete one".to_owned());
-            anyhow::bail!("no picture of {} can be decoded ({why}): copy or download it again", path.display());
+            let name = path.display();
+            let problem = format!("no picture of {name} can be decoded ({why}): copy or download it again");
+            return Err(UnreadableMedia(problem).into());
         }
         let size = [first.width() as usize, first.height() as usize];
         let image_size = orientation.upright_size(probe::square_pixels(size, first.aspect_ratio()));

@@ -21,3 +21,4 @@ pub mod sound_stream;
 pub mod source;
 
 pub use library::version;
+pub use source::UnreadableMedia;

@@ -1,6 +1,6 @@
 //! Opening a media file: its streams, or an error that names the file, what is wrong with it and what was expected.
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result};
 use ffmpeg_next as ffmpeg;
 use ffmpeg_next::format::context::Input;
 use ffmpeg_next::format::stream::{Disposition, Stream};
@@ -8,6 +8,11 @@ use std::io::Read;
 use std::path::Path;
 
 const EXPECTED: &str = "expected a video or sound file (mp4, mov, mkv, webm, avi, wav, flac, mp3, ...)";
+
+/// A file that gives no picture or sound. The message names the file, what is wrong with it and what to do.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct UnreadableMedia(pub String);
 
 /// Longest time between two frames that is believed, and that the last one lasts, seconds. What a broken time skips
 /// would be filled with repeated pictures or silence.
@@ -20,37 +25,40 @@ pub(crate) fn open(path: &Path) -> Result<Input> {
     open_with(path, &[])
 }
 
-/// The same with options for the container's reader.
+/// Opens `path` with options for the container's reader.
 pub(crate) fn open_with(path: &Path, options: &[(&str, &str)]) -> Result<Input> {
     super::library::init();
-    let mut file = std::fs::File::open(path).with_context(|| format!("cannot read {}: {EXPECTED}", path.display()))?;
-    let size = file.metadata().with_context(|| format!("cannot read {}", path.display()))?;
+    let name = path.display();
+    let cannot = || UnreadableMedia(format!("cannot read {name}"));
+    let mut file =
+        std::fs::File::open(path).with_context(|| UnreadableMedia(format!("cannot read {name}: {EXPECTED}")))?;
+    let size = file.metadata().with_context(cannot)?;
+    let unreadable = |problem: String| Err(UnreadableMedia(problem).into());
     if size.is_dir() {
-        bail!("{} is a folder: {EXPECTED}", path.display());
+        return unreadable(format!("{name} is a folder: {EXPECTED}"));
     }
     if size.is_file() && size.len() == 0 {
-        bail!("{} is empty (0 bytes): {EXPECTED}; copy it again", path.display());
+        return unreadable(format!("{name} is empty (0 bytes): {EXPECTED}; copy it again"));
     }
     let mut head = [0u8; 12];
-    let n = file.read(&mut head).with_context(|| format!("cannot read {}", path.display()))?;
+    let n = file.read(&mut head).with_context(cannot)?;
     let is_mp4 = n == head.len() && &head[4..8] == b"ftyp";
     let cut_short = || {
         format!(
-            "{} is cut short: it begins like an mp4 but its index (moov) is missing or broken; copy or download it again",
-            path.display()
+            "{name} is cut short: it begins like an mp4 but its index (moov) is missing or broken; copy or download it again"
         )
     };
     let input = match ffmpeg::format::input_with_dictionary(&url(path)?, options.iter().copied().collect()) {
         Ok(input) => input,
-        Err(ffmpeg::Error::InvalidData) if is_mp4 => bail!(cut_short()),
-        Err(ffmpeg::Error::InvalidData) => bail!("{} is not a media file: {EXPECTED}", path.display()),
-        Err(error) => bail!("cannot open {} ({error}): {EXPECTED}", path.display()),
+        Err(ffmpeg::Error::InvalidData) if is_mp4 => return unreadable(cut_short()),
+        Err(ffmpeg::Error::InvalidData) => return unreadable(format!("{name} is not a media file: {EXPECTED}")),
+        Err(error) => return unreadable(format!("cannot open {name} ({error}): {EXPECTED}")),
     };
-    if video_stream(&input).is_none() && audio_stream(&input).is_none() {
-        ensure!(!is_mp4, cut_short());
-        bail!("{} holds neither pictures nor sound: {EXPECTED}", path.display());
+    match video_stream(&input).is_none() && audio_stream(&input).is_none() {
+        false => Ok(input),
+        true if is_mp4 => unreadable(cut_short()),
+        true => unreadable(format!("{name} holds neither pictures nor sound: {EXPECTED}")),
     }
-    Ok(input)
 }
 
 /// `path` as ffmpeg wants it: text, and marked as a file so that a colon in its name is not taken for a protocol.

@@ -193,6 +193,11 @@ impl Stage for DatasetStage {
     }
 }
 
+/// All that a speaker shows was refused, so that there is nothing to make a dataset of. The message has the reasons.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct NothingKept(pub String);
+
 /// The videos must have something to make a dataset of.
 fn check(unit: &Unit, work: &Path, videos: &[Video]) -> Result<()> {
     ensure!(
@@ -205,8 +210,10 @@ fn check(unit: &Unit, work: &Path, videos: &[Video]) -> Result<()> {
     for (reason, secs) in videos.iter().flat_map(|video| video.ledger.refused_secs()) {
         *refused.entry(reason).or_default() += secs;
     }
-    ensure!(
-        videos.iter().any(|video| !video.intervals.intervals.is_empty()),
+    if videos.iter().any(|video| !video.intervals.intervals.is_empty()) {
+        return Ok(());
+    }
+    let message = format!(
         "no interval worth keeping in {} of {:.1} s, so there is no dataset of {}; refused: {}; \
          the {} of each video under {} says where and why",
         counted(videos.len(), "video"),
@@ -216,7 +223,7 @@ fn check(unit: &Unit, work: &Path, videos: &[Video]) -> Result<()> {
         Artifact::LiftLedger.file(),
         speaker_dir(work, StageName::Lift, &unit.speaker).display()
     );
-    Ok(())
+    Err(NothingKept(message).into())
 }
 
 /// The videos of the dataset that is there; one with a damaged file is as good as not there.

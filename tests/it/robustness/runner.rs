@@ -78,15 +78,16 @@ fn a_failure_stops_no_other_and_keeps_what_was_made() {
     let made = units(dir.path(), &[("a", "fine"), ("b", "bad"), ("c", "panic"), ("d", "good")]);
     let stage = Shout { version: 1, mark: "!" };
     let ended = run(&stage, &made, &work, &hashes, (1, false), &Silent);
-    let errors: Vec<Option<&str>> = ended
+    let errors: Vec<Option<String>> = ended
         .iter()
         .map(|ended| match ended {
-            Ended::Failed(error) => Some(error.as_str()),
+            Ended::Failed(error) => Some(format!("{error:#}")),
             _ => None,
         })
         .collect();
     assert!(errors[0].is_none() && errors[3].is_none());
-    assert!(errors[1].unwrap().ends_with("bad text") && errors[2].unwrap().contains("a defect"));
+    let message = |at: usize| errors[at].as_deref().unwrap();
+    assert!(message(1).ends_with("bad text") && message(2).contains("a defect"));
     std::fs::write(&made[0].source, "bad").unwrap();
     assert!(matches!(run(&stage, &made[..1], &work, &hashes, (1, false), &Silent)[0], Ended::Failed(_)));
     assert!(matches!(state(&stage, &made[0], &work, &hashes), State::Failed(_)));

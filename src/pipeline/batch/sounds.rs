@@ -1,8 +1,8 @@
 //! Which sounds a batch has and what each motion is called: from a folder, or from a table of comma-separated values (RFC 4180;
 //! semicolons and tabs are understood too).
 
+use crate::animate::export::file::ExportFormat;
 use anyhow::{Context, Result, bail, ensure};
-use orator::animate::export::file::ExportFormat;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
@@ -13,8 +13,9 @@ const SOUNDS: [&str; 18] = [
 ];
 
 /// A sound of a batch.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BatchSound {
+    /// A file with sound.
     pub audio: PathBuf,
     /// The motion's name below the folder of outputs, `/` between folders, without an ending.
     pub name: String,
@@ -24,7 +25,7 @@ pub struct Row {
 
 /// All that sounds below `folder`, each called as its file; where two would be called the same, with their endings. What is
 /// below `out`, where motions go, is none of it: films sound too.
-pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<Row>> {
+pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
     ensure!(folder.is_dir(), "{} is no folder", folder.display());
     let out = out.canonicalize().ok();
     ensure!(
@@ -41,7 +42,11 @@ pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<Row>> {
     files.iter().for_each(|(file, _)| *called.entry(stem(file).to_lowercase()).or_default() += 1);
     let rows = files.into_iter().map(|(file, audio)| {
         let alone = called.get(&stem(&file).to_lowercase()) == Some(&1);
-        Row { audio, name: if alone { stem(&file) } else { file.replacen('.', "_", usize::MAX) }, checkpoint: None }
+        BatchSound {
+            audio,
+            name: if alone { stem(&file) } else { file.replacen('.', "_", usize::MAX) },
+            checkpoint: None,
+        }
     });
     distinct(rows.collect())
 }
@@ -66,14 +71,14 @@ fn collect(folder: &Path, before: &str, without: Option<&Path>, files: &mut Vec<
 
 /// The rows of the table `path`: columns `audio`, and if they are there `out` and `checkpoint` (or `speaker`). Paths count
 /// from the table's folder. Errors name the line.
-pub fn of_file(path: &Path) -> Result<Vec<Row>> {
+pub fn of_table(path: &Path) -> Result<Vec<BatchSound>> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let text = std::str::from_utf8(&bytes).with_context(|| format!("{} is no text in UTF-8", path.display()))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     parse(text, folder).and_then(distinct).with_context(|| format!("the table {}", path.display()))
 }
 
-fn parse(text: &str, folder: &Path) -> Result<Vec<Row>> {
+fn parse(text: &str, folder: &Path) -> Result<Vec<BatchSound>> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let heads = text.lines().next().unwrap_or_default();
     let comma = [',', ';', '\t'].into_iter().max_by_key(|c| heads.matches(*c).count()).filter(|c| heads.contains(*c));
@@ -98,7 +103,11 @@ fn parse(text: &str, folder: &Path) -> Result<Vec<Row>> {
             None => named(&Path::new(file).file_stem().unwrap_or_default().to_string_lossy())
                 .with_context(|| format!("line {line}"))?,
         };
-        rows.push(Row { audio: folder.join(file), name, checkpoint: field(checkpoint).map(|path| folder.join(path)) });
+        rows.push(BatchSound {
+            audio: folder.join(file),
+            name,
+            checkpoint: field(checkpoint).map(|path| folder.join(path)),
+        });
     }
     ensure!(!rows.is_empty(), "it names no sound");
     Ok(rows)
@@ -119,7 +128,7 @@ fn named(out: &str) -> Result<String> {
 }
 
 /// Errors where two motions would be one file, upper and lower case being the same on many disks.
-fn distinct(rows: Vec<Row>) -> Result<Vec<Row>> {
+fn distinct(rows: Vec<BatchSound>) -> Result<Vec<BatchSound>> {
     let mut seen = BTreeMap::new();
     for row in &rows {
         if let Some(other) = seen.insert(row.name.to_lowercase(), &row.audio) {
@@ -163,7 +172,7 @@ mod tests {
 
     #[test]
     fn tables_of_every_kind_are_read() {
-        let row = |audio: &str, name: &str, checkpoint: Option<&str>| Row {
+        let row = |audio: &str, name: &str, checkpoint: Option<&str>| BatchSound {
             audio: PathBuf::from(audio),
             name: name.into(),
             checkpoint: checkpoint.map(PathBuf::from),

@@ -1,0 +1,9 @@
+//! Speech to motion files: one sound, or a folder or table of sounds as units of a stage, so that what is there already is
+//! not made again.
+
+pub mod job;
+pub mod motion_files;
+pub mod sounds;
+pub mod stage;
+
+pub use job::{BatchOutcome, BatchReport, BatchState, SpeechBatch};

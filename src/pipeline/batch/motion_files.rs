@@ -1,0 +1,136 @@
+//! One sound to motion to files. The sound is streamed, so that its length takes no memory but for its motion; only a film,
+//! which holds the sound, reads it whole.
+
+use crate::animate::export::file::{ExportContent, ExportFormat};
+use crate::animate::{AnimationOptions, perform};
+use crate::audio::mel;
+use crate::external::ffmpeg::UnreadableMedia;
+use crate::external::ffmpeg::sound_stream;
+use crate::external::ffmpeg::sound_stream::SoundStream;
+use crate::external::ffmpeg::{audio, probe};
+use crate::formats::checkpoint;
+use crate::generate::Speaker;
+use crate::generate::model::BEST;
+use crate::stage::progress::Progress;
+use crate::types::sound::SAMPLE_RATE;
+use anyhow::{Context as _, Result, ensure};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// A sound whose motion was written.
+#[derive(Clone, Debug)]
+pub struct SpokenMotion {
+    /// Seconds of sound.
+    pub secs: f64,
+    /// Frames of motion.
+    pub n_frames: usize,
+    /// Seconds it took to make the motion, files not counted.
+    pub motion_secs: f64,
+    /// What a user should know of the sound.
+    pub note: Option<String>,
+}
+
+/// The checkpoint file meant by a file or a training's folder: its best, else its newest.
+///
+/// # Errors
+/// A path that is not there, a folder without checkpoints.
+pub fn checkpoint_file(path: &Path) -> Result<PathBuf> {
+    ensure!(path.exists(), "{} is not there; `orator train gan` makes checkpoints", path.display());
+    if !path.is_dir() {
+        return Ok(path.to_owned());
+    }
+    let best = path.join(BEST);
+    if best.is_file() {
+        return Ok(best);
+    }
+    let newest = checkpoint::list(path)?.pop();
+    newest
+        .map(|(_, file)| file)
+        .with_context(|| format!("{} holds no checkpoint (best.safetensors or step-*.safetensors)", path.display()))
+}
+
+/// Writes the motion of `speaker` for the sound of `audio` to `outputs`. Errors name the sound.
+pub fn write_motion(
+    speaker: &Speaker,
+    audio: &Path,
+    outputs: &[(PathBuf, ExportFormat)],
+    progress: &dyn Progress,
+) -> Result<SpokenMotion> {
+    let started = Instant::now();
+    let task = progress.begin("speech to motion", 0);
+    task.detail("listening");
+    let (n_samples, note) = measure(audio)?;
+    let secs = n_samples as f64 / f64::from(SAMPLE_RATE);
+    let no_motion = || format!("no motion for {}", audio.display());
+    let n_frames = speaker.n_frames(n_samples).with_context(no_motion)?;
+    drop(task);
+    let task = progress.begin("speech to motion", n_frames as u64);
+    task.detail(&format!("{secs:.1} s of sound"));
+    let pieces = SoundStream::open(audio, SAMPLE_RATE);
+    let motion =
+        speaker.motion_of_pieces(pieces, n_samples, &mut |n| task.advance(n as u64)).with_context(no_motion)?;
+    drop(task);
+    let motion_secs = started.elapsed().as_secs_f64();
+    // Files of joints hold what the network gave, before it is put on a figure.
+    let (joints, figures): (Vec<_>, Vec<_>) = outputs.iter().partition(|(_, format)| format.holds_joints());
+    for (path, format) in joints {
+        format.write_joints(path, &motion)?;
+    }
+    if !figures.is_empty() {
+        let performance = perform(&motion, None, &AnimationOptions::default());
+        drop(motion);
+        let is_film = figures.iter().any(|(_, format)| *format == ExportFormat::Mp4);
+        let sound = if is_film { audio::read_mono(audio, SAMPLE_RATE)? } else { None };
+        let sources = ExportContent { sound: sound.as_ref(), ..ExportContent::default() };
+        for (path, format) in figures {
+            format.write(path, &performance, &sources, progress)?;
+        }
+    }
+    Ok(SpokenMotion { secs, n_frames, motion_secs, note })
+}
+
+/// Number of samples of the sound at 16 kHz, and what a user should know of it.
+fn measure(path: &Path) -> Result<(usize, Option<String>)> {
+    ensure!(path.exists(), "{} is not there", path.display());
+    ensure!(path.is_file(), "{} is no file", path.display());
+    let info = probe::probe(path)?;
+    let name = path.display();
+    let Some(track) = info.audio else {
+        return Err(UnreadableMedia(format!("{name} has no sound track; give a file with speech")).into());
+    };
+    match sound_stream::n_samples(path, SAMPLE_RATE)? {
+        Some(n) if n > 0 => Ok((n, narrow_band_note(track.rate))),
+        _ => {
+            let problem =
+                format!("{name}: its sound track ({}) holds no samples; give a file with speech", track.codec);
+            Err(UnreadableMedia(problem).into())
+        }
+    }
+}
+
+/// The note on a sample rate too low for the spectrogram.
+fn narrow_band_note(rate: u32) -> Option<String> {
+    let highest_hz = f64::from(rate) / 2.0;
+    if rate == 0 || highest_hz >= mel::HIGHEST_HZ {
+        return None;
+    }
+    let n_empty = (0..mel::N_MELS).filter(|band| mel::lowest_hz(*band) >= highest_hz).count();
+    Some(format!(
+        "the sound has {rate} samples a second, so nothing above {highest_hz:.0} Hz: {n_empty} of the {} mel bands a speaker \
+         listens to are empty, and it gestures as to muffled speech",
+        mel::N_MELS
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::narrow_band_note;
+
+    #[test]
+    fn a_telephone_gives_a_note() {
+        assert_eq!(narrow_band_note(16_000), None);
+        assert_eq!(narrow_band_note(44_100), None);
+        let text = narrow_band_note(8000).unwrap();
+        assert!(text.contains("4000 Hz") && text.contains("of the 64 mel bands"), "{text}");
+    }
+}

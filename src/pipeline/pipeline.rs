@@ -1,0 +1,49 @@
+//! The pipeline as a value: a configuration with the videos it names, to be run and asked how it stands.
+
+use crate::config::videos::Videos;
+use crate::config::{Config, videos};
+use crate::stage::artifacts;
+use crate::stage::fingerprint::HashCache;
+use anyhow::{Result, ensure};
+
+/// Videos to datasets, by one configuration. `run` does the work, `status` says how far it is.
+#[derive(Clone, Debug)]
+pub struct Pipeline {
+    config: Config,
+    videos: Vec<Videos>,
+}
+
+impl Pipeline {
+    /// Looks for the videos that the configuration names; writes nothing.
+    ///
+    /// # Errors
+    /// A configuration without speakers.
+    pub fn open(config: Config) -> Result<Self> {
+        let videos = videos::of(&config);
+        ensure!(!videos.is_empty(), "{} names no [[speaker]]", config.file.display());
+        Ok(Self { config, videos })
+    }
+
+    /// The configuration.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// The videos of the speakers of those names; of all where none is named.
+    ///
+    /// # Errors
+    /// A name the configuration does not have.
+    pub fn videos(&self, speakers: &[String]) -> Result<Vec<Videos>> {
+        for name in speakers {
+            let known: Vec<&str> = self.videos.iter().map(|videos| videos.speaker.as_str()).collect();
+            ensure!(known.contains(&name.as_str()), "no speaker is called {name}; there are: {}", known.join(", "));
+        }
+        let chosen = self.videos.iter().filter(|v| speakers.is_empty() || speakers.contains(&v.speaker));
+        Ok(chosen.cloned().collect())
+    }
+
+    /// The hashes of files that are known from earlier runs.
+    pub(super) fn hashes(&self) -> HashCache {
+        HashCache::open(&artifacts::hashes(&self.config.settings.work.dir))
+    }
+}

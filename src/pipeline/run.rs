@@ -1,0 +1,211 @@
+//! A run of the pipeline: the stages of videos, video by video, then the datasets of the speakers.
+
+use super::pipeline::Pipeline;
+use super::selection::Selection;
+use super::stages;
+use crate::config::Config;
+use crate::config::videos::Videos;
+use crate::stage::artifacts::{StageName, speaker_dir};
+use crate::stage::fingerprint::HashCache;
+use crate::stage::progress::{Event, Progress};
+use crate::stage::runner::Ended;
+use crate::stage::{Stage, Unit, runner, workdir};
+use anyhow::{Context, Result, ensure};
+use serde::Serialize;
+use serde_json::{Map, Value};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// How a run ended.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct RunReport {
+    /// Units of each stage by how they ended.
+    pub stages: BTreeMap<StageName, StageCounts>,
+    /// What failed; the rest is done.
+    pub failures: Vec<UnitFailure>,
+    /// What is done or was fresh.
+    pub units: Vec<UnitReport>,
+    /// Folders of the datasets that stand.
+    pub datasets: Vec<PathBuf>,
+    /// Number of speakers chosen.
+    #[serde(skip)]
+    pub n_speakers: usize,
+}
+
+/// Units of a stage by how they ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct StageCounts {
+    /// Worked on.
+    pub done: usize,
+    /// Fresh already.
+    pub fresh: usize,
+    /// Failed.
+    pub failed: usize,
+}
+
+/// A unit that failed at a stage, or a speaker with an entry that leads to no video.
+#[derive(Clone, Debug, Serialize)]
+pub struct UnitFailure {
+    /// The speaker, where an entry of the configuration leads to no video.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speaker: Option<String>,
+    /// The unit: `speaker/video`, or `speaker` of a dataset.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+    /// Where it failed.
+    pub stage: StageName,
+    /// With its causes, for people.
+    pub error: String,
+    /// To be matched by `downcast_ref`: `UnreadableMedia`, `NothingKept`, `NoSpace`, `ModelError`.
+    #[serde(skip)]
+    pub cause: Option<Arc<anyhow::Error>>,
+}
+
+/// A unit that is fresh at a stage now.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct UnitReport {
+    /// `speaker/video`, or `speaker` of a dataset.
+    pub unit: String,
+    /// The stage.
+    pub stage: StageName,
+    /// Whether this run did it.
+    pub state: RunState,
+    /// The stage's line for people.
+    pub line: String,
+    /// The stage's numbers.
+    pub facts: Map<String, Value>,
+}
+
+/// Whether a unit was worked on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RunState {
+    /// Worked on.
+    Done,
+    /// Fresh already.
+    Fresh,
+}
+
+impl Pipeline {
+    /// Runs the chosen stages; fresh units are skipped, a unit that fails does not stop the others.
+    ///
+    /// # Errors
+    /// What stops the whole run: an unknown speaker, a missing model, another run in the same work folder
+    /// (`BusyFolder`), a work folder that cannot be written.
+    pub fn run(&self, selection: &Selection, progress: &dyn Progress) -> Result<RunReport> {
+        let Selection { from, to, force, .. } = *selection;
+        ensure!(from <= to, "--from {from} comes after --to {to}");
+        let mut alive = self.videos(&selection.speakers)?;
+        let settings = &self.config().settings;
+        if selection.has(StageName::Pose2d) {
+            stages::check_models(settings)?;
+        }
+        // What a stage needs (weights, the manifest) is looked at before hours of work, not after.
+        for name in StageName::ALL.into_iter().filter(|name| selection.has(*name)) {
+            stages::build(name, self.config(), &[])?;
+        }
+        let _lock = workdir::lock(&settings.work.dir)
+            .context("no run now; another folder is chosen with --set work.dir=FOLDER")?;
+        let jobs = match selection.jobs.unwrap_or(settings.work.jobs) {
+            0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
+            n => n,
+        };
+        let report = RunReport { n_speakers: alive.len(), ..RunReport::default() };
+        let hashes = self.hashes();
+        let mut run = StageRun { config: self.config(), hashes: &hashes, limits: (jobs, force), progress, report };
+        for videos in &alive {
+            for error in &videos.missing {
+                progress.event(&Event::NoVideo { speaker: &videos.speaker, error });
+                run.report.failures.push(UnitFailure {
+                    speaker: Some(videos.speaker.clone()),
+                    unit: None,
+                    stage: StageName::Extract,
+                    error: error.clone(),
+                    cause: None,
+                });
+            }
+        }
+        let names: Vec<StageName> = StageName::OF_VIDEOS.into_iter().filter(|name| selection.has(*name)).collect();
+        run.stages(&names, &[], &mut alive)?;
+        if selection.has(StageName::Dataset) {
+            let ready = run.ready(&alive)?;
+            let failed = run.stages(&[StageName::Dataset], &ready, &mut alive)?;
+            let stand = alive.iter().map(|videos| &videos.speaker).filter(|speaker| !failed.contains(speaker));
+            run.report.datasets =
+                stand.map(|speaker| speaker_dir(&settings.work.dir, StageName::Dataset, speaker)).collect();
+        }
+        Ok(run.report)
+    }
+}
+
+struct StageRun<'a> {
+    config: &'a Config,
+    hashes: &'a HashCache,
+    /// Workers, and whether fresh units are worked on again.
+    limits: (usize, bool),
+    progress: &'a dyn Progress,
+    report: RunReport,
+}
+
+impl StageRun<'_> {
+    /// Runs stages that have the same units, for everything alive; what fails is not alive for later ones. Gives the
+    /// speakers of what failed.
+    fn stages(&mut self, names: &[StageName], ready: &[Unit], alive: &mut [Videos]) -> Result<Vec<String>> {
+        let Some(&first) = names.first() else { return Ok(Vec::new()) };
+        let units: Vec<Unit> = alive.iter().flat_map(|videos| stages::units(first, self.config, videos)).collect();
+        let stages = names.iter().map(|name| stages::build(*name, self.config, ready)).collect::<Result<Vec<_>>>()?;
+        let stages: Vec<&dyn Stage> = stages.iter().map(|stage| &**stage).collect();
+        let work = &self.config.settings.work.dir;
+        let ended = runner::run_stages(&stages, &units, work, self.hashes, self.limits, self.progress);
+        self.hashes.save()?;
+        for name in names {
+            self.report.stages.entry(*name).or_default();
+        }
+        let mut failed = Vec::new();
+        for (unit, answers) in units.iter().zip(ended) {
+            for (&stage, answer) in names.iter().zip(answers) {
+                let counts = self.report.stages.entry(stage).or_default();
+                let (count, state) = match &answer {
+                    Ended::Done(_) => (&mut counts.done, RunState::Done),
+                    Ended::Skipped(_) => (&mut counts.fresh, RunState::Fresh),
+                    Ended::Failed(_) => (&mut counts.failed, RunState::Done),
+                };
+                *count += 1;
+                match answer {
+                    Ended::Done(report) | Ended::Skipped(report) => {
+                        let (unit, line, facts) = (unit.to_string(), report.line, report.facts);
+                        self.report.units.push(UnitReport { unit, stage, state, line, facts });
+                    }
+                    Ended::Failed(error) => {
+                        failed.push(unit.speaker.clone());
+                        self.report.failures.push(UnitFailure {
+                            speaker: None,
+                            unit: Some(unit.to_string()),
+                            stage,
+                            error: format!("{error:#}"),
+                            cause: Some(error),
+                        });
+                        for videos in alive.iter_mut().filter(|videos| videos.speaker == unit.speaker) {
+                            videos.units.retain(|alive| alive != unit);
+                        }
+                    }
+                }
+            }
+        }
+        Ok(failed)
+    }
+
+    /// The videos the datasets are made of; an event tells of each that is not ready and left out.
+    fn ready(&self, alive: &[Videos]) -> Result<Vec<Unit>> {
+        let mut all_ready = Vec::new();
+        for videos in alive {
+            let ready = stages::ready(self.config, videos, self.hashes)?;
+            for unit in videos.units.iter().filter(|unit| !ready.contains(unit)) {
+                self.progress.event(&Event::LeftOut { unit: &unit.to_string() });
+            }
+            all_ready.extend(ready);
+        }
+        Ok(all_ready)
+    }
+}

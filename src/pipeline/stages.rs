@@ -1,0 +1,74 @@
+//! The stages by their names, ready to run, and the units each works on.
+
+use super::dataset::stage::DatasetStage;
+use super::extract::Extract;
+use super::lift::LiftStage;
+use super::pose2d::Pose2dStage;
+use super::segment::SegmentStage;
+use crate::config::videos::Videos;
+use crate::config::{Config, Settings, videos};
+use crate::dataset::info::ModelUsed;
+use crate::external::onnx::{Model, Runtime};
+use crate::stage::artifacts::StageName;
+use crate::stage::fingerprint::HashCache;
+use crate::stage::runner;
+use crate::stage::runner::State;
+use crate::stage::{Stage, Unit};
+use anyhow::Result;
+
+/// The stage, ready to run. `ready` are the videos the dataset is made of.
+///
+/// # Errors
+/// A model the manifest does not have, weights that cannot be read.
+pub fn build(name: StageName, config: &Config, ready: &[Unit]) -> Result<Box<dyn Stage>> {
+    let settings = &config.settings;
+    Ok(match name {
+        StageName::Extract => Box::new(Extract::new(&settings.extract)),
+        StageName::Pose2d => Box::new(Pose2dStage::new(settings)?),
+        StageName::Segment => Box::new(SegmentStage::new(&settings.segment, &settings.work.dir)),
+        StageName::Lift => Box::new(LiftStage::new(&settings.lift, &settings.segment, &settings.work.dir)?),
+        StageName::Dataset => Box::new(
+            DatasetStage::new(settings, ready).with_videos(videos::of(config)).with_models(models_used(settings)?),
+        ),
+    })
+}
+
+/// What a stage works on: every video, or the speaker as a whole.
+pub fn units(name: StageName, config: &Config, videos: &Videos) -> Vec<Unit> {
+    if name != StageName::Dataset {
+        return videos.units.clone();
+    }
+    let speaker = videos.speaker.clone();
+    vec![Unit { speaker, video: String::new(), source: config.file.clone() }]
+}
+
+/// The videos of a speaker that are fresh at every stage before the last: those a dataset is made of.
+///
+/// # Errors
+/// Those of `build`.
+pub fn ready(config: &Config, videos: &Videos, hashes: &HashCache) -> Result<Vec<Unit>> {
+    let stages = StageName::OF_VIDEOS.into_iter().map(|name| build(name, config, &[])).collect::<Result<Vec<_>>>()?;
+    let state = |stage: &dyn Stage, unit: &Unit| runner::state(stage, unit, &config.settings.work.dir, hashes);
+    let fresh = |unit: &&Unit| stages.iter().all(|stage| matches!(state(&**stage, unit), State::Fresh(_)));
+    Ok(videos.units.iter().filter(fresh).cloned().collect())
+}
+
+/// Opens every model the configuration chooses, so that a wrong set-up is known before any work.
+///
+/// # Errors
+/// No ONNX Runtime; a model that is missing or not what the manifest says.
+pub fn check_models(settings: &Settings) -> Result<()> {
+    let runtime = Runtime::load(&settings.models.onnxruntime, &settings.models.dir)?;
+    for (_, entry) in Pose2dStage::new(settings)?.used()? {
+        Model::open(&runtime, entry, &settings.models.dir)?;
+    }
+    Ok(())
+}
+
+fn models_used(settings: &Settings) -> Result<Vec<ModelUsed>> {
+    let stage = Pose2dStage::new(settings)?;
+    let used = stage.used()?.into_iter();
+    let named =
+        used.map(|(role, entry)| ModelUsed { role: role.into(), id: entry.id.clone(), sha256: entry.sha256.clone() });
+    Ok(named.collect())
+}
