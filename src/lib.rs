@@ -31,6 +31,7 @@
 //! | 6 | `demo` | the synthetic speaker: drawn, with a known rule, and the checks against it | `types math stage audio motion formats external animate dataset metrics generate` |
 //! | 7 | `evaluate` | clips, baselines, table, verdict; the lifters' errors | `types math stage config external audio motion formats nn mocap metrics generate animate dataset pipeline train` |
 //! | 8 | `report` | pages for people | `types math stage config external audio motion formats nn mocap metrics generate animate dataset pipeline train evaluate` |
+//! | - | `guide` | the pages of the guide, in Markdown | nothing |
 //!
 //! `cli` (in the program only) imports everything and is the one place that prints. `tests/it/house.rs` holds the code to
 //! this table.
@@ -48,6 +49,7 @@ pub mod evaluate;
 pub mod external;
 pub mod formats;
 pub mod generate;
+pub mod guide;
 pub mod math;
 pub mod metrics;
 pub mod mocap;

@@ -5,9 +5,9 @@ use super::dataset::{forget, import, verify as dataset};
 use super::motion::{lift, sheet};
 use super::outcome::Outcome;
 use super::pipeline::{init, report, run, status};
-use super::setup::{doctor, models};
+use super::setup::{completions, doctor, guide, models};
 use super::{animate, demo, evaluate, generate, train, ui};
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// Videos of one speaker to a 3D speech-gesture dataset, and to a model that gestures like that speaker.
@@ -39,6 +39,9 @@ enum Verb {
     Generate(generate::Args),
     Animate(animate::Args),
     Demo(demo::Args),
+    Guide(guide::Args),
+    Completions(completions::Args),
+    Man(completions::ManArgs),
 }
 
 /// Parses the command line, runs the verb, reports an error, and gives the exit code.
@@ -68,6 +71,9 @@ pub fn main() -> ExitCode {
         Verb::Generate(args) => generate::run(args, &ui),
         Verb::Animate(args) => animate::run(args, &ui),
         Verb::Demo(args) => demo::run(args, &ui),
+        Verb::Guide(args) => guide::run(&args, &ui),
+        Verb::Completions(args) => completions::run(&args, Cli::command(), &ui),
+        Verb::Man(args) => completions::run_man(&args, Cli::command(), &ui),
     };
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

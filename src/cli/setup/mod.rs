@@ -1,4 +1,6 @@
-//! The verbs of an installation: `models`, `doctor`.
+//! The verbs of an installation: `models`, `doctor`, `guide`, `completions`, `man`.
 
+pub mod completions;
 pub mod doctor;
+pub mod guide;
 pub mod models;

@@ -1,0 +1,24 @@
+//! The guide: one page a topic. `orator guide TOPIC` prints a page; here the same pages stand as documentation.
+
+mod topics;
+
+pub use topics::{TOPICS, Topic};
+
+#[doc = include_str!("dataset.md")]
+pub mod dataset {}
+#[doc = include_str!("lifting.md")]
+pub mod lifting {}
+#[doc = include_str!("training.md")]
+pub mod training {}
+#[doc = include_str!("animation.md")]
+pub mod animation {}
+#[doc = include_str!("evaluation.md")]
+pub mod evaluation {}
+#[doc = include_str!("models.md")]
+pub mod models {}
+#[doc = include_str!("configuration.md")]
+pub mod configuration {}
+#[doc = include_str!("architecture.md")]
+pub mod architecture {}
+#[doc = include_str!("contributing.md")]
+pub mod contributing {}
