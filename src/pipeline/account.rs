@@ -1,8 +1,8 @@
 //! The account of seconds: of every video what was kept, refused for which reason, lost to a failed stage or is not
 //! judged yet, and whether that adds up to its duration.
 
-use super::segment::Video;
 use crate::external::ffmpeg::probe::probe;
+use crate::formats::media_json::MediaInfo;
 use crate::stage::Unit;
 use crate::stage::artifacts::{Artifact, StageName};
 use crate::stage::ledger::Ledger;
@@ -76,8 +76,8 @@ impl TimeAccount {
     /// One video whose stages wrote under `work`; `is_extracted`: the extract stage is fresh.
     pub(super) fn of_video(work: &Path, unit: &Unit, standing: Standing, is_extracted: bool) -> Self {
         let account = Self { of: unit.to_string(), kind: AccountKind::Video, ..Self::default() };
-        let media = if is_extracted { Video::read(&Artifact::MediaInfo.path(work, unit)).ok() } else { None };
-        let Some(duration) = media.map(|media| media.duration_secs).or_else(|| probed(&unit.source)) else {
+        let media = if is_extracted { MediaInfo::read(&Artifact::MediaInfo.path(work, unit)).ok() } else { None };
+        let Some(duration) = media.as_ref().map(|media| media.duration_secs).or_else(|| probed(&unit.source)) else {
             return Self { n_unknown: 1, ..account };
         };
         let (ledger, waiting) = match standing {
@@ -91,7 +91,7 @@ impl TimeAccount {
         let (kept, refused, failed) = (ledger.kept_secs() + 0.0, ledger.refused_secs(), ledger.failed_secs() + 0.0);
         let mut account = Self { kept, refused, failed, waiting, duration, ..account };
         account.sum = account.added();
-        let frame_secs = media.map_or(UNKNOWN_FRAME_SECS, |media| 1.0 / media.fps.per_sec());
+        let frame_secs = media.as_ref().map_or(UNKNOWN_FRAME_SECS, |media| 1.0 / media.fps.per_sec());
         account.n_wrong = usize::from((account.sum - duration).abs() > frame_secs);
         account
     }

@@ -8,7 +8,7 @@
 use super::decode::StreamDecoder;
 use super::picture::{Converter, Orientation};
 use super::probe;
-use super::probe::MediaInfo;
+use super::probe::ProbedMedia;
 use super::source;
 use super::source::{LONGEST_GAP_SECS, UnreadableMedia};
 use crate::types::image::Image;
@@ -49,7 +49,7 @@ pub struct FrameReader {
     path: PathBuf,
     fps: FrameRate,
     decode: StreamDecoder,
-    info: MediaInfo,
+    info: ProbedMedia,
     orientation: Orientation,
     image_size: [usize; 2],
     converters: Vec<([usize; 2], Converter)>,
@@ -116,7 +116,7 @@ impl FrameReader {
     }
 
     /// What the headers say.
-    pub fn info(&self) -> &MediaInfo {
+    pub fn info(&self) -> &ProbedMedia {
         &self.info
     }
 

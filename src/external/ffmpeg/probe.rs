@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// What a file holds.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MediaInfo {
+pub struct ProbedMedia {
     /// Length as stated: of the pictures if there are any, else of the sound; `None` if no header says.
     pub duration_secs: Option<f64>,
     pub video: Option<VideoInfo>,
@@ -45,15 +45,15 @@ pub struct AudioInfo {
 }
 
 /// Reads the headers of `path`.
-pub fn probe(path: &Path) -> Result<MediaInfo> {
+pub fn probe(path: &Path) -> Result<ProbedMedia> {
     Ok(describe(&source::open(path)?))
 }
 
-pub(crate) fn describe(input: &Input) -> MediaInfo {
+pub(crate) fn describe(input: &Input) -> ProbedMedia {
     let video = source::video_stream(input);
     let audio = source::audio_stream(input);
     let duration_secs = video.as_ref().or(audio.as_ref()).and_then(|stream| source::stated_secs(input, stream));
-    MediaInfo {
+    ProbedMedia {
         duration_secs,
         video: video.map(|stream| describe_video(&stream)),
         audio: audio.map(|stream| {

@@ -14,6 +14,7 @@ use crate::dataset::split::{Assignment, Split, Unassigned, assign as place_in_sp
 use crate::dataset::write::part;
 use crate::dataset::write::part::{VideoEntry, VideoSource};
 use crate::dataset::write::writer::DatasetWriter;
+use crate::formats::media_json::MediaInfo;
 use crate::stage::artifacts::{Artifact, StageName, dir, speaker_dir};
 use crate::stage::ledger::{Ledger, Refused, longest_first};
 use crate::stage::progress::Progress;
@@ -90,9 +91,8 @@ fn failure(work: &Path, unit: &Unit) -> VideoSource {
     let failure = |stage: StageName| Some((stage.as_str(), Failure::read(&dir(work, stage, unit))?.error));
     let error = StageName::OF_VIDEOS.into_iter().find_map(failure);
     let (stage, error) = error.unwrap_or(("run", "not every stage is done".to_owned()));
-    let media = std::fs::read(Artifact::MediaInfo.path(work, unit)).unwrap_or_default();
-    let media: serde_json::Value = serde_json::from_slice(&media).unwrap_or_default();
-    let duration_secs = media["duration_secs"].as_f64().filter(|secs| secs.is_finite() && *secs > 0.0);
+    let duration_secs = MediaInfo::read(&Artifact::MediaInfo.path(work, unit)).ok().map(|media| media.duration_secs);
+    let duration_secs = duration_secs.filter(|secs| *secs > 0.0);
     VideoSource {
         name: unit.video.clone(),
         file: unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned(),

@@ -7,7 +7,7 @@ use super::outliers::BoneChange;
 use super::refuse::amend;
 use super::{Lifted, Lifter};
 use crate::config;
-use crate::formats::npz::Npz;
+use crate::formats::timeline_npz::Timeline;
 use crate::formats::{joints_npz, keypoints_npz};
 use crate::stage::artifacts::{Artifact, StageName};
 use crate::stage::ledger::Ledger;
@@ -96,7 +96,7 @@ impl Stage for LiftStage {
     fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
         let mut keypoints = keypoints_npz::read(&self.file(Artifact::Keypoints, unit))?;
         let timeline = self.file(Artifact::Timeline, unit);
-        let repeated = Npz::open(&timeline)?.bools("repeated", &[None])?.into_iter().collect::<Vec<bool>>();
+        let repeated = Timeline::read(&timeline)?.repeated;
         ensure!(
             repeated.len() == keypoints.n_frames(),
             "the keypoints have {} frames, {} has {}: run the stage pose2d again",

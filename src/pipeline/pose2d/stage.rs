@@ -12,7 +12,7 @@ use crate::external::ffmpeg::ahead;
 use crate::external::ffmpeg::frames::{FrameReader, FrameTime};
 use crate::external::onnx::{Manifest, ModelEntry, ModelError, Runtime};
 use crate::external::opencv;
-use crate::formats::npz::Npz;
+use crate::formats::timeline_npz::Timeline;
 use crate::stage::artifacts::{Artifact, StageName};
 use crate::stage::progress::Progress;
 use crate::stage::{Input, Report, Stage, Unit};
@@ -117,7 +117,7 @@ impl Stage for Pose2dStage {
     }
 
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
-        let restarts = restarts(&Artifact::Timeline.path(&self.work, unit))?;
+        let restarts = Timeline::read(&Artifact::Timeline.path(&self.work, unit))?.restart;
         let mut chain = Chain::new(&self.runtime()?, &self.manifest, &self.models.dir, &self.settings)?;
         if let Some(path) = self.references.get(&unit.speaker) {
             let mut reference = FrameReader::open(path, FrameRate::new(1, 1))?;
@@ -158,11 +158,6 @@ impl Stage for Pose2dStage {
         store::write(&Artifact::Keypoints.within(out), &keypoints, &extras)?;
         Ok(seen.report())
     }
-}
-
-/// The frames at which following begins anew.
-fn restarts(timeline: &Path) -> Result<Vec<bool>> {
-    Ok(Npz::open(timeline)?.bools("restart", &[None])?.into_iter().collect())
 }
 
 fn unlike(video: &Path, found: usize, expected: usize) -> String {

@@ -6,38 +6,16 @@ use super::measure::Measures;
 use super::refusal::Refusal;
 use super::table::{FrameRule, Gap, frame_rules, piece_rules};
 use crate::config;
+use crate::formats::media_json::MediaInfo;
 use crate::stage::ledger::{Kept, Ledger, Refused};
 use crate::types::interval::{Interval, Intervals};
 use crate::types::time::FrameRate;
-use anyhow::{Context, Result, ensure};
-use serde::Deserialize;
-use std::path::Path;
-
-/// What the verdict needs of a video beside the measures.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-pub struct Video {
-    pub duration_secs: f64,
-    pub n_frames: usize,
-    pub fps: FrameRate,
-}
 
 /// A refusal with what was measured and the threshold.
 type Mark = (Refusal, f64, f64);
 
-impl Video {
-    /// Reads `media.json` as the extract stage writes it.
-    pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-        let video: Self =
-            serde_json::from_slice(&bytes).with_context(|| format!("{} is incomplete", path.display()))?;
-        let secs = video.duration_secs;
-        ensure!(secs.is_finite() && secs >= 0.0, "{}: a duration of {secs} s", path.display());
-        Ok(video)
-    }
-}
-
 /// Judges a whole video.
-pub fn judge(measures: &Measures, video: &Video, rules: &config::Segment) -> (Intervals, Ledger) {
+pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::Segment) -> (Intervals, Ledger) {
     let n_frames = measures.n_frames();
     let begins_shot = |t: usize| {
         let score = f64::from(measures.shot_score[t]);
@@ -135,7 +113,7 @@ fn broken_by_piece(piece: Interval, measures: &Measures, rules: &config::Segment
 }
 
 /// The pieces as seconds. The last one ends with the video, so that a partly filled last frame is not lost.
-fn ledger(pieces: &[(Interval, Option<Mark>)], n_frames: usize, video: &Video) -> Ledger {
+fn ledger(pieces: &[(Interval, Option<Mark>)], n_frames: usize, video: &MediaInfo) -> Ledger {
     let mut ledger = Ledger { duration_secs: video.duration_secs, ..Ledger::default() };
     let nothing = [(Interval { start: 0, end: 0 }, Some((Refusal::NoPerson, 0.0, 0.0)))];
     let pieces = if pieces.is_empty() { &nothing[..] } else { pieces };

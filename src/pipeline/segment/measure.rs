@@ -20,7 +20,7 @@ pub struct Measures {
     /// Loudness of the second around the frame, dB of full scale.
     pub sound_db: Vec<f32>,
     /// Change of the picture since the frame before, in steps of 8-bit colour.
-    pub still: Vec<f32>,
+    pub frame_difference: Vec<f32>,
     /// Best score of a face or arm point: whether somebody is there.
     pub person: Vec<f32>,
     /// Distance between the shoulders, px.
@@ -73,7 +73,7 @@ impl Measures {
         Self {
             sound: vec![1.0; n_frames],
             sound_db: vec![0.0; n_frames],
-            still: vec![255.0; n_frames],
+            frame_difference: vec![255.0; n_frames],
             left_hand: mean_scores(keypoints.left_hand.view()),
             right_hand: mean_scores(keypoints.right_hand.view()),
             n_people: vec![1.0; n_frames],

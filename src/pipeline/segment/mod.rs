@@ -10,7 +10,6 @@ pub mod stage;
 pub mod store;
 pub mod table;
 
-pub use judge::Video;
 pub use judge::judge;
 pub use measure::Measures;
 pub use refusal::Refusal;

@@ -1,13 +1,14 @@
 //! The stage: reads what `extract` and `pose2d` wrote of a video, judges it, writes `intervals.json`, `ledger.json`
 //! and `measures.npz`.
 
-use super::judge::{Video, judge};
+use super::judge::judge;
 use super::measure;
 use super::measure::Measures;
 use super::sound;
 use crate::config;
 use crate::formats::keypoints_npz;
-use crate::formats::npz::Npz;
+use crate::formats::media_json::MediaInfo;
+use crate::formats::timeline_npz::Timeline;
 use crate::stage::artifacts::{Artifact, StageName};
 use crate::stage::ledger::{Ledger, longest_first};
 use crate::stage::progress::Progress;
@@ -61,7 +62,7 @@ impl Stage for SegmentStage {
     }
 
     fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
-        let video = Video::read(&self.file(Artifact::MediaInfo, unit))?;
+        let video = MediaInfo::read(&self.file(Artifact::MediaInfo, unit))?;
         let measures = self.measures(unit, &video)?;
         let (intervals, ledger) = judge(&measures, &video, &self.rules);
         write_json(&Artifact::SegmentIntervals.within(out), &intervals)?;
@@ -72,7 +73,7 @@ impl Stage for SegmentStage {
 }
 
 impl SegmentStage {
-    fn measures(&self, unit: &Unit, video: &Video) -> Result<Measures> {
+    fn measures(&self, unit: &Unit, video: &MediaInfo) -> Result<Measures> {
         let path = self.file(Artifact::Keypoints, unit);
         let (keypoints, extras) = (keypoints_npz::read(&path)?, keypoints_npz::read_extras(&path)?);
         let n_frames = video.n_frames;
@@ -83,19 +84,21 @@ impl SegmentStage {
             keypoints.fps,
             video.fps
         );
-        let mut timeline = Npz::open(&self.file(Artifact::Timeline, unit))?;
-        let shot_score = timeline.floats("shot_score", &[Some(n_frames)])?.into_iter().collect();
-        let still = timeline.floats("still", &[Some(n_frames)])?.into_iter().collect();
-        let restart: Vec<bool> = timeline.bools("restart", &[Some(n_frames)])?.into_iter().collect();
+        let timeline = Timeline::read(&self.file(Artifact::Timeline, unit))?;
+        ensure!(
+            timeline.n_frames() == n_frames,
+            "the timeline has {} frames, the video {n_frames}: run the stage extract again",
+            timeline.n_frames()
+        );
         let (sound, sound_db) = sound::levels(&self.file(Artifact::Sound, unit), video.fps, n_frames)?;
         let of_body = Measures::of(&keypoints);
         Ok(Measures {
             sound,
             sound_db,
-            still,
+            frame_difference: timeline.frame_difference,
             n_people: extras.n_people.iter().map(|&n| n as f32).collect(),
-            identity: measure::identity(&extras.identity.to_vec(), &restart, &of_body.jump),
-            shot_score,
+            identity: measure::identity(&extras.identity.to_vec(), &timeline.restart, &of_body.jump),
+            shot_score: timeline.shot_score.iter().map(|&score| score as f32).collect(),
             ..of_body
         })
     }

@@ -15,7 +15,7 @@ impl Measures {
         [
             ("sound", &self.sound),
             ("sound_db", &self.sound_db),
-            ("still", &self.still),
+            ("still", &self.frame_difference),
             ("person", &self.person),
             ("shoulder_px", &self.shoulder_px),
             ("face", &self.face),
@@ -52,7 +52,7 @@ impl Measures {
         Ok(Self {
             sound: read("sound")?,
             sound_db: read("sound_db")?,
-            still: read("still")?,
+            frame_difference: read("still")?,
             shoulder_px: read("shoulder_px")?,
             face: read("face")?,
             facing: read("facing")?,

@@ -81,7 +81,7 @@ pub fn frame_rules(rules: &config::Segment) -> [FrameRule; 12] {
     [
         row(Refusal::NoSound, |m| &m.sound, AtLeast(0.5), none),
         row(Refusal::Quiet, |m| &m.sound_db, AtLeast(rules.min_sound_db), quiet),
-        secs(row(Refusal::Still, |m| &m.still, AtLeast(rules.min_change), still)),
+        secs(row(Refusal::Still, |m| &m.frame_difference, AtLeast(rules.min_change), still)),
         row(Refusal::NoPerson, |m| &m.person, score, body),
         row(Refusal::Small, |m| &m.shoulder_px, AtLeast(rules.min_shoulder_px), body),
         row(Refusal::Face, |m| &m.face, score, body),

@@ -9,8 +9,8 @@ use super::worst::Worst;
 use crate::config::Settings;
 use crate::config::videos::Videos;
 use crate::formats::joints_npz;
+use crate::formats::media_json::MediaInfo;
 use crate::formats::npz::Npz;
-use crate::pipeline::segment;
 use crate::pipeline::segment::Measures;
 use crate::stage::Unit;
 use crate::stage::artifacts::Artifact;
@@ -100,8 +100,8 @@ impl ReportData {
     }
 }
 
-fn measured(work: &Path, unit: &Unit) -> Result<(Measures, segment::Video)> {
-    let judged = segment::Video::read(&Artifact::MediaInfo.path(work, unit))?;
+fn measured(work: &Path, unit: &Unit) -> Result<(Measures, MediaInfo)> {
+    let judged = MediaInfo::read(&Artifact::MediaInfo.path(work, unit))?;
     let measures = Measures::read(&Artifact::Measures.path(work, unit))?;
     ensure!(
         measures.n_frames() == judged.n_frames,

@@ -1,6 +1,7 @@
 //! What became of a video: its ledger as the last stage left it, or the reason why there is none.
 
 use super::reasons::WAITING;
+use crate::formats::media_json::MediaInfo;
 use crate::stage::Unit;
 use crate::stage::artifacts::{Artifact, StageName, dir};
 use crate::stage::ledger::Ledger;
@@ -72,9 +73,8 @@ impl VideoSummary {
 
     /// The account of a video without a verdict.
     fn lose(&mut self, work: &Path, stage: &str, error: &str) {
-        let media = std::fs::read(Artifact::MediaInfo.path(work, &self.unit)).unwrap_or_default();
-        let media: serde_json::Value = serde_json::from_slice(&media).unwrap_or_default();
-        let secs = media["duration_secs"].as_f64().filter(|secs| secs.is_finite() && *secs > 0.0);
+        let media = MediaInfo::read(&Artifact::MediaInfo.path(work, &self.unit));
+        let secs = media.ok().map(|media| media.duration_secs).filter(|secs| *secs > 0.0);
         self.ledger = secs.map_or_else(Ledger::default, |secs| Ledger::of_failure(secs, stage, error));
         self.has_failed = stage != WAITING;
         match stage {

@@ -4,6 +4,7 @@
 
 use super::thresholds::THRESHOLDS;
 use crate::config::Segment;
+use crate::formats::media_json::MediaInfo;
 use crate::pipeline::segment;
 use crate::pipeline::segment::Measures;
 use crate::stage::ledger::Ledger;
@@ -15,7 +16,7 @@ pub type Kept = Vec<Vec<f64>>;
 /// A video as far as the rules look at it.
 pub struct Judged<'a> {
     pub measures: &'a Measures,
-    pub video: &'a segment::Video,
+    pub video: &'a MediaInfo,
     /// Frames that lifting refused.
     pub refused_by_lift: &'a [bool],
 }
@@ -56,7 +57,7 @@ impl Judged<'_> {
 }
 
 /// The frames of stretches that lifting refused for what it saw.
-pub fn refused_by_lift(ledger: &Ledger, video: &segment::Video) -> Vec<bool> {
+pub fn refused_by_lift(ledger: &Ledger, video: &MediaInfo) -> Vec<bool> {
     let mut refused = vec![false; video.n_frames];
     for stretch in ledger.refused.iter().filter(|stretch| ["bones", "open"].contains(&stretch.reason.as_str())) {
         let frame = |secs: f64| ((secs * video.fps.per_sec()).round() as usize).min(video.n_frames);
@@ -81,7 +82,7 @@ mod tests {
         Measures {
             sound: of(1.0),
             sound_db: of(-20.0),
-            still: of(5.0),
+            frame_difference: of(5.0),
             person: of(0.9),
             shoulder_px: of(120.0),
             face: of(0.9),
@@ -99,7 +100,7 @@ mod tests {
 
     #[test]
     fn other_thresholds_keep_what_the_rules_say_and_what_lifting_refused_stays_out() {
-        let video = segment::Video { duration_secs: 19.99, n_frames: 300, fps: FrameRate::new(15, 1) };
+        let video = MediaInfo::new(19.99, 300, FrameRate::new(15, 1));
         let (measures, rules) = (measures(), Segment::default());
         let refused = Refused {
             start_secs: 10.0,

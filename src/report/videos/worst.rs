@@ -3,7 +3,7 @@
 
 use super::reasons;
 use crate::config::Segment;
-use crate::pipeline::segment;
+use crate::formats::media_json::MediaInfo;
 use crate::pipeline::segment::table::{Bound, frame_rules, piece_rules};
 use crate::pipeline::segment::{Measures, Refusal};
 use crate::report::html::numbers::number;
@@ -47,7 +47,7 @@ impl Worst {
         video: usize,
         ledger: &Ledger,
         (measures, bone_change): (&Measures, &[f32]),
-        judged: &segment::Video,
+        judged: &MediaInfo,
         rules: &Segment,
     ) {
         for stretch in &ledger.refused {
@@ -75,7 +75,7 @@ fn moment(
     video: usize,
     stretch: &Refused,
     (measures, bone_change): (&Measures, &[f32]),
-    judged: &segment::Video,
+    judged: &MediaInfo,
     rules: &Segment,
 ) -> Option<Moment> {
     let n_frames = measures.n_frames();
@@ -193,7 +193,7 @@ mod tests {
             stretch(9.0, 9.5, Refusal::TooShort, 0.5),
         ];
         let ledger = Ledger { duration_secs: 10.0, refused, ..Ledger::default() };
-        let judged = segment::Video { duration_secs: 10.0, n_frames: 100, fps: FrameRate::new(10, 1) };
+        let judged = MediaInfo::new(10.0, 100, FrameRate::new(10, 1));
         let mut worst = Worst::new(1);
         worst.add(0, &ledger, (&measures, &[]), &judged, &Segment::default());
         let frames: Vec<(&str, Vec<usize>)> =

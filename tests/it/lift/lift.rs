@@ -6,6 +6,7 @@ use ndarray::{Array3, s};
 use ndarray_npy::{NpzWriter, read_npy};
 use orator::config;
 use orator::formats::keypoints_npz::Extras;
+use orator::formats::timeline_npz::Timeline;
 use orator::formats::{joints_npz, keypoints_npz};
 use orator::mocap::upper_body;
 use orator::motion::upper_body::{L_SHOULDER, NOSE, Pose, R_HIP, R_SHOULDER, metres_per_unit};
@@ -264,9 +265,14 @@ fn the_stage_writes_joints_and_bones() {
     let [extract, pose2d, segment] = [StageName::Extract, StageName::Pose2d, StageName::Segment]
         .map(|stage| artifacts::dir(dir.path(), stage, &unit));
     [&extract, &pose2d, &segment].into_iter().for_each(|folder| std::fs::create_dir_all(folder).unwrap());
-    let mut timeline = NpzWriter::new(std::fs::File::create(extract.join("timeline.npz")).unwrap());
-    timeline.add_array("repeated", &ndarray::Array1::from_shape_fn(70, |t| t % 3 == 2)).unwrap();
-    timeline.finish().unwrap();
+    let timeline = Timeline {
+        source_secs: vec![0.0; 70],
+        repeated: (0..70).map(|t| t % 3 == 2).collect(),
+        shot_score: vec![0.0; 70],
+        restart: vec![false; 70],
+        frame_difference: vec![1.0; 70],
+    };
+    timeline.write(&extract.join("timeline.npz")).unwrap();
     keypoints_npz::write(&pose2d.join("keypoints.npz"), &keypoints, &extras).unwrap();
     let intervals = |n_frames| Intervals::new(keypoints.fps, n_frames, vec![Interval { start: 2, end: 68 }]);
     std::fs::write(segment.join("intervals.json"), serde_json::to_vec(&intervals(70)).unwrap()).unwrap();

@@ -2,18 +2,16 @@
 
 use crate::fixtures::clips;
 use crate::fixtures::onnx_models::models;
-use ndarray::Array1;
-use ndarray_npy::NpzWriter;
 use orator::config;
 use orator::config::Settings;
 use orator::external::onnx::Manifest;
 use orator::formats::keypoints_npz;
+use orator::formats::timeline_npz::Timeline;
 use orator::pipeline::pose2d::{Chain, Pose2dStage};
 use orator::stage::progress::Silent;
 use orator::stage::{Stage, Unit};
 use orator::types::image::Image;
 use orator::types::time::FrameRate;
-use std::fs::File;
 use std::path::Path;
 
 fn noise(width: usize, height: usize) -> Image {
@@ -75,9 +73,15 @@ fn unit(dir: &Path, n: usize, models: &Path) -> (Unit, Settings) {
 fn write_timeline(settings: &Settings, unit: &Unit, restart: Vec<bool>) {
     let folder = settings.work.dir.join("extract").join(&unit.speaker).join(&unit.video);
     std::fs::create_dir_all(&folder).unwrap();
-    let mut npz = NpzWriter::new(File::create(folder.join("timeline.npz")).unwrap());
-    npz.add_array("restart", &Array1::from(restart)).unwrap();
-    npz.finish().unwrap();
+    let n_frames = restart.len();
+    let timeline = Timeline {
+        source_secs: vec![0.0; n_frames],
+        repeated: vec![false; n_frames],
+        shot_score: vec![0.0; n_frames],
+        restart,
+        frame_difference: vec![1.0; n_frames],
+    };
+    timeline.write(&folder.join("timeline.npz")).unwrap();
 }
 
 #[test]

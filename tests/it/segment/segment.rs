@@ -3,7 +3,8 @@
 use crate::fixtures::footage::{FPS, Footage, good, write};
 use ndarray::s;
 use orator::config;
-use orator::pipeline::segment::{Measures, Refusal, SegmentStage, Video, judge};
+use orator::formats::media_json::MediaInfo;
+use orator::pipeline::segment::{Measures, Refusal, SegmentStage, judge};
 use orator::stage::ledger::Ledger;
 use orator::stage::progress::Silent;
 use orator::stage::{Stage, Unit};
@@ -28,7 +29,7 @@ fn measures(footage: &Footage) -> Measures {
 }
 
 fn judged_measures(measures: &Measures, duration_secs: f64) -> (Intervals, Ledger) {
-    let video = Video { fps: FPS, duration_secs, n_frames: measures.n_frames() };
+    let video = MediaInfo::new(duration_secs, measures.n_frames(), FPS);
     judge(measures, &video, &config::Segment::default())
 }
 
@@ -137,10 +138,13 @@ fn spoilt(change: impl Fn(&mut Measures)) -> (Vec<(usize, usize)>, Vec<String>) 
 fn pauses_and_short_stands_are_kept_and_longer_ones_are_not() {
     assert_eq!(spoilt(|m| m.sound_db[80..125].fill(-60.0)), (vec![(0, 200)], vec![]));
     assert_eq!(spoilt(|m| m.sound_db[80..126].fill(-60.0)), (vec![(0, 80), (126, 200)], vec!["quiet".into()]));
-    assert_eq!(spoilt(|m| m.still[90..97].fill(0.0)), (vec![(0, 200)], vec![]));
-    assert_eq!(spoilt(|m| m.still[90..98].fill(0.0)), (vec![(0, 90), (98, 200)], vec!["still".into()]));
+    assert_eq!(spoilt(|m| m.frame_difference[90..97].fill(0.0)), (vec![(0, 200)], vec![]));
+    assert_eq!(spoilt(|m| m.frame_difference[90..98].fill(0.0)), (vec![(0, 90), (98, 200)], vec!["still".into()]));
     // 10 frames a second shown at 15
-    assert_eq!(spoilt(|m| (0..200).filter(|t| t % 3 == 1).for_each(|t| m.still[t] = 0.0)), (vec![(0, 200)], vec![]));
+    assert_eq!(
+        spoilt(|m| (0..200).filter(|t| t % 3 == 1).for_each(|t| m.frame_difference[t] = 0.0)),
+        (vec![(0, 200)], vec![])
+    );
 }
 
 #[test]

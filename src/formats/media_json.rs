@@ -1,0 +1,68 @@
+//! `media.json`: what a video is, as far as the stages after the first need it and people want to know.
+
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, ensure};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// A video: its length at the dataset rate, and what its file holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MediaInfo {
+    pub duration_secs: f64,
+    /// Frames at the dataset rate.
+    pub n_frames: usize,
+    /// The dataset rate.
+    pub fps: FrameRate,
+    /// Width and height in px as shown: turned upright, with square pixels.
+    #[serde(default)]
+    pub image_size: [usize; 2],
+    /// Degrees clockwise from coded to upright: 0, 90, 180 or 270.
+    #[serde(default)]
+    pub rotation: Option<u32>,
+    /// ffmpeg's name: `h264`, `hevc`, `vp9`.
+    #[serde(default)]
+    pub codec: Option<String>,
+    /// Average frames a second of the file; `None` if no header says.
+    #[serde(default)]
+    pub source_fps: Option<FrameRate>,
+    #[serde(default)]
+    pub has_audio: bool,
+    /// Length of the sound, seconds.
+    #[serde(default)]
+    pub audio_secs: Option<f64>,
+    /// What could not be read of the file.
+    #[serde(default)]
+    pub damage: Option<String>,
+}
+
+impl MediaInfo {
+    /// A video of which nothing but its length is known.
+    pub const fn new(duration_secs: f64, n_frames: usize, fps: FrameRate) -> Self {
+        Self {
+            duration_secs,
+            n_frames,
+            fps,
+            image_size: [0, 0],
+            rotation: None,
+            codec: None,
+            source_fps: None,
+            has_audio: false,
+            audio_secs: None,
+            damage: None,
+        }
+    }
+
+    /// Reads `media.json`. Errors: unreadable, incomplete, or a duration that is none.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let info: Self = serde_json::from_slice(&bytes).with_context(|| format!("{} is incomplete", path.display()))?;
+        let secs = info.duration_secs;
+        ensure!(secs.is_finite() && secs >= 0.0, "{}: a duration of {secs} s", path.display());
+        Ok(info)
+    }
+
+    /// Writes `media.json`.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        std::fs::write(path, serde_json::to_vec_pretty(self)?).with_context(|| path.display().to_string())
+    }
+}

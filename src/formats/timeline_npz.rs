@@ -1,0 +1,85 @@
+//! `timeline.npz`: the frames of a video at the dataset rate, one value each. Arrays: `source_secs` f64 [T], `repeated`
+//! bool [T], `shot_score` f64 [T], `restart` bool [T], `still` f32 [T].
+
+use super::npz::Npz;
+use anyhow::{Context, Result};
+use ndarray::Array1;
+use ndarray_npy::NpzWriter;
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
+use std::path::Path;
+
+/// The frames of a video, one value each; all of the same length T.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Timeline {
+    /// Time of the picture in the video file, seconds.
+    pub source_secs: Vec<f64>,
+    /// Whether the frame shows the picture of the frame before.
+    pub repeated: Vec<bool>,
+    /// How much the frame looks like the first one of a shot, 0..1.
+    pub shot_score: Vec<f64>,
+    /// Whether the score is high enough for tracking to begin anew.
+    pub restart: Vec<bool>,
+    /// Mean change of the picture since the frame before, in steps of 8-bit colour; 0 where it is repeated.
+    pub frame_difference: Vec<f32>,
+}
+
+impl Timeline {
+    /// Number of frames T.
+    pub fn n_frames(&self) -> usize {
+        self.repeated.len()
+    }
+
+    /// Reads `timeline.npz`. Errors name the file and the array that is missing or of another length.
+    pub fn read(path: &Path) -> Result<Self> {
+        let mut npz = Npz::open(path)?;
+        let repeated: Vec<bool> = npz.bools("repeated", &[None])?.into_iter().collect();
+        let length = [Some(repeated.len())];
+        Ok(Self {
+            source_secs: npz.numbers("source_secs", &length)?.into_iter().collect(),
+            shot_score: npz.numbers("shot_score", &length)?.into_iter().collect(),
+            restart: npz.bools("restart", &length)?.into_iter().collect(),
+            frame_difference: npz.floats("still", &length)?.into_iter().collect(),
+            repeated,
+        })
+    }
+
+    /// Writes `timeline.npz`; the same timeline gives the same bytes.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let written = || -> Result<()> {
+            let mut npz = NpzWriter::new(BufWriter::new(File::create(path)?));
+            npz.add_array("source_secs", &Array1::from_vec(self.source_secs.clone()))?;
+            npz.add_array("repeated", &Array1::from_vec(self.repeated.clone()))?;
+            npz.add_array("shot_score", &Array1::from_vec(self.shot_score.clone()))?;
+            npz.add_array("restart", &Array1::from_vec(self.restart.clone()))?;
+            npz.add_array("still", &Array1::from_vec(self.frame_difference.clone()))?;
+            Ok(npz.finish()?.flush()?)
+        };
+        written().with_context(|| format!("cannot write {}", path.display()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_back_and_a_missing_array_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.npz");
+        let timeline = Timeline {
+            source_secs: vec![0.0, 0.1],
+            repeated: vec![false, true],
+            shot_score: vec![0.0, 0.75],
+            restart: vec![false, true],
+            frame_difference: vec![0.0, 2.5],
+        };
+        timeline.write(&path).unwrap();
+        assert_eq!(Timeline::read(&path).unwrap(), timeline);
+        let mut npz = NpzWriter::new(File::create(&path).unwrap());
+        npz.add_array("repeated", &Array1::from_vec(vec![false; 3])).unwrap();
+        npz.finish().unwrap();
+        let text = format!("{:#}", Timeline::read(&path).unwrap_err());
+        assert!(text.contains("a.npz") && text.contains("source_secs"), "{text}");
+    }
+}
