@@ -13,10 +13,9 @@ use orator::demo::drawn::folder;
 use orator::demo::drawn::folder::DemoPlan;
 use orator::demo::rule::dataset;
 use orator::external::opencv::png;
-use orator::formats::npy;
 use orator::generate::Speaker;
+use orator::mocap::motion_file;
 use orator::stage::workdir;
-use orator::types::pose3d::Motion;
 use orator::types::time::FrameRate;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -222,8 +221,8 @@ fn draw_sheet(dir: &Path, out: &Path, generated: Option<&Path>, ui: &Ui) -> Resu
     let Some(unit) = units.iter().flat_map(|videos| &videos.units).next() else {
         bail!("{} names no video", dir.join("pipeline.toml").display());
     };
-    let generated = generated.map(|path| -> Result<Motion> { npy::read(path, folder::DATASET_FPS) }).transpose()?;
-    let image = sheet::draw_sheet(&config.settings.work.dir, unit, generated.as_ref())
+    let generated = generated.map(|path| motion_file::read(path, Some(folder::DATASET_FPS))).transpose()?;
+    let image = sheet::draw_sheet(&config.settings.work.dir, unit, generated.as_ref().map(|read| &read.motion))
         .with_context(|| format!("drawing a contact sheet of {}", unit.source.display()))?;
     workdir::replace(out, |attempt| png::write(attempt, &image))?;
     ui.summary(&format!("wrote {}", out.display()), None, json!({ "sheet": out }));

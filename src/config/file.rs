@@ -279,27 +279,11 @@ fn typed(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
 
 /// ` (did you mean X?)` where a known key is close.
 fn nearest<'k>(name: &str, known: impl Iterator<Item = &'k String>) -> String {
-    let best = known.map(|key| (distance(name, key), key)).min();
+    let best = known.map(|key| (strsim::levenshtein(name, key), key)).min();
     match best {
         Some((steps, key)) if steps <= 1 + key.len() / 3 => format!(" (did you mean {key}?)"),
         _ => String::new(),
     }
-}
-
-/// Levenshtein distance.
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, cb) in b.iter().enumerate() {
-            let step = (row[j].min(row[j + 1]) + 1).min(diagonal + usize::from(ca != *cb));
-            diagonal = row[j + 1];
-            row[j + 1] = step;
-        }
-    }
-    row[b.len()]
 }
 
 fn line_of(text: &str, offset: usize) -> usize {

@@ -58,7 +58,7 @@ impl Sample {
             npy_slice::write_bool(self.motion.mask.shape(), self.motion.mask.iter()),
             npy_slice::write_f32(self.pose2d.shape(), self.pose2d.iter()),
             npy_slice::write_f32(self.motion.joints.shape(), self.motion.joints.iter()),
-            wav::write(&self.sound),
+            wav::to_bytes(&self.sound)?,
         ])
     }
 }

@@ -1,32 +1,19 @@
-//! Motion as a plain `.npy` array [T, 49, 3] of f32 in house order, a missing joint NaN. The rate is not in the file.
+//! Motion as a plain `.npy` array [T, 49, 3] in house order, a missing joint NaN. The file does not hold the rate.
 
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::time::FrameRate;
 use anyhow::{Context as _, ensure};
-use ndarray::{Array, Array3, Dimension, Ix3, IxDyn};
+use ndarray::{Array, Array3, Dimension, IxDyn};
 use ndarray_npy::npy::header::Header;
 use ndarray_npy::{ReadNpyError, ReadNpyExt as _, ReadableElement, WriteNpyExt as _};
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
-/// Reads a motion of `fps`; joints that are not finite are missing, in the mask too.
+/// Reads a motion of `fps` from an array of f32 or f64, [T, 49, 3] or [T, 147] (joint after joint); a joint that is not
+/// finite is missing, in the mask too.
 pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
-    let bytes = std::fs::read(path).with_context(|| format!("cannot open {}", path.display()))?;
-    let joints = parse::<f32, Ix3>(&bytes)
-        .with_context(|| format!("{} is not a .npy file of float32 with three axes", path.display()))?;
-    ensure!(
-        joints.shape()[1..] == [N_JOINTS, 3],
-        "{} has the shape {:?}, expected [frames, {N_JOINTS}, 3]",
-        path.display(),
-        joints.shape()
-    );
-    Ok(Motion::from_joints(fps, joints))
-}
-
-/// Reads a motion of `fps` from an array of f32 or f64, [T, 49, 3] or [T, 147] (the same numbers, joint after joint).
-pub fn read_any(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot open {}", path.display()))?;
     let numbers = parse::<f32, IxDyn>(&bytes).or_else(|error| match error {
         ReadNpyError::WrongDescriptor(_) => Ok(parse::<f64, IxDyn>(&bytes)?.mapv(|v| v as f32)),
@@ -84,6 +71,7 @@ pub fn write_points(path: &Path, points: &Array3<f32>) -> anyhow::Result<()> {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use ndarray::Ix3;
 
     /// The file with another shape in its header.
     pub fn with_shape(bytes: &[u8], old: &str, new: &str) -> Vec<u8> {

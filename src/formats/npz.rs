@@ -87,12 +87,11 @@ impl Npz {
     pub fn frame_rate(&mut self, name: &str) -> Result<FrameRate> {
         let values = self.numbers(name, &[])?.into_raw_vec_and_offset().0;
         let rate = match values[..] {
-            [rate] => rate_near(rate),
-            [num, 1.0] => rate_near(num),
+            [rate] => FrameRate::nearest(rate),
             [num, den] if num >= 1.0 && den >= 1.0 && num.max(den) <= 1e9 && num.fract() + den.fract() == 0.0 => {
                 Some(FrameRate::new(num as u32, den as u32))
             }
-            [num, den] => rate_near(num / den),
+            [num, den] => FrameRate::nearest(num / den),
             _ => None,
         };
         rate.with_context(|| {
@@ -146,18 +145,6 @@ impl Npz {
         }
         Ok(())
     }
-}
-
-/// The simplest fraction within one part in 100 000 of `rate`: whole, NTSC (over 1001), or thousandths.
-pub fn rate_near(rate: f64) -> Option<FrameRate> {
-    if !rate.is_finite() || !(0.01..=100_000.0).contains(&rate) {
-        return None;
-    }
-    [1u32, 1001, 1000]
-        .into_iter()
-        .map(|den| FrameRate::new((rate * f64::from(den)).round() as u32, den))
-        .find(|r| (r.per_sec() / rate - 1.0).abs() < 1e-5)
-        .or_else(|| Some(FrameRate::new((rate * 10_000.0).round() as u32, 10_000)))
 }
 
 #[cfg(test)]

@@ -1,42 +1,79 @@
-//! Sound of a shard: 16-bit mono WAV with the plain 44-byte header, in memory. Files of others are read in `media`.
+//! Sound as 16-bit mono WAV with the plain 44-byte header, written to memory or to a file; and where the samples of such
+//! a file lie, so that a part of it can be read. Sound files of others are read by `external::ffmpeg`.
 
 use crate::types::sound::Sound;
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
+use hound::{SampleFormat, WavReader, WavSpec};
+use std::fs::File;
+use std::io::{BufWriter, Cursor, Seek, Write};
+use std::path::{Path, PathBuf};
 
 /// Bytes before the first sample.
 pub const HEADER_BYTES: usize = 44;
 
-fn header(rate: u32, n_samples: usize) -> [u8; HEADER_BYTES] {
-    let data_bytes = 2 * n_samples as u32;
-    let mut bytes = *b"RIFF....WAVEfmt \x10\0\0\0\x01\0\x01\0........\x02\0\x10\0data....";
-    bytes[4..8].copy_from_slice(&(36 + data_bytes).to_le_bytes());
-    bytes[24..28].copy_from_slice(&rate.to_le_bytes());
-    bytes[28..32].copy_from_slice(&(2 * rate).to_le_bytes());
-    bytes[40..44].copy_from_slice(&data_bytes.to_le_bytes());
-    bytes
+const fn spec(rate: u32) -> WavSpec {
+    WavSpec { channels: 1, sample_rate: rate, bits_per_sample: 16, sample_format: SampleFormat::Int }
 }
 
-/// The sound as a WAV file; samples outside -1..1 are clipped. `sound` of another wav comes back bit for bit.
-pub fn write(sound: &Sound) -> Vec<u8> {
-    let mut bytes = header(sound.rate, sound.samples.len()).to_vec();
-    bytes.resize(HEADER_BYTES + 2 * sound.samples.len(), 0);
-    let places = bytes[HEADER_BYTES..].as_chunks_mut::<2>().0;
-    for (place, sample) in places.iter_mut().zip(&sound.samples) {
+/// Writes samples, those outside -1..1 clipped; samples of another such WAV come back bit for bit.
+fn push<W: Write + Seek>(file: &mut hound::WavWriter<W>, samples: &[f32]) -> hound::Result<()> {
+    let mut places = file.get_i16_writer(samples.len() as u32);
+    for sample in samples {
         let value = f64::from(sample * 32_768.0);
         // Halves away from zero, as `round` has it, exactly; `round` itself is a slow call.
-        *place = ((value + 0.5f64.copysign(value)) as i16).to_le_bytes();
+        places.write_sample((value + 0.5f64.copysign(value)) as i16);
     }
-    bytes
+    places.flush()
 }
 
-/// How many samples a file of `file_bytes` that begins with `bytes` holds; it must be as `write` makes it.
+/// The bytes of a WAV file. Errors: more than 4 GB of samples.
+pub fn to_bytes(sound: &Sound) -> Result<Vec<u8>> {
+    let mut bytes = Cursor::new(Vec::with_capacity(HEADER_BYTES + 2 * sound.samples.len()));
+    let mut file = hound::WavWriter::new(&mut bytes, spec(sound.rate))?;
+    push(&mut file, &sound.samples)?;
+    file.finalize()?;
+    Ok(bytes.into_inner())
+}
+
+/// Writes a sound to the file `out`.
+pub fn write(out: &Path, sound: &Sound) -> Result<()> {
+    let mut wav = WavWriter::create(out, sound.rate)?;
+    wav.push(&sound.samples)?;
+    wav.finish()
+}
+
+/// A WAV file written piece by piece.
+pub struct WavWriter {
+    path: PathBuf,
+    file: hound::WavWriter<BufWriter<File>>,
+}
+
+impl WavWriter {
+    /// Begins a file of `rate` samples a second.
+    pub fn create(path: &Path, rate: u32) -> Result<Self> {
+        let file = hound::WavWriter::create(path, spec(rate));
+        Ok(Self { path: path.to_owned(), file: file.with_context(|| format!("cannot write {}", path.display()))? })
+    }
+
+    /// Appends samples.
+    pub fn push(&mut self, samples: &[f32]) -> Result<()> {
+        push(&mut self.file, samples).with_context(|| format!("cannot write {}", self.path.display()))
+    }
+
+    /// Completes the header and closes the file.
+    pub fn finish(self) -> Result<()> {
+        self.file.finalize().with_context(|| format!("cannot write {}", self.path.display()))
+    }
+}
+
+/// Number of samples in a file of `file_bytes` that begins with `bytes`. Errors: not as this module writes files.
 pub fn n_samples(bytes: &[u8], file_bytes: u64, rate: u32) -> Result<usize> {
-    let n_samples = (file_bytes.saturating_sub(HEADER_BYTES as u64) / 2) as usize;
-    ensure!(
-        bytes.starts_with(&header(rate, n_samples)) && file_bytes == (HEADER_BYTES + 2 * n_samples) as u64,
-        "not a 16-bit mono WAV file at {rate} Hz with a 44-byte header"
-    );
-    Ok(n_samples)
+    let mut head = Cursor::new(&bytes[..bytes.len().min(HEADER_BYTES)]);
+    let found = WavReader::new(&mut head).ok().map(|reader| (reader.spec(), reader.len() as usize));
+    let whole = |n: &usize| head.position() == HEADER_BYTES as u64 && file_bytes == (HEADER_BYTES + 2 * n) as u64;
+    let n_samples = found.filter(|(found, n)| *found == spec(rate) && whole(n)).map(|(_, n)| n);
+    ensure!(n_samples.is_some(), "not a 16-bit mono WAV file at {rate} Hz with a 44-byte header");
+    Ok(n_samples.unwrap_or_default())
 }
 
 /// Little endian 16-bit samples as -1..1.
@@ -49,15 +86,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_value_comes_back_and_others_can_read_it() {
+    fn every_value_comes_back_and_the_header_is_the_plain_one() {
         let all: Vec<f32> = (i16::MIN..=i16::MAX).map(|n| f32::from(n) / 32_768.0).collect();
-        let bytes = write(&Sound { rate: 16_000, samples: all.clone() });
+        let bytes = to_bytes(&Sound { rate: 16_000, samples: all.clone() }).unwrap();
+        let header = b"RIFF\x24\0\x02\0WAVEfmt \x10\0\0\0\x01\0\x01\0\x80\x3e\0\0\0\x7d\0\0\x02\0\x10\0data\0\0\x02\0";
+        assert_eq!(&bytes[..44], header);
         assert_eq!(n_samples(&bytes[..44], bytes.len() as u64, 16_000).unwrap(), all.len());
         assert_eq!(samples(&bytes[44..]), all);
-        let reader = hound::WavReader::new(&bytes[..]).unwrap();
-        assert_eq!((reader.spec().sample_rate, reader.spec().channels, reader.len()), (16_000, 1, 65_536));
-        assert_eq!(write(&Sound { rate: 16_000, samples: vec![1.5] })[44..], i16::MAX.to_le_bytes());
+        let path = tempfile::tempdir().unwrap().keep().join("a.wav");
+        write(&path, &Sound { rate: 16_000, samples: all }).unwrap();
+        assert_eq!(std::fs::read(path).unwrap(), bytes);
+    }
+
+    #[test]
+    fn loud_samples_are_clipped_and_other_files_refused() {
+        let loud = Sound { rate: 16_000, samples: vec![1.5, -1.5, f32::NAN, 1e-5, 1.6e-5] };
+        let bytes = to_bytes(&loud).unwrap();
+        let expected = [i16::MAX, i16::MIN, 0, 0, 1].map(i16::to_le_bytes).concat();
+        assert_eq!(bytes[44..], expected);
         assert!(n_samples(&bytes[..44], bytes.len() as u64 - 2, 16_000).is_err());
+        assert!(n_samples(&bytes[..44], bytes.len() as u64, 22_050).is_err());
         assert!(n_samples(&bytes[..20], 20, 16_000).is_err());
     }
 }

@@ -5,7 +5,6 @@ use super::fingers::bvh;
 use super::take::Captured;
 use crate::formats::bvh::joint_names;
 use crate::formats::bvh::read::{Bvh, Positions};
-use crate::formats::npz;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::types::pose3d::Motion;
@@ -133,6 +132,6 @@ fn rate(frame_secs: f64) -> FrameRate {
     let nearest = RATES.into_iter().min_by(|&a, &b| off(a).total_cmp(&off(b)));
     match nearest.filter(|&rate| off(rate) < RATE_ROUNDING) {
         Some((num, den)) => FrameRate::new(num, den),
-        None => npz::rate_near(1.0 / frame_secs).unwrap_or(FrameRate::new(1, 1)),
+        None => FrameRate::nearest(1.0 / frame_secs).unwrap_or(FrameRate::new(1, 1)),
     }
 }

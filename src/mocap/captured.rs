@@ -1,16 +1,13 @@
 //! Captured motion as its source holds it, in house order and axes but at the source's own rate and with its own
 //! bones; and which reader a file needs.
 
+use super::motion_file::USUAL_FPS;
 use super::take::Captured;
 use super::{bvh, ted};
 use crate::formats::authors_txt;
-use crate::types::time::FrameRate;
 use anyhow::{Result, bail};
 use serde_json::Map;
 use std::path::Path;
-
-/// The authors' clips do not name their rate.
-const AUTHORS_FPS: FrameRate = FrameRate::new(15, 1);
 
 /// What a file of motion is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -40,7 +37,7 @@ impl Kind {
 pub fn read(kind: Kind, path: &Path) -> Result<Captured> {
     match kind {
         Kind::Authors => {
-            let motion = authors_txt::read(path, AUTHORS_FPS)?;
+            let motion = authors_txt::read(path, USUAL_FPS)?;
             Ok(Captured { motion, text: None, facts: Map::new() })
         }
         Kind::Ted => ted::read(path),

@@ -1,8 +1,8 @@
-//! Any file that holds a motion: `.npy` [T, 49, 3] or [T, 147], `.npz` (`pose3d`), the authors' `.txt`, `.bvh`. How often a
-//! second its frames come stands in .npz and .bvh alone; the others take the rate they are given.
+//! Reads any file that holds a motion: `.npy` [T, 49, 3] or [T, 147] of float32 or float64, `.npz` (`pose3d`), the
+//! authors' `.txt`, `.bvh`. Only .npz and .bvh name their rate; the others take the rate that the caller assumes.
 
 use super::bvh;
-use crate::formats::npz::{Axis, Npz, rate_near};
+use crate::formats::npz::{Axis, Npz};
 use crate::formats::{authors_txt, npy};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
@@ -16,12 +16,17 @@ pub const ENDINGS: [&str; 4] = ["npy", "npz", "txt", "bvh"];
 /// The authors' rate, for files that do not say theirs.
 pub const USUAL_FPS: FrameRate = FrameRate::new(15, 1);
 
-/// A motion and what had to be assumed to read it.
+/// A motion, and what had to be assumed to read it.
 #[derive(Clone, Debug)]
-pub struct Read {
+pub struct MotionFile {
     pub motion: Motion,
-    /// Sentences for people.
+    /// Assumptions as sentences for people.
     pub notes: Vec<String>,
+}
+
+/// Whether the name of a file ends like that of a motion.
+pub fn has_ending(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known)))
 }
 
 /// Reads the motion of `path`; `fps` is the rate of a file that does not say its own (without: 15).
@@ -29,7 +34,7 @@ pub struct Read {
 /// # Errors
 /// Not there, empty, of another kind, another number of joints, without a frame, or without any joint that is seen: the
 /// message names the file, what is in it and what was expected.
-pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<Read> {
+pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let size = std::fs::metadata(path).with_context(|| format!("{} cannot be read", path.display()))?.len();
     ensure!(size > 0, "{} is empty (0 bytes): expected a motion", path.display());
@@ -42,7 +47,7 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<Read> {
     };
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let motion = match ending.as_str() {
-        "npy" => npy::read_any(path, given(&mut notes))?,
+        "npy" => npy::read(path, given(&mut notes))?,
         "npz" => of_npz(path, || given(&mut notes))?,
         // the authors' clips are 15 frames a second, which needs no remark
         "txt" => authors_txt::read(path, fps.unwrap_or(USUAL_FPS))?,
@@ -63,7 +68,7 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<Read> {
         path.display(),
         motion.n_frames()
     );
-    Ok(Read { motion, notes })
+    Ok(MotionFile { motion, notes })
 }
 
 /// `pose3d` [T, 49, 3], with `mask` [T, 49] and `fps` where they are.
@@ -78,17 +83,6 @@ fn of_npz(path: &Path, given: impl FnOnce() -> FrameRate) -> Result<Motion> {
         motion.mask.zip_mut_with(&seen, |there, seen| *there &= seen);
     }
     Ok(motion)
-}
-
-/// A rate as people write it: `15`, `29.97`, `30000/1001`.
-pub fn rate(text: &str) -> std::result::Result<FrameRate, String> {
-    let number = |text: &str| text.trim().parse::<f64>().ok();
-    let rate = match text.split_once('/') {
-        Some((num, den)) => number(num).zip(number(den)).map(|(num, den)| num / den),
-        None => number(text),
-    };
-    let known = rate.filter(|rate| (1.0..=1000.0).contains(rate)).and_then(rate_near);
-    known.ok_or_else(|| format!("{text} is no frame rate: expected 1 to 1000 frames a second, like 15 or 30000/1001"))
 }
 
 #[cfg(test)]
@@ -154,16 +148,6 @@ mod tests {
         ];
         for (text, says) in cases {
             assert!(text.contains(says), "{says}: {text}");
-        }
-    }
-
-    #[test]
-    fn rates_are_read_as_people_write_them() {
-        assert_eq!(rate("15"), Ok(FrameRate::new(15, 1)));
-        assert_eq!(rate("29.97002997"), Ok(FrameRate::new(30_000, 1001)));
-        assert_eq!(rate("30000/1001"), Ok(FrameRate::new(30_000, 1001)));
-        for wrong in ["", "0", "-3", "1/0", "nan", "1e9", "fast"] {
-            assert!(rate(wrong).is_err(), "{wrong}");
         }
     }
 }

@@ -5,6 +5,7 @@ use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::types::pose2d::coco;
 use crate::types::skeleton;
+use crate::types::skeleton::BODY_BONES;
 
 /// Nose, right shoulder, elbow, wrist, left the same, right hip, left hip.
 pub const N_POINTS: usize = 9;
@@ -43,10 +44,6 @@ const _: () = assert!(
 /// The same point of the other side.
 pub const MIRROR: [usize; N_POINTS] = [NOSE, L_SHOULDER, L_ELBOW, L_WRIST, R_SHOULDER, R_ELBOW, R_WRIST, L_HIP, R_HIP];
 
-/// The bones that give a body its size: shoulders, upper arms, forearms.
-pub const BONES: [(usize, usize); 5] =
-    [(R_SHOULDER, L_SHOULDER), (R_SHOULDER, R_ELBOW), (L_SHOULDER, L_ELBOW), (R_ELBOW, R_WRIST), (L_ELBOW, L_WRIST)];
-
 /// Nine points in camera axes (x right, y down, z away) relative to the neck, the middle of the shoulders.
 pub type Pose = [Vec3; N_POINTS];
 
@@ -59,7 +56,7 @@ pub const REFERENCE_SIZE: f64 = 0.90;
 /// Width of the shoulders, a mean upper arm and a mean forearm together.
 pub fn size(pose: &Pose) -> f64 {
     let bone = |(a, b): (usize, usize)| vec3::norm(vec3::sub(pose[a], pose[b]));
-    bone(BONES[0]) + (bone(BONES[1]) + bone(BONES[2]) + bone(BONES[3]) + bone(BONES[4])) / 2.0
+    bone(BODY_BONES[0]) + (bone(BODY_BONES[1]) + bone(BODY_BONES[2]) + bone(BODY_BONES[3]) + bone(BODY_BONES[4])) / 2.0
 }
 
 /// Metres a unit of `poses`, such that their median size is `REFERENCE_SIZE`; 1 when there is nothing to measure.

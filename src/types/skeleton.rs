@@ -21,6 +21,15 @@ pub const L_HAND: usize = 7;
 /// Root of the right hand; equals `R_WRIST` exactly.
 pub const R_HAND: usize = 28;
 
+/// Bones of the arms, each with the joints at its ends: upper arms, then forearms, right before left.
+pub const ARM_BONES: [(usize, usize); 4] =
+    [(R_SHOULDER, R_ELBOW), (L_SHOULDER, L_ELBOW), (R_ELBOW, R_WRIST), (L_ELBOW, L_WRIST)];
+/// The shoulders as one bone, then `ARM_BONES`: the bones that give a body its size.
+pub const BODY_BONES: [(usize, usize); 5] =
+    [(R_SHOULDER, L_SHOULDER), ARM_BONES[0], ARM_BONES[1], ARM_BONES[2], ARM_BONES[3]];
+/// Shoulder, elbow and wrist of the right and the left arm.
+pub const ARMS: [[usize; 3]; 2] = [[R_SHOULDER, R_ELBOW, R_WRIST], [L_SHOULDER, L_ELBOW, L_WRIST]];
+
 /// Side of the speaker's own body a joint belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {

@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::str::FromStr;
 
-/// Frames a second as an exact fraction (`30000/1001` is NTSC). Both parts are at least 1.
+/// Frames a second as an exact fraction in lowest terms (`30000/1001` is NTSC). Both parts are at least 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(from = "Parts")]
+#[serde(from = "Fraction")]
 pub struct FrameRate {
     pub num: u32,
     pub den: u32,
@@ -13,23 +14,42 @@ pub struct FrameRate {
 
 /// A rate as it stands in a file, where a part may be 0.
 #[derive(Deserialize)]
-struct Parts {
+struct Fraction {
     num: u32,
     den: u32,
 }
 
-impl From<Parts> for FrameRate {
-    fn from(Parts { num, den }: Parts) -> Self {
+impl From<Fraction> for FrameRate {
+    fn from(Fraction { num, den }: Fraction) -> Self {
         Self::new(num, den)
     }
 }
 
 impl FrameRate {
-    /// `num / den` frames a second; a zero part becomes 1, so that no rate divides by zero.
+    /// `num / den` frames a second in lowest terms; a zero part becomes 1, so that no rate divides by zero.
     pub const fn new(num: u32, den: u32) -> Self {
         let num = if num == 0 { 1 } else { num };
         let den = if den == 0 { 1 } else { den };
-        Self { num, den }
+        let (mut divisor, mut rest) = (num, den);
+        while rest != 0 {
+            (divisor, rest) = (rest, divisor % rest);
+        }
+        Self { num: num / divisor, den: den / divisor }
+    }
+
+    /// The simplest fraction within one part in 100 000 of a decimal: whole, NTSC (hundreds over 1001), thousandths;
+    /// else ten thousandths. `None` outside 0.01..=100 000.
+    pub fn nearest(per_sec: f64) -> Option<Self> {
+        if !(0.01..=100_000.0).contains(&per_sec) {
+            return None;
+        }
+        let over = |den: u32| ((per_sec * f64::from(den)).round() as u32, den);
+        let is_meant = |&(num, den): &(u32, u32)| {
+            let is_near = (f64::from(num) / f64::from(den) / per_sec - 1.0).abs() < 1e-5;
+            is_near && (den != 1001 || num.is_multiple_of(100))
+        };
+        let (num, den) = [over(1), over(1001), over(1000)].into_iter().find(is_meant).unwrap_or(over(10_000));
+        Some(Self::new(num, den))
     }
 
     /// The rate in frames a second.
@@ -49,6 +69,25 @@ impl FrameRate {
     }
 }
 
+/// Reads `15`, `29.97` (meaning 30000/1001), `30000/1001`, each with or without ` fps`; 1 to 1000 frames a second.
+impl FromStr for FrameRate {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = text.trim().trim_end_matches("fps").trim_end();
+        let rate = match number.split_once('/') {
+            Some((num, den)) => match (num.trim().parse(), den.trim().parse()) {
+                (Ok(num), Ok(den)) if num > 0 && den > 0 => Some(Self::new(num, den)),
+                _ => None,
+            },
+            None => number.parse().ok().and_then(Self::nearest),
+        };
+        rate.filter(|rate| (1.0..=1000.0).contains(&rate.per_sec())).ok_or_else(|| {
+            format!("`{text}` is no frame rate: expected 1 to 1000 frames a second, like 15, 29.97 or 30000/1001")
+        })
+    }
+}
+
 impl fmt::Display for FrameRate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.den == 1 { write!(f, "{} fps", self.num) } else { write!(f, "{}/{} fps", self.num, self.den) }
@@ -65,6 +104,34 @@ mod tests {
         assert_eq!(ntsc.frames_in(ntsc.secs(600)), 600);
         assert_eq!(FrameRate::new(15, 1).frames_in(2.01), 31);
         assert_eq!(FrameRate::new(0, 0).per_sec(), 1.0);
+    }
+
+    #[test]
+    fn a_rate_is_in_lowest_terms() {
+        assert_eq!(FrameRate::new(30, 2), FrameRate::new(15, 1));
+        assert_eq!(FrameRate::new(29_970, 1000), FrameRate { num: 2997, den: 100 });
+        assert_eq!(FrameRate::new(30_000, 1001), FrameRate { num: 30_000, den: 1001 });
+    }
+
+    #[test]
+    fn rates_are_read_as_people_write_them() {
+        for (text, num, den) in [
+            ("15", 15, 1),
+            (" 25.0", 25, 1),
+            ("29.97", 30_000, 1001),
+            ("29.97002997", 30_000, 1001),
+            ("23.976", 24_000, 1001),
+            ("59.94 fps", 60_000, 1001),
+            ("30000/1001", 30_000, 1001),
+            ("60/2", 30, 1),
+            ("12.5", 25, 2),
+            ("240.5", 481, 2),
+        ] {
+            assert_eq!(text.parse(), Ok(FrameRate::new(num, den)), "{text}");
+        }
+        for wrong in ["", "0", "-3", "1/0", "0/1", "nan", "inf", "1e9", "fast", "1001", "15/", "fps"] {
+            assert!(wrong.parse::<FrameRate>().is_err(), "{wrong}");
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@ use anyhow::{Context, Result, ensure};
 use orator::config;
 use orator::demo::drawn::folder;
 use orator::demo::drawn::folder::DemoPlan;
-use orator::external::ffmpeg::audio;
+use orator::formats::wav;
 use orator::pipeline::extract::Extract;
 use orator::pipeline::pose2d::Pose2dStage;
 use orator::stage::artifacts::{self, Artifact};
@@ -124,7 +124,7 @@ fn make(clip: &Path, dir: &Path, n_videos: usize) -> Result<()> {
             let to = unit.dir(&config.settings.work.dir.join(stage.name()));
             copy_all(&from, &to)?;
             if writes_sound {
-                audio::write_wav(&Artifact::Sound.within(&to), &noise(n as u64))?;
+                wav::write(&Artifact::Sound.within(&to), &noise(n as u64))?;
             }
             let fingerprint = Fingerprint::now(stage, unit, &hashes)?;
             Record { fingerprint, outputs: Output::list(&to)?, ..record.clone() }.write(&to)?;

@@ -4,12 +4,13 @@ use anyhow::{Context as _, Result, bail, ensure};
 use orator::animate::Face;
 use orator::dataset::index::SampleRef;
 use orator::dataset::{Dataset, Split};
-use orator::formats::{authors_txt, joints_npz, keypoints_npz, npy};
+use orator::formats::keypoints_npz;
 use orator::math::order;
+use orator::mocap::motion_file;
 use orator::stage::artifacts::{Artifact, StageName};
 use orator::types::pose2d::N_BODY;
 use orator::types::pose3d::Motion;
-use orator::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
+use orator::types::skeleton::ARM_BONES;
 use orator::types::sound::Sound;
 use orator::types::time::FrameRate;
 use std::path::{Path, PathBuf};
@@ -56,14 +57,19 @@ pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
         let whole = path.canonicalize().with_context(|| format!("cannot open {}", path.display()))?;
         return Ok(vec![file(Artifact::Joints.within(path), &whole)]);
     }
-    let mut found = Vec::new();
+    let (mut found, mut bvh) = (Vec::new(), Vec::new());
     for entry in std::fs::read_dir(path).with_context(|| format!("cannot open {}", path.display()))? {
         let entry = entry.with_context(|| format!("cannot read {}", path.display()))?.path();
         if Artifact::Joints.within(&entry).is_file() {
             found.push(file(Artifact::Joints.within(&entry), &entry));
-        } else if entry.is_file() && is_motion(&entry) {
-            found.push(file(entry.clone(), &entry));
+        } else if entry.is_file() && motion_file::has_ending(&entry) {
+            let is_bvh = entry.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("bvh"));
+            if is_bvh { &mut bvh } else { &mut found }.push(file(entry.clone(), &entry));
         }
+    }
+    // BVH files beside joints are what was made of them.
+    if found.is_empty() {
+        found = bvh;
     }
     found.sort_by(|a, b| a.name.cmp(&b.name));
     for pair in found.windows(2) {
@@ -76,7 +82,7 @@ pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
     }
     ensure!(
         !found.is_empty(),
-        "{} holds no motion: neither .npy, .txt or .npz files nor folders with a {}",
+        "{} holds no motion: neither .npy, .txt, .npz or .bvh files nor folders with a {}",
         path.display(),
         Artifact::Joints.file()
     );
@@ -124,7 +130,7 @@ impl Input {
                 let body = sample.pose2d.slice(ndarray::s![.., ..N_BODY, ..]).to_owned();
                 Take { motion: sample.motion, face: Some(Face { body }), sound: Some(sample.sound) }
             }
-            Place::File(path) => Take { motion: read_motion(path, fps)?, face: None, sound: None },
+            Place::File(path) => Take { motion: motion_file::read(path, Some(fps))?.motion, face: None, sound: None },
         };
         check(&take.motion).with_context(|| format!("no animation of {}", self.name))?;
         match keypoints.map(Path::to_owned).or_else(|| self.of_run(Artifact::Keypoints)) {
@@ -162,31 +168,12 @@ fn read_face(path: &Path, motion: &Motion) -> Result<Face> {
     Ok(Face { body: keypoints.body })
 }
 
-/// Whether a file is a motion by its ending.
-pub fn is_motion(path: &Path) -> bool {
-    ["npy", "txt", "npz"].contains(&ending(path).as_str())
-}
-
-/// Reads a file of joints; `fps` is that of a kind of file without a rate.
-pub fn read_motion(path: &Path, fps: FrameRate) -> Result<Motion> {
-    match ending(path).as_str() {
-        "npy" => npy::read(path, fps),
-        "txt" => authors_txt::read(path, fps),
-        "npz" => joints_npz::read(path),
-        _ => bail!(
-            "{}: motion is read from .npy (joints), .txt (the authors' layout), .npz (of a run), a lifted video's folder \
-             or a dataset",
-            path.display()
-        ),
-    }
-}
-
 /// That there is something to animate, in metres.
 fn check(motion: &Motion) -> Result<()> {
     ensure!(motion.n_frames() > 0, "it has no frames");
     let mut lengths: Vec<f32> = Vec::new();
     for frame in motion.joints.outer_iter() {
-        for (a, b) in [(L_SHOULDER, L_ELBOW), (L_ELBOW, L_WRIST), (R_SHOULDER, R_ELBOW), (R_ELBOW, R_WRIST)] {
+        for (a, b) in ARM_BONES {
             lengths.push((0..3).map(|k| (frame[[a, k]] - frame[[b, k]]).powi(2)).sum::<f32>().sqrt());
         }
     }
@@ -197,8 +184,4 @@ fn check(motion: &Motion) -> Result<()> {
         "its arm bones are {length} long; joints must be in metres about the neck, x image right, y down, z away"
     );
     Ok(())
-}
-
-fn ending(path: &Path) -> String {
-    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }

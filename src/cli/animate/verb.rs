@@ -1,6 +1,6 @@
 //! `orator animate`.
 
-use super::input::{Input, Take, inputs, is_motion, read_motion};
+use super::input::{Input, Take, inputs};
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
@@ -13,6 +13,7 @@ use orator::animate::{AnimationOptions, Constraints, Performance, Smoothing, Yaw
 use orator::dataset::Split;
 use orator::external::ffmpeg::audio;
 use orator::math::one_euro::OneEuro;
+use orator::mocap::motion_file;
 use orator::stage::progress::Progress as _;
 use orator::types::sound::{SAMPLE_RATE, Sound};
 use orator::types::time::FrameRate;
@@ -66,7 +67,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE", conflicts_with = "format")]
     audio: Option<PathBuf>,
     /// What a film shows beside the figure: the video it was taken from, whose sound it has where there is no other, or
-    /// another motion (.npy, .txt, .npz), put on a figure in the same way.
+    /// another motion (.npy, .txt, .npz, .bvh), put on a figure in the same way.
     #[arg(long, value_name = "FILE", conflicts_with = "format")]
     beside: Option<PathBuf>,
     /// The second of the video beside, at which the motion begins.
@@ -76,10 +77,10 @@ pub struct Args {
     #[arg(long, value_names = ["OURS", "OTHER"], num_args = 2, requires = "beside")]
     labels: Option<Vec<String>>,
     /// Frames a second of a .npy or .txt.
-    #[arg(long, value_name = "RATE", default_value = "15", value_parser = rate)]
+    #[arg(long, value_name = "RATE", default_value = "15")]
     in_fps: FrameRate,
     /// Frames a second of what is written; without: those of the motion. A fraction is 30000/1001.
-    #[arg(long, value_name = "RATE", value_parser = rate)]
+    #[arg(long, value_name = "RATE")]
     fps: Option<FrameRate>,
     /// The turn of the shoulders about the vertical: of spine and chest, or removed, so that the figure faces ahead.
     #[arg(long, value_enum, default_value = "spine")]
@@ -203,7 +204,10 @@ fn animate(
     let performance = perform(&motion, face.as_ref(), options);
     let secs = started.elapsed().as_secs_f64();
     let other = match &args.beside {
-        Some(path) if is_motion(path) => Some(perform(&read_motion(path, args.in_fps)?, None, options).motion()),
+        Some(path) if motion_file::has_ending(path) => {
+            let other = motion_file::read(path, Some(args.in_fps))?;
+            Some(perform(&other.motion, None, options).motion())
+        }
         _ => None,
     };
     let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -373,21 +377,4 @@ fn split(name: &str) -> Result<Split, String> {
 fn names_called(label: &str) -> Result<Names, String> {
     let known = || Names::ALL.map(Names::label).join(", ");
     Names::ALL.into_iter().find(|names| names.label() == label).ok_or_else(|| format!("expected one of {}", known()))
-}
-
-/// `15`, `29.97` or `30000/1001`, 1 to 240.
-fn rate(text: &str) -> Result<FrameRate, String> {
-    let wrong = || "expected frames a second between 1 and 240, such as 30 or 30000/1001".to_owned();
-    let fps = match text.split_once('/') {
-        Some((num, den)) => match (num.parse(), den.parse()) {
-            (Ok(num), Ok(den)) if num > 0 && den > 0 => FrameRate::new(num, den),
-            _ => return Err(wrong()),
-        },
-        None => match text.parse::<f64>() {
-            Ok(fps) if fps.fract() == 0.0 && (1.0..=240.0).contains(&fps) => FrameRate::new(fps as u32, 1),
-            Ok(fps) if (1.0..=240.0).contains(&fps) => FrameRate::new((fps * 1000.0).round() as u32, 1000),
-            _ => return Err(wrong()),
-        },
-    };
-    if (1.0..=240.0).contains(&fps.per_sec()) { Ok(fps) } else { Err(wrong()) }
 }

@@ -45,7 +45,7 @@ pub struct Args {
     force: bool,
     /// Frames a second of the dataset. Default: 15, or the rate of the first dataset among the sources.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=240))]
-    fps: Option<u32>,
+    fps: Option<FrameRate>,
     /// Shortest take, in frames of the dataset.
     #[arg(long, default_value_t = 64, value_name = "N")]
     min_frames: usize,
@@ -113,10 +113,7 @@ fn plan(args: &Args) -> Result<ImportPlan> {
         "--validation and --test: expected 0 to 0.9, together at most 0.95"
     );
     ensure!((0.0..=60.0).contains(&args.max_apart), "--max-apart: expected 0 to 60 seconds");
-    let fps = match args.fps {
-        Some(fps) => FrameRate::new(fps, 1),
-        None => rate_of(&args.sources).unwrap_or(FrameRate::new(15, 1)),
-    };
+    let fps = args.fps.or_else(|| rate_of(&args.sources)).unwrap_or(FrameRate::new(15, 1));
     let (licence, consent, source) = (args.licence.clone(), args.consent.clone(), args.source.clone());
     Ok(ImportPlan {
         sources: args.sources.clone(),

@@ -16,7 +16,6 @@ use orator::evaluate::verdict::text;
 use orator::generate::Speaker;
 use orator::metrics::settings::Convention;
 use orator::metrics::settings::Settings;
-use orator::mocap::motion_file;
 use orator::report::evaluation::page;
 use orator::stage::progress::{Progress as _, Task};
 use orator::stage::workdir;
@@ -59,7 +58,7 @@ struct MotionArgs {
     #[arg(long, value_name = "PATH", requires = "truth")]
     audio: Option<PathBuf>,
     /// Frames a second of files that do not say it themselves (.npy, .txt), like 15 or 30000/1001 [default: 15]
-    #[arg(long, value_name = "RATE", requires = "truth", value_parser = motion_file::rate)]
+    #[arg(long, value_name = "RATE", requires = "truth")]
     fps: Option<FrameRate>,
     /// Instead of files: a dataset, a folder of `orator run` or `orator import`.
     #[arg(long, value_name = "DIR", conflicts_with = "truth", requires = "checkpoint")]

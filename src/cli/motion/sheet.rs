@@ -6,7 +6,8 @@ use crate::cli::ui::Ui;
 use anyhow::{Result, bail, ensure};
 use orator::animate::{AnimationOptions, perform};
 use orator::external::opencv::png;
-use orator::formats::{joints_npz, keypoints_npz, npy};
+use orator::formats::keypoints_npz;
+use orator::mocap::motion_file;
 use orator::pipeline::Pipeline;
 use orator::pipeline::lift::quality;
 use orator::pipeline::lift::quality::{ArmFigures, ClipFigures};
@@ -14,8 +15,6 @@ use orator::report::sheet::sheet::SheetClip;
 use orator::stage::artifacts::Artifact;
 use orator::stage::progress::Progress as _;
 use orator::stage::{Unit, workdir};
-use orator::types::pose3d::Motion;
-use orator::types::time::FrameRate;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -135,7 +134,8 @@ fn of_run(args: &Args) -> Result<Vec<Files>> {
 fn draw(files: &Files, every_secs: f64, figure: bool, ui: &Ui) -> Result<(Vec<PathBuf>, ClipFigures)> {
     let (keypoints, notes) = keypoints_npz::read_noting(&files.keypoints)?;
     notes.iter().for_each(|note| ui.say(&format!("{}: {note}", files.keypoints.display())));
-    let motion = read_motion(&files.joints, keypoints.fps)?;
+    // A file without a rate is taken to run as the keypoints do.
+    let motion = motion_file::read(&files.joints, Some(keypoints.fps))?.motion;
     let figure = figure.then(|| perform(&motion, None, &AnimationOptions::default()).motion());
     let figure = figure.as_ref();
     let clip = SheetClip { title: &files.title, video: &files.video, keypoints: &keypoints, motion: &motion, figure };
@@ -147,15 +147,6 @@ fn draw(files: &Files, every_secs: f64, figure: bool, ui: &Ui) -> Result<(Vec<Pa
         Ok(())
     })?;
     Ok((written, quality::measure(&motion, &keypoints)?))
-}
-
-/// A .npy has no rate of its own and is taken to run as the keypoints do.
-fn read_motion(path: &Path, fps: FrameRate) -> Result<Motion> {
-    match path.extension().and_then(|ending| ending.to_str()) {
-        Some("npy") => npy::read(path, fps),
-        Some("npz") => joints_npz::read(path),
-        _ => bail!("{}: joints are .npy (of `orator lift`) or .npz (of a run)", path.display()),
-    }
 }
 
 /// `sheet.png` to `sheet_003.png`.

@@ -3,7 +3,7 @@
 
 use super::scene::DrawnScene;
 use super::truth::DrawnTruth;
-use crate::external::ffmpeg::audio;
+use crate::formats::wav;
 use crate::stage::progress::Progress;
 use crate::stage::workdir;
 use crate::types::time::FrameRate;
@@ -77,7 +77,7 @@ pub fn draw(dir: &Path, plan: &DemoPlan, progress: &dyn Progress) -> anyhow::Res
         videos.push(video);
     }
     let unheard = DrawnScene::new(plan.seed.wrapping_mul(1000), UNHEARD_SECS, plan.size).sound();
-    workdir::replace(&dir.join("speech.wav"), |attempt| audio::write_wav(attempt, &unheard))?;
+    workdir::replace(&dir.join("speech.wav"), |attempt| wav::write(attempt, &unheard))?;
     workdir::write_file(&dir.join("pipeline.toml"), PIPELINE.replace("SPLITS", &splits(plan.n_videos)).as_bytes())?;
     Ok(videos)
 }

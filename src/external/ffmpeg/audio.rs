@@ -33,72 +33,16 @@ pub fn read_mono(path: &Path, rate: u32) -> Result<Option<Sound>> {
     Ok(heard.map(|_| Sound { rate, samples }))
 }
 
-/// What `extract_wav` wrote.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Extracted {
-    pub secs: f64,
-    /// What was left out, in words.
-    pub damage: Option<String>,
-}
-
-/// Writes the sound of `path` to the 16-bit mono wav `out`, a piece at a time; `None` (and no file) when there is no
-/// sound.
-pub fn extract_wav(path: &Path, out: &Path, rate: u32) -> Result<Option<Extracted>> {
-    let mut wav = None;
-    let heard = stream_mono(path, rate, &mut |piece| {
-        if wav.is_none() {
-            wav = Some(WavWriter::create(out, rate)?);
-        }
-        wav.as_mut().map_or(Ok(()), |wav: &mut WavWriter| wav.push(piece))
-    })?;
-    if let Some(wav) = wav {
-        wav.finish()?;
-    }
-    Ok(heard.map(|heard| Extracted { secs: heard.n_samples as f64 / f64::from(rate), damage: heard.damage() }))
-}
-
-/// Writes `sound` to the 16-bit mono wav `out`.
-pub fn write_wav(out: &Path, sound: &Sound) -> Result<()> {
-    let mut wav = WavWriter::create(out, sound.rate)?;
-    wav.push(&sound.samples)?;
-    wav.finish()
-}
-
-/// A 16-bit mono wav file being written.
-struct WavWriter {
-    path: std::path::PathBuf,
-    file: hound::WavWriter<std::io::BufWriter<std::fs::File>>,
-}
-
-impl WavWriter {
-    fn create(path: &Path, rate: u32) -> Result<Self> {
-        let sample_format = hound::SampleFormat::Int;
-        let spec = hound::WavSpec { channels: 1, sample_rate: rate, bits_per_sample: 16, sample_format };
-        let file = hound::WavWriter::create(path, spec).with_context(|| format!("cannot write {}", path.display()))?;
-        Ok(Self { path: path.to_owned(), file })
-    }
-
-    fn push(&mut self, samples: &[f32]) -> Result<()> {
-        for sample in samples {
-            let sample = (sample * 32_768.0).round().clamp(-32_768.0, 32_767.0) as i16;
-            self.file.write_sample(sample).with_context(|| format!("cannot write {}", self.path.display()))?;
-        }
-        Ok(())
-    }
-
-    fn finish(self) -> Result<()> {
-        self.file.finalize().with_context(|| format!("cannot write {}", self.path.display()))
-    }
-}
-
 /// What `stream_mono` handed on.
-pub(crate) struct StreamedSound {
-    n_samples: u64,
+pub struct StreamedSound {
+    /// Number of samples handed on.
+    pub n_samples: u64,
     n_misplaced: u64,
 }
 
 impl StreamedSound {
-    fn damage(&self) -> Option<String> {
+    /// Sentence about what was left out.
+    pub fn damage(&self) -> Option<String> {
         (self.n_misplaced > 0).then(|| format!("{} pieces of sound with impossible times", self.n_misplaced))
     }
 }

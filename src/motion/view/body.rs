@@ -5,7 +5,8 @@
 
 use crate::math::order::Ordered;
 use crate::math::vec3;
-use crate::motion::upper_body::{BONES, L_HIP, L_SHOULDER, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, Seen};
+use crate::motion::upper_body::{L_HIP, L_SHOULDER, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, Seen};
+use crate::types::skeleton::BODY_BONES;
 
 /// Frames of the stretch before and after the middle one.
 const AROUND: isize = 40;
@@ -156,9 +157,9 @@ fn longest(frames: &[Seen]) -> [f32; N_KINDS] {
     let neck = |f: &Seen| middle(f[R_SHOULDER], f[L_SHOULDER]);
     let bone = |(a, b): (usize, usize)| large(frames.iter().filter_map(|f| apart(f[a], f[b])));
     [
-        bone(BONES[0]),
-        bone(BONES[1]).max(bone(BONES[2])),
-        bone(BONES[3]).max(bone(BONES[4])),
+        bone(BODY_BONES[0]),
+        bone(BODY_BONES[1]).max(bone(BODY_BONES[2])),
+        bone(BODY_BONES[3]).max(bone(BODY_BONES[4])),
         large(frames.iter().filter_map(|f| apart(f[NOSE], neck(f)))),
         large(frames.iter().filter_map(|f| apart(middle(f[R_HIP], f[L_HIP]), neck(f)))),
     ]

@@ -140,28 +140,20 @@ fn distinct(rows: Vec<BatchSound>) -> Result<Vec<BatchSound>> {
 
 /// Fields of each line with something on it, and its number.
 fn fields(text: &str, comma: char) -> Result<Vec<(usize, Vec<String>)>> {
-    let mut rows = Vec::new();
-    let (mut row, mut field, mut quoted, mut line, mut began) = (Vec::new(), String::new(), false, 1, 1);
-    let mut letters = text.chars().peekable();
-    while let Some(letter) = letters.next() {
-        match letter {
-            '"' if quoted && letters.peek() == Some(&'"') => field.extend(letters.next()),
-            '"' if quoted => quoted = false,
-            '"' if field.is_empty() => quoted = true,
-            c if c == comma && !quoted => row.push(std::mem::take(&mut field)),
-            '\n' if !quoted => {
-                row.push(std::mem::take(&mut field));
-                rows.push((began, std::mem::take(&mut row)));
-                began = line + 1;
-            }
-            '\r' if !quoted => {}
-            c => field.push(c),
-        }
-        line += usize::from(letter == '\n');
+    let mut table =
+        csv::ReaderBuilder::new().delimiter(comma as u8).has_headers(false).flexible(true).from_reader(text.as_bytes());
+    let (mut rows, mut last) = (Vec::new(), (1, ""));
+    for record in table.records() {
+        let record = record?;
+        // The position is before the empty lines that lead to the record.
+        let (line, rest) = record.position().map_or((1, text), |at| (at.line() as usize, &text[at.byte() as usize..]));
+        let body = rest.trim_start_matches(['\r', '\n']);
+        let line = line + rest[..rest.len() - body.len()].matches('\n').count();
+        rows.push((line, record.iter().map(str::to_owned).collect::<Vec<_>>()));
+        last = (line, body);
     }
-    ensure!(!quoted, "line {began}: a quotation mark is not closed");
-    row.push(field);
-    rows.push((began, row));
+    // An open quotation mark reaches to the end of the table.
+    ensure!(last.1.matches('"').count() % 2 == 0, "line {}: a quotation mark is not closed", last.0);
     rows.retain(|(_, fields)| fields.iter().any(|field| !field.trim().is_empty()));
     Ok(rows)
 }

@@ -2,6 +2,7 @@
 //! pass over the pictures and one over the sound. `shots` finds cuts and, with `gradual`, dissolves, wipes and fades, all
 //! on `thumbnail`s by their `likeness`; `still` measures movement, `stage` knows the files.
 
+pub mod audio_file;
 pub mod block_match;
 pub mod dissolves;
 pub mod frame_difference;

@@ -6,7 +6,6 @@ use super::frame_difference::THUMBNAIL;
 use super::shots::{RESTART, ShotFinder};
 use crate::config;
 use crate::external::ffmpeg;
-use crate::external::ffmpeg::audio;
 use crate::external::ffmpeg::frames::FrameReader;
 use crate::external::opencv::png;
 use crate::formats::media_json::MediaInfo;
@@ -53,7 +52,7 @@ impl Stage for Extract {
         let mut reader = FrameReader::open(&unit.source, rate)?;
         let timeline = self.timeline(&mut reader, out, progress)?;
         timeline.write(&Artifact::Timeline.within(out))?;
-        let sound = audio::extract_wav(&unit.source, &Artifact::Sound.within(out), SAMPLE_RATE)?;
+        let sound = super::audio_file::extract_wav(&unit.source, &Artifact::Sound.within(out), SAMPLE_RATE)?;
         let audio_secs = sound.as_ref().map(|sound| sound.secs);
 
         let n_frames = timeline.n_frames();

@@ -3,11 +3,10 @@
 
 use super::gaps;
 use crate::math::order::{lower_median, median};
-use crate::motion::upper_body::{
-    COCO, L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, Seen,
-};
+use crate::motion::upper_body::{COCO, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_HIP, R_SHOULDER, R_WRIST, Seen};
 use crate::types::interval::Interval;
 use crate::types::pose2d::{Keypoints, coco};
+use crate::types::skeleton::BODY_BONES;
 use ndarray::{Array2, Array3, s};
 
 /// A body keypoint counts as seen from this score on.
@@ -21,10 +20,6 @@ const STRAY: f32 = 0.15;
 /// ...and this many times as far as the farthest of those: a fast gesture moves in them as well. Beats of up to 3.5 a
 /// second pass untouched.
 const STRAY_SPREAD: f32 = 2.0;
-
-/// Bones that tell how large the body appears.
-const BONES: [(usize, usize); 5] =
-    [(R_SHOULDER, L_SHOULDER), (R_SHOULDER, R_ELBOW), (L_SHOULDER, L_ELBOW), (R_ELBOW, R_WRIST), (L_ELBOW, L_WRIST)];
 
 /// The nine points over an interval.
 pub struct Sight {
@@ -135,12 +130,13 @@ fn largest_bone(points: &Array3<f32>, t: usize) -> f32 {
         let (a, b) = (at(points, t, a)?, at(points, t, b)?);
         Some((a[0] - b[0]).hypot(a[1] - b[1]))
     };
-    BONES.iter().filter_map(bone).fold(f32::NAN, f32::max)
+    BODY_BONES.iter().filter_map(bone).fold(f32::NAN, f32::max)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion::upper_body::R_ELBOW;
     use crate::types::time::FrameRate;
 
     /// A speaker whose right wrist swings 120 px wide at `hertz`, 15 frames a second.

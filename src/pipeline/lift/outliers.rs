@@ -9,13 +9,10 @@ use crate::math::order::lower_median;
 use crate::types::interval::Interval;
 use crate::types::pose2d::{Keypoints, coco};
 use crate::types::pose3d::Motion;
-use crate::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
+use crate::types::skeleton::BODY_BONES;
 use ndarray::{Array2, s};
 
-/// The bones that are looked at, each with its ends.
-const BONES: [(usize, usize); 5] =
-    [(R_SHOULDER, L_SHOULDER), (R_SHOULDER, R_ELBOW), (L_SHOULDER, L_ELBOW), (R_ELBOW, R_WRIST), (L_ELBOW, L_WRIST)];
-/// The keypoints of those ends.
+/// The keypoints of the ends of `BODY_BONES`.
 const POINTS: [(usize, usize); 5] = [
     (coco::R_SHOULDER, coco::L_SHOULDER),
     (coco::R_SHOULDER, coco::R_ELBOW),
@@ -33,8 +30,8 @@ pub struct BoneChange {
 impl BoneChange {
     /// Measures bones as they were lifted, before they are given one length each.
     pub fn of(raw: &Motion) -> Self {
-        let mut changes = Array2::from_elem((raw.n_frames(), BONES.len()), f32::NAN);
-        for (i, (from, to)) in BONES.into_iter().enumerate() {
+        let mut changes = Array2::from_elem((raw.n_frames(), BODY_BONES.len()), f32::NAN);
+        for (i, (from, to)) in BODY_BONES.into_iter().enumerate() {
             let seen = |t: usize| raw.mask[[t, from]] && raw.mask[[t, to]];
             let length = |t: usize| if seen(t) { bone(raw, t, from, to) } else { f32::NAN };
             let lengths: Vec<f32> = (0..raw.n_frames()).map(length).collect();

@@ -8,12 +8,13 @@ use crate::evaluate::table::table::Table;
 use crate::metrics::beat::consistency;
 use crate::report::html::chart::tracks::{Lane, lanes};
 use crate::report::html::numbers::clock;
-use crate::report::html::picture::base64;
 use crate::report::html::{Node, node};
 use crate::types::skeleton;
 use crate::types::skeleton::{L_WRIST, N_JOINTS, R_WRIST, is_duplicate};
 use crate::types::sound::SAMPLE_RATE;
 use anyhow::Result;
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use ndarray::ArrayView3;
 use serde_json::{Value, json};
 use std::ops::Range;
@@ -193,9 +194,9 @@ impl Excerpt {
         json!({
             "secs": self.secs,
             "fps": self.fps,
-            "real": base64(&self.ground_truth),
-            "made": base64(&self.predicted),
-            "sound": self.sound.as_deref().map(base64),
+            "real": STANDARD.encode(&self.ground_truth),
+            "made": STANDARD.encode(&self.predicted),
+            "sound": self.sound.as_ref().map(|sound| STANDARD.encode(sound)),
         })
     }
 }

@@ -6,10 +6,11 @@ use crate::math::procrustes;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::motion::upper_body::{
-    L_ELBOW, L_SHOULDER, L_WRIST, N_POINTS, NOSE, Pose, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, Seen, metres_per_unit,
+    L_SHOULDER, L_WRIST, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, R_WRIST, Seen, metres_per_unit,
 };
 use crate::train::scene::body::Scene;
 use crate::train::scene::body_motion::Proportions;
+use crate::types::skeleton;
 use serde::Serialize;
 use std::fmt;
 
@@ -164,7 +165,7 @@ pub fn with_bone_depth(scene: &Scene) -> Vec<Option<Pose>> {
         pose[L_SHOULDER] = on_sphere(rays[L_SHOULDER]?, neck, bones.shoulders / 2.0, !left_is_away);
         pose[R_SHOULDER] = on_sphere(rays[R_SHOULDER]?, neck, bones.shoulders / 2.0, left_is_away);
         pose[NOSE] = on_sphere(rays[NOSE]?, neck, bones.nose, true);
-        for (shoulder, elbow, wrist) in [(R_SHOULDER, R_ELBOW, R_WRIST), (L_SHOULDER, L_ELBOW, L_WRIST)] {
+        for [shoulder, elbow, wrist] in skeleton::ARMS {
             pose[elbow] = on_sphere(rays[elbow]?, pose[shoulder], bones.upper_arm, true);
             pose[wrist] = on_sphere(rays[wrist]?, pose[elbow], bones.forearm, true);
         }

@@ -8,8 +8,9 @@ use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::mocap::upper_body::Take;
 use crate::motion::upper_body::{
-    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, MIRROR, N_POINTS, NOSE, Pose, R_ELBOW, R_HIP, R_SHOULDER, R_WRIST, Seen,
+    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, R_WRIST, Seen,
 };
+use crate::types::skeleton;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -243,7 +244,7 @@ fn with_bones(pose: &Pose, bones: &Proportions) -> Pose {
     let mut new: Pose = [[0.0; 3]; N_POINTS];
     new[L_SHOULDER] = along(pose[R_SHOULDER], pose[L_SHOULDER], bones.shoulders / 2.0);
     new[R_SHOULDER] = vec3::scale(new[L_SHOULDER], -1.0);
-    for (shoulder, elbow, wrist) in [(R_SHOULDER, R_ELBOW, R_WRIST), (L_SHOULDER, L_ELBOW, L_WRIST)] {
+    for [shoulder, elbow, wrist] in skeleton::ARMS {
         new[elbow] = vec3::add(new[shoulder], along(pose[shoulder], pose[elbow], bones.upper_arm));
         new[wrist] = vec3::add(new[elbow], along(pose[elbow], pose[wrist], bones.forearm));
     }
@@ -258,6 +259,7 @@ fn with_bones(pose: &Pose, bones: &Proportions) -> Pose {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion::upper_body::R_ELBOW;
 
     fn take() -> Take {
         let mut rng = ChaCha8Rng::seed_from_u64(3);

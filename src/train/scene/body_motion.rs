@@ -262,7 +262,7 @@ impl Beat {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::upper_body::{L_ELBOW, L_WRIST, R_ELBOW, R_WRIST};
+    use crate::motion::upper_body::{R_ELBOW, R_WRIST};
     use rand::SeedableRng;
 
     #[test]
@@ -271,7 +271,7 @@ mod tests {
             let poses = gesture(&mut ChaCha8Rng::seed_from_u64(seed), 60, 1.0 / 15.0);
             let bone = |p: &Pose, a: usize, b: usize| vec3::norm(vec3::sub(p[a], p[b]));
             for pair in poses.windows(2) {
-                for (a, b) in [(R_SHOULDER, R_ELBOW), (R_ELBOW, R_WRIST), (L_SHOULDER, L_ELBOW), (L_ELBOW, L_WRIST)] {
+                for (a, b) in crate::types::skeleton::ARM_BONES {
                     assert!((bone(&pair[0], a, b) - bone(&pair[1], a, b)).abs() < 1e-9);
                 }
                 let step = (0..N_POINTS).map(|j| vec3::norm(vec3::sub(pair[1][j], pair[0][j]))).fold(0.0, f64::max);

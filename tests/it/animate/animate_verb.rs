@@ -103,7 +103,7 @@ fn a_film_has_the_sound_of_its_run_and_a_silent_one_is_told_of() {
     assert_eq!(silent["film_has_sound"], false);
     assert!(audio::read_mono(&dir.join("silent.mp4"), SAMPLE_RATE).unwrap().is_none());
     let sound = crate::fixtures::clips::tone(SAMPLE_RATE, 2.0, 440.0);
-    audio::write_wav(&extracted.join("audio.wav"), &sound).unwrap();
+    orator::formats::wav::write(&extracted.join("audio.wav"), &sound).unwrap();
     assert_eq!(done(dir, "work/lift/host/talk --out heard.mp4")["film_has_sound"], true);
     let heard = audio::read_mono(&dir.join("heard.mp4"), SAMPLE_RATE).unwrap().unwrap();
     assert!((15_000..18_000).contains(&heard.samples.len()), "{} samples", heard.samples.len());
@@ -206,8 +206,8 @@ fn what_is_wrong_is_said_and_nothing_is_written() {
         ("good.npy --out x.bvh x.bvh", "asked for twice"),
         ("good.npy --out nothing", "is a folder"),
         ("good.npy --out x.bvh --in-fps 0", "between 1 and 240"),
-        ("good.npy --out x.bvh --fps 1000", "between 1 and 240"),
-        ("good.npy --out x.bvh --fps fast", "between 1 and 240"),
+        ("good.npy --out x.bvh --fps 1001", "1 to 1000 frames"),
+        ("good.npy --out x.bvh --fps fast", "1 to 1000 frames"),
         ("good.npy --out x.bvh --sample one", "is no dataset"),
         ("good.npy --out x.bvh --smoothing one-euro --one-euro-hz 0", "expected 0.01 to 100"),
         ("good.npy --out x.bvh --audio picture.png", "picture.png"),

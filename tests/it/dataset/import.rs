@@ -8,7 +8,6 @@ use orator::dataset::import::{Imported, import, shards};
 use orator::dataset::info::About;
 use orator::dataset::verify::verify::{accounts, verify};
 use orator::dataset::{Dataset, Sample};
-use orator::external::ffmpeg::audio;
 use orator::mocap::captured;
 use orator::mocap::captured::Kind;
 use orator::mocap::take::Captured;
@@ -42,7 +41,7 @@ fn wav(path: &Path, secs: f64, seed: u64) {
     let mut noise = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     let samples = (0..(secs * 22_050.0) as usize).map(|_| noise.random_range(-0.5f32..0.5)).collect();
     fs::create_dir_all(path.parent().unwrap()).unwrap();
-    audio::write_wav(path, &Sound { rate: 22_050, samples }).unwrap();
+    orator::formats::wav::write(path, &Sound { rate: 22_050, samples }).unwrap();
 }
 
 fn write(path: PathBuf, text: &str) {

@@ -5,7 +5,7 @@ use crate::fixtures::motion_folders::{folders, spoken, write_npy};
 use crate::fixtures::skip::real_data;
 use crate::fixtures::support::{Answer, Project};
 use ndarray::{Array3, s};
-use orator::external::ffmpeg::audio;
+use orator::formats::wav;
 use orator::formats::{authors_txt, joints_npz};
 use orator::types::pose3d::Motion;
 use orator::types::time::FrameRate;
@@ -145,7 +145,7 @@ fn bad_files() -> Project {
     let twice = Array3::from_shape_fn((240, 49, 3), |(t, j, k)| made[[t / 2, j, k]]);
     joints_npz::write(&at("30.npz"), &Motion::from_joints(slow, twice)).unwrap();
     fs::write(at("t.txt"), authors_txt::format(&motion)).unwrap();
-    audio::write_wav(&at("t.wav"), &sound).unwrap();
+    wav::write(&at("t.wav"), &sound).unwrap();
     fs::write(at("none.mp3"), [b"ID3\x03\0\0\0\0\0\x0a".as_slice(), &[0; 10]].concat()).unwrap();
     wav(&at("phone.wav"), 8000, sound.samples.iter().step_by(2).copied());
     wav(&at("short.wav"), 16_000, sound.samples[..32_000].iter().copied());

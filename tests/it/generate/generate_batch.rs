@@ -3,7 +3,7 @@
 
 use crate::fixtures::clips;
 use crate::fixtures::untrained::{generate, write_untrained_speaker};
-use orator::external::ffmpeg::audio::write_wav;
+use orator::formats::wav;
 use serde_json::Value;
 use std::path::Path;
 
@@ -13,8 +13,8 @@ fn folder() -> tempfile::TempDir {
     let dir = folder.path();
     std::fs::create_dir_all(dir.join("talks/sub")).unwrap();
     write_untrained_speaker(&dir.join("host.safetensors"));
-    write_wav(&dir.join("talks/a.wav"), &clips::tone(16_000, 1.5, 220.0)).unwrap();
-    write_wav(&dir.join("talks/sub/b.wav"), &clips::tone(8_000, 1.0, 330.0)).unwrap();
+    wav::write(&dir.join("talks/a.wav"), &clips::tone(16_000, 1.5, 220.0)).unwrap();
+    wav::write(&dir.join("talks/sub/b.wav"), &clips::tone(8_000, 1.0, 330.0)).unwrap();
     std::fs::write(dir.join("talks/notes.mp3"), "no sound").unwrap();
     std::fs::write(dir.join("talks/read.me"), "no sound either").unwrap();
     folder
@@ -49,7 +49,7 @@ fn a_folder_is_made_once_and_goes_on_after_a_bad_file() {
     std::fs::remove_file(dir.join("made/a.bvh")).unwrap();
     assert_eq!(run(dir, args).0, [1, 1, 1]);
     let before = bytes("made/sub/b.npy");
-    write_wav(&dir.join("talks/sub/b.wav"), &clips::tone(16_000, 1.0, 500.0)).unwrap();
+    wav::write(&dir.join("talks/sub/b.wav"), &clips::tone(16_000, 1.0, 500.0)).unwrap();
     assert_eq!(run(dir, args).0, [1, 1, 1]);
     assert_ne!(bytes("made/sub/b.npy"), before);
     assert_eq!(run(dir, &args.replace("npy,bvh", "txt")).0, [2, 0, 1]);

@@ -4,9 +4,10 @@
 use crate::fixtures::clips;
 use crate::fixtures::figures::FPS;
 use crate::fixtures::untrained::{generate, write_untrained_speaker};
-use orator::external::ffmpeg::audio::{read_mono, write_wav};
+use orator::external::ffmpeg::audio::read_mono;
 use orator::external::ffmpeg::sound_stream::{SoundStream, n_samples};
 use orator::formats::npy;
+use orator::formats::wav;
 use orator::generate::Speaker;
 use orator::types::sound::Sound;
 
@@ -23,7 +24,7 @@ fn a_streamed_sound_gives_the_motion_of_the_whole_one() {
             *sample *= ((i * 7919) % 100_003) as f32 / 100_003.0;
         }
         let path = dir.join("speech.wav");
-        write_wav(&path, &sound).unwrap();
+        wav::write(&path, &sound).unwrap();
         let whole = read_mono(&path, 16_000).unwrap().unwrap();
         let n = n_samples(&path, 16_000).unwrap().unwrap();
         assert_eq!(n, whole.samples.len());
@@ -46,7 +47,7 @@ fn a_telephone_is_told_of_and_nothing_is_said_of_better_sound() {
     let dir = folder.path();
     write_untrained_speaker(&dir.join("host.safetensors"));
     for (rate, is_narrow) in [(8_000, true), (22_050, false)] {
-        write_wav(&dir.join("speech.wav"), &clips::tone(rate, 1.0, 220.0)).unwrap();
+        wav::write(&dir.join("speech.wav"), &clips::tone(rate, 1.0, 220.0)).unwrap();
         let output = generate(dir, "--checkpoint host.safetensors --audio speech.wav --out a.bvh");
         let said = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(output.status.success() && said.contains("nothing above 4000 Hz") == is_narrow, "{said}");
@@ -58,7 +59,7 @@ fn sounds_without_a_sample_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     write_untrained_speaker(&dir.join("host.safetensors"));
-    write_wav(&dir.join("empty.wav"), &Sound { rate: 16_000, samples: Vec::new() }).unwrap();
+    wav::write(&dir.join("empty.wav"), &Sound { rate: 16_000, samples: Vec::new() }).unwrap();
     std::fs::write(dir.join("nothing.mp3"), "").unwrap();
     std::fs::write(dir.join("text.mp3"), "this is no sound, whatever its name says\n".repeat(50)).unwrap();
     // a tag without music behind it

@@ -173,7 +173,7 @@ fn bad_files_are_named_with_what_was_expected() {
     clips::write_numbered(dir.path(), "in.mp4", 60, FrameRate::new(30, 1), None);
     let bytes = std::fs::read(at("in.mp4")).unwrap();
     std::fs::write(at("no_index.mp4"), &bytes[..200]).unwrap();
-    orator::external::ffmpeg::audio::write_wav(&at("sound.wav"), &clips::tone(16_000, 0.5, 440.0)).unwrap();
+    orator::formats::wav::write(&at("sound.wav"), &clips::tone(16_000, 0.5, 440.0)).unwrap();
     for (name, words) in [
         ("empty.mp4", "is empty (0 bytes)"),
         ("text.mp4", "is not a media file"),

@@ -2,10 +2,12 @@
 
 use crate::fixtures::clips::{ffmpeg, tone, write_numbered};
 use crate::fixtures::skip::real_data;
-use orator::external::ffmpeg::audio::{extract_wav, read_mono, write_wav};
+use orator::external::ffmpeg::audio::read_mono;
 use orator::external::ffmpeg::encode::VideoWriter;
 use orator::external::ffmpeg::frames::FrameReader;
 use orator::external::ffmpeg::sound_stream::SoundStream;
+use orator::formats::wav;
+use orator::pipeline::extract::audio_file::extract_wav;
 use orator::types::image::Image;
 use orator::types::sound::Sound;
 use orator::types::time::FrameRate;
@@ -76,7 +78,7 @@ fn flash_and_beep_stay_together() {
 fn a_late_track_is_padded_and_an_early_one_cut() {
     let dir = tempfile::tempdir().unwrap();
     write_numbered(dir.path(), "in.mp4", 60, PICTURES, None);
-    write_wav(&dir.path().join("tone.wav"), &tone(RATE, 1.5, 500.0)).unwrap();
+    wav::write(&dir.path().join("tone.wav"), &tone(RATE, 1.5, 500.0)).unwrap();
     // The sound starts half a second after the pictures.
     if ffmpeg(dir.path(), "-i in.mp4 -itsoffset 0.5 -i tone.wav -map 0:v -map 1:a -c:v copy -c:a pcm_s16le late.mkv") {
         let sound = read_mono(&dir.path().join("late.mkv"), RATE).unwrap().unwrap();
@@ -96,7 +98,7 @@ fn a_late_track_is_padded_and_an_early_one_cut() {
 #[test]
 fn a_gap_in_the_container_is_silence() {
     let dir = tempfile::tempdir().unwrap();
-    write_wav(&dir.path().join("tone.wav"), &tone(48_000, 3.0, 500.0)).unwrap();
+    wav::write(&dir.path().join("tone.wav"), &tone(48_000, 3.0, 500.0)).unwrap();
     // Drops the samples of second 1 to 2 and keeps the times of the rest.
     if !ffmpeg(dir.path(), "-i tone.wav -af aselect='lt(t,1)+gt(t,2)' -c:a pcm_s16le gap.mkv") {
         return;
@@ -114,7 +116,7 @@ fn a_gap_in_the_container_is_silence() {
 #[test]
 fn a_jump_in_time_is_damage_not_an_hour_of_silence() {
     let dir = tempfile::tempdir().unwrap();
-    write_wav(&dir.path().join("tone.wav"), &tone(48_000, 3.0, 500.0)).unwrap();
+    wav::write(&dir.path().join("tone.wav"), &tone(48_000, 3.0, 500.0)).unwrap();
     let jump = "asetpts=if(gte(T\\,1)\\,PTS+3600/TB\\,PTS)";
     if ffmpeg(dir.path(), &format!("-i tone.wav -af {jump} -c:a pcm_s16le jump.mkv")) {
         let extracted = extract_wav(&dir.path().join("jump.mkv"), &dir.path().join("out.wav"), RATE).unwrap().unwrap();
@@ -126,7 +128,7 @@ fn a_jump_in_time_is_damage_not_an_hour_of_silence() {
 #[test]
 fn rates_and_channels_become_16_khz_mono() {
     let dir = tempfile::tempdir().unwrap();
-    write_wav(&dir.path().join("tone.wav"), &tone(48_000, 2.0, 440.0)).unwrap();
+    wav::write(&dir.path().join("tone.wav"), &tone(48_000, 2.0, 440.0)).unwrap();
     let mut cases = vec![("tone.wav".to_owned(), 1e-9)];
     for (name, how, tolerance) in [
         ("22050.wav", "-ar 22050", 1e-3),
@@ -155,7 +157,7 @@ fn rates_and_channels_become_16_khz_mono() {
 fn wavs_round_trip_to_the_bit_and_streaming_gives_the_same() {
     let dir = tempfile::tempdir().unwrap();
     let (path, out) = (dir.path().join("in.wav"), dir.path().join("out.wav"));
-    write_wav(&path, &tone(RATE, 1.2345, 300.0)).unwrap();
+    wav::write(&path, &tone(RATE, 1.2345, 300.0)).unwrap();
     let extracted = extract_wav(&path, &out, RATE).unwrap().unwrap();
     assert_eq!((extracted.secs, extracted.damage), ((1.2345f64 * 16_000.0).round() / 16_000.0, None));
     assert_eq!(std::fs::read(&path).unwrap(), std::fs::read(&out).unwrap());

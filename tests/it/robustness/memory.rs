@@ -9,7 +9,7 @@ use crate::fixtures::support::Project;
 use crate::fixtures::untrained::write_untrained_speaker;
 use ndarray::{Array3, s};
 use ndarray_npy::NpzWriter;
-use orator::external::ffmpeg::audio::write_wav;
+use orator::formats::wav;
 use orator::train::scene::body::{Filming, Scene};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -89,7 +89,7 @@ fn lifting_holds_its_arrays_and_little_more() {
 fn peak_of_generate(secs: f64) -> (f64, f64) {
     let dir = tempfile::tempdir().unwrap();
     write_untrained_speaker(&dir.path().join("host.safetensors"));
-    write_wav(&dir.path().join("speech.wav"), &clips::tone(16_000, secs, 220.0)).unwrap();
+    wav::write(&dir.path().join("speech.wav"), &clips::tone(16_000, secs, 220.0)).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
     command.args(["generate", "--checkpoint", "host.safetensors", "--audio", "speech.wav", "--out", "a.npy"]);
     let peak = peak_mib(command.current_dir(dir.path()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());

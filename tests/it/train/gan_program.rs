@@ -5,7 +5,6 @@
 use crate::fixtures::clips;
 use crate::fixtures::gesture_dataset::{FPS, sample};
 use orator::dataset::{Split, write_dataset};
-use orator::external::ffmpeg::audio;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -99,7 +98,7 @@ fn each_speaker_has_a_model_that_needs_only_its_file() {
     // Far from its project, the one file generates.
     let elsewhere = tempfile::tempdir().unwrap();
     std::fs::write(elsewhere.path().join("ben.safetensors"), &models[1]).unwrap();
-    audio::write_wav(&elsewhere.path().join("speech.wav"), &clips::tone(16_000, 2.0, 220.0)).unwrap();
+    orator::formats::wav::write(&elsewhere.path().join("speech.wav"), &clips::tone(16_000, 2.0, 220.0)).unwrap();
     drop(folder);
     let generate = "generate --checkpoint ben.safetensors --audio speech.wav --out motion.npy";
     assert!(orator(elsewhere.path(), generate).status().unwrap().success());
