@@ -1,5 +1,5 @@
-//! The road from joints to animation: motion is smoothed, put on a figure as rotations, brought to the rate asked for
-//! and held within what a body can do. Every file is written from what comes out; what was done on the way is told.
+//! Pipeline from joints to animation: motion is smoothed, solved as rotations of a rig, resampled to the requested rate
+//! and held within the joint limits. Every exported file is written from its result.
 
 use super::rig::constraints::{ClampTally, Clamps, Constraints};
 use super::rig::rig::{CM, Rig};
@@ -21,42 +21,43 @@ use ndarray::{Array2, Array3};
 use serde::Serialize;
 use std::ops::Range;
 
-/// How motion becomes an animation; the default is what a user wants.
+/// Settings of the animation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AnimationOptions {
     pub smoothing: Smoothing,
     pub constraints: Constraints,
     pub yaw: Yaw,
-    /// Frames a second of what is written; `None`: those of the motion.
+    /// Frame rate of the output; `None`: that of the motion.
     pub fps: Option<FrameRate>,
 }
 
-/// What becomes of the turn of the shoulders about the vertical.
+/// Treatment of the shoulders' yaw.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Yaw {
-    /// Spine and chest turn.
+    /// Yaw turns spine and chest.
     #[default]
     Spine,
-    /// The figure always faces +z.
+    /// Yaw is removed: the rig always faces +z.
     Removed,
 }
 
-/// What was done to the motion.
+/// Account of what was done to the motion.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct AnimationReport {
     pub n_frames: usize,
-    /// Jerk at the motion's own rate, over the frames that were seen.
+    /// Jerk of the arms at the motion's own rate, over the frames that were seen.
     pub arms: Jerk,
-    /// That of fingers about their wrist.
+    /// Jerk of the fingers relative to their wrist.
     pub hands: Jerk,
-    /// Clamps by kind of the joints as they came, at the motion's own rate.
+    /// Clamps by kind of the unsmoothed joints, at the motion's own rate.
     pub clamps: Vec<Clamps>,
-    /// Frames in which the face was seen; `None` without keypoints of it.
+    /// Number of frames with a visible face; `None` without face keypoints.
     pub face_frames: Option<usize>,
     pub seen: SeenFrames,
 }
 
-/// Frames, at the motion's own rate, in which a part of the body was seen; in the others it is bridged or held.
+/// Number of frames, at the motion's own rate, in which a part of the body was seen; in the others it is interpolated
+/// or held.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct SeenFrames {
     /// Shoulder, elbow and wrist.
@@ -87,14 +88,14 @@ impl SeenFrames {
     }
 }
 
-/// Mean norm of the third derivative, m/s^3; `None` where no four frames in a row are seen.
+/// Mean norm of the third derivative, m/s^3; `None` where no four consecutive frames are seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Jerk {
     pub before: Option<f64>,
     pub after: Option<f64>,
 }
 
-/// A motion on its figure.
+/// Motion on its rig.
 #[derive(Clone, Debug)]
 pub struct Performance {
     pub rig: Rig,
@@ -102,10 +103,10 @@ pub struct Performance {
     pub report: AnimationReport,
 }
 
-/// Puts a motion on the figure of its own bone lengths; with a `face` the head turns.
+/// Animates a motion on a rig of its own bone lengths; a `face` turns the head.
 ///
-/// What no body can do is clamped before smoothing, so that a joint found on the wrong side pulls no other frame with
-/// it, and once more behind it and at the rate that is written, so that the limits hold in every frame of the file.
+/// Joint limits are applied before smoothing, so that a joint found on the wrong side does not pull its neighbours in
+/// time, and again after smoothing and at the output rate, so that they hold in every written frame.
 pub fn perform(motion: &Motion, face: Option<&Face>, options: &AnimationOptions) -> Performance {
     let rig = Rig::from_motion(motion);
     let clip_of = |tracks: &[RotationTrack]| {
@@ -155,7 +156,7 @@ pub fn perform(motion: &Motion, face: Option<&Face>, options: &AnimationOptions)
 }
 
 impl Performance {
-    /// The joints [T, 49, 3] of the figure (metres, house axes, the neck at the origin) at the clip's rate.
+    /// Joints [T, 49, 3] of the rig (metres, axes of `types::skeleton`, the neck at the origin) at the clip's rate.
     pub fn motion(&self) -> Motion {
         Motion::from_joints(self.clip.fps, joints(&self.rig, &self.clip))
     }
@@ -175,12 +176,12 @@ fn joints(rig: &Rig, clip: &Clip) -> Array3<f32> {
     joints
 }
 
-/// [T, 49]: where there are numbers, seen or filled.
+/// Mask [T, 49] of the joints with finite coordinates, seen or filled.
 fn seen(motion: &Motion) -> Array2<bool> {
     motion.joints.map_axis(ndarray::Axis(2), |place| place.iter().all(|v| v.is_finite()))
 }
 
-/// Where a clip of the figure has these joints; what was missing stays missing.
+/// Positions of these joints in a clip of the rig; missing joints stay missing.
 fn moved(positions: &JointPositions, rig: &Rig, clip: &Clip) -> JointPositions {
     let moved = |(t, frame): (usize, &[Option<Vec3>; N_JOINTS])| {
         let positions = clip.positions(t);

@@ -1,5 +1,5 @@
-//! The avatar: a skinned figure of our own, made from the figure's bones. Its form is a distance field around the
-//! bones in a stance near to what speakers do; surfaces, weights, and the way back to the T-pose follow from it.
+//! Skinned avatar of a rig. Its shape is a signed distance field around the bones in a relaxed stance; the surface
+//! mesh, the skinning weights and the vertices in T-pose (by inverse linear skinning) follow from it.
 
 use super::body::BodyForm;
 use super::field::Form;
@@ -11,7 +11,7 @@ use crate::animate::rig::rig::Rig;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, add, cross, dot, sub, unit};
 
-/// Size of the cells that surfaces are made of, cm.
+/// Cell sizes of the surface meshes, cm.
 const SHIRT_CELL: f64 = 1.6;
 const LEGS_CELL: f64 = 2.0;
 const SHOE_CELL: f64 = 1.4;
@@ -20,7 +20,7 @@ const PALM_CELL: f64 = 0.56;
 const CUFF_CELL: f64 = 0.7;
 const FINGER_CELL: f64 = 0.42;
 
-/// What a part is made of.
+/// Material of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Material {
     Skin,
@@ -40,7 +40,7 @@ pub struct AvatarMesh {
     pub weights: Vec<Weights>,
 }
 
-/// The skin of a figure.
+/// Meshes that together cover a rig.
 #[derive(Clone, Debug)]
 pub struct Avatar {
     pub parts: Vec<AvatarMesh>,
@@ -88,7 +88,7 @@ impl Avatar {
     }
 }
 
-/// Surfaces of one material in the stance.
+/// Mesh of one material in the stance, before it is brought to the T-pose.
 #[derive(Default)]
 struct PosedMesh {
     surface: Surface,
@@ -104,7 +104,7 @@ impl PosedMesh {
         self.weights.extend(weights);
     }
 
-    /// The part in the T-pose: linear skinning brings it exactly into the stance.
+    /// Mesh in the T-pose; linear skinning of it with the stance gives the posed mesh exactly.
     fn rested(self, material: Material, stance: &Stance) -> AvatarMesh {
         let Surface { points, normals, triangles } = self.surface;
         let (points, normals) = points
@@ -122,9 +122,9 @@ impl PosedMesh {
     }
 }
 
-/// The linear map of linear skinning at one vertex.
+/// Linear map of linear blend skinning at one vertex.
 struct Blend {
-    /// Columns.
+    /// Columns of the 3 x 3 matrix.
     columns: [Vec3; 3],
     shift: Vec3,
 }
@@ -143,7 +143,7 @@ impl Blend {
         blend
     }
 
-    /// The inverse of the map without its shift (Cramer's rule).
+    /// Inverse of the linear part (Cramer's rule).
     fn back(&self, a: Vec3) -> Vec3 {
         let [x, y, z] = self.columns;
         let volume = dot(x, cross(y, z));

@@ -1,25 +1,25 @@
-//! The form of the body in its stance: head and neck, shirt, trousers, shoes. A calm mannequin; hands are elsewhere.
-//! Numbers are cm of a body of 1.78 m, in the axes of the joint they hang on (x to its left, y up, z forward).
+//! Shape of the body in its stance: head and neck, shirt, trousers, shoes. Numbers are cm of a body of 1.78 m, in the
+//! axes of the joint they belong to (x to its left, y up, z forward); hands are in `hand`.
 
 use super::field::{Form, RoundCone, around, joined};
 use super::stance::{Stance, Trunk};
 use crate::animate::rig::rig::{Rig, RigArm};
 use crate::math::vec3::{Vec3, add, dot, norm, scale, sub, unit};
 
-/// Half the distance of the shoulders the numbers below are for.
+/// Half of the shoulder width that the numbers below belong to, cm.
 const SHOULDERS: f64 = 16.5;
-/// The sleeve ends this far before the wrist, with this radius; of a hand of size 1.
+/// Distance of the sleeve's end from the wrist, and its radius there, cm, for a hand of size 1.
 const BARE: f64 = 1.9;
 const SLEEVE: f64 = 3.05;
 
-/// Forms on the figure in its stance.
+/// Shapes of a rig in its stance.
 pub struct BodyForm<'a> {
     pub rig: &'a Rig,
     pub stance: &'a Stance,
     pub trunk: Trunk,
-    /// Width of the shoulders against the form's.
+    /// Shoulder width relative to the shape's.
     broad: f64,
-    /// Sizes of the hands.
+    /// Sizes of the hands relative to the shape's.
     hands: [f64; 2],
 }
 
@@ -31,7 +31,7 @@ impl<'a> BodyForm<'a> {
         Self { rig, stance, trunk: Trunk::find(rig), broad, hands }
     }
 
-    /// A limb from point to point of the form's size; `joint` gives the axes.
+    /// Tapered limb between two points of the shape's size in the axes of `joint`.
     fn limb(&self, joint: usize, ends: [Vec3; 2], radii: [f64; 2]) -> RoundCone {
         RoundCone::new(ends.map(|end| self.stance.at(joint, end)), radii.map(|r| r * self.stance.scale))
     }

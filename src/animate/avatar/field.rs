@@ -1,14 +1,13 @@
-//! Forms as signed distance fields (cm, negative inside): tapered limbs grown together and cut. What a body is made of
-//! is told elsewhere.
+//! Shapes as signed distance fields (cm, negative inside): tapered limbs joined with smooth unions and cut by planes.
 
 use crate::math::vec3::{Vec3, add, dot, norm, scale, sub};
 
-/// A rounded limb between two points with a radius at each.
+/// Rounded cone between two points with a radius at each.
 #[derive(Clone, Copy, Debug)]
 pub struct RoundCone {
     ends: [Vec3; 2],
     radii: [f64; 2],
-    /// Along this unit vector the limb is thinner (or thicker) by this factor.
+    /// Unit vector along which the limb is thinner (or thicker), and the factor.
     flat: Option<(Vec3, f64)>,
 }
 
@@ -17,12 +16,12 @@ impl RoundCone {
         Self { ends, radii, flat: None }
     }
 
-    /// The same with all radii along the unit vector `axis` multiplied by `factor`.
+    /// Multiplies all radii along the unit vector `axis` by `factor`.
     pub fn flat(self, axis: Vec3, factor: f64) -> Self {
         Self { flat: Some((axis, factor)), ..self }
     }
 
-    /// Distance of a point, exact for a round limb of one radius.
+    /// Signed distance of a point, exact for a limb of one radius and no flattening.
     pub fn distance(&self, point: Vec3) -> f64 {
         let [a, b] = self.ends;
         let along = sub(b, a);
@@ -36,7 +35,7 @@ impl RoundCone {
         if stretched < 1e-9 { -radius * factor.min(1.0) } else { (stretched - radius) * far / stretched }
     }
 
-    /// Corners of a box around it.
+    /// Corners of the axis-aligned bounding box.
     fn bounds(&self) -> [Vec3; 2] {
         let reach = self.radii[0].max(self.radii[1]) * self.flat.map_or(1.0, |(_, factor)| factor.max(1.0));
         let [a, b] = self.ends;
@@ -50,12 +49,12 @@ pub fn joined(a: f64, b: f64, blend: f64) -> f64 {
     a.min(b) - near * near / (4.0 * blend.max(1e-9))
 }
 
-/// Limbs grown together, then cut by planes.
+/// Smooth union of limbs, cut by planes.
 #[derive(Clone, Debug, Default)]
 pub struct Form {
-    /// Each with the width over which it grows into those before it.
+    /// Limb and the width of its blend with those before it, cm.
     limbs: Vec<(RoundCone, f64)>,
-    /// A point, the outward unit normal, the roundness of the edge.
+    /// Point of the plane, outward unit normal, roundness of the edge, cm.
     cuts: Vec<(Vec3, Vec3, f64)>,
 }
 
@@ -66,7 +65,7 @@ impl Form {
         self
     }
 
-    /// Nothing is left on the side that `normal` points to.
+    /// Cuts off the side that `normal` points to.
     #[must_use]
     pub fn cut(mut self, point: Vec3, normal: Vec3, edge: f64) -> Self {
         self.cuts.push((point, normal, edge));
@@ -80,7 +79,7 @@ impl Form {
         self.cuts.iter().fold(grown, |d, (at, normal, edge)| -joined(-d, -dot(sub(point, *at), *normal), *edge))
     }
 
-    /// Corners of a box around it.
+    /// Corners of the axis-aligned bounding box.
     pub fn bounds(&self) -> [Vec3; 2] {
         around(self.limbs.iter().map(|(limb, blend)| {
             let [low, high] = limb.bounds();
@@ -89,7 +88,7 @@ impl Form {
     }
 }
 
-/// Corners of the box around boxes.
+/// Corners of the bounding box of boxes.
 pub fn around(boxes: impl Iterator<Item = [Vec3; 2]>) -> [Vec3; 2] {
     boxes.fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], [a, b]| {
         [[0, 1, 2].map(|k| low[k].min(a[k])), [0, 1, 2].map(|k| high[k].max(b[k]))]

@@ -1,27 +1,27 @@
-//! The form of a hand in its stance, on the speaker's own bones: a palm grown from its metacarpals, five fingers that
-//! grow into the palm but not into each other, and the wrist inside the sleeve.
+//! Shape of a hand in its stance on the rig's own bones: a palm over the metacarpals, five fingers that blend with the
+//! palm but not with each other, and the wrist inside the sleeve.
 
 use super::field::{Form, RoundCone, around, joined};
 use super::stance::{Stance, finger_joints};
 use crate::animate::rig::rig::Rig;
 use crate::math::vec3::{Vec3, add, cross, norm, scale, sub, unit};
 
-/// Mean length of the four metacarpals of the hand the numbers are for, cm.
+/// Mean length of the four metacarpals of the reference hand, cm.
 const METACARPAL: f64 = 7.5;
-/// Length of its middle finger from the knuckle to the joint of the tip.
+/// Length of the reference hand's middle finger from the knuckle to the end joint, cm.
 const MIDDLE: f64 = 9.8;
-/// Radius of each finger at its knuckle, thumb to little finger, and how it goes on to the tip.
+/// Radius of each finger at its knuckle (thumb to little finger), and its share at the further joints.
 const FINGERS: [f64; 5] = [1.10, 0.88, 0.90, 0.85, 0.76];
 const ALONG: [f64; 4] = [1.0, 0.90, 0.80, 0.66];
 const THUMB_ALONG: [f64; 4] = [1.10, 1.0, 0.93, 0.74];
-/// Of the distance between two knuckles a finger's radius takes at most this share.
+/// Largest radius of a finger as a share of the distance of two knuckles.
 const CROWDED: f64 = 0.47;
 
 /// One hand.
 pub struct HandForm {
     palm: Form,
     fingers: [Form; 5],
-    /// Size of the hand against the form's.
+    /// Size of the hand relative to the reference hand.
     pub scale: f64,
 }
 
@@ -57,7 +57,7 @@ impl HandForm {
             palm = palm.with(RoundCone::new([start, end], [cm(1.25), radius * 1.08]), cm(0.9));
         }
         let thumb = fingers[0].map(|joint| stance.positions[joint]);
-        // The balls of the thumb and of the little finger; the web between thumb and index finger.
+        // Balls of the thumb and of the little finger; web between thumb and index finger.
         let thumb_ball = [inwards(mix(wrist, thumb[0], 0.7), 0.2), mix(thumb[0], thumb[1], 0.7)];
         let little_ball = [0.3, 0.8].map(|share| inwards(mix(wrist, knuckle(4), share), 0.42));
         palm = palm
@@ -67,7 +67,7 @@ impl HandForm {
             let web = [mix(thumb[0], thumb[1], on_thumb), inwards(mix(wrist, knuckle(1), on_index), 0.2)];
             palm = palm.with(RoundCone::new(web, [cm(0.85), cm(0.85)]), cm(1.6));
         }
-        // The wrist, wider than thick, goes on into the sleeve.
+        // Wrist, wider than thick, up into the sleeve.
         let elbow = stance.positions[arm.fore];
         let stub = [mix(wrist, elbow, 0.30), mix(wrist, elbow, -0.03)];
         palm = palm.with(RoundCone::new(stub, [cm(2.5), cm(2.4)]).flat(back, 0.76), cm(2.0));
@@ -95,7 +95,7 @@ impl HandForm {
         self.fingers[finger].distance(at)
     }
 
-    /// The whole hand as light falls on it: a finger goes over into the palm.
+    /// Distance to the whole hand with fingers blended into the palm; its gradient gives the normals.
     pub fn whole(&self, at: Vec3) -> f64 {
         let palm = self.palm(at);
         (1..5).fold(palm, |d, finger| d.min(joined(palm, self.finger(finger, at), 0.6 * self.scale)))

@@ -1,5 +1,5 @@
-//! The avatar: a skinned figure of our own, made from the figure's bones. Its form is a distance field around the
-//! bones in a stance near to what speakers do; surfaces, weights, and the way back to the T-pose follow from it.
+//! Skinned avatar of a rig: distance fields (`field`, `body`, `hand`), their surfaces, the stance they are built in,
+//! and skinning weights.
 
 pub mod avatar;
 pub mod body;

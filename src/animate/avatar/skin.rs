@@ -1,5 +1,5 @@
-//! Which joints carry a vertex: along every chain of joints a vertex passes smoothly from one to the next where the
-//! bone bends, between chains it belongs to the nearer, and all is smoothed over the surface.
+//! Skinning weights. Along a chain of joints a vertex passes smoothly from one joint to the next where the bone bends,
+//! between chains it belongs to the nearer one; all weights are smoothed over the surface.
 
 use super::body::BodyForm;
 use super::stance::finger_joints;
@@ -9,13 +9,13 @@ use crate::math::vec3::{Vec3, dot, norm, sub};
 /// Joints of a vertex with their weights, which sum to 1.
 pub type Weights = [(usize, f64); 4];
 
-/// How much each joint carries of one vertex; sparse.
+/// Sparse weights of one vertex by joint.
 type Shares = Vec<(usize, f64)>;
 
-/// The joints of a chain and where a vertex passes from each to the next.
+/// Joints of a chain and the transitions between them.
 struct WeightChain {
     joints: Vec<usize>,
-    /// For each joint but the first: its place, the normal of the plane of passing, half the width of passing.
+    /// For each joint but the first: position, normal of the transition plane, half the width of the transition (cm).
     passes: Vec<(Vec3, Vec3, f64)>,
 }
 
@@ -39,14 +39,14 @@ fn add_share(into: &mut Shares, joint: usize, share: f64) {
     }
 }
 
-/// 0 at -1, 1 at 1, smooth between.
+/// Smooth step from 0 at -1 to 1 at 1.
 fn rise(at: f64) -> f64 {
     let t = ((at + 1.0) / 2.0).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
 impl BodyForm<'_> {
-    /// A chain whose passes lie across the bisector of the bones at each joint; `halves` in cm of the figure.
+    /// Chain whose transition planes bisect the bones at each joint; `halves` in cm of the rig.
     fn chain(&self, before: usize, joints: &[usize], after: usize, halves: &[f64]) -> WeightChain {
         let stance = self.stance;
         let at = |k: usize| joints.get(k).copied().unwrap_or(after);
@@ -99,7 +99,7 @@ impl BodyForm<'_> {
                 let shoulder = self.stance.positions[arm.upper];
                 let out = arm.sign * (at[0] - shoulder[0]) / cm;
                 let on_arm = rise((on_trunk - sleeve.distance(at)) / (1.5 * cm) - 0.6) * rise((out + 1.0) / 3.0);
-                // The shoulder's own bone carries the top of the trunk, more and more towards the shoulder.
+                // The clavicle carries the top of the trunk, increasingly towards the shoulder.
                 let high = rise((at[1] - shoulder[1] + 9.0 * cm) / (9.0 * cm));
                 let on_shoulder = high * rise((out + 7.0) / 6.0);
                 chain.shares(at, left * on_arm, shares);
@@ -110,7 +110,7 @@ impl BodyForm<'_> {
         })
     }
 
-    /// Weights of a cuff: it stays with the forearm.
+    /// Weights of a cuff, which follows the forearm.
     pub fn cuff_weights(&self, side: usize, surface: &Surface) -> Vec<Weights> {
         let fore = self.rig.arms[side].fore;
         vec![[(fore, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)]; surface.points.len()]
@@ -173,7 +173,7 @@ fn to_segment(at: Vec3, a: Vec3, b: Vec3) -> f64 {
     norm([0, 1, 2].map(|k| at[k] - a[k] - share * along[k]))
 }
 
-/// Shares of every vertex, smoothed `rounds` times over its neighbours, the four greatest kept.
+/// Weights of every vertex, smoothed `rounds` times over its neighbours, the four largest kept.
 fn settled(surface: &Surface, rounds: usize, of: impl Fn(Vec3, &mut Shares)) -> Vec<Weights> {
     let mut all: Vec<Shares> = surface
         .points

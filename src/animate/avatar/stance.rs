@@ -1,31 +1,30 @@
-//! The stance in which the form of the avatar is made: arms hanging aside, elbows and fingers half bent. It lies in
-//! the middle of what speakers do, so that skinning bends the form little either way; the T-pose gets what the inverse
-//! of the skinning gives it.
+//! Stance in which the avatar's shape is built: arms down beside the body, elbows and fingers half bent. Poses of
+//! speakers lie around it, so skinning deforms the shape little.
 
 use crate::animate::rig::rig::Rig;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, add, scale, sub, unit};
 use crate::types::skeleton::{L_HAND, R_HAND};
 
-/// Degrees: the arm below the level, the elbow's bend, a finger's bends from knuckle to tip.
+/// Degrees: upper arm below the horizontal, elbow flexion, flexion of a finger's joints from knuckle to tip.
 const ARM: f64 = 54.0;
 const ELBOW: f64 = 35.0;
 const FINGER: [f64; 3] = [22.0, 28.0, 18.0];
 const THUMB: [f64; 3] = [0.0, 8.0, 10.0];
-/// How far the fingers are fanned out towards the thumb, thumb to little finger.
+/// Degrees by which the fingers are spread towards the thumb, thumb to little finger.
 const FAN: [f64; 5] = [0.0, 4.0, 1.0, -2.0, -5.0];
 
-/// The figure in that stance: places (cm) and rotations of its joints.
+/// Joint positions (cm) and world rotations of the rig in the stance.
 pub struct Stance {
     pub positions: Vec<Vec3>,
     pub world: Vec<Rotation>,
-    /// Places in the T-pose.
+    /// Positions in the T-pose, cm.
     pub rest: Vec<Vec3>,
-    /// Length of the trunk against the one whose form is given, so that cm of the form become cm of the figure.
+    /// Trunk length relative to the shape's reference body.
     pub scale: f64,
 }
 
-/// Indices of the figure's joints that are not in its `Arm`s.
+/// Indices of the rig's joints outside its arms.
 pub struct Trunk {
     pub hips: usize,
     pub spine: usize,
@@ -82,7 +81,7 @@ impl Stance {
         }
     }
 
-    /// The point `cm` away from a joint, in the joint's axes and the form's size.
+    /// Point `cm` away from a joint, in the joint's axes and the shape's size.
     pub fn at(&self, joint: usize, cm: Vec3) -> Vec3 {
         add(self.positions[joint], self.world[joint].turn(scale(cm, self.scale)))
     }

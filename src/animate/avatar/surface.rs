@@ -1,19 +1,18 @@
-//! A closed surface of triangles around a distance field: surface nets (one vertex in every cell that the surface
-//! passes, a quad around every edge that crosses it), then every vertex drawn onto the surface itself and
-//! evenly over it. Its normals are
-//! the field's own.
+//! Closed triangle mesh of a distance field by surface nets (Gibson 1998): one vertex in every cell that the surface
+//! crosses, a quad around every edge that crosses it; vertices are then projected onto the surface and relaxed over it.
+//! Normals are the field's gradient.
 
 use crate::math::vec3::{Vec3, add, dot, norm, scale, sub, unit};
 use rayon::prelude::*;
 
-/// Cells of a block that is passed over at once where the surface is far.
+/// Cells of a block that is skipped as a whole where the surface is far away.
 const BLOCK: usize = 4;
-/// Share of a cell a vertex may move onto the surface at once.
+/// Largest step of a vertex towards the surface, as a share of a cell.
 const REACH: f64 = 0.9;
-/// How often vertices are moved towards the middle of their neighbours.
+/// Rounds of moving vertices towards the middle of their neighbours.
 const ROUNDS: usize = 3;
 
-/// Triangles, outside counter-clockwise.
+/// Triangle mesh, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
     pub points: Vec<Vec3>,
@@ -21,17 +20,17 @@ pub struct Surface {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Values of the field at the corners of the cells.
+/// Field values at the corners of the cells.
 struct Grid {
     low: Vec3,
     cell: f64,
-    /// Corners along x, y, z.
+    /// Number of corners along x, y, z.
     n: [usize; 3],
     values: Vec<f32>,
 }
 
 impl Surface {
-    /// The surface of `field` inside the box `bounds`, with cells of `cell`.
+    /// Surface of `field` inside the box `bounds`, with cells of `cell` cm.
     pub fn from_field(field: &(dyn Fn(Vec3) -> f64 + Sync), bounds: [Vec3; 2], cell: f64) -> Self {
         let grid = Grid::sample(field, bounds, cell);
         let mut surface = Self::default();
@@ -57,7 +56,7 @@ impl Surface {
         surface
     }
 
-    /// Draws the vertices onto the surface and evenly over it.
+    /// Projects the vertices onto the surface and distributes them evenly.
     fn settle(&mut self, field: &(dyn Fn(Vec3) -> f64 + Sync), cell: f64) {
         let near = self.neighbours();
         for round in 0..=ROUNDS {
@@ -73,7 +72,7 @@ impl Surface {
         }
     }
 
-    /// The same under the light of another field: its normals.
+    /// Replaces the normals by those of another field at the vertices.
     #[must_use]
     pub fn lit(mut self, field: &(dyn Fn(Vec3) -> f64 + Sync), cell: f64) -> Self {
         let normals = self
@@ -109,7 +108,7 @@ impl Surface {
     }
 }
 
-/// The point of the surface near `point`, and the outward normal there.
+/// Point of the surface near `point`, and the outward normal there.
 fn onto(field: &(dyn Fn(Vec3) -> f64 + Sync), point: Vec3, cell: f64, steps: usize) -> (Vec3, Vec3) {
     let mut at = point;
     for _ in 0..steps {
@@ -123,7 +122,7 @@ fn onto(field: &(dyn Fn(Vec3) -> f64 + Sync), point: Vec3, cell: f64, steps: usi
     (at, unit(gradient(field, at, cell), 1e-9).unwrap_or([0.0, 1.0, 0.0]))
 }
 
-/// The slope of the field, over a fiftieth of a cell.
+/// Gradient of the field by central differences over a fiftieth of a cell.
 fn gradient(field: &(dyn Fn(Vec3) -> f64 + Sync), at: Vec3, cell: f64) -> Vec3 {
     let step = cell * 0.02;
     std::array::from_fn(|k| {
@@ -146,7 +145,7 @@ impl Grid {
                     let half = (BLOCK - 1) as f64 / 2.0 * cell;
                     let first = place([x0, y0, slab * BLOCK]);
                     let middle = field([0, 1, 2].map(|k| low[k] + first[k] + half));
-                    // The fields are no steeper than 1 by much.
+                    // Gradients of the fields are not much larger than 1.
                     let far = (middle.abs() > 1.4 * half * 3f64.sqrt() + cell).then_some(middle as f32);
                     for z in 0..values.len() / layer {
                         for y in y0..(y0 + BLOCK).min(n[1]) {
@@ -167,7 +166,7 @@ impl Grid {
         (z * self.n[1] + y) * self.n[0] + x
     }
 
-    /// The mean of where the surface crosses the edges of a cell.
+    /// Mean of the surface's crossings of a cell's edges.
     fn vertex(&self, cell: [usize; 3]) -> Option<Vec3> {
         let corner = |bits: usize| [0, 1, 2].map(|k| cell[k] + (bits >> k & 1));
         let values: [f32; 8] = std::array::from_fn(|bits| self.values[self.index(corner(bits))]);
@@ -186,7 +185,7 @@ impl Grid {
         (n > 0.0).then(|| add(self.low, scale(sum, self.cell / n)))
     }
 
-    /// The four cells (by their index) around every edge that crosses the surface.
+    /// Calls `see` with the four cells (by index) around every edge that crosses the surface.
     fn quads(&self, mut see: impl FnMut([usize; 4], bool)) {
         for axis in 0..3 {
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);

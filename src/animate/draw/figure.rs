@@ -1,5 +1,5 @@
-//! The figure in a picture: arms and hands as tapered limbs, left and right in two colours, darker where nearer, over
-//! a plain trunk and head that are in no data. `FigureView` says from where; joints that are missing are left out.
+//! Pose drawn as a figure: arms and hands as tapered limbs, left and right in two colours, darker where nearer, over a
+//! plain trunk and head that no data describes. Missing joints are left out.
 
 use crate::external::opencv::draw;
 use crate::types::image::Image;
@@ -7,34 +7,34 @@ use crate::types::skeleton;
 use crate::types::skeleton::{L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, R_HAND, R_SHOULDER, R_WRIST, Side};
 use ndarray::ArrayView2;
 
-/// The paper of our pictures.
+/// Background colour of all pictures.
 pub const PAPER: [u8; 3] = [248, 247, 244];
-/// Words and marks on it.
+/// Colour of text and marks.
 pub const INK: [u8; 3] = [92, 98, 106];
-/// The speaker's own left and right.
+/// Colours of the speaker's left and right side.
 pub const LEFT: [u8; 3] = [20, 118, 150];
 pub const RIGHT: [u8; 3] = [214, 98, 38];
 const TRUNK: [u8; 3] = [212, 214, 216];
 const HEAD: [u8; 3] = [196, 199, 203];
 
-/// Pieces an arm bone is drawn in, so that its shade can change along it.
+/// Number of pieces an arm bone is drawn in, so that its shade can change along it.
 const PIECES: usize = 12;
-/// Nearer and further than the neck by this much, metres, the shade no longer changes.
+/// Distance nearer or further than the neck, metres, beyond which the shade no longer changes.
 const SHADE_METRES: f32 = 0.45;
 
-/// From where a figure is seen, and where it stands in the picture.
+/// Viewpoint of a figure and its position in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FigureView {
-    /// Where the neck is.
+    /// Pixel position of the neck.
     pub neck_px: [f32; 2],
     pub px_per_metre: f32,
-    /// 0: from the front; 90: from the speaker's left.
+    /// Yaw of the view; 0: from the front, 90: from the speaker's left.
     pub yaw_degrees: f32,
     /// Distance of the camera from the neck, metres; infinite: no perspective.
     pub camera_metres: f32,
-    /// Size of trunk and head against a grown person of 0.55 m from shoulder to wrist; 0: none.
+    /// Size of trunk and head relative to an adult of 0.55 m from shoulder to wrist; 0: none.
     pub trunk: f32,
-    /// A seam of this colour parts a limb from what is behind it.
+    /// Colour of a seam that separates a limb from what is behind it.
     pub seam: Option<[u8; 3]>,
 }
 
@@ -44,7 +44,7 @@ impl FigureView {
         Self { neck_px, px_per_metre, yaw_degrees: 0.0, camera_metres: 3.0, trunk: 1.0, seam: Some(PAPER) }
     }
 
-    /// Place in px and depth in metres (away from the camera, 0 at the neck) of a point in metres.
+    /// Position in px and depth in metres (away from the camera, 0 at the neck) of a point in metres.
     pub fn project(&self, [x, y, z]: [f32; 3]) -> ([f32; 2], f32) {
         let (sin, cos) = self.yaw_degrees.to_radians().sin_cos();
         let (across, depth) = (cos * x + sin * z, cos * z - sin * x);
@@ -52,13 +52,13 @@ impl FigureView {
         ([self.neck_px[0] + scale * across, self.neck_px[1] + scale * y], depth)
     }
 
-    /// How much larger a thing looks at this depth than at the neck's.
+    /// Magnification at a depth, relative to the neck's depth.
     fn nearness(&self, depth: f32) -> f32 {
         1.0 / (1.0 + (depth / self.camera_metres).max(-0.8))
     }
 }
 
-/// Draws one frame [49, 3] (metres, house order and axes).
+/// Draws one frame [49, 3] (metres, joints in the order of `types::skeleton`).
 pub fn draw_pose(image: &mut Image, joints: ArrayView2<f32>, view: &FigureView) -> anyhow::Result<()> {
     let place = |joint: usize| -> [f32; 3] { std::array::from_fn(|k| joints[[joint, k]]) };
     let mut limbs: Vec<DrawnLimb> = (1..N_JOINTS).flat_map(|joint| limbs_to(joint, place)).collect();
@@ -81,13 +81,13 @@ pub fn draw_pose(image: &mut Image, joints: ArrayView2<f32>, view: &FigureView) 
     Ok(())
 }
 
-/// A piece of a bone: two ends in metres, their radii, a colour at mean depth.
+/// Piece of a bone: two ends in metres, their radii, a colour at mean depth.
 struct DrawnLimb {
     ends: [[f32; 3]; 2],
     radii: [f32; 2],
     left: bool,
     rgb: [u8; 3],
-    /// The seam begins at this share of its length (1: none): nearer the joint it would cut the limb this one hangs on.
+    /// Share of its length at which the seam begins (1: none); nearer the joint it would cut the parent limb.
     seam_from: f32,
 }
 
@@ -131,7 +131,7 @@ fn limbs_to(joint: usize, place: impl Fn(usize) -> [f32; 3]) -> Vec<DrawnLimb> {
         .collect()
 }
 
-/// Where the seam of a finger's four bones begins.
+/// Share of the length at which the seam of a finger's four bones begins.
 const SEAM_FROM: [f32; 4] = [1.0, 0.15, 0.2, 0.2];
 
 impl DrawnLimb {
@@ -140,7 +140,7 @@ impl DrawnLimb {
         let radius = |k: usize, depth: f32| (self.radii[k] * view.px_per_metre * view.nearness(depth)).max(1.0);
         let (ra, rb) = (radius(0, near), radius(1, far));
         if let Some(seam) = view.seam.filter(|_| self.seam_from < 1.0) {
-            // Along the sides only, for the same reason.
+            // Seams run along the sides only, so that they do not cut the parent limb.
             let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
             let length = dx.hypot(dy).max(1e-3);
             let (nx, ny) = (-dy / length, dx / length);
@@ -156,18 +156,18 @@ impl DrawnLimb {
     }
 }
 
-/// Lighter away from the camera, darker towards it.
+/// Colour at a depth: lighter away from the camera, darker towards it.
 fn shade(rgb: [u8; 3], depth: f32) -> [u8; 3] {
     let share = (depth / SHADE_METRES).clamp(-1.0, 1.0);
     if share > 0.0 { mix(rgb, PAPER, 0.55 * share) } else { mix(rgb, [0; 3], -0.28 * share) }
 }
 
-/// `share` of the way from `a` to `b`.
+/// Colour at `share` of the way from `a` to `b`.
 pub fn mix(a: [u8; 3], b: [u8; 3], share: f32) -> [u8; 3] {
     std::array::from_fn(|k| (f32::from(a[k]) + share * (f32::from(b[k]) - f32::from(a[k]))).round() as u8)
 }
 
-/// Trunk, neck and head, upright under and over the neck joint, turned with the shoulders.
+/// Draws trunk, neck and head, upright under and over the neck joint, turned with the shoulders.
 fn draw_trunk(image: &mut Image, view: &FigureView, left: [f32; 3], right: [f32; 3]) -> anyhow::Result<()> {
     let size = view.trunk;
     let seen = left.iter().chain(&right).all(|v| v.is_finite());

@@ -1,5 +1,5 @@
-//! 2D keypoints over the picture they were found in: body and both hands, left and right in their colours. A point that
-//! was not found is not drawn, nor the bones that end in it.
+//! 2D keypoints drawn over the picture they were found in, left and right in their colours. Points that were not found
+//! are not drawn, nor the bones that end in them.
 
 use super::figure::{INK, LEFT, RIGHT};
 use crate::external::opencv::draw;
@@ -9,13 +9,13 @@ use crate::types::pose2d::{Keypoints, N_HAND};
 use anyhow::Result;
 use ndarray::{ArrayView2, Axis};
 
-/// A point counts as found from this score on.
+/// Lowest score of a point that is drawn.
 const FOUND_SCORE: f32 = 0.3;
 /// Bones between the points of COCO-17 that are drawn.
 const BONES: [(usize, usize); 10] =
     [(5, 6), (5, 7), (7, 9), (6, 8), (8, 10), (5, 11), (6, 12), (11, 12), (0, 1), (0, 2)];
 
-/// Where the video's pixels are in the picture drawn on: `scale * px + shift`, by axis.
+/// Transform of the video's pixels into the picture drawn on: `scale * px + shift`, by axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageTransform {
     pub scale: [f32; 2],
@@ -59,8 +59,8 @@ pub fn draw_keypoints(
     Ok(())
 }
 
-/// The box around what was found of the upper body and the hands over the whole clip, but for each point's outermost
-/// places (one frame in fifty on each side): left, top, right, bottom in px; `None` where nothing was found.
+/// Bounding box of the upper body and the hands over the whole clip without each point's outermost positions (one frame
+/// in fifty on each side): left, top, right, bottom in px; `None` where nothing was found.
 pub fn extent(keypoints: &Keypoints) -> Option<[f32; 4]> {
     const N_UPPER: usize = 11;
     let mut extent: Option<[f32; 4]> = None;

@@ -1,4 +1,4 @@
-//! A motion file of any kind we write, chosen by its name's extension, put in its place atomically.
+//! Motion file of any kind, chosen by its name's extension, written atomically.
 
 use super::{film, glb_scene, json};
 use crate::animate::avatar::Avatar;
@@ -13,28 +13,28 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write as _};
 use std::path::Path;
 
-/// What else goes into a file than the performance.
+/// Content of a file beside the performance.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ExportContent<'a> {
     pub sound: Option<&'a Sound>,
-    /// What the bones are called where they have names.
+    /// Bone names, in formats that have names.
     pub names: Names,
     /// What a film shows beside the figure.
     pub beside: film::SecondPanel<'a>,
 }
 
-/// What a motion can be written as.
+/// Format of a motion file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExportFormat {
     /// Joints [T, 49, 3] f32.
     Npy,
-    /// The layout of Rebol et al. 2021.
+    /// Text layout of Rebol et al. (2021): 147 numbers a line.
     AuthorsTxt,
-    /// Bone rotations of the whole figure.
+    /// Bone rotations of the whole rig.
     Bvh,
     /// The skinned avatar with its motion.
     Glb,
-    /// Joints and rotations for programs of one's own (`json`).
+    /// Joints and rotations as JSON (`export::json`).
     Json,
     /// A film of the figure with the sound.
     Mp4,
@@ -59,12 +59,12 @@ impl ExportFormat {
         }
     }
 
-    /// Whether the file holds joints and nothing of a figure.
+    /// Whether the format holds joints and no rig.
     pub fn holds_joints(self) -> bool {
         matches!(self, Self::Npy | Self::AuthorsTxt)
     }
 
-    /// Writes a performance; only a film has use for the sound.
+    /// Writes a performance; only a film uses the sound.
     pub fn write(
         self,
         path: &Path,
@@ -91,7 +91,7 @@ impl ExportFormat {
         }
     }
 
-    /// Writes joints as they are, which only the files of joints can hold.
+    /// Writes joints unchanged, which only the joint formats can hold.
     pub fn write_joints(self, path: &Path, motion: &Motion) -> anyhow::Result<()> {
         match self {
             Self::Npy => workdir::replace(path, |attempt| npy::write(attempt, motion)),
@@ -101,7 +101,7 @@ impl ExportFormat {
     }
 }
 
-/// A text written piece by piece.
+/// Writes a text through a buffered writer.
 fn streamed(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> anyhow::Result<()> {
     workdir::replace(path, |attempt| {
         let mut text = BufWriter::new(File::create(attempt)?);

@@ -1,5 +1,5 @@
-//! Motion as a film: the figure from the front, beside it the figure from its left, the video it was taken from, or
-//! another motion; under them the sound's wave with a mark that runs along it.
+//! Motion as a film: the figure from the front; beside it the figure from its left, the source video, or another
+//! motion; below, the sound's waveform with a running mark.
 
 use crate::animate::draw::figure::{FigureView, INK, LEFT, PAPER, RIGHT, draw_pose, mix};
 use crate::animate::rig::rig::bone_metres;
@@ -16,33 +16,33 @@ use std::path::Path;
 
 /// Size of the picture in px.
 pub const SIZE: [usize; 2] = [1280, 720];
-/// Left, top, right, bottom of what is drawn, px.
+/// Left, top, right, bottom of an area, px.
 type Area = [f32; 4];
 const FRONT: Area = [30.0, 24.0, 850.0, 610.0];
 const SIDE: Area = [890.0, 90.0, 1250.0, 610.0];
 const HALVES: [Area; 2] = [[30.0, 66.0, 630.0, 610.0], [650.0, 66.0, 1250.0, 610.0]];
 const WAVE: Area = [40.0, 636.0, 1240.0, 684.0];
-/// A joint further from the neck than this is an error of the data and does not shrink the figure, metres.
+/// Joints further from the neck than this, metres, are errors of the data and do not shrink the figure.
 const FURTHEST_METRES: f32 = 1.2;
 const WORDS_PX: f32 = 11.0;
 
-/// What is seen beside the figure.
+/// Content of the picture's second half.
 #[derive(Clone, Copy, Debug, Default)]
 pub enum SecondPanel<'a> {
     /// The figure from its left.
     #[default]
     Itself,
-    /// The pictures of a video from this second of it on.
+    /// Frames of a video from this second of it on.
     Video { path: &'a Path, from_secs: f64 },
-    /// Another motion, drawn in the same size: what the two are called, the other last.
+    /// Another motion, drawn in the same size; the labels of the two, the other last.
     Motion { motion: &'a Motion, labels: [&'a str; 2] },
 }
 
-/// Draws the frames of one motion.
+/// Renderer of one motion's frames.
 pub struct Film<'a> {
     motion: &'a Motion,
     panels: Vec<FilmPanel<'a>>,
-    /// Loudness of each column of the wave, 0..1; empty without sound.
+    /// Loudness of each column of the waveform, 0..1; empty without sound.
     wave: Vec<f32>,
 }
 
@@ -51,12 +51,12 @@ struct FilmPanel<'a> {
     motion: &'a Motion,
     view: FigureView,
     label: &'a str,
-    /// Where the label begins, px from the left.
+    /// Left edge of the label, px.
     label_px: f32,
 }
 
 impl<'a> Film<'a> {
-    /// One view for the whole film: everything the motion does fits in.
+    /// Film with one view in which every frame of the motion fits.
     pub fn new(motion: &'a Motion, sound: Option<&Sound>, beside: SecondPanel<'a>) -> Self {
         let trunk = trunk_of(motion);
         let panel = |motion, view, label, label_px| FilmPanel { motion, view, label, label_px };
@@ -81,12 +81,12 @@ impl<'a> Film<'a> {
         Self { motion, panels, wave: sound.map(|sound| loudness(sound, secs)).unwrap_or_default() }
     }
 
-    /// The picture of one frame, `SIZE` px; of a video beside it only the place.
+    /// Picture of one frame, `SIZE` px; an empty area in place of a video.
     pub fn frame(&self, frame_idx: usize) -> anyhow::Result<Image> {
         let mut image = Image::filled(SIZE[0], SIZE[1], PAPER);
         let secs = self.motion.fps.secs(frame_idx);
         for FilmPanel { motion, view, label, label_px } in &self.panels {
-            // The other motion's frame nearest in time; after its end it is gone.
+            // The other motion's frame nearest in time, none after its end.
             let shown =
                 if motion.fps == self.motion.fps { frame_idx } else { (secs * motion.fps.per_sec()).round() as usize };
             if shown < motion.n_frames() {
@@ -120,7 +120,7 @@ impl<'a> Film<'a> {
     }
 }
 
-/// Writes the film as an mp4 with the sound. It writes in place: call it inside `stage::workdir::replace`.
+/// Writes the film as an mp4 with the sound, in place; callers wrap it in `stage::workdir::replace`.
 pub fn write(
     path: &Path,
     motion: &Motion,
@@ -146,7 +146,7 @@ pub fn write(
     writer.finish()
 }
 
-/// The pictures of a video in step with a motion.
+/// Frames of a video in step with a motion.
 struct FilmFootage {
     frames: FrameReader,
     /// Width and height of its pictures in the film, px.
@@ -171,7 +171,7 @@ impl FilmFootage {
         Ok(Self { frames, size, ended: false })
     }
 
-    /// Puts the next picture at its place; after the last one there is none.
+    /// Draws the next frame into its area; nothing after the last one.
     fn show(&mut self, image: &mut Image) -> anyhow::Result<()> {
         self.ended = self.ended || self.frames.advance()?.is_none();
         if self.ended {
@@ -188,7 +188,7 @@ impl FilmFootage {
     }
 }
 
-/// Size of the trunk that goes with the motion's arms.
+/// Trunk size that fits the motion's arms.
 fn trunk_of(motion: &Motion) -> f32 {
     let metres = bone_metres(motion);
     let arms: f64 = [R_ELBOW, R_WRIST, L_ELBOW, L_WRIST].map(|joint| metres[joint]).iter().sum();
@@ -198,7 +198,7 @@ fn trunk_of(motion: &Motion) -> f32 {
 /// Width of a column of the wave.
 const COLUMN_PX: f32 = 4.0;
 
-/// Root mean square of the sound in each column of the wave, the loudest 1; silence after its end.
+/// Root mean square of the sound in each column of the waveform, the loudest 1; 0 after its end.
 fn loudness(sound: &Sound, secs: f64) -> Vec<f32> {
     let n_columns = ((WAVE[2] - WAVE[0]) / COLUMN_PX) as usize;
     let samples = secs * f64::from(sound.rate) / n_columns as f64;
@@ -214,7 +214,7 @@ fn loudness(sound: &Sound, secs: f64) -> Vec<f32> {
     columns
 }
 
-/// The view from `yaw_degrees` in which trunk, head and every frame's joints of all motions fit into `area`.
+/// View from `yaw_degrees` in which trunk, head and every frame's joints of all motions fit into `area`.
 fn fitting(motions: &[&Motion], [left, top, right, bottom]: Area, yaw_degrees: f32, trunk: f32) -> FigureView {
     let plain = FigureView { yaw_degrees, trunk, ..FigureView::front([0.0, 0.0], 1.0) };
     // Head, trunk and, at least, the arms hanging beside it.
@@ -234,7 +234,7 @@ fn fitting(motions: &[&Motion], [left, top, right, bottom]: Area, yaw_degrees: f
     FigureView { neck_px: [middle([left, right], x), middle([top, bottom], y)], px_per_metre, ..plain }
 }
 
-/// `1:05.3`
+/// Time as minutes and seconds: `1:05.3`.
 fn clock(secs: f64) -> String {
     let tenths = (secs * 10.0).round() as u64;
     format!("{}:{:02}.{}", tenths / 600, tenths / 10 % 60, tenths % 10)

@@ -1,9 +1,8 @@
-//! A binary glTF 2.0 file: one buffer, its views and accessors, and the two chunks around it and the scene's JSON.
-//! What is in the scene is `glb_scene`'s.
+//! Binary glTF 2.0 container: one buffer, its views and accessors, and the two chunks around it and the scene's JSON.
 
 use serde_json::{Value, json};
 
-/// What a run of numbers is for.
+/// Target of a buffer view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BufferUse {
     Vertices = 34_962,
@@ -12,7 +11,7 @@ pub enum BufferUse {
     Other = 0,
 }
 
-/// The numbers of a file so far.
+/// Buffer under construction with its views and accessors.
 #[derive(Debug, Default)]
 pub struct GlbBuffer {
     bytes: Vec<u8>,
@@ -21,8 +20,8 @@ pub struct GlbBuffer {
 }
 
 impl GlbBuffer {
-    /// Adds vectors of `N` floats with their smallest and greatest values; gives the accessor's index. `kind`: `SCALAR`,
-    /// `VEC3`, `VEC4`, `MAT4`.
+    /// Adds vectors of `N` floats with their minimum and maximum; returns the accessor's index. `kind` is one of
+    /// `SCALAR`, `VEC3`, `VEC4`, `MAT4`.
     pub fn floats<const N: usize>(&mut self, values: &[[f32; N]], kind: &str, purpose: BufferUse) -> usize {
         let view = self.view(values.iter().flatten().flat_map(|v| v.to_le_bytes()), purpose);
         let bound = |pick: fn(f32, f32) -> f32| -> Vec<f32> {
@@ -35,7 +34,7 @@ impl GlbBuffer {
         self.accessors.len() - 1
     }
 
-    /// Adds vectors of four bytes (joints).
+    /// Adds vectors of four bytes (joints); returns the accessor's index.
     pub fn bytes4(&mut self, values: &[[u8; 4]]) -> usize {
         let view = self.view(values.iter().flatten().copied(), BufferUse::Vertices);
         self.accessors
@@ -43,7 +42,7 @@ impl GlbBuffer {
         self.accessors.len() - 1
     }
 
-    /// Adds vectors of four shares of 65535 (weights).
+    /// Adds vectors of four 16-bit fixed-point fractions (weights); returns the accessor's index.
     pub fn shares4(&mut self, values: &[[u16; 4]]) -> usize {
         let view = self.view(values.iter().flatten().flat_map(|v| v.to_le_bytes()), BufferUse::Vertices);
         self.accessors.push(json!({
@@ -52,7 +51,7 @@ impl GlbBuffer {
         self.accessors.len() - 1
     }
 
-    /// Adds corners of triangles, in two bytes each where they fit.
+    /// Adds triangle corners, as 16-bit numbers where they fit; returns the accessor's index.
     pub fn indices(&mut self, triangles: &[[u32; 3]]) -> usize {
         let flat = || triangles.iter().flatten();
         let small = flat().all(|&v| v < u32::from(u16::MAX));
@@ -80,7 +79,7 @@ impl GlbBuffer {
         self.views.len() - 1
     }
 
-    /// The whole file of a scene that refers to these accessors.
+    /// Bytes of the file of a scene that refers to these accessors.
     pub fn file(mut self, mut scene: Value) -> Vec<u8> {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         scene["accessors"] = json!(self.accessors);

@@ -1,5 +1,5 @@
-//! A performance as a glTF scene: the figure's joints as nodes in T-pose (metres, y up, facing +z), the avatar as one
-//! skinned mesh on them, the clip as one animation. A joint that does not turn has one key.
+//! Performance as a glTF scene: the rig's joints as nodes in T-pose (metres, y up, facing +z), the avatar as one
+//! skinned mesh, the clip as one animation. Joints that do not turn have one key.
 
 use super::glb::{BufferUse, GlbBuffer};
 use crate::animate::avatar::{Avatar, AvatarMesh, Material};
@@ -11,12 +11,12 @@ use crate::math::vec3::Vec3;
 use serde_json::{Value, json};
 
 const METRES: f64 = 0.01;
-/// A joint whose quaternions never differ by more does not turn.
+/// Largest difference of the quaternions of a joint that does not turn.
 const STILL: f64 = 1e-7;
-/// Where the licence of a VRM's own terms is found; the format wants it named.
+/// Licence address that the VRM format requires.
 const VRM_LICENSE: &str = "https://vrm.dev/licenses/1.0/";
 
-/// The bytes of the file of a clip on its figure, which wears `avatar`.
+/// Bytes of the GLB file of a clip on its rig with `avatar` as its skin.
 pub fn file(rig: &Rig, clip: &Clip, avatar: &Avatar, names: Names) -> Vec<u8> {
     let mut buffer = GlbBuffer::default();
     let bones = &rig.skeleton.joints;
@@ -98,7 +98,7 @@ fn primitive(buffer: &mut GlbBuffer, part: &AvatarMesh, material: usize) -> Valu
     })
 }
 
-/// Weights as whole shares that sum to 65535, greatest first; a joint without a share is joint 0.
+/// Weights as 16-bit fractions that sum to 65535, largest first; a joint with weight 0 is joint 0.
 fn whole_shares(weights: &crate::animate::avatar::Weights) -> ([u8; 4], [u16; 4]) {
     let mut shares = weights.map(|(_, weight)| (weight * 65_535.0).round() as u16);
     let others: u16 = shares[1..].iter().sum();
@@ -142,7 +142,7 @@ fn animation(buffer: &mut GlbBuffer, clip: &Clip) -> Value {
     json!({ "name": "Gesture", "samplers": samplers, "channels": channels })
 }
 
-/// x, y, z, w of a joint over time, each on the side of the one before.
+/// Quaternions (x, y, z, w) of a joint over time, each with the sign nearest to the one before.
 fn quaternions(clip: &Clip, joint: usize) -> Vec<[f32; 4]> {
     let mut before = [0.0, 0.0, 0.0, 1.0];
     let next = |local: &Vec<Rotation>| {
@@ -157,7 +157,7 @@ fn quaternions(clip: &Clip, joint: usize) -> Vec<[f32; 4]> {
     clip.local.iter().map(next).collect()
 }
 
-/// The VRM 1.0 extension: which node is which bone of a human, and whose the avatar is.
+/// VRM 1.0 extension: nodes of the humanoid bones, and the avatar's author and licence.
 fn vrm(own: &[String], called: &[String]) -> Value {
     let is_bone = |name: &str| !name.ends_with('4') && !name.ends_with("End");
     let bones: serde_json::Map<String, Value> = own

@@ -1,10 +1,8 @@
-//! A performance as JSON, for programs of one's own. One object:
-//!
-//! `format` "orator motion"; `version` 1; `fps` [numerator, denominator]; `n_frames`; `units` "metres"; `axes` "x to
-//! the figure's left, y up, z forward"; `names`, `parents` (index or null) and `offsets` ([x, y, z] from the parent in
-//! T-pose) of the joints, ends of bones included; `joints49`, for each of the 49 joints of a motion the index of the
-//! joint at its place; `positions` [frame][joint][x, y, z], the soles at y = 0; `rotations` [frame][joint]
-//! [x, y, z, w], unit quaternions relative to the parent, identity in the T-pose. Places keep 1e-6 m, quaternions 1e-7.
+//! Performance as one JSON object: `format` "orator motion", `version` 1, `fps` [numerator, denominator], `n_frames`,
+//! `units`, `axes`; `names`, `parents` (index or null) and `offsets` (from the parent in T-pose) of the joints, bone
+//! ends included; `joints49`, the joint for each of the 49 joints of a motion; `positions` [frame][joint][x, y, z] to
+//! 1e-6 m, the soles at y = 0; `rotations` [frame][joint][x, y, z, w], unit quaternions relative to the parent, to
+//! 1e-7.
 
 use crate::animate::performance::Performance;
 use crate::animate::rig::names::Names;
@@ -13,7 +11,7 @@ use crate::math::vec3::Vec3;
 use serde_json::json;
 use std::io::{self, Write};
 
-/// Writes the text of the file.
+/// Writes the file's text.
 pub fn write(text: &mut impl Write, performance: &Performance, names: Names) -> io::Result<()> {
     let (clip, bones) = (&performance.clip, &performance.clip.skeleton.joints);
     let head = json!({

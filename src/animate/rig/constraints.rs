@@ -1,6 +1,6 @@
-//! Plausibility constraints (Rebol et al. 2021): no joint bends where no person's does, and neighbouring fingers curl
-//! together. A frame is changed by itself alone; what is within the limits stays, what is changed is counted by kind,
-//! and nothing that moves evenly is made to jump. The limits are in `limits`.
+//! Plausibility constraints (Rebol et al. 2021): joint limits, and neighbouring fingers that curl together. Each frame
+//! is changed by itself; angles within the limits stay, changed ones are counted by kind, and a continuous motion stays
+//! continuous. The limits are in `limits`.
 
 use super::hinge::Bend;
 use super::limits;
@@ -11,12 +11,12 @@ use crate::animate::solve::track::smoothstep;
 use crate::math::rotation::Rotation;
 use serde::Serialize;
 
-/// Which constraints hold.
+/// Constraints that are applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Constraints {
     /// Limits of every joint.
     pub limits: bool,
-    /// Fingers within 10 degrees of the mean curl of the four. A finger that points is then bent with the others.
+    /// Fingers within 10 degrees of the mean curl of the four; a pointing finger is bent with the others.
     pub curl_coherence: bool,
 }
 
@@ -30,7 +30,7 @@ impl Constraints {
     pub const NONE: Self = Self { limits: false, curl_coherence: false };
 }
 
-/// What can be clamped: where, with the number of such angles in both arms.
+/// Kinds of clamps, with the number of such angles in both arms.
 const KINDS: [(&str, usize); 14] = [
     ("elbow flexion", 2),
     ("elbow to the side", 2),
@@ -53,26 +53,26 @@ const WRIST: usize = 3;
 const FINGER: usize = 5;
 const THUMB: usize = 11;
 const COHERENCE: usize = 13;
-/// A change of less than this, degrees, is rounding.
+/// Smallest change that counts as a clamp, degrees; less is rounding.
 const LEAST_DEGREES: f64 = 1e-6;
 
 /// Clamps of one kind.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Clamps {
     pub kind: &'static str,
-    /// How many angles were clamped, and their share of all of this kind.
+    /// Number of clamped angles, and their share of all angles of this kind.
     pub joint_frames: usize,
     pub share: f64,
-    /// How far the clamped ones were beyond their limit.
+    /// Mean amount by which the clamped angles exceeded their limit.
     pub mean_excess_degrees: f64,
     pub largest_excess_degrees: f64,
 }
 
-/// Counts clamps.
+/// Counter of clamps.
 #[derive(Clone, Debug, Default)]
 pub struct ClampTally {
     n_frames: usize,
-    /// For each kind: how many, sum and largest of the excess.
+    /// Count, sum and maximum of the excess by kind.
     kinds: [(usize, f64, f64); KINDS.len()],
 }
 
@@ -88,7 +88,7 @@ impl ClampTally {
         to
     }
 
-    /// Every kind, those without a clamp too.
+    /// Counts of every kind, zero counts included.
     pub fn clamps(&self) -> Vec<Clamps> {
         let kinds = KINDS.into_iter().zip(self.kinds);
         kinds
@@ -125,11 +125,11 @@ impl Constraints {
 
 fn limit(pose: &mut ArmPose, tally: &mut ClampTally) {
     pose.elbow = bend(pose.elbow, limits::ELBOW, ELBOW, tally);
-    // Followed beyond half a turn it is still beyond the same end.
+    // An angle tracked beyond half a turn is still beyond the same end.
     let [pronated, supinated] = limits::SUPINATION;
     let turned = pose.supination.clamp(pronated, supinated);
-    // A hand that lies across the forearm, whatever its turn: the turn and the flexion cannot be told apart.
-    let turned = turned * report(pose.wrist.side);
+    // A hand bent across the forearm: turn and flexion are not distinguishable.
+    let turned = turned * certainty(pose.wrist.side);
     pose.supination = tally.changed(TURN, pose.supination, turned);
     pose.wrist = bend(pose.wrist, limits::WRIST, WRIST, tally);
     for (finger, limits) in limits::FINGERS.iter().enumerate() {
@@ -140,23 +140,23 @@ fn limit(pose: &mut ArmPose, tally: &mut ClampTally) {
     }
 }
 
-/// The bend within its limits; `kind` counts the flexion, the next one the side.
+/// Bend clamped to its limits; `kind` counts the flexion, the next one the side.
 fn bend(given: Bend, limit: Limit, kind: usize, tally: &mut ClampTally) -> Bend {
     let middle = (limit.flexion[0] + limit.flexion[1]) / 2.0;
-    let flexion = middle + report(given.side) * (within(limit.flexion, given.flexion) - middle);
+    let flexion = middle + certainty(given.side) * (within(limit.flexion, given.flexion) - middle);
     Bend {
         flexion: tally.changed(kind, given.flexion, flexion),
         side: tally.changed(kind + 1, given.side, given.side.clamp(limit.side[0], limit.side[1])),
     }
 }
 
-/// How well a flexion is defined: 1, and from 60 degrees to the side on less, down to 0 straight to the side.
-fn report(side: f64) -> f64 {
+/// Certainty of a flexion: 1, falling from 60 degrees of sideways bend on to 0 at 90.
+fn certainty(side: f64) -> f64 {
     1.0 - smoothstep([60.0, 90.0], side.abs())
 }
 
-/// Brings the four fingers' flexion, level by level, within reach of their mean. That is the mean of what comes out, so
-/// that nothing is left to do.
+/// Brings the four fingers' flexion, level by level, within reach of their mean; the mean is that of the result, so a
+/// second application changes nothing.
 fn cohere(pose: &mut ArmPose, tally: &mut ClampTally) {
     for k in 0..3 {
         let given = [1, 2, 3, 4].map(|finger: usize| pose.fingers[finger][k].flexion);
@@ -168,8 +168,8 @@ fn cohere(pose: &mut ArmPose, tally: &mut ClampTally) {
     }
 }
 
-/// The mean of four angles that is also the mean of them clamped around it; of several such the one nearest to the
-/// plain mean. `rise(m)`, the clamped ones' mean less m, falls with m: it is bisected from the plain mean on.
+/// Mean of four angles that is also the mean of them clamped around it; of several the one nearest to the plain mean.
+/// `rise(m)`, the mean of the clamped angles minus m, decreases with m and is bisected from the plain mean on.
 fn coherent_mean(given: [f64; 4]) -> f64 {
     let rise = |m: f64| given.iter().map(|f| (f - m).clamp(-CURL_COHERENCE, CURL_COHERENCE)).sum::<f64>() / 4.0;
     let mean = given.iter().sum::<f64>() / 4.0;

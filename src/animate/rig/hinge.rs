@@ -1,56 +1,55 @@
-//! A joint that bends: the direction of a bone as two angles, flexion about an axis of the parent and, across it, how
-//! far it leans to the side. Every direction is two such angles and back; only straight to the side the flexion is
-//! not defined.
+//! Hinge joint: the direction of a bone as two angles, flexion about an axis of the parent and lean to the side across
+//! it. Every direction has such angles; only at 90 degrees to the side flexion is undefined.
 
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, cross, scale};
 
-/// Where a bone points, degrees.
+/// Direction of a bone, degrees.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bend {
-    /// -180..=180; 0: straight.
+    /// Flexion, -180..=180; 0: straight.
     pub flexion: f64,
-    /// -90..=90; towards the side that the hinge calls its own (the thumb's, in a hand).
+    /// Sideways bend, -90..=90, positive towards the hinge's own side (the thumb's, in a hand).
     pub side: f64,
 }
 
-/// A bone's rest direction with the axis it bends about.
+/// Rest direction of a bone with its flexion axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Hinge {
-    /// Turns x along the resting bone and -z along the axis.
+    /// Rotation from x to the resting bone and from -z to the axis.
     rest: Rotation,
 }
 
 impl Hinge {
-    /// Both unit vectors, at right angles, in the parent's axes. Flexion turns `along` about `axis`.
+    /// Hinge of two unit vectors at right angles in the parent's axes; flexion turns `along` about `axis`.
     pub fn new(along: Vec3, axis: Vec3) -> Self {
         let side = scale(axis, -1.0);
         Self { rest: Rotation::from_axes(along, cross(side, along), side) }
     }
 
-    /// The angles of a bone that points along the unit vector `direction` of the parent's axes.
+    /// Angles of a bone with the direction `direction`, a unit vector in the parent's axes.
     pub fn bend(&self, direction: Vec3) -> Bend {
         let [x, y, z] = self.rest.inverse().turn(direction);
         Bend { flexion: (-y).atan2(x).to_degrees(), side: z.clamp(-1.0, 1.0).asin().to_degrees() }
     }
 
-    /// The rotation with these angles: it takes the resting bone to the direction and twists nothing.
+    /// Rotation with these angles and no twist.
     pub fn rotation(&self, bend: Bend) -> Rotation {
         self.rest * flexed(bend.flexion) * sideways(bend.side) * self.rest.inverse()
     }
 
-    /// The direction of the bone at rest.
+    /// Direction of the bone at rest.
     pub fn along(&self) -> Vec3 {
         self.rest.turn([1.0, 0.0, 0.0])
     }
 }
 
-/// About -z.
+/// Rotation about -z.
 pub fn flexed(degrees: f64) -> Rotation {
     Rotation::about([0.0, 0.0, -1.0], degrees.to_radians())
 }
 
-/// About -y: x goes towards z.
+/// Rotation about -y, from x towards z.
 pub fn sideways(degrees: f64) -> Rotation {
     Rotation::about([0.0, -1.0, 0.0], degrees.to_radians())
 }

@@ -1,15 +1,14 @@
-//! What bones are called in the files: by us, by Mixamo, by Unity's humanoid, by VRM 1.0. The skeleton is the same;
-//! only its names change.
+//! Bone names in files: our own, Mixamo's, Unity's humanoid, VRM 1.0. Only names differ, not the skeleton.
 
 use crate::motion::fk::Skeleton;
 
-/// Whose names.
+/// Naming convention.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Names {
-    /// `Hips`, `LeftForeArm`, `LeftHandIndex1`: Mixamo's without its prefix, and `Chest`.
+    /// `Hips`, `LeftForeArm`, `LeftHandIndex1`: Mixamo's names without prefix, and `Chest`.
     #[default]
     Own,
-    /// `mixamorig:Hips` and so on. Our chest is its `Spine1`; it has a `Spine2` more.
+    /// `mixamorig:Hips` and so on; our chest is `Spine1`, and `Spine2` does not occur.
     Mixamo,
     /// Unity's `HumanBodyBones`.
     UnityHumanoid,
@@ -20,7 +19,7 @@ pub enum Names {
 impl Names {
     pub const ALL: [Self; 4] = [Self::Own, Self::Mixamo, Self::UnityHumanoid, Self::Vrm];
 
-    /// As a user writes it.
+    /// Name on the command line.
     pub fn label(self) -> &'static str {
         match self {
             Self::Own => "own",
@@ -30,7 +29,7 @@ impl Names {
         }
     }
 
-    /// The names of all joints of a skeleton, ends of bones too (a finger's fourth, `HeadEnd`, `LeftFootEnd`).
+    /// Names of all joints of a skeleton, bone ends included (a finger's fourth, `HeadEnd`, `LeftFootEnd`).
     pub fn of(self, skeleton: &Skeleton) -> Vec<String> {
         let own = |joint: usize| -> String {
             let bone = &skeleton.joints[joint];
@@ -45,7 +44,7 @@ impl Names {
         (0..skeleton.joints.len()).map(|joint| self.translated(&own(joint))).collect()
     }
 
-    /// The skeleton under these names; ends of bones stay without one.
+    /// Skeleton with these names; bone ends stay without one.
     pub fn applied(self, skeleton: &Skeleton) -> Skeleton {
         let mut renamed = skeleton.clone();
         for (joint, name) in renamed.joints.iter_mut().zip(self.of(skeleton)) {
@@ -77,7 +76,7 @@ impl Names {
     }
 }
 
-/// The name in Unity's way; `thumb` names the thumb's bones from base to tip.
+/// Name in Unity's convention; `thumb` names the thumb's bones from base to tip.
 fn humanoid(own: &str, thumb: [&str; 3]) -> String {
     let Some((side, part)) = ["Left", "Right"].iter().find_map(|side| Some((*side, own.strip_prefix(side)?))) else {
         return own.to_owned();

@@ -1,7 +1,6 @@
-//! The figure that motion is put on: a whole body in T-pose (y up, facing +z, palms down), Hips to Head, fixed legs,
-//! both arms with all fingers. Its arms and hands have the motion's own bone lengths and its palms the motion's own
-//! shape, medians over the clip; they are rigid, and the fingers hang on the hand. Trunk, head and legs, which no
-//! joint of ours tells of, are in proportion to the arms. Lengths in cm.
+//! Rig that motion is put on: a whole body in T-pose (y up, facing +z, palms down) with Hips to Head, fixed legs, both
+//! arms and all fingers. Arms and hands have the motion's median bone lengths and palm shapes and are rigid; trunk,
+//! head and legs, which the joints do not describe, are in proportion to the arms. Lengths in cm.
 
 use super::hinge::Hinge;
 use crate::animate::solve::positions::{JointPositions, palm_frame};
@@ -12,12 +11,12 @@ use crate::types::pose3d::Motion;
 use crate::types::skeleton;
 use crate::types::skeleton::{L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_HAND};
 
-/// Our lengths in a metre.
+/// Centimetres in a metre.
 pub const CM: f64 = 100.0;
-/// Upper arm and forearm of the body whose trunk and legs are given below, metres.
+/// Length of upper arm and forearm of the body whose trunk and legs are given below, metres.
 const ARM_METRES: f64 = 0.55;
 const FINGERS: [&str; 5] = ["Thumb", "Index", "Middle", "Ring", "Pinky"];
-/// Bone lengths of a left side where the motion never shows them, metres: joints 4..=6, then the hand 8..=27.
+/// Default bone lengths of the left side, metres: joints 4..=6, then the hand 8..=27.
 const DEFAULT_ARM: [f64; 3] = [0.165, 0.30, 0.25];
 const DEFAULT_FINGERS: [[f64; 4]; 5] = [
     [0.030, 0.038, 0.030, 0.025],
@@ -26,14 +25,14 @@ const DEFAULT_FINGERS: [[f64; 4]; 5] = [
     [0.073, 0.043, 0.027, 0.023],
     [0.070, 0.034, 0.020, 0.020],
 ];
-/// Where a finger's base lies by default: degrees from the hand's axis towards the thumb's side.
+/// Default direction of a finger's base: degrees from the hand's axis towards the thumb's side.
 const SPREAD_DEGREES: [f64; 5] = [50.0, 16.0, 5.0, -6.0, -17.0];
-/// The left thumb at rest, and whither it bends; both as medians of speaking hands have them, about.
+/// Direction of the left thumb at rest and of its flexion, close to the medians of speaking hands.
 const THUMB_ALONG: Vec3 = [0.74, -0.35, 0.57];
 const THUMB_BENDS: Vec3 = [0.0, -0.5, -0.87];
 const X: Vec3 = [1.0, 0.0, 0.0];
 
-/// One arm: indices of its joints in the skeleton.
+/// Joint indices of one arm in the skeleton.
 #[derive(Clone, Debug)]
 pub struct RigArm {
     /// +1 left, -1 right: the sign of x.
@@ -42,15 +41,15 @@ pub struct RigArm {
     pub upper: usize,
     pub fore: usize,
     pub hand: usize,
-    /// Thumb to little finger, each its three phalanges.
+    /// Thumb to little finger, three phalanges each.
     pub fingers: [[usize; 3]; 5],
 }
 
-/// The skeleton with the meaning of its joints.
+/// Skeleton with the meaning of its joints.
 #[derive(Clone, Debug)]
 pub struct Rig {
     pub skeleton: Skeleton,
-    /// Where the hips stand, cm; the soles at y = 0.
+    /// Position of the hips, cm; the soles at y = 0.
     pub root: Vec3,
     pub spine: usize,
     pub chest: usize,
@@ -58,12 +57,12 @@ pub struct Rig {
     pub head: usize,
     /// Left, right.
     pub arms: [RigArm; 2],
-    /// For each of the 49 joints of a motion the joint of the skeleton at its place (ends of bones included).
+    /// For each of the 49 joints of a motion the joint of the skeleton at its position (bone ends included).
     pub positions: [usize; N_JOINTS],
 }
 
 impl Rig {
-    /// The figure for a motion: lengths and palms are medians over its frames.
+    /// Rig for a motion: bone lengths and palms are medians over its frames.
     pub fn from_motion(motion: &Motion) -> Self {
         let (positions, metres) = (JointPositions::from_motion(motion), bone_metres(motion));
         let [left, right] = [median_palm(&positions), median_palm(&positions.mirrored())];
@@ -71,8 +70,8 @@ impl Rig {
         Self::with_measures(&metres, &palms)
     }
 
-    /// The figure with given bone lengths in metres (entry `j` is the bone from joint `j` to its parent) and palms:
-    /// the bases of the fingers in the hand's frame, metres, left and right, the right one in the mirror.
+    /// Rig with given bone lengths in metres (entry `j`: from joint `j` to its parent) and palms: the bases of the
+    /// fingers in the hand's frame, metres, left and right, the right one mirrored.
     pub fn with_measures(metres: &[f64; N_JOINTS], palms: &[[Vec3; 5]; 2]) -> Self {
         let arm = |shoulder: usize| metres[shoulder + 1] + metres[shoulder + 2];
         let body = (arm(L_SHOULDER) + arm(skeleton::R_SHOULDER)) / 2.0 / ARM_METRES * CM;
@@ -139,8 +138,8 @@ fn push_arm(
     RigArm { sign, clavicle, upper, fore, hand, fingers }
 }
 
-/// How a finger's joints bend, in the axes of the left hand: the four along x about the line through the knuckles, the
-/// thumb across the palm.
+/// Hinge of a finger's joints in the axes of the left hand: four fingers along x about the knuckle line, the thumb
+/// across the palm.
 pub fn finger_hinge(finger: usize) -> Hinge {
     if finger > 0 {
         return Hinge::new(X, [0.0, 0.0, -1.0]);
@@ -150,7 +149,7 @@ pub fn finger_hinge(finger: usize) -> Hinge {
     Hinge::new(along, scale(cross(along, bends), 1.0 / norm(bends)))
 }
 
-/// Medians over the frames of the bases of the left hand's fingers in its frame; `None` if they are never seen.
+/// Medians over the frames of the finger bases in the left hand's frame; `None` if never seen.
 fn median_palm(positions: &JointPositions) -> Option<[Vec3; 5]> {
     let seen: Vec<_> = (0..positions.n_frames()).filter_map(|t| positions.palm(t)).collect();
     let middle = |finger: usize, axis: usize| upper_median(seen.iter().filter_map(|palm| Some(palm[finger]?[axis])));
@@ -160,12 +159,12 @@ fn median_palm(positions: &JointPositions) -> Option<[Vec3; 5]> {
             *place = middle(finger, axis)?;
         }
     }
-    // In the frame of its own knuckles, as every frame's palm is.
+    // Result in the frame of its own knuckles, like every frame's palm.
     let out_of_palm = palm_frame(&palm)?.inverse();
     Some(palm.map(|base| out_of_palm.turn(base)))
 }
 
-/// A flat palm with metacarpals of these lengths.
+/// Flat palm with metacarpals of these lengths.
 fn default_palm(metres: &[f64; N_JOINTS]) -> [Vec3; 5] {
     std::array::from_fn(|finger| {
         let (sin, cos) = SPREAD_DEGREES[finger].to_radians().sin_cos();

@@ -1,7 +1,7 @@
-//! A left arm from its joints, shoulder to finger tips. Bones are given their smoothed directions; the upper arm's
-//! roll makes the elbow's axis lie across upper arm and forearm, and is bridged where the arm is straight; the hand's
-//! frame comes from its knuckles, and half of its turn about the forearm is the forearm's own. Fingers bend without
-//! twist.
+//! Rotations of a left arm from its joints, shoulder to finger tips. Bones take their smoothed directions; the upper
+//! arm's roll puts the elbow's axis across upper arm and forearm and is interpolated where the arm is straight; the
+//! hand's frame comes from its knuckles, and half of its turn about the forearm belongs to the forearm. Fingers bend
+//! without twist.
 
 use super::arm_pose::{ArmPose, elbow};
 use super::positions::JointPositions;
@@ -16,16 +16,16 @@ use crate::types::skeleton::{L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, NECK};
 use crate::types::time::FrameRate;
 
 const X: Vec3 = [1.0, 0.0, 0.0];
-/// A missing hand is relaxed after this time.
+/// Time in which a missing hand relaxes, seconds.
 const RELAX_SECS: f64 = 0.5;
-/// Flexion of the relaxed hand's joints, thumb first.
+/// Flexion of the relaxed hand's joints, degrees, thumb first.
 const RELAXED: [[f64; 3]; 5] =
     [[8.0, 10.0, 10.0], [20.0, 26.0, 16.0], [20.0, 26.0, 16.0], [20.0, 26.0, 16.0], [20.0, 26.0, 16.0]];
-/// How far a hand's turn is followed beyond half a turn from the middle of its range, degrees, before it is taken for
-/// a turn the other way.
+/// Degrees beyond half a turn from the middle of its range up to which a hand's turn is tracked before it counts as a
+/// turn the other way.
 const FOLLOWED: f64 = 60.0;
 
-/// Frames a second and the filters for them.
+/// Frame rate and the filters for it.
 pub struct SolveFilters {
     pub fps: f64,
     pub arms: Filter,
@@ -40,7 +40,7 @@ impl SolveFilters {
 
 type Directions = Vec<Option<Vec3>>;
 
-/// Solves the arm and writes its tracks into `local` (one a joint of the skeleton), as a left arm whatever `arm` is.
+/// Solves the arm as a left arm, whichever `arm` is, and writes its tracks into `local` (one a joint of the skeleton).
 pub fn solve(
     positions: &JointPositions,
     arm: &RigArm,
@@ -89,8 +89,8 @@ pub fn solve(
     }
 }
 
-/// The hand's rotations against the untwisted forearm, smoothed by their three angles: within its limits a hand has no
-/// two sets of them, and between a palm up and a palm down lies a hand on edge, where directions would cancel out.
+/// Hand rotations relative to the untwisted forearm, smoothed by their three angles: within the limits these are
+/// unique, while directions would cancel out between palm up and palm down.
 fn smooth_hand(forearm: &RotationTrack, frames: &ObservedTrack, filter: &Filter) -> ObservedTrack {
     let mut followed = 0.0;
     let mut angle = |(hand, fore): (&Option<Rotation>, &Rotation)| {
@@ -104,8 +104,8 @@ fn smooth_hand(forearm: &RotationTrack, frames: &ObservedTrack, filter: &Filter)
     angles.into_iter().map(|angles| angles.map(rotation)).collect()
 }
 
-/// Local rotations of a finger's three joints. Bones are smoothed in the axes of the hand as it was seen: what shakes
-/// the whole hand does not shake them.
+/// Local rotations of a finger's three joints. Bones are smoothed in the axes of the observed hand, so that noise of
+/// the whole hand does not reach them.
 fn solve_finger(
     positions: &JointPositions,
     frames: &ObservedTrack,

@@ -1,5 +1,5 @@
-//! What a left arm does below its upper arm, in angles: the one place that knows how rotations of the figure's joints
-//! are made of angles and angles of rotations. Half of the hand's turn about the forearm belongs to the forearm.
+//! Angles of a left arm below its upper arm, and their conversion to and from local rotations of the rig. Half of the
+//! hand's turn about the forearm belongs to the forearm.
 
 use crate::animate::rig::hinge::{Bend, Hinge, flexed, sideways};
 use crate::animate::rig::limits::turn;
@@ -13,21 +13,21 @@ const X: Vec3 = [1.0, 0.0, 0.0];
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ArmPose {
     pub elbow: Bend,
-    /// Turn of the hand about the forearm; 0: the palm lies along the elbow's axis, positive: supination.
+    /// Turn of the hand about the forearm; 0: palm along the elbow's axis, positive: supination.
     pub supination: f64,
-    /// Positive flexion: towards the palm; positive side: radial.
+    /// Wrist; positive flexion: towards the palm, positive side: radial.
     pub wrist: Bend,
-    /// Thumb to little finger, knuckle to end joint.
+    /// Fingers, thumb to little finger, knuckle to end joint.
     pub fingers: [[Bend; 3]; 5],
 }
 
-/// The left elbow: it bends forward.
+/// Hinge of the left elbow, which bends forward.
 pub fn elbow() -> Hinge {
     Hinge::new(X, [0.0, -1.0, 0.0])
 }
 
 impl ArmPose {
-    /// The angles of the arm in a frame's local rotations. A finger's twist, which no joint tells, is left out.
+    /// Angles of the arm in a frame's local rotations. Twist of the fingers, which no joint shows, is left out.
     pub fn from_rotations(arm: &RigArm, local: &[Rotation]) -> Self {
         let of = |joint: usize| on_left(arm, local[joint]);
         let (fore, hand) = (of(arm.fore), of(arm.hand));
@@ -42,7 +42,7 @@ impl ArmPose {
         Self { elbow: elbow_bend, supination, wrist, fingers }
     }
 
-    /// Puts the angles into a frame's local rotations.
+    /// Writes the angles into a frame's local rotations.
     pub fn write(&self, arm: &RigArm, local: &mut [Rotation]) {
         let mut put = |joint: usize, rotation: Rotation| local[joint] = on_left(arm, rotation);
         let (fore, hand) = Self::shared(elbow().rotation(self.elbow), self.supination, self.wrist);
@@ -55,10 +55,10 @@ impl ArmPose {
         }
     }
 
-    /// Supination and wrist of a hand given against the untwisted forearm. The turn is the one nearest to `followed`,
-    /// unless that is more than half a turn and `leave` from the palm along the elbow's axis.
+    /// Supination and wrist angles of a hand relative to the untwisted forearm. The turn is the one nearest to
+    /// `followed`, unless that exceeds half a turn plus `leave` from the palm along the elbow's axis.
     pub fn hand_angles(hand: Rotation, followed: f64, leave: f64) -> (f64, Bend) {
-        // hand = about x (supination) * sideways * flexed: the flexion's axis -z shows the first two.
+        // hand = about x (supination) * sideways * flexed: the flexion's axis -z gives the first two.
         let [x, y, z] = hand.turn([0.0, 0.0, 1.0]);
         let pronation = (-y).atan2(z).to_degrees();
         let along = (about_x(pronation).inverse() * hand).turn(X);
@@ -69,12 +69,12 @@ impl ArmPose {
         (supination, Bend { flexion: (-y).atan2(x).to_degrees(), side })
     }
 
-    /// The hand with these angles, against the untwisted forearm.
+    /// Hand rotation of these angles relative to the untwisted forearm.
     pub fn hand(supination: f64, wrist: Bend) -> Rotation {
         about_x(-supination) * sideways(wrist.side) * flexed(wrist.flexion)
     }
 
-    /// Local rotations of forearm and hand: `bent` is the untwisted forearm.
+    /// Local rotations of forearm and hand; `bent` is the untwisted forearm.
     pub fn shared(bent: Rotation, supination: f64, wrist: Bend) -> (Rotation, Rotation) {
         let half = about_x(-supination / 2.0);
         (bent * half, half * sideways(wrist.side) * flexed(wrist.flexion))
@@ -85,7 +85,7 @@ fn about_x(degrees: f64) -> Rotation {
     Rotation::about(X, degrees.to_radians())
 }
 
-/// A rotation of this arm as one of a left arm, and back.
+/// Rotation mirrored between this arm and a left arm, in either direction.
 fn on_left(arm: &RigArm, rotation: Rotation) -> Rotation {
     if arm.sign < 0.0 { rotation.mirrored() } else { rotation }
 }

@@ -1,6 +1,6 @@
-//! The head, turned as the face in the picture is: a rigid face of eyes, ears and nose is laid on the keypoints
-//! (weak perspective, least squares with what is usual as prior). The clip's median nod counts as looking ahead, since
-//! no face is built like the rigid one. Neck and head share the turn; where no face is seen they rest.
+//! Head rotation from face keypoints: a rigid face of eyes, ears and nose is fitted under weak perspective by least
+//! squares with a prior. The clip's median pitch counts as looking ahead, since faces differ from the rigid one. Neck
+//! and head share the turn equally; without a face they rest.
 
 use super::arm::SolveFilters;
 use super::track::{ObservedTrack, RotationTrack, filled};
@@ -11,37 +11,35 @@ use crate::math::vec3::Vec3;
 use crate::types::pose2d::coco;
 use ndarray::{Array3, ArrayView2};
 
-/// Keypoints of the speaker's body in the picture, from which the head is turned: COCO's 17 points, frame by frame
-/// those of the motion.
+/// Keypoints of the speaker's body, from which the head is turned: COCO's 17 points, one row a frame of the motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Face {
     /// [T, 17, 3]: x px, y px, score.
     pub body: Array3<f32>,
 }
 
-/// Nose, left and right eye, left and right ear of a grown person, metres from the middle between the ears, in the
-/// figure's axes (x to the person's left, y up, z ahead).
+/// Nose, left and right eye, left and right ear of an adult, metres from the middle between the ears, in the rig's axes
+/// (x to the person's left, y up, z ahead).
 const FACE: [Vec3; 5] =
     [[0.0, -0.020, 0.105], [0.032, 0.030, 0.075], [-0.032, 0.030, 0.075], [0.075, 0.0, 0.0], [-0.075, 0.0, 0.0]];
-/// A keypoint with a lower score is not seen; with fewer of the five the head is not.
+/// Lowest score of a keypoint that is used, and fewest of the five that give a head.
 const LEAST_SCORE: f32 = 0.3;
 const LEAST_POINTS: usize = 3;
-/// A person's shoulders are this wide, metres: the first guess of the picture's scale.
+/// Shoulder width of an adult, metres, for the initial scale.
 const SHOULDERS_METRES: f64 = 0.36;
-/// How far a keypoint lies from the rigid face, metres.
+/// Standard deviation of a keypoint from the rigid face, metres.
 const POINT_METRES: f64 = 0.010;
-/// What is usual: standard deviation of yaw, pitch, roll (degrees) and of the scale's logarithm, at first and once the
-/// clip's own is known.
+/// Prior: standard deviations of yaw, pitch, roll (degrees) and of the scale's logarithm, before and after the clip's
+/// own median is known.
 const USUAL_DEGREES: Vec3 = [45.0, 25.0, 20.0];
 const USUAL_SCALE: [f64; 2] = [0.3, 0.08];
-/// How far the head turns, nods and leans against the chest, degrees (about the normal range of the neck, AAOS: 80, 45,
-/// 45).
+/// Largest yaw, pitch and roll against the chest, degrees (normal range of the neck, AAOS: 80, 45, 45).
 const LIMITS: Vec3 = [75.0, 40.0, 40.0];
-/// A head not seen rests after this time.
+/// Time in which an unseen head returns to rest, seconds.
 const RELAX_SECS: f64 = 0.5;
 const STEPS: usize = 8;
 
-/// Turns neck and head; gives the number of frames in which the face was seen.
+/// Turns neck and head; returns the number of frames in which the face was seen.
 pub fn turn(face: &Face, rig: &Rig, means: &SolveFilters, local: &mut [RotationTrack]) -> usize {
     let n_frames = local[rig.head].len();
     let frame = |t: usize| FacePoints::from_keypoints(face.body.index_axis(ndarray::Axis(0), t));
@@ -83,19 +81,19 @@ pub fn turn(face: &Face, rig: &Rig, means: &SolveFilters, local: &mut [RotationT
     n_seen
 }
 
-/// Yaw (to the person's left), pitch (down) and roll (towards the person's right shoulder), radians.
+/// Rotation of yaw (to the person's left), pitch (down) and roll (towards the right shoulder), radians.
 fn rotation([yaw, pitch, roll]: Vec3) -> Rotation {
     Rotation::about([0.0, 1.0, 0.0], yaw)
         * Rotation::about([1.0, 0.0, 0.0], pitch)
         * Rotation::about([0.0, 0.0, 1.0], roll)
 }
 
-/// The face's keypoints in one frame: places in px (y up) with weights, those unseen 0. An ear behind the head is
-/// guessed with a somewhat lower score; its fourth power makes that tell.
+/// Face keypoints of one frame: px (y up) with weights, 0 for unseen ones. Weights are the fourth power of the score,
+/// since hidden ears are predicted with slightly lower scores.
 struct FacePoints {
     positions: [[f64; 2]; 5],
     weights: [f64; 5],
-    /// px a metre by the width of the shoulders.
+    /// Pixels a metre by the width of the shoulders.
     shoulder_scale: Option<f64>,
 }
 
@@ -119,22 +117,22 @@ impl FacePoints {
         })
     }
 
-    /// How wide the seen points lie, px.
+    /// Horizontal extent of the seen points, px.
     fn spread(&self) -> f64 {
         let seen =
             || self.positions.iter().zip(self.weights).filter(|(_, weight)| *weight > 0.0).map(|(place, _)| place[0]);
         (seen().fold(f64::MIN, f64::max) - seen().fold(f64::MAX, f64::min)).max(1.0)
     }
 
-    /// Yaw, pitch, roll and the logarithm of the scale (px a metre) by Gauss and Newton from `usual` on, which is also
-    /// what is expected, the scale within `usual_scale`.
+    /// Yaw, pitch, roll and log scale (px a metre) by Gauss-Newton; `usual` is the start and the prior's mean,
+    /// `usual_scale` the prior's deviation of the log scale.
     fn fit(&self, usual: [f64; 4], usual_scale: f64) -> [f64; 4] {
         let [yaw, pitch, roll] = USUAL_DEGREES.map(|degrees| 1.0 / degrees.to_radians().powi(2));
         let certain = [yaw, pitch, roll, 1.0 / usual_scale.powi(2)];
         let mut fit = usual;
         for _ in 0..STEPS {
             let errors = self.errors(fit);
-            // Central differences: a mirrored face gives the mirrored turn.
+            // Central differences, so that a mirrored face gives the mirrored turn.
             let slopes: [[[f64; 2]; 5]; 4] = std::array::from_fn(|k| {
                 let [up, down] = [1e-4, -1e-4].map(|step| {
                     let mut beside = fit;
@@ -159,7 +157,7 @@ impl FacePoints {
         fit
     }
 
-    /// Rigid face less keypoints, both about their weighted middle, in units of `POINT_METRES`.
+    /// Residuals of the rigid face against the keypoints, both about their weighted mean, in units of `POINT_METRES`.
     fn errors(&self, [yaw, pitch, roll, log_scale]: [f64; 4]) -> [[f64; 2]; 5] {
         let (turned, scale) = (rotation([yaw, pitch, roll]), log_scale.exp());
         let apart: [[f64; 2]; 5] = std::array::from_fn(|n| {
@@ -172,7 +170,7 @@ impl FacePoints {
     }
 }
 
-/// Solves a positive definite system of four.
+/// Solution of a positive definite 4 x 4 system by elimination.
 fn solved(mut matrix: [[f64; 4]; 4], mut right: [f64; 4]) -> [f64; 4] {
     for pivot in 0..4 {
         for row in pivot + 1..4 {

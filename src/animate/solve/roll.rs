@@ -1,24 +1,24 @@
-//! The roll of an upper arm. The elbow's axis lies across upper arm and forearm; a straight arm does not show it. So
-//! the axis is carried along with the upper arm without roll, the elbow's plane is measured against it where the arm
-//! is bent, and between such stretches the roll passes evenly from one to the other; before and after them it is held.
+//! Roll of an upper arm. The elbow's axis lies across upper arm and forearm; a straight arm does not show it. The axis
+//! is transported with the upper arm without roll, the elbow's plane is measured against it where the arm is bent, and
+//! the roll is interpolated between and held outside such frames.
 
 use super::track::{ObservedTrack, smoothstep};
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, across, cross, dot, unit};
 
-/// Elbow angles, degrees (0: straight), between which the plane passes from not seen to seen.
+/// Elbow angles, degrees (0: straight), between which the plane's weight rises from 0 to 1.
 const STRAIGHT_DEGREES: [f64; 2] = [8.0, 20.0];
-/// The left upper arm and the axis its elbow bends about, at rest.
+/// Left upper arm and its elbow's axis at rest.
 const REST: (Vec3, Vec3) = ([1.0, 0.0, 0.0], [0.0, -1.0, 0.0]);
-/// How much an uneven roll counts against a frame's own plane.
+/// Weight of a change of roll against a frame's measured plane.
 const EVEN: f64 = 0.02;
-/// How much a roll other than the one carried along counts where nothing is seen: hardly.
+/// Weight of the transported roll, which decides only where nothing is measured.
 const CARRIED: f64 = 1e-9;
 
-/// Rotations of the upper arm from the directions of upper arm and forearm in the clavicle's axes; none where the upper
-/// arm is not seen.
+/// Rotations of the upper arm from the directions of upper arm and forearm in the clavicle's axes; `None` where the
+/// upper arm is not seen.
 pub fn elbow_axes(upper: &[Option<Vec3>], fore: &[Option<Vec3>]) -> ObservedTrack {
-    // Carried along, and the measured roll against it with its weight.
+    // Transported axis, and the measured roll against it with its weight.
     let mut carried = REST;
     let mut frames: Vec<(usize, (Vec3, Vec3))> = Vec::with_capacity(upper.len());
     let mut measured: Vec<[f64; 2]> = Vec::with_capacity(upper.len());
@@ -46,8 +46,8 @@ pub fn elbow_axes(upper: &[Option<Vec3>], fore: &[Option<Vec3>]) -> ObservedTrac
     rolls
 }
 
-/// The rolls nearest to the measured ones (each with its weight) that change evenly where nothing is measured: the
-/// least of `sum w (r - m)^2 + EVEN sum (r[t] - r[t - 1])^2`, by elimination in a matrix of three diagonals.
+/// Rolls nearest to the measured ones (value, weight) that change evenly where nothing is measured: the minimum of `sum
+/// w (r - m)^2 + EVEN sum (r[t] - r[t - 1])^2`, a tridiagonal system.
 fn evened(measured: &[[f64; 2]]) -> Vec<f64> {
     let n = measured.len();
     let mut ahead: Vec<[f64; 2]> = Vec::with_capacity(n);

@@ -1,7 +1,6 @@
-//! Joints to bone rotations, by swing and twist. The turn of the shoulders about the vertical goes half to the spine
-//! and half to the chest; the clavicle swings; arms and hands are in `arm`, the right one solved as the left one's
-//! mirror image. Forward kinematics gives the joints back wherever bones keep their length and palms their shape, but
-//! for what was smoothed.
+//! Joint positions to bone rotations by swing and twist. The shoulders' yaw goes half to the spine and half to the
+//! chest; the clavicle swings; arms and hands are in `arm`. Forward kinematics returns the joints wherever bones keep
+//! their length and palms their shape, apart from smoothing.
 
 use super::arm;
 use super::arm::SolveFilters;
@@ -11,8 +10,7 @@ use crate::animate::rig::rig::Rig;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::Vec3;
 
-/// Local rotations of the figure's joints, joint by joint, in the figure's axes (x, -y, -z of the motion's). Hips,
-/// neck, head and legs rest.
+/// Local rotations by joint of the rig. Hips, neck, head and legs rest.
 pub fn rotations(positions: &JointPositions, rig: &Rig, means: &SolveFilters) -> Vec<RotationTrack> {
     let n_frames = positions.n_frames();
     let mut local: Vec<RotationTrack> = vec![vec![Rotation::IDENTITY; n_frames]; rig.skeleton.joints.len()];

@@ -1,37 +1,37 @@
-//! Smoothing before rotations are made. Every bone's direction is smoothed as a vector, in the axes of what it hangs
-//! on (the trunk for arms, the hand for fingers), and made a unit vector again; a hand by its three angles against the
-//! forearm. So bones keep their length, hands can be smoothed more than arms without coming late after them, no angle
-//! can jump through half a turn, and the elbow's plane, which comes from the smooth directions, trembles less than if
-//! it were smoothed after it is known. The time step is the motion's own; a gap divides.
+//! Smoothing before rotations are solved. Every bone's direction is smoothed as a vector in the axes of its parent
+//! (trunk for arms, hand for fingers) and normalised again; a hand by its three angles relative to the forearm. Bones
+//! keep their length, no angle jumps through half a turn, and the elbow's plane, which follows from smooth directions,
+//! is less noisy than if it were smoothed itself. Gaps separate runs.
 
 use crate::math::one_euro::OneEuro;
 use crate::math::savitzky_golay::SavitzkyGolay;
 use crate::math::vec3::{Vec3, unit};
 use crate::types::time::FrameRate;
 
-/// How motion is smoothed.
+/// Smoothing method.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Smoothing {
     None,
-    /// Cubics over 0.6 s for arms (9 frames at 15 fps) and over 1 s (15 frames) for hands; at another rate windows of
-    /// the same time. Nothing comes late.
+    /// Cubic Savitzky-Golay filter over 0.6 s for arms (9 frames at 15 fps) and 1 s (15 frames) for hands, without
+    /// delay.
     #[default]
     SavitzkyGolay,
-    /// Causal; hands with half of the cut-off at rest. Speeds are those of directions, radians a second.
+    /// One-Euro filter (causal); hands with half of the cut-off at rest. Speeds are those of directions, radians a
+    /// second.
     OneEuro(OneEuro),
 }
 
-/// The one-Euro filter where no parameters are given.
+/// Default parameters of the one-Euro filter.
 pub const ONE_EURO: OneEuro = OneEuro { rest_hz: 1.5, beta: 0.5 };
 /// Order of the polynomials.
 const ORDER: usize = 3;
-/// Half a window less half a frame, seconds.
+/// Half a window minus half a frame, seconds.
 const ARMS_HALF_SECS: f64 = 4.0 / 15.0;
 const HANDS_HALF_SECS: f64 = 7.0 / 15.0;
-/// The one-Euro cut-off of hands against that of arms.
+/// One-Euro cut-off of hands relative to that of arms.
 const HANDS_SHARE: f64 = 0.5;
 
-/// A filter for tracks of one rate.
+/// Filter for tracks of one rate.
 pub enum Filter {
     None,
     Polynomial(SavitzkyGolay),
@@ -39,12 +39,12 @@ pub enum Filter {
 }
 
 impl Smoothing {
-    /// The filter for arms (trunk and head too) at this rate.
+    /// Filter for trunk, head and arms at this rate.
     pub fn arms(self, fps: FrameRate) -> Filter {
         self.filter(fps, ARMS_HALF_SECS, 1.0)
     }
 
-    /// The filter for hands and fingers.
+    /// Filter for hands and fingers at this rate.
     pub fn hands(self, fps: FrameRate) -> Filter {
         self.filter(fps, HANDS_HALF_SECS, HANDS_SHARE)
     }
@@ -64,14 +64,13 @@ impl Smoothing {
 }
 
 impl Filter {
-    /// Smooths the directions of each stretch of frames that are seen; a frame whose neighbours cancel each other out
-    /// tells no direction.
+    /// Smooths the directions of each run of seen frames; a frame whose neighbours cancel out gets no direction.
     pub fn directions(&self, track: &mut [Option<Vec3>]) {
         self.runs(track);
         track.iter_mut().for_each(|seen| *seen = seen.and_then(|v| unit(v, 1e-3)));
     }
 
-    /// The same for vectors of any length.
+    /// Smooths vectors of any length in each run of seen frames.
     pub fn runs(&self, track: &mut [Option<Vec3>]) {
         let mut start = 0;
         while start < track.len() {

@@ -1,11 +1,11 @@
-//! A joint's rotation over time, and how what was seen of it becomes whole: a gap between seen frames is bridged the
-//! shortest way, before and after them the nearest is held.
+//! Rotation tracks of a joint, and their completion: gaps between seen frames are interpolated the shortest way, before
+//! and after them the nearest rotation is held.
 
 use crate::math::rotation::Rotation;
 
 /// Rotations of one joint, frame by frame.
 pub type RotationTrack = Vec<Rotation>;
-/// The same where not every frame tells.
+/// Rotations of one joint by frame; `None` where it is not seen.
 pub type ObservedTrack = Vec<Option<Rotation>>;
 
 /// World rotations of a joint from its parent's and its own local ones.
@@ -19,8 +19,8 @@ pub fn mirrored(mut track: RotationTrack) -> RotationTrack {
     track
 }
 
-/// A track without gaps; `rest` if nothing is seen. With `relax_frames` it moves to `rest` within that many frames of
-/// the nearest seen one.
+/// Track without gaps; `rest` if nothing is seen. With `relax_frames` it moves to `rest` within that many frames of the
+/// nearest seen one.
 pub fn filled(seen: ObservedTrack, rest: Rotation, relax_frames: Option<f64>) -> RotationTrack {
     let (mut before, mut after) = (None, next_seen(&seen, 0));
     let mut track = RotationTrack::with_capacity(seen.len());
@@ -47,12 +47,12 @@ pub fn filled(seen: ObservedTrack, rest: Rotation, relax_frames: Option<f64>) ->
     track
 }
 
-/// The first seen frame from `start` on. Asked only where a gap begins or a frame is seen: next to it, mostly.
+/// First seen frame from `start` on.
 fn next_seen(seen: &ObservedTrack, start: usize) -> Option<(usize, Rotation)> {
     seen[start..].iter().position(Option::is_some).and_then(|ahead| Some((start + ahead, seen[start + ahead]?)))
 }
 
-/// 0 below `low`, 1 above `high`, smooth between.
+/// Smooth step from 0 below `low` to 1 above `high`.
 pub fn smoothstep([low, high]: [f64; 2], at: f64) -> f64 {
     let share = ((at - low) / (high - low)).clamp(0.0, 1.0);
     share * share * (3.0 - 2.0 * share)
