@@ -1,6 +1,6 @@
-//! What is measured beside each other: the prediction, and what knows less than it should. Two poses that never move do
-//! nothing; the nearest neighbour copies; another clip's motion is as good as motion can be that did not listen; the
-//! truth beside itself is where every figure ends.
+//! Baselines that the prediction is compared with: two constant poses, the nearest neighbour by sound (copying),
+//! mismatched motion (realistic, but unrelated to the sound), and the ground truth itself, the upper bound of every
+//! metric.
 
 use super::constant_pose::ConstantPoses;
 use super::neighbour;
@@ -10,10 +10,10 @@ use anyhow::Result;
 use ndarray::{Array2, Array3, ArrayView3, s};
 use serde::Serialize;
 
-/// A mismatched motion is at least this much out of step.
+/// Smallest shift of a mismatched motion, seconds.
 const LEAST_SHIFT_SECS: f64 = 3.0;
 
-/// Who made the motion.
+/// Source of the predicted motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PredictorKind {
@@ -22,16 +22,16 @@ pub enum PredictorKind {
     MedianPose,
     NearestNeighbour,
     MismatchedPrediction,
-    /// The clip's own prediction, out of step with it.
+    /// The clip's own prediction, shifted in time.
     LatePrediction,
     MismatchedTruth,
-    /// One half of the truth beside the other.
+    /// One half of the ground truth against the other.
     TruthHalves,
     Truth,
 }
 
 impl PredictorKind {
-    /// For people.
+    /// Name for people.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Prediction => "prediction",
@@ -47,31 +47,31 @@ impl PredictorKind {
     }
 }
 
-/// The motion of one clip.
+/// Motion of one clip by a predictor.
 #[derive(Clone, Debug)]
 pub enum ClipMotion {
-    /// The clip's own prediction.
+    /// Prediction of the clip.
     Own,
-    /// The clip's own truth.
+    /// Ground truth of the clip.
     Real,
-    /// A pose [49, 3] in every frame.
+    /// Constant pose [49, 3].
     Still(Array2<f32>),
-    /// [T, 49, 3]
+    /// Joints [T, 49, 3].
     Moves(Array3<f32>),
 }
 
-/// A motion for every clip.
+/// Motion for every clip.
 #[derive(Clone, Debug)]
 pub struct Predictor {
     pub kind: PredictorKind,
-    /// What it is, in a sentence.
+    /// Description in a sentence.
     pub description: String,
-    /// One a clip.
+    /// One motion a clip.
     pub motions: Vec<ClipMotion>,
 }
 
 impl Predictor {
-    /// The motion for a clip, as long as it.
+    /// Motion for a clip, cut or repeated to its length.
     pub fn motion<'a>(&'a self, clips: &'a EvalClips, clip: usize) -> Option<ArrayView3<'a, f32>> {
         let of = clips.clips.get(clip)?;
         match self.motions.get(clip)? {
@@ -97,7 +97,7 @@ impl Predictor {
     }
 }
 
-/// All baselines that files alone allow, and a sentence for each that is left out.
+/// Baselines that files alone allow, and a sentence for each that is left out.
 pub fn of_files(clips: &EvalClips) -> Result<(Vec<Predictor>, Vec<String>)> {
     let (mut all, mut left_out) = (constant_poses(clips), Vec::new());
     match neighbours(clips, &all[0])? {
@@ -125,8 +125,8 @@ pub fn of_files(clips: &EvalClips) -> Result<(Vec<Predictor>, Vec<String>)> {
     Ok((all, left_out))
 }
 
-/// Each clip's own prediction, half of the clip later and from the beginning again: it knows where the speaker of the clip
-/// holds the arms, which another clip's motion does not, and only the sound's moment is wrong.
+/// Each clip's own prediction, shifted by half of the clip with wrap-around. The posture of the clip is right, unlike
+/// in another clip's motion; only the moment of the sound is wrong.
 fn late(clips: &EvalClips, still: &Predictor) -> Predictor {
     let of = |clip: &EvalClip| {
         let n_frames = clip.n_frames();
@@ -139,12 +139,12 @@ fn late(clips: &EvalClips, still: &Predictor) -> Predictor {
     predictor
 }
 
-/// Why a mismatched motion is left out.
+/// Reason why a mismatched motion is left out.
 pub fn too_short(kind: PredictorKind) -> String {
     format!("{}: left out, since the only clip is shorter than {:.0} s", kind.name(), 2.0 * LEAST_SHIFT_SECS)
 }
 
-/// Mean and median pose: of the other clips, or, of a single one, its own (which no predictor can know).
+/// Mean and median pose of the other clips; of a single clip its own, which no predictor can know.
 fn constant_poses(clips: &EvalClips) -> Vec<Predictor> {
     let mut all = ConstantPoses::default();
     clips.clips.iter().for_each(|clip| all.add(clip.ground_truth.view(), clip.mask.view()));
@@ -157,7 +157,7 @@ fn constant_poses(clips: &EvalClips) -> Vec<Predictor> {
         let (mut mean, mut median) = (all.mean(), all.median());
         if !is_alone {
             all.add(clip.ground_truth.view(), clip.mask.view());
-            // a joint that no other clip has
+            // Joints that no other clip has.
             complete(&mut mean, || all.mean());
             complete(&mut median, || all.median());
         }
@@ -182,7 +182,7 @@ fn complete(pose: &mut Array2<f32>, from: impl FnOnce() -> Array2<f32>) {
     }
 }
 
-/// Puts the poses of `still` where the motion has no number.
+/// Fills missing values with the poses of `still`.
 pub fn fill(predictor: &mut Predictor, still: &Predictor) {
     for (predicted, still) in predictor.motions.iter_mut().zip(&still.motions) {
         if let (ClipMotion::Moves(joints), ClipMotion::Still(pose)) = (predicted, still) {
@@ -193,7 +193,7 @@ pub fn fill(predictor: &mut Predictor, still: &Predictor) {
     }
 }
 
-/// The other clips as a library.
+/// Library of all other clips.
 struct OtherClips<'a>(&'a EvalClips);
 
 impl Library for OtherClips<'_> {
@@ -231,8 +231,8 @@ fn neighbours(clips: &EvalClips, still: &Predictor) -> Result<Option<Predictor>>
     Ok(Some(predictor))
 }
 
-/// For each clip the motion (`Prediction` or `Truth`, mismatched) of another, played back and forth where it is shorter;
-/// of a single clip its own, half of it later and from the beginning again. `still` stands in where there is no number.
+/// For each clip the motion (`Prediction` or `Truth`) of another, played back and forth where it is shorter; for a
+/// single clip its own, shifted by half of it with wrap-around. `still` fills missing values.
 pub fn mismatched(clips: &EvalClips, kind: PredictorKind, still: &Predictor) -> Option<Predictor> {
     let of = |clip: usize| match kind {
         PredictorKind::MismatchedTruth => &clips.clips[clip].ground_truth,
@@ -269,7 +269,7 @@ fn taken(from: &Array3<f32>, frames: impl Iterator<Item = usize>) -> Array3<f32>
     to
 }
 
-/// Frame `t` of something of `n` frames that turns round at its ends: 0 1 2 1 0 1 2 ...
+/// Frame index at step `t` of `n` frames played back and forth: 0 1 2 1 0 1 2 ...
 fn back_and_forth(t: usize, n: usize) -> usize {
     if n < 2 {
         return 0;

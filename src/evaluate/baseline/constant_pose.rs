@@ -1,20 +1,20 @@
-//! Poses that never move: the mean and the median of many, joint by joint. Counted into fine bins, so that any number of
-//! hours takes the same memory, and so that what one clip added can be taken away again.
+//! Constant poses: mean and median of many poses, joint by joint. Values are counted in fine bins, so that memory does
+//! not grow with the data and the contribution of one clip can be subtracted again.
 
 use crate::types::skeleton::N_JOINTS;
 use ndarray::{Array2, ArrayView2, ArrayView3};
 
 const N_NUMBERS: usize = 3 * N_JOINTS;
-/// Reach of the bins on either side, metres, and how many there are: 0.25 mm each.
+/// Range of the bins on either side, metres, and their number: 0.25 mm each.
 const REACH: f64 = 1.5;
 const N_BINS: usize = 12_000;
 
-/// Poses counted so far.
+/// Counts of poses.
 #[derive(Clone)]
 pub struct ConstantPoses {
     n: Vec<u64>,
     sum: Vec<f64>,
-    /// [147, `N_BINS`]
+    /// Counts [147, `N_BINS`].
     bins: Vec<u32>,
 }
 
@@ -25,12 +25,12 @@ impl Default for ConstantPoses {
 }
 
 impl ConstantPoses {
-    /// Counts the joints [T, 49, 3], metres, that the mask [T, 49] says are seen.
+    /// Adds the joints [T, 49, 3], metres, whose mask [T, 49] is true.
     pub fn add(&mut self, joints: ArrayView3<f32>, mask: ArrayView2<bool>) {
         self.count(joints, mask, true);
     }
 
-    /// Takes away what was counted.
+    /// Subtracts joints that were added before.
     pub fn take_away(&mut self, joints: ArrayView3<f32>, mask: ArrayView2<bool>) {
         self.count(joints, mask, false);
     }
@@ -53,18 +53,18 @@ impl ConstantPoses {
         }
     }
 
-    /// The mean pose [49, 3]; NaN where nothing was seen.
+    /// Mean pose [49, 3], metres; NaN where nothing was seen.
     pub fn mean(&self) -> Array2<f32> {
         pose(|i| if self.n[i] > 0 { self.sum[i] / self.n[i] as f64 } else { f64::NAN })
     }
 
-    /// The median pose [49, 3], to a quarter of a millimetre; NaN where nothing was seen.
+    /// Median pose [49, 3], metres, to 0.25 mm; NaN where nothing was seen.
     pub fn median(&self) -> Array2<f32> {
-        // of an even number the mean of the two in the middle
+        // For an even count the mean of the two values in the middle.
         pose(|i| (self.ranked(i, self.n[i].saturating_sub(1) / 2) + self.ranked(i, self.n[i] / 2)) / 2.0)
     }
 
-    /// The value of number `i` that has `rank` below it, those of a bin spread evenly over it.
+    /// Value of coordinate `i` with rank `rank`, spread evenly within its bin.
     fn ranked(&self, i: usize, rank: u64) -> f64 {
         let mut before = 0;
         for (bin, count) in self.bins[i * N_BINS..(i + 1) * N_BINS].iter().enumerate() {

@@ -1,5 +1,5 @@
-//! Nearest neighbour by sound: what a predictor reaches that copies. For each 4 s of sound the stretch of a library whose
-//! log-mel spectrogram is nearest, and the poses that the speaker made there.
+//! Nearest-neighbour baseline: for each 4 s of sound the poses of the library window whose log-mel spectrogram is
+//! nearest.
 
 use crate::audio::mel;
 use crate::evaluate::clips::sound_features::POOLED;
@@ -10,48 +10,49 @@ use ndarray::{Array3, s};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Length of a stretch that is looked for.
+/// Length of a window, seconds.
 const WINDOW_SECS: f64 = 4.0;
-/// Rows between two places looked at.
+/// Rows between two candidate windows.
 const STRIDE: usize = 2;
 
-/// A sound to find poses for: rows of pooled spectrogram (`hearing::Heard`), and how many frames of motion it has.
+/// Sound to find poses for: rows of pooled spectrogram (`sound_features::SoundFeatures`), and its number of motion
+/// frames.
 #[derive(Clone, Copy, Debug)]
 pub struct Query<'a> {
     pub rows: &'a [f32],
     pub n_frames: usize,
 }
 
-/// Where neighbours are looked for.
+/// Entries among which neighbours are searched.
 pub trait Library: Sync {
-    /// How many entries it has.
+    /// Number of entries.
     fn len(&self) -> usize;
 
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The pooled spectrogram of an entry and its frames of motion; `None`: it has no sound.
+    /// Pooled spectrogram of an entry and its number of motion frames; `None`: no sound.
     fn features(&self, entry: usize) -> Result<Option<(Vec<f32>, usize)>>;
 
-    /// The poses of an entry [T, 49, 3].
+    /// Joints of an entry [T, 49, 3].
     fn joints(&self, entry: usize) -> Result<Array3<f32>>;
 
-    /// Whether an entry may answer for that sound: a clip must not copy itself.
+    /// Whether an entry may answer a query; a clip must not copy itself.
     fn may_answer(&self, query: usize, entry: usize) -> bool;
 }
 
-/// A stretch to find poses for.
+/// Window of a query.
 struct QueryWindow {
     query: usize,
     frames: Range<usize>,
     rows: Vec<f32>,
 }
 
-/// The best place so far: squared distance, entry of the library, first frame.
+/// Best match so far: squared distance, entry of the library, first frame.
 type NearestMatch = (f32, usize, usize);
 
-/// Motion [T, 49, 3] for each sound, NaN where the library's is; `None` where a stretch finds nothing long enough.
+/// Motion [T, 49, 3] for each query, NaN where the library's is; `None` where a window finds nothing long enough.
 pub fn motions(query: &[Query], library: &dyn Library, fps: FrameRate) -> Result<Option<Vec<Array3<f32>>>> {
     let wanted: Vec<QueryWindow> = query.iter().enumerate().flat_map(|(i, query)| stretches(i, query, fps)).collect();
     let best = (0..library.len())
@@ -68,7 +69,7 @@ pub fn motions(query: &[Query], library: &dyn Library, fps: FrameRate) -> Result
             |a, b| Ok(a.into_iter().zip(b).map(|(a, b)| nearer(a, b)).collect()),
         )?;
     let mut predicted: Vec<Array3<f32>> = query.iter().map(|a| Array3::zeros((a.n_frames, N_JOINTS, 3))).collect();
-    // entry by entry, so that each is read once
+    // Ordered by entry, so that each is read once.
     let mut places: Vec<(usize, usize, &QueryWindow)> = Vec::with_capacity(wanted.len());
     for (wanted, found) in wanted.iter().zip(best) {
         let Some((_, entry, first)) = found else { return Ok(None) };
@@ -85,7 +86,7 @@ pub fn motions(query: &[Query], library: &dyn Library, fps: FrameRate) -> Result
     Ok(Some(predicted))
 }
 
-/// The sound cut into stretches, the last one shorter.
+/// Windows of a query, the last one shorter.
 fn stretches(query: usize, sound: &Query, fps: FrameRate) -> Vec<QueryWindow> {
     let window = (((WINDOW_SECS * fps.per_sec()) as usize) / POOLED * POOLED).max(POOLED);
     let stretch = |first: usize| {
@@ -97,7 +98,7 @@ fn stretches(query: usize, sound: &Query, fps: FrameRate) -> Vec<QueryWindow> {
     (0..sound.n_frames).step_by(window).map(stretch).collect()
 }
 
-/// The place in an entry whose sound is nearest.
+/// Best match of a window within one entry.
 fn nearest(rows: &[f32], n_frames: usize, wanted: &QueryWindow, entry: usize) -> Option<NearestMatch> {
     let places = (0..).step_by(STRIDE).take_while(|row| row * POOLED + wanted.frames.len() <= n_frames);
     let of_place = |row: usize| {
@@ -107,7 +108,7 @@ fn nearest(rows: &[f32], n_frames: usize, wanted: &QueryWindow, entry: usize) ->
     places.map(of_place).fold(None, nearer)
 }
 
-/// Squared distance, in eight sums side by side.
+/// Squared distance, summed in eight lanes.
 fn distance(a: &[f32], b: &[f32]) -> f32 {
     let mut sums = [0.0f32; 8];
     for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
@@ -118,7 +119,7 @@ fn distance(a: &[f32], b: &[f32]) -> f32 {
     sums.iter().sum()
 }
 
-/// The nearer of two; of equals the one that comes first in the library.
+/// Nearer of two matches; of equals the one that comes first in the library.
 fn nearer(a: Option<NearestMatch>, b: Option<NearestMatch>) -> Option<NearestMatch> {
     let order = |a: &NearestMatch, b: &NearestMatch| a.0.total_cmp(&b.0).then_with(|| (a.1, a.2).cmp(&(b.1, b.2)));
     a.into_iter().chain(b).min_by(order)

@@ -1,4 +1,4 @@
-//! What a trained speaker makes of a sound of a given length; its own, and another's.
+//! Motion that a trained speaker generates for a sound of a given length.
 
 use crate::generate::Speaker;
 use crate::types::pose3d::Motion;
@@ -7,7 +7,7 @@ use crate::types::sync;
 use anyhow::{Result, ensure};
 use ndarray::s;
 
-/// The trained speaker's motion for one sound, exactly `n_frames` long.
+/// Generated motion for one sound, exactly `n_frames` long.
 pub fn motion(speaker: &Speaker, sound: &Sound, n_frames: usize) -> Result<Motion> {
     let wanted = sync::sample_at(speaker.fps(), SAMPLE_RATE, n_frames) + 1;
     let mut sound = sound.clone();
@@ -17,8 +17,8 @@ pub fn motion(speaker: &Speaker, sound: &Sound, n_frames: usize) -> Result<Motio
     Ok(Motion::from_joints(predicted.fps, predicted.joints.slice(s![..n_frames, .., ..]).to_owned()))
 }
 
-/// What is heard half of all these sounds later (and from the beginning again) instead of sound `which`, as long as it:
-/// the furthest away, and most often another video.
+/// Mismatched sound for sound `which`, as long as it: what follows half of all sounds later, with wrap-around, and so
+/// most often another video.
 pub fn turned(sounds: &[&Sound], which: usize) -> Sound {
     let length = |sounds: &[&Sound]| sounds.iter().map(|sound| sound.samples.len()).sum::<usize>();
     let (all, before) = (length(sounds), length(&sounds[..which]));

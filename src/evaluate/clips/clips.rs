@@ -1,5 +1,5 @@
-//! What is measured: clips of one rate, each the real motion, the made one of the same frames, and what was heard. Here
-//! files become clips; a dataset and a speaker become them in `speaker`.
+//! Evaluation clips of one frame rate: ground truth, prediction of the same frames, and sound features. This file reads
+//! them from files; `of_speaker` makes them from a dataset and a checkpoint.
 
 use super::pairs::FilePair;
 use super::sound_features;
@@ -17,40 +17,40 @@ use ndarray::{Array2, Array3, s};
 use rayon::prelude::*;
 use std::path::PathBuf;
 
-/// Two lengths of one clip may differ by a second, or by this share of the longer.
+/// Largest difference in length of one clip's files: a second, or this share of the longer.
 const MOST_APART_SECS: f64 = 1.0;
 const MOST_APART: f64 = 0.05;
-/// Share of the real joints for which a prediction may have no number.
+/// Largest share of the ground-truth joints that a prediction may miss.
 const MOST_MISSING: f64 = 0.05;
-/// How far a neck may stand from the origin before it is moved there, metres.
+/// Largest distance of a neck from the origin, metres, that is left as it is.
 const NECK_METRES: f32 = 1e-3;
-/// Median bones this many times longer or shorter are in another unit.
+/// Ratio of median bone lengths from which another unit is assumed.
 const OTHER_UNIT: f64 = 2.5;
 
-/// One clip.
+/// Clip with ground truth and prediction.
 #[derive(Clone, Debug)]
 pub struct EvalClip {
     pub name: String,
-    /// [T, 49, 3], metres, the neck at the origin.
+    /// Joints [T, 49, 3], metres, the neck at the origin.
     pub ground_truth: Array3<f32>,
     pub predicted: Array3<f32>,
-    /// [T, 49]: what is compared: seen in the real motion.
+    /// Mask [T, 49] of the compared joints, those seen in the ground truth.
     pub mask: Array2<bool>,
     pub features: Option<SoundFeatures>,
-    /// Where its sound is, for whoever wants to hear it.
+    /// Sound for the player of the report.
     pub voice: Option<ClipAudio>,
 }
 
-/// A sound that can be heard again.
+/// Sound that can be read again.
 #[derive(Clone, Debug)]
 pub enum ClipAudio {
     File(PathBuf),
-    /// 16 kHz.
+    /// Samples at 16 kHz.
     Kept(Vec<i16>),
 }
 
 impl ClipAudio {
-    /// The 16 kHz samples from second `start` to `end`, fewer where the sound ends before.
+    /// Samples at 16 kHz from second `start` to `end`, fewer where the sound ends before.
     pub fn samples(&self, start: f64, end: f64) -> Result<Vec<i16>> {
         let at = |secs: f64| (secs.max(0.0) * f64::from(SAMPLE_RATE)).round() as usize;
         let (from, to) = (at(start), at(end));
@@ -73,7 +73,7 @@ impl ClipAudio {
     }
 }
 
-/// A sample of 16 bits.
+/// Sample as a 16-bit integer.
 pub fn pcm(sample: f32) -> i16 {
     (sample * 32_768.0).round().clamp(-32_768.0, 32_767.0) as i16
 }
@@ -84,14 +84,14 @@ impl EvalClip {
     }
 }
 
-/// Clips of one rate.
+/// Clips of one frame rate.
 #[derive(Clone, Debug)]
 pub struct EvalClips {
     pub fps: FrameRate,
     pub clips: Vec<EvalClip>,
-    /// What had to be assumed, changed or left out, in sentences.
+    /// Assumptions, changes and omissions, in sentences.
     pub notes: Vec<String>,
-    /// Whether the prediction's maker learnt from these very clips: then it can show nothing.
+    /// Whether the model was trained on these clips, so that they prove nothing.
     pub learnt: bool,
 }
 
@@ -104,7 +104,7 @@ impl EvalClips {
         self.fps.secs(self.n_frames())
     }
 
-    /// Hash of the real motion, and of what of it is compared.
+    /// Hash of the ground truth and of its compared joints.
     pub fn truth(&self) -> String {
         let mut hasher = blake3::Hasher::new();
         for clip in &self.clips {
@@ -124,10 +124,10 @@ impl EvalClips {
     }
 }
 
-/// Reads pairs of files at the rate of the first truth. `fps`: for files that do not say theirs.
+/// Reads pairs of files at the frame rate of the first ground truth. `fps` is for files without a rate.
 ///
 /// # Errors
-/// A file that is no motion; a prediction much longer or shorter than its truth, or with many missing joints. The
+/// A file without motion; a prediction much longer or shorter than its ground truth, or with many missing joints. The
 /// message names the clip and what to do.
 pub fn read(pairs: &[FilePair], fps: Option<FrameRate>) -> Result<EvalClips> {
     let first = pairs.first().context("there is no pair to measure")?;
@@ -225,8 +225,8 @@ fn cut(joints: Array3<f32>, n_frames: usize) -> Array3<f32> {
     if joints.shape()[0] == n_frames { joints } else { joints.slice(s![..n_frames, .., ..]).to_owned() }
 }
 
-/// What is compared: the real joints that are seen. Where the made motion has no number it is held where it was last (before
-/// its first number, at the neck); at how many of the compared places is told.
+/// Mask of the compared joints, those seen in the ground truth, and the number of them that the prediction misses.
+/// Missing predictions keep their last position (the neck's before the first one).
 pub fn compared(ground_truth: &Array3<f32>, seen: &Array2<bool>, predicted: &mut Array3<f32>) -> (Array2<bool>, usize) {
     let there = |joints: &Array3<f32>, t: usize, joint: usize| (0..3).all(|k| joints[[t, joint, k]].is_finite());
     let mask = Array2::from_shape_fn(seen.raw_dim(), |(t, joint)| seen[[t, joint]] && there(ground_truth, t, joint));
@@ -240,7 +240,7 @@ pub fn compared(ground_truth: &Array3<f32>, seen: &Array2<bool>, predicted: &mut
     (mask, n_missing)
 }
 
-/// Takes the neck off all joints of a frame; how far it stood away at most, where that is worth a word.
+/// Moves the neck to the origin; returns its largest distance from there where it matters.
 fn neck_to_origin(motion: &mut Motion) -> Option<f32> {
     let mut far = 0.0f32;
     for mut frame in motion.joints.outer_iter_mut() {
@@ -256,7 +256,7 @@ fn neck_to_origin(motion: &mut Motion) -> Option<f32> {
     (far > 0.0).then_some(far)
 }
 
-/// A word where the made bones are so much longer or shorter that they must be in another unit.
+/// Note where the bone lengths of the prediction indicate another unit.
 fn other_unit(ground_truth: &Motion, predicted: &Motion) -> Option<String> {
     let size = |motion: &Motion| bones::measure(motion).iter().take(6).map(|v| f64::from(*v)).sum::<f64>();
     let times = size(predicted) / size(ground_truth);

@@ -1,4 +1,4 @@
-//! The intervals a speaker is measured on: what is true, with the sound. No figure here.
+//! Held-out intervals that a speaker is evaluated on: ground truth and sound.
 
 use crate::dataset::index::SampleRef;
 use crate::dataset::{Dataset, Split};
@@ -12,15 +12,15 @@ use ndarray::s;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// One interval.
+/// Interval of the dataset with its sound.
 pub struct HeldOutInterval {
     pub key: String,
-    /// With the bone lengths of the speaker, as in training: every video has its own.
+    /// Motion with the speaker's bone lengths, as in training; each video has its own.
     pub ground_truth: Motion,
     pub sound: Sound,
 }
 
-/// The intervals of `split`, in the dataset's order. Errors where there is none, naming the splits that have some.
+/// Samples of `split` in the dataset's order. Errors where there are none, naming the splits that have some.
 pub fn samples(dataset: &Dataset, split: Split) -> Result<Vec<SampleRef>> {
     let samples = dataset.samples(split);
     if samples.is_empty() {
@@ -36,7 +36,7 @@ pub fn samples(dataset: &Dataset, split: Split) -> Result<Vec<SampleRef>> {
     Ok(samples)
 }
 
-/// Reads them.
+/// Reads the samples.
 pub fn read(dataset: &Dataset, samples: &[SampleRef], normal: &Normalisation) -> Result<Vec<HeldOutInterval>> {
     let lengths = std::array::from_fn(|bone| normal.bone_lengths.get(bone).copied().unwrap_or(0.0));
     let interval = |sample| -> Result<HeldOutInterval> {
@@ -48,7 +48,7 @@ pub fn read(dataset: &Dataset, samples: &[SampleRef], normal: &Normalisation) ->
 }
 
 impl HeldOutInterval {
-    /// Only these frames of it.
+    /// Part of the interval: these frames and their sound.
     pub fn cut(&self, frames: Range<usize>) -> Self {
         let ground_truth = &self.ground_truth;
         let sound = sync::samples_of(ground_truth.fps, self.sound.rate, frames.clone());

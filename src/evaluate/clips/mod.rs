@@ -1,5 +1,4 @@
-//! What is evaluated: pairs of files, held-out intervals of a dataset with the motion that a checkpoint generates, and
-//! the sound features of both.
+//! Clips to evaluate: from pairs of files or from held-out intervals with generated motion, and their sound features.
 
 pub mod clips;
 pub mod held_out;

@@ -1,5 +1,5 @@
-//! Clips and baselines of a trained speaker on a split of a dataset: what is true is in the dataset, what is made comes
-//! from the sound alone, and all that a baseline knows is of the training split.
+//! Clips and baselines of a trained speaker on a split of a dataset. Ground truth comes from the dataset, predictions
+//! from the sound alone, and baselines know the training split only.
 
 use super::clips::{ClipAudio, EvalClip, EvalClips, compared, pcm};
 use super::held_out;
@@ -24,13 +24,13 @@ use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3, s};
 use rayon::prelude::*;
 
-/// What is measured: the clips, and the predictors beside each other, the speaker's own motion first.
+/// Clips and predictors to evaluate, the speaker's own motion first.
 pub struct SpeakerEvaluation {
     pub clips: EvalClips,
     pub predictors: Vec<Predictor>,
 }
 
-/// The speaker of a checkpoint on a split of `dataset`.
+/// Evaluates the speaker of a checkpoint on a split of `dataset`.
 ///
 /// # Errors
 /// A dataset of another frame rate; a split without intervals.
@@ -134,12 +134,12 @@ fn constant_poses(dataset: &Dataset, normal: &Normalisation, n_clips: usize) -> 
     Ok(vec![predictor(PredictorKind::MeanPose, mean), predictor(PredictorKind::MedianPose, median)])
 }
 
-/// The training split as a library, read anew for every question, so that its length costs no memory.
+/// Training split as a library, read again for every query, so that memory does not grow with its length.
 struct TrainingLibrary<'a> {
     dataset: &'a Dataset,
     normal: &'a Normalisation,
     samples: Vec<SampleRef>,
-    /// Whether the clips that ask are its own entries, in the same order.
+    /// Whether the queries are the library's own entries, in the same order.
     asks_itself: bool,
 }
 
@@ -172,7 +172,7 @@ impl Library for TrainingLibrary<'_> {
     }
 }
 
-/// The nearest neighbours' motion; what is missing where it was copied from is NaN.
+/// Motion of the nearest neighbours; NaN where the copied motion is missing.
 pub fn copied(
     dataset: &Dataset,
     normal: &Normalisation,

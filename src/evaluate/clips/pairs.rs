@@ -1,17 +1,17 @@
-//! Which files belong together: a truth, what was predicted for it, and its sound, by their names. Nothing is opened here.
+//! Pairs of files by name: ground truth, prediction and sound of a clip. No file is opened here.
 
 use crate::mocap::motion_file;
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What a name may begin with to say on which side its file stands; the rest is the clip's name.
+/// Prefixes that name the side of a file; the rest is the clip's name.
 const TRUTH: [&str; 7] = ["gt_interval_", "ground_truth_", "truth_", "real_", "gt_", "true_", "natural_"];
 const PREDICTION: [&str; 8] =
     ["prediction_interval_", "prediction_", "predicted_", "generated_", "pred_", "made_", "output_", "synthetic_"];
 const SOUND: [&str; 11] = ["wav", "flac", "mp3", "m4a", "ogg", "opus", "aac", "mp4", "mov", "mkv", "webm"];
 
-/// A clip's files.
+/// Files of a clip.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FilePair {
     pub name: String,
@@ -20,7 +20,7 @@ pub struct FilePair {
     pub sound: Option<PathBuf>,
 }
 
-/// The pairs in the order of their names, and a sentence for each file that has no partner.
+/// Pairs in the order of their names, and a sentence for each file without a partner.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FilePairs {
     pub pairs: Vec<FilePair>,
@@ -122,7 +122,7 @@ fn by_name(found: &mut FilePairs, audio: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The files of a folder with one of these endings, hidden ones left out, in the order of their names.
+/// Files of a folder with one of these endings, hidden ones left out, in the order of their names.
 fn files(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>> {
     let looking = || format!("cannot look into {}", folder.display());
     let mut files = Vec::new();
@@ -147,7 +147,7 @@ fn by_key(files: impl IntoIterator<Item = PathBuf>) -> Result<BTreeMap<String, P
     Ok(named)
 }
 
-/// The clip a file belongs to: its name without ending and without what says its side.
+/// Clip of a file: its name without the ending and the prefix of its side.
 fn key(path: &Path) -> String {
     let stem = stem(path);
     let start = TRUTH.iter().chain(&PREDICTION).find(|start| stem.starts_with(**start) && stem.len() > start.len());

@@ -1,5 +1,5 @@
-//! What evaluation hears of a sound, taken in piece by piece: its onsets, for the beats, and its pooled spectrogram, for
-//! the nearest neighbour. The samples themselves are not kept.
+//! Sound features for evaluation, computed in a stream: onsets for the beat metrics, a pooled spectrogram for the
+//! nearest neighbour. Samples are not kept.
 
 use crate::audio::mel;
 use crate::audio::onset::{Loudest, Onsets};
@@ -10,37 +10,37 @@ use crate::types::time::FrameRate;
 use anyhow::{Context, Result};
 use std::path::Path;
 
-/// Frames of motion whose spectrogram is averaged into one row.
+/// Motion frames whose spectrogram is averaged into one row.
 pub const POOLED: usize = 2;
-/// Samples that wait before a spectrogram is made of them.
+/// Number of buffered samples that triggers a spectrogram.
 const PIECE: usize = 10 * SAMPLE_RATE as usize;
 
-/// What was heard of one sound.
+/// Features of one sound.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SoundFeatures {
     pub secs: f64,
-    /// Seconds from the start.
+    /// Onset times, seconds from the start.
     pub onsets: Vec<f64>,
-    /// Mean of the log-mel spectrogram over every `POOLED` frames of motion: rows of `mel::N_MELS` numbers.
+    /// Mean of the log-mel spectrogram over every `POOLED` motion frames: rows of `mel::N_MELS` numbers.
     pub rows: Vec<f32>,
 }
 
-/// Takes in a sound of 16 kHz.
+/// Extractor for sound of 16 kHz.
 pub struct SoundFeatureExtractor {
     fps: FrameRate,
     n_samples: usize,
     onsets: Option<Onsets>,
-    /// Samples that wait, the first of them that of spectrogram frame `n_mels`.
+    /// Buffered samples, starting with spectrogram frame `n_mels`.
     waiting: Vec<f32>,
     n_mels: usize,
-    /// Sum of the spectrogram over the row at hand, and how many frames that is.
+    /// Sum of the spectrogram over the current row, and its number of frames.
     row: [f32; mel::N_MELS],
     n_in_row: usize,
     rows: Vec<f32>,
 }
 
 impl SoundFeatureExtractor {
-    /// For motion of `fps`. Onsets are only found where it is known how loud the sound ever gets (`onset::Loudest`).
+    /// Extractor for motion of `fps`. Onsets are found only with a known peak level (`onset::Loudest`).
     pub fn new(fps: FrameRate, loudest_db: Option<f32>) -> Self {
         Self {
             fps,
@@ -54,7 +54,7 @@ impl SoundFeatureExtractor {
         }
     }
 
-    /// The next samples.
+    /// Adds samples.
     pub fn push(&mut self, samples: &[f32]) {
         self.n_samples += samples.len();
         if let Some(onsets) = &mut self.onsets {
@@ -66,7 +66,7 @@ impl SoundFeatureExtractor {
         }
     }
 
-    /// The rest of a sound, heard up to `n_frames` of motion: as many rows as they begin, silence where it has ended.
+    /// Features of a sound cut or padded with silence to `n_frames` of motion.
     pub fn finish(mut self, n_frames: usize) -> SoundFeatures {
         let secs = self.n_samples as f64 / f64::from(SAMPLE_RATE);
         let n_rows = n_frames.div_ceil(POOLED);
@@ -87,7 +87,7 @@ impl SoundFeatureExtractor {
             self.row.iter_mut().zip(frame).for_each(|(sum, v)| *sum += v);
             self.n_in_row += 1;
             self.n_mels += 1;
-            // more than one row where motion is faster than the spectrogram
+            // Several rows where motion has more frames a second than the spectrogram.
             while self.n_mels >= mel_frames(self.fps, (self.rows.len() / mel::N_MELS + 1) * POOLED) {
                 match self.n_in_row {
                     0 => self.rows.extend_from_within(self.rows.len() - mel::N_MELS..),
@@ -101,7 +101,7 @@ impl SoundFeatureExtractor {
     }
 }
 
-/// Hears a sound of 16 kHz beside `n_frames` of motion.
+/// Features of a sound of 16 kHz for `n_frames` of motion.
 pub fn of_samples(samples: &[f32], fps: FrameRate, n_frames: usize) -> SoundFeatures {
     let mut loudest = Loudest::default();
     loudest.push(samples);
@@ -110,10 +110,9 @@ pub fn of_samples(samples: &[f32], fps: FrameRate, n_frames: usize) -> SoundFeat
     listener.finish(n_frames)
 }
 
-/// Hears the file beside `n_frames` of motion, twice from its beginning; what goes on behind them is not decoded. `None`:
-/// it holds no sound.
+/// Features of a file for `n_frames` of motion, read twice; later sound is not decoded. `None`: no sound.
 pub fn extract(path: &Path, fps: FrameRate, n_frames: usize) -> Result<Option<SoundFeatures>> {
-    // a second more, so that an onset at the end stands out from what follows
+    // One second more, so that an onset at the end stands out from what follows.
     let n_wanted = ((fps.secs(n_frames) + 1.0) * f64::from(SAMPLE_RATE)).ceil() as usize;
     let listen = |sink: &mut dyn FnMut(&[f32])| -> Result<usize> {
         let mut n = 0;
@@ -163,7 +162,7 @@ mod tests {
             let apart = pieces.rows.iter().zip(&whole.rows).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             assert!(pieces.rows.len() == whole.rows.len() && apart < 1e-4, "{piece}: {apart}");
         }
-        // what the spectrogram of the whole is, averaged over two frames of motion
+        // Spectrogram of the whole sound, averaged over two motion frames.
         let mels = mel::log_mel(&sound);
         let frames = mel_frames(fps, 20)..mel_frames(fps, 22);
         let mean = mels.slice(ndarray::s![frames, 5]).mean().unwrap();

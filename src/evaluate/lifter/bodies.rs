@@ -1,9 +1,8 @@
-//! The body lifter's errors on captured motion, beside methods that need no network. Convention: bodies of the common
-//! adult's bones; 4 s scenes at 15 frames a second; cameras within 60 degrees of the side, 15 above or below, 4 of roll;
-//! keypoints that err and miss ("drop": `train::body_scene::Filming`). Each frame is taken relative to its own neck;
-//! prediction and truth of a scene are each scaled by one number to the reference size (0.90 m); nothing is turned.
-//! MPJPE over nose, shoulders, elbows, wrists; P-MPJPE after a similarity per frame on those and the neck. The methods
-//! without a network get exact keypoints, and what else they need: true lengths, the true scale, the set's own mean.
+//! Errors of the body lifter on captured motion, beside methods without a network. Scenes: 4 s at 15 fps, average
+//! adult's bones, camera yaw within 60 degrees, pitch 15, roll 4, noisy keypoints with gaps ("drop"). Frames are
+//! relative to the neck; each scene's prediction and truth are scaled to the reference size (0.90 m). MPJPE over nose,
+//! shoulders, elbows, wrists; P-MPJPE after a similarity per frame. Methods without a network get exact keypoints and
+//! what they need: true lengths, true scale, or the set's mean.
 
 use crate::config;
 use crate::mocap::upper_body::Set;
@@ -19,44 +18,44 @@ use anyhow::{Result, ensure};
 use ndarray::{Array3, s};
 use serde::Serialize;
 
-/// Scenes of a set, unless told otherwise.
+/// Default number of scenes of a set.
 pub const SCENES: usize = 240;
-/// Bands of |yaw| that errors are given apart for, in degrees.
+/// Bands of |yaw| with errors of their own, degrees.
 const BANDS: [(f64, f64); 3] = [(0.0, 20.0), (20.0, 40.0), (40.0, 60.0)];
 
-/// The middle of the picture in px.
+/// Centre of the picture, px.
 const MIDDLE: [f32; 2] = [640.0, 360.0];
 
-/// The lifter as a user meets it, and its network alone.
+/// Body lifter of `orator lift`, and its network alone.
 pub struct Lifters {
     whole: Lifter,
     network: BodyLifter,
 }
 
 impl Lifters {
-    /// Of the weights that `settings` name, or the built-in ones.
+    /// Lifters with the weights that `settings` name, or the built-in ones.
     pub fn new(settings: &config::Lift) -> Result<Self> {
         Ok(Self { whole: Lifter::new(settings)?, network: weights::body(&settings.body_weights)? })
     }
 }
 
-/// One method's errors on one set.
+/// Errors of one method on one set.
 #[derive(Clone, Debug, Serialize)]
 pub struct BodyRow {
     pub set: String,
     pub method: &'static str,
-    /// What the method was given: "drop" or "clean" keypoints.
+    /// Keypoints of the method: "drop" or "clean".
     pub input: &'static str,
     pub errors: Errors,
-    /// The same by |yaw|: 0 to 20, 20 to 40, 40 to 60 degrees.
+    /// Errors by |yaw|: 0 to 20, 20 to 40, 40 to 60 degrees.
     pub by_yaw: Vec<Errors>,
     /// Share of the frames in which the method gave all points.
     #[serde(rename = "told")]
     pub complete_share: f64,
 }
 
-/// The table: for each set the lifter, its network alone, and three methods without a network. Errors: a set whose takes
-/// are all shorter than a scene.
+/// Errors by set of the lifter, its network alone, and three methods without a network. Errors on a set whose takes are
+/// all shorter than a scene.
 pub fn table(lifters: &Lifters, sets: &[Set], n_scenes: usize) -> Result<Vec<BodyRow>> {
     let mut rows = Vec::new();
     for (set, takes) in sets {
@@ -97,7 +96,7 @@ fn row(
     Ok(BodyRow { set: set.to_owned(), method, input: "drop", errors, by_yaw, complete_share })
 }
 
-/// A scene through the whole of `orator lift`.
+/// Lifts a scene with the whole of `orator lift`.
 fn whole(lifter: &Lifter, scene: &Scene) -> Result<Vec<Option<Pose>>> {
     let n_frames = scene.seen.len();
     let none = Array3::zeros((n_frames, N_HAND, 3));
@@ -126,7 +125,7 @@ fn whole(lifter: &Lifter, scene: &Scene) -> Result<Vec<Option<Pose>>> {
     Ok((0..n_frames).map(pose).collect())
 }
 
-/// The table for people.
+/// Table for people.
 pub fn text(rows: &[BodyRow]) -> String {
     let mut text = format!(
         "{:22} {:6} {:>6} {:>8} {:>6} {:>7} {:>9} {:>6}   MPJPE by yaw {}\n",

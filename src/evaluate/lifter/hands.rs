@@ -1,10 +1,7 @@
-//! The hand lifter's error on captured or labelled fingers, seen by random cameras from every side.
-//!
-//! Every set's hands have one size (`motion::finger_take::Size`; the middle proximal phalanx is 48 mm). A hand is
-//! turned at random, any turn equally likely, stands at 5 to 20 of its lengths from the camera, and its keypoints get
-//! normal noise of 2 % of the palm in x and in y. Errors are relative to the wrist, in the camera's axes, not turned.
-//! A lifted hand is given the true hand's total length of the bones between counted points, since a picture shows no
-//! size. The wrist itself, and points that a source does not have, count nowhere.
+//! Errors of the hand lifter on captured or labelled fingers seen by random cameras. All hands have one size (middle
+//! proximal phalanx 48 mm), a uniformly random rotation, a distance of 5 to 20 hand lengths, and keypoint noise of 2 %
+//! of the palm. Errors are relative to the wrist in the camera's axes. A lifted hand is scaled to the true total bone
+//! length, since a picture shows no size. The wrist and points that a source lacks do not count.
 
 use crate::formats::checkpoint::Contents;
 use crate::math::order::median;
@@ -28,57 +25,57 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use std::path::Path;
 
-/// Hands measured in a set.
+/// Number of hands measured in a set.
 pub const MEASURED: usize = 4000;
-/// Noise of a keypoint, shares of wrist to middle knuckle.
+/// Noise of a keypoint as a share of the distance from wrist to middle knuckle.
 const NOISE: f64 = 0.02;
-/// Wrist to middle knuckle of a hand that has none, metres.
+/// Distance from wrist to middle knuckle of a hand without knuckles, metres.
 const PALM: f64 = 0.093;
-/// px a metre at the wrist; the lifter does not see it.
+/// Focal length: px a metre at the wrist; unknown to the lifter.
 const PX: f64 = 1000.0;
 
-/// Something that lifts: keypoints of right hands to hands in any unit, the wrist at 0; `None`: not lifted.
+/// Lifter of right hands: keypoints to joints in any unit, the wrist at 0; `None`: not lifted.
 pub type LiftHands<'a> = dyn Fn(&[SeenHand]) -> Result<Vec<Option<Hand>>> + 'a;
 
-/// Errors in mm, medians over all counted points of all hands.
+/// Errors in mm, medians over all compared points of all hands.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct HandErrors {
-    /// As it is; none for hands without knuckles.
+    /// Error without alignment; `None` for hands without knuckles.
     pub median_mm: Option<f32>,
-    /// Each hand after the similarity that fits it best.
+    /// Error after the similarity that fits each hand best.
     pub aligned_mm: f32,
-    /// Share of hands whose points err by more than 30 mm on average (as it is).
+    /// Share of hands with a mean error above 30 mm without alignment.
     pub above_30: Option<f64>,
 }
 
-/// One set's errors: of the lifter, and of what needs no network.
+/// Errors on one set of the lifter and of two baselines without a network.
 #[derive(Clone, Debug, Serialize)]
 pub struct HandRow {
     pub set: String,
-    /// What gave the hands their size.
+    /// Source of the hands' size.
     pub size: &'static str,
     pub n_hands: usize,
     /// Share of the hands that were lifted.
     pub lifted: f64,
     pub lifter: HandErrors,
-    /// The keypoints without depth, at the true scale.
+    /// Keypoints without depth, at the true scale.
     pub flat: HandErrors,
-    /// A constant hand at rest, turned within the picture, palm or back towards the viewer, whichever fits better.
+    /// Constant relaxed hand, rotated within the picture, palm or back towards the viewer, whichever fits better.
     pub relaxed: HandErrors,
 }
 
-/// A hand before the camera: the truth in metres in the camera's axes, and its keypoints in px.
+/// Hand before a camera: true joints in metres in the camera's axes, and its keypoints in px.
 struct ProjectedHand {
     truth: Truth,
     seen: SeenHand,
 }
 
-/// The error table of `lift` on `sets`, `MEASURED` hands each, drawn with `seed`.
+/// Errors of `lift` on `sets`, `n_hands` each, drawn with `seed`.
 pub fn evaluate(lift: &LiftHands, sets: &[FingerSet], n_hands: usize, seed: u64) -> Result<Vec<HandRow>> {
     sets.iter().map(|set| row(lift, set, n_hands, seed)).collect()
 }
 
-/// What the weights of a file (the built-in ones where `path` is empty) lift, of either network.
+/// Lifter with the weights of a file (built-in ones where `path` is empty), of either network.
 pub fn lifter_of(path: &Path) -> Result<Box<LiftHands<'static>>> {
     if !path.as_os_str().is_empty() && Contents::read(path)?.facts["kind"] == heatmaps::KIND {
         let lesson = HeatmapLesson::new(0)?;
@@ -129,7 +126,7 @@ fn shot(truth: &Truth, rng: &mut ChaCha8Rng) -> ProjectedHand {
     ProjectedHand { truth: Truth { hand, ..truth.clone() }, seen }
 }
 
-/// The lifted hand with the true hand's bones, all counted together.
+/// Lifted hand scaled to the true hand's total bone length.
 fn to_size(truth: &Truth, hand: &Hand) -> Hand {
     let counts = |j: usize| j == 0 || truth.counted[j];
     let bones: Vec<usize> = (1..N_HAND).filter(|&j| counts(j) && counts(parent(j))).collect();
@@ -153,7 +150,7 @@ fn at_rest(seen: &SeenHand) -> Hand {
         let sin: f64 = there().map(|(h, p)| h[0] * p[1] - h[1] * p[0]).sum();
         let angle = sin.atan2(cos);
         let turned = hand.map(|[x, y, z]| [angle.cos() * x - angle.sin() * y, angle.sin() * x + angle.cos() * y, z]);
-        // of equal lengths, the one that agrees more fits better
+        // Of equal lengths, the one with the better agreement.
         (cos.hypot(sin), turned)
     });
     let [(palm_fit, palm), (back_fit, back)] = fitted;
@@ -181,7 +178,7 @@ fn errors(shots: &[ProjectedHand], hands: &[Option<Hand>], whole: bool) -> HandE
     }
 }
 
-/// The table as text, a line a set.
+/// Table as text, a line a set.
 pub fn text(rows: &[HandRow]) -> String {
     let number = |value: Option<f32>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.1}"));
     let one = |e: &HandErrors| format!("{:>5} /{:>5.1}", number(e.median_mm), e.aligned_mm);

@@ -1,4 +1,4 @@
-//! Motion beside motion in blocks of about 4 s: what is resampled, since neighbouring frames say the same. The blocks add
+//! Metrics in blocks of about 4 s, the units of the bootstrap, since neighbouring frames are correlated. The blocks add
 //! up to the whole.
 
 use crate::evaluate::baseline::baselines::Predictor;
@@ -8,12 +8,12 @@ use ndarray::{Array2, s};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Length of a block, seconds: a clip has as many as fit best, all of one length. Of more than an hour they are longer, so
-/// that there are not many more of them.
+/// Length of a block, seconds; a clip has the number of equal blocks that fits best. Above an hour of motion blocks
+/// become longer, which bounds their number.
 const BLOCK_SECS: f64 = 4.0;
 const MOST_SECS: f64 = 3600.0;
-/// A longer clip is measured in pieces, so that it takes no more memory and several threads; what lies across a border is
-/// not seen.
+/// Length, seconds, of the pieces in which longer clips are measured in parallel and in bounded memory; differences
+/// across a border are not counted.
 const PIECE_SECS: f64 = 600.0;
 
 /// Length of the blocks of these clips, seconds.
@@ -21,12 +21,12 @@ pub fn block_secs(clips: &EvalClips) -> f64 {
     BLOCK_SECS * (clips.secs() / MOST_SECS).ceil().max(1.0)
 }
 
-/// The same in frames.
+/// Length of the blocks of these clips, frames.
 fn block_frames(clips: &EvalClips) -> usize {
     ((block_secs(clips) * clips.fps.per_sec()).round() as usize).max(1)
 }
 
-/// A predictor's sums over all clips and their blocks. The same whatever the number of threads.
+/// Metric sums of a predictor over all clips and their blocks, independent of the number of threads.
 pub fn measure(catalogue: &Catalogue, clips: &EvalClips, predictor: &Predictor) -> Measured {
     let all: Vec<Measured> = pieces(clips)
         .into_par_iter()
@@ -66,8 +66,8 @@ fn pieces(clips: &EvalClips) -> Vec<(usize, Range<usize>)> {
     (0..clips.clips.len()).flat_map(of_clip).collect()
 }
 
-/// One half of the truth beside the other: every second stretch of a block's length as if it were made, beside the one
-/// before it.
+/// One half of the ground truth against the other: every second block is treated as the prediction of the one before
+/// it.
 pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> Measured {
     let length = block_frames(clips);
     let stretches = |clip: usize| (0..clips.clips[clip].n_frames() / length).map(move |i| (clip, i * length));
@@ -87,7 +87,7 @@ pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> Measured {
     together(all.par_chunks_exact(2).map(beside).collect())
 }
 
-/// In their order.
+/// Sum of measurements in their order.
 fn together(all: Vec<Measured>) -> Measured {
     let mut sum = Measured::default();
     for one in all {
@@ -97,7 +97,7 @@ fn together(all: Vec<Measured>) -> Measured {
     sum
 }
 
-/// How often each of `n` blocks is in each draw [n_draws, n].
+/// Number of occurrences of each of `n` blocks in each draw [n_draws, n].
 pub fn counts(drawn: &[Vec<usize>], n: usize) -> Array2<f64> {
     let mut counts = Array2::zeros((drawn.len(), n));
     for (mut row, draw) in counts.outer_iter_mut().zip(drawn) {

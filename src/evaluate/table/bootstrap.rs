@@ -1,16 +1,15 @@
-//! How sure a figure is: the same figure of blocks drawn with replacement (Efron 1979; blocks, since neighbouring frames
-//! say the same: Kuensch 1989).
+//! Block bootstrap: confidence intervals of a metric from blocks drawn with replacement (Efron 1979; Kuensch 1989).
 
 use crate::math::order::Ordered;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-/// Share of the draws that an interval leaves out at each end.
+/// Share of the draws outside the interval at each end.
 const TAIL: f64 = 0.025;
 const SEED: u64 = 1;
 
-/// A figure with its 95 % interval.
+/// Metric value with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Estimate {
     pub value: f64,
@@ -18,8 +17,8 @@ pub struct Estimate {
     pub high: f64,
 }
 
-/// `n_draws` times `n_blocks` blocks drawn with replacement; always the same ones, so that two figures of the same draws
-/// can be compared draw by draw.
+/// `n_draws` draws of `n_blocks` blocks with replacement, from a fixed seed, so that two metrics can be compared draw
+/// by draw.
 pub fn draws(n_blocks: usize, n_draws: usize) -> Vec<Vec<usize>> {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     let block = |rng: &mut ChaCha8Rng| rng.random_range(0..n_blocks.max(1) as u64) as usize;
@@ -27,8 +26,8 @@ pub fn draws(n_blocks: usize, n_draws: usize) -> Vec<Vec<usize>> {
 }
 
 impl Estimate {
-    /// `value` of all blocks, with the spread of `drawn` around its median: moved so that the median is the value, since a
-    /// distance between distributions grows when blocks are repeated. Draws that are no number are left out.
+    /// `value` of all blocks with the spread of `drawn` around their median. The draws are shifted so that their median
+    /// is the value, since repeated blocks bias distances between distributions. Non-finite draws are left out.
     pub fn from_draws(value: f64, drawn: &[f64]) -> Self {
         let drawn = Ordered::new(drawn.iter().copied());
         let at = |share: f64| drawn.quantile(share).unwrap_or(f64::NAN);

@@ -1,5 +1,5 @@
-//! Two results side by side. Values are put beside each other only where their definitions are the same to the last
-//! parameter; where they differ, it is said in what, and nothing is compared.
+//! Comparison of two results. Values are compared only where their definitions agree to the last parameter; elsewhere
+//! the difference is named.
 
 use super::bootstrap::Estimate;
 use super::result::{StoredMetric, StoredResult};
@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeSet;
 
-/// A metric that both have.
+/// Metric that both results have.
 #[derive(Clone, Debug, Serialize)]
 pub struct MetricPair {
     pub name: String,
@@ -18,15 +18,15 @@ pub struct MetricPair {
     pub b: Option<Estimate>,
 }
 
-/// What came of it.
+/// Outcome of a comparison.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Comparison {
-    /// Said where the figures are of different real motion.
+    /// Warning where the results have different ground truth.
     pub warning: Option<String>,
     pub beside: Vec<MetricPair>,
-    /// A sentence for each metric of one name whose definitions differ.
+    /// Sentences for metrics of one name whose definitions differ.
     pub refused: Vec<String>,
-    /// Metrics that one of them has, and which.
+    /// Metrics that only one of them has.
     pub only_in_a: Vec<String>,
     pub only_in_b: Vec<String>,
 }
@@ -65,7 +65,7 @@ pub fn compare(a: &StoredResult, b: &StoredResult) -> Comparison {
     compared
 }
 
-/// `mpjpe (all), joint error, is not comparable: fps is 15.0 in A and 30.0 in B (hash ... and ...)`
+/// Sentence like `mpjpe (all), joint error, is not comparable: fps is 15.0 in A and 30.0 in B (hash ... and ...)`.
 fn refusal(a: &StoredMetric, b: &StoredMetric) -> String {
     let mut differ = Vec::new();
     differences("", &a.parameters, &b.parameters, &mut differ);
@@ -104,7 +104,7 @@ fn shown(value: &Value) -> String {
     }
 }
 
-/// Side by side as text.
+/// Table of both as text.
 pub fn text(compared: &Comparison) -> String {
     let cell = |estimate: &Option<Estimate>| match estimate {
         Some(e) if e.low.is_finite() => format!("  {:.4} [{:.4}, {:.4}]", e.value, e.low, e.high),

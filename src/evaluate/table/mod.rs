@@ -1,5 +1,5 @@
-//! Metrics with what stands beside them: sums over blocks, bootstrap intervals, the table, the file of a result, and
-//! two results compared.
+//! Metric values with their context: sums over blocks, bootstrap intervals, the table, the result file, and the
+//! comparison of two results.
 
 pub mod blocks;
 pub mod bootstrap;

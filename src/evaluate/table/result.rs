@@ -1,5 +1,5 @@
-//! A table as JSON: each value with its definition, parameters and their hash, so that it can be held against another one
-//! later; and reading it back. Only values of one hash are comparable.
+//! Table as JSON and back. Each value has its definition, parameters and their hash; only values of one hash are
+//! comparable.
 
 use super::bootstrap::Estimate;
 use super::table::Table;
@@ -11,10 +11,10 @@ use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// Of the form of the JSON.
+/// Version of the JSON's layout.
 pub const VERSION: u64 = 1;
 
-/// The whole result.
+/// Result as JSON.
 pub fn json(table: &Table) -> Value {
     let metrics = (0..table.definitions.len()).map(|index| metric(table, index));
     let predictors = table.rows.iter().map(|row| json!({ "name": row.kind, "says": row.description }));
@@ -64,7 +64,7 @@ fn metric(table: &Table, index: usize) -> Value {
     })
 }
 
-/// One metric of a result that was read.
+/// Metric of a result file.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct StoredMetric {
     pub name: String,
@@ -77,21 +77,21 @@ pub struct StoredMetric {
     values: Map<String, Value>,
 }
 
-/// Metrics of a result.
+/// Result file.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct StoredResult {
     evaluation: u64,
-    /// Hash of the real motion behind the figures, and how many clips it has.
+    /// Hash of the ground truth behind the values, and the number of its clips.
     pub truth: String,
     pub n_clips: usize,
     pub metrics: Vec<StoredMetric>,
 }
 
 impl StoredResult {
-    /// Reads what `orator evaluate --json` wrote.
+    /// Reads the output of `orator evaluate --json`.
     ///
     /// # Errors
-    /// Not there, no such JSON, of another version, or with a hash that is not that of its definition.
+    /// A missing file, other JSON, another version, or a hash that does not match its definition.
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
         let stored: Self = serde_json::from_str(&text).with_context(|| {
@@ -108,7 +108,7 @@ impl StoredResult {
 }
 
 impl StoredMetric {
-    /// The value of a predictor, with its interval where it has one.
+    /// Value of a predictor with its interval, if any.
     pub fn value(&self, kind: PredictorKind) -> Option<Estimate> {
         let name = serde_json::to_value(kind).ok()?;
         let value = self.values.get(name.as_str()?)?;

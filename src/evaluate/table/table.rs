@@ -1,4 +1,4 @@
-//! The table: every figure of every predictor with its interval, on the same clips and the same draws.
+//! Table of every metric of every predictor with its interval, on the same clips and the same draws.
 
 use super::blocks;
 use super::bootstrap::{Estimate, draws};
@@ -10,54 +10,54 @@ use crate::stage::progress::Task;
 use anyhow::{Result, ensure};
 use ndarray::{Array2, s};
 
-/// Draws behind an interval; a costly figure (Frechet distances, correlations) takes fewer.
+/// Number of draws behind an interval; costly metrics (Frechet distances, correlations) take fewer.
 pub const N_DRAWS: usize = 1000;
 pub const N_COSTLY_DRAWS: usize = 100;
-/// Fewer blocks than this carry no conclusion.
+/// Number of blocks below which no conclusion is drawn.
 pub const FEW_BLOCKS: usize = 10;
 
-/// One predictor's figures.
+/// Metrics of one predictor.
 #[derive(Clone, Debug)]
 pub struct PredictorRow {
     pub kind: PredictorKind,
-    /// What it is, in a sentence.
+    /// Description in a sentence.
     pub description: String,
-    /// One a definition.
+    /// One estimate a definition.
     pub values: Vec<Estimate>,
-    /// Why a value is none; empty where there is one.
+    /// Reasons of missing values; empty where there is a value.
     pub reasons: Vec<String>,
-    /// [`N_DRAWS`, definitions]; NaN where a costly figure has no more draws. Empty where none were taken.
+    /// Draws [`N_DRAWS`, definitions]; NaN beyond the draws of costly metrics. Empty without draws.
     drawn: Array2<f64>,
 }
 
-/// All of them.
+/// Metrics of all predictors.
 #[derive(Clone, Debug)]
 pub struct Table {
     pub settings: Settings,
     pub definitions: Vec<Definition>,
-    /// For a figure that should be near the real motion's: where that stands.
+    /// For a metric that should match the ground truth's: index of the ground truth's value.
     pub truth_of: Vec<Option<usize>>,
     pub n_clips: usize,
     pub n_blocks: usize,
-    /// About how long each is.
+    /// Approximate length of a block, seconds.
     pub block_secs: f64,
     pub n_frames: usize,
     pub secs: f64,
     pub with_sound: bool,
-    /// Whether the prediction's maker learnt from these very clips.
+    /// Whether the model was trained on these clips.
     pub learnt: bool,
-    /// Hash of the real motion and of what of it is compared.
+    /// Hash of the ground truth and of its compared joints.
     pub truth: String,
-    /// The prediction first, the truth last.
+    /// Rows, the prediction first, the ground truth last.
     pub rows: Vec<PredictorRow>,
     pub notes: Vec<String>,
 }
 
-/// Measures the prediction, the baselines, and the truth beside itself. One predictor after the other, so that memory
-/// holds the sums of one; the same figures whatever the number of threads.
+/// Measures the prediction, the baselines and the ground truth itself, one predictor at a time to bound memory; results
+/// are independent of the number of threads.
 ///
 /// # Errors
-/// Settings that the catalogue does not take; no frame to measure.
+/// Settings that the catalogue rejects; no frame to measure.
 pub fn measure(clips: &EvalClips, settings: &Settings, predictors: &[Predictor], task: &dyn Task) -> Result<Table> {
     let settings = Settings { fps: clips.fps, ..settings.clone() };
     let catalogue = Catalogue::new(&settings)?;
@@ -73,7 +73,7 @@ pub fn measure(clips: &EvalClips, settings: &Settings, predictors: &[Predictor],
     task.detail("truth");
     rows.extend(halves(&catalogue, clips));
     let truth = Predictor::truth(clips);
-    // without its blocks: nothing is drawn of it
+    // Without blocks, since the ground truth has no draws.
     let whole = blocks::measure(&catalogue, clips, &truth).whole;
     rows.push(row(&catalogue, PredictorKind::Truth, &truth.description, &Measured { whole, blocks: Vec::new() }));
     task.advance(1);
@@ -96,7 +96,7 @@ pub fn measure(clips: &EvalClips, settings: &Settings, predictors: &[Predictor],
     })
 }
 
-/// One half of the truth beside the other: figures of whole sets of frames alone, since no frame has a partner.
+/// One half of the ground truth against the other, for metrics of whole sets only, since frames have no partner.
 fn halves(catalogue: &Catalogue, clips: &EvalClips) -> Option<PredictorRow> {
     let measured = blocks::halves(catalogue, clips);
     if measured.blocks.is_empty() {
@@ -112,7 +112,7 @@ fn halves(catalogue: &Catalogue, clips: &EvalClips) -> Option<PredictorRow> {
     Some(row)
 }
 
-/// Whether a figure compares two sets of frames whatever their order.
+/// Whether a metric compares two sets of frames regardless of their order.
 fn is_of_sets(definition: &Definition) -> bool {
     ["frechet", "hellinger"].iter().any(|start| definition.name.starts_with(start))
 }
@@ -125,7 +125,7 @@ fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: 
     } else {
         let counts = blocks::counts(&draws(n_blocks, N_DRAWS), n_blocks);
         let mut drawn = catalogue.draw_cheap(&measured.blocks, counts.view());
-        // the first of the same draws
+        // A prefix of the same draws.
         let costly = catalogue.draw_costly(&measured.blocks, counts.slice(s![..N_COSTLY_DRAWS, ..]));
         for index in (0..values.len()).filter(|index| catalogue.is_costly(*index)) {
             drawn.column_mut(index).fill(f64::NAN);
@@ -135,7 +135,7 @@ fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: 
     };
     let estimate = |(index, value): (usize, &f64)| {
         let estimate = Estimate::from_draws(*value, &drawn.column(index).to_vec());
-        // no figure is below 0
+        // Metrics are never below 0.
         Estimate { low: estimate.low.max(0.0 * estimate.low), ..estimate }
     };
     let reason = |(index, value): (usize, &f64)| match value.is_finite() {
@@ -152,13 +152,13 @@ fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: 
 }
 
 impl Table {
-    /// The figures of a predictor, where it was measured.
+    /// Row of a predictor, if it was measured.
     pub fn row(&self, kind: PredictorKind) -> Option<&PredictorRow> {
         self.rows.iter().find(|row| row.kind == kind)
     }
 
-    /// By how much `a` is better than `b` in a figure, in its unit: above 0 where it is better, with the interval of the
-    /// same draws of both. NaN where the figure knows no better.
+    /// Gain of `a` over `b` in a metric, in its unit, positive where `a` is better, with the interval of paired draws.
+    /// NaN where neither direction of the metric is better.
     pub fn gain(&self, a: &PredictorRow, b: &PredictorRow, index: usize) -> Estimate {
         let good = |value: f64, truth: f64| match self.definitions.get(index).map(|d| d.better) {
             Some(Better::Higher) => value,

@@ -1,9 +1,9 @@
-//! Figures as people read them: a plain name, digits that say something, the interval in brackets.
+//! Labels of metrics for people: name, unit, rounded value, interval in brackets.
 
 use crate::evaluate::table::bootstrap::Estimate;
 use crate::metrics::catalogue::{Better, Definition};
 
-/// Names of families of figures, longest beginning first where two begin alike.
+/// Names of metric families; of common prefixes the longest comes first.
 const NAMES: [(&str, &str); 26] = [
     ("pck_3d", "correct keypoints"),
     ("pck_2d", "correct keypoints, front view"),
@@ -33,7 +33,7 @@ const NAMES: [(&str, &str); 26] = [
     ("energy", "motion energy"),
 ];
 
-/// `correct keypoints at 0.2, fingers`
+/// Name with the part of the body, like `correct keypoints at 0.2, fingers`.
 pub fn name(definition: &Definition) -> String {
     match part(definition) {
         "" => whole_name(definition),
@@ -41,7 +41,7 @@ pub fn name(definition: &Definition) -> String {
     }
 }
 
-/// The name without the part of the body.
+/// Name without the part of the body.
 pub fn whole_name(definition: &Definition) -> String {
     let known =
         NAMES.iter().filter(|(start, _)| definition.name.starts_with(start)).max_by_key(|(start, _)| start.len());
@@ -61,7 +61,7 @@ pub fn whole_name(definition: &Definition) -> String {
     name
 }
 
-/// The part of the body, plainly; all of it needs no word.
+/// Part of the body; empty for the whole body.
 pub fn part(definition: &Definition) -> &'static str {
     match definition.part {
         "all" => "",
@@ -74,7 +74,7 @@ pub fn part(definition: &Definition) -> &'static str {
     }
 }
 
-/// Which way it is good, as a sign of one letter or two: more, less, as the truth, one.
+/// Short sign of the better direction: more, less, as the ground truth, near one.
 pub const fn direction(better: Better) -> &'static str {
     match better {
         Better::Higher => "more is better",
@@ -85,7 +85,7 @@ pub const fn direction(better: Better) -> &'static str {
     }
 }
 
-/// What a figure is counted in; shares are shown in percent.
+/// Unit of a metric; shares are shown in percent.
 pub fn unit(definition: &Definition) -> &str {
     if is_share(definition) {
         return "%";
@@ -105,27 +105,27 @@ fn is_share(definition: &Definition) -> bool {
     definition.name.starts_with("pck")
 }
 
-/// The value alone, `-` where there is none.
+/// Value alone, `-` where there is none.
 pub fn number(definition: &Definition, value: f64) -> String {
     let value = if is_share(definition) { 100.0 * value } else { value };
     if !value.is_finite() {
         return "-".to_owned();
     }
-    // three digits that say something
+    // Three significant digits.
     let digits = match value.abs() {
         _ if is_share(definition) => 1,
         n if n >= 100.0 => usize::from(n < 1000.0),
         n if n >= 10.0 => 1,
         n if n >= 1.0 => 2,
         n if n >= 0.001 => (2.0 - n.log10().floor()) as usize,
-        // what is less is rounding
+        // Smaller values are rounding.
         _ => 4,
     };
     let text = format!("{value:.digits$}");
     if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') { "0".to_owned() } else { text }
 }
 
-/// `41.2 [38.0, 44.1]`
+/// Value with interval, like `41.2 [38.0, 44.1]`.
 pub fn bracketed(definition: &Definition, estimate: &Estimate) -> String {
     let number = |value: f64| number(definition, value);
     match estimate.low.is_finite() && estimate.high.is_finite() {

@@ -1,4 +1,4 @@
-//! What an evaluation says in words: the verdict on a result, the labels of metrics, and the text of the terminal.
+//! Conclusions in words: the verdict on a result, labels of metrics, and the text for the terminal.
 
 pub mod labels;
 pub mod text;

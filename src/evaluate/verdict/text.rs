@@ -1,4 +1,4 @@
-//! The table as text for a terminal.
+//! Table as text for a terminal.
 
 use super::labels;
 use super::verdict::{better_than_nothing, hears};
@@ -22,9 +22,9 @@ const fn heads(kind: PredictorKind) -> [&'static str; 2] {
     }
 }
 
-/// The table, what its columns are, and what follows from it.
+/// Table, descriptions of its columns, and conclusions.
 ///
-/// With `all`, every figure; otherwise those of arms, fingers and wrists only of correct keypoints and joint errors.
+/// `all` shows every metric; otherwise arms, fingers and wrists are shown for correct keypoints and joint errors only.
 pub fn text(table: &Table, all: bool) -> String {
     let Table { n_clips, n_blocks, n_frames, secs, block_secs, .. } = table;
     let clips = if *n_clips == 1 { "clip" } else { "clips" };
@@ -70,7 +70,7 @@ pub fn text(table: &Table, all: bool) -> String {
     text
 }
 
-/// Figures that nobody has a value of, with the reason; those of one reason together.
+/// Sentences on metrics without any value, grouped by reason.
 pub fn undefined(table: &Table) -> Vec<String> {
     let mut by_reason: Vec<(String, Vec<String>)> = Vec::new();
     let Some(own) = table.row(PredictorKind::Prediction) else { return Vec::new() };
@@ -85,7 +85,7 @@ pub fn undefined(table: &Table) -> Vec<String> {
     by_reason.into_iter().map(|(reason, names)| format!("{}: {reason}", names.join(", "))).collect()
 }
 
-/// Whether a figure is shown where not all are: the whole of it, its only part, or a part of the first figures of place.
+/// Whether a metric is shown without `all`: the whole body, its only part, or a part of the first position metrics.
 fn is_main(table: &Table, index: usize) -> bool {
     let definition = &table.definitions[index];
     let name = labels::whole_name(definition);
@@ -112,7 +112,7 @@ fn named(table: &Table, index: usize) -> String {
     format!("{sign}  {}{unit}", labels::name(definition))
 }
 
-/// Two heads and a cell for each figure; the prediction's with their intervals.
+/// Two heads and a cell a metric; the prediction's cells have intervals.
 fn column(table: &Table, row: &PredictorRow, shown: &[usize]) -> Vec<String> {
     let cell = |index: &usize| {
         let (definition, estimate) = (&table.definitions[*index], &row.values[*index]);

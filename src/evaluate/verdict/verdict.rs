@@ -1,6 +1,6 @@
-//! What a table means in plain words: is the prediction better than doing nothing, and does it hear? Several figures are
-//! asked, each with the interval of its difference on the same draws; one alone says little (a pose that never moves
-//! has many correct keypoints).
+//! Conclusions from a table: whether the prediction is better than no motion, and whether it follows the sound. Several
+//! metrics vote, each with the interval of its paired difference, since one alone is misleading (a constant pose has
+//! many correct keypoints).
 
 use super::labels;
 use crate::evaluate::baseline::baselines::PredictorKind;
@@ -9,21 +9,21 @@ use crate::evaluate::table::table::{FEW_BLOCKS, PredictorRow, Table};
 use crate::metrics::catalogue::Better;
 use serde::Serialize;
 
-/// What a figure is about.
+/// Aspect of motion that a metric describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Aspect {
-    /// Where the joints are at each moment.
+    /// Position of the joints at each moment.
     Place,
-    /// Which poses are made, and how they follow each other.
+    /// Poses and their sequence.
     Poses,
-    /// How fast it moves.
+    /// Speed of movement.
     Movement,
-    /// Whether it moves on the beat of the sound.
+    /// Alignment of movement with the beat of the sound.
     Beat,
 }
 
-/// What a figure says.
+/// Conclusion of a metric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Answer {
@@ -32,31 +32,31 @@ pub enum Answer {
     Undecided,
 }
 
-/// A figure that was asked.
+/// Vote of a metric.
 #[derive(Clone, Debug, Serialize)]
 pub struct Vote {
     #[serde(rename = "figure")]
     pub metric: String,
     pub aspect: Aspect,
-    /// Who it was held against.
+    /// Predictor of the comparison.
     pub against: PredictorKind,
     pub answer: Answer,
-    /// How much better, in the figure's unit; below 0: worse.
+    /// Gain in the metric's unit; below 0: worse.
     pub gain: Estimate,
 }
 
-/// A question with its answer.
+/// Question with its conclusion.
 #[derive(Clone, Debug, Serialize)]
 pub struct Verdict {
-    /// `yes`, `no`, `in part` or `undecided`.
+    /// One of `yes`, `no`, `in part`, `undecided`.
     pub word: &'static str,
-    /// In full, but for what each figure says.
+    /// Full sentence without the votes.
     pub sentence: String,
-    /// The figures that were asked.
+    /// Votes of the metrics.
     pub votes: Vec<Vote>,
 }
 
-/// Is it better than the better of the poses that never move?
+/// Compares the prediction with the better of the constant poses.
 pub fn better_than_nothing(table: &Table) -> Verdict {
     let question = "Is it better than doing nothing?";
     let Some(own) = table.row(PredictorKind::Prediction) else { return nothing(question) };
@@ -65,7 +65,7 @@ pub fn better_than_nothing(table: &Table) -> Verdict {
     let of = |aspect: Aspect| summed(votes.iter().filter(|vote| vote.aspect == aspect));
     let asks = |aspect: Aspect| votes.iter().any(|vote| vote.aspect == aspect);
     let rest = match summed(votes.iter().filter(|vote| vote.aspect != Aspect::Place)) {
-        // a pose that fits better, and never moves either, has its poses for it and no movement
+        // A constant pose that fits better wins by its poses, and has no movement.
         Answer::Yes if asks(Aspect::Movement) && of(Aspect::Movement) != Answer::Yes => Answer::Undecided,
         rest => rest,
     };
@@ -131,7 +131,7 @@ pub fn better_than_nothing(table: &Table) -> Verdict {
     Verdict { word, sentence: format!("{question} {}: {description}.{oracle}", capital(word)), votes }
 }
 
-/// The better of the poses that never move, in a figure.
+/// Better of the constant poses in a metric.
 fn better_still(table: &Table, index: usize) -> Option<&PredictorRow> {
     let better = |a: &PredictorRow, b: &PredictorRow| table.gain(a, b, index).value >= 0.0;
     let constant_poses =
@@ -139,7 +139,7 @@ fn better_still(table: &Table, index: usize) -> Option<&PredictorRow> {
     constant_poses.reduce(|a, b| if better(a, b) { a } else { b })
 }
 
-/// Whether the prediction is better in one figure than the better of the poses that never move, whatever that says.
+/// Comparison of the prediction with the better of the constant poses in one metric, whatever its aspect.
 pub fn against_nothing(table: &Table, index: usize) -> Option<Answer> {
     let gain = table.gain(table.row(PredictorKind::Prediction)?, better_still(table, index)?, index);
     (gain.value.is_finite() && table.n_blocks >= FEW_BLOCKS).then(|| answer(&gain))
@@ -153,8 +153,8 @@ fn answer(gain: &Estimate) -> Answer {
     }
 }
 
-/// Does it fit its own sound better than another's? It is held against itself out of step where there is such a row:
-/// another clip's motion is made for another posture too.
+/// Compares the prediction with a mismatched one. Its own shifted prediction is preferred where there is one, since
+/// another clip's motion also has another posture.
 pub fn hears(table: &Table) -> Verdict {
     let question = "Does it hear?";
     let other = table.row(PredictorKind::LatePrediction).or_else(|| table.row(PredictorKind::MismatchedPrediction));
@@ -201,7 +201,7 @@ fn too_few(question: &str, table: &Table) -> Verdict {
     Verdict { word: "undecided", sentence, votes: Vec::new() }
 }
 
-/// What the figures of these aspects say, each against a row of its own.
+/// Votes of the metrics of these aspects, each against its own row.
 fn votes<'a>(
     table: &'a Table,
     own: &PredictorRow,
@@ -219,16 +219,16 @@ fn votes<'a>(
     (0..table.definitions.len()).filter_map(vote).collect()
 }
 
-/// What a figure is asked for; none for those that say the same as another.
+/// Aspect of a metric; `None` for metrics that repeat another.
 fn aspect(table: &Table, index: usize) -> Option<Aspect> {
     let definition = &table.definitions[index];
     let is_first = |start: &str| table.definitions.iter().position(|d| d.name.starts_with(start)) == Some(index);
     let starts = |start: &str| definition.name.starts_with(start);
-    // the whole body, or the first part there is
+    // Whole body, or the first part present.
     let is_whole = table.definitions.iter().position(|d| d.name == definition.name) == Some(index);
     match definition.better {
         Better::Neither => None,
-        // of several shares, planes and parts the first
+        // First of several shares, planes and parts.
         _ if starts("pck") => is_first("pck").then_some(Aspect::Place),
         _ if starts("maje") => Some(Aspect::Place),
         _ if starts("mpjpe") => is_first("mpjpe").then_some(Aspect::Place),
@@ -240,7 +240,7 @@ fn aspect(table: &Table, index: usize) -> Option<Aspect> {
     }
 }
 
-/// Yes or no where some say so and none the contrary.
+/// Yes or no where some votes say so and none the contrary.
 fn summed<'a>(votes: impl Iterator<Item = &'a Vote>) -> Answer {
     let (mut yes, mut no) = (false, false);
     for vote in votes {
@@ -255,7 +255,7 @@ fn summed<'a>(votes: impl Iterator<Item = &'a Vote>) -> Answer {
 }
 
 impl Verdict {
-    /// The sentence with what the figures say: `... (better: a, b; worse: c; not told apart: d)`
+    /// Sentence with the votes: `... (better: a, b; worse: c; not told apart: d)`.
     pub fn text(&self) -> String {
         let of = |answer: Answer| {
             let names: Vec<&str> =
