@@ -1,5 +1,5 @@
-//! Pictures of an evaluation: the share of correct keypoints of every joint on a figure, and how often each speed and jerk
-//! is made and real.
+//! Charts of an evaluation: share of correct keypoints by joint, drawn on a body and two hands, and distributions of
+//! speed and jerk of prediction and ground truth.
 
 use crate::evaluate::clips::clips::{EvalClip, EvalClips};
 use crate::evaluate::table::table::Table;
@@ -11,7 +11,7 @@ use crate::types::skeleton;
 use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, is_duplicate};
 use ndarray::ArrayView3;
 
-/// What a joint is called beside what share of its frames is correct, on a body and two hands.
+/// Charts of the share of correct frames of every joint, on a body and two hands.
 pub fn joints(table: &Table, clips: &EvalClips) -> Vec<Node> {
     let alpha = table.settings.alphas.first().copied().unwrap_or(0.2);
     let shares = shares(clips, alpha);
@@ -20,7 +20,7 @@ pub fn joints(table: &Table, clips: &EvalClips) -> Vec<Node> {
     let mut edges = Vec::new();
     let mut all = Vec::new();
     for joint in (0..N_JOINTS).filter(|joint| !is_duplicate(*joint)) {
-        // a finger's first bone begins at the wrist of the large hand
+        // A finger's first bone begins at the wrist of the large hand.
         let parent = skeleton::parent(joint);
         edges.extend(parent.map(|parent| [place(parent), place(joint)]));
         if joint == NECK {
@@ -57,7 +57,7 @@ pub fn joints(table: &Table, clips: &EvalClips) -> Vec<Node> {
     vec![node("p").text(about), node("div").class("card scroll wide").child(drawing), scale]
 }
 
-/// The share of each joint, NaN where it is never seen.
+/// Share of correct frames of each joint, NaN where never seen.
 fn shares(clips: &EvalClips, alpha: f64) -> Vec<f64> {
     let (mut right, mut seen) = (vec![0.0; N_JOINTS], vec![0.0; N_JOINTS]);
     for clip in &clips.clips {
@@ -81,14 +81,14 @@ fn shares(clips: &EvalClips, alpha: f64) -> Vec<f64> {
     right.iter().zip(&seen).map(|(right, seen)| right / seen).collect()
 }
 
-/// Where a joint of the body is drawn; the speaker's right is on the left.
+/// Position of a body joint in the chart; the speaker's right is on the left.
 fn body_place(joint: usize) -> [f64; 2] {
     let places =
         [[180.0, 60.0], [120.0, 72.0], [84.0, 150.0], [112.0, 222.0], [240.0, 72.0], [276.0, 150.0], [248.0, 222.0]];
     places[joint.min(L_WRIST)]
 }
 
-/// Where a joint of a hand is drawn, fingers up, the thumbs inside; the root of a hand stands for its wrist.
+/// Position of a hand joint in the chart, fingers up, thumbs inside; the root of a hand stands for its wrist.
 fn hand_place(joint: usize) -> [f64; 2] {
     let (root, sign, x) = if joint >= R_HAND { (R_HAND, 1.0, 405.0) } else { (L_HAND, -1.0, 640.0) };
     let wrist = [x, 228.0];
@@ -102,7 +102,7 @@ fn hand_place(joint: usize) -> [f64; 2] {
     [wrist[0] + sign * length * angle.sin(), wrist[1] - length * angle.cos()]
 }
 
-/// How often each speed and jerk of wrists and finger tips is made and real.
+/// Distributions of speed and jerk of wrists and finger tips.
 pub fn speeds(clips: &EvalClips) -> Vec<Node> {
     let wrists = [skeleton::R_WRIST, L_WRIST];
     let tips: Vec<usize> = [L_HAND, R_HAND].iter().flat_map(|root| (1..=5).map(move |k| root + 4 * k)).collect();
@@ -139,7 +139,7 @@ pub fn speeds(clips: &EvalClips) -> Vec<Node> {
     vec![node("p").text(about), legend(), node("div").class("grid").children(charts.into_iter().map(card))]
 }
 
-/// The norms of the differences of that order of a joint, per second to that power, where it is seen throughout.
+/// Norms of a joint's differences of this order, per second to that power, where it is seen throughout.
 fn derivative<'a>(
     clip: &'a EvalClip,
     joints: ArrayView3<'a, f32>,
@@ -157,7 +157,7 @@ fn derivative<'a>(
     })
 }
 
-/// Which colour is whose.
+/// Legend of the colours.
 pub fn legend() -> Node {
     let key = |class: &str, name: &str| {
         node("li").child(node("span").class(format!("swatch line {class}"))).child(node("span").text(name))

@@ -1,4 +1,4 @@
-//! The page of an evaluation: its table, its charts, and the player of truth beside prediction.
+//! Page of an evaluation: table, charts, and the player of ground truth beside prediction.
 
 pub mod charts;
 pub mod page;

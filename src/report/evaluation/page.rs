@@ -1,5 +1,5 @@
-//! The page of an evaluation: what the figures mean, all of them beside what defends them, how made and real motion look
-//! beside each other, and both playing with the sound. The same table and clips give the same bytes.
+//! Page of an evaluation: conclusions, the table with its baselines, charts, and a player with sound. The bytes depend
+//! on the table and the clips alone.
 
 use super::charts::{joints, speeds};
 use super::player;
@@ -14,7 +14,7 @@ use crate::report::html::{Node, Page, Section, node};
 use anyhow::Result;
 use serde_json::json;
 
-/// The whole file.
+/// Whole page.
 pub fn html(table: &Table, clips: &EvalClips, title: &str) -> Result<String> {
     let excerpts = player::choose(clips)?;
     let section = |id, title, body| Section { id, title, body };
@@ -51,7 +51,7 @@ fn lead(table: &Table) -> String {
     )
 }
 
-/// The two sentences, what the figures say to each, and what had to be assumed.
+/// Conclusions with the votes behind them, and assumptions.
 fn meaning(table: &Table, verdicts: &[Verdict; 2]) -> Vec<Node> {
     let card = |verdict: &Verdict| {
         let class = format!("card verdict {}", verdict.word.replace(' ', "-"));

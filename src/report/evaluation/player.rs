@@ -1,6 +1,6 @@
-//! Excerpts of an evaluation to watch: the best, the typical and the worst by the error of the joints, truth and prediction
-//! side by side with the sound, and under them the wrists and the beats over time. A minute at most, motion to a
-//! millimetre, so that the page stays small.
+//! Excerpts of an evaluation: the best, the typical and the worst by joint error, ground truth and prediction side by
+//! side with the sound, and charts of wrists and beats over time. At most a minute in all and motion in whole
+//! millimetres, which bounds the page's size.
 
 use super::charts::legend;
 use crate::evaluate::clips::clips::{EvalClip, EvalClips};
@@ -19,28 +19,29 @@ use ndarray::ArrayView3;
 use serde_json::{Value, json};
 use std::ops::Range;
 
-/// Longest excerpt, and most frames of it a second.
+/// Longest excerpt, seconds, and its highest frame rate.
 const MOST_SECS: f64 = 20.0;
 const MOST_FPS: f64 = 30.0;
-/// A joint that is not there.
+/// Value of a missing joint.
 const MISSING: i16 = i16::MIN;
-/// Order of a beat, as the beat consistency has it: 7 frames of 30 a second on either side are faster.
+/// Half window of a motion beat, as in beat consistency: a local minimum of speed over 7 frames at 30 fps on either
+/// side.
 const BEAT_SECS: f64 = 7.0 / 30.0;
 
-/// A stretch of a clip to watch.
+/// Part of a clip in the player.
 pub struct Excerpt {
     pub name: String,
     pub secs: f64,
     fps: f64,
-    /// i16 millimetres [T, 49, 3], little endian.
+    /// Joints [T, 49, 3] in millimetres, i16, little endian.
     ground_truth: Vec<u8>,
     predicted: Vec<u8>,
-    /// A wav file.
+    /// Sound as a wav file.
     sound: Option<Vec<u8>>,
     lanes: Vec<Lane>,
 }
 
-/// The excerpts: of all stretches of at most `MOST_SECS` that with the least, the median and the largest error.
+/// Excerpts with the smallest, median and largest error among all parts of at most `MOST_SECS`.
 pub fn choose(clips: &EvalClips) -> Result<Vec<Excerpt>> {
     let mut stretches: Vec<(f64, usize, Range<usize>)> = Vec::new();
     for (i, clip) in clips.clips.iter().enumerate() {
@@ -104,7 +105,7 @@ fn millimetres(joints: ArrayView3<f32>, frames: &[usize]) -> Vec<u8> {
     numbers.flat_map(i16::to_le_bytes).collect()
 }
 
-/// A wav file of 16 bits, mono.
+/// Mono wav file of 16 bits.
 fn wav(samples: &[i16]) -> Vec<u8> {
     let n_bytes = 2 * samples.len() as u32;
     let mut file = Vec::with_capacity(44 + n_bytes as usize);
@@ -124,7 +125,7 @@ fn wav(samples: &[i16]) -> Vec<u8> {
     file
 }
 
-/// Heights and speeds of the wrists over time, the loudness with its onsets, and the beats of the motion.
+/// Charts of wrist height and speed over time, loudness with onsets, and motion beats.
 fn lanes_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[i16]>) -> Vec<Lane> {
     let secs = |t: usize| (t - frames.start) as f64 / fps;
     let both: [(&str, ArrayView3<f32>); 2] = [("real", clip.ground_truth.view()), ("made", clip.predicted.view())];
@@ -189,7 +190,7 @@ fn wrist_speed(clip: &EvalClip, joints: ArrayView3<f32>, frames: &Range<usize>, 
 }
 
 impl Excerpt {
-    /// What the script reads.
+    /// Data of the page's script.
     pub fn data(&self) -> Value {
         json!({
             "secs": self.secs,
@@ -214,7 +215,7 @@ pub fn bones() -> Vec<[usize; 3]> {
     (0..N_JOINTS).filter(|joint| !is_duplicate(*joint)).filter_map(bone).collect()
 }
 
-/// The player and the charts under it.
+/// Player and the charts under it.
 pub fn body(excerpts: &[Excerpt], table: &Table) -> Vec<Node> {
     if excerpts.is_empty() {
         return vec![node("p").class("empty").text("There is no stretch with motion on both sides to show.")];

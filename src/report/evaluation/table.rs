@@ -1,4 +1,4 @@
-//! The figures of an evaluation as a table, and their exact definitions.
+//! Metrics of an evaluation as a table, and their exact definitions.
 
 use crate::evaluate::baseline::baselines::PredictorKind;
 use crate::evaluate::table::table::{N_COSTLY_DRAWS, N_DRAWS, Table};
@@ -7,7 +7,7 @@ use crate::evaluate::verdict::verdict::{Answer, against_nothing};
 use crate::metrics::catalogue::{Better, Definition};
 use crate::report::html::{Node, node};
 
-/// Groups of figures by the beginnings of their names; the last takes what is left.
+/// Groups of metrics by the prefixes of their names; the last takes the rest.
 const GROUPS: [(&str, &[&str]); 4] = [
     ("Where the joints are", &["pck", "l1", "mpjpe", "p_mpjpe", "maje", "mae", "acceleration_error"]),
     ("Which poses and movements", &["frechet", "l1div", "diversity", "pairwise", "average_pairwise", "apd", "cca"]),
@@ -15,7 +15,7 @@ const GROUPS: [(&str, &[&str]); 4] = [
     ("Sound and the rest", &[""]),
 ];
 
-/// The table.
+/// Table by group.
 pub fn body(table: &Table) -> Vec<Node> {
     let head = |text: &str| node("th").attr("scope", "col").class("num").text(text);
     let heads = table.rows.iter().map(|row| head(row.kind.name()));
@@ -46,14 +46,15 @@ pub fn body(table: &Table) -> Vec<Node> {
 }
 
 fn group_of(definition: &Definition) -> usize {
-    // acceleration_error is an error of places, acceleration is none: the longest beginning counts
+    // The longest prefix counts: acceleration_error is a position error, acceleration is not.
     let starts =
         GROUPS.iter().enumerate().flat_map(|(group, (_, starts))| starts.iter().map(move |start| (group, *start)));
     let fitting = starts.filter(|(_, start)| definition.name.starts_with(start));
     fitting.max_by_key(|(_, start)| start.len()).map_or(GROUPS.len() - 1, |(group, _)| group)
 }
 
-/// A figure; none that nobody has. Of one that differs from the `last` in its part alone only the part is named.
+/// Row of a metric; `None` without any value. A metric that differs from the `last` in its body part alone shows only
+/// the part.
 fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
     let definition = &table.definitions[index];
     let has_value = table.rows.iter().any(|row| row.values[index].value.is_finite());
@@ -97,7 +98,7 @@ fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
     Some(node("tr").child(name).child(against).children(cells))
 }
 
-/// Every definition with its parameters and hash, those of the real motion alone too.
+/// Every definition with its parameters and hash, those of the ground truth alone included.
 pub fn definitions(table: &Table) -> Vec<Node> {
     let item = |definition: &Definition| {
         let name = node("summary").text(labels::name(definition));

@@ -1,5 +1,5 @@
-//! The file itself: head, navigation, sections, and the little script and style that all pages share. It needs nothing
-//! beside it and its policy lets it load nothing.
+//! Whole file: head, navigation, sections, and the style and script that all pages share. A page refers to no other
+//! file, and its content security policy forbids loading any.
 
 use super::node::{Node, node};
 use serde_json::Value;
@@ -9,29 +9,29 @@ const SCRIPT: &str = include_str!("page.js");
 const POLICY: &str =
     "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
-/// A page.
+/// HTML page.
 pub struct Page {
     pub title: String,
-    /// A sentence under the title.
+    /// Sentence under the title.
     pub lead: String,
     pub sections: Vec<Section>,
-    /// Style and script of its own, after those of all pages.
+    /// Style and script of this page, after the shared ones.
     pub style: &'static str,
     pub script: &'static str,
-    /// What its script reads (element `data`).
+    /// Data of its script (element `data`).
     pub data: Value,
 }
 
-/// A section of a page.
+/// Section of a page.
 pub struct Section {
-    /// What links point at; letters and dashes.
+    /// Anchor; letters and dashes.
     pub id: &'static str,
     pub title: &'static str,
     pub body: Vec<Node>,
 }
 
 impl Page {
-    /// The whole file.
+    /// Text of the file.
     pub fn html(&self) -> String {
         let links =
             self.sections.iter().map(|section| node("a").attr("href", format!("#{}", section.id)).text(section.title));
@@ -39,7 +39,7 @@ impl Page {
             let title = node("h2").text(section.title);
             node("section").id(section.id).child(title).children(section.body.iter().cloned())
         });
-        // `<` inside a JSON text only stands in strings, where this is the same letter.
+        // Within JSON `<` stands only in strings, where the escape is equivalent.
         let data = self.data.to_string().replace('<', "\\u003c");
         let head = node("head")
             .child(node("meta").attr("charset", "utf-8"))

@@ -1,7 +1,6 @@
-//! HTML pages for people: the one room that writes markup. `html` builds elements and escapes every word in them,
-//! `document` makes of them one file that needs nothing else, `figures` writes numbers as people read them; the rest are
-//! pictures of numbers, drawn without a script: `timeline`, `bars`, `histogram`, `curve`, `chart`, `ranges`,
-//! `profile`, `lanes`, `dots`, `picture`. What stands on a page is decided elsewhere (`report`).
+//! HTML pages for people, the only folder that writes markup. `node` builds elements and escapes text, `document` makes
+//! a self-contained file, `numbers` formats numbers, `chart` draws SVG charts and `picture` embeds JPEG. Contents are
+//! decided by the pages (`videos`, `training`, `evaluation`).
 
 pub mod chart;
 pub mod document;

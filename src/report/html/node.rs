@@ -1,9 +1,9 @@
-//! Elements of a page. Words and attribute values are escaped here and nowhere else; markup comes from `Node` alone, so
-//! no text of a user can become one.
+//! HTML elements. Text and attribute values are escaped here and nowhere else; markup comes from `Node` alone, so no
+//! text of a user can become markup.
 
 use std::fmt::{self, Display, Write as _};
 
-/// An element with its attributes and what is in it.
+/// Element with its attributes and content.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
     name: &'static str,
@@ -11,12 +11,12 @@ pub struct Node {
     inner: String,
 }
 
-/// An empty element, like `node("p")`.
+/// Empty element, like `node("p")`.
 pub fn node(name: &'static str) -> Node {
     Node { name, attributes: String::new(), inner: String::new() }
 }
 
-/// Text with what would be markup replaced.
+/// Text with markup characters replaced by entities.
 pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
@@ -34,13 +34,13 @@ pub fn escape(text: &str) -> String {
 }
 
 impl Node {
-    /// With an attribute; its name is ours, its value anybody's.
+    /// Adds an attribute; the name is a constant, the value any text.
     pub fn attr(mut self, name: &str, value: impl Display) -> Self {
         let _ = write!(self.attributes, " {name}=\"{}\"", escape(&value.to_string()));
         self
     }
 
-    /// With an attribute that has no value, like `hidden`.
+    /// Adds an attribute without a value, like `hidden`.
     pub fn flag(mut self, name: &str) -> Self {
         let _ = write!(self.attributes, " {name}");
         self
@@ -54,7 +54,7 @@ impl Node {
         self.attr("id", name)
     }
 
-    /// Words after what is in it already.
+    /// Appends text.
     pub fn text(mut self, words: impl Display) -> Self {
         self.inner.push_str(&escape(&words.to_string()));
         self
@@ -69,7 +69,7 @@ impl Node {
         children.into_iter().fold(self, Node::child)
     }
 
-    /// The content of a style or script, which knows no escapes: `text` is our own, and its closing tag is not in it.
+    /// Sets the content of a style or script, which has no escapes; `text` is a constant without the closing tag.
     pub(crate) fn verbatim(mut self, text: &str) -> Self {
         self.inner.push_str(text);
         self

@@ -1,8 +1,8 @@
-//! Numbers as people read them.
+//! Numbers formatted for people.
 
-/// A length of time: `41.2 s`, `12.4 min`, `3.27 h`. The page's script has the same.
+/// Duration: `41.2 s`, `12.4 min`, `3.27 h`, like `length` in `page.js`.
 pub fn length(secs: f64) -> String {
-    // A sum of nothing is -0.
+    // An empty sum is -0.
     let secs = secs + 0.0;
     match secs.abs() {
         n if n < 120.0 => format!("{secs:.1} s"),
@@ -11,7 +11,7 @@ pub fn length(secs: f64) -> String {
     }
 }
 
-/// A moment of a video: `0:04.8`, `1:02:03.0`.
+/// Time in a video: `0:04.8`, `1:02:03.0`.
 pub fn clock(secs: f64) -> String {
     let tenths = (secs.max(0.0) * 10.0).round() as u64;
     let (hours, minutes, rest) = (tenths / 36_000, tenths / 600 % 60, tenths % 600);
@@ -19,7 +19,7 @@ pub fn clock(secs: f64) -> String {
     if hours > 0 { format!("{hours}:{minutes:02}:{seconds}") } else { format!("{minutes}:{seconds}") }
 }
 
-/// At least three digits that say something, no idle zero among them.
+/// Number with at least three significant digits and no trailing zeros.
 pub fn number(value: f64) -> String {
     if !value.is_finite() {
         return "unknown".to_owned();
@@ -35,17 +35,17 @@ pub fn number(value: f64) -> String {
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// With its unit, which may be empty.
+/// Number with its unit, which may be empty.
 pub fn with_unit(value: f64, unit: &str) -> String {
     format!("{} {unit}", number(value)).trim_end().to_owned()
 }
 
-/// A share of a whole in percent; of nothing, a dash.
+/// Share of a whole in percent; a dash for an empty whole.
 pub fn percent(part: f64, whole: f64) -> String {
     if whole > 0.0 { format!("{:.1} %", 100.0 * part / whole + 0.0) } else { "\u{2013}".to_owned() }
 }
 
-/// `1 video`, `2 videos`, `3 stretches`.
+/// Number with a noun: `1 video`, `2 videos`, `3 stretches`.
 pub fn counted(n: usize, what: &str) -> String {
     let ending = if what.ends_with("ch") { "es" } else { "s" };
     if n == 1 { format!("1 {what}") } else { format!("{n} {what}{ending}") }

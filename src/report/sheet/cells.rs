@@ -1,5 +1,5 @@
-//! The cells of a contact sheet: the picture under its keypoints, and the 3D pose on a grid of decimetres, from the
-//! front or from the left, always at the same scale. Where cells stand on a page is decided in `sheet`.
+//! Cells of a contact sheet: the video frame under its keypoints, and the 3D pose on a decimetre grid from the front or
+//! from the left, at constant scale.
 
 use crate::animate::draw::figure::{FigureView, INK, PAPER, draw_pose, mix};
 use crate::animate::draw::overlay;
@@ -13,25 +13,24 @@ use ndarray::ArrayView2;
 
 /// Side of a cell, px.
 pub const CELL_PX: usize = 340;
-/// Scale of the 3D cells, and where the neck stands in them.
+/// Scale of the 3D cells, and the position of the neck in them.
 const PX_PER_METRE: f32 = 270.0;
 const NECK_PX: [f32; 2] = [CELL_PX as f32 / 2.0, 125.0];
-/// The part of the picture shown is this much larger than what was found in it.
+/// Size of the crop relative to the extent of the keypoints.
 const MARGIN: f32 = 1.15;
-/// A picture is not enlarged further than this.
+/// Largest magnification of a frame.
 const MAX_ENLARGED: f32 = 4.0;
 
-/// The square of the picture that is shown in every cell of a clip.
+/// Square crop of the video that all cells of a clip show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SheetCrop {
-    /// Size in px of the whole picture after scaling.
+    /// Size of the whole frame after scaling, px.
     scaled: [usize; 2],
     place: ImageTransform,
 }
 
 impl SheetCrop {
-    /// The square around all that was found in the clip, in a picture of `image_size` px; the whole picture where
-    /// nothing was.
+    /// Square around all keypoints found in the clip, in a frame of `image_size` px; the whole frame without keypoints.
     pub fn around(keypoints: &Keypoints, image_size: [usize; 2]) -> Self {
         let whole = image_size.map(|px| px as f32);
         let found = overlay::extent(keypoints).unwrap_or([0.0, 0.0, whole[0], whole[1]]);
@@ -45,7 +44,7 @@ impl SheetCrop {
         Self { scaled, place: ImageTransform { scale, shift: shift.map(f32::round) } }
     }
 
-    /// The frame the reader shows, cropped, under its keypoints.
+    /// Current frame of the reader, cropped, under its keypoints.
     pub fn cell(&self, reader: &mut FrameReader, keypoints: &Keypoints, frame_idx: usize) -> Result<Image> {
         let picture = reader.picture(Some(self.scaled))?;
         let mut cell = Image::filled(CELL_PX, CELL_PX, PAPER);
@@ -57,7 +56,7 @@ impl SheetCrop {
     }
 }
 
-/// From where a 3D cell is seen.
+/// Viewpoint of a 3D cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CellView {
     Front,
@@ -65,7 +64,7 @@ pub enum CellView {
     Left,
 }
 
-/// One pose [49, 3] on its grid, without perspective.
+/// Pose [49, 3] on its grid, without perspective.
 pub fn pose_cell(joints: ArrayView2<f32>, from: CellView) -> Result<Image> {
     let mut cell = Image::filled(CELL_PX, CELL_PX, PAPER);
     let view = FigureView {
@@ -85,7 +84,7 @@ pub fn pose_cell(joints: ArrayView2<f32>, from: CellView) -> Result<Image> {
     Ok(cell)
 }
 
-/// A line every 0.1 m, a stronger one every 0.5 m, the strongest through the neck.
+/// Draws a line every 0.1 m, a stronger one every 0.5 m, the strongest through the neck.
 fn draw_grid(cell: &mut Image) -> Result<()> {
     let end = CELL_PX as f32;
     for decimetre in -15..=15_i32 {
@@ -105,7 +104,7 @@ fn draw_grid(cell: &mut Image) -> Result<()> {
     Ok(())
 }
 
-/// The outline of a head above the neck, upright whatever the speaker does: it is in no data.
+/// Draws the outline of a head above the neck, always upright, since no data describes it.
 fn draw_head(cell: &mut Image, from: CellView) -> Result<()> {
     let rgb = mix(INK, PAPER, 0.6);
     let at = |across: f32, down: f32| [NECK_PX[0] + across * PX_PER_METRE, NECK_PX[1] + down * PX_PER_METRE];

@@ -1,6 +1,6 @@
-//! Contact sheets of a lifted clip: at regular moments the picture with its keypoints, the 3D pose from the front and
-//! from the left, and, if asked for, the animated figure beside it, page after page, each with a strip of the wrists' way. The video is streamed; only the page at work
-//! is in memory.
+//! Contact sheets of a lifted clip: at regular moments the frame with its keypoints, the 3D pose from the front and
+//! from the left, and on request the animated rig, with a chart of the wrists on each page. The video is streamed; only
+//! one page is in memory.
 
 use super::cells::{CELL_PX, CellView, SheetCrop, pose_cell};
 use super::strip::{STRIP_PX, draw_strip};
@@ -19,25 +19,25 @@ use std::path::Path;
 
 /// Rows of moments on a page.
 const ROWS: usize = 5;
-/// A moment: a line of words over its cells, then a gap.
+/// Height of a moment: a line of text, its cells, a gap.
 const WORDS_PX: usize = 22;
 const GAP_PX: usize = 16;
 const MOMENT_HIGH_PX: usize = WORDS_PX + CELL_PX + 6;
 const TITLE_PX: usize = 36;
 
-/// What a sheet is drawn of.
+/// Content of a contact sheet.
 pub struct SheetClip<'a> {
     pub title: &'a str,
     pub video: &'a Path,
     pub keypoints: &'a Keypoints,
     pub motion: &'a Motion,
-    /// What the animation makes of it, if that is to be seen too, frame by frame the motion's.
+    /// Motion of the animated rig, frame by frame that of `motion`, if it is shown too.
     pub figure: Option<&'a Motion>,
 }
 
 impl SheetClip<'_> {
     /// Draws a moment every `every_secs` and hands out page after page (page, number of pages, picture). Errors: no
-    /// frames; keypoints, motion and video of unequal lengths or rates; a moment every less than a frame.
+    /// frames; keypoints, motion and video of unequal lengths or rates; a step shorter than a frame.
     pub fn pages(
         &self,
         every_secs: f64,
@@ -70,7 +70,7 @@ impl SheetClip<'_> {
         Ok(())
     }
 
-    /// Moments side by side.
+    /// Number of moments side by side.
     fn n_columns(&self) -> usize {
         if self.figure.is_some() { 1 } else { 2 }
     }
@@ -80,7 +80,7 @@ impl SheetClip<'_> {
         n_cells * CELL_PX + GAP_PX
     }
 
-    /// The frames drawn.
+    /// Frames that are drawn.
     fn moments(&self, every_secs: f64) -> Result<Vec<usize>> {
         let (n_frames, fps) = (self.motion.n_frames(), self.motion.fps);
         ensure!(n_frames > 0, "the motion has no frames: nothing to draw");
@@ -102,7 +102,7 @@ impl SheetClip<'_> {
         Ok(moments.collect())
     }
 
-    /// That the video is as long as the motion, as far as its headers tell.
+    /// Checks that the video is as long as the motion, as far as its headers tell.
     fn check_length(&self, reader: &FrameReader) -> Result<()> {
         let (n_frames, fps) = (self.motion.n_frames(), self.motion.fps);
         let Some(expected) = reader.expected_frames() else { return Ok(()) };
@@ -164,7 +164,7 @@ impl SheetClip<'_> {
         draw::text(page, &self.words(frame_idx), [left as f32 + 6.0, (top + WORDS_PX - 6) as f32], 10.0, INK)
     }
 
-    /// `3.0 s   wrists shake L 2.1 R 0.9 mm   not seen: left hand`
+    /// Text over a moment: `3.0 s   wrists shake L 2.1 R 0.9 mm   not seen: left hand`.
     fn words(&self, frame_idx: usize) -> String {
         let mask = self.motion.mask.row(frame_idx);
         let half_seen = |root: usize| (1..N_HAND_JOINTS).filter(|j| mask[root + j]).count() * 2 >= N_HAND_JOINTS;

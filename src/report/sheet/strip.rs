@@ -1,4 +1,4 @@
-//! The strip under a contact sheet: height and depth of both wrists over time, filled stretches paler than seen ones.
+//! Chart under a contact sheet: height and depth of both wrists over time, filled frames paler than seen ones.
 
 use crate::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, mix};
 use crate::external::opencv::draw;
@@ -8,14 +8,14 @@ use crate::types::skeleton::{L_WRIST, R_WRIST};
 use anyhow::Result;
 use std::ops::Range;
 
-/// Height of a strip, px.
+/// Height of the chart, px.
 pub const STRIP_PX: usize = 260;
-/// Room for the words at the left.
+/// Width of the labels at the left.
 const MARGIN_PX: f32 = 60.0;
-/// What a lane shows: its axis, its range in metres from its top to its bottom, the words beside it.
+/// Axis of a lane, its range in metres from top to bottom, and its label.
 const LANES: [(usize, [f32; 2], &str); 2] = [(1, [-0.3, 0.7], "height"), (2, [-0.7, 0.1], "depth")];
 
-/// Draws the wrists over the frames `frames`, the rows of the picture from `top` on; a mark stands at each of `marks`.
+/// Draws the wrists over the frames `frames` from row `top` on, with a mark at each of `marks`.
 pub fn draw_strip(image: &mut Image, top: usize, motion: &Motion, frames: Range<usize>, marks: &[usize]) -> Result<()> {
     let lane_px = (STRIP_PX as f32 - 30.0) / LANES.len() as f32;
     let (left, right) = (MARGIN_PX, image.width as f32 - 10.0);

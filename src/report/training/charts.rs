@@ -1,18 +1,18 @@
-//! The curves of a training from the lines of its log.
+//! Curves of a training from the lines of its log.
 
 use crate::report::html::chart::lines::{ChartLevel, ChartLine, LineChart};
 use serde_json::Value;
 
-/// Most points of a curve; neighbours of a longer one are averaged.
+/// Largest number of points of a curve; neighbours of a longer one are averaged.
 const MOST_POINTS: usize = 240;
 
-/// What the log of a training tells.
+/// Parsed log of a training.
 pub struct TrainingLog<'a> {
-    /// Lines of steps.
+    /// Lines of training steps.
     steps: Vec<&'a Value>,
     /// Lines of validations.
     pub epochs: Vec<&'a Value>,
-    /// The validation with the best (least) score.
+    /// Validation with the best (smallest) score.
     pub best: Option<&'a Value>,
 }
 
@@ -24,7 +24,7 @@ impl<'a> TrainingLog<'a> {
         Self { steps, epochs, best }
     }
 
-    /// All curves that are not 0 throughout.
+    /// Curves that are not 0 throughout.
     pub fn charts(&self) -> Vec<LineChart> {
         let made = |name: &str, colour, of: &str| self.validated(name, colour, &format!("/validation/generator/{of}"));
         let still = |name: &str, colour, of: &str| self.level(name, colour, &format!("/validation/mean_pose/{of}"));
@@ -86,19 +86,19 @@ impl<'a> TrainingLog<'a> {
         charts.into_iter().filter(says_something).collect()
     }
 
-    /// The curve of a number of the training lines.
+    /// Curve of a value of the training lines.
     fn trained(&self, name: &str, colour: usize, of: &str) -> ChartLine {
         let places = self.steps.iter().filter_map(|line| Some([line["step"].as_f64()?, line[of].as_f64()?]));
         ChartLine { name: name.to_owned(), colour, places: thinned(&places.collect::<Vec<_>>()) }
     }
 
-    /// The curve of a number of the validations.
+    /// Curve of a value of the validations.
     fn validated(&self, name: &str, colour: usize, at: &str) -> ChartLine {
         let places = self.epochs.iter().filter_map(|line| Some([line["step"].as_f64()?, line.pointer(at)?.as_f64()?]));
         ChartLine { name: name.to_owned(), colour, places: thinned(&places.collect::<Vec<_>>()) }
     }
 
-    /// A number that is the same in all validations.
+    /// Level of a value that all validations share.
     fn level(&self, name: &str, colour: usize, at: &str) -> ChartLevel {
         let last = self.epochs.last().and_then(|line| line.pointer(at)).and_then(Value::as_f64);
         ChartLevel { name: name.to_owned(), colour, value: last.unwrap_or(f64::NAN) }

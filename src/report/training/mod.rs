@@ -1,4 +1,4 @@
-//! The page of a training: its curves, and generated beside true poses.
+//! Page of a training: curves, and generated beside true poses.
 
 pub mod charts;
 pub mod page;

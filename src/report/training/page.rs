@@ -1,5 +1,5 @@
-//! How a training went, on one page beside its checkpoints: the curves of its log with the best epoch marked, the best
-//! epoch's figures beside the mean pose's, and generated against true poses.
+//! Page of a training beside its checkpoints: the curves of its log with the best epoch marked, the best epoch's
+//! metrics beside the mean pose's, and generated against true poses.
 
 use super::charts::TrainingLog;
 use super::picture::picture;
@@ -15,11 +15,11 @@ use anyhow::{Context, Result};
 use serde_json::Value;
 use std::path::Path;
 
-/// The page, and the same as a picture.
+/// File names of the page and of its picture.
 pub const PAGE: &str = "training.html";
 pub const PICTURE: &str = "training.png";
 
-/// A figure of a validation: name, where it stands, in percent.
+/// Metric of a validation: name, JSON pointer, whether in percent.
 const FIGURES: [(&str, &str, bool); 6] = [
     ("L1 error (normalised)", "l1", false),
     ("PCK 0.2", "pck", true),
@@ -29,8 +29,8 @@ const FIGURES: [(&str, &str, bool); 6] = [
     ("Motion energy as a share of the data's", "energy", true),
 ];
 
-/// Writes `training.html` and `training.png` into the training's folder, from the log there and poses of held-out
-/// intervals, which may be none. The same log and poses give the same bytes.
+/// Writes `training.html` and `training.png` into the training's folder, from its log and poses of held-out intervals
+/// (possibly none). The bytes depend on log and poses alone.
 pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> {
     let lines = log::read(folder)?;
     let told = TrainingLog::parse(&lines);
@@ -82,7 +82,7 @@ fn lead(told: &TrainingLog) -> String {
     )
 }
 
-/// The table of the best epoch, and the alarm where there is one.
+/// Table of the best epoch, and a warning where one is due.
 fn best(told: &TrainingLog) -> Vec<Node> {
     let Some(best) = told.best.map(|line| &line["validation"]) else {
         return vec![node("p").class("empty").text("The log has no validation.")];

@@ -1,4 +1,4 @@
-//! The same page as one picture: the curves in rows, the strip under them.
+//! Page of a training as one picture: the curves in rows, the poses below.
 
 use super::strip::WIDTH;
 use crate::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, mix};
@@ -12,10 +12,10 @@ const N_COLUMNS: usize = 4;
 const CELL: [usize; 2] = [WIDTH / N_COLUMNS, 180];
 const TITLE_PX: usize = 40;
 const GAP_PX: usize = 20;
-/// The page's colours of lines.
+/// Line colours, equal to those of the page.
 const COLOURS: [[u8; 3]; 3] = [LEFT, RIGHT, [122, 128, 134]];
 
-/// Draws title, curves and strip.
+/// Draws title, curves and poses.
 pub fn picture(title: &str, charts: &[LineChart], strip: &Image) -> Result<Image> {
     let charts_px = charts.len().div_ceil(N_COLUMNS) * CELL[1];
     let mut image = Image::filled(WIDTH, TITLE_PX + charts_px + GAP_PX + strip.height, PAPER);
@@ -36,7 +36,7 @@ fn draw_chart(image: &mut Image, [left, top]: [f32; 2], chart: &LineChart) -> Re
     let (ceiling, floor) = (top + 40.0, top + CELL[1] as f32 - 24.0);
     let x = |step: f64| start + (end - start) * ((step - first) / (last - first)) as f32;
     let y = |value: f64| floor + (ceiling - floor) * ((value - low) / (high - low)).clamp(0.0, 1.0) as f32;
-    // the font knows ASCII alone
+    // The font has ASCII only.
     draw::text(image, &chart.title.replace('\u{b2}', "2"), [left + 10.0, top + 14.0], 9.0, INK)?;
     let mut at = left + 10.0;
     for (name, colour) in chart.lines.iter().map(|line| (&line.name, line.colour)) {

@@ -1,5 +1,5 @@
-//! Generated against true poses of held-out intervals: for each the figure at a few moments, true above generated, and
-//! the height of both wrists over time.
+//! Generated against true poses of held-out intervals: the figure at a few moments, true above generated, and the
+//! height of both wrists over time.
 
 use crate::animate::draw::figure::{FigureView, INK, LEFT, PAPER, RIGHT, draw_pose, mix};
 use crate::external::opencv::draw;
@@ -10,10 +10,10 @@ use anyhow::Result;
 use ndarray::Axis;
 use std::ops::Range;
 
-/// A held-out interval: what is true, and what was made for its sound; the same rate and, but for rounding, length.
+/// Ground truth and generated motion of a held-out interval, of one rate and, up to rounding, one length.
 pub struct HeldOutPair {
     pub name: String,
-    /// Where in the interval they begin.
+    /// Start within the interval, seconds.
     pub start_secs: f64,
     pub ground_truth: Motion,
     pub predicted: Motion,
@@ -22,15 +22,15 @@ pub struct HeldOutPair {
 const N_MOMENTS: usize = 8;
 const EVERY_SECS: f64 = 0.5;
 const CELL: [usize; 2] = [136, 150];
-/// Room for the words at the left, and for the name above.
+/// Width of the labels at the left, and height of the name above, px.
 const MARGIN: usize = 84;
 const NAME_PX: usize = 24;
 const LANE_PX: usize = 64;
 const PAIR_PX: usize = NAME_PX + 2 * CELL[1] + 2 * LANE_PX + 14;
-/// Least height a lane shows from bottom to top.
+/// Smallest height range of a lane, metres.
 const LANE_METRES: f32 = 0.15;
 
-/// Width of a strip, px.
+/// Width of the picture, px.
 pub const WIDTH: usize = MARGIN + N_MOMENTS * CELL[0];
 
 /// Draws the pairs one below the other.
@@ -46,7 +46,7 @@ fn draw_pair(image: &mut Image, top: usize, pair: &HeldOutPair) -> Result<()> {
     let fps = pair.ground_truth.fps;
     let n_frames = pair.ground_truth.n_frames().min(pair.predicted.n_frames());
     let span = ((N_MOMENTS as f64 * EVERY_SECS * fps.per_sec()).round() as usize).clamp(1, n_frames.max(1));
-    // from the middle: the beginning of an interval is often a rest
+    // From the middle, since an interval often begins at rest.
     let first = n_frames.saturating_sub(span) / 2;
     let frame_of = |moment: usize| first + (2 * moment + 1) * span / (2 * N_MOMENTS);
     let words = format!("{}, from {:.1} s", pair.name, pair.start_secs + fps.secs(first));
@@ -87,7 +87,7 @@ fn draw_pair(image: &mut Image, top: usize, pair: &HeldOutPair) -> Result<()> {
     Ok(())
 }
 
-/// Highest and lowest place of a wrist in either motion, metres below the neck.
+/// Largest and smallest height of a wrist in either motion, metres below the neck.
 fn range(pair: &HeldOutPair, joint: usize, frames: Range<usize>) -> [f32; 2] {
     let heights = [&pair.ground_truth, &pair.predicted].into_iter().flat_map(|motion| {
         frames.clone().map(|frame| motion.joints[[frame, joint, 1]]).filter(|height| height.is_finite())

@@ -1,4 +1,4 @@
-//! How often each value was measured, beside its threshold.
+//! Histograms of every measure with its threshold.
 
 use super::spread::{MeasureCounts, MeasureHistogram};
 use crate::config::Settings;
@@ -6,7 +6,7 @@ use crate::report::html::chart::histogram::histogram;
 use crate::report::html::numbers::{counted, percent};
 use crate::report::html::{Node, node};
 
-/// A card a measure.
+/// Card for each measure.
 pub fn distributions(spread: &MeasureCounts, settings: &Settings, per_sec: f64) -> Vec<Node> {
     let about = "Of all frames of all videos, also the refused ones. The side that does not pass is in the other colour; \
                  heights go with the square root of the share, so that rare values can be seen; what lies beyond an end is in \

@@ -1,4 +1,4 @@
-//! The worst frames of every rule, as pictures.
+//! Worst frames of every rule as pictures.
 
 use super::pictures::MomentThumbnail;
 use super::reasons;
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 /// Pictures by video and by the frames of their moment.
 pub type Pictures = BTreeMap<(usize, Vec<usize>), MomentThumbnail>;
 
-/// A row of pictures a rule.
+/// Row of pictures for each rule.
 pub fn gallery(worst: &Worst, pictures: &Pictures, videos: &[VideoSummary]) -> Vec<Node> {
     if worst.rules.is_empty() {
         return vec![node("p").class("empty").text("Nothing was refused, or no pictures were asked for.")];

@@ -1,4 +1,5 @@
-//! Goes through the videos once, one at a time, and adds each to the sums. Of a video only its ledger is kept.
+//! Single pass over the videos, one at a time, that collects all data of the report. Of a video only its ledger is
+//! kept.
 
 use super::movement::MovementCounts;
 use super::spread::MeasureCounts;
@@ -19,19 +20,19 @@ use crate::types::interval::Intervals;
 use anyhow::{Context, Result, ensure};
 use std::path::Path;
 
-/// All the numbers of a report.
+/// Data of a report.
 pub struct ReportData {
     pub videos: Vec<VideoSummary>,
-    /// By video; `None`: nothing to judge.
+    /// Results of `what_if` by video; `None`: nothing to judge.
     pub kept: Vec<Option<Kept>>,
     pub spread: MeasureCounts,
     pub movement: MovementCounts,
     pub worst: Worst,
-    /// Entries of the configuration that lead to no video.
+    /// Entries of the configuration without a video.
     pub missing: Vec<String>,
 }
 
-/// Gathers of all `videos`; at most `n_pictures` moments a rule.
+/// Collects the data of all `videos`, at most `n_pictures` moments a rule.
 pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progress: &dyn Progress) -> ReportData {
     let missing = videos.iter().flat_map(|of| of.missing.iter().map(move |text| format!("{}: {text}", of.speaker)));
     let mut all = ReportData {
@@ -60,7 +61,7 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
 }
 
 impl ReportData {
-    /// Adds what was measured of a video; what cannot be read becomes a note.
+    /// Adds the measures of a video; what cannot be read becomes a note.
     fn add(&mut self, settings: &Settings, video: &mut VideoSummary) -> Option<Kept> {
         let rules = &settings.segment;
         let (work, unit) = (&settings.work.dir, video.unit.clone());

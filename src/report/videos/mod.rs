@@ -1,6 +1,6 @@
-//! The page of a speaker's videos. Gathered (`gather`, once through the videos): `video`, `what_if`, `spread`,
-//! `movement`, `worst`, `pictures`. Shown: `summary`, `timelines`, `gallery`, `distributions`, `sliders`, `motion`;
-//! `page` puts them together.
+//! Page of a speaker's videos. Data (`gather`, one pass over the videos): `video`, `what_if`, `spread`, `movement`,
+//! `worst`, `pictures`. Sections: `summary`, `timelines`, `gallery`, `distributions`, `sliders`, `motion`; `page` joins
+//! them.
 
 pub mod distributions;
 pub mod gallery;

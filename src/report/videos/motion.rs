@@ -1,4 +1,4 @@
-//! Where the joints go and how fast.
+//! Charts of joint positions and speeds.
 
 use super::movement::{MovementCounts, PAIRS};
 use crate::report::html::chart::profile::profile;
@@ -6,7 +6,7 @@ use crate::report::html::chart::ranges::{ValueRange, ranges};
 use crate::report::html::numbers::{counted, number};
 use crate::report::html::{Node, node};
 
-/// Axis: what it is, and what lies at its ends.
+/// Axis with the labels of its ends.
 const AXES: [(&str, [&str; 2]); 3] = [
     ("across", ["speaker's right", "speaker's left"]),
     ("height", ["up", "down"]),
@@ -74,7 +74,7 @@ fn range_card(
             })
         })
         .collect();
-    // one scale for the three axes, so that they compare
+    // One scale for the three axes, so that they are comparable.
     let all = pairs().flat_map(|(joints, _)| joints).flat_map(|joint| [0, 1, 2].map(|axis| joint.marks(axis)));
     let farthest = all.flatten().filter(|mark| mark.is_finite()).fold(0.05, |a: f64, b| a.max(b.abs()));
     let end = (farthest * 20.0).ceil() / 20.0;

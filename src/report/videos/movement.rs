@@ -1,16 +1,16 @@
-//! Where joints are and how fast they move in the kept frames. Arms are measured from the neck, finger tips from their wrist.
+//! Positions and speeds of joints in the kept frames. Arms are measured from the neck, finger tips from their wrist.
 
 use crate::report::html::chart::histogram::Counts;
 use crate::types::interval::Interval;
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::{L_ELBOW, L_HAND, L_WRIST, NECK, R_ELBOW, R_HAND, R_WRIST};
 
-/// Farther than this no joint is from what it hangs on, metres.
+/// Largest distance of a joint from its reference, metres.
 const REACH: f64 = 1.2;
-/// Faster ones are counted as this fast, metres a second.
+/// Largest counted speed, metres a second.
 const FASTEST: f64 = 3.0;
 
-/// A joint of each side (left, right) and what each is measured from.
+/// Joint of each side (left, right) and the joints they are measured from.
 #[derive(Clone, Copy)]
 pub struct JointPair {
     pub name: &'static str,
@@ -32,11 +32,11 @@ pub const PAIRS: [JointPair; 5] = [
     tip("little tip", 4),
 ];
 
-/// One joint's places by axis (x to the speaker's left, y down, z away from the camera), and its speeds.
+/// Positions of a joint by axis (x to the speaker's left, y down, z away from the camera), and its speeds.
 pub struct JointMovement {
     places: [Counts; 3],
     ends: [[f64; 2]; 3],
-    /// Metres a second.
+    /// Speeds, metres a second.
     pub speeds: Counts,
 }
 
@@ -50,7 +50,7 @@ impl JointMovement {
         }
     }
 
-    /// Lowest, 5 %, median, 95 %, highest on an axis, metres; NaN where it was never there.
+    /// Minimum, 5 %, median, 95 %, maximum on an axis, metres; NaN where never measured.
     pub fn marks(&self, axis: usize) -> [f64; 5] {
         if self.places[axis].total() == 0 {
             return [f64::NAN; 5];
@@ -61,7 +61,7 @@ impl JointMovement {
     }
 }
 
-/// Left and right of every pair.
+/// Left and right joint of every pair.
 pub struct MovementCounts {
     pub pairs: Vec<[JointMovement; 2]>,
     pub n_frames: usize,

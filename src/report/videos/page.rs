@@ -1,4 +1,4 @@
-//! The whole report: gathered, drawn, put on one page.
+//! Whole page of a speaker's videos.
 
 use super::gallery::{Pictures, gallery};
 use super::gather::{ReportData, gather};
@@ -12,23 +12,23 @@ use crate::report::html::{Page, Section};
 use crate::stage::progress::Progress;
 use serde_json::json;
 
-/// What is to be reported on.
+/// Request for a report.
 pub struct ReportRequest<'a> {
     pub settings: &'a Settings,
     pub videos: &'a [Videos],
-    /// Most pictures of a rule; 0: no video is opened.
+    /// Largest number of pictures of a rule; 0: no video is opened.
     pub n_pictures: usize,
 }
 
-/// A report.
+/// Report as a page and as numbers.
 pub struct ReportPage {
     pub html: String,
     pub sums: ReportTotals,
-    /// The same as numbers, for programs.
+    /// Contents as JSON.
     pub facts: serde_json::Value,
 }
 
-/// Makes the report. What is missing is said on the page.
+/// Makes the report. Missing data is named on the page.
 pub fn make(wanted: &ReportRequest, progress: &dyn Progress) -> ReportPage {
     let ReportRequest { settings, videos, n_pictures } = *wanted;
     let mut gathered = gather(settings, videos, n_pictures, progress);

@@ -1,5 +1,5 @@
-//! Thumbnails of the chosen moments: frames of the video, small, under their keypoints. A video is read once, and no further
-//! than its last moment.
+//! Thumbnails of the chosen moments: small video frames under their keypoints. A video is read once, up to its last
+//! moment.
 
 use super::worst::Worst;
 use crate::animate::draw::overlay;
@@ -21,14 +21,14 @@ const MOST_PX: [f64; 2] = [400.0, 260.0];
 const GAP_PX: usize = 4;
 const GAP_RGB: [u8; 3] = [255; 3];
 
-/// A thumbnail.
+/// Thumbnail of a moment.
 #[derive(Clone, Debug)]
 pub struct MomentThumbnail {
     pub jpeg: Vec<u8>,
     pub size: [usize; 2],
 }
 
-/// The pictures of video number `video`, by the frames of their moments.
+/// Pictures of video number `video`, by the frames of their moments.
 pub fn thumbnails(
     work: &Path,
     unit: &Unit,
@@ -61,7 +61,7 @@ pub fn thumbnails(
     moments.into_iter().map(|frames| Ok((frames.clone(), picture(frames)?))).collect()
 }
 
-/// The frame on show under its keypoints, `n_wide` of which stand side by side.
+/// Current frame under its keypoints, `n_wide` of which stand side by side.
 fn thumb(reader: &mut FrameReader, keypoints: &Keypoints, frame_idx: usize, n_wide: usize) -> Result<Image> {
     let size = reader.image_size();
     let whole = size.map(|px| px.max(1) as f64);

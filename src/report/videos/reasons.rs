@@ -1,10 +1,10 @@
-//! The reasons of a ledger in the order in which they are shown, each with its colour's class and a sentence. One colour is
-//! one kind of thing; of two reasons of a kind one is striped (`report.css`).
+//! Reasons of a ledger in display order, each with the CSS class of its colour and a sentence. A colour stands for a
+//! kind of reason; of two reasons of a kind one is striped (`page.css`).
 
-/// Stands for the stage of a video that no stage has finished.
+/// Label of a video that no stage has finished.
 pub const WAITING: &str = "not done";
 
-/// Reason, sentence.
+/// Reason and sentence.
 const REASONS: [(&str, &str); 16] = [
     ("no sound", "no sound track, or it has ended"),
     ("quiet", "the sound is too quiet for speech"),
@@ -24,17 +24,17 @@ const REASONS: [(&str, &str); 16] = [
     ("open", "joints stay unseen for too long"),
 ];
 
-/// Its place in the order; unknown ones come last.
+/// Index in the order; unknown reasons come last.
 pub fn order(reason: &str) -> usize {
     REASONS.iter().position(|(known, _)| *known == reason).unwrap_or(REASONS.len())
 }
 
-/// The sentence; empty for unknown ones.
+/// Sentence of a reason; empty for unknown ones.
 pub fn description(reason: &str) -> &'static str {
     REASONS.iter().find(|(known, _)| *known == reason).map_or("", |(_, description)| description)
 }
 
-/// The class of its colour.
+/// CSS class of a reason.
 pub fn class(reason: &str) -> String {
     let known = REASONS.iter().any(|(known, _)| *known == reason);
     if known { format!("r-{}", reason.replace(' ', "-")) } else { "r-unknown".to_owned() }

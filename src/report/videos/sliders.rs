@@ -1,4 +1,4 @@
-//! A slider a threshold, and the table it picks from; `report.js` moves what is built here.
+//! Slider for each threshold, and the table behind it; `page.js` moves what is built here.
 
 use super::thresholds::{THRESHOLDS, ThresholdGrid};
 use super::video::VideoSummary;
@@ -9,7 +9,7 @@ use crate::report::html::numbers::{length, with_unit};
 use crate::report::html::{Node, node};
 use serde_json::{Value, json};
 
-/// Seconds kept of all videos: by threshold, by value.
+/// Seconds kept of all videos, by threshold and value.
 fn sums(kept: &[Option<Kept>], rules: &Segment) -> Kept {
     let zeros = || THRESHOLDS.iter().map(|threshold| vec![0.0; threshold.grid(rules).0.len()]).collect::<Kept>();
     kept.iter().flatten().fold(zeros(), |mut sums, of| {
@@ -20,7 +20,7 @@ fn sums(kept: &[Option<Kept>], rules: &Segment) -> Kept {
     })
 }
 
-/// What the script reads: thresholds with their values and sums, videos with their seconds (in tenths, by threshold).
+/// Data of the script: thresholds with their values and sums, videos with their seconds (in tenths, by threshold).
 pub fn data(kept: &[Option<Kept>], videos: &[VideoSummary], rules: &Segment) -> Value {
     let milli = |secs: f64| (secs * 1000.0).round() / 1000.0;
     let row = |(threshold, sums): (&ThresholdGrid, &Vec<f64>)| {
@@ -42,7 +42,7 @@ pub fn data(kept: &[Option<Kept>], videos: &[VideoSummary], rules: &Segment) -> 
     json!({ "thresholds": thresholds, "videos": judged.collect::<Vec<_>>() })
 }
 
-/// The sliders.
+/// Section of sliders.
 pub fn sliders(kept: &[Option<Kept>], rules: &Segment) -> Vec<Node> {
     if kept.iter().all(Option::is_none) {
         return vec![node("p").class("empty").text("No video has been judged yet: orator run.")];

@@ -1,12 +1,11 @@
-//! How often each value was measured, over all frames of all videos, and how long the kept stretches are.
+//! Distributions of every measure over all frames of all videos, and of the lengths of kept intervals.
 
 use crate::config::Settings;
 use crate::pipeline::segment::Measures;
 use crate::report::html::chart::histogram::{Counts, ThresholdLine};
 use crate::stage::ledger::Ledger;
 
-/// A measure: its array, what it says, its unit, the ends and the number of its bins, its threshold, and whether
-/// that is the least value.
+/// Measure: its array, title, unit, range and number of its bins, its threshold, and whether that is a minimum.
 struct Measure {
     name: &'static str,
     title: &'static str,
@@ -107,17 +106,17 @@ const ROWS: [Measure; 15] = [
     ),
 ];
 
-/// The counts of all rows.
+/// Counts of all measures.
 pub struct MeasureCounts(Vec<Counts>);
 
-/// A row to be shown.
+/// Histogram of a measure.
 pub struct MeasureHistogram<'a> {
     pub title: &'static str,
     pub key: &'static str,
     pub unit: &'static str,
     pub counts: &'a Counts,
     pub threshold: ThresholdLine,
-    /// What is counted.
+    /// Noun of what is counted.
     pub of: &'static str,
 }
 
@@ -139,17 +138,17 @@ impl MeasureCounts {
         }
     }
 
-    /// Counts what lifting measured of a video's frames.
+    /// Counts the bone changes of a video's frames.
     pub fn add_bones(&mut self, bone_change: &[f32]) {
         self.add(BONES, bone_change.iter().map(|value| f64::from(*value)));
     }
 
-    /// Counts the stretches a video keeps.
+    /// Counts the intervals that a video keeps.
     pub fn add_kept(&mut self, ledger: &Ledger) {
         self.add(LENGTHS, ledger.kept.iter().map(|kept| kept.end_secs - kept.start_secs));
     }
 
-    /// Every row, with its threshold under `settings` for frames that come `per_sec` a second.
+    /// Histograms of all measures with thresholds under `settings` for videos of `per_sec` frames a second.
     pub fn shown(&self, settings: &Settings, per_sec: f64) -> Vec<MeasureHistogram<'_>> {
         let shown = self.0.iter().zip(&ROWS).map(|(counts, row)| {
             let (key, value, is_least) = row.threshold;

@@ -1,4 +1,4 @@
-//! The first sections: the sums, the seconds by reason, and a row a video.
+//! First sections: totals, seconds by reason, and a table of videos.
 
 use super::reasons;
 use super::reasons::WAITING;
@@ -42,7 +42,7 @@ impl ReportTotals {
     }
 }
 
-/// The sums as tiles, and what is to be known of them.
+/// Totals as tiles, with notes.
 pub fn totals(sums: &ReportTotals, videos: &[VideoSummary], missing: &[String]) -> Vec<Node> {
     let tile = |name: &str, id: &str, secs: f64, description: String| {
         let value = node("b").id(id).attr("data-secs", format!("{secs:.3}")).text(length(secs));
@@ -63,7 +63,7 @@ pub fn totals(sums: &ReportTotals, videos: &[VideoSummary], missing: &[String]) 
     std::iter::once(node("div").class("tiles").children(tiles)).chain(notes).collect()
 }
 
-/// A bar a reason, the longest first.
+/// Bar for each reason, the longest first.
 pub fn by_reason(sums: &ReportTotals) -> Vec<Node> {
     let bar = |(reason, secs): (&String, &f64)| StackedBar {
         name: reason.clone(),
@@ -89,7 +89,7 @@ pub fn by_reason(sums: &ReportTotals) -> Vec<Node> {
     vec![bars("Seconds kept, refused by reason, and failed", &parts, sums.whole)]
 }
 
-/// A row a video, with a link to its line.
+/// Table of videos, linked to their timelines.
 pub fn table(videos: &[VideoSummary]) -> Vec<Node> {
     let heads = [("Video", ""), ("Length", "num"), ("Kept", "num"), ("", "num"), ("Most refused for", "")];
     let head = heads.into_iter().map(|(name, class)| node("th").class(class).attr("scope", "col").text(name));

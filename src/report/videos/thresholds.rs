@@ -1,25 +1,25 @@
-//! The thresholds of `[segment]` that can be tried out: what each means, and the values it is tried at.
+//! Thresholds of `[segment]` with sliders: meaning, and grid of values.
 
 use crate::config::Segment;
 
 /// Steps between the ends of a grid.
 const N_STEPS: u32 = 20;
 
-/// One of them.
+/// Threshold with its grid.
 pub struct ThresholdGrid {
-    /// Its key in `[segment]`.
+    /// Key in `[segment]`.
     pub key: &'static str,
     pub description: &'static str,
-    /// Empty: a score or a share, 0 to 1.
+    /// Unit; empty for a score or a share, 0 to 1.
     pub unit: &'static str,
-    /// Ends of what is tried.
+    /// Ends of the grid.
     pub low: f64,
     pub high: f64,
     pub get: fn(&Segment) -> f64,
     pub set: fn(&mut Segment, f64),
 }
 
-/// A row: key, sentence, unit, ends, and the field.
+/// Grid of a threshold: key, sentence, unit, ends, and the field.
 macro_rules! row {
     ($key:ident, $description:literal, $unit:literal, $low:literal, $high:literal) => {
         ThresholdGrid {
@@ -34,7 +34,7 @@ macro_rules! row {
     };
 }
 
-/// The thresholds of `[segment]`.
+/// Thresholds of `[segment]`.
 pub const THRESHOLDS: [ThresholdGrid; 16] = [
     row!(min_sound_db, "least loudness of the second around a frame", "dB of full scale", -90.0, -10.0),
     row!(max_quiet_secs, "longest pause of speech that is kept", "s", 0.0, 10.0),
@@ -77,7 +77,7 @@ pub const THRESHOLDS: [ThresholdGrid; 16] = [
 ];
 
 impl ThresholdGrid {
-    /// The values it is tried at, rising, and which of them is the configured one.
+    /// Values of the grid, ascending, and the index of the configured one.
     pub fn grid(&self, rules: &Segment) -> (Vec<f64>, usize) {
         let configured = (self.get)(rules);
         let step = (self.high - self.low) / f64::from(N_STEPS);
@@ -89,14 +89,14 @@ impl ThresholdGrid {
         (grid, at)
     }
 
-    /// `rules` with this one at `value`.
+    /// Copy of `rules` with this threshold at `value`.
     pub fn with(&self, rules: &Segment, value: f64) -> Segment {
         let mut other = rules.clone();
         (self.set)(&mut other, value);
         other
     }
 
-    /// The value as it is written in `pipeline.toml`.
+    /// Value as written in `pipeline.toml`.
     pub fn written(&self, value: f64) -> String {
         match self.key {
             "max_people" | "min_frames" => format!("{value:.0}"),

@@ -1,4 +1,4 @@
-//! A line a video: which of its seconds are kept, and why the others are not.
+//! Timeline of each video: kept seconds, and the reasons of the others.
 
 use super::reasons;
 use super::reasons::WAITING;
@@ -8,13 +8,13 @@ use crate::report::html::numbers::{clock, counted, length, number, with_unit};
 use crate::report::html::{Node, node};
 use std::collections::BTreeSet;
 
-/// Stretches that are drawn of all videos together, and the least of each: the page must not grow too large.
+/// Largest number of parts of all timelines together, which bounds the page, and smallest number of each.
 const MOST: usize = 40_000;
 const LEAST: usize = 50;
-/// No line is narrower than this share of the longest one's.
+/// Smallest width of a timeline as a share of the longest one's.
 const NARROWEST: f64 = 0.05;
 
-/// The lines of all videos under their legend.
+/// Timelines of all videos under their legend.
 pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
     let longest = videos.iter().map(|video| video.ledger.duration_secs).fold(0.0, f64::max).max(1e-9);
     let most = (MOST / videos.len().max(1)).max(LEAST);
@@ -52,7 +52,7 @@ pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
     shown
 }
 
-/// Every stretch of a ledger, in order.
+/// Parts of a ledger in order.
 fn stretches(video: &VideoSummary) -> Vec<TimelineSpan> {
     let ledger = &video.ledger;
     let stretch = |start_secs: f64, end_secs: f64, class: String, word: &str, description: String| TimelineSpan {
@@ -89,7 +89,7 @@ fn stretches(video: &VideoSummary) -> Vec<TimelineSpan> {
     all
 }
 
-/// What the colours on the lines mean.
+/// Legend of the colours.
 fn legend(videos: &[VideoSummary]) -> Node {
     let ledgers = || videos.iter().map(|video| &video.ledger);
     let found: BTreeSet<(usize, &str)> = ledgers()

@@ -1,4 +1,4 @@
-//! What became of a video: its ledger as the last stage left it, or the reason why there is none.
+//! State of a video: its ledger after the last finished stage, or the reason why there is none.
 
 use super::reasons::WAITING;
 use crate::formats::media_json::MediaInfo;
@@ -8,26 +8,26 @@ use crate::stage::ledger::Ledger;
 use crate::stage::record::Failure;
 use std::path::Path;
 
-/// A video of the report.
+/// Video of the report.
 #[derive(Clone, Debug)]
 pub struct VideoSummary {
     pub unit: Unit,
-    /// The file's name, as the user knows it.
+    /// File name.
     pub file: String,
-    /// Every second of it; empty where not even its length is known.
+    /// Ledger of the whole video; empty where not even its length is known.
     pub ledger: Ledger,
-    /// Whether lifting has had its say.
+    /// Whether the lift stage has finished.
     pub is_lifted: bool,
-    /// Whether a stage lost it.
+    /// Whether a stage failed.
     pub has_failed: bool,
-    /// What is missing of it, in sentences.
+    /// Missing data, in sentences.
     pub notes: Vec<String>,
-    /// Folders of this machine, and what stands for them on a page.
+    /// Local folders and their replacements on the page.
     folders: [(String, &'static str); 2],
 }
 
 impl VideoSummary {
-    /// Reads the verdict on `unit` from the folder `work`. What cannot be read is a note.
+    /// Reads the state of `unit` from the folder `work`. What cannot be read is a note.
     pub fn read(work: &Path, unit: &Unit) -> Self {
         let file = unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let folders = [(work, "work"), (unit.source.parent().unwrap_or(work), "")];
@@ -71,7 +71,7 @@ impl VideoSummary {
         video
     }
 
-    /// The account of a video without a verdict.
+    /// Records a failed stage.
     fn lose(&mut self, work: &Path, stage: &str, error: &str) {
         let media = MediaInfo::read(&Artifact::MediaInfo.path(work, &self.unit));
         let secs = media.ok().map(|media| media.duration_secs).filter(|secs| *secs > 0.0);
@@ -86,7 +86,7 @@ impl VideoSummary {
         }
     }
 
-    /// Adds a note; folders of this machine are not told.
+    /// Adds a note without local folder names.
     pub fn note(&mut self, text: &str) {
         let text = self.folders.iter().fold(text.to_owned(), |text, (folder, name)| match name.is_empty() {
             true => text.replace(&format!("{folder}/"), ""),
@@ -95,7 +95,7 @@ impl VideoSummary {
         self.notes.push(text);
     }
 
-    /// Where links to it point.
+    /// Anchor of its timeline.
     pub fn anchor(&self) -> String {
         format!("video-{}-{}", self.unit.speaker, self.unit.video)
     }

@@ -1,5 +1,5 @@
-//! The frames that show best what a rule refuses: of each refused stretch the frame farthest from the threshold, of each rule
-//! the stretches that break it most. Equal ones come in the order of the videos, so the choice is always the same.
+//! Frames that best show what a rule refuses: of each refused span the frame farthest from the threshold, of each rule
+//! the worst spans. Ties follow the order of the videos, so the choice is deterministic.
 
 use super::reasons;
 use crate::config::Segment;
@@ -10,29 +10,29 @@ use crate::report::html::numbers::number;
 use crate::stage::ledger::{Ledger, Refused};
 use std::collections::BTreeMap;
 
-/// A moment worth a picture.
+/// Moment with a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moment {
-    /// The video's place in the report.
+    /// Index of the video in the report.
     pub video: usize,
-    /// The frame, and before it the one it differs from, where a rule compares the two.
+    /// Frame, preceded by the one it is compared with where a rule compares two.
     pub frames: Vec<usize>,
     pub secs: f64,
-    /// How far beyond the threshold.
+    /// Excess over the threshold.
     beyond: f64,
-    /// The stretch's sentence.
+    /// Sentence of the refusal.
     pub description: String,
-    /// What was measured in this very frame; empty where the rule is not on frames.
+    /// Value in this frame; empty where the rule is not about frames.
     pub here: String,
 }
 
-/// A rule's place in the order, its reason and its unit: `turned` and `hands` are two rules each.
+/// Index in the order, reason and unit: `turned` and `hands` are two rules each.
 type Rule = (usize, String, String);
 
-/// The worst moments of every rule.
+/// Worst moments of every rule.
 pub struct Worst {
     pub rules: BTreeMap<Rule, Vec<Moment>>,
-    /// Most moments of a rule.
+    /// Largest number of moments of a rule.
     most: usize,
 }
 
@@ -41,7 +41,7 @@ impl Worst {
         Self { rules: BTreeMap::new(), most }
     }
 
-    /// Looks at a video's refused stretches; `bone_change` may be empty.
+    /// Adds a video's refused spans; `bone_change` may be empty.
     pub fn add(
         &mut self,
         video: usize,
@@ -61,7 +61,7 @@ impl Worst {
         self.rules.retain(|_, moments| !moments.is_empty());
     }
 
-    /// The frames wanted of a video, rising.
+    /// Frames needed of a video, ascending.
     pub fn frames_of(&self, video: usize) -> Vec<usize> {
         let moments = self.rules.values().flatten().filter(|moment| moment.video == video);
         let mut frames: Vec<usize> = moments.flat_map(|moment| moment.frames.iter().copied()).collect();
@@ -109,7 +109,7 @@ fn moment(
     Some(Moment { video, frames, secs: judged.fps.secs(t), beyond, description: stretch.says.clone(), here })
 }
 
-/// The frame that breaks the refusal's rules most: its number, value, bound, and whether the ledger means that value.
+/// Frame that breaks the refusal's rules most: index, value, bound, and whether the ledger means that value.
 fn farthest(
     refusal: Refusal,
     measures: &Measures,
@@ -118,7 +118,7 @@ fn farthest(
 ) -> Option<(usize, f64, Bound, bool)> {
     let on_frames = frame_rules(rules).into_iter().filter(|rule| rule.refusal == refusal);
     let on_frames = on_frames.map(|rule| (rule.values, rule.bound, !rule.says_secs));
-    // Of a share that must be reached, frames that do not count are the bad ones; of one that must not, those that do.
+    // For a minimum share the frames that do not count are the bad ones; for a maximum share those that do.
     let on_pieces = piece_rules(rules).into_iter().filter(|rule| rule.refusal == refusal).map(|rule| {
         let bad = match rule.share {
             Bound::AtLeast(_) => rule.counted,
@@ -136,7 +136,7 @@ fn farthest(
     known.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, found)| found)
 }
 
-/// The lowest (or highest) known value of the frames; of equal ones that nearest the middle.
+/// Smallest (or largest) known value of the frames; of equal ones that nearest the middle.
 fn extreme(values: &[f32], frames: std::ops::Range<usize>, lowest: bool) -> (usize, f64) {
     let middle = frames.start.midpoint(frames.end.saturating_sub(1));
     let known = frames.filter(|t| !values[*t].is_nan());
@@ -145,7 +145,7 @@ fn extreme(values: &[f32], frames: std::ops::Range<usize>, lowest: bool) -> (usi
     t.map_or((middle, f64::NAN), |t| (t, f64::from(values[t])))
 }
 
-/// What a frame's value is, in words.
+/// Value of a frame, in words.
 fn said(refusal: Refusal, value: f64) -> String {
     let value = number(value);
     match refusal {

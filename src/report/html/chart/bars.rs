@@ -3,17 +3,17 @@
 use crate::report::html::node::{Node, node};
 use crate::report::html::numbers::{length, percent};
 
-/// A part.
+/// Part of a whole.
 pub struct StackedBar {
     pub name: String,
-    /// What colours it.
+    /// CSS class of its colour.
     pub class: String,
     pub secs: f64,
-    /// What it means, in a sentence; may be empty.
+    /// Meaning in a sentence; may be empty.
     pub description: String,
 }
 
-/// A row a part, in the order given; `whole_secs` is what the shares are of.
+/// Table with a row a part in the given order; shares are of `whole_secs`.
 pub fn bars(caption: &str, parts: &[StackedBar], whole_secs: f64) -> Node {
     let longest = parts.iter().map(|part| part.secs).fold(0.0, f64::max).max(1e-9);
     let row = |part: &StackedBar| {

@@ -1,17 +1,17 @@
-//! A line over a few steps, with one step marked: how much each threshold would keep.
+//! Line over a few steps with one step marked: what each value of a threshold would keep.
 
 use super::scale::{Scale, drawing, line, px};
 use crate::report::html::node::{Node, node};
 
 const WIDTH: f64 = 300.0;
 const HEIGHT: f64 = 56.0;
-/// Where the first and the last step are: under the middle of a slider's thumb at its ends.
+/// Margins that put the first and last step under a slider's thumb at its ends.
 const TOP: f64 = 6.0;
 const FLOOR: f64 = 50.0;
 const LEFT: f64 = 8.0;
 const RIGHT: f64 = 292.0;
 
-/// `values` from 0 to `most`; the step `marked` has the line and the dot that a script moves (`data-xs`, `data-ys`).
+/// Curve of `values` from 0 to `most`; a script moves the line and dot of the step `marked` (`data-xs`, `data-ys`).
 pub fn curve(label: &str, values: &[f64], most: f64, marked: usize) -> Node {
     let x = Scale { low: 0.0, high: values.len().saturating_sub(1) as f64, from: LEFT, to: RIGHT };
     let y = Scale { low: 0.0, high: most.max(1e-9), from: FLOOR, to: TOP };

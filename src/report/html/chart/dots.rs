@@ -1,27 +1,27 @@
-//! Dots on a drawing of lines, each coloured by a share of a whole.
+//! Dots on a line drawing, each coloured by a share.
 
 use super::scale::{drawing, line, px, words};
 use crate::report::html::node::{Node, node};
 
-/// A dot.
+/// Dot of the drawing.
 #[derive(Clone, Debug)]
 pub struct ChartDot {
     pub at: [f64; 2],
-    /// 0..1; NaN: not known.
+    /// Share 0..1; NaN: unknown.
     pub share: f64,
     pub radius: f64,
-    /// What is shown under the pointer and read out.
+    /// Tooltip and text for screen readers.
     pub description: String,
 }
 
-/// Words on the drawing.
+/// Text on the drawing.
 #[derive(Clone, Debug)]
 pub struct AxisLabel {
     pub at: [f64; 2],
     pub text: String,
 }
 
-/// The drawing of `size` units.
+/// Drawing of `size` units.
 pub fn dots(label: &str, size: [f64; 2], edges: &[[[f64; 2]; 2]], dots: &[ChartDot], labels: &[AxisLabel]) -> Node {
     let mut svg = drawing(size[0], size[1], label).class("dots");
     for [from, to] in edges {

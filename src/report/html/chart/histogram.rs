@@ -1,16 +1,16 @@
-//! How often each value was measured, with the threshold marked and the side that does not pass in another colour.
+//! Histogram with a threshold; the side that fails has another colour.
 
 use super::scale::{Scale, drawing, line, px, rect, words};
 use crate::report::html::node::Node;
 use crate::report::html::numbers::{number, with_unit};
 
-/// Counts in bins of equal width from `low` to `high`; the outer bins hold what is beyond as well.
+/// Counts in bins of equal width from `low` to `high`; the outer bins include values beyond.
 #[derive(Clone, Debug)]
 pub struct Counts {
     pub low: f64,
     pub high: f64,
     pub bins: Vec<u64>,
-    /// Values that were not known.
+    /// Number of unknown values.
     pub unknown: u64,
 }
 
@@ -19,7 +19,7 @@ impl Counts {
         Self { low, high, bins: vec![0; n_bins.max(1)], unknown: 0 }
     }
 
-    /// Counts a value.
+    /// Counts a value; NaN as unknown.
     pub fn add(&mut self, value: f64) {
         if value.is_nan() {
             self.unknown += 1;
@@ -30,17 +30,17 @@ impl Counts {
         self.bins[bin] += 1;
     }
 
-    /// Known values.
+    /// Number of known values.
     pub fn total(&self) -> u64 {
         self.bins.iter().sum()
     }
 
-    /// Where bin `bin` begins.
+    /// Lower edge of bin `bin`.
     pub fn edge(&self, bin: usize) -> f64 {
         self.low + (self.high - self.low) * bin as f64 / self.bins.len() as f64
     }
 
-    /// The value below which `share` of all lie, as if those of a bin were spread evenly over it; NaN of nothing.
+    /// Value below which `share` of all lie, with values spread evenly within a bin; NaN without values.
     pub fn quantile(&self, share: f64) -> f64 {
         let wanted = share * self.total() as f64;
         let mut before = 0.0;
@@ -56,11 +56,11 @@ impl Counts {
     }
 }
 
-/// A threshold on a drawing.
+/// Threshold in a histogram.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThresholdLine {
     pub value: f64,
-    /// Values below it do not pass; otherwise those above.
+    /// Whether values below it fail; otherwise those above.
     pub is_least: bool,
 }
 
@@ -71,7 +71,7 @@ const FLOOR: f64 = 122.0;
 const LEFT: f64 = 8.0;
 const RIGHT: f64 = 332.0;
 
-/// The drawing. Heights go with the square root of the share, so that rare values are seen beside frequent ones.
+/// Histogram as SVG. Heights follow the square root of the share, so that rare values remain visible.
 pub fn histogram(label: &str, counts: &Counts, unit: &str, threshold: Option<ThresholdLine>) -> Node {
     let x = Scale { low: counts.low, high: counts.high, from: LEFT, to: RIGHT };
     let most = counts.bins.iter().copied().max().unwrap_or(0).max(1) as f64;

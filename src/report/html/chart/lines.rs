@@ -1,4 +1,4 @@
-//! Lines over the steps of a training, with levels to compare them with and one step marked.
+//! Lines over the steps of a training, with constant levels for comparison and one step marked.
 
 use super::scale::{Scale, drawing, line, px, words};
 use crate::report::html::node::{Node, node};
@@ -11,30 +11,30 @@ const FLOOR: f64 = 160.0;
 const LEFT: f64 = 44.0;
 const RIGHT: f64 = 350.0;
 
-/// What a chart shows.
+/// Line chart.
 #[derive(Clone, Debug, Default)]
 pub struct LineChart {
     pub title: String,
-    /// What it means, in a sentence.
+    /// Meaning in a sentence.
     pub description: String,
     pub lines: Vec<ChartLine>,
-    /// Levels across the whole width.
+    /// Horizontal lines across the whole width.
     pub levels: Vec<ChartLevel>,
-    /// The step that is marked.
+    /// Marked step.
     pub marked: Option<f64>,
 }
 
-/// A line.
+/// Line of a chart.
 #[derive(Clone, Debug)]
 pub struct ChartLine {
     pub name: String,
-    /// Which of the colours, from 0.
+    /// Index of the colour.
     pub colour: usize,
-    /// Step and value, by step; what is not finite is left out.
+    /// Step and value, by step; non-finite values are left out.
     pub places: Vec<[f64; 2]>,
 }
 
-/// A level.
+/// Horizontal line of a chart.
 #[derive(Clone, Debug)]
 pub struct ChartLevel {
     pub name: String,
@@ -43,12 +43,12 @@ pub struct ChartLevel {
 }
 
 impl LineChart {
-    /// Whether there is anything to show.
+    /// Whether there is nothing to show.
     pub fn is_empty(&self) -> bool {
         self.places().next().is_none()
     }
 
-    /// From the first to the last step, and from 0 (or the least value below it) to the largest value.
+    /// Ranges of the axes: first to last step, and 0 (or the smallest value below it) to the largest value.
     pub fn ranges(&self) -> [[f64; 2]; 2] {
         let levels = self.levels.iter().map(|level| level.value).filter(|value| value.is_finite());
         let around = |values: &mut dyn Iterator<Item = f64>, low: f64| {
@@ -61,13 +61,13 @@ impl LineChart {
             .map(|range| if range.iter().all(|v| v.is_finite()) { range } else { [0.0, 1.0] })
     }
 
-    /// Round numbers on the axis of the values.
+    /// Round numbers for the value axis.
     pub fn ticks(&self) -> Vec<f64> {
         let [_, [low, high]] = self.ranges();
         Scale { low, high, from: 0.0, to: 1.0 }.ticks(4)
     }
 
-    /// The card: title, drawing, what the colours are.
+    /// Card of title, drawing and legend.
     pub fn card(&self) -> Node {
         let mut card = node("div").class("card chart").child(node("h3").text(&self.title));
         if !self.description.is_empty() {

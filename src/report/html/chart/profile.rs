@@ -1,4 +1,4 @@
-//! Two distributions over one another as lines: the left and the right of a pair.
+//! Two distributions over one another as lines.
 
 use super::histogram::Counts;
 use super::scale::{Scale, drawing, line, px, words};
@@ -12,7 +12,7 @@ const FLOOR: f64 = 100.0;
 const LEFT: f64 = 8.0;
 const RIGHT: f64 = 332.0;
 
-/// A line of each, in its class; heights go with the square root of the share. All have the bins of the first.
+/// Lines with their class; heights follow the square root of the share. All have the bins of the first.
 pub fn profile(label: &str, unit: &str, lines: &[(&str, &Counts)]) -> Node {
     let mut svg = drawing(WIDTH, HEIGHT, label);
     let Some((_, first)) = lines.first() else { return svg };

@@ -1,14 +1,14 @@
-//! Ranges of several things on one scale: from lowest to highest thin, the middle nine tenths thick, the median a tick.
+//! Ranges on one scale: thin from minimum to maximum, thick for the middle nine tenths, a tick at the median.
 
 use super::scale::{Scale, drawing, line, rect, words};
 use crate::report::html::node::Node;
 use crate::report::html::numbers::number;
 
-/// One row.
+/// Row of the chart.
 pub struct ValueRange {
     pub name: String,
     pub class: &'static str,
-    /// Lowest, 5 %, median, 95 %, highest; NaN: nothing was measured.
+    /// Minimum, 5 %, median, 95 %, maximum; NaN: nothing was measured.
     pub marks: [f64; 5],
 }
 
@@ -18,7 +18,7 @@ const TOP: f64 = 6.0;
 const LEFT: f64 = 104.0;
 const RIGHT: f64 = 332.0;
 
-/// The drawing, from `low` to `high`; `ends` says what lies there.
+/// Chart from `low` to `high`; `ends` labels the two ends.
 pub fn ranges(label: &str, rows: &[ValueRange], [low, high]: [f64; 2], ends: [&str; 2]) -> Node {
     let x = Scale { low, high, from: LEFT, to: RIGHT };
     let floor = TOP + ROW * rows.len() as f64;

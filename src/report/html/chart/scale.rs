@@ -1,8 +1,8 @@
-//! From numbers to places on a drawing, and the round numbers marked beside it.
+//! Linear scales, round tick values, and SVG elements.
 
 use crate::report::html::node::{Node, node};
 
-/// A straight scale: `low` is drawn at `from`, `high` at `to` (units of the drawing).
+/// Linear scale: `low` is drawn at `from`, `high` at `to` (units of the drawing).
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
     pub low: f64,
@@ -12,7 +12,7 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Where `value` is drawn; at the ends what is beyond them, at the start what is no number.
+    /// Position of `value`, clamped to the ends; NaN is at the start.
     pub fn at(&self, value: f64) -> f64 {
         let width = self.high - self.low;
         let share = if width > 0.0 { (value - self.low) / width } else { 0.5 };
@@ -34,13 +34,13 @@ impl Scale {
     }
 }
 
-/// A place on a drawing, short.
+/// Coordinate as short text.
 pub fn px(value: f64) -> String {
     let text = format!("{value:.1}");
     text.strip_suffix(".0").unwrap_or(&text).to_owned()
 }
 
-/// An SVG drawing of `width` x `height` units that shrinks with its column; `label` is read out in its stead.
+/// SVG of `width` x `height` units that shrinks with its column; `label` is for screen readers.
 pub fn drawing(width: f64, height: f64, label: &str) -> Node {
     node("svg")
         .attr("viewBox", format!("0 0 {} {}", px(width), px(height)))
@@ -59,7 +59,7 @@ pub fn line(class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> Node {
     ends.into_iter().fold(node("line").class(class), |line, (name, value)| line.attr(name, px(value)))
 }
 
-/// Words whose `anchor` (`start`, `middle`, `end`) is at the place.
+/// Text with its `anchor` (`start`, `middle`, `end`) at a point.
 pub fn words(class: &str, [x, y]: [f64; 2], anchor: &str, text: &str) -> Node {
     node("text").class(class).attr("x", px(x)).attr("y", px(y)).attr("text-anchor", anchor).text(text)
 }

@@ -1,23 +1,23 @@
-//! The stretches of a video side by side, each as wide as it lasts: a list, so that it can be read out, walked by keys
+//! Parts of a video side by side with widths by duration: an HTML list, so that it can be read out, navigated by keys
 //! (`page.js`) and drawn at any width.
 
 use crate::report::html::node::{Node, node};
 
-/// One stretch.
+/// Part of a timeline.
 #[derive(Clone, Debug)]
 pub struct TimelineSpan {
     pub start_secs: f64,
     pub end_secs: f64,
-    /// What colours it.
+    /// CSS class of its colour.
     pub class: String,
-    /// A word shown where there is room.
+    /// Label, shown where there is room.
     pub word: String,
-    /// All there is to say of it.
+    /// Tooltip.
     pub description: String,
 }
 
-/// The line of a video of `duration_secs`, which `label` names. Of more than `most` stretches the shortest are drawn
-/// together, which leaves twice as many at most.
+/// Timeline of a video of `duration_secs` with the name `label`. Above `most` parts, the shortest are merged, which
+/// leaves at most twice as many.
 pub fn timeline(label: &str, duration_secs: f64, stretches: &[TimelineSpan], most: usize) -> Node {
     let whole = duration_secs.max(1e-9);
     let share = |secs: f64| format!("{:.3}%", 100.0 * (secs / whole).clamp(0.0, 1.0));
@@ -30,15 +30,15 @@ pub fn timeline(label: &str, duration_secs: f64, stretches: &[TimelineSpan], mos
     }))
 }
 
-/// The stretches that are drawn: all of them, or, of more than `most`, slivers side by side as one, which looks like the
-/// longest of them and says how many it is.
+/// Parts that are drawn: all, or above `most` parts with neighbouring slivers merged into one with the look of the
+/// longest and their number.
 fn drawn(stretches: &[TimelineSpan], whole: f64, most: usize) -> Vec<TimelineSpan> {
     if stretches.len() <= most {
         return stretches.to_vec();
     }
     let secs = |stretch: &TimelineSpan| stretch.end_secs - stretch.start_secs;
     let narrow = |stretch: &TimelineSpan| secs(stretch) * (most as f64) < whole;
-    // Each with the number of slivers in it, and the seconds of the longest.
+    // Part with the number of slivers in it, and the seconds of the longest.
     let mut drawn: Vec<(TimelineSpan, usize, f64)> = Vec::new();
     for stretch in stretches {
         match drawn.last_mut() {

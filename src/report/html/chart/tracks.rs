@@ -1,5 +1,5 @@
-//! Lanes under one another over the same seconds: lines, and moments marked as short strokes. A script may move the line
-//! `at` over them (`data-left`, `data-right`: where the first and the last second are).
+//! Tracks below one another over the same seconds: lines, and events as short strokes. A script may move the line `at`
+//! over them (`data-left`, `data-right`: positions of the first and last second).
 
 use super::scale::{Scale, drawing, line, px, words};
 use crate::report::html::node::{Node, node};
@@ -12,18 +12,18 @@ const FOOT: f64 = 20.0;
 const LEFT: f64 = 4.0;
 const RIGHT: f64 = 716.0;
 
-/// One lane.
+/// Track of the chart.
 #[derive(Clone, Debug, Default)]
 pub struct Lane {
-    /// What it shows, with its unit.
+    /// Name with unit.
     pub name: String,
-    /// Class and places (second, value) of each line; values go up. What is not finite is a gap.
+    /// Class and points (second, value) of each line; values go up. Non-finite values are gaps.
     pub lines: Vec<(&'static str, Vec<[f64; 2]>)>,
-    /// Class and seconds of marks, drawn on the floor of the lane, the later ones above the earlier.
+    /// Class and seconds of events, drawn at the bottom of the track, later ones on top.
     pub marks: Vec<(&'static str, Vec<f64>)>,
 }
 
-/// The drawing of `secs` seconds.
+/// Chart of `secs` seconds.
 pub fn lanes(label: &str, secs: f64, lanes: &[Lane]) -> Node {
     let height = lanes.len() as f64 * (LANE + GAP) + FOOT;
     let x = Scale { low: 0.0, high: secs.max(1e-9), from: LEFT, to: RIGHT };
@@ -54,7 +54,7 @@ pub fn lanes(label: &str, secs: f64, lanes: &[Lane]) -> Node {
         }
         let n = lane.marks.len().max(1) as f64;
         for (k, (class, moments)) in lane.marks.iter().enumerate() {
-            // alone from floor to top, else one above the other
+            // Full height without lines, else above one another.
             let part = if lane.lines.is_empty() { LANE / n } else { 12.0 };
             let base = floor - k as f64 * part;
             let drawn: Vec<String> = moments
