@@ -1,16 +1,11 @@
-//! The synthetic speaker: a drawn figure that talks with its hands, whose every joint is known in 3D. It is the
-//! embedded demo and the end-to-end test of the road: a video of it goes in at the front, and what comes out at the
-//! back is held against the truth. Nothing here knows a stage; `measure` reads their files.
+//! Synthetic speaker: a drawn figure with known 3D joints, the embedded demo and the end-to-end test of the pipeline.
 //!
-//! `speech` decides when syllables fall and sounds them -> `gesture` moves the body to them -> `figure` turns the
-//! body's controls into joints -> `camera` sees them -> `paint` draws them, one colour a joint (`palette`).
-//!
-//! Without a picture: `speech` -> `rule` (a known rule, instead of `gesture`) -> `figure` -> `speaker` (hours of it, as a
-//! dataset) -> `train::gan` -> `learned`, which holds a trained speaker against the rule and against `listener`
-//! (`traces` draws it).
+//! `drawn`: `speech` -> `gesture` -> `figure` (joints) -> `camera` -> `paint` (one colour for each joint). `rule`:
+//! hours of speech and motion by a known rule, as a dataset. `check`: the results of the pipeline and of trained models
+//! against the truth.
 
 pub mod check;
 pub mod drawn;
 pub mod rule;
 
-pub use drawn::generator_version::GENERATOR;
+pub use check::pipeline::GENERATOR;

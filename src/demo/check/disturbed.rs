@@ -1,5 +1,5 @@
-//! Motion made worse in known ways, and what each of the three Frechet distances (raw poses, `metrics::basis`,
-//! `metrics::embedding`) says of it: a distance is worth what it notices.
+//! Disturbed motion, and the response of the three Frechet distances (raw poses, `metrics::space::basis`,
+//! `metrics::space::embedding`) to each disturbance.
 
 use crate::demo::rule::dataset;
 use crate::metrics::distribution::frechet::{Gaussian, frechet, poses};
@@ -13,28 +13,28 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-/// What is done to a motion.
+/// Disturbance of a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Disturbance {
-    /// Nothing: the distance of one half of the data from the other.
+    /// No disturbance: distance of one half of the data from the other.
     None,
     /// White noise on every joint, standard deviation in millimetres.
     NoiseMm(f32),
-    /// The frames of every so many are put in a random order.
+    /// Random order of the frames within every group of this many.
     Scrambled(usize),
-    /// The mean of so many frames around.
+    /// Moving average over this many frames.
     Smoothed(usize),
-    /// The mean pose, always.
+    /// Constant mean pose.
     MeanPose,
     /// Every second frame only: twice as fast.
     Faster,
-    /// The hands stay as they are on average, seen from their wrists.
+    /// Hands in their average shape, relative to their wrists.
     StiffHands,
-    /// Left is right.
+    /// Left and right exchanged.
     Mirrored,
 }
 
-/// What the table holds, in order.
+/// Rows of the table, in order.
 pub const TABLE: [Disturbance; 16] = [
     Disturbance::None,
     Disturbance::NoiseMm(2.0),
@@ -70,7 +70,7 @@ impl std::fmt::Display for Disturbance {
 }
 
 impl Disturbance {
-    /// The motion made worse; the same dice give the same. The neck stays where it is.
+    /// Disturbed motion; the neck stays where it is. Deterministic for a given state of `rng`.
     pub fn apply(self, motion: &Motion, rng: &mut ChaCha8Rng) -> Motion {
         let joints = &motion.joints;
         let n = motion.n_frames();
@@ -124,11 +124,11 @@ fn stiff(joints: &Array3<f32>) -> Array3<f32> {
 #[derive(Clone, Copy, Debug)]
 pub struct DisturbanceRow {
     pub disturbance: Disturbance,
-    /// Raw poses (cm²), basis, embedding.
+    /// Distances by raw poses (cm²), basis, embedding.
     pub distances: [f64; 3],
 }
 
-/// The table over `motions`: every second one is disturbed, and its distance from the others taken.
+/// Table over `motions`: every second one is disturbed, and its distance from the others measured.
 pub fn table(motions: &[Motion]) -> Vec<DisturbanceRow> {
     let joints: Vec<usize> = (1..N_JOINTS).filter(|joint| !is_duplicate(*joint)).collect();
     let spaces = |motions: &mut dyn Iterator<Item = Motion>| {
@@ -150,7 +150,7 @@ pub fn table(motions: &[Motion]) -> Vec<DisturbanceRow> {
     TABLE.into_iter().map(row).collect()
 }
 
-/// Minutes of the speaker of `rule` that no shipped space was learnt from.
+/// Minutes of the rule-based speaker that no shipped space was trained on.
 pub fn unseen(n_minutes: usize) -> Result<Vec<Motion>> {
     const FIRST_SEED: u64 = 900_000;
     let minute = |n: usize| -> Result<Motion> {

@@ -1,5 +1,5 @@
-//! What a trained speaker has learnt of the rule: its motion for the sound of the test split, held against what the synthetic
-//! speaker did and against what the rule alone would have it do, beside predictors that know less.
+//! Check of a speaker trained on the rule: its motion for the sound of the test split against the synthetic speaker's
+//! motion and the rule's predictable part, beside simpler predictors.
 
 use super::traces;
 use crate::dataset::{Dataset, Sample, Split};
@@ -16,32 +16,32 @@ use anyhow::{Result, ensure};
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis, concatenate};
 use serde::Serialize;
 
-/// A predictor on the whole test split.
+/// Metrics of a predictor on the whole test split.
 #[derive(Clone, Debug, Serialize)]
 pub struct LearnedRow {
     pub predictor: &'static str,
-    /// Pearson's correlation of the speed of the left and of the right wrist with the predictable part's, all clips one
-    /// after the other, a number a frame, no smoothing.
+    /// Pearson correlation of the left and of the right wrist's speed with the predictable part's, over all frames of
+    /// all clips, without smoothing.
     pub speed_correlation: [f64; 2],
-    /// The other figures; `None`: it predicts no poses.
+    /// Pose metrics; `None`: no poses are predicted.
     pub poses: Option<PoseQuality>,
 }
 
-/// How near the poses are to what the speaker did.
+/// Agreement of the poses with the speaker's.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct PoseQuality {
     /// Share of keypoints within 0.2 of the pose's extent, 48 joints.
     pub pck: f64,
     /// Mean squared speed of the joints, as a share of the data's.
     pub energy: f64,
-    /// The same over the steps in which the rule holds both wrists still: the whims alone, which no sound tells. Where a
-    /// predictor falls back to what is likely, this is what goes first.
+    /// Energy over the frames in which the rule holds both wrists still, where only variation moves that no sound
+    /// predicts; a predictor that regresses to the mean loses this first.
     pub pauses: f64,
     /// Mean absolute error of coordinates, each in standard deviations of the training split (of 1 cm at least).
     pub l1: f64,
 }
 
-/// All predictors.
+/// Metrics of all predictors.
 #[derive(Clone, Debug, Serialize)]
 pub struct Learned {
     pub n_clips: usize,
@@ -49,30 +49,30 @@ pub struct Learned {
     pub rows: Vec<LearnedRow>,
     /// Penalties of the ridge regressions to speeds and to poses.
     pub ridge_strengths: [f64; 2],
-    /// Whether the generator reaches the targets; `None`: there is none.
+    /// Whether the generator reaches the targets; `None`: no generator.
     pub good: Option<bool>,
-    /// The first clip, to look at.
+    /// First clip, for the picture.
     #[serde(skip)]
     pub first: Option<traces::TraceClip>,
 }
 
-/// What the generator has to reach: correlation of each wrist's speed, PCK as a multiple of the mean pose's and of the
+/// Targets of the generator: correlation of each wrist's speed, PCK as a multiple of the mean pose's and of the
 /// mismatched prediction's, motion energy as a share of the data's.
 pub const LEAST_CORRELATION: f64 = 0.7;
 pub const LEAST_PCK: f64 = 1.5;
 pub const ENERGY: std::ops::RangeInclusive<f64> = 0.7..=1.3;
 
-/// Slower than this a wrist of the rule stands still, m/s.
+/// Speed below which a wrist of the rule is held, m/s.
 const HELD: f64 = 0.05;
 
-/// A clip of the test split.
+/// Clip of the test split.
 struct TestClip {
     sample: Sample,
     predictable: Array3<f32>,
     sound: Array2<f64>,
 }
 
-/// Measures `speaker` on the test split of the synthetic speaker's `dataset`; without one, the others alone.
+/// Measures `speaker` on the test split of the synthetic speaker's `dataset`; without one, the baselines alone.
 pub fn measure(dataset: &Dataset, speaker: Option<&Speaker>, progress: &dyn Progress) -> Result<Learned> {
     let tests: Vec<TestClip> =
         dataset.samples(Split::Test).iter().map(|s| TestClip::new(dataset.read(s)?)).collect::<Result<_>>()?;
@@ -126,7 +126,7 @@ pub fn measure(dataset: &Dataset, speaker: Option<&Speaker>, progress: &dyn Prog
     })
 }
 
-/// Whether the first row, the generator's, reaches the targets; the second is the mismatched one, the third the mean pose.
+/// Whether the first row (the generator) reaches the targets against the second (mismatched) and the third (mean pose).
 fn good(rows: &[LearnedRow]) -> bool {
     let [predicted, others @ ..] = rows else { return false };
     let Some(poses) = predicted.poses else { return false };
@@ -146,7 +146,7 @@ impl TestClip {
 
 struct Judge<'a> {
     tests: &'a [TestClip],
-    /// [49, 3] metres
+    /// Standard deviations [49, 3], metres.
     std: Array2<f32>,
     fps: FrameRate,
 }
@@ -193,7 +193,7 @@ impl Judge<'_> {
         std::array::from_fn(|hand| correlation(predicted.column(hand), truth.column(hand)))
     }
 
-    /// Sum of normalised errors, and how many.
+    /// Sum and number of normalised errors.
     fn error(&self, predicted: ArrayView3<f32>, ground_truth: ArrayView3<f32>) -> (f64, f64) {
         let mut sum = (0.0, 0.0);
         for ((t, joint, k), ground_truth) in ground_truth.indexed_iter() {
@@ -206,8 +206,7 @@ impl Judge<'_> {
     }
 }
 
-/// The mask of the frames at whose both sides the rule moves no wrist faster than `HELD`; two such frames in a row have
-/// such a step between them.
+/// Mask of the frames with wrist speeds of the rule below `HELD` on both sides.
 fn held(test: &TestClip, fps: FrameRate) -> Array2<bool> {
     let speeds = wrist_speeds(test.predictable.view(), fps);
     let still = |t: usize| speeds.row(t.min(speeds.nrows() - 1)).iter().all(|speed| *speed < HELD);

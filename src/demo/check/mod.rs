@@ -1,4 +1,4 @@
-//! What the pipeline and a trained model made of the synthetic speaker, held against the truth.
+//! Checks of the pipeline and of trained models against the synthetic speaker's ground truth.
 
 pub mod disturbed;
 pub mod learned;

@@ -1,5 +1,5 @@
-//! The contact sheet: a few moments of a clip, each as the video shows it, with its keypoints, as the 3D figure from the
-//! front and from the left, beside a moment of generated motion.
+//! Contact sheet of the demo: at a few moments the video frame with its keypoints, the 3D figure from the front and
+//! from the left, and a moment of generated motion.
 
 use crate::animate::draw::figure::{FigureView, INK, PAPER, draw_pose};
 use crate::animate::draw::overlay::{ImageTransform, draw_keypoints};
@@ -15,14 +15,14 @@ use anyhow::{Context, Result, ensure};
 use ndarray::{ArrayView2, Axis};
 use std::path::Path;
 
-/// A cell, the line of words above the columns and the rows' margin, px.
+/// Size of a cell, height of the title line and margin of the rows, px.
 const CELL: [usize; 2] = [320, 240];
 const HEAD_PX: usize = 40;
 const N_ROWS: usize = 3;
 const COLUMNS: [&str; 5] =
     ["video", "2D keypoints", "3D, from the front", "3D, from the left", "generated from speech"];
 
-/// Draws the sheet of the video `unit` of a run in the folder `work`, with a generated motion, where there is one.
+/// Draws the sheet of the video `unit` of a run in the folder `work`, with generated motion where there is some.
 pub fn draw_sheet(work: &Path, unit: &Unit, generated: Option<&Motion>) -> Result<Image> {
     let keypoints = keypoints_npz::read(&Artifact::Keypoints.path(work, unit))?;
     let lifted = Artifact::Joints.path(work, unit);
@@ -65,7 +65,7 @@ pub fn draw_sheet(work: &Path, unit: &Unit, generated: Option<&Motion>) -> Resul
     Ok(sheet)
 }
 
-/// Frames spread over those that have a pose.
+/// Frames spread evenly over those with a pose.
 fn moments(motion: &Motion) -> Vec<usize> {
     let whole = |frame: &ArrayView2<f32>| frame.iter().all(|v| v.is_finite());
     let frames: Vec<usize> =
@@ -82,7 +82,7 @@ fn small(image: &Image) -> Result<Image> {
     Ok(cell)
 }
 
-/// The frame, paled, under its keypoints.
+/// Frame, lightened, under its keypoints.
 fn overlay(image: &Image, keypoints: &Keypoints, frame_idx: usize) -> Result<Image> {
     let mut cell = small(image)?;
     for (value, paper) in cell.data.iter_mut().zip(PAPER.iter().cycle()) {

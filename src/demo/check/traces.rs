@@ -1,5 +1,5 @@
-//! A picture of what was learnt: the speed of each wrist over the first half minute of a test sound, as the rule has it,
-//! as the speaker moved in fact, and as the trained speaker moves; under them a few poses of the last two.
+//! Picture of what was learnt: the speed of each wrist over the first half minute of a test sound by the rule, by the
+//! speaker and by the trained model; below, a few poses of the latter two.
 
 use crate::animate::draw::figure::{FigureView, INK, LEFT, PAPER, RIGHT, draw_pose, mix};
 use crate::demo::rule::baselines::{WRISTS, wrist_speeds};
@@ -14,10 +14,10 @@ const LANE_PX: f32 = 220.0;
 const POSES_PX: f32 = 170.0;
 const MARGIN_PX: f32 = 70.0;
 const N_POSES: usize = 10;
-/// Seconds that are shown, and the speed at the top of a lane, m/s.
+/// Shown seconds, and the speed at the top of a lane, m/s.
 const SECS: f64 = 30.0;
 const TOP_SPEED: f32 = 2.5;
-/// The rule's colour.
+/// Colour of the rule.
 const RULE: [u8; 3] = [40, 44, 50];
 
 /// Joints [T, 49, 3] of one clip.

@@ -1,9 +1,9 @@
-//! A pinhole camera in front of the figure.
+//! Pinhole camera in front of the figure.
 
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, add};
 
-/// Looks at a point a little below the figure's neck.
+/// Camera that looks at a point a little below the figure's neck.
 #[derive(Clone, Copy, Debug)]
 pub struct DemoCamera {
     pub width: usize,
@@ -12,20 +12,20 @@ pub struct DemoCamera {
     pub focal_px: f64,
     /// Camera axes (x right, y down, z away) from world axes.
     axes: Rotation,
-    /// The looked-at point in the world, metres, and its distance.
+    /// Target point in the world, metres, and its distance.
     target: Vec3,
     distance: f64,
 }
 
 impl DemoCamera {
-    /// `yaw` to the figure's left, `pitch` down from above, radians; `distance` in metres.
+    /// Camera of a yaw to the figure's left and a pitch down from above, radians; `distance` in metres.
     pub fn new([width, height]: [usize; 2], yaw: f64, pitch: f64, distance: f64) -> Self {
         let axes = Rotation::about([1.0, 0.0, 0.0], pitch) * Rotation::about([0.0, 1.0, 0.0], yaw);
         let focal_px = 1.4 * width.min(height * 4 / 3) as f64;
         Self { width, height, focal_px, axes, target: [0.0, 0.1, 0.0], distance }
     }
 
-    /// A point of the world in camera axes, metres from the camera.
+    /// Point of the world in camera axes, metres.
     pub fn see(&self, point: Vec3) -> Vec3 {
         let turned = self.axes.turn(crate::math::vec3::sub(point, self.target));
         add(turned, [0.0, 0.0, self.distance])

@@ -1,46 +1,46 @@
-//! The body: controls (where the wrists are, how the hands are turned and curled, how torso and head lean) to joints in
-//! metres. The world's axes are a frontal camera's: x to the figure's left (image right), y down, z away from the
-//! viewer; the figure faces -z and its neck stands near the origin.
+//! Body of the drawn figure: controls (wrists, turn and curl of the hands, lean of torso and head) to joints in metres.
+//! World axes are those of a frontal camera: x to the figure's left (image right), y down, z away from the viewer; the
+//! figure faces -z with its neck near the origin.
 
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 use crate::types::skeleton::{L_HAND, L_SHOULDER, N_HAND_JOINTS, N_JOINTS, NECK, R_HAND, R_SHOULDER};
 
-/// Bone lengths in metres (a grown-up).
+/// Bone lengths of an adult, metres.
 pub const SHOULDER_WIDTH: f64 = 0.35;
 pub const UPPER_ARM: f64 = 0.29;
 pub const FOREARM: f64 = 0.25;
-/// Nose, left and right eye, ear, from the neck; the nose is 0.21 m away.
+/// Nose, left and right eye, left and right ear relative to the neck, metres; the nose is 0.21 m away.
 const HEAD: [Vec3; 5] =
     [[0.0, -0.19, -0.09], [0.034, -0.23, -0.07], [-0.034, -0.23, -0.07], [0.078, -0.205, 0.01], [-0.078, -0.205, 0.01]];
-/// The head turns about this point.
+/// Centre of the head's rotation.
 const SKULL_BASE: Vec3 = [0.0, -0.08, 0.02];
-/// Left and right hip from the neck.
+/// Left and right hip relative to the neck.
 const HIPS: [Vec3; 2] = [[0.11, 0.5, 0.02], [-0.11, 0.5, 0.02]];
-/// First joint of thumb to little finger from the wrist, in the hand's axes: along the fingers, to the thumb's side,
-/// out of the palm.
+/// First joint of thumb to little finger relative to the wrist, in the hand's axes: along the fingers, towards the
+/// thumb, out of the palm.
 const FINGER_BASES: [Vec3; 5] =
     [[0.026, 0.028, 0.012], [0.09, 0.026, 0.0], [0.094, 0.003, 0.0], [0.087, -0.018, 0.0], [0.078, -0.037, 0.003]];
 /// The three bones of each finger beyond its base; the middle finger's first is 48 mm.
 const PHALANGES: [[f64; 3]; 5] =
     [[0.044, 0.034, 0.028], [0.044, 0.027, 0.021], [0.048, 0.03, 0.022], [0.044, 0.028, 0.022], [0.036, 0.021, 0.019]];
 
-/// Where elbows hang to, in torso axes: outwards, down, away. With it elbows are 0.27 m beside and below the neck and
+/// Direction of the elbows in torso axes: outwards, down, away. Elbows are then 0.27 m beside and below the neck and
 /// hardly before or behind it, as measured on speakers of talks.
 const ELBOW_POLE: [f64; 3] = [0.3, 0.95, 0.0];
 
-/// Controls of one arm, the same numbers for both sides.
+/// Controls of one arm, mirrored for the right side.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ArmControls {
     /// Wrist from the neck in torso axes: outwards, down, away from the viewer; metres.
     pub wrist: [f64; 3],
     /// Turn about the hand's length; 0: thumb up, positive: palm down. Radians.
     pub roll: f64,
-    /// How far the hand is raised out of the forearm's line, tangent.
+    /// Tangent of the angle of the hand above the forearm's line.
     pub raise: f64,
-    /// Bend of index to little finger, 0 straight .. 1 fist.
+    /// Flexion of index to little finger, 0 straight .. 1 fist.
     pub curl: f64,
-    /// Bend of the index finger on top, negative points.
+    /// Additional flexion of the index finger; negative: pointing.
     pub index: f64,
     /// Spread of the fingers, radians between neighbours.
     pub spread: f64,
@@ -53,16 +53,16 @@ pub struct Controls {
     pub arms: [ArmControls; 2],
     /// Turn about the vertical, lean forward, lean to the figure's left.
     pub torso: [f64; 3],
-    /// The same of the head, on top of the torso's.
+    /// Rotation of the head relative to the torso, in the same order.
     pub head: [f64; 3],
-    /// The neck's place in the world, metres.
+    /// Position of the neck in the world, metres.
     pub neck: Vec3,
 }
 
-/// Every known point of the figure, world metres.
+/// Points of the figure, world metres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawnFigure {
-    /// House order.
+    /// Joints in the order of `types::skeleton`.
     pub joints: [Vec3; N_JOINTS],
     /// Nose, left and right eye, left and right ear.
     pub head: [Vec3; 5],
@@ -73,7 +73,7 @@ pub struct DrawnFigure {
 }
 
 impl DrawnFigure {
-    /// The figure in the posture of its controls.
+    /// Figure in the posture of its controls.
     pub fn new(controls: &Controls) -> Self {
         let torso = lean(controls.torso);
         let skull = torso * lean(controls.head);

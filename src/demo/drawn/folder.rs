@@ -1,5 +1,5 @@
-//! The demo's folder: clips of the synthetic speaker, what is true of them, the marker models, and the configuration
-//! that leads `orator run` through all of it.
+//! Demo folder: videos of the synthetic speaker, their ground truth, the marker models, and a configuration for `orator
+//! run`.
 
 use super::scene::DrawnScene;
 use super::truth::DrawnTruth;
@@ -10,9 +10,9 @@ use crate::types::time::FrameRate;
 use anyhow::ensure;
 use std::path::{Path, PathBuf};
 
-/// Rate of the dataset and of the truth.
+/// Frame rate of the dataset and of the truth.
 pub const DATASET_FPS: FrameRate = FrameRate::new(15, 1);
-/// Seconds of speech without pictures for `orator generate`.
+/// Seconds of speech without video for `orator generate`.
 const UNHEARD_SECS: f64 = 10.0;
 
 const MODELS: [(&str, &[u8]); 3] = [
@@ -41,7 +41,7 @@ learning_rate = 5e-4               # for hundreds of steps on a minute of speech
 lambda_gan = 0.15                  # 1 moves nearly three times as much as the data after 600 steps
 "#;
 
-/// What is drawn.
+/// Contents of a demo folder.
 #[derive(Clone, Debug)]
 pub struct DemoPlan {
     pub n_videos: usize,
@@ -60,8 +60,8 @@ impl Default for DemoPlan {
     }
 }
 
-/// Writes `videos/host/clip-<n>.mp4`, `truth/clip-<n>.npz`, `speech.wav`, `models/` and `pipeline.toml` into `dir`.
-/// Gives the videos.
+/// Writes `videos/host/clip-<n>.mp4`, `truth/clip-<n>.npz`, `speech.wav`, `models/` and `pipeline.toml` into `dir`;
+/// returns the videos.
 pub fn draw(dir: &Path, plan: &DemoPlan, progress: &dyn Progress) -> anyhow::Result<Vec<PathBuf>> {
     ensure!((1..=1000).contains(&plan.n_videos), "between 1 and 1000 videos can be drawn, not {}", plan.n_videos);
     ensure!((1.0..=3600.0).contains(&plan.secs), "a video lasts 1 to 3600 seconds, not {}", plan.secs);
@@ -82,7 +82,7 @@ pub fn draw(dir: &Path, plan: &DemoPlan, progress: &dyn Progress) -> anyhow::Res
     Ok(videos)
 }
 
-/// The lines that put the videos into splits: the last two validate and test; fewer than three all train.
+/// Configuration lines for the splits: the last two videos validate and test; fewer than three all train.
 fn splits(n_videos: usize) -> String {
     if n_videos < 3 {
         return "train = [\"*.mp4\"]".to_owned();

@@ -1,5 +1,5 @@
-//! Gestures to speech: every phrase has strokes to new places in front of the body, every stressed syllable a beat of
-//! hands and head, every longer pause a rest. Time in seconds in, controls of the figure out, smooth everywhere.
+//! Gestures for speech: every phrase has strokes to new positions in front of the body, every stressed syllable a beat
+//! of hands and head, every longer pause a rest. Controls are smooth functions of time.
 
 use super::figure::{ArmControls, Controls};
 use super::speech::Speech;
@@ -7,12 +7,12 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
 
-/// Numbers of an arm.
+/// Number of controls of an arm.
 const N_ARM: usize = 8;
-/// Hands folded low in front of the body.
+/// Rest pose: hands folded low in front of the body.
 const REST: [f64; N_ARM] = [0.17, 0.35, -0.19, 0.6, 0.45, 0.35, 0.0, 0.06];
 
-/// From `start` on the arms move to `arms`, within `secs`.
+/// Movement of the arms to `arms` from `start` on within `secs`.
 #[derive(Clone, Debug)]
 struct Stroke {
     start: f64,
@@ -22,7 +22,7 @@ struct Stroke {
     head: [f64; 3],
 }
 
-/// A quick dip of hands and head around a stressed syllable.
+/// Short dip of hands and head around a stressed syllable.
 #[derive(Clone, Debug)]
 struct BeatGesture {
     at: f64,
@@ -31,7 +31,7 @@ struct BeatGesture {
     hands: [f64; 2],
 }
 
-/// The motion of a clip.
+/// Gestures of a clip.
 #[derive(Clone, Debug)]
 pub struct DrawnGestures {
     strokes: Vec<Stroke>,
@@ -41,7 +41,7 @@ pub struct DrawnGestures {
 }
 
 impl DrawnGestures {
-    /// Strokes and beats for what is said.
+    /// Strokes and beats of a speech.
     pub fn new(speech: &Speech, rng: &mut ChaCha8Rng) -> Self {
         let sway = std::array::from_fn(|_| rng.random_range(0.0..2.0 * PI));
         let mut gestures = Self { strokes: Vec::new(), beats: Vec::new(), sway };
@@ -68,7 +68,7 @@ impl DrawnGestures {
         gestures
     }
 
-    /// A stroke to a new place of both hands, or of one while the other stays low.
+    /// Adds a stroke to a new position of both hands, or of one while the other rests.
     fn stroke(&mut self, start: f64, only: Option<usize>, rng: &mut ChaCha8Rng) {
         let place = |rng: &mut ChaCha8Rng| -> [f64; N_ARM] {
             [
@@ -83,7 +83,7 @@ impl DrawnGestures {
             ]
         };
         let first = place(rng);
-        // Two hands mostly do nearly the same.
+        // Two-handed gestures are mostly nearly symmetric.
         let second = std::array::from_fn(|k| 0.85 * first[k] + 0.15 * REST[k]);
         let mut arms = if rng.random_range(0.0..1.0) < 0.6 { [first, second] } else { [first, place(rng)] };
         if let Some(side) = only {
@@ -93,7 +93,7 @@ impl DrawnGestures {
         self.strokes.push(Stroke { start, secs: rng.random_range(0.5..0.75), arms, head });
     }
 
-    /// The controls at `secs`.
+    /// Controls at `secs`.
     pub fn controls(&self, secs: f64) -> Controls {
         let mut arms = [REST; 2];
         let mut head = [0.0; 3];
@@ -128,7 +128,7 @@ fn arm([out, down, away, roll, raise, curl, index, spread]: [f64; N_ARM]) -> Arm
     ArmControls { wrist: [out, down, away], roll, raise, curl, index, spread }
 }
 
-/// 0 to 1 over 0..1 with speed and acceleration 0 at both ends (Flash and Hogan 1985).
+/// Minimum-jerk profile from 0 to 1 (Flash and Hogan 1985).
 fn minimum_jerk(along: f64) -> f64 {
     let u = along.clamp(0.0, 1.0);
     u * u * u * (10.0 + u * (6.0 * u - 15.0))

@@ -1,9 +1,8 @@
-//! The drawn speaker: speech, gesture, figure, camera, paint.
+//! Drawn speaker: speech, gesture, figure, camera, paint.
 
 pub mod camera;
 pub mod figure;
 pub mod folder;
-pub mod generator_version;
 pub mod gesture;
 pub mod paint;
 pub mod palette;

@@ -1,4 +1,4 @@
-//! The picture of the figure: a grey mannequin on a plain ground in a marker suit, one colour a joint.
+//! Picture of the figure: a grey mannequin in a marker suit on a plain ground, one colour for each joint.
 
 use super::camera::DemoCamera;
 use super::figure::DrawnFigure;
@@ -24,7 +24,7 @@ const BODY_MARKER: f64 = 0.02;
 const FACE_MARKER: f64 = 0.0145;
 const FINGER_MARKER: f64 = 0.0095;
 
-/// Draws the figure; `mouth` 0..1 is how far it is open.
+/// Draws the figure; `mouth` is its opening, 0..1.
 pub fn picture(figure: &DrawnFigure, camera: &DemoCamera, mouth: f64) -> anyhow::Result<Image> {
     let mut canvas = Canvas { image: Image::filled(camera.width, camera.height, GROUND), camera };
     canvas.floor()?;
@@ -40,7 +40,7 @@ pub fn picture(figure: &DrawnFigure, camera: &DemoCamera, mouth: f64) -> anyhow:
     Ok(canvas.image)
 }
 
-/// The 13 points of COCO-17 that are in the picture, in its order.
+/// The 13 drawn points of COCO-17, in its order.
 pub fn coco(figure: &DrawnFigure) -> [Vec3; N_BODY_MARKERS] {
     let [nose, l_eye, r_eye, l_ear, r_ear] = figure.head;
     let arm = [L_SHOULDER, R_SHOULDER, L_ELBOW, R_ELBOW, L_WRIST, R_WRIST].map(|joint| figure.joints[joint]);
@@ -76,7 +76,7 @@ impl Canvas<'_> {
         )
     }
 
-    /// A chain of limbs, outlined as one: (from, radius, to, radius) in metres.
+    /// Draws a chain of limbs with one outline: (from, radius, to, radius) in metres.
     fn limbs(&mut self, parts: &[(Vec3, f64, Vec3, f64)], rgb: [u8; 3]) -> anyhow::Result<()> {
         let line = (self.camera.height as f32 / 400.0).max(1.0);
         for (grow, colour) in [(line, OUTLINE), (0.0, rgb)] {
@@ -152,7 +152,7 @@ impl Canvas<'_> {
         self.limbs(&parts, HAND)
     }
 
-    /// All markers, far ones first, each with a grey rim that keeps its edge away from its neighbours.
+    /// Draws all markers, far ones first, each with a grey rim against its neighbours.
     fn markers(&mut self, figure: &DrawnFigure) -> anyhow::Result<()> {
         let body = coco(figure);
         let mut all: Vec<(Vec3, f64, [u8; 3])> = Vec::with_capacity(N_BODY_MARKERS + 2 * N_FINGER_MARKERS);

@@ -1,16 +1,16 @@
-//! The colours of the marker suit, read from `fixtures/marker_palette.txt`, which the marker models are made from too.
+//! Colours of the marker suit, read from `fixtures/marker_palette.txt`, from which the marker models are made too.
 
 use std::sync::LazyLock;
 
 const FILE: &str = include_str!("../../../fixtures/marker_palette.txt");
-/// Markers of the body: the first 13 points of COCO-17.
+/// Number of body markers: the first 13 points of COCO-17.
 pub const N_BODY_MARKERS: usize = 13;
-/// Markers of a hand without its wrist, which is a marker of the body.
+/// Number of markers of a hand without its wrist, which is a body marker.
 pub const N_FINGER_MARKERS: usize = 20;
-/// Colours: the body's, then the fingers', which both hands share.
+/// Number of colours: the body's, then the fingers', which both hands share.
 pub const N_COLOURS: usize = N_BODY_MARKERS + N_FINGER_MARKERS;
 
-/// Red, green, blue of each marker: COCO points 0..13, then thumb to little finger, each base to tip.
+/// RGB of each marker: COCO points 0..13, then thumb to little finger, each base to tip.
 pub static COLOURS: LazyLock<[[u8; 3]; N_COLOURS]> = LazyLock::new(|| {
     let mut colours = [[0; 3]; N_COLOURS];
     let lines = FILE.lines().filter(|line| !line.starts_with('#') && !line.trim().is_empty());

@@ -1,4 +1,4 @@
-//! One clip of the synthetic speaker: its speech, gestures and camera, all from one seed.
+//! Clip of the synthetic speaker: speech, gestures and camera from one seed.
 
 use super::camera::DemoCamera;
 use super::figure::DrawnFigure;
@@ -14,7 +14,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 
-/// What the speaker says and does in `secs` seconds before a camera.
+/// Clip of `secs` seconds.
 pub struct DrawnScene {
     pub secs: f64,
     pub camera: DemoCamera,
@@ -24,7 +24,7 @@ pub struct DrawnScene {
 }
 
 impl DrawnScene {
-    /// The clip of that seed; the camera stands a little aside and above.
+    /// Clip of a seed; the camera stands a little aside and above.
     pub fn new(seed: u64, secs: f64, size: [usize; 2]) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let speech = Speech::new(secs, &mut rng);
@@ -38,22 +38,22 @@ impl DrawnScene {
         Self { secs, camera, seed, speech, gestures }
     }
 
-    /// The figure at a time, in world axes.
+    /// Figure at a time, in world axes.
     pub fn figure(&self, secs: f64) -> DrawnFigure {
         DrawnFigure::new(&self.gestures.controls(secs))
     }
 
-    /// The picture at a time.
+    /// Picture at a time.
     pub fn picture(&self, secs: f64) -> anyhow::Result<Image> {
         paint::picture(&self.figure(secs), &self.camera, self.speech.loudness(secs))
     }
 
-    /// What is heard.
+    /// Sound of the clip.
     pub fn sound(&self) -> Sound {
         self.speech.sound(self.secs, &mut ChaCha8Rng::seed_from_u64(self.seed ^ 0x50EA))
     }
 
-    /// Films the clip at `fps`.
+    /// Writes the clip as a video at `fps`.
     pub fn film(&self, path: &Path, fps: FrameRate, progress: &dyn Progress) -> anyhow::Result<()> {
         let n_frames = fps.frames_in(self.secs);
         let name = path.file_name().unwrap_or_default().to_string_lossy();

@@ -1,5 +1,5 @@
-//! What the synthetic speaker says: phrases of syllables with stresses and pauses, and how they sound. It is no
-//! language: a pulse train through three formants, a little noise at the onsets.
+//! Speech of the synthetic speaker: phrases of syllables with stresses and pauses, and their sound, a pulse train
+//! through three formants with a little noise at the onsets.
 
 use crate::types::sound::{SAMPLE_RATE, Sound};
 use rand::Rng;
@@ -25,18 +25,18 @@ pub struct Syllable {
     pub vowel: usize,
     /// Pitch, Hz.
     pub pitch: f64,
-    /// How loud its phrase is said, 0..1.
+    /// Loudness of its phrase, 0..1.
     pub volume: f64,
 }
 
-/// Syllables `first..last` said in one breath.
+/// Syllables `first..last` of one breath.
 #[derive(Clone, Debug)]
 pub struct Phrase {
     pub first: usize,
     pub last: usize,
 }
 
-/// Everything said in a clip.
+/// Speech of a clip.
 #[derive(Clone, Debug, Default)]
 pub struct Speech {
     pub syllables: Vec<Syllable>,
@@ -70,8 +70,8 @@ impl Speech {
         speech
     }
 
-    /// Free speech for `secs` seconds: phrases of any length, soft and loud, with accents (stress of at least 0.7, all
-    /// other syllables have at most 0.2) at no regular distance, half a second apart or more.
+    /// Free speech of `secs` seconds: phrases of any length, soft and loud, with irregular accents (stress at least
+    /// 0.7, all others at most 0.2) at least half a second apart.
     pub fn free(secs: f64, rng: &mut ChaCha8Rng) -> Self {
         let mut speech = Self::default();
         let (mut now, mut last_accent) = (rng.random_range(0.2..0.8), f64::NEG_INFINITY);
@@ -100,13 +100,13 @@ impl Speech {
         speech
     }
 
-    /// How loud the voice is at `secs`, 0..1: also how far the mouth is open.
+    /// Loudness of the voice at `secs`, 0..1, also the opening of the mouth.
     pub fn loudness(&self, secs: f64) -> f64 {
         let next = self.syllables.partition_point(|s| s.end <= secs);
         self.syllables.get(next).filter(|s| s.start <= secs).map_or(0.0, |s| s.loudness(secs))
     }
 
-    /// The sound, `secs` long.
+    /// Sound of `secs` seconds.
     pub fn sound(&self, secs: f64, rng: &mut ChaCha8Rng) -> Sound {
         let rate = f64::from(SAMPLE_RATE);
         let mut samples = vec![0.0f32; (secs * rate).round().max(0.0) as usize];
@@ -127,7 +127,7 @@ impl Speech {
 }
 
 impl Syllable {
-    /// Its greatest loudness, 0..1.
+    /// Largest loudness of the syllable, 0..1.
     pub fn peak(&self) -> f64 {
         (0.45 + 0.55 * self.stress) * self.volume
     }
@@ -138,7 +138,7 @@ impl Syllable {
     }
 }
 
-/// Pulses of the voice through three resonators in a row.
+/// Voice pulses through three resonators in series.
 struct VoiceSource {
     phase: f64,
     pitch: f64,
@@ -153,7 +153,7 @@ impl VoiceSource {
 
     fn next(&mut self, rate: f64) -> f64 {
         self.phase += self.pitch / rate;
-        // A rounded saw: the flow through the glottis opens slowly and closes fast.
+        // Rounded sawtooth: the flow through the glottis opens slowly and closes fast.
         self.phase -= self.phase.floor();
         let flow = self.phase - (self.phase / 0.95).powi(12);
         self.formants.iter_mut().fold(flow - 0.45, |sound, formant| formant.next(sound))

@@ -1,4 +1,5 @@
-//! What is known about a clip: every joint in 3D and its pixel, at the dataset rate, as one `.npz` file a video.
+//! Ground truth of a clip: every joint in 3D and its pixel, at the dataset's frame rate, as one `.npz` file for each
+//! video.
 
 use super::paint;
 use super::scene::DrawnScene;
@@ -12,21 +13,21 @@ use ndarray::{Array3, Ix3, arr1, s};
 use ndarray_npy::NpzWriter;
 use std::path::Path;
 
-/// The truth of a clip.
+/// Ground truth of a clip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawnTruth {
-    /// Camera axes, metres, the neck at the origin of every frame.
+    /// Joints in camera axes, metres, the neck at the origin of every frame.
     pub motion: Motion,
-    /// [T, 13, 2] px: COCO points 0..13.
+    /// COCO points 0..13, [T, 13, 2] px.
     pub body: Array3<f32>,
-    /// [T, 21, 2] px
+    /// Left hand, [T, 21, 2] px.
     pub left_hand: Array3<f32>,
-    /// [T, 21, 2] px
+    /// Right hand, [T, 21, 2] px.
     pub right_hand: Array3<f32>,
 }
 
 impl DrawnTruth {
-    /// The truth of a scene at the times of `fps`.
+    /// Ground truth of a scene at the frames of `fps`.
     pub fn new(scene: &DrawnScene, fps: FrameRate) -> Self {
         let n_frames = fps.frames_in(scene.secs);
         let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
@@ -66,7 +67,7 @@ impl DrawnTruth {
         .with_context(|| format!("cannot write {}", path.display()))
     }
 
-    /// Reads what `write` wrote.
+    /// Reads a file of `write`.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         let mut npz = Npz::open(path)?;
         let fps = npz.frame_rate("fps")?;

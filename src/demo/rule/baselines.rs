@@ -1,5 +1,5 @@
-//! Predictors that a trained speaker is held against, all learnt from the training split: the ridge regression from the
-//! sound of the same frame (`ridge`), the motion of the training window that sounds most alike, and the mean pose.
+//! Baselines for a speaker trained on the rule, learnt from the training split: ridge regression from the sound of the
+//! same frame, the training window with the nearest sound, and the mean pose.
 
 use super::ridge::{Ridge, RidgeSums};
 use crate::audio::mel;
@@ -17,10 +17,10 @@ use rayon::prelude::*;
 pub const WRISTS: [usize; 2] = [L_WRIST, R_WRIST];
 /// Frames of a window of the nearest neighbour.
 const WINDOW: usize = 64;
-/// Penalties that are tried; validation chooses.
+/// Ridge penalties; validation chooses.
 const STRENGTHS: [f64; 8] = [1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 
-/// Log-mel of each of `n_frames` frames, [T, 64]: the mean over the hops that begin in it.
+/// Log-mel spectrogram by motion frame [T, 64]: the mean over the hops that begin in the frame.
 pub fn sound_of_frames(sound: &Sound, n_frames: usize, fps: FrameRate) -> Array2<f64> {
     let mut samples = sound.samples.clone();
     samples.resize(sync::sample_at(fps, sound.rate, n_frames) + mel::WINDOW, 0.0);
@@ -43,16 +43,16 @@ pub fn wrist_speeds(joints: ArrayView3<f32>, fps: FrameRate) -> Array2<f64> {
     })
 }
 
-/// What was learnt from the training split.
+/// Baselines fitted to the training split.
 pub struct RuleBaselines {
     fps: FrameRate,
-    /// To the speeds of both wrists, m/s.
+    /// Regression to the speeds of both wrists, m/s.
     speed: Ridge,
-    /// To the 147 coordinates of the joints, metres.
+    /// Regression to the 147 joint coordinates, metres.
     pose: Ridge,
-    /// Penalties chosen for both.
+    /// Chosen penalties of both.
     pub strengths: [f64; 2],
-    /// Sound [64 x 64] and motion of the training windows, side by side.
+    /// Sound [64 x 64] and motion of the training windows.
     windows: Vec<(Array2<f64>, Array3<f32>)>,
     mean: Array2<f32>,
 }
@@ -64,7 +64,7 @@ struct TrainingClip {
 }
 
 impl RuleBaselines {
-    /// Learns from the training split, the penalties from the validation split.
+    /// Fits to the training split, with penalties from the validation split.
     pub fn learn(dataset: &Dataset) -> Result<Self> {
         let fps = dataset.info().fps;
         let (train, validation) = (clips(dataset, Split::Train)?, clips(dataset, Split::Validation)?);
@@ -102,18 +102,18 @@ impl RuleBaselines {
         })
     }
 
-    /// Speeds of both wrists by the ridge regression, [T - 1, 2].
+    /// Speeds of both wrists by ridge regression, [T - 1, 2].
     pub fn ridge_speeds(&self, sound: &Array2<f64>) -> Array2<f64> {
         self.speed.predict(sound.slice(s![..sound.nrows().saturating_sub(1), ..]))
     }
 
-    /// Joints by the ridge regression.
+    /// Joints by ridge regression, [T, 49, 3].
     pub fn ridge_poses(&self, sound: &Array2<f64>) -> Array3<f32> {
         let numbers = self.pose.predict(sound.view());
         Array3::from_shape_fn((sound.nrows(), N_JOINTS, 3), |(t, joint, k)| numbers[[t, 3 * joint + k]] as f32)
     }
 
-    /// Joints of the training windows whose sound is nearest, window by window of 64 frames.
+    /// Joints of the training windows with the nearest sound, in windows of 64 frames.
     pub fn nearest(&self, sound: &Array2<f64>) -> Array3<f32> {
         let starts: Vec<usize> = (0..sound.nrows()).step_by(WINDOW).collect();
         let parts: Vec<Array3<f32>> = starts.par_iter().map(|&t| self.nearest_window(sound, t)).collect();
@@ -131,7 +131,7 @@ impl RuleBaselines {
         nearest.map_or_else(|| self.still(n), |(_, joints)| joints.slice(s![..n, .., ..]).to_owned())
     }
 
-    /// The mean pose for `n_frames`.
+    /// Mean pose for `n_frames`.
     pub fn still(&self, n_frames: usize) -> Array3<f32> {
         Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(_, joint, k)| self.mean[[joint, k]])
     }
@@ -143,7 +143,7 @@ impl RuleBaselines {
 }
 
 impl TrainingClip {
-    /// All frames but the last: the sound from a frame to the next.
+    /// Sound [T - 1, 64] from each frame to the next.
     fn inputs(&self) -> ndarray::ArrayView2<'_, f64> {
         self.sound.slice(s![..self.sound.nrows().saturating_sub(1), ..])
     }

@@ -1,6 +1,6 @@
-//! Hours of the synthetic speaker without a picture: a dataset of sound and motion in the form that `import` and
-//! `orator run` write, gestured by `rule`. Every clip is made from the seed, its split and its number alone, so the splits
-//! share no speech and no whim, and the predictable part of a clip is made again when it is needed.
+//! Hours of the synthetic speaker without video: a dataset of sound and motion by `rule`, laid out as by the pipeline.
+//! Each clip follows from seed, split and number alone, so splits share neither speech nor variation, and its
+//! predictable part can be computed again.
 
 use super::rule::RuleGestures;
 use crate::dataset::bones::VideoBones;
@@ -27,19 +27,19 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::path::Path;
 
-/// Version of the rule and of its speech; another is refused where the predictable part is made again.
+/// Version of the rule and of its speech; another one is refused where the predictable part is needed.
 pub const RULE: u32 = 1;
 pub const NAME: &str = "synthetic";
 const FPS: FrameRate = FrameRate::new(15, 1);
-/// Frames of a clip: a minute.
+/// Frames of a clip (a minute).
 const CLIP_FRAMES: usize = 900;
-/// Clips of the validation and the test split: ten minutes each.
+/// Clips of the validation and the test split (ten minutes each).
 const HELD_OUT_CLIPS: usize = 10;
-/// Loudness of the room, as a share of full scale.
+/// Amplitude of the room noise.
 const ROOM: f32 = 0.001;
 const SHARD_BYTES: u64 = 256 << 20;
 
-/// A clip: what it is made from. It stands in its sample's json under `rule`.
+/// Parameters of a clip, stored in its sample's JSON under `rule`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SpokenClip {
     pub rule: u32,
@@ -58,19 +58,19 @@ impl SpokenClip {
         format!("{NAME}-{}-{:04}", self.split.name(), self.number)
     }
 
-    /// Dice of its own for each purpose.
+    /// Random generator for one purpose.
     fn rng(&self, purpose: &str) -> ChaCha8Rng {
         let Self { rule, seed, split, number, .. } = self;
         let hash = blake3::hash(format!("{rule} {seed} {} {number} {purpose}", split.name()).as_bytes());
         ChaCha8Rng::from_seed(*hash.as_bytes())
     }
 
-    /// What is said.
+    /// Speech of the clip.
     pub fn speech(&self) -> Speech {
         Speech::free(self.secs(), &mut self.rng("speech"))
     }
 
-    /// How it sounds, in a room that is not quite silent.
+    /// Sound of the clip with room noise.
     pub fn sound(&self) -> Sound {
         let mut rng = self.rng("sound");
         let mut sound = self.speech().sound(self.secs(), &mut rng);
@@ -79,17 +79,17 @@ impl SpokenClip {
         sound
     }
 
-    /// What the speaker does, whims and all.
+    /// Motion of the clip: rule and variation.
     pub fn motion(&self) -> Motion {
         RuleGestures::with_variation(&self.speech(), self.secs(), &mut self.rng("whims")).motion(self.n_frames, FPS)
     }
 
-    /// What the rule alone would have it do.
+    /// Predictable part of the motion: the rule alone.
     pub fn predictable(&self) -> Motion {
         RuleGestures::new(&self.speech()).motion(self.n_frames, FPS)
     }
 
-    /// BLAKE3 of the clip's parameters, in a text that the first datasets of this speaker fixed.
+    /// BLAKE3 of the clip's parameters; the text is fixed by existing datasets.
     fn content_hash(&self) -> String {
         let Self { rule, seed, split, number, n_frames } = self;
         let text =
@@ -97,7 +97,7 @@ impl SpokenClip {
         blake3::hash(text.as_bytes()).to_hex().to_string()
     }
 
-    /// The clip that a sample of the dataset was made from.
+    /// Clip that a sample of the dataset was made from.
     pub fn from_sample(sample: &Sample) -> Result<Self> {
         let clip: Self =
             serde_json::from_value(sample.meta.get("rule").cloned().unwrap_or_default()).with_context(|| {
@@ -141,7 +141,7 @@ impl SpokenClip {
     }
 }
 
-/// The clips of `hours` of training, and ten minutes each to validate and to test.
+/// Clips of `hours` of training, and ten minutes each of validation and test.
 pub fn clips(hours: f64, seed: u64) -> Result<Vec<SpokenClip>> {
     ensure!((0.01..=100.0).contains(&hours), "--hours {hours}: expected 0.01 to 100");
     let n_train = (hours * 3600.0 / FPS.secs(CLIP_FRAMES)).ceil() as usize;

@@ -1,21 +1,21 @@
-//! The simplest listener there is: a ridge regression from the sound of a frame to the motion of the same frame. It sees no
-//! context; how well it does says how much of a rule is a function of the moment.
+//! Ridge regression from the sound of a frame to the motion of the same frame. Without context, its error shows how
+//! much of a rule depends on the present moment alone.
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
 
-/// Sums over frames, from which a regression of any strength follows.
+/// Sums over frames that determine a regression of any penalty.
 pub struct RidgeSums {
-    /// [n + 1, n + 1] of the inputs and a 1.
+    /// Products [n + 1, n + 1] of the inputs and a constant 1.
     inputs: Array2<f64>,
-    /// [n + 1, m]
+    /// Products [n + 1, m] of inputs and outputs.
     products: Array2<f64>,
 }
 
-/// [n + 1, m]; the last row is the offset.
+/// Weights [n + 1, m]; the last row is the offset.
 pub struct Ridge(Array2<f64>);
 
 impl RidgeSums {
-    /// Of `n` inputs and `m` outputs.
+    /// Sums of `n` inputs and `m` outputs.
     pub fn new(n: usize, m: usize) -> Self {
         Self { inputs: Array2::zeros((n + 1, n + 1)), products: Array2::zeros((n + 1, m)) }
     }
@@ -28,7 +28,7 @@ impl RidgeSums {
         self.products += &inputs.t().dot(&outputs);
     }
 
-    /// The regression with the penalty `strength` times the mean square of an input, on all weights but the offset.
+    /// Regression with the penalty `strength` times the mean square of an input, on all weights but the offset.
     pub fn ridge(&self, strength: f64) -> Ridge {
         let n = self.inputs.nrows() - 1;
         let scale = (0..n).map(|k| self.inputs[[k, k]]).sum::<f64>() / n.max(1) as f64;
@@ -46,7 +46,7 @@ impl Ridge {
     }
 }
 
-/// X of A X = B for a symmetric positive definite A, by Cholesky's decomposition.
+/// Solution X of A X = B for a symmetric positive definite A, by Cholesky decomposition.
 fn solve(mut a: Array2<f64>, mut b: Array2<f64>) -> Array2<f64> {
     let n = a.nrows();
     for j in 0..n {
@@ -69,7 +69,7 @@ fn solve(mut a: Array2<f64>, mut b: Array2<f64>) -> Array2<f64> {
     b
 }
 
-/// Pearson's correlation of two rows of numbers; 0 where one of them does not vary.
+/// Pearson correlation of two series; 0 where one of them is constant.
 pub fn correlation(a: ArrayView1<f64>, b: ArrayView1<f64>) -> f64 {
     let n = a.len().min(b.len()).max(1) as f64;
     let mean = |x: ArrayView1<f64>| x.sum() / n;

@@ -1,22 +1,5 @@
-//! The rule by which the synthetic speaker of `speaker` gestures: one pure function of its speech, the predictable part,
-//! and the speaker's whims on top of it.
-//!
-//! The speech gives the envelope E(t), 0..1 (`Speech::loudness`), and the accents k: the onsets t_k of stressed syllables,
-//! their peak loudness a_k and their vowel v_k. Loudness, onsets and vowels (formants) can all be heard.
-//!
-//! Each hand h has a wish x_h(t) in body coordinates (wrist, turn and shape of the hand). With u the minimum jerk of 0..1,
-//! REST the lap, and PLACES[v][h] where the vowel v sends the hand h (some vowels send one hand only):
-//!
-//! * stroke: from s = t_k + d_h for 0.4 s, x_h <- x_h + u((t - s) / 0.4) (goal - x_h), goal = REST + g_k (PLACES[v_k][h] - REST),
-//!   g_k = 0.45 + 0.4 (a_k - 0.4) / 0.6: a louder accent reaches farther;
-//! * hold for 0.5 s after the stroke, then return: over 0.6 s the same with goal = REST; the next stroke of that hand breaks in;
-//! * lift: both wrists are raised by 0.2 m times L(t) = integral of E(t - r) w(r) dr, w a raised cosine over r = 0.2 .. 0.8 s.
-//!
-//! Habit: the speaker is right-handed. The right hand leads, d = 0.2 s, so that its speed peaks 0.4 s after an onset; the left
-//! follows, d = 0.4 s, with its peak at 0.6 s. Nothing moves with the sound of its own moment.
-//!
-//! Whims (of a seed of their own, no part of the predictable part): accents that are passed over, strokes without an accent,
-//! strokes early or late and places missed, and a sway of arms and torso.
+//! Gesture rule of the synthetic speaker: a deterministic function of its speech (the predictable part), and random
+//! variation on top.
 
 use crate::demo::drawn::figure::{ArmControls, Controls, DrawnFigure};
 use crate::demo::drawn::speech::{Speech, Syllable};
@@ -30,28 +13,28 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
-/// Seconds from an onset to its stroke: left hand, right hand.
+/// Delay from an onset to its stroke, seconds: left hand, right hand.
 pub const DELAYS: [f64; 2] = [0.4, 0.2];
-/// Seconds a stroke, its hold and its return last.
+/// Durations of a stroke, its hold and its return, seconds.
 pub const STROKE: f64 = 0.4;
 pub const HOLD: f64 = 0.5;
 pub const RETURN: f64 = 0.6;
-/// The envelope acts on the lift through these delays, seconds, and by so much, metres.
+/// Range of delays through which the envelope lifts the wrists, seconds, and the lift, metres.
 const LIFT_DELAYS: [f64; 2] = [0.2, 0.8];
 const LIFT: f64 = 0.2;
-/// Syllables of more stress than this are accents.
+/// Stress above which a syllable is an accent.
 const ACCENT: f64 = 0.5;
 
-/// Numbers of an arm: wrist out, down, away (metres), roll, raise, curl, index, spread (`figure::Arm`).
+/// Number of controls of an arm: wrist out, down, away (metres), roll, raise, curl, index, spread.
 const N_ARM: usize = 8;
 type ArmTarget = [f64; N_ARM];
-/// Hands in the lap.
+/// Rest pose: hands in the lap.
 const REST: ArmTarget = [0.16, 0.36, -0.2, 0.9, 0.3, 0.45, 0.0, 0.05];
 const WIDE: ArmTarget = [0.42, 0.16, -0.24, -0.4, 0.6, 0.1, 0.0, 0.16];
 const HIGH: ArmTarget = [0.26, -0.06, -0.26, 0.2, 1.0, 0.15, -0.1, 0.12];
 const POINT: ArmTarget = [0.04, 0.1, -0.38, 0.6, 0.5, 0.8, -0.8, 0.02];
 const CENTRE: ArmTarget = [0.1, 0.14, -0.36, -0.2, 0.8, 0.3, 0.0, 0.1];
-/// Where each vowel of `speech` sends the left and the right hand.
+/// Stroke targets of the left and the right hand by vowel of `speech`.
 const PLACES: [[Option<ArmTarget>; 2]; 5] = [
     [Some(WIDE), Some(WIDE)],
     [None, Some(HIGH)],
@@ -60,8 +43,8 @@ const PLACES: [[Option<ArmTarget>; 2]; 5] = [
     [Some(CENTRE), Some(CENTRE)],
 ];
 
-/// Whims: share of accents passed over, strokes a second without one, deviations of a stroke's time (seconds), place
-/// (metres) and hand shape, and the sway of wrists (metres) and torso (radians) with its frequencies.
+/// Variation: share of skipped accents, rate of strokes without an accent (1/s), deviations of a stroke's time
+/// (seconds), target (metres) and hand shape, and the sway of wrists (metres) and torso (radians) with its frequencies.
 const PASSED_OVER: f64 = 0.12;
 const FIDGETS: f64 = 0.12;
 const LATE: f64 = 0.06;
@@ -71,7 +54,7 @@ const SWAY: f64 = 0.012;
 const TORSO: f64 = 0.03;
 const SWAY_HZ: std::ops::Range<f64> = 0.3..1.5;
 
-/// From `start` on, for `secs`, a hand goes to `goal`.
+/// Movement of a hand to `goal` from `start` on within `secs`.
 #[derive(Clone, Debug)]
 struct WristMove {
     start: f64,
@@ -79,7 +62,22 @@ struct WristMove {
     goal: ArmTarget,
 }
 
-/// All that the speaker does while it says something.
+/// Gestures of the speaker for a speech.
+///
+/// The speech gives the envelope E(t), 0..1 (`Speech::loudness`), and the accents k: onsets t_k of stressed syllables
+/// with peak loudness a_k and vowel v_k, all of them audible. Hand h follows a target x_h(t) of wrist position,
+/// rotation and hand shape in body coordinates. With the minimum-jerk profile u, the rest pose REST and PLACES[v][h],
+/// the target of vowel v:
+///
+/// * stroke: from s = t_k + d_h for 0.4 s, x_h <- x_h + u((t - s) / 0.4) (goal - x_h), goal = REST + g_k
+/// (PLACES[v_k][h] - REST), g_k = 0.45 + 0.4 (a_k - 0.4) / 0.6;
+/// * hold for 0.5 s, then return over 0.6 s with goal = REST, unless the next stroke of the hand begins;
+/// * lift: both wrists rise by 0.2 m times L(t) = integral of E(t - r) w(r) dr, w a raised cosine over r = 0.2 .. 0.8
+/// s.
+///
+/// The right hand leads with d = 0.2 s (peak speed 0.4 s after an onset), the left follows with d = 0.4 s (0.6 s);
+/// nothing depends on the sound of the present moment. Variation, with a seed of its own: skipped accents, strokes
+/// without an accent, errors of stroke times and targets, and sway of arms and torso.
 pub struct RuleGestures<'a> {
     speech: &'a Speech,
     /// Left, right; in order of time.
@@ -87,11 +85,11 @@ pub struct RuleGestures<'a> {
     sway: Option<Variation>,
 }
 
-/// Two waves a number: left wrist 0..3, right wrist 3..6, torso 6..9; frequency (Hz) and phase.
+/// Two sine waves for each of: left wrist 0..3, right wrist 3..6, torso 6..9; frequency (Hz) and phase.
 struct Variation([[[f64; 2]; 2]; 9]);
 
 impl<'a> RuleGestures<'a> {
-    /// The predictable part: what the rule makes of `speech`.
+    /// Predictable part: gestures of the rule for `speech`.
     pub fn new(speech: &'a Speech) -> Self {
         let strokes = std::array::from_fn(|hand| {
             let accents = speech.syllables.iter().filter(|syllable| syllable.stress > ACCENT);
@@ -104,7 +102,7 @@ impl<'a> RuleGestures<'a> {
         Self { speech, moves: strokes.map(with_returns), sway: None }
     }
 
-    /// What the speaker does in fact, whims and all; `secs` long.
+    /// Gestures of `secs` seconds with random variation.
     pub fn with_variation(speech: &'a Speech, secs: f64, rng: &mut ChaCha8Rng) -> Self {
         let mut strokes: [Vec<(f64, ArmTarget)>; 2] = Default::default();
         for accent in speech.syllables.iter().filter(|syllable| syllable.stress > ACCENT) {
@@ -135,7 +133,7 @@ impl<'a> RuleGestures<'a> {
         Self { speech, moves: strokes.map(with_returns), sway: Some(sway) }
     }
 
-    /// The controls of the figure at `secs`.
+    /// Controls of the figure at `secs`.
     pub fn controls(&self, secs: f64) -> Controls {
         let lift = LIFT * self.slow_envelope(secs);
         let sway = |number: usize| self.sway.as_ref().map_or(0.0, |sway| sway.at(number, secs));
@@ -154,7 +152,7 @@ impl<'a> RuleGestures<'a> {
         Controls { arms: [arm(0), arm(1)], torso, ..Controls::default() }
     }
 
-    /// Joints at the times of `fps`, the neck at the origin.
+    /// Joints at the frames of `fps`, the neck at the origin.
     pub fn motion(&self, n_frames: usize, fps: FrameRate) -> Motion {
         let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
         for frame_idx in 0..n_frames {
@@ -167,7 +165,7 @@ impl<'a> RuleGestures<'a> {
         Motion::from_joints(fps, joints)
     }
 
-    /// L(t): the envelope of the last second, late.
+    /// Lift L(t): the delayed, averaged envelope.
     fn slow_envelope(&self, secs: f64) -> f64 {
         const N: usize = 24;
         let [first, last] = LIFT_DELAYS;
@@ -198,12 +196,12 @@ fn with_returns(strokes: Vec<(f64, ArmTarget)>) -> Vec<WristMove> {
     moves
 }
 
-/// g: how far a louder accent sends a hand.
+/// Reach g of an accent; louder accents reach farther.
 fn reach(accent: &Syllable) -> f64 {
     0.45 + 0.4 * (accent.peak() - 0.4) / 0.6
 }
 
-/// The share `reach` of the way from the lap to a place.
+/// Target at the share `reach` of the way from the rest pose to `place`.
 fn towards(place: &ArmTarget, reach: f64) -> ArmTarget {
     std::array::from_fn(|k| REST[k] + reach * (place[k] - REST[k]))
 }
@@ -216,7 +214,7 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// 0 to 1 over 0..1 with speed and acceleration 0 at both ends (Flash and Hogan 1985).
+/// Minimum-jerk profile from 0 to 1 (Flash and Hogan 1985).
 fn minimum_jerk(along: f64) -> f64 {
     let u = along.clamp(0.0, 1.0);
     u * u * u * (10.0 + u * (6.0 * u - 15.0))
@@ -237,7 +235,8 @@ mod tests {
         Speech::free(SECS, &mut ChaCha8Rng::seed_from_u64(seed))
     }
 
-    /// The delay, seconds, at which the speed of a wrist goes most with the onsets of accents (each as a bump of 0.1 s).
+    /// Delay, seconds, with the best correlation of a wrist's speed and the onsets of accents (each as a bump of 0.1
+    /// s).
     fn delay(hand: usize) -> f64 {
         let speech = speech(1);
         let n_frames = FPS.frames_in(SECS);
@@ -246,7 +245,7 @@ mod tests {
         let onsets: Vec<f64> = accents.map(|accent| accent.start).collect();
         let at = |delay: f64| {
             let bump = |secs: f64| -> f64 { onsets.iter().map(|t| (-((secs - t - delay) / 0.1).powi(2)).exp()).sum() };
-            // A speed belongs to the middle between two frames.
+            // Speed is at the middle between two frames.
             let expected = Array1::from_shape_fn(n_frames - 1, |t| bump(FPS.secs(t) + 0.5 * FPS.secs(1)));
             correlation(expected.view(), speeds.slice(s![.., hand]))
         };
