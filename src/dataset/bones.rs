@@ -1,5 +1,5 @@
-//! Bone lengths: constant in the shards of a video (`bones.json`, written by the lift stage), and the speaker's one set
-//! for readers: the median of the videos' sets, each weighing as many frames as it was measured on.
+//! Bone lengths: constant within a video's shards (`bones.json`, written by the lift stage), and one set for the
+//! speaker, the frame-weighted median over the videos.
 
 use crate::math::order::weighted_median;
 use crate::types::skeleton::N_BONES;
@@ -7,12 +7,12 @@ use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// The bone lengths of one video.
+/// Bone lengths of one video.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct VideoBones {
-    /// Of joints 1..=48 to their parents, metres; 0: not measured.
+    /// Lengths from joints 1..=48 to their parents, metres; 0: not measured.
     pub lengths_metres: Vec<f64>,
-    /// Frames they were measured on.
+    /// Number of frames of the measurement.
     pub n_frames: usize,
 }
 
@@ -32,7 +32,7 @@ impl VideoBones {
     }
 }
 
-/// The weighted median of each bone over the videos in which it was measured; 0 where it never was.
+/// Weighted median of each bone over the videos in which it was measured; 0 where it never was.
 pub fn of_speaker(videos: &[VideoBones]) -> [f32; N_BONES] {
     std::array::from_fn(|bone| {
         let lengths = videos.iter().filter_map(|video| {

@@ -1,4 +1,4 @@
-//! The dataset card `README.md`: a YAML header as the hubs read it, and what a stranger needs to use the numbers.
+//! Dataset card `README.md`: a YAML header in the hubs' form, and a description for readers.
 
 use super::info::DatasetInfo;
 use super::leakage::Leakage;
@@ -6,7 +6,7 @@ use super::split::Split;
 use super::stats::DatasetStats;
 use std::fmt::Write;
 
-/// The card.
+/// Text of the card.
 pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> String {
     let mut text = header(info);
     let speaker = &info.speaker;
@@ -75,7 +75,7 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
     text
 }
 
-/// The YAML header. Values are quoted as JSON, which YAML reads.
+/// YAML header. Values are quoted as JSON, which is valid YAML.
 fn header(info: &DatasetInfo) -> String {
     let quoted = |text: &str| serde_json::Value::from(text).to_string();
     let licence = if info.licence.is_empty() { "unknown" } else { &info.licence };
@@ -99,7 +99,7 @@ fn header(info: &DatasetInfo) -> String {
     text + "---\n\n"
 }
 
-/// Seconds as people say them.
+/// Duration for people.
 fn length(secs: f64) -> String {
     match secs {
         ..120.0 => format!("{secs:.1} s"),

@@ -1,10 +1,10 @@
-//! `index.jsonl`: where each sample lies in which shard, and its BLAKE3 hash, a line a sample, for random access and
-//! checks. The shards themselves stand in `info.json`.
+//! Index file `index.jsonl`: a line for each sample with its location in a shard and its BLAKE3 hash, for random access
+//! and checks. Shards are listed in `info.json`.
 
 use crate::types::split::Split;
 use serde::{Deserialize, Serialize};
 
-/// One tar file.
+/// Tar file of samples.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShardRef {
     pub file: String,
@@ -13,18 +13,18 @@ pub struct ShardRef {
     pub blake3: String,
 }
 
-/// One sample and its members; offsets count from the beginning of the shard.
+/// Sample with its members; offsets count from the beginning of the shard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SampleRef {
     pub key: String,
     pub split: Split,
     /// File name of the shard.
     pub shard: String,
-    /// The sample with its tar headers: a valid tar stream by itself.
+    /// Start of the sample with its tar headers, a valid tar stream by itself.
     pub offset: u64,
     pub size: u64,
     pub n_frames: usize,
-    /// Of the `size` bytes at `offset`.
+    /// Hash of the `size` bytes at `offset`.
     pub blake3: String,
     pub json: ByteRange,
     pub mask: ByteRange,
@@ -33,7 +33,7 @@ pub struct SampleRef {
     pub wav: ByteRange,
 }
 
-/// Bytes of a shard.
+/// Range of bytes in a shard.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ByteRange {
     pub offset: u64,

@@ -1,4 +1,4 @@
-//! `info.json`: what the numbers mean. Everything a reader needs who has never seen this project.
+//! Description file `info.json`: the meaning of all numbers, for readers without this program.
 
 use super::index::ShardRef;
 use super::sample::N_KEYPOINTS;
@@ -10,54 +10,54 @@ use crate::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The whole file.
+/// Contents of `info.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DatasetInfo {
     pub schema: u32,
     pub speaker: String,
-    /// The program that wrote it, with its version.
+    /// Program that wrote the dataset, with its version.
     pub tool: String,
     pub fps: FrameRate,
-    /// Samples of sound a second.
+    /// Sound samples a second.
     pub sound_rate: u32,
-    /// The members of a sample, by extension.
+    /// Members of a sample, by extension.
     pub members: BTreeMap<String, Member>,
-    /// What the coordinates of `pose3d.npy` are.
+    /// Coordinates of `pose3d.npy`.
     pub axes: JointAxes,
     pub joints: Vec<SkeletonJoint>,
-    /// Length of the bone from joint `n + 1` to its parent, metres: the median of the videos. In a video's samples the
-    /// bones have the constant lengths of that video, see `videos/<name>.json`.
+    /// Length from joint `n + 1` to its parent, metres, the median over the videos. Within a video bones have the
+    /// constant lengths of `videos/<name>.json`.
     pub bone_lengths_metres: Vec<f64>,
-    /// The 59 points of `pose2d.npy`.
+    /// Names of the 59 points of `pose2d.npy`.
     pub keypoints: Vec<String>,
-    /// The models that looked at the videos.
+    /// Models that were applied to the videos.
     pub models: Vec<ModelUsed>,
-    /// Identifier of the licence, how the speaker agreed, where the videos come from; empty: not said.
+    /// Licence identifier, form of the speaker's consent, origin of the videos; empty: not stated.
     pub licence: String,
     pub consent: String,
     pub source: String,
-    /// What else a reader must know, a sentence each.
+    /// Further notes for readers, a sentence each.
     pub notes: Vec<String>,
     pub splits: BTreeMap<String, SplitInfo>,
-    /// Sorted by name; those without a sample too.
+    /// Videos by name, those without a sample too.
     pub videos: Vec<DatasetVideo>,
 }
 
-/// A video of the dataset.
+/// Video of the dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DatasetVideo {
     pub name: String,
     pub file: String,
     /// BLAKE3 of the file.
     pub content: String,
-    /// `None`: nothing of it was kept.
+    /// Split; `None`: no sample.
     pub split: Option<Split>,
     pub split_by: SplitBy,
     pub samples: usize,
     pub secs: f64,
 }
 
-/// An array or file of a sample.
+/// Array or file of a sample.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Member {
     pub shape: String,
@@ -75,7 +75,7 @@ pub struct JointAxes {
     pub origin: String,
 }
 
-/// A joint of the skeleton; `parent` is its number in the list.
+/// Joint of the skeleton; `parent` is its index in the list.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SkeletonJoint {
     pub name: String,
@@ -83,7 +83,7 @@ pub struct SkeletonJoint {
     pub side: String,
 }
 
-/// A model by its role (`body`, `hand`, ...), its id in the manifest, and the hash of its file.
+/// Model by role (`body`, `hand`, ...), its id in the manifest, and the hash of its file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ModelUsed {
     pub role: String,
@@ -91,7 +91,7 @@ pub struct ModelUsed {
     pub sha256: String,
 }
 
-/// How much a split holds.
+/// Size of a split.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SplitInfo {
     pub shards: Vec<ShardRef>,
@@ -101,7 +101,7 @@ pub struct SplitInfo {
     pub secs: f64,
 }
 
-/// What a dataset is beside its videos.
+/// Description of a dataset apart from its videos.
 #[derive(Clone, Debug, PartialEq)]
 pub struct About {
     pub speaker: String,
@@ -115,7 +115,7 @@ pub struct About {
 }
 
 impl About {
-    /// Of `speaker` at `fps`, made by this program; nothing else is said.
+    /// Description of `speaker` at `fps` with all other fields empty.
     pub fn new(speaker: &str, fps: FrameRate) -> Self {
         let nothing = String::new;
         Self {
@@ -132,7 +132,7 @@ impl About {
 }
 
 impl DatasetInfo {
-    /// The description of a dataset `about` with these videos and bones (48 lengths, metres).
+    /// Contents for a dataset `about` with these videos and bones (48 lengths, metres).
     pub fn new(about: &About, bones: &[f32], splits: BTreeMap<Split, SplitInfo>, videos: Vec<DatasetVideo>) -> Self {
         let About { speaker, tool, fps, models, licence, consent, source, notes } = about.clone();
         Self {
@@ -162,13 +162,13 @@ impl DatasetInfo {
         }
     }
 
-    /// What it was made from, beside the videos.
+    /// Description apart from the videos.
     pub fn about(&self) -> About {
         let DatasetInfo { speaker, tool, fps, models, licence, consent, source, notes, .. } = self.clone();
         About { speaker, tool, fps, models, licence, consent, source, notes }
     }
 
-    /// The shards of all splits.
+    /// Shards of all splits.
     pub fn shards(&self) -> impl Iterator<Item = &ShardRef> {
         self.splits.values().flat_map(|split| &split.shards)
     }
@@ -207,11 +207,11 @@ fn joint(joint: usize) -> SkeletonJoint {
     SkeletonJoint { name: skeleton::name(joint), parent: skeleton::parent(joint), side: side.to_owned() }
 }
 
-/// Names of the 59 keypoints of a shard, in their order.
+/// Names of the 59 keypoints, in their order.
 pub fn keypoint_names() -> Vec<String> {
     let paired = ["Eye", "Ear", "Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle"];
     let body = paired.iter().flat_map(|name| [format!("L{name}"), format!("R{name}")]);
-    // a hand's points have the joints' order: the root is the wrist, then the fingers, base to tip
+    // Points of a hand are in joint order: wrist, then the fingers, base to tip.
     let hand = |root: usize| (root..root + skeleton::N_HAND_JOINTS).map(skeleton::name);
     let mut names = Vec::with_capacity(N_KEYPOINTS);
     names.push("Nose".to_owned());

@@ -1,18 +1,18 @@
-//! Mean, deviation and range of the joints of a video, such that those of several videos can be put together without
-//! looking at the joints again (Chan, Golub, LeVeque 1979).
+//! Mean, deviation and range of a video's joints, mergeable over videos without reading joints again (Chan, Golub,
+//! LeVeque 1979).
 
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
 use serde::{Deserialize, Serialize};
 
-/// Sums over the frames in which a joint was seen; rows are joints, columns x, y, z in metres.
+/// Moments over the frames in which a joint was seen; rows are joints, columns x, y, z in metres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointMoments {
     pub n_seen: Vec<u64>,
     pub mean: Vec<[f64; 3]>,
-    /// Sums of the squared distances from the mean.
+    /// Sums of squared differences from the mean.
     pub squares: Vec<[f64; 3]>,
-    /// 0 where a joint was never seen.
+    /// Minimum; 0 where a joint was never seen.
     pub min: Vec<[f64; 3]>,
     pub max: Vec<[f64; 3]>,
 }
@@ -25,7 +25,7 @@ impl Default for JointMoments {
 }
 
 impl JointMoments {
-    /// Takes in the joints that were seen.
+    /// Adds the joints that were seen.
     pub fn learn(&mut self, motion: &Motion) {
         for (frame, seen) in motion.joints.outer_iter().zip(motion.mask.outer_iter()) {
             for (joint, row) in frame.outer_iter().enumerate() {
@@ -47,7 +47,7 @@ impl JointMoments {
         }
     }
 
-    /// Takes in what was learnt from other frames. Rows that `other` lacks count as never seen.
+    /// Adds the moments of other frames. Rows that `other` lacks count as never seen.
     pub fn merge(&mut self, other: &JointMoments) {
         let rows = other.mean.iter().zip(&other.squares).zip(other.min.iter().zip(&other.max));
         for (joint, ((mean, squares), (min, max))) in rows.enumerate().take(N_JOINTS) {
@@ -66,7 +66,7 @@ impl JointMoments {
         }
     }
 
-    /// Standard deviations (of the population).
+    /// Population standard deviations.
     pub fn std(&self) -> Vec<[f64; 3]> {
         let of = |(squares, n): (&[f64; 3], &u64)| squares.map(|square| (square / (*n).max(1) as f64).sqrt());
         self.squares.iter().zip(&self.n_seen).map(of).collect()

@@ -1,20 +1,12 @@
-//! The dataset of one speaker on disk: written by the dataset stage, read back by training. A folder holds WebDataset
-//! tar shards of each video (`train-<video>-0000.tar`, ...), `videos/` (what is known of each video), and the files put
-//! together from these: `info.json` (what the numbers mean), `stats.json` (what they are like), `index.jsonl` (where each
-//! sample lies), `ledger.jsonl` (what became of every second), `leakage.json`, the card `README.md`, `checksums.b3`.
-//!
-//! A sample is an interval, continuous motion with its sound; windows are drawn when training (`train::examples`). The
-//! way of a sample: `video` (cut) -> `sample` (members) -> `shard` (tar) -> `part` (a video) -> `assemble`; back: `read`.
-//! `split` and `shared_sound` decide where a video goes, `verify` checks all of it. Sound and motion meet by time in
-//! `sync`, nowhere else.
+//! Files and constants of the dataset's folder.
 
 /// Version of the folder's layout; a reader refuses any other.
 pub const SCHEMA: u32 = 2;
-/// The window of the paper, in frames, and the stride of training windows: what statistics count.
+/// Window length of Rebol et al. (2021) and stride of training windows, in frames, which the statistics count.
 pub const WINDOW_FRAMES: usize = 64;
 pub const STRIDE_FRAMES: usize = 5;
 
-/// Names of the files that speak of all videos.
+/// Names of the files that describe all videos.
 pub const INFO: &str = "info.json";
 pub const STATS: &str = "stats.json";
 pub const INDEX: &str = "index.jsonl";

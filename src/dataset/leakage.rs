@@ -1,21 +1,21 @@
-//! `leakage.json`: which videos share sound, and whether any of them stand in different splits.
+//! Leakage file `leakage.json`: videos that share sound, and those of them in different splits.
 
 use super::shared_sound::SharedSound;
 use super::split::Split;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What is compared, and found.
+/// Contents of `leakage.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Leakage {
-    /// Seconds of equal sound that count; 0: sound was not compared.
+    /// Shortest shared sound that counts, seconds; 0: sound was not compared.
     pub duplicate_secs: f64,
-    /// Videos with samples whose sound was compared.
+    /// Number of compared videos with samples.
     pub n_compared: usize,
-    /// Every two videos that share sound.
+    /// Pairs of videos that share sound.
     pub shared: Vec<SharedSound>,
-    /// Those of them that stand in different splits: a test on one has seen the other. Only names in the configuration
-    /// bring this about.
+    /// Pairs in different splits, where a test has seen training sound; caused only by splits named in the
+    /// configuration.
     pub leaks: Vec<Leak>,
 }
 
@@ -29,7 +29,7 @@ pub struct Leak {
     pub secs: f64,
 }
 
-/// What was found out by comparing the sound of all videos.
+/// Result of comparing the sound of all videos.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SoundComparison {
     pub duplicate_secs: f64,
@@ -37,7 +37,7 @@ pub struct SoundComparison {
 }
 
 impl Leakage {
-    /// The report on videos of these splits.
+    /// Report on videos of these splits.
     pub fn new(compared: &SoundComparison, splits: &BTreeMap<String, Split>) -> Self {
         let leak = |shared: &SharedSound| {
             let (a_split, b_split) = (*splits.get(&shared.a)?, *splits.get(&shared.b)?);
@@ -52,7 +52,7 @@ impl Leakage {
         }
     }
 
-    /// What it was made from, beside the splits.
+    /// Comparison it was made from.
     pub fn compared(&self) -> SoundComparison {
         SoundComparison { duplicate_secs: self.duplicate_secs, shared: self.shared.clone() }
     }

@@ -1,12 +1,8 @@
-//! The dataset of one speaker on disk: written by the dataset stage, read back by training. A folder holds WebDataset
-//! tar shards of each video (`train-<video>-0000.tar`, ...), `videos/` (what is known of each video), and the files put
-//! together from these: `info.json` (what the numbers mean), `stats.json` (what they are like), `index.jsonl` (where each
-//! sample lies), `ledger.jsonl` (what became of every second), `leakage.json`, the card `README.md`, `checksums.b3`.
-//!
-//! A sample is an interval, continuous motion with its sound; windows are drawn when training (`train::examples`). The
-//! way of a sample: `video` (cut) -> `sample` (members) -> `shard` (tar) -> `part` (a video) -> `assemble`; back: `read`.
-//! `split` and `shared_sound` decide where a video goes, `verify` checks all of it. Sound and motion meet by time in
-//! `sync`, nowhere else.
+//! Dataset of one speaker on disk. A folder holds WebDataset tar shards of each video (`train-<video>-0000.tar`, ...),
+//! `videos/` (an entry for each video), and common files assembled from the entries: `info.json`, `stats.json`,
+//! `index.jsonl`, `ledger.jsonl`, `leakage.json`, `README.md`, `checksums.b3`. A sample is an interval of continuous
+//! motion with its sound; training draws windows from it. Writing: `sample` -> `write::tar` -> `write::part` ->
+//! `write::assemble`; reading: `read`; splits: `split`, `shared_sound`; checks: `verify`.
 
 pub mod bones;
 pub mod card;

@@ -1,5 +1,5 @@
-//! Reading a dataset's folder: opened once, then any sample or any stretch of one by its place. Damaged, missing or
-//! foreign files are errors that name the file and what to do; nothing here panics on what is in a file.
+//! Reading of a dataset's folder: any sample, or any range of frames of one. Damaged, missing or foreign files are
+//! errors that name the file and what to do.
 
 use super::index::{ByteRange, SampleRef};
 use super::info::DatasetInfo;
@@ -22,7 +22,7 @@ use std::ops::Range;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
-/// An open dataset. Reading needs no lock: threads may share it.
+/// Open dataset; threads may share it without a lock.
 pub struct Dataset {
     dir: PathBuf,
     info: DatasetInfo,
@@ -32,8 +32,8 @@ pub struct Dataset {
 }
 
 impl Dataset {
-    /// Opens the folder of one speaker (`work/dataset/<speaker>`): reads its JSON files, and checks that every shard
-    /// is there with the size it should have. Contents are checked by `read` and by `verify`.
+    /// Opens the folder of one speaker (`work/dataset/<speaker>`): reads its JSON files and checks that every shard
+    /// exists with its size. Contents are checked by `read` and by `verify`.
     pub fn open(dir: impl AsRef<Path>) -> Result<Dataset> {
         let dir = dir.as_ref().to_owned();
         ensure!(
@@ -88,34 +88,34 @@ impl Dataset {
         Ok(Dataset { dir, info, stats, samples, shards })
     }
 
-    /// The folder.
+    /// Folder of the dataset.
     pub fn dir(&self) -> &Path {
         &self.dir
     }
 
-    /// Hash (BLAKE3, hex) of the dataset's checksums, and so of everything in it.
+    /// Hash (BLAKE3, hex) of the dataset's checksums, and so of all its files.
     pub fn hash(&self) -> Result<String> {
         let path = self.dir.join(CHECKSUMS);
         let checksums = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
         Ok(blake3::hash(&checksums).to_hex().to_string())
     }
 
-    /// What the numbers mean.
+    /// Description of the numbers.
     pub fn info(&self) -> &DatasetInfo {
         &self.info
     }
 
-    /// What the numbers are like.
+    /// Statistics of the numbers.
     pub fn stats(&self) -> &DatasetStats {
         &self.stats
     }
 
-    /// The samples of a split, in the order of the shards.
+    /// Samples of a split, in the order of the shards.
     pub fn samples(&self, split: Split) -> Vec<SampleRef> {
         self.samples.iter().filter(|sample| sample.split == split).cloned().collect()
     }
 
-    /// Reads a whole sample and checks its hash.
+    /// Reads a sample and checks its hash.
     pub fn read(&self, sample: &SampleRef) -> Result<Sample> {
         let hash = blake3::hash(&self.bytes(sample, ByteRange { offset: sample.offset, size: sample.size })?);
         ensure!(
@@ -135,7 +135,7 @@ impl Dataset {
         Ok(Sample { key: sample.key.clone(), motion: self.motion(sample, frames)?, pose2d, sound, meta })
     }
 
-    /// The motion of the frames `frames` of a sample; only these are read, no hash is checked.
+    /// Motion of the frames `frames` of a sample; only these are read, no hash is checked.
     fn motion(&self, sample: &SampleRef, frames: Range<usize>) -> Result<Motion> {
         let n_frames = frames.len();
         let joints =
@@ -158,7 +158,7 @@ impl Dataset {
         Ok(Sound { rate, samples: wav::samples(&self.bytes(sample, span)?) })
     }
 
-    /// The bytes of the rows `frames` of an array.
+    /// Bytes of the rows `frames` of an array.
     fn rows(
         &self,
         sample: &SampleRef,
@@ -185,7 +185,7 @@ impl Dataset {
     fn bytes(&self, sample: &SampleRef, span: ByteRange) -> Result<Vec<u8>> {
         let place = || format!("reading {} in {}", sample.key, self.dir.join(&sample.shard).display());
         let file = self.shards.get(&sample.shard).with_context(|| format!("{}: no such shard", place()))?;
-        // spans lie inside the file (checked when it was opened, and by the layouts), so this allocation is honest
+        // Ranges lie inside the file (checked on opening and by the array headers), which bounds the allocation.
         ensure!(span.size <= sample.size, "{}: {} bytes of a smaller sample were asked for", place(), span.size);
         let mut bytes = vec![0; span.size as usize];
         file.read_exact_at(&mut bytes, span.offset).with_context(place)?;

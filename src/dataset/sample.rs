@@ -1,4 +1,4 @@
-//! One sample of the dataset: an interval's motion, keypoints, sound and facts, and its members as bytes.
+//! Sample of the dataset: motion, keypoints, sound and metadata of an interval, and its members as bytes.
 
 use crate::formats::{npy_slice, wav};
 use crate::types::pose2d::{N_BODY, N_HAND};
@@ -9,24 +9,24 @@ use crate::types::sync;
 use anyhow::{Context, Result, ensure};
 use ndarray::Array3;
 
-/// Keypoints of a frame in a shard: 17 of the body, 21 of the left hand, 21 of the right hand.
+/// Keypoints of a frame: 17 of the body, 21 of the left hand, 21 of the right hand.
 pub const N_KEYPOINTS: usize = N_BODY + 2 * N_HAND;
 
-/// An interval: continuous motion of the speaker with its sound.
+/// Interval of continuous motion with its sound.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sample {
-    /// `<slug>-<8 hex of the video's content>-<first frame, 6 digits>`; [a-z0-9_-] only.
+    /// Key `<slug>-<8 hex of the video's content>-<first frame, 6 digits>`; [a-z0-9_-] only.
     pub key: String,
     pub motion: Motion,
-    /// [T, 59, 3]: x px, y px, score.
+    /// Keypoints [T, 59, 3]: x px, y px, score.
     pub pose2d: Array3<f32>,
-    /// 16 kHz mono, from the beginning of the first frame to the end of the last.
+    /// Sound at 16 kHz mono, from the beginning of the first frame to the end of the last.
     pub sound: Sound,
-    /// Where it comes from, and what is special about it (see `stage`).
+    /// Metadata: source and properties of the interval.
     pub meta: serde_json::Value,
 }
 
-/// The members of a sample, in the order in which they lie in a shard: extension and bytes.
+/// Extensions of the members, in the order of a shard.
 pub const EXTENSIONS: [&str; 5] = ["json", "mask.npy", "pose2d.npy", "pose3d.npy", "wav"];
 
 impl Sample {
@@ -35,7 +35,7 @@ impl Sample {
         self.motion.n_frames()
     }
 
-    /// The bytes of each of `EXTENSIONS`. Fails when shapes or lengths contradict each other.
+    /// Bytes of each of `EXTENSIONS`. Errors where shapes or lengths contradict each other.
     pub fn members(&self) -> Result<[Vec<u8>; 5]> {
         let (key, n_frames) = (&self.key, self.n_frames());
         let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';

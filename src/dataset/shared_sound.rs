@@ -1,5 +1,6 @@
-//! Which videos share sound: a re-upload, a cut-down version, the same intro. Codes of the sound (`audio::fingerprint`)
-//! that are equal in two videos vote for an offset in time; along an offset with votes the codes are compared bit by bit.
+//! Sound shared between videos: a re-upload, a shortened version, the same intro. Fingerprint codes
+//! (`audio::fingerprint`) that are equal in two videos vote for a time offset; along an offset with votes the codes are
+//! compared bit by bit.
 //!
 //! Memory: one code in four of every video, 12 bytes each (0.3 MB an hour), and the codes of two videos.
 
@@ -8,32 +9,33 @@ use anyhow::Result;
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
-/// Share of bits that may differ along a stretch that is the same: unlike sounds differ in a half, with little spread.
+/// Largest share of different bits within shared sound; unrelated sounds differ in half of the bits, with little
+/// spread.
 const MAX_WRONG: f64 = 0.33;
-/// Stretch over which that share is taken, seconds.
+/// Window of that share, seconds.
 const WINDOW_SECS: f64 = 3.0;
-/// Codes that tell where the stretch begins and ends.
+/// Number of codes that locate the ends of shared sound.
 const EDGE: usize = 16;
-/// Equal codes that an offset needs to be looked at.
+/// Number of equal codes from which an offset is examined.
 const MIN_VOTES: usize = 2;
-/// A code in more places than this (a hum, a beep) tells nothing.
+/// Number of occurrences above which a code (a hum, a beep) is ignored.
 const MAX_PLACES: usize = 64;
 
-/// A stretch of sound that two videos share.
+/// Sound that two videos share.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SharedSound {
     /// Names of the videos, in alphabetical order.
     pub a: String,
     pub b: String,
-    /// Where it begins in each, seconds.
+    /// Start in each video, seconds.
     pub a_secs: f64,
     pub b_secs: f64,
-    /// How long it is.
+    /// Duration, seconds.
     pub secs: f64,
 }
 
 impl SharedSound {
-    /// The other video of the pair, if `name` is one of them.
+    /// Name of the other video of the pair, if `name` is one of them.
     pub fn other(&self, name: &str) -> Option<&str> {
         if self.a == name {
             Some(&self.b)
@@ -44,17 +46,17 @@ impl SharedSound {
         }
     }
 
-    /// The order of pairs.
+    /// Order of pairs by name.
     pub fn cmp_names(&self, other: &Self) -> Ordering {
         (&self.a, &self.b).cmp(&(&other.a, &other.b))
     }
 }
 
-/// A code that stands for its surroundings.
+/// Code with its video and position.
 type Landmark = (u32, u32, u32);
 
-/// The stretches of at least `min_secs` that two of the videos share, the longest of each pair, in the order of the names.
-/// `names` are sorted; `codes` gives those of the n-th video.
+/// Shared sounds of at least `min_secs`, the longest of each pair of videos, in the order of the names. `names` are
+/// sorted; `codes` returns those of the n-th video.
 pub fn find(names: &[String], codes: impl Fn(usize) -> Result<Vec<u32>>, min_secs: f64) -> Result<Vec<SharedSound>> {
     let mut landmarks: Vec<Landmark> = Vec::new();
     for video in 0..names.len() {
@@ -86,7 +88,7 @@ pub fn find(names: &[String], codes: impl Fn(usize) -> Result<Vec<u32>>, min_sec
     Ok(found)
 }
 
-/// For every two videos with equal codes the offsets in time (second less first, in codes) that enough of them agree on.
+/// Offsets (second minus first, in codes) with enough votes, for every two videos with equal codes.
 fn votes(landmarks: &[Landmark]) -> Vec<((u32, u32), Vec<i64>)> {
     let mut votes: Vec<((u32, u32), i64)> = Vec::new();
     for same in landmarks.chunk_by(|x, y| x.0 == y.0).filter(|same| same.len() <= MAX_PLACES) {
@@ -112,7 +114,7 @@ fn votes(landmarks: &[Landmark]) -> Vec<((u32, u32), Vec<i64>)> {
     pairs
 }
 
-/// The longest stretch that is the same at about this offset: its start in `a`, the offset, its length, in codes.
+/// Longest shared sound at about this offset: its start in `a`, the offset, its length, in codes.
 fn longest_equal(a: &[u32], b: &[u32], offset: i64) -> Option<(i64, i64, usize)> {
     (offset - 1..=offset + 2).filter_map(|offset| longest_at(a, b, offset)).max_by_key(|(_, _, n)| *n)
 }
@@ -138,7 +140,7 @@ fn longest_at(a: &[u32], b: &[u32], offset: i64) -> Option<(i64, i64, usize)> {
         }
     }
     best.map(|(start, offset, n)| {
-        // A window goes over the edges of what is the same; there, short pieces tell.
+        // Windows extend over the edges of shared sound; there, shorter pieces decide.
         let place = (start as usize).saturating_sub(a_start);
         let unlike = |piece: &[(u32, u32)]| {
             let (bits, wrong) = piece.iter().fold((0, 0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
@@ -151,7 +153,7 @@ fn longest_at(a: &[u32], b: &[u32], offset: i64) -> Option<(i64, i64, usize)> {
     })
 }
 
-/// Bits compared, and of them unlike; silence is not compared.
+/// Number of compared and of different bits; silence is not compared.
 fn wrong_bits(x: u32, y: u32) -> (u32, u32) {
     if x == 0 || y == 0 { (0, 0) } else { (32, (x ^ y).count_ones()) }
 }

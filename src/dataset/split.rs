@@ -1,6 +1,6 @@
-//! Which split a video belongs to. A video is never divided, and its split follows from its content alone, or from a
-//! name in the configuration, so that adding videos moves none of the others. Videos that share sound (a re-upload, the
-//! same intro) are kept together: the later one goes where the earlier one is.
+//! Assignment of videos to splits. A video is never divided, and its split follows from its content hash or from a name
+//! in the configuration, so that adding videos moves no other. Videos that share sound stay together: the later one
+//! follows the earlier one.
 
 use super::shared_sound::SharedSound;
 use serde::{Deserialize, Serialize};
@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 pub use crate::types::split::Split;
 use std::collections::BTreeMap;
 
-/// The split of a video whose content has this hash: the hash is a place in 0..1, of which the first `test`
-/// share tests, the next `validation` share validates, and the rest trains.
+/// Split by content hash: the hash as a number in 0..1, of which the first `test` share tests, the next `validation`
+/// share validates, and the rest trains.
 pub fn of_content(content_hash: &str, validation: f64, test: f64) -> Split {
     let digest = blake3::hash(format!("split {content_hash}").as_bytes());
     let place = digest.as_bytes().iter().take(8).rev().fold(0.0, |sum, &byte| (sum + f64::from(byte)) / 256.0);
@@ -22,27 +22,27 @@ pub fn of_content(content_hash: &str, validation: f64, test: f64) -> Split {
     }
 }
 
-/// A video that waits for its split.
+/// Video without a split.
 #[derive(Clone, Debug)]
 pub struct Unassigned<'a> {
     pub name: &'a str,
     pub content: &'a str,
-    /// The split the configuration names.
+    /// Split named in the configuration.
     pub named: Option<Split>,
-    /// Why it was in its split in the dataset before this one; `None`: it is new.
+    /// Reason of its split in the previous dataset; `None`: a new video.
     pub before: Option<&'a SplitBy>,
 }
 
-/// Where a video goes.
+/// Assignment of a video.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Assignment {
     In(Split, SplitBy),
-    /// It shares sound with these videos of different splits, so that it would leak in any: the longest first.
+    /// No split, since it shares sound with these videos of different splits; the longest first.
     Nowhere(Vec<SharedSound>),
 }
 
-/// The places of the videos, in their order. Those named come first, then those that were there before, then the new
-/// ones in the order of their content's hash: the order in which they are given has no say.
+/// Assignments of the videos, in their order. Named ones come first, then those of the previous dataset, then new ones
+/// in the order of their content hash, so that the order of `videos` does not matter.
 pub fn assign(videos: &[Unassigned], shared: &[SharedSound], validation: f64, test: f64) -> Vec<Assignment> {
     let rank = |video: &Unassigned| match (video.named, video.before) {
         (Some(_), _) => 0,
@@ -82,16 +82,16 @@ pub fn assign(videos: &[Unassigned], shared: &[SharedSound], validation: f64, te
     placed.into_iter().map(|answer| answer.unwrap_or(Assignment::Nowhere(Vec::new()))).collect()
 }
 
-/// Why a video is in its split.
+/// Reason of a video's split.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SplitBy {
-    /// The hash of its content.
+    /// Content hash.
     #[default]
     Content,
-    /// Whoever made the dataset.
+    /// Configuration or source dataset.
     Name,
-    /// It shares sound with the video of this name, and goes where that one goes.
+    /// Shared sound with the video of this name, whose split it follows.
     SoundOf(String),
 }
 

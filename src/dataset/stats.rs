@@ -1,5 +1,5 @@
-//! `stats.json`: what the numbers are like. Means and deviations come from the training split alone, from joints that
-//! were seen; hours, windows and refused seconds are of everything.
+//! Statistics file `stats.json`. Means and deviations come from joints seen in the training split; hours, windows and
+//! refused seconds from all splits.
 
 use super::joint_stats::JointMoments;
 use super::write::part::VideoEntry;
@@ -11,13 +11,13 @@ use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The whole file. Rows are joints, columns x, y, z in metres; a joint never seen has zeros.
+/// Contents of `stats.json`. Rows are joints, columns x, y, z in metres; a joint never seen has zeros.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DatasetStats {
     /// Frames of the training split in which each joint was seen.
     pub n_seen: Vec<u64>,
     pub mean: Vec<[f64; 3]>,
-    /// Of the population.
+    /// Population standard deviation.
     pub std: Vec<[f64; 3]>,
     pub min: Vec<[f64; 3]>,
     pub max: Vec<[f64; 3]>,
@@ -25,7 +25,7 @@ pub struct DatasetStats {
     pub footage: FootageCount,
 }
 
-/// Windows in each split: drawn at the training stride, and side by side without overlap.
+/// Number of windows in each split: at the training stride, and without overlap.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WindowCount {
     pub n_frames: usize,
@@ -34,19 +34,19 @@ pub struct WindowCount {
     pub apart: BTreeMap<String, usize>,
 }
 
-/// What became of the speaker's footage, in seconds; `kept_secs`, `refused_secs` and `failed_secs` add up to `secs`.
+/// Seconds of the speaker's footage; `kept_secs`, `refused_secs` and `failed_secs` add up to `secs`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FootageCount {
     pub n_videos: usize,
     pub n_intervals: usize,
     pub secs: f64,
     pub kept_secs: f64,
-    /// By reason.
+    /// Refused seconds by reason.
     pub refused_secs: BTreeMap<String, f64>,
     pub failed_secs: f64,
     /// Videos that failed before their length was known.
     pub n_of_unknown_length: usize,
-    /// Silence appended where the sound ended before the motion.
+    /// Seconds of silence appended where the sound ended before the motion.
     pub padded_sound_secs: f64,
 }
 
@@ -61,7 +61,7 @@ impl DatasetStats {
         table(&self.std)
     }
 
-    /// Whether every table has one row a joint.
+    /// Whether every table has one row for each joint.
     pub(crate) fn is_whole(&self) -> bool {
         self.n_seen.len() == N_JOINTS
             && [&self.mean, &self.std, &self.min, &self.max].iter().all(|t| t.len() == N_JOINTS)
@@ -72,7 +72,7 @@ fn table(rows: &[[f64; 3]]) -> Array2<f32> {
     Array2::from_shape_fn((N_JOINTS, 3), |(joint, k)| rows.get(joint).map_or(0.0, |row| row[k] as f32))
 }
 
-/// Adds up the videos of a dataset.
+/// Accumulator over the videos of a dataset.
 pub struct StatsCollector {
     moments: JointMoments,
     windows: WindowCount,
@@ -89,7 +89,7 @@ impl Default for StatsCollector {
 }
 
 impl StatsCollector {
-    /// Takes in a video.
+    /// Adds a video.
     pub fn push(&mut self, part: &VideoEntry) {
         if part.split == Some(Split::Train) {
             self.moments.merge(&part.moments);
@@ -115,7 +115,7 @@ impl StatsCollector {
         }
     }
 
-    /// The finished statistics.
+    /// Finished statistics.
     pub fn finish(self) -> DatasetStats {
         let std = self.moments.std();
         let JointMoments { n_seen, mean, min, max, .. } = self.moments;

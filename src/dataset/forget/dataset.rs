@@ -1,6 +1,6 @@
-//! A dataset without some of its videos: the parts of the others are taken over byte for byte into a new folder, what is
-//! said of the forgotten ones in them is taken out, the rest is put together again, and the new folder takes the old
-//! one's place.
+//! Dataset without some of its videos: the entries of the others are linked byte for byte into a new folder, references
+//! to the forgotten ones are removed from them, the common files are assembled again, and the new folder replaces the
+//! old one.
 
 use crate::dataset::info::DatasetInfo;
 use crate::dataset::leakage::Leakage;
@@ -14,19 +14,19 @@ use anyhow::{Context, Result, ensure};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// What stands for a forgotten video's name in the accounts of others.
+/// Replacement of a forgotten video's name in the entries of others.
 const FORGOTTEN: &str = "a video that was forgotten";
 
-/// Whether the video of this name has samples in the dataset; one whose file is damaged may have.
+/// Whether the video has samples in the dataset; one whose entry is damaged may have.
 pub fn has_samples(dir: &Path, name: &str) -> bool {
     VideoEntry::read(&VideoEntry::path(dir, name)).map_or(true, |part| !part.samples.is_empty())
 }
 
-/// Whether what stays of `dir` without the videos `names` is as it was written: putting it together again would give
-/// damage a checksum of its own.
+/// Checks that the files of `dir` without the videos `names` match their checksums; assembling damaged files would give
+/// them new ones.
 ///
 /// # Errors
-/// A file of another video that is not what `checksums.b3` says.
+/// A file of another video that does not match `checksums.b3`.
 pub fn ensure_sound_without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
     if !dir.join(part::FOLDER).is_dir() {
         return Ok(());
@@ -44,10 +44,10 @@ pub fn ensure_sound_without(dir: &Path, names: &BTreeSet<String>) -> Result<()> 
     Ok(())
 }
 
-/// Puts a dataset without the videos `names` in the place of `dir`; without any video left, `dir` goes.
+/// Replaces `dir` by the dataset without the videos `names`; without any video left, `dir` is removed.
 ///
 /// # Errors
-/// A part that cannot be read, a folder that cannot be written.
+/// An entry that cannot be read, a folder that cannot be written.
 pub fn without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
     if !dir.exists() {
         return Ok(());
@@ -70,7 +70,7 @@ pub fn without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
             let silent = silenced(&part, names);
             part.take_over(dir, &attempt)?;
             if silent != part {
-                // a new file: the old one is linked into the old dataset
+                // Written anew, since the old file is linked into the old dataset.
                 workdir::write_file(&VideoEntry::path(&attempt, name), &pretty(&silent)?)?;
             }
         }
@@ -84,11 +84,11 @@ pub fn without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
     made
 }
 
-/// The part without the names of the forgotten.
+/// Entry without the names of the forgotten videos.
 fn silenced(part: &VideoEntry, names: &BTreeSet<String>) -> VideoEntry {
     let mut part = part.clone();
     if matches!(&part.split_by, SplitBy::SoundOf(other) if names.contains(other)) {
-        // it stays where it is
+        // Its split does not change.
         part.split_by = SplitBy::Name;
     }
     for refused in &mut part.ledger.refused {

@@ -1,5 +1,5 @@
-//! The videos a project knows of: those its configuration names, those with folders in the work folder, and those in its
-//! datasets; and which of them is meant by a path, a file's name or a work name.
+//! Videos of a project, from its configuration, its work folder and its datasets, and the choice of one by path, file
+//! name or work name.
 
 use crate::config::{Config, videos};
 use crate::dataset::write::part;
@@ -11,24 +11,24 @@ use anyhow::{Result, bail, ensure};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// A video and the names it goes by.
+/// Video with all its names.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct KnownVideo {
     pub speaker: String,
-    /// Its work name; `None`: only a dataset knows it.
+    /// Work name; `None`: known from a dataset only.
     pub work: Option<String>,
-    /// Where the configuration says it is.
+    /// Path in the configuration.
     pub source: Option<PathBuf>,
-    /// BLAKE3 of its content, where anything tells.
+    /// BLAKE3 of the content, where it is recorded.
     pub content: Option<String>,
     /// File name.
     pub file: String,
-    /// Its names in the speaker's dataset.
+    /// Names in the speaker's dataset.
     pub parts: BTreeSet<String>,
 }
 
 impl KnownVideo {
-    /// For people.
+    /// Name for people.
     pub fn title(&self) -> String {
         let name = self.work.as_ref().or(self.parts.first()).cloned().unwrap_or_else(|| self.file.clone());
         format!("{}/{name}", self.speaker)
@@ -50,7 +50,7 @@ impl KnownVideo {
     }
 }
 
-/// Every video of a project, also those the configuration excludes.
+/// Videos of a project, excluded ones too.
 ///
 /// # Errors
 /// A folder that cannot be listed.
@@ -88,10 +88,10 @@ pub fn of_project(config: &Config) -> Result<Vec<KnownVideo>> {
     Ok(known)
 }
 
-/// Every video of the dataset in `dir`.
+/// Videos of the dataset in `dir`.
 ///
 /// # Errors
-/// No dataset is there.
+/// No dataset in `dir`.
 pub fn of_dataset(dir: &Path) -> Result<Vec<KnownVideo>> {
     ensure!(dir.join(part::FOLDER).is_dir(), "{} is no dataset: it has no folder {}", dir.display(), part::FOLDER);
     let mut known = Vec::new();
@@ -99,13 +99,13 @@ pub fn of_dataset(dir: &Path) -> Result<Vec<KnownVideo>> {
     Ok(known)
 }
 
-/// A video of a dataset is the known one with its content, or with its name.
+/// Merges the videos of a dataset with the known ones of equal content or name.
 fn add_dataset(dir: &Path, speaker: &str, known: &mut Vec<KnownVideo>) -> Result<()> {
     if !dir.join(part::FOLDER).is_dir() {
         return Ok(());
     }
     for name in part::names(dir)? {
-        // a damaged file still has a name to be forgotten by
+        // A damaged entry still has a name that can be forgotten.
         let part = VideoEntry::read(&VideoEntry::path(dir, &name)).ok();
         let (content, file) = part.map(|part| (part.content, part.file)).unwrap_or_default();
         let own = |k: &&mut KnownVideo| k.speaker == speaker && k.work.is_some();
@@ -114,7 +114,7 @@ fn add_dataset(dir: &Path, speaker: &str, known: &mut Vec<KnownVideo>) -> Result
         if called.is_some() {
             continue;
         }
-        // without a record of its first stage, a video of that name is looked at itself
+        // Without a record of its first stage the content is hashed from the video itself.
         for k in known.iter_mut().filter(own).filter(|k| k.content.is_none() && k.file == file) {
             k.content = k.source.as_ref().and_then(|source| hash_file(source).ok());
         }
@@ -137,7 +137,7 @@ fn add_dataset(dir: &Path, speaker: &str, known: &mut Vec<KnownVideo>) -> Result
     Ok(())
 }
 
-/// The content of a video, from the record of the stage that read it.
+/// Content hash of a video from the record of the stage that read it.
 fn content(work: &Path, speaker: &str, video: &str) -> Option<String> {
     let record = Record::read(&speaker_dir(work, StageName::Extract, speaker).join(video))?;
     record.fingerprint.inputs.get("video").cloned()
@@ -151,7 +151,7 @@ fn folders(dir: &Path) -> Vec<String> {
     names
 }
 
-/// The units of a stage's folder: their folders, records, failures and left-over attempts.
+/// Units in a stage's folder, from folders, records, failures and unfinished attempts.
 fn entries(dir: &Path) -> BTreeSet<String> {
     let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
     let name = |name: String| {
@@ -163,10 +163,10 @@ fn entries(dir: &Path) -> BTreeSet<String> {
     names.filter(|name| !name.is_empty()).collect()
 }
 
-/// The one video that is meant.
+/// Video that `wanted` names.
 ///
 /// # Errors
-/// None, or several; the message lists them.
+/// None or several videos; the message lists them.
 pub fn one<'a>(known: &'a [KnownVideo], wanted: &str, speaker: Option<&str>) -> Result<&'a KnownVideo> {
     let all: Vec<&KnownVideo> = known.iter().filter(|k| speaker.is_none_or(|speaker| k.speaker == speaker)).collect();
     let list = |videos: &[&KnownVideo]| {
@@ -184,10 +184,10 @@ pub fn one<'a>(known: &'a [KnownVideo], wanted: &str, speaker: Option<&str>) -> 
     }
 }
 
-/// All videos of a speaker.
+/// Videos of a speaker.
 ///
 /// # Errors
-/// Nobody is called so; the message lists the speakers.
+/// An unknown speaker; the message lists the speakers.
 pub fn of_speaker<'a>(known: &'a [KnownVideo], speaker: &str) -> Result<Vec<&'a KnownVideo>> {
     let own: Vec<&KnownVideo> = known.iter().filter(|k| k.speaker == speaker).collect();
     let names: BTreeSet<&str> = known.iter().map(|k| k.speaker.as_str()).collect();

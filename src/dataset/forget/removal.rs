@@ -1,6 +1,6 @@
-//! What goes when a video is forgotten, and the going. First a mark is laid into the dataset, so that `dataset verify`
-//! calls it unsound until all is done; then the stages' files go; last the dataset is replaced by one without the video,
-//! in one step. A kill anywhere leaves something that a second run finishes.
+//! Removal of a video's data. First a marker file in the dataset makes `dataset verify` fail until all is done; then
+//! the stages' files are removed; last the dataset is replaced by one without the video in one step. After a kill at
+//! any point, a second run completes the removal.
 
 use super::dataset;
 use super::known::KnownVideo;
@@ -14,27 +14,27 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The file that lies in a dataset while a video of it is being forgotten.
+/// Marker file in a dataset while one of its videos is being forgotten.
 pub const PENDING: &str = "FORGETTING.txt";
 
-/// Everything that goes with some videos of one speaker, or with the speaker.
+/// Data to remove for some videos of a speaker, or for all.
 #[derive(Clone, Debug, Default)]
 pub struct Removal {
     pub speaker: String,
-    /// Files and folders of the stages, records, failures, attempts, pictures, reports that name one of them.
+    /// Files and folders of the stages: results, records, failures, attempts, pictures, and reports that name a video.
     pub paths: Vec<PathBuf>,
-    /// Folders of trained models that have seen the videos.
+    /// Folders of models that were trained on the videos.
     pub models: Vec<PathBuf>,
-    /// The dataset, and the names in it that go.
+    /// Dataset, and the names of its videos to remove.
     pub dataset: Option<(PathBuf, BTreeSet<String>)>,
-    /// The table of known hashes, and how many of its entries go.
+    /// Table of content hashes, and the number of its entries to remove.
     pub hashes: Option<(PathBuf, usize)>,
-    /// What the videos are known by.
+    /// Search terms of the videos.
     pub marks: Vec<SearchTerm>,
 }
 
 impl Removal {
-    /// What is there of `videos` in the work folder; `others` are the videos that stay.
+    /// Data of `videos` in the work folder; `others` are the videos that stay.
     ///
     /// # Errors
     /// A folder that cannot be listed.
@@ -72,7 +72,7 @@ impl Removal {
         let left_over = workdir::left_over(&dir);
         if !names.is_empty() || (whole && dir.exists()) || dir.join(PENDING).exists() {
             removal.dataset = Some((dir.clone(), names));
-            // it names the videos among its inputs, and their files in its report
+            // The dataset stage names the videos among its inputs, and their files in its report.
             removal
                 .paths
                 .extend([record::record_path(&dir), record::failure_path(&dir)].into_iter().filter(|p| p.exists()));
@@ -82,19 +82,19 @@ impl Removal {
         Ok(removal)
     }
 
-    /// What is there of `videos` in a dataset's folder without a work folder.
+    /// Data of `videos` in a dataset's folder without a work folder.
     pub fn of_dataset(dir: &Path, videos: &[&KnownVideo], others: &[&KnownVideo]) -> Self {
         let names = videos.iter().flat_map(|video| video.parts.iter().cloned()).collect();
         let paths = workdir::left_over(dir);
         Self { dataset: Some((dir.to_owned(), names)), marks: marks(videos, others), paths, ..Self::default() }
     }
 
-    /// Whether nothing is there.
+    /// Whether there is nothing to remove.
     pub fn is_empty(&self) -> bool {
         self.paths.is_empty() && self.models.is_empty() && self.dataset.is_none() && self.hashes.is_none()
     }
 
-    /// What goes, a line each.
+    /// Description of what is removed, a line each.
     pub fn lines(&self, keep_models: bool) -> Vec<String> {
         let mut lines: Vec<String> = self.paths.iter().map(|path| path.display().to_string()).collect();
         if let Some((path, n)) = &self.hashes {
@@ -109,7 +109,7 @@ impl Removal {
         lines
     }
 
-    /// Does it, with the trained models unless they are kept.
+    /// Carries out the removal, trained models included unless they are kept.
     ///
     /// # Errors
     /// A damaged video among those that stay, before anything is removed; a file that cannot be removed or written.
@@ -140,7 +140,7 @@ impl Removal {
         workdir::write_file(path, &serde_json::to_vec(&table)?)
     }
 
-    /// Whether an entry of the table speaks of one of the videos.
+    /// Whether an entry of the hash table belongs to one of the videos.
     fn is_own_hash(&self, file: &str, known: &serde_json::Value) -> bool {
         let entry = format!("{file}\n{known}");
         let gone = self.paths.iter().any(|path| Path::new(file).starts_with(path));
@@ -160,7 +160,7 @@ fn hashes(path: &Path, removal: &Removal) -> Option<(PathBuf, usize)> {
     (n > 0).then(|| (path.to_owned(), n))
 }
 
-/// The reports in the work folder: pages that anybody can have made again.
+/// Report pages in the work folder, which can be made again.
 fn pages(work: &Path) -> Result<Vec<PathBuf>> {
     let (mut pages, mut folders) = (Vec::new(), vec![work.to_owned()]);
     while let Some(folder) = folders.pop() {
@@ -197,7 +197,7 @@ fn remove(path: &Path) -> Result<()> {
     }
 }
 
-/// The names and hashes of `videos` that no other video shares.
+/// Names and hashes of `videos` that no other video shares.
 fn marks(videos: &[&KnownVideo], others: &[&KnownVideo]) -> Vec<SearchTerm> {
     let mut marks: Vec<SearchTerm> = Vec::new();
     for video in videos {

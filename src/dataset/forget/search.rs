@@ -1,55 +1,55 @@
-//! The proof: every byte of every file is searched for a video's names and hashes, as text, as raw bytes, and inside
-//! `.npz` archives (a tar file's members lie in it as they are). Names of files and folders are searched too.
+//! Search of every byte of every file for a video's names and hashes: as text, as raw bytes, and inside `.npz` archives
+//! (members of tar files are stored uncompressed). Names of files and folders are searched too.
 
 use anyhow::{Context, Result};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// Something that must not be found.
+/// Text or bytes that must not be found.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SearchTerm {
-    /// What it is, for people.
+    /// Description for people.
     pub what: String,
     pub bytes: Vec<u8>,
-    /// Only where no letter, digit, `-` or `_` stands before it: `a.mp4` is not in `extra.mp4`.
+    /// Whether matches need a boundary: no letter, digit, `-` or `_` before it (`a.mp4` is not in `extra.mp4`).
     pub whole: bool,
 }
 
 impl SearchTerm {
-    /// A name, found only as a whole.
+    /// Term for a name, with a boundary.
     pub fn name(what: &str, name: &str) -> Self {
         Self { what: format!("{what} {name}"), bytes: name.as_bytes().to_vec(), whole: true }
     }
 
-    /// Hexadecimal digits, as text and as the bytes they stand for.
+    /// Terms for hexadecimal digits: as text and as the bytes they encode.
     pub fn hash(what: &str, hex: &str) -> Vec<Self> {
         let text = Self { what: format!("{what} {hex}"), bytes: hex.as_bytes().to_vec(), whole: false };
         let digit = |byte: u8| char::from(byte).to_digit(16);
         let pairs = hex.as_bytes().as_chunks::<2>().0.iter();
         let raw: Option<Vec<u8>> = pairs.map(|[a, b]| Some((16 * digit(*a)? + digit(*b)?) as u8)).collect();
-        // four bytes turn up by chance in any gigabyte
+        // Four bytes occur by chance in any gigabyte.
         let raw = raw.filter(|raw| raw.len() >= 16);
         let raw = raw.map(|bytes| Self { what: format!("{what} {hex}, as bytes"), bytes, whole: false });
         [text].into_iter().chain(raw).collect()
     }
 }
 
-/// A place where a mark was found.
+/// Occurrence of a term.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SearchHit {
-    /// The file, with the archive's entry behind a `!`.
+    /// File; for an archive followed by `!` and the entry.
     pub file: String,
-    /// `None`: in the name.
+    /// Offset; `None`: in the name.
     pub at: Option<u64>,
     pub what: String,
 }
 
-/// What was searched, and found.
+/// Result of a search.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Searched {
     pub n_files: usize,
-    /// Of the files, and of what was inside archives.
+    /// Bytes of the files, and of the contents of archives.
     pub bytes: u64,
     pub inside_bytes: u64,
     pub places: Vec<SearchHit>,
@@ -61,7 +61,7 @@ const PIECE: usize = 1 << 20;
 /// Searches everything below `folders`.
 ///
 /// # Errors
-/// A file that cannot be read: what was not searched proves nothing.
+/// A file that cannot be read, since it proves nothing.
 pub fn search(folders: &[PathBuf], marks: &[SearchTerm]) -> Result<Searched> {
     let mut searched = Searched::default();
     let marks: Vec<&SearchTerm> = marks.iter().filter(|mark| mark.bytes.len() >= 2).collect();
@@ -71,7 +71,7 @@ pub fn search(folders: &[PathBuf], marks: &[SearchTerm]) -> Result<Searched> {
     Ok(searched)
 }
 
-/// Whether one of the marks is in the bytes.
+/// Whether one of the terms is in the bytes.
 pub fn is_in(bytes: &[u8], marks: &[SearchTerm]) -> bool {
     let marks: Vec<&SearchTerm> = marks.iter().filter(|mark| mark.bytes.len() >= 2).collect();
     let mut scan = Scan::new(&marks);
@@ -105,7 +105,7 @@ fn walk(root: &Path, path: &Path, marks: &[&SearchTerm], searched: &mut Searched
     let file = path.display().to_string();
     searched.places.extend(found.into_iter().map(|found| place(&file, found)));
     if path.extension().is_some_and(|ending| ending == "npz" || ending == "zip") {
-        // one that is no archive has been searched as it is
+        // A file that is no archive was searched as it is.
         let Ok(mut archive) = zip::ZipArchive::new(File::open(path).with_context(reading)?) else { return Ok(()) };
         for n in 0..archive.len() {
             let entry = archive.by_index(n).with_context(reading)?;
@@ -118,7 +118,7 @@ fn walk(root: &Path, path: &Path, marks: &[&SearchTerm], searched: &mut Searched
     Ok(())
 }
 
-/// The bytes read, and the offset and description of each mark found.
+/// Number of bytes read, and offset and description of each term found.
 fn scan(mut from: impl Read, marks: &[&SearchTerm]) -> Result<(u64, Vec<(u64, String)>)> {
     let mut scan = Scan::new(marks);
     let mut piece = vec![0; PIECE];
@@ -134,15 +134,15 @@ fn scan(mut from: impl Read, marks: &[&SearchTerm]) -> Result<(u64, Vec<(u64, St
     Ok((scan.at, scan.found))
 }
 
-/// A search through bytes that come in pieces.
+/// Search through bytes that arrive in pieces.
 struct Scan<'a> {
     marks: &'a [&'a SearchTerm],
-    /// Whether a mark begins with these two bytes.
+    /// For every pair of bytes, whether a term begins with it.
     begins: Vec<bool>,
     longest: usize,
-    /// The end of the bytes before: a mark may lie across two pieces.
+    /// Last bytes of the previous piece, since a term may span two pieces.
     tail: Vec<u8>,
-    /// Bytes seen before the tail ends.
+    /// Number of bytes before the tail.
     at: u64,
     found: Vec<(u64, String)>,
 }
@@ -166,7 +166,7 @@ impl<'a> Scan<'a> {
             }
             for mark in self.marks {
                 let end = at + mark.bytes.len();
-                // what ends in the tail was found before
+                // Matches that end in the tail were found before.
                 let new = end > n_tail && bytes.get(at..end) == Some(mark.bytes.as_slice());
                 let before = at.checked_sub(1).map(|before| bytes[before]);
                 let joined = before.is_some_and(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_');
@@ -176,7 +176,7 @@ impl<'a> Scan<'a> {
             }
         }
         self.at += piece.len() as u64;
-        // one byte more than a mark is long: it decides whether a name is whole
+        // One byte more than the longest term, which decides on the boundary.
         let keep = bytes.len().saturating_sub(self.longest);
         self.tail = bytes.split_off(keep);
     }

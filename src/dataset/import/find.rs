@@ -1,5 +1,5 @@
-//! Which files belong together: every motion file below the sources by what is in it, with the sound and the
-//! transcript that have its name, beside it or in a folder beside its own (`bvh/`, `wav/`, `tsv/`).
+//! Motion files below the sources by content, each with the sound and transcript of its name in its own folder or in a
+//! neighbouring one (`bvh/`, `wav/`, `tsv/`).
 
 use crate::dataset::INFO;
 use crate::dataset::write::part;
@@ -10,7 +10,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-/// A motion file with what belongs to it.
+/// Motion file with its sound and transcript.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TakeFiles {
     pub kind: Kind,
@@ -19,28 +19,28 @@ pub struct TakeFiles {
     pub transcript: Option<PathBuf>,
 }
 
-/// What the sources hold.
+/// Files found in the sources.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportSources {
-    /// In the order of their paths.
+    /// Takes in the order of their paths.
     pub takes: Vec<TakeFiles>,
-    /// Folders of datasets of ours.
+    /// Folders of orator datasets.
     pub datasets: Vec<PathBuf>,
-    /// Tar files elsewhere, and why each of the other files that look like motion was left out.
+    /// Tar files outside datasets, and files that look like motion but were left out, with the reason.
     pub tars: Vec<PathBuf>,
     pub unknown: Vec<(PathBuf, String)>,
 }
 
 const SOUND: [&str; 7] = ["wav", "flac", "mp3", "m4a", "ogg", "opus", "aac"];
 const TRANSCRIPT: [&str; 3] = ["tsv", "json", "txt"];
-/// Folders beside a motion's own, in small letters.
+/// Names of neighbouring folders, in lower case.
 const SOUND_FOLDERS: [&str; 6] = ["wav", "wavs", "audio", "audios", "sound", "speech"];
 const TRANSCRIPT_FOLDERS: [&str; 8] = ["tsv", "transcript", "transcripts", "text", "texts", "txt", "json", "words"];
 
-/// Looks through `sources`, files or folders; with `only`, files of other kinds are left out.
+/// Searches `sources`, files or folders; with `only`, files of other kinds are left out.
 ///
 /// # Errors
-/// A source that is not there, or sources in which nothing is motion.
+/// A source that does not exist, or sources without any motion.
 pub fn find(sources: &[PathBuf], only: Option<Kind>) -> Result<ImportSources> {
     let (mut files, mut found) = (Vec::new(), ImportSources::default());
     for source in sources {
@@ -76,7 +76,7 @@ pub fn find(sources: &[PathBuf], only: Option<Kind>) -> Result<ImportSources> {
     Ok(found)
 }
 
-/// The files below `path`; a dataset's folder is not looked into.
+/// Files below `path`; folders of datasets are not entered.
 fn walk(path: &Path, files: &mut Vec<PathBuf>, datasets: &mut Vec<PathBuf>) -> Result<()> {
     if !path.is_dir() {
         files.push(path.to_owned());
@@ -96,7 +96,7 @@ fn walk(path: &Path, files: &mut Vec<PathBuf>, datasets: &mut Vec<PathBuf>) -> R
     Ok(())
 }
 
-/// What a file is; `None`: no motion; an error: it looks like motion but is none that is understood.
+/// Kind of a file; `None`: no motion; an error: not readable as motion although its name suggests it.
 fn kind(path: &Path) -> std::result::Result<Option<Kind>, String> {
     match ending(path).as_str() {
         "bvh" => Ok(Some(Kind::Bvh)),
@@ -117,7 +117,7 @@ fn kind(path: &Path) -> std::result::Result<Option<Kind>, String> {
 fn has_147_numbers(path: &Path) -> bool {
     let Ok(file) = File::open(path) else { return false };
     let mut line = String::new();
-    // a line of the authors' is under 4 kB
+    // A line of the text layout of Rebol et al. (2021) is under 4 kB.
     let read = BufReader::new(file.take(16 << 10)).read_line(&mut line);
     read.is_ok() && line.split_whitespace().count() == 147 && line.split_whitespace().all(|w| w.parse::<f64>().is_ok())
 }
@@ -125,14 +125,14 @@ fn has_147_numbers(path: &Path) -> bool {
 fn with_company(kind: Kind, motion: PathBuf) -> TakeFiles {
     let stem = motion.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut stems = vec![stem.as_str()];
-    // gt_interval_3821.txt is said in 3821.wav
+    // The sound of gt_interval_3821.txt is 3821.wav.
     stems.extend(["gt_interval_", "prediction_interval_"].iter().filter_map(|prefix| stem.strip_prefix(prefix)));
     let sound = beside(&motion, &stems, &SOUND, &SOUND_FOLDERS);
     let transcript = beside(&motion, &stems, &TRANSCRIPT, &TRANSCRIPT_FOLDERS);
     TakeFiles { kind, sound, transcript, motion }
 }
 
-/// The file of one of these names and endings in the motion's own folder, or in a folder of those names beside it.
+/// File of one of these names and endings in the motion's own folder or in a neighbouring folder of those names.
 fn beside(motion: &Path, stems: &[&str], endings: &[&str], folders: &[&str]) -> Option<PathBuf> {
     let own = motion.parent()?;
     let mut places = vec![own.to_owned()];

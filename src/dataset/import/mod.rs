@@ -1,9 +1,9 @@
-//! Bridges in: motion that others captured, with its sound, becomes a dataset of the same form as one made from
-//! videos. Read are the authors' text clips, TED Expressive, BVH with sound, and WebDataset shards of our own.
+//! Import of captured motion with its sound into a dataset: text clips of Rebol et al. (2021), TED Expressive, BVH with
+//! sound, and WebDataset shards of orator.
 //!
-//! The way of a take: `find` (which files belong together) -> `captured` (`bvh`, `facing`, `ted`: joints in house order
-//! and axes, at the source's rate) -> `in_time` (at the dataset's rate) -> `take` (bones, sound, the cut: a sample, or
-//! a refusal) -> `write` (the dataset). Shards come in by `shards`, their members as they are.
+//! Steps of a take: `find` (files) -> `mocap` (joints at the source's rate) -> `motion::resample` (the dataset's rate)
+//! -> `take` (bones, sound, cut; a sample or a refusal) -> `write` (the dataset). `shards` imports tar members
+//! unchanged.
 
 pub mod find;
 pub mod plan;

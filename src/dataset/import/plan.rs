@@ -1,4 +1,4 @@
-//! What an import is asked for, and what became of each take.
+//! Request and outcome of an import.
 
 use crate::config;
 use crate::dataset::import::take::TakeLimits;
@@ -7,24 +7,24 @@ use crate::mocap::captured::Kind;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// What is wanted.
+/// Request of an import.
 #[derive(Clone, Debug)]
 pub struct ImportPlan {
     pub sources: Vec<PathBuf>,
-    /// Only sources of this kind; `None`: of every kind.
+    /// Kind of the sources to import; `None`: every kind.
     pub kind: Option<Kind>,
-    /// The dataset; `about.fps` and `limits.fps` agree.
+    /// Description of the dataset; `about.fps` equals `limits.fps`.
     pub about: About,
     pub limits: TakeLimits,
     /// Shares of the splits, seconds of shared sound, size of shards.
     pub dataset: config::DatasetConfig,
 }
 
-/// What became of a take, or of a video of other shards.
+/// Outcome of a take, or of a video of other shards.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ImportOutcome {
     pub file: String,
-    /// `kept`, `refused` or `failed`.
+    /// One of `kept`, `refused`, `failed`.
     pub ended: &'static str,
     /// Seconds in the dataset.
     pub kept_secs: f64,

@@ -1,6 +1,5 @@
-//! Tar shards by themselves, of ours or passed through other hands: members are found by their names, in any order and
-//! any tar; what is no member of a sample is left out and noted. The bytes of a member stay as they are wherever a
-//! dataset can hold them.
+//! Tar shards outside a dataset folder: members are found by name, in any order and any tar; other files are left out
+//! and noted. Bytes of members stay unchanged wherever a dataset can hold them.
 
 use crate::dataset::Split;
 use crate::dataset::sample::{EXTENSIONS, N_KEYPOINTS, Sample};
@@ -19,7 +18,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// Where a member lies.
+/// Location of a member.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct MemberLocation {
     tar: PathBuf,
@@ -27,41 +26,41 @@ struct MemberLocation {
     bytes: u64,
 }
 
-/// A sample that waits to be read: its members in the order of `EXTENSIONS`.
+/// Sample to be read: its members in the order of `EXTENSIONS`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LooseSample {
     pub key: String,
     members: [Option<MemberLocation>; 5],
 }
 
-/// The samples whose keys differ only behind the last dash.
+/// Samples whose keys differ only behind the last dash.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LooseVideo {
     pub name: String,
-    /// By the names of the tars; `None`: they do not tell.
+    /// Split by the names of the tars; `None`: unknown.
     pub split: Option<Split>,
-    /// In the order of their keys.
+    /// Samples in the order of their keys.
     pub samples: Vec<LooseSample>,
 }
 
-/// What tars hold.
+/// Contents of tars.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Loose {
     pub videos: Vec<LooseVideo>,
-    /// What was left out, a sentence each.
+    /// Notes on what was left out, a sentence each.
     pub notes: Vec<String>,
-    /// Tars that cannot be read, and why.
+    /// Unreadable tars, with the error.
     pub failed: Vec<(PathBuf, String)>,
 }
 
 impl LooseVideo {
-    /// The tars its samples lie in.
+    /// Tars that hold its samples.
     pub fn tars(&self) -> Vec<&PathBuf> {
         self.samples.iter().flat_map(|sample| sample.members.iter().flatten().map(|place| &place.tar)).collect()
     }
 }
 
-/// Looks through the tars; no member is read yet.
+/// Lists the tars without reading any member.
 pub fn open(tars: &[PathBuf]) -> Loose {
     let mut loose = Loose::default();
     let mut samples: BTreeMap<String, LooseSample> = BTreeMap::new();
@@ -116,7 +115,7 @@ fn list(tar: &Path, samples: &mut BTreeMap<String, LooseSample>, unknown: &mut B
     Ok(())
 }
 
-/// `train-...tar`.
+/// Split of a tar by its name, `train-...tar`.
 fn split_of(tar: &Path) -> Option<Split> {
     let name = tar.file_name()?.to_string_lossy().into_owned();
     Split::ALL.into_iter().find(|split| name.starts_with(&format!("{}-", split.name())))
@@ -134,7 +133,7 @@ fn read_place(place: &MemberLocation) -> Result<Vec<u8>> {
 }
 
 impl LooseSample {
-    /// The sample, and the bytes of its JSON as they are.
+    /// Sample, and the unchanged bytes of its JSON.
     ///
     /// # Errors
     /// A member that is missing or damaged; the message names it and its tar.
@@ -174,7 +173,7 @@ impl LooseSample {
     }
 }
 
-/// A 16-bit mono wav at the dataset's rate, with whatever header.
+/// Sound of a 16-bit mono wav at the dataset's rate, with any header.
 fn read_wav(bytes: &[u8]) -> Result<Sound> {
     if wav::n_samples(bytes, bytes.len() as u64, SAMPLE_RATE).is_ok() {
         return Ok(Sound { rate: SAMPLE_RATE, samples: wav::samples(&bytes[wav::HEADER_BYTES..]) });
@@ -192,7 +191,7 @@ fn read_wav(bytes: &[u8]) -> Result<Sound> {
     samples.map(|samples| Sound { rate: SAMPLE_RATE, samples }).map_err(|error: hound::Error| error.into())
 }
 
-/// The account of a video of which only these samples are known: where each begins, and its seconds.
+/// Ledger of a video of which only these samples (start, seconds) are known.
 pub fn ledger(samples: &[(f64, f64)]) -> Ledger {
     let mut ledger = Ledger::default();
     for &(start, secs) in samples {

@@ -1,5 +1,5 @@
-//! What is imported: a take, a video of another dataset, or the samples of a video in loose tars. Each is looked at
-//! (kept or not, its account, its sound's codes), and written when its split is known.
+//! Items of an import: a take, a video of another dataset, or the samples of a video in loose tars. Each is inspected
+//! first (outcome, ledger, sound codes) and written once its split is known.
 
 use super::find::{ImportSources, TakeFiles};
 use super::plan::{ImportOutcome, ImportPlan};
@@ -23,35 +23,35 @@ use crate::types::sound::Sound;
 use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
 
-/// Joints moved by more than this, in the median of a take, are worth a remark.
+/// Median movement of the joints of a take, mm, above which a remark is given.
 const MUCH_MOVED_MM: f64 = 5.0;
 
-/// Something to import.
+/// Item to import.
 #[derive(Clone, Debug)]
 pub enum ImportItem {
     Take(TakeFiles),
-    /// The video of this name in the dataset's folder.
+    /// Video of this name in a dataset's folder.
     Part(PathBuf, String),
     Loose(LooseVideo),
-    /// A file that looks like motion and is none, and why.
+    /// File that looks like motion but is not readable, with the reason.
     Unknown(PathBuf, String),
 }
 
-/// What was found out about it.
+/// Result of the inspection of an item.
 #[derive(Clone, Debug, Default)]
 pub struct InspectedItem {
     pub source: VideoSource,
-    /// The split it comes with, then the one it is given.
+    /// Split of the source, later the assigned one.
     pub split: Option<(Split, SplitBy)>,
     pub codes: Option<Vec<u32>>,
-    /// What a user should know of a take that is kept.
+    /// Remark for the user on a kept take.
     pub remark: String,
-    /// Hash of the codes, once written.
+    /// Hash of the written sound codes.
     pub sound: Option<String>,
 }
 
 impl ImportItem {
-    /// Everything in the sources, and what was left out of their tars.
+    /// Items in the sources, and notes on what was left out of their tars.
     pub fn all(sources: &ImportSources) -> (Vec<Self>, Vec<String>) {
         let mut origins: Vec<Self> = sources.takes.iter().cloned().map(Self::Take).collect();
         for dir in &sources.datasets {
@@ -67,7 +67,7 @@ impl ImportItem {
         (origins, loose.notes)
     }
 
-    /// Its name for people.
+    /// Name for people.
     pub fn file(&self) -> String {
         match self {
             Self::Take(TakeFiles { motion: path, .. }) | Self::Unknown(path, _) => path.display().to_string(),
@@ -76,7 +76,7 @@ impl ImportItem {
         }
     }
 
-    /// The folders its files lie in.
+    /// Folders of its files.
     fn folders(&self) -> Vec<String> {
         let files: Vec<&PathBuf> = match self {
             Self::Take(found) => {
@@ -92,7 +92,7 @@ impl ImportItem {
         folders
     }
 
-    /// Looks at it; what cannot be read is a failure.
+    /// Inspects the item; what cannot be read is a failure.
     pub fn look(&self, plan: &ImportPlan) -> InspectedItem {
         let look = match self {
             Self::Take(found) => look_at_take(found, plan),
@@ -109,7 +109,7 @@ impl ImportItem {
             Self::Part(dir, name) => (dir.clone(), Some(name.clone())),
             Self::Loose(video) => (PathBuf::from(&video.name), Some(video.name.clone())),
         };
-        // where the files lay has no say in the dataset
+        // Local folders must not influence the dataset.
         let error = self.folders().iter().fold(error.to_owned(), |error, dir| error.replace(&format!("{dir}/"), ""));
         let content = hash_file(&path).unwrap_or_default();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -125,7 +125,7 @@ impl ImportItem {
         InspectedItem { source, ..InspectedItem::default() }
     }
 
-    /// Writes it into the dataset in `out` as `look` says.
+    /// Writes the item into the dataset in `out` according to its inspection.
     pub fn write(&self, look: &InspectedItem, plan: &ImportPlan, writer: &DatasetWriter, out: &Path) -> Result<()> {
         let Some((split, by)) = look.split.clone().filter(|_| look.is_kept()) else {
             writer.video(look.source.clone(), Split::Train, SplitBy::Content)?.finish(None)?;
@@ -192,7 +192,7 @@ fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
     }
 }
 
-/// Of the files and of what is made of them.
+/// Hash of the files and of the settings that the sample depends on.
 fn made_from(found: &TakeFiles, plan: &ImportPlan) -> Result<String> {
     let files = [Some(&found.motion), found.sound.as_ref(), found.transcript.as_ref()];
     let hashes = files.into_iter().flatten().map(|path| hash_file(path)).collect::<Result<Vec<_>>>()?;
@@ -289,7 +289,7 @@ impl InspectedItem {
         !self.source.ledger.kept.is_empty() && self.source.failure.is_none()
     }
 
-    /// The same name was there before: it is refused, under a name of its own.
+    /// Refuses a repeated name, under a name of its own.
     pub fn twice(mut self, nth: usize) -> Self {
         let first = self.source.name.clone();
         let message = format!("{first} is there already");
@@ -300,7 +300,7 @@ impl InspectedItem {
         self
     }
 
-    /// It shares sound with videos of different splits.
+    /// Refuses an item that shares sound with videos of different splits.
     pub fn refuse_shared(&mut self, with: &[SharedSound], threshold: f64) {
         let name = self.source.name.clone();
         let others: Vec<&str> = with.iter().filter_map(|shared| shared.other(&name)).collect();
@@ -328,7 +328,7 @@ impl InspectedItem {
         self.codes = None;
     }
 
-    /// What became of it, in a line.
+    /// Outcome of the item.
     pub fn line(&self, file: &str) -> ImportOutcome {
         let (ended, reason, message) = match (&self.source.failure, self.source.ledger.refused.first()) {
             (Some(error), _) => ("failed", "error".to_owned(), error.clone()),

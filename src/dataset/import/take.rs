@@ -1,5 +1,5 @@
-//! One take on its way to a sample: its motion at the dataset's rate with constant bones, its sound, and the cut to
-//! what both have; or the reason why it is refused. A take is one continuous interval.
+//! Conversion of one take to a sample: motion at the dataset's rate with constant bones, sound, and the cut to their
+//! common length; or the reason of a refusal. A take is one continuous interval.
 
 use super::find::TakeFiles;
 use super::transcript::Transcript;
@@ -23,59 +23,59 @@ use ndarray::{Array3, s};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// What a take must be.
+/// Requirements on a take.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TakeLimits {
-    /// The dataset's rate.
+    /// Frame rate of the dataset.
     pub fps: FrameRate,
     /// Shortest take, in frames of the dataset.
     pub min_frames: usize,
-    /// Most seconds by which sound and motion may differ in length.
+    /// Largest difference between the lengths of sound and motion, seconds.
     pub max_apart_secs: f64,
 }
 
-/// A take that was read.
+/// Take with its outcome.
 #[derive(Clone, Debug)]
 pub struct ImportedTake {
     /// `<slug of the file's name>-<8 hex of its content>`.
     pub name: String,
     /// BLAKE3 of the motion file.
     pub content: String,
-    /// Frames at the dataset's rate that the motion has, before the cut.
+    /// Frames of the motion at the dataset's rate, before the cut.
     pub n_frames: usize,
     pub ended: TakeOutcome,
 }
 
-/// What became of it.
+/// Outcome of a take.
 #[derive(Clone, Debug)]
 pub enum TakeOutcome {
     Kept(Box<KeptTake>),
     Refused(TakeRefusal),
 }
 
-/// A sample, and the bones its motion was given (metres; 0: not there).
+/// Sample, and the bone lengths of its motion (metres; 0: not there).
 #[derive(Clone, Debug)]
 pub struct KeptTake {
-    /// By how much the joints moved when every bone was given one length: the median, mm.
+    /// Median movement of the joints by making bones constant, mm.
     pub moved_mm: f64,
     pub sample: Sample,
     pub lengths: [f32; N_BONES],
 }
 
-/// Why a take is left out.
+/// Reason why a take is refused.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TakeRefusal {
-    /// A word or two, for programs.
+    /// Reason for programs, a word or two.
     pub reason: &'static str,
     pub measured: f64,
     pub threshold: f64,
     pub unit: &'static str,
-    /// The same as a sentence, for people.
+    /// Reason for people, a sentence.
     pub message: String,
 }
 
 impl ImportedTake {
-    /// Reads the files of a take. Errors: one of them is not what it should be; the message names it.
+    /// Reads the files of a take. Errors name the file that is not as expected.
     pub fn read(found: &TakeFiles, limits: &TakeLimits) -> Result<Self> {
         let content = hash_file(&found.motion)?;
         let stem = found.motion.file_stem().unwrap_or_default().to_string_lossy();
@@ -136,7 +136,7 @@ fn no_sound(found: &TakeFiles) -> TakeRefusal {
     TakeRefusal { reason: "no sound", measured: 0.0, threshold: 0.0, unit: "s", message }
 }
 
-/// Frames that lie in the motion and wholly in the sound.
+/// Number of frames within the motion and wholly within the sound.
 fn n_common(n_frames: usize, sound: &Sound, fps: FrameRate) -> usize {
     n_frames.min((sound.secs() * fps.per_sec() + 1e-6).floor() as usize)
 }
@@ -195,7 +195,7 @@ fn keep(name: &str, found: &TakeFiles, captured: &Captured, mut motion: Motion, 
     Ok(KeptTake { moved_mm: moved[0], sample, lengths })
 }
 
-/// By how much the joints were moved to give every bone one length: the median and the largest, mm to a hundredth.
+/// Movement of the joints by making bones constant: median and maximum, mm to a hundredth.
 fn moved_mm(before: &Array3<f32>, after: &Array3<f32>) -> [f64; 2] {
     let moved = (0..before.shape()[0])
         .flat_map(|t| (1..N_JOINTS).map(move |joint| (t, joint)))

@@ -1,12 +1,12 @@
-//! What is said in a take: words with times from `.tsv` (start, end, word: GENEA 2022 and 2023) and `.json` (speech
-//! recognisers' answers with `words`: GENEA 2020, and plain lists), or words alone from `.txt`.
+//! Transcripts: words with times from `.tsv` (start, end, word: GENEA 2022 and 2023) and `.json` (output of speech
+//! recognisers with `words`: GENEA 2020, and plain lists), or words alone from `.txt`.
 
 use anyhow::{Context, Result, bail, ensure};
 use serde::Serialize;
 use serde_json::Value;
 use std::path::Path;
 
-/// A word and when it is said, seconds after the take's beginning.
+/// Word with its time, seconds after the take's beginning.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Word {
     pub start_secs: f64,
@@ -14,7 +14,7 @@ pub struct Word {
     pub word: String,
 }
 
-/// A transcript; `words` is empty where no times are known.
+/// Transcript; `words` is empty without times.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Transcript {
     pub text: String,
@@ -22,7 +22,7 @@ pub struct Transcript {
 }
 
 impl Transcript {
-    /// Words without times.
+    /// Transcript without times.
     pub fn of_text(text: &str) -> Self {
         Self { text: text.split_whitespace().collect::<Vec<_>>().join(" "), words: Vec::new() }
     }
@@ -46,7 +46,7 @@ impl Transcript {
         read.with_context(|| format!("{} is no transcript", path.display()))
     }
 
-    /// What is said before second `end`: the words that begin before it. Text without times is kept whole.
+    /// Transcript of the words that begin before second `end`; text without times is kept whole.
     pub fn until(&self, end: f64) -> Self {
         if self.words.is_empty() {
             return self.clone();
@@ -64,7 +64,7 @@ fn tsv(text: &str) -> Result<Transcript> {
         };
         match (start.parse::<f64>(), end.parse::<f64>()) {
             (Ok(start), Ok(end)) => words.push(word_at(start, end, word).with_context(|| format!("line {n}"))?),
-            // the names of the columns
+            // Header line.
             _ if n == 1 => {}
             _ => bail!("line {n}: `{start}` and `{end}` are no seconds"),
         }
@@ -72,7 +72,7 @@ fn tsv(text: &str) -> Result<Transcript> {
     Ok(Transcript::of_words(words))
 }
 
-/// Finds every list `words` at any depth; a recogniser's `alternatives` count by their first.
+/// Finds every list `words` at any depth; of a recogniser's `alternatives` the first counts.
 fn json(text: &str) -> Result<Transcript> {
     let value: Value = serde_json::from_str(text).context("it is not valid JSON")?;
     let mut words = Vec::new();
@@ -119,7 +119,7 @@ fn gather(list: &[Value], words: &mut Vec<Word>) -> Result<()> {
     Ok(())
 }
 
-/// `1.5`, `"1.5"` or `"1.5s"`.
+/// Seconds as `1.5`, `"1.5"` or `"1.5s"`.
 fn seconds(entry: &Value, keys: &[&str]) -> Option<f64> {
     let value = keys.iter().find_map(|key| entry.get(key))?;
     value.as_f64().or_else(|| value.as_str()?.trim().trim_end_matches('s').parse().ok())

@@ -1,5 +1,5 @@
-//! From sources to a dataset's folder. Everything is looked at first (is it kept? what does it sound like?), so that
-//! splits can be chosen without leaks; then it is read again and written. Memory: one take, and the codes of all sound.
+//! Import in two passes: every item is inspected first (outcome, sound codes), so that splits can be assigned without
+//! leaks, then read again and written. Memory: one take, and the codes of all sound.
 
 use super::find;
 use super::find::TakeFiles;
@@ -20,17 +20,17 @@ use anyhow::{Context, Result, ensure};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// The dataset that was written.
+/// Result of an import.
 #[derive(Clone, Debug)]
 pub struct Imported {
     pub lines: Vec<ImportOutcome>,
-    /// What was left out of tars.
+    /// Notes on what was left out of tars.
     pub notes: Vec<String>,
     pub info: DatasetInfo,
     pub stats: DatasetStats,
 }
 
-/// The rate of the first dataset folder among the sources: what an import without a rate of its own takes.
+/// Frame rate of the first dataset folder among the sources, the default rate of an import.
 pub fn rate_of(sources: &[PathBuf]) -> Option<crate::types::time::FrameRate> {
     let info = sources.iter().find_map(|source| std::fs::read(source.join(INFO)).ok())?;
     serde_json::from_slice::<DatasetInfo>(&info).ok().map(|info| info.fps)
@@ -39,7 +39,7 @@ pub fn rate_of(sources: &[PathBuf]) -> Option<crate::types::time::FrameRate> {
 /// Imports into the empty folder `out`.
 ///
 /// # Errors
-/// Nothing to import, or nothing of it kept; files that cannot be written. A take that fails is a line.
+/// Nothing to import, or nothing kept; files that cannot be written. A failed take is an outcome, not an error.
 pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<Imported> {
     let sources = find::find(&plan.sources, plan.kind)?;
     let (mut about, notes) = (plan.about.clone(), notes(&sources.takes));
@@ -100,7 +100,7 @@ fn compare(looks: &[InspectedItem], kept: &[usize], out: &Path, duplicate_secs: 
     Ok(SoundComparison { duplicate_secs, shared })
 }
 
-/// Where each kept video goes; one that comes from a dataset stays in its split.
+/// Assigns each kept video to a split; one of a dataset keeps its split.
 fn place(
     looks: &[InspectedItem],
     kept: &[usize],
@@ -109,7 +109,7 @@ fn place(
 ) -> Vec<Assignment> {
     let waiting = kept.iter().map(|&at| {
         let InspectedItem { source, split, .. } = &looks[at];
-        // what has no content of its own is placed by its name
+        // Without a content hash the name decides.
         let content = if source.content.is_empty() { &source.name } else { &source.content };
         Unassigned { name: &source.name, content, named: split.as_ref().map(|(split, _)| *split), before: None }
     });
@@ -121,7 +121,7 @@ fn place(
     kept.iter().zip(placed).map(as_before).collect()
 }
 
-/// What a reader of the dataset must know about the kinds in it.
+/// Notes on the kinds of sources for readers of the dataset.
 fn notes(takes: &[TakeFiles]) -> Vec<String> {
     let there: BTreeSet<Kind> = takes.iter().map(|take| take.kind).collect();
     let mut notes: Vec<String> = there
@@ -151,7 +151,7 @@ fn notes(takes: &[TakeFiles]) -> Vec<String> {
     notes
 }
 
-/// The first few reasons why nothing is kept.
+/// First few reasons why nothing is kept.
 fn first_reasons(origins: &[ImportItem], looks: &[InspectedItem]) -> String {
     let mut reasons: BTreeMap<String, usize> = BTreeMap::new();
     let lines = origins.iter().zip(looks).map(|(origin, look)| look.line(&origin.file()));

@@ -1,4 +1,4 @@
-//! The dataset checked: every sum, every sample, every array.
+//! Check of a dataset: checksums, samples, arrays.
 
 pub mod sample;
 pub mod verify;

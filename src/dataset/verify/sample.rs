@@ -1,16 +1,15 @@
-//! Whether the numbers of a sample can be: shapes that agree, joints that are there where the mask says so, bones of one
-//! length, keypoints in range.
+//! Consistency of a sample: matching shapes, joints present where the mask says so, constant bones, keypoints in range.
 
 use crate::dataset::sample::Sample;
 use crate::types::skeleton::{L_HAND, N_JOINTS, NECK, R_HAND, parent};
 use anyhow::{Result, ensure};
 
-/// How far a bone may be from its length, metres: the rounding of float32 half a metre from the neck.
+/// Largest deviation of a bone from its length, metres: the rounding of float32 half a metre from the neck.
 const BONE_TOLERANCE: f64 = 1e-5;
 
 /// Checks a sample whose video has these bone lengths (metres; 0: not measured).
 pub fn check_sample(sample: &Sample, lengths: &[f64]) -> Result<()> {
-    // What cannot be written cannot have been written.
+    // A sample that cannot be written is damaged.
     sample.members()?;
     let (joints, mask) = (&sample.motion.joints, &sample.motion.mask);
     for t in 0..sample.n_frames() {

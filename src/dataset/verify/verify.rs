@@ -1,8 +1,8 @@
-//! Whether a dataset is what was written. Fast: every file is there with its size, the small ones and all sums are right,
-//! every second of every video is accounted for. Deep: every hash, and every array's shape, numbers and bones.
+//! Check of a dataset. Fast: every file exists with its size, small files and all checksums are right, every second of
+//! every video is accounted for. Deep: every hash, and shape, values and bones of every array.
 //!
-//! What is put together from the videos (`assemble`) is put together again and compared, so that a number that is not
-//! what the videos add up to is found whichever file holds it.
+//! Files assembled from the entries of the videos are assembled again and compared, which detects wrong numbers in any
+//! of them.
 
 use super::sample::check_sample;
 use crate::dataset::info::DatasetInfo;
@@ -22,7 +22,7 @@ use std::io::Write;
 use std::path::Path;
 use std::rc::Rc;
 
-/// Something that is not as it was written.
+/// Deviation from what was written.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DatasetProblem {
     /// Path in the dataset's folder.
@@ -30,7 +30,7 @@ pub struct DatasetProblem {
     pub what: String,
 }
 
-/// What was looked at, and found wrong.
+/// Result of a check.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Verified {
     pub problems: Vec<DatasetProblem>,
@@ -55,10 +55,10 @@ impl Verified {
     }
 }
 
-/// Checks the dataset in `dir`; what is wrong is in the answer, sorted and each once.
+/// Checks the dataset in `dir`; the problems are sorted and unique.
 ///
 /// # Errors
-/// A folder that cannot be listed, or is no dataset at all.
+/// A folder that cannot be listed, or is no dataset.
 pub fn verify(dir: &Path, deep: bool, progress: &dyn Progress) -> Result<Verified> {
     let is_dataset = [INFO, CHECKSUMS].iter().any(|name| dir.join(name).exists());
     ensure!(is_dataset, "{} is no dataset: it has neither {INFO} nor {CHECKSUMS}", dir.display());
@@ -82,7 +82,7 @@ pub fn verify(dir: &Path, deep: bool, progress: &dyn Progress) -> Result<Verifie
     Ok(found)
 }
 
-/// Assembles the dataset again: the hash that every file must have, by its path.
+/// Assembles the dataset again: the expected hash of every file, by its path.
 fn assembled(dir: &Path, there: &BTreeMap<String, u64>, found: &mut Verified) -> Result<BTreeMap<String, String>> {
     let info: DatasetInfo = read_json(dir, INFO)?;
     let leakage: Leakage = read_json(dir, LEAKAGE)?;
@@ -113,7 +113,7 @@ fn assembled(dir: &Path, there: &BTreeMap<String, u64>, found: &mut Verified) ->
     Ok(wanted)
 }
 
-/// A file kept in memory.
+/// Writer into shared memory.
 struct SharedBuffer(Rc<RefCell<Vec<u8>>>);
 
 impl Write for SharedBuffer {
@@ -127,7 +127,7 @@ impl Write for SharedBuffer {
     }
 }
 
-/// Every file of the list is there, and no other.
+/// Checks that exactly the listed files exist.
 fn listed(there: &BTreeMap<String, u64>, wanted: &BTreeMap<String, String>, found: &mut Verified) {
     for file in wanted.keys().map(String::as_str).chain([CHECKSUMS]).filter(|file| !there.contains_key(*file)) {
         found.wrong(file, "it is missing");
@@ -137,7 +137,7 @@ fn listed(there: &BTreeMap<String, u64>, wanted: &BTreeMap<String, String>, foun
     }
 }
 
-/// Sizes and sums of each video.
+/// Checks the sums of each video.
 fn videos(dir: &Path, found: &mut Verified) -> Result<()> {
     let fps = read_json::<DatasetInfo>(dir, INFO)?.fps;
     let mut keys = BTreeSet::new();
@@ -175,7 +175,7 @@ fn videos(dir: &Path, found: &mut Verified) -> Result<()> {
     Ok(())
 }
 
-/// Every second of a video is in its ledger, and what was kept is in its samples, to a frame each.
+/// Checks that the ledger of a video covers every second, and its samples every kept second, to a frame each.
 fn account(part: &VideoEntry, fps: FrameRate) -> Result<()> {
     let ledger = &part.ledger;
     let unknown = ledger.duration_secs == 0.0 && part.failure.is_some();
@@ -194,7 +194,7 @@ fn account(part: &VideoEntry, fps: FrameRate) -> Result<()> {
     Ok(())
 }
 
-/// The hash of every small file; of the large ones only if `deep`.
+/// Checks the hash of every small file; of the large ones only if `deep`.
 fn hashes(dir: &Path, wanted: &BTreeMap<String, String>, deep: bool, found: &mut Verified, progress: &dyn Progress) {
     let task = progress.begin("hashes", wanted.len() as u64);
     for (file, hash) in wanted {
@@ -213,7 +213,7 @@ fn hashes(dir: &Path, wanted: &BTreeMap<String, String>, deep: bool, found: &mut
     }
 }
 
-/// Every array of every sample.
+/// Checks every array of every sample.
 fn samples(dir: &Path, found: &mut Verified, progress: &dyn Progress) {
     let dataset = match Dataset::open(dir) {
         Ok(dataset) => dataset,
@@ -230,7 +230,7 @@ fn samples(dir: &Path, found: &mut Verified, progress: &dyn Progress) {
     }
 }
 
-/// Every file under `dir` by its path, with its size.
+/// Files below `dir` by path, with sizes.
 fn files_of(dir: &Path) -> Result<BTreeMap<String, u64>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![(dir.to_owned(), String::new())];
@@ -255,7 +255,7 @@ fn read_json<T: serde::de::DeserializeOwned>(dir: &Path, name: &str) -> Result<T
     serde_json::from_slice(&bytes).with_context(|| format!("{name} is not as it was written"))
 }
 
-/// The accounts of all videos of the dataset in `dir`.
+/// Ledgers of all videos of the dataset in `dir`.
 pub fn accounts(dir: &Path) -> Result<Vec<LedgerLine>> {
     let path = dir.join(crate::dataset::LEDGER);
     let text = std::fs::read_to_string(&path).with_context(|| format!("reading {}", path.display()))?;

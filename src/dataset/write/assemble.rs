@@ -1,7 +1,7 @@
-//! The files of a dataset that speak of all its videos, put together from the videos' own (`part`): `index.jsonl`,
-//! `ledger.jsonl`, `info.json`, `stats.json`, `leakage.json`, the card `README.md`, and `checksums.b3` with the BLAKE3 of
-//! every other file, in the form of `b3sum`. The same videos give the same bytes, so that a dataset grows, forgets and is
-//! verified by assembling it again. Memory: one video, and a line for each.
+//! Common files of a dataset, assembled from the entries of its videos: `index.jsonl`, `ledger.jsonl`, `info.json`,
+//! `stats.json`, `leakage.json`, `README.md`, and `checksums.b3` with the BLAKE3 of every other file in the form of
+//! `b3sum`. The bytes depend on the videos alone, so a dataset grows, forgets and is verified by assembling it again.
+//! Memory: one video, and a line for each.
 
 use super::part;
 use super::part::VideoEntry;
@@ -19,19 +19,19 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// A line of `ledger.jsonl`: what became of every second of a video.
+/// Line of `ledger.jsonl`: the account of every second of a video.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LedgerLine {
     pub name: String,
     pub file: String,
     pub split: Option<Split>,
-    /// Why nothing came of it.
+    /// Reason why the video has no result.
     pub failure: Option<String>,
     #[serde(flatten)]
     pub ledger: Ledger,
 }
 
-/// Where an assembled file of this name goes.
+/// Opener of an assembled file by name.
 pub type Open<'a> = dyn FnMut(&str) -> Result<Box<dyn Write>> + 'a;
 
 /// Assembles the dataset in `dir` in place.
@@ -43,7 +43,7 @@ pub fn assemble(dir: &Path, about: &About, compared: &SoundComparison) -> Result
     })
 }
 
-/// Assembles the dataset in `dir`, whose files `open` takes.
+/// Assembles the dataset in `dir` into files that `open` provides.
 pub fn assemble_into(
     dir: &Path,
     about: &About,
@@ -115,7 +115,7 @@ fn pretty(value: &impl Serialize) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// A file being written, and its hash.
+/// File with a running hash.
 struct HashedFile {
     to: Box<dyn Write>,
     hasher: blake3::Hasher,

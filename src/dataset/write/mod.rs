@@ -1,4 +1,4 @@
-//! The dataset written: tar shards of a video, its part, and the whole put together.
+//! Writing of a dataset: shards and entry of a video, and the common files.
 
 pub mod assemble;
 pub mod part;

@@ -1,6 +1,6 @@
-//! What a dataset has of one video: its shards, the codes of its sound (`videos/<name>.sound`, u32 little endian), and
-//! `videos/<name>.json`, which says where it comes from and adds up what is in them. All other files of a dataset are
-//! put together from these (`assemble`), so that a video is added or forgotten without touching another.
+//! Entry of a video in a dataset: its shards, its sound codes (`videos/<name>.sound`, u32 little endian), and
+//! `videos/<name>.json` with origin and totals. All other files are assembled from the entries (`assemble`), so that a
+//! video is added or forgotten without touching another.
 
 use super::tar::ShardWriter;
 use crate::dataset::bones::VideoBones;
@@ -17,31 +17,31 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The folder of the parts, in the dataset's.
+/// Folder of the entries within the dataset.
 pub const FOLDER: &str = "videos";
 
-/// A video of a dataset.
+/// Video of a dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VideoEntry {
     pub schema: u32,
-    /// `<slug of the file's name>-<8 hex of its content>`: the beginning of its samples' keys.
+    /// Name `<slug of the file's name>-<8 hex of its content>`, the prefix of its samples' keys.
     pub name: String,
     /// File name of the video.
     pub file: String,
-    /// BLAKE3 of the video file; empty: it could not be read.
+    /// BLAKE3 of the video file; empty: unreadable.
     pub content: String,
-    /// BLAKE3 of all that its shards are made of; shards with the same are taken over as they are.
+    /// BLAKE3 of all inputs of its shards; shards of equal inputs are reused.
     pub made_from: String,
-    /// `None`: it has no sample.
+    /// Split; `None`: no sample.
     pub split: Option<Split>,
-    /// Why it is in that split.
+    /// Reason of the split.
     pub split_by: SplitBy,
     pub ledger: Ledger,
-    /// Why nothing came of it: the stage and its error.
+    /// Reason without result: the stage and its error.
     pub failure: Option<String>,
-    /// Of the arms and hands in its samples.
+    /// Bone lengths of the samples.
     pub bones: VideoBones,
-    /// BLAKE3 of the codes of its sound; `None`: it has none.
+    /// BLAKE3 of the sound codes; `None`: no sound.
     pub sound: Option<String>,
     pub shards: Vec<ShardRef>,
     pub samples: Vec<SampleRef>,
@@ -50,10 +50,10 @@ pub struct VideoEntry {
     pub moments: JointMoments,
 }
 
-/// What a writer of a video knows beforehand.
+/// Properties of a video known before its samples.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VideoSource {
-    /// [a-z0-9_-] only.
+    /// Name; [a-z0-9_-] only.
     pub name: String,
     pub file: String,
     pub content: String,
@@ -63,7 +63,7 @@ pub struct VideoSource {
     pub failure: Option<String>,
 }
 
-/// Writes one video into a dataset's folder.
+/// Writer of one video.
 pub struct EntryWriter {
     dir: PathBuf,
     part: VideoEntry,
@@ -71,7 +71,7 @@ pub struct EntryWriter {
 }
 
 impl EntryWriter {
-    /// Begins a video of the dataset in `dir`. A shard is closed before it would grow past `max_shard_bytes`.
+    /// Begins a video of the dataset in `dir`. A shard is closed before it would exceed `max_shard_bytes`.
     pub fn new(dir: &Path, source: VideoSource, split: Split, split_by: SplitBy, max_shard_bytes: u64) -> Result<Self> {
         let VideoSource { name, file, content, made_from, ledger, bones, failure } = source;
         let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
@@ -100,14 +100,13 @@ impl EntryWriter {
         Ok(Self { dir: dir.to_owned(), part, shards })
     }
 
-    /// Adds an interval; the order of intervals is the order in the shards. `padded_secs` of its sound are silence that
-    /// the video does not have.
+    /// Adds an interval; shards keep the order of the calls. `padded_secs` of its sound are appended silence.
     pub fn push(&mut self, sample: &Sample, padded_secs: f64) -> Result<()> {
         self.part.padded_sound_secs += padded_secs;
         self.push_members(sample, &sample.members()?)
     }
 
-    /// Adds an interval that comes from another dataset: its JSON stays byte for byte what it was.
+    /// Adds an interval of another dataset with its JSON unchanged.
     pub fn push_as_it_was(&mut self, sample: &Sample, json: Vec<u8>) -> Result<()> {
         let mut members = sample.members()?;
         members[0] = json;
@@ -122,8 +121,8 @@ impl EntryWriter {
         Ok(())
     }
 
-    /// Closes the shards and writes the video's JSON; `sound` is what `write_sound` gave, if it has sound. A video without
-    /// a sample is in no split.
+    /// Closes the shards and writes the video's JSON; `sound` is the result of `write_sound`, if it has sound. A video
+    /// without a sample has no split.
     pub fn finish(mut self, sound: Option<String>) -> Result<VideoEntry> {
         let (shards, samples) = self.shards.finish()?;
         self.part.split = self.part.split.filter(|_| !samples.is_empty());
@@ -137,12 +136,12 @@ impl EntryWriter {
 }
 
 impl VideoEntry {
-    /// `videos/<name>.json` of the dataset in `dir`.
+    /// Path of `videos/<name>.json` in the dataset in `dir`.
     pub fn path(dir: &Path, name: &str) -> PathBuf {
         dir.join(FOLDER).join(format!("{name}.json"))
     }
 
-    /// Reads one; its ledger must be whole, and it must be of this layout.
+    /// Reads an entry; its ledger must be complete and its layout current.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = fs::read(path).with_context(|| format!("reading {}", path.display()))?;
         let wrong = || format!("{} is not as the dataset stage writes it; run the stage again", path.display());
@@ -160,20 +159,19 @@ impl VideoEntry {
         fs::write(&path, bytes).with_context(|| format!("writing {}", path.display()))
     }
 
-    /// The codes of its sound, from the dataset in `dir`; empty without sound.
+    /// Sound codes from the dataset in `dir`; empty without sound.
     pub fn codes(&self, dir: &Path) -> Result<Vec<u32>> {
         if self.sound.is_none() { Ok(Vec::new()) } else { read_sound(dir, &self.name) }
     }
 
-    /// Its files by their paths in the dataset's folder, the JSON left out, with their hashes.
+    /// Files by path in the dataset's folder, without the JSON, with their hashes.
     pub fn files(&self) -> Vec<(String, String)> {
         let shards = self.shards.iter().map(|shard| (shard.file.clone(), shard.blake3.clone()));
         let sound = self.sound.iter().map(|hash| (format!("{FOLDER}/{}.sound", self.name), hash.clone()));
         shards.chain(sound).collect()
     }
 
-    /// Takes over this video from the dataset in `from` into that in `to`, byte for byte, without copying where the file
-    /// system can (hard links).
+    /// Copies this video's files from the dataset in `from` into that in `to`, by hard links where possible.
     pub fn take_over(&self, from: &Path, to: &Path) -> Result<()> {
         fs::create_dir_all(to.join(FOLDER)).with_context(|| format!("making {}", to.join(FOLDER).display()))?;
         let json = format!("{FOLDER}/{}.json", self.name);
@@ -189,7 +187,7 @@ impl VideoEntry {
         Ok(())
     }
 
-    /// Whether every file of it in the dataset in `dir` is what `stated` says (hashes by path, as in `checksums.b3`).
+    /// Whether all its files in the dataset in `dir` match `stated` (hashes by path, as in `checksums.b3`).
     pub fn is_sound(&self, dir: &Path, stated: &BTreeMap<String, String>) -> bool {
         let json = format!("{FOLDER}/{}.json", self.name);
         let as_stated =
@@ -198,13 +196,13 @@ impl VideoEntry {
     }
 }
 
-/// The hashes that `checksums.b3` of the dataset in `dir` states, by path; none where it cannot be read.
+/// Hashes by path from `checksums.b3` of the dataset in `dir`; empty where it cannot be read.
 pub fn stated_hashes(dir: &Path) -> BTreeMap<String, String> {
     let text = fs::read_to_string(dir.join(crate::dataset::CHECKSUMS)).unwrap_or_default();
     text.lines().filter_map(|line| line.split_once("  ")).map(|(hash, file)| (file.into(), hash.into())).collect()
 }
 
-/// The names of the videos of the dataset in `dir`, sorted.
+/// Names of the videos of the dataset in `dir`, sorted.
 pub fn names(dir: &Path) -> Result<Vec<String>> {
     let folder = dir.join(FOLDER);
     let entries = fs::read_dir(&folder).with_context(|| format!("reading the folder {}", folder.display()))?;
@@ -217,7 +215,7 @@ pub fn names(dir: &Path) -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// Writes the codes of the sound of the video `name` into the dataset in `dir`; their hash.
+/// Writes the sound codes of the video `name` into the dataset in `dir`; returns their hash.
 pub fn write_sound(dir: &Path, name: &str, codes: &[u32]) -> Result<String> {
     let bytes: Vec<u8> = codes.iter().flat_map(|code| code.to_le_bytes()).collect();
     let path = sound_path(dir, name);
@@ -226,7 +224,7 @@ pub fn write_sound(dir: &Path, name: &str, codes: &[u32]) -> Result<String> {
     Ok(blake3::hash(&bytes).to_hex().to_string())
 }
 
-/// What `write_sound` wrote.
+/// Reads the sound codes of the video `name`.
 pub fn read_sound(dir: &Path, name: &str) -> Result<Vec<u32>> {
     let path = sound_path(dir, name);
     let bytes = fs::read(&path).with_context(|| format!("reading {}", path.display()))?;
@@ -234,7 +232,7 @@ pub fn read_sound(dir: &Path, name: &str) -> Result<Vec<u32>> {
     Ok(bytes.as_chunks::<4>().0.iter().map(|code| u32::from_le_bytes(*code)).collect())
 }
 
-/// Takes the codes of a video that is left out away again.
+/// Removes the sound codes of a video that is left out.
 pub fn remove_sound(dir: &Path, name: &str) -> Result<()> {
     let path = sound_path(dir, name);
     fs::remove_file(&path).with_context(|| format!("removing {}", path.display()))

@@ -1,5 +1,5 @@
-//! Tar shards: the same samples give the same bytes on any machine (ustar, no times, no owners), a sample is never
-//! divided, and every sample's place and hash are noted while writing.
+//! Tar shards with reproducible bytes (ustar, no times, no owners). A sample is never divided; its location and hash
+//! are recorded while writing.
 
 use crate::dataset::index::{ByteRange, SampleRef, ShardRef};
 use crate::dataset::sample::{EXTENSIONS, Sample};
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 const BLOCK: usize = 512;
 
-/// Writes the samples of one video into `<split>-<video>-0000.tar`, `<split>-<video>-0001.tar`, ... of a folder.
+/// Writer of one video's samples into `<split>-<video>-0000.tar`, `<split>-<video>-0001.tar`, ... of a folder.
 pub struct ShardWriter {
     dir: PathBuf,
     video: String,
@@ -30,7 +30,7 @@ struct OpenShard {
 }
 
 impl ShardWriter {
-    /// A shard is closed before it would grow past `max_bytes`; a longer sample is a shard by itself.
+    /// Writer that closes a shard before it would exceed `max_bytes`; a longer sample gets a shard of its own.
     pub fn new(dir: &Path, video: &str, split: Split, max_bytes: u64) -> Self {
         let (dir, video) = (dir.to_owned(), video.to_owned());
         Self { dir, video, split, max_bytes, open: None, shards: Vec::new(), samples: Vec::new() }
@@ -45,7 +45,7 @@ impl ShardWriter {
         self.push_members(sample, &sample.members()?)
     }
 
-    /// Appends a sample whose members are these bytes.
+    /// Appends a sample with these bytes as members.
     pub fn push_members(&mut self, sample: &Sample, members: &[Vec<u8>; 5]) -> Result<()> {
         let bytes: usize = members.iter().map(|m| BLOCK + m.len().next_multiple_of(BLOCK)).sum();
         if self.open.as_ref().is_some_and(|open| open.bytes + (bytes + 2 * BLOCK) as u64 > self.max_bytes) {
@@ -98,7 +98,7 @@ impl ShardWriter {
         let written =
             open.push(&[0; 2 * BLOCK]).and_then(|()| open.file.into_inner().map_err(|error| error.into_error()));
         let shard = written.with_context(|| format!("writing {}", self.dir.join(&file).display()))?;
-        // Whoever puts the folder in place flushes every file; this only lets the disk begin while the next is made.
+        // Every file is flushed when the folder is put in place; this only starts the disk early.
         drop(std::thread::spawn(move || shard.sync_all()));
         self.shards.push(ShardRef {
             file,
@@ -109,7 +109,7 @@ impl ShardWriter {
         Ok(())
     }
 
-    /// Closes and flushes the last shard; what was written, in order.
+    /// Closes and flushes the last shard; returns shards and samples in order.
     pub fn finish(mut self) -> Result<(Vec<ShardRef>, Vec<SampleRef>)> {
         self.close()?;
         Ok((self.shards, self.samples))
@@ -125,7 +125,7 @@ impl OpenShard {
     }
 }
 
-/// The ustar header of a member: readable by all, owned by nobody in particular, from no time in particular.
+/// Header of a member in ustar form, readable by all, without owner and time.
 fn header(name: &str, size: usize) -> Result<tar::Header> {
     let mut header = tar::Header::new_ustar();
     header.set_path(name).with_context(|| format!("`{name}` does not fit a tar header"))?;

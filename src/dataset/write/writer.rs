@@ -1,4 +1,4 @@
-//! Writing a dataset's folder: video by video, then all that is put together from them.
+//! Writing of a dataset's folder: the videos, then the common files.
 
 use super::assemble::assemble;
 use super::part::{EntryWriter, VideoSource};
@@ -15,7 +15,7 @@ use crate::types::time::FrameRate;
 use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
 
-/// Writes one dataset. Memory: one sample, and the places of a video's samples.
+/// Writer of a dataset. Memory: one sample, and the locations of a video's samples.
 pub struct DatasetWriter {
     dir: PathBuf,
     about: About,
@@ -24,31 +24,31 @@ pub struct DatasetWriter {
 }
 
 impl DatasetWriter {
-    /// Begins a dataset in the existing, empty folder `dir`. A shard is closed before it would grow past
+    /// Begins a dataset in the existing, empty folder `dir`. A shard is closed before it would exceed
     /// `max_shard_bytes`.
     pub fn new(dir: &Path, about: About, max_shard_bytes: u64) -> Self {
         Self { dir: dir.to_owned(), about, max_shard_bytes, compared: SoundComparison::default() }
     }
 
-    /// Says which videos share sound.
+    /// Sets the comparison of the videos' sound.
     pub fn with_compared(self, compared: SoundComparison) -> Self {
         Self { compared, ..self }
     }
 
-    /// Begins a video; `finish` of what comes back ends it. Videos may be written in any order.
+    /// Begins a video, which `finish` of the result ends. Videos may be written in any order.
     pub fn video(&self, source: VideoSource, split: Split, split_by: SplitBy) -> Result<EntryWriter> {
         EntryWriter::new(&self.dir, source, split, split_by, self.max_shard_bytes)
     }
 
-    /// Puts the dataset together from its videos.
+    /// Assembles the dataset from its videos.
     pub fn finish(self) -> Result<(DatasetInfo, DatasetStats)> {
         assemble(&self.dir, &self.about, &self.compared)
     }
 }
 
-/// A whole dataset from samples in memory, in the folder `dir` (made if it is not there): what tests and small
-/// experiments need. Samples whose keys differ only behind the last dash are of one video, and stand side by side. Their
-/// motion is left as it is; the video's bones are its median lengths.
+/// Writes a dataset from samples in memory into the folder `dir` (made if missing), for tests and small experiments.
+/// Samples whose keys differ only behind the last dash belong to one video and are adjacent. Motion stays as it is; the
+/// video's bones are its median lengths.
 pub fn write_dataset(
     dir: &Path,
     speaker: &str,

@@ -1,18 +1,18 @@
-//! Decoding beside other work: one thread reads a video's frames, another works on them, a few frames apart. What comes
-//! out is what one thread alone would give.
+//! Decoding in parallel with other work: one thread reads a video's frames, another processes them. Results equal those
+//! of one thread.
 
 use super::frames::{FrameReader, FrameTime};
 use anyhow::Result;
 use std::sync::mpsc;
 
-/// Frames that may wait for the work.
+/// Number of frames that may wait.
 const WAITING: usize = 3;
 
-/// Reads all frames of `reader` in a thread of their own, where `pick` takes of each what is needed (its picture, or
-/// nothing), and gives that to `work`, in order. Memory: five picks.
+/// Reads all frames of `reader` in a thread, where `pick` selects what is needed of each, and passes the selections to
+/// `work` in order. Memory: five selections.
 ///
 /// # Errors
-/// The first of `reader`, `pick` or `work`.
+/// The first error of `reader`, `pick` or `work`.
 pub fn for_each<T: Send>(
     mut reader: FrameReader,
     mut pick: impl FnMut(&mut FrameReader, FrameTime) -> Result<T> + Send,
@@ -28,7 +28,7 @@ pub fn for_each<T: Send>(
                 });
                 let Some(next) = next.transpose() else { break };
                 let has_failed = next.is_err();
-                // Nobody listens any more where the work has failed.
+                // The receiver is gone once the work has failed.
                 if sender.send(next).is_err() || has_failed {
                     break;
                 }

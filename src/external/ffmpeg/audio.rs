@@ -13,8 +13,8 @@ use anyhow::{Context, Result, bail};
 use ffmpeg_next::frame;
 use std::path::Path;
 
-/// Timestamps this far from the count of samples are a gap, seconds: less than a lost frame of any codec, more than the
-/// rounding of any container.
+/// Difference between timestamp and sample count that is a gap, seconds: less than a lost frame of any codec, more than
+/// the rounding of any container.
 const GAP_SECS: f64 = 0.015;
 /// Timestamps that wander away from the count of samples, as where a clock ran slow, are followed: where their mean
 /// distance over `MEAN_SECS` is more than the rounding of a container, the next `STRETCH_SECS` are stretched by it.
@@ -33,7 +33,7 @@ pub fn read_mono(path: &Path, rate: u32) -> Result<Option<Sound>> {
     Ok(heard.map(|_| Sound { rate, samples }))
 }
 
-/// What `stream_mono` handed on.
+/// Totals of `stream_mono`.
 pub struct StreamedSound {
     /// Number of samples handed on.
     pub n_samples: u64,
@@ -78,7 +78,7 @@ pub(crate) fn stream_mono(
         }
         let at = frame.timestamp().map(|ticks| ticks as f64 * secs_per_tick);
         let zero = *zero_secs.get_or_insert(at.unwrap_or(0.0));
-        // A time far beyond the file's stated end is a broken one: the sound goes on where it was.
+        // A time far beyond the file's stated end is broken; the sound continues without a gap.
         let at = at.map(|at| at - zero).filter(|at| *at < latest_secs);
         if timeline.reaches(at) {
             n_frames += 1;
@@ -105,7 +105,7 @@ pub(crate) fn stream_mono(
     Ok(Some(StreamedSound { n_samples: timeline.n_written, n_misplaced }))
 }
 
-/// How far timestamps are ahead of the count of samples.
+/// Difference of timestamps and sample count.
 #[derive(Default)]
 struct ClockDrift {
     sum: f64,
@@ -113,7 +113,7 @@ struct ClockDrift {
 }
 
 impl ClockDrift {
-    /// Takes in a frame of `secs` whose timestamp is `ahead` seconds late; the mean at the end of each `MEAN_SECS`.
+    /// Adds a frame of `secs` whose timestamp is `ahead` seconds late; returns the mean at the end of each `MEAN_SECS`.
     fn mean(&mut self, ahead: f64, secs: f64) -> Option<f64> {
         self.sum += ahead * secs;
         self.secs += secs;
@@ -125,13 +125,13 @@ impl ClockDrift {
     }
 }
 
-/// Lays runs of continuous sound at their places in time.
+/// Placement of continuous runs of sound in time.
 struct SoundTimeline<'a> {
     rate: u32,
     n_written: u64,
-    /// Samples at the start of the run that are before time 0, or that were heard already.
+    /// Samples at the start of the run that are before time 0 or repeated.
     n_skip: u64,
-    /// The run at hand, and its start in seconds.
+    /// Current run, and its start in seconds.
     run: Option<(Resampler, f64)>,
     ahead: ClockDrift,
     ready: Vec<f32>,
@@ -145,7 +145,7 @@ impl SoundTimeline<'_> {
         self.run.as_ref().map_or(written, |(run, start)| start + run.secs())
     }
 
-    /// Whether sound at second `at` is near enough to what came before, and before the last second believed.
+    /// Whether sound at second `at` is close enough to the sound before it, and before the last plausible second.
     fn reaches(&self, at: Option<f64>) -> bool {
         let end = self.end_secs();
         let at = at.unwrap_or(end);

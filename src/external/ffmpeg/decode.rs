@@ -1,12 +1,11 @@
-//! One stream of a file, decoded frame by frame with presentation times. Broken packets are counted and passed over,
-//! so that what can be read is read; what the frames are for is not known here.
+//! Decoder of one stream, frame by frame with presentation times. Broken packets are counted and skipped.
 
 use anyhow::{Context, Result};
 use ffmpeg_next as ffmpeg;
 use ffmpeg_next::{Frame, Packet, Rational, codec, decoder, format, media};
 use std::path::{Path, PathBuf};
 
-/// A decoder with its place in the file.
+/// Decoder with its position in the file.
 pub(crate) struct StreamDecoder {
     path: PathBuf,
     input: format::context::Input,
@@ -68,7 +67,7 @@ impl StreamDecoder {
                         return Ok(false);
                     }
                 }
-                // The decoder's last frames are broken: what came before them stands.
+                // The decoder's last frames are broken; those before are valid.
                 Err(_) if self.draining && self.n_bad > 1000 => return Ok(false),
                 Err(_) => self.n_bad += 1,
             }
@@ -78,7 +77,7 @@ impl StreamDecoder {
         }
     }
 
-    /// Gives the decoder its next packet, or tells it that there is none.
+    /// Passes the next packet to the decoder, or the end of the stream.
     fn feed(&mut self) -> Result<()> {
         let mut packet = Packet::empty();
         match packet.read(&mut self.input) {
@@ -100,7 +99,7 @@ impl StreamDecoder {
         Ok(())
     }
 
-    /// What went wrong on the way, if anything did, in words.
+    /// Description of damage, if any.
     pub fn damage(&self) -> Option<String> {
         let stopped = self.stopped.map(|error| format!("reading broke off ({error})"));
         let bad = (self.n_bad > 0).then(|| format!("{} packets could not be decoded", self.n_bad));

@@ -1,5 +1,5 @@
-//! Pictures and sound to an mp4: H.264 where libx264 is there, else MPEG-4 part 2, with AAC. The same pictures give the
-//! same bytes. Drawing the pictures is the caller's; so is the atomic way of putting the file in its place.
+//! Writing of an mp4: H.264 by libx264 where available, else MPEG-4 part 2, with AAC. The bytes are reproducible. The
+//! caller replaces the file atomically.
 
 use super::source;
 use crate::types::image::Image;
@@ -13,7 +13,7 @@ use ffmpeg_next::software::scaling;
 use ffmpeg_next::{ChannelLayout, Dictionary, Packet, Rational, color, encoder, frame};
 use std::path::{Path, PathBuf};
 
-/// An mp4 being written. Without `finish` the file is no valid mp4.
+/// Open mp4. Without `finish` the file is no valid mp4.
 pub struct VideoWriter {
     path: PathBuf,
     output: format::context::Output,
@@ -63,7 +63,7 @@ impl VideoWriter {
         Ok(Self { path, output, size: [width, height], even, fps, video, scaler, n_frames: 0, sound })
     }
 
-    /// The next picture, shown for one frame.
+    /// Appends a picture, shown for one frame.
     pub fn push(&mut self, image: &Image) -> Result<()> {
         let [width, height] = self.size;
         ensure!(
@@ -78,7 +78,7 @@ impl VideoWriter {
         self.encode(image, sound_until).with_context(|| format!("cannot write the video {}", self.path.display()))
     }
 
-    /// Writes what is left and closes the file.
+    /// Writes the rest and closes the file.
     pub fn finish(mut self) -> Result<()> {
         self.close().with_context(|| format!("cannot write the video {}", self.path.display()))
     }
@@ -91,7 +91,7 @@ impl VideoWriter {
         for (row_idx, row) in rgb.data_mut(0).chunks_mut(stride).take(self.even[1]).enumerate() {
             let from = row_bytes * row_idx.min(image.height - 1);
             row[..row_bytes].copy_from_slice(&image.data[from..from + row_bytes]);
-            // To the end of the row, padding and all: swscale looks beyond the last pixel.
+            // Padding to the end of the row is filled, since swscale reads beyond the last pixel.
             for at in row_bytes..row.len() {
                 row[at] = row[at - 3];
             }
@@ -167,10 +167,11 @@ impl SoundTrack {
         Rational(1, self.sound.rate as i32)
     }
 
-    /// Gives the encoder its next frame of samples if that ends before second `until`; false if there is none.
+    /// Passes the next frame of samples to the encoder if it ends before second `until`; returns false if there is
+    /// none.
     fn send(&mut self, until: f64) -> Result<bool> {
         let n_until = (until * f64::from(self.sound.rate)).min(self.sound.samples.len() as f64) as usize;
-        // Only the very last frame may be shorter than the rest.
+        // Only the last frame may be shorter.
         let end = self.n_sent + (self.encoder.frame_size() as usize).max(1);
         let end = if until.is_infinite() { end.min(n_until) } else { end };
         if end > n_until || end == self.n_sent {
@@ -195,7 +196,7 @@ fn open_video([width, height]: [usize; 2], fps: FrameRate) -> Result<encoder::vi
     context.set_width(u32::try_from(width)?);
     context.set_height(u32::try_from(height)?);
     context.set_format(Pixel::YUV420P);
-    // What swscale writes by default, said so that players of large pictures do not assume BT.709.
+    // The default of swscale, stated so that players of large pictures do not assume BT.709.
     context.set_colorspace(color::Space::SMPTE170M);
     context.set_color_range(color::Range::MPEG);
     context.set_time_base(video_tick(fps));

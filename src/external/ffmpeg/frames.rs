@@ -1,9 +1,7 @@
-//! The pictures of a video as a stream at the dataset rate, by presentation time: output frame n shows the source
-//! frame whose time is nearest n / rate, the earlier one of two equally near. So a slower source repeats frames, a
-//! faster one loses some, and a variable rate needs no case of its own. Only frames that are shown are converted.
-//!
-//! Time 0 is the first source frame that decodes. The last frame lasts as long as its packet says (else one source
-//! frame, ten minutes at most), which ends the video at `duration_secs`; there are `FrameRate::frames_in(duration_secs)` output frames.
+//! Pictures of a video as a stream at the dataset's rate by presentation time: output frame n shows the source frame
+//! nearest n / rate, the earlier one of two equally near. Only shown frames are converted. Time 0 is the first source
+//! frame that decodes. The last frame lasts as long as its packet says (else one source frame, ten minutes at most),
+//! which gives `duration_secs`; there are `FrameRate::frames_in(duration_secs)` output frames.
 
 use super::decode::StreamDecoder;
 use super::picture::{Converter, Orientation};
@@ -25,11 +23,11 @@ pub struct TimedFrame {
     pub image: Image,
     /// Presentation time of the source frame shown, seconds from the first one.
     pub source_secs: f64,
-    /// It is the same source frame as the one before.
+    /// Whether it is the source frame of the previous output frame.
     pub repeated: bool,
 }
 
-/// The times of one output frame, without its picture.
+/// Times of one output frame, without its picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameTime {
     pub frame_idx: usize,
@@ -43,7 +41,7 @@ struct SourceFrame {
     ticks: i64,
 }
 
-/// Streams a video's pictures at one rate. As an iterator it gives them in full size; `advance` and `picture` give
+/// Stream of a video's pictures at one rate. As an iterator it yields full-size pictures; `advance` and `picture` give
 /// times alone and pictures on demand.
 pub struct FrameReader {
     path: PathBuf,
@@ -55,24 +53,24 @@ pub struct FrameReader {
     converters: Vec<([usize; 2], Converter)>,
     /// Ticks of the stream's clock at the first frame.
     origin: i64,
-    /// The frame on show and the one after it.
+    /// Shown frame and the one after it.
     shown: SourceFrame,
     following: Option<SourceFrame>,
     next_idx: usize,
     last_shown: Option<i64>,
-    /// No time after this is believed.
+    /// Latest plausible time, seconds.
     latest_secs: f64,
     n_misplaced: usize,
     failed: bool,
 }
 
 impl FrameReader {
-    /// Opens the video `path` with one decoder thread and decodes its first frames; an error if none decodes.
+    /// Opens the video `path` with one decoder thread and decodes its first frames; errors if none decodes.
     pub fn open(path: &Path, fps: FrameRate) -> Result<Self> {
         Self::open_with(path, fps, 1)
     }
 
-    /// The same with `threads` decoder threads (0: one a core). The frames are the same whatever their number.
+    /// Opens with `threads` decoder threads (0: one a core), which do not change the frames.
     pub fn open_with(path: &Path, fps: FrameRate, threads: usize) -> Result<Self> {
         let input = source::open(path)?;
         let info = probe::describe(&input);
@@ -115,7 +113,7 @@ impl FrameReader {
         Ok(reader)
     }
 
-    /// What the headers say.
+    /// Information of the headers.
     pub fn info(&self) -> &ProbedMedia {
         &self.info
     }
@@ -125,7 +123,7 @@ impl FrameReader {
         self.image_size
     }
 
-    /// How many frames there will be, as far as the headers tell; for progress bars.
+    /// Expected number of frames by the headers, for progress bars.
     pub fn expected_frames(&self) -> Option<usize> {
         self.info.duration_secs.map(|secs| self.fps.frames_in(secs))
     }
@@ -136,7 +134,7 @@ impl FrameReader {
         self.secs(last.ticks) + self.secs_of(last).min(LONGEST_GAP_SECS)
     }
 
-    /// What was wrong with the file although frames came, in words; complete once the frames are at their end.
+    /// Description of damage although frames came; complete at the end of the frames.
     pub fn damage(&self) -> Option<String> {
         let misplaced = (self.n_misplaced > 0).then(|| format!("{} frames with impossible times", self.n_misplaced));
         let last = self.secs_of(self.following.as_ref().unwrap_or(&self.shown));
@@ -149,7 +147,7 @@ impl FrameReader {
         (!parts.is_empty()).then(|| parts.join(", "))
     }
 
-    /// The times of the next output frame, whose picture `picture` then gives; `None` at the end.
+    /// Times of the next output frame, whose picture `picture` then returns; `None` at the end.
     pub fn advance(&mut self) -> Result<Option<FrameTime>> {
         let frame_idx = self.next_idx;
         while let Some(following) = &self.following {
@@ -170,7 +168,7 @@ impl FrameReader {
         Ok(Some(FrameTime { frame_idx, source_secs: self.secs(self.shown.ticks), repeated }))
     }
 
-    /// The picture on show, upright: in full, or scaled to `size` (width, height in px).
+    /// Shown picture, upright: in full, or scaled to `size` (width, height in px).
     pub fn picture(&mut self, size: Option<[usize; 2]>) -> Result<Image> {
         let size = size.unwrap_or(self.image_size);
         let at = self.converters.iter().position(|(of, _)| *of == size).unwrap_or_else(|| {
@@ -194,7 +192,7 @@ impl FrameReader {
     fn decode_after(&mut self, ticks: i64) -> Result<Option<SourceFrame>> {
         let mut frame = frame::Video::empty();
         while self.decode.next(&mut frame)? {
-            // A frame without a time follows the one before by that one's length.
+            // A frame without a time follows the previous one by that one's duration.
             let own = frame.timestamp().map(|at| at.saturating_sub(self.origin));
             let at = own.unwrap_or_else(|| ticks.saturating_add(frame.packet().duration.max(1)));
             let is_near = self.secs(at.saturating_sub(ticks)) <= LONGEST_GAP_SECS;
@@ -210,7 +208,7 @@ impl FrameReader {
         ticks as f64 * f64::from(self.decode.time_base())
     }
 
-    /// How long a source frame lasts, as the file says.
+    /// Duration of a source frame by the file.
     fn secs_of(&self, source: &SourceFrame) -> f64 {
         let stated = self.secs(source.frame.packet().duration);
         if stated > 0.0 {

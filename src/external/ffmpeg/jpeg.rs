@@ -1,4 +1,4 @@
-//! One picture to a JPEG in memory: thumbnails of pages. The same picture gives the same bytes.
+//! JPEG in memory with reproducible bytes, for thumbnails of pages.
 
 use crate::types::image::Image;
 use anyhow::{Context, Result, ensure};
@@ -11,7 +11,7 @@ use ffmpeg_next::{Packet, Rational, encoder, frame};
 /// ffmpeg's quality, 1 (best) to 31: near to what cameras write at "85".
 const QUALITY: i32 = 4;
 
-/// The bytes of a JPEG file. Errors: a picture without pixels, an ffmpeg without the encoder.
+/// Bytes of a JPEG file. Errors: a picture without pixels, an ffmpeg without the encoder.
 pub fn encode(image: &Image) -> Result<Vec<u8>> {
     super::library::init();
     let [width, height] = [u32::try_from(image.width)?, u32::try_from(image.height)?];

@@ -1,12 +1,6 @@
-//! The only room that knows ffmpeg. `probe` says what a file holds, `frames` streams its pictures at a chosen rate by
-//! presentation time (`ahead`: beside other work), `audio` its sound on the same clock (`sound_stream`: as it is asked for), `encode` writes mp4. Beneath
-//! them: `source` opens files and names what is wrong with them, `decode` turns one stream into decoded frames, `picture`
-//! makes those upright RGB.
-//!
-//! One clock for all: time 0 is the first picture that decodes (`origin`); a file without pictures starts with its first
-//! sample.
+//! Initialisation and version of the ffmpeg libraries.
 
-/// Starts ffmpeg, once; its own log lines are kept off the terminal, since every error is told by this room.
+/// Starts ffmpeg once and silences its log lines, since every error is reported by this crate.
 pub(crate) fn init() {
     static ONCE: std::sync::Once = std::sync::Once::new();
     ONCE.call_once(|| {

@@ -1,10 +1,7 @@
-//! The only room that knows ffmpeg. `probe` says what a file holds, `frames` streams its pictures at a chosen rate by
-//! presentation time (`ahead`: beside other work), `audio` its sound on the same clock (`sound_stream`: as it is asked for), `encode` writes mp4. Beneath
-//! them: `source` opens files and names what is wrong with them, `decode` turns one stream into decoded frames, `picture`
-//! makes those upright RGB.
-//!
-//! One clock for all: time 0 is the first picture that decodes (`origin`); a file without pictures starts with its first
-//! sample.
+//! The only folder that uses ffmpeg: `probe` (headers), `frames` (pictures at a chosen rate; `ahead` in parallel),
+//! `audio` (sound on the same clock; `sound_stream` on demand), `encode` (mp4), `jpeg`. Below them: `source` opens
+//! files, `decode` decodes one stream, `picture` converts to upright RGB. Time 0 is the first picture that decodes
+//! (`origin`); without pictures it is the first sample.
 
 pub mod ahead;
 pub mod audio;

@@ -1,5 +1,5 @@
-//! Time 0 of a file: when its first picture that decodes is shown, on the container's own clock. Pictures count from
-//! there by themselves; sound must be told.
+//! Time 0 of a file: presentation time of its first picture that decodes, on the container's clock. Sound is placed
+//! relative to it.
 
 use super::decode::StreamDecoder;
 use super::source;
@@ -7,7 +7,7 @@ use anyhow::Result;
 use ffmpeg_next::{Packet, Rational, frame};
 use std::path::Path;
 
-/// Packets read in search of the first picture.
+/// Largest number of packets read in search of the first picture.
 const MOST_PACKETS: usize = 100_000;
 
 /// Second on the container's clock at which the first picture of `path` that decodes is shown; `None` without pictures.
@@ -33,9 +33,9 @@ pub(crate) fn first_picture_secs(path: &Path) -> Result<Option<f64>> {
     Ok(Some(secs(ticks, tick)))
 }
 
-/// Where an edit list begins between two pictures, ffmpeg's usual reading moves the first whole picture (and all after
-/// it) back to the beginning of the edit, while the sound keeps its place. This gives the time of the picture at byte
-/// `position` by the plain reading, which moves nothing (and knows no second edit, which no first picture needs).
+/// Presentation time of the picture at byte `position` without edit lists. Where an edit list begins between two
+/// pictures, ffmpeg's default moves the first whole picture (and all after it) to the beginning of the edit, while the
+/// sound stays.
 fn unmoved_ticks(path: &Path, stream_idx: usize, position: i64) -> Result<Option<i64>> {
     let mut input = source::open_with(path, &[("advanced_editlist", "0")])?;
     let mut packet = Packet::empty();

@@ -1,5 +1,4 @@
-//! A decoded frame to an upright RGB `Image`: colour conversion and scaling by swscale, then the turn the file asks
-//! for. Which frames are worth converting is `frames`' business.
+//! Conversion of a decoded frame to an upright RGB `Image`: colour conversion and scaling by swscale, then rotation.
 
 use crate::types::image::Image;
 use anyhow::{Context, Result, bail};
@@ -9,8 +8,8 @@ use ffmpeg_next::format::{Pixel, stream::Stream};
 use ffmpeg_next::software::scaling;
 use ffmpeg_next::{color, frame};
 
-/// How the coded picture must be turned to be upright: its x axis points along `x` and its y axis along `y` of the
-/// upright picture, each a unit step (right and down are positive). Mirrors are possible, other angles are not.
+/// Rotation of the coded picture to the upright one: its x axis points along `x` and its y axis along `y` of the
+/// upright picture, each a unit step (right and down are positive). Mirroring is possible, other angles are not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Orientation {
     x: [i8; 2],
@@ -20,8 +19,8 @@ pub(crate) struct Orientation {
 impl Orientation {
     pub const UPRIGHT: Self = Self { x: [1, 0], y: [0, 1] };
 
-    /// From the display matrix of a stream (nine 16.16 numbers; the first two rows hold the images of the axes),
-    /// snapped to right angles.
+    /// Orientation by the display matrix of a stream (nine 16.16 numbers; the first two rows are the images of the
+    /// axes), snapped to right angles.
     pub fn from_stream(stream: &Stream) -> Self {
         let matrix = stream.side_data().find(|side| side.kind() == SideData::DisplayMatrix);
         let Some(numbers) = matrix.filter(|side| side.data().len() >= 36).map(|side| {
@@ -46,7 +45,7 @@ impl Orientation {
         }
     }
 
-    /// Width and height after the turn.
+    /// Width and height after rotation.
     pub fn upright_size(self, [width, height]: [usize; 2]) -> [usize; 2] {
         if self.x[0] == 0 { [height, width] } else { [width, height] }
     }
@@ -57,7 +56,7 @@ impl Orientation {
         }
         let [width, height] = self.upright_size([coded.width, coded.height]);
         let mut upright = Image::filled(width, height, [0; 3]);
-        // The place of coded pixel 0, 0: at the far side of every axis that runs backwards.
+        // Position of coded pixel 0, 0: at the far side of every reversed axis.
         let origin = |back: bool, n: usize| if back { n as isize - 1 } else { 0 };
         let x0 = origin(self.x[0] + self.y[0] < 0, width);
         let y0 = origin(self.x[1] + self.y[1] < 0, height);
@@ -74,10 +73,10 @@ impl Orientation {
     }
 }
 
-/// Converts frames of one stream to pictures of one size; swscale's tables are kept between frames.
+/// Converter of one stream's frames to pictures of one size; swscale's tables are kept between frames.
 pub(crate) struct Converter {
     orientation: Orientation,
-    /// Size of the pictures before the turn.
+    /// Size of the pictures before rotation.
     coded_size: [usize; 2],
     scaler: Option<(scaling::Context, [i32; 2])>,
     rgb: frame::Video,
@@ -134,7 +133,7 @@ fn new_scaler(frame: &frame::Video, [width, height]: [usize; 2], colour: [i32; 2
     Ok(scaler)
 }
 
-/// swscale's number of a matrix; what a file does not say is read as BT.601, as swscale does.
+/// Matrix number of swscale; unspecified spaces are BT.601, its default.
 fn colour_matrix(space: color::Space) -> i32 {
     match space {
         color::Space::BT709 => ffmpeg::ffi::SWS_CS_ITU709,

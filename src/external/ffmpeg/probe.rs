@@ -1,5 +1,5 @@
-//! What a media file says about itself, without decoding it. What a header leaves out stays unknown; a file that
-//! holds neither pictures nor sound is an error.
+//! Headers of a media file, without decoding. Missing values stay unknown; a file with neither pictures nor sound is an
+//! error.
 
 use super::picture::Orientation;
 use super::source;
@@ -10,7 +10,7 @@ use ffmpeg_next::format::context::Input;
 use ffmpeg_next::format::stream::Stream;
 use std::path::Path;
 
-/// What a file holds.
+/// Streams of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbedMedia {
     /// Length as stated: of the pictures if there are any, else of the sound; `None` if no header says.
@@ -19,7 +19,7 @@ pub struct ProbedMedia {
     pub audio: Option<AudioInfo>,
 }
 
-/// The stream of pictures.
+/// Stream of pictures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VideoInfo {
     /// ffmpeg's name: `h264`, `hevc`, `vp9`.
@@ -34,7 +34,7 @@ pub struct VideoInfo {
     pub fps: Option<FrameRate>,
 }
 
-/// The stream of sound.
+/// Stream of sound.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AudioInfo {
     /// ffmpeg's name: `aac`, `opus`, `pcm_s16le`.
@@ -73,7 +73,7 @@ pub(crate) fn describe(input: &Input) -> ProbedMedia {
 }
 
 fn describe_video(stream: &Stream) -> VideoInfo {
-    // SAFETY: as above.
+    // SAFETY: the stream and its parameters live as long as `input`.
     let (width, height, aspect) = unsafe {
         let parameters = stream.parameters();
         let parameters = parameters.as_ptr();
@@ -91,8 +91,8 @@ fn describe_video(stream: &Stream) -> VideoInfo {
     }
 }
 
-/// The size with square pixels: the width stretched by the sample aspect ratio, when that differs from 1 by more than
-/// a hundredth and less than a factor 4 (other values are slips of an encoder).
+/// Size with square pixels: the width stretched by the sample aspect ratio where that differs from 1 by more than a
+/// hundredth and less than a factor 4 (other values are errors of an encoder).
 pub(crate) fn square_pixels([width, height]: [usize; 2], aspect: Rational) -> [usize; 2] {
     let ratio = f64::from(aspect);
     let believable = ratio.is_finite() && (0.25..=4.0).contains(&ratio) && (ratio - 1.0).abs() > 0.01;

@@ -1,5 +1,5 @@
-//! Decoded sound to mono f32 at one rate, by swresample. A `Resampler` lives as long as the sound is continuous and
-//! its format stays; where sound belongs in time is `audio`'s business.
+//! Conversion of decoded sound to mono f32 at one rate by swresample. A `Resampler` serves one continuous run of one
+//! format.
 
 use anyhow::{Context, Result, ensure};
 use ffmpeg_next as ffmpeg;
@@ -7,7 +7,7 @@ use ffmpeg_next::format::{Sample, sample};
 use ffmpeg_next::software::resampling;
 use ffmpeg_next::{ChannelLayout, Dictionary, frame};
 
-/// What a frame of sound looks like: sample format, channel layout, rate.
+/// Format of a sound frame: sample format, channel layout, rate.
 pub(crate) type Format = (Sample, ChannelLayout, u32);
 
 /// The format of `frame`; a layout that the file does not name is the usual one for its number of channels.
@@ -17,8 +17,7 @@ pub(crate) fn format_of(frame: &frame::Audio) -> Format {
     (frame.format(), if named.is_empty() { usual() } else { named }, frame.rate())
 }
 
-/// The first sample of `frame` that is no number (NaN or infinite) in any channel: one of them makes all that is
-/// reckoned from the sound no number too, without a word.
+/// First sample of `frame` that is NaN or infinite in any channel; such a sample would make every derived value NaN.
 pub(crate) fn first_not_finite(frame: &frame::Audio) -> Option<usize> {
     let (n_samples, n_channels) = (frame.samples(), usize::from(frame.channels()));
     let (n_planes, n_each) = match frame.format() {
@@ -43,14 +42,14 @@ pub(crate) fn first_not_finite(frame: &frame::Audio) -> Option<usize> {
     (0..n_planes).filter_map(first).min()
 }
 
-/// One continuous run of sound on its way to mono f32.
+/// Resampler of one continuous run to mono f32.
 pub(crate) struct Resampler {
     context: resampling::Context,
     format: Format,
     rate: u32,
     n_in: u64,
     n_out: u64,
-    /// Samples added (or left out) by stretching, and the count of samples in at which the last stretch is done.
+    /// Number of samples added (or removed) by stretching, and the input count at which the last stretch ends.
     n_stretched: i64,
     even_at: u64,
 }
@@ -74,12 +73,12 @@ impl Resampler {
         self.format
     }
 
-    /// Seconds of sound taken in, stretched as it was.
+    /// Seconds of input, stretched.
     pub fn secs(&self) -> f64 {
         self.n_in as f64 / f64::from(self.format.2) + self.n_stretched as f64 / f64::from(self.rate)
     }
 
-    /// Whether no stretch is under way.
+    /// Whether no stretch is active.
     pub fn is_even(&self) -> bool {
         self.n_in >= self.even_at
     }

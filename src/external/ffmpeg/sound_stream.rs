@@ -1,16 +1,15 @@
-//! The sound of a file as a stream that is asked for its pieces, so that a sound of hours takes no memory: it is decoded
-//! beside the asker's work, a few pieces ahead.
+//! Sound of a file as a pull stream in constant memory: a thread decodes a few pieces ahead.
 
 use super::audio::stream_mono;
 use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
-/// Samples of a piece at most, and pieces that are decoded ahead.
+/// Largest number of samples of a piece, and number of pieces decoded ahead.
 const PIECE: usize = 16_384;
 const AHEAD: usize = 8;
 
-/// Samples that the sound of `path` has as mono at `rate`: all of it is decoded once. `None` when it has no sound.
+/// Number of samples of the sound of `path` as mono at `rate`, by decoding all of it; `None` without sound.
 pub fn n_samples(path: &Path, rate: u32) -> Result<Option<usize>> {
     let mut n = 0;
     let heard = stream_mono(path, rate, &mut |piece| {
@@ -20,13 +19,13 @@ pub fn n_samples(path: &Path, rate: u32) -> Result<Option<usize>> {
     Ok(heard.map(|_| n))
 }
 
-/// The sound of a file, piece by piece: mono samples in -1..1.
+/// Sound of a file in pieces: mono samples in -1..1.
 pub struct SoundStream {
     pieces: Receiver<Result<Vec<f32>>>,
 }
 
 impl SoundStream {
-    /// Begins to decode the sound of `path` as mono at `rate`. What goes wrong comes as the last piece.
+    /// Begins to decode the sound of `path` as mono at `rate`. An error comes as the last piece.
     pub fn open(path: &Path, rate: u32) -> Self {
         let (sender, pieces) = sync_channel(AHEAD);
         let path = path.to_owned();
@@ -55,7 +54,7 @@ fn decode(path: PathBuf, rate: u32, sender: &SyncSender<Result<Vec<f32>>>) {
         Ok(())
     });
     if let (Err(error), false) = (ended, has_left) {
-        // that nobody waits for the error is no further trouble
+        // A receiver that is gone needs no error.
         let _ = sender.send(Err(error));
     }
 }

@@ -1,4 +1,4 @@
-//! Opening a media file: its streams, or an error that names the file, what is wrong with it and what was expected.
+//! Opening of a media file: its streams, or an error that names the file, the defect and what was expected.
 
 use anyhow::{Context, Result};
 use ffmpeg_next as ffmpeg;
@@ -14,10 +14,10 @@ const EXPECTED: &str = "expected a video or sound file (mp4, mov, mkv, webm, avi
 #[error("{0}")]
 pub struct UnreadableMedia(pub String);
 
-/// Longest time between two frames that is believed, and that the last one lasts, seconds. What a broken time skips
-/// would be filled with repeated pictures or silence.
+/// Longest plausible time between two frames, and duration of the last one, seconds. Longer gaps would be filled with
+/// repeated pictures or silence.
 pub(crate) const LONGEST_GAP_SECS: f64 = 600.0;
-/// Longest video or sound that is believed, seconds: a day.
+/// Longest plausible video or sound, seconds (a day).
 pub(crate) const LONGEST_SECS: f64 = 86_400.0;
 
 /// Opens `path` and reads its headers.
@@ -68,7 +68,7 @@ pub(crate) fn url(path: &Path) -> Result<String> {
     Ok(format!("file:{text}"))
 }
 
-/// The stream of moving pictures, if there is one; the cover picture of a sound file is none.
+/// Stream of moving pictures, if any; the cover picture of a sound file is none.
 pub(crate) fn video_stream(input: &Input) -> Option<Stream<'_>> {
     let stream = input.streams().best(ffmpeg::media::Type::Video)?;
     (!stream.disposition().contains(Disposition::ATTACHED_PIC)).then_some(stream)
@@ -84,7 +84,7 @@ pub(crate) fn stated_secs(input: &Input, stream: &Stream) -> Option<f64> {
     lengths(input, stream).into_iter().find(|secs| *secs > 0.0)
 }
 
-/// The second after which no timestamp is believed: a minute past every stated end, a day at most.
+/// Latest plausible timestamp, seconds: a minute past every stated end, a day at most.
 pub(crate) fn latest_secs(input: &Input, stream: &Stream) -> f64 {
     let stated = lengths(input, stream).into_iter().fold(0.0, f64::max);
     if stated > 0.0 { LONGEST_SECS.min(stated + 60.0) } else { LONGEST_SECS }

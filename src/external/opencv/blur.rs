@@ -1,10 +1,10 @@
-//! Gaussian blur of a small map of numbers, at single cells: a heat-map is only looked at around its peak.
+//! Gaussian blur at single cells of a small map: a heat-map is only needed around its peak.
 
-/// A Gaussian of odd width, its weights summing to 1; the widths 1 to 7 are OpenCV's fixed tables.
+/// Gaussian kernel of odd width with sum 1; widths 1 to 7 are OpenCV's fixed tables.
 pub struct GaussianBlur(Vec<f32>);
 
 impl GaussianBlur {
-    /// `width` cells (made odd), the standard deviation OpenCV takes for it.
+    /// Kernel of `width` cells (made odd) with OpenCV's standard deviation for it.
     pub fn new(width: usize) -> Self {
         match width | 1 {
             1 => Self(vec![1.0]),

@@ -1,6 +1,6 @@
-//! Anti-aliased drawing on pictures: lines, circles, polygons, capsules, text. Places are pixels with fractions (the
-//! centre of the top left pixel is 0, 0), an edge softens about half a pixel outwards; what lies outside the picture is clipped and a place that is not finite
-//! draws nothing. What a figure looks like is decided in `animate`.
+//! Anti-aliased drawing: lines, circles, polygons, capsules, text. Points are pixels with fractions (the centre of the
+//! top left pixel is 0, 0), an edge softens about half a pixel outwards; drawing is clipped to the picture and
+//! non-finite points draw nothing.
 
 use crate::types::image::Image;
 use anyhow::Context as _;
@@ -10,7 +10,7 @@ use opencv::imgproc;
 
 /// Binary digits after the point of the coordinates handed to OpenCV: 1/16 px.
 const SHIFT: i32 = 4;
-/// Coordinates further out than this are brought here, so that none overflows.
+/// Largest magnitude of coordinates, px; larger ones are clamped against overflow.
 const FAR_PX: f32 = 30_000.0;
 /// Corners of a capsule's half circle.
 const ROUND_STEPS: usize = 12;
@@ -131,13 +131,13 @@ fn colour([r, g, b]: [u8; 3]) -> Scalar {
     Scalar::new(f64::from(r), f64::from(g), f64::from(b), 0.0)
 }
 
-/// A place in OpenCV's fixed-point coordinates; `None` where it is not finite.
+/// Point in OpenCV's fixed-point coordinates; `None` where it is not finite.
 fn fixed([x, y]: [f32; 2]) -> Option<Point> {
     let digits = |v: f32| (v.clamp(-FAR_PX, FAR_PX) * (1 << SHIFT) as f32).round() as i32;
     (x.is_finite() && y.is_finite()).then(|| Point::new(digits(x), digits(y)))
 }
 
-/// Lets OpenCV draw into the picture's own memory.
+/// Calls OpenCV on the picture's own memory.
 fn on(image: &mut Image, paint: impl FnOnce(&mut BoxedRefMut<Mat>) -> opencv::Result<()>) -> anyhow::Result<()> {
     if image.width == 0 || image.height == 0 {
         return Ok(());

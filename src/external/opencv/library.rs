@@ -1,4 +1,4 @@
-//! The only room that knows OpenCV: warps and letterboxes, pixels to tensors, heat-map filters, drawing; and PNG files.
+//! Version of the OpenCV libraries.
 
 /// Version of the OpenCV library linked.
 pub fn version() -> String {

@@ -1,4 +1,4 @@
-//! The only room that knows OpenCV: warps and letterboxes, pixels to tensors, heat-map filters, drawing; and PNG files.
+//! The only folder that uses OpenCV: warps and letterboxes, pixels to tensors, heat-map filters, drawing, PNG files.
 
 pub mod blur;
 pub mod draw;

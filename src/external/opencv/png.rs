@@ -1,4 +1,4 @@
-//! PNG files: the pictures looked at by people.
+//! PNG files.
 
 use crate::types::image::Image;
 use anyhow::{Context, Result, ensure};

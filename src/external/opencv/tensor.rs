@@ -1,11 +1,11 @@
-//! Pixels to the numbers a network is fed: channel order, axes, scale, mean and standard deviation in one pass, by a
-//! table of the 256 values a byte of each channel can become.
+//! Pixels to network input: channel order, layout, scale, mean and standard deviation in one pass, by a table of 256
+//! values for each channel.
 
 use crate::types::image::Image;
 
-/// How bytes become numbers.
+/// Conversion of bytes to numbers.
 pub struct Normaliser {
-    /// Channels in the tensor's order: which byte of a pixel, and its 256 values.
+    /// Channels in the tensor's order: index of a pixel's byte, and its 256 values.
     channels: [(usize, Box<[f32; 256]>); 3],
     planar: bool,
 }
