@@ -73,7 +73,7 @@ pub(crate) fn describe(input: &Input) -> ProbedMedia {
 }
 
 fn describe_video(stream: &Stream) -> VideoInfo {
-    // SAFETY: the stream and its parameters live as long as `input`.
+    // SAFETY: the parameters belong to `stream` and are only read here.
     let (width, height, aspect) = unsafe {
         let parameters = stream.parameters();
         let parameters = parameters.as_ptr();
