@@ -7,16 +7,6 @@ use std::path::{Path, PathBuf};
 
 /// Files whose `//!` has more than six lines.
 const LONG_HEADS: &[&str] = &[
-    "src/animate/export/json.rs",
-    "src/dataset/layout.rs",
-    "src/dataset/mod.rs",
-    "src/demo/drawn/generator_version.rs",
-    "src/demo/mod.rs",
-    "src/demo/rule/rule.rs",
-    "src/evaluate/lifter/hands.rs",
-    "src/evaluate/mod.rs",
-    "src/external/ffmpeg/library.rs",
-    "src/external/ffmpeg/mod.rs",
     "src/metrics/convention.rs",
     "src/metrics/distribution/frechet.rs",
     "src/mocap/fingers/files.rs",
@@ -26,12 +16,11 @@ const LONG_HEADS: &[&str] = &[
     "src/pipeline/extract/shots.rs",
     "src/pipeline/lift/lifter.rs",
     "src/pipeline/lift/mod.rs",
-    "src/report/mod.rs",
     "src/stage/fingerprint.rs",
 ];
 
 /// How many lines still break the other rules.
-const STILL_DEPENDENT: usize = 62;
+const STILL_DEPENDENT: usize = 44;
 const STILL_INVENTED: usize = 4;
 const STILL_OUTSIDE: usize = 23;
 
