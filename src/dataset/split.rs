@@ -108,7 +108,7 @@ mod tests {
         assert!((share(Split::Test) - 0.1).abs() < 0.02);
     }
 
-    fn new<'a>(name: &'a str) -> Unassigned<'a> {
+    fn new(name: &str) -> Unassigned<'_> {
         Unassigned { name, content: name, named: None, before: None }
     }
 

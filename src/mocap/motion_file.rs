@@ -134,7 +134,7 @@ mod tests {
             (said("nan.npy", &npy((4, 49, 3), f32::NAN)), "all joints of all 4 frames are missing"),
             (
                 said("whole.npy", &|path| {
-                    Array2::<i32>::zeros((4, 147)).write_npy(File::create(path).unwrap()).unwrap()
+                    Array2::<i32>::zeros((4, 147)).write_npy(File::create(path).unwrap()).unwrap();
                 }),
                 "float",
             ),

@@ -129,7 +129,7 @@ fn with_company(kind: Kind, motion: PathBuf) -> TakeFiles {
     stems.extend(["gt_interval_", "prediction_interval_"].iter().filter_map(|prefix| stem.strip_prefix(prefix)));
     let sound = beside(&motion, &stems, &SOUND, &SOUND_FOLDERS);
     let transcript = beside(&motion, &stems, &TRANSCRIPT, &TRANSCRIPT_FOLDERS);
-    TakeFiles { kind, sound, transcript, motion }
+    TakeFiles { kind, motion, sound, transcript }
 }
 
 /// File of one of these names and endings in the motion's own folder or in a neighbouring folder of those names.

@@ -47,7 +47,7 @@ mod tests {
 
     #[test]
     fn the_interval_of_a_mean_is_about_two_standard_errors_wide() {
-        let values: Vec<f64> = (0..200).map(|i| (i * 7919 % 1009) as f64 / 1009.0).collect();
+        let values: Vec<f64> = (0..200).map(|i| f64::from(i * 7919 % 1009) / 1009.0).collect();
         let mean = |blocks: &[usize]| blocks.iter().map(|i| values[*i]).sum::<f64>() / blocks.len() as f64;
         let all: Vec<usize> = (0..200).collect();
         let drawn: Vec<f64> = draws(200, 1000).iter().map(|blocks| mean(blocks)).collect();

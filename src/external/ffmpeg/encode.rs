@@ -155,7 +155,7 @@ impl SoundTrack {
         context.set_format(Sample::F32(sample::Type::Planar));
         context.set_channel_layout(ChannelLayout::MONO);
         // SAFETY: the context is ours; ffmpeg before 7 wants the layout in both its old and its new field.
-        unsafe { ffmpeg::ffi::av_channel_layout_default(&mut (*context.as_mut_ptr()).ch_layout, 1) };
+        unsafe { ffmpeg::ffi::av_channel_layout_default(&raw mut (*context.as_mut_ptr()).ch_layout, 1) };
         context.set_bit_rate(96_000);
         context.set_time_base(Rational(1, i32::try_from(sound.rate)?));
         context.set_flags(codec::Flags::GLOBAL_HEADER | codec::Flags::BITEXACT);

@@ -100,7 +100,7 @@ impl Resampler {
         debug_assert!(format_of(frame) == self.format);
         self.n_in += frame.samples() as u64;
         // SAFETY: `frame` is a decoded frame, whose extended_data holds a pointer for each of its planes.
-        unsafe { self.convert((*frame.as_ptr()).extended_data as *mut *const u8, frame.samples(), out) }
+        unsafe { self.convert((*frame.as_ptr()).extended_data.cast::<*const u8>(), frame.samples(), out) }
     }
 
     /// Appends the samples still inside, so that input and output last equally long.
@@ -126,7 +126,7 @@ impl Resampler {
             let room = ffmpeg::ffi::swr_get_out_samples(context, n_samples).max(0) + 32;
             out.resize(start + room as usize, 0.0);
             let mut plane = out.as_mut_ptr().add(start).cast::<u8>();
-            ffmpeg::ffi::swr_convert(context, &mut plane, room, planes, n_samples)
+            ffmpeg::ffi::swr_convert(context, &raw mut plane, room, planes, n_samples)
         };
         out.truncate(start + usize::try_from(n_out).unwrap_or(0));
         ensure!(n_out >= 0, "swresample failed ({})", ffmpeg::Error::from(n_out));

@@ -128,11 +128,11 @@ impl Decode {
     fn check(&self) -> Result<()> {
         match self {
             Self::Heatmap { blur, .. } => {
-                ensure!(blur % 2 == 1 && *blur <= 31, "decode.blur must be odd and at most 31")
+                ensure!(blur % 2 == 1 && *blur <= 31, "decode.blur must be odd and at most 31");
             }
             Self::Simcc { split, .. } => ensure!(split.is_finite() && *split > 0.0, "decode.split must be above 0"),
             Self::YoloxGrid { strides, .. } | Self::SsdAnchors { strides, .. } => {
-                ensure!(!strides.is_empty() && !strides.contains(&0), "decode.strides must be numbers from 1")
+                ensure!(!strides.is_empty() && !strides.contains(&0), "decode.strides must be numbers from 1");
             }
             _ => {}
         }

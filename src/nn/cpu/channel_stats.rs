@@ -35,7 +35,7 @@ impl Moments {
                 [*sum] = sums_of_squares(block, n_channels, first, &[*mean]);
                 first += 1;
             }
-            let f64s = |values: Vec<T>| values.into_iter().map(|v| v.to_f64()).collect();
+            let f64s = |values: Vec<T>| values.into_iter().map(candle_core::WithDType::to_f64).collect();
             all = all.and(&Self { n, mean: f64s(mean), squares: f64s(squares) });
         }
         all
@@ -278,7 +278,7 @@ mod tests {
     #[test]
     fn moments_of_parts_are_those_of_the_whole() {
         let n_channels = 3;
-        let values: Vec<f64> = (0..3 * 20_000).map(|i| (i as f64 * 0.37).sin() + (i % 3) as f64).collect();
+        let values: Vec<f64> = (0..3 * 20_000).map(|i| (f64::from(i) * 0.37).sin() + f64::from(i % 3)).collect();
         let whole = Moments::of(&values, n_channels);
         for channel in 0..n_channels {
             let own: Vec<f64> = values.iter().skip(channel).step_by(n_channels).copied().collect();

@@ -45,7 +45,7 @@ pub fn awake<R>(f: impl FnOnce() -> R) -> R {
         (0..n_helpers).for_each(|_| {
             scope.spawn(|| team.help());
         });
-        TEAM.set(&team);
+        TEAM.set(&raw const team);
         let result = catch_unwind(AssertUnwindSafe(f));
         TEAM.set(std::ptr::null());
         team.over.store(true, SeqCst);

@@ -299,8 +299,8 @@ mod tests {
             missing += scene.seen.iter().flat_map(|f| &f[..R_HIP]).filter(|p| p.is_none()).count();
             hips += usize::from(scene.seen.iter().all(|f| f[R_HIP].is_none()));
         }
-        let share = missing as f64 / (n * 27 * 7) as f64;
+        let share = missing as f64 / f64::from(n * 27 * 7);
         assert!((0.06..0.14).contains(&share), "{share}");
-        assert!((0.5..0.7).contains(&(hips as f64 / n as f64)));
+        assert!((0.5..0.7).contains(&(hips as f64 / f64::from(n))));
     }
 }

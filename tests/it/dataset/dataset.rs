@@ -129,7 +129,7 @@ fn damage_is_an_error_and_never_a_panic() {
 }
 
 /// Reads the shards as a stranger would and prints sums; needs NumPy only.
-const PYTHON: &str = r#"
+const PYTHON: &str = r"
 import io, json, sys, tarfile, wave
 import numpy as np
 samples = {}
@@ -143,7 +143,7 @@ for key, members in samples.items():
     assert (pose3d.dtype, pose2d.dtype, mask.dtype) == (np.float32, np.float32, np.bool_)
     print(key, *pose3d.shape, *pose2d.shape, *mask.shape, sound.getframerate(), len(pcm), pcm.sum(), mask.sum(),
           repr(float(np.nansum(pose3d.astype(np.float64)))), json.loads(members['json'])['n_frames'])
-"#;
+";
 
 #[test]
 fn python_reads_the_same_numbers() {

@@ -47,14 +47,14 @@ def line(key, pose3d, pose2d, mask, wav, meta):
           f"{total(pose3d):.4f} {total(pose2d):.4f}")
 "#;
 
-const WEBDATASET: &str = r#"
+const WEBDATASET: &str = r"
 import webdataset as wds
 for sample in wds.WebDataset(sorted(glob.glob('train-*.tar')), shardshuffle=False):
     array = lambda name: np.load(io.BytesIO(sample[name]))
     line(sample['__key__'], array('pose3d.npy'), array('pose2d.npy'), array('mask.npy'), sample['wav'], json.loads(sample['json']))
-"#;
+";
 
-const DATASETS: &str = r#"
+const DATASETS: &str = r"
 from datasets import Audio, load_dataset
 # datasets wants torchcodec (and torch) at hand even to store the bytes of a sound as they are
 Audio.encode_example = lambda self, value: value
@@ -67,7 +67,7 @@ for row in rows:
         return np.load(io.BytesIO(value)) if isinstance(value, bytes) else np.array(value, dtype=dtype)
     line(row['__key__'], array('pose3d.npy', np.float32), array('pose2d.npy', np.float32), array('mask.npy', bool), wav, row['json'])
 assert load_dataset(os.getcwd(), split='test', cache_dir=sys.argv[1]).num_rows == 1
-"#;
+";
 
 fn read_with(package: &str, program: &str) {
     let Some(packages) = readers(package) else { return };

@@ -18,13 +18,13 @@ fn python(readers: &Path, script: &str, argument: &Path) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-const EVENTS: &str = r#"
+const EVENTS: &str = r"
 import json, sys
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 log = EventAccumulator(sys.argv[1], size_guidance={'scalars': 0})
 log.Reload()
 print(json.dumps([[tag, e.step, e.wall_time, e.value] for tag in log.Tags()['scalars'] for e in log.Scalars(tag)]))
-"#;
+";
 
 #[test]
 fn tensorboard_reads_every_number_of_the_log() {

@@ -16,7 +16,7 @@ fn numbers(path: &Path, fps: FrameRate) -> Vec<(usize, bool)> {
     frames
         .enumerate()
         .map(|(n, frame)| (assert_eq!(n, frame.frame_idx), number_of(&frame.image), frame.repeated))
-        .map(|(_, number, repeated)| (number, repeated))
+        .map(|((), number, repeated)| (number, repeated))
         .collect()
 }
 
