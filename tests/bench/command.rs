@@ -66,6 +66,7 @@ pub fn measure(words: impl IntoIterator<Item = impl Into<OsString>>, progress: &
 }
 
 /// Parses the command line, measures, prints the result. Exit code 1 after an error.
+#[allow(clippy::print_stdout)]
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let Some(part) = &cli.part else {

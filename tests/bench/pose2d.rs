@@ -80,7 +80,7 @@ impl Bench<'_> {
     }
 
     /// Two workers, each doing all of `work`; seconds until both are done.
-    fn side_by_side(&self, chains: &mut [Chain; 2], work: impl Fn(&mut Chain) -> Result<Run> + Sync) -> Result<Run> {
+    fn side_by_side(chains: &mut [Chain; 2], work: impl Fn(&mut Chain) -> Result<Run> + Sync) -> Result<Run> {
         let start = Instant::now();
         let runs = std::thread::scope(|scope| {
             let workers = chains.each_mut().map(|chain| scope.spawn(|| work(chain)));
@@ -120,9 +120,9 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let (mut one, mut streamed, mut two, mut two_streamed, mut python) = (vec![], vec![], vec![], vec![], vec![]);
     for _ in 0..args.rounds {
         one.push(bench.decoded(&mut chains[0])?);
-        two.push(bench.side_by_side(&mut chains, |chain| bench.decoded(chain))?);
+        two.push(Bench::side_by_side(&mut chains, |chain| bench.decoded(chain))?);
         streamed.push(bench.streamed(&mut chains[0])?);
-        two_streamed.push(bench.side_by_side(&mut chains, |chain| bench.streamed(chain))?);
+        two_streamed.push(Bench::side_by_side(&mut chains, |chain| bench.streamed(chain))?);
         if let Some(script) = &args.python {
             python.push(reference(script, &args.video, &bench.models_dir)?);
         }

@@ -147,9 +147,10 @@ fn siblings_stay_apart() {
                 siblings.iter().find(|name| rest.starts_with(&format!("{name}/"))).copied()
             };
             if let (Some(here), Some(there)) = (sibling(from), sibling(to))
-                && here != there {
-                    wrong.push(format!("{} imports {}", from.name, to.name));
-                }
+                && here != there
+            {
+                wrong.push(format!("{} imports {}", from.name, to.name));
+            }
         }
         if from.name.starts_with("report/html/") && !to.name.starts_with("report/html/") {
             wrong.push(format!("{} imports {}", from.name, to.name));

@@ -52,7 +52,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let place = |given: Option<PathBuf>, room: &str| -> Result<PathBuf> {
         match given {
             Some(path) => Ok(path),
-            None => Ok(config.settings.work.dir.join(room).join(speaker(&args.speaker, &config)?)),
+            None => Ok(config.settings.work.dir.join(room).join(speaker(args.speaker.as_ref(), &config)?)),
         }
     };
     let (folder, out) = (place(args.dataset, "dataset")?, place(args.out, "gan")?);
@@ -154,7 +154,7 @@ fn pairs(dataset: &Dataset, speaker: &Speaker) -> Result<Vec<HeldOutPair>> {
 }
 
 /// The speaker's name: given, or the only one configured.
-fn speaker(given: &Option<String>, config: &Config) -> Result<String> {
+fn speaker(given: Option<&String>, config: &Config) -> Result<String> {
     let names: Vec<&str> = config.settings.speaker.iter().map(|speaker| speaker.name.as_str()).collect();
     match (given, names.as_slice()) {
         (Some(name), _) if names.contains(&name.as_str()) => Ok(name.clone()),

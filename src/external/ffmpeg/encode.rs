@@ -214,7 +214,7 @@ fn open_video([width, height]: [usize; 2], fps: FrameRate) -> Result<encoder::vi
             &[]
         }
     };
-    Ok(context.open_as_with(codec, Dictionary::from_iter(options.iter().copied()))?)
+    Ok(context.open_as_with(codec, options.iter().copied().collect::<Dictionary>())?)
 }
 
 fn video_tick(fps: FrameRate) -> Rational {

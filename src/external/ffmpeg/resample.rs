@@ -27,6 +27,7 @@ pub(crate) fn first_not_finite(frame: &frame::Audio) -> Option<usize> {
     };
     let is_double = matches!(frame.format(), Sample::F64(_));
     let n_values = n_samples * n_each;
+    #[allow(clippy::cast_ptr_alignment)] // ffmpeg aligns its planes
     let first = |plane: usize| {
         // SAFETY: the extended_data of a decoded frame holds a pointer for each of its planes, each to `n_values`
         // values of its format.

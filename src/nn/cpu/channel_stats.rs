@@ -35,7 +35,7 @@ impl Moments {
                 [*sum] = sums_of_squares(block, n_channels, first, &[*mean]);
                 first += 1;
             }
-            let f64s = |values: Vec<T>| values.into_iter().map(candle_core::WithDType::to_f64).collect();
+            let f64s = |values: Vec<T>| values.into_iter().map(|v| v.to_f64()).collect();
             all = all.and(&Self { n, mean: f64s(mean), squares: f64s(squares) });
         }
         all

@@ -148,6 +148,7 @@ kernel!(any_tile_f64, any_f64, f64, 4, 2, any::zero, any::load, any::store, any:
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use super::Job;
+    #[allow(clippy::wildcard_imports)] // intrinsics
     use std::arch::x86_64::*;
 
     kernel!(

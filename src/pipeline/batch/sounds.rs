@@ -60,7 +60,8 @@ fn collect(folder: &Path, before: &str, without: Option<&Path>, files: &mut Vec<
         let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         if name.starts_with('.') || (path.is_dir() && path.canonicalize().ok().as_deref() == without) {
             continue;
-        } else if path.is_dir() {
+        }
+        if path.is_dir() {
             collect(&path, &format!("{before}{name}/"), without, files)?;
         } else if SOUNDS.contains(&ending.as_str()) {
             files.push((format!("{before}{name}"), path));

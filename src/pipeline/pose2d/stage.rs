@@ -23,8 +23,6 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The file this stage writes.
-
 /// Stage `pose2d`.
 pub struct Pose2dStage {
     settings: config::Pose2d,
