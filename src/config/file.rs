@@ -52,8 +52,16 @@ pub struct Given {
 /// Former keys and sections, and what each is called now.
 const RENAMED: [(&str, &str); 2] = [("shard", "dataset"), ("segment.max_bone_change", "lift.max_bone_change")];
 
+/// Folders that paths count from.
+pub struct Folders<'a> {
+    /// Of the configuration file.
+    pub file: &'a str,
+    /// Of the process, for `--set`.
+    pub current: &'a str,
+}
+
 /// Reads the text of a `pipeline.toml` and `--set key=value` changes over the defaults.
-pub fn read(text: &str, sets: &[String]) -> Given {
+pub fn read(text: &str, sets: &[String], folders: &Folders) -> Given {
     let mut reader = Reader { places: BTreeMap::new(), problems: Vec::new(), notes: Vec::new() };
     let mut table = defaults();
     match DeTable::parse(text) {
@@ -70,7 +78,8 @@ pub fn read(text: &str, sets: &[String]) -> Given {
     for set in sets {
         reader.set(set, &mut table);
     }
-    reader.drop_too_large(&mut table);
+    reader.drop_refused(&mut table);
+    reader.resolve_paths(&mut table, folders);
     let settings = table.try_into::<Settings>().unwrap_or_else(|error| {
         reader.problem("", Place::Line(1), error.message().to_owned());
         Settings::default()
@@ -192,18 +201,47 @@ impl Reader {
         table.insert("speaker".to_owned(), Value::Array(speakers));
     }
 
-    /// Takes out each whole number that its setting's type cannot hold, so that the problem has its key and the others
-    /// are still looked at.
-    fn drop_too_large(&mut self, table: &mut Table) {
+    /// Takes out each value that its setting's type refuses, so that the problem has its key and the others are still
+    /// looked at.
+    fn drop_refused(&mut self, table: &mut Table) {
         for (key, place) in self.places.clone() {
             let Some((section, name)) = key.split_once('.') else { continue };
             let Some(inner) = table.get_mut(section).and_then(Value::as_table_mut) else { continue };
-            let Some(value @ Value::Integer(_)) = inner.get(name).cloned() else { continue };
+            let Some(value) = inner.get(name).cloned() else { continue };
             let alone = Table::from_iter([(name.to_owned(), value.clone())]);
             let alone = Table::from_iter([(section.to_owned(), Value::Table(alone))]);
-            if alone.try_into::<Settings>().is_err() {
+            if let Err(error) = alone.try_into::<Settings>() {
                 inner.remove(name);
-                self.problem(&key, place, format!("{value} is too large"));
+                self.problem(&key, place, refused(&value, error.message()));
+            }
+        }
+    }
+
+    /// Makes each path absolute: those of the file within its folder, those of `--set` within the current one. A path is
+    /// a setting whose type also takes a path with a folder.
+    fn resolve_paths(&self, table: &mut Table, folders: &Folders) {
+        for (section, value) in table.iter_mut() {
+            let (is_list, entries) = match value {
+                Value::Array(entries) => (true, entries.iter_mut().filter_map(Value::as_table_mut).collect()),
+                Value::Table(inner) => (false, vec![inner]),
+                _ => continue,
+            };
+            for (at, inner) in entries.into_iter().enumerate() {
+                let texts = inner.iter().filter_map(|(name, value)| Some((name.clone(), value.as_str()?.to_owned())));
+                for (name, path) in texts.filter(|(_, path)| !path.is_empty()).collect::<Vec<_>>() {
+                    let key = if is_list { format!("{section}[{at}].{name}") } else { format!("{section}.{name}") };
+                    let is_set = self.places.get(&key) == Some(&Place::CommandLine);
+                    let folder = if is_set { folders.current } else { folders.file };
+                    let path = [("folder", folder.to_owned()), ("path", path)];
+                    let path = path.map(|(key, text)| (key.to_owned(), Value::String(text)));
+                    let mut changed = inner.clone();
+                    changed.insert(name, Value::Table(path.into_iter().collect()));
+                    let alone = Value::Table(changed.clone());
+                    let alone = if is_list { Value::Array(vec![alone]) } else { alone };
+                    if Table::from_iter([(section.clone(), alone)]).try_into::<Settings>().is_ok() {
+                        *inner = changed;
+                    }
+                }
             }
         }
     }
@@ -275,6 +313,14 @@ fn typed(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
         (Value::Table(_), _) => wrong("a table"),
         (Value::Datetime(_), _) => wrong("another value"),
     }
+}
+
+/// What is wrong with a value of the right kind that its setting refuses; `message` is serde's.
+fn refused(value: &Value, message: &str) -> String {
+    let Value::String(text) = value else { return format!("{value} is too large") };
+    let expected = message.strip_prefix(&format!("unknown variant `{text}`, ")).unwrap_or(message);
+    let known: Vec<String> = expected.split('`').skip(1).step_by(2).map(str::to_owned).collect();
+    format!("{text:?} is not known: {}{}", expected.replace('`', "\""), nearest(text, known.iter()))
 }
 
 /// ` (did you mean X?)` where a known key is close.

@@ -2,7 +2,7 @@
 //! defaults in, paths absolute, every value in its range). Each section is one small struct whose defaults are the
 //! documented ones; the top level `pipeline.toml` documents them and a test holds the two together.
 
-use super::file::Problem;
+use super::file::{Folders, Problem};
 use super::sections::Settings;
 use super::{file, rules};
 use anyhow::{Context, Result};
@@ -48,31 +48,21 @@ pub fn load(file: &Path, sets: &[String]) -> Result<Config> {
         format!("cannot read the configuration {}; `orator init DIR` writes one, -c FILE names another", file.display())
     })?;
     let file = std::path::absolute(file)?;
-    let (mut settings, notes) = resolve(&text, sets, &file)?;
-    let here = std::env::current_dir()?;
-    let folder = file.parent().unwrap_or(&here).to_owned();
-    let on_command_line = |key: &str| sets.iter().any(|set| set.starts_with(&format!("{key}=")));
-    let paths: [(&str, &mut PathBuf); 5] = [
-        ("work.dir", &mut settings.work.dir),
-        ("models.dir", &mut settings.models.dir),
-        ("models.onnxruntime", &mut settings.models.onnxruntime),
-        ("lift.body_weights", &mut settings.lift.body_weights),
-        ("lift.hand_weights", &mut settings.lift.hand_weights),
-    ];
-    for (key, path) in paths {
-        if !path.as_os_str().is_empty() {
-            *path = if on_command_line(key) { here.join(&*path) } else { folder.join(&*path) };
-        }
-    }
-    for speaker in settings.speaker.iter_mut().filter(|speaker| !speaker.reference.as_os_str().is_empty()) {
-        speaker.reference = folder.join(&speaker.reference);
-    }
+    let (settings, notes) = resolve(&text, sets, &file)?;
     Ok(Config { settings, file, notes })
 }
 
-/// The settings a text gives, checked but with paths as written.
+/// The settings that the text of `file` gives, and notes on former keys.
 fn resolve(text: &str, sets: &[String], file: &Path) -> Result<(Settings, Vec<String>)> {
-    let given = file::read(text, sets);
+    let current = std::env::current_dir()?;
+    let unicode = |folder: &Path| -> Result<String> {
+        Ok(folder
+            .to_str()
+            .with_context(|| format!("the folder {} has a name that is no text", folder.display()))?
+            .into())
+    };
+    let folder = unicode(file.parent().unwrap_or(Path::new("")))?;
+    let given = file::read(text, sets, &Folders { file: &folder, current: &unicode(&current)? });
     let mut problems = given.problems;
     problems.extend(rules::check(&given.settings, &given.places));
     problems.sort_by(|a, b| (a.place, &a.key).cmp(&(b.place, &b.key)));
@@ -176,6 +166,39 @@ mod tests {
                 "--set: nothing: unknown key",
             ]
         );
+    }
+
+    #[test]
+    fn a_value_that_is_not_known_is_refused_with_those_that_are() {
+        for (set, expected) in [
+            ("gan.preset=ligth", "\"ligth\" is not known: expected \"light\" or \"paper\" (did you mean light?)"),
+            ("gan.representation=anything", "\"anything\" is not known: expected \"bones\" or \"positions\""),
+            ("gan.adversarial=hinge", "\"hinge\" is not known: expected \"least-squares\" or \"log\""),
+            ("gan.device=`gpu`", "\"`gpu`\" is not known: expected \"cpu\" or \"cuda\""),
+        ] {
+            let (key, _) = set.split_once('=').unwrap();
+            assert_eq!(problems("", &[set]), [format!("--set: {key}: {expected}")]);
+        }
+        let text = "[gan]\nrepresentation = \"position\"\npreset = 3\n";
+        let found = problems(text, &[]);
+        assert!(found[0].starts_with("line 2: gan.representation") && found[0].ends_with("(did you mean positions?)"));
+        assert_eq!(found[1], "line 3: gan.preset: expected a string, found integer");
+    }
+
+    #[test]
+    fn paths_count_from_the_file_or_the_current_folder() {
+        let text = "[models]\nonnxruntime = \"lib/ort.so\"\n[lift]\nbody_weights = \"/abs.safetensors\"\n\
+                    [[speaker]]\nname = \"work\"\nvideos = [\"a.mp4\"]\nreference = \"face.jpg\"\nsource = \"disk\"\n";
+        let file = Path::new("/project/pipeline.toml");
+        let settings = resolve(text, &["lift.hand_weights=hands.safetensors".into()], file).unwrap().0;
+        assert_eq!(&*settings.work.dir, Path::new("/project/work"));
+        assert_eq!(&*settings.models.onnxruntime, Path::new("/project/lib/ort.so"));
+        assert_eq!(&*settings.lift.body_weights, Path::new("/abs.safetensors"));
+        assert_eq!(&*settings.lift.hand_weights, std::env::current_dir().unwrap().join("hands.safetensors"));
+        let speaker = &settings.speaker[0];
+        assert_eq!((&*speaker.reference, speaker.source.as_str()), (Path::new("/project/face.jpg"), "disk"));
+        assert_eq!((speaker.name.as_str(), settings.pose2d.person.as_str()), ("work", "person-rtmdet-nano"));
+        assert!(settings.speaker[0].licence.is_empty());
     }
 
     #[test]

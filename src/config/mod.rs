@@ -2,12 +2,16 @@
 //! defaults in, paths absolute, every value in its range). Each section is one small struct whose defaults are the
 //! documented ones; the top level `pipeline.toml` documents them and a test holds the two together.
 
+pub mod choices;
+pub mod config_path;
 pub mod file;
 pub mod load;
 pub mod rules;
 pub mod sections;
 pub mod videos;
 
+pub use choices::{AdversarialLoss, ComputeDevice, MotionRepresentation, NetworkPreset};
+pub use config_path::ConfigPath;
 pub use file::Place;
 pub use file::Problem;
 pub use load::Config;

@@ -40,16 +40,6 @@ pub fn check(settings: &Settings, places: &BTreeMap<String, Place>) -> Vec<Probl
     if s.dataset.validation + s.dataset.test > 0.95 {
         rules.problem("dataset.test", "validation and test together leave less than 5 % to train on".to_owned());
     }
-    for (key, value, [one, other]) in [
-        ("gan.preset", &s.gan.preset, ["light", "paper"]),
-        ("gan.representation", &s.gan.representation, ["bones", "positions"]),
-        ("gan.adversarial", &s.gan.adversarial, ["least-squares", "log"]),
-        ("gan.device", &s.gan.device, ["cpu", "cuda"]),
-    ] {
-        if value != one && value != other {
-            rules.problem(key, format!("{value:?} is not known: expected {one:?} or {other:?}"));
-        }
-    }
     rules.within("gan.window_frames", s.gan.window_frames as f64, 32.0, 4096.0, "frames");
     if !s.gan.window_frames.is_multiple_of(32) {
         rules.problem("gan.window_frames", format!("{} is not a multiple of 32", s.gan.window_frames));

@@ -1,9 +1,10 @@
 //! The sections of `pipeline.toml` with their defaults. What each key means, its unit and its reason stand in the
 //! top level `pipeline.toml`; here are the types.
 
+use super::choices::{AdversarialLoss, ComputeDevice, MotionRepresentation, NetworkPreset};
+use super::config_path::ConfigPath;
 use crate::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
 
 /// Everything a run needs to know. Paths are absolute once resolved.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,7 +31,7 @@ pub struct Speaker {
     pub videos: Vec<String>,
     /// A picture that shows the speaker as its largest person; empty: none.
     #[serde(default)]
-    pub reference: PathBuf,
+    pub reference: ConfigPath,
     /// Videos to leave out, though `videos` names them: paths, file names or patterns. So are the next three.
     #[serde(default)]
     pub exclude: Vec<String>,
@@ -54,7 +55,7 @@ pub struct Speaker {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Work {
-    pub dir: PathBuf,
+    pub dir: ConfigPath,
     /// Units worked on side by side; 0: one a core.
     pub jobs: usize,
 }
@@ -69,14 +70,14 @@ impl Default for Work {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Models {
-    pub dir: PathBuf,
+    pub dir: ConfigPath,
     /// Path of `libonnxruntime.so`; empty: searched for (see `orator doctor`).
-    pub onnxruntime: PathBuf,
+    pub onnxruntime: ConfigPath,
 }
 
 impl Default for Models {
     fn default() -> Self {
-        Self { dir: "models".into(), onnxruntime: PathBuf::new() }
+        Self { dir: "models".into(), onnxruntime: ConfigPath::default() }
     }
 }
 
@@ -206,9 +207,9 @@ impl Default for Segment {
 #[serde(default, deny_unknown_fields)]
 pub struct Lift {
     /// Weights of the body lifter (safetensors); empty: the built-in ones.
-    pub body_weights: PathBuf,
+    pub body_weights: ConfigPath,
     /// Weights of the hand lifter (safetensors); empty: the built-in ones.
-    pub hand_weights: PathBuf,
+    pub hand_weights: ConfigPath,
     /// Width of the Gaussian that smooths arms, in frames at 15 fps; 0: none.
     pub smooth_arms: f64,
     /// The same for hands.
@@ -221,7 +222,7 @@ pub struct Lift {
 
 impl Default for Lift {
     fn default() -> Self {
-        let none = PathBuf::new();
+        let none = ConfigPath::default();
         let (smooth_arms, smooth_hands, level, max_bone_change) = (0.8, 1.5, false, 0.4);
         Self { body_weights: none.clone(), hand_weights: none, smooth_arms, smooth_hands, level, max_bone_change }
     }
@@ -250,10 +251,8 @@ impl Default for DatasetConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Gan {
-    /// Network preset: `light` (CPU) or `paper`.
-    pub preset: String,
-    /// What the generator's numbers are: `bones` (directions, lengths constant by construction) or `positions`.
-    pub representation: String,
+    pub preset: NetworkPreset,
+    pub representation: MotionRepresentation,
     /// Window length in frames.
     pub window_frames: usize,
     /// Frames between the starts of two windows of an interval.
@@ -261,8 +260,7 @@ pub struct Gan {
     pub batch: usize,
     pub steps: usize,
     pub learning_rate: f64,
-    /// The adversarial loss: `least-squares` or `log`.
-    pub adversarial: String,
+    pub adversarial: AdversarialLoss,
     /// Weights of the losses.
     pub lambda_l1: f64,
     pub lambda_velocity: f64,
@@ -277,21 +275,20 @@ pub struct Gan {
     pub checkpoint_every: usize,
     /// Checkpoints kept.
     pub keep_checkpoints: usize,
-    /// Where the tensors are: `cpu` or `cuda`.
-    pub device: String,
+    pub device: ComputeDevice,
 }
 
 impl Default for Gan {
     fn default() -> Self {
         Self {
-            preset: "light".into(),
-            representation: "bones".into(),
+            preset: NetworkPreset::Light,
+            representation: MotionRepresentation::Bones,
             window_frames: 64,
             stride_frames: 5,
             batch: 32,
             steps: 6000,
             learning_rate: 1e-4,
-            adversarial: "least-squares".into(),
+            adversarial: AdversarialLoss::LeastSquares,
             lambda_l1: 1.0,
             lambda_velocity: 0.0,
             lambda_gan: 1.0,
@@ -301,7 +298,7 @@ impl Default for Gan {
             patience: 0,
             checkpoint_every: 100,
             keep_checkpoints: 3,
-            device: "cpu".into(),
+            device: ComputeDevice::Cpu,
         }
     }
 }

@@ -201,7 +201,7 @@ struct Loaded {
 /// Batches as training draws them, then training itself, on the same dataset.
 fn loader(args: &Args, dir: &Path, out: &Path) -> Result<Loaded> {
     let settings = config::Gan {
-        preset: "light".to_owned(),
+        preset: config::NetworkPreset::Light,
         window_frames: 64,
         stride_frames: 5,
         steps: args.steps,

@@ -62,7 +62,8 @@ struct Fixed {
 
 impl Fixed {
     fn new(args: &Args) -> Result<Self> {
-        let settings = Gan { preset: args.preset.clone(), batch: args.batch, ..Gan::default() };
+        let preset = serde_json::from_value(json!(args.preset))?;
+        let settings = Gan { preset, batch: args.batch, ..Gan::default() };
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let table = |value: f32| ndarray::Array2::from_elem((N_JOINTS, 3), value);
         let length = |joint: usize| if is_duplicate(joint) { 0.0 } else { 0.1 };

@@ -149,7 +149,7 @@ fn of_project(args: &Args) -> Result<(Task, Option<File>)> {
     }
     advice.extend(how_to_keep_away(&config, &speaker, &videos, whole));
     let titles = if whole { vec![speaker] } else { videos.iter().map(|video| video.title()).collect() };
-    Ok((Task { titles, removals: vec![removal], folders: vec![work.clone()], advice }, lock))
+    Ok((Task { titles, removals: vec![removal], folders: vec![work.to_path_buf()], advice }, lock))
 }
 
 /// What keeps the next run from bringing the videos back; nothing, where it would not.

@@ -62,8 +62,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         ensure!((0.0..=100.0).contains(&sigma), "a smoothing of {sigma} frames; it must lie between 0 and 100");
     }
     let settings = config::Lift {
-        body_weights: args.body_weights.unwrap_or_default(),
-        hand_weights: args.hand_weights.unwrap_or_default(),
+        body_weights: args.body_weights.unwrap_or_default().into(),
+        hand_weights: args.hand_weights.unwrap_or_default().into(),
         smooth_arms: args.smooth_arms,
         smooth_hands: args.smooth_hands,
         level: args.level,

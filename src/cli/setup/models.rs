@@ -115,7 +115,7 @@ fn settings(args: &Args) -> Result<Settings> {
         Settings::default()
     };
     if let Some(dir) = &args.models_dir {
-        settings.models.dir.clone_from(dir);
+        settings.models.dir = dir.clone().into();
     }
     Ok(settings)
 }

@@ -42,7 +42,7 @@ impl DatasetStage {
         Self {
             settings: settings.dataset.clone(),
             speakers: settings.speaker.clone(),
-            work: settings.work.dir.clone(),
+            work: settings.work.dir.to_path_buf(),
             ready: ready.to_vec(),
             all: Vec::new(),
             models: Vec::new(),

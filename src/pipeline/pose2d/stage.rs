@@ -41,12 +41,12 @@ impl Pose2dStage {
     /// A manifest that is not sound; a model that is not in it.
     pub fn new(settings: &Settings) -> Result<Self> {
         let named = settings.speaker.iter().filter(|speaker| !speaker.reference.as_os_str().is_empty());
-        let references = named.map(|speaker| (speaker.name.clone(), speaker.reference.clone()));
+        let references = named.map(|speaker| (speaker.name.clone(), speaker.reference.to_path_buf()));
         let stage = Self {
             settings: settings.pose2d.clone(),
             models: settings.models.clone(),
             fps: settings.extract.rate(),
-            work: settings.work.dir.clone(),
+            work: settings.work.dir.to_path_buf(),
             manifest: Manifest::load(&settings.models.dir)?,
             references: references.collect(),
         };

@@ -1,5 +1,6 @@
 //! What the networks are trained to make small: pure functions of tensors.
 
+use crate::config::AdversarialLoss;
 use crate::generate::normalisation::{N_NUMBERS, Normalisation};
 use crate::nn::gan::discriminator::motion;
 use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WRIST, is_duplicate, parent};
@@ -23,29 +24,8 @@ pub fn both_seen(mask: &Tensor) -> Result<Tensor> {
     mask.narrow(2, 1, n)? * mask.narrow(2, 0, n)?
 }
 
-/// The game between generator and discriminator, on the discriminator's scores of any shape.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Adversarial {
-    /// Least squares (Mao et al. 2017), as in the code the paper descends from: real scores towards 1, made ones towards 0.
-    LeastSquares,
-    /// Cross entropy of the scores as logits (Goodfellow et al. 2014, the paper's equation); the generator's in its
-    /// non-saturating form, -log D(made) instead of log(1 - D(made)).
-    Log,
-}
-
-impl std::str::FromStr for Adversarial {
-    type Err = anyhow::Error;
-
-    fn from_str(name: &str) -> anyhow::Result<Self> {
-        match name {
-            "least-squares" => Ok(Self::LeastSquares),
-            "log" => Ok(Self::Log),
-            _ => anyhow::bail!("the adversarial loss is `least-squares` or `log`, not `{name}`"),
-        }
-    }
-}
-
-impl Adversarial {
+/// The loss on the discriminator's scores, of any shape.
+impl AdversarialLoss {
     /// What the discriminator makes small.
     pub fn discriminator(self, real_scores: &Tensor, made_scores: &Tensor) -> Result<Tensor> {
         match self {
@@ -145,7 +125,7 @@ mod tests {
         let mask = pattern(&shape, 9.0)?.gt(0.0)?.to_dtype(DType::F64)?;
         assert!(worst(std::slice::from_ref(&made), |v| l1(&v[0], &real, &mask))? < 1e-7);
         assert!(worst(std::slice::from_ref(&made), |v| velocity(&v[0], &real, &mask))? < 1e-7);
-        for game in [Adversarial::LeastSquares, Adversarial::Log] {
+        for game in [AdversarialLoss::LeastSquares, AdversarialLoss::Log] {
             assert!(worst(&[made.clone(), real.clone()], |v| game.discriminator(&v[0], &v[1]))? < 1e-7);
             assert!(worst(std::slice::from_ref(&made), |v| game.generator(&v[0]))? < 1e-7);
         }
@@ -171,9 +151,9 @@ mod tests {
         let (real, made) = (row([0.5, -1.0, 90.0])?, row([2.0, 0.0, -90.0])?);
         let log = |x: f64| -(1.0 / (1.0 + (-x).exp())).ln();
         let expected = (log(0.5) + log(-1.0)) / 3.0 + (log(-2.0) + log(0.0)) / 3.0;
-        assert!((number(Adversarial::Log.discriminator(&real, &made))? - expected).abs() < 1e-12);
-        assert!((number(Adversarial::Log.generator(&made))? - (log(2.0) + log(0.0) + 90.0) / 3.0).abs() < 1e-12);
-        assert_eq!(number(Adversarial::LeastSquares.generator(&row([2.0, 0.0, 1.0])?))?, 2.0 / 3.0);
+        assert!((number(AdversarialLoss::Log.discriminator(&real, &made))? - expected).abs() < 1e-12);
+        assert!((number(AdversarialLoss::Log.generator(&made))? - (log(2.0) + log(0.0) + 90.0) / 3.0).abs() < 1e-12);
+        assert_eq!(number(AdversarialLoss::LeastSquares.generator(&row([2.0, 0.0, 1.0])?))?, 2.0 / 3.0);
         // Speeds 1, -2 against 0, 3, of which the second is not seen.
         let loss = velocity(&row([1.0, 2.0, 0.0])?, &row([1.0, 1.0, 4.0])?, &row([1.0, 1.0, 0.0])?);
         assert_eq!(number(loss)?, 1.0);

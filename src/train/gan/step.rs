@@ -1,10 +1,11 @@
 //! A generator and its discriminator in training: one step, and all of it to a checkpoint and back.
 
 use super::losses;
-use super::losses::{Adversarial, BoneConstancy};
+use super::losses::BoneConstancy;
 use super::score::Validation;
 use super::windows::Batch;
 use crate::config::Gan;
+use crate::config::{AdversarialLoss, ComputeDevice};
 use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
 use crate::generate::model::BEST;
@@ -68,7 +69,7 @@ pub struct Training {
     adam_g: Adam,
     adam_d: Adam,
     bones: BoneConstancy,
-    adversarial: Adversarial,
+    adversarial: AdversarialLoss,
     /// Steps done.
     pub step: usize,
     /// Step and score of the best validation so far.
@@ -78,7 +79,7 @@ pub struct Training {
 impl Training {
     /// Networks as the seed makes them.
     pub fn new(facts: Facts, settings: Gan) -> Result<Self> {
-        let device = device::named(&settings.device)?;
+        let device = device::open(settings.device == ComputeDevice::Cuda)?;
         let mut generator_params = Params::new(settings.seed).on(&device);
         let generator = Generator::new(&mut generator_params, &facts.network)?;
         // Another seed, or tensors of the same name would begin alike.
@@ -88,7 +89,7 @@ impl Training {
         Ok(Self {
             decoder: facts.representation.decoder(&facts.normalisation, DType::F32, &device)?,
             bones: BoneConstancy::new(&facts.normalisation, DType::F32, &device)?,
-            adversarial: settings.adversarial.parse()?,
+            adversarial: settings.adversarial,
             adam_g: Adam::new(&generator_params, adam)?,
             adam_d: Adam::new(&discriminator_params, adam)?,
             generator_params,

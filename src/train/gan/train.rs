@@ -7,6 +7,7 @@ use super::step::{Losses, Stored, Training};
 use super::validate::HeldOut;
 use super::windows::Examples;
 use crate::config::Gan;
+use crate::config::{ComputeDevice, MotionRepresentation, NetworkPreset};
 use crate::dataset::{Dataset, Split};
 use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
@@ -17,6 +18,7 @@ use crate::generate::representation::Representation;
 use crate::motion::bones;
 use crate::nn::cpu::thread_team::awake;
 use crate::nn::device;
+use crate::nn::gan::generator::Preset;
 use crate::nn::gan::generator::{Config, FRAMES_MULTIPLE};
 use crate::stage::progress::{Progress, Task};
 use crate::stage::workdir;
@@ -78,11 +80,11 @@ pub fn train(dataset: &Dataset, wanted: &Gan, folder: &Path, progress: &dyn Prog
     let mut training = match &resumed {
         Some((stored, _)) => Training::new(stored.speaker.clone(), settings)?,
         None => {
-            let representation = match settings.representation.as_str() {
-                "positions" => Representation::Positions,
-                _ => Representation::bones(&normal, examples.poses()),
+            let representation = match settings.representation {
+                MotionRepresentation::Positions => Representation::Positions,
+                MotionRepresentation::Bones => Representation::bones(&normal, examples.poses()),
             };
-            let network = Config::of(settings.preset.parse()?, N_NUMBERS);
+            let network = Config::of(preset(settings.preset), N_NUMBERS);
             let (info, hash) = (dataset.info(), dataset.hash()?);
             let facts = Facts::new(&info.speaker, info.fps, &hash, network, normal, representation);
             Training::new(facts, settings)?
@@ -225,6 +227,14 @@ fn show(task: &dyn Task, losses: &Losses, steps_per_sec: f64) {
     ));
 }
 
+/// The network of a preset of the configuration.
+pub const fn preset(preset: NetworkPreset) -> Preset {
+    match preset {
+        NetworkPreset::Light => Preset::Light,
+        NetworkPreset::Paper => Preset::Paper,
+    }
+}
+
 fn check(settings: &Gan) -> Result<()> {
     ensure!(
         settings.window_frames > 0 && settings.window_frames.is_multiple_of(FRAMES_MULTIPLE),
@@ -236,7 +246,7 @@ fn check(settings: &Gan) -> Result<()> {
         settings.checkpoint_every > 0 && settings.epoch_steps > 0 && settings.stride_frames > 0,
         "gan.checkpoint_every, gan.epoch_steps and gan.stride_frames must be at least 1"
     );
-    device::named(&settings.device)?;
+    device::open(settings.device == ComputeDevice::Cuda)?;
     Ok(())
 }
 

@@ -71,7 +71,7 @@ fn video_with(root: &Path, name: &str, n_frames: usize, seed: u64, sound_seed: u
 
 fn settings(root: &Path) -> Settings {
     let mut settings = Settings::default();
-    settings.work.dir = root.join("work");
+    settings.work.dir = root.join("work").into();
     settings.dataset.max_mb = 1;
     settings
 }

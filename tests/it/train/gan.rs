@@ -3,6 +3,7 @@
 
 use crate::fixtures::gesture_dataset::{FPS, dataset, sample};
 use orator::config::Gan;
+use orator::config::{AdversarialLoss, MotionRepresentation, NetworkPreset};
 use orator::dataset::{Dataset, Split, write_dataset};
 use orator::generate::Speaker;
 use orator::generate::model::BEST;
@@ -69,7 +70,12 @@ fn a_training_stopped_at_any_step_ends_with_the_same_bytes() {
         (
             "positions",
             vec![4],
-            Gan { representation: "positions".into(), adversarial: "log".into(), lambda_velocity: 0.5, ..settings() },
+            Gan {
+                representation: MotionRepresentation::Positions,
+                adversarial: AdversarialLoss::Log,
+                lambda_velocity: 0.5,
+                ..settings()
+            },
         ),
     ] {
         let place = |part: &str| folder.path().join(format!("{name}-{part}"));
@@ -104,7 +110,12 @@ fn the_checkpoints_settings_win_and_differences_are_told() {
     let out = folder.path().join("out");
     train(&dataset, &Gan { steps: 3, ..settings() }, &out, &Silent).unwrap();
     let stop = Stop::at(u64::MAX);
-    let other = Gan { learning_rate: 1e-3, preset: "paper".into(), representation: "positions".into(), ..settings() };
+    let other = Gan {
+        learning_rate: 1e-3,
+        preset: NetworkPreset::Paper,
+        representation: MotionRepresentation::Positions,
+        ..settings()
+    };
     train(&dataset, &other, &out, &Shared(stop.clone())).unwrap();
     let said = stop.said.lock().unwrap().join("\n");
     for key in ["gan.learning_rate", "gan.preset", "gan.representation"] {

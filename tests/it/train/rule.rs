@@ -1,6 +1,7 @@
 //! The synthetic speaker with a known rule, by the program: what its dataset must be like before anything is trained on it.
 //! That a training learns the rule is proved by the commands in `fixtures/rule.toml`.
 
+use orator::config::{MotionRepresentation, NetworkPreset};
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
@@ -40,6 +41,6 @@ fn neither_the_mean_pose_nor_the_sound_of_the_moment_explains_the_gestures() {
 fn the_settings_of_the_proof_are_settings() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/rule.toml");
     let gan = orator::config::load(&file, &[]).unwrap().settings.gan;
-    assert_eq!((gan.preset.as_str(), gan.representation.as_str()), ("light", "bones"));
+    assert_eq!((gan.preset, gan.representation), (NetworkPreset::Light, MotionRepresentation::Bones));
     assert!(gan.lambda_gan > 0.0);
 }

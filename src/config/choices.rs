@@ -1,0 +1,48 @@
+//! Settings with few values, as enums: a value that is none of them is refused with the names of those that are.
+
+use serde::{Deserialize, Serialize};
+
+/// Size of the generator's network.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NetworkPreset {
+    /// For CPUs: convolutions run over time only.
+    #[default]
+    Light,
+    /// The published network (Rebol et al. 2021): convolutions over time and frequency.
+    Paper,
+}
+
+/// Meaning of the generator's numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MotionRepresentation {
+    /// Directions of bones, whose lengths are constant by construction.
+    #[default]
+    Bones,
+    /// Positions of joints, as in the paper.
+    Positions,
+}
+
+/// The game between generator and discriminator.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AdversarialLoss {
+    /// Least squares (Mao et al. 2017), as in the code the paper descends from: real scores towards 1, generated ones
+    /// towards 0.
+    #[default]
+    LeastSquares,
+    /// Cross entropy of the scores as logits (Goodfellow et al. 2014, the paper's equation); the generator's in its
+    /// non-saturating form, -log D(generated) instead of log(1 - D(generated)).
+    Log,
+}
+
+/// Processor that holds the tensors of a training.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ComputeDevice {
+    #[default]
+    Cpu,
+    /// The first NVIDIA card, in a build with the feature `cuda`.
+    Cuda,
+}
