@@ -1,6 +1,7 @@
 //! The account of a video's seconds: every one of them is kept, refused for a reason with what was measured, or lost to a
-//! stage that failed. The stage that judges writes it (`ledger.json`), lifting amends it; later ones only add up.
+//! stage that failed. `segment` writes it, `lift` moves seconds from kept to refused; later stages only add up.
 
+use super::refusal::FrameRefusal;
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -28,15 +29,31 @@ pub struct Kept {
 pub struct Refused {
     pub start_secs: f64,
     pub end_secs: f64,
-    /// One word, for programs.
+    /// The reason in a word or two, for programs.
     pub reason: String,
     /// What was measured, and what it had to reach or stay below, both in `unit`.
     pub measured: f64,
     pub threshold: f64,
     #[serde(default)]
     pub unit: String,
-    /// The same as a sentence, for people.
-    pub says: String,
+    /// A sentence for people.
+    #[serde(rename = "says")]
+    pub message: String,
+}
+
+impl Refused {
+    /// A stretch refused for `why`, in the words of its reason.
+    pub fn new(start_secs: f64, end_secs: f64, why: FrameRefusal) -> Self {
+        let message = why.refusal.message(why.measured, why.threshold);
+        Self::with_message(start_secs, end_secs, why, message)
+    }
+
+    /// A stretch refused for `why`, in words of its own.
+    pub fn with_message(start_secs: f64, end_secs: f64, why: FrameRefusal, message: String) -> Self {
+        let FrameRefusal { refusal, measured, threshold } = why;
+        let (reason, unit) = (refusal.reason().to_owned(), refusal.unit().to_owned());
+        Self { start_secs, end_secs, reason, measured, threshold, unit, message }
+    }
 }
 
 /// A stretch that no verdict was reached on: its stage failed.

@@ -6,6 +6,7 @@ pub mod fingerprint;
 pub mod ledger;
 pub mod progress;
 pub mod record;
+pub mod refusal;
 pub mod runner;
 pub mod unit;
 pub mod workdir;

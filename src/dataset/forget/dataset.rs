@@ -92,7 +92,7 @@ fn silenced(part: &VideoEntry, names: &BTreeSet<String>) -> VideoEntry {
         part.split_by = SplitBy::Name;
     }
     for refused in &mut part.ledger.refused {
-        names.iter().for_each(|name| refused.says = refused.says.replace(name.as_str(), FORGOTTEN));
+        names.iter().for_each(|name| refused.message = refused.message.replace(name.as_str(), FORGOTTEN));
     }
     part
 }

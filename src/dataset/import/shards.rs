@@ -7,6 +7,7 @@ use crate::formats::npy_slice;
 use crate::formats::npy_slice::{Element, Layout};
 use crate::formats::wav;
 use crate::stage::ledger::{Kept, Ledger, Refused};
+use crate::stage::refusal::{FrameRefusal, Refusal};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::{SAMPLE_RATE, Sound};
@@ -198,15 +199,8 @@ pub fn ledger(samples: &[(f64, f64)]) -> Ledger {
         let at = ledger.duration_secs;
         let start_secs = if start.is_finite() && start > at { start } else { at };
         if start_secs > at {
-            ledger.refused.push(Refused {
-                start_secs: at,
-                end_secs: start_secs,
-                reason: "not here".to_owned(),
-                measured: 0.0,
-                threshold: 0.0,
-                unit: "s".to_owned(),
-                says: "the shards that were imported do not hold it".to_owned(),
-            });
+            let why = FrameRefusal::new(Refusal::NotImported, 0.0, 0.0);
+            ledger.refused.push(Refused::new(at, start_secs, why));
         }
         ledger.duration_secs = start_secs + secs;
         ledger.kept.push(Kept { start_secs, end_secs: ledger.duration_secs });

@@ -5,7 +5,7 @@ use super::find::{ImportSources, TakeFiles};
 use super::plan::{ImportOutcome, ImportPlan};
 use super::shards;
 use super::shards::LooseVideo;
-use super::take::{ImportedTake, TakeOutcome, TakeRefusal};
+use super::take::{ImportedTake, TakeOutcome};
 use crate::audio::fingerprint::Fingerprinter;
 use crate::config::videos::slug;
 use crate::dataset::bones::{VideoBones, of_speaker};
@@ -19,6 +19,7 @@ use crate::dataset::{INFO, Split};
 use crate::motion::bones;
 use crate::stage::fingerprint::hash_file;
 use crate::stage::ledger::{Kept, Ledger, Refused};
+use crate::stage::refusal::{FrameRefusal, Refusal};
 use crate::types::sound::Sound;
 use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
@@ -168,7 +169,7 @@ fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
     };
     match take.ended {
         TakeOutcome::Refused(refusal) => {
-            source.ledger.refused.push(refused(0.0, duration_secs, &refusal));
+            source.ledger.refused.push(Refused::with_message(0.0, duration_secs, refusal.why, refusal.message));
             Ok(InspectedItem { source, ..InspectedItem::default() })
         }
         TakeOutcome::Kept(kept) => {
@@ -176,9 +177,8 @@ fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
             let end_secs = plan.limits.fps.secs(n_frames);
             source.ledger.kept.push(Kept { start_secs: 0.0, end_secs });
             if end_secs < duration_secs {
-                let message = "the sound ends here".to_owned();
-                let refusal = TakeRefusal { reason: "no sound", measured: 0.0, threshold: 0.0, unit: "s", message };
-                source.ledger.refused.push(refused(end_secs, duration_secs, &refusal));
+                let why = FrameRefusal::new(Refusal::NoSoundFile, 0.0, 0.0);
+                source.ledger.refused.push(Refused::new(end_secs, duration_secs, why));
             }
             source.bones = VideoBones { lengths_metres: kept.lengths.map(f64::from).to_vec(), n_frames };
             let remark = match kept.moved_mm {
@@ -198,19 +198,6 @@ fn made_from(found: &TakeFiles, plan: &ImportPlan) -> Result<String> {
     let hashes = files.into_iter().flatten().map(|path| hash_file(path)).collect::<Result<Vec<_>>>()?;
     let all = serde_json::json!([env!("CARGO_PKG_VERSION"), hashes, plan.limits.fps, plan.dataset.max_mb]);
     Ok(blake3::hash(all.to_string().as_bytes()).to_hex().to_string())
-}
-
-fn refused(start_secs: f64, end_secs: f64, refusal: &TakeRefusal) -> Refused {
-    let TakeRefusal { reason, measured, threshold, unit, message } = refusal.clone();
-    Refused {
-        start_secs,
-        end_secs,
-        reason: reason.to_owned(),
-        measured,
-        threshold,
-        unit: unit.to_owned(),
-        says: message,
-    }
 }
 
 fn look_at_part(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedItem> {
@@ -293,7 +280,7 @@ impl InspectedItem {
     pub fn twice(mut self, nth: usize) -> Self {
         let first = self.source.name.clone();
         let message = format!("{first} is there already");
-        self.refuse("duplicate", self.source.ledger.kept_secs(), 0.0, &message);
+        self.refuse(self.source.ledger.kept_secs(), 0.0, &message);
         let mark = blake3::hash(format!("{first} {nth}").as_bytes()).to_hex();
         let stem = first.rsplit_once('-').map_or(first.as_str(), |(stem, _)| stem);
         self.source.name = format!("{stem}-{}", &mark[..8]);
@@ -307,21 +294,14 @@ impl InspectedItem {
         let secs = with.first().map_or(0.0, |shared| shared.secs);
         let message =
             format!("the same {secs:.1} s of sound are in {}, which are in different splits", others.join(" and "));
-        self.refuse("duplicate", secs, threshold, &message);
+        self.refuse(secs, threshold, &message);
         (self.sound, self.split) = (None, None);
     }
 
-    fn refuse(&mut self, reason: &str, measured: f64, threshold: f64, message: &str) {
+    fn refuse(&mut self, measured: f64, threshold: f64, message: &str) {
         let ledger = &mut self.source.ledger;
-        let refused = |kept: Kept| Refused {
-            start_secs: kept.start_secs,
-            end_secs: kept.end_secs,
-            reason: reason.to_owned(),
-            measured,
-            threshold,
-            unit: "s".to_owned(),
-            says: message.to_owned(),
-        };
+        let why = FrameRefusal::new(Refusal::Duplicate, measured, threshold);
+        let refused = |kept: Kept| Refused::with_message(kept.start_secs, kept.end_secs, why, message.to_owned());
         let all: Vec<Refused> = ledger.kept.drain(..).map(refused).collect();
         ledger.refused.extend(all);
         ledger.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
@@ -333,7 +313,7 @@ impl InspectedItem {
         let (ended, reason, message) = match (&self.source.failure, self.source.ledger.refused.first()) {
             (Some(error), _) => ("failed", "error".to_owned(), error.clone()),
             (None, _) if self.is_kept() => ("kept", String::new(), self.remark.clone()),
-            (None, Some(refused)) => ("refused", refused.reason.clone(), refused.says.clone()),
+            (None, Some(refused)) => ("refused", refused.reason.clone(), refused.message.clone()),
             (None, None) => ("refused", "empty".to_owned(), "it holds nothing".to_owned()),
         };
         ImportOutcome { file: file.to_owned(), ended, kept_secs: self.source.ledger.kept_secs(), reason, message }

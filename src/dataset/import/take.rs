@@ -13,6 +13,7 @@ use crate::mocap::take::Captured;
 use crate::motion::bones;
 use crate::motion::resample;
 use crate::stage::fingerprint::hash_file;
+use crate::stage::refusal::{FrameRefusal, Refusal};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::{L_HAND, N_BONES, N_HAND_JOINTS, N_JOINTS, R_HAND};
 use crate::types::sound::{SAMPLE_RATE, Sound};
@@ -65,13 +66,17 @@ pub struct KeptTake {
 /// Reason why a take is refused.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TakeRefusal {
-    /// Reason for programs, a word or two.
-    pub reason: &'static str,
-    pub measured: f64,
-    pub threshold: f64,
-    pub unit: &'static str,
+    pub why: FrameRefusal,
     /// Reason for people, a sentence.
     pub message: String,
+}
+
+impl TakeRefusal {
+    /// A refusal in the words of its reason.
+    pub fn new(refusal: Refusal, measured: f64, threshold: f64) -> Self {
+        let message = refusal.message(measured, threshold);
+        Self { why: FrameRefusal::new(refusal, measured, threshold), message }
+    }
 }
 
 impl ImportedTake {
@@ -98,18 +103,14 @@ impl ImportedTake {
 fn refusal(n_frames: usize, sound: Option<&Sound>, found: &TakeFiles, limits: &TakeLimits) -> Option<TakeRefusal> {
     let stem = found.motion.file_stem().unwrap_or_default().to_string_lossy();
     if found.kind == Kind::Authors && stem.starts_with("prediction") {
-        let message = "it is what a model predicted, not how a person moved".to_owned();
-        return Some(TakeRefusal { reason: "prediction", measured: 0.0, threshold: 0.0, unit: "", message });
+        return Some(TakeRefusal::new(Refusal::Prediction, 0.0, 0.0));
     }
     let Some(sound) = sound else { return Some(no_sound(found)) };
     let (motion_secs, sound_secs) = (limits.fps.secs(n_frames), sound.secs());
     let apart = sound_secs - motion_secs;
     if apart.abs() > limits.max_apart_secs {
         return Some(TakeRefusal {
-            reason: "out of step",
-            measured: apart.abs(),
-            threshold: limits.max_apart_secs,
-            unit: "s",
+            why: FrameRefusal::new(Refusal::OutOfStep, apart.abs(), limits.max_apart_secs),
             message: format!(
                 "the sound has {sound_secs:.3} s, the motion {motion_secs:.3} s: {:.3} s apart, at most {} s are believed",
                 apart.abs(),
@@ -118,13 +119,8 @@ fn refusal(n_frames: usize, sound: Option<&Sound>, found: &TakeFiles, limits: &T
         });
     }
     let n_common = n_common(n_frames, sound, limits.fps);
-    (n_common < limits.min_frames).then(|| TakeRefusal {
-        reason: "too short",
-        measured: n_common as f64,
-        threshold: limits.min_frames as f64,
-        unit: "frames",
-        message: format!("{n_common} frames have motion and sound, at least {} are needed", limits.min_frames),
-    })
+    (n_common < limits.min_frames)
+        .then(|| TakeRefusal::new(Refusal::FewFrames, n_common as f64, limits.min_frames as f64))
 }
 
 fn no_sound(found: &TakeFiles) -> TakeRefusal {
@@ -133,7 +129,7 @@ fn no_sound(found: &TakeFiles) -> TakeRefusal {
         Some(sound) => format!("{} holds no sound", name(sound)),
         None => format!("no sound file has the name of {}", name(&found.motion)),
     };
-    TakeRefusal { reason: "no sound", measured: 0.0, threshold: 0.0, unit: "s", message }
+    TakeRefusal { why: FrameRefusal::new(Refusal::NoSoundFile, 0.0, 0.0), message }
 }
 
 /// Number of frames within the motion and wholly within the sound.

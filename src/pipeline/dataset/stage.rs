@@ -19,6 +19,7 @@ use crate::stage::artifacts::{Artifact, StageName, dir, speaker_dir};
 use crate::stage::ledger::{Ledger, Refused, longest_first};
 use crate::stage::progress::Progress;
 use crate::stage::record::Failure;
+use crate::stage::refusal::{FrameRefusal, Refusal};
 use crate::stage::{Input, Report, Stage, Unit, counted};
 use anyhow::{Result, ensure};
 use std::collections::BTreeMap;
@@ -342,14 +343,9 @@ impl Run<'_> {
     fn duplicate(&self, video: &Video, of: &str, secs: f64) -> VideoSource {
         let threshold = self.stage.settings.duplicate_secs;
         let mut ledger = video.ledger.clone();
-        let refused = ledger.kept.drain(..).map(|kept| Refused {
-            start_secs: kept.start_secs,
-            end_secs: kept.end_secs,
-            reason: "duplicate".to_owned(),
-            measured: secs,
-            threshold,
-            unit: "s".to_owned(),
-            says: format!("the same {secs:.1} s are in {of}"),
+        let why = FrameRefusal::new(Refusal::Duplicate, secs, threshold);
+        let refused = ledger.kept.drain(..).map(|kept| {
+            Refused::with_message(kept.start_secs, kept.end_secs, why, format!("the same {secs:.1} s are in {of}"))
         });
         let refused: Vec<Refused> = refused.collect();
         ledger.refused.extend(refused);

@@ -1,11 +1,11 @@
 //! What lifting tells of a video beyond its keypoints: frames whose bones came out far from the lengths they have in the
-//! rest of the video (a wrong keypoint, another person's arm), and frames in which a joint stayed open. How they change
-//! intervals and ledger is `amend`'s.
+//! rest of the video (a wrong keypoint, another person's arm), and frames in which a joint stayed open. `refuse` takes
+//! them out of intervals and ledger.
 
-use super::gaps::long_gaps;
 use super::lengths::bone;
-use super::refuse::Mark;
+use super::refuse::{bone_refusals, exceeds};
 use crate::math::order::lower_median;
+use crate::stage::refusal::{FrameRefusal, Refusal};
 use crate::types::interval::Interval;
 use crate::types::pose2d::{Keypoints, coco};
 use crate::types::pose3d::Motion;
@@ -49,37 +49,33 @@ impl BoneChange {
             .collect()
     }
 
-    /// Marks the frames of runs longer than `max_gap` in which a bone is more than `most` off. In shorter runs the ends
+    /// Refuses the frames of runs longer than `max_gap` in which a bone is more than `most` off. In shorter runs the ends
     /// of such bones are made unseen in `keypoints`, so that lifting fills them.
-    pub fn judge(&self, most: f64, max_gap: usize, keypoints: &mut Keypoints) -> Vec<Option<Mark>> {
-        let is_off = |change: f32| f64::from(change.abs()) > most;
-        let farthest = self.farthest();
-        let fine: Vec<bool> = farthest.iter().map(|&change| !is_off(change)).collect();
-        let long = long_gaps(&fine, max_gap);
-        for (t, _) in fine.iter().enumerate().filter(|(t, fine)| !**fine && !long[*t]) {
-            for (i, (from, to)) in POINTS.into_iter().enumerate() {
-                if is_off(self.changes[[t, i]]) {
+    pub fn judge(&self, most: f64, max_gap: usize, keypoints: &mut Keypoints) -> Vec<Option<FrameRefusal>> {
+        let refusals = bone_refusals(&self.farthest(), most, max_gap);
+        for (changes, t) in self.changes.outer_iter().zip(0..).filter(|(_, t)| refusals[*t].is_none()) {
+            for (&change, (from, to)) in changes.iter().zip(POINTS) {
+                if exceeds(change, most) {
                     [from, to].into_iter().for_each(|point| keypoints.body[[t, point, 2]] = 0.0);
                 }
             }
         }
-        let mark = |t: usize| long[t].then(|| Mark::bones(f64::from(farthest[t]), most));
-        (0..farthest.len()).map(mark).collect()
+        refusals
     }
 
     /// Whether any frame is more than `most` off.
     pub fn exceeds(&self, most: f64) -> bool {
-        self.changes.iter().any(|change| f64::from(change.abs()) > most)
+        self.changes.iter().any(|&change| exceeds(change, most))
     }
 }
 
-/// Marks the frames of `intervals` in which a joint was not seen for longer than lifting fills.
-pub fn open(raw: &Motion, intervals: &[Interval]) -> Vec<Option<Mark>> {
-    let mut marks = vec![None; raw.n_frames()];
+/// Refuses the frames of `intervals` in which a joint was not seen for longer than lifting fills.
+pub fn open_refusals(raw: &Motion, intervals: &[Interval]) -> Vec<Option<FrameRefusal>> {
+    let mut refusals = vec![None; raw.n_frames()];
     for t in intervals.iter().flat_map(|interval| interval.start..interval.end) {
         let joints = raw.joints.slice(s![t, .., 0]);
         let n_open = joints.iter().filter(|x| !x.is_finite()).count();
-        marks[t] = (n_open > 0).then(|| Mark::open(n_open as f64));
+        refusals[t] = (n_open > 0).then(|| FrameRefusal::new(Refusal::Open, n_open as f64, 0.0));
     }
-    marks
+    refusals
 }

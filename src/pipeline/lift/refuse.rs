@@ -1,49 +1,40 @@
-//! Intervals and ledger once more: frames that lifting refuses are taken out, and pieces that this leaves too short.
+//! Frames that lifting refuses, taken out of intervals and ledger; and the pieces that this leaves too short. The report's
+//! sliders decide by the same functions.
 
+use super::gaps::long_gaps;
+use crate::config;
 use crate::stage::ledger::{Kept, Ledger, Refused};
+use crate::stage::refusal::{FrameRefusal, Refusal};
 use crate::types::interval::{Interval, Intervals};
+use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
 
-/// Why a frame is refused, with what was measured and the threshold.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mark {
-    reason: &'static str,
-    measured: f64,
-    threshold: f64,
-    unit: &'static str,
+/// Whole frames of the longest gap of the body that is filled.
+pub fn max_gap_frames(rules: &config::Segment, fps: FrameRate) -> usize {
+    (rules.max_body_gap_secs * fps.per_sec() + 1e-6) as usize
 }
 
-impl Mark {
-    /// A bone off its length in the video, both as shares of that length.
-    pub const fn bones(measured: f64, threshold: f64) -> Self {
-        Self { reason: "bones", measured, threshold, unit: "bone lengths" }
-    }
-
-    /// Joints that stayed open.
-    pub const fn open(n_joints: f64) -> Self {
-        Self { reason: "open", measured: n_joints, threshold: 0.0, unit: "joints" }
-    }
-
-    const fn too_short(secs: f64, least: f64) -> Self {
-        Self { reason: "too short", measured: secs, threshold: least, unit: "s" }
-    }
-
-    fn says(&self) -> String {
-        let (m, t) = (self.measured, self.threshold);
-        match self.reason {
-            "bones" => format!("a bone was lifted {m:.2} off its length in the video, {t:.2} is allowed"),
-            "open" => format!("{m:.0} of the joints are not seen for longer than can be filled"),
-            _ => format!("too short: {m:.1} s between refused stretches, an interval needs {t:.1} s"),
-        }
-    }
+/// Refuses the frames of runs longer than `max_gap` in which a bone is more than `most` off its length. `bone_change` [T]:
+/// the farthest that a bone of the frame is from its length, as a share of it; NaN: not known, and no reason to refuse.
+pub fn bone_refusals(bone_change: &[f32], most: f64, max_gap: usize) -> Vec<Option<FrameRefusal>> {
+    let fine: Vec<bool> = bone_change.iter().map(|&change| !exceeds(change, most)).collect();
+    let long = long_gaps(&fine, max_gap);
+    let refused =
+        |(&change, &long): (&f32, &bool)| long.then(|| FrameRefusal::new(Refusal::Bones, f64::from(change), most));
+    bone_change.iter().zip(&long).map(refused).collect()
 }
 
-/// Takes the marked frames out of `intervals` and moves their seconds in `ledger` from kept to refused. The ledger keeps
+/// Whether a bone that is `change` off its length is more than `most` off.
+pub fn exceeds(change: f32, most: f64) -> bool {
+    f64::from(change.abs()) > most
+}
+
+/// Takes the refused frames out of `intervals` and moves their seconds in `ledger` from kept to refused. The ledger keeps
 /// one stretch an interval, in the same order. Errors: it does not.
-pub fn amend(
+pub fn exclude_frames(
     intervals: &Intervals,
     ledger: &Ledger,
-    marks: &[Option<Mark>],
+    refusals: &[Option<FrameRefusal>],
     min_frames: usize,
 ) -> Result<(Intervals, Ledger)> {
     let fps = intervals.fps;
@@ -54,44 +45,37 @@ pub fn amend(
         ledger.kept.len()
     );
     let mut left = Vec::new();
-    let mut amended = Ledger { kept: Vec::new(), ..ledger.clone() };
+    let mut reduced = Ledger { kept: Vec::new(), ..ledger.clone() };
     for (interval, kept) in intervals.intervals.iter().zip(&ledger.kept) {
-        for (piece, mark) in pieces(*interval, marks) {
+        for (piece, refused) in pieces(*interval, refusals) {
             let start_secs = if piece.start == interval.start { kept.start_secs } else { fps.secs(piece.start) };
             let end_secs = if piece.end == interval.end { kept.end_secs } else { fps.secs(piece.end) };
             let short = piece.n_frames() < min_frames && piece != *interval;
-            let too_short = || short.then(|| Mark::too_short(fps.secs(piece.n_frames()), fps.secs(min_frames)));
-            match mark.or_else(too_short) {
+            let (secs, least) = (fps.secs(piece.n_frames()), fps.secs(min_frames));
+            let too_short = || short.then(|| FrameRefusal::new(Refusal::TooShort, secs, least));
+            match refused.or_else(too_short) {
                 None => {
                     left.push(piece);
-                    amended.kept.push(Kept { start_secs, end_secs });
+                    reduced.kept.push(Kept { start_secs, end_secs });
                 }
-                Some(mark) => amended.refused.push(Refused {
-                    start_secs,
-                    end_secs,
-                    reason: mark.reason.to_owned(),
-                    measured: mark.measured,
-                    threshold: mark.threshold,
-                    unit: mark.unit.to_owned(),
-                    says: mark.says(),
-                }),
+                Some(why) => reduced.refused.push(Refused::new(start_secs, end_secs, why)),
             }
         }
     }
-    amended.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
-    Ok((Intervals::new(fps, intervals.n_frames, left), amended))
+    reduced.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+    Ok((Intervals::new(fps, intervals.n_frames, left), reduced))
 }
 
-/// An interval as pieces end to end, each unmarked, or marked with one reason and the mean of what was measured.
-fn pieces(interval: Interval, marks: &[Option<Mark>]) -> Vec<(Interval, Option<Mark>)> {
+/// An interval as pieces end to end, each kept (`None`), or refused for one reason with the mean of what was measured.
+fn pieces(interval: Interval, refusals: &[Option<FrameRefusal>]) -> Vec<(Interval, Option<FrameRefusal>)> {
     let Interval { start, end } = interval;
-    let reason = |mark: &Option<Mark>| mark.map(|mark| mark.reason);
+    let reason = |refused: &Option<FrameRefusal>| refused.map(|refused| refused.refusal);
     let mut at = start;
-    let runs = marks[start..end].chunk_by(|a, b| reason(a) == reason(b)).map(|run| {
+    let runs = refusals[start..end].chunk_by(|a, b| reason(a) == reason(b)).map(|run| {
         let piece = Interval { start: at, end: at + run.len() };
         at = piece.end;
-        let measured = run.iter().flatten().map(|mark| mark.measured).sum::<f64>() / run.len() as f64;
-        (piece, run[0].map(|mark| Mark { measured, ..mark }))
+        let measured = FrameRefusal::mean_measured(run);
+        (piece, run[0].map(|refused| FrameRefusal { measured, ..refused }))
     });
     runs.collect()
 }
@@ -99,34 +83,25 @@ fn pieces(interval: Interval, marks: &[Option<Mark>]) -> Vec<(Interval, Option<M
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::time::FrameRate;
 
     #[test]
-    fn marked_frames_go_and_every_second_stays_accounted_for() {
+    fn refused_frames_go_and_every_second_stays_accounted_for() {
         let fps = FrameRate::new(15, 1);
         let intervals =
             Intervals::new(fps, 300, vec![Interval { start: 0, end: 100 }, Interval { start: 120, end: 300 }]);
-        let silent = Refused {
-            start_secs: fps.secs(100),
-            end_secs: 8.0,
-            reason: "quiet".into(),
-            measured: -70.0,
-            threshold: -50.0,
-            unit: "dB".into(),
-            says: String::new(),
-        };
+        let silent = Refused::new(fps.secs(100), 8.0, FrameRefusal::new(Refusal::Quiet, -70.0, -50.0));
         let kept = [(0.0, fps.secs(100)), (8.0, 19.99)].map(|(start_secs, end_secs)| Kept { start_secs, end_secs });
         let ledger = Ledger { duration_secs: 19.99, kept: kept.to_vec(), refused: vec![silent], ..Ledger::default() };
-        let mut marks = vec![None; 300];
-        let same = amend(&intervals, &ledger, &marks, 64).unwrap();
+        let mut refusals = vec![None; 300];
+        let same = exclude_frames(&intervals, &ledger, &refusals, 64).unwrap();
         assert_eq!(same, (intervals.clone(), ledger.clone()));
-        marks[150..160].fill(Some(Mark::bones(0.75, 0.5)));
-        marks[299] = Some(Mark::open(3.0));
-        let (left, amended) = amend(&intervals, &ledger, &marks, 64).unwrap();
+        refusals[150..160].fill(Some(FrameRefusal::new(Refusal::Bones, 0.75, 0.5)));
+        refusals[299] = Some(FrameRefusal::new(Refusal::Open, 3.0, 0.0));
+        let (left, reduced) = exclude_frames(&intervals, &ledger, &refusals, 64).unwrap();
         assert_eq!(left.intervals, [Interval { start: 0, end: 100 }, Interval { start: 160, end: 299 }]);
-        assert!(amended.is_whole());
-        let reasons: Vec<(&str, f64)> = amended.refused.iter().map(|r| (r.reason.as_str(), r.measured)).collect();
+        assert!(reduced.is_whole());
+        let reasons: Vec<(&str, f64)> = reduced.refused.iter().map(|r| (r.reason.as_str(), r.measured)).collect();
         assert_eq!(reasons, [("quiet", -70.0), ("too short", 2.0), ("bones", 0.75), ("open", 3.0)]);
-        assert!(amend(&intervals, &Ledger { kept: vec![], ..ledger }, &marks, 64).is_err());
+        assert!(exclude_frames(&intervals, &Ledger { kept: vec![], ..ledger }, &refusals, 64).is_err());
     }
 }

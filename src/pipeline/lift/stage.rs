@@ -4,7 +4,7 @@
 
 use super::outliers;
 use super::outliers::BoneChange;
-use super::refuse::amend;
+use super::refuse::{exclude_frames, max_gap_frames};
 use super::{Lifted, Lifter};
 use crate::config;
 use crate::formats::timeline_npz::Timeline;
@@ -150,13 +150,12 @@ impl LiftStage {
         let mut raw = self.lifter.raw(keypoints, &intervals.intervals)?;
         let change = BoneChange::of(&raw.motion);
         if change.exceeds(most) {
-            let max_gap = (self.rules.max_body_gap_secs * keypoints.fps.per_sec() + 1e-6) as usize;
-            let marks = change.judge(most, max_gap, keypoints);
-            (intervals, ledger) = amend(&intervals, &ledger, &marks, min_frames)?;
+            let refusals = change.judge(most, max_gap_frames(&self.rules, keypoints.fps), keypoints);
+            (intervals, ledger) = exclude_frames(&intervals, &ledger, &refusals, min_frames)?;
             raw = self.lifter.raw(keypoints, &intervals.intervals)?;
         }
-        let open = outliers::open(&raw.motion, &intervals.intervals);
-        (intervals, ledger) = amend(&intervals, &ledger, &open, min_frames)?;
+        let open = outliers::open_refusals(&raw.motion, &intervals.intervals);
+        (intervals, ledger) = exclude_frames(&intervals, &ledger, &open, min_frames)?;
         write_measures(&Artifact::BoneChange.within(out), change.farthest())?;
         Ok((self.lifter.finish(raw, &intervals.intervals), intervals, ledger))
     }

@@ -3,16 +3,13 @@
 //! pieces that are too short, or that break a rule on pieces, are refused whole.
 
 use super::measure::Measures;
-use super::refusal::Refusal;
 use super::table::{FrameRule, Gap, frame_rules, piece_rules};
 use crate::config;
 use crate::formats::media_json::MediaInfo;
 use crate::stage::ledger::{Kept, Ledger, Refused};
+use crate::stage::refusal::{FrameRefusal, Refusal};
 use crate::types::interval::{Interval, Intervals};
 use crate::types::time::FrameRate;
-
-/// A refusal with what was measured and the threshold.
-type Mark = (Refusal, f64, f64);
 
 /// Judges a whole video.
 pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::Segment) -> (Intervals, Ledger) {
@@ -22,18 +19,24 @@ pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::Segment) ->
         t > 0 && score > 0.0 && score >= rules.shot_threshold
     };
     let begins_shot: Vec<bool> = (0..n_frames).map(begins_shot).collect();
-    let mut marks = vec![None; n_frames];
+    let mut refusals = vec![None; n_frames];
     for rule in frame_rules(rules) {
-        apply(&rule, &mut marks, measures, &begins_shot, video.fps);
+        apply(&rule, &mut refusals, measures, &begins_shot, video.fps);
     }
-    let pieces = pieces(&marks, measures, &begins_shot, video.fps, rules);
-    let intervals = pieces.iter().filter(|(_, mark)| mark.is_none()).map(|(interval, _)| *interval).collect();
+    let pieces = pieces(&refusals, measures, &begins_shot, video.fps, rules);
+    let intervals = pieces.iter().filter(|(_, refused)| refused.is_none()).map(|(interval, _)| *interval).collect();
     (Intervals::new(video.fps, n_frames, intervals), ledger(&pieces, n_frames, video))
 }
 
-/// Marks the frames that break `rule` for too long, where no earlier rule has.
-fn apply(rule: &FrameRule, marks: &mut [Option<Mark>], measures: &Measures, begins_shot: &[bool], fps: FrameRate) {
-    let (values, n_frames) = ((rule.values)(measures), marks.len());
+/// Refuses the frames that break `rule` for too long, where no earlier rule has.
+fn apply(
+    rule: &FrameRule,
+    refusals: &mut [Option<FrameRefusal>],
+    measures: &Measures,
+    begins_shot: &[bool],
+    fps: FrameRate,
+) {
+    let (values, n_frames) = ((rule.values)(measures), refusals.len());
     let passes = |t: usize| rule.bound.holds(f64::from(values[t])) || (rule.compares && begins_shot[t]);
     for run in runs(n_frames, |t| !passes(t), |t| begins_shot[t]) {
         let inside = run.start > 0 && run.end < n_frames && !begins_shot[run.start] && !begins_shot[run.end];
@@ -45,35 +48,38 @@ fn apply(rule: &FrameRule, marks: &mut [Option<Mark>], measures: &Measures, begi
             continue;
         }
         for t in run.start..run.end {
-            let mark = if rule.says_secs {
-                (rule.refusal, fps.secs(run.n_frames()), threshold)
+            let refused = if rule.says_secs {
+                FrameRefusal::new(rule.refusal, fps.secs(run.n_frames()), threshold)
             } else {
-                (rule.refusal, f64::from(values[t]), rule.bound.threshold())
+                FrameRefusal::new(rule.refusal, f64::from(values[t]), rule.bound.threshold())
             };
-            marks[t] = marks[t].or(Some(mark));
+            refusals[t] = refusals[t].or(Some(refused));
         }
     }
 }
 
-/// Stretches end to end over all frames: kept (no mark) or refused.
+/// Stretches end to end over all frames: kept (`None`) or refused.
 fn pieces(
-    marks: &[Option<Mark>],
+    refusals: &[Option<FrameRefusal>],
     measures: &Measures,
     begins_shot: &[bool],
     fps: FrameRate,
     rules: &config::Segment,
-) -> Vec<(Interval, Option<Mark>)> {
-    let reason = |t: usize| marks[t].map(|(refusal, _, _)| refusal);
+) -> Vec<(Interval, Option<FrameRefusal>)> {
+    let reason = |t: usize| refusals[t].map(|refused| refused.refusal);
     let begins = |t: usize| begins_shot[t] || measures.identity[t] > 0.0;
     let divides = |t: usize| reason(t) != reason(t - 1) || (reason(t).is_none() && begins(t));
-    let judged = runs(marks.len(), |_| true, divides).into_iter().map(|piece| {
-        let mark = match marks[piece.start] {
-            Some((refusal, _, threshold)) => Some((refusal, mean(&marks[piece.start..piece.end]), threshold)),
+    let judged = runs(refusals.len(), |_| true, divides).into_iter().map(|piece| {
+        let refused = match refusals[piece.start] {
+            Some(refused) => {
+                let measured = FrameRefusal::mean_measured(&refusals[piece.start..piece.end]);
+                Some(FrameRefusal { measured, ..refused })
+            }
             None => {
                 too_short(piece, measures, begins_shot, fps, rules).or_else(|| broken_by_piece(piece, measures, rules))
             }
         };
-        (piece, mark)
+        (piece, refused)
     });
     judged.collect()
 }
@@ -85,7 +91,7 @@ fn too_short(
     begins_shot: &[bool],
     fps: FrameRate,
     rules: &config::Segment,
-) -> Option<Mark> {
+) -> Option<FrameRefusal> {
     if piece.n_frames() >= rules.min_frames {
         return None;
     }
@@ -99,25 +105,25 @@ fn too_short(
     } else {
         Refusal::TooShort
     };
-    Some((refusal, fps.secs(piece.n_frames()), fps.secs(rules.min_frames)))
+    Some(FrameRefusal::new(refusal, fps.secs(piece.n_frames()), fps.secs(rules.min_frames)))
 }
 
 /// The first rule on pieces that a piece of good frames breaks.
-fn broken_by_piece(piece: Interval, measures: &Measures, rules: &config::Segment) -> Option<Mark> {
+fn broken_by_piece(piece: Interval, measures: &Measures, rules: &config::Segment) -> Option<FrameRefusal> {
     piece_rules(rules).into_iter().find_map(|rule| {
         let values = &(rule.values)(measures)[piece.start..piece.end];
         let n = values.iter().filter(|&&value| rule.counted.holds(f64::from(value))).count();
         let share = n as f64 / piece.n_frames().max(1) as f64;
-        (!rule.share.holds(share)).then(|| (rule.refusal, share, rule.share.threshold()))
+        (!rule.share.holds(share)).then(|| FrameRefusal::new(rule.refusal, share, rule.share.threshold()))
     })
 }
 
 /// The pieces as seconds. The last one ends with the video, so that a partly filled last frame is not lost.
-fn ledger(pieces: &[(Interval, Option<Mark>)], n_frames: usize, video: &MediaInfo) -> Ledger {
+fn ledger(pieces: &[(Interval, Option<FrameRefusal>)], n_frames: usize, video: &MediaInfo) -> Ledger {
     let mut ledger = Ledger { duration_secs: video.duration_secs, ..Ledger::default() };
-    let nothing = [(Interval { start: 0, end: 0 }, Some((Refusal::NoPerson, 0.0, 0.0)))];
+    let nothing = [(Interval { start: 0, end: 0 }, Some(FrameRefusal::new(Refusal::NoPerson, 0.0, 0.0)))];
     let pieces = if pieces.is_empty() { &nothing[..] } else { pieces };
-    for (piece, mark) in pieces {
+    for (piece, refused) in pieces {
         let start_secs = video.fps.secs(piece.start).min(video.duration_secs);
         let end_secs = if piece.end == n_frames {
             video.duration_secs
@@ -127,17 +133,9 @@ fn ledger(pieces: &[(Interval, Option<Mark>)], n_frames: usize, video: &MediaInf
         if end_secs <= start_secs {
             continue;
         }
-        match *mark {
+        match *refused {
             None => ledger.kept.push(Kept { start_secs, end_secs }),
-            Some((refusal, measured, threshold)) => ledger.refused.push(Refused {
-                start_secs,
-                end_secs,
-                reason: refusal.reason().to_owned(),
-                measured,
-                threshold,
-                unit: refusal.unit().to_owned(),
-                says: refusal.says(measured, threshold),
-            }),
+            Some(why) => ledger.refused.push(Refused::new(start_secs, end_secs, why)),
         }
     }
     ledger
@@ -158,8 +156,4 @@ fn runs(n_frames: usize, holds: impl Fn(usize) -> bool, divides: impl Fn(usize) 
 /// Whole frames within `secs`.
 fn frames_within(secs: f64, fps: FrameRate) -> usize {
     (secs * fps.per_sec() + 1e-6) as usize
-}
-
-fn mean(marks: &[Option<Mark>]) -> f64 {
-    marks.iter().flatten().map(|(_, measured, _)| measured).sum::<f64>() / marks.len().max(1) as f64
 }

@@ -1,10 +1,9 @@
 //! Stage 3: keypoints to intervals worth keeping. `measure` and `sound` turn what the stages before wrote into a few
-//! numbers a frame (`store` keeps them), `table` has the rules, a row each, `judge` applies them, `refusal` says why in
-//! words, `stage` reads and writes the files.
+//! numbers a frame (`store` keeps them), `table` has the rules, a row each, `judge` applies them,
+//! `stage` reads and writes the files.
 
 pub mod judge;
 pub mod measure;
-pub mod refusal;
 pub mod sound;
 pub mod stage;
 pub mod store;
@@ -12,5 +11,4 @@ pub mod table;
 
 pub use judge::judge;
 pub use measure::Measures;
-pub use refusal::Refusal;
 pub use stage::SegmentStage;

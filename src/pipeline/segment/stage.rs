@@ -124,7 +124,7 @@ fn report(intervals: &Intervals, ledger: &Ledger) -> Report {
     let length = |r: &crate::stage::ledger::Refused| r.end_secs - r.start_secs;
     let worst = ledger.refused.iter().max_by(|a, b| length(a).total_cmp(&length(b)));
     if let (true, Some(worst)) = (intervals.intervals.is_empty(), worst) {
-        line += &format!(" ({})", worst.says);
+        line += &format!(" ({})", worst.message);
     }
     let facts = serde_json::json!({
         "duration_secs": ledger.duration_secs,

@@ -2,8 +2,8 @@
 //! Rows stand in the order in which they have their say. Thresholds come from `[segment]` of the configuration.
 
 use super::measure::Measures;
-use super::refusal::Refusal;
 use crate::config;
+use crate::stage::refusal::Refusal;
 
 /// What a value must be.
 #[derive(Clone, Copy, Debug, PartialEq)]

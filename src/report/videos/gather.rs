@@ -5,7 +5,7 @@ use super::movement::MovementCounts;
 use super::spread::MeasureCounts;
 use super::thresholds::THRESHOLDS;
 use super::video::VideoSummary;
-use super::what_if::{Judged, Kept, refused_by_lift};
+use super::what_if::{Judged, Kept, open_frames};
 use super::worst::Worst;
 use crate::config::Settings;
 use crate::config::videos::Videos;
@@ -87,8 +87,10 @@ impl ReportData {
                 Err(error) => video.note(&format!("Its motion is not shown: {error:#}")),
             }
         }
-        let refused = refused_by_lift(&video.ledger, &judged);
-        let judged = Judged { measures: &measures, video: &judged, refused_by_lift: &refused };
+        let open = open_frames(&video.ledger, &judged);
+        let max_bone_change = settings.lift.max_bone_change;
+        let judged =
+            Judged { measures: &measures, video: &judged, bone_change: &bone_change, max_bone_change, open: &open };
         let now = judged.kept_secs(rules);
         if (now - video.ledger.kept_secs()).abs() > 1e-6 {
             video.note(

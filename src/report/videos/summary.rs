@@ -69,7 +69,7 @@ pub fn by_reason(sums: &ReportTotals) -> Vec<Node> {
         name: reason.clone(),
         class: reasons::class(reason),
         secs: *secs,
-        description: reasons::description(reason).to_owned(),
+        description: reasons::heading(reason).to_owned(),
     };
     let mut parts: Vec<StackedBar> = sums.refused.iter().map(bar).collect();
     parts.sort_by(|a, b| b.secs.total_cmp(&a.secs).then(a.name.cmp(&b.name)));

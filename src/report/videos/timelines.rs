@@ -76,7 +76,7 @@ fn stretches(video: &VideoSummary) -> Vec<TimelineSpan> {
     let refused = ledger.refused.iter().map(|refused| {
         let (measured, threshold) = (refused.measured, with_unit(refused.threshold, &refused.unit));
         let description =
-            format!("{}\nmeasured {}, threshold {threshold}", refused.says, with_unit(measured, &refused.unit));
+            format!("{}\nmeasured {}, threshold {threshold}", refused.message, with_unit(measured, &refused.unit));
         stretch(refused.start_secs, refused.end_secs, reasons::class(&refused.reason), &refused.reason, description)
     });
     let failed = ledger.failed.iter().map(|failed| {

@@ -1,13 +1,15 @@
-//! What other thresholds would keep, exactly: the rules are applied again to the stored measures, with one threshold at each
-//! value of its grid and the others as they are configured. What lifting refused stays refused; frames that were never
-//! lifted count as good ones.
+//! What other thresholds would keep: `segment` judges the stored measures again and `lift` takes frames out again, with one
+//! threshold at each value of its grid and the others as they are configured. Frames that lifting left open stay refused;
+//! frames that were never lifted count as good ones.
 
 use super::thresholds::THRESHOLDS;
 use crate::config::Segment;
 use crate::formats::media_json::MediaInfo;
+use crate::pipeline::lift::refuse::{bone_refusals, exclude_frames, max_gap_frames};
 use crate::pipeline::segment;
 use crate::pipeline::segment::Measures;
 use crate::stage::ledger::Ledger;
+use crate::stage::refusal::{FrameRefusal, Refusal};
 use rayon::prelude::*;
 
 /// Seconds kept of one video: by threshold, by value of its grid.
@@ -17,33 +19,32 @@ pub type Kept = Vec<Vec<f64>>;
 pub struct Judged<'a> {
     pub measures: &'a Measures,
     pub video: &'a MediaInfo,
-    /// Frames that lifting refused.
-    pub refused_by_lift: &'a [bool],
+    /// What lifting measured of each frame's bones; empty where the video is not lifted.
+    pub bone_change: &'a [f32],
+    /// Farthest that a bone may be off its length.
+    pub max_bone_change: f64,
+    /// Frames that lifting left open; empty where the video is not lifted.
+    pub open: &'a [Option<FrameRefusal>],
 }
 
 impl Judged<'_> {
-    /// Seconds kept under `rules`.
-    pub fn kept_secs(&self, rules: &Segment) -> f64 {
-        let (intervals, ledger) = segment::judge(self.measures, self.video, rules);
-        let fps = self.video.fps;
-        let mut secs = 0.0;
-        for (interval, kept) in intervals.intervals.iter().zip(&ledger.kept) {
-            let refused = |t: usize| self.refused_by_lift.get(t).copied().unwrap_or(false);
-            let mut start = interval.start;
-            for t in interval.start..=interval.end {
-                if t < interval.end && !refused(t) {
-                    continue;
-                }
-                let whole = (start, t) == (interval.start, interval.end);
-                if t > start && (whole || t - start >= rules.min_frames) {
-                    let from = if start == interval.start { kept.start_secs } else { fps.secs(start) };
-                    let to = if t == interval.end { kept.end_secs } else { fps.secs(t) };
-                    secs += to - from;
-                }
-                start = t + 1;
+    /// The account under `rules`.
+    pub fn ledger(&self, rules: &Segment) -> Ledger {
+        let (mut intervals, mut ledger) = segment::judge(self.measures, self.video, rules);
+        let bones = bone_refusals(self.bone_change, self.max_bone_change, max_gap_frames(rules, self.video.fps));
+        for refusals in [&bones[..], self.open] {
+            if refusals.len() == intervals.n_frames
+                && let Ok(left) = exclude_frames(&intervals, &ledger, refusals, rules.min_frames)
+            {
+                (intervals, ledger) = left;
             }
         }
-        secs
+        ledger
+    }
+
+    /// Seconds kept under `rules`.
+    pub fn kept_secs(&self, rules: &Segment) -> f64 {
+        self.ledger(rules).kept_secs()
     }
 
     /// Seconds kept at every value of every threshold, on all cores.
@@ -56,16 +57,18 @@ impl Judged<'_> {
     }
 }
 
-/// The frames of stretches that lifting refused for what it saw.
-pub fn refused_by_lift(ledger: &Ledger, video: &MediaInfo) -> Vec<bool> {
-    let mut refused = vec![false; video.n_frames];
-    for stretch in ledger.refused.iter().filter(|stretch| ["bones", "open"].contains(&stretch.reason.as_str())) {
+/// The frames of a lifted video's ledger that were left open.
+pub fn open_frames(ledger: &Ledger, video: &MediaInfo) -> Vec<Option<FrameRefusal>> {
+    let mut open = vec![None; video.n_frames];
+    let is_open = |reason: &str, unit: &str| Refusal::find(reason, unit) == Some(Refusal::Open);
+    for stretch in ledger.refused.iter().filter(|stretch| is_open(&stretch.reason, &stretch.unit)) {
         let frame = |secs: f64| ((secs * video.fps.per_sec()).round() as usize).min(video.n_frames);
         // The last frame may be cut off by the video's end.
         let end = if stretch.end_secs == video.duration_secs { video.n_frames } else { frame(stretch.end_secs) };
-        refused[frame(stretch.start_secs).min(end)..end].fill(true);
+        let why = FrameRefusal::new(Refusal::Open, stretch.measured, stretch.threshold);
+        open[frame(stretch.start_secs).min(end)..end].fill(Some(why));
     }
-    refused
+    open
 }
 
 #[cfg(test)]
@@ -102,29 +105,25 @@ mod tests {
     fn other_thresholds_keep_what_the_rules_say_and_what_lifting_refused_stays_out() {
         let video = MediaInfo::new(19.99, 300, FrameRate::new(15, 1));
         let (measures, rules) = (measures(), Segment::default());
-        let refused = Refused {
-            start_secs: 10.0,
-            end_secs: 11.0,
-            reason: "bones".to_owned(),
-            measured: 0.0,
-            threshold: 0.0,
-            unit: String::new(),
-            says: String::new(),
-        };
-        let ledger = Ledger { refused: vec![refused], ..Ledger::default() };
-        let none = Judged { measures: &measures, video: &video, refused_by_lift: &[] };
+        let max_bone_change = 0.4;
+        let none = Judged { measures: &measures, video: &video, bone_change: &[], max_bone_change, open: &[] };
         assert!((none.kept_secs(&rules) - (19.99 - 1.0 / 15.0)).abs() < 1e-9);
-        let marks = refused_by_lift(&ledger, &video);
-        assert_eq!((marks.iter().filter(|mark| **mark).count(), marks[150], marks[165]), (15, true, false));
-        let some = Judged { refused_by_lift: &marks, ..none };
-        // frames 0..150 and 201..300: what is left between 165 and 200 is too short
-        assert!((some.kept_secs(&rules) - (10.0 + 19.99 - 201.0 / 15.0)).abs() < 1e-9);
+        let why = FrameRefusal::new(Refusal::Open, 3.0, 0.0);
+        let refused = vec![Refused::new(12.0, 13.0, why), Refused::new(19.0, 19.99, why)];
+        let open = open_frames(&Ledger { refused, ..Ledger::default() }, &video);
+        assert_eq!((open.iter().flatten().count(), open[180].is_some(), open[195].is_some()), (30, true, false));
+        let mut bone_change = vec![0.1; 300];
+        bone_change[150..165].fill(0.9);
+        bone_change[20] = 0.9;
+        let some = Judged { bone_change: &bone_change, open: &open, ..none };
+        // frames 0..150 and 201..285: what is left between 165 and 180, and to 200, is too short
+        assert!((some.kept_secs(&rules) - (10.0 + 84.0 / 15.0)).abs() < 1e-9);
         let table = some.table(&rules);
         for (threshold, row) in THRESHOLDS.iter().zip(&table) {
             let (grid, at) = threshold.grid(&rules);
             assert_eq!((row.len(), row[at]), (grid.len(), some.kept_secs(&rules)), "{}", threshold.key);
         }
         let jump = THRESHOLDS.iter().position(|threshold| threshold.key == "max_jump").unwrap();
-        assert!((table[jump].last().unwrap() - 18.99).abs() < 1e-9);
+        assert!((table[jump].last().unwrap() - (10.0 + 90.0 / 15.0)).abs() < 1e-9);
     }
 }

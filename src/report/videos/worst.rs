@@ -4,10 +4,11 @@
 use super::reasons;
 use crate::config::Segment;
 use crate::formats::media_json::MediaInfo;
+use crate::pipeline::segment::Measures;
 use crate::pipeline::segment::table::{Bound, frame_rules, piece_rules};
-use crate::pipeline::segment::{Measures, Refusal};
 use crate::report::html::numbers::number;
 use crate::stage::ledger::{Ledger, Refused};
+use crate::stage::refusal::Refusal;
 use std::collections::BTreeMap;
 
 /// Moment with a picture.
@@ -83,7 +84,7 @@ fn moment(
     let start = frame(stretch.start_secs).min(n_frames.checked_sub(1)?);
     let end = frame(stretch.end_secs).clamp(start + 1, n_frames);
     let mean = (stretch.measured - stretch.threshold).abs();
-    let refusal = Refusal::ALL.into_iter().find(|r| r.reason() == stretch.reason && r.unit() == stretch.unit);
+    let refusal = Refusal::find(&stretch.reason, &stretch.unit);
     let (t, beyond, here) = match refusal {
         Some(refusal @ (Refusal::Cut | Refusal::Identity)) => {
             let score = if refusal == Refusal::Cut { &measures.shot_score } else { &measures.identity };
@@ -91,22 +92,22 @@ fn moment(
             let t = ends.max_by(|a, b| score[*a].total_cmp(&score[*b]).then(b.cmp(a)))?;
             (t, mean, said(refusal, f64::from(score[t])))
         }
+        Some(Refusal::Bones) if bone_change.len() == n_frames => {
+            let (t, value) = extreme(bone_change, start..end, false);
+            (t, (value - stretch.threshold).abs(), format!("{} off its length here", number(value)))
+        }
         Some(refusal) => match farthest(refusal, measures, rules, start..end) {
             Some((t, value, bound, is_mean)) => {
                 (t, if is_mean { (value - bound.threshold()).abs() } else { mean }, said(refusal, value))
             }
             None => (start.midpoint(end - 1), mean, String::new()),
         },
-        None if stretch.reason == "bones" && bone_change.len() == n_frames => {
-            let (t, value) = extreme(bone_change, start..end, false);
-            (t, (value - stretch.threshold).abs(), format!("{} off its length here", number(value)))
-        }
         None => (start.midpoint(end - 1), mean, String::new()),
     };
     let compares = matches!(refusal, Some(Refusal::Cut | Refusal::Identity | Refusal::Jump)) && t > 0;
     let frames = if compares { vec![t - 1, t] } else { vec![t] };
     let beyond = if beyond.is_finite() { beyond } else { 0.0 };
-    Some(Moment { video, frames, secs: judged.fps.secs(t), beyond, description: stretch.says.clone(), here })
+    Some(Moment { video, frames, secs: judged.fps.secs(t), beyond, description: stretch.message.clone(), here })
 }
 
 /// Frame that breaks the refusal's rules most: index, value, bound, and whether the ledger means that value.
@@ -159,14 +160,15 @@ fn said(refusal: Refusal, value: f64) -> String {
         Refusal::Crowd => format!("{value} people here"),
         Refusal::Cut => format!("shot score {value} at the right picture"),
         Refusal::Identity => "before and after".to_owned(),
-        Refusal::NoSound | Refusal::TooShort => String::new(),
         Refusal::NoPerson | Refusal::Face | Refusal::Arms => format!("scores {value} here"),
+        _ => String::new(),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stage::refusal::FrameRefusal;
     use crate::types::time::FrameRate;
 
     #[test]
@@ -177,14 +179,8 @@ mod tests {
         (measures.jump[20], measures.jump[50]) = (0.8, 1.8);
         measures.right_hand[70..90].fill(0.2);
         measures.right_hand[74] = 0.1;
-        let stretch = |start: f64, end: f64, refusal: Refusal, measured: f64| Refused {
-            start_secs: start,
-            end_secs: end,
-            reason: refusal.reason().to_owned(),
-            measured,
-            threshold: 0.5,
-            unit: refusal.unit().to_owned(),
-            says: refusal.says(measured, 0.5),
+        let stretch = |start: f64, end: f64, refusal: Refusal, measured: f64| {
+            Refused::new(start, end, FrameRefusal::new(refusal, measured, 0.5))
         };
         let refused = vec![
             stretch(2.0, 2.1, Refusal::Jump, 0.8),

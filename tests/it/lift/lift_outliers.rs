@@ -64,7 +64,7 @@ fn a_bone_off_its_length_is_refused_and_a_short_slip_is_filled_and_masked() {
     assert!(others.is_empty() && bones.len() == 1 && intervals.len() == 2, "{ledger:?}");
     let bones = bones[0];
     assert!((bones.start_secs - FPS.secs(100)).abs() < 0.15 && (bones.end_secs - FPS.secs(130)).abs() < 0.15);
-    assert!(bones.measured > bones.threshold && bones.unit == "bone lengths" && bones.says.contains("bone"));
+    assert!(bones.measured > bones.threshold && bones.unit == "bone lengths" && bones.message.contains("bone"));
 
     let mut footage = good(200);
     footage.keypoints.left_hand.slice_mut(s![99..105, .., ..]).fill(0.0);
@@ -85,5 +85,5 @@ fn gaps_that_add_up_to_more_than_lifting_fills_are_refused() {
     let (intervals, ledger, _) = lifted(&footage);
     assert_eq!(intervals, [(0, 100), (124, 300)], "{ledger:?}");
     assert_eq!(ledger.refused[0].reason, "open");
-    assert!(ledger.refused[0].says.starts_with("21 of the joints"), "{}", ledger.refused[0].says);
+    assert!(ledger.refused[0].message.starts_with("21 of the joints"), "{}", ledger.refused[0].message);
 }

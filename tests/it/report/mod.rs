@@ -3,3 +3,4 @@
 pub mod evaluate_page;
 pub mod report;
 pub mod sheet;
+pub mod sliders;

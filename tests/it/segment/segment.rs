@@ -4,9 +4,10 @@ use crate::fixtures::footage::{FPS, Footage, good, write};
 use ndarray::s;
 use orator::config;
 use orator::formats::media_json::MediaInfo;
-use orator::pipeline::segment::{Measures, Refusal, SegmentStage, judge};
+use orator::pipeline::segment::{Measures, SegmentStage, judge};
 use orator::stage::ledger::Ledger;
 use orator::stage::progress::Silent;
+use orator::stage::refusal::Refusal;
 use orator::stage::{Stage, Unit};
 use orator::types::interval::{Interval, Intervals};
 use orator::types::pose2d::{Keypoints, coco};
@@ -42,7 +43,7 @@ fn verdict(footage: &Footage) -> (Vec<(usize, usize)>, Vec<String>) {
     let (intervals, ledger) = judged(footage);
     assert!(ledger.is_whole());
     for refused in &ledger.refused {
-        assert!(refused.measured.is_finite() && refused.says.len() > 20, "{refused:?}");
+        assert!(refused.measured.is_finite() && refused.message.len() > 20, "{refused:?}");
     }
     let intervals = intervals.intervals.iter().map(|i| (i.start, i.end)).collect();
     (intervals, ledger.refused.iter().map(|r| r.reason.clone()).collect())
@@ -217,8 +218,8 @@ fn no_second_is_lost_or_counted_twice() {
         let text = serde_json::to_vec(&ledger).unwrap();
         assert!(serde_json::from_slice::<Ledger>(&text).unwrap().is_whole());
     }
-    let reasons = Refusal::ALL.map(|refusal| refusal.says(1.0, 2.0));
-    assert_eq!(reasons.iter().collect::<std::collections::BTreeSet<_>>().len(), Refusal::ALL.len());
+    let reasons = Refusal::JUDGED.map(|refusal| refusal.message(1.0, 2.0));
+    assert_eq!(reasons.iter().collect::<std::collections::BTreeSet<_>>().len(), Refusal::JUDGED.len());
 }
 
 #[test]

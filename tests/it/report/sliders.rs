@@ -1,0 +1,88 @@
+//! Every threshold changed: what a slider of the report says would be kept is what `segment` and `lift` keep when they
+//! run again.
+
+use crate::fixtures::footage::{Footage, good, write};
+use ndarray::s;
+use orator::config::{self, Segment};
+use orator::formats::media_json::MediaInfo;
+use orator::formats::npz::Npz;
+use orator::pipeline::lift::LiftStage;
+use orator::pipeline::segment::{Measures, SegmentStage};
+use orator::report::videos::thresholds::THRESHOLDS;
+use orator::report::videos::what_if::{Judged, open_frames};
+use orator::stage::artifacts::Artifact;
+use orator::stage::ledger::Ledger;
+use orator::stage::progress::Silent;
+use orator::stage::{Stage, Unit};
+use orator::types::pose2d::coco;
+use std::path::Path;
+
+/// Half a minute with a cut, a small step aside, a quiet part, a hand that leaves the picture for a while, and a wrist
+/// that is found far away for 10 frames.
+fn footage() -> Footage {
+    let mut footage = good(450);
+    footage.shot[130..].fill(1);
+    footage.keypoints.body.slice_mut(s![220.., .., 0]).mapv_inplace(|x| x + 40.0);
+    footage.keypoints.right_hand.slice_mut(s![30..42, .., 2]).fill(0.0);
+    let wrist = 340..350;
+    footage.keypoints.body.slice_mut(s![wrist.clone(), coco::L_WRIST, 0]).mapv_inplace(|x| x + 400.0);
+    footage.keypoints.left_hand.slice_mut(s![wrist, .., 0]).mapv_inplace(|x| x + 400.0);
+    if let Some(sound) = &mut footage.sound {
+        sound[250 * 1067..310 * 1067].iter_mut().for_each(|sample| *sample /= 500);
+    }
+    footage
+}
+
+/// What is left of the video when both stages run.
+fn run(work: &Path, unit: &Unit, rules: &Segment, lift: &config::Lift) -> Ledger {
+    let stages: [Box<dyn Stage>; 2] =
+        [Box::new(SegmentStage::new(rules, work)), Box::new(LiftStage::new(lift, rules, work).unwrap())];
+    for stage in stages {
+        let out = unit.dir(&work.join(stage.name()));
+        std::fs::create_dir_all(&out).unwrap();
+        stage.run(unit, &out, &Silent).unwrap();
+    }
+    Ledger::read(&Artifact::LiftLedger.path(work, unit)).unwrap()
+}
+
+#[test]
+fn a_slider_says_what_a_run_keeps() {
+    let dir = tempfile::tempdir().unwrap();
+    let unit = Unit { speaker: "host".into(), video: "talk-00000000".into(), source: dir.path().join("talk.mp4") };
+    write(dir.path(), &unit, &footage(), "a");
+    let (rules, lift) = (Segment::default(), config::Lift::default());
+    let now = run(dir.path(), &unit, &rules, &lift);
+    assert!(now.refused_secs().contains_key("bones"), "{now:?}");
+
+    let video = MediaInfo::read(&Artifact::MediaInfo.path(dir.path(), &unit)).unwrap();
+    let measures = Measures::read(&Artifact::Measures.path(dir.path(), &unit)).unwrap();
+    let bone_change = Npz::open(&Artifact::BoneChange.path(dir.path(), &unit)).unwrap();
+    let bone_change: Vec<f32> = { bone_change }.floats("bone_change", &[None]).unwrap().into_iter().collect();
+    let open = open_frames(&now, &video);
+    let judged = |max_bone_change| Judged {
+        measures: &measures,
+        video: &video,
+        bone_change: &bone_change,
+        max_bone_change,
+        open: &open,
+    };
+    assert!((judged(lift.max_bone_change).kept_secs(&rules) - now.kept_secs()).abs() < 1e-3);
+
+    let mut n_changed = 0;
+    let mut compare = |key: &str, value: f64, rules: &Segment, lift: &config::Lift| {
+        let (slider, again) = (judged(lift.max_bone_change).kept_secs(rules), run(dir.path(), &unit, rules, lift));
+        let kept = again.kept_secs();
+        assert!((slider - kept).abs() < 1e-3, "{key} = {value}: the slider says {slider} s, a run keeps {kept} s");
+        n_changed += usize::from((kept - now.kept_secs()).abs() > 1e-3);
+    };
+    for threshold in &THRESHOLDS {
+        let (grid, _) = threshold.grid(&rules);
+        for value in [grid[5], grid[15]] {
+            compare(threshold.key, value, &threshold.with(&rules, value), &lift);
+        }
+    }
+    for max_bone_change in [0.2, 2.0] {
+        compare("max_bone_change", max_bone_change, &rules, &config::Lift { max_bone_change, ..lift.clone() });
+    }
+    assert!(n_changed >= 8, "only {n_changed} of the changes changed what is kept");
+}
