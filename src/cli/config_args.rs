@@ -14,7 +14,7 @@ pub struct ConfigArgs {
 }
 
 impl ConfigArgs {
-    /// The same arguments again, for the next command to type; begins with a space unless empty.
+    /// Arguments as typed, for the next command; begins with a space unless empty.
     pub fn flags(&self) -> String {
         let file = self.config.display().to_string();
         let file = if file == "pipeline.toml" { String::new() } else { format!(" -c {file}") };

@@ -212,7 +212,7 @@ pub struct Lift {
     pub hand_weights: ConfigPath,
     /// Width of the Gaussian that smooths arms, in frames at 15 fps; 0: none.
     pub smooth_arms: f64,
-    /// The same for hands.
+    /// Width of the Gaussian that smooths hands, in frames at 15 fps; 0: none.
     pub smooth_hands: f64,
     /// Turn each interval as if the camera had been level and the speaker upright.
     pub level: bool,

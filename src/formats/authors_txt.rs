@@ -22,7 +22,7 @@ pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
     parse(&text, fps).with_context(|| format!("{} is not motion in the authors' layout", path.display()))
 }
 
-/// The same from text.
+/// Reads motion from text in the authors' layout.
 pub fn parse(text: &str, fps: FrameRate) -> anyhow::Result<Motion> {
     let mut numbers: Vec<f32> = Vec::with_capacity(text.len() / 26);
     for (line, n) in text.lines().zip(1..).filter(|(line, _)| !line.trim().is_empty()) {

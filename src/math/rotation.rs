@@ -73,7 +73,7 @@ impl Rotation {
         Self { w: self.w, v: scale(self.v, -1.0) }
     }
 
-    /// The same rotation seen in a mirror that turns x round.
+    /// Rotation as seen in a mirror that turns x round.
     pub fn mirrored(self) -> Self {
         Self { w: self.w, v: [self.v[0], -self.v[1], -self.v[2]] }
     }
@@ -129,7 +129,7 @@ impl Rotation {
         if sum.w.hypot(norm(sum.v)) > 1e-9 { sum.normalised() } else { from }
     }
 
-    /// The same rotation by the other of its two quaternions.
+    /// Rotation by the other of its two quaternions.
     fn opposite(self) -> Self {
         Self { w: -self.w, v: scale(self.v, -1.0) }
     }

@@ -73,7 +73,7 @@ impl House {
         Ok(Self { axes: [x, y, z], metres, unit, up: up_axis, turned_degrees: -sin.atan2(cos).to_degrees() })
     }
 
-    /// The same without the turn, for a source that is y up and faces +z (within `MOST_DEGREES`) already.
+    /// Axes without the turn, for a source that is y up and faces +z (within `MOST_DEGREES`) already.
     pub fn as_it_stands(&self) -> Option<Self> {
         let faces = self.up == "+y" && self.turned_degrees.abs() <= MOST_DEGREES;
         let axes = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];

@@ -41,7 +41,7 @@ const _: () = assert!(
         && L_WRIST == skeleton::L_WRIST
 );
 
-/// The same point of the other side.
+/// Index of the point on the other side.
 pub const MIRROR: [usize; N_POINTS] = [NOSE, L_SHOULDER, L_ELBOW, L_WRIST, R_SHOULDER, R_ELBOW, R_WRIST, L_HIP, R_HIP];
 
 /// Nine points in camera axes (x right, y down, z away) relative to the neck, the middle of the shoulders.

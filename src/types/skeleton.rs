@@ -84,7 +84,7 @@ pub fn name(joint: usize) -> String {
     }
 }
 
-/// The same joint of the other side of the body.
+/// Joint on the other side of the body.
 pub const fn mirror(joint: usize) -> usize {
     match joint {
         NECK => NECK,

@@ -28,7 +28,7 @@ pub struct Child {
 /// Runs `orator ARGS` in the folder `dir`.
 ///
 /// # Errors
-/// It cannot be started, or fails: with its own words.
+/// Fails where the program cannot be started, or fails with its own words.
 pub fn measure(dir: &Path, args: &[&str]) -> Result<Child> {
     let n_cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));

@@ -69,7 +69,7 @@ impl Bench<'_> {
         Ok(Run { whole: start.elapsed().as_secs_f64(), inside: chain.secs_inside() - before })
     }
 
-    /// The same frames from the file.
+    /// Frames decoded from the file.
     fn streamed(&self, chain: &mut Chain) -> Result<Run> {
         chain.begin_shot();
         let (start, before) = (Instant::now(), chain.secs_inside());

@@ -1,7 +1,7 @@
 //! Rules of the source tree: who may import whom, where types and foreign libraries live, what a file and a comment
 //! look like. `FLOORS` is the table of `src/lib.rs`.
 
-use crate::fixtures::imports::{SourceFile, Sources, rust_files, tokens, without_comments};
+use crate::fixtures::imports::{SourceFile, Sources, rust_files, scan, tokens, without_comments, without_tests};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -260,6 +260,29 @@ fn a_type_name_stands_once() {
     files.retain(|name, files| files.len() > 1 && !COMMON_NAMES.contains(name));
     files.retain(|name, _| !STILL_TWICE.split(' ').any(|known| known == *name));
     assert!(files.is_empty(), "{files:#?}");
+}
+
+#[test]
+fn stages_and_their_files_are_spelt_in_one_file() {
+    let names = ["extract", "pose2d", "segment", "lift"];
+    let files = ["audio.wav", "timeline.npz", "media.json", "keypoints.npz", "measures.npz", "joints.npz"];
+    let files = [&files[..], &["bones.json", "camera.json", "bone_change.npz", "hashes.json"]].concat();
+    let mut wrong = Vec::new();
+    for path in rust_files(&root().join("src")) {
+        if path.ends_with("stage/artifacts.rs") {
+            continue;
+        }
+        let (code, strings) = scan(&fs::read_to_string(&path).unwrap());
+        let n_code = without_tests(&code).len();
+        for (string, end) in strings.into_iter().filter(|(_, end)| *end <= n_code) {
+            // The settings of a stage are a section of the fingerprint: a key of JSON.
+            let is_key = code[end..].trim_start().starts_with(':');
+            if files.contains(&string.as_str()) || names.contains(&string.as_str()) && !is_key {
+                wrong.push(format!("{}: \"{string}\"", below_root(&path)));
+            }
+        }
+    }
+    none(&wrong);
 }
 
 #[test]

@@ -356,7 +356,7 @@ fn names(outputs: &[(PathBuf, ExportFormat)]) -> Vec<String> {
     outputs.iter().map(|(path, _)| path.display().to_string()).collect()
 }
 
-/// The same again as a film, or for an animation program; nothing when both are there.
+/// Command that writes the motion as a film, or for an animation program; nothing when both are there.
 fn next_command(args: &Args, outputs: &[(PathBuf, ExportFormat)]) -> Option<String> {
     let missing = [(ExportFormat::Mp4, "mp4"), (ExportFormat::Bvh, "bvh")]
         .into_iter()

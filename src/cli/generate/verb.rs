@@ -110,7 +110,7 @@ fn outputs(out: &[PathBuf], audio: &Path) -> Result<Vec<(PathBuf, ExportFormat)>
     out.iter().map(|path| Ok((path.clone(), ExportFormat::from_path(path)?))).collect()
 }
 
-/// The same again as a film, or for an animation program; nothing when both are there.
+/// Command that writes the motion as a film, or for an animation program; nothing when both are there.
 fn next_command(checkpoint: &Path, audio: &Path, outputs: &[(PathBuf, ExportFormat)]) -> Option<String> {
     let missing = [(ExportFormat::Mp4, "mp4"), (ExportFormat::Bvh, "bvh")]
         .into_iter()

@@ -44,7 +44,7 @@ pub struct Args {
     /// Width of the Gaussian that smooths arms, in frames at 15 fps; 0: none.
     #[arg(long, default_value_t = config::Lift::default().smooth_arms)]
     smooth_arms: f64,
-    /// The same for hands.
+    /// Width of the Gaussian that smooths hands, in frames at 15 fps; 0: none.
     #[arg(long, default_value_t = config::Lift::default().smooth_hands)]
     smooth_hands: f64,
 }

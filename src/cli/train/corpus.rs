@@ -32,7 +32,7 @@ pub struct MotionArgs {
     /// Takes to measure on and not to learn from, by their names: patterns like 'test_*'.
     #[arg(long, value_name = "PATTERN", num_args = 1..)]
     hold_out: Vec<String>,
-    /// The same seed gives the same numbers.
+    /// Seed of the random numbers; equal seeds give equal results.
     #[arg(long, default_value_t = 1337)]
     pub seed: u64,
 }

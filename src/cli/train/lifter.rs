@@ -52,7 +52,7 @@ pub struct Args {
     /// Channels of the network [default: 256 body, 896 hands]
     #[arg(long, hide_default_value = true)]
     width: Option<usize>,
-    /// The same seed gives the same weights.
+    /// Seed of the random numbers; equal seeds give equal weights.
     #[arg(long, default_value_t = 1337)]
     seed: u64,
     /// Steps between two checkpoints.

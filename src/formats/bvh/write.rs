@@ -32,7 +32,7 @@ impl Clip {
         self.skeleton.positions(self.root, &self.local[frame_idx])
     }
 
-    /// The same motion at another rate: through the given frames, its speed without a jump at them; the last frame is
+    /// Motion at another rate: through the given frames, its speed without a jump at them; the last frame is
     /// held.
     pub fn resampled(&self, fps: FrameRate) -> Self {
         let n_frames = if self.local.is_empty() { 0 } else { fps.frames_in(self.fps.secs(self.n_frames())) };

@@ -72,7 +72,7 @@ impl View {
         Some(Self { numbers, scale })
     }
 
-    /// The same window in the mirror: what the network sees of a speaker whose left is their right.
+    /// Window in the mirror: what the network sees of a speaker whose left is their right.
     pub fn mirrored(&self) -> Self {
         let n = self.n_frames();
         let mut numbers = Vec::with_capacity(self.numbers.len());

@@ -35,7 +35,7 @@ fn video(root: &Path, name: &str, n_frames: usize, seed: u64) -> Unit {
     video_with(root, name, n_frames, seed, seed)
 }
 
-/// The same, with noise of another seed as its sound.
+/// Video whose sound is noise of another seed.
 fn video_with(root: &Path, name: &str, n_frames: usize, seed: u64, sound_seed: u64) -> Unit {
     let (work, unit) = (root.join("work"), unit(root, name));
     let mut footage = good(n_frames);
@@ -80,7 +80,7 @@ fn shard(root: &Path, videos: &[Unit], out: &str) -> (anyhow::Result<Report>, Pa
     shard_with(root, videos, &[], out)
 }
 
-/// The same; `named` puts videos into splits.
+/// Dataset with videos put into splits by `named`.
 fn shard_with(root: &Path, videos: &[Unit], named: &[(&Unit, Split)], out: &str) -> (anyhow::Result<Report>, PathBuf) {
     let speaker = Unit { speaker: "host".into(), video: String::new(), source: root.join("pipeline.toml") };
     let splits = named.iter().map(|(unit, split)| (unit.video.clone(), *split)).collect();

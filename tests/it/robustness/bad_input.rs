@@ -50,7 +50,7 @@ fn keypoints(project: &Project, name: &str) -> Keypoints {
     keypoints_npz::read(&file.expect(name).1).unwrap()
 }
 
-/// The same picture coded twice: the same points are found, within a few px.
+/// One picture coded twice: equal points are found, within a few px.
 fn assert_alike(one: &Keypoints, other: &Keypoints) {
     assert_eq!((one.image_size, one.n_frames()), (other.image_size, other.n_frames()));
     let parts = [
