@@ -1,6 +1,12 @@
 //! Videos of one speaker to a 3D speech-gesture dataset, and to a model that gestures like that speaker
 //! (Rebol, Guetl, Pietroszek 2021; FineMotion's entry to GENEA 2020). This file is the map.
 //!
+//! The items below are the public interface. A [`Pipeline`] is opened with a [`Config`] and does all that `orator run`
+//! does; [`Lifter`], [`GestureGenerator`], [`perform`], [`Dataset`] and [`Evaluation`] do one thing each. Errors are
+//! [`anyhow::Error`]s that name file, place and remedy; those a program handles apart are found by `downcast_ref`:
+//! [`ConfigError`], [`ModelError`], [`UnreadableMedia`], [`NothingKept`], [`BusyFolder`], [`NoSpace`]. The rooms
+//! themselves are public for the program, tests and benchmarks, and may change.
+//!
 //! A frame: `external::ffmpeg` -> `external::opencv` (crop, warp) -> `external::onnx` -> `pipeline::pose2d` (decode,
 //! track) -> *keypoints* -> `pipeline::segment` -> `pipeline::lift` -> *joints* -> `dataset::write` -> *shard* ->
 //! `dataset::read` -> `train::gan`.
@@ -40,23 +46,88 @@
 //! an attempt, flushed, renamed (`stage::workdir`), and its record comes last. Memory does not grow with the length of
 //! a video, except for its keypoints. No user input panics.
 
+#![warn(missing_docs)]
+
+#[doc(hidden)]
 pub mod animate;
+#[doc(hidden)]
 pub mod audio;
+#[doc(hidden)]
 pub mod config;
+#[doc(hidden)]
 pub mod dataset;
+#[doc(hidden)]
 pub mod demo;
+#[doc(hidden)]
 pub mod evaluate;
+#[doc(hidden)]
 pub mod external;
+#[doc(hidden)]
 pub mod formats;
+#[doc(hidden)]
 pub mod generate;
 pub mod guide;
+#[doc(hidden)]
 pub mod math;
+#[doc(hidden)]
 pub mod metrics;
+#[doc(hidden)]
 pub mod mocap;
+#[doc(hidden)]
 pub mod motion;
+#[doc(hidden)]
 pub mod nn;
+#[doc(hidden)]
 pub mod pipeline;
+#[doc(hidden)]
 pub mod report;
+#[doc(hidden)]
 pub mod stage;
+#[doc(hidden)]
 pub mod train;
+#[doc(hidden)]
 pub mod types;
+
+// Videos to datasets.
+pub use config::{Config, load as load_config};
+pub use pipeline::{Pipeline, RunReport, Selection, StatusReport, TimeAccount};
+pub use stage::artifacts::StageName;
+pub use stage::progress::{Event, Progress, Silent, Task};
+
+// Values.
+pub use types::pose2d::Keypoints;
+pub use types::pose3d::Motion;
+pub use types::sound::Sound;
+pub use types::time::FrameRate;
+
+// Keypoints to motion.
+pub use config::Lift as LiftConfig;
+pub use formats::keypoints_npz::read as read_keypoints;
+pub use pipeline::lift::{Lifted, Lifter};
+
+// Datasets.
+pub use dataset::index::SampleRef;
+pub use dataset::{Dataset, Sample, Split};
+
+// Speech to motion.
+pub use external::ffmpeg::audio::read_sound;
+pub use generate::Speaker as GestureGenerator;
+pub use pipeline::batch::{BatchReport, SpeechBatch};
+
+// Motion to files for animation programs.
+pub use animate::export::file::{ExportContent, ExportFormat};
+pub use animate::{AnimationOptions, Performance, perform};
+
+// Predicted motion against ground truth.
+pub use evaluate::Evaluation;
+pub use metrics::settings::Settings as MetricSettings;
+
+// Models that look at pictures.
+pub use external::onnx::{ModelState, ModelStore};
+
+// Errors to be matched.
+pub use config::ConfigError;
+pub use external::ffmpeg::UnreadableMedia;
+pub use external::onnx::ModelError;
+pub use pipeline::dataset::NothingKept;
+pub use stage::workdir::{BusyFolder, NoSpace};

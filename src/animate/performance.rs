@@ -24,8 +24,11 @@ use std::ops::Range;
 /// Settings of the animation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AnimationOptions {
+    /// The filter over time.
     pub smoothing: Smoothing,
+    /// Which joint limits hold.
     pub constraints: Constraints,
+    /// The turn of the shoulders.
     pub yaw: Yaw,
     /// Frame rate of the output; `None`: that of the motion.
     pub fps: Option<FrameRate>,
@@ -44,6 +47,7 @@ pub enum Yaw {
 /// Account of what was done to the motion.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct AnimationReport {
+    /// Frames of the motion.
     pub n_frames: usize,
     /// Jerk of the arms at the motion's own rate, over the frames that were seen.
     pub arms: Jerk,
@@ -53,6 +57,7 @@ pub struct AnimationReport {
     pub clamps: Vec<Clamps>,
     /// Number of frames with a visible face; `None` without face keypoints.
     pub face_frames: Option<usize>,
+    /// Frames in which each limb was seen.
     pub seen: SeenFrames,
 }
 
@@ -62,9 +67,11 @@ pub struct AnimationReport {
 pub struct SeenFrames {
     /// Shoulder, elbow and wrist.
     pub left_arm: usize,
+    /// Shoulder, elbow and wrist.
     pub right_arm: usize,
     /// At least half of the hand's joints.
     pub left_hand: usize,
+    /// At least half of the hand's joints.
     pub right_hand: usize,
 }
 
@@ -91,15 +98,20 @@ impl SeenFrames {
 /// Mean norm of the third derivative, m/s^3; `None` where no four consecutive frames are seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Jerk {
+    /// Of the motion as it came.
     pub before: Option<f64>,
+    /// Of the motion on the rig.
     pub after: Option<f64>,
 }
 
 /// Motion on its rig.
 #[derive(Clone, Debug)]
 pub struct Performance {
+    /// The skeleton with its bone lengths.
     pub rig: Rig,
+    /// The rotations of its joints.
     pub clip: Clip,
+    /// What was done to the motion.
     pub report: AnimationReport,
 }
 

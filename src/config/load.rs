@@ -25,12 +25,14 @@ pub struct Config {
 
 /// Everything wrong with a configuration, one line a problem.
 #[derive(Debug, thiserror::Error)]
-pub struct Invalid {
+pub struct ConfigError {
+    /// The file with the problems.
     pub file: PathBuf,
+    /// Every problem, in the order of its lines.
     pub problems: Vec<Problem>,
 }
 
-impl fmt::Display for Invalid {
+impl fmt::Display for ConfigError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let plural = if self.problems.len() == 1 { "problem" } else { "problems" };
         write!(f, "{} {plural} in {}", self.problems.len(), self.file.display())?;
@@ -42,7 +44,7 @@ impl fmt::Display for Invalid {
 /// `--set` to the current folder.
 ///
 /// # Errors
-/// A file that cannot be read, or `Invalid` with every problem at once.
+/// A file that cannot be read, or `ConfigError` with every problem at once.
 pub fn load(file: &Path, sets: &[String]) -> Result<Config> {
     let text = std::fs::read_to_string(file).with_context(|| {
         format!("cannot read the configuration {}; `orator init DIR` writes one, -c FILE names another", file.display())
@@ -69,7 +71,7 @@ fn resolve(text: &str, sets: &[String], file: &Path) -> Result<(Settings, Vec<St
     if problems.is_empty() {
         Ok((given.settings, given.notes))
     } else {
-        Err(Invalid { file: file.to_owned(), problems }.into())
+        Err(ConfigError { file: file.to_owned(), problems }.into())
     }
 }
 

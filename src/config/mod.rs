@@ -15,7 +15,7 @@ pub use config_path::ConfigPath;
 pub use file::Place;
 pub use file::Problem;
 pub use load::Config;
+pub use load::ConfigError;
 pub use load::DEFAULT_FILE;
-pub use load::Invalid;
 pub use load::load;
 pub use sections::*;

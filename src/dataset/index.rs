@@ -7,36 +7,51 @@ use serde::{Deserialize, Serialize};
 /// Tar file of samples.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShardRef {
+    /// Name in the dataset's folder.
     pub file: String,
+    /// Size.
     pub bytes: u64,
+    /// Samples in it.
     pub n_samples: usize,
+    /// Hash of its content, in hex.
     pub blake3: String,
 }
 
 /// Sample with its members; offsets count from the beginning of the shard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SampleRef {
+    /// Name, once in the dataset.
     pub key: String,
+    /// The part it belongs to.
     pub split: Split,
     /// File name of the shard.
     pub shard: String,
     /// Start of the sample with its tar headers, a valid tar stream by itself.
     pub offset: u64,
+    /// Bytes from `offset` on.
     pub size: u64,
+    /// Frames of motion.
     pub n_frames: usize,
     /// Hash of the `size` bytes at `offset`.
     pub blake3: String,
+    /// Where it comes from.
     pub json: ByteRange,
+    /// Which joints were seen.
     pub mask: ByteRange,
+    /// Keypoints.
     pub pose2d: ByteRange,
+    /// Joints.
     pub pose3d: ByteRange,
+    /// Sound.
     pub wav: ByteRange,
 }
 
 /// Range of bytes in a shard.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ByteRange {
+    /// The first byte.
     pub offset: u64,
+    /// Number of bytes.
     pub size: u64,
 }
 

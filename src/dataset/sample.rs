@@ -17,6 +17,7 @@ pub const N_KEYPOINTS: usize = N_BODY + 2 * N_HAND;
 pub struct Sample {
     /// Key `<slug>-<8 hex of the video's content>-<first frame, 6 digits>`; [a-z0-9_-] only.
     pub key: String,
+    /// Joints at the dataset rate.
     pub motion: Motion,
     /// Keypoints [T, 59, 3]: x px, y px, score.
     pub pose2d: Array3<f32>,

@@ -4,6 +4,9 @@
 
 pub mod baseline;
 pub mod clips;
+pub mod evaluation;
 pub mod lifter;
 pub mod table;
 pub mod verdict;
+
+pub use evaluation::Evaluation;

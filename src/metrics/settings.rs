@@ -7,6 +7,7 @@ use serde::Serialize;
 /// What the numbers are set to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Settings {
+    /// Whose definitions count.
     pub convention: Convention,
     /// Shares of the pose's largest extent for PCK, each > 0.
     pub alphas: Vec<f64>,
@@ -29,10 +30,15 @@ pub enum Convention {
     /// This project's own.
     #[default]
     Orator,
+    /// Ginosar et al. 2019.
     Speech2gesture,
+    /// The GENEA challenges.
     Genea,
+    /// Liu et al. 2024.
     Emage,
+    /// Yoon et al. 2020.
     Trimodal,
+    /// Li et al. 2021.
     Aist,
 }
 

@@ -10,10 +10,15 @@ use std::str::FromStr;
 /// A stage of the pipeline, in the order in which they run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum StageName {
+    /// Videos to sound, frame times and shot scores.
     Extract,
+    /// Frames to 2D keypoints of one speaker.
     Pose2d,
+    /// Keypoints to intervals worth keeping.
     Segment,
+    /// 2D keypoints to 3D joints.
     Lift,
+    /// All videos of a speaker to one dataset.
     Dataset,
 }
 

@@ -14,7 +14,7 @@ pub trait Progress: Send + Sync {
     }
 }
 
-/// Something that happened to a unit of a run. Units are `speaker/video`, or `speaker` of a dataset.
+/// Something that happened to a `unit` at a `stage` of a run. Units are `speaker/video`, or `speaker` of a dataset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event<'a> {
     /// A stage worked on the unit; `line` is the stage's report.

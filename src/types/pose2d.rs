@@ -47,12 +47,17 @@ pub struct PersonBox {
 /// What was found in one frame. A hand or body not found is all zeros.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pose2d {
+    /// The followed person.
     pub person: PersonBox,
+    /// People in view.
     pub n_people: u8,
     /// Which person is followed: another number, another person.
     pub identity: i64,
+    /// COCO-17.
     pub body: [Keypoint; N_BODY],
+    /// The speaker's left hand.
     pub left_hand: [Keypoint; N_HAND],
+    /// The speaker's right hand.
     pub right_hand: [Keypoint; N_HAND],
 }
 
@@ -72,6 +77,7 @@ impl Default for Pose2d {
 /// The keypoints of a whole video at the dataset rate; last axis x px, y px, score; score 0 = missing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Keypoints {
+    /// The dataset rate.
     pub fps: FrameRate,
     /// Width and height in px of the upright picture.
     pub image_size: [u32; 2],

@@ -7,6 +7,7 @@ use ndarray::{Array2, Array3};
 /// neck at the origin of every frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
+    /// Frames a second.
     pub fps: FrameRate,
     /// [T, 49, 3]; a missing joint is NaN.
     pub joints: Array3<f32>,

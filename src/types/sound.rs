@@ -6,7 +6,9 @@ pub const SAMPLE_RATE: u32 = 16_000;
 /// Mono samples in -1..1 at `rate` samples a second.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sound {
+    /// Samples a second.
     pub rate: u32,
+    /// Amplitudes, -1..1.
     pub samples: Vec<f32>,
 }
 

@@ -6,15 +6,19 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Split {
+    /// Videos to learn from.
     Train,
+    /// Videos that choose the best checkpoint.
     Validation,
+    /// Videos for the final measurement.
     Test,
 }
 
 impl Split {
+    /// Every split.
     pub const ALL: [Split; 3] = [Split::Train, Split::Validation, Split::Test];
 
-    /// Its name in file names, JSON and the configuration.
+    /// The name in file names, JSON and the configuration.
     pub const fn name(self) -> &'static str {
         match self {
             Split::Train => "train",

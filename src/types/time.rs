@@ -8,7 +8,9 @@ use std::str::FromStr;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(from = "Fraction")]
 pub struct FrameRate {
+    /// Numerator.
     pub num: u32,
+    /// Denominator.
     pub den: u32,
 }
 

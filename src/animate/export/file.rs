@@ -16,6 +16,7 @@ use std::path::Path;
 /// Content of a file beside the performance.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ExportContent<'a> {
+    /// The sound of a film.
     pub sound: Option<&'a Sound>,
     /// Bone names, in formats that have names.
     pub names: Names,

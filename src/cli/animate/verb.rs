@@ -135,7 +135,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         );
     };
     let outputs = outputs(&args, input)?;
-    let sound = args.audio.as_deref().map(read_sound).transpose()?;
+    let sound = args.audio.as_deref().map(audio::read_sound).transpose()?;
     let done = animate(&args, input, sound, &outputs, &options, ui)?;
     let next = next_command(&args, &outputs);
     let text = format!("{}wrote {}", done.text, names(&outputs).join(", "));
@@ -336,14 +336,6 @@ fn outputs(args: &Args, input: &Input) -> Result<Vec<(PathBuf, ExportFormat)>> {
         ensure!(!path.is_dir(), "{} is a folder; name a file in it, or give --format bvh", path.display());
     }
     args.out.iter().map(|path| Ok((path.clone(), ExportFormat::from_path(path)?))).collect()
-}
-
-fn read_sound(path: &Path) -> Result<Sound> {
-    ensure!(path.is_file(), "{} is no file", path.display());
-    match audio::read_mono(path, SAMPLE_RATE)? {
-        Some(sound) if !sound.samples.is_empty() => Ok(sound),
-        _ => bail!("{} has no sound", path.display()),
-    }
 }
 
 /// The part of a sound from a second on, as much as there is of `secs`.

@@ -3,21 +3,15 @@
 use super::{compare, lifter};
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Result, bail, ensure};
 use orator::dataset::{Dataset, Split};
-use orator::evaluate::baseline::baselines;
-use orator::evaluate::baseline::baselines::Predictor;
-use orator::evaluate::clips::clips;
-use orator::evaluate::clips::clips::EvalClips;
-use orator::evaluate::clips::{of_speaker, pairs};
+use orator::evaluate::Evaluation;
 use orator::evaluate::table::result;
-use orator::evaluate::table::table;
 use orator::evaluate::verdict::text;
 use orator::generate::Speaker;
 use orator::metrics::settings::Convention;
 use orator::metrics::settings::Settings;
 use orator::report::evaluation::page;
-use orator::stage::progress::{Progress as _, Task};
 use orator::stage::workdir;
 use orator::types::time::FrameRate;
 use serde::Deserialize as _;
@@ -121,17 +115,13 @@ fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
         with_neck: args.with_neck,
         ..Settings::default()
     };
-    let (clips, table) = {
-        let task = ui.begin("evaluating", 0);
-        let (clips, predictors) = material(args, &*task)?;
-        let table = table::measure(&clips, &settings, &predictors, &*task)?;
-        (clips, table)
-    };
+    let evaluation = evaluation(args, ui)?;
+    let table = evaluation.measure(&settings, ui)?;
     let mut facts: Value = result::json(&table);
     let mut text = text::text(&table, args.all);
     if let Some(path) = &args.report {
         let title = format!("Evaluation of {}", title(args));
-        let html = page::html(&table, &clips, &title)?;
+        let html = page::html(&table, &evaluation.clips, &title)?;
         workdir::write_file(path, html.as_bytes())?;
         text += &format!("\nwrote {} ({:.1} MB)\n", path.display(), html.len() as f64 / 1e6);
         facts["report"] = json!(path);
@@ -153,26 +143,12 @@ fn title(args: &MotionArgs) -> String {
 }
 
 /// What is measured, from files or from a dataset.
-fn material(args: &MotionArgs, task: &dyn Task) -> Result<(EvalClips, Vec<Predictor>)> {
+fn evaluation(args: &MotionArgs, ui: &Ui) -> Result<Evaluation> {
     if let (Some(dataset), Some(checkpoint)) = (&args.dataset, &args.checkpoint) {
-        let made = of_speaker::material(&Dataset::open(dataset)?, &Speaker::open(checkpoint)?, args.split, task)?;
-        return Ok((made.clips, made.predictors));
+        return Evaluation::of_generator(&Dataset::open(dataset)?, &Speaker::open(checkpoint)?, args.split, ui);
     }
     let (Some(truth), Some(prediction)) = (&args.truth, &args.prediction) else {
         bail!("nothing to measure: give --truth and --prediction, or --dataset and --checkpoint")
     };
-    task.detail("reading");
-    let found = pairs::find(truth, prediction, args.audio.as_deref())?;
-    let mut clips = clips::read(&found.pairs, args.fps)?;
-    ensure!(
-        args.audio.is_none() || clips.have_sound() || args.audio.as_ref().is_some_and(|audio| audio.is_dir()),
-        "{} holds no sound",
-        args.audio.as_deref().context("no sound")?.display()
-    );
-    clips.notes.splice(0..0, found.notes);
-    let mut predictors = vec![Predictor::prediction(&clips, "the motion under test")];
-    let (others, left_out) = baselines::of_files(&clips)?;
-    predictors.extend(others);
-    clips.notes.extend(left_out);
-    Ok((clips, predictors))
+    Evaluation::from_files(truth, prediction, args.audio.as_deref(), args.fps, ui)
 }

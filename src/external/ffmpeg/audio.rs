@@ -8,7 +8,7 @@ use super::origin;
 use super::resample::{Resampler, first_not_finite, format_of};
 use super::source;
 use super::source::{LONGEST_GAP_SECS, LONGEST_SECS, UnreadableMedia};
-use crate::types::sound::Sound;
+use crate::types::sound::{SAMPLE_RATE, Sound};
 use anyhow::{Context, Result, bail};
 use ffmpeg_next::frame;
 use std::path::Path;
@@ -31,6 +31,22 @@ pub fn read_mono(path: &Path, rate: u32) -> Result<Option<Sound>> {
         Ok(())
     })?;
     Ok(heard.map(|_| Sound { rate, samples }))
+}
+
+/// The whole sound of `path` as mono at 16 kHz.
+///
+/// # Errors
+/// `UnreadableMedia` where there is none, or none that decodes.
+pub fn read_sound(path: &Path) -> Result<Sound> {
+    let name = path.display();
+    let unreadable = |problem| Err(UnreadableMedia(problem).into());
+    if !path.is_file() {
+        return unreadable(format!("{name} is no file"));
+    }
+    match read_mono(path, SAMPLE_RATE)? {
+        Some(sound) if !sound.samples.is_empty() => Ok(sound),
+        _ => unreadable(format!("{name} has no sound")),
+    }
 }
 
 /// Totals of `stream_mono`.

@@ -12,22 +12,27 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Why a model cannot be used.
+/// Why a model cannot be used: `id` is the model, `path` its file, `found` what is there instead of `expected`.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelError {
+    /// The file is not there.
     #[error(
         "the model {id} is missing: {path} is not there; `orator models fetch` gets it, models.dir names another folder"
     )]
     Missing { id: String, path: PathBuf },
+    /// The file cannot be read.
     #[error("the model {id} cannot be read: {path}: {error}")]
     Unreadable { id: String, path: PathBuf, error: String },
+    /// The file has other bytes than those pinned.
     #[error(
         "the model {id} is not the one described: {path} has sha256 {found}, expected {expected}; `orator models fetch` gets the \
          right one, `orator models add` registers this one"
     )]
     WrongHash { id: String, path: PathBuf, expected: String, found: String },
+    /// ONNX Runtime does not open the file.
     #[error("the model {id} is no ONNX model this ONNX Runtime can open: {path}: {error}")]
     NotOnnx { id: String, path: PathBuf, error: String },
+    /// An input or output, `port`, has another name, type or shape.
     #[error(
         "the model {id} has another layout than described: {path}: {port}: expected {expected}, found {found}; describe it in \
          manifest.toml (`orator models add FILE --like ID`)"

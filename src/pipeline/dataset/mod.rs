@@ -3,3 +3,5 @@
 pub mod outcome;
 pub mod stage;
 pub mod video;
+
+pub use stage::NothingKept;

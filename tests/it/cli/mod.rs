@@ -3,5 +3,7 @@
 pub mod bench;
 pub mod completions;
 pub mod demo;
+pub mod examples;
 pub mod guide;
+pub mod library;
 pub mod models_verb;

@@ -1,0 +1,72 @@
+//! An evaluation as a value: motions beside their ground truth, with the simple predictors measured beside them.
+
+use super::baseline::baselines;
+use super::baseline::baselines::Predictor;
+use super::clips::clips;
+use super::clips::clips::EvalClips;
+use super::clips::{of_speaker, pairs};
+use super::table::table;
+use super::table::table::Table;
+use crate::dataset::{Dataset, Split};
+use crate::generate::Speaker;
+use crate::metrics::settings::Settings;
+use crate::stage::progress::Progress;
+use crate::types::time::FrameRate;
+use anyhow::{Result, ensure};
+use std::path::Path;
+
+/// Motions to be measured beside their ground truth.
+pub struct Evaluation {
+    /// The ground truth, cut into clips, with its sound.
+    pub clips: EvalClips,
+    /// The motion under test first, then the simple predictors.
+    pub predictors: Vec<Predictor>,
+}
+
+impl Evaluation {
+    /// Reads files of motion: `truth` and `prediction` are two files, or two folders whose files have the same names;
+    /// `audio` is a sound or a folder of sounds. `fps` is the rate of files that do not state one.
+    ///
+    /// # Errors
+    /// Files that do not belong together or cannot be read.
+    pub fn from_files(
+        truth: &Path,
+        prediction: &Path,
+        audio: Option<&Path>,
+        fps: Option<FrameRate>,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let task = progress.begin("evaluating", 0);
+        task.detail("reading");
+        let found = pairs::find(truth, prediction, audio)?;
+        let mut clips = clips::read(&found.pairs, fps)?;
+        if let Some(audio) = audio {
+            ensure!(clips.have_sound() || audio.is_dir(), "{} holds no sound", audio.display());
+        }
+        clips.notes.splice(0..0, found.notes);
+        let mut predictors = vec![Predictor::prediction(&clips, "the motion under test")];
+        let (others, left_out) = baselines::of_files(&clips)?;
+        predictors.extend(others);
+        clips.notes.extend(left_out);
+        Ok(Self { clips, predictors })
+    }
+
+    /// Generates motion for the sounds of a split of the dataset, whose own motion is the ground truth.
+    ///
+    /// # Errors
+    /// A split without samples, a dataset of another rate than the generator's.
+    pub fn of_generator(dataset: &Dataset, generator: &Speaker, split: Split, progress: &dyn Progress) -> Result<Self> {
+        let task = progress.begin("evaluating", 0);
+        let of_speaker::SpeakerEvaluation { clips, predictors } =
+            of_speaker::material(dataset, generator, split, &*task)?;
+        Ok(Self { clips, predictors })
+    }
+
+    /// Measures every predictor.
+    ///
+    /// # Errors
+    /// Settings that fit no clip.
+    pub fn measure(&self, settings: &Settings, progress: &dyn Progress) -> Result<Table> {
+        table::measure(&self.clips, settings, &self.predictors, &*progress.begin("evaluating", 0))
+    }
+}

@@ -1,0 +1,67 @@
+//! The pipeline as another program uses it: run, looked at and refused without the command line.
+
+use crate::fixtures::footage;
+use orator::pipeline::{RunState, UnitState};
+use orator::stage::workdir;
+use orator::{BusyFolder, Event, Pipeline, Progress, Selection, Silent, StageName, Task, load_config};
+use std::sync::Mutex;
+
+/// Keeps the events of a run.
+#[derive(Default)]
+struct Heard(Mutex<Vec<String>>);
+
+impl Progress for Heard {
+    fn begin(&self, _label: &str, _total: u64) -> Box<dyn Task> {
+        Box::new(Silent)
+    }
+    fn say(&self, _line: &str) {}
+    fn event(&self, event: &Event<'_>) {
+        self.0.lock().unwrap().push(format!("{event:?}"));
+    }
+}
+
+#[test]
+fn a_program_runs_the_pipeline_and_asks_how_it_stands() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("pipeline.toml");
+    std::fs::write(&file, "[[speaker]]\nname = \"host\"\nvideos = [\"a.mp4\", \"none-*.mp4\"]\n").unwrap();
+    let pipeline = Pipeline::open(load_config(&file, &[]).unwrap()).unwrap();
+    let [videos] = &pipeline.videos(&[]).unwrap()[..] else { panic!("one speaker") };
+    let [unit] = &videos.units[..] else { panic!("one video") };
+    let work = &pipeline.config().settings.work.dir;
+    footage::write(work, unit, &footage::good(100), "a");
+
+    let selection = Selection { from: StageName::Segment, to: StageName::Lift, ..Selection::default() };
+    let heard = Heard::default();
+    let report = pipeline.run(&selection, &heard).unwrap();
+    let done: Vec<_> = report.units.iter().map(|unit| (unit.stage, unit.state)).collect();
+    assert_eq!(done, [(StageName::Segment, RunState::Done), (StageName::Lift, RunState::Done)]);
+    assert_eq!(report.stages[&StageName::Lift].done, 1);
+    let [failure] = &report.failures[..] else { panic!("the pattern that names no video") };
+    assert_eq!(failure.speaker.as_deref(), Some("host"));
+    let events = heard.0.into_inner().unwrap();
+    assert!(events[0].starts_with("NoVideo") && events[2].starts_with("Done { stage: \"lift\""), "{events:?}");
+    assert_eq!(pipeline.run(&selection, &Silent).unwrap().units[1].state, RunState::Fresh);
+
+    let status = pipeline.status(&[]).unwrap();
+    assert_eq!(status.units[0].state, UnitState::NoVideo);
+    assert_eq!((status.units[1].stage, status.units[1].state), (StageName::Extract, UnitState::NeverDone));
+    assert!(!status.datasets_are_fresh());
+    assert_eq!(pipeline.account(&[]).unwrap(), status.account);
+    assert!(pipeline.status(&["guest".to_owned()]).is_err());
+}
+
+#[test]
+fn what_stops_a_run_can_be_matched() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("pipeline.toml");
+    std::fs::write(&file, "[[speaker]]\nname = \"host\"\nvideos = [\"a.mp4\"]\n").unwrap();
+    let error = load_config(&file, &["extract.fps=0".to_owned()]).unwrap_err();
+    assert!(error.is::<orator::ConfigError>(), "{error:#}");
+    let pipeline = Pipeline::open(load_config(&file, &[]).unwrap()).unwrap();
+    let missing = pipeline.run(&Selection::only(StageName::Extract), &Silent).unwrap();
+    assert!(missing.failures[0].cause.is_some() && missing.stages[&StageName::Extract].failed == 1);
+    let _lock = workdir::lock(&pipeline.config().settings.work.dir).unwrap();
+    let error = pipeline.run(&Selection::only(StageName::Extract), &Silent).unwrap_err();
+    assert!(error.is::<BusyFolder>(), "{error:#}");
+}
