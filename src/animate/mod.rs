@@ -7,12 +7,8 @@ pub mod performance;
 pub mod rig;
 pub mod solve;
 
-pub use draw::figure::FigureView;
-pub use draw::figure::draw_pose;
-pub use performance::AnimationOptions;
-pub use performance::Performance;
-pub use performance::Yaw;
-pub use performance::perform;
+pub use draw::figure::{FigureView, draw_pose};
+pub use performance::{AnimationOptions, Performance, Yaw, perform};
 pub use rig::constraints::Constraints;
 pub use solve::head::Face;
 pub use solve::smoothing::Smoothing;

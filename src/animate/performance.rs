@@ -135,9 +135,9 @@ pub fn perform(motion: &Motion, face: Option<&Face>, options: &AnimationOptions)
         let as_it_is = rotations(&positions, &rig, &SolveFilters::new(Smoothing::None, motion.fps));
         positions = moved(&positions, &rig, &constrained(clip_of(&as_it_is), &mut tally));
     }
-    let means = SolveFilters::new(options.smoothing, motion.fps);
-    let mut tracks = rotations(&positions, &rig, &means);
-    let face_frames = face.map(|face| head::turn(face, &rig, &means, &mut tracks));
+    let filters = SolveFilters::new(options.smoothing, motion.fps);
+    let mut tracks = rotations(&positions, &rig, &filters);
+    let face_frames = face.map(|face| head::turn(face, &rig, &filters, &mut tracks));
     if options.yaw == Yaw::Removed {
         for joint in [rig.spine, rig.chest] {
             tracks[joint].fill(Rotation::IDENTITY);

@@ -21,17 +21,7 @@ pub mod stats;
 pub mod verify;
 pub mod write;
 
-pub use layout::CHECKSUMS;
-pub use layout::INDEX;
-pub use layout::INFO;
-pub use layout::LEAKAGE;
-pub use layout::LEDGER;
-pub use layout::README;
-pub use layout::SCHEMA;
-pub use layout::STATS;
-pub use layout::STRIDE_FRAMES;
-pub use layout::WINDOW_FRAMES;
+pub use layout::{CHECKSUMS, INDEX, INFO, LEAKAGE, LEDGER, README, SCHEMA, STATS, STRIDE_FRAMES, WINDOW_FRAMES};
 pub use read::Dataset;
 pub use sample::Sample;
 pub use split::Split;
-pub use write::writer::write_dataset;

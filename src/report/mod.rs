@@ -7,7 +7,5 @@ pub mod sheet;
 pub mod training;
 pub mod videos;
 
-pub use videos::page::ReportPage;
-pub use videos::page::ReportRequest;
-pub use videos::page::make;
+pub use videos::page::{ReportPage, ReportRequest, make};
 pub use videos::summary::ReportTotals;

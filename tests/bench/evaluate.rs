@@ -129,8 +129,8 @@ fn evaluate(speaker: Vec<Unheard>, watch: &Stopwatch) -> Result<(table::Table, S
         let Unheard { ground_truth, mask, mut predicted, sound } = unheard;
         let features = Some(sound_features::of_samples(&sound.samples, FPS, ground_truth.shape()[0]));
         let (mask, _) = compared(&ground_truth, &mask, &mut predicted);
-        let voice = Some(ClipAudio::Kept(sound.samples.into_iter().map(pcm).collect()));
-        EvalClip { name: format!("clip {number}"), ground_truth, predicted, mask, features, voice }
+        let audio = Some(ClipAudio::Kept(sound.samples.into_iter().map(pcm).collect()));
+        EvalClip { name: format!("clip {number}"), ground_truth, predicted, mask, features, audio }
     };
     let clips = speaker.into_par_iter().enumerate().map(clip).collect();
     let clips = EvalClips { fps: FPS, clips, notes: Vec::new(), learnt: false };

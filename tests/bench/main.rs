@@ -5,6 +5,8 @@ pub mod animate;
 pub mod child;
 pub mod command;
 pub mod dataset;
+#[path = "../it/fixtures/disturbed.rs"]
+pub mod disturbed;
 pub mod evaluate;
 pub mod generate;
 pub mod lift;

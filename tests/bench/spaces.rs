@@ -1,11 +1,10 @@
 //! `cargo bench -- spaces`.
 
+use super::disturbed::{self, Disturbance};
 use super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
 use ndarray::{ArrayView3, Axis, concatenate};
 use orator::dataset::Dataset;
-use orator::demo::check::disturbed;
-use orator::demo::check::disturbed::Disturbance;
 use orator::metrics::space::{basis, embedding};
 use orator::stage::progress::Progress;
 use orator::types::pose3d::Motion;

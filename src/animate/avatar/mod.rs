@@ -9,7 +9,5 @@ pub mod skin;
 pub mod stance;
 pub mod surface;
 
-pub use avatar::Avatar;
-pub use avatar::AvatarMesh;
-pub use avatar::Material;
+pub use avatar::{Avatar, AvatarMesh, Material};
 pub use skin::Weights;

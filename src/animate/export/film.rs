@@ -180,10 +180,7 @@ impl FilmFootage {
         let picture = self.frames.picture(Some(self.size))?;
         let [left, top, right, bottom] = HALVES[0].map(|px| px as usize);
         let (x0, y0) = (left + (right - left - picture.width) / 2, top + (bottom - top - picture.height) / 2);
-        for (y, row) in picture.data.chunks_exact(3 * picture.width).enumerate() {
-            let at = 3 * ((y0 + y) * image.width + x0);
-            image.data[at..at + row.len()].copy_from_slice(row);
-        }
+        draw::paste(image, &picture, [x0, y0]);
         Ok(())
     }
 }

@@ -45,15 +45,15 @@ pub fn solve(
     positions: &JointPositions,
     arm: &RigArm,
     chest: &RotationTrack,
-    means: &SolveFilters,
+    filters: &SolveFilters,
     local: &mut [RotationTrack],
 ) {
     let n_frames = positions.n_frames();
-    let relax_frames = Some(RELAX_SECS * means.fps);
+    let relax_frames = Some(RELAX_SECS * filters.fps);
     let smooth = |parent: &RotationTrack, from: usize, to: usize| -> Directions {
         let seen = |t: usize| Some(parent[t].inverse().turn(positions.direction(t, from, to)?));
         let mut track: Directions = (0..n_frames).map(seen).collect();
-        means.arms.directions(&mut track);
+        filters.arms.directions(&mut track);
         track
     };
     let clavicle = smooth(chest, NECK, L_SHOULDER).into_iter().map(|to| Some(Rotation::between(X, to?)));
@@ -73,7 +73,7 @@ pub fn solve(
     let forearm = world(&world(&clavicle, &local[arm.upper]), &fore);
 
     let frames: ObservedTrack = (0..n_frames).map(|t| positions.hand_frame(t)).collect();
-    let hand = filled(smooth_hand(&forearm, &frames, &means.hands), Rotation::IDENTITY, relax_frames);
+    let hand = filled(smooth_hand(&forearm, &frames, &filters.hands), Rotation::IDENTITY, relax_frames);
     let mut followed = 0.0;
     for t in 0..n_frames {
         let (supination, wrist) = ArmPose::hand_angles(hand[t], followed, FOLLOWED);
@@ -81,7 +81,7 @@ pub fn solve(
         (local[arm.fore][t], local[arm.hand][t]) = ArmPose::shared(fore[t], supination, wrist);
     }
     for (finger, joints) in arm.fingers.iter().enumerate() {
-        let bones = solve_finger(positions, &frames, finger, &means.hands);
+        let bones = solve_finger(positions, &frames, finger, &filters.hands);
         for ((&joint, bone), relaxed) in joints.iter().zip(bones).zip(RELAXED[finger]) {
             let rest = finger_hinge(finger).rotation(Bend { flexion: relaxed, side: 0.0 });
             local[joint] = filled(bone, rest, relax_frames);

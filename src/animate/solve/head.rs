@@ -40,7 +40,7 @@ const RELAX_SECS: f64 = 0.5;
 const STEPS: usize = 8;
 
 /// Turns neck and head; returns the number of frames in which the face was seen.
-pub fn turn(face: &Face, rig: &Rig, means: &SolveFilters, local: &mut [RotationTrack]) -> usize {
+pub fn turn(face: &Face, rig: &Rig, filters: &SolveFilters, local: &mut [RotationTrack]) -> usize {
     let n_frames = local[rig.head].len();
     let frame = |t: usize| FacePoints::from_keypoints(face.body.index_axis(ndarray::Axis(0), t));
     let points: Vec<Option<FacePoints>> =
@@ -61,7 +61,7 @@ pub fn turn(face: &Face, rig: &Rig, means: &SolveFilters, local: &mut [RotationT
 
     let mut angles: Vec<Option<Vec3>> =
         second.iter().map(|fit| fit.map(|[yaw, pitch, roll, _]| [yaw, pitch - nod, roll])).collect();
-    means.hands.runs(&mut angles);
+    filters.hands.runs(&mut angles);
     let halves: ObservedTrack = angles
         .into_iter()
         .enumerate()
@@ -75,7 +75,7 @@ pub fn turn(face: &Face, rig: &Rig, means: &SolveFilters, local: &mut [RotationT
         })
         .collect();
     let n_seen = halves.iter().flatten().count();
-    let halves = filled(halves, Rotation::IDENTITY, Some(RELAX_SECS * means.fps));
+    let halves = filled(halves, Rotation::IDENTITY, Some(RELAX_SECS * filters.fps));
     local[rig.neck].clone_from(&halves);
     local[rig.head] = halves;
     n_seen

@@ -11,12 +11,12 @@ use crate::math::rotation::Rotation;
 use crate::math::vec3::Vec3;
 
 /// Local rotations by joint of the rig. Hips, neck, head and legs rest.
-pub fn rotations(positions: &JointPositions, rig: &Rig, means: &SolveFilters) -> Vec<RotationTrack> {
+pub fn rotations(positions: &JointPositions, rig: &Rig, filters: &SolveFilters) -> Vec<RotationTrack> {
     let n_frames = positions.n_frames();
     let mut local: Vec<RotationTrack> = vec![vec![Rotation::IDENTITY; n_frames]; rig.skeleton.joints.len()];
 
     let mut line: Vec<Option<Vec3>> = (0..n_frames).map(|t| positions.shoulder_line(t)).collect();
-    means.arms.directions(&mut line);
+    filters.arms.directions(&mut line);
     let half_yaw = |[x, _, z]: Vec3| Rotation::about([0.0, 1.0, 0.0], (-z).atan2(x) / 2.0);
     let half_yaw = filled(line.into_iter().map(|line| line.map(half_yaw)).collect(), Rotation::IDENTITY, None);
     let chest: RotationTrack = half_yaw.iter().map(|&half| half * half).collect();
@@ -24,8 +24,8 @@ pub fn rotations(positions: &JointPositions, rig: &Rig, means: &SolveFilters) ->
     local[rig.chest] = half_yaw;
 
     let [left, right] = &rig.arms;
-    arm::solve(positions, left, &chest, means, &mut local);
-    arm::solve(&positions.mirrored(), right, &mirrored(chest), means, &mut local);
+    arm::solve(positions, left, &chest, filters, &mut local);
+    arm::solve(&positions.mirrored(), right, &mirrored(chest), filters, &mut local);
     let fingers = right.fingers.iter().flatten();
     for &joint in [right.clavicle, right.upper, right.fore, right.hand].iter().chain(fingers) {
         local[joint] = mirrored(std::mem::take(&mut local[joint]));

@@ -71,8 +71,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         let done = removal.carry_out(args.keep_models);
         done.with_context(|| format!("{what} is forgotten by half; run the same command again to finish"))?;
     }
-    let marks: Vec<_> = task.removals.iter().flat_map(|removal| removal.marks.clone()).collect();
-    let searched = search(&task.folders, &marks).context("nothing is proved")?;
+    let terms: Vec<_> = task.removals.iter().flat_map(|removal| removal.terms.clone()).collect();
+    let searched = search(&task.folders, &terms).context("nothing is proved")?;
     let mut text = match lines.is_empty() {
         true => vec![format!("nothing of {what} was there")],
         false => vec![format!("forgotten: {what}"), format!("  {}", lines.join("\n  "))],
@@ -86,14 +86,14 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let Searched { n_files, bytes, inside_bytes, places } = &searched;
     text.push(format!(
         "searched {n_files} files, {bytes} bytes and {inside_bytes} more inside archives, for {} names and hashes: {} found",
-        marks.len(),
+        terms.len(),
         places.len()
     ));
     let found: Vec<_> =
         places.iter().map(|place| json!({ "file": place.file, "at": place.at, "what": place.what })).collect();
     let facts = json!({
         "videos": task.titles, "removed": lines, "kept_models": kept, "advice": task.advice, "found": found,
-        "searched": { "files": n_files, "bytes": bytes, "inside_bytes": inside_bytes, "marks": marks.len() },
+        "searched": { "files": n_files, "bytes": bytes, "inside_bytes": inside_bytes, "marks": terms.len() },
     });
     ui.summary(&text.join("\n"), None, facts);
     Ok(if places.is_empty() { Outcome::Done } else { Outcome::Wrong })

@@ -30,7 +30,7 @@ pub struct Removal {
     /// Table of content hashes, and the number of its entries to remove.
     pub hashes: Option<(PathBuf, usize)>,
     /// Search terms of the videos.
-    pub marks: Vec<SearchTerm>,
+    pub terms: Vec<SearchTerm>,
 }
 
 impl Removal {
@@ -45,7 +45,7 @@ impl Removal {
         others: &[&KnownVideo],
         whole: bool,
     ) -> Result<Self> {
-        let mut removal = Self { speaker: speaker.to_owned(), marks: marks(videos, others), ..Self::default() };
+        let mut removal = Self { speaker: speaker.to_owned(), terms: terms(videos, others), ..Self::default() };
         for folder in StageName::OF_VIDEOS.map(StageName::as_str).into_iter().chain(["sheets"]) {
             let folder = work.join(folder).join(speaker);
             if whole {
@@ -62,7 +62,7 @@ impl Removal {
                 removal.paths.extend(own.iter().any(is_of).then_some(path));
             }
         }
-        let names_one = |path: &PathBuf| fs::read(path).is_ok_and(|bytes| super::search::is_in(&bytes, &removal.marks));
+        let names_one = |path: &PathBuf| fs::read(path).is_ok_and(|bytes| super::search::is_in(&bytes, &removal.terms));
         let reports: Vec<PathBuf> = pages(work)?.into_iter().filter(names_one).collect();
         removal.paths.extend(reports);
         let (models, dir) = (work.join("gan").join(speaker), speaker_dir(work, StageName::Dataset, speaker));
@@ -86,7 +86,7 @@ impl Removal {
     pub fn of_dataset(dir: &Path, videos: &[&KnownVideo], others: &[&KnownVideo]) -> Self {
         let names = videos.iter().flat_map(|video| video.parts.iter().cloned()).collect();
         let paths = workdir::left_over(dir);
-        Self { dataset: Some((dir.to_owned(), names)), marks: marks(videos, others), paths, ..Self::default() }
+        Self { dataset: Some((dir.to_owned(), names)), terms: terms(videos, others), paths, ..Self::default() }
     }
 
     /// Whether there is nothing to remove.
@@ -145,7 +145,7 @@ impl Removal {
         let entry = format!("{file}\n{known}");
         let gone = self.paths.iter().any(|path| Path::new(file).starts_with(path));
         let in_dataset = self.dataset.as_ref().is_some_and(|(dir, _)| Path::new(file).starts_with(dir));
-        gone || in_dataset || super::search::is_in(entry.as_bytes(), &self.marks)
+        gone || in_dataset || super::search::is_in(entry.as_bytes(), &self.terms)
     }
 }
 
@@ -198,22 +198,22 @@ fn remove(path: &Path) -> Result<()> {
 }
 
 /// Names and hashes of `videos` that no other video shares.
-fn marks(videos: &[&KnownVideo], others: &[&KnownVideo]) -> Vec<SearchTerm> {
-    let mut marks: Vec<SearchTerm> = Vec::new();
+fn terms(videos: &[&KnownVideo], others: &[&KnownVideo]) -> Vec<SearchTerm> {
+    let mut terms: Vec<SearchTerm> = Vec::new();
     for video in videos {
-        marks.extend(video.work.iter().map(|name| SearchTerm::name("work name", name)));
-        marks.extend(video.parts.iter().map(|name| SearchTerm::name("dataset name", name)));
+        terms.extend(video.work.iter().map(|name| SearchTerm::name("work name", name)));
+        terms.extend(video.parts.iter().map(|name| SearchTerm::name("dataset name", name)));
         if !video.file.is_empty() && others.iter().all(|other| other.file != video.file) {
-            marks.push(SearchTerm::name("file name", &video.file));
+            terms.push(SearchTerm::name("file name", &video.file));
         }
         let source = video.source.as_ref().map(|source| source.to_string_lossy().into_owned());
-        marks.extend(source.iter().map(|path| SearchTerm::name("path", path)));
+        terms.extend(source.iter().map(|path| SearchTerm::name("path", path)));
         let hashed = || video.source.as_ref().and_then(|source| hash_file(source).ok());
         let content = video.content.clone().or_else(hashed);
         if let Some(content) = content.filter(|c| others.iter().all(|other| other.content.as_ref() != Some(c))) {
-            marks.extend(SearchTerm::hash("content hash", &content));
-            marks.extend(content.get(..8).map(|key| SearchTerm::hash("key", key)).into_iter().flatten());
+            terms.extend(SearchTerm::hash("content hash", &content));
+            terms.extend(content.get(..8).map(|key| SearchTerm::hash("key", key)).into_iter().flatten());
         }
     }
-    marks
+    terms
 }

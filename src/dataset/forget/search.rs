@@ -62,31 +62,31 @@ const PIECE: usize = 1 << 20;
 ///
 /// # Errors
 /// A file that cannot be read, since it proves nothing.
-pub fn search(folders: &[PathBuf], marks: &[SearchTerm]) -> Result<Searched> {
+pub fn search(folders: &[PathBuf], terms: &[SearchTerm]) -> Result<Searched> {
     let mut searched = Searched::default();
-    let marks: Vec<&SearchTerm> = marks.iter().filter(|mark| mark.bytes.len() >= 2).collect();
+    let terms: Vec<&SearchTerm> = terms.iter().filter(|term| term.bytes.len() >= 2).collect();
     for folder in folders {
-        walk(folder, folder, &marks, &mut searched)?;
+        walk(folder, folder, &terms, &mut searched)?;
     }
     Ok(searched)
 }
 
 /// Whether one of the terms is in the bytes.
-pub fn is_in(bytes: &[u8], marks: &[SearchTerm]) -> bool {
-    let marks: Vec<&SearchTerm> = marks.iter().filter(|mark| mark.bytes.len() >= 2).collect();
-    let mut scan = Scan::new(&marks);
+pub fn is_in(bytes: &[u8], terms: &[SearchTerm]) -> bool {
+    let terms: Vec<&SearchTerm> = terms.iter().filter(|term| term.bytes.len() >= 2).collect();
+    let mut scan = Scan::new(&terms);
     scan.piece(bytes);
     !scan.found.is_empty()
 }
 
-fn walk(root: &Path, path: &Path, marks: &[&SearchTerm], searched: &mut Searched) -> Result<()> {
+fn walk(root: &Path, path: &Path, terms: &[&SearchTerm], searched: &mut Searched) -> Result<()> {
     let reading = || format!("cannot search {}", path.display());
     if !path.exists() && !path.is_symlink() {
         return Ok(());
     }
     if path != root {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let mut scan = Scan::new(marks);
+        let mut scan = Scan::new(terms);
         scan.piece(name.as_bytes());
         let found =
             scan.found.into_iter().map(|(_, what)| SearchHit { file: path.display().to_string(), at: None, what });
@@ -96,10 +96,10 @@ fn walk(root: &Path, path: &Path, marks: &[&SearchTerm], searched: &mut Searched
         let entries = std::fs::read_dir(path).with_context(reading)?;
         let mut entries = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>().with_context(reading)?;
         entries.sort();
-        return entries.iter().try_for_each(|entry| walk(root, entry, marks, searched));
+        return entries.iter().try_for_each(|entry| walk(root, entry, terms, searched));
     }
     searched.n_files += 1;
-    let (bytes, found) = scan(File::open(path).with_context(reading)?, marks).with_context(reading)?;
+    let (bytes, found) = scan(File::open(path).with_context(reading)?, terms).with_context(reading)?;
     searched.bytes += bytes;
     let place = |file: &str, (at, what)| SearchHit { file: file.to_owned(), at: Some(at), what };
     let file = path.display().to_string();
@@ -110,7 +110,7 @@ fn walk(root: &Path, path: &Path, marks: &[&SearchTerm], searched: &mut Searched
         for n in 0..archive.len() {
             let entry = archive.by_index(n).with_context(reading)?;
             let inside = format!("{file}!{}", entry.name());
-            let (bytes, found) = scan(entry, marks).with_context(reading)?;
+            let (bytes, found) = scan(entry, terms).with_context(reading)?;
             searched.inside_bytes += bytes;
             searched.places.extend(found.into_iter().map(|found| place(&inside, found)));
         }
@@ -119,8 +119,8 @@ fn walk(root: &Path, path: &Path, marks: &[&SearchTerm], searched: &mut Searched
 }
 
 /// Number of bytes read, and offset and description of each term found.
-fn scan(mut from: impl Read, marks: &[&SearchTerm]) -> Result<(u64, Vec<(u64, String)>)> {
-    let mut scan = Scan::new(marks);
+fn scan(mut from: impl Read, terms: &[&SearchTerm]) -> Result<(u64, Vec<(u64, String)>)> {
+    let mut scan = Scan::new(terms);
     let mut piece = vec![0; PIECE];
     loop {
         let n = match from.read(&mut piece) {
@@ -136,7 +136,7 @@ fn scan(mut from: impl Read, marks: &[&SearchTerm]) -> Result<(u64, Vec<(u64, St
 
 /// Search through bytes that arrive in pieces.
 struct Scan<'a> {
-    marks: &'a [&'a SearchTerm],
+    terms: &'a [&'a SearchTerm],
     /// For every pair of bytes, whether a term begins with it.
     begins: Vec<bool>,
     longest: usize,
@@ -148,11 +148,11 @@ struct Scan<'a> {
 }
 
 impl<'a> Scan<'a> {
-    fn new(marks: &'a [&'a SearchTerm]) -> Self {
+    fn new(terms: &'a [&'a SearchTerm]) -> Self {
         let mut begins = vec![false; 1 << 16];
-        marks.iter().for_each(|mark| begins[pair(&mark.bytes)] = true);
-        let longest = marks.iter().map(|mark| mark.bytes.len()).max().unwrap_or(0);
-        Self { marks, begins, longest, tail: Vec::new(), at: 0, found: Vec::new() }
+        terms.iter().for_each(|term| begins[pair(&term.bytes)] = true);
+        let longest = terms.iter().map(|term| term.bytes.len()).max().unwrap_or(0);
+        Self { terms, begins, longest, tail: Vec::new(), at: 0, found: Vec::new() }
     }
 
     fn piece(&mut self, piece: &[u8]) {
@@ -164,14 +164,14 @@ impl<'a> Scan<'a> {
             if !self.begins[pair(&bytes[at..])] {
                 continue;
             }
-            for mark in self.marks {
-                let end = at + mark.bytes.len();
+            for term in self.terms {
+                let end = at + term.bytes.len();
                 // Matches that end in the tail were found before.
-                let new = end > n_tail && bytes.get(at..end) == Some(mark.bytes.as_slice());
+                let new = end > n_tail && bytes.get(at..end) == Some(term.bytes.as_slice());
                 let before = at.checked_sub(1).map(|before| bytes[before]);
                 let joined = before.is_some_and(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_');
-                if new && !(mark.whole && joined) {
-                    self.found.push((start + at as u64, mark.what.clone()));
+                if new && !(term.whole && joined) {
+                    self.found.push((start + at as u64, term.what.clone()));
                 }
             }
         }
@@ -194,7 +194,7 @@ mod tests {
     use super::*;
     use std::io::Write as _;
 
-    fn marks() -> Vec<SearchTerm> {
+    fn terms() -> Vec<SearchTerm> {
         let hash = blake3::hash(b"a").to_hex().to_string();
         [vec![SearchTerm::name("file", "a.mp4")], SearchTerm::hash("content", &hash)].concat()
     }
@@ -213,7 +213,7 @@ mod tests {
         npz.write_all(b"header a.mp4").unwrap();
         npz.finish().unwrap();
         std::fs::create_dir(dir.path().join("a.mp4")).unwrap();
-        let searched = search(&[dir.path().to_owned()], &marks()).unwrap();
+        let searched = search(&[dir.path().to_owned()], &terms()).unwrap();
         let mut files: Vec<String> =
             searched.places.iter().map(|p| p.file.rsplit('/').next().unwrap().to_owned()).collect();
         files.dedup();
@@ -226,11 +226,11 @@ mod tests {
 
     #[test]
     fn a_mark_across_two_pieces_is_found_once() {
-        let marks = marks();
-        let marks: Vec<&SearchTerm> = marks.iter().collect();
+        let terms = terms();
+        let terms: Vec<&SearchTerm> = terms.iter().collect();
         let text: Vec<u8> = [&[b' '; 300][..], b"a.mp4", &[b' '; 300]].concat();
         for step in [1, 2, 3, 7, 64, 305, 1000] {
-            let mut scan = Scan::new(&marks);
+            let mut scan = Scan::new(&terms);
             text.chunks(step).for_each(|piece| scan.piece(piece));
             assert_eq!(scan.found, [(300, "file a.mp4".to_owned())], "pieces of {step}");
             assert_eq!(scan.at, 605);

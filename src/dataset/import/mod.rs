@@ -13,7 +13,6 @@ pub mod take;
 pub mod transcript;
 pub mod write;
 
-pub use super::import::plan::ImportPlan;
+pub use plan::ImportPlan;
 pub use take::ImportedTake;
-pub use write::Imported;
-pub use write::import;
+pub use write::{Imported, import};

@@ -54,18 +54,18 @@ pub struct InspectedItem {
 impl ImportItem {
     /// Items in the sources, and notes on what was left out of their tars.
     pub fn all(sources: &ImportSources) -> (Vec<Self>, Vec<String>) {
-        let mut origins: Vec<Self> = sources.takes.iter().cloned().map(Self::Take).collect();
+        let mut items: Vec<Self> = sources.takes.iter().cloned().map(Self::Take).collect();
         for dir in &sources.datasets {
             match part::names(dir) {
-                Ok(names) => origins.extend(names.into_iter().map(|name| Self::Part(dir.clone(), name))),
-                Err(error) => origins.push(Self::Unknown(dir.clone(), format!("{error:#}"))),
+                Ok(names) => items.extend(names.into_iter().map(|name| Self::Part(dir.clone(), name))),
+                Err(error) => items.push(Self::Unknown(dir.clone(), format!("{error:#}"))),
             }
         }
         let loose = shards::open(&sources.tars);
-        origins.extend(loose.videos.into_iter().map(Self::Loose));
+        items.extend(loose.videos.into_iter().map(Self::Loose));
         let unknown = loose.failed.into_iter().chain(sources.unknown.iter().cloned());
-        origins.extend(unknown.map(|(path, why)| Self::Unknown(path, why)));
-        (origins, loose.notes)
+        items.extend(unknown.map(|(path, why)| Self::Unknown(path, why)));
+        (items, loose.notes)
     }
 
     /// Name for people.
@@ -94,14 +94,14 @@ impl ImportItem {
     }
 
     /// Inspects the item; what cannot be read is a failure.
-    pub fn look(&self, plan: &ImportPlan) -> InspectedItem {
-        let look = match self {
+    pub fn inspect(&self, plan: &ImportPlan) -> InspectedItem {
+        let inspected = match self {
             Self::Take(found) => look_at_take(found, plan),
             Self::Part(dir, name) => look_at_part(dir, name, plan),
             Self::Loose(video) => look_at_loose(video, plan),
             Self::Unknown(_, why) => Err(anyhow::anyhow!("{why}")),
         };
-        look.unwrap_or_else(|error| self.failed(&format!("{error:#}")))
+        inspected.unwrap_or_else(|error| self.failed(&format!("{error:#}")))
     }
 
     fn failed(&self, error: &str) -> InspectedItem {
@@ -127,15 +127,21 @@ impl ImportItem {
     }
 
     /// Writes the item into the dataset in `out` according to its inspection.
-    pub fn write(&self, look: &InspectedItem, plan: &ImportPlan, writer: &DatasetWriter, out: &Path) -> Result<()> {
-        let Some((split, by)) = look.split.clone().filter(|_| look.is_kept()) else {
-            writer.video(look.source.clone(), Split::Train, SplitBy::Content)?.finish(None)?;
+    pub fn write(
+        &self,
+        inspected: &InspectedItem,
+        plan: &ImportPlan,
+        writer: &DatasetWriter,
+        out: &Path,
+    ) -> Result<()> {
+        let Some((split, by)) = inspected.split.clone().filter(|_| inspected.is_kept()) else {
+            writer.video(inspected.source.clone(), Split::Train, SplitBy::Content)?.finish(None)?;
             return Ok(());
         };
         if let Self::Part(dir, name) = self {
             return VideoEntry::read(&VideoEntry::path(dir, name))?.take_over(dir, out);
         }
-        let mut part = writer.video(look.source.clone(), split, by)?;
+        let mut part = writer.video(inspected.source.clone(), split, by)?;
         match self {
             Self::Take(found) => {
                 let TakeOutcome::Kept(kept) = ImportedTake::read(found, &plan.limits)?.ended else {
@@ -151,7 +157,7 @@ impl ImportItem {
             }
             Self::Part(..) | Self::Unknown(..) => {}
         }
-        part.finish(look.sound.clone())?;
+        part.finish(inspected.sound.clone())?;
         Ok(())
     }
 }

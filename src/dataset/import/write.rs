@@ -44,81 +44,81 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
     let sources = find::find(&plan.sources, plan.kind)?;
     let (mut about, notes) = (plan.about.clone(), notes(&sources.takes));
     about.notes.extend(notes);
-    let (origins, left_out) = ImportItem::all(&sources);
-    let task = progress.begin("look", origins.len() as u64);
+    let (items, left_out) = ImportItem::all(&sources);
+    let task = progress.begin("look", items.len() as u64);
     let mut names = BTreeSet::new();
-    let mut looks: Vec<InspectedItem> = Vec::new();
-    for origin in &origins {
-        task.detail(&origin.file());
-        let mut look = origin.look(plan);
-        if !names.insert(look.source.name.clone()) {
-            look = look.twice(names.len() + looks.len());
-            names.insert(look.source.name.clone());
+    let mut inspected: Vec<InspectedItem> = Vec::new();
+    for item in &items {
+        task.detail(&item.file());
+        let mut one = item.inspect(plan);
+        if !names.insert(one.source.name.clone()) {
+            one = one.twice(names.len() + inspected.len());
+            names.insert(one.source.name.clone());
         }
-        if let (Some(codes), true) = (&look.codes, look.is_kept()) {
-            look.sound = Some(part::write_sound(out, &look.source.name, codes)?);
-            look.codes = None;
+        if let (Some(codes), true) = (&one.codes, one.is_kept()) {
+            one.sound = Some(part::write_sound(out, &one.source.name, codes)?);
+            one.codes = None;
         }
-        looks.push(look);
+        inspected.push(one);
         task.advance(1);
     }
     drop(task);
-    let kept: Vec<usize> = (0..looks.len()).filter(|&at| looks[at].is_kept()).collect();
-    ensure!(!kept.is_empty(), "nothing can be imported: {}", first_reasons(&origins, &looks));
-    let compared = compare(&looks, &kept, out, plan.dataset.duplicate_secs)?;
-    for (&at, placed) in kept.iter().zip(place(&looks, &kept, &compared, &plan.dataset)) {
-        match placed {
-            Assignment::In(split, by) => looks[at].split = Some((split, by)),
+    let kept: Vec<usize> = (0..inspected.len()).filter(|&at| inspected[at].is_kept()).collect();
+    ensure!(!kept.is_empty(), "nothing can be imported: {}", first_reasons(&items, &inspected));
+    let compared = compare(&inspected, &kept, out, plan.dataset.duplicate_secs)?;
+    for (&at, assigned) in kept.iter().zip(assign(&inspected, &kept, &compared, &plan.dataset)) {
+        match assigned {
+            Assignment::In(split, by) => inspected[at].split = Some((split, by)),
             Assignment::Nowhere(with) => {
-                part::remove_sound(out, &looks[at].source.name)?;
-                looks[at].refuse_shared(&with, plan.dataset.duplicate_secs);
+                part::remove_sound(out, &inspected[at].source.name)?;
+                inspected[at].refuse_shared(&with, plan.dataset.duplicate_secs);
             }
         }
     }
     let max_shard_bytes = u64::from(plan.dataset.max_mb) << 20;
     let writer = DatasetWriter::new(out, about, max_shard_bytes).with_compared(compared);
-    let task = progress.begin("write", origins.len() as u64);
+    let task = progress.begin("write", items.len() as u64);
     let mut lines = Vec::new();
-    for (origin, look) in origins.iter().zip(&looks) {
-        task.detail(&origin.file());
-        origin.write(look, plan, &writer, out).with_context(|| format!("importing {}", origin.file()))?;
-        lines.push(look.line(&origin.file()));
+    for (item, inspected) in items.iter().zip(&inspected) {
+        task.detail(&item.file());
+        item.write(inspected, plan, &writer, out).with_context(|| format!("importing {}", item.file()))?;
+        lines.push(inspected.line(&item.file()));
         task.advance(1);
     }
     let (info, stats) = writer.finish()?;
     Ok(Imported { lines, notes: left_out, info, stats })
 }
 
-fn compare(looks: &[InspectedItem], kept: &[usize], out: &Path, duplicate_secs: f64) -> Result<SoundComparison> {
+fn compare(inspected: &[InspectedItem], kept: &[usize], out: &Path, duplicate_secs: f64) -> Result<SoundComparison> {
     if duplicate_secs <= 0.0 {
         return Ok(SoundComparison::default());
     }
-    let audible = kept.iter().filter(|&&at| looks[at].sound.is_some());
-    let mut names: Vec<String> = audible.map(|&at| looks[at].source.name.clone()).collect();
+    let audible = kept.iter().filter(|&&at| inspected[at].sound.is_some());
+    let mut names: Vec<String> = audible.map(|&at| inspected[at].source.name.clone()).collect();
     names.sort();
     let shared = shared_sound::find(&names, |n| part::read_sound(out, &names[n]), duplicate_secs)?;
     Ok(SoundComparison { duplicate_secs, shared })
 }
 
 /// Assigns each kept video to a split; one of a dataset keeps its split.
-fn place(
-    looks: &[InspectedItem],
+fn assign(
+    inspected: &[InspectedItem],
     kept: &[usize],
     compared: &SoundComparison,
     settings: &config::DatasetConfig,
 ) -> Vec<Assignment> {
     let waiting = kept.iter().map(|&at| {
-        let InspectedItem { source, split, .. } = &looks[at];
+        let InspectedItem { source, split, .. } = &inspected[at];
         // Without a content hash the name decides.
         let content = if source.content.is_empty() { &source.name } else { &source.content };
         Unassigned { name: &source.name, content, named: split.as_ref().map(|(split, _)| *split), before: None }
     });
-    let placed = split::assign(&waiting.collect::<Vec<_>>(), &compared.shared, settings.validation, settings.test);
-    let as_before = |(at, placed): (&usize, Assignment)| match (&looks[*at].split, placed) {
+    let assigned = split::assign(&waiting.collect::<Vec<_>>(), &compared.shared, settings.validation, settings.test);
+    let as_before = |(at, assigned): (&usize, Assignment)| match (&inspected[*at].split, assigned) {
         (Some((split, by)), _) => Assignment::In(*split, by.clone()),
-        (None, placed) => placed,
+        (None, assigned) => assigned,
     };
-    kept.iter().zip(placed).map(as_before).collect()
+    kept.iter().zip(assigned).map(as_before).collect()
 }
 
 /// Notes on the kinds of sources for readers of the dataset.
@@ -152,9 +152,9 @@ fn notes(takes: &[TakeFiles]) -> Vec<String> {
 }
 
 /// First few reasons why nothing is kept.
-fn first_reasons(origins: &[ImportItem], looks: &[InspectedItem]) -> String {
+fn first_reasons(items: &[ImportItem], inspected: &[InspectedItem]) -> String {
     let mut reasons: BTreeMap<String, usize> = BTreeMap::new();
-    let lines = origins.iter().zip(looks).map(|(origin, look)| look.line(&origin.file()));
+    let lines = items.iter().zip(inspected).map(|(item, inspected)| inspected.line(&item.file()));
     let mut said: Vec<String> = Vec::new();
     for line in lines {
         let n = reasons.entry(line.reason.clone()).or_default();

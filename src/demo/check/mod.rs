@@ -1,6 +1,5 @@
 //! Checks of the pipeline and of trained models against the synthetic speaker's ground truth.
 
-pub mod disturbed;
 pub mod learned;
 pub mod pipeline;
 pub mod sheet;

@@ -97,9 +97,9 @@ pub fn measure(dir: &Path) -> Result<PipelineCheck> {
         let n_frames = sample.n_frames().min(truth.motion.n_frames().saturating_sub(first));
         for start in (0..n_frames).step_by(SEGMENT) {
             let end = (start + SEGMENT).min(n_frames);
-            let told = sample.motion.joints.slice(s![start..end, .., ..]);
+            let predicted = sample.motion.joints.slice(s![start..end, .., ..]);
             let known = truth.motion.joints.slice(s![first + start..first + end, .., ..]);
-            lifted.push(scaled(told));
+            lifted.push(scaled(predicted));
             true_joints.push(scaled(known));
         }
         measured.n_frames += n_frames;
@@ -195,20 +195,20 @@ fn scaled(segment: ArrayView3<f32>) -> Array3<f32> {
     segment.mapv(|v| v * ARM_METRES / size)
 }
 
-/// Copy of `told` with the joints that have a number in `lifted`, others NaN.
-fn where_known(mut told: Array3<f32>, lifted: &Array3<f32>) -> Array3<f32> {
-    Zip::from(&mut told).and(lifted).for_each(|v, known| {
+/// Copy of `predicted` with the joints that have a number in `lifted`, others NaN.
+fn where_known(mut predicted: Array3<f32>, lifted: &Array3<f32>) -> Array3<f32> {
+    Zip::from(&mut predicted).and(lifted).for_each(|v, known| {
         if !known.is_finite() {
             *v = f32::NAN;
         }
     });
-    told
+    predicted
 }
 
 /// Joints with x and y of `truth`, each in front of its parent as the bone's mean length implies; shoulders lie in the
 /// picture's plane.
 fn with_bone_depth(truth: &Array3<f32>) -> Array3<f32> {
-    let mut told = truth.clone();
+    let mut predicted = truth.clone();
     // In joint order a parent precedes its children.
     for (joint, parent) in (0..N_JOINTS).filter_map(|joint| Some((joint, parent(joint)?))) {
         let bone = &truth.slice(s![.., joint, ..]) - &truth.slice(s![.., parent, ..]);
@@ -217,21 +217,22 @@ fn with_bone_depth(truth: &Array3<f32>) -> Array3<f32> {
         for (t, bone) in bone.outer_iter().enumerate() {
             let rest = (length * length - bone[0] * bone[0] - bone[1] * bone[1]).max(0.0).sqrt();
             let depth = if parent == NECK { 0.0 } else { rest };
-            told[[t, joint, 2]] = told[[t, parent, 2]] - depth;
+            predicted[[t, joint, 2]] = predicted[[t, parent, 2]] - depth;
         }
     }
-    told
+    predicted
 }
 
 /// Mean distances between joints [T, 49, 3] in metres; non-finite joints are left out.
-fn distances(told: &Array3<f32>, truth: &Array3<f32>) -> Millimetres {
+fn distances(predicted: &Array3<f32>, truth: &Array3<f32>) -> Millimetres {
     let mean = |joints: &[usize], from: &dyn Fn(usize) -> usize| {
         let (mut sum, mut count) = (0.0, 0usize);
-        for (told, truth) in told.outer_iter().zip(truth.outer_iter()) {
+        for (predicted, truth) in predicted.outer_iter().zip(truth.outer_iter()) {
             for &joint in joints {
                 let root = from(joint);
-                let apart =
-                    |k: usize| f64::from((told[[joint, k]] - told[[root, k]]) - (truth[[joint, k]] - truth[[root, k]]));
+                let apart = |k: usize| {
+                    f64::from((predicted[[joint, k]] - predicted[[root, k]]) - (truth[[joint, k]] - truth[[root, k]]))
+                };
                 let distance = (0..3).map(|k| apart(k).powi(2)).sum::<f64>().sqrt();
                 if distance.is_finite() {
                     sum += distance;
@@ -294,10 +295,10 @@ mod tests {
         let truth = DrawnTruth::new(&DrawnScene::new(2, 4.0, [640, 480]), DATASET_FPS).motion.joints;
         let mut lifted = truth.clone();
         lifted.slice_mut(s![.., L_WRIST, ..]).fill(f32::NAN);
-        let mut told = truth.clone();
-        told.slice_mut(s![.., L_WRIST, ..]).mapv_inplace(|v| v + 1.0);
-        assert!(distances(&told, &truth).body > 10.0);
-        assert!(distances(&where_known(told, &lifted), &truth).body < 1e-3);
+        let mut predicted = truth.clone();
+        predicted.slice_mut(s![.., L_WRIST, ..]).mapv_inplace(|v| v + 1.0);
+        assert!(distances(&predicted, &truth).body > 10.0);
+        assert!(distances(&where_known(predicted, &lifted), &truth).body < 1e-3);
         let mut flat = truth.clone();
         flat.slice_mut(s![.., .., 2]).fill(0.0);
         let (solved, flat) = (distances(&with_bone_depth(&truth), &truth), distances(&flat, &truth));

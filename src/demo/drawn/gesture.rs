@@ -129,7 +129,7 @@ fn arm([out, down, away, roll, raise, curl, index, spread]: [f64; N_ARM]) -> Arm
 }
 
 /// Minimum-jerk profile from 0 to 1 (Flash and Hogan 1985).
-fn minimum_jerk(along: f64) -> f64 {
+pub fn minimum_jerk(along: f64) -> f64 {
     let u = along.clamp(0.0, 1.0);
     u * u * u * (10.0 + u * (6.0 * u - 15.0))
 }

@@ -2,6 +2,7 @@
 //! variation on top.
 
 use crate::demo::drawn::figure::{ArmControls, Controls, DrawnFigure};
+use crate::demo::drawn::gesture::minimum_jerk;
 use crate::demo::drawn::speech::{Speech, Syllable};
 use crate::math::vec3::sub;
 use crate::types::pose3d::Motion;
@@ -212,12 +213,6 @@ fn missed(goal: &ArmTarget, rng: &mut ChaCha8Rng) -> ArmTarget {
 
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
-}
-
-/// Minimum-jerk profile from 0 to 1 (Flash and Hogan 1985).
-fn minimum_jerk(along: f64) -> f64 {
-    let u = along.clamp(0.0, 1.0);
-    u * u * u * (10.0 + u * (6.0 * u - 15.0))
 }
 
 #[cfg(test)]

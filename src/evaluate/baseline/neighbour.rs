@@ -53,34 +53,35 @@ struct QueryWindow {
 type NearestMatch = (f32, usize, usize);
 
 /// Motion [T, 49, 3] for each query, NaN where the library's is; `None` where a window finds nothing long enough.
-pub fn motions(query: &[Query], library: &dyn Library, fps: FrameRate) -> Result<Option<Vec<Array3<f32>>>> {
-    let wanted: Vec<QueryWindow> = query.iter().enumerate().flat_map(|(i, query)| stretches(i, query, fps)).collect();
+pub fn motions(queries: &[Query], library: &dyn Library, fps: FrameRate) -> Result<Option<Vec<Array3<f32>>>> {
+    let windows: Vec<QueryWindow> =
+        queries.iter().enumerate().flat_map(|(i, query)| stretches(i, query, fps)).collect();
     let best = (0..library.len())
         .into_par_iter()
         .map(|entry| -> Result<Vec<Option<NearestMatch>>> {
-            let Some((rows, n_frames)) = library.features(entry)? else { return Ok(vec![None; wanted.len()]) };
-            let find = |wanted: &QueryWindow| {
-                library.may_answer(wanted.query, entry).then(|| nearest(&rows, n_frames, wanted, entry)).flatten()
+            let Some((rows, n_frames)) = library.features(entry)? else { return Ok(vec![None; windows.len()]) };
+            let find = |window: &QueryWindow| {
+                library.may_answer(window.query, entry).then(|| nearest(&rows, n_frames, window, entry)).flatten()
             };
-            Ok(wanted.par_iter().map(find).collect())
+            Ok(windows.par_iter().map(find).collect())
         })
         .try_reduce(
-            || vec![None; wanted.len()],
+            || vec![None; windows.len()],
             |a, b| Ok(a.into_iter().zip(b).map(|(a, b)| nearer(a, b)).collect()),
         )?;
-    let mut predicted: Vec<Array3<f32>> = query.iter().map(|a| Array3::zeros((a.n_frames, N_JOINTS, 3))).collect();
+    let mut predicted: Vec<Array3<f32>> = queries.iter().map(|a| Array3::zeros((a.n_frames, N_JOINTS, 3))).collect();
     // Ordered by entry, so that each is read once.
-    let mut places: Vec<(usize, usize, &QueryWindow)> = Vec::with_capacity(wanted.len());
-    for (wanted, found) in wanted.iter().zip(best) {
+    let mut places: Vec<(usize, usize, &QueryWindow)> = Vec::with_capacity(windows.len());
+    for (window, found) in windows.iter().zip(best) {
         let Some((_, entry, first)) = found else { return Ok(None) };
-        places.push((entry, first, wanted));
+        places.push((entry, first, window));
     }
     places.sort_by_key(|(entry, _, _)| *entry);
     for of_entry in places.chunk_by(|a, b| a.0 == b.0) {
         let joints = library.joints(of_entry[0].0)?;
-        for (_, first, wanted) in of_entry {
-            let from = joints.slice(s![*first..first + wanted.frames.len(), .., ..]);
-            predicted[wanted.query].slice_mut(s![wanted.frames.clone(), .., ..]).assign(&from);
+        for (_, first, window) in of_entry {
+            let from = joints.slice(s![*first..first + window.frames.len(), .., ..]);
+            predicted[window.query].slice_mut(s![window.frames.clone(), .., ..]).assign(&from);
         }
     }
     Ok(Some(predicted))
@@ -99,11 +100,11 @@ fn stretches(query: usize, sound: &Query, fps: FrameRate) -> Vec<QueryWindow> {
 }
 
 /// Best match of a window within one entry.
-fn nearest(rows: &[f32], n_frames: usize, wanted: &QueryWindow, entry: usize) -> Option<NearestMatch> {
-    let places = (0..).step_by(STRIDE).take_while(|row| row * POOLED + wanted.frames.len() <= n_frames);
+fn nearest(rows: &[f32], n_frames: usize, window: &QueryWindow, entry: usize) -> Option<NearestMatch> {
+    let places = (0..).step_by(STRIDE).take_while(|row| row * POOLED + window.frames.len() <= n_frames);
     let of_place = |row: usize| {
-        let sound = rows.get(row * mel::N_MELS..)?.get(..wanted.rows.len())?;
-        Some((distance(sound, &wanted.rows), entry, row * POOLED))
+        let sound = rows.get(row * mel::N_MELS..)?.get(..window.rows.len())?;
+        Some((distance(sound, &window.rows), entry, row * POOLED))
     };
     places.map(of_place).fold(None, nearer)
 }

@@ -38,7 +38,7 @@ pub struct EvalClip {
     pub mask: Array2<bool>,
     pub features: Option<SoundFeatures>,
     /// Sound for the player of the report.
-    pub voice: Option<ClipAudio>,
+    pub audio: Option<ClipAudio>,
 }
 
 /// Sound that can be read again.
@@ -60,8 +60,8 @@ impl ClipAudio {
                 let (mut n, mut samples) = (0, Vec::new());
                 for piece in SoundStream::open(path, SAMPLE_RATE) {
                     let piece = piece?;
-                    let wanted = from.saturating_sub(n).min(piece.len())..to.saturating_sub(n).min(piece.len());
-                    samples.extend(piece[wanted].iter().copied().map(pcm));
+                    let range = from.saturating_sub(n).min(piece.len())..to.saturating_sub(n).min(piece.len());
+                    samples.extend(piece[range].iter().copied().map(pcm));
                     n += piece.len();
                     if n >= to {
                         break;
@@ -207,7 +207,7 @@ fn clip(pair: &FilePair, given: Option<FrameRate>, fps: FrameRate) -> Result<(Ev
             ),
         }
     }
-    let voice = pair.sound.clone().filter(|_| features.is_some()).map(ClipAudio::File);
+    let audio = pair.sound.clone().filter(|_| features.is_some()).map(ClipAudio::File);
     Ok((
         EvalClip {
             name: pair.name.clone(),
@@ -215,7 +215,7 @@ fn clip(pair: &FilePair, given: Option<FrameRate>, fps: FrameRate) -> Result<(Ev
             predicted: predicted_joints,
             mask,
             features,
-            voice,
+            audio,
         },
         notes,
     ))
@@ -231,9 +231,9 @@ pub fn compared(ground_truth: &Array3<f32>, seen: &Array2<bool>, predicted: &mut
     let there = |joints: &Array3<f32>, t: usize, joint: usize| (0..3).all(|k| joints[[t, joint, k]].is_finite());
     let mask = Array2::from_shape_fn(seen.raw_dim(), |(t, joint)| seen[[t, joint]] && there(ground_truth, t, joint));
     let mut n_missing = 0;
-    for ((t, joint), wanted) in mask.indexed_iter() {
+    for ((t, joint), range) in mask.indexed_iter() {
         if !there(predicted, t, joint) {
-            n_missing += usize::from(*wanted);
+            n_missing += usize::from(*range);
             (0..3).for_each(|k| predicted[[t, joint, k]] = if t > 0 { predicted[[t - 1, joint, k]] } else { 0.0 });
         }
     }

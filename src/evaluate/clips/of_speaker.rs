@@ -112,8 +112,8 @@ fn clip(held_out: HeldOutInterval, predicted: Array3<f32>, fps: FrameRate) -> Ev
     let features = Some(sound_features::of_samples(&sound.samples, fps, ground_truth.n_frames()));
     let mut predicted = predicted;
     let (mask, _) = compared(&ground_truth.joints, &ground_truth.mask, &mut predicted);
-    let voice = Some(ClipAudio::Kept(sound.samples.into_iter().map(pcm).collect()));
-    EvalClip { name: key, ground_truth: ground_truth.joints, predicted, mask, features, voice }
+    let audio = Some(ClipAudio::Kept(sound.samples.into_iter().map(pcm).collect()));
+    EvalClip { name: key, ground_truth: ground_truth.joints, predicted, mask, features, audio }
 }
 
 /// Mean and median pose of the training split.

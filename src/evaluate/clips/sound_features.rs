@@ -70,8 +70,8 @@ impl SoundFeatureExtractor {
     pub fn finish(mut self, n_frames: usize) -> SoundFeatures {
         let secs = self.n_samples as f64 / f64::from(SAMPLE_RATE);
         let n_rows = n_frames.div_ceil(POOLED);
-        let wanted = mel::n_samples(mel_frames(self.fps, n_rows * POOLED) + 1);
-        let more = wanted.saturating_sub(self.n_mels * mel::HOP + self.waiting.len());
+        let range = mel::n_samples(mel_frames(self.fps, n_rows * POOLED) + 1);
+        let more = range.saturating_sub(self.n_mels * mel::HOP + self.waiting.len());
         self.waiting.resize(self.waiting.len() + more, 0.0);
         self.pool();
         self.rows.truncate(n_rows * mel::N_MELS);

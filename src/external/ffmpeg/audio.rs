@@ -26,11 +26,11 @@ const STRETCH_SECS: f64 = 1.0;
 /// sound.
 pub fn read_mono(path: &Path, rate: u32) -> Result<Option<Sound>> {
     let mut samples = Vec::new();
-    let heard = stream_mono(path, rate, &mut |piece| {
+    let streamed = stream_mono(path, rate, &mut |piece| {
         samples.extend_from_slice(piece);
         Ok(())
     })?;
-    Ok(heard.map(|_| Sound { rate, samples }))
+    Ok(streamed.map(|_| Sound { rate, samples }))
 }
 
 /// The whole sound of `path` as mono at 16 kHz.
@@ -218,10 +218,10 @@ impl SoundTimeline<'_> {
     fn deliver(&mut self) -> Result<()> {
         let n_skip = self.n_skip.min(self.ready.len() as u64);
         self.n_skip -= n_skip;
-        let heard = &self.ready[n_skip as usize..];
-        if !heard.is_empty() {
-            (self.sink)(heard)?;
-            self.n_written += heard.len() as u64;
+        let streamed = &self.ready[n_skip as usize..];
+        if !streamed.is_empty() {
+            (self.sink)(streamed)?;
+            self.n_written += streamed.len() as u64;
         }
         self.ready.clear();
         Ok(())

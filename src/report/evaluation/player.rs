@@ -85,7 +85,7 @@ fn error_mm(clip: &EvalClip, frames: Range<usize>) -> f64 {
 fn excerpt(word: &str, error: f64, clip: &EvalClip, frames: Range<usize>, fps: f64) -> Result<Excerpt> {
     let (start, end) = (frames.start as f64 / fps, frames.end as f64 / fps);
     let step = (fps / MOST_FPS).ceil().max(1.0) as usize;
-    let samples = clip.voice.as_ref().map(|voice| voice.samples(start, end)).transpose()?;
+    let samples = clip.audio.as_ref().map(|audio| audio.samples(start, end)).transpose()?;
     let shown: Vec<usize> = frames.clone().step_by(step).collect();
     Ok(Excerpt {
         name: format!("{word}: {} from {} to {} ({error:.0} mm)", clip.name, clock(start), clock(end)),

@@ -8,7 +8,5 @@ pub mod node;
 pub mod numbers;
 pub mod picture;
 
-pub use document::Page;
-pub use document::Section;
-pub use node::Node;
-pub use node::node;
+pub use document::{Page, Section};
+pub use node::{Node, node};

@@ -33,8 +33,8 @@ const FIGURES: [(&str, &str, bool); 6] = [
 /// (possibly none). The bytes depend on log and poses alone.
 pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> {
     let lines = log::read(folder)?;
-    let told = TrainingLog::parse(&lines);
-    let charts = told.charts();
+    let training_log = TrainingLog::parse(&lines);
+    let charts = training_log.charts();
     let title = format!("Training of {speaker}");
     let strip = strip(pairs)?;
     let whole = picture(&title, &charts, &strip)?;
@@ -55,9 +55,9 @@ pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> 
     let section = |id, title, body| Section { id, title, body };
     let page = Page {
         title,
-        lead: lead(&told),
+        lead: lead(&training_log),
         sections: vec![
-            section("best", "Best epoch", best(&told)),
+            section("best", "Best epoch", best(&training_log)),
             section("curves", "Curves", vec![node("div").class("grid").children(charts.iter().map(|c| c.card()))]),
             section("poses", "Generated against true poses", poses),
         ],
@@ -68,14 +68,14 @@ pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> 
     workdir::write_file(&folder.join(PAGE), page.html().as_bytes()).context("writing the page of the training")
 }
 
-fn lead(told: &TrainingLog) -> String {
-    let Some(best) = told.best else { return "No validation yet.".to_owned() };
+fn lead(training_log: &TrainingLog) -> String {
+    let Some(best) = training_log.best else { return "No validation yet.".to_owned() };
     let step = |line: &Value| line["step"].as_u64().unwrap_or(0);
-    let last = told.epochs.last().map_or(0, |line| step(line));
+    let last = training_log.epochs.last().map_or(0, |line| step(line));
     let windows = best["validation"]["n_windows"].as_u64().unwrap_or(0) as usize;
     format!(
         "{last} steps. Of {} validations the one at step {} has the best score, measured on {} of the {} split.",
-        told.epochs.len(),
+        training_log.epochs.len(),
         step(best),
         counted(windows, "window"),
         best["validation"]["split"].as_str().unwrap_or("validation"),
@@ -83,8 +83,8 @@ fn lead(told: &TrainingLog) -> String {
 }
 
 /// Table of the best epoch, and a warning where one is due.
-fn best(told: &TrainingLog) -> Vec<Node> {
-    let Some(best) = told.best.map(|line| &line["validation"]) else {
+fn best(training_log: &TrainingLog) -> Vec<Node> {
+    let Some(best) = training_log.best.map(|line| &line["validation"]) else {
         return vec![node("p").class("empty").text("The log has no validation.")];
     };
     let shown = |value: &Value, in_percent: bool| match value.as_f64() {

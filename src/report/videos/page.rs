@@ -29,8 +29,8 @@ pub struct ReportPage {
 }
 
 /// Makes the report. Missing data is named on the page.
-pub fn make(wanted: &ReportRequest, progress: &dyn Progress) -> ReportPage {
-    let ReportRequest { settings, videos, n_pictures } = *wanted;
+pub fn make(request: &ReportRequest, progress: &dyn Progress) -> ReportPage {
+    let ReportRequest { settings, videos, n_pictures } = *request;
     let mut gathered = gather(settings, videos, n_pictures, progress);
     let pictures = draw(settings, &mut gathered, progress);
     let sums = ReportTotals::sum(&gathered.videos);
@@ -45,15 +45,15 @@ pub fn make(wanted: &ReportRequest, progress: &dyn Progress) -> ReportPage {
         "waiting_secs": sums.waiting,
         "missing": gathered.missing,
     });
-    ReportPage { html: page(wanted, &gathered, &pictures, &sums).html(), sums, facts }
+    ReportPage { html: page(request, &gathered, &pictures, &sums).html(), sums, facts }
 }
 
 fn draw(settings: &Settings, gathered: &mut ReportData, progress: &dyn Progress) -> Pictures {
     let mut found = Pictures::new();
-    let wanted: Vec<usize> =
+    let request: Vec<usize> =
         (0..gathered.videos.len()).filter(|video| !gathered.worst.frames_of(*video).is_empty()).collect();
-    let task = progress.begin("pictures", wanted.len() as u64);
-    for number in wanted {
+    let task = progress.begin("pictures", request.len() as u64);
+    for number in request {
         let video = &mut gathered.videos[number];
         task.detail(&video.unit.video);
         match pictures::thumbnails(&settings.work.dir, &video.unit, number, &gathered.worst) {
@@ -65,11 +65,11 @@ fn draw(settings: &Settings, gathered: &mut ReportData, progress: &dyn Progress)
     found
 }
 
-fn page(wanted: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sums: &ReportTotals) -> Page {
-    let rules = &wanted.settings.segment;
-    let per_sec = wanted.settings.extract.rate().per_sec();
+fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sums: &ReportTotals) -> Page {
+    let rules = &request.settings.segment;
+    let per_sec = request.settings.extract.rate().per_sec();
     let ReportData { videos, kept, spread, movement, worst, missing } = gathered;
-    let names: Vec<&str> = wanted.videos.iter().map(|videos| videos.speaker.as_str()).collect();
+    let names: Vec<&str> = request.videos.iter().map(|videos| videos.speaker.as_str()).collect();
     let section = |id, title, body| Section { id, title, body };
     Page {
         title: format!("Report on {}", names.join(", ")),
@@ -84,7 +84,7 @@ fn page(wanted: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sums
             section("timelines", "Timelines", timelines::lines(videos)),
             section("thresholds", "Thresholds", sliders::sliders(kept, rules)),
             section("frames", "Worst frames", gallery(worst, pictures, videos)),
-            section("distributions", "Distributions", distributions::distributions(spread, wanted.settings, per_sec)),
+            section("distributions", "Distributions", distributions::distributions(spread, request.settings, per_sec)),
             section("motion", "Motion", motion::motion(movement)),
         ],
         style: include_str!("page.css"),

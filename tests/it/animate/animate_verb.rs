@@ -3,9 +3,10 @@
 
 use crate::fixtures::animation::bvh::{Bvh, worst_mm};
 use crate::fixtures::figures::{FPS, swinging};
+use crate::fixtures::write_dataset::write_dataset;
 use ndarray::{Array3, s};
 use orator::dataset::sample::N_KEYPOINTS;
-use orator::dataset::{Sample, Split, write_dataset};
+use orator::dataset::{Sample, Split};
 use orator::external::ffmpeg::audio;
 use orator::formats::{authors_txt, joints_npz, npy};
 use orator::types::pose3d::Motion;

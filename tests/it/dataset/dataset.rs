@@ -2,7 +2,8 @@
 
 use crate::fixtures::samples::random_sample;
 use crate::fixtures::skip::python;
-use orator::dataset::{Dataset, Sample, Split, write_dataset};
+use crate::fixtures::write_dataset::write_dataset;
+use orator::dataset::{Dataset, Sample, Split};
 use orator::types::pose3d::Motion;
 use orator::types::time::FrameRate;
 use rand::{Rng, SeedableRng};

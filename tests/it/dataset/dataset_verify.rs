@@ -3,8 +3,9 @@
 
 use crate::fixtures::samples::constant_sample;
 use crate::fixtures::support::files_under;
+use crate::fixtures::write_dataset::write_dataset;
 use orator::dataset::verify::verify::verify;
-use orator::dataset::{Sample, Split, write_dataset};
+use orator::dataset::{Sample, Split};
 use orator::stage::progress::Silent;
 use orator::types::time::FrameRate;
 use rand::{Rng, SeedableRng};

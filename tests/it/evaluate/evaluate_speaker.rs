@@ -4,8 +4,9 @@
 use crate::fixtures::browser::Browser;
 use crate::fixtures::gesture_dataset::{dataset, sample};
 use crate::fixtures::support::Project;
+use crate::fixtures::write_dataset::write_dataset;
 use ndarray::s;
-use orator::dataset::{Dataset, Split, write_dataset};
+use orator::dataset::{Dataset, Split};
 use orator::evaluate::baseline::baselines::ClipMotion;
 use orator::evaluate::clips::clips::{EvalClip, EvalClips};
 use orator::evaluate::clips::held_out;
@@ -109,7 +110,7 @@ fn the_neighbour_by_sound_is_found_where_it_was_taken_from() {
         ground_truth: ground_truth.joints.clone(),
         mask: ground_truth.mask,
         features,
-        voice: None,
+        audio: None,
     };
     let clips = EvalClips { fps, clips: vec![clip], notes: Vec::new(), learnt: false };
     let found = copied(&dataset, &normal, &clips, Split::Validation).unwrap().unwrap();

@@ -3,5 +3,6 @@
 pub mod evaluate;
 pub mod evaluate_files;
 pub mod evaluate_speaker;
+pub mod frechet_response;
 pub mod golden_metrics;
 pub mod metrics;

@@ -3,7 +3,8 @@
 
 use crate::fixtures::samples::constant_sample;
 use crate::fixtures::skip::readers;
-use orator::dataset::{Sample, Split, write_dataset};
+use crate::fixtures::write_dataset::write_dataset;
+use orator::dataset::{Sample, Split};
 use orator::types::time::FrameRate;
 use std::path::Path;
 use std::process::Command;

@@ -2,9 +2,10 @@
 //! resumes exactly, stops when it breaks, and its checkpoint generates.
 
 use crate::fixtures::gesture_dataset::{FPS, dataset, sample};
+use crate::fixtures::write_dataset::write_dataset;
 use orator::config::Gan;
 use orator::config::{AdversarialLoss, MotionRepresentation, NetworkPreset};
-use orator::dataset::{Dataset, Split, write_dataset};
+use orator::dataset::{Dataset, Split};
 use orator::generate::Speaker;
 use orator::generate::model::BEST;
 use orator::stage::progress::{Progress, Silent, Task};

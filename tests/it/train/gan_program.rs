@@ -4,7 +4,8 @@
 
 use crate::fixtures::clips;
 use crate::fixtures::gesture_dataset::{FPS, sample};
-use orator::dataset::{Split, write_dataset};
+use crate::fixtures::write_dataset::write_dataset;
+use orator::dataset::Split;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};

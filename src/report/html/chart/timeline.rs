@@ -53,14 +53,14 @@ fn drawn(stretches: &[TimelineSpan], whole: f64, most: usize) -> Vec<TimelineSpa
             _ => drawn.push((stretch.clone(), usize::from(narrow(stretch)), secs(stretch))),
         }
     }
-    let told = drawn.into_iter().map(|(stretch, n, _)| match n {
+    let merged = drawn.into_iter().map(|(stretch, n, _)| match n {
         0 | 1 => stretch,
         n => TimelineSpan {
             description: format!("{n} short stretches, the longest: {}", stretch.description),
             ..stretch
         },
     });
-    told.collect()
+    merged.collect()
 }
 
 #[cfg(test)]
