@@ -111,7 +111,7 @@ pub use dataset::{Dataset, Sample, Split};
 
 // Speech to motion.
 pub use external::ffmpeg::audio::read_sound;
-pub use generate::Speaker as GestureGenerator;
+pub use generate::GestureGenerator;
 pub use pipeline::batch::{BatchReport, SpeechBatch};
 
 // Motion to files for animation programs.
@@ -120,7 +120,7 @@ pub use animate::{AnimationOptions, Performance, perform};
 
 // Predicted motion against ground truth.
 pub use evaluate::Evaluation;
-pub use metrics::settings::Settings as MetricSettings;
+pub use metrics::settings::MetricSettings;
 
 // Models that look at pictures.
 pub use external::onnx::{ModelState, ModelStore};

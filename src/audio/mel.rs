@@ -60,16 +60,16 @@ fn mel_of(hz: f64) -> f64 {
     1127.0 * (1.0 + hz / 700.0).ln()
 }
 
-static BANDS: LazyLock<Vec<Band>> = LazyLock::new(bands);
+static BANDS: LazyLock<Vec<MelBand>> = LazyLock::new(bands);
 
 /// The bins of one band that have a weight.
-struct Band {
+struct MelBand {
     first: usize,
     weights: Vec<f32>,
 }
 
 /// Triangles with corners equally spaced in mel; the zero bin belongs to none.
-fn bands() -> Vec<Band> {
+fn bands() -> Vec<MelBand> {
     let (low, high) = (mel_of(LOWEST_HZ), mel_of(HIGHEST_HZ));
     let corner = |i: usize| low + (high - low) * i as f64 / (N_MELS + 1) as f64;
     let weight = |band: usize, bin: usize| {
@@ -80,7 +80,7 @@ fn bands() -> Vec<Band> {
     let band = |band: usize| {
         let inside: Vec<usize> = (1..=FFT / 2).filter(|bin| weight(band, *bin) > 0.0).collect();
         let first = inside.first().copied().unwrap_or(0);
-        Band { first, weights: inside.iter().map(|bin| weight(band, *bin) as f32).collect() }
+        MelBand { first, weights: inside.iter().map(|bin| weight(band, *bin) as f32).collect() }
     };
     (0..N_MELS).map(band).collect()
 }

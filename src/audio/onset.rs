@@ -137,7 +137,7 @@ fn peaks(strengths: &[f32]) -> Vec<usize> {
 struct Spectra {
     samples: Vec<f32>,
     window: Vec<f32>,
-    bands: Vec<Band>,
+    bands: Vec<OnsetBand>,
     fft: Arc<dyn RealToComplex<f32>>,
     frame: Vec<f32>,
     spectrum: Vec<Complex<f32>>,
@@ -145,7 +145,7 @@ struct Spectra {
 }
 
 /// The bins of one band that have a weight.
-struct Band {
+struct OnsetBand {
     first: usize,
     weights: Vec<f32>,
 }
@@ -189,7 +189,7 @@ impl Spectra {
 
 /// Triangles of equal area with corners equally spaced on Slaney's mel scale, 0 to 8000 Hz: linear below 1000 Hz,
 /// logarithmic above (Slaney, Auditory Toolbox, 1998).
-fn bands() -> Vec<Band> {
+fn bands() -> Vec<OnsetBand> {
     const LINEAR: f64 = 200.0 / 3.0;
     const BREAK_HZ: f64 = 1000.0;
     let step = 6.4f64.ln() / 27.0;
@@ -209,7 +209,7 @@ fn bands() -> Vec<Band> {
         };
         let bins: Vec<usize> = (0..=WINDOW / 2).filter(|bin| weight(*bin) > 0.0).collect();
         let first = bins.first().copied().unwrap_or(0);
-        Band { first, weights: bins.into_iter().map(weight).collect() }
+        OnsetBand { first, weights: bins.into_iter().map(weight).collect() }
     };
     (0..N_MELS).map(band).collect()
 }

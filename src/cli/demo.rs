@@ -13,7 +13,7 @@ use orator::demo::drawn::folder;
 use orator::demo::drawn::folder::DemoPlan;
 use orator::demo::rule::dataset;
 use orator::external::opencv::png;
-use orator::generate::Speaker;
+use orator::generate::GestureGenerator;
 use orator::mocap::motion_file;
 use orator::stage::workdir;
 use orator::types::time::FrameRate;
@@ -181,7 +181,7 @@ fn speak(dir: &Path, hours: f64, seed: u64, ui: &Ui) -> Result<Outcome> {
 
 fn learned(dataset: &Path, checkpoint: Option<&Path>, picture: Option<&Path>, ui: &Ui) -> Result<Outcome> {
     let dataset = Dataset::open(dataset)?;
-    let speaker = checkpoint.map(Speaker::open).transpose()?;
+    let speaker = checkpoint.map(GestureGenerator::open).transpose()?;
     let learned = learned::measure(&dataset, speaker.as_ref(), ui)?;
     let heads = "predictor                          speed L  speed R  PCK 0.2   energy   pauses       L1";
     let mut text = format!("test split: {} clips, {:.0} s\n{heads}\n", learned.n_clips, learned.secs);

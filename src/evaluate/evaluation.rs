@@ -8,8 +8,8 @@ use super::clips::{of_speaker, pairs};
 use super::table::table;
 use super::table::table::Table;
 use crate::dataset::{Dataset, Split};
-use crate::generate::Speaker;
-use crate::metrics::settings::Settings;
+use crate::generate::GestureGenerator;
+use crate::metrics::settings::MetricSettings;
 use crate::stage::progress::Progress;
 use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
@@ -55,7 +55,7 @@ impl Evaluation {
     ///
     /// # Errors
     /// A split without samples, a dataset of another rate than the generator's.
-    pub fn of_generator(dataset: &Dataset, generator: &Speaker, split: Split, progress: &dyn Progress) -> Result<Self> {
+    pub fn of_generator(dataset: &Dataset, generator: &GestureGenerator, split: Split, progress: &dyn Progress) -> Result<Self> {
         let task = progress.begin("evaluating", 0);
         let of_speaker::SpeakerEvaluation { clips, predictors } =
             of_speaker::material(dataset, generator, split, &*task)?;
@@ -66,7 +66,7 @@ impl Evaluation {
     ///
     /// # Errors
     /// Settings that fit no clip.
-    pub fn measure(&self, settings: &Settings, progress: &dyn Progress) -> Result<Table> {
+    pub fn measure(&self, settings: &MetricSettings, progress: &dyn Progress) -> Result<Table> {
         table::measure(&self.clips, settings, &self.predictors, &*progress.begin("evaluating", 0))
     }
 }

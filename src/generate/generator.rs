@@ -1,13 +1,13 @@
 //! Speech to motion with a trained speaker, chunk by chunk: memory does not grow with the sound.
 
-use super::mel_stream::Heard;
+use super::mel_stream::MelStream;
 use super::mel_stream::mel_frames;
 use super::model;
 use super::model::BEST;
-use super::model::{Facts, TrainedSpeaker};
-use super::normalisation::N_NUMBERS;
+use super::model::{SpeakerMetadata, SpeakerModel};
+use super::normalisation::N_FEATURES;
 use crate::nn::gan::generator::FRAMES_MULTIPLE;
-use crate::nn::gan::streaming::Chunks;
+use crate::nn::gan::streaming::StreamingGenerator;
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::{SAMPLE_RATE, Sound};
@@ -20,37 +20,37 @@ use std::path::Path;
 const CHUNK: usize = 2048;
 
 /// A trained speaker.
-pub struct Speaker {
-    trained: TrainedSpeaker,
+pub struct GestureGenerator {
+    model: SpeakerModel,
 }
 
-impl From<TrainedSpeaker> for Speaker {
-    fn from(trained: TrainedSpeaker) -> Self {
-        Self { trained }
+impl From<SpeakerModel> for GestureGenerator {
+    fn from(model: SpeakerModel) -> Self {
+        Self { model }
     }
 }
 
-impl Speaker {
+impl GestureGenerator {
     /// Opens a checkpoint of `orator train gan`: a file, or the folder of a training (its best checkpoint).
     pub fn open(path: &Path) -> Result<Self> {
         let file = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
         ensure!(file.is_file(), "there is no checkpoint {}; `orator train gan` writes one", file.display());
-        Ok(Self { trained: model::load(&file)? })
+        Ok(Self { model: model::load(&file)? })
     }
 
     /// The speaker's name.
     pub fn name(&self) -> &str {
-        &self.trained.facts.name
+        &self.model.metadata.name
     }
 
     /// What its checkpoint says of it.
-    pub fn facts(&self) -> &Facts {
-        &self.trained.facts
+    pub fn metadata(&self) -> &SpeakerMetadata {
+        &self.model.metadata
     }
 
     /// The rate of the motion it makes.
     pub fn fps(&self) -> FrameRate {
-        self.trained.facts.fps
+        self.model.metadata.fps
     }
 
     /// Motion for `sound` (16 kHz): as many whole frames as fit into it, bones of the speaker's lengths. Errors on another
@@ -86,9 +86,9 @@ impl Speaker {
         let n_frames = self.n_frames(n_samples)?;
         let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
         let mut first = 0;
-        for poses in self.numbers_of(pieces, n_samples, chunk)? {
+        for poses in self.features_of(pieces, n_samples, chunk)? {
             let poses = poses?;
-            let part = self.trained.facts.motion(poses.view());
+            let part = self.model.metadata.motion(poses.view());
             joints.slice_mut(s![first..first + poses.ncols(), .., ..]).assign(&part.joints);
             first += poses.ncols();
             made(poses.ncols());
@@ -99,32 +99,33 @@ impl Speaker {
     /// What the network says for `sound`, [144, T] of one chunk after another, `chunk` frames or less each: raw numbers
     /// that the checkpoint's facts make into motion. The sound is continued by its mirror image up to a multiple of 32
     /// frames (rebol.md section 6).
-    pub fn numbers<'a>(
+    pub fn features<'a>(
         &'a self,
         sound: &'a Sound,
         chunk: usize,
     ) -> Result<impl Iterator<Item = Result<Array2<f32>>> + 'a> {
         ensure!(sound.rate == SAMPLE_RATE, "the sound has {} Hz, expected {SAMPLE_RATE}", sound.rate);
-        self.numbers_of(pieces(sound), sound.samples.len(), chunk)
+        self.features_of(pieces(sound), sound.samples.len(), chunk)
     }
 
-    fn numbers_of<'a>(
+    fn features_of<'a>(
         &'a self,
         pieces: impl Iterator<Item = Result<Vec<f32>>> + 'a,
         n_samples: usize,
         chunk: usize,
     ) -> Result<impl Iterator<Item = Result<Array2<f32>>> + 'a> {
-        let facts = &self.trained.facts;
+        let metadata = &self.model.metadata;
         let n_frames = self.n_frames(n_samples)?;
         let padded = (n_frames / FRAMES_MULTIPLE + 1) * FRAMES_MULTIPLE;
-        let n_mel_frames = mel_frames(facts.fps, padded);
-        let mut heard = Heard::new(pieces, n_samples, n_mel_frames);
-        let mels = move |frames| heard.log_mels(frames).map_err(|error| candle_core::Error::Msg(format!("{error:#}")));
-        let chunks = Chunks::new(&self.trained.generator, facts.network.preset, n_mel_frames, padded, chunk, mels)?;
+        let n_mel_frames = mel_frames(metadata.fps, padded);
+        let mut stream = MelStream::new(pieces, n_samples, n_mel_frames);
+        let mels = move |frames| stream.log_mels(frames).map_err(|error| candle_core::Error::Msg(format!("{error:#}")));
+        let chunks =
+            StreamingGenerator::new(&self.model.generator, metadata.network.preset, n_mel_frames, padded, chunk, mels)?;
         Ok(chunks.zip((0..n_frames).step_by(chunk)).map(move |(poses, first)| {
             let n = chunk.min(n_frames - first);
             let poses = poses?.narrow(2, 0, n)?.flatten_all()?.to_vec1()?;
-            Ok(Array2::from_shape_vec((N_NUMBERS, n), poses)?)
+            Ok(Array2::from_shape_vec((N_FEATURES, n), poses)?)
         }))
     }
 

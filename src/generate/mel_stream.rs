@@ -10,7 +10,7 @@ use candle_core::{Device, Tensor};
 use std::ops::Range;
 
 /// Sound of a known length in pieces of any.
-pub struct Heard<I> {
+pub struct MelStream<I> {
     pieces: I,
     n_samples: usize,
     /// The samples at hand, and which is the first of them.
@@ -20,7 +20,7 @@ pub struct Heard<I> {
     tail: usize,
 }
 
-impl<I: Iterator<Item = Result<Vec<f32>>>> Heard<I> {
+impl<I: Iterator<Item = Result<Vec<f32>>>> MelStream<I> {
     /// `pieces` of `n_samples` together, of which `n_mel_frames` spectrogram frames will be asked for.
     pub fn new(pieces: I, n_samples: usize, n_mel_frames: usize) -> Self {
         let end = mel::n_samples(n_mel_frames);
@@ -77,14 +77,14 @@ pub fn mel_frames(fps: FrameRate, n_frames: usize) -> usize {
 mod tests {
     use super::*;
 
-    fn heard(samples: &[f32], piece: usize, n_mel_frames: usize) -> Heard<impl Iterator<Item = Result<Vec<f32>>>> {
+    fn stream(samples: &[f32], piece: usize, n_mel_frames: usize) -> MelStream<impl Iterator<Item = Result<Vec<f32>>>> {
         let pieces = samples.chunks(piece).map(|piece| Ok(piece.to_vec())).collect::<Vec<_>>();
-        Heard::new(pieces.into_iter(), samples.len(), n_mel_frames)
+        MelStream::new(pieces.into_iter(), samples.len(), n_mel_frames)
     }
 
     #[test]
     fn sound_is_mirrored_as_long_as_needed() {
-        let all = |samples: &[f32], range| heard(samples, 2, 10).mirrored(range).unwrap();
+        let all = |samples: &[f32], range| stream(samples, 2, 10).mirrored(range).unwrap();
         assert_eq!(all(&[1.0, 2.0, 3.0], 0..8), [1.0, 2.0, 3.0, 2.0, 1.0, 2.0, 3.0, 2.0]);
         assert_eq!(all(&[1.0], 0..3), [1.0, 1.0, 1.0]);
         assert_eq!(all(&[1.0, 2.0, 3.0], 3..5), [2.0, 1.0]);
@@ -94,25 +94,25 @@ mod tests {
     fn little_is_kept_and_nothing_is_lost() {
         let samples: Vec<f32> = (0..200_000).map(|i| ((i * 7919) % 1009) as f32 / 1009.0 - 0.5).collect();
         let n_mel_frames = mel::n_frames(210_000);
-        let whole = heard(&samples, 200_000, n_mel_frames).log_mels(0..n_mel_frames).unwrap();
-        let mut heard = heard(&samples, 999, n_mel_frames);
+        let whole = stream(&samples, 200_000, n_mel_frames).log_mels(0..n_mel_frames).unwrap();
+        let mut stream = stream(&samples, 999, n_mel_frames);
         let mut most = 0;
         for first in (0..n_mel_frames).step_by(100) {
             let frames = first.saturating_sub(20)..(first + 100).min(n_mel_frames);
-            let part = heard.log_mels(frames.clone()).unwrap();
+            let part = stream.log_mels(frames.clone()).unwrap();
             let expected = whole.narrow(2, frames.start, frames.len()).unwrap();
             let numbers = |t: &Tensor| t.flatten_all().unwrap().to_vec1::<f32>().unwrap();
             assert_eq!(numbers(&part), numbers(&expected));
-            most = most.max(heard.samples.len());
+            most = most.max(stream.samples.len());
         }
         assert!(most < 32_000, "{most} samples at hand");
     }
 
     #[test]
     fn a_sound_that_became_shorter_is_found_out() {
-        let mut heard = heard(&[0.1; 5000], 999, mel::n_frames(6000));
-        heard.n_samples = 6000;
-        let text = heard.log_mels(0..mel::n_frames(6000)).unwrap_err().to_string();
+        let mut stream = stream(&[0.1; 5000], 999, mel::n_frames(6000));
+        stream.n_samples = 6000;
+        let text = stream.log_mels(0..mel::n_frames(6000)).unwrap_err().to_string();
         assert!(text.contains("5000 of 6000"), "{text}");
     }
 }

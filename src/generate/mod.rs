@@ -6,4 +6,4 @@ pub mod model;
 pub mod normalisation;
 pub mod representation;
 
-pub use generator::Speaker;
+pub use generator::GestureGenerator;

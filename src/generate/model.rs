@@ -1,6 +1,6 @@
 //! What a checkpoint of the generator means: the facts that make a new sound into motion, and the network itself.
 
-use super::normalisation::{N_NUMBERS, Normalisation};
+use super::normalisation::{N_FEATURES, Normalisation};
 use super::representation::Representation;
 use crate::audio::mel;
 use crate::formats::checkpoint::Contents;
@@ -27,14 +27,14 @@ const MOST_FPS: f64 = 1000.0;
 
 /// Everything beside the tensors that generation needs. Stored under `speaker` in a checkpoint's facts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Facts {
+pub struct SpeakerMetadata {
     pub kind: String,
     /// The speaker's name.
     pub name: String,
     pub fps: FrameRate,
     pub skeleton: String,
     pub network: Config,
-    pub audio: Audio,
+    pub audio: SpectrogramSettings,
     pub normalisation: Normalisation,
     pub representation: Representation,
     /// Hash of the dataset it learnt from.
@@ -43,7 +43,7 @@ pub struct Facts {
 
 /// How the spectrogram was made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Audio {
+pub struct SpectrogramSettings {
     pub rate: u32,
     pub window: usize,
     pub hop: usize,
@@ -53,9 +53,9 @@ pub struct Audio {
     pub highest_hz: f64,
 }
 
-impl Audio {
+impl SpectrogramSettings {
     /// This program's.
-    pub fn present() -> Self {
+    pub fn current() -> Self {
         Self {
             rate: SAMPLE_RATE,
             window: mel::WINDOW,
@@ -68,7 +68,7 @@ impl Audio {
     }
 }
 
-impl Facts {
+impl SpeakerMetadata {
     /// This program's skeleton and audio; `name` and `fps` of the speaker, `dataset` as its hash.
     pub fn new(
         name: &str,
@@ -84,7 +84,7 @@ impl Facts {
             fps,
             skeleton: SKELETON.to_owned(),
             network,
-            audio: Audio::present(),
+            audio: SpectrogramSettings::current(),
             normalisation,
             representation,
             dataset: dataset.to_owned(),
@@ -101,34 +101,43 @@ impl Facts {
 }
 
 /// A trained generator, ready to use.
-pub struct TrainedSpeaker {
-    pub facts: Facts,
+pub struct SpeakerModel {
+    pub metadata: SpeakerMetadata,
     pub generator: Generator,
 }
 
 /// Reads a checkpoint of `orator train gan`. Errors name the file and what is wrong with it.
-pub fn load(path: &Path) -> Result<TrainedSpeaker> {
+pub fn load(path: &Path) -> Result<SpeakerModel> {
     let contents = Contents::read(path)?;
     build(&contents).with_context(|| format!("{} is no checkpoint of `orator train gan`", path.display()))
 }
 
-fn build(contents: &Contents) -> Result<TrainedSpeaker> {
+fn build(contents: &Contents) -> Result<SpeakerModel> {
     let kind = &contents.facts["speaker"]["kind"];
     ensure!(kind == KIND, "its kind is {kind}, this program reads {KIND:?}");
-    let facts: Facts = serde_json::from_value(contents.facts["speaker"].clone()).context("its facts are incomplete")?;
-    ensure!(facts.skeleton == SKELETON, "its skeleton is {:?}, expected {SKELETON:?}", facts.skeleton);
-    ensure!(facts.audio == Audio::present(), "its audio settings are others than this program's: {:?}", facts.audio);
-    ensure!(facts.network.n_out == N_NUMBERS, "it makes {} numbers a pose, not {N_NUMBERS}", facts.network.n_out);
-    let (network, fps) = (&facts.network, facts.fps);
+    let metadata: SpeakerMetadata =
+        serde_json::from_value(contents.facts["speaker"].clone()).context("its facts are incomplete")?;
+    ensure!(metadata.skeleton == SKELETON, "its skeleton is {:?}, expected {SKELETON:?}", metadata.skeleton);
+    ensure!(
+        metadata.audio == SpectrogramSettings::current(),
+        "its audio settings are others than this program's: {:?}",
+        metadata.audio
+    );
+    ensure!(
+        metadata.network.n_out == N_FEATURES,
+        "it makes {} numbers a pose, not {N_FEATURES}",
+        metadata.network.n_out
+    );
+    let (network, fps) = (&metadata.network, metadata.fps);
     ensure!(network.n_mels == mel::N_MELS, "it reads {} mel bands, not {}", network.n_mels, mel::N_MELS);
     ensure!((4..=MOST_WIDTH).contains(&network.width), "its width is {}, expected 4 to {MOST_WIDTH}", network.width);
     ensure!(fps.per_sec() <= MOST_FPS, "it moves at {fps}, expected {MOST_FPS} at most");
-    facts.normalisation.check()?;
-    facts.representation.check()?;
+    metadata.normalisation.check()?;
+    metadata.representation.check()?;
     let mut params = Params::frozen();
-    let generator = Generator::new(&mut params, &facts.network)?;
+    let generator = Generator::new(&mut params, &metadata.network)?;
     params.load(&contents.part(GENERATOR))?;
-    Ok(TrainedSpeaker { facts, generator })
+    Ok(SpeakerModel { metadata, generator })
 }
 
 /// The best checkpoint by the validation's score: the generator alone, to generate with.
@@ -143,10 +152,11 @@ mod tests {
 
     #[test]
     fn facts_that_no_training_writes_are_refused() {
-        let table = vec![1.0; N_NUMBERS];
+        let table = vec![1.0; N_FEATURES];
         let normal = Normalisation { mean: table.clone(), std: table, bone_lengths: vec![0.1; N_BONES] };
-        let network = Config { width: 8, ..Config::of(Preset::Light, N_NUMBERS) };
-        let facts = Facts::new("host", FrameRate::new(15, 1), "", network.clone(), normal, Representation::Positions);
+        let network = Config { width: 8, ..Config::from_preset(Preset::Light, N_FEATURES) };
+        let facts =
+            SpeakerMetadata::new("host", FrameRate::new(15, 1), "", network.clone(), normal, Representation::Positions);
         let mut params = Params::new(0);
         Generator::new(&mut params, &network).unwrap();
         let mut contents = Contents { facts: serde_json::json!({ "speaker": facts }), tensors: BTreeMap::new() };

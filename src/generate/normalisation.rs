@@ -8,7 +8,7 @@ use ndarray::{Array2, Array3, ArrayView2};
 use serde::{Deserialize, Serialize};
 
 /// Numbers of a pose. Number `3 * (joint - 1) + k` is coordinate k of a joint.
-pub const N_NUMBERS: usize = 3 * N_BONES;
+pub const N_FEATURES: usize = 3 * N_BONES;
 /// Least deviation a coordinate is divided by, metres: what hardly moves is not blown up.
 const LEAST_STD: f32 = 0.01;
 
@@ -24,23 +24,23 @@ pub struct Normalisation {
 impl Normalisation {
     /// From the statistics of a dataset, [49, 3] each.
     pub fn new(mean: &Array2<f32>, std: &Array2<f32>, bone_lengths: Vec<f32>) -> Self {
-        let numbers = |table: &Array2<f32>| table.iter().skip(3).copied().collect::<Vec<f32>>();
-        let std = numbers(std).into_iter().map(|v| v.max(LEAST_STD)).collect();
-        Self { mean: numbers(mean), std, bone_lengths }
+        let features = |table: &Array2<f32>| table.iter().skip(3).copied().collect::<Vec<f32>>();
+        let std = features(std).into_iter().map(|v| v.max(LEAST_STD)).collect();
+        Self { mean: features(mean), std, bone_lengths }
     }
 
     /// Errors unless the tables have the lengths they should.
     pub fn check(&self) -> anyhow::Result<()> {
         let lengths = [self.mean.len(), self.std.len(), self.bone_lengths.len()];
-        ensure!(lengths == [N_NUMBERS, N_NUMBERS, N_BONES], "its normalisation has {lengths:?} numbers");
+        ensure!(lengths == [N_FEATURES, N_FEATURES, N_BONES], "its normalisation has {lengths:?} numbers");
         Ok(())
     }
 
     /// Motion [T, 49, 3] to numbers [144, T], and which joints but the neck to learn from [48, T]: those that are seen,
     /// without the hand roots. A number that is missing is 0.
-    pub fn numbers(&self, motion: &Motion) -> (Array2<f32>, Array2<bool>) {
+    pub fn features(&self, motion: &Motion) -> (Array2<f32>, Array2<bool>) {
         let n_frames = motion.n_frames();
-        let mut numbers = Array2::zeros((N_NUMBERS, n_frames));
+        let mut features = Array2::zeros((N_FEATURES, n_frames));
         let mut mask = Array2::from_elem((N_BONES, n_frames), false);
         for (joint, t) in (1..N_JOINTS).flat_map(|joint| (0..n_frames).map(move |t| (joint, t))) {
             let value = |k: usize| {
@@ -49,16 +49,16 @@ impl Normalisation {
             };
             let values = [value(0), value(1), value(2)];
             if values.iter().all(|v| v.is_finite()) {
-                (0..3).for_each(|k| numbers[[3 * (joint - 1) + k, t]] = values[k]);
+                (0..3).for_each(|k| features[[3 * (joint - 1) + k, t]] = values[k]);
                 mask[[joint - 1, t]] = motion.mask[[t, joint]] && !is_duplicate(joint);
             }
         }
-        (numbers, mask)
+        (features, mask)
     }
 
     /// Numbers [144, T] to joints [T, 49, 3] in metres: the neck at 0, the hand roots at the wrists.
-    pub fn joints(&self, numbers: ArrayView2<f32>) -> Array3<f32> {
-        Array3::from_shape_fn((numbers.ncols(), N_JOINTS, 3), |(t, joint, k)| {
+    pub fn joints(&self, features: ArrayView2<f32>) -> Array3<f32> {
+        Array3::from_shape_fn((features.ncols(), N_JOINTS, 3), |(t, joint, k)| {
             let joint = match joint {
                 NECK => return 0.0,
                 L_HAND => L_WRIST,
@@ -66,7 +66,7 @@ impl Normalisation {
                 other => other,
             };
             let i = 3 * (joint - 1) + k;
-            numbers[[i, t]] * self.std[i] + self.mean[i]
+            features[[i, t]] * self.std[i] + self.mean[i]
         })
     }
 }
@@ -94,10 +94,10 @@ mod tests {
         let table = |value| Array2::from_elem((N_JOINTS, 3), value);
         let normal = Normalisation::new(&table(0.1), &table(0.0), vec![0.0; N_BONES]);
         normal.check().unwrap();
-        let (numbers, mask) = normal.numbers(&motion);
-        assert_eq!((numbers[[12, 2]], numbers[[13, 2]]), (0.0, 0.0));
+        let (features, mask) = normal.features(&motion);
+        assert_eq!((features[[12, 2]], features[[13, 2]]), (0.0, 0.0));
         assert_eq!((mask[[4, 2]], mask[[8, 3]], mask[[8, 2]], mask[[L_HAND - 1, 0]]), (false, false, true, false));
-        let back = normal.joints(numbers.view());
+        let back = normal.joints(features.view());
         for ((t, joint, k), expected) in whole.indexed_iter() {
             if (t, joint) != (2, 5) {
                 assert!((back[[t, joint, k]] - expected).abs() < 1e-5);

@@ -2,7 +2,7 @@
 //! directions of the bones, which forward kinematics turns into joints with the speaker's own lengths. The second way
 //! exists twice: on tensors, to train through, and on arrays, to generate with.
 
-use super::normalisation::{N_NUMBERS, Normalisation};
+use super::normalisation::{N_FEATURES, Normalisation};
 use crate::types::skeleton::{N_BONES, N_JOINTS, NECK, is_duplicate, parent};
 use anyhow::{bail, ensure};
 use candle_core::{DType, Device, Result, Tensor};
@@ -31,9 +31,9 @@ impl Representation {
         normal: &Normalisation,
         poses: impl Iterator<Item = (ArrayView2<'a, f32>, ArrayView2<'a, bool>)>,
     ) -> Self {
-        let (mut n, mut sum, mut squares) = ([0.0f64; N_BONES], [0.0f64; N_NUMBERS], [0.0f64; N_NUMBERS]);
-        for (numbers, mask) in poses {
-            let joints = normal.joints(numbers);
+        let (mut n, mut sum, mut squares) = ([0.0f64; N_BONES], [0.0f64; N_FEATURES], [0.0f64; N_FEATURES]);
+        for (features, mask) in poses {
+            let joints = normal.joints(features);
             for (t, joints) in joints.outer_iter().enumerate() {
                 let seen = |joint: usize| joint == NECK || mask[[joint - 1, t]];
                 for joint in (1..N_JOINTS).filter(|joint| !is_duplicate(*joint) && seen(*joint)) {
@@ -56,7 +56,7 @@ impl Representation {
             0.0 => (f64::from(u8::from(i % 3 == 1)), LEAST_STD),
             n => (sum[i] / n, (squares[i] / n - (sum[i] / n).powi(2)).max(0.0).sqrt().max(LEAST_STD)),
         };
-        let (mean, std) = (0..N_NUMBERS).map(of).map(|(mean, std)| (mean as f32, std as f32)).unzip();
+        let (mean, std) = (0..N_FEATURES).map(of).map(|(mean, std)| (mean as f32, std as f32)).unzip();
         Self::Bones { mean, std }
     }
 
@@ -77,7 +77,7 @@ impl Representation {
     pub fn check(&self) -> anyhow::Result<()> {
         if let Self::Bones { mean, std } = self {
             let lengths = [mean.len(), std.len()];
-            ensure!(lengths == [N_NUMBERS; 2], "its table of directions has {lengths:?} numbers");
+            ensure!(lengths == [N_FEATURES; 2], "its table of directions has {lengths:?} numbers");
             if mean.iter().chain(std).any(|v| !v.is_finite()) {
                 bail!("its table of directions holds a number that is not finite");
             }
@@ -108,10 +108,10 @@ impl Representation {
     }
 
     /// The same on tensors.
-    pub fn decoder(&self, normal: &Normalisation, dtype: DType, device: &Device) -> Result<Decoder> {
-        let Self::Bones { mean, std } = self else { return Ok(Decoder { kinematics: None }) };
+    pub fn decoder(&self, normal: &Normalisation, dtype: DType, device: &Device) -> Result<PoseDecoder> {
+        let Self::Bones { mean, std } = self else { return Ok(PoseDecoder { kinematics: None }) };
         let table = |values: Vec<f64>, shape: &[usize]| Tensor::from_vec(values, shape, device)?.to_dtype(dtype);
-        let column = |values: &[f32]| table(values.iter().map(|v| f64::from(*v)).collect(), &[1, N_NUMBERS, 1]);
+        let column = |values: &[f32]| table(values.iter().map(|v| f64::from(*v)).collect(), &[1, N_FEATURES, 1]);
         let lengths = (1..N_JOINTS).map(|joint| f64::from(length_of(joint, normal))).collect();
         // Row `joint`: 1 at every bone on the way from the neck to it.
         let mut way = vec![0.0; N_BONES * N_BONES];
@@ -122,7 +122,7 @@ impl Representation {
                 at = parent(at).unwrap_or(NECK);
             }
         }
-        Ok(Decoder {
+        Ok(PoseDecoder {
             kinematics: Some(Kinematics {
                 direction_mean: column(mean)?,
                 direction_std: column(std)?,
@@ -146,7 +146,7 @@ fn length_of(joint: usize, normal: &Normalisation) -> f32 {
 }
 
 /// Raw numbers to normalised positions, differentiable.
-pub struct Decoder {
+pub struct PoseDecoder {
     kinematics: Option<Kinematics>,
 }
 
@@ -161,7 +161,7 @@ struct Kinematics {
     std: Tensor,
 }
 
-impl Decoder {
+impl PoseDecoder {
     /// Raw numbers [B, 144, T] to normalised positions [B, 144, T].
     pub fn poses(&self, raw: &Tensor) -> Result<Tensor> {
         let Some(k) = &self.kinematics else { return Ok(raw.clone()) };
@@ -172,7 +172,7 @@ impl Decoder {
         let bones = directions.broadcast_div(&norms)?.broadcast_mul(&k.lengths)?;
         let way = k.way.broadcast_as((batch, N_BONES, N_BONES))?.contiguous()?;
         let joints = way.matmul(&bones.reshape((batch, N_BONES, 3 * n_frames))?)?;
-        joints.reshape((batch, N_NUMBERS, n_frames))?.broadcast_sub(&k.mean)?.broadcast_div(&k.std)
+        joints.reshape((batch, N_FEATURES, n_frames))?.broadcast_sub(&k.mean)?.broadcast_div(&k.std)
     }
 }
 
@@ -198,21 +198,21 @@ mod tests {
         let value = |i: usize, t: usize| (i as f32 * 1.7 + t as f32 * 0.3).sin();
         let mut motion = Motion::from_joints(
             FrameRate::new(15, 1),
-            normal.joints(Array2::from_shape_fn((N_NUMBERS, 40), |(i, t)| value(i, t)).view()),
+            normal.joints(Array2::from_shape_fn((N_FEATURES, 40), |(i, t)| value(i, t)).view()),
         );
         let lengths = std::array::from_fn(|bone| normal.bone_lengths[bone]);
         bones::with_lengths(&mut motion, &lengths);
         motion.mask[[3, 9]] = false;
-        normal.numbers(&motion)
+        normal.features(&motion)
     }
 
     #[test]
     fn gradients_are_right() -> anyhow::Result<()> {
         let normal = normal();
-        let (numbers, mask) = poses(&normal);
-        let bones = Representation::bones(&normal, [(numbers.view(), mask.view())].into_iter());
+        let (features, mask) = poses(&normal);
+        let bones = Representation::bones(&normal, [(features.view(), mask.view())].into_iter());
         let decoder = bones.decoder(&normal, DType::F64, &Device::Cpu)?;
-        let error = worst(&[pattern(&[2, N_NUMBERS, 2], 0.0)?], |v| decoder.poses(&v[0]))?;
+        let error = worst(&[pattern(&[2, N_FEATURES, 2], 0.0)?], |v| decoder.poses(&v[0]))?;
         assert!(error < 1e-6, "{error}");
         Ok(())
     }
@@ -220,14 +220,14 @@ mod tests {
     #[test]
     fn tensors_and_arrays_agree_and_bones_keep_their_lengths() -> anyhow::Result<()> {
         let normal = normal();
-        let (numbers, mask) = poses(&normal);
-        let bones = Representation::bones(&normal, [(numbers.view(), mask.view())].into_iter());
+        let (features, mask) = poses(&normal);
+        let bones = Representation::bones(&normal, [(features.view(), mask.view())].into_iter());
         bones.check()?;
-        let raw = pattern(&[1, N_NUMBERS, 50], 0.0)?.affine(6.0, 0.0)?.to_dtype(DType::F32)?;
+        let raw = pattern(&[1, N_FEATURES, 50], 0.0)?.affine(6.0, 0.0)?.to_dtype(DType::F32)?;
         let decoded = bones.decoder(&normal, DType::F32, &Device::Cpu)?.poses(&raw)?.flatten_all()?.to_vec1::<f32>()?;
-        let tensors = normal.joints(ArrayView2::from_shape((N_NUMBERS, 50), &decoded)?);
+        let tensors = normal.joints(ArrayView2::from_shape((N_FEATURES, 50), &decoded)?);
         let raw = raw.flatten_all()?.to_vec1::<f32>()?;
-        let arrays = bones.joints(ArrayView2::from_shape((N_NUMBERS, 50), &raw)?, &normal);
+        let arrays = bones.joints(ArrayView2::from_shape((N_FEATURES, 50), &raw)?, &normal);
         for (a, b) in tensors.iter().zip(&arrays) {
             assert!((a - b).abs() < 2e-6, "{a} {b}");
         }
@@ -242,11 +242,11 @@ mod tests {
     #[test]
     fn directions_of_the_data_give_the_data_back() -> anyhow::Result<()> {
         let normal = normal();
-        let (numbers, mask) = poses(&normal);
-        let bones = Representation::bones(&normal, [(numbers.view(), mask.view())].into_iter());
+        let (features, mask) = poses(&normal);
+        let bones = Representation::bones(&normal, [(features.view(), mask.view())].into_iter());
         let Representation::Bones { mean, std } = &bones else { anyhow::bail!("not bones") };
-        let joints = normal.joints(numbers.view());
-        let raw = Array2::from_shape_fn((N_NUMBERS, numbers.ncols()), |(i, t)| {
+        let joints = normal.joints(features.view());
+        let raw = Array2::from_shape_fn((N_FEATURES, features.ncols()), |(i, t)| {
             let joint = i / 3 + 1;
             let bone = |k: usize| joints[[t, joint, k]] - joints[[t, real_parent(joint), k]];
             let length = (0..3).map(|k| bone(k).powi(2)).sum::<f32>().sqrt().max(1e-9);

@@ -4,7 +4,7 @@ use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER
 
 /// A part of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
+pub enum BodyPart {
     /// The 48 joints without the neck; the two hand roots, which are the wrists again, count.
     All,
     /// All 49 joints, the neck among them, which stands still.
@@ -21,12 +21,12 @@ pub enum Part {
 
 /// A joint, and what it is measured from (the neck, at the origin, where nothing is named).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct From {
+pub(crate) struct MeasuredPoint {
     pub joint: usize,
     pub origin: Option<usize>,
 }
 
-impl Part {
+impl BodyPart {
     pub const fn name(self) -> &'static str {
         match self {
             Self::All => "all",
@@ -50,13 +50,13 @@ impl Part {
     }
 
     /// The joints with what each is measured from.
-    pub(crate) fn points(self) -> Vec<From> {
+    pub(crate) fn points(self) -> Vec<MeasuredPoint> {
         let origin = |joint| match self {
             Self::FingersFromWrist if joint < R_HAND => Some(L_WRIST),
             Self::FingersFromWrist => Some(R_WRIST),
             _ => None,
         };
-        self.joints().into_iter().map(|joint| From { joint, origin: origin(joint) }).collect()
+        self.joints().into_iter().map(|joint| MeasuredPoint { joint, origin: origin(joint) }).collect()
     }
 }
 
@@ -66,10 +66,13 @@ mod tests {
 
     #[test]
     fn parts_have_the_joints_they_say() {
-        let n = |part: Part| part.joints().len();
-        assert_eq!([Part::All, Part::WithNeck, Part::Body, Part::Hands, Part::Wrists].map(n), [48, 49, 6, 40, 2]);
-        let fingers = Part::FingersFromWrist.points();
-        assert!(fingers.contains(&From { joint: 8, origin: Some(L_WRIST) }));
-        assert!(fingers.contains(&From { joint: 29, origin: Some(R_WRIST) }));
+        let n = |part: BodyPart| part.joints().len();
+        assert_eq!(
+            [BodyPart::All, BodyPart::WithNeck, BodyPart::Body, BodyPart::Hands, BodyPart::Wrists].map(n),
+            [48, 49, 6, 40, 2]
+        );
+        let fingers = BodyPart::FingersFromWrist.points();
+        assert!(fingers.contains(&MeasuredPoint { joint: 8, origin: Some(L_WRIST) }));
+        assert!(fingers.contains(&MeasuredPoint { joint: 29, origin: Some(R_WRIST) }));
     }
 }

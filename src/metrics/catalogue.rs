@@ -2,27 +2,27 @@
 //! then read the values off any sum of intervals. A metric's own arithmetic is in its own file.
 
 use super::convention;
-use super::definition::Metric;
-use super::pair::Pair;
-use super::settings::Settings;
+use super::definition::MetricFamily;
+use super::pair::PairedFrames;
+use super::settings::MetricSettings;
 use super::sums;
-use super::sums::{Blocks, Costly};
+use super::sums::{BlockSums, CostlySums};
 use crate::types::time::FrameRate;
 use anyhow::ensure;
 use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 
 pub use super::definition::{Better, Definition};
-pub use super::pair::Interval;
+pub use super::pair::MotionPair;
 pub use super::settings::Convention;
-pub use super::sums::Sums;
+pub use super::sums::MetricSums;
 
 /// Numbers that stand before the cheap sums: made joints that are not finite, frames of another rate.
 const N_FACTS: usize = 2;
 
 /// All numbers of one convention.
 pub struct Catalogue {
-    metrics: Vec<Box<dyn Metric>>,
+    metrics: Vec<Box<dyn MetricFamily>>,
     definitions: Vec<Definition>,
     /// How many definitions each metric has.
     n_values: Vec<usize>,
@@ -31,14 +31,14 @@ pub struct Catalogue {
 
 /// One interval, whole and in blocks.
 #[derive(Clone, Debug, Default)]
-pub struct Measured {
-    pub whole: Sums,
-    pub blocks: Vec<Sums>,
+pub struct IntervalSums {
+    pub whole: MetricSums,
+    pub blocks: Vec<MetricSums>,
 }
 
 impl Catalogue {
     /// Errors: an alpha that is not above 0.
-    pub fn new(settings: &Settings) -> anyhow::Result<Self> {
+    pub fn new(settings: &MetricSettings) -> anyhow::Result<Self> {
         for alpha in &settings.alphas {
             ensure!(
                 alpha.is_finite() && *alpha > 0.0,
@@ -77,24 +77,24 @@ impl Catalogue {
 
     /// The sums of one interval. Frames beyond the shortest of its arrays are not looked at. An interval of another
     /// frame rate than the settings' makes every value NaN.
-    pub fn measure(&self, interval: &Interval) -> Sums {
+    pub fn measure(&self, interval: &MotionPair) -> MetricSums {
         self.measure_blocks(interval, usize::MAX).whole
     }
 
     /// The same, and as blocks of about `n_frames` frames: what begins in a block is counted there, whatever it reaches
     /// into, so that the blocks add up to the whole and no value depends on how long they are.
-    pub fn measure_blocks(&self, interval: &Interval, n_frames: usize) -> Measured {
-        let pair = Pair::new(interval);
+    pub fn measure_blocks(&self, interval: &MotionPair, n_frames: usize) -> IntervalSums {
+        let pair = PairedFrames::new(interval);
         let n = ((pair.n_frames() as f64 / n_frames.max(1) as f64).round() as usize).max(1);
-        let mut facts = Blocks::new(n, N_FACTS, pair.n_frames(), 0.0);
+        let mut facts = BlockSums::new(n, N_FACTS, pair.n_frames(), 0.0);
         let other_rate = interval.fps != self.fps;
         for t in 0..pair.n_frames() {
             facts.at(t)[0] += pair.n_broken(t) as f64;
             facts.at(t)[1] += f64::from(u8::from(other_rate));
         }
         let start = if other_rate { f64::NAN } else { 0.0 };
-        let measure = |metric: &dyn Metric| {
-            let mut blocks = Blocks::new(n, metric.n_sums(), pair.n_frames(), start);
+        let measure = |metric: &dyn MetricFamily| {
+            let mut blocks = BlockSums::new(n, metric.n_sums(), pair.n_frames(), start);
             metric.measure(&pair, &mut blocks);
             (metric.is_costly(), blocks)
         };
@@ -103,42 +103,37 @@ impl Catalogue {
         for (is_costly, blocks) in of_each {
             if is_costly { &mut costly } else { &mut cheap }.push(blocks);
         }
-        let row = |all: &mut [Blocks], block| all.iter_mut().flat_map(|blocks| blocks.row(block).to_vec()).collect();
-        let mut measured = Measured::default();
+        let row = |all: &mut [BlockSums], block| all.iter_mut().flat_map(|blocks| blocks.row(block).to_vec()).collect();
+        let mut measured = IntervalSums::default();
         for block in 0..n {
             let (cheap, costly): (Vec<f64>, Vec<f64>) = (row(&mut cheap, block), row(&mut costly, block));
-            let short = Costly::Block(costly.iter().map(|v| *v as f32).collect());
-            measured.whole += &Sums { cheap: cheap.clone(), costly: Costly::Added(costly) };
-            measured.blocks.push(Sums { cheap, costly: short });
+            let short = CostlySums::Block(costly.iter().map(|v| *v as f32).collect());
+            measured.whole += &MetricSums { cheap: cheap.clone(), costly: CostlySums::Added(costly) };
+            measured.blocks.push(MetricSums { cheap, costly: short });
         }
         measured
     }
 
     /// One value a definition; NaN where undefined.
-    pub fn values(&self, sums: &Sums) -> Vec<f64> {
+    pub fn values(&self, sums: &MetricSums) -> Vec<f64> {
         self.read(Some(&sums.cheap), Some(&sums.costly.row()))
     }
 
-    /// The same, with NaN in place of every costly value.
-    pub fn cheap_values(&self, sums: &Sums) -> Vec<f64> {
-        self.read(Some(&sums.cheap), None)
-    }
-
     /// Values [n_draws, n_definitions] of draws of blocks with replacement, NaN in place of costly ones. `counts`
-    /// [n_draws, n_blocks]: how often each block was drawn. Much faster than adding `Sums` one by one.
-    pub fn draw_cheap(&self, blocks: &[Sums], counts: ArrayView2<f64>) -> Array2<f64> {
+    /// [n_draws, n_blocks]: how often each block was drawn. Much faster than adding `MetricSums` one by one.
+    pub fn draw_cheap(&self, blocks: &[MetricSums], counts: ArrayView2<f64>) -> Array2<f64> {
         let drawn = sums::draw_cheap(blocks, counts);
         self.rows(drawn.outer_iter().map(|row| row.to_vec()).collect(), |row| self.read(Some(row), None))
     }
 
     /// The same of costly values, NaN in place of the others.
-    pub fn draw_costly(&self, blocks: &[Sums], counts: ArrayView2<f64>) -> Array2<f64> {
+    pub fn draw_costly(&self, blocks: &[MetricSums], counts: ArrayView2<f64>) -> Array2<f64> {
         let drawn = sums::draw_costly(blocks, counts);
         self.rows(drawn.outer_iter().map(|row| row.to_vec()).collect(), |row| self.read(None, Some(row)))
     }
 
     /// Why value `index` of these sums is NaN.
-    pub fn reason(&self, sums: &Sums, index: usize) -> String {
+    pub fn reason(&self, sums: &MetricSums, index: usize) -> String {
         match sums.cheap.get(..N_FACTS) {
             None => "nothing was measured".to_owned(),
             Some([_, n_other]) if *n_other > 0.0 => {
@@ -181,19 +176,19 @@ mod tests {
 
     /// Two motions without meaning, [T, 49, 3].
     fn motions(n_frames: usize) -> (Array3<f32>, Array3<f32>) {
-        let real = Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(t, joint, k)| {
+        let ground_truth = Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(t, joint, k)| {
             ((t * 7919 + joint * 104_729 + k * 611_953) % 1009) as f32 / 1009.0 - 0.5
         });
-        let made = real.mapv(|v| v * v - 0.1);
-        (made, real)
+        let predicted = ground_truth.mapv(|v| v * v - 0.1);
+        (predicted, ground_truth)
     }
 
-    fn measured(catalogue: &Catalogue, frames: std::ops::Range<usize>) -> Sums {
-        let (made, real) = motions(120);
+    fn measured(catalogue: &Catalogue, frames: std::ops::Range<usize>) -> MetricSums {
+        let (predicted, ground_truth) = motions(120);
         let mask = Array2::from_elem((120, N_JOINTS), true);
-        catalogue.measure(&Interval {
-            made: made.slice(s![frames.clone(), .., ..]),
-            real: real.slice(s![frames.clone(), .., ..]),
+        catalogue.measure(&MotionPair {
+            predicted: predicted.slice(s![frames.clone(), .., ..]),
+            ground_truth: ground_truth.slice(s![frames.clone(), .., ..]),
             mask: mask.slice(s![frames, ..]),
             fps: FrameRate::new(15, 1),
             onsets: Some(&[0.3, 1.7, 2.5]),
@@ -201,8 +196,8 @@ mod tests {
     }
 
     /// As in the reference script.
-    fn moving(made: bool) -> Array3<f32> {
-        let kind = f64::from(u8::from(made));
+    fn moving(predicted: bool) -> Array3<f32> {
+        let kind = f64::from(u8::from(predicted));
         Array3::from_shape_fn((90, N_JOINTS, 3), |(t, joint, k)| {
             if joint == 0 {
                 return 0.0;
@@ -212,7 +207,7 @@ mod tests {
             let place = hash - 0.5
                 + 0.08 * (t * (0.07 + 0.05 * hash + 0.01 * kind) + 6.0 * hash).sin()
                 + 0.02 * (0.9 * t + joint as f64).sin();
-            (if made { 1.1 * place + 0.03 * (0.4 * t + phase).cos() } else { place }) as f32
+            (if predicted { 1.1 * place + 0.03 * (0.4 * t + phase).cos() } else { place }) as f32
         })
     }
 
@@ -221,17 +216,17 @@ mod tests {
         let golden: serde_json::Value =
             serde_json::from_str(include_str!("../../fixtures/reference/metrics_golden.json")).unwrap();
         let onsets: Vec<f64> = serde_json::from_value(golden["motion"]["onsets"].clone()).unwrap();
-        let (made, real) = (moving(true), moving(false));
+        let (predicted, ground_truth) = (moving(true), moving(false));
         let mask = Array2::from_elem((90, N_JOINTS), true);
         for convention in Convention::ALL {
             let known = &golden["motion"]["known"];
             let known = if convention == Convention::Orator { known } else { &known[convention.name()] };
-            let catalogue = Catalogue::new(&Settings { convention, ..Settings::default() }).unwrap();
+            let catalogue = Catalogue::new(&MetricSettings { convention, ..MetricSettings::default() }).unwrap();
             let fps = FrameRate::new(15, 1);
-            let (made, real) = (made.view(), real.view());
-            let interval = Interval { made, real, mask: mask.view(), fps, onsets: Some(&onsets) };
+            let (predicted, ground_truth) = (predicted.view(), ground_truth.view());
+            let interval = MotionPair { predicted, ground_truth, mask: mask.view(), fps, onsets: Some(&onsets) };
             let measured = catalogue.measure_blocks(&interval, 20);
-            let mut added = Sums::default();
+            let mut added = MetricSums::default();
             measured.blocks.iter().for_each(|block| added += block);
             let values = catalogue.values(&measured.whole);
             for (label, known) in known.as_object().into_iter().flatten().filter(|(_, v)| v.is_number()) {
@@ -255,7 +250,7 @@ mod tests {
 
     #[test]
     fn drawing_blocks_is_adding_them() {
-        let catalogue = Catalogue::new(&Settings::default()).unwrap();
+        let catalogue = Catalogue::new(&MetricSettings::default()).unwrap();
         let blocks = [measured(&catalogue, 0..60), measured(&catalogue, 60..120)];
         let mut sums = blocks[0].clone();
         sums += &blocks[1];
@@ -268,16 +263,16 @@ mod tests {
             let drawn = if catalogue.is_costly(i) { &costly } else { &cheap }[[1, i]];
             assert!(same(drawn, value), "{}: {drawn} {value}", catalogue.definitions()[i].label());
         }
-        let alone = catalogue.cheap_values(&blocks[0]);
-        assert!(alone.iter().zip(cheap.row(0)).all(|(a, b)| same(*a, *b)));
+        let alone = catalogue.values(&blocks[0]);
+        assert!((0..alone.len()).filter(|i| !catalogue.is_costly(*i)).all(|i| same(alone[i], cheap[[0, i]])));
     }
 
     #[test]
     fn every_figure_is_another_and_a_wrong_setting_is_told() {
-        let catalogue = Catalogue::new(&Settings { with_neck: true, ..Settings::default() }).unwrap();
+        let catalogue = Catalogue::new(&MetricSettings { with_neck: true, ..MetricSettings::default() }).unwrap();
         let hashes: std::collections::BTreeSet<_> = catalogue.definitions().iter().map(Definition::hash).collect();
         assert_eq!(hashes.len(), catalogue.definitions().len());
-        assert!(Catalogue::new(&Settings { alphas: vec![0.0], ..Settings::default() }).is_err());
+        assert!(Catalogue::new(&MetricSettings { alphas: vec![0.0], ..MetricSettings::default() }).is_err());
         for i in 0..catalogue.definitions().len() {
             let needs = catalogue.definitions()[i].better == Better::NearerTruth;
             assert_eq!(catalogue.truth_of(i).is_some(), needs, "{}", catalogue.definitions()[i].label());
@@ -286,13 +281,13 @@ mod tests {
 
     #[test]
     fn a_made_joint_that_is_not_finite_is_told() {
-        let catalogue = Catalogue::new(&Settings::default()).unwrap();
-        let (mut made, real) = motions(30);
-        made[[3, 20, 1]] = f32::NAN;
+        let catalogue = Catalogue::new(&MetricSettings::default()).unwrap();
+        let (mut predicted, ground_truth) = motions(30);
+        predicted[[3, 20, 1]] = f32::NAN;
         let mask = Array2::from_elem((30, N_JOINTS), true);
-        let interval = Interval {
-            made: made.view(),
-            real: real.view(),
+        let interval = MotionPair {
+            predicted: predicted.view(),
+            ground_truth: ground_truth.view(),
             mask: mask.view(),
             fps: FrameRate::new(15, 1),
             onsets: None,
@@ -304,10 +299,10 @@ mod tests {
         assert!(values[of("mpjpe", "body")].is_finite());
         assert!(values[of("mpjpe", "hands")].is_nan());
         assert!(catalogue.reason(&sums, of("mpjpe", "hands")).contains("1 joints of the made motion"));
-        let nothing = catalogue.measure(&Interval { mask: mask.slice(s![..0, ..]), ..interval });
+        let nothing = catalogue.measure(&MotionPair { mask: mask.slice(s![..0, ..]), ..interval });
         assert!(catalogue.values(&nothing).iter().all(|value| value.is_nan()));
         assert!(catalogue.reason(&nothing, 0).contains("no joint"));
-        let other = catalogue.measure(&Interval { fps: FrameRate::new(30, 1), ..interval });
+        let other = catalogue.measure(&MotionPair { fps: FrameRate::new(30, 1), ..interval });
         assert!(catalogue.values(&other).iter().all(|value| value.is_nan()));
     }
 
@@ -318,10 +313,10 @@ mod tests {
             !((20..35).contains(&t) && (7..28).contains(&joint) || t % 40 == 13 && joint == 3)
         });
         for convention in Convention::ALL {
-            let catalogue = Catalogue::new(&Settings { convention, ..Settings::default() }).unwrap();
+            let catalogue = Catalogue::new(&MetricSettings { convention, ..MetricSettings::default() }).unwrap();
             let [first, second] = [f32::NAN, 7.0].map(|hidden| {
-                let [made, real] = [true, false].map(|made| {
-                    let mut joints = moving(made);
+                let [predicted, ground_truth] = [true, false].map(|predicted| {
+                    let mut joints = moving(predicted);
                     joints
                         .indexed_iter_mut()
                         .filter(|((t, joint, _), _)| !mask[[*t, *joint]])
@@ -329,8 +324,14 @@ mod tests {
                     joints
                 });
                 let onsets: &[f64] = &[0.35, 1.4, 2.2, 3.3, 4.4];
-                let (made, real, fps) = (made.view(), real.view(), FrameRate::new(15, 1));
-                let sums = catalogue.measure(&Interval { made, real, mask: mask.view(), fps, onsets: Some(onsets) });
+                let (predicted, ground_truth, fps) = (predicted.view(), ground_truth.view(), FrameRate::new(15, 1));
+                let sums = catalogue.measure(&MotionPair {
+                    predicted,
+                    ground_truth,
+                    mask: mask.view(),
+                    fps,
+                    onsets: Some(onsets),
+                });
                 catalogue.values(&sums)
             });
             for ((a, b), definition) in first.iter().zip(&second).zip(catalogue.definitions()) {

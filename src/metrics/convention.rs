@@ -12,31 +12,31 @@
 //! | `aist` (Li et al. 2021) | beat alignment | mean over the beats of the MOTION; an interval without any scores 0; every interval weighs the same |
 
 use super::beat::{aist, angles, consistency};
-use super::body_part::Part;
-use super::definition::Metric;
+use super::body_part::BodyPart;
+use super::definition::MetricFamily;
 use super::distribution::pairwise;
 use super::distribution::{diversity, frechet_metrics};
 use super::movement::hellinger;
 use super::movement::{bone_change, cca, derivatives};
 use super::position::acceleration;
-use super::position::pck::Axes;
+use super::position::pck::PckAxes;
 use super::position::{l1, mpjpe, p_mpjpe, pck};
 use super::settings::Convention;
-use super::settings::Settings;
+use super::settings::MetricSettings;
 
 /// The metrics of the settings' convention.
-pub(crate) fn metrics(settings: &Settings) -> Vec<Box<dyn Metric>> {
+pub(crate) fn metrics(settings: &MetricSettings) -> Vec<Box<dyn MetricFamily>> {
     let fps = settings.fps.per_sec();
     match settings.convention {
         Convention::Orator => own(settings),
         Convention::Speech2gesture => vec![pck::by_frame(&settings.alphas)],
         Convention::Genea => vec![
-            derivatives::by_interval(derivatives::Order::Acceleration),
-            derivatives::by_interval(derivatives::Order::Jerk),
+            derivatives::by_interval(derivatives::DerivativeOrder::Acceleration),
+            derivatives::by_interval(derivatives::DerivativeOrder::Jerk),
             hellinger::genea(),
-            cca::metric(Part::WithNeck),
+            cca::metric(BodyPart::WithNeck),
         ],
-        Convention::Emage => vec![diversity::metric(Part::All), consistency::emage(fps)],
+        Convention::Emage => vec![diversity::metric(BodyPart::All), consistency::emage(fps)],
         Convention::Trimodal => {
             vec![acceleration::maje(fps), acceleration::by_coordinate(), angles::metric(fps)]
         }
@@ -44,13 +44,14 @@ pub(crate) fn metrics(settings: &Settings) -> Vec<Box<dyn Metric>> {
     }
 }
 
-fn own(settings: &Settings) -> Vec<Box<dyn Metric>> {
-    let parts = [Part::All, Part::Body, Part::Hands];
-    let mut measured = vec![Part::All, Part::Body, Part::Hands, Part::Wrists, Part::FingersFromWrist];
+fn own(settings: &MetricSettings) -> Vec<Box<dyn MetricFamily>> {
+    let parts = [BodyPart::All, BodyPart::Body, BodyPart::Hands];
+    let mut measured =
+        vec![BodyPart::All, BodyPart::Body, BodyPart::Hands, BodyPart::Wrists, BodyPart::FingersFromWrist];
     if settings.with_neck {
-        measured.push(Part::WithNeck);
+        measured.push(BodyPart::WithNeck);
     }
-    let mut all = vec![pck::metric(&[Axes::Xyz, Axes::Xy], &parts, &settings.alphas)];
+    let mut all = vec![pck::metric(&[PckAxes::Xyz, PckAxes::Xy], &parts, &settings.alphas)];
     if settings.with_neck {
         all.push(pck::neck_in_box(&settings.alphas));
     }
@@ -58,7 +59,7 @@ fn own(settings: &Settings) -> Vec<Box<dyn Metric>> {
     all.extend(measured.iter().map(|part| mpjpe::metric(*part)));
     all.extend(parts.iter().map(|part| p_mpjpe::metric(*part)));
     all.extend(measured.iter().map(|part| acceleration::metric(*part)));
-    for order in derivatives::Order::ALL {
+    for order in derivatives::DerivativeOrder::ALL {
         all.extend(measured.iter().map(|part| derivatives::metric(order, *part)));
     }
     all.extend(parts.iter().map(|part| hellinger::metric(*part)));
@@ -66,10 +67,10 @@ fn own(settings: &Settings) -> Vec<Box<dyn Metric>> {
     all.extend(parts.iter().map(|part| pairwise::metric(*part)));
     all.push(bone_change::metric());
     all.push(consistency::metric(settings.fps.per_sec()));
-    all.push(frechet_metrics::poses(Part::All));
-    all.push(frechet_metrics::poses(Part::Body));
+    all.push(frechet_metrics::poses(BodyPart::All));
+    all.push(frechet_metrics::poses(BodyPart::Body));
     all.push(frechet_metrics::basis());
     all.push(frechet_metrics::embedding());
-    all.push(cca::metric(Part::Body));
+    all.push(cca::metric(BodyPart::Body));
     all
 }

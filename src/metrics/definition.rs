@@ -1,8 +1,8 @@
 //! What a number means: its name, its part of the body, its formula and every parameter, with a hash over all of it.
 //! Values under different hashes are different things. And what every metric is: sums that add, and numbers from them.
 
-use super::pair::Pair;
-use super::sums::Blocks;
+use super::pair::PairedFrames;
+use super::sums::BlockSums;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -77,14 +77,14 @@ fn canonical(value: &Value) -> String {
 }
 
 /// A family of numbers that share their sums.
-pub(crate) trait Metric: Send + Sync {
+pub(crate) trait MetricFamily: Send + Sync {
     /// What `values` gives, in order.
     fn definitions(&self) -> Vec<Definition>;
     /// How many sums it takes.
     fn n_sums(&self) -> usize;
     /// Adds one interval to the sums, `n_sums` numbers in each block that start at 0. What belongs to several frames
     /// goes to the block of the first.
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks);
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums);
     /// The numbers from added sums; NaN where undefined.
     fn values(&self, sums: &[f64]) -> Vec<f64>;
     /// Whether the sums are large and the numbers slow (matrices): fewer draws.

@@ -1,72 +1,71 @@
 //! The commonest form of a figure: a number of each frame and point, and their mean over all there are. What the number
 //! is stands in the file of each metric.
 
-use super::body_part::{From, Part};
-use super::definition::{Definition, Metric};
-use super::pair::{Pair, Point};
-use super::sums::Blocks;
+use super::body_part::{BodyPart, MeasuredPoint};
+use super::definition::{Definition, MetricFamily};
+use super::pair::PairedFrames;
+use super::sums::BlockSums;
+use crate::math::vec3;
+use crate::math::vec3::Vec3;
 use crate::types::skeleton::N_JOINTS;
 
 /// Mean over frames and points.
-pub(crate) struct Mean {
+pub(crate) struct FrameMean {
     definition: Definition,
-    points: Vec<From>,
+    points: Vec<MeasuredPoint>,
     /// How many frames in a row it looks at.
     n_frames: usize,
-    of: fn(&Window) -> f64,
+    of: fn(&PointWindow) -> f64,
 }
 
 /// What such a number is computed from: one point in a few frames in a row, all of them seen.
-pub(crate) struct Window<'a> {
-    made: &'a [[Point; N_JOINTS]],
-    real: &'a [[Point; N_JOINTS]],
+pub(crate) struct PointWindow<'a> {
+    predicted: &'a [[Vec3; N_JOINTS]],
+    ground_truth: &'a [[Vec3; N_JOINTS]],
     t: usize,
-    point: From,
+    point: MeasuredPoint,
     /// Frames a second.
     pub fps: f64,
 }
 
-impl Window<'_> {
+impl PointWindow<'_> {
     /// Where the made point is in frame `k` of the window.
-    pub fn made(&self, k: usize) -> Point {
-        self.at(self.made, k)
+    pub fn predicted(&self, k: usize) -> Vec3 {
+        self.at(self.predicted, k)
     }
 
     /// Where the real point is in frame `k` of the window.
-    pub fn real(&self, k: usize) -> Point {
-        self.at(self.real, k)
+    pub fn ground_truth(&self, k: usize) -> Vec3 {
+        self.at(self.ground_truth, k)
     }
 
     /// Made less real.
-    pub fn apart(&self, k: usize) -> Point {
-        less(self.made(k), self.real(k))
+    pub fn apart(&self, k: usize) -> Vec3 {
+        vec3::sub(self.predicted(k), self.ground_truth(k))
     }
 
-    fn at(&self, poses: &[[Point; N_JOINTS]], k: usize) -> Point {
+    fn at(&self, poses: &[[Vec3; N_JOINTS]], k: usize) -> Vec3 {
         let pose = &poses[self.t + k];
         match self.point.origin {
-            Some(origin) => less(pose[self.point.joint], pose[origin]),
+            Some(origin) => vec3::sub(pose[self.point.joint], pose[origin]),
             None => pose[self.point.joint],
         }
     }
 }
 
-pub(crate) fn less(a: Point, b: Point) -> Point {
-    std::array::from_fn(|k| a[k] - b[k])
-}
-
-pub(crate) fn norm(v: Point) -> f64 {
-    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
-}
-
-impl Mean {
+impl FrameMean {
     /// Of `of` over all points of `part` and all `n_frames` frames in a row.
-    pub fn over(definition: Definition, part: Part, n_frames: usize, of: fn(&Window) -> f64) -> Box<dyn Metric> {
+    pub fn over(
+        definition: Definition,
+        part: BodyPart,
+        n_frames: usize,
+        of: fn(&PointWindow) -> f64,
+    ) -> Box<dyn MetricFamily> {
         Box::new(Self { definition, points: part.points(), n_frames, of })
     }
 }
 
-impl Metric for Mean {
+impl MetricFamily for FrameMean {
     fn definitions(&self) -> Vec<Definition> {
         vec![self.definition.clone()]
     }
@@ -75,13 +74,19 @@ impl Metric for Mean {
         2
     }
 
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
         for t in 0..(pair.n_frames() + 1).saturating_sub(self.n_frames) {
             let sums = blocks.at(t);
             for &point in &self.points {
                 let seen = |joint| pair.sees(t, self.n_frames, joint);
                 if seen(point.joint) && point.origin.is_none_or(seen) {
-                    sums[0] += (self.of)(&Window { made: &pair.made, real: &pair.real, t, point, fps: pair.fps });
+                    sums[0] += (self.of)(&PointWindow {
+                        predicted: &pair.predicted,
+                        ground_truth: &pair.ground_truth,
+                        t,
+                        point,
+                        fps: pair.fps,
+                    });
                     sums[1] += 1.0;
                 }
             }

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 /// What the numbers are set to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Settings {
+pub struct MetricSettings {
     /// Whose definitions count.
     pub convention: Convention,
     /// Shares of the pose's largest extent for PCK, each > 0.
@@ -17,7 +17,7 @@ pub struct Settings {
     pub with_neck: bool,
 }
 
-impl Default for Settings {
+impl Default for MetricSettings {
     fn default() -> Self {
         Self { convention: Convention::default(), alphas: vec![0.2, 0.1], fps: FrameRate::new(15, 1), with_neck: false }
     }

@@ -7,45 +7,45 @@ use std::ops::{AddAssign, Range};
 /// What one interval, or many added, come to. `Default` is nothing. Costly sums (packed matrices) stand apart, since
 /// they are large and fewer draws are taken of them.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Sums {
+pub struct MetricSums {
     pub(crate) cheap: Vec<f64>,
-    pub(crate) costly: Costly,
+    pub(crate) costly: CostlySums,
 }
 
 /// Large sums: of one block in f32 (half the memory; the rounding of 6e-8 is nothing beside drawing blocks), of
 /// anything added in f64.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Costly {
+pub(crate) enum CostlySums {
     Block(Vec<f32>),
     Added(Vec<f64>),
 }
 
 /// Sums of one metric over the blocks of an interval.
-pub(crate) struct Blocks {
+pub(crate) struct BlockSums {
     n_frames: usize,
     width: usize,
     /// [n_blocks x width].
     rows: Vec<f64>,
 }
 
-impl Sums {
+impl MetricSums {
     /// Memory of these sums, bytes.
     pub fn n_bytes(&self) -> usize {
         let costly = match &self.costly {
-            Costly::Block(row) => size_of_val(&row[..]),
-            Costly::Added(row) => size_of_val(&row[..]),
+            CostlySums::Block(row) => size_of_val(&row[..]),
+            CostlySums::Added(row) => size_of_val(&row[..]),
         };
         size_of_val(&self.cheap[..]) + costly
     }
 }
 
-impl Default for Costly {
+impl Default for CostlySums {
     fn default() -> Self {
         Self::Added(Vec::new())
     }
 }
 
-impl Costly {
+impl CostlySums {
     pub fn len(&self) -> usize {
         match self {
             Self::Block(row) => row.len(),
@@ -66,13 +66,13 @@ impl Costly {
     }
 }
 
-impl AddAssign<&Self> for Sums {
+impl AddAssign<&Self> for MetricSums {
     fn add_assign(&mut self, other: &Self) {
         add(&mut self.cheap, other.cheap.iter().copied());
-        if let Costly::Block(row) = &self.costly {
-            self.costly = Costly::Added(row.iter().map(|v| f64::from(*v)).collect());
+        if let CostlySums::Block(row) = &self.costly {
+            self.costly = CostlySums::Added(row.iter().map(|v| f64::from(*v)).collect());
         }
-        if let Costly::Added(row) = &mut self.costly {
+        if let CostlySums::Added(row) = &mut self.costly {
             add(row, other.costly.part(0..other.costly.len()));
         }
     }
@@ -88,7 +88,7 @@ fn add(own: &mut Vec<f64>, others: impl Iterator<Item = f64>) {
     }
 }
 
-impl Blocks {
+impl BlockSums {
     /// `n` blocks of `width` numbers, all `start`, over an interval of `n_frames`.
     pub fn new(n: usize, width: usize, n_frames: usize, start: f64) -> Self {
         Self { n_frames, width, rows: vec![start; n * width] }
@@ -117,13 +117,13 @@ impl Blocks {
 
 /// One row of cheap sums for each draw [n_draws, n_cheap]. `counts` [n_draws, n_blocks] says how often a block was
 /// drawn.
-pub(crate) fn draw_cheap(blocks: &[Sums], counts: ArrayView2<f64>) -> Array2<f64> {
+pub(crate) fn draw_cheap(blocks: &[MetricSums], counts: ArrayView2<f64>) -> Array2<f64> {
     let width = blocks.iter().map(|sums| sums.cheap.len()).max().unwrap_or(0);
     drawn(width, blocks, counts, |sums, range| Box::new(sums.cheap.get(range).unwrap_or_default().iter().copied()))
 }
 
 /// The same of the costly sums.
-pub(crate) fn draw_costly(blocks: &[Sums], counts: ArrayView2<f64>) -> Array2<f64> {
+pub(crate) fn draw_costly(blocks: &[MetricSums], counts: ArrayView2<f64>) -> Array2<f64> {
     let width = blocks.iter().map(|sums| sums.costly.len()).max().unwrap_or(0);
     drawn(width, blocks, counts, |sums, range| sums.costly.part(range))
 }
@@ -131,9 +131,9 @@ pub(crate) fn draw_costly(blocks: &[Sums], counts: ArrayView2<f64>) -> Array2<f6
 /// Columns at a time, so that the copy stays small.
 const N_COLUMNS: usize = 1024;
 
-type Part = for<'a> fn(&'a Sums, Range<usize>) -> Box<dyn Iterator<Item = f64> + 'a>;
+type CostlyColumns = for<'a> fn(&'a MetricSums, Range<usize>) -> Box<dyn Iterator<Item = f64> + 'a>;
 
-fn drawn(width: usize, blocks: &[Sums], counts: ArrayView2<f64>, part: Part) -> Array2<f64> {
+fn drawn(width: usize, blocks: &[MetricSums], counts: ArrayView2<f64>, part: CostlyColumns) -> Array2<f64> {
     let mut all = Array2::zeros((counts.nrows(), width));
     all.axis_chunks_iter_mut(Axis(1), N_COLUMNS).into_par_iter().enumerate().for_each(|(i, mut all)| {
         let from = i * N_COLUMNS;

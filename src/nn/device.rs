@@ -26,7 +26,7 @@ fn cuda() -> Result<Device> {
 }
 
 /// Whether the tensor lives where this room's own operators do not run.
-pub fn needed(x: &Tensor) -> bool {
+pub fn needs_fallback(x: &Tensor) -> bool {
     !x.device().is_cpu()
 }
 

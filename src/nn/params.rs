@@ -76,8 +76,8 @@ impl Params {
             candle_core::bail!("two tensors are called {name}");
         }
         let fan = |dims: &[usize]| dims.iter().product::<usize>().max(1) as f64;
-        let taps = fan(shape.get(2..).unwrap_or(&[]));
-        let (fan_out, fan_in) = (fan(&shape[..shape.len().min(1)]) * taps, fan(shape.get(1..).unwrap_or(&[])));
+        let kernel_len = fan(shape.get(2..).unwrap_or(&[]));
+        let (fan_out, fan_in) = (fan(&shape[..shape.len().min(1)]) * kernel_len, fan(shape.get(1..).unwrap_or(&[])));
         let n: usize = shape.iter().product();
         let values: Vec<f64> = match (self.seed, init) {
             (None, _) => vec![0.0; n],

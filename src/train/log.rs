@@ -14,18 +14,18 @@ use std::path::{Path, PathBuf};
 pub const FILE: &str = "metrics.jsonl";
 
 /// The open log.
-pub struct Log {
-    lines: Growing,
-    events: Option<Growing>,
+pub struct MetricsLog {
+    lines: AppendedFile,
+    events: Option<AppendedFile>,
 }
 
-impl Log {
+impl MetricsLog {
     /// Opens the log in `folder`, made if missing, with the lines up to `step`.
     pub fn open(folder: &Path, step: usize) -> Result<Self> {
         let mut log = Self::lines_alone(&folder.join(FILE), step)?;
         let records = read(folder)?.iter().filter_map(tfevents::record).collect();
         let start = [vec![tfevents::first()], records].concat().concat();
-        log.events = Some(Growing::open(&folder.join(tfevents::FILE), &start)?);
+        log.events = Some(AppendedFile::open(&folder.join(tfevents::FILE), &start)?);
         Ok(log)
     }
 
@@ -34,7 +34,7 @@ impl Log {
         let text = text(path)?;
         let seen = |line: &&str| parsed(line).is_some_and(|line| step_of(&line) <= step as u64);
         let kept: String = text.lines().filter(seen).map(|line| format!("{line}\n")).collect();
-        Ok(Self { lines: Growing::open(path, kept.as_bytes())?, events: None })
+        Ok(Self { lines: AppendedFile::open(path, kept.as_bytes())?, events: None })
     }
 
     /// Adds a line.
@@ -71,12 +71,12 @@ fn step_of(line: &Value) -> u64 {
 }
 
 /// A file that only grows.
-struct Growing {
+struct AppendedFile {
     path: PathBuf,
     file: File,
 }
 
-impl Growing {
+impl AppendedFile {
     fn open(path: &Path, start: &[u8]) -> Result<Self> {
         workdir::write_file(path, start)?;
         let file = OpenOptions::new().append(true).open(path);
@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn resuming_drops_what_the_checkpoint_has_not_seen() -> Result<()> {
         let (folder, other) = (tempfile::tempdir()?, tempfile::tempdir()?);
-        let mut log = Log::open(folder.path(), 0)?;
+        let mut log = MetricsLog::open(folder.path(), 0)?;
         for step in [10, 20, 30] {
             log.write(&json!({"step": step, "l1": 0.1 + 0.2}))?;
         }
@@ -104,12 +104,12 @@ mod tests {
         if let Some(events) = &mut log.events {
             events.add(&[1, 2, 3])?;
         }
-        Log::open(folder.path(), 20)?.write(&json!({"step": 30, "l1": 0.25}))?;
+        MetricsLog::open(folder.path(), 20)?.write(&json!({"step": 30, "l1": 0.25}))?;
         let bytes = |folder: &Path, file: &str| std::fs::read(folder.join(file));
         let text = bytes(folder.path(), FILE)?;
         let expected = "{\"step\":10,\"l1\":0.30000000000000004}\n{\"step\":20,\"l1\":0.30000000000000004}\n{\"step\":30,\"l1\":0.25}\n";
         assert_eq!(text, expected.as_bytes());
-        let mut undisturbed = Log::open(other.path(), 0)?;
+        let mut undisturbed = MetricsLog::open(other.path(), 0)?;
         read(folder.path())?.iter().try_for_each(|line| undisturbed.write(line))?;
         assert_eq!(bytes(folder.path(), tfevents::FILE)?, bytes(other.path(), tfevents::FILE)?);
         Ok(())

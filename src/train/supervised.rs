@@ -1,7 +1,7 @@
 //! Training of the lifters: one straight loop over freshly drawn samples. What is learnt (bodies or hands) is a
-//! `Lesson`; the schedule, the optimiser and resuming are here.
+//! `TrainingTask`; the schedule, the optimiser and resuming are here.
 
-use super::log::Log;
+use super::log::MetricsLog;
 use super::optim::adam;
 use super::optim::adam::Adam;
 use crate::formats::checkpoint::{Contents, expect_same};
@@ -18,11 +18,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// What a lifter learns: where samples come from and the network they go through.
-pub trait Lesson: Send + Sync {
+pub trait TrainingTask: Send + Sync {
     /// Kind of the weights file.
     fn kind(&self) -> &'static str;
     /// The network's shape, and everything else the samples depend on.
-    fn facts(&self) -> Value;
+    fn metadata(&self) -> Value;
     fn params(&self) -> &Params;
     /// Shape of one sample that goes in.
     fn shape_in(&self) -> Vec<usize>;
@@ -33,7 +33,7 @@ pub trait Lesson: Send + Sync {
         1
     }
     /// Draws a group of samples: what goes in, and what should come out. At the end of a batch a group may be smaller.
-    fn draw(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]);
+    fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]);
     /// [B, shape in] to [B, 3 x points].
     fn forward(&self, x: &Tensor, mode: &mut Mode) -> candle_core::Result<Tensor>;
     /// The loss of what came out, [B, points, 3], against what should have; `weights` [1, points] of mean 1. The mean
@@ -81,7 +81,7 @@ impl Schedule {
         self.learning_rate * shape
     }
 
-    fn facts(&self) -> Value {
+    fn metadata(&self) -> Value {
         let mut facts =
             json!({ "steps": self.steps, "batch": self.batch, "learning_rate": self.learning_rate, "seed": self.seed });
         if let Some(hash) = &self.started_from {
@@ -92,12 +92,17 @@ impl Schedule {
 }
 
 /// Gives the lesson's network the weights of a file; returns their hash. Errors name the file and what does not fit.
-pub fn start_from(lesson: &dyn Lesson, path: &Path) -> Result<String> {
+pub fn start_from(training_task: &dyn TrainingTask, path: &Path) -> Result<String> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read the weights {}", path.display()))?;
     let load = || -> Result<()> {
         let contents = Contents::from_bytes(&bytes)?;
-        ensure!(contents.facts["kind"] == lesson.kind(), "it is a {}, not a {}", contents.facts["kind"], lesson.kind());
-        lesson.params().load(&contents.tensors)
+        ensure!(
+            contents.facts["kind"] == training_task.kind(),
+            "it is a {}, not a {}",
+            contents.facts["kind"],
+            training_task.kind()
+        );
+        training_task.params().load(&contents.tensors)
     };
     load().with_context(|| format!("cannot start from {}", path.display()))?;
     Ok(blake3::hash(&bytes).to_hex().to_string())
@@ -106,17 +111,23 @@ pub fn start_from(lesson: &dyn Lesson, path: &Path) -> Result<String> {
 /// Trains and writes the weights to `out`. A checkpoint beside it (`<out>.checkpoint`) lets an interrupted training
 /// go on, to the same bytes, when called again with the same schedule and data; it is removed at the end. The log is
 /// `<out>.jsonl`. Gives the errors on held-out samples; with no steps that is all it does.
-pub fn train(lesson: &mut dyn Lesson, schedule: &Schedule, out: &Path, progress: &dyn Progress) -> Result<Vec<String>> {
+pub fn train(
+    training_task: &mut dyn TrainingTask,
+    schedule: &Schedule,
+    out: &Path,
+    progress: &dyn Progress,
+) -> Result<Vec<String>> {
     if schedule.steps == 0 {
-        return lesson.errors(false);
+        return training_task.errors(false);
     }
     // inside the pool: its own thread does not sleep and wake for every small piece of work
-    rayon::scope(|_| train_until(lesson, schedule, out, schedule.steps, progress))?;
-    let facts = json!({ "kind": lesson.kind(), "lesson": lesson.facts(), "schedule": schedule.facts() });
-    let weights = halved(lesson.params().tensors()?)?;
+    rayon::scope(|_| train_until(training_task, schedule, out, schedule.steps, progress))?;
+    let facts =
+        json!({ "kind": training_task.kind(), "lesson": training_task.metadata(), "schedule": schedule.metadata() });
+    let weights = halved(training_task.params().tensors()?)?;
     // the errors are those of the weights as they are kept
-    lesson.params().load(&weights)?;
-    let errors = lesson.errors(false)?;
+    training_task.params().load(&weights)?;
+    let errors = training_task.errors(false)?;
     let mut contents = Contents { facts, tensors: BTreeMap::new() };
     contents.add("", weights);
     contents.write(out)?;
@@ -129,7 +140,7 @@ pub fn train(lesson: &mut dyn Lesson, schedule: &Schedule, out: &Path, progress:
 
 /// The part of a training up to `end`, with a checkpoint there.
 fn train_until(
-    lesson: &mut dyn Lesson,
+    training_task: &mut dyn TrainingTask,
     schedule: &Schedule,
     out: &Path,
     end: usize,
@@ -137,13 +148,13 @@ fn train_until(
 ) -> Result<()> {
     ensure!(schedule.batch > 1, "a training needs at least two samples a batch");
     let mut adam =
-        Adam::new(lesson.params(), adam::Config { amsgrad: true, max_norm: Some(1.0), ..Default::default() })?;
-    let start = resume(lesson, schedule, out, &mut adam)?;
+        Adam::new(training_task.params(), adam::Config { amsgrad: true, max_norm: Some(1.0), ..Default::default() })?;
+    let start = resume(training_task, schedule, out, &mut adam)?;
     if start > 0 {
         progress.say(&format!("going on at step {start} of {}", schedule.steps));
     }
-    let mut log = Log::lines_alone(&beside(out, ".jsonl"), start)?;
-    let weights = lesson.weights();
+    let mut log = MetricsLog::lines_alone(&beside(out, ".jsonl"), start)?;
+    let weights = training_task.weights();
     let n_points = weights.len();
     let mean_weight = weights.iter().sum::<f32>() / n_points as f32;
     let weights: Vec<f32> = weights.iter().map(|w| w / mean_weight).collect();
@@ -152,12 +163,12 @@ fn train_until(
     let measure_every = schedule.steps.div_ceil(MEASURES);
     let (mut sum, mut n_summed) = (0.0, 0);
     for step in start..end {
-        let (x, y) = batch(lesson, schedule, step, n_points)?;
+        let (x, y) = batch(training_task, schedule, step, n_points)?;
         // the running statistics settle as the training does: 0.1 falls to 0.001
-        lesson.set_momentum(0.1 * (-(step as f64 / schedule.steps as f64) * 100f64.ln()).exp());
+        training_task.set_momentum(0.1 * (-(step as f64 / schedule.steps as f64) * 100f64.ln()).exp());
         let mut rng = stream(schedule.seed, step, schedule.batch, schedule.batch);
-        let lifted = lesson.forward(&x, &mut Mode::Train(&mut rng))?.reshape(y.shape())?;
-        let loss = lesson.loss(&lifted, &y, &weights)?;
+        let lifted = training_task.forward(&x, &mut Mode::Train(&mut rng))?.reshape(y.shape())?;
+        let loss = training_task.loss(&lifted, &y, &weights)?;
         let norm = adam.step(&loss.backward()?, schedule.learning_rate(step))?;
         ensure!(norm.is_finite(), "step {step}: the gradient is not finite; try a smaller --learning-rate");
         let loss = f64::from(loss.to_scalar::<f32>()?);
@@ -171,15 +182,15 @@ fn train_until(
         }
         if (step + 1) % measure_every == 0 {
             progress.say(&format!("step {} of {}: loss {:.4}", step + 1, schedule.steps, sum / f64::from(n_summed)));
-            let errors = lesson.errors(true)?;
+            let errors = training_task.errors(true)?;
             errors.iter().for_each(|line| progress.say(&format!("  {line}")));
             log.write(&json!({ "step": step + 1, "errors": errors }))?;
             (sum, n_summed) = (0.0, 0);
         }
         if (step + 1) % schedule.checkpoint_every.max(1) == 0 || step + 1 == end {
-            let facts = json!({ "kind": lesson.kind(), "lesson": lesson.facts(), "schedule": schedule.facts(), "step": step + 1 });
+            let facts = json!({ "kind": training_task.kind(), "lesson": training_task.metadata(), "schedule": schedule.metadata(), "step": step + 1 });
             let mut contents = Contents { facts, tensors: BTreeMap::new() };
-            contents.add("net.", lesson.params().tensors()?);
+            contents.add("net.", training_task.params().tensors()?);
             contents.add("", adam.tensors("adam.")?);
             contents.write(&beside(out, ".checkpoint"))?;
         }
@@ -188,17 +199,17 @@ fn train_until(
 }
 
 /// Takes up the checkpoint beside `out`, if there is one; gives the step to go on at.
-fn resume(lesson: &dyn Lesson, schedule: &Schedule, out: &Path, adam: &mut Adam) -> Result<usize> {
+fn resume(training_task: &dyn TrainingTask, schedule: &Schedule, out: &Path, adam: &mut Adam) -> Result<usize> {
     let path = beside(out, ".checkpoint");
     if !path.exists() {
         return Ok(0);
     }
     let contents = Contents::read(&path)?;
     let fit = || -> Result<usize> {
-        expect_same(&contents.facts, "kind", &json!(lesson.kind()))?;
-        expect_same(&contents.facts, "lesson", &lesson.facts())?;
-        expect_same(&contents.facts, "schedule", &schedule.facts())?;
-        lesson.params().load(&contents.part("net."))?;
+        expect_same(&contents.facts, "kind", &json!(training_task.kind()))?;
+        expect_same(&contents.facts, "lesson", &training_task.metadata())?;
+        expect_same(&contents.facts, "schedule", &schedule.metadata())?;
+        training_task.params().load(&contents.part("net."))?;
         Ok(contents.facts["step"].as_u64().context("it names no step")? as usize)
     };
     let step = fit().with_context(|| format!("cannot go on from {}", path.display()))?;
@@ -214,13 +225,18 @@ fn beside(out: &Path, ending: &str) -> PathBuf {
 }
 
 /// The samples of a step: each from its own stream of random numbers, so that threads and resuming do not matter.
-fn batch(lesson: &dyn Lesson, schedule: &Schedule, step: usize, n_points: usize) -> Result<(Tensor, Tensor)> {
-    let (n, shape) = (schedule.batch, lesson.shape_in());
+fn batch(
+    training_task: &dyn TrainingTask,
+    schedule: &Schedule,
+    step: usize,
+    n_points: usize,
+) -> Result<(Tensor, Tensor)> {
+    let (n, shape) = (schedule.batch, training_task.shape_in());
     let (n_in, n_out) = (shape.iter().product::<usize>(), 3 * n_points);
     let (mut x, mut y) = (vec![0.0; n * n_in], vec![0.0; n * n_out]);
-    let group = lesson.group();
+    let group = training_task.group();
     x.par_chunks_mut(group * n_in).zip(y.par_chunks_mut(group * n_out)).enumerate().for_each(|(i, (x, y))| {
-        lesson.draw(&mut stream(schedule.seed, step, n, i), x, y);
+        training_task.sample(&mut stream(schedule.seed, step, n, i), x, y);
     });
     let x = Tensor::from_vec(x, [vec![n], shape].concat(), &Device::Cpu)?;
     Ok((x, Tensor::from_vec(y, (n, n_points, 3), &Device::Cpu)?))
@@ -244,25 +260,25 @@ mod tests {
     use super::*;
     use crate::nn::lifter::body::BodyLifter;
     use crate::stage::progress::Silent;
-    use crate::train::lifter::body::BodyLesson;
-    use crate::train::lifter::hands::HandLesson;
+    use crate::train::lifter::body::BodyLifterTask;
+    use crate::train::lifter::hands::HandLifterTask;
 
     const SCHEDULE: Schedule =
         Schedule { steps: 6, batch: 8, learning_rate: 1e-3, seed: 3, checkpoint_every: 2, started_from: None };
 
-    fn resumed_equals_straight(lesson: impl Fn() -> Box<dyn Lesson>) {
+    fn resumed_equals_straight(training_task: impl Fn() -> Box<dyn TrainingTask>) {
         let dir = tempfile::tempdir().unwrap();
         let (straight, resumed) = (dir.path().join("a.safetensors"), dir.path().join("b.safetensors"));
-        train(&mut *lesson(), &SCHEDULE, &straight, &Silent).unwrap();
-        train_until(&mut *lesson(), &SCHEDULE, &resumed, 3, &Silent).unwrap();
+        train(&mut *training_task(), &SCHEDULE, &straight, &Silent).unwrap();
+        train_until(&mut *training_task(), &SCHEDULE, &resumed, 3, &Silent).unwrap();
         let other = Schedule { seed: 4, ..SCHEDULE };
-        let text = format!("{:#}", train(&mut *lesson(), &other, &resumed, &Silent).unwrap_err());
+        let text = format!("{:#}", train(&mut *training_task(), &other, &resumed, &Silent).unwrap_err());
         assert!(text.contains("schedule"), "{text}");
-        train(&mut *lesson(), &SCHEDULE, &resumed, &Silent).unwrap();
+        train(&mut *training_task(), &SCHEDULE, &resumed, &Silent).unwrap();
         assert_eq!(std::fs::read(&straight).unwrap(), std::fs::read(resumed).unwrap());
         let measured =
-            Schedule { steps: 0, started_from: Some(start_from(&*lesson(), &straight).unwrap()), ..SCHEDULE };
-        assert!(!train(&mut *lesson(), &measured, &straight, &Silent).unwrap().is_empty());
+            Schedule { steps: 0, started_from: Some(start_from(&*training_task(), &straight).unwrap()), ..SCHEDULE };
+        assert!(!train(&mut *training_task(), &measured, &straight, &Silent).unwrap().is_empty());
         let log = |weights: &Path| std::fs::read_to_string(beside(weights, ".jsonl")).unwrap();
         assert_eq!(log(&straight), log(&dir.path().join("b.safetensors")));
         assert!(log(&straight).lines().count() >= 6, "{}", log(&straight));
@@ -272,13 +288,13 @@ mod tests {
     #[test]
     fn an_interrupted_body_training_ends_in_the_same_bytes() {
         resumed_equals_straight(|| {
-            Box::new(BodyLesson::new(Vec::new(), Vec::new(), &BodyLifter::config(8, &[3, 3, 3]), 3).unwrap())
+            Box::new(BodyLifterTask::new(Vec::new(), Vec::new(), &BodyLifter::config(8, &[3, 3, 3]), 3).unwrap())
         });
     }
 
     #[test]
     fn an_interrupted_hand_training_ends_in_the_same_bytes() {
-        resumed_equals_straight(|| Box::new(HandLesson::new(16, 3).unwrap()));
+        resumed_equals_straight(|| Box::new(HandLifterTask::new(16, 3).unwrap()));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use orator::dataset::write::writer::DatasetWriter;
 use orator::dataset::{Dataset, Sample, Split};
 use orator::stage::progress::{Progress, Silent, Task};
 use orator::train::gan::train;
-use orator::train::gan::windows::Examples;
+use orator::train::gan::windows::WindowLoader;
 use orator::types::pose3d::Motion;
 use orator::types::skeleton::N_JOINTS;
 use orator::types::sound::{SAMPLE_RATE, Sound};
@@ -210,7 +210,7 @@ fn loader(args: &Args, dir: &Path, out: &Path) -> Result<Loaded> {
     };
     let dataset = Dataset::open(dir)?;
     let start = Instant::now();
-    let examples = Examples::load(&dataset, Split::Train, &train::normalisation(&dataset)?, 64, 5)?;
+    let examples = WindowLoader::load(&dataset, Split::Train, &train::normalisation(&dataset)?, 64, 5)?;
     let load_secs = start.elapsed().as_secs_f64();
     let mut rng = ChaCha8Rng::seed_from_u64(1337);
     let (mut n_loaded, start) = (0, Instant::now());

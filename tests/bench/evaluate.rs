@@ -11,7 +11,7 @@ use orator::evaluate::clips::clips::{ClipAudio, EvalClip, EvalClips, compared, p
 use orator::evaluate::clips::sound_features;
 use orator::evaluate::table::{result, table};
 use orator::evaluate::verdict::text;
-use orator::metrics::settings::Settings;
+use orator::metrics::settings::MetricSettings;
 use orator::report::evaluation::page;
 use orator::stage::progress::{Progress, Task};
 use orator::types::sound::Sound;
@@ -137,7 +137,7 @@ fn evaluate(speaker: Vec<Unheard>, watch: &Stopwatch) -> Result<(table::Table, S
     watch.detail("making the baselines");
     let mut predictors = vec![Predictor::prediction(&clips, "what the rule alone would do")];
     predictors.extend(baselines::of_files(&clips)?.0);
-    let table = table::measure(&clips, &Settings::default(), &predictors, watch)?;
+    let table = table::measure(&clips, &MetricSettings::default(), &predictors, watch)?;
     watch.detail("the verdict and the JSON");
     let length = text::text(&table, true).len() + result::json(&table).to_string().len();
     ensure!(length > 0, "there is nothing to say");

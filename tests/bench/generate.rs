@@ -4,9 +4,9 @@ use super::child;
 use super::report::{Report, median};
 use anyhow::{Result, ensure};
 use orator::demo::drawn::speech::Speech;
-use orator::generate::Speaker;
-use orator::generate::model::{Facts, TrainedSpeaker};
-use orator::generate::normalisation::{N_NUMBERS, Normalisation};
+use orator::generate::GestureGenerator;
+use orator::generate::model::{SpeakerMetadata, SpeakerModel};
+use orator::generate::normalisation::{N_FEATURES, Normalisation};
 use orator::generate::representation::Representation;
 use orator::nn::gan::generator::{Config, Generator, Preset};
 use orator::nn::params::Params;
@@ -94,8 +94,8 @@ fn speech(secs: f64) -> Sound {
 }
 
 /// A speaker with random weights.
-fn untrained(preset: Preset) -> Result<Speaker> {
-    let network = Config::of(preset, N_NUMBERS);
+fn untrained(preset: Preset) -> Result<GestureGenerator> {
+    let network = Config::from_preset(preset, N_FEATURES);
     let mut random = Params::new(1337);
     Generator::new(&mut random, &network)?;
     let mut params = Params::frozen();
@@ -103,6 +103,6 @@ fn untrained(preset: Preset) -> Result<Speaker> {
     params.load(&random.tensors()?)?;
     let table = ndarray::Array2::from_elem((N_JOINTS, 3), 0.1);
     let normalisation = Normalisation::new(&table, &table, vec![0.1; N_BONES]);
-    let facts = Facts::new("untrained", FPS, "", network, normalisation, Representation::Positions);
-    Ok(Speaker::from(TrainedSpeaker { facts, generator }))
+    let facts = SpeakerMetadata::new("untrained", FPS, "", network, normalisation, Representation::Positions);
+    Ok(GestureGenerator::from(SpeakerModel { metadata: facts, generator }))
 }

@@ -11,7 +11,7 @@ use orator::nn::lifter::body::BodyLifter;
 use orator::nn::lifter::hand::HandLifter;
 use orator::pipeline::lift::{Lifter, weights};
 use orator::stage::progress::Progress;
-use orator::train::scene::body::{Filming, Scene};
+use orator::train::scene::body::{FilmedScene, Filming};
 use orator::train::scene::hand_shape;
 use orator::types::pose2d::Keypoints;
 use orator::types::time::FrameRate;
@@ -106,8 +106,8 @@ fn networks(body: &BodyLifter, hands: &HandLifter, n_frames: usize) -> Result<()
 /// A speaker made by rule, filmed with noise and gaps, a hand of one shape at each wrist.
 fn made_by_rule(n_frames: usize) -> Keypoints {
     let mut rng = ChaCha8Rng::seed_from_u64(1337);
-    let scene = Scene::of_rule(Filming::Training, n_frames, &mut rng);
-    let shape = hand_shape::draw(&mut rng);
+    let scene = FilmedScene::from_rule(Filming::Training, n_frames, &mut rng);
+    let shape = hand_shape::sample_shape(&mut rng);
     let none = Array3::zeros((n_frames, 21, 3));
     let mut keypoints = Keypoints {
         fps: FrameRate::new(15, 1),

@@ -12,7 +12,7 @@ use orator::nn::lifter::temporal::{Config, TemporalLifter};
 use orator::nn::params::Params;
 use orator::stage::progress::{Progress, Silent};
 use orator::train::supervised;
-use orator::train::supervised::{Lesson, Schedule};
+use orator::train::supervised::{Schedule, TrainingTask};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
@@ -121,11 +121,11 @@ impl Fixed {
     }
 }
 
-impl Lesson for Fixed {
+impl TrainingTask for Fixed {
     fn kind(&self) -> &'static str {
         "benchmark"
     }
-    fn facts(&self) -> Value {
+    fn metadata(&self) -> Value {
         json!({ "config": self.net.config() })
     }
     fn params(&self) -> &Params {
@@ -137,7 +137,7 @@ impl Lesson for Fixed {
     fn weights(&self) -> Vec<f32> {
         vec![1.0; N_OUT / 3]
     }
-    fn draw(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
+    fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
         // a sample of the trainer has its number in its stream of random numbers
         let sample = rng.get_stream() as usize % (self.batch() + 1);
         let part = |all: &[f32], to: &mut [f32]| {

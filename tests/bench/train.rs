@@ -10,14 +10,14 @@ use orator::audio::mel::N_MELS;
 use orator::config::Gan;
 use orator::formats::checkpoint::{self, Contents};
 use orator::generate::mel_stream::mel_frames;
-use orator::generate::model::Facts;
-use orator::generate::normalisation::{N_NUMBERS, Normalisation};
+use orator::generate::model::SpeakerMetadata;
+use orator::generate::normalisation::{N_FEATURES, Normalisation};
 use orator::generate::representation::Representation;
-use orator::nn::cpu::thread_team::awake;
+use orator::nn::cpu::thread_team::with_spinning_workers;
 use orator::nn::gan::generator::Config;
 use orator::stage::progress::Progress;
-use orator::train::gan::step::{Losses, MAX_NORM, Training};
-use orator::train::gan::windows::Batch;
+use orator::train::gan::step::{GanTrainer, Losses, MAX_NORM};
+use orator::train::gan::windows::WindowBatch;
 use orator::types::skeleton::{N_BONES, N_JOINTS, NECK, is_duplicate, parent};
 use orator::types::time::FrameRate;
 use rand::{Rng, SeedableRng};
@@ -56,8 +56,8 @@ pub struct Args {
 
 /// The trainer with a batch that stays.
 struct Fixed {
-    trainer: Training,
-    batch: Batch,
+    trainer: GanTrainer,
+    batch: WindowBatch,
 }
 
 impl Fixed {
@@ -70,31 +70,35 @@ impl Fixed {
         let normalisation = Normalisation::new(&table(0.1), &table(0.3), (1..N_JOINTS).map(length).collect());
         let mut numbers = |low: f32, high: f32, n: usize| (0..n).map(|_| rng.random_range(low..high)).collect();
         let representation =
-            Representation::Bones { mean: numbers(-0.5, 0.5, N_NUMBERS), std: numbers(0.1, 0.4, N_NUMBERS) };
+            Representation::Bones { mean: numbers(-0.5, 0.5, N_FEATURES), std: numbers(0.1, 0.4, N_FEATURES) };
         // Running statistics are no part of what is compared: one momentum for both networks.
-        let network = Config { norm_momentum: 0.1, ..Config::of(args.preset.parse()?, N_NUMBERS) };
+        let network = Config { norm_momentum: 0.1, ..Config::from_preset(args.preset.parse()?, N_FEATURES) };
         let (n_mels, n_frames) = (mel_frames(FPS, settings.window_frames), settings.window_frames);
         let tensor = |values: Vec<f32>, rows: usize, columns: usize| {
             Tensor::from_vec(values, (args.batch, rows, columns), &Device::Cpu)
         };
         let mels = tensor(numbers(-1.0, 1.0, args.batch * N_MELS * n_mels), N_MELS, n_mels)?;
-        let poses: Vec<f32> = numbers(-1.0, 1.0, args.batch * N_NUMBERS * n_frames);
+        let poses: Vec<f32> = numbers(-1.0, 1.0, args.batch * N_FEATURES * n_frames);
         let mut is_learnt = |i: usize| !is_duplicate(i / n_frames % N_BONES + 1) && rng.random_bool(1.0 - MISSING);
         let joints: Vec<bool> = (0..args.batch * N_BONES * n_frames).map(&mut is_learnt).collect();
         let rows = joints.chunks_exact(n_frames).flat_map(|row| [row; 3]).flatten();
         let mask: Vec<f32> = rows.map(|learnt| f32::from(*learnt)).collect();
         let poses = poses.iter().zip(&mask).map(|(number, mask)| number * mask).collect();
-        let batch =
-            Batch { mels, poses: tensor(poses, N_NUMBERS, n_frames)?, mask: tensor(mask, N_NUMBERS, n_frames)? };
-        let facts = Facts::new("benchmark", FPS, "", network, normalisation, representation);
-        Ok(Self { trainer: Training::new(facts, settings)?, batch })
+        let batch = WindowBatch {
+            mels,
+            poses: tensor(poses, N_FEATURES, n_frames)?,
+            mask: tensor(mask, N_FEATURES, n_frames)?,
+        };
+        let facts = SpeakerMetadata::new("benchmark", FPS, "", network, normalisation, representation);
+        Ok(Self { trainer: GanTrainer::new(facts, settings)?, batch })
     }
 
     /// Weights, batch and settings for the reference.
     fn contents(&self, folder: &Path) -> Result<Contents> {
         self.trainer.save(folder)?;
         let mut contents = Contents::read(&checkpoint::path(folder, 0))?;
-        let Training { facts: Facts { normalisation, representation, .. }, settings, .. } = &self.trainer;
+        let GanTrainer { metadata: SpeakerMetadata { normalisation, representation, .. }, settings, .. } =
+            &self.trainer;
         let Representation::Bones { mean, std } = representation else { anyhow::bail!("no bones to compare") };
         let parents: Vec<f32> = (1..N_JOINTS).map(|joint| parent(joint).unwrap_or(NECK) as f32).collect();
         let numbers = [settings.lambda_l1, settings.lambda_gan, settings.learning_rate, MAX_NORM];
@@ -118,7 +122,7 @@ impl Fixed {
 
     /// Seconds of `steps` steps, and the last one's losses.
     fn train(&mut self, steps: usize) -> Result<(f64, Losses)> {
-        awake(|| {
+        with_spinning_workers(|| {
             let start = Instant::now();
             for _ in 1..steps {
                 self.trainer.step(&self.batch)?;
@@ -135,7 +139,7 @@ impl Fixed {
             phases.push((name, last.elapsed().as_secs_f64()));
             last = Instant::now();
         };
-        awake(|| self.trainer.step_in_phases(&self.batch, &mut phase))?;
+        with_spinning_workers(|| self.trainer.step_in_phases(&self.batch, &mut phase))?;
         Ok(phases)
     }
 

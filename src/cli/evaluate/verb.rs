@@ -8,9 +8,9 @@ use orator::dataset::{Dataset, Split};
 use orator::evaluate::Evaluation;
 use orator::evaluate::table::result;
 use orator::evaluate::verdict::text;
-use orator::generate::Speaker;
+use orator::generate::GestureGenerator;
 use orator::metrics::settings::Convention;
-use orator::metrics::settings::Settings;
+use orator::metrics::settings::MetricSettings;
 use orator::report::evaluation::page;
 use orator::stage::workdir;
 use orator::types::time::FrameRate;
@@ -109,11 +109,11 @@ fn check_report(args: &MotionArgs) -> Result<()> {
 
 fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
     check_report(args)?;
-    let settings = Settings {
+    let settings = MetricSettings {
         convention: args.convention,
         alphas: args.alpha.clone(),
         with_neck: args.with_neck,
-        ..Settings::default()
+        ..MetricSettings::default()
     };
     let evaluation = evaluation(args, ui)?;
     let table = evaluation.measure(&settings, ui)?;
@@ -145,7 +145,7 @@ fn title(args: &MotionArgs) -> String {
 /// What is measured, from files or from a dataset.
 fn evaluation(args: &MotionArgs, ui: &Ui) -> Result<Evaluation> {
     if let (Some(dataset), Some(checkpoint)) = (&args.dataset, &args.checkpoint) {
-        return Evaluation::of_generator(&Dataset::open(dataset)?, &Speaker::open(checkpoint)?, args.split, ui);
+        return Evaluation::of_generator(&Dataset::open(dataset)?, &GestureGenerator::open(checkpoint)?, args.split, ui);
     }
     let (Some(truth), Some(prediction)) = (&args.truth, &args.prediction) else {
         bail!("nothing to measure: give --truth and --prediction, or --dataset and --checkpoint")

@@ -5,7 +5,7 @@ use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
 use orator::animate::export::file::ExportFormat;
-use orator::generate::Speaker;
+use orator::generate::GestureGenerator;
 use orator::pipeline::batch::motion_files::{checkpoint_file, write_motion};
 use orator::pipeline::batch::{SpeechBatch, sounds};
 use orator::stage::progress::Progress as _;
@@ -59,7 +59,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     if checkpoint != *given {
         ui.say(&format!("checkpoint {}", checkpoint.display()));
     }
-    let speaker = Speaker::open(&checkpoint)?;
+    let speaker = GestureGenerator::open(&checkpoint)?;
     let written = write_motion(&speaker, audio, &outputs, ui)?;
     let speed = written.secs / written.motion_secs.max(1e-6);
     let names: Vec<String> = outputs.iter().map(|(path, _)| path.display().to_string()).collect();

@@ -4,7 +4,7 @@ use super::corpus;
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::ensure;
-use orator::train::space::embedding::EmbeddingLesson;
+use orator::train::space::embedding::EmbeddingTask;
 use orator::train::supervised::{Schedule, start_from, train};
 use std::path::PathBuf;
 
@@ -42,8 +42,8 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
     ensure!(args.learning_rate > 0.0 && args.learning_rate < 1.0, "--learning-rate must lie between 0 and 1");
     let corpus = corpus::gather(&args.corpus, ui)?;
     let n_frames = corpus.n_frames();
-    let mut lesson = EmbeddingLesson::new(corpus, args.corpus.seed)?;
-    let started_from = args.start.as_deref().map(|path| start_from(&lesson, path)).transpose()?;
+    let mut training_task = EmbeddingTask::new(corpus, args.corpus.seed)?;
+    let started_from = args.start.as_deref().map(|path| start_from(&training_task, path)).transpose()?;
     let schedule = Schedule {
         steps: args.steps,
         batch: args.batch,
@@ -52,7 +52,7 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
         checkpoint_every: args.checkpoint_every,
         started_from,
     };
-    let errors = train(&mut lesson, &schedule, &args.out, ui)?;
+    let errors = train(&mut training_task, &schedule, &args.out, ui)?;
     let written = if args.steps == 0 { String::new() } else { format!("{} written\n", args.out.display()) };
     let text =
         format!("{written}{n_frames} frames to learn from; of held-out windows came back\n{}", errors.join("\n"));

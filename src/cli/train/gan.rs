@@ -9,11 +9,11 @@ use orator::dataset::{Dataset, Split};
 use orator::evaluate::baseline::predictor;
 use orator::evaluate::clips::held_out;
 use orator::evaluate::clips::held_out::HeldOutInterval;
-use orator::generate::Speaker;
+use orator::generate::GestureGenerator;
 use orator::report::training::page;
 use orator::report::training::strip::HeldOutPair;
 use orator::stage::progress::Progress as _;
-use orator::train::gan::score::{Figures, Validation};
+use orator::train::gan::score::{Validation, ValidationMetrics};
 use orator::train::gan::train;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -102,7 +102,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 fn figures(validation: &Validation) -> String {
     let (predicted, still) = (&validation.generator, &validation.mean_pose);
     let row = |name: &str, predicted: f64, still: f64| format!("{name:24}{predicted:9.3}   {still:9.3}\n");
-    let distance = |figures: &Figures| figures.frechet.unwrap_or(f64::NAN);
+    let distance = |figures: &ValidationMetrics| figures.frechet.unwrap_or(f64::NAN);
     let mut text = format!("on {} {} windows    generator   mean pose\n", validation.n_windows, validation.split);
     text += &row("L1 (normalised)", predicted.l1, still.l1);
     text += &row("PCK 0.2", predicted.pck, still.pck);
@@ -123,7 +123,7 @@ fn figures(validation: &Validation) -> String {
 /// Writes the page of the training; the training is done, so what hinders the page is told and no more.
 fn page(dataset: &Dataset, best: &Path, folder: &Path, ui: &Ui) -> Option<PathBuf> {
     let written = || -> Result<()> {
-        let pairs = pairs(dataset, &Speaker::open(best)?)?;
+        let pairs = pairs(dataset, &GestureGenerator::open(best)?)?;
         page::write(folder, &dataset.info().speaker, &pairs)
     };
     match written() {
@@ -136,12 +136,12 @@ fn page(dataset: &Dataset, best: &Path, folder: &Path, ui: &Ui) -> Option<PathBu
 }
 
 /// True and generated poses of a few intervals that were not trained on; of the training split where there are no others.
-fn pairs(dataset: &Dataset, speaker: &Speaker) -> Result<Vec<HeldOutPair>> {
+fn pairs(dataset: &Dataset, speaker: &GestureGenerator) -> Result<Vec<HeldOutPair>> {
     let splits = [Split::Validation, Split::Train].map(|split| dataset.samples(split));
     let samples = splits.into_iter().find(|samples| !samples.is_empty()).unwrap_or_default();
     let n = samples.len().min(N_PAIRS);
     let chosen: Vec<_> = (0..n).map(|i| samples[i * samples.len() / n].clone()).collect();
-    let intervals = held_out::read(dataset, &chosen, &speaker.facts().normalisation)?;
+    let intervals = held_out::read(dataset, &chosen, &speaker.metadata().normalisation)?;
     let pair = |interval: HeldOutInterval| {
         let n_frames = interval.ground_truth.n_frames();
         let span = ((PAIR_SECS * speaker.fps().per_sec()) as usize).min(n_frames);

@@ -5,10 +5,10 @@ use crate::cli::ui::Ui;
 use anyhow::{Context, ensure};
 use orator::mocap::upper_body;
 use orator::nn::lifter::body::BodyLifter;
-use orator::train::lifter::body::BodyLesson;
-use orator::train::lifter::hands::HandLesson;
-use orator::train::lifter::heatmaps::HeatmapLesson;
-use orator::train::supervised::{Lesson, Schedule, start_from, train};
+use orator::train::lifter::body::BodyLifterTask;
+use orator::train::lifter::hands::HandLifterTask;
+use orator::train::lifter::heatmaps::HeatmapLifterTask;
+use orator::train::supervised::{Schedule, TrainingTask, start_from, train};
 use std::path::PathBuf;
 
 /// Train the networks that lift 2D keypoints to 3D joints.
@@ -77,7 +77,7 @@ enum HandNetwork {
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
     ensure!(args.learning_rate > 0.0 && args.learning_rate < 1.0, "--learning-rate must lie between 0 and 1");
     ensure!((1..=4096).contains(&args.width.unwrap_or(256)), "--width must lie between 1 and 4096");
-    let (mut lesson, steps): (Box<dyn Lesson>, usize) = match args.part {
+    let (mut training_task, steps): (Box<dyn TrainingTask>, usize) = match args.part {
         Part::Body => {
             ensure!(!args.mocap.is_empty(), "the body lifter learns from captured motion: give --mocap PATH");
             ensure!(
@@ -88,7 +88,7 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
             let (held_out, takes) = upper_body::divide(takes, &args.hold_out)?;
             ensure!(!takes.is_empty(), "--hold-out leaves nothing to learn from");
             let config = BodyLifter::config(args.width.unwrap_or(256), &args.widths);
-            (Box::new(BodyLesson::new(takes, held_out, &config, args.seed)?), 9000)
+            (Box::new(BodyLifterTask::new(takes, held_out, &config, args.seed)?), 9000)
         }
         Part::Hands => {
             ensure!(
@@ -96,12 +96,14 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
                 "the hand lifter learns from hands made by rule: no --mocap"
             );
             match args.network {
-                HandNetwork::Coordinates => (Box::new(HandLesson::new(args.width.unwrap_or(896), args.seed)?), 9000),
-                HandNetwork::Heatmap => (Box::new(HeatmapLesson::new(args.seed)?), 9000),
+                HandNetwork::Coordinates => {
+                    (Box::new(HandLifterTask::new(args.width.unwrap_or(896), args.seed)?), 9000)
+                }
+                HandNetwork::Heatmap => (Box::new(HeatmapLifterTask::new(args.seed)?), 9000),
             }
         }
     };
-    let started_from = args.start.as_deref().map(|path| start_from(&*lesson, path)).transpose()?;
+    let started_from = args.start.as_deref().map(|path| start_from(&*training_task, path)).transpose()?;
     let schedule = Schedule {
         steps: args.steps.unwrap_or(steps),
         batch: args.batch,
@@ -110,7 +112,7 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
         checkpoint_every: args.checkpoint_every,
         started_from,
     };
-    let errors = train(&mut *lesson, &schedule, &args.out, ui)?;
+    let errors = train(&mut *training_task, &schedule, &args.out, ui)?;
     if schedule.steps == 0 {
         ui.summary(&errors.join("\n"), None, serde_json::json!({ "errors": errors }));
         return Ok(Outcome::Done);
@@ -118,7 +120,8 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
     let text = format!("{} written\n{}", args.out.display(), errors.join("\n"));
     let key = if args.part == Part::Body { "--body-weights" } else { "--hand-weights" };
     let next = format!("orator lift KEYPOINTS.npz --out JOINTS.npy {key} {}", args.out.display());
-    let facts = serde_json::json!({ "out": args.out, "parameters": lesson.params().n_parameters(), "errors": errors });
+    let facts =
+        serde_json::json!({ "out": args.out, "parameters": training_task.params().n_parameters(), "errors": errors });
     ui.summary(&text, Some(&next), facts);
     Ok(Outcome::Done)
 }

@@ -6,9 +6,9 @@ use crate::dataset::{Dataset, Sample, Split};
 use crate::demo::rule::baselines::{RuleBaselines, sound_of_frames, wrist_speeds};
 use crate::demo::rule::dataset::SpokenClip;
 use crate::demo::rule::ridge::correlation;
-use crate::generate::Speaker;
+use crate::generate::GestureGenerator;
 use crate::metrics::movement::energy::MotionEnergy;
-use crate::metrics::position::pck::Correct;
+use crate::metrics::position::pck::CorrectKeypoints;
 use crate::stage::progress::Progress;
 use crate::types::skeleton::{NECK, is_duplicate};
 use crate::types::time::FrameRate;
@@ -73,7 +73,7 @@ struct TestClip {
 }
 
 /// Measures `speaker` on the test split of the synthetic speaker's `dataset`; without one, the baselines alone.
-pub fn measure(dataset: &Dataset, speaker: Option<&Speaker>, progress: &dyn Progress) -> Result<Learned> {
+pub fn measure(dataset: &Dataset, speaker: Option<&GestureGenerator>, progress: &dyn Progress) -> Result<Learned> {
     let tests: Vec<TestClip> =
         dataset.samples(Split::Test).iter().map(|s| TestClip::new(dataset.read(s)?)).collect::<Result<_>>()?;
     ensure!(tests.len() > 1, "{}: the test split needs two clips at least", dataset.dir().display());
@@ -153,7 +153,7 @@ struct Judge<'a> {
 
 impl Judge<'_> {
     fn row(&self, predictor: &'static str, predicted: &[Array3<f32>]) -> LearnedRow {
-        let mut correct = Correct::default();
+        let mut correct = CorrectKeypoints::default();
         let (mut energy, mut reference_energy) = (MotionEnergy::default(), MotionEnergy::default());
         let (mut pauses, mut reference_pauses) = (MotionEnergy::default(), MotionEnergy::default());
         let mut errors = (0.0, 0.0);

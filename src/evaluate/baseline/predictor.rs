@@ -1,6 +1,6 @@
 //! Motion that a trained speaker generates for a sound of a given length.
 
-use crate::generate::Speaker;
+use crate::generate::GestureGenerator;
 use crate::types::pose3d::Motion;
 use crate::types::sound::{SAMPLE_RATE, Sound};
 use crate::types::sync;
@@ -8,7 +8,7 @@ use anyhow::{Result, ensure};
 use ndarray::s;
 
 /// Generated motion for one sound, exactly `n_frames` long.
-pub fn motion(speaker: &Speaker, sound: &Sound, n_frames: usize) -> Result<Motion> {
+pub fn motion(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> Result<Motion> {
     let wanted = sync::sample_at(speaker.fps(), SAMPLE_RATE, n_frames) + 1;
     let mut sound = sound.clone();
     sound.samples.resize(sound.samples.len().max(wanted), 0.0);

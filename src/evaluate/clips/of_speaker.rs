@@ -14,8 +14,8 @@ use crate::evaluate::baseline::constant_pose::ConstantPoses;
 use crate::evaluate::baseline::neighbour;
 use crate::evaluate::baseline::neighbour::{Library, Query};
 use crate::evaluate::baseline::predictor;
-use crate::generate::Speaker;
-use crate::generate::normalisation::{N_NUMBERS, Normalisation};
+use crate::generate::GestureGenerator;
+use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::stage::progress::Task;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::Sound;
@@ -34,14 +34,19 @@ pub struct SpeakerEvaluation {
 ///
 /// # Errors
 /// A dataset of another frame rate; a split without intervals.
-pub fn material(dataset: &Dataset, speaker: &Speaker, split: Split, task: &dyn Task) -> Result<SpeakerEvaluation> {
+pub fn material(
+    dataset: &Dataset,
+    speaker: &GestureGenerator,
+    split: Split,
+    task: &dyn Task,
+) -> Result<SpeakerEvaluation> {
     let (of_dataset, of_speaker) = (dataset.info().fps, speaker.fps());
     ensure!(
         of_dataset == of_speaker,
         "{} moves at {of_dataset}, the checkpoint's speaker at {of_speaker}: it was trained on another dataset",
         dataset.dir().display()
     );
-    let normal = &speaker.facts().normalisation;
+    let normal = &speaker.metadata().normalisation;
     task.detail("reading the intervals");
     let held_out = held_out::read(dataset, &held_out::samples(dataset, split)?, normal)?;
     task.detail("generating motion");
@@ -95,7 +100,7 @@ pub fn material(dataset: &Dataset, speaker: &Speaker, split: Split, task: &dyn T
 }
 
 fn generated(
-    speaker: &Speaker,
+    speaker: &GestureGenerator,
     held_out: &[HeldOutInterval],
     features: impl Fn(&[&Sound], usize) -> Sound,
 ) -> Result<Vec<Array3<f32>>> {
@@ -123,7 +128,7 @@ fn constant_poses(dataset: &Dataset, normal: &Normalisation, n_clips: usize) -> 
         let interval = held_out::read(dataset, &[sample], normal)?.remove(0);
         constant_poses.add(interval.ground_truth.joints.view(), interval.ground_truth.mask.view());
     }
-    let mean: Array2<f32> = normal.joints(Array2::zeros((N_NUMBERS, 1)).view()).slice(s![0, .., ..]).to_owned();
+    let mean: Array2<f32> = normal.joints(Array2::zeros((N_FEATURES, 1)).view()).slice(s![0, .., ..]).to_owned();
     let mut median = constant_poses.median();
     median.zip_mut_with(&mean, |v, mean| *v = if v.is_finite() { *v } else { *mean });
     let predictor = |kind: PredictorKind, pose: Array2<f32>| Predictor {

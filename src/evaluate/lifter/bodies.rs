@@ -9,8 +9,8 @@ use crate::mocap::upper_body::Set;
 use crate::motion::upper_body::{ARMS, COCO, L_HIP, N_POINTS, NOSE, Pose, R_HIP};
 use crate::nn::lifter::body::BodyLifter;
 use crate::pipeline::lift::{Lifter, weights};
-use crate::train::lifter::errors::{Errors, mean_pose, of_lifted, with_bone_depth, with_mean_depth};
-use crate::train::scene::body::{FPS, Filming, Scene, scenes};
+use crate::train::lifter::errors::{BodyErrors, mean_pose, of_lifted, with_bone_depth, with_mean_depth};
+use crate::train::scene::body::{FPS, FilmedScene, Filming, scenes};
 use crate::types::interval::Interval;
 use crate::types::pose2d::{Keypoints, N_BODY, N_HAND};
 use crate::types::time::FrameRate;
@@ -46,9 +46,9 @@ pub struct BodyRow {
     pub method: &'static str,
     /// Keypoints of the method: "drop" or "clean".
     pub input: &'static str,
-    pub errors: Errors,
+    pub errors: BodyErrors,
     /// Errors by |yaw|: 0 to 20, 20 to 40, 40 to 60 degrees.
-    pub by_yaw: Vec<Errors>,
+    pub by_yaw: Vec<BodyErrors>,
     /// Share of the frames in which the method gave all points.
     #[serde(rename = "told")]
     pub complete_share: f64,
@@ -62,7 +62,7 @@ pub fn table(lifters: &Lifters, sets: &[Set], n_scenes: usize) -> Result<Vec<Bod
         let (drop, clean) = (scenes(takes, Filming::Drop, n_scenes), scenes(takes, Filming::Clean, n_scenes));
         ensure!(!drop.is_empty(), "{set}: no take lasts for a scene of 4 s");
         let mean = mean_pose(&clean);
-        let network = |scene: &Scene| Ok(lifters.network.poses(&scene.seen, 1.0)?);
+        let network = |scene: &FilmedScene| Ok(lifters.network.poses(&scene.seen, 1.0)?);
         rows.extend([
             row(set, "orator lift", &drop, |scene| whole(&lifters.whole, scene))?,
             row(set, "network alone", &drop, network)?,
@@ -81,8 +81,8 @@ pub fn table(lifters: &Lifters, sets: &[Set], n_scenes: usize) -> Result<Vec<Bod
 fn row(
     set: &str,
     method: &'static str,
-    scenes: &[Scene],
-    lift: impl Fn(&Scene) -> Result<Vec<Option<Pose>>>,
+    scenes: &[FilmedScene],
+    lift: impl Fn(&FilmedScene) -> Result<Vec<Option<Pose>>>,
 ) -> Result<BodyRow> {
     let lifted = scenes.iter().map(|scene| Ok((scene, lift(scene)?))).collect::<Result<Vec<_>>>()?;
     let errors = of_lifted(lifted.iter().map(|(scene, poses)| (*scene, &poses[..])));
@@ -97,7 +97,7 @@ fn row(
 }
 
 /// Lifts a scene with the whole of `orator lift`.
-fn whole(lifter: &Lifter, scene: &Scene) -> Result<Vec<Option<Pose>>> {
+fn whole(lifter: &Lifter, scene: &FilmedScene) -> Result<Vec<Option<Pose>>> {
     let n_frames = scene.seen.len();
     let none = Array3::zeros((n_frames, N_HAND, 3));
     let mut body = Array3::zeros((n_frames, N_BODY, 3));

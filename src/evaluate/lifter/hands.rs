@@ -14,8 +14,8 @@ use crate::motion::view::hand::{Hand, SeenHand, parent};
 use crate::nn::lifter::hand::HandLifter;
 use crate::pipeline::lift::weights;
 use crate::train::lifter::heatmaps;
-use crate::train::lifter::heatmaps::HeatmapLesson;
-use crate::train::scene::hand_shape::{any_turn, normal};
+use crate::train::lifter::heatmaps::HeatmapLifterTask;
+use crate::train::scene::hand_shape::{normal, random_rotation};
 use crate::train::supervised::start_from;
 use crate::types::pose2d::N_HAND;
 use crate::types::skeleton::Side;
@@ -78,9 +78,9 @@ pub fn evaluate(lift: &LiftHands, sets: &[FingerSet], n_hands: usize, seed: u64)
 /// Lifter with the weights of a file (built-in ones where `path` is empty), of either network.
 pub fn lifter_of(path: &Path) -> Result<Box<LiftHands<'static>>> {
     if !path.as_os_str().is_empty() && Contents::read(path)?.facts["kind"] == heatmaps::KIND {
-        let lesson = HeatmapLesson::new(0)?;
-        start_from(&lesson, path)?;
-        return Ok(Box::new(move |seen| Ok(lesson.lifter().lift(seen, Side::Right)?)));
+        let training_task = HeatmapLifterTask::new(0)?;
+        start_from(&training_task, path)?;
+        return Ok(Box::new(move |seen| Ok(training_task.lifter().lift(seen, Side::Right)?)));
     }
     let lifter: HandLifter = weights::hands(path)?;
     Ok(Box::new(move |seen| Ok(lifter.lift(seen, Side::Right)?)))
@@ -114,7 +114,7 @@ fn row(lift: &LiftHands, set: &FingerSet, n_hands: usize, seed: u64) -> Result<H
 }
 
 fn shot(truth: &Truth, rng: &mut ChaCha8Rng) -> ProjectedHand {
-    let turn = any_turn(rng);
+    let turn = random_rotation(rng);
     let hand = truth.hand.map(|p| turn.turn(p));
     let distance = 0.19 * rng.random_range(5.0..20.0);
     let palm = if truth.there[9] { vec3::norm(hand[9]) } else { PALM };

@@ -3,7 +3,7 @@
 
 use crate::evaluate::baseline::baselines::Predictor;
 use crate::evaluate::clips::clips::EvalClips;
-use crate::metrics::catalogue::{Catalogue, Interval, Measured};
+use crate::metrics::catalogue::{Catalogue, IntervalSums, MotionPair};
 use ndarray::{Array2, s};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -27,12 +27,12 @@ fn block_frames(clips: &EvalClips) -> usize {
 }
 
 /// Metric sums of a predictor over all clips and their blocks, independent of the number of threads.
-pub fn measure(catalogue: &Catalogue, clips: &EvalClips, predictor: &Predictor) -> Measured {
-    let all: Vec<Measured> = pieces(clips)
+pub fn measure(catalogue: &Catalogue, clips: &EvalClips, predictor: &Predictor) -> IntervalSums {
+    let all: Vec<IntervalSums> = pieces(clips)
         .into_par_iter()
         .map(|(clip, frames)| {
             let (of, Some(predicted)) = (&clips.clips[clip], predictor.motion(clips, clip)) else {
-                return Measured::default();
+                return IntervalSums::default();
             };
             let onsets: Option<Vec<f64>> = of.features.as_ref().map(|features| {
                 let (start, end) = (clips.fps.secs(frames.start), clips.fps.secs(frames.end));
@@ -43,9 +43,9 @@ pub fn measure(catalogue: &Catalogue, clips: &EvalClips, predictor: &Predictor) 
                     .map(|onset| onset - start)
                     .collect()
             });
-            let interval = Interval {
-                made: predicted.slice(s![frames.clone(), .., ..]),
-                real: of.ground_truth.slice(s![frames.clone(), .., ..]),
+            let interval = MotionPair {
+                predicted: predicted.slice(s![frames.clone(), .., ..]),
+                ground_truth: of.ground_truth.slice(s![frames.clone(), .., ..]),
                 mask: of.mask.slice(s![frames, ..]),
                 fps: clips.fps,
                 onsets: onsets.as_deref(),
@@ -68,7 +68,7 @@ fn pieces(clips: &EvalClips) -> Vec<(usize, Range<usize>)> {
 
 /// One half of the ground truth against the other: every second block is treated as the prediction of the one before
 /// it.
-pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> Measured {
+pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> IntervalSums {
     let length = block_frames(clips);
     let stretches = |clip: usize| (0..clips.clips[clip].n_frames() / length).map(move |i| (clip, i * length));
     let all: Vec<(usize, usize)> = (0..clips.clips.len()).flat_map(stretches).collect();
@@ -80,16 +80,15 @@ pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> Measured {
         let ((ground_truth, seen), (predicted, also)) = (part(pair[0]), part(pair[1]));
         let mut mask = seen.to_owned();
         mask.zip_mut_with(&also, |seen, also| *seen &= also);
-        let interval =
-            Interval { made: predicted, real: ground_truth, mask: mask.view(), fps: clips.fps, onsets: None };
+        let interval = MotionPair { predicted, ground_truth, mask: mask.view(), fps: clips.fps, onsets: None };
         catalogue.measure_blocks(&interval, length)
     };
     together(all.par_chunks_exact(2).map(beside).collect())
 }
 
 /// Sum of measurements in their order.
-fn together(all: Vec<Measured>) -> Measured {
-    let mut sum = Measured::default();
+fn together(all: Vec<IntervalSums>) -> IntervalSums {
+    let mut sum = IntervalSums::default();
     for one in all {
         sum.whole += &one.whole;
         sum.blocks.extend(one.blocks);

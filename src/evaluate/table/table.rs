@@ -4,8 +4,8 @@ use super::blocks;
 use super::bootstrap::{Estimate, draws};
 use crate::evaluate::baseline::baselines::{Predictor, PredictorKind};
 use crate::evaluate::clips::clips::EvalClips;
-use crate::metrics::catalogue::{Better, Catalogue, Definition, Measured};
-use crate::metrics::settings::Settings;
+use crate::metrics::catalogue::{Better, Catalogue, Definition, IntervalSums};
+use crate::metrics::settings::MetricSettings;
 use crate::stage::progress::Task;
 use anyhow::{Result, ensure};
 use ndarray::{Array2, s};
@@ -33,7 +33,7 @@ pub struct PredictorRow {
 /// Metrics of all predictors.
 #[derive(Clone, Debug)]
 pub struct Table {
-    pub settings: Settings,
+    pub settings: MetricSettings,
     pub definitions: Vec<Definition>,
     /// For a metric that should match the ground truth's: index of the ground truth's value.
     pub truth_of: Vec<Option<usize>>,
@@ -58,8 +58,13 @@ pub struct Table {
 ///
 /// # Errors
 /// Settings that the catalogue rejects; no frame to measure.
-pub fn measure(clips: &EvalClips, settings: &Settings, predictors: &[Predictor], task: &dyn Task) -> Result<Table> {
-    let settings = Settings { fps: clips.fps, ..settings.clone() };
+pub fn measure(
+    clips: &EvalClips,
+    settings: &MetricSettings,
+    predictors: &[Predictor],
+    task: &dyn Task,
+) -> Result<Table> {
+    let settings = MetricSettings { fps: clips.fps, ..settings.clone() };
     let catalogue = Catalogue::new(&settings)?;
     ensure!(clips.n_frames() > 0, "there is no frame to measure");
     let (mut rows, mut n_blocks) = (Vec::new(), 0);
@@ -75,7 +80,7 @@ pub fn measure(clips: &EvalClips, settings: &Settings, predictors: &[Predictor],
     let truth = Predictor::truth(clips);
     // Without blocks, since the ground truth has no draws.
     let whole = blocks::measure(&catalogue, clips, &truth).whole;
-    rows.push(row(&catalogue, PredictorKind::Truth, &truth.description, &Measured { whole, blocks: Vec::new() }));
+    rows.push(row(&catalogue, PredictorKind::Truth, &truth.description, &IntervalSums { whole, blocks: Vec::new() }));
     task.advance(1);
     let definitions = catalogue.definitions().to_vec();
     let truth_of = (0..definitions.len()).map(|index| catalogue.truth_of(index)).collect();
@@ -117,7 +122,7 @@ fn is_of_sets(definition: &Definition) -> bool {
     ["frechet", "hellinger"].iter().any(|start| definition.name.starts_with(start))
 }
 
-fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: &Measured) -> PredictorRow {
+fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: &IntervalSums) -> PredictorRow {
     let values = catalogue.values(&measured.whole);
     let n_blocks = measured.blocks.len();
     let drawn = if n_blocks == 0 {

@@ -138,12 +138,12 @@ pub fn bracketed(definition: &Definition, estimate: &Estimate) -> String {
 mod tests {
     use super::*;
     use crate::metrics::catalogue::Catalogue;
-    use crate::metrics::settings::Settings;
+    use crate::metrics::settings::MetricSettings;
     use std::collections::BTreeSet;
 
     #[test]
     fn every_figure_has_a_plain_name_of_its_own() {
-        let catalogue = Catalogue::new(&Settings::default()).unwrap();
+        let catalogue = Catalogue::new(&MetricSettings::default()).unwrap();
         let names: Vec<String> = catalogue.definitions().iter().map(name).collect();
         assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len(), "{names:#?}");
         assert!(names.iter().all(|name| !name.contains('_')), "{names:#?}");
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn numbers_are_short() {
-        let catalogue = Catalogue::new(&Settings::default()).unwrap();
+        let catalogue = Catalogue::new(&MetricSettings::default()).unwrap();
         let share = &catalogue.definitions()[0];
         let estimate = Estimate { value: 0.4123, low: 0.38, high: 0.44 };
         assert_eq!(bracketed(share, &estimate), "41.2 [38.0, 44.0]");

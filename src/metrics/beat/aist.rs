@@ -2,11 +2,12 @@
 //! of the motion are to those of the sound. A motion with one well placed beat scores 1.
 
 use super::consistency::{minima, nearness};
-use crate::metrics::body_part::Part;
-use crate::metrics::definition::{Better, Definition, Metric};
-use crate::metrics::pair::{Pair, Point};
-use crate::metrics::per_frame::{less, norm};
-use crate::metrics::sums::Blocks;
+use crate::math::vec3;
+use crate::math::vec3::Vec3;
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::pair::PairedFrames;
+use crate::metrics::sums::BlockSums;
 use crate::types::skeleton::N_JOINTS;
 use serde_json::json;
 
@@ -20,28 +21,28 @@ struct BeatAlignment {
 }
 
 /// For data of this frame rate.
-pub(crate) fn metric(fps: f64) -> Box<dyn Metric> {
+pub(crate) fn metric(fps: f64) -> Box<dyn MetricFamily> {
     Box::new(BeatAlignment { order: ((ORDER / FPS * fps).round() as usize).max(1) })
 }
 
 /// Sum over joints 1-6 of the way since the frame before, 0 in the first; NaN where one is not seen.
-fn envelope(pair: &Pair, poses: &[[Point; N_JOINTS]]) -> Vec<f64> {
-    let joints = Part::Body.joints();
+fn envelope(pair: &PairedFrames, poses: &[[Vec3; N_JOINTS]]) -> Vec<f64> {
+    let joints = BodyPart::Body.joints();
     let at = |t: usize| match t {
         0 => 0.0,
         _ if joints.iter().all(|joint| pair.sees(t - 1, 2, *joint)) => {
-            joints.iter().map(|joint| norm(less(poses[t][*joint], poses[t - 1][*joint]))).sum()
+            joints.iter().map(|joint| vec3::norm(vec3::sub(poses[t][*joint], poses[t - 1][*joint]))).sum()
         }
         _ => f64::NAN,
     };
     (0..pair.n_frames()).map(at).collect()
 }
 
-impl Metric for BeatAlignment {
+impl MetricFamily for BeatAlignment {
     fn definitions(&self) -> Vec<Definition> {
         let definition = |name, better| Definition {
             name,
-            part: Part::Body.name(),
+            part: BodyPart::Body.name(),
             unit: "1",
             better,
             formula: "per interval the mean over the beats of the MOTION of exp(-d^2 / 2 sigma^2), d to the nearest onset, \
@@ -50,7 +51,7 @@ impl Metric for BeatAlignment {
                       among `order` frames on either side (10 at 60 frames a second); sigma 3 frames at 60 a second. \
                       Theirs: beats of music instead of onsets, 24 joints of SMPL",
             undefined: "no interval has sound with an onset",
-            parameters: json!({"sigma_secs": SIGMA_FRAMES / FPS, "order_frames": self.order, "joints": Part::Body.joints()}),
+            parameters: json!({"sigma_secs": SIGMA_FRAMES / FPS, "order_frames": self.order, "joints": BodyPart::Body.joints()}),
         };
         vec![definition("beat_alignment", Better::NearerTruth), definition("beat_alignment_of_real", Better::Neither)]
     }
@@ -59,7 +60,7 @@ impl Metric for BeatAlignment {
         3
     }
 
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
         let Some(onsets) = pair.interval.onsets else { return };
         let n = pair.n_frames();
         let frames = onsets.iter().map(|onset| (onset * pair.fps).round()).filter(|t| *t < n as f64);
@@ -68,7 +69,7 @@ impl Metric for BeatAlignment {
             return;
         }
         let sigma = SIGMA_FRAMES / FPS * pair.fps;
-        for (i, poses) in [&pair.made, &pair.real].into_iter().enumerate() {
+        for (i, poses) in [&pair.predicted, &pair.ground_truth].into_iter().enumerate() {
             let beats = minima(&envelope(pair, poses), self.order);
             for &t in &beats {
                 blocks.at(t)[i] += nearness(t as f64, &onsets, sigma) / beats.len() as f64;

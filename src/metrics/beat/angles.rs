@@ -2,10 +2,11 @@
 //! beats are where the angle between neighbouring bones changes slowly.
 
 use super::consistency::nearness;
-use crate::metrics::definition::{Better, Definition, Metric};
-use crate::metrics::pair::{Pair, Point};
-use crate::metrics::per_frame::{less, norm};
-use crate::metrics::sums::Blocks;
+use crate::math::vec3;
+use crate::math::vec3::Vec3;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::pair::PairedFrames;
+use crate::metrics::sums::BlockSums;
 use crate::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_ELBOW, R_SHOULDER, R_WRIST};
 use serde_json::json;
 use std::f64::consts::PI;
@@ -29,18 +30,24 @@ struct AngleBeats {
 }
 
 /// For data of this frame rate.
-pub(crate) fn metric(fps: f64) -> Box<dyn Metric> {
+pub(crate) fn metric(fps: f64) -> Box<dyn MetricFamily> {
     Box::new(AngleBeats { per_frame: FPS / fps })
 }
 
 impl AngleBeats {
     /// Times of the beats of one angle, seconds; `None` where a made joint is not finite.
-    fn beats(&self, pair: &Pair, poses: &[[Point; N_JOINTS]], joints: [usize; 3], usual: f64) -> Option<Vec<f64>> {
+    fn beats(
+        &self,
+        pair: &PairedFrames,
+        poses: &[[Vec3; N_JOINTS]],
+        joints: [usize; 3],
+        usual: f64,
+    ) -> Option<Vec<f64>> {
         let seen = |t: usize| joints.iter().all(|joint| pair.seen[t][*joint]);
         let angle = |t: usize| {
             let [a, b, c] = joints.map(|joint| poses[t][joint]);
-            let (first, second) = (less(b, a), less(c, b));
-            let cosine = (0..3).map(|k| first[k] * second[k]).sum::<f64>() / (norm(first) * norm(second));
+            let (first, second) = (vec3::sub(b, a), vec3::sub(c, b));
+            let cosine = (0..3).map(|k| first[k] * second[k]).sum::<f64>() / (vec3::norm(first) * vec3::norm(second));
             cosine.clamp(-1.0, 1.0).acos() / PI
         };
         if (0..pair.n_frames()).any(|t| seen(t) && joints.iter().any(|joint| !poses[t][*joint][0].is_finite())) {
@@ -60,7 +67,7 @@ impl AngleBeats {
     }
 }
 
-impl Metric for AngleBeats {
+impl MetricFamily for AngleBeats {
     fn definitions(&self) -> Vec<Definition> {
         let definition = |name, better| Definition {
             name,
@@ -86,10 +93,10 @@ impl Metric for AngleBeats {
         4
     }
 
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
         let Some(onsets) = pair.interval.onsets else { return };
         for (joints, usual) in ANGLES {
-            for (i, poses) in [&pair.made, &pair.real].into_iter().enumerate() {
+            for (i, poses) in [&pair.predicted, &pair.ground_truth].into_iter().enumerate() {
                 let beats = self.beats(pair, poses, joints, usual);
                 for &onset in onsets.iter().filter(|onset| (**onset * pair.fps) < pair.n_frames() as f64) {
                     let sums = &mut blocks.at((onset * pair.fps) as usize)[2 * i..2 * i + 2];

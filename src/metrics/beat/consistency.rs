@@ -1,11 +1,12 @@
 //! Beat consistency: whether motion has beats where the sound has onsets. This project's own, and that of the emage
 //! convention (Liu et al. 2024), of which it is a plainer form.
 
-use crate::metrics::body_part::Part;
-use crate::metrics::definition::{Better, Definition, Metric};
-use crate::metrics::pair::{Pair, Point};
-use crate::metrics::per_frame::{less, norm};
-use crate::metrics::sums::Blocks;
+use crate::math::vec3;
+use crate::math::vec3::Vec3;
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::pair::PairedFrames;
+use crate::metrics::sums::BlockSums;
 use crate::types::skeleton::{L_ELBOW, L_WRIST, N_JOINTS, R_ELBOW, R_WRIST};
 use serde_json::json;
 
@@ -28,16 +29,16 @@ pub(crate) fn nearness(time: f64, times: &[f64], sigma: f64) -> f64 {
 }
 
 /// Speeds by central differences, one-sided at the two ends, m/s; NaN where a frame is missing.
-fn speeds(track: &[Point], fps: f64) -> Vec<f64> {
+fn speeds(track: &[Vec3], fps: f64) -> Vec<f64> {
     let at = |t: usize| {
         let (before, after) = (t.saturating_sub(1), (t + 1).min(track.len() - 1));
-        norm(less(track[after], track[before])) * fps / (after - before).max(1) as f64
+        vec3::norm(vec3::sub(track[after], track[before])) * fps / (after - before).max(1) as f64
     };
     (0..track.len()).map(at).collect()
 }
 
 /// Places of a joint, NaN where it is not seen.
-fn track(pair: &Pair, poses: &[[Point; N_JOINTS]], joint: usize) -> Vec<Point> {
+fn track(pair: &PairedFrames, poses: &[[Vec3; N_JOINTS]], joint: usize) -> Vec<Vec3> {
     poses.iter().zip(&pair.seen).map(|(pose, seen)| if seen[joint] { pose[joint] } else { [f64::NAN; 3] }).collect()
 }
 
@@ -54,7 +55,7 @@ struct BeatConsistency {
 }
 
 /// For data of this frame rate.
-pub(crate) fn metric(fps: f64) -> Box<dyn Metric> {
+pub(crate) fn metric(fps: f64) -> Box<dyn MetricFamily> {
     Box::new(BeatConsistency { order: order(fps) })
 }
 
@@ -62,7 +63,7 @@ fn order(fps: f64) -> usize {
     ((ORDER / ORDER_FPS * fps).round() as usize).max(1)
 }
 
-impl Metric for BeatConsistency {
+impl MetricFamily for BeatConsistency {
     fn definitions(&self) -> Vec<Definition> {
         let definition = |name, better| Definition {
             name,
@@ -84,10 +85,10 @@ impl Metric for BeatConsistency {
         3
     }
 
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
         let Some(onsets) = pair.interval.onsets else { return };
         for joint in JOINTS {
-            let [made, real] = [&pair.made, &pair.real].map(|poses| {
+            let [predicted, ground_truth] = [&pair.predicted, &pair.ground_truth].map(|poses| {
                 let beats = minima(&speeds(&track(pair, poses, joint), pair.fps), self.order);
                 beats.into_iter().map(|t| t as f64 / pair.fps).collect::<Vec<_>>()
             });
@@ -95,9 +96,9 @@ impl Metric for BeatConsistency {
                 let t = (onset * pair.fps) as usize;
                 if pair.sees(t, 1, joint) {
                     let sums = blocks.at(t);
-                    let broken = pair.made[t][joint].iter().any(|v| !v.is_finite());
-                    sums[0] += if broken { f64::NAN } else { nearness(onset, &made, SIGMA) };
-                    sums[1] += nearness(onset, &real, SIGMA);
+                    let broken = pair.predicted[t][joint].iter().any(|v| !v.is_finite());
+                    sums[0] += if broken { f64::NAN } else { nearness(onset, &predicted, SIGMA) };
+                    sums[1] += nearness(onset, &ground_truth, SIGMA);
                     sums[2] += 1.0;
                 }
             }
@@ -114,19 +115,19 @@ const EMAGE_THRESHOLD: f64 = 0.3;
 /// What is left out at both ends, seconds.
 const EMAGE_CUT: f64 = 2.0;
 
-struct Emage {
+struct EmageBeatConsistency {
     order: usize,
     cut: usize,
 }
 
 /// Emage's, for data of this frame rate.
-pub(crate) fn emage(fps: f64) -> Box<dyn Metric> {
-    Box::new(Emage { order: order(fps), cut: (EMAGE_CUT * fps).round() as usize })
+pub(crate) fn emage(fps: f64) -> Box<dyn MetricFamily> {
+    Box::new(EmageBeatConsistency { order: order(fps), cut: (EMAGE_CUT * fps).round() as usize })
 }
 
-impl Emage {
+impl EmageBeatConsistency {
     /// Times of the beats of one joint from the cut on; `mean_speed` is the real motion's.
-    fn beats(&self, places: &[Point], mean_speed: f64, fps: f64) -> Vec<f64> {
+    fn beats(&self, places: &[Vec3], mean_speed: f64, fps: f64) -> Vec<f64> {
         let speeds: Vec<f64> = speeds(&folded(places), fps).iter().map(|speed| speed / mean_speed).collect();
         let inner = speeds.get(self.cut..speeds.len().saturating_sub(self.cut)).unwrap_or_default();
         // theirs looks the threshold up at the index within the cut, so 2 s early
@@ -136,17 +137,17 @@ impl Emage {
 }
 
 /// Distances from the mean by coordinate, which is what L1div leaves in the array that is then searched for beats.
-fn folded(places: &[Point]) -> Vec<Point> {
-    let seen: Vec<&Point> = places.iter().filter(|p| p.iter().all(|v| v.is_finite())).collect();
-    let mean: Point = std::array::from_fn(|k| seen.iter().map(|p| p[k]).sum::<f64>() / seen.len() as f64);
+fn folded(places: &[Vec3]) -> Vec<Vec3> {
+    let seen: Vec<&Vec3> = places.iter().filter(|p| p.iter().all(|v| v.is_finite())).collect();
+    let mean: Vec3 = std::array::from_fn(|k| seen.iter().map(|p| p[k]).sum::<f64>() / seen.len() as f64);
     places.iter().map(|p| std::array::from_fn(|k| (p[k] - mean[k]).abs())).collect()
 }
 
-impl Metric for Emage {
+impl MetricFamily for EmageBeatConsistency {
     fn definitions(&self) -> Vec<Definition> {
         let definition = |name, better| Definition {
             name,
-            part: Part::Body.name(),
+            part: BodyPart::Body.name(),
             unit: "1",
             better,
             formula: "per interval the mean over joints 1-6 and over onsets of exp(-d^2 / 2 sigma^2), d to the nearest beat \
@@ -157,7 +158,7 @@ impl Metric for Emage {
                       onsets left out (theirs finds onsets in the sound thus cut)",
             undefined: "no interval has an onset and a seen joint further than 2 s from both its ends",
             parameters: json!({
-                "joints": Part::Body.joints(), "sigma_secs": EMAGE_SIGMA, "order_frames": self.order,
+                "joints": BodyPart::Body.joints(), "sigma_secs": EMAGE_SIGMA, "order_frames": self.order,
                 "threshold": EMAGE_THRESHOLD, "cut_frames": self.cut,
             }),
         };
@@ -169,18 +170,19 @@ impl Metric for Emage {
         3
     }
 
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
         let Some(onsets) = pair.interval.onsets else { return };
         let n_inner = pair.n_frames().saturating_sub(2 * self.cut);
         let (from, to) = (self.cut as f64 / pair.fps, (self.cut + n_inner) as f64 / pair.fps);
         let inner: Vec<f64> = onsets.iter().copied().filter(|onset| (from..to).contains(onset)).collect();
-        for joint in Part::Body.joints() {
-            let real = track(pair, &pair.real, joint);
-            let speeds: Vec<f64> = speeds(&real, pair.fps).into_iter().filter(|speed| speed.is_finite()).collect();
+        for joint in BodyPart::Body.joints() {
+            let ground_truth = track(pair, &pair.ground_truth, joint);
+            let speeds: Vec<f64> =
+                speeds(&ground_truth, pair.fps).into_iter().filter(|speed| speed.is_finite()).collect();
             let mean_speed = speeds.iter().sum::<f64>() / speeds.len() as f64;
-            let beats = |places: &[Point]| self.beats(places, mean_speed, pair.fps);
-            let (made, real) = (beats(&track(pair, &pair.made, joint)), beats(&real));
-            let broken = (0..pair.n_frames()).any(|t| pair.seen[t][joint] && !pair.made[t][joint][0].is_finite());
+            let beats = |places: &[Vec3]| self.beats(places, mean_speed, pair.fps);
+            let (predicted, ground_truth) = (beats(&track(pair, &pair.predicted, joint)), beats(&ground_truth));
+            let broken = (0..pair.n_frames()).any(|t| pair.seen[t][joint] && !pair.predicted[t][joint][0].is_finite());
             if speeds.is_empty() {
                 continue;
             }
@@ -188,8 +190,8 @@ impl Metric for Emage {
             for onset in &inner {
                 let sums = blocks.at((onset * pair.fps) as usize);
                 let time = onset - from;
-                sums[0] += if broken { f64::NAN } else { weight * nearness(time, &made, EMAGE_SIGMA) };
-                sums[1] += weight * nearness(time, &real, EMAGE_SIGMA);
+                sums[0] += if broken { f64::NAN } else { weight * nearness(time, &predicted, EMAGE_SIGMA) };
+                sums[1] += weight * nearness(time, &ground_truth, EMAGE_SIGMA);
                 sums[2] += weight;
             }
         }

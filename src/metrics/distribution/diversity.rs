@@ -1,23 +1,24 @@
 //! L1div: how far poses are from the mean pose of their interval (Liu et al. 2024, EMAGE, `metric.py` of their
 //! repository). A motion that hardly leaves its mean has little.
 
-use crate::metrics::body_part::Part;
-use crate::metrics::definition::{Better, Definition, Metric};
-use crate::metrics::pair::{Pair, Point};
-use crate::metrics::sums::Blocks;
+use crate::math::vec3::Vec3;
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::pair::PairedFrames;
+use crate::metrics::sums::BlockSums;
 use crate::types::skeleton::N_JOINTS;
 use serde_json::json;
 
 struct L1Div {
-    part: Part,
+    part: BodyPart,
     joints: Vec<usize>,
 }
 
-pub(crate) fn metric(part: Part) -> Box<dyn Metric> {
+pub(crate) fn metric(part: BodyPart) -> Box<dyn MetricFamily> {
     Box::new(L1Div { part, joints: part.joints() })
 }
 
-impl Metric for L1Div {
+impl MetricFamily for L1Div {
     fn definitions(&self) -> Vec<Definition> {
         let definition = |name, better| Definition {
             name,
@@ -37,18 +38,18 @@ impl Metric for L1Div {
         3 * self.joints.len()
     }
 
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
         for (i, &joint) in self.joints.iter().enumerate() {
             let seen: Vec<usize> = (0..pair.n_frames()).filter(|t| pair.seen[*t][joint]).collect();
-            let mean = |poses: &[[Point; N_JOINTS]]| -> Point {
+            let mean = |poses: &[[Vec3; N_JOINTS]]| -> Vec3 {
                 std::array::from_fn(|k| seen.iter().map(|t| poses[*t][joint][k]).sum::<f64>() / seen.len() as f64)
             };
-            let (made, real) = (mean(&pair.made), mean(&pair.real));
+            let (predicted, ground_truth) = (mean(&pair.predicted), mean(&pair.ground_truth));
             for &t in &seen {
                 let sums = &mut blocks.at(t)[3 * i..3 * i + 3];
-                let apart = |x: Point, mean: Point| (0..3).map(|k| (x[k] - mean[k]).abs()).sum::<f64>();
-                sums[0] += apart(pair.made[t][joint], made);
-                sums[1] += apart(pair.real[t][joint], real);
+                let apart = |x: Vec3, mean: Vec3| (0..3).map(|k| (x[k] - mean[k]).abs()).sum::<f64>();
+                sums[0] += apart(pair.predicted[t][joint], predicted);
+                sums[1] += apart(pair.ground_truth[t][joint], ground_truth);
                 sums[2] += 1.0;
             }
         }

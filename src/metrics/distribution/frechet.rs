@@ -16,7 +16,7 @@ const CM: f64 = 100.0;
 
 /// The normal distribution of a set of rows.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Gaussian {
+pub struct GaussianFit {
     /// Number of rows.
     pub n: usize,
     pub mean: Array1<f64>,
@@ -47,9 +47,9 @@ pub fn poses(motion: ArrayView3<f32>, mask: ArrayView2<bool>, joints: &[usize]) 
     })
 }
 
-impl Gaussian {
+impl GaussianFit {
     /// Of rows [n, d].
-    pub fn of(rows: ArrayView2<f64>) -> Self {
+    pub fn fit(rows: ArrayView2<f64>) -> Self {
         let mean = rows.mean_axis(Axis(0)).unwrap_or_else(|| Array1::zeros(rows.ncols()));
         let rest = &rows - &mean;
         Self { n: rows.nrows(), scatter: rest.t().dot(&rest), mean }
@@ -61,7 +61,7 @@ impl Gaussian {
     }
 }
 
-impl AddAssign<&Self> for Gaussian {
+impl AddAssign<&Self> for GaussianFit {
     /// Both sets together (Chan, Golub, LeVeque 1979). Both must have rows of the same length.
     fn add_assign(&mut self, other: &Self) {
         if self.n == 0 || other.n == 0 {
@@ -82,7 +82,7 @@ impl AddAssign<&Self> for Gaussian {
 
 /// `|m1 - m2|^2 + tr(C1 + C2 - 2 sqrt(C1 C2))`, at least 0; for poses in square centimetres. NaN where a number is, or
 /// where either set is empty.
-pub fn frechet(a: &Gaussian, b: &Gaussian) -> f64 {
+pub fn frechet(a: &GaussianFit, b: &GaussianFit) -> f64 {
     if a.n == 0 || b.n == 0 {
         return f64::NAN;
     }
@@ -127,7 +127,7 @@ mod tests {
         for case in golden["frechet"].as_array().unwrap() {
             let number = |name: &str| case[name].as_f64().unwrap();
             let [n_a, n_b, d] = ["n_a", "n_b", "d"].map(|name| number(name) as usize);
-            let (a, b) = (Gaussian::of(rows(n_a, d, 0).view()), Gaussian::of(rows(n_b, d, 1).view()));
+            let (a, b) = (GaussianFit::fit(rows(n_a, d, 0).view()), GaussianFit::fit(rows(n_b, d, 1).view()));
             let expected = number("distance");
             for found in [frechet(&a, &b), frechet(&b, &a)] {
                 assert!((found - expected).abs() < 1e-6 * expected, "{case}: {found}");
@@ -138,17 +138,17 @@ mod tests {
     #[test]
     fn a_set_is_nowhere_from_itself_and_parts_make_the_whole() {
         let all = rows(200, 30, 1);
-        let whole = Gaussian::of(all.view());
+        let whole = GaussianFit::fit(all.view());
         assert!(frechet(&whole, &whole) < 1e-5);
-        let mut parts = Gaussian::of(all.slice(s![..1, ..]));
-        parts += &Gaussian::of(all.slice(s![1..1, ..]));
-        parts += &Gaussian::of(all.slice(s![1..77, ..]));
-        parts += &Gaussian::of(all.slice(s![77.., ..]));
+        let mut parts = GaussianFit::fit(all.slice(s![..1, ..]));
+        parts += &GaussianFit::fit(all.slice(s![1..1, ..]));
+        parts += &GaussianFit::fit(all.slice(s![1..77, ..]));
+        parts += &GaussianFit::fit(all.slice(s![77.., ..]));
         assert_eq!(parts.n, 200);
         let near = |a: &Array2<f64>, b: &Array2<f64>| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
         assert!(near(&parts.covariance(), &whole.covariance()));
         assert!((&parts.mean - &whole.mean).iter().all(|v| v.abs() < 1e-12));
-        assert!(frechet(&whole, &Gaussian::of(all.slice(s![..0, ..]))).is_nan());
+        assert!(frechet(&whole, &GaussianFit::fit(all.slice(s![..0, ..]))).is_nan());
     }
 
     #[test]
@@ -162,8 +162,8 @@ mod tests {
         let rows = poses(joints.view(), mask.view(), &counted);
         assert_eq!(rows.shape(), [2, 138]);
         assert_eq!((rows[[0, 0]], rows[[1, 18]], rows[[1, 137]]), (10_100.0, 20_800.0, 25_000.0));
-        let mut none = Gaussian::default();
-        none += &Gaussian::of(rows.view());
+        let mut none = GaussianFit::default();
+        none += &GaussianFit::fit(rows.view());
         assert_eq!(none.n, 2);
         assert_eq!(none.mean[0], 15_100.0);
         mask.column_mut(48).fill(false);

@@ -3,13 +3,14 @@
 
 use super::frechet::between;
 use super::moments;
-use crate::metrics::body_part::Part;
-use crate::metrics::definition::{Better, Definition, Metric};
-use crate::metrics::pair::{Pair, Point};
+use crate::math::vec3::Vec3;
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::pair::PairedFrames;
 use crate::metrics::space::fixed_rate;
 use crate::metrics::space::fixed_rate::Frames;
 use crate::metrics::space::{basis, embedding};
-use crate::metrics::sums::Blocks;
+use crate::metrics::sums::BlockSums;
 use crate::types::skeleton::N_JOINTS;
 use ndarray::{Array2, ArrayView2, ArrayView3};
 use serde_json::json;
@@ -17,17 +18,17 @@ use serde_json::json;
 const CM: f64 = 100.0;
 
 /// Distance of single poses.
-struct Poses {
-    part: Part,
+struct FrechetPoses {
+    part: BodyPart,
     joints: Vec<usize>,
 }
 
 /// Of all 48 joints (144 numbers) or of the body (18).
-pub(crate) fn poses(part: Part) -> Box<dyn Metric> {
-    Box::new(Poses { part, joints: part.joints() })
+pub(crate) fn poses(part: BodyPart) -> Box<dyn MetricFamily> {
+    Box::new(FrechetPoses { part, joints: part.joints() })
 }
 
-impl Metric for Poses {
+impl MetricFamily for FrechetPoses {
     fn definitions(&self) -> Vec<Definition> {
         vec![Definition {
             name: "frechet_pose",
@@ -46,21 +47,21 @@ impl Metric for Poses {
         2 * moments::packed_len(3 * self.joints.len())
     }
 
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
         let mut frames = vec![Vec::new(); blocks.n()];
         for t in 0..pair.n_frames() {
             if self.joints.iter().all(|joint| pair.seen[t][*joint]) {
                 frames[blocks.of(t)].push(t);
             }
         }
-        let rows = |poses: &[[Point; N_JOINTS]], frames: &[usize]| {
+        let rows = |poses: &[[Vec3; N_JOINTS]], frames: &[usize]| {
             let shape = (frames.len(), 3 * self.joints.len());
             Array2::from_shape_fn(shape, |(row, i)| CM * poses[frames[row]][self.joints[i / 3]][i % 3])
         };
         for (block, frames) in frames.iter().enumerate() {
-            let (made, real) = blocks.row(block).split_at_mut(moments::packed_len(3 * self.joints.len()));
-            moments::add(rows(&pair.made, frames).view(), made);
-            moments::add(rows(&pair.real, frames).view(), real);
+            let (predicted, ground_truth) = blocks.row(block).split_at_mut(moments::packed_len(3 * self.joints.len()));
+            moments::add(rows(&pair.predicted, frames).view(), predicted);
+            moments::add(rows(&pair.ground_truth, frames).view(), ground_truth);
         }
     }
 
@@ -74,22 +75,22 @@ impl Metric for Poses {
 }
 
 /// Rows of windows: of joints, mask and frame rate.
-type Windows = fn(ArrayView3<f32>, ArrayView2<bool>, crate::types::time::FrameRate) -> Array2<f64>;
+type WindowRows = fn(ArrayView3<f32>, ArrayView2<bool>, crate::types::time::FrameRate) -> Array2<f64>;
 
 /// Distance of windows in a fixed space.
-struct Space {
+struct FrechetSpace {
     name: &'static str,
     formula: &'static str,
     hash: String,
-    windows: Windows,
+    windows: WindowRows,
     n_frames: usize,
     stride: usize,
     n_numbers: usize,
 }
 
 /// Of windows of 15 frames in the fixed basis.
-pub(crate) fn basis() -> Box<dyn Metric> {
-    Box::new(Space {
+pub(crate) fn basis() -> Box<dyn MetricFamily> {
+    Box::new(FrechetSpace {
         name: "frechet_window",
         formula: "|m_p - m_g|^2 + trace(C_p + C_g - 2 sqrt(C_p C_g)), m and C mean and unbiased covariance of the rows; a row \
                   is a window of wholly seen frames at 15 a second (46 joints, weighted centimetres, fingers from their \
@@ -103,8 +104,8 @@ pub(crate) fn basis() -> Box<dyn Metric> {
 }
 
 /// Of windows in the embedding that is shipped.
-pub(crate) fn embedding() -> Box<dyn Metric> {
-    Box::new(Space {
+pub(crate) fn embedding() -> Box<dyn MetricFamily> {
+    Box::new(FrechetSpace {
         name: "frechet_embedding",
         formula: "|m_p - m_g|^2 + trace(C_p + C_g - 2 sqrt(C_p C_g)), m and C mean and unbiased covariance of the rows; a row \
                   is what the shipped encoder (models/motion_embedding.md) makes of a window of wholly seen frames at 15 \
@@ -117,7 +118,7 @@ pub(crate) fn embedding() -> Box<dyn Metric> {
     })
 }
 
-impl Metric for Space {
+impl MetricFamily for FrechetSpace {
     fn definitions(&self) -> Vec<Definition> {
         vec![Definition {
             name: self.name,
@@ -136,16 +137,16 @@ impl Metric for Space {
         2 * moments::packed_len(self.n_numbers)
     }
 
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
         let interval = &pair.interval;
         // what one of both lacks is left out of both
         let mut mask = interval.mask.to_owned();
         for ((t, joint), seen) in mask.indexed_iter_mut() {
             *seen &= pair.seen.get(t).is_some_and(|seen| seen.get(joint) == Some(&true));
         }
-        let starts = Frames::new(interval.real, mask.view(), interval.fps).starts(self.n_frames, self.stride);
+        let starts = Frames::new(interval.ground_truth, mask.view(), interval.fps).starts(self.n_frames, self.stride);
         let length = moments::packed_len(self.n_numbers);
-        for (i, joints) in [interval.made, interval.real].into_iter().enumerate() {
+        for (i, joints) in [interval.predicted, interval.ground_truth].into_iter().enumerate() {
             let rows = (self.windows)(joints, mask.view(), interval.fps);
             if rows.nrows() != starts.len() {
                 // a made joint that is not finite breaks its window
@@ -171,9 +172,11 @@ impl Metric for Space {
 
 /// Of two packed moments of rows of `d` numbers, one after the other.
 fn distance(sums: &[f64], d: usize) -> f64 {
-    let (made, real) = sums.split_at(moments::packed_len(d));
-    match (moments::read(made, d), moments::read(real, d)) {
-        (Some((_, of_made, made)), Some((_, of_real, real))) => between((&of_made, &made), (&of_real, &real)),
+    let (predicted, ground_truth) = sums.split_at(moments::packed_len(d));
+    match (moments::read(predicted, d), moments::read(ground_truth, d)) {
+        (Some((_, of_made, predicted)), Some((_, of_real, ground_truth))) => {
+            between((&of_made, &predicted), (&of_real, &ground_truth))
+        }
         _ => f64::NAN,
     }
 }

@@ -1,10 +1,11 @@
 //! Average pairwise distance of poses some seconds apart: like L1div, but without a mean pose.
 
-use crate::metrics::body_part::Part;
-use crate::metrics::definition::{Better, Definition, Metric};
-use crate::metrics::pair::{Pair, Point};
-use crate::metrics::per_frame::{less, norm};
-use crate::metrics::sums::Blocks;
+use crate::math::vec3;
+use crate::math::vec3::Vec3;
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::pair::PairedFrames;
+use crate::metrics::sums::BlockSums;
 use crate::types::skeleton::N_JOINTS;
 use serde_json::json;
 
@@ -12,15 +13,15 @@ use serde_json::json;
 const MOST_SECS: usize = 30;
 
 struct Pairwise {
-    part: Part,
+    part: BodyPart,
     joints: Vec<usize>,
 }
 
-pub(crate) fn metric(part: Part) -> Box<dyn Metric> {
+pub(crate) fn metric(part: BodyPart) -> Box<dyn MetricFamily> {
     Box::new(Pairwise { part, joints: part.joints() })
 }
 
-impl Metric for Pairwise {
+impl MetricFamily for Pairwise {
     fn definitions(&self) -> Vec<Definition> {
         let definition = |name, better| Definition {
             name,
@@ -34,15 +35,15 @@ impl Metric for Pairwise {
             undefined: "no interval is longer than a second, or no joint of the part is seen in both poses",
             parameters: json!({"every_secs": 1, "most_secs": MOST_SECS}),
         };
-        let (made, real) = ("average_pairwise_distance", "average_pairwise_distance_of_real");
-        vec![definition(made, Better::NearerTruth), definition(real, Better::Neither)]
+        let (predicted, ground_truth) = ("average_pairwise_distance", "average_pairwise_distance_of_real");
+        vec![definition(predicted, Better::NearerTruth), definition(ground_truth, Better::Neither)]
     }
 
     fn n_sums(&self) -> usize {
         3
     }
 
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
         let frame_of = |secs: usize| (secs as f64 * pair.fps).round() as usize;
         let samples: Vec<usize> = (0..).map(frame_of).take_while(|t| *t < pair.n_frames()).collect();
         for (i, &a) in samples.iter().enumerate() {
@@ -53,13 +54,16 @@ impl Metric for Pairwise {
                 if n == 0 {
                     continue;
                 }
-                let distance = |poses: &[[Point; N_JOINTS]]| {
-                    let squares =
-                        self.joints.iter().filter(seen).map(|j| norm(less(poses[a][*j], poses[b][*j])).powi(2));
+                let distance = |poses: &[[Vec3; N_JOINTS]]| {
+                    let squares = self
+                        .joints
+                        .iter()
+                        .filter(seen)
+                        .map(|j| vec3::norm(vec3::sub(poses[a][*j], poses[b][*j])).powi(2));
                     (squares.sum::<f64>() * self.joints.len() as f64 / n as f64).sqrt()
                 };
-                sums[0] += distance(&pair.made);
-                sums[1] += distance(&pair.real);
+                sums[0] += distance(&pair.predicted);
+                sums[1] += distance(&pair.ground_truth);
                 sums[2] += 1.0;
             }
         }

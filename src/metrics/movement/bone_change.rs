@@ -1,10 +1,11 @@
 //! How much bones change their length, which real ones do not: from frame to frame, and over time.
 
-use crate::metrics::body_part::Part;
-use crate::metrics::definition::{Better, Definition, Metric};
-use crate::metrics::pair::{Pair, Point};
-use crate::metrics::per_frame::{less, norm};
-use crate::metrics::sums::Blocks;
+use crate::math::vec3;
+use crate::math::vec3::Vec3;
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::pair::PairedFrames;
+use crate::metrics::sums::BlockSums;
 use crate::types::skeleton::{N_JOINTS, parent};
 use serde_json::json;
 
@@ -17,23 +18,23 @@ const N_LENGTHS: usize = 2 * N_OF_MOTION;
 const N_CHANGES: usize = N_LENGTHS + 1;
 const N_OF_BONE: usize = N_CHANGES + 1;
 
-const PARTS: [Part; 2] = [Part::Body, Part::Hands];
+const PARTS: [BodyPart; 2] = [BodyPart::Body, BodyPart::Hands];
 
-struct Bones {
+struct BoneLengths {
     /// The joint at the end of each bone, and its parent.
     bones: Vec<(usize, usize)>,
 }
 
-pub(crate) fn metric() -> Box<dyn Metric> {
+pub(crate) fn metric() -> Box<dyn MetricFamily> {
     let joints = PARTS.iter().flat_map(|part| part.joints());
-    Box::new(Bones { bones: joints.filter_map(|joint| Some((joint, parent(joint)?))).collect() })
+    Box::new(BoneLengths { bones: joints.filter_map(|joint| Some((joint, parent(joint)?))).collect() })
 }
 
-impl Metric for Bones {
+impl MetricFamily for BoneLengths {
     fn definitions(&self) -> Vec<Definition> {
         let mut all = Vec::new();
         for part in PARTS {
-            for (name, of_real, unit, formula) in FIGURES {
+            for (name, of_real, unit, formula) in METRICS {
                 for (name, better) in [(name, Better::Lower), (of_real, Better::Neither)] {
                     all.push(Definition {
                         name,
@@ -54,7 +55,7 @@ impl Metric for Bones {
         self.bones.len() * N_OF_BONE
     }
 
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
         for t in 0..pair.n_frames() {
             let sums = blocks.at(t);
             for (sums, &(joint, parent)) in sums.chunks_exact_mut(N_OF_BONE).zip(&self.bones) {
@@ -62,8 +63,8 @@ impl Metric for Bones {
                 if !seen(1) {
                     continue;
                 }
-                for (i, poses) in [&pair.made, &pair.real].into_iter().enumerate() {
-                    let length = |pose: &[Point; N_JOINTS]| norm(less(pose[joint], pose[parent]));
+                for (i, poses) in [&pair.predicted, &pair.ground_truth].into_iter().enumerate() {
+                    let length = |pose: &[Vec3; N_JOINTS]| vec3::norm(vec3::sub(pose[joint], pose[parent]));
                     let own = &mut sums[i * N_OF_MOTION..(i + 1) * N_OF_MOTION];
                     own[LENGTH] += length(&poses[t]);
                     own[SQUARE] += length(&poses[t]).powi(2);
@@ -78,7 +79,7 @@ impl Metric for Bones {
     }
 
     fn values(&self, sums: &[f64]) -> Vec<f64> {
-        let (body, hands) = sums.split_at(Part::Body.joints().len() * N_OF_BONE);
+        let (body, hands) = sums.split_at(BodyPart::Body.joints().len() * N_OF_BONE);
         let mut values = Vec::new();
         for part in [body, hands] {
             let mean = |of: &dyn Fn(&[f64]) -> f64, needs: usize| {
@@ -87,23 +88,24 @@ impl Metric for Bones {
             };
             let mean_length = |bone: &[f64], i: usize| bone[i + LENGTH] / bone[N_LENGTHS];
             let mean_change = |bone: &[f64], i: usize| bone[i + CHANGE] / bone[N_CHANGES];
-            let [made, real] = [0, N_OF_MOTION];
-            values.extend([made, real].map(|i| 1000.0 * mean(&|bone| mean_change(bone, i), N_CHANGES)));
+            let [predicted, ground_truth] = [0, N_OF_MOTION];
+            values.extend([predicted, ground_truth].map(|i| 1000.0 * mean(&|bone| mean_change(bone, i), N_CHANGES)));
             values.extend(
-                [made, real].map(|i| 100.0 * mean(&|bone| mean_change(bone, i) / mean_length(bone, i), N_CHANGES)),
+                [predicted, ground_truth]
+                    .map(|i| 100.0 * mean(&|bone| mean_change(bone, i) / mean_length(bone, i), N_CHANGES)),
             );
             let deviation = |bone: &[f64], i: usize| {
                 let variance = bone[i + SQUARE] / bone[N_LENGTHS] - mean_length(bone, i).powi(2);
                 variance.max(0.0).sqrt() / mean_length(bone, i)
             };
-            values.extend([made, real].map(|i| 100.0 * mean(&|bone| deviation(bone, i), N_LENGTHS)));
+            values.extend([predicted, ground_truth].map(|i| 100.0 * mean(&|bone| deviation(bone, i), N_LENGTHS)));
         }
         values
     }
 }
 
 /// Name, name of the real motion's, unit, formula.
-const FIGURES: [(&str, &str, &str, &str); 3] = [
+const METRICS: [(&str, &str, &str, &str); 3] = [
     (
         "bone_change",
         "bone_change_of_real",

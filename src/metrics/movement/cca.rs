@@ -2,11 +2,11 @@
 //! coordinates has with one of all real coordinates. With few frames for many coordinates it is near 1 for anything.
 
 use crate::math::eigen;
-use crate::metrics::body_part::Part;
-use crate::metrics::definition::{Better, Definition, Metric};
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
 use crate::metrics::distribution::moments;
-use crate::metrics::pair::Pair;
-use crate::metrics::sums::Blocks;
+use crate::metrics::pair::PairedFrames;
+use crate::metrics::sums::BlockSums;
 use ndarray::{Array2, ArrayView2, s};
 use serde_json::json;
 
@@ -16,15 +16,15 @@ const CONSTANT: f64 = 1e-8;
 const DETERMINED: f64 = 1e-10;
 
 struct Cca {
-    part: Part,
+    part: BodyPart,
     joints: Vec<usize>,
 }
 
-pub(crate) fn metric(part: Part) -> Box<dyn Metric> {
+pub(crate) fn metric(part: BodyPart) -> Box<dyn MetricFamily> {
     Box::new(Cca { part, joints: part.joints() })
 }
 
-impl Metric for Cca {
+impl MetricFamily for Cca {
     fn definitions(&self) -> Vec<Definition> {
         vec![Definition {
             name: "cca",
@@ -44,7 +44,7 @@ impl Metric for Cca {
         moments::packed_len(6 * self.joints.len())
     }
 
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
         let mut frames = vec![Vec::new(); blocks.n()];
         for t in 0..pair.n_frames() {
             if self.joints.iter().all(|joint| pair.seen[t][*joint]) {
@@ -54,7 +54,7 @@ impl Metric for Cca {
         let d = 3 * self.joints.len();
         for (block, frames) in frames.iter().enumerate() {
             let rows = Array2::from_shape_fn((frames.len(), 2 * d), |(row, i)| {
-                let poses = if i < d { &pair.made } else { &pair.real };
+                let poses = if i < d { &pair.predicted } else { &pair.ground_truth };
                 poses[frames[row]][self.joints[i % d / 3]][i % 3]
             });
             moments::add(rows.view(), blocks.row(block));
@@ -77,7 +77,10 @@ pub(crate) fn correlation(covariance: ArrayView2<f64>, d: usize) -> f64 {
     if covariance.iter().any(|v| !v.is_finite()) {
         return f64::NAN;
     }
-    let (a, b) = (Independent::of(covariance, 0..d), Independent::of(covariance, d..covariance.nrows()));
+    let (a, b) = (
+        IndependentDimensions::select(covariance, 0..d),
+        IndependentDimensions::select(covariance, d..covariance.nrows()),
+    );
     if a.which.is_empty() || b.which.is_empty() {
         return f64::NAN;
     }
@@ -91,7 +94,7 @@ pub(crate) fn correlation(covariance: ArrayView2<f64>, d: usize) -> f64 {
 }
 
 /// Dimensions that say all, with the Cholesky factor of their correlation.
-struct Independent {
+struct IndependentDimensions {
     which: Vec<usize>,
     /// Standard deviation of each.
     scale: Vec<f64>,
@@ -99,9 +102,9 @@ struct Independent {
     factor: Array2<f64>,
 }
 
-impl Independent {
+impl IndependentDimensions {
     /// Of a range of dimensions: Cholesky's with pivots, ended where what is left is determined.
-    fn of(covariance: ArrayView2<f64>, range: std::ops::Range<usize>) -> Self {
+    fn select(covariance: ArrayView2<f64>, range: std::ops::Range<usize>) -> Self {
         let mut left: Vec<usize> = range.filter(|i| covariance[[*i, *i]].max(0.0).sqrt() > CONSTANT).collect();
         let scale_of = |i: usize| covariance[[i, i]].sqrt();
         let mut rest: Vec<f64> = vec![1.0; left.len()];

@@ -1,23 +1,24 @@
 //! How fast, how accelerated and how jerky a motion is: mean norms of its first three differences over time, of the made
 //! and of the real motion. A made motion that stands still has the least error of a poor one; here it shows.
 
-use crate::metrics::body_part::{From, Part};
-use crate::metrics::definition::{Better, Definition, Metric};
-use crate::metrics::pair::{Pair, Point};
-use crate::metrics::per_frame::{less, norm};
-use crate::metrics::sums::Blocks;
+use crate::math::vec3;
+use crate::math::vec3::Vec3;
+use crate::metrics::body_part::{BodyPart, MeasuredPoint};
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::pair::PairedFrames;
+use crate::metrics::sums::BlockSums;
 use crate::types::skeleton::N_JOINTS;
 use serde_json::json;
 
 /// How often positions are differentiated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Order {
+pub(crate) enum DerivativeOrder {
     Speed,
     Acceleration,
     Jerk,
 }
 
-impl Order {
+impl DerivativeOrder {
     pub const ALL: [Self; 3] = [Self::Speed, Self::Acceleration, Self::Jerk];
 
     /// Weights of the frames, first to last.
@@ -39,46 +40,46 @@ impl Order {
 }
 
 struct Derivative {
-    order: Order,
-    part: Part,
-    points: Vec<From>,
+    order: DerivativeOrder,
+    part: BodyPart,
+    points: Vec<MeasuredPoint>,
     /// The genea convention: every interval weighs the same, in centimetres.
     by_interval: bool,
 }
 
 /// Mean over frames and joints.
-pub(crate) fn metric(order: Order, part: Part) -> Box<dyn Metric> {
+pub(crate) fn metric(order: DerivativeOrder, part: BodyPart) -> Box<dyn MetricFamily> {
     Box::new(Derivative { order, part, points: part.points(), by_interval: false })
 }
 
 /// As the genea evaluation averages.
-pub(crate) fn by_interval(order: Order) -> Box<dyn Metric> {
-    let part = Part::WithNeck;
+pub(crate) fn by_interval(order: DerivativeOrder) -> Box<dyn MetricFamily> {
+    let part = BodyPart::WithNeck;
     Box::new(Derivative { order, part, points: part.points(), by_interval: true })
 }
 
 impl Derivative {
     /// `[made, real]` norms at frame `t`, or nothing where the point is not seen throughout.
-    fn norms(&self, pair: &Pair, t: usize, point: From) -> Option<[f64; 2]> {
+    fn norms(&self, pair: &PairedFrames, t: usize, point: MeasuredPoint) -> Option<[f64; 2]> {
         let weights = self.order.weights();
         let seen = |joint| pair.sees(t, weights.len(), joint);
         if !seen(point.joint) || !point.origin.is_none_or(seen) {
             return None;
         }
         let scale = pair.fps.powi(weights.len() as i32 - 1);
-        let of = |poses: &[[Point; N_JOINTS]]| {
+        let of = |poses: &[[Vec3; N_JOINTS]]| {
             let mut sum = [0.0; 3];
             for (weight, pose) in weights.iter().zip(&poses[t..]) {
-                let at = point.origin.map_or(pose[point.joint], |origin| less(pose[point.joint], pose[origin]));
+                let at = point.origin.map_or(pose[point.joint], |origin| vec3::sub(pose[point.joint], pose[origin]));
                 (0..3).for_each(|k| sum[k] += weight * at[k]);
             }
-            norm(sum) * scale
+            vec3::norm(sum) * scale
         };
-        Some([of(&pair.made), of(&pair.real)])
+        Some([of(&pair.predicted), of(&pair.ground_truth)])
     }
 }
 
-impl Metric for Derivative {
+impl MetricFamily for Derivative {
     fn definitions(&self) -> Vec<Definition> {
         let units = if self.by_interval { ["cm/s", "cm/s^2", "cm/s^3"] } else { ["m/s", "m/s^2", "m/s^3"] };
         let definition = |name, better| Definition {
@@ -87,11 +88,11 @@ impl Metric for Derivative {
             unit: units[self.order.weights().len() - 2],
             better,
             formula: match (self.by_interval, self.order) {
-                (false, Order::Speed) => "mean over t and j of |x(t+1) - x(t)| * fps, x seen in both frames",
-                (false, Order::Acceleration) => {
+                (false, DerivativeOrder::Speed) => "mean over t and j of |x(t+1) - x(t)| * fps, x seen in both frames",
+                (false, DerivativeOrder::Acceleration) => {
                     "mean over t and j of |x(t+2) - 2 x(t+1) + x(t)| * fps^2, x seen in all three frames"
                 }
-                (false, Order::Jerk) => {
+                (false, DerivativeOrder::Jerk) => {
                     "mean over t and j of |x(t+3) - 3 x(t+2) + 3 x(t+1) - x(t)| * fps^3, x seen in all four frames"
                 }
                 (true, _) => {
@@ -112,7 +113,7 @@ impl Metric for Derivative {
         3
     }
 
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
         let windows = 0..(pair.n_frames() + 1).saturating_sub(self.order.weights().len());
         let n = match self.by_interval {
             true => {
@@ -123,9 +124,9 @@ impl Metric for Derivative {
         };
         for t in windows {
             let sums = blocks.at(t);
-            for [made, real] in self.points.iter().filter_map(|point| self.norms(pair, t, *point)) {
-                sums[0] += made / n;
-                sums[1] += real / n;
+            for [predicted, ground_truth] in self.points.iter().filter_map(|point| self.norms(pair, t, *point)) {
+                sums[0] += predicted / n;
+                sums[1] += ground_truth / n;
                 sums[2] += 1.0 / n;
             }
         }

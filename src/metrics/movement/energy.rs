@@ -40,8 +40,8 @@ impl MotionEnergy {
 
     /// This motion's energy as a share of the real one's, 1 when they move as much; NaN where the real one stands
     /// still.
-    pub fn relative_to(&self, real: &Self) -> f64 {
-        if real.sum > 0.0 { self.mean() / real.mean() } else { f64::NAN }
+    pub fn relative_to(&self, ground_truth: &Self) -> f64 {
+        if ground_truth.sum > 0.0 { self.mean() / ground_truth.mean() } else { f64::NAN }
     }
 }
 

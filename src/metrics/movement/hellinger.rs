@@ -1,10 +1,11 @@
 //! How far apart the distributions of speeds are: Hellinger distance of two histograms, 0 the same, 1 nothing in common.
 
-use crate::metrics::body_part::Part;
-use crate::metrics::definition::{Better, Definition, Metric};
-use crate::metrics::pair::{Pair, Point};
-use crate::metrics::per_frame::{less, norm};
-use crate::metrics::sums::Blocks;
+use crate::math::vec3;
+use crate::math::vec3::Vec3;
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::pair::PairedFrames;
+use crate::metrics::sums::BlockSums;
 use crate::types::skeleton::N_JOINTS;
 use serde_json::json;
 
@@ -18,12 +19,12 @@ struct Hellinger {
 }
 
 /// Bins of 0.05 m/s up to 6 m/s.
-pub(crate) fn metric(part: Part) -> Box<dyn Metric> {
+pub(crate) fn metric(part: BodyPart) -> Box<dyn MetricFamily> {
     Box::new(Hellinger { part: part.name(), joints: part.joints(), bin: 0.05, n_bins: 120, genea: false })
 }
 
 /// As the genea evaluation counts, at the bins of its script for the distance (0.05 cm/s).
-pub(crate) fn genea() -> Box<dyn Metric> {
+pub(crate) fn genea() -> Box<dyn MetricFamily> {
     let joints = (GENEA_FIRST..N_JOINTS).collect();
     Box::new(Hellinger { part: "from_joint_8", joints, bin: 0.0005, n_bins: 980, genea: true })
 }
@@ -31,7 +32,7 @@ pub(crate) fn genea() -> Box<dyn Metric> {
 /// The first of the joints that `[:, 8:]` leaves of 49.
 const GENEA_FIRST: usize = 8;
 
-impl Metric for Hellinger {
+impl MetricFamily for Hellinger {
     fn definitions(&self) -> Vec<Definition> {
         let parameters = match self.genea {
             true => json!({"bin_cm_per_s": 0.05, "first_joint": GENEA_FIRST}),
@@ -62,12 +63,12 @@ impl Metric for Hellinger {
         2 * self.n_bins
     }
 
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
         for t in 0..pair.n_frames().saturating_sub(1) {
             let sums = blocks.at(t);
             for &joint in self.joints.iter().filter(|joint| pair.sees(t, 2, **joint)) {
-                let mut count = |poses: &[[Point; N_JOINTS]], from: usize| {
-                    let speed = norm(less(poses[t + 1][joint], poses[t][joint])) * pair.fps;
+                let mut count = |poses: &[[Vec3; N_JOINTS]], from: usize| {
+                    let speed = vec3::norm(vec3::sub(poses[t + 1][joint], poses[t][joint])) * pair.fps;
                     match (speed / self.bin).floor() {
                         bin if bin < self.n_bins as f64 => sums[from + bin as usize] += 1.0,
                         // a made joint that is not finite: no distance
@@ -75,15 +76,15 @@ impl Metric for Hellinger {
                         _ => {}
                     }
                 };
-                count(&pair.made, 0);
-                count(&pair.real, self.n_bins);
+                count(&pair.predicted, 0);
+                count(&pair.ground_truth, self.n_bins);
             }
         }
     }
 
     fn values(&self, sums: &[f64]) -> Vec<f64> {
-        let (made, real) = sums.split_at(self.n_bins);
-        vec![distance(made, real)]
+        let (predicted, ground_truth) = sums.split_at(self.n_bins);
+        vec![distance(predicted, ground_truth)]
     }
 }
 

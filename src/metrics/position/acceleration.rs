@@ -1,14 +1,16 @@
 //! How far the accelerations of the made motion are from the real ones; and the two errors of the trimodal convention,
 //! which has its own (Yoon et al. 2020, `train.py` of their repository).
 
-use crate::metrics::body_part::Part;
-use crate::metrics::definition::{Better, Definition, Metric};
-use crate::metrics::pair::{Pair, Point};
-use crate::metrics::per_frame::{Mean, Window, norm};
-use crate::metrics::sums::Blocks;
+use crate::math::vec3;
+use crate::math::vec3::Vec3;
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::pair::PairedFrames;
+use crate::metrics::per_frame::{FrameMean, PointWindow};
+use crate::metrics::sums::BlockSums;
 use serde_json::json;
 
-pub(crate) fn metric(part: Part) -> Box<dyn Metric> {
+pub(crate) fn metric(part: BodyPart) -> Box<dyn MetricFamily> {
     let definition = Definition {
         name: "acceleration_error",
         part: part.name(),
@@ -19,20 +21,20 @@ pub(crate) fn metric(part: Part) -> Box<dyn Metric> {
         undefined: "no joint of the part is seen in 3 frames in a row",
         parameters: json!({}),
     };
-    Mean::over(definition, part, 3, |window| norm(second_difference(window)) * window.fps * window.fps)
+    FrameMean::over(definition, part, 3, |window| vec3::norm(second_difference(window)) * window.fps * window.fps)
 }
 
 /// Of made less real.
-fn second_difference(window: &Window) -> Point {
+fn second_difference(window: &PointWindow) -> Vec3 {
     let [a, b, c] = [0, 1, 2].map(|k| window.apart(k));
     std::array::from_fn(|k| a[k] - 2.0 * b[k] + c[k])
 }
 
 /// Trimodal: per coordinate and frame.
-pub(crate) fn by_coordinate() -> Box<dyn Metric> {
+pub(crate) fn by_coordinate() -> Box<dyn MetricFamily> {
     let definition = Definition {
         name: "acceleration_error",
-        part: Part::All.name(),
+        part: BodyPart::All.name(),
         unit: "m/frame^2",
         better: Better::Lower,
         formula: "mean over t, j and the coordinates x, y, z of |d2 p - d2 g|, d2 the second difference from frame to frame, \
@@ -40,7 +42,9 @@ pub(crate) fn by_coordinate() -> Box<dyn Metric> {
         undefined: "no joint is seen in 3 frames in a row",
         parameters: json!({}),
     };
-    Mean::over(definition, Part::All, 3, |window| second_difference(window).iter().map(|v| v.abs()).sum::<f64>() / 3.0)
+    FrameMean::over(definition, BodyPart::All, 3, |window| {
+        second_difference(window).iter().map(|v| v.abs()).sum::<f64>() / 3.0
+    })
 }
 
 /// Frames given as a seed, of the trimodal convention's 15 a second.
@@ -53,15 +57,15 @@ struct Maje {
 }
 
 /// For data of this frame rate.
-pub(crate) fn maje(fps: f64) -> Box<dyn Metric> {
+pub(crate) fn maje(fps: f64) -> Box<dyn MetricFamily> {
     Box::new(Maje { n_seed: (N_SEED / SEED_FPS * fps).round() as usize })
 }
 
-impl Metric for Maje {
+impl MetricFamily for Maje {
     fn definitions(&self) -> Vec<Definition> {
         vec![Definition {
             name: "maje",
-            part: Part::All.name(),
+            part: BodyPart::All.name(),
             unit: "m",
             better: Better::Lower,
             formula: "mean over t, j and the coordinates x, y, z of |p - g| without the first frames of every interval, \
@@ -75,11 +79,13 @@ impl Metric for Maje {
         2
     }
 
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
         for t in self.n_seed..pair.n_frames() {
             let sums = blocks.at(t);
-            for joint in Part::All.joints().into_iter().filter(|joint| pair.seen[t][*joint]) {
-                sums[0] += (0..3).map(|k| (pair.made[t][joint][k] - pair.real[t][joint][k]).abs()).sum::<f64>() / 3.0;
+            for joint in BodyPart::All.joints().into_iter().filter(|joint| pair.seen[t][*joint]) {
+                sums[0] +=
+                    (0..3).map(|k| (pair.predicted[t][joint][k] - pair.ground_truth[t][joint][k]).abs()).sum::<f64>()
+                        / 3.0;
                 sums[1] += 1.0;
             }
         }

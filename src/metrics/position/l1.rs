@@ -1,11 +1,11 @@
 //! Mean absolute difference of coordinates, metres: what the L1 loss of training measures.
 
-use crate::metrics::body_part::Part;
-use crate::metrics::definition::{Better, Definition, Metric};
-use crate::metrics::per_frame::Mean;
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::per_frame::FrameMean;
 use serde_json::json;
 
-pub(crate) fn metric(part: Part) -> Box<dyn Metric> {
+pub(crate) fn metric(part: BodyPart) -> Box<dyn MetricFamily> {
     let definition = Definition {
         name: "l1",
         part: part.name(),
@@ -15,5 +15,5 @@ pub(crate) fn metric(part: Part) -> Box<dyn Metric> {
         undefined: "no joint of the part is seen",
         parameters: json!({}),
     };
-    Mean::over(definition, part, 1, |window| window.apart(0).iter().map(|v| v.abs()).sum::<f64>() / 3.0)
+    FrameMean::over(definition, part, 1, |window| window.apart(0).iter().map(|v| v.abs()).sum::<f64>() / 3.0)
 }

@@ -1,11 +1,12 @@
 //! Mean per-joint position error, millimetres, from the neck, or from the own wrist.
 
-use crate::metrics::body_part::Part;
-use crate::metrics::definition::{Better, Definition, Metric};
-use crate::metrics::per_frame::{Mean, norm};
+use crate::math::vec3;
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::per_frame::FrameMean;
 use serde_json::json;
 
-pub(crate) fn metric(part: Part) -> Box<dyn Metric> {
+pub(crate) fn metric(part: BodyPart) -> Box<dyn MetricFamily> {
     let definition = Definition {
         name: "mpjpe",
         part: part.name(),
@@ -16,5 +17,5 @@ pub(crate) fn metric(part: Part) -> Box<dyn Metric> {
         undefined: "no joint of the part is seen",
         parameters: json!({}),
     };
-    Mean::over(definition, part, 1, |window| 1000.0 * norm(window.apart(0)))
+    FrameMean::over(definition, part, 1, |window| 1000.0 * vec3::norm(window.apart(0)))
 }

@@ -2,30 +2,31 @@
 //! not with where it looks.
 
 use crate::math::procrustes::similarity;
-use crate::metrics::body_part::Part;
-use crate::metrics::definition::{Better, Definition, Metric};
-use crate::metrics::pair::{Pair, Point};
-use crate::metrics::per_frame::{less, norm};
-use crate::metrics::sums::Blocks;
+use crate::math::vec3;
+use crate::math::vec3::Vec3;
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::pair::PairedFrames;
+use crate::metrics::sums::BlockSums;
 use crate::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
 use serde_json::json;
 
 struct PMpjpe {
-    part: Part,
+    part: BodyPart,
     /// What is laid onto the real joints together.
     groups: Vec<Vec<usize>>,
 }
 
 /// All, body, or each hand (its 21 joints) for itself.
-pub(crate) fn metric(part: Part) -> Box<dyn Metric> {
+pub(crate) fn metric(part: BodyPart) -> Box<dyn MetricFamily> {
     let groups = match part {
-        Part::Hands => [L_HAND, R_HAND].map(|root| (root..root + N_HAND_JOINTS).collect()).to_vec(),
+        BodyPart::Hands => [L_HAND, R_HAND].map(|root| (root..root + N_HAND_JOINTS).collect()).to_vec(),
         _ => vec![part.joints()],
     };
     Box::new(PMpjpe { part, groups })
 }
 
-impl Metric for PMpjpe {
+impl MetricFamily for PMpjpe {
     fn definitions(&self) -> Vec<Definition> {
         vec![Definition {
             name: "p_mpjpe",
@@ -44,16 +45,16 @@ impl Metric for PMpjpe {
         2
     }
 
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
         for t in 0..pair.n_frames() {
             for group in &self.groups {
                 let seen = group.iter().copied().filter(|joint| pair.seen[t][*joint]);
-                let (made, real): (Vec<Point>, Vec<Point>) =
-                    seen.map(|joint| (pair.made[t][joint], pair.real[t][joint])).unzip();
-                if made.len() >= 3 {
+                let (predicted, ground_truth): (Vec<Vec3>, Vec<Vec3>) =
+                    seen.map(|joint| (pair.predicted[t][joint], pair.ground_truth[t][joint])).unzip();
+                if predicted.len() >= 3 {
                     let sums = blocks.at(t);
-                    sums[0] += 1000.0 * error(&made, &real);
-                    sums[1] += made.len() as f64;
+                    sums[0] += 1000.0 * error(&predicted, &ground_truth);
+                    sums[1] += predicted.len() as f64;
                 }
             }
         }
@@ -65,17 +66,17 @@ impl Metric for PMpjpe {
 }
 
 /// Sum of the distances after the best similarity; NaN where a made point is not finite.
-fn error(made: &[Point], real: &[Point]) -> f64 {
-    if made.iter().flatten().any(|v| !v.is_finite()) {
+fn error(predicted: &[Vec3], ground_truth: &[Vec3]) -> f64 {
+    if predicted.iter().flatten().any(|v| !v.is_finite()) {
         return f64::NAN;
     }
-    match similarity(made, real) {
-        Some(best) => made.iter().zip(real).map(|(p, g)| norm(less(best.apply(*p), *g))).sum(),
+    match similarity(predicted, ground_truth) {
+        Some(best) => predicted.iter().zip(ground_truth).map(|(p, g)| vec3::norm(vec3::sub(best.apply(*p), *g))).sum(),
         // all made points in one place: the best is the middle of the real ones
         None => {
-            let n = real.len() as f64;
-            let middle: Point = std::array::from_fn(|k| real.iter().map(|g| g[k]).sum::<f64>() / n);
-            real.iter().map(|g| norm(less(middle, *g))).sum()
+            let n = ground_truth.len() as f64;
+            let middle: Vec3 = std::array::from_fn(|k| ground_truth.iter().map(|g| g[k]).sum::<f64>() / n);
+            ground_truth.iter().map(|g| vec3::norm(vec3::sub(middle, *g))).sum()
         }
     }
 }

@@ -1,13 +1,13 @@
-//! Share of correct keypoints (rebol.md section 12, after Ginosar et al. 2019): a joint is correct when it lies within
-//! a share of the real pose's largest extent from the real one. `Correct` counts at a fifth, for training; the metric has any
+//! Share of correct keypoints (Ginosar et al. 2019, section 5; Rebol et al. 2021): a joint is correct when it lies within
+//! a share of the real pose's largest extent from the real one. `CorrectKeypoints` counts at a fifth, for training; the metric has any
 //! share, in the plane and in space.
 
-use crate::metrics::body_part::Part;
-use crate::metrics::definition::{Better, Definition, Metric};
-use crate::metrics::pair::{Pair, Point};
-use crate::metrics::sums::Blocks;
+use crate::metrics::body_part::BodyPart;
+use crate::metrics::definition::{Better, Definition, MetricFamily};
+use crate::metrics::pair::PairedFrames;
+use crate::metrics::sums::BlockSums;
 use crate::types::skeleton::{L_WRIST, N_JOINTS, NECK, R_SHOULDER, is_duplicate};
-use ndarray::{ArrayView2, ArrayView3};
+use ndarray::{ArrayView2, ArrayView3, NdFloat};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::ops::AddAssign;
@@ -17,32 +17,32 @@ pub const ALPHA: f32 = 0.2;
 
 /// Correct and counted keypoints of one part of the body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Count {
+pub struct KeypointCount {
     pub n_correct: usize,
     pub n: usize,
 }
 
 /// Correct and counted keypoints.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Correct {
+pub struct CorrectKeypoints {
     /// The published figure: every joint but the neck, the two hand roots (the wrists again) included.
-    pub all: Count,
+    pub all: KeypointCount,
     /// Shoulders, elbows and wrists.
-    pub body: Count,
+    pub body: KeypointCount,
     /// The joints of both hands but their roots.
-    pub hands: Count,
+    pub hands: KeypointCount,
 }
 
 /// In how many of the axes x, y, z distances and extents are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Axes {
+pub enum PckAxes {
     /// The picture's: as in the first publication.
     Xy,
     /// Space.
     Xyz,
 }
 
-impl Count {
+impl KeypointCount {
     /// Share of correct keypoints, 0..1; 0 of none.
     pub fn share(&self) -> f64 {
         self.n_correct as f64 / self.n.max(1) as f64
@@ -57,7 +57,7 @@ impl Count {
 /// Shares at several alphas, in several axes, of several parts.
 struct Pck {
     /// One a share.
-    figures: Vec<(Axes, Part, f64)>,
+    variants: Vec<(PckAxes, BodyPart, f64)>,
     /// Whether the box is around the neck as well.
     neck_in_box: bool,
     /// The speech2gesture convention: every frame weighs the same, however many joints are seen.
@@ -65,56 +65,56 @@ struct Pck {
 }
 
 /// For each of `axes`, each alpha and each of `parts` one share.
-pub(crate) fn metric(axes: &[Axes], parts: &[Part], alphas: &[f64]) -> Box<dyn Metric> {
-    let mut figures = Vec::new();
+pub(crate) fn metric(axes: &[PckAxes], parts: &[BodyPart], alphas: &[f64]) -> Box<dyn MetricFamily> {
+    let mut variants = Vec::new();
     for axes in axes {
         for alpha in alphas {
-            figures.extend(parts.iter().map(|part| (*axes, *part, *alpha)));
+            variants.extend(parts.iter().map(|part| (*axes, *part, *alpha)));
         }
     }
-    Box::new(Pck { figures, neck_in_box: false, by_frame: false })
+    Box::new(Pck { variants, neck_in_box: false, by_frame: false })
 }
 
 /// As speech2gesture counts (`common/evaluation.py` of its repository).
-pub(crate) fn by_frame(alphas: &[f64]) -> Box<dyn Metric> {
-    let figures = alphas.iter().map(|alpha| (Axes::Xy, Part::All, *alpha)).collect();
-    Box::new(Pck { figures, neck_in_box: false, by_frame: true })
+pub(crate) fn by_frame(alphas: &[f64]) -> Box<dyn MetricFamily> {
+    let variants = alphas.iter().map(|alpha| (PckAxes::Xy, BodyPart::All, *alpha)).collect();
+    Box::new(Pck { variants, neck_in_box: false, by_frame: true })
 }
 
 /// In space, of all joints, with the neck in the box.
-pub(crate) fn neck_in_box(alphas: &[f64]) -> Box<dyn Metric> {
-    let figures = alphas.iter().map(|alpha| (Axes::Xyz, Part::All, *alpha)).collect();
-    Box::new(Pck { figures, neck_in_box: true, by_frame: false })
+pub(crate) fn neck_in_box(alphas: &[f64]) -> Box<dyn MetricFamily> {
+    let variants = alphas.iter().map(|alpha| (PckAxes::Xyz, BodyPart::All, *alpha)).collect();
+    Box::new(Pck { variants, neck_in_box: true, by_frame: false })
 }
 
-impl Metric for Pck {
+impl MetricFamily for Pck {
     fn definitions(&self) -> Vec<Definition> {
-        let definition = |(axes, part, alpha): &(Axes, Part, f64)| Definition {
+        let definition = |(axes, part, alpha): &(PckAxes, BodyPart, f64)| Definition {
             name: match axes {
-                Axes::Xyz if self.neck_in_box => "pck_3d_neck_in_box",
-                Axes::Xyz => "pck_3d",
-                Axes::Xy => "pck_2d",
+                PckAxes::Xyz if self.neck_in_box => "pck_3d_neck_in_box",
+                PckAxes::Xyz => "pck_3d",
+                PckAxes::Xy => "pck_2d",
             },
             part: part.name(),
             unit: "1",
             better: Better::Higher,
             formula: match axes {
-                Axes::Xy if self.by_frame => {
+                PckAxes::Xy if self.by_frame => {
                     "mean over frames of the share of the 48 joints without the neck with |p - g| <= alpha * max(width, \
                      height) of the box around those of g in the frame; x and y alone; metres, not scaled to another \
                      speaker (a scale cancels); not seen joints left out"
                 }
-                Axes::Xyz if self.neck_in_box => {
+                PckAxes::Xyz if self.neck_in_box => {
                     "share of all seen joints of the part in all frames with |p - g| <= alpha * the largest of the sides \
                      x, y, z of the box around all seen joints of g in the frame, the neck among them; a made joint that \
                      is not finite is wrong"
                 }
-                Axes::Xyz => {
+                PckAxes::Xyz => {
                     "share of all seen joints of the part in all frames with |p - g| <= alpha * the largest of the sides \
                      x, y, z of the box around all seen joints of g in the frame but the neck, whatever the part; a made \
                      joint that is not finite is wrong"
                 }
-                Axes::Xy => {
+                PckAxes::Xy => {
                     "share of all seen joints of the part in all frames with |p - g| <= alpha * the larger of the sides \
                      x, y of the box around all seen joints of g in the frame but the neck, whatever the part; distances \
                      in x and y alone; a made joint that is not finite is wrong"
@@ -123,24 +123,25 @@ impl Metric for Pck {
             undefined: "no joint of the part is seen",
             parameters: json!({"alpha": alpha}),
         };
-        self.figures.iter().map(definition).collect()
+        self.variants.iter().map(definition).collect()
     }
 
     fn n_sums(&self) -> usize {
-        2 * self.figures.len()
+        2 * self.variants.len()
     }
 
-    fn measure(&self, pair: &Pair, blocks: &mut Blocks) {
-        let figures: Vec<_> = self.figures.iter().map(|(axes, part, alpha)| (*axes, part.joints(), *alpha)).collect();
+    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
+        let variants: Vec<_> = self.variants.iter().map(|(axes, part, alpha)| (*axes, part.joints(), *alpha)).collect();
         for t in 0..pair.n_frames() {
-            let (made, real, seen) = (&pair.made[t], &pair.real[t], &pair.seen[t]);
-            for (row, (axes, joints, alpha)) in blocks.at(t).chunks_exact_mut(2).zip(&figures) {
+            let (predicted, ground_truth, seen) = (&pair.predicted[t], &pair.ground_truth[t], &pair.seen[t]);
+            for (row, (axes, joints, alpha)) in blocks.at(t).chunks_exact_mut(2).zip(&variants) {
                 let from = if self.neck_in_box { NECK } else { NECK + 1 };
-                let radius = alpha * extent(*axes, real, seen, from);
+                let boxed = (from..N_JOINTS).filter(|joint| seen[*joint]);
+                let radius = alpha * extent(*axes, boxed, |joint, k| ground_truth[joint][k]);
                 let n_seen = joints.iter().filter(|joint| seen[**joint]).count();
                 let weight = if self.by_frame { 1.0 / n_seen as f64 } else { 1.0 };
                 for &joint in joints.iter().filter(|joint| seen[**joint]) {
-                    let correct = distance(*axes, &made[joint], &real[joint]) <= radius;
+                    let correct = distance(*axes, |k| predicted[joint][k], |k| ground_truth[joint][k]) <= radius;
                     row[0] += if correct { weight } else { 0.0 };
                     row[1] += weight;
                 }
@@ -153,7 +154,7 @@ impl Metric for Pck {
     }
 }
 
-impl Axes {
+impl PckAxes {
     fn n(self) -> usize {
         match self {
             Self::Xy => 2,
@@ -162,21 +163,26 @@ impl Axes {
     }
 }
 
-/// Largest side of the box around the seen joints, those before `from` left out.
-fn extent(axes: Axes, pose: &[Point; N_JOINTS], seen: &[bool; N_JOINTS], from: usize) -> f64 {
+/// Largest side of the box around these joints of a pose.
+fn extent<F: NdFloat>(
+    axes: PckAxes,
+    joints: impl Iterator<Item = usize> + Clone,
+    pose: impl Fn(usize, usize) -> F,
+) -> F {
     let side = |k: usize| {
-        let values = (from..N_JOINTS).filter(|joint| seen[*joint]).map(|joint| pose[joint][k]);
-        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        let values = joints.clone().map(|joint| pose(joint, k));
+        let (low, high) = values.fold((F::infinity(), F::neg_infinity()), |(low, high), v| (low.min(v), high.max(v)));
         high - low
     };
-    (0..axes.n()).map(side).fold(0.0, f64::max)
+    (0..axes.n()).map(side).fold(F::zero(), F::max)
 }
 
-fn distance(axes: Axes, a: &Point, b: &Point) -> f64 {
-    (0..axes.n()).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
+/// Distance of two points, whose coordinates `a` and `b` give.
+fn distance<F: NdFloat>(axes: PckAxes, a: impl Fn(usize) -> F, b: impl Fn(usize) -> F) -> F {
+    (0..axes.n()).map(|k| (a(k) - b(k)).powi(2)).fold(F::zero(), |sum, square| sum + square).sqrt()
 }
 
-impl Correct {
+impl CorrectKeypoints {
     /// The published figure, 0..1.
     pub fn share(&self) -> f64 {
         self.all.share()
@@ -186,25 +192,25 @@ impl Correct {
     /// true: correct when the distance is at most `ALPHA` of the largest side of the box around all real joints of
     /// the frame that are seen, the neck left out. The radius is the same for every part. A made joint that is not
     /// finite is wrong.
-    pub fn count(&mut self, made: ArrayView3<f32>, real: ArrayView3<f32>, mask: ArrayView2<bool>) {
-        self.count_in(Axes::Xyz, made, real, mask);
+    pub fn count(&mut self, predicted: ArrayView3<f32>, ground_truth: ArrayView3<f32>, mask: ArrayView2<bool>) {
+        self.count_in(PckAxes::Xyz, predicted, ground_truth, mask);
     }
 
     /// As `count`, with distance and box in these axes.
-    pub fn count_in(&mut self, axes: Axes, made: ArrayView3<f32>, real: ArrayView3<f32>, mask: ArrayView2<bool>) {
-        let n_axes = axes.n();
-        for ((made, real), mask) in made.outer_iter().zip(real.outer_iter()).zip(mask.outer_iter()) {
+    pub fn count_in(
+        &mut self,
+        axes: PckAxes,
+        predicted: ArrayView3<f32>,
+        ground_truth: ArrayView3<f32>,
+        mask: ArrayView2<bool>,
+    ) {
+        for ((predicted, ground_truth), mask) in
+            predicted.outer_iter().zip(ground_truth.outer_iter()).zip(mask.outer_iter())
+        {
             let seen: Vec<usize> = (NECK + 1..N_JOINTS).filter(|joint| mask[*joint]).collect();
-            let extent = |k: usize| {
-                let values = seen.iter().map(|joint| real[[*joint, k]]);
-                let (low, high) =
-                    values.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-                high - low
-            };
-            let radius = ALPHA * (0..n_axes).map(extent).fold(0.0, f32::max);
+            let radius = ALPHA * extent(axes, seen.iter().copied(), |joint, k| ground_truth[[joint, k]]);
             for joint in seen {
-                let square: f32 = (0..n_axes).map(|k| (made[[joint, k]] - real[[joint, k]]).powi(2)).sum();
-                let correct = square.sqrt() <= radius;
+                let correct = distance(axes, |k| predicted[[joint, k]], |k| ground_truth[[joint, k]]) <= radius;
                 self.all.add(correct);
                 match joint {
                     R_SHOULDER..=L_WRIST => self.body.add(correct),
@@ -216,14 +222,14 @@ impl Correct {
     }
 }
 
-impl AddAssign for Count {
+impl AddAssign for KeypointCount {
     fn add_assign(&mut self, other: Self) {
         self.n_correct += other.n_correct;
         self.n += other.n;
     }
 }
 
-impl AddAssign for Correct {
+impl AddAssign for CorrectKeypoints {
     fn add_assign(&mut self, other: Self) {
         self.all += other.all;
         self.body += other.body;
@@ -238,22 +244,22 @@ mod tests {
 
     #[test]
     fn the_radius_is_a_fifth_of_the_largest_extent() {
-        let mut real = Array3::<f32>::zeros((1, N_JOINTS, 3));
-        real[[0, 1, 2]] = 1.0;
-        let mut made = real.clone();
-        made[[0, 2, 0]] = 0.19;
-        made[[0, 3, 0]] = 0.21;
-        made[[0, 4, 0]] = 9.0;
-        made[[0, 20, 1]] = f32::NAN;
+        let mut ground_truth = Array3::<f32>::zeros((1, N_JOINTS, 3));
+        ground_truth[[0, 1, 2]] = 1.0;
+        let mut predicted = ground_truth.clone();
+        predicted[[0, 2, 0]] = 0.19;
+        predicted[[0, 3, 0]] = 0.21;
+        predicted[[0, 4, 0]] = 9.0;
+        predicted[[0, 20, 1]] = f32::NAN;
         let mut mask = Array2::from_elem((1, N_JOINTS), true);
         mask[[0, 4]] = false;
-        let mut correct = Correct::default();
-        correct.count(made.view(), real.view(), mask.view());
-        let count = |n_correct, n| Count { n_correct, n };
-        assert_eq!(correct, Correct { all: count(45, 47), body: count(4, 5), hands: count(39, 40) });
+        let mut correct = CorrectKeypoints::default();
+        correct.count(predicted.view(), ground_truth.view(), mask.view());
+        let count = |n_correct, n| KeypointCount { n_correct, n };
+        assert_eq!(correct, CorrectKeypoints { all: count(45, 47), body: count(4, 5), hands: count(39, 40) });
         // without z, the box is a point
-        let mut flat = Correct::default();
-        flat.count_in(Axes::Xy, made.view(), real.view(), mask.view());
+        let mut flat = CorrectKeypoints::default();
+        flat.count_in(PckAxes::Xy, predicted.view(), ground_truth.view(), mask.view());
         assert_eq!(flat.body, count(3, 5));
         let mut twice = correct;
         twice += correct;

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 /// How kernels lie over one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Axis {
+pub struct ConvAxis {
     pub n_in: usize,
     pub n_out: usize,
     pub kernel: usize,
@@ -14,7 +14,7 @@ pub struct Axis {
     pub pad: usize,
 }
 
-impl Axis {
+impl ConvAxis {
     /// TensorFlow's "same": ceil(n_in / stride) places come out; the smaller half of the padding goes first.
     pub fn same(n_in: usize, kernel: usize, stride: usize) -> Self {
         let n_out = n_in.div_ceil(stride);
@@ -27,12 +27,12 @@ impl Axis {
         Self { n_in, n_out: (n_in + 1).saturating_sub(kernel), kernel, stride: 1, pad: 0 }
     }
 
-    pub fn forward(&self) -> Windows {
-        Windows {
+    pub fn forward(&self) -> AxisWindows {
+        AxisWindows {
             n_from: self.n_in,
             first: -(self.pad as isize),
             step: self.stride,
-            taps: (0..self.kernel).collect(),
+            kernel_offsets: (0..self.kernel).collect(),
             n: self.n_out,
             n_to: self.n_out,
             to_first: 0,
@@ -42,18 +42,18 @@ impl Axis {
 
     /// The gradient's way back: an input's gradient depends on its place modulo the stride, so there are `stride`
     /// convolutions of the output's gradient, each with every `stride`-th tap, last tap first.
-    pub fn backward(&self) -> Vec<Windows> {
+    pub fn backward(&self) -> Vec<AxisWindows> {
         let of_phase = |phase: usize| {
-            let taps: Vec<usize> = (phase..self.kernel).step_by(self.stride).rev().collect();
+            let kernel_offsets: Vec<usize> = (phase..self.kernel).step_by(self.stride).rev().collect();
             // Input i = stride * u + phase - pad, for u in first..=last.
             let first = self.pad.saturating_sub(phase).div_ceil(self.stride);
             let last = (self.n_in - 1 + self.pad).checked_sub(phase)? / self.stride;
-            Some(Windows {
+            Some(AxisWindows {
                 n_from: self.n_out,
-                first: first as isize + 1 - taps.len() as isize,
+                first: first as isize + 1 - kernel_offsets.len() as isize,
                 step: 1,
                 n: (last + 1).checked_sub(first)?,
-                taps,
+                kernel_offsets,
                 n_to: self.n_in,
                 to_first: self.stride * first + phase - self.pad,
                 to_step: self.stride,
@@ -72,34 +72,34 @@ impl Axis {
 /// Sums over one axis: the one of window `v` reads from `first + v * step` on, a place for each of `taps`, and its
 /// result is place `to_first + v * to_step`.
 #[derive(Clone, Debug)]
-pub struct Windows {
+pub struct AxisWindows {
     pub n_from: usize,
     pub first: isize,
     pub step: usize,
-    pub taps: Vec<usize>,
+    pub kernel_offsets: Vec<usize>,
     pub n: usize,
     pub n_to: usize,
     pub to_first: usize,
     pub to_step: usize,
 }
 
-impl Windows {
+impl AxisWindows {
     /// Places read by so many windows.
-    pub fn reach(&self, n: usize) -> usize {
-        (n.max(1) - 1) * self.step + self.taps.len()
+    pub fn receptive_field(&self, n: usize) -> usize {
+        (n.max(1) - 1) * self.step + self.kernel_offsets.len()
     }
 }
 
 /// How a kernel walks over the frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Walk {
+pub struct ConvGeometry {
     pub stride: usize,
     pub dilation: usize,
     /// Zero frames put before and after the input.
     pub pad: (usize, usize),
 }
 
-impl Walk {
+impl ConvGeometry {
     /// Every frame, no padding.
     pub const VALID: Self = Self { stride: 1, dilation: 1, pad: (0, 0) };
 
@@ -111,8 +111,8 @@ impl Walk {
 
     /// Frames that come out of `n_frames`; `None` when the kernel does not fit.
     pub fn n_out(&self, n_frames: usize, kernel: usize) -> Option<usize> {
-        let reach = self.dilation * kernel.checked_sub(1)? + 1;
+        let receptive_field = self.dilation * kernel.checked_sub(1)? + 1;
         let padded = n_frames + self.pad.0 + self.pad.1;
-        Some(padded.checked_sub(reach)? / self.stride.max(1) + 1)
+        Some(padded.checked_sub(receptive_field)? / self.stride.max(1) + 1)
     }
 }

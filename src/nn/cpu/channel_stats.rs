@@ -1,8 +1,8 @@
 //! Statistics over the rows of a matrix whose columns are channels, and batch norm with the leaky ReLU behind it on
 //! such rows: plain memory in, plain memory out. Sums run over blocks of fixed size in one order.
 
-use super::tensor::{LANES, Real, Start};
-use super::thread_team::each;
+use super::tensor::{GRAIN, LANES, OutputStart, Scalar, written};
+use super::thread_team::parallel_for;
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
@@ -12,15 +12,15 @@ const TASK: usize = 128 * 1024;
 
 /// How many values each channel has had, their mean, and the sum of their squared distances to it.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Moments {
+pub struct ChannelMoments {
     pub n: f64,
     pub mean: Vec<f64>,
     pub squares: Vec<f64>,
 }
 
-impl Moments {
+impl ChannelMoments {
     /// Of rows of `n_channels`.
-    pub fn of<T: Real>(values: &[T], n_channels: usize) -> Self {
+    pub fn measure<T: Scalar>(values: &[T], n_channels: usize) -> Self {
         let mut all = Self::default();
         for block in values.chunks(whole_rows(BLOCK, n_channels)) {
             let n = (block.len() / n_channels) as f64;
@@ -60,8 +60,8 @@ fn whole_rows(n: usize, n_channels: usize) -> usize {
     (n / n_channels).max(1) * n_channels
 }
 
-fn block_sums<T: Real>(block: &[T], n_channels: usize) -> Vec<T> {
-    fn some<T: Real, const N: usize>(block: &[T], n_channels: usize, first: usize) -> [T; N] {
+fn block_sums<T: Scalar>(block: &[T], n_channels: usize) -> Vec<T> {
+    fn some<T: Scalar, const N: usize>(block: &[T], n_channels: usize, first: usize) -> [T; N] {
         let mut sums = [T::zero(); N];
         rows(block, n_channels, first).for_each(|row: &[T; N]| (0..N).for_each(|i| sums[i] += row[i]));
         sums
@@ -84,7 +84,7 @@ fn rows<T, const N: usize>(block: &[T], n_channels: usize, first: usize) -> impl
     block.chunks_exact(n_channels).filter_map(move |row| row.get(first..)?.first_chunk())
 }
 
-fn sums_of_squares<T: Real, const N: usize>(block: &[T], n_channels: usize, first: usize, mean: &[T; N]) -> [T; N] {
+fn sums_of_squares<T: Scalar, const N: usize>(block: &[T], n_channels: usize, first: usize, mean: &[T; N]) -> [T; N] {
     let mut sums = [T::zero(); N];
     for row in rows::<T, N>(block, n_channels, first) {
         for i in 0..N {
@@ -96,7 +96,7 @@ fn sums_of_squares<T: Real, const N: usize>(block: &[T], n_channels: usize, firs
 }
 
 /// The sum of each channel.
-pub fn sums<T: Real>(values: &[T], n_channels: usize) -> Vec<f64> {
+pub fn sums<T: Scalar>(values: &[T], n_channels: usize) -> Vec<f64> {
     let of_task = |task: &[T]| {
         let mut sums = vec![0.0; n_channels];
         for block in task.chunks(whole_rows(BLOCK, n_channels)) {
@@ -124,7 +124,7 @@ pub struct Norm<T> {
     pub slope: T,
 }
 
-impl<T: Real> Norm<T> {
+impl<T: Scalar> Norm<T> {
     /// `z` overwritten with the result.
     pub fn apply(&self, z: &mut [T]) {
         let (scale, scale_rest) = self.scale.as_chunks::<LANES>();
@@ -140,10 +140,34 @@ impl<T: Real> Norm<T> {
         }
     }
 
-    /// `y` from `z`.
-    pub fn forward(&self, z: &[T], y: &mut [T]) {
-        y.copy_from_slice(z);
-        self.apply(y);
+    /// Rows of `z` that one task takes, as numbers.
+    fn chunk(&self) -> usize {
+        whole_rows(GRAIN, self.scale.len())
+    }
+
+    /// `apply` on all threads.
+    pub fn apply_parallel(&self, z: &mut [T]) {
+        let (n, start, chunk) = (z.len(), OutputStart::new(z), self.chunk());
+        // SAFETY: every piece is a part of `z` of its own.
+        parallel_for(n.div_ceil(chunk), |i| unsafe {
+            self.apply(std::slice::from_raw_parts_mut(start.at(i * chunk), chunk.min(n - i * chunk)));
+        });
+    }
+
+    /// The result for `z`, which stays, on all threads.
+    pub fn forward(&self, z: &[T]) -> Vec<T> {
+        let chunk = self.chunk();
+        // SAFETY: every chunk writes as many numbers of the result as it reads, at the same place.
+        unsafe {
+            written(z.len(), |y: OutputStart<T>| {
+                parallel_for(z.len().div_ceil(chunk), |i| {
+                    let z = &z[i * chunk..z.len().min((i + 1) * chunk)];
+                    let y = std::slice::from_raw_parts_mut(y.at(i * chunk), z.len());
+                    y.copy_from_slice(z);
+                    self.apply(y);
+                });
+            })
+        }
     }
 
     #[inline(always)]
@@ -184,7 +208,7 @@ impl<T: Real> Norm<T> {
         let chunk = whole_rows(TASK, n);
         let tasks: Vec<_> = z.chunks(chunk).zip(grad.chunks(chunk)).collect();
         let sums: Vec<OnceLock<Vec<f64>>> = tasks.iter().map(|_| OnceLock::new()).collect();
-        each(tasks.len(), |task| {
+        parallel_for(tasks.len(), |task| {
             let _ = sums[task].set(of_task(tasks[task]));
         });
         let mut plain = add_up(sums.into_iter().filter_map(OnceLock::into_inner).collect(), 2 * n);
@@ -220,10 +244,11 @@ impl<T: Real> Norm<T> {
         let chunk = whole_rows(TASK, n);
         let channels = |i: usize| (self.scale[i], self.shift[i], offset[i], linear[i]);
         let n_wide = n / LANES;
-        let wide: Vec<Turn<T, LANES>> = (0..n_wide).map(|i| Turn::new(|lane| channels(i * LANES + lane))).collect();
-        let rest: Vec<Turn<T, 1>> = (n_wide * LANES..n).map(|i| Turn::new(|_| channels(i))).collect();
-        let (n_all, start) = (z.len(), Start::of(z));
-        each(n_all.div_ceil(chunk), |task| {
+        let wide: Vec<NormGradient<T, LANES>> =
+            (0..n_wide).map(|i| NormGradient::new(|lane| channels(i * LANES + lane))).collect();
+        let rest: Vec<NormGradient<T, 1>> = (n_wide * LANES..n).map(|i| NormGradient::new(|_| channels(i))).collect();
+        let (n_all, start) = (z.len(), OutputStart::new(z));
+        parallel_for(n_all.div_ceil(chunk), |task| {
             let part = task * chunk..n_all.min((task + 1) * chunk);
             // SAFETY: every task's part of `z` is its own.
             let z = unsafe { std::slice::from_raw_parts_mut(start.at(part.start), part.len()) };
@@ -242,14 +267,14 @@ impl<T: Real> Norm<T> {
 }
 
 /// What turns `z` of `N` channels into its gradient.
-struct Turn<T, const N: usize> {
+struct NormGradient<T, const N: usize> {
     scale: [T; N],
     shift: [T; N],
     offset: [T; N],
     linear: [T; N],
 }
 
-impl<T: Real, const N: usize> Turn<T, N> {
+impl<T: Scalar, const N: usize> NormGradient<T, N> {
     fn new(of: impl Fn(usize) -> (T, T, T, T)) -> Self {
         use std::array::from_fn;
         Self {
@@ -279,7 +304,7 @@ mod tests {
     fn moments_of_parts_are_those_of_the_whole() {
         let n_channels = 3;
         let values: Vec<f64> = (0..3 * 20_000).map(|i| (f64::from(i) * 0.37).sin() + f64::from(i % 3)).collect();
-        let whole = Moments::of(&values, n_channels);
+        let whole = ChannelMoments::measure(&values, n_channels);
         for channel in 0..n_channels {
             let own: Vec<f64> = values.iter().skip(channel).step_by(n_channels).copied().collect();
             let mean = own.iter().sum::<f64>() / own.len() as f64;

@@ -4,11 +4,11 @@
 //!
 //! Every number is summed by one thread in one order, so results do not depend on how many threads there are.
 
-use super::axis::{Axis, Windows};
-use super::kernel::{MOST_ROWS, Steps};
-use super::packed_weights::{Block, Order, Panels};
-use super::tensor::{Real, Start, scratch, written};
-use super::thread_team::each;
+use super::axis::{AxisWindows, ConvAxis};
+use super::kernel::{MOST_ROWS, TileSteps};
+use super::packed_weights::{PackedWeights, StepBlock, WeightOrder};
+use super::tensor::{OutputStart, Scalar, scratch, written};
+use super::thread_team::parallel_for;
 use std::ops::Range;
 
 /// Numbers of input a piece of work copies at most (some rows at least), and steps of a sum whose packed weights stay
@@ -19,15 +19,15 @@ const DEPTH: usize = 144;
 /// A convolution's sizes: input [B, rows, columns, n_in], weight [n_out, n_in, K rows, K columns], output
 /// [B, rows', columns', n_out].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Sizes {
+pub struct ConvSizes {
     pub batch: usize,
     pub n_in: usize,
     pub n_out: usize,
-    pub axes: [Axis; 2],
+    pub axes: [ConvAxis; 2],
 }
 
-impl Sizes {
-    pub fn n_taps(&self) -> usize {
+impl ConvSizes {
+    pub fn kernel_len(&self) -> usize {
         self.axes[0].kernel * self.axes[1].kernel
     }
 
@@ -37,7 +37,7 @@ impl Sizes {
     }
 
     pub fn len_weight(&self) -> usize {
-        self.n_in * self.n_out * self.n_taps()
+        self.n_in * self.n_out * self.kernel_len()
     }
 
     pub fn len_out(&self) -> usize {
@@ -47,8 +47,8 @@ impl Sizes {
 
 /// The convolution of `x` plus `bias`. As soon as some rows of an output are whole, while they lie in the cache,
 /// `finish` gets them, [places, n_out], with the number of the piece (0..[`n_pieces`]).
-pub fn forward<T: Real>(
-    s: &Sizes,
+pub fn forward<T: Scalar>(
+    s: &ConvSizes,
     x: &[T],
     weight: &[T],
     bias: &[T],
@@ -56,13 +56,13 @@ pub fn forward<T: Real>(
 ) -> Vec<T> {
     assert!(x.len() == s.len_in() && weight.len() == s.len_weight() && bias.len() == s.n_out);
     let pass = forward_pass(s);
-    let panels = Panels::pack(weight, &pass.order(s.n_in * s.n_taps(), s.n_taps()));
+    let panels = PackedWeights::pack(weight, &pass.order(s.n_in * s.kernel_len(), s.kernel_len()));
     let per_row = s.axes[1].n_out * s.n_out;
     // SAFETY: the pieces together write every row of every output, each its own.
     unsafe {
-        written(s.len_out(), |to: Start<T>| {
+        written(s.len_out(), |to: OutputStart<T>| {
             let pieces = pass.pieces();
-            each(pieces.len(), |number| {
+            parallel_for(pieces.len(), |number| {
                 let (b, rows) = pieces[number].clone();
                 let start = to.at((b * s.axes[0].n_out + rows.start) * per_row);
                 let n = rows.len() * per_row;
@@ -74,12 +74,12 @@ pub fn forward<T: Real>(
 }
 
 /// How many pieces a forward pass works in.
-pub fn n_pieces(s: &Sizes) -> usize {
+pub fn n_pieces(s: &ConvSizes) -> usize {
     forward_pass(s).pieces().len()
 }
 
-fn forward_pass(s: &Sizes) -> Pass {
-    Pass {
+fn forward_pass(s: &ConvSizes) -> ConvPass {
+    ConvPass {
         batch: s.batch,
         n_from: s.n_in,
         n_to: s.n_out,
@@ -89,24 +89,24 @@ fn forward_pass(s: &Sizes) -> Pass {
 }
 
 /// The gradient of the input.
-pub fn gradient_of_input<T: Real>(s: &Sizes, weight: &[T], grad: &[T]) -> Vec<T> {
+pub fn gradient_of_input<T: Scalar>(s: &ConvSizes, weight: &[T], grad: &[T]) -> Vec<T> {
     assert!(grad.len() == s.len_out() && weight.len() == s.len_weight());
     let zeros = vec![T::zero(); s.n_in];
     // SAFETY: the pieces of the phases together write every place, each its own.
     unsafe {
-        written(s.len_in(), |to: Start<T>| {
+        written(s.len_in(), |to: OutputStart<T>| {
             for rows in s.axes[0].backward() {
                 for columns in s.axes[1].backward() {
-                    let pass = Pass {
+                    let pass = ConvPass {
                         batch: s.batch,
                         n_from: s.n_out,
                         n_to: s.n_in,
                         windows: [rows.clone(), columns],
                         kernel: s.axes.map(|axis| axis.kernel),
                     };
-                    let panels = Panels::pack(weight, &pass.order(s.n_taps(), s.n_in * s.n_taps()));
+                    let panels = PackedWeights::pack(weight, &pass.order(s.kernel_len(), s.n_in * s.kernel_len()));
                     let pieces = pass.pieces();
-                    each(pieces.len(), |number| {
+                    parallel_for(pieces.len(), |number| {
                         let (b, rows) = pieces[number].clone();
                         pass.run(grad, &panels, &zeros, to, b, rows);
                     });
@@ -117,29 +117,32 @@ pub fn gradient_of_input<T: Real>(s: &Sizes, weight: &[T], grad: &[T]) -> Vec<T>
 }
 
 /// One convolution over padded rows, forward or (a phase of) backward.
-struct Pass {
+struct ConvPass {
     batch: usize,
     n_from: usize,
     n_to: usize,
-    windows: [Windows; 2],
+    windows: [AxisWindows; 2],
     /// The whole kernel's size.
     kernel: [usize; 2],
 }
 
-impl Pass {
+impl ConvPass {
     /// Where the weights lie for this pass.
-    fn order(&self, per_column: usize, per_channel: usize) -> Order {
+    fn order(&self, per_column: usize, per_channel: usize) -> WeightOrder {
         let [rows, columns] = &self.windows;
-        let taps =
-            rows.taps.iter().flat_map(|row| columns.taps.iter().map(move |c| row * self.kernel[1] + c)).collect();
-        Order { n_columns: self.n_to, per_column, n_channels: self.n_from, per_channel, taps }
+        let kernel_offsets = rows
+            .kernel_offsets
+            .iter()
+            .flat_map(|row| columns.kernel_offsets.iter().map(move |c| row * self.kernel[1] + c))
+            .collect();
+        WeightOrder { n_columns: self.n_to, per_column, n_channels: self.n_from, per_channel, kernel_offsets }
     }
 
     /// Sample and windows' rows of each piece of work; the same for any number of threads.
     fn pieces(&self) -> Vec<(usize, Range<usize>)> {
         let [rows, columns] = &self.windows;
-        let per_row = columns.reach(columns.n) * self.n_from;
-        let n_rows = ((PIECE / per_row.max(1)).saturating_sub(rows.taps.len()) / rows.step + 1)
+        let per_row = columns.receptive_field(columns.n) * self.n_from;
+        let n_rows = ((PIECE / per_row.max(1)).saturating_sub(rows.kernel_offsets.len()) / rows.step + 1)
             .max(MOST_ROWS.div_ceil(columns.n))
             .min(rows.n);
         // Pieces of equal size rather than a small last one.
@@ -151,19 +154,19 @@ impl Pass {
     /// Writes the places of the windows of sample `b` in these rows: `begin` plus the sums.
     ///
     /// Safety: `to` holds the batch's results, and no other thread writes to those of these windows.
-    unsafe fn run<T: Real>(
+    unsafe fn run<T: Scalar>(
         &self,
         from: &[T],
-        panels: &Panels<T>,
+        panels: &PackedWeights<T>,
         begin: &[T],
-        to: Start<T>,
+        to: OutputStart<T>,
         b: usize,
         piece: Range<usize>,
     ) {
         let [rows, columns] = &self.windows;
-        let (width, n_from) = (columns.reach(columns.n), self.n_from);
+        let (width, n_from) = (columns.receptive_field(columns.n), self.n_from);
         let per_row = width * n_from;
-        scratch(rows.reach(piece.len()) * per_row, |padded: &mut [T]| {
+        scratch(rows.receptive_field(piece.len()) * per_row, |padded: &mut [T]| {
             self.copy(from, padded, b, piece.start);
             let places = piece.clone().flat_map(|row| (0..columns.n).map(move |column| (row, column)));
             let places: Vec<(usize, usize)> = places
@@ -178,19 +181,19 @@ impl Pass {
                 unsafe { to.at(*place).copy_from_nonoverlapping(begin.as_ptr(), self.n_to) };
             }
             // Steps of one row tap lie side by side in the padded copy.
-            let run = columns.taps.len() * n_from;
+            let run = columns.kernel_offsets.len() * n_from;
             let n_runs = (DEPTH / run.max(1)).max(1);
             let n_parts = run.div_ceil(DEPTH);
             for panel in &panels.panels {
-                for row in (0..rows.taps.len()).step_by(n_runs) {
+                for row in (0..rows.kernel_offsets.len()).step_by(n_runs) {
                     for part in 0..n_parts {
                         let part = run * part / n_parts..run * (part + 1) / n_parts;
-                        let outer = n_runs.min(rows.taps.len() - row);
-                        let at = Block {
+                        let outer = n_runs.min(rows.kernel_offsets.len() - row);
+                        let at = StepBlock {
                             left: row * per_row + part.start,
                             right: (row * run + part.start) * panel.columns,
-                            outer: Steps { n: outer, left: per_row, right: run * panel.columns },
-                            inner: Steps { n: part.len(), left: 1, right: panel.columns },
+                            outer: TileSteps { n: outer, left: per_row, right: run * panel.columns },
+                            inner: TileSteps { n: part.len(), left: 1, right: panel.columns },
                         };
                         // SAFETY: places lie inside the padded copy and `to`; the caller sees to the rest.
                         unsafe { panel.multiply(&panels.data, padded, &places, to, &at) };
@@ -201,9 +204,9 @@ impl Pass {
     }
 
     /// The rows the piece from `first_row` on reads, with zeros where the input ends.
-    fn copy<T: Real>(&self, from: &[T], padded: &mut [T], b: usize, first_row: usize) {
+    fn copy<T: Scalar>(&self, from: &[T], padded: &mut [T], b: usize, first_row: usize) {
         let [rows, columns] = &self.windows;
-        let width = columns.reach(columns.n) as isize;
+        let width = columns.receptive_field(columns.n) as isize;
         let inside = |first: isize, n: usize| (-first).clamp(0, width)..(n as isize - first).clamp(0, width);
         let inside = inside(columns.first, columns.n_from);
         let numbers = inside.start as usize * self.n_from..inside.end.max(inside.start) as usize * self.n_from;

@@ -7,19 +7,19 @@ pub const MOST_ROWS: usize = 6;
 
 /// What a tile is made of: for all steps k, an outer and an inner loop,
 /// `to[row][column] += rows[row][at(k)] * right[at(k)][column]`.
-pub struct Job<T> {
+pub struct TileJob<T> {
     /// Where each row's left factors and its sums begin.
     pub rows: [*const T; MOST_ROWS],
     pub to: [*mut T; MOST_ROWS],
     /// Where the right factors begin: vectors of columns.
     pub right: *const T,
-    pub outer: Steps,
-    pub inner: Steps,
+    pub outer: TileSteps,
+    pub inner: TileSteps,
 }
 
 /// `n` steps, and how far left and right factors lie apart.
 #[derive(Clone, Copy, Debug)]
-pub struct Steps {
+pub struct TileSteps {
     pub n: usize,
     pub left: usize,
     pub right: usize,
@@ -27,7 +27,7 @@ pub struct Steps {
 
 /// The loop as the processor has it.
 #[derive(Clone, Copy)]
-pub struct Kernel<T> {
+pub struct TileKernel<T> {
     /// Numbers in a vector.
     pub lanes: usize,
     /// Vectors beside each other in a tile at most: 1, 2 or 4.
@@ -36,7 +36,7 @@ pub struct Kernel<T> {
     ///
     /// # Safety
     /// Every address the job names is readable, those of `to` writable by this thread alone.
-    pub run: unsafe fn(&Job<T>, usize, usize),
+    pub run: unsafe fn(&TileJob<T>, usize, usize),
 }
 
 /// A tile's loop and the choice of its size, for one kind of processor and one type of number.
@@ -44,7 +44,7 @@ macro_rules! kernel {
     ($(#[$attribute:meta])* $tile:ident, $choose:ident, $number:ty, $lanes:literal, $vectors:literal, $zero:path, $load:path, $store:path, $spread:path,
      $add_product:expr) => {
         $(#[$attribute])*
-        unsafe fn $tile<const ROWS: usize, const VECTORS: usize>(job: &Job<$number>) {
+        unsafe fn $tile<const ROWS: usize, const VECTORS: usize>(job: &TileJob<$number>) {
             // SAFETY: the caller's.
             unsafe {
                 let mut sums = [[$zero(); VECTORS]; ROWS];
@@ -84,7 +84,7 @@ macro_rules! kernel {
         }
 
         #[allow(unreachable_patterns)]
-        pub(crate) unsafe fn $choose(job: &Job<$number>, n_rows: usize, n_vectors: usize) {
+        pub(crate) unsafe fn $choose(job: &TileJob<$number>, n_rows: usize, n_vectors: usize) {
             // SAFETY: the caller's.
             unsafe {
                 match (n_rows, n_vectors) {
@@ -147,7 +147,7 @@ kernel!(any_tile_f64, any_f64, f64, 4, 2, any::zero, any::load, any::store, any:
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::Job;
+    use super::TileJob;
     #[allow(clippy::wildcard_imports)] // intrinsics
     use std::arch::x86_64::*;
 
@@ -206,35 +206,35 @@ mod x86 {
 }
 
 /// For f32.
-pub fn of_f32() -> Kernel<f32> {
+pub fn of_f32() -> TileKernel<f32> {
     #[cfg(target_arch = "x86_64")]
     {
         if std::arch::is_x86_feature_detected!("avx512f") {
-            return Kernel { lanes: 16, most_vectors: 4, run: x86::wide_f32 };
+            return TileKernel { lanes: 16, most_vectors: 4, run: x86::wide_f32 };
         }
         if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-            return Kernel { lanes: 8, most_vectors: 2, run: x86::half_f32 };
+            return TileKernel { lanes: 8, most_vectors: 2, run: x86::half_f32 };
         }
     }
-    Kernel { lanes: 4, most_vectors: 2, run: any_f32 }
+    TileKernel { lanes: 4, most_vectors: 2, run: any_f32 }
 }
 
 /// For f64.
-pub fn of_f64() -> Kernel<f64> {
+pub fn of_f64() -> TileKernel<f64> {
     #[cfg(target_arch = "x86_64")]
     {
         if std::arch::is_x86_feature_detected!("avx512f") {
-            return Kernel { lanes: 8, most_vectors: 4, run: x86::wide_f64 };
+            return TileKernel { lanes: 8, most_vectors: 4, run: x86::wide_f64 };
         }
         if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-            return Kernel { lanes: 4, most_vectors: 2, run: x86::half_f64 };
+            return TileKernel { lanes: 4, most_vectors: 2, run: x86::half_f64 };
         }
     }
-    Kernel { lanes: 4, most_vectors: 2, run: any_f64 }
+    TileKernel { lanes: 4, most_vectors: 2, run: any_f64 }
 }
 
 /// Columns cut into panels as wide as tiles: (first column, vectors), widest first; the last may reach beyond.
-pub fn panels<T>(kernel: &Kernel<T>, n_columns: usize) -> Vec<(usize, usize)> {
+pub fn panels<T>(kernel: &TileKernel<T>, n_columns: usize) -> Vec<(usize, usize)> {
     let (mut panels, mut first, mut left) = (Vec::new(), 0, n_columns.div_ceil(kernel.lanes));
     while left > 0 {
         let n = [4, 2, 1].into_iter().find(|n| *n <= left && *n <= kernel.most_vectors).unwrap_or(1);
@@ -249,7 +249,7 @@ pub fn panels<T>(kernel: &Kernel<T>, n_columns: usize) -> Vec<(usize, usize)> {
 mod tests {
     use super::*;
 
-    fn agrees(kernel: Kernel<f64>) {
+    fn agrees(kernel: TileKernel<f64>) {
         for n_vectors in [1, 2, 4].into_iter().filter(|n| *n <= kernel.most_vectors) {
             for n_rows in 1..=MOST_ROWS {
                 let (n_columns, n_steps) = (n_vectors * kernel.lanes, 5);
@@ -257,12 +257,12 @@ mod tests {
                 let right: Vec<f64> = (0..2000).map(|i| f64::from(i % 17)).collect();
                 let mut sums = vec![1.0; MOST_ROWS * n_columns];
                 let start = sums.as_mut_ptr();
-                let job = Job {
+                let job = TileJob {
                     rows: std::array::from_fn(|row| &raw const left[row * 20]),
                     to: std::array::from_fn(|row| start.wrapping_add(row * n_columns)),
                     right: right.as_ptr(),
-                    outer: Steps { n: 2, left: 10, right: 400 },
-                    inner: Steps { n: n_steps, left: 2, right: 60 },
+                    outer: TileSteps { n: 2, left: 10, right: 400 },
+                    inner: TileSteps { n: n_steps, left: 2, right: 60 },
                 };
                 // SAFETY: all lies inside the vectors above.
                 unsafe { (kernel.run)(&job, n_rows, n_vectors) };
@@ -282,16 +282,16 @@ mod tests {
     #[test]
     fn every_processors_tiles_are_right() {
         agrees(of_f64());
-        agrees(Kernel { lanes: 4, most_vectors: 2, run: any_f64 });
+        agrees(TileKernel { lanes: 4, most_vectors: 2, run: any_f64 });
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-            agrees(Kernel { lanes: 4, most_vectors: 2, run: x86::half_f64 });
+            agrees(TileKernel { lanes: 4, most_vectors: 2, run: x86::half_f64 });
         }
     }
 
     #[test]
     fn panels_cover_all_columns() {
-        let kernel = Kernel { lanes: 16, most_vectors: 4, run: any_f32 };
+        let kernel = TileKernel { lanes: 16, most_vectors: 4, run: any_f32 };
         assert_eq!(panels(&kernel, 144), [(0, 4), (64, 4), (128, 1)]);
         assert_eq!(panels(&kernel, 96), [(0, 4), (64, 2)]);
         assert_eq!(panels(&kernel, 1), [(0, 1)]);

@@ -3,7 +3,7 @@
 //! pieces of a fixed size and each number is summed by one thread in one order.
 
 use super::kernel;
-use super::kernel::Kernel;
+use super::kernel::TileKernel;
 use candle_core::{CpuStorage, DType, Layout, Result, Storage, Tensor, WithDType};
 use rayon::prelude::*;
 use std::cell::RefCell;
@@ -17,16 +17,16 @@ pub const LANES: usize = 16;
 pub const GRAIN: usize = 16 * 1024;
 
 /// The number types our operators are written for: f32 to train with, f64 to prove the gradients with.
-pub trait Real: WithDType {
+pub trait Scalar: WithDType {
     fn pool() -> &'static LocalKey<RefCell<Vec<Vec<Self>>>>;
     /// The loop of the processor at hand.
-    fn kernel() -> Kernel<Self>;
+    fn kernel() -> TileKernel<Self>;
 }
 
 macro_rules! real {
     ($type:ty, $kernel:path) => {
-        impl Real for $type {
-            fn kernel() -> Kernel<Self> {
+        impl Scalar for $type {
+            fn kernel() -> TileKernel<Self> {
                 $kernel()
             }
 
@@ -41,7 +41,7 @@ real!(f32, kernel::of_f32);
 real!(f64, kernel::of_f64);
 
 /// The numbers of a contiguous tensor inside an operator. Errors when it is not contiguous (callers see to it).
-pub fn slice<'a, T: Real>(storage: &'a CpuStorage, layout: &Layout) -> Result<&'a [T]> {
+pub fn slice<'a, T: Scalar>(storage: &'a CpuStorage, layout: &Layout) -> Result<&'a [T]> {
     let Some((start, end)) = layout.contiguous_offsets() else {
         candle_core::bail!("this operator wants contiguous tensors, got strides {:?}", layout.stride());
     };
@@ -49,7 +49,7 @@ pub fn slice<'a, T: Real>(storage: &'a CpuStorage, layout: &Layout) -> Result<&'
 }
 
 /// Lends the numbers of a tensor on the CPU, copying only when it is not contiguous.
-pub fn read<T: Real, R>(tensor: &Tensor, f: impl FnOnce(&[T]) -> Result<R>) -> Result<R> {
+pub fn read<T: Scalar, R>(tensor: &Tensor, f: impl FnOnce(&[T]) -> Result<R>) -> Result<R> {
     let tensor = tensor.contiguous()?;
     let (storage, layout) = tensor.storage_and_layout();
     match &*storage {
@@ -68,7 +68,7 @@ pub fn is_f64(dtype: DType) -> Result<bool> {
 }
 
 /// Lends a buffer of `len` numbers whose contents are arbitrary; the memory is kept for the next caller.
-pub fn scratch<T: Real, R>(len: usize, f: impl FnOnce(&mut [T]) -> R) -> R {
+pub fn scratch<T: Scalar, R>(len: usize, f: impl FnOnce(&mut [T]) -> R) -> R {
     let mut buffer = T::pool().with_borrow_mut(|pool| pool.pop()).unwrap_or_default();
     if buffer.len() < len {
         buffer.resize(len, T::zero());
@@ -99,19 +99,19 @@ impl<'a, T> Matrix<'a, T> {
 }
 
 /// `product = left x right`, [m, depth] x [depth, n], row-major; `product` is overwritten.
-pub fn matmul<T: Real>(product: &mut [T], left: Matrix<T>, right: Matrix<T>, m: usize, n: usize, depth: usize) {
+pub fn matmul<T: Scalar>(product: &mut [T], left: Matrix<T>, right: Matrix<T>, m: usize, n: usize, depth: usize) {
     if m == 0 || n == 0 {
         return;
     }
-    let reach = |matrix: Matrix<T>, rows: usize, columns: usize| {
+    let last_index = |matrix: Matrix<T>, rows: usize, columns: usize| {
         (rows - 1) * matrix.row_stride + (columns - 1) * matrix.column_stride
     };
     assert!(product.len() == m * n && depth > 0, "product of {m} x {n} over {depth}");
-    assert!(reach(left, m, depth) < left.data.len() && reach(right, depth, n) < right.data.len());
+    assert!(last_index(left, m, depth) < left.data.len() && last_index(right, depth, n) < right.data.len());
     let strides = |matrix: Matrix<T>| (matrix.row_stride as isize, matrix.column_stride as isize);
     let (left_strides, right_strides) = (strides(left), strides(right));
     let (tiles_down, tiles_across) = (m.div_ceil(TILE.0), n.div_ceil(TILE.1));
-    let start = Start(product.as_mut_ptr());
+    let start = OutputStart(product.as_mut_ptr());
     (0..tiles_down * tiles_across).into_par_iter().for_each(|tile| {
         let (row, column) = (tile / tiles_across * TILE.0, tile % tiles_across * TILE.1);
         let left = &left.data[row * left.row_stride..];
@@ -148,9 +148,9 @@ pub fn matmul<T: Real>(product: &mut [T], left: Matrix<T>, right: Matrix<T>, m: 
 ///
 /// # Safety
 /// `write` writes every one of the `len` numbers, and reads none that it has not written.
-pub unsafe fn written<T: Real>(len: usize, write: impl FnOnce(Start<T>)) -> Vec<T> {
+pub unsafe fn written<T: Scalar>(len: usize, write: impl FnOnce(OutputStart<T>)) -> Vec<T> {
     let mut values = Vec::with_capacity(len);
-    write(Start(values.as_mut_ptr()));
+    write(OutputStart(values.as_mut_ptr()));
     // SAFETY: all are written, as the caller promises.
     unsafe { values.set_len(len) };
     values
@@ -158,15 +158,15 @@ pub unsafe fn written<T: Real>(len: usize, write: impl FnOnce(Start<T>)) -> Vec<
 
 /// Where a result begins: tasks write disjoint parts of it.
 #[derive(Clone, Copy)]
-pub struct Start<T>(*mut T);
+pub struct OutputStart<T>(*mut T);
 
 // SAFETY: only the address is shared; who writes where is the affair of those who call `at`.
-unsafe impl<T: Send> Send for Start<T> {}
-unsafe impl<T: Send> Sync for Start<T> {}
+unsafe impl<T: Send> Send for OutputStart<T> {}
+unsafe impl<T: Send> Sync for OutputStart<T> {}
 
-impl<T> Start<T> {
+impl<T> OutputStart<T> {
     /// That of these numbers, which nobody else uses meanwhile.
-    pub fn of(values: &mut [T]) -> Self {
+    pub fn new(values: &mut [T]) -> Self {
         Self(values.as_mut_ptr())
     }
 
@@ -178,7 +178,7 @@ impl<T> Start<T> {
 }
 
 /// The sum of `values`, always in the same order.
-pub fn sum<T: Real>(values: &[T]) -> f64 {
+pub fn sum<T: Scalar>(values: &[T]) -> f64 {
     let (chunks, rest) = values.as_chunks::<LANES>();
     let mut lanes = [T::zero(); LANES];
     for chunk in chunks {

@@ -8,12 +8,12 @@ use std::cell::{Cell, UnsafeCell};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
 
-/// A piece's work by its number, as the team sees it: alive as long as `Team::run` has not returned.
-type Work = *const (dyn Fn(usize) + Sync);
+/// A piece's work by its number, as the team sees it: alive as long as `ThreadTeam::run` has not returned.
+type TeamTask = *const (dyn Fn(usize) + Sync);
 
-struct Team {
+struct ThreadTeam {
     /// Written by the leader alone, while it is closed and nobody is active.
-    work: UnsafeCell<Option<(Work, usize)>>,
+    work: UnsafeCell<Option<(TeamTask, usize)>>,
     next: AtomicUsize,
     /// Helpers that may be reading `work`.
     active: AtomicUsize,
@@ -23,13 +23,13 @@ struct Team {
 }
 
 // SAFETY: `work` is guarded by `closed` and `active` as said there.
-unsafe impl Sync for Team {}
+unsafe impl Sync for ThreadTeam {}
 
-thread_local!(static TEAM: Cell<*const Team> = const { Cell::new(std::ptr::null()) });
+thread_local!(static TEAM: Cell<*const ThreadTeam> = const { Cell::new(std::ptr::null()) });
 
 /// Runs `f`, whose parallel pieces are shared out among threads that stay awake until it returns.
-pub fn awake<R>(f: impl FnOnce() -> R) -> R {
-    let team = Team {
+pub fn with_spinning_workers<R>(f: impl FnOnce() -> R) -> R {
+    let team = ThreadTeam {
         work: UnsafeCell::new(None),
         next: AtomicUsize::new(0),
         active: AtomicUsize::new(0),
@@ -54,7 +54,7 @@ pub fn awake<R>(f: impl FnOnce() -> R) -> R {
 }
 
 /// Runs `f` for 0..n, on all threads at hand, in any order.
-pub fn each(n: usize, f: impl Fn(usize) + Sync) {
+pub fn parallel_for(n: usize, f: impl Fn(usize) + Sync) {
     let team = TEAM.get();
     if team.is_null() {
         return (0..n).into_par_iter().for_each(&f);
@@ -69,17 +69,17 @@ pub fn each(n: usize, f: impl Fn(usize) + Sync) {
     }
 }
 
-impl Team {
+impl ThreadTeam {
     fn run(&self, n: usize, f: &(dyn Fn(usize) + Sync)) {
         // SAFETY: only the lifetime is forgotten; nobody is active when this function returns.
-        let work: Work = unsafe { std::mem::transmute::<&(dyn Fn(usize) + Sync), Work>(f) };
+        let work: TeamTask = unsafe { std::mem::transmute::<&(dyn Fn(usize) + Sync), TeamTask>(f) };
         // SAFETY: closed, and nobody active: since the last run, or from the beginning.
         unsafe { *self.work.get() = Some((work, n)) };
         self.next.store(0, SeqCst);
         self.closed.store(false, SeqCst);
         let own = catch_unwind(AssertUnwindSafe(|| self.take(f, n)));
         self.closed.store(true, SeqCst);
-        let mut patience = Patience::default();
+        let mut patience = SpinWait::default();
         while self.active.load(SeqCst) > 0 {
             patience.wait();
         }
@@ -100,13 +100,13 @@ impl Team {
     }
 
     fn help(&self) {
-        let mut patience = Patience::default();
+        let mut patience = SpinWait::default();
         while !self.over.load(SeqCst) {
             if self.closed.load(SeqCst) {
                 patience.wait();
                 continue;
             }
-            patience = Patience::default();
+            patience = SpinWait::default();
             self.active.fetch_add(1, SeqCst);
             // Seen open while active: the leader waits for us from here on.
             if !self.closed.load(SeqCst) {
@@ -127,11 +127,11 @@ impl Team {
 
 /// Waits awake; where it takes long, whoever else wants the processor gets it.
 #[derive(Default)]
-struct Patience {
+struct SpinWait {
     n_spins: u32,
 }
 
-impl Patience {
+impl SpinWait {
     fn wait(&mut self) {
         if self.n_spins < 1 << 12 {
             self.n_spins += 1;
@@ -154,10 +154,10 @@ mod tests {
     fn every_piece_is_done_once() {
         for n_threads in [1, 3] {
             with_threads(n_threads, || {
-                awake(|| {
+                with_spinning_workers(|| {
                     for n in (0..200).chain([10_000]) {
                         let done: Vec<AtomicUsize> = (0..n).map(|_| AtomicUsize::new(0)).collect();
-                        each(n, |i| {
+                        parallel_for(n, |i| {
                             done[i].fetch_add(1, SeqCst);
                         });
                         assert!(done.iter().all(|done| done.load(SeqCst) == 1));
@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn a_piece_that_fails_is_told_and_the_threads_are_let_go() {
-        let failing = || awake(|| each(100, |i| assert!(i != 50, "piece 50")));
+        let failing = || with_spinning_workers(|| parallel_for(100, |i| assert!(i != 50, "piece 50")));
         assert!(with_threads(3, || catch_unwind(failing)).is_err());
     }
 }

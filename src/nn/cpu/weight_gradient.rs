@@ -1,10 +1,10 @@
 //! The gradient of a convolution's weight: for every tap and channel pair a sum over all places of the batch. Tasks
 //! share out the weights, not the places, so that no two threads add to one number.
 
-use super::direct_conv::Sizes;
-use super::kernel::{Job, MOST_ROWS, Steps, panels};
-use super::tensor::{Real, Start, written};
-use super::thread_team::each;
+use super::direct_conv::ConvSizes;
+use super::kernel::{MOST_ROWS, TileJob, TileSteps, panels};
+use super::tensor::{OutputStart, Scalar, written};
+use super::thread_team::parallel_for;
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -17,11 +17,11 @@ const AT_ONCE: usize = 32;
 const CHANNELS: usize = 11 * MOST_ROWS;
 
 /// The gradient of the weight.
-pub fn gradient_of_weight<T: Real>(s: &Sizes, x: &[T], grad: &[T]) -> Vec<T> {
+pub fn gradient_of_weight<T: Scalar>(s: &ConvSizes, x: &[T], grad: &[T]) -> Vec<T> {
     assert!(x.len() == s.len_in() && grad.len() == s.len_out());
     // Only runs along the second axis are long in memory: a lone axis is that one.
     let turned = s.axes[1].n_in == 1 && s.axes[1].kernel == 1 && s.axes[1].n_out == 1;
-    let s = &if turned { Sizes { axes: [s.axes[1], s.axes[0]], ..*s } } else { *s };
+    let s = &if turned { ConvSizes { axes: [s.axes[1], s.axes[0]], ..*s } } else { *s };
     let kernel = T::kernel();
     let panels = panels(&kernel, s.n_out);
     let (padded, n_columns) = pad_channels(grad, s.n_out, kernel.lanes);
@@ -29,28 +29,31 @@ pub fn gradient_of_weight<T: Real>(s: &Sizes, x: &[T], grad: &[T]) -> Vec<T> {
     let rows = s.axes[0];
     let n_chunks = s.n_in.div_ceil(CHANNELS);
     let tasks: Vec<(usize, usize, usize)> = (0..panels.len())
-        .flat_map(|panel| (0..rows.kernel).flat_map(move |tap| (0..n_chunks).map(move |chunk| (panel, tap, chunk))))
+        .flat_map(|panel| {
+            (0..rows.kernel)
+                .flat_map(move |kernel_offset| (0..n_chunks).map(move |chunk| (panel, kernel_offset, chunk)))
+        })
         .collect();
     let chunk = |chunk: usize| chunk * CHANNELS..s.n_in.min((chunk + 1) * CHANNELS);
     let sums: Vec<OnceLock<Vec<T>>> = tasks.iter().map(|_| OnceLock::new()).collect();
-    each(tasks.len(), |task| {
-        let (panel, tap, of_chunk) = tasks[task];
-        let _ = sums[task].set(sum_products(s, x, grad, n_columns, panels[panel], tap, chunk(of_chunk)));
+    parallel_for(tasks.len(), |task| {
+        let (panel, kernel_offset, of_chunk) = tasks[task];
+        let _ = sums[task].set(sum_products(s, x, grad, n_columns, panels[panel], kernel_offset, chunk(of_chunk)));
     });
     let sums: Vec<Vec<T>> = sums.into_iter().filter_map(OnceLock::into_inner).collect();
-    let spread = |gradient: Start<T>, (panel, of_chunk): (usize, usize)| {
+    let spread = |gradient: OutputStart<T>, (panel, of_chunk): (usize, usize)| {
         let ((first, n_vectors), channels) = (panels[panel], chunk(of_chunk));
         let width = n_vectors * kernel.lanes;
         let of_row = tasks.iter().zip(&sums).filter(|((p, _, c), _)| (*p, *c) == (panel, of_chunk));
         let of_row: Vec<&[T]> = of_row.map(|(_, sums)| &sums[..]).collect();
-        let taps = of_row.iter().flat_map(|sums| sums.chunks_exact(channels.len() * width));
-        let taps: Vec<&[T]> = taps.collect();
-        let n_at_once = (AT_ONCE / s.n_taps()).max(1);
+        let kernel_offsets = of_row.iter().flat_map(|sums| sums.chunks_exact(channels.len() * width));
+        let kernel_offsets: Vec<&[T]> = kernel_offsets.collect();
+        let n_at_once = (AT_ONCE / s.kernel_len()).max(1);
         for some in (0..channels.len()).step_by(n_at_once).map(|c| c..channels.len().min(c + n_at_once)) {
             for o in first..s.n_out.min(first + width) {
-                let mut at = (o * s.n_in + channels.start + some.start) * s.n_taps();
+                let mut at = (o * s.n_in + channels.start + some.start) * s.kernel_len();
                 for c in some.clone() {
-                    for sums in &taps {
+                    for sums in &kernel_offsets {
                         // SAFETY: the numbers of these channels of this output, which only this task writes.
                         unsafe { gradient.at(at).write(sums[c * width + o - first]) };
                         at += 1;
@@ -63,14 +66,14 @@ pub fn gradient_of_weight<T: Real>(s: &Sizes, x: &[T], grad: &[T]) -> Vec<T> {
         (0..panels.len()).flat_map(|panel| (0..n_chunks).map(move |chunk| (panel, chunk))).collect();
     // SAFETY: the parts together write every number.
     unsafe {
-        written(s.len_weight(), |gradient: Start<T>| {
-            each(parts.len(), |part| spread(gradient, parts[part]));
+        written(s.len_weight(), |gradient: OutputStart<T>| {
+            parallel_for(parts.len(), |part| spread(gradient, parts[part]));
         })
     }
 }
 
 /// The numbers with their channels filled up with zeros to whole vectors (None where they are), and how many there are.
-fn pad_channels<T: Real>(values: &[T], n: usize, lanes: usize) -> (Option<Vec<T>>, usize) {
+fn pad_channels<T: Scalar>(values: &[T], n: usize, lanes: usize) -> (Option<Vec<T>>, usize) {
     let padded = n.next_multiple_of(lanes);
     if padded == n {
         return (None, n);
@@ -84,13 +87,13 @@ fn pad_channels<T: Real>(values: &[T], n: usize, lanes: usize) -> (Option<Vec<T>
 
 /// For one row tap, some input channels and a panel of output channels: sums of `x * grad` over all places of the batch,
 /// [column taps, channels, width of the panel].
-fn sum_products<T: Real>(
-    s: &Sizes,
+fn sum_products<T: Scalar>(
+    s: &ConvSizes,
     x: &[T],
     grad: &[T],
     n_columns: usize,
     (first, n_vectors): (usize, usize),
-    row_tap: usize,
+    row_offset: usize,
     channels: Range<usize>,
 ) -> Vec<T> {
     let kernel = T::kernel();
@@ -98,27 +101,27 @@ fn sum_products<T: Real>(
     let [rows, columns] = s.axes;
     let mut sums = vec![T::zero(); columns.kernel * channels.len() * width];
     let start = sums.as_mut_ptr();
-    let inside = rows.inside(row_tap);
+    let inside = rows.inside(row_offset);
     let n_rows = (PLACES / columns.n_out).max(1);
     for b in 0..s.batch {
         for row in inside.clone().step_by(n_rows) {
             let n = n_rows.min(inside.end - row);
-            let x_row = b * rows.n_in + row * rows.stride + row_tap - rows.pad;
-            for column_tap in 0..columns.kernel {
-                let across = columns.inside(column_tap);
+            let x_row = b * rows.n_in + row * rows.stride + row_offset - rows.pad;
+            for column_offset in 0..columns.kernel {
+                let across = columns.inside(column_offset);
                 // A row longer than a piece is cut.
                 for across in across.clone().step_by(PLACES).map(|at| at..across.end.min(at + PLACES)) {
                     let x_at =
-                        (x_row * columns.n_in + across.start * columns.stride + column_tap - columns.pad) * s.n_in;
+                        (x_row * columns.n_in + across.start * columns.stride + column_offset - columns.pad) * s.n_in;
                     let grad_at = ((b * rows.n_out + row) * columns.n_out + across.start) * n_columns + first;
                     let outer =
-                        Steps { n, left: rows.stride * columns.n_in * s.n_in, right: columns.n_out * n_columns };
-                    let inner = Steps { n: across.len(), left: columns.stride * s.n_in, right: n_columns };
+                        TileSteps { n, left: rows.stride * columns.n_in * s.n_in, right: columns.n_out * n_columns };
+                    let inner = TileSteps { n: across.len(), left: columns.stride * s.n_in, right: n_columns };
                     for channel in channels.clone().step_by(MOST_ROWS) {
                         let n_rows = MOST_ROWS.min(channels.end - channel);
                         let of = |row: usize| row.min(n_rows - 1);
-                        let at = column_tap * channels.len() + channel - channels.start;
-                        let job = Job {
+                        let at = column_offset * channels.len() + channel - channels.start;
+                        let job = TileJob {
                             rows: std::array::from_fn(|row| &raw const x[x_at + channel + of(row)]),
                             to: std::array::from_fn(|row| start.wrapping_add((at + of(row)) * width)),
                             right: &raw const grad[grad_at],

@@ -1,5 +1,5 @@
 //! The speech-to-gesture generator (Ginosar et al. 2019, as Rebol et al. 2021 use it): log-mel in, poses out. An
-//! audio front turns the spectrogram into one vector a pose frame; a UNet over time with additive skips turns those
+//! audio encoder turns the spectrogram into one vector a pose frame; a UNet over time with additive skips turns those
 //! into motion. Fully convolutional: any number of frames that is a multiple of [`FRAMES_MULTIPLE`].
 
 use super::conv_block::{Block1d, Block2d};
@@ -59,15 +59,26 @@ fn before_it_was_stated() -> f64 {
 impl Config {
     /// The sizes of a preset; the UNet is the same. The published momentum is 0.01, which a training of some hundred
     /// steps on a CPU never catches up with: `light` takes 0.1.
-    pub fn of(preset: Preset, n_out: usize) -> Self {
+    pub fn from_preset(preset: Preset, n_out: usize) -> Self {
         let norm_momentum = if preset == Preset::Paper { 0.01 } else { 0.1 };
         Self { preset, n_mels: 64, width: 256, n_out, norm_momentum }
     }
 }
 
-/// The generator.
+/// Log-mel spectrograms to poses.
 pub struct Generator {
-    front: Front,
+    audio_encoder: AudioEncoder,
+    unet: MotionUnet,
+}
+
+/// Convolutions over the spectrogram that shorten time by 8, one vector a step.
+enum AudioEncoder {
+    Light(Vec<Block1d>),
+    Paper(Vec<Block2d>),
+}
+
+/// A UNet over time with additive skips.
+struct MotionUnet {
     enter: Vec<Block1d>,
     downs: Vec<Block1d>,
     ups: Vec<Block1d>,
@@ -78,17 +89,36 @@ pub struct Generator {
 /// A block of so many channels in and out.
 type MakeBlock = fn(&mut Params, &str, usize, usize) -> Result<Block1d>;
 
-/// Both fronts shorten time by 8 before it is resized to the pose frames.
-enum Front {
-    Light(Vec<Block1d>),
-    Paper(Vec<Block2d>),
-}
-
 impl Generator {
     /// Makes the network's tensors.
     pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
+        Ok(Self { audio_encoder: AudioEncoder::new(params, config)?, unet: MotionUnet::new(params, config)? })
+    }
+
+    /// `mels` [B, n_mels, T_mel] to poses [B, n_out, n_frames]; `n_frames` is a multiple of [`FRAMES_MULTIPLE`] and
+    /// both span the same time.
+    pub fn forward(&self, mels: &Tensor, n_frames: usize, train: bool) -> Result<Tensor> {
+        if n_frames == 0 || !n_frames.is_multiple_of(FRAMES_MULTIPLE) {
+            candle_core::bail!("the generator makes a multiple of {FRAMES_MULTIPLE} frames, not {n_frames}");
+        }
+        self.decode(&resize::linear(&self.encode(mels, train)?, n_frames)?, train)
+    }
+
+    /// `mels` [B, n_mels, T_mel] to encoded sound [B, width, about T_mel / 8].
+    pub fn encode(&self, mels: &Tensor, train: bool) -> Result<Tensor> {
+        self.audio_encoder.forward(mels, train)?.t()?.contiguous()
+    }
+
+    /// Encoded sound at every pose frame, [B, width, T], to poses [B, n_out, T]; T is a multiple of
+    /// [`FRAMES_MULTIPLE`].
+    pub fn decode(&self, x: &Tensor, train: bool) -> Result<Tensor> {
+        self.unet.forward(&x.t()?, train)?.t()?.contiguous()
+    }
+}
+
+impl MotionUnet {
+    fn new(params: &mut Params, config: &Config) -> Result<Self> {
         let n = config.width;
-        let front = Front::new(params, config)?;
         let mut row = |name: &str, n_blocks: usize, make: MakeBlock| {
             let block = |i| Ok(make(params, &format!("{name}.{i}"), n, n)?.with_momentum(config.norm_momentum));
             (0..n_blocks).map(block).collect::<Result<Vec<_>>>()
@@ -98,27 +128,12 @@ impl Generator {
         let ups = row("up", N_LEVELS, Block1d::plain)?;
         let decoder = row("decoder", N_DECODER, Block1d::plain)?;
         let last = Conv::new(params, "last", &[config.n_out, n, 1], 1)?;
-        Ok(Self { front, enter, downs, ups, decoder, last })
+        Ok(Self { enter, downs, ups, decoder, last })
     }
 
-    /// `mels` [B, n_mels, T_mel] to poses [B, n_out, n_frames]; `n_frames` is a multiple of [`FRAMES_MULTIPLE`] and
-    /// both span the same time.
-    pub fn forward(&self, mels: &Tensor, n_frames: usize, train: bool) -> Result<Tensor> {
-        if n_frames == 0 || !n_frames.is_multiple_of(FRAMES_MULTIPLE) {
-            candle_core::bail!("the generator makes a multiple of {FRAMES_MULTIPLE} frames, not {n_frames}");
-        }
-        self.trunk(&resize::linear(&self.front(mels, train)?, n_frames)?, train)
-    }
-
-    /// `mels` [B, n_mels, T_mel] to what is heard [B, width, about T_mel / 8].
-    pub fn front(&self, mels: &Tensor, train: bool) -> Result<Tensor> {
-        self.front.forward(mels, train)?.t()?.contiguous()
-    }
-
-    /// What is heard at every pose frame, [B, width, T], to poses [B, n_out, T]; T is a multiple of
-    /// [`FRAMES_MULTIPLE`].
-    pub fn trunk(&self, x: &Tensor, train: bool) -> Result<Tensor> {
-        let mut x = x.t()?;
+    /// [B, T, width] to [B, T, n_out].
+    fn forward(&self, x: &Tensor, train: bool) -> Result<Tensor> {
+        let mut x = x.clone();
         for block in &self.enter {
             x = block.forward(&x, train)?;
         }
@@ -133,11 +148,11 @@ impl Generator {
         for block in &self.decoder {
             x = block.forward(&x, train)?;
         }
-        self.last.forward(&x)?.t()?.contiguous()
+        self.last.forward(&x)
     }
 }
 
-impl Front {
+impl AudioEncoder {
     fn new(params: &mut Params, config: &Config) -> Result<Self> {
         let (mels, n) = (config.n_mels, config.width);
         let name = |i: usize| format!("front.{i}");
@@ -154,7 +169,7 @@ impl Front {
                     Block1d::down(params, &name(5), wide, n)?,
                     Block1d::plain(params, &name(6), n, n)?,
                 ];
-                Front::Light(blocks.into_iter().map(|block| block.with_momentum(momentum)).collect())
+                AudioEncoder::Light(blocks.into_iter().map(|block| block.with_momentum(momentum)).collect())
             }
             Preset::Paper => {
                 let blocks = vec![
@@ -167,7 +182,7 @@ impl Front {
                     Block2d::plain(params, &name(6), n, n)?,
                     Block2d::across(params, &name(7), [n, n, 3, mels / 8])?,
                 ];
-                Front::Paper(blocks.into_iter().map(|block| block.with_momentum(momentum)).collect())
+                AudioEncoder::Paper(blocks.into_iter().map(|block| block.with_momentum(momentum)).collect())
             }
         })
     }
@@ -175,8 +190,8 @@ impl Front {
     /// [B, n_mels, T_mel] to [B, T_mel / 8, width].
     fn forward(&self, mels: &Tensor, train: bool) -> Result<Tensor> {
         match self {
-            Front::Light(blocks) => blocks.iter().try_fold(mels.t()?, |x, block| block.forward(&x, train)),
-            Front::Paper(blocks) => {
+            AudioEncoder::Light(blocks) => blocks.iter().try_fold(mels.t()?, |x, block| block.forward(&x, train)),
+            AudioEncoder::Paper(blocks) => {
                 let image = mels.t()?.unsqueeze(3)?;
                 blocks.iter().try_fold(image, |x, block| block.forward(&x, train))?.squeeze(2)
             }
@@ -192,7 +207,7 @@ mod tests {
 
     fn size(preset: Preset, n_out: usize) -> Result<usize> {
         let mut params = Params::frozen();
-        Generator::new(&mut params, &Config::of(preset, n_out))?;
+        Generator::new(&mut params, &Config::from_preset(preset, n_out))?;
         Ok(params.n_parameters())
     }
 
@@ -207,7 +222,7 @@ mod tests {
     #[test]
     fn shapes_follow_the_frames_asked_for() -> Result<()> {
         let mut params = Params::new(0);
-        let config = Config { width: 16, ..Config::of(Preset::Light, 6) };
+        let config = Config { width: 16, ..Config::from_preset(Preset::Light, 6) };
         let net = Generator::new(&mut params, &config)?;
         for (n_mel, n_frames) in [(418, 64), (427, 64), (213, 32), (1000, 160)] {
             let mels = pattern(&[2, 64, n_mel], 0.0)?.to_dtype(DType::F32)?;
@@ -222,7 +237,7 @@ mod tests {
     fn gradients_reach_the_input_right() -> Result<()> {
         for (preset, n_mels) in [(Preset::Light, 5), (Preset::Paper, 8)] {
             let mut params = Params::with_dtype(1, DType::F64);
-            let net = Generator::new(&mut params, &Config { n_mels, width: 4, ..Config::of(preset, 3) })?;
+            let net = Generator::new(&mut params, &Config { n_mels, width: 4, ..Config::from_preset(preset, 3) })?;
             let mels = pattern(&[2, n_mels, 41], 0.0)?;
             let error = worst(&[mels], |v| net.forward(&v[0], 32, false))?;
             assert!(error < 1e-5, "{preset:?}: {error}");

@@ -20,12 +20,12 @@ const PIECE: usize = 256;
 
 /// Places that are read, first and last.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Span {
+struct FrameSpan {
     first: i64,
     last: i64,
 }
 
-impl Span {
+impl FrameSpan {
     /// What a layer of kernel 3, stride 1 reads for these.
     fn under_plain(self) -> Self {
         Self { first: self.first - 1, last: self.last + 1 }
@@ -47,9 +47,9 @@ impl Span {
 }
 
 /// Spectrogram frames, relative to `8 * i`, that result `i` of the front depends on.
-fn under_front(preset: Preset) -> Span {
+fn audio_encoder_field(preset: Preset) -> FrameSpan {
     // The last layer of `paper` is not padded: place i reads i..=i + 2.
-    let mut span = Span { first: 0, last: if preset == Preset::Paper { 2 } else { 0 } }.under_plain();
+    let mut span = FrameSpan { first: 0, last: if preset == Preset::Paper { 2 } else { 0 } }.under_plain();
     for _ in 0..3 {
         span = span.under_down().under_plain();
     }
@@ -57,8 +57,8 @@ fn under_front(preset: Preset) -> Span {
 }
 
 /// Frames of its input, relative to the first of 32, that these 32 of its results depend on.
-fn under_trunk() -> Span {
-    let mut span = Span { first: 0, last: FRAMES_MULTIPLE as i64 - 1 };
+fn unet_field() -> FrameSpan {
+    let mut span = FrameSpan { first: 0, last: FRAMES_MULTIPLE as i64 - 1 };
     for _ in 0..N_DECODER {
         span = span.under_plain();
     }
@@ -78,13 +78,13 @@ fn under_trunk() -> Span {
 }
 
 /// Results of the front for so many spectrogram frames.
-fn n_results(preset: Preset, n_mel_frames: usize) -> usize {
+fn n_encoded_frames(preset: Preset, n_mel_frames: usize) -> usize {
     let eighth = (0..3).fold(n_mel_frames, |n, _| n.div_ceil(2));
     if preset == Preset::Paper { eighth.saturating_sub(2) } else { eighth }
 }
 
 /// A sound of any length on its way through the generator; yields the poses [1, n_out, T] of one chunk after another.
-pub struct Chunks<'a, M> {
+pub struct StreamingGenerator<'a, M> {
     generator: &'a Generator,
     preset: Preset,
     /// Log-mels [1, n_mels, T_mel] of these spectrogram frames.
@@ -95,11 +95,11 @@ pub struct Chunks<'a, M> {
     /// First frame that is still to be made.
     next: usize,
     /// Results of the front that later chunks need, [1, width, n], and which is the first of them.
-    heard: Option<Tensor>,
-    first_heard: usize,
+    encoded: Option<Tensor>,
+    first_encoded: usize,
 }
 
-impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> Chunks<'a, M> {
+impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
     /// `n_mel_frames` of sound, which `mels` makes as they are asked for, in order, become `n_frames` of poses, `chunk`
     /// at a time; both are multiples of 32 frames and `n_frames` spans the same time as the sound.
     pub fn new(
@@ -115,60 +115,60 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> Chunks<'a, M> {
                 candle_core::bail!("{what} must have a multiple of {FRAMES_MULTIPLE} frames, not {n}");
             }
         }
-        if n_results(preset, n_mel_frames) == 0 {
+        if n_encoded_frames(preset, n_mel_frames) == 0 {
             candle_core::bail!("{n_mel_frames} spectrogram frames are too few for this network");
         }
-        Ok(Self { generator, preset, mels, n_mel_frames, n_frames, chunk, next: 0, heard: None, first_heard: 0 })
+        Ok(Self { generator, preset, mels, n_mel_frames, n_frames, chunk, next: 0, encoded: None, first_encoded: 0 })
     }
 
     fn chunk(&mut self, frames: Range<usize>) -> Result<Tensor> {
-        let reach = under_trunk();
+        let field = unet_field();
         let beside = |n: i64| (n.max(0) as usize).next_multiple_of(FRAMES_MULTIPLE);
-        let first = frames.start.saturating_sub(beside(-reach.first));
-        let end = (frames.end + beside(reach.last + 1 - FRAMES_MULTIPLE as i64)).min(self.n_frames);
-        let n_heard = n_results(self.preset, self.n_mel_frames);
-        let part = resize::Part { frames: first..end, n_out: self.n_frames, n_in: n_heard };
+        let first = frames.start.saturating_sub(beside(-field.first));
+        let end = (frames.end + beside(field.last + 1 - FRAMES_MULTIPLE as i64)).min(self.n_frames);
+        let n_encoded = n_encoded_frames(self.preset, self.n_mel_frames);
+        let part = resize::ResizedPart { frames: first..end, n_out: self.n_frames, n_in: n_encoded };
         let needed = part.needed();
-        self.hear(needed.clone(), n_heard)?;
-        let Some(heard) = &self.heard else { candle_core::bail!("nothing was heard") };
-        let heard = heard.narrow(2, needed.start - self.first_heard, needed.len())?;
-        let poses = self.generator.trunk(&resize::linear_part(&heard, &part)?, false)?;
+        self.encode_until(needed.clone(), n_encoded)?;
+        let Some(encoded) = &self.encoded else { candle_core::bail!("nothing was heard") };
+        let encoded = encoded.narrow(2, needed.start - self.first_encoded, needed.len())?;
+        let poses = self.generator.decode(&resize::linear_part(&encoded, &part)?, false)?;
         poses.narrow(2, frames.start - first, frames.len())
     }
 
     /// Sees to it that these results of the front are at hand, and lets go of those before them.
-    fn hear(&mut self, needed: Range<usize>, n_heard: usize) -> Result<()> {
+    fn encode_until(&mut self, needed: Range<usize>, n_encoded: usize) -> Result<()> {
         let mut parts = Vec::new();
         let mut end = needed.start;
-        if let Some(heard) = self.heard.take() {
-            end = self.first_heard + heard.dim(2)?;
-            parts.push(heard.narrow(2, needed.start - self.first_heard, end - needed.start)?);
+        if let Some(encoded) = self.encoded.take() {
+            end = self.first_encoded + encoded.dim(2)?;
+            parts.push(encoded.narrow(2, needed.start - self.first_encoded, end - needed.start)?);
         }
-        self.first_heard = needed.start;
+        self.first_encoded = needed.start;
         while end < needed.end {
-            let piece = end..(end + PIECE).min(n_heard);
+            let piece = end..(end + PIECE).min(n_encoded);
             end = piece.end;
-            parts.push(self.front(piece, n_heard)?);
+            parts.push(self.encode(piece, n_encoded)?);
         }
         // A copy, so that what is let go of is freed.
-        self.heard = Some(Tensor::cat(&parts, 2)?.force_contiguous()?);
+        self.encoded = Some(Tensor::cat(&parts, 2)?.force_contiguous()?);
         Ok(())
     }
 
     /// These results of the front.
-    fn front(&mut self, piece: Range<usize>, n_heard: usize) -> Result<Tensor> {
-        let reach = under_front(self.preset);
-        let first = piece.start.saturating_sub(((-reach.first).max(0) as usize).div_ceil(HOPS));
+    fn encode(&mut self, piece: Range<usize>, n_encoded: usize) -> Result<Tensor> {
+        let field = audio_encoder_field(self.preset);
+        let first = piece.start.saturating_sub(((-field.first).max(0) as usize).div_ceil(HOPS));
         let end = match piece.end {
-            end if end == n_heard => self.n_mel_frames,
-            end => ((end - 1) * HOPS + reach.last.max(0) as usize + 1).min(self.n_mel_frames),
+            end if end == n_encoded => self.n_mel_frames,
+            end => ((end - 1) * HOPS + field.last.max(0) as usize + 1).min(self.n_mel_frames),
         };
-        let heard = self.generator.front(&(self.mels)(first * HOPS..end)?, false)?;
-        heard.narrow(2, piece.start - first, piece.len())
+        let encoded = self.generator.encode(&(self.mels)(first * HOPS..end)?, false)?;
+        encoded.narrow(2, piece.start - first, piece.len())
     }
 }
 
-impl<M: FnMut(Range<usize>) -> Result<Tensor>> Iterator for Chunks<'_, M> {
+impl<M: FnMut(Range<usize>) -> Result<Tensor>> Iterator for StreamingGenerator<'_, M> {
     type Item = Result<Tensor>;
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -196,17 +196,17 @@ mod tests {
 
     #[test]
     fn what_is_read_follows_from_the_layers() {
-        assert_eq!(under_front(Preset::Light), Span { first: -22, last: 29 });
-        assert_eq!(under_front(Preset::Paper), Span { first: -22, last: 45 });
-        assert_eq!(under_trunk(), Span { first: -97, last: 31 + 97 });
-        assert_eq!([418, 425, 8, 1].map(|n| n_results(Preset::Light, n)), [53, 54, 1, 1]);
-        assert_eq!([418, 425, 17, 16].map(|n| n_results(Preset::Paper, n)), [51, 52, 1, 0]);
+        assert_eq!(audio_encoder_field(Preset::Light), FrameSpan { first: -22, last: 29 });
+        assert_eq!(audio_encoder_field(Preset::Paper), FrameSpan { first: -22, last: 45 });
+        assert_eq!(unet_field(), FrameSpan { first: -97, last: 31 + 97 });
+        assert_eq!([418, 425, 8, 1].map(|n| n_encoded_frames(Preset::Light, n)), [53, 54, 1, 1]);
+        assert_eq!([418, 425, 17, 16].map(|n| n_encoded_frames(Preset::Paper, n)), [51, 52, 1, 0]);
     }
 
     /// A network of random numbers, the running statistics too, in f64: what reached too far would be seen.
     fn network(preset: Preset) -> anyhow::Result<Generator> {
         let mut params = Params::with_dtype(5, DType::F64);
-        let net = Generator::new(&mut params, &Config { n_mels: 8, width: 8, ..Config::of(preset, 3) })?;
+        let net = Generator::new(&mut params, &Config { n_mels: 8, width: 8, ..Config::from_preset(preset, 3) })?;
         let mut tensors: BTreeMap<_, _> = params.tensors()?;
         for (i, (name, tensor)) in tensors.iter_mut().enumerate().filter(|(_, (_, t))| t.rank() == 1) {
             let around = if name.ends_with("running_var") || name.ends_with("norm.weight") { 1.0 } else { 0.0 };
@@ -226,7 +226,7 @@ mod tests {
                 let whole = net.forward(&mels, n_frames, false)?;
                 for chunk in [32, 96, 256, 4096] {
                     let mels = |frames: Range<usize>| mels.narrow(2, frames.start, frames.len());
-                    let chunks = Chunks::new(&net, preset, n_mel, n_frames, chunk, mels)?;
+                    let chunks = StreamingGenerator::new(&net, preset, n_mel, n_frames, chunk, mels)?;
                     let parts = chunks.collect::<Result<Vec<_>>>()?;
                     assert!(parts.iter().all(|part| part.dims()[2] <= chunk));
                     let off = (Tensor::cat(&parts, 2)? - &whole)?.abs()?.max_all()?.to_scalar::<f64>()?;
@@ -234,9 +234,12 @@ mod tests {
                 }
             }
             let mels = |_: Range<usize>| candle_core::bail!("no sound");
-            assert!(Chunks::new(&net, preset, 427, 64, 33, mels).is_err());
-            assert!(Chunks::new(&net, preset, 0, 64, 32, mels).is_err());
-            assert_eq!(Chunks::new(&net, preset, 427, 64, 32, mels)?.filter(|chunk| chunk.is_err()).count(), 1);
+            assert!(StreamingGenerator::new(&net, preset, 427, 64, 33, mels).is_err());
+            assert!(StreamingGenerator::new(&net, preset, 0, 64, 32, mels).is_err());
+            assert_eq!(
+                StreamingGenerator::new(&net, preset, 427, 64, 32, mels)?.filter(|chunk| chunk.is_err()).count(),
+                1
+            );
         }
         Ok(())
     }

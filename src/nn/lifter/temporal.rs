@@ -36,26 +36,26 @@ impl Config {
 /// The network: `expand`, a residual block a further width, `shrink`.
 pub struct TemporalLifter {
     config: Config,
-    expand: Unit,
-    blocks: Vec<Block>,
+    expand: ConvUnit,
+    blocks: Vec<ResidualBlock>,
     shrink: Conv1d,
 }
 
 /// A convolution over `width` frames that lie `dilation` apart, then one of width 1.
-struct Block {
+struct ResidualBlock {
     dilation: usize,
     width: usize,
-    over_time: Unit,
-    mix: Unit,
+    over_time: ConvUnit,
+    mix: ConvUnit,
 }
 
 /// Convolution without bias, batch norm, ReLU; dropout follows.
-struct Unit {
+struct ConvUnit {
     conv: Conv1d,
     norm: BatchNorm,
 }
 
-impl Unit {
+impl ConvUnit {
     fn new(params: &mut Params, name: &str, n: [usize; 2], width: usize, dilation: usize) -> Result<Self> {
         Ok(Self {
             conv: Conv1d::valid(params, &format!("{name}.conv"), n[0], n[1], width, dilation)?,
@@ -79,14 +79,14 @@ impl TemporalLifter {
             candle_core::bail!("the widths of a temporal lifter are odd, got {:?}", config.widths);
         }
         let (n, mut dilation) = (config.channels, *first);
-        let expand = Unit::new(params, &format!("{name}.expand"), [config.n_in, n], *first, 1)?;
+        let expand = ConvUnit::new(params, &format!("{name}.expand"), [config.n_in, n], *first, 1)?;
         let mut blocks = Vec::new();
         for (i, width) in others.iter().enumerate() {
-            blocks.push(Block {
+            blocks.push(ResidualBlock {
                 dilation,
                 width: *width,
-                over_time: Unit::new(params, &format!("{name}.block{i}.over_time"), [n, n], *width, dilation)?,
-                mix: Unit::new(params, &format!("{name}.block{i}.mix"), [n, n], 1, 1)?,
+                over_time: ConvUnit::new(params, &format!("{name}.block{i}.over_time"), [n, n], *width, dilation)?,
+                mix: ConvUnit::new(params, &format!("{name}.block{i}.mix"), [n, n], 1, 1)?,
             });
             dilation *= width;
         }

@@ -3,7 +3,7 @@
 //! evaluation uses the running ones.
 
 use super::fallback;
-use crate::nn::cpu::tensor::{GRAIN, LANES, Real, is_f64, read, slice, sum};
+use crate::nn::cpu::tensor::{GRAIN, LANES, Scalar, is_f64, read, slice, sum};
 use crate::nn::params::{Init, Params};
 use candle_core::backend::BackendStorage;
 use candle_core::{CpuStorage, CustomOp3, Device, Layout, Result, Shape, Tensor, Var};
@@ -51,14 +51,14 @@ impl BatchNorm {
 
     /// [B, C, ...] to the same shape. Training moves the running statistics.
     pub fn forward(&self, x: &Tensor, train: bool) -> Result<Tensor> {
-        if crate::nn::device::needed(x) {
-            return self.forward_composed(x, train);
+        if crate::nn::device::needs_fallback(x) {
+            return self.forward_fallback(x, train);
         }
         let statistics = Arc::new(OnceLock::new());
         if !train {
             let _ = statistics.set(self.running()?);
         }
-        let op = Op { statistics: statistics.clone(), eps: self.eps, slope: self.slope, train };
+        let op = BatchNormOp { statistics: statistics.clone(), eps: self.eps, slope: self.slope, train };
         let y = x.contiguous()?.apply_op3(&self.weight, &self.bias, op)?;
         if let (true, Some(batch)) = (train, statistics.get()) {
             self.follow(batch, x.elem_count() / batch.mean.len())?;
@@ -67,7 +67,7 @@ impl BatchNorm {
     }
 
     /// The same of the framework's operators, on any device.
-    pub fn forward_composed(&self, x: &Tensor, train: bool) -> Result<Tensor> {
+    pub fn forward_fallback(&self, x: &Tensor, train: bool) -> Result<Tensor> {
         let (mean, variance) = match train {
             true => fallback::statistics(x)?,
             false => (self.running_mean.as_detached_tensor(), self.running_var.as_detached_tensor()),
@@ -102,7 +102,7 @@ impl BatchNorm {
     }
 }
 
-struct Op {
+struct BatchNormOp {
     /// Set by the forward pass when training, before it when evaluating.
     statistics: Arc<OnceLock<Statistics>>,
     eps: f64,
@@ -111,9 +111,9 @@ struct Op {
 }
 
 /// Batch, channels, and numbers of a channel in one sample.
-type Sizes = (usize, usize, usize);
+type NormSizes = (usize, usize, usize);
 
-fn sizes(dims: &[usize], n_weights: usize) -> Result<Sizes> {
+fn sizes(dims: &[usize], n_weights: usize) -> Result<NormSizes> {
     match dims {
         [batch, channels, rest @ ..] if *channels == n_weights && dims.iter().all(|d| *d > 0) => {
             Ok((*batch, *channels, rest.iter().product()))
@@ -123,11 +123,11 @@ fn sizes(dims: &[usize], n_weights: usize) -> Result<Sizes> {
 }
 
 /// The rows [b, c] of channel `c`, over all b.
-fn rows<T>(x: &[T], c: usize, (_, channels, len): Sizes) -> impl Iterator<Item = &[T]> {
+fn rows<T>(x: &[T], c: usize, (_, channels, len): NormSizes) -> impl Iterator<Item = &[T]> {
     x.chunks_exact(len).skip(c).step_by(channels)
 }
 
-fn measure<T: Real>(x: &[T], s: Sizes) -> Statistics {
+fn measure<T: Scalar>(x: &[T], s: NormSizes) -> Statistics {
     let n = (s.0 * s.2) as f64;
     let per_channel = |c: usize| {
         let mean = rows(x, c, s).map(sum).sum::<f64>() / n;
@@ -138,7 +138,7 @@ fn measure<T: Real>(x: &[T], s: Sizes) -> Statistics {
 }
 
 /// The sum of `(x - centre)^2`, always in the same order.
-fn sum_of_squares<T: Real>(x: &[T], centre: T) -> f64 {
+fn sum_of_squares<T: Scalar>(x: &[T], centre: T) -> f64 {
     let (chunks, rest) = x.as_chunks::<LANES>();
     let mut lanes = [T::zero(); LANES];
     let add = |lane: &mut T, x: &T| *lane += (*x - centre) * (*x - centre);
@@ -149,7 +149,7 @@ fn sum_of_squares<T: Real>(x: &[T], centre: T) -> f64 {
 
 /// The sums of `grad` and of `grad * (x - centre)`, `grad` being taken back through the activation whose result is
 /// `y`; always in the same order.
-fn sums_of_gradient<T: Real>(x: &[T], y: &[T], grad: &[T], centre: T, slope: T) -> (f64, f64) {
+fn sums_of_gradient<T: Scalar>(x: &[T], y: &[T], grad: &[T], centre: T, slope: T) -> (f64, f64) {
     let (xs, ys, grads) = (x.as_chunks::<LANES>(), y.as_chunks::<LANES>(), grad.as_chunks::<LANES>());
     let (mut plain, mut product) = ([T::zero(); LANES], [T::zero(); LANES]);
     let mut add = |x: &[T], y: &[T], grad: &[T]| {
@@ -167,12 +167,12 @@ fn sums_of_gradient<T: Real>(x: &[T], y: &[T], grad: &[T], centre: T, slope: T) 
 }
 
 /// The gradient before the leaky ReLU whose result is `y`.
-fn before_activation<T: Real>(y: T, grad: T, slope: T) -> T {
+fn before_activation<T: Scalar>(y: T, grad: T, slope: T) -> T {
     if y > T::zero() { grad } else { grad * slope }
 }
 
-impl Op {
-    fn forward<T: Real>(&self, x: &[T], weight: &[T], bias: &[T], s: Sizes) -> Vec<T> {
+impl BatchNormOp {
+    fn forward<T: Scalar>(&self, x: &[T], weight: &[T], bias: &[T], s: NormSizes) -> Vec<T> {
         let statistics = self.statistics.get_or_init(|| measure(x, s));
         let (zero, slope) = (T::zero(), T::from_f64(self.slope));
         let mut y = vec![zero; x.len()];
@@ -190,7 +190,14 @@ impl Op {
     }
 
     /// Gradients of the input, the weight and the bias.
-    fn backward<T: Real>(&self, x: &[T], weight: &[T], y: &[T], grad: &[T], s: Sizes) -> (Vec<T>, Vec<T>, Vec<T>) {
+    fn backward<T: Scalar>(
+        &self,
+        x: &[T],
+        weight: &[T],
+        y: &[T],
+        grad: &[T],
+        s: NormSizes,
+    ) -> (Vec<T>, Vec<T>, Vec<T>) {
         let statistics = self.statistics.get_or_init(|| measure(x, s));
         let slope = T::from_f64(self.slope);
         let per_channel = |c: usize| {
@@ -228,7 +235,7 @@ impl Op {
     }
 }
 
-impl CustomOp3 for Op {
+impl CustomOp3 for BatchNormOp {
     fn name(&self) -> &'static str {
         "batch norm and leaky ReLU"
     }
@@ -259,7 +266,13 @@ impl CustomOp3 for Op {
         y: &Tensor,
         grad: &Tensor,
     ) -> Result<(Option<Tensor>, Option<Tensor>, Option<Tensor>)> {
-        fn typed<T: Real>(op: &Op, x: &Tensor, w: &Tensor, y: &Tensor, grad: &Tensor) -> Result<[Tensor; 3]> {
+        fn typed<T: Scalar>(
+            op: &BatchNormOp,
+            x: &Tensor,
+            w: &Tensor,
+            y: &Tensor,
+            grad: &Tensor,
+        ) -> Result<[Tensor; 3]> {
             let s = sizes(x.dims(), w.elem_count())?;
             let (grad_x, grad_w, grad_b) = read::<T, _>(x, |x| {
                 read::<T, _>(w, |w| read::<T, _>(y, |y| read::<T, _>(grad, |grad| Ok(op.backward(x, w, y, grad, s)))))
@@ -282,12 +295,12 @@ mod tests {
     use crate::nn::ops::gradcheck::{pattern, worst};
     use candle_core::DType;
 
-    fn op(train: bool, slope: f64) -> Op {
+    fn op(train: bool, slope: f64) -> BatchNormOp {
         let statistics = Arc::new(OnceLock::new());
         if !train {
             let _ = statistics.set(Statistics { mean: vec![0.2, -0.3, 0.1], variance: vec![0.5, 1.5, 2.0] });
         }
-        Op { statistics, eps: 1e-3, slope, train }
+        BatchNormOp { statistics, eps: 1e-3, slope, train }
     }
 
     #[test]

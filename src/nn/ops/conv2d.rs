@@ -2,28 +2,28 @@
 //! time and frequency. The sums are in `conv`; where a batch norm follows, `conv_norm` does both at once.
 
 use super::fallback;
-use crate::nn::cpu::axis::Axis;
+use crate::nn::cpu::axis::ConvAxis;
 use crate::nn::cpu::channel_stats;
 use crate::nn::cpu::direct_conv;
-use crate::nn::cpu::direct_conv::Sizes;
-use crate::nn::cpu::tensor::{Real, is_f64, read, slice};
+use crate::nn::cpu::direct_conv::ConvSizes;
+use crate::nn::cpu::tensor::{Scalar, is_f64, read, slice};
 use crate::nn::cpu::weight_gradient;
 use crate::nn::params::{Init, Params};
 use candle_core::backend::BackendStorage;
 use candle_core::{CpuStorage, CustomOp3, Layout, Result, Shape, Tensor};
 
 /// The sizes of a convolution of `x` with `weight` [O, C, K] or [O, C, K, K'], padding "same".
-pub fn same(x: &Tensor, weight: &Tensor, stride: usize) -> Result<Sizes> {
-    sizes(x, weight, |n, kernel| Axis::same(n, kernel, stride))
+pub fn same(x: &Tensor, weight: &Tensor, stride: usize) -> Result<ConvSizes> {
+    sizes(x, weight, |n, kernel| ConvAxis::same(n, kernel, stride))
 }
 
 /// The same without padding, every place.
-pub fn valid(x: &Tensor, weight: &Tensor) -> Result<Sizes> {
-    sizes(x, weight, Axis::valid)
+pub fn valid(x: &Tensor, weight: &Tensor) -> Result<ConvSizes> {
+    sizes(x, weight, ConvAxis::valid)
 }
 
-fn sizes(x: &Tensor, weight: &Tensor, axis: impl Fn(usize, usize) -> Axis) -> Result<Sizes> {
-    let alone = Axis::valid(1, 1);
+fn sizes(x: &Tensor, weight: &Tensor, axis: impl Fn(usize, usize) -> ConvAxis) -> Result<ConvSizes> {
+    let alone = ConvAxis::valid(1, 1);
     let (batch, channels, axes) = match (x.dims(), weight.dims()) {
         ([b, t, c], [_, _, kernel]) => (*b, *c, [axis(*t, *kernel), alone]),
         ([b, t, f, c], [_, _, down, across]) => (*b, *c, [axis(*t, *down), axis(*f, *across)]),
@@ -33,11 +33,11 @@ fn sizes(x: &Tensor, weight: &Tensor, axis: impl Fn(usize, usize) -> Axis) -> Re
     if n_in != channels || n_in * n_out * batch == 0 || axes.iter().any(|axis| axis.n_in * axis.n_out == 0) {
         candle_core::bail!("convolution: input {:?} (channels last) does not fit weight {:?}", x.dims(), weight.dims());
     }
-    Ok(Sizes { batch, n_in, n_out, axes })
+    Ok(ConvSizes { batch, n_in, n_out, axes })
 }
 
 /// The shape of the result of a convolution of an input of this rank.
-pub fn shape_out(s: &Sizes, rank: usize) -> Shape {
+pub fn shape_out(s: &ConvSizes, rank: usize) -> Shape {
     let [rows, columns] = s.axes;
     match rank {
         3 => Shape::from((s.batch, rows.n_out, s.n_out)),
@@ -46,7 +46,7 @@ pub fn shape_out(s: &Sizes, rank: usize) -> Shape {
 }
 
 /// Gradients of `x` and the weight from that of the result, each where it is wanted.
-pub fn gradients<T: Real>(s: &Sizes, x: &Tensor, weight: &Tensor, grad: &[T]) -> Result<[Option<Tensor>; 2]> {
+pub fn gradients<T: Scalar>(s: &ConvSizes, x: &Tensor, weight: &Tensor, grad: &[T]) -> Result<[Option<Tensor>; 2]> {
     let of_x =
         x.track_op().then(|| read::<T, _>(weight, |w| Ok(direct_conv::gradient_of_input(s, w, grad)))).transpose()?;
     let of_weight = weight
@@ -83,18 +83,18 @@ impl Conv {
 }
 
 /// The convolution of these sizes, on any device.
-pub fn conv(x: &Tensor, weight: &Tensor, bias: &Tensor, sizes: Sizes) -> Result<Tensor> {
-    if crate::nn::device::needed(x) {
+pub fn conv(x: &Tensor, weight: &Tensor, bias: &Tensor, sizes: ConvSizes) -> Result<Tensor> {
+    if crate::nn::device::needs_fallback(x) {
         return fallback::conv(x, weight, bias, &sizes);
     }
-    x.contiguous()?.apply_op3(weight, bias, Op { sizes })
+    x.contiguous()?.apply_op3(weight, bias, ConvOp { sizes })
 }
 
-struct Op {
-    sizes: Sizes,
+struct ConvOp {
+    sizes: ConvSizes,
 }
 
-impl CustomOp3 for Op {
+impl CustomOp3 for ConvOp {
     fn name(&self) -> &'static str {
         "convolution, channels last"
     }
@@ -125,7 +125,13 @@ impl CustomOp3 for Op {
         _y: &Tensor,
         grad: &Tensor,
     ) -> Result<(Option<Tensor>, Option<Tensor>, Option<Tensor>)> {
-        fn typed<T: Real>(s: &Sizes, x: &Tensor, w: &Tensor, b: &Tensor, grad: &Tensor) -> Result<[Option<Tensor>; 3]> {
+        fn typed<T: Scalar>(
+            s: &ConvSizes,
+            x: &Tensor,
+            w: &Tensor,
+            b: &Tensor,
+            grad: &Tensor,
+        ) -> Result<[Option<Tensor>; 3]> {
             read::<T, _>(grad, |grad| {
                 let [of_x, of_weight] = gradients(s, x, w, grad)?;
                 let sums = channel_stats::sums(grad, s.n_out);
@@ -144,21 +150,21 @@ mod tests {
     use super::*;
     use crate::nn::ops::gradcheck::{pattern, worst};
 
-    fn convolve(v: &[Tensor], sizes: Sizes) -> Result<Tensor> {
-        v[0].apply_op3(&v[1], &v[2], Op { sizes })
+    fn convolve(v: &[Tensor], sizes: ConvSizes) -> Result<Tensor> {
+        v[0].apply_op3(&v[1], &v[2], ConvOp { sizes })
     }
 
     /// The sum as written in a textbook.
-    fn by_definition(s: &Sizes, v: &[Tensor]) -> Result<Vec<f64>> {
+    fn by_definition(s: &ConvSizes, v: &[Tensor]) -> Result<Vec<f64>> {
         let [x, weight, bias] = [0, 1, 2].map(|i| v[i].flatten_all().and_then(|v| v.to_vec1::<f64>()));
         let (x, weight, bias, [rows, columns]) = (x?, weight?, bias?, s.axes);
         let place = |i: usize| (i / columns.n_out / rows.n_out, i / columns.n_out % rows.n_out, i % columns.n_out);
         let one = |i: usize| {
             let ((b, row, column), o) = (place(i / s.n_out), i % s.n_out);
-            let taps = (0..rows.kernel).flat_map(|down| (0..columns.kernel).map(move |across| (down, across)));
-            let inside = taps.filter_map(|(down, across)| {
-                let at = |axis: Axis, out: usize, tap: usize| {
-                    (out * axis.stride + tap).checked_sub(axis.pad).filter(|at| *at < axis.n_in)
+            let offsets = (0..rows.kernel).flat_map(|down| (0..columns.kernel).map(move |across| (down, across)));
+            let inside = offsets.filter_map(|(down, across)| {
+                let at = |axis: ConvAxis, out: usize, offset: usize| {
+                    (out * axis.stride + offset).checked_sub(axis.pad).filter(|at| *at < axis.n_in)
                 };
                 let place = (b * rows.n_in + at(rows, row, down)?) * columns.n_in + at(columns, column, across)?;
                 let product = |c: usize| {
@@ -173,8 +179,8 @@ mod tests {
 
     #[test]
     fn forward_and_gradients_are_right() -> Result<()> {
-        let same = |n, kernel, stride| Axis::same(n, kernel, stride);
-        let alone = Axis::valid(1, 1);
+        let same = |n, kernel, stride| ConvAxis::same(n, kernel, stride);
+        let alone = ConvAxis::valid(1, 1);
         for (n_in, n_out, axes) in [
             (3, 5, [same(9, 3, 1), alone]),
             (2, 3, [same(9, 1, 1), alone]),
@@ -184,9 +190,9 @@ mod tests {
             (1, 9, [same(5, 3, 1), same(6, 3, 1)]),
             (3, 2, [same(7, 4, 2), same(6, 4, 2)]),
             (2, 3, [same(6, 4, 2), same(9, 4, 2)]),
-            (7, 1, [Axis::valid(5, 3), Axis::valid(4, 4)]),
+            (7, 1, [ConvAxis::valid(5, 3), ConvAxis::valid(4, 4)]),
         ] {
-            let s = Sizes { batch: 2, n_in, n_out, axes };
+            let s = ConvSizes { batch: 2, n_in, n_out, axes };
             let weight = [n_out, n_in, axes[0].kernel, axes[1].kernel];
             let inputs = [
                 pattern(&[2, axes[0].n_in, axes[1].n_in, n_in], 0.0)?,
@@ -206,7 +212,7 @@ mod tests {
     #[test]
     fn panels_of_every_width_are_right() -> Result<()> {
         for (n_in, n_out) in [(70, 96), (5, 113)] {
-            let s = Sizes { batch: 2, n_in, n_out, axes: [Axis::same(6, 4, 2), Axis::same(3, 3, 1)] };
+            let s = ConvSizes { batch: 2, n_in, n_out, axes: [ConvAxis::same(6, 4, 2), ConvAxis::same(3, 3, 1)] };
             let inputs =
                 [pattern(&[2, 6, 3, n_in], 0.0)?, pattern(&[n_out, n_in, 4, 3], 7.0)?, pattern(&[n_out], 3.0)?];
             let y = convolve(&inputs, s)?.flatten_all()?.to_vec1::<f64>()?;

@@ -1,8 +1,8 @@
 //! Convolution of pictures with kernels of 3 x 3, padding "same", channels last: every output place's patch becomes a
 //! row, and the layer one matrix product. Own forward and backward for the patches.
 
-use crate::nn::cpu::axis::Walk;
-use crate::nn::cpu::tensor::{Real, is_f64, read, slice};
+use crate::nn::cpu::axis::ConvGeometry;
+use crate::nn::cpu::tensor::{Scalar, is_f64, read, slice};
 use crate::nn::params::{Init, Params};
 use candle_core::backend::BackendStorage;
 use candle_core::{CpuStorage, CustomOp1, Layout, Result, Shape, Tensor};
@@ -38,22 +38,23 @@ struct Patches {
 }
 
 /// A picture's sizes: batch, height, width, channels.
-type Sizes = (usize, usize, usize, usize);
+type PictureSizes = (usize, usize, usize, usize);
 
 impl Patches {
     /// Calls `each` with (start of a place's channels in the patches, start of them in the pictures).
-    fn walk(&self, (batch, height, width, n_in): Sizes, mut each: impl FnMut(usize, usize)) {
-        let (down, across) = (Walk::same(height, 3, self.stride), Walk::same(width, 3, self.stride));
+    fn for_each_offset(&self, (batch, height, width, n_in): PictureSizes, mut each: impl FnMut(usize, usize)) {
+        let (down, across) = (ConvGeometry::same(height, 3, self.stride), ConvGeometry::same(width, 3, self.stride));
         let (n_down, n_across) = (height.div_ceil(self.stride), width.div_ceil(self.stride));
         for b in 0..batch {
             for row in 0..n_down {
                 for column in 0..n_across {
                     let patch = ((b * n_down + row) * n_across + column) * 9;
-                    for tap in 0..9 {
-                        let y = (row * self.stride + tap / 3).checked_sub(down.pad.0).filter(|y| *y < height);
-                        let x = (column * self.stride + tap % 3).checked_sub(across.pad.0).filter(|x| *x < width);
+                    for kernel_offset in 0..9 {
+                        let y = (row * self.stride + kernel_offset / 3).checked_sub(down.pad.0).filter(|y| *y < height);
+                        let x =
+                            (column * self.stride + kernel_offset % 3).checked_sub(across.pad.0).filter(|x| *x < width);
                         if let (Some(y), Some(x)) = (y, x) {
-                            each((patch + tap) * n_in, ((b * height + y) * width + x) * n_in);
+                            each((patch + kernel_offset) * n_in, ((b * height + y) * width + x) * n_in);
                         }
                     }
                 }
@@ -61,22 +62,22 @@ impl Patches {
         }
     }
 
-    fn n_rows(&self, (batch, height, width, _): Sizes) -> usize {
+    fn n_rows(&self, (batch, height, width, _): PictureSizes) -> usize {
         batch * height.div_ceil(self.stride) * width.div_ceil(self.stride)
     }
 
-    fn gather<T: Real>(&self, x: &[T], sizes: Sizes) -> Vec<T> {
+    fn gather<T: Scalar>(&self, x: &[T], sizes: PictureSizes) -> Vec<T> {
         let n_in = sizes.3;
         let mut patches = vec![T::zero(); self.n_rows(sizes) * 9 * n_in];
-        self.walk(sizes, |to, from| patches[to..to + n_in].copy_from_slice(&x[from..from + n_in]));
+        self.for_each_offset(sizes, |to, from| patches[to..to + n_in].copy_from_slice(&x[from..from + n_in]));
         patches
     }
 
     /// The transpose of `gather`.
-    fn spread<T: Real>(&self, patches: &[T], sizes: Sizes) -> Vec<T> {
+    fn spread<T: Scalar>(&self, patches: &[T], sizes: PictureSizes) -> Vec<T> {
         let (batch, height, width, n_in) = sizes;
         let mut x = vec![T::zero(); batch * height * width * n_in];
-        self.walk(sizes, |from, to| {
+        self.for_each_offset(sizes, |from, to| {
             x[to..to + n_in].iter_mut().zip(&patches[from..from + n_in]).for_each(|(x, g)| *x += *g);
         });
         x

@@ -5,11 +5,10 @@
 use super::batch_norm::{BatchNorm, Statistics};
 use super::conv2d;
 use super::fallback;
-use crate::nn::cpu::channel_stats::{Moments, Norm};
+use crate::nn::cpu::channel_stats::{ChannelMoments, Norm};
 use crate::nn::cpu::direct_conv;
-use crate::nn::cpu::direct_conv::Sizes;
-use crate::nn::cpu::tensor::{GRAIN, Real, Start, is_f64, read, slice, written};
-use crate::nn::cpu::thread_team::each;
+use crate::nn::cpu::direct_conv::ConvSizes;
+use crate::nn::cpu::tensor::{Scalar, is_f64, read, slice};
 use candle_core::backend::BackendStorage;
 use candle_core::{CpuStorage, CustomOp3, Layout, Result, Shape, Tensor};
 use std::sync::{Arc, Mutex, OnceLock};
@@ -21,10 +20,10 @@ pub fn conv_norm(
     weight: &Tensor,
     bias: &Tensor,
     norm: &BatchNorm,
-    sizes: Sizes,
+    sizes: ConvSizes,
     train: bool,
 ) -> Result<Tensor> {
-    if crate::nn::device::needed(x) {
+    if crate::nn::device::needs_fallback(x) {
         return fallback_conv_norm(x, weight, bias, norm, &sizes, train);
     }
     let x = x.contiguous()?;
@@ -35,7 +34,7 @@ pub fn conv_norm(
     }
     let keeps = [&x, weight, &channels].iter().any(|tensor| tensor.track_op());
     let kept = keeps.then(|| Mutex::new(None));
-    let op = Op { sizes, eps: norm.eps, slope: norm.slope, train, statistics: statistics.clone(), kept };
+    let op = ConvNormOp { sizes, eps: norm.eps, slope: norm.slope, train, statistics: statistics.clone(), kept };
     let y = x.apply_op3(weight, &channels, op)?;
     if let (true, Some(batch)) = (train, statistics.get()) {
         norm.follow(batch, y.elem_count() / sizes.n_out)?;
@@ -44,8 +43,8 @@ pub fn conv_norm(
 }
 
 /// Its third input holds bias, norm's weight and norm's bias, one after the other.
-struct Op {
-    sizes: Sizes,
+struct ConvNormOp {
+    sizes: ConvSizes,
     eps: f64,
     slope: f64,
     train: bool,
@@ -55,8 +54,8 @@ struct Op {
     kept: Option<Mutex<Option<CpuStorage>>>,
 }
 
-impl Op {
-    fn norm<T: Real>(&self, channels: &[T], statistics: &Statistics) -> Norm<T> {
+impl ConvNormOp {
+    fn norm<T: Scalar>(&self, channels: &[T], statistics: &Statistics) -> Norm<T> {
         let (weight, bias) = channels[self.sizes.n_out..].split_at(self.sizes.n_out);
         let scale = |(weight, variance): (&T, &f64)| weight.to_f64() / (variance + self.eps).sqrt();
         let scale: Vec<f64> = weight.iter().zip(&statistics.variance).map(scale).collect();
@@ -70,46 +69,32 @@ impl Op {
     }
 
     /// The result and, where there is a way back, what was before the norm.
-    fn forward<T: Real>(&self, x: &[T], weight: &[T], channels: &[T]) -> (Vec<T>, Option<Vec<T>>) {
+    fn forward<T: Scalar>(&self, x: &[T], weight: &[T], channels: &[T]) -> (Vec<T>, Option<Vec<T>>) {
         let (s, bias) = (&self.sizes, &channels[..self.sizes.n_out]);
         if let (None, Some(statistics)) = (&self.kept, self.statistics.get()) {
             let norm = self.norm(channels, statistics);
             return (direct_conv::forward(s, x, weight, bias, |_, piece| norm.apply(piece)), None);
         }
-        let moments: Vec<OnceLock<Moments>> = (0..direct_conv::n_pieces(s)).map(|_| OnceLock::new()).collect();
+        let moments: Vec<OnceLock<ChannelMoments>> = (0..direct_conv::n_pieces(s)).map(|_| OnceLock::new()).collect();
         let mut z = direct_conv::forward(s, x, weight, bias, |piece, values| {
             if self.train {
-                let _ = moments[piece].set(Moments::of(values, s.n_out));
+                let _ = moments[piece].set(ChannelMoments::measure(values, s.n_out));
             }
         });
         let statistics = self.statistics.get_or_init(|| {
-            let all = moments.iter().filter_map(OnceLock::get).fold(Moments::default(), |all, one| all.and(one));
+            let all = moments.iter().filter_map(OnceLock::get).fold(ChannelMoments::default(), |all, one| all.and(one));
             Statistics { variance: all.squares.iter().map(|v| v / all.n).collect(), mean: all.mean }
         });
         let norm = self.norm(channels, statistics);
-        let chunk = (GRAIN / s.n_out).max(1) * s.n_out;
         if self.kept.is_none() {
-            let (n, start) = (z.len(), Start::of(&mut z));
-            // SAFETY: every piece is a part of `z` of its own.
-            each(n.div_ceil(chunk), |i| unsafe {
-                norm.apply(std::slice::from_raw_parts_mut(start.at(i * chunk), chunk.min(n - i * chunk)));
-            });
+            norm.apply_parallel(&mut z);
             return (z, None);
         }
-        // SAFETY: every chunk writes as many numbers of the result as it reads, at the same place.
-        let y = unsafe {
-            written(z.len(), |y: Start<T>| {
-                each(z.len().div_ceil(chunk), |i| {
-                    let z = &z[i * chunk..z.len().min((i + 1) * chunk)];
-                    norm.forward(z, std::slice::from_raw_parts_mut(y.at(i * chunk), z.len()));
-                });
-            })
-        };
-        (y, Some(z))
+        (norm.forward(&z), Some(z))
     }
 
     /// Overwrites `z` with its gradient; gives those of bias, norm's weight and norm's bias.
-    fn backward<T: Real>(&self, z: &mut [T], channels: &[T], statistics: &Statistics, grad: &[T]) -> Vec<T> {
+    fn backward<T: Scalar>(&self, z: &mut [T], channels: &[T], statistics: &Statistics, grad: &[T]) -> Vec<T> {
         let norm = self.norm(channels, statistics);
         let (plain, product) = norm.sums_of_gradient(z, grad);
         let n = (z.len() / self.sizes.n_out) as f64;
@@ -128,7 +113,7 @@ impl Op {
     }
 }
 
-impl CustomOp3 for Op {
+impl CustomOp3 for ConvNormOp {
     fn name(&self) -> &'static str {
         "convolution, batch norm and leaky ReLU"
     }
@@ -163,8 +148,8 @@ impl CustomOp3 for Op {
         _y: &Tensor,
         grad: &Tensor,
     ) -> Result<(Option<Tensor>, Option<Tensor>, Option<Tensor>)> {
-        fn typed<T: Real>(
-            op: &Op,
+        fn typed<T: Scalar>(
+            op: &ConvNormOp,
             (x, weight, channels): (&Tensor, &Tensor, &Tensor),
             mut z: Vec<T>,
             statistics: &Statistics,
@@ -192,10 +177,10 @@ pub fn fallback_conv_norm(
     weight: &Tensor,
     bias: &Tensor,
     norm: &BatchNorm,
-    s: &Sizes,
+    s: &ConvSizes,
     train: bool,
 ) -> Result<Tensor> {
-    fallback::last(&norm.forward_composed(&fallback::conv_first(x, weight, bias, s)?, train)?, x.rank())
+    fallback::last(&norm.forward_fallback(&fallback::conv_first(x, weight, bias, s)?, train)?, x.rank())
 }
 
 #[cfg(test)]
@@ -219,7 +204,7 @@ mod tests {
                 if !train {
                     let _ = statistics.set(fixed.clone());
                 }
-                let op = Op { sizes, eps: 1e-3, slope, train, statistics, kept: Some(Mutex::new(None)) };
+                let op = ConvNormOp { sizes, eps: 1e-3, slope, train, statistics, kept: Some(Mutex::new(None)) };
                 v[0].apply_op3(&v[1], &v[2], op)
             })?;
             assert!(error < 1e-7, "train {train}, slope {slope}: {error}");

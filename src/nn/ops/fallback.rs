@@ -2,15 +2,15 @@
 //! a gradient that finite differences confirm, and runs wherever the framework does. On the CPU they are only tested:
 //! they give what the room's own operators give.
 
-use crate::nn::cpu::axis::Axis;
-use crate::nn::cpu::axis::Walk;
-use crate::nn::cpu::direct_conv::Sizes;
+use crate::nn::cpu::axis::ConvAxis;
+use crate::nn::cpu::axis::ConvGeometry;
+use crate::nn::cpu::direct_conv::ConvSizes;
 use candle_core::{D, Result, Tensor};
 
 /// Pads axis `dim` of `x` by `before`, and on the other side pads or cuts it to `reach` places in all, so that a kernel
 /// walks to the very last one: with some left over the framework's backward pass fails.
-fn fitted(x: &Tensor, dim: usize, before: usize, reach: usize) -> Result<Tensor> {
-    let (n, end) = (x.dim(dim)?, reach.saturating_sub(before));
+fn fitted(x: &Tensor, dim: usize, before: usize, len: usize) -> Result<Tensor> {
+    let (n, end) = (x.dim(dim)?, len.saturating_sub(before));
     if end < n {
         return x.narrow(dim, 0, end)?.pad_with_zeros(dim, before, 0);
     }
@@ -18,21 +18,21 @@ fn fitted(x: &Tensor, dim: usize, before: usize, reach: usize) -> Result<Tensor>
 }
 
 /// A convolution of pictures one place high.
-pub fn conv1d(x: &Tensor, weight: &Tensor, bias: &Tensor, walk: Walk) -> Result<Tensor> {
+pub fn conv1d(x: &Tensor, weight: &Tensor, bias: &Tensor, geometry: ConvGeometry) -> Result<Tensor> {
     let (n, kernel) = (x.dim(2)?, weight.dim(2)?);
-    let Some(n_out) = walk.n_out(n, kernel) else {
-        candle_core::bail!("a kernel of {kernel} does not fit into {n} frames with {walk:?}");
+    let Some(n_out) = geometry.n_out(n, kernel) else {
+        candle_core::bail!("a kernel of {kernel} does not fit into {n} frames with {geometry:?}");
     };
-    let reach = (n_out - 1) * walk.stride + walk.dilation * (kernel - 1) + 1;
-    let x = fitted(x, 2, walk.pad.0, reach)?.unsqueeze(2)?.contiguous()?;
+    let len = (n_out - 1) * geometry.stride + geometry.dilation * (kernel - 1) + 1;
+    let x = fitted(x, 2, geometry.pad.0, len)?.unsqueeze(2)?.contiguous()?;
     let weight = weight.unsqueeze(2)?.contiguous()?;
-    let y = x.conv2d(&weight, 0, walk.stride, walk.dilation, 1)?.squeeze(2)?;
+    let y = x.conv2d(&weight, 0, geometry.stride, geometry.dilation, 1)?.squeeze(2)?;
     y.broadcast_add(&bias.reshape((1, (), 1))?)
 }
 
 /// A convolution of `x` [B, T, C] or [B, T, F, C] with `weight` [O, C, K] or [O, C, K, K'], and `bias` [O]: channels
 /// first, [B, O, T', F'].
-pub fn conv_first(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &Sizes) -> Result<Tensor> {
+pub fn conv_first(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &ConvSizes) -> Result<Tensor> {
     let (x, weight) = match x.rank() {
         3 => (x.unsqueeze(2)?, weight.unsqueeze(3)?),
         _ => (x.clone(), weight.clone()),
@@ -44,7 +44,7 @@ pub fn conv_first(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &Sizes) -> Resu
     if across.stride != stride && across.n_out != 1 {
         candle_core::bail!("one stride for both axes, not {} and {}", down.stride, across.stride);
     }
-    for (dim, Axis { n_out, kernel, pad, .. }) in [(2, down), (3, across)] {
+    for (dim, ConvAxis { n_out, kernel, pad, .. }) in [(2, down), (3, across)] {
         x = fitted(&x, dim, pad, (n_out - 1) * stride + kernel)?;
     }
     let y = x.contiguous()?.conv2d(&weight.contiguous()?, 0, stride, 1, 1)?;
@@ -58,7 +58,7 @@ pub fn last(y: &Tensor, rank: usize) -> Result<Tensor> {
 }
 
 /// A convolution, channels last: as [`super::conv2d::Conv`].
-pub fn conv(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &Sizes) -> Result<Tensor> {
+pub fn conv(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &ConvSizes) -> Result<Tensor> {
     last(&conv_first(x, weight, bias, s)?, x.rank())
 }
 
@@ -143,12 +143,12 @@ mod tests {
             (13, 3, 2, 3, (2, 3)),
             (1, 4, 2, 1, (1, 2)),
         ] {
-            let walk = Walk { stride, dilation, pad };
+            let geometry = ConvGeometry { stride, dilation, pad };
             let inputs = [pattern(&[3, 2, n_frames], 0.0)?, pattern(&[4, 2, kernel], 7.0)?, pattern(&[4], 3.0)?];
-            let composed = |v: &[Tensor]| conv1d(&v[0], &v[1], &v[2], walk);
-            let off = apart(&inputs, composed, |v| own::conv1d(&v[0], &v[1], &v[2], walk))?;
-            assert!(off < 1e-12, "{walk:?} kernel {kernel}: {off:e}");
-            assert!(worst(&inputs, composed)? < 1e-7, "{walk:?} kernel {kernel}");
+            let by_fallback = |v: &[Tensor]| conv1d(&v[0], &v[1], &v[2], geometry);
+            let off = apart(&inputs, by_fallback, |v| own::conv1d(&v[0], &v[1], &v[2], geometry))?;
+            assert!(off < 1e-12, "{geometry:?} kernel {kernel}: {off:e}");
+            assert!(worst(&inputs, by_fallback)? < 1e-7, "{geometry:?} kernel {kernel}");
         }
         Ok(())
     }
@@ -170,10 +170,10 @@ mod tests {
         for (shape, kernel, stride) in LAYERS {
             let inputs = [pattern(shape, 0.0)?, pattern(kernel, 7.0)?, pattern(&kernel[..1], 3.0)?];
             let s = conv2d::same(&inputs[0], &inputs[1], stride)?;
-            let composed = |v: &[Tensor]| conv(&v[0], &v[1], &v[2], &s);
-            let off = apart(&inputs, composed, |v| conv2d::conv(&v[0], &v[1], &v[2], s))?;
+            let by_fallback = |v: &[Tensor]| conv(&v[0], &v[1], &v[2], &s);
+            let off = apart(&inputs, by_fallback, |v| conv2d::conv(&v[0], &v[1], &v[2], s))?;
             assert!(off < 1e-12, "{shape:?} {kernel:?}: {off:e}");
-            assert!(worst(&inputs, composed)? < 1e-7, "{shape:?} {kernel:?}");
+            assert!(worst(&inputs, by_fallback)? < 1e-7, "{shape:?} {kernel:?}");
         }
         Ok(())
     }
@@ -185,8 +185,8 @@ mod tests {
             let s = conv2d::same(&inputs[0], &inputs[1], stride)?;
             let norm = |slope| BatchNorm::new(&mut Params::with_dtype(0, DType::F64), "n", 3, 1e-3, 0.1, slope);
             let (mine, own) = (norm(0.2)?, norm(0.2)?);
-            let composed = |v: &[Tensor]| fallback_conv_norm(&v[0], &v[1], &v[2], &mine, &s, train);
-            let off = apart(&inputs, composed, |v| conv_norm::conv_norm(&v[0], &v[1], &v[2], &own, s, train))?;
+            let by_fallback = |v: &[Tensor]| fallback_conv_norm(&v[0], &v[1], &v[2], &mine, &s, train);
+            let off = apart(&inputs, by_fallback, |v| conv_norm::conv_norm(&v[0], &v[1], &v[2], &own, s, train))?;
             assert!(off < 1e-11, "{shape:?} {kernel:?} {train}: {off:e}");
             let (mine, own) = (mine.running()?, own.running()?);
             let pairs = mine.mean.iter().chain(&mine.variance).zip(own.mean.iter().chain(&own.variance));

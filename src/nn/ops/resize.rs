@@ -1,7 +1,7 @@
 //! Changing the number of frames: twice as many by repetition, any number by linear interpolation.
 
 use super::fallback;
-use crate::nn::cpu::tensor::{Real, is_f64, read, slice};
+use crate::nn::cpu::tensor::{Scalar, is_f64, read, slice};
 use candle_core::backend::BackendStorage;
 use candle_core::{CpuStorage, CustomOp1, Layout, Result, Shape, Tensor};
 use std::ops::Range;
@@ -9,7 +9,7 @@ use std::ops::Range;
 /// Every frame twice: [B, T, C] to [B, 2T, C]. An own operator: the stock one overwrites the gradient where `x` is
 /// used again.
 pub fn twice(x: &Tensor) -> Result<Tensor> {
-    if crate::nn::device::needed(x) {
+    if crate::nn::device::needs_fallback(x) {
         return fallback::twice(x);
     }
     x.contiguous()?.apply_op1(Twice)
@@ -23,7 +23,7 @@ impl CustomOp1 for Twice {
     }
 
     fn cpu_fwd(&self, x: &CpuStorage, layout: &Layout) -> Result<(CpuStorage, Shape)> {
-        fn repeat<T: Real>(x: &[T], n_channels: usize) -> Vec<T> {
+        fn repeat<T: Scalar>(x: &[T], n_channels: usize) -> Vec<T> {
             let mut y = Vec::with_capacity(2 * x.len());
             for frame in x.chunks_exact(n_channels) {
                 y.extend_from_slice(frame);
@@ -41,7 +41,7 @@ impl CustomOp1 for Twice {
     }
 
     fn bwd(&self, x: &Tensor, _y: &Tensor, grad: &Tensor) -> Result<Option<Tensor>> {
-        fn typed<T: Real>(grad: &Tensor) -> Result<Vec<T>> {
+        fn typed<T: Scalar>(grad: &Tensor) -> Result<Vec<T>> {
             let n = grad.dim(2)?;
             read::<T, _>(grad, |grad| {
                 let mut sums = Vec::with_capacity(grad.len() / 2);
@@ -66,18 +66,18 @@ pub fn linear(x: &Tensor, n_out: usize) -> Result<Tensor> {
     if n_in == n_out {
         return Ok(x.clone());
     }
-    let part = Part { frames: 0..n_out, n_in, n_out };
+    let part = ResizedPart { frames: 0..n_out, n_in, n_out };
     linear_part(&x.narrow(2, 0, part.needed().end)?, &part)
 }
 
 /// Some frames of a linear interpolation of `n_in` frames to `n_out`.
-pub struct Part {
+pub struct ResizedPart {
     pub frames: Range<usize>,
     pub n_in: usize,
     pub n_out: usize,
 }
 
-impl Part {
+impl ResizedPart {
     /// The frame at or before the place of frame `i` of the result, and the way from it to the next.
     fn place(&self, i: usize) -> (usize, f64) {
         let at = i as f64 * self.n_in as f64 / self.n_out as f64;
@@ -93,7 +93,7 @@ impl Part {
 }
 
 /// A part of what [`linear`] makes, from the frames that it needs, [B, C, `part.needed()`].
-pub fn linear_part(x: &Tensor, part: &Part) -> Result<Tensor> {
+pub fn linear_part(x: &Tensor, part: &ResizedPart) -> Result<Tensor> {
     let needed = part.needed();
     if x.dim(2)? != needed.len() || needed.is_empty() || part.frames.is_empty() {
         candle_core::bail!("cannot interpolate frames {:?} from {} of {needed:?}", part.frames, x.dim(2)?);
@@ -135,7 +135,7 @@ mod tests {
         let at = |n_out| linear(&x, n_out)?.flatten_all()?.to_vec1::<f64>();
         assert_eq!(at(8)?, [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.0]);
         assert_eq!(at(2)?, [0.0, 2.0]);
-        let part = Part { frames: 3..6, n_in: 4, n_out: 8 };
+        let part = ResizedPart { frames: 3..6, n_in: 4, n_out: 8 };
         assert_eq!(part.needed(), 1..4);
         let some = linear_part(&x.narrow(2, 1, 3)?, &part)?.flatten_all()?.to_vec1::<f64>()?;
         assert_eq!(some, [1.5, 2.0, 2.5]);

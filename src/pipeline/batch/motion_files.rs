@@ -9,7 +9,7 @@ use crate::external::ffmpeg::sound_stream;
 use crate::external::ffmpeg::sound_stream::SoundStream;
 use crate::external::ffmpeg::{audio, probe};
 use crate::formats::checkpoint;
-use crate::generate::Speaker;
+use crate::generate::GestureGenerator;
 use crate::generate::model::BEST;
 use crate::stage::progress::Progress;
 use crate::types::sound::SAMPLE_RATE;
@@ -51,7 +51,7 @@ pub fn checkpoint_file(path: &Path) -> Result<PathBuf> {
 
 /// Writes the motion of `speaker` for the sound of `audio` to `outputs`. Errors name the sound.
 pub fn write_motion(
-    speaker: &Speaker,
+    speaker: &GestureGenerator,
     audio: &Path,
     outputs: &[(PathBuf, ExportFormat)],
     progress: &dyn Progress,

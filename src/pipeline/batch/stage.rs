@@ -4,7 +4,7 @@ use super::motion_files::{checkpoint_file, write_motion};
 use super::sounds::BatchSound;
 use crate::animate::AnimationOptions;
 use crate::animate::export::file::ExportFormat;
-use crate::generate::Speaker;
+use crate::generate::GestureGenerator;
 use crate::stage::progress::Progress;
 use crate::stage::{Input, Report, Stage, Unit};
 use anyhow::{Context, Result, bail, ensure};
@@ -21,7 +21,7 @@ pub struct BatchStage {
     folder: PathBuf,
     /// Of the sounds that name none.
     checkpoint: Option<PathBuf>,
-    generators: Mutex<BTreeMap<PathBuf, Arc<Speaker>>>,
+    generators: Mutex<BTreeMap<PathBuf, Arc<GestureGenerator>>>,
 }
 
 impl BatchStage {
@@ -60,12 +60,12 @@ impl BatchStage {
         own.or_else(|| self.checkpoint.clone()).context("no checkpoint is named")
     }
 
-    fn generator(&self, checkpoint: &Path) -> Result<Arc<Speaker>> {
+    fn generator(&self, checkpoint: &Path) -> Result<Arc<GestureGenerator>> {
         let mut generators = self.generators.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         if let Some(generator) = generators.get(checkpoint) {
             return Ok(generator.clone());
         }
-        let generator = Arc::new(Speaker::open(checkpoint)?);
+        let generator = Arc::new(GestureGenerator::open(checkpoint)?);
         generators.insert(checkpoint.to_owned(), generator.clone());
         Ok(generator)
     }

@@ -1,7 +1,7 @@
 //! What the networks are trained to make small: pure functions of tensors.
 
 use crate::config::AdversarialLoss;
-use crate::generate::normalisation::{N_NUMBERS, Normalisation};
+use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::nn::gan::discriminator::motion;
 use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WRIST, is_duplicate, parent};
 use candle_core::{DType, Device, Result, Tensor};
@@ -27,18 +27,18 @@ pub fn both_seen(mask: &Tensor) -> Result<Tensor> {
 /// The loss on the discriminator's scores, of any shape.
 impl AdversarialLoss {
     /// What the discriminator makes small.
-    pub fn discriminator(self, real_scores: &Tensor, made_scores: &Tensor) -> Result<Tensor> {
+    pub fn discriminator(self, real_scores: &Tensor, generated_scores: &Tensor) -> Result<Tensor> {
         match self {
-            Self::LeastSquares => (real_scores - 1.0)?.sqr()?.mean_all()? + made_scores.sqr()?.mean_all()?,
-            Self::Log => softplus(&real_scores.neg()?)?.mean_all()? + softplus(made_scores)?.mean_all()?,
+            Self::LeastSquares => (real_scores - 1.0)?.sqr()?.mean_all()? + generated_scores.sqr()?.mean_all()?,
+            Self::Log => softplus(&real_scores.neg()?)?.mean_all()? + softplus(generated_scores)?.mean_all()?,
         }
     }
 
     /// What the generator makes small.
-    pub fn generator(self, made_scores: &Tensor) -> Result<Tensor> {
+    pub fn generator(self, generated_scores: &Tensor) -> Result<Tensor> {
         match self {
-            Self::LeastSquares => (made_scores - 1.0)?.sqr()?.mean_all(),
-            Self::Log => softplus(&made_scores.neg()?)?.mean_all(),
+            Self::LeastSquares => (generated_scores - 1.0)?.sqr()?.mean_all(),
+            Self::Log => softplus(&generated_scores.neg()?)?.mean_all(),
         }
     }
 }
@@ -92,7 +92,7 @@ impl BoneConstancy {
     pub fn loss(&self, poses: &Tensor) -> Result<Tensor> {
         let (batch, n_numbers, n_frames) = poses.dims3()?;
         let n_bones = self.inverse_lengths.dim(1)?;
-        if n_bones == 0 || n_frames < 2 || n_numbers != N_NUMBERS {
+        if n_bones == 0 || n_frames < 2 || n_numbers != N_FEATURES {
             return poses.zeros_like()?.mean_all();
         }
         let metres = poses.broadcast_mul(&self.std)?.broadcast_add(&self.mean)?;
@@ -130,7 +130,7 @@ mod tests {
             assert!(worst(std::slice::from_ref(&made), |v| game.generator(&v[0]))? < 1e-7);
         }
         let bones = BoneConstancy::new(&normal(), DType::F64, &Device::Cpu)?;
-        assert!(worst(&[pattern(&[2, N_NUMBERS, 3], 0.0)?], |v| bones.loss(&v[0]))? < 1e-6);
+        assert!(worst(&[pattern(&[2, N_FEATURES, 3], 0.0)?], |v| bones.loss(&v[0]))? < 1e-6);
         Ok(())
     }
 
@@ -163,9 +163,9 @@ mod tests {
     #[test]
     fn only_changing_bones_cost() -> Result<()> {
         let bones = BoneConstancy::new(&normal(), DType::F64, &Device::Cpu)?;
-        let still = pattern(&[1, N_NUMBERS, 1], 0.0)?.broadcast_as((1, N_NUMBERS, 5))?.contiguous()?;
+        let still = pattern(&[1, N_FEATURES, 1], 0.0)?.broadcast_as((1, N_FEATURES, 5))?.contiguous()?;
         assert!(bones.loss(&still)?.to_scalar::<f64>()? < 1e-12);
-        assert!(bones.loss(&pattern(&[1, N_NUMBERS, 5], 0.0)?)?.to_scalar::<f64>()? > 0.01);
+        assert!(bones.loss(&pattern(&[1, N_FEATURES, 5], 0.0)?)?.to_scalar::<f64>()? > 0.01);
         Ok(())
     }
 }

@@ -10,7 +10,7 @@ const LEAST_SPREAD: f64 = 0.1;
 
 /// A predictor's figures on the held-out windows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Figures {
+pub struct ValidationMetrics {
     /// Mean absolute error of normalised coordinates.
     pub l1: f64,
     /// Share of correct keypoints, 0..1: all, of shoulders, elbows and wrists, of the fingers.
@@ -31,8 +31,8 @@ pub struct Validation {
     pub n_windows: usize,
     /// Poses behind the Frechet distance.
     pub n_poses: usize,
-    pub generator: Figures,
-    pub mean_pose: Figures,
+    pub generator: ValidationMetrics,
+    pub mean_pose: ValidationMetrics,
     /// Mean change of a bone's length from frame to frame in the network's own output, mm.
     pub bone_change_mm: f64,
     /// How much windows of different sound differ from each other, as a share of what real windows differ by.
@@ -47,7 +47,7 @@ pub struct Validation {
 /// pose's, and half the distance of the motion energy from the data's, |ln(energy)| / 2. The first asks for the right
 /// pose at the right time, the second for poses like the speaker's, the third for as much motion. The adversarial loss
 /// has no part in it: it measures the two networks against each other. Without a Frechet distance its share is 1.
-pub fn score(generator: &Figures, mean_pose: &Figures) -> f64 {
+pub fn score(generator: &ValidationMetrics, mean_pose: &ValidationMetrics) -> f64 {
     let frechet = match (generator.frechet, mean_pose.frechet) {
         (Some(own), Some(still)) if still > 0.0 => own / still,
         _ => 1.0,
@@ -74,15 +74,16 @@ mod tests {
 
     #[test]
     fn the_score_wants_all_three() {
-        let still = Figures { l1: 0.8, pck: 0.3, pck_body: 0.3, pck_hands: 0.3, frechet: Some(200.0), energy: 0.0 };
-        let good = Figures { l1: 0.4, frechet: Some(50.0), energy: 1.0, ..still };
+        let still =
+            ValidationMetrics { l1: 0.8, pck: 0.3, pck_body: 0.3, pck_hands: 0.3, frechet: Some(200.0), energy: 0.0 };
+        let good = ValidationMetrics { l1: 0.4, frechet: Some(50.0), energy: 1.0, ..still };
         assert!((score(&good, &still) - 0.75).abs() < 1e-12);
         for worse in [
-            Figures { l1: 0.5, ..good },
-            Figures { frechet: Some(90.0), ..good },
-            Figures { energy: 0.5, ..good },
-            Figures { energy: 2.0, ..good },
-            Figures { frechet: None, ..good },
+            ValidationMetrics { l1: 0.5, ..good },
+            ValidationMetrics { frechet: Some(90.0), ..good },
+            ValidationMetrics { energy: 0.5, ..good },
+            ValidationMetrics { energy: 2.0, ..good },
+            ValidationMetrics { frechet: None, ..good },
             still,
         ] {
             assert!(score(&worse, &still) > score(&good, &still), "{worse:?}");

@@ -3,15 +3,15 @@
 use super::losses;
 use super::losses::BoneConstancy;
 use super::score::Validation;
-use super::windows::Batch;
+use super::windows::WindowBatch;
 use crate::config::Gan;
 use crate::config::{AdversarialLoss, ComputeDevice};
 use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
 use crate::generate::model::BEST;
-use crate::generate::model::{Facts, GENERATOR};
-use crate::generate::normalisation::N_NUMBERS;
-use crate::generate::representation::Decoder;
+use crate::generate::model::{GENERATOR, SpeakerMetadata};
+use crate::generate::normalisation::N_FEATURES;
+use crate::generate::representation::PoseDecoder;
 use crate::nn::device;
 use crate::nn::gan::discriminator::{Discriminator, motion};
 use crate::nn::gan::generator::Generator;
@@ -48,8 +48,8 @@ pub struct Losses {
 
 /// What a checkpoint says beside its tensors.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Stored {
-    pub speaker: Facts,
+pub struct TrainerState {
+    pub speaker: SpeakerMetadata,
     pub settings: Gan,
     /// Steps done.
     pub step: usize,
@@ -58,11 +58,11 @@ pub struct Stored {
 }
 
 /// Networks, optimisers and where they are.
-pub struct Training {
-    pub facts: Facts,
+pub struct GanTrainer {
+    pub metadata: SpeakerMetadata,
     pub settings: Gan,
     pub generator: Generator,
-    pub decoder: Decoder,
+    pub decoder: PoseDecoder,
     generator_params: Params,
     discriminator: Discriminator,
     discriminator_params: Params,
@@ -76,19 +76,19 @@ pub struct Training {
     pub best: Option<(usize, f32)>,
 }
 
-impl Training {
+impl GanTrainer {
     /// Networks as the seed makes them.
-    pub fn new(facts: Facts, settings: Gan) -> Result<Self> {
+    pub fn new(metadata: SpeakerMetadata, settings: Gan) -> Result<Self> {
         let device = device::open(settings.device == ComputeDevice::Cuda)?;
         let mut generator_params = Params::new(settings.seed).on(&device);
-        let generator = Generator::new(&mut generator_params, &facts.network)?;
+        let generator = Generator::new(&mut generator_params, &metadata.network)?;
         // Another seed, or tensors of the same name would begin alike.
         let mut discriminator_params = Params::new(!settings.seed).on(&device);
-        let discriminator = Discriminator::new(&mut discriminator_params, N_NUMBERS)?;
+        let discriminator = Discriminator::new(&mut discriminator_params, N_FEATURES)?;
         let adam = adam::Config { max_norm: Some(MAX_NORM), ..adam::Config::default() };
         Ok(Self {
-            decoder: facts.representation.decoder(&facts.normalisation, DType::F32, &device)?,
-            bones: BoneConstancy::new(&facts.normalisation, DType::F32, &device)?,
+            decoder: metadata.representation.decoder(&metadata.normalisation, DType::F32, &device)?,
+            bones: BoneConstancy::new(&metadata.normalisation, DType::F32, &device)?,
             adversarial: settings.adversarial,
             adam_g: Adam::new(&generator_params, adam)?,
             adam_d: Adam::new(&discriminator_params, adam)?,
@@ -96,7 +96,7 @@ impl Training {
             generator,
             discriminator_params,
             discriminator,
-            facts,
+            metadata,
             settings,
             step: 0,
             best: None,
@@ -114,32 +114,32 @@ impl Training {
     }
 
     /// One step of the discriminator, then one of the generator, on the same windows.
-    pub fn step(&mut self, batch: &Batch) -> Result<Losses> {
+    pub fn step(&mut self, batch: &WindowBatch) -> Result<Losses> {
         self.step_in_phases(batch, &mut |_| ())
     }
 
     /// `step`, with a call at the end of each phase, by its name: for measuring where the time goes.
-    pub fn step_in_phases(&mut self, batch: &Batch, phase: &mut dyn FnMut(&'static str)) -> Result<Losses> {
+    pub fn step_in_phases(&mut self, batch: &WindowBatch, phase: &mut dyn FnMut(&'static str)) -> Result<Losses> {
         let batch = batch.on(self.device())?;
         let Gan { lambda_l1, lambda_velocity, lambda_gan, lambda_bone, learning_rate, .. } = self.settings;
         let raw = self.generator.forward(&batch.mels, self.settings.window_frames, true)?;
-        let made = self.decoder.poses(&raw)?;
+        let generated = self.decoder.poses(&raw)?;
         // Differences count where both frames do, so that a missing joint looks the same in both.
         let mask = losses::both_seen(&batch.mask)?;
-        let made_motion = (motion(&made)? * &mask)?;
+        let generated_motion = (motion(&generated)? * &mask)?;
         phase("generator forward");
 
         let mut of_discriminator = 0.0;
         if lambda_gan > 0.0 {
-            let real = self.discriminator.forward(&(motion(&batch.poses)? * &mask)?, true)?;
-            let fake = self.discriminator.forward(&made_motion.detach(), true)?;
-            let loss = self.adversarial.discriminator(&real, &fake)?;
+            let real_scores = self.discriminator.forward(&(motion(&batch.poses)? * &mask)?, true)?;
+            let generated_scores = self.discriminator.forward(&generated_motion.detach(), true)?;
+            let loss = self.adversarial.discriminator(&real_scores, &generated_scores)?;
             of_discriminator = number(&loss)?;
             self.adam_d.step(&loss.backward()?, learning_rate)?;
         }
         phase("discriminator's step");
 
-        let l1 = losses::l1(&made, &batch.poses, &batch.mask)?;
+        let l1 = losses::l1(&generated, &batch.poses, &batch.mask)?;
         let mut total = (&l1 * lambda_l1)?;
         let (mut velocity, mut bone, mut adversarial) = (0.0, 0.0, 0.0);
         let mut add = |loss: Tensor, weight: f64| -> Result<f64> {
@@ -147,13 +147,13 @@ impl Training {
             number(&loss)
         };
         if lambda_velocity > 0.0 {
-            velocity = add(losses::velocity(&made, &batch.poses, &batch.mask)?, lambda_velocity)?;
+            velocity = add(losses::velocity(&generated, &batch.poses, &batch.mask)?, lambda_velocity)?;
         }
-        if lambda_bone > 0.0 && !self.facts.representation.keeps_lengths() {
-            bone = add(self.bones.loss(&made)?, lambda_bone)?;
+        if lambda_bone > 0.0 && !self.metadata.representation.keeps_lengths() {
+            bone = add(self.bones.loss(&generated)?, lambda_bone)?;
         }
         if lambda_gan > 0.0 {
-            let scores = self.discriminator.forward(&made_motion, true)?;
+            let scores = self.discriminator.forward(&generated_motion, true)?;
             adversarial = add(self.adversarial.generator(&scores)?, lambda_gan)?;
         }
         phase("generator's losses");
@@ -187,12 +187,12 @@ impl Training {
     }
 
     fn stored(&self) -> Result<Value> {
-        let (speaker, settings) = (self.facts.clone(), self.settings.clone());
-        Ok(serde_json::to_value(Stored { speaker, settings, step: self.step, best: self.best })?)
+        let (speaker, settings) = (self.metadata.clone(), self.settings.clone());
+        Ok(serde_json::to_value(TrainerState { speaker, settings, step: self.step, best: self.best })?)
     }
 
     /// Takes up the tensors and the place of a checkpoint.
-    pub fn load(&mut self, stored: &Stored, contents: &Contents) -> Result<()> {
+    pub fn load(&mut self, stored: &TrainerState, contents: &Contents) -> Result<()> {
         self.generator_params.load(&contents.part(GENERATOR))?;
         self.discriminator_params.load(&contents.part(DISCRIMINATOR))?;
         self.adam_g.load(ADAM_G, &contents.tensors)?;
@@ -202,9 +202,9 @@ impl Training {
     }
 }
 
-impl Stored {
+impl TrainerState {
     /// What a checkpoint of a training says. Errors when it is none, or of another program's version.
-    pub fn of(contents: &Contents) -> Result<Self> {
+    pub fn from_checkpoint(contents: &Contents) -> Result<Self> {
         ensure!(
             contents.facts["settings"].is_object(),
             "it is no checkpoint that this version can go on from; choose another --out, or move that folder away"
@@ -213,10 +213,10 @@ impl Stored {
     }
 
     /// The settings to go on with: the checkpoint's, but for those that may change; and a line for each difference.
-    pub fn settings(&self, wanted: &Gan) -> Result<(Gan, Vec<String>)> {
-        let (mut kept, wanted) = (serde_json::to_value(&self.settings)?, serde_json::to_value(wanted)?);
+    pub fn settings(&self, requested: &Gan) -> Result<(Gan, Vec<String>)> {
+        let (mut kept, requested) = (serde_json::to_value(&self.settings)?, serde_json::to_value(requested)?);
         let mut differences = Vec::new();
-        for (key, value) in wanted.as_object().into_iter().flatten() {
+        for (key, value) in requested.as_object().into_iter().flatten() {
             if FREE.contains(&key.as_str()) {
                 kept[key] = value.clone();
             } else if kept[key] != *value {

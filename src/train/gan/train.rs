@@ -3,26 +3,26 @@
 //! and the step alone (the place of the loader is the step), everything else is in the checkpoint.
 
 use super::score::Validation;
-use super::step::{Losses, Stored, Training};
-use super::validate::HeldOut;
-use super::windows::Examples;
+use super::step::{GanTrainer, Losses, TrainerState};
+use super::validate::ValidationWindows;
+use super::windows::WindowLoader;
 use crate::config::Gan;
 use crate::config::{ComputeDevice, MotionRepresentation, NetworkPreset};
 use crate::dataset::{Dataset, Split};
 use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
 pub use crate::generate::model::BEST;
-use crate::generate::model::Facts;
-use crate::generate::normalisation::{N_NUMBERS, Normalisation};
+use crate::generate::model::SpeakerMetadata;
+use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::generate::representation::Representation;
 use crate::motion::bones;
-use crate::nn::cpu::thread_team::awake;
+use crate::nn::cpu::thread_team::with_spinning_workers;
 use crate::nn::device;
 use crate::nn::gan::generator::Preset;
 use crate::nn::gan::generator::{Config, FRAMES_MULTIPLE};
 use crate::stage::progress::{Progress, Task};
 use crate::stage::workdir;
-use crate::train::log::Log;
+use crate::train::log::MetricsLog;
 use crate::types::skeleton::N_BONES;
 use anyhow::{Context, Result, bail, ensure};
 use rand::{Rng, SeedableRng};
@@ -36,7 +36,7 @@ const LOG_EVERY: usize = 10;
 
 /// How a training ended.
 #[derive(Clone, Debug)]
-pub struct Outcome {
+pub struct TrainingOutcome {
     /// Steps of this training altogether, and the step this run began at.
     pub steps: usize,
     pub began_at: usize,
@@ -60,64 +60,64 @@ pub struct Outcome {
 /// # Errors
 /// No window to train on; a checkpoint of another speaker or version; another training at work in `folder`; a loss that
 /// is not finite or explodes (the last good checkpoint stays).
-pub fn train(dataset: &Dataset, wanted: &Gan, folder: &Path, progress: &dyn Progress) -> Result<Outcome> {
-    check(wanted)?;
+pub fn train(dataset: &Dataset, requested: &Gan, folder: &Path, progress: &dyn Progress) -> Result<TrainingOutcome> {
+    check(requested)?;
     let _lock = workdir::lock(folder)?;
-    let resumed = resume(dataset, wanted, folder, progress)?;
+    let resumed = resume(dataset, requested, folder, progress)?;
     let (settings, normal) = match &resumed {
         Some((stored, _)) => (stored.settings.clone(), stored.speaker.normalisation.clone()),
-        None => (wanted.clone(), normalisation(dataset)?),
+        None => (requested.clone(), normalisation(dataset)?),
     };
-    let examples = Examples::load(dataset, Split::Train, &normal, settings.window_frames, settings.stride_frames)?;
+    let loader = WindowLoader::load(dataset, Split::Train, &normal, settings.window_frames, settings.stride_frames)?;
     ensure!(
-        !examples.is_empty(),
+        !loader.is_empty(),
         "{}: no interval of the training split is as long as a window of {} frames; more footage, or a smaller \
          gan.window_frames",
         dataset.dir().display(),
         settings.window_frames
     );
-    let held_out = HeldOut::load(dataset, &settings, &normal, progress)?;
-    let mut training = match &resumed {
-        Some((stored, _)) => Training::new(stored.speaker.clone(), settings)?,
+    let held_out = ValidationWindows::load(dataset, &settings, &normal, progress)?;
+    let mut trainer = match &resumed {
+        Some((stored, _)) => GanTrainer::new(stored.speaker.clone(), settings)?,
         None => {
             let representation = match settings.representation {
                 MotionRepresentation::Positions => Representation::Positions,
-                MotionRepresentation::Bones => Representation::bones(&normal, examples.poses()),
+                MotionRepresentation::Bones => Representation::bones(&normal, loader.poses()),
             };
-            let network = Config::of(preset(settings.preset), N_NUMBERS);
+            let network = Config::from_preset(preset(settings.preset), N_FEATURES);
             let (info, hash) = (dataset.info(), dataset.hash()?);
-            let facts = Facts::new(&info.speaker, info.fps, &hash, network, normal, representation);
-            Training::new(facts, settings)?
+            let metadata = SpeakerMetadata::new(&info.speaker, info.fps, &hash, network, normal, representation);
+            GanTrainer::new(metadata, settings)?
         }
     };
     if let Some((stored, contents)) = &resumed {
-        training.load(stored, contents)?;
+        trainer.load(stored, contents)?;
     }
-    awake(|| run(&mut training, &examples, &held_out, folder, progress))
+    with_spinning_workers(|| run(&mut trainer, &loader, &held_out, folder, progress))
 }
 
 /// The loop: steps, and at the end of each epoch a validation.
 fn run(
-    training: &mut Training,
-    examples: &Examples,
-    held_out: &HeldOut,
+    trainer: &mut GanTrainer,
+    loader: &WindowLoader,
+    held_out: &ValidationWindows,
     folder: &Path,
     progress: &dyn Progress,
-) -> Result<Outcome> {
-    let settings = training.settings.clone();
-    let began_at = training.step;
-    let mut log = Log::open(folder, began_at)?;
-    let task = progress.begin(&format!("train {}", training.facts.name), settings.steps as u64);
+) -> Result<TrainingOutcome> {
+    let settings = trainer.settings.clone();
+    let began_at = trainer.step;
+    let mut log = MetricsLog::open(folder, began_at)?;
+    let task = progress.begin(&format!("train {}", trainer.metadata.name), settings.steps as u64);
     task.advance(began_at.min(settings.steps) as u64);
     let (start, mut waiting, mut stepping) = (Instant::now(), Duration::ZERO, Duration::ZERO);
     let mut last = None;
-    while training.step < settings.steps && !is_over(training) {
+    while trainer.step < settings.steps && !is_over(trainer) {
         let before = Instant::now();
-        let batch = examples.batch(&draw(settings.seed, training.step, settings.batch, examples.len()))?;
+        let batch = loader.batch(&sample_windows(settings.seed, trainer.step, settings.batch, loader.len()))?;
         waiting += before.elapsed();
-        let losses = training.step(&batch)?;
+        let losses = trainer.step(&batch)?;
         stepping += before.elapsed();
-        let step = training.step;
+        let step = trainer.step;
         losses.check(step).with_context(|| kept(folder))?;
         task.advance(1);
         if step.is_multiple_of(LOG_EVERY) {
@@ -127,7 +127,7 @@ fn run(
         let is_last = step == settings.steps;
         let ends_epoch = step.is_multiple_of(settings.epoch_steps);
         if ends_epoch || is_last {
-            let validation = held_out.validate(training)?;
+            let validation = held_out.validate(trainer)?;
             log.write(
                 &json!({ "step": step, "epoch": step.div_ceil(settings.epoch_steps), "validation": validation }),
             )?;
@@ -136,14 +136,14 @@ fn run(
             }
             // In f32, whose decimals come back exactly from JSON.
             let score = validation.score as f32;
-            if training.best.is_none_or(|(_, best)| score < best) {
-                training.best = Some((step, score));
-                training.save_best(folder, &validation)?;
+            if trainer.best.is_none_or(|(_, best)| score < best) {
+                trainer.best = Some((step, score));
+                trainer.save_best(folder, &validation)?;
             }
             last = Some(validation);
         }
         if ends_epoch || is_last || step.is_multiple_of(settings.checkpoint_every) {
-            training.save(folder)?;
+            trainer.save(folder)?;
         }
     }
     let Some((_, newest)) = checkpoint::list(folder)?.pop() else {
@@ -151,18 +151,18 @@ fn run(
     };
     let validation = match last {
         Some(validation) => validation,
-        None => held_out.validate(training)?,
+        None => held_out.validate(trainer)?,
     };
-    Ok(Outcome {
-        steps: training.step,
+    Ok(TrainingOutcome {
+        steps: trainer.step,
         began_at,
-        stopped_early: training.step < settings.steps,
-        n_windows: examples.len(),
-        n_parameters: training.n_parameters(),
+        stopped_early: trainer.step < settings.steps,
+        n_windows: loader.len(),
+        n_parameters: trainer.n_parameters(),
         validation,
         newest,
         best: folder.join(BEST),
-        best_step: training.best.map_or(training.step, |(step, _)| step),
+        best_step: trainer.best.map_or(trainer.step, |(step, _)| step),
         waiting: waiting.as_secs_f64() / stepping.as_secs_f64().max(1e-9),
     })
 }
@@ -170,32 +170,32 @@ fn run(
 /// The newest checkpoint, and what it says with the settings that count now. Tells where these differ from `wanted`.
 fn resume(
     dataset: &Dataset,
-    wanted: &Gan,
+    requested: &Gan,
     folder: &Path,
     progress: &dyn Progress,
-) -> Result<Option<(Stored, Contents)>> {
+) -> Result<Option<(TrainerState, Contents)>> {
     let Some((step, newest)) = checkpoint::list(folder)?.pop() else { return Ok(None) };
     let contents = Contents::read(&newest)?;
-    let read = || -> Result<(Stored, Vec<String>)> {
-        let mut stored = Stored::of(&contents)?;
-        let (settings, mut differences) = stored.settings(wanted)?;
+    let read = || -> Result<(TrainerState, Vec<String>)> {
+        let mut stored = TrainerState::from_checkpoint(&contents)?;
+        let (settings, mut differences) = stored.settings(requested)?;
         stored.settings = settings;
-        let (info, facts) = (dataset.info(), &mut stored.speaker);
+        let (info, metadata) = (dataset.info(), &mut stored.speaker);
         ensure!(
-            facts.name == info.speaker && facts.fps == info.fps,
+            metadata.name == info.speaker && metadata.fps == info.fps,
             "it is of {} at {}, the dataset of {} at {}; choose another --out",
-            facts.name,
-            facts.fps,
+            metadata.name,
+            metadata.fps,
             info.speaker,
             info.fps
         );
         let hash = dataset.hash()?;
-        if facts.dataset != hash {
+        if metadata.dataset != hash {
             differences.push(
                 "the dataset is another now: its windows are trained on, with the checkpoint's mean, deviation and bones"
                     .to_owned(),
             );
-            facts.dataset = hash;
+            metadata.dataset = hash;
         }
         Ok((stored, differences))
     };
@@ -206,9 +206,9 @@ fn resume(
 }
 
 /// Whether the score has not become better for as many epochs as `gan.patience` allows.
-fn is_over(training: &Training) -> bool {
-    let Gan { patience, epoch_steps, .. } = training.settings;
-    let since = training.step - training.best.map_or(training.step, |(step, _)| step.min(training.step));
+fn is_over(trainer: &GanTrainer) -> bool {
+    let Gan { patience, epoch_steps, .. } = trainer.settings;
+    let since = trainer.step - trainer.best.map_or(trainer.step, |(step, _)| step.min(trainer.step));
     patience > 0 && since >= patience * epoch_steps
 }
 
@@ -263,7 +263,7 @@ pub fn normalisation(dataset: &Dataset) -> Result<Normalisation> {
 }
 
 /// The windows of a step, drawn with replacement.
-fn draw(seed: u64, step: usize, n: usize, n_windows: usize) -> Vec<usize> {
+fn sample_windows(seed: u64, step: usize, n: usize, n_windows: usize) -> Vec<usize> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(step as u64 + 1);
     (0..n).map(|_| rng.random_range(0..n_windows as u64) as usize).collect()

@@ -2,16 +2,16 @@
 
 use super::losses;
 use super::score;
-use super::score::{Figures, Validation};
-use super::step::Training;
-use super::windows::{Batch, Examples};
+use super::score::{Validation, ValidationMetrics};
+use super::step::GanTrainer;
+use super::windows::{WindowBatch, WindowLoader};
 use crate::config::Gan;
 use crate::dataset::{Dataset, Split};
-use crate::generate::normalisation::{N_NUMBERS, Normalisation};
+use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::metrics::distribution::frechet;
-use crate::metrics::distribution::frechet::{Gaussian, frechet};
+use crate::metrics::distribution::frechet::{GaussianFit, frechet};
 use crate::metrics::movement::energy::MotionEnergy;
-use crate::metrics::position::pck::Correct;
+use crate::metrics::position::pck::CorrectKeypoints;
 use crate::stage::progress::Progress;
 use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WRIST, is_duplicate, parent};
 use crate::types::time::FrameRate;
@@ -23,42 +23,42 @@ use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
 const N_WINDOWS: usize = 256;
 
 /// The windows to validate on.
-pub struct HeldOut {
+pub struct ValidationWindows {
     split: Split,
     fps: FrameRate,
     n_frames: usize,
-    batches: Vec<Batch>,
+    batches: Vec<WindowBatch>,
     /// What poses are compared by.
     joints: Vec<usize>,
 }
 
 /// A held-out window: what was made for its sound, and what is real. [T, 49, 3] metres; mask [T, 49].
-pub struct Window {
-    pub made: Array3<f32>,
-    pub real: Array3<f32>,
+pub struct ValidationWindow {
+    pub predicted: Array3<f32>,
+    pub ground_truth: Array3<f32>,
     pub mask: Array2<bool>,
 }
 
-impl HeldOut {
+impl ValidationWindows {
     /// Windows side by side, at most `N_WINDOWS` evenly chosen: of the validation split, or where that has none of the
     /// training split, which is said.
     pub fn load(dataset: &Dataset, settings: &Gan, normal: &Normalisation, progress: &dyn Progress) -> Result<Self> {
         let n_frames = settings.window_frames;
         let mut split = Split::Validation;
-        let mut examples = Examples::load(dataset, split, normal, n_frames, n_frames)?;
-        if examples.is_empty() {
+        let mut loader = WindowLoader::load(dataset, split, normal, n_frames, n_frames)?;
+        if loader.is_empty() {
             progress.say("the dataset has no validation window: the figures below are on training windows");
             split = Split::Train;
-            examples = Examples::load(dataset, split, normal, n_frames, n_frames)?;
+            loader = WindowLoader::load(dataset, split, normal, n_frames, n_frames)?;
         }
-        let n = examples.len().min(N_WINDOWS);
-        let chosen: Vec<usize> = (0..n).map(|i| i * examples.len() / n).collect();
-        let batches: Vec<Batch> =
-            chosen.chunks(settings.batch).map(|which| examples.batch(which)).collect::<Result<_>>()?;
+        let n = loader.len().min(N_WINDOWS);
+        let chosen: Vec<usize> = (0..n).map(|i| i * loader.len() / n).collect();
+        let batches: Vec<WindowBatch> =
+            chosen.chunks(settings.batch).map(|which| loader.batch(which)).collect::<Result<_>>()?;
         let mut masks = Vec::new();
         for batch in &batches {
             for i in 0..batch.mask.dim(0)? {
-                masks.push(joints_seen(numbers(&batch.mask, i)?.view()));
+                masks.push(joints_seen(features(&batch.mask, i)?.view()));
             }
         }
         let joints = frechet::joints(masks.iter().map(|mask| mask.view()));
@@ -66,35 +66,38 @@ impl HeldOut {
     }
 
     /// Both predictors on the same windows.
-    pub fn validate(&self, training: &Training) -> Result<Validation> {
-        let Training { generator, decoder, .. } = training;
-        let normal = &training.facts.normalisation;
-        let (mut made, mut still, mut real) = (Tally::default(), Tally::default(), Tally::default());
-        let (mut change, mut spread) = (Mean::default(), Spread::default());
+    pub fn validate(&self, trainer: &GanTrainer) -> Result<Validation> {
+        let GanTrainer { generator, decoder, .. } = trainer;
+        let normal = &trainer.metadata.normalisation;
+        let (mut predicted, mut mean_pose, mut ground_truth) =
+            (PredictorSums::default(), PredictorSums::default(), PredictorSums::default());
+        let (mut change, mut spread) = (RunningMean::default(), WindowSpread::default());
         let mut n_windows = 0;
         for batch in &self.batches {
-            let batch = &batch.on(training.device())?;
+            let batch = &batch.on(trainer.device())?;
             let poses = decoder.poses(&generator.forward(&batch.mels, self.n_frames, false)?.detach())?;
             let nothing = poses.zeros_like()?;
-            for (tally, poses) in [(&mut made, &poses), (&mut still, &nothing), (&mut real, &batch.poses)] {
+            for (tally, poses) in
+                [(&mut predicted, &poses), (&mut mean_pose, &nothing), (&mut ground_truth, &batch.poses)]
+            {
                 tally.add_error(poses, batch)?;
             }
             let windows = windows(&poses, batch, normal)?;
-            let still_window = joints(&nothing, 0, normal)?;
+            let mean_pose_window = joints(&nothing, 0, normal)?;
             for window in &windows {
-                made.add(window.made.view(), window, self);
-                still.add(still_window.view(), window, self);
-                real.add(window.real.view(), window, self);
-                change.add(bone_changes(window.made.view()));
+                predicted.add(window.predicted.view(), window, self);
+                mean_pose.add(mean_pose_window.view(), window, self);
+                ground_truth.add(window.ground_truth.view(), window, self);
+                change.add(bone_changes(window.predicted.view()));
                 spread.add(window);
             }
             n_windows += windows.len();
         }
-        let (generator, mean_pose) = (made.figures(&real), still.figures(&real));
+        let (generator, mean_pose) = (predicted.metrics(&ground_truth), mean_pose.metrics(&ground_truth));
         Ok(Validation {
             split: self.split.name().to_owned(),
             n_windows,
-            n_poses: real.poses.n,
+            n_poses: ground_truth.poses.n,
             generator,
             mean_pose,
             bone_change_mm: 1e3 * change.mean(),
@@ -105,67 +108,73 @@ impl HeldOut {
     }
 }
 
-fn windows(made: &Tensor, batch: &Batch, normal: &Normalisation) -> Result<Vec<Window>> {
-    let window = |i: usize| -> Result<Window> {
-        let mask = joints_seen(numbers(&batch.mask, i)?.view());
-        Ok(Window { made: joints(made, i, normal)?, real: joints(&batch.poses, i, normal)?, mask })
+fn windows(predicted: &Tensor, batch: &WindowBatch, normal: &Normalisation) -> Result<Vec<ValidationWindow>> {
+    let window = |i: usize| -> Result<ValidationWindow> {
+        let mask = joints_seen(features(&batch.mask, i)?.view());
+        Ok(ValidationWindow {
+            predicted: joints(predicted, i, normal)?,
+            ground_truth: joints(&batch.poses, i, normal)?,
+            mask,
+        })
     };
-    (0..made.dim(0)?).map(window).collect()
+    (0..predicted.dim(0)?).map(window).collect()
 }
 
 fn joints(poses: &Tensor, i: usize, normal: &Normalisation) -> Result<Array3<f32>> {
-    Ok(normal.joints(numbers(poses, i)?.view()))
+    Ok(normal.joints(features(poses, i)?.view()))
 }
 
-fn numbers(x: &Tensor, i: usize) -> Result<Array2<f32>> {
+fn features(x: &Tensor, i: usize) -> Result<Array2<f32>> {
     let values = x.get(i)?.flatten_all()?.to_vec1::<f32>()?;
-    Ok(Array2::from_shape_vec((N_NUMBERS, values.len() / N_NUMBERS), values)?)
+    Ok(Array2::from_shape_vec((N_FEATURES, values.len() / N_FEATURES), values)?)
 }
 
 /// A predictor's sums so far.
 #[derive(Default)]
-struct Tally {
+struct PredictorSums {
     error: f64,
     n_numbers: f64,
-    correct: Correct,
+    correct: CorrectKeypoints,
     energy: MotionEnergy,
-    poses: Gaussian,
+    poses: GaussianFit,
 }
 
-impl Tally {
-    fn add_error(&mut self, made: &Tensor, batch: &Batch) -> Result<()> {
+impl PredictorSums {
+    fn add_error(&mut self, predicted: &Tensor, batch: &WindowBatch) -> Result<()> {
         let seen = f64::from(batch.mask.sum_all()?.to_scalar::<f32>()?);
-        self.error += f64::from(losses::l1(made, &batch.poses, &batch.mask)?.to_scalar::<f32>()?) * seen;
+        self.error += f64::from(losses::l1(predicted, &batch.poses, &batch.mask)?.to_scalar::<f32>()?) * seen;
         self.n_numbers += seen;
         Ok(())
     }
 
-    fn add(&mut self, made: ArrayView3<f32>, window: &Window, of: &HeldOut) {
-        self.correct.count(made, window.real.view(), window.mask.view());
-        self.energy.add(made, window.mask.view(), of.fps);
-        self.poses += &Gaussian::of(frechet::poses(made, window.mask.view(), &of.joints).view());
+    fn add(&mut self, predicted: ArrayView3<f32>, window: &ValidationWindow, of: &ValidationWindows) {
+        self.correct.count(predicted, window.ground_truth.view(), window.mask.view());
+        self.energy.add(predicted, window.mask.view(), of.fps);
+        self.poses += &GaussianFit::fit(frechet::poses(predicted, window.mask.view(), &of.joints).view());
     }
 
-    fn figures(&self, real: &Self) -> Figures {
-        Figures {
+    fn metrics(&self, ground_truth: &Self) -> ValidationMetrics {
+        ValidationMetrics {
             l1: self.error / self.n_numbers.max(1.0),
             pck: self.correct.share(),
             pck_body: self.correct.body.share(),
             pck_hands: self.correct.hands.share(),
-            frechet: Some(frechet(&self.poses, &real.poses)).filter(|distance| distance.is_finite()),
-            energy: Some(self.energy.relative_to(&real.energy)).filter(|share| share.is_finite()).unwrap_or(0.0),
+            frechet: Some(frechet(&self.poses, &ground_truth.poses)).filter(|distance| distance.is_finite()),
+            energy: Some(self.energy.relative_to(&ground_truth.energy))
+                .filter(|share| share.is_finite())
+                .unwrap_or(0.0),
         }
     }
 }
 
 /// A running mean.
 #[derive(Default)]
-struct Mean {
+struct RunningMean {
     sum: f64,
     n: usize,
 }
 
-impl Mean {
+impl RunningMean {
     fn add(&mut self, values: impl IntoIterator<Item = f64>) {
         for value in values {
             self.sum += value;
@@ -180,31 +189,31 @@ impl Mean {
 
 /// How far windows that follow each other in the set lie apart, at the same frame, where both are seen.
 #[derive(Default)]
-struct Spread {
+struct WindowSpread {
     last: Option<(Array3<f32>, Array3<f32>, Array2<bool>)>,
-    made: Mean,
-    real: Mean,
+    predicted: RunningMean,
+    ground_truth: RunningMean,
 }
 
-impl Spread {
-    fn add(&mut self, window: &Window) {
-        if let Some((made, real, mask)) = &self.last {
+impl WindowSpread {
+    fn add(&mut self, window: &ValidationWindow) {
+        if let Some((predicted, ground_truth, mask)) = &self.last {
             for ((t, joint), seen) in window.mask.indexed_iter() {
                 if *seen && mask[[t, joint]] && !is_duplicate(joint) {
                     let apart = |a: &Array3<f32>, b: &Array3<f32>| {
                         (0..3).map(|k| f64::from(a[[t, joint, k]] - b[[t, joint, k]]).powi(2)).sum::<f64>().sqrt()
                     };
-                    self.made.add([apart(made, &window.made)]);
-                    self.real.add([apart(real, &window.real)]);
+                    self.predicted.add([apart(predicted, &window.predicted)]);
+                    self.ground_truth.add([apart(ground_truth, &window.ground_truth)]);
                 }
             }
         }
-        self.last = Some((window.made.clone(), window.real.clone(), window.mask.clone()));
+        self.last = Some((window.predicted.clone(), window.ground_truth.clone(), window.mask.clone()));
     }
 
     /// 1 for a single window, which has none to differ from.
     fn share(&self) -> f64 {
-        if self.real.mean() > 0.0 { self.made.mean() / self.real.mean() } else { 1.0 }
+        if self.ground_truth.mean() > 0.0 { self.predicted.mean() / self.ground_truth.mean() } else { 1.0 }
     }
 }
 

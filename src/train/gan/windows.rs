@@ -4,7 +4,7 @@
 use crate::audio::mel;
 use crate::dataset::{Dataset, Split};
 use crate::generate::mel_stream::mel_frames;
-use crate::generate::normalisation::{N_NUMBERS, Normalisation};
+use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::motion::bones;
 use crate::types::interval::Interval as Span;
 use crate::types::time::FrameRate;
@@ -14,9 +14,9 @@ use ndarray::{Array2, ArrayView2, Axis, Slice};
 use rayon::prelude::*;
 
 /// One interval.
-struct Interval {
+struct TrainingInterval {
     /// [144, T]
-    numbers: Array2<f32>,
+    features: Array2<f32>,
     /// [48, T]: whether the joint (all but the neck) is to be learnt there.
     mask: Array2<bool>,
     /// [64, at least the mel frames of T]
@@ -24,16 +24,16 @@ struct Interval {
 }
 
 /// All windows of a split.
-pub struct Examples {
+pub struct WindowLoader {
     fps: FrameRate,
     n_frames: usize,
-    intervals: Vec<Interval>,
+    intervals: Vec<TrainingInterval>,
     /// Interval and first frame of every window.
     starts: Vec<(usize, usize)>,
 }
 
 /// Windows side by side, f32.
-pub struct Batch {
+pub struct WindowBatch {
     /// [B, 64, mel frames]
     pub mels: Tensor,
     /// [B, 144, n_frames], normalised; 0 where missing.
@@ -42,7 +42,7 @@ pub struct Batch {
     pub mask: Tensor,
 }
 
-impl Batch {
+impl WindowBatch {
     /// The same on this device.
     pub fn on(&self, device: &Device) -> Result<Self> {
         let on = |tensor: &Tensor| tensor.to_device(device);
@@ -50,7 +50,7 @@ impl Batch {
     }
 }
 
-impl Examples {
+impl WindowLoader {
     /// Reads the intervals of `split` that hold a window of `n_frames`; one begins every `stride` frames.
     pub fn load(
         dataset: &Dataset,
@@ -63,21 +63,21 @@ impl Examples {
         let fps = dataset.info().fps;
         let long: Vec<_> = dataset.samples(split).into_iter().filter(|sample| sample.n_frames >= n_frames).collect();
         let lengths = std::array::from_fn(|bone| normal.bone_lengths.get(bone).copied().unwrap_or(0.0));
-        let read = |sample| -> Result<Interval> {
+        let read = |sample| -> Result<TrainingInterval> {
             let mut sample = dataset.read(sample)?;
             // Every video has its own constant lengths; the generator learns one body.
             bones::with_lengths(&mut sample.motion, &lengths);
-            let (numbers, mask) = normal.numbers(&sample.motion);
+            let (features, mask) = normal.features(&sample.motion);
             // Rounding may ask for one spectrogram frame more than the sound has windows for.
             let enough = mel::n_samples(mel_frames(fps, sample.motion.n_frames()) + 1);
             let mut samples = sample.sound.samples;
             samples.resize(enough.max(samples.len()), 0.0);
             let mels = mel::log_mel(&samples).reversed_axes().as_standard_layout().into_owned();
-            Ok(Interval { numbers, mask, mels })
+            Ok(TrainingInterval { features, mask, mels })
         };
-        let intervals: Vec<Interval> = long.par_iter().map(read).collect::<Result<_>>()?;
-        let of_interval = |(i, interval): (usize, &Interval)| {
-            let n_windows = Span { start: 0, end: interval.numbers.ncols() }.n_windows(n_frames, stride);
+        let intervals: Vec<TrainingInterval> = long.par_iter().map(read).collect::<Result<_>>()?;
+        let of_interval = |(i, interval): (usize, &TrainingInterval)| {
+            let n_windows = Span { start: 0, end: interval.features.ncols() }.n_windows(n_frames, stride);
             (0..n_windows).map(move |window| (i, window * stride)).collect::<Vec<_>>()
         };
         let starts = intervals.iter().enumerate().flat_map(of_interval).collect();
@@ -86,7 +86,7 @@ impl Examples {
 
     /// All poses as normalised numbers [144, T] with the joints seen [48, T], interval by interval.
     pub fn poses(&self) -> impl Iterator<Item = (ArrayView2<'_, f32>, ArrayView2<'_, bool>)> {
-        self.intervals.iter().map(|interval| (interval.numbers.view(), interval.mask.view()))
+        self.intervals.iter().map(|interval| (interval.features.view(), interval.mask.view()))
     }
 
     /// Number of windows.
@@ -99,7 +99,7 @@ impl Examples {
     }
 
     /// The windows of these numbers (each below `len`) as one batch.
-    pub fn batch(&self, which: &[usize]) -> Result<Batch> {
+    pub fn batch(&self, which: &[usize]) -> Result<WindowBatch> {
         ensure!(!which.is_empty() && which.iter().all(|i| *i < self.len()), "windows {which:?} of {}", self.len());
         let n_mels = mel_frames(self.fps, self.n_frames);
         let (mut mels, mut poses, mut mask) = (Vec::new(), Vec::new(), Vec::new());
@@ -107,16 +107,16 @@ impl Examples {
             let interval = &self.intervals[interval];
             let first_mel = mel_frames(self.fps, start);
             take(&mut mels, &interval.mels, first_mel, n_mels);
-            take(&mut poses, &interval.numbers, start, self.n_frames);
+            take(&mut poses, &interval.features, start, self.n_frames);
             for seen in interval.mask.slice_axis(Axis(1), Slice::from(start..start + self.n_frames)).rows() {
                 (0..3).for_each(|_| mask.extend(seen.iter().map(|seen| f32::from(*seen))));
             }
         }
         let tensor = |values, rows, columns| Tensor::from_vec(values, (which.len(), rows, columns), &Device::Cpu);
-        Ok(Batch {
+        Ok(WindowBatch {
             mels: tensor(mels, mel::N_MELS, n_mels)?,
-            poses: tensor(poses, N_NUMBERS, self.n_frames)?,
-            mask: tensor(mask, N_NUMBERS, self.n_frames)?,
+            poses: tensor(poses, N_FEATURES, self.n_frames)?,
+            mask: tensor(mask, N_FEATURES, self.n_frames)?,
         })
     }
 }

@@ -8,8 +8,8 @@ use crate::nn::Mode;
 use crate::nn::lifter::body::BodyLifter;
 use crate::nn::lifter::temporal::Config;
 use crate::nn::params::Params;
-use crate::train::scene::body::{Filming, Scene, scenes};
-use crate::train::supervised::Lesson;
+use crate::train::scene::body::{FilmedScene, Filming, scenes};
+use crate::train::supervised::TrainingTask;
 use anyhow::Result;
 use candle_core::Tensor;
 use rand::Rng;
@@ -30,7 +30,7 @@ const MEASURED: usize = 120;
 const MEASURED_BRIEFLY: usize = 40;
 
 /// The lesson.
-pub struct BodyLesson {
+pub struct BodyLifterTask {
     params: Params,
     lifter: BodyLifter,
     takes: Vec<Take>,
@@ -40,7 +40,7 @@ pub struct BodyLesson {
     held_out: Vec<Set>,
 }
 
-impl BodyLesson {
+impl BodyLifterTask {
     /// A network with first values from `seed` that learns from `takes`; `held_out` takes are only measured on.
     pub fn new(mut takes: Vec<Take>, held_out: Vec<Set>, config: &Config, seed: u64) -> Result<Self> {
         takes.sort_by(|a, b| a.name.cmp(&b.name));
@@ -59,27 +59,27 @@ impl BodyLesson {
         self.takes.get(self.ends.partition_point(|&end| end <= at))
     }
 
-    fn scene(&self, rng: &mut ChaCha8Rng) -> Scene {
+    fn scene(&self, rng: &mut ChaCha8Rng) -> FilmedScene {
         let n_frames = rng.random_range(SCENE_FRAMES);
         if let (true, Some(take)) = (rng.random_bool(CAPTURED), self.take(rng)) {
             let other = if rng.random_bool(MIXED) { self.take(rng) } else { None };
             // a short take lasts for as long as it goes slowly
             for n_frames in [n_frames, *SCENE_FRAMES.start()] {
-                if let Some(scene) = Scene::of_take(take, other, Filming::Training, n_frames, rng) {
+                if let Some(scene) = FilmedScene::from_take(take, other, Filming::Training, n_frames, rng) {
                     return scene;
                 }
             }
         }
-        Scene::of_rule(Filming::Training, n_frames, rng)
+        FilmedScene::from_rule(Filming::Training, n_frames, rng)
     }
 }
 
-impl Lesson for BodyLesson {
+impl TrainingTask for BodyLifterTask {
     fn kind(&self) -> &'static str {
         "body-lifter"
     }
 
-    fn facts(&self) -> Value {
+    fn metadata(&self) -> Value {
         let mut hash = blake3::Hasher::new();
         for take in &self.takes {
             hash.update(take.name.as_bytes());
@@ -111,7 +111,7 @@ impl Lesson for BodyLesson {
         WINDOWS
     }
 
-    fn draw(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
+    fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
         let window = self.lifter.net().config().receptive_field();
         let mut scene = self.scene(rng);
         for (x, y) in x.chunks_exact_mut(N_IN * window).zip(y.chunks_exact_mut(N_OUT)) {

@@ -8,7 +8,7 @@ use crate::math::vec3::Vec3;
 use crate::motion::upper_body::{
     L_SHOULDER, L_WRIST, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, R_WRIST, Seen, metres_per_unit,
 };
-use crate::train::scene::body::Scene;
+use crate::train::scene::body::FilmedScene;
 use crate::train::scene::body_motion::Proportions;
 use crate::types::skeleton;
 use serde::Serialize;
@@ -19,7 +19,7 @@ const COUNTED: std::ops::Range<usize> = NOSE..R_HIP;
 
 /// Mean errors in mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Errors {
+pub struct BodyErrors {
     pub mpjpe: f64,
     pub p_mpjpe: f64,
     pub wrist: f64,
@@ -31,7 +31,7 @@ pub struct Errors {
     pub n_frames: usize,
 }
 
-impl fmt::Display for Errors {
+impl fmt::Display for BodyErrors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { mpjpe, p_mpjpe, wrist, wrist_depth, wrist_velocity, .. } = self;
         write!(
@@ -43,17 +43,17 @@ impl fmt::Display for Errors {
 
 /// A method's errors over scenes: `lift` gives a scene's poses (see `of_lifted`).
 pub fn of_method(
-    scenes: &[Scene],
-    lift: impl Fn(&Scene) -> anyhow::Result<Vec<Option<Pose>>>,
-) -> anyhow::Result<Errors> {
+    scenes: &[FilmedScene],
+    lift: impl Fn(&FilmedScene) -> anyhow::Result<Vec<Option<Pose>>>,
+) -> anyhow::Result<BodyErrors> {
     let lifted = scenes.iter().map(&lift).collect::<anyhow::Result<Vec<_>>>()?;
     Ok(of_lifted(scenes.iter().zip(lifted.iter().map(Vec::as_slice))))
 }
 
 /// The errors of poses lifted from scenes, a scene's in any one unit, the neck anywhere; a frame of `None` or with a
 /// point that is not finite does not count.
-pub fn of_lifted<'a>(scenes: impl Iterator<Item = (&'a Scene, &'a [Option<Pose>])>) -> Errors {
-    let (mut sum, mut n_steps) = (Errors::default(), 0);
+pub fn of_lifted<'a>(scenes: impl Iterator<Item = (&'a FilmedScene, &'a [Option<Pose>])>) -> BodyErrors {
+    let (mut sum, mut n_steps) = (BodyErrors::default(), 0);
     for (scene, poses) in scenes {
         let finite = |pose: &Pose| pose[COUNTED].iter().flatten().all(|v| v.is_finite());
         let lifted: Vec<Option<Pose>> = poses.iter().map(|pose| pose.filter(finite)).collect();
@@ -82,7 +82,7 @@ pub fn of_lifted<'a>(scenes: impl Iterator<Item = (&'a Scene, &'a [Option<Pose>]
     }
     let mean = |v: f64, n: usize| 1000.0 * v / n.max(1) as f64;
     let n_frames = sum.n_frames;
-    Errors {
+    BodyErrors {
         mpjpe: mean(sum.mpjpe, n_frames),
         p_mpjpe: mean(sum.p_mpjpe, n_frames),
         wrist: mean(sum.wrist, n_frames),
@@ -98,27 +98,27 @@ fn to_reference(pose: &Pose, grow: f64) -> Pose {
     pose.map(|p| vec3::scale(vec3::sub(p, neck), grow))
 }
 
-fn of_frame(p: &Pose, q: &Pose) -> Errors {
+fn of_frame(p: &Pose, q: &Pose) -> BodyErrors {
     let apart = |j: usize| vec3::norm(vec3::sub(p[j], q[j]));
     let with_neck = |pose: &Pose| pose[COUNTED].iter().copied().chain([[0.0; 3]]).collect::<Vec<Vec3>>();
     let (from, to) = (with_neck(p), with_neck(q));
     let aligned = procrustes::similarity(&from, &to);
     let after = |j: usize| vec3::norm(vec3::sub(aligned.map_or(from[j], |s| s.apply(from[j])), to[j]));
     let n = COUNTED.len() as f64;
-    Errors {
+    BodyErrors {
         mpjpe: COUNTED.map(apart).sum::<f64>() / n,
         p_mpjpe: (0..COUNTED.len()).map(after).sum::<f64>() / n,
         wrist: (apart(R_WRIST) + apart(L_WRIST)) / 2.0,
         wrist_depth: [R_WRIST, L_WRIST].map(|j| (p[j][2] - q[j][2]).abs()).iter().sum::<f64>() / 2.0,
-        ..Errors::default()
+        ..BodyErrors::default()
     }
 }
 
 /// The mean pose of scenes, of the reference size.
-pub fn mean_pose(scenes: &[Scene]) -> Pose {
+pub fn mean_pose(scenes: &[FilmedScene]) -> Pose {
     let mut mean: Pose = [[0.0; 3]; N_POINTS];
     let mut n = 0.0;
-    let of_scene = |scene: &Scene| {
+    let of_scene = |scene: &FilmedScene| {
         let grow = metres_per_unit(&scene.truth);
         scene.truth.iter().map(|pose| to_reference(pose, grow)).collect::<Vec<Pose>>()
     };
@@ -132,7 +132,7 @@ pub fn mean_pose(scenes: &[Scene]) -> Pose {
 }
 
 /// x and y of a clean scene in metres at the neck's distance, the neck at 0.
-fn flat(scene: &Scene) -> Vec<Pose> {
+fn flat(scene: &FilmedScene) -> Vec<Pose> {
     let frame = |seen: &Seen| {
         let points: Pose = seen.map(|p| {
             let [x, y] = p.unwrap_or_default();
@@ -145,7 +145,7 @@ fn flat(scene: &Scene) -> Vec<Pose> {
 }
 
 /// Every point at its mean depth (of `mean`), x and y as seen. Needs a clean scene and is told its scale.
-pub fn with_mean_depth(scene: &Scene, mean: &Pose) -> Vec<Option<Pose>> {
+pub fn with_mean_depth(scene: &FilmedScene, mean: &Pose) -> Vec<Option<Pose>> {
     let deep = |pose: Pose| Some(std::array::from_fn(|j| [pose[j][0], pose[j][1], mean[j][2]]));
     flat(scene).into_iter().map(deep).collect()
 }
@@ -153,7 +153,7 @@ pub fn with_mean_depth(scene: &Scene, mean: &Pose) -> Vec<Option<Pose>> {
 /// Depth solved from the bone lengths of the common adult: each joint lies where its line of sight meets the sphere
 /// around its parent, arms on the side of the camera; the shoulders turn to the side that the nose points to. Needs a
 /// clean scene and is told the camera and where the neck is.
-pub fn with_bone_depth(scene: &Scene) -> Vec<Option<Pose>> {
+pub fn with_bone_depth(scene: &FilmedScene) -> Vec<Option<Pose>> {
     let bones = Proportions::MEAN;
     let solve = |seen: &Seen| {
         let rays = seen.map(|p| p.map(|[x, y]| [f64::from(x) / scene.focal_px, f64::from(y) / scene.focal_px, 1.0]));
@@ -194,9 +194,10 @@ mod tests {
     #[test]
     fn the_truth_in_another_size_is_without_error_and_baselines_are_not() -> anyhow::Result<()> {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
-        let scenes: Vec<Scene> = (0..8).map(|_| Scene::of_rule(Filming::Clean, 20, &mut rng)).collect();
-        let larger =
-            |s: &Scene| Ok(s.truth.iter().map(|p| Some(p.map(|q| vec3::add(vec3::scale(q, 7.0), [1.0; 3])))).collect());
+        let scenes: Vec<FilmedScene> = (0..8).map(|_| FilmedScene::from_rule(Filming::Clean, 20, &mut rng)).collect();
+        let larger = |s: &FilmedScene| {
+            Ok(s.truth.iter().map(|p| Some(p.map(|q| vec3::add(vec3::scale(q, 7.0), [1.0; 3])))).collect())
+        };
         let none = of_method(&scenes, larger)?;
         assert!(none.mpjpe < 1e-6 && none.p_mpjpe < 1e-6, "{none}");
         let mean = mean_pose(&scenes);

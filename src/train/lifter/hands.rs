@@ -4,8 +4,8 @@ use crate::motion::view::hand::{HandView, N_IN, N_OUT};
 use crate::nn::Mode;
 use crate::nn::lifter::hand::{Config, HandLifter, NAME};
 use crate::nn::params::Params;
-use crate::train::scene::hand::{errors, sample};
-use crate::train::supervised::Lesson;
+use crate::train::scene::hand::{errors, sample_hand};
+use crate::train::supervised::TrainingTask;
 use crate::types::pose2d::N_HAND;
 use crate::types::skeleton::Side;
 use anyhow::Result;
@@ -17,12 +17,12 @@ use serde_json::{Value, json};
 const MEASURED: usize = 4000;
 
 /// The lesson.
-pub struct HandLesson {
+pub struct HandLifterTask {
     params: Params,
     lifter: HandLifter,
 }
 
-impl HandLesson {
+impl HandLifterTask {
     /// A network with `hidden` numbers in its layers and first values from `seed`.
     pub fn new(hidden: usize, seed: u64) -> Result<Self> {
         let mut params = Params::new(seed);
@@ -32,12 +32,12 @@ impl HandLesson {
     }
 }
 
-impl Lesson for HandLesson {
+impl TrainingTask for HandLifterTask {
     fn kind(&self) -> &'static str {
         "hand-lifter"
     }
 
-    fn facts(&self) -> Value {
+    fn metadata(&self) -> Value {
         json!({ "config": self.lifter.config() })
     }
 
@@ -53,9 +53,9 @@ impl Lesson for HandLesson {
         vec![1.0; N_HAND]
     }
 
-    fn draw(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
+    fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
         let (drawn, view) = loop {
-            let drawn = sample(rng);
+            let drawn = sample_hand(rng);
             if let Some(view) = HandView::of(&drawn.seen, Side::Right) {
                 break (drawn, view);
             }

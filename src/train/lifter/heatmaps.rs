@@ -5,9 +5,9 @@ use crate::motion::view::heatmaps::{Crop, PLACES, canonical, score_maps};
 use crate::nn::Mode;
 use crate::nn::lifter::heatmap::{HeatmapLifter, NAME, right_sides};
 use crate::nn::params::Params;
-use crate::train::scene::hand::{errors, sample};
+use crate::train::scene::hand::{errors, sample_hand};
 use crate::train::scene::hand_shape::normal;
-use crate::train::supervised::Lesson;
+use crate::train::supervised::TrainingTask;
 use crate::types::pose2d::N_HAND;
 use crate::types::skeleton::Side;
 use anyhow::Result;
@@ -25,12 +25,12 @@ const N_ROWS: usize = N_HAND + 3;
 const MEASURED: usize = 300;
 
 /// The lesson.
-pub struct HeatmapLesson {
+pub struct HeatmapLifterTask {
     params: Params,
     lifter: HeatmapLifter,
 }
 
-impl HeatmapLesson {
+impl HeatmapLifterTask {
     /// The networks with first values from `seed`.
     pub fn new(seed: u64) -> Result<Self> {
         let mut params = Params::new(seed);
@@ -43,12 +43,12 @@ impl HeatmapLesson {
     }
 }
 
-impl Lesson for HeatmapLesson {
+impl TrainingTask for HeatmapLifterTask {
     fn kind(&self) -> &'static str {
         KIND
     }
 
-    fn facts(&self) -> Value {
+    fn metadata(&self) -> Value {
         json!({ "config": { "places": PLACES, "points": N_HAND } })
     }
 
@@ -65,9 +65,9 @@ impl Lesson for HeatmapLesson {
     }
 
     /// The crop is up to 1.2 times as large as it need be and its centre off by 10 px (sd) of its 256.
-    fn draw(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
+    fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
         let (drawn, crop, (own, axes)) = loop {
-            let drawn = sample(rng);
+            let drawn = sample_hand(rng);
             if let (Some(crop), Some(target)) = (Crop::of(&drawn.seen), canonical(&drawn.truth, true)) {
                 break (drawn, crop, target);
             }
@@ -105,15 +105,15 @@ mod tests {
 
     #[test]
     fn targets_are_hands_in_their_own_frame_and_a_right_answer_costs_nothing() -> Result<()> {
-        let lesson = HeatmapLesson::new(1)?;
+        let training_task = HeatmapLifterTask::new(1)?;
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let (mut x, mut y) = (vec![0.0; N_MAPS], vec![0.0; 3 * N_ROWS]);
-        lesson.draw(&mut rng, &mut x, &mut y);
+        training_task.sample(&mut rng, &mut x, &mut y);
         assert!(x.iter().all(|v| (0.0..=1.0).contains(v)) && x.iter().any(|v| *v > 0.9));
         assert!(y[3 * 9].abs() + y[3 * 9 + 2].abs() + y[3 * 17 + 2].abs() < 1e-6 && y[3 * 9 + 1] > 0.5);
         let y = Tensor::from_vec(y, (1, N_ROWS, 3), &Device::Cpu)?;
-        let weights = Tensor::from_vec(lesson.weights(), (1, N_ROWS), &Device::Cpu)?;
-        assert_eq!(lesson.loss(&y, &y, &weights)?.to_scalar::<f32>()?, 0.0);
+        let weights = Tensor::from_vec(training_task.weights(), (1, N_ROWS), &Device::Cpu)?;
+        assert_eq!(training_task.loss(&y, &y, &weights)?.to_scalar::<f32>()?, 0.0);
         Ok(())
     }
 }

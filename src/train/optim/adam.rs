@@ -2,8 +2,8 @@
 //! gradient's norm. One pass over the memory of each tensor; the same bits for any number of threads.
 
 use super::adam_fallback;
-use super::adam_fallback::Numbers;
-use crate::nn::cpu::thread_team::each;
+use super::adam_fallback::AdamScalars;
+use crate::nn::cpu::thread_team::parallel_for;
 use crate::nn::params::Params;
 use anyhow::{Context, ensure};
 use candle_core::backprop::GradStore;
@@ -38,25 +38,25 @@ pub struct Adam {
     config: Config,
     /// Updates done.
     step: u64,
-    slots: Vec<Slot>,
+    slots: Vec<AdamSlot>,
 }
 
-struct Slot {
+struct AdamSlot {
     name: String,
     var: Var,
-    moments: Place,
+    moments: MomentStorage,
 }
 
 /// Where the moments are.
-enum Place {
-    Cpu(RefCell<Moments>),
+enum MomentStorage {
+    Cpu(RefCell<AdamMoments>),
     /// Elsewhere, beside their tensor.
-    Device(adam_fallback::Moments),
+    Device(adam_fallback::DeviceMoments),
 }
 
 /// First moment, second moment, largest second moment (empty without AMSGrad).
 #[derive(Clone, Default)]
-struct Moments {
+struct AdamMoments {
     first: Vec<f32>,
     second: Vec<f32>,
     largest: Vec<f32>,
@@ -65,16 +65,16 @@ struct Moments {
 impl Adam {
     /// Moments of zero for every trainable tensor (f32).
     pub fn new(params: &Params, config: Config) -> Result<Self> {
-        let moments = |var: &Var| -> Result<Place> {
+        let moments = |var: &Var| -> Result<MomentStorage> {
             if !var.device().is_cpu() {
-                return Ok(Place::Device(adam_fallback::Moments::zeros(var, config.amsgrad)?));
+                return Ok(MomentStorage::Device(adam_fallback::DeviceMoments::zeros(var, config.amsgrad)?));
             }
             let zeros = vec![0.0; var.elem_count()];
             let largest = if config.amsgrad { zeros.clone() } else { Vec::new() };
-            Ok(Place::Cpu(RefCell::new(Moments { first: zeros.clone(), second: zeros, largest })))
+            Ok(MomentStorage::Cpu(RefCell::new(AdamMoments { first: zeros.clone(), second: zeros, largest })))
         };
-        let slot = |(name, var): (&str, &Var)| -> Result<Slot> {
-            Ok(Slot { name: name.to_owned(), var: var.clone(), moments: moments(var)? })
+        let slot = |(name, var): (&str, &Var)| -> Result<AdamSlot> {
+            Ok(AdamSlot { name: name.to_owned(), var: var.clone(), moments: moments(var)? })
         };
         Ok(Self { config, step: 0, slots: params.trainables().map(slot).collect::<Result<_>>()? })
     }
@@ -102,7 +102,7 @@ impl Adam {
         let Config { beta1, beta2, eps, max_norm, .. } = self.config;
         let age = self.step.min(i32::MAX as u64) as i32;
         let scale = max_norm.map_or(1.0, |max| if norm > max { max / norm } else { 1.0 });
-        let numbers = Numbers {
+        let scalars = AdamScalars {
             beta1: beta1 as f32,
             beta2: beta2 as f32,
             eps: eps as f32,
@@ -113,8 +113,8 @@ impl Adam {
         for (slot, gradient) in self.slots.iter_mut().zip(&gradients) {
             let Some(gradient) = gradient else { continue };
             match &mut slot.moments {
-                Place::Cpu(moments) => slot.var.inplace_op2(gradient, &Update { moments, numbers })?,
-                Place::Device(moments) => moments.update(&slot.var, gradient, &numbers)?,
+                MomentStorage::Cpu(moments) => slot.var.inplace_op2(gradient, &AdamUpdate { moments, scalars })?,
+                MomentStorage::Device(moments) => moments.update(&slot.var, gradient, &scalars)?,
             }
         }
         Ok(norm)
@@ -148,15 +148,15 @@ impl Adam {
                 n => values(format!("{prefix}{}.{kind}", slot.name), n),
             };
             match &mut slot.moments {
-                Place::Cpu(moments) => {
+                MomentStorage::Cpu(moments) => {
                     let moments = moments.get_mut();
-                    *moments = Moments {
+                    *moments = AdamMoments {
                         first: of_kind("first", moments.first.len())?,
                         second: of_kind("second", moments.second.len())?,
                         largest: of_kind("largest", moments.largest.len())?,
                     };
                 }
-                Place::Device(moments) => moments.load(of_kind)?,
+                MomentStorage::Device(moments) => moments.load(of_kind)?,
             }
         }
         self.step = ((halves[0] as u64) << 24) + halves[1] as u64;
@@ -164,12 +164,12 @@ impl Adam {
     }
 }
 
-impl Slot {
+impl AdamSlot {
     /// The moments that there are, by kind, on the CPU.
     fn kinds(&self) -> Result<Vec<(&'static str, Tensor)>> {
         let moments = match &self.moments {
-            Place::Cpu(moments) => moments.borrow(),
-            Place::Device(moments) => return moments.tensors(),
+            MomentStorage::Cpu(moments) => moments.borrow(),
+            MomentStorage::Device(moments) => return moments.tensors(),
         };
         let kinds = [("first", &moments.first), ("second", &moments.second), ("largest", &moments.largest)];
         let there = kinds.into_iter().filter(|(_, values)| !values.is_empty());
@@ -188,18 +188,18 @@ fn sum_of_squares(values: &[f32]) -> f64 {
     };
     let pieces: Vec<&[f32]> = values.chunks(GRAIN).collect();
     let sums: Vec<OnceLock<f64>> = pieces.iter().map(|_| OnceLock::new()).collect();
-    each(pieces.len(), |piece| {
+    parallel_for(pieces.len(), |piece| {
         let _ = sums[piece].set(of_piece(pieces[piece]));
     });
     sums.iter().filter_map(OnceLock::get).sum()
 }
 
-struct Update<'a> {
-    moments: &'a RefCell<Moments>,
-    numbers: Numbers,
+struct AdamUpdate<'a> {
+    moments: &'a RefCell<AdamMoments>,
+    scalars: AdamScalars,
 }
 
-impl InplaceOp2 for Update<'_> {
+impl InplaceOp2 for AdamUpdate<'_> {
     fn name(&self) -> &'static str {
         "adam"
     }
@@ -209,7 +209,7 @@ impl InplaceOp2 for Update<'_> {
         let Some((start, end)) = layout.contiguous_offsets() else { candle_core::bail!("adam: variable in pieces") };
         let grad = crate::nn::cpu::tensor::slice::<f32>(grad, grad_layout)?;
         let moments = &mut *self.moments.borrow_mut();
-        let Numbers { beta1, beta2, eps, scale, rate, correction } = self.numbers;
+        let AdamScalars { beta1, beta2, eps, scale, rate, correction } = self.scalars;
         let update = |value: &mut f32, grad: &f32, first: &mut f32, second: &mut f32, largest: Option<&mut f32>| {
             let grad = grad * scale;
             *first = beta1 * *first + (1.0 - beta1) * grad;
@@ -227,17 +227,17 @@ impl InplaceOp2 for Update<'_> {
         let both = values.zip(moments.first.chunks_mut(GRAIN)).zip(moments.second.chunks_mut(GRAIN));
         let mut largest = moments.largest.chunks_mut(GRAIN);
         let pieces: Vec<_> = both.map(|piece| Mutex::new((piece, largest.next()))).collect();
-        each(pieces.len(), |piece| {
+        parallel_for(pieces.len(), |piece| {
             // Every piece is taken once: the lock is free.
             let Ok(mut piece) = pieces[piece].lock() else { return };
             let piece = &mut *piece;
             let (((values, grad), first), second) = &mut piece.0;
-            let numbers = values.iter_mut().zip(grad.iter()).zip(first.iter_mut().zip(second.iter_mut()));
+            let scalars = values.iter_mut().zip(grad.iter()).zip(first.iter_mut().zip(second.iter_mut()));
             match &mut piece.1 {
                 Some(largest) => {
-                    numbers.zip(largest.iter_mut()).for_each(|(((v, g), (f, s)), l)| update(v, g, f, s, Some(l)));
+                    scalars.zip(largest.iter_mut()).for_each(|(((v, g), (f, s)), l)| update(v, g, f, s, Some(l)));
                 }
-                None => numbers.for_each(|((v, g), (f, s))| update(v, g, f, s, None)),
+                None => scalars.for_each(|((v, g), (f, s))| update(v, g, f, s, None)),
             }
         });
         Ok(())
@@ -293,23 +293,24 @@ mod tests {
     fn the_composed_update_is_the_own_one() -> anyhow::Result<()> {
         for amsgrad in [false, true] {
             let config = Config { amsgrad, max_norm: Some(2.0), ..Config::default() };
-            let walk = |composed: bool| -> anyhow::Result<Vec<f32>> {
+            let descend_through = |by_fallback: bool| -> anyhow::Result<Vec<f32>> {
                 let mut params = Params::new(3);
                 let w = params.trainable("w", &[5, 4], Init::Glorot)?;
                 let mut adam = Adam::new(&params, config)?;
                 for step in 0..6 {
-                    if composed && step % 3 == 0 {
+                    if by_fallback && step % 3 == 0 {
                         // Elsewhere from the beginning, and again from what was saved.
                         let saved = adam.tensors("")?;
-                        adam.slots[0].moments = Place::Device(adam_fallback::Moments::zeros(&w, amsgrad)?);
+                        adam.slots[0].moments =
+                            MomentStorage::Device(adam_fallback::DeviceMoments::zeros(&w, amsgrad)?);
                         adam.load("", &saved)?;
                     }
                     adam.step(&(&w * (f64::from(step) - 2.5))?.sqr()?.sum_all()?.backward()?, 0.1)?;
                 }
                 Ok(w.flatten_all()?.to_vec1()?)
             };
-            let (own, composed) = (walk(false)?, walk(true)?);
-            assert!(own.iter().zip(&composed).all(|(a, b)| (a - b).abs() < 1e-6), "{own:?} {composed:?}");
+            let (own, by_fallback) = (descend_through(false)?, descend_through(true)?);
+            assert!(own.iter().zip(&by_fallback).all(|(a, b)| (a - b).abs() < 1e-6), "{own:?} {by_fallback:?}");
         }
         Ok(())
     }

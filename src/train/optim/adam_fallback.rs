@@ -4,13 +4,13 @@
 use candle_core::{Device, Result, Tensor, Var};
 
 /// First moment, second moment, largest second moment (with AMSGrad), each of the tensor's shape and on its device.
-pub struct Moments {
+pub struct DeviceMoments {
     first: Tensor,
     second: Tensor,
     largest: Option<Tensor>,
 }
 
-impl Moments {
+impl DeviceMoments {
     pub fn zeros(like: &Tensor, amsgrad: bool) -> Result<Self> {
         let largest = if amsgrad { Some(like.zeros_like()?.detach()) } else { None };
         Ok(Self { first: like.zeros_like()?.detach(), second: like.zeros_like()?.detach(), largest })
@@ -35,8 +35,8 @@ impl Moments {
     }
 
     /// Moves `var` against `grad`.
-    pub fn update(&mut self, var: &Var, grad: &Tensor, numbers: &Numbers) -> Result<()> {
-        let Numbers { beta1, beta2, eps, scale, rate, correction } = *numbers;
+    pub fn update(&mut self, var: &Var, grad: &Tensor, numbers: &AdamScalars) -> Result<()> {
+        let AdamScalars { beta1, beta2, eps, scale, rate, correction } = *numbers;
         let of = f64::from;
         let grad = (grad.detach() * of(scale))?;
         self.first = ((&self.first * of(beta1))? + (&grad * of(1.0 - beta1))?)?;
@@ -60,7 +60,7 @@ pub fn sum_of_squares(grad: &Tensor) -> Result<f64> {
 
 /// The numbers of one update.
 #[derive(Clone, Copy)]
-pub struct Numbers {
+pub struct AdamScalars {
     pub beta1: f32,
     pub beta2: f32,
     pub eps: f32,

@@ -20,7 +20,7 @@ pub const FPS: f64 = 15.0;
 
 /// What was filmed: the truth in metres and camera axes, and the keypoints.
 #[derive(Clone, Debug)]
-pub struct Scene {
+pub struct FilmedScene {
     pub truth: Vec<Pose>,
     pub seen: Vec<Seen>,
     /// Which side the body is seen from on average, radians; 0: from ahead.
@@ -43,10 +43,10 @@ pub enum Filming {
     Clean,
 }
 
-impl Scene {
+impl FilmedScene {
     /// Captured motion: a random stretch of `take`, seen from a random side within 60 degrees. In training an arm may
     /// come from `other`: what the two arms do together is seldom the same twice. `None` when the take is too short.
-    pub fn of_take(
+    pub fn from_take(
         take: &Take,
         other: Option<&Take>,
         filming: Filming,
@@ -58,7 +58,7 @@ impl Scene {
         if let Some(other) = other.and_then(|other| stretch(other, training, n_frames, rng)) {
             poses.iter_mut().zip(&other).for_each(|(pose, other)| take_arm(pose, other));
         }
-        let bones = if training { Proportions::draw(rng) } else { Proportions::MEAN };
+        let bones = if training { Proportions::sample(rng) } else { Proportions::MEAN };
         poses.iter_mut().for_each(|pose| *pose = with_bones(pose, &bones));
         if training {
             let glance = turn(rng.random_range(-0.5..0.5), rng.random_range(-0.2..0.2), 0.0);
@@ -68,7 +68,7 @@ impl Scene {
     }
 
     /// Motion made by rule.
-    pub fn of_rule(filming: Filming, n_frames: usize, rng: &mut ChaCha8Rng) -> Self {
+    pub fn from_rule(filming: Filming, n_frames: usize, rng: &mut ChaCha8Rng) -> Self {
         let poses = body_motion::gesture(rng, n_frames, 1.0 / FPS);
         Self::filmed(poses, filming, rng)
     }
@@ -205,14 +205,14 @@ const MEASURED_SEED: u64 = 20_000;
 
 /// `n` scenes to measure errors on, of `takes` in turn or, when there are none, of motion made by rule: the same ones
 /// whenever asked. Takes shorter than a scene are left out; nothing when all are.
-pub fn scenes(takes: &[Take], filming: Filming, n: usize) -> Vec<Scene> {
+pub fn scenes(takes: &[Take], filming: Filming, n: usize) -> Vec<FilmedScene> {
     let mut rng = ChaCha8Rng::seed_from_u64(MEASURED_SEED);
     if takes.is_empty() {
-        return (0..n).map(|_| Scene::of_rule(filming, MEASURED_FRAMES, &mut rng)).collect();
+        return (0..n).map(|_| FilmedScene::from_rule(filming, MEASURED_FRAMES, &mut rng)).collect();
     }
     let long: Vec<&Take> = takes.iter().filter(|t| t.n_frames_at(FPS) >= MEASURED_FRAMES).collect();
     (0..if long.is_empty() { 0 } else { n })
-        .filter_map(|i| Scene::of_take(long[i % long.len()], None, filming, MEASURED_FRAMES, &mut rng))
+        .filter_map(|i| FilmedScene::from_take(long[i % long.len()], None, filming, MEASURED_FRAMES, &mut rng))
         .collect()
 }
 
@@ -276,7 +276,7 @@ mod tests {
     fn a_clean_scene_is_its_own_projection() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         for _ in 0..20 {
-            let scene = Scene::of_take(&take(), None, Filming::Clean, 27, &mut rng).unwrap();
+            let scene = FilmedScene::from_take(&take(), None, Filming::Clean, 27, &mut rng).unwrap();
             for (truth, seen) in scene.truth.iter().zip(&scene.seen) {
                 assert!(truth[R_SHOULDER][0] < truth[L_SHOULDER][0] && truth[NOSE][1] < 0.0);
                 let bone = vec3::norm(vec3::sub(truth[R_ELBOW], truth[R_WRIST]));
@@ -287,7 +287,7 @@ mod tests {
                 assert!((wide / true_wide - 1.0).abs() < 0.35, "{wide} {true_wide}");
             }
         }
-        assert!(Scene::of_take(&take(), None, Filming::Clean, 200, &mut rng).is_none());
+        assert!(FilmedScene::from_take(&take(), None, Filming::Clean, 200, &mut rng).is_none());
     }
 
     #[test]
@@ -295,7 +295,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let (mut missing, mut hips, n) = (0, 0, 300);
         for _ in 0..n {
-            let scene = Scene::of_rule(Filming::Drop, 27, &mut rng);
+            let scene = FilmedScene::from_rule(Filming::Drop, 27, &mut rng);
             missing += scene.seen.iter().flat_map(|f| &f[..R_HIP]).filter(|p| p.is_none()).count();
             hips += usize::from(scene.seen.iter().all(|f| f[R_HIP].is_none()));
         }

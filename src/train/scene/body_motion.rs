@@ -28,7 +28,7 @@ impl Proportions {
 
     /// Somebody else: lengths against each other vary by 5 to 6 % among adults, and detectors and captures place joints
     /// a little differently.
-    pub fn draw(rng: &mut ChaCha8Rng) -> Self {
+    pub fn sample(rng: &mut ChaCha8Rng) -> Self {
         let mut about = |mean: f64, share: f64| {
             let z: f64 = rng.sample(rand_distr::StandardNormal);
             mean * (1.0 + share * z.clamp(-2.5, 2.5))
@@ -46,24 +46,24 @@ impl Proportions {
 
 /// Where a wrist may rest, relative to the neck, for the arm on the +x side: ranges of x, y, z in metres. The speaker
 /// faces -z. On measured talkers the mean wrist is 0.10 to 0.19 m before the neck, so the ranges begin near the body.
-type Place = [(f64, f64); 3];
-const LAP: Place = [(-0.08, 0.24), (0.36, 0.56), (-0.38, -0.08)];
-const DESK: Place = [(-0.10, 0.32), (0.20, 0.42), (-0.44, -0.12)];
-const FRONT: Place = [(-0.14, 0.42), (-0.04, 0.38), (-0.42, -0.05)];
-const RAISED: Place = [(-0.02, 0.48), (-0.48, 0.02), (-0.45, 0.0)];
-const WIDE: Place = [(0.28, 0.66), (-0.12, 0.42), (-0.36, 0.08)];
-const HANGING: Place = [(0.16, 0.34), (0.44, 0.58), (-0.14, 0.12)];
+type WristRegion = [(f64, f64); 3];
+const LAP: WristRegion = [(-0.08, 0.24), (0.36, 0.56), (-0.38, -0.08)];
+const DESK: WristRegion = [(-0.10, 0.32), (0.20, 0.42), (-0.44, -0.12)];
+const FRONT: WristRegion = [(-0.14, 0.42), (-0.04, 0.38), (-0.42, -0.05)];
+const RAISED: WristRegion = [(-0.02, 0.48), (-0.48, 0.02), (-0.45, 0.0)];
+const WIDE: WristRegion = [(0.28, 0.66), (-0.12, 0.42), (-0.36, 0.08)];
+const HANGING: WristRegion = [(0.16, 0.34), (0.44, 0.58), (-0.14, 0.12)];
 /// Pointing and stretching: most of it lies out of reach, so that the arm is straight.
-const REACH: Place = [(-0.05, 0.75), (-0.50, 0.42), (-0.62, 0.05)];
-const FACE: Place = [(-0.10, 0.14), (-0.24, 0.02), (-0.26, -0.08)];
-const HIP: Place = [(0.16, 0.30), (0.36, 0.52), (-0.10, 0.10)];
-const CROSSED: Place = [(-0.22, -0.04), (0.18, 0.36), (-0.28, -0.10)];
+const REACH: WristRegion = [(-0.05, 0.75), (-0.50, 0.42), (-0.62, 0.05)];
+const FACE: WristRegion = [(-0.10, 0.14), (-0.24, 0.02), (-0.26, -0.08)];
+const HIP: WristRegion = [(0.16, 0.30), (0.36, 0.52), (-0.10, 0.10)];
+const CROSSED: WristRegion = [(-0.22, -0.04), (0.18, 0.36), (-0.28, -0.10)];
 
 /// What a speaker does: where the hands rest, where they go, how often they rest, and how far back (+z) elbows are
 /// carried: seated speakers carry them forward, over desk or lap.
 struct Habit {
-    rest: Place,
-    gestures: &'static [Place],
+    rest: WristRegion,
+    gestures: &'static [WristRegion],
     rests: f64,
     back: (f64, f64),
 }
@@ -83,30 +83,30 @@ const HABITS: [Habit; 7] = [
 
 /// `n_frames` poses, `frame_secs` apart, metres, camera axes, the speaker facing a camera in front (-z).
 pub fn gesture(rng: &mut ChaCha8Rng, n_frames: usize, frame_secs: f64) -> Vec<Pose> {
-    let body = Proportions::draw(rng);
+    let body = Proportions::sample(rng);
     let habit = &HABITS[rng.random_range(0..HABITS.len())];
     let secs = n_frames as f64 * frame_secs;
-    let left = Track::draw(rng, habit, secs);
+    let left = WristPath::sample(rng, habit, secs);
     let right = match rng.random_range(0..10) {
         0..4 => left.copied(rng),
-        _ => Track::draw(rng, habit, secs),
+        _ => WristPath::sample(rng, habit, secs),
     };
     let joined = rng.random_bool(0.12);
-    let swivel = Swivel::draw(rng, habit.back);
-    let sway: [Sway; 9] = [
-        Sway::draw(rng, 0.14),
-        Sway::draw(rng, 0.10),
-        Sway::draw(rng, 0.08),
-        Sway::draw(rng, 0.55),
-        Sway::draw(rng, 0.30),
-        Sway::draw(rng, 0.2),
-        Sway::draw(rng, 0.025),
-        Sway::draw(rng, 0.02),
-        Sway::draw(rng, 0.04),
+    let swivel = Swivel::sample(rng, habit.back);
+    let sway: [SlowSwing; 9] = [
+        SlowSwing::sample(rng, 0.14),
+        SlowSwing::sample(rng, 0.10),
+        SlowSwing::sample(rng, 0.08),
+        SlowSwing::sample(rng, 0.55),
+        SlowSwing::sample(rng, 0.30),
+        SlowSwing::sample(rng, 0.2),
+        SlowSwing::sample(rng, 0.025),
+        SlowSwing::sample(rng, 0.02),
+        SlowSwing::sample(rng, 0.04),
     ];
     let lean = rng.random_range(-0.1..0.6);
     let reach = rng.random_range(0.0..0.06);
-    let beat = Beat::draw(rng);
+    let beat = BeatStroke::sample(rng);
     (0..n_frames)
         .map(|frame| {
             let t = frame as f64 * frame_secs;
@@ -153,13 +153,13 @@ fn bend(shoulder: Vec3, wrist: Vec3, upper: f64, fore: f64, pole: Vec3) -> (Vec3
 }
 
 /// A wrist's way for the +x arm: it leaves for each place at one time and is there at another.
-struct Track {
+struct WristPath {
     start: Vec3,
     moves: Vec<(f64, f64, Vec3)>,
 }
 
-impl Track {
-    fn draw(rng: &mut ChaCha8Rng, habit: &Habit, secs: f64) -> Self {
+impl WristPath {
+    fn sample(rng: &mut ChaCha8Rng, habit: &Habit, secs: f64) -> Self {
         let pace = rng.random_range(0.8..1.7);
         let place = |rng: &mut ChaCha8Rng| {
             let rests = rng.random_bool(habit.rests);
@@ -203,15 +203,15 @@ impl Track {
 
 /// Which way elbows point: down, more or less outwards, a little back or forward.
 struct Swivel {
-    out: Sway,
-    back: Sway,
+    out: SlowSwing,
+    back: SlowSwing,
     mean_out: f64,
     mean_back: f64,
 }
 
 impl Swivel {
-    fn draw(rng: &mut ChaCha8Rng, mean_back: (f64, f64)) -> Self {
-        let (out, back) = (Sway::draw(rng, 0.25), Sway::draw(rng, 0.25));
+    fn sample(rng: &mut ChaCha8Rng, mean_back: (f64, f64)) -> Self {
+        let (out, back) = (SlowSwing::sample(rng, 0.25), SlowSwing::sample(rng, 0.25));
         let (least, most) = mean_back;
         Self { out, back, mean_out: rng.random_range(0.0..1.1), mean_back: rng.random_range(least..most) }
     }
@@ -222,15 +222,15 @@ impl Swivel {
 }
 
 /// A slow swing about a mean.
-struct Sway {
+struct SlowSwing {
     mean: f64,
     swing: f64,
     rate: f64,
     phase: f64,
 }
 
-impl Sway {
-    fn draw(rng: &mut ChaCha8Rng, most: f64) -> Self {
+impl SlowSwing {
+    fn sample(rng: &mut ChaCha8Rng, most: f64) -> Self {
         let (mean, swing) = (rng.random_range(-most..most), 0.5 * rng.random_range(0.0..most));
         Self { mean, swing, rate: TAU * rng.random_range(0.05..0.6), phase: rng.random_range(0.0..TAU) }
     }
@@ -241,14 +241,14 @@ impl Sway {
 }
 
 /// Small quick strokes on top of a place, in time with speech.
-struct Beat {
+struct BeatStroke {
     reach: Vec3,
     rate: f64,
     phase: f64,
 }
 
-impl Beat {
-    fn draw(rng: &mut ChaCha8Rng) -> Self {
+impl BeatStroke {
+    fn sample(rng: &mut ChaCha8Rng) -> Self {
         let most = if rng.random_bool(0.4) { rng.random_range(0.005..0.05) } else { 0.004 };
         let reach = std::array::from_fn(|_| rng.random_range(-most..most));
         Self { reach, rate: TAU * rng.random_range(0.8..3.5), phase: rng.random_range(0.0..TAU) }

@@ -1,6 +1,6 @@
 //! Hands made by rule before a camera, as the hand lifters learn them, and the errors on such hands.
 
-use super::hand_shape::{any_turn, draw, normal};
+use super::hand_shape::{normal, random_rotation, sample_shape};
 use crate::math::order;
 use crate::math::procrustes;
 use crate::math::vec3;
@@ -12,15 +12,15 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// A hand in px of the picture with the wrist at 0, and what a detector says of it.
-pub struct Sample {
+pub struct HandSample {
     pub truth: Hand,
     pub seen: SeenHand,
 }
 
 /// A hand from any side at 5 to 20 of its lengths, in px; noise 2 % of the palm more or less, a part of it common to
 /// a finger; sometimes a finger that the detector can only guess, sometimes points missing.
-pub fn sample(rng: &mut ChaCha8Rng) -> Sample {
-    let (shape, turn) = (draw(rng), any_turn(rng));
+pub fn sample_hand(rng: &mut ChaCha8Rng) -> HandSample {
+    let (shape, turn) = (sample_shape(rng), random_rotation(rng));
     let turned = shape.map(|p| turn.turn(p));
     let distance = 0.19 * rng.random_range(5.0..20.0);
     let px_per_metre: f64 = 1000.0;
@@ -42,7 +42,7 @@ pub fn sample(rng: &mut ChaCha8Rng) -> Sample {
         *point = (!gone[j]).then_some(at.map(|v| v as f32));
     }
     // the view hangs on the wrist that is seen, the truth on the true one: the same within the noise
-    Sample { truth: turned.map(|p| vec3::scale(p, px_per_metre)), seen }
+    HandSample { truth: turned.map(|p| vec3::scale(p, px_per_metre)), seen }
 }
 
 /// Points that a detector does not give: mostly none, else some anywhere, a finger, all tips, or all knuckles but the
@@ -69,7 +69,7 @@ fn missing(rng: &mut ChaCha8Rng) -> [bool; N_HAND] {
 pub fn errors(lift: impl Fn(&[SeenHand]) -> Result<Vec<Option<Hand>>>, n: usize, brief: bool) -> Result<Vec<String>> {
     let mut rng = ChaCha8Rng::seed_from_u64(20_001);
     let n = if brief { n / 10 } else { n };
-    let samples: Vec<Sample> = (0..n).map(|_| sample(&mut rng)).collect();
+    let samples: Vec<HandSample> = (0..n).map(|_| sample_hand(&mut rng)).collect();
     let seen: Vec<SeenHand> = samples.iter().map(|s| s.seen).collect();
     let (mut with, mut hands) = (Vec::new(), Vec::new());
     for (sample, hand) in samples.iter().zip(lift(&seen)?) {
@@ -78,16 +78,16 @@ pub fn errors(lift: impl Fn(&[SeenHand]) -> Result<Vec<Option<Hand>>>, n: usize,
             hands.push(hand);
         }
     }
-    let mut lines = vec![format!("hands made by rule lifter        {}", Errors::of(&with, &hands))];
+    let mut lines = vec![format!("hands made by rule lifter        {}", SyntheticHandErrors::measure(&with, &hands))];
     if !brief {
         let flat: Vec<Hand> = with.iter().map(|s| flat_hand(s)).collect();
-        lines.push(format!("hands made by rule flat, in scale {}", Errors::of(&with, &flat)));
+        lines.push(format!("hands made by rule flat, in scale {}", SyntheticHandErrors::measure(&with, &flat)));
     }
     Ok(lines)
 }
 
 /// The keypoints as they are, without depth.
-fn flat_hand(sample: &Sample) -> Hand {
+fn flat_hand(sample: &HandSample) -> Hand {
     let [x0, y0] = sample.seen[0].unwrap_or_default();
     sample.seen.map(|p| {
         let [x, y] = p.unwrap_or([x0, y0]);
@@ -97,14 +97,14 @@ fn flat_hand(sample: &Sample) -> Hand {
 
 /// Errors in mm of hands whose middle finger's first phalanx measures 48 mm, relative to the wrist: the median over
 /// hands of the mean over points, as it is and after a similarity; and the share of hands above 30 mm.
-struct Errors {
+struct SyntheticHandErrors {
     median: f32,
     aligned: f32,
     above_30: f64,
 }
 
-impl Errors {
-    fn of(samples: &[&Sample], hands: &[Hand]) -> Self {
+impl SyntheticHandErrors {
+    fn measure(samples: &[&HandSample], hands: &[Hand]) -> Self {
         let (mut plain, mut aligned) = (Vec::new(), Vec::new());
         for (sample, hand) in samples.iter().zip(hands) {
             let to_mm = 1000.0 * PHALANX / vec3::norm(vec3::sub(sample.truth[10], sample.truth[9])).max(1e-9);
@@ -127,7 +127,7 @@ impl Errors {
     }
 }
 
-impl std::fmt::Display for Errors {
+impl std::fmt::Display for SyntheticHandErrors {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { median, aligned, above_30 } = self;
         write!(f, "median {median:.1}  aligned {aligned:.1} mm  above 30 mm {:.0} %", 100.0 * above_30)
@@ -141,19 +141,19 @@ mod tests {
     #[test]
     fn the_truth_is_without_error() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let samples: Vec<Sample> = (0..50).map(|_| sample(&mut rng)).collect();
-        let samples: Vec<&Sample> = samples.iter().collect();
+        let samples: Vec<HandSample> = (0..50).map(|_| sample_hand(&mut rng)).collect();
+        let samples: Vec<&HandSample> = samples.iter().collect();
         let truth: Vec<Hand> = samples.iter().map(|s| s.truth.map(|p| vec3::scale(p, 3.0))).collect();
-        let errors = Errors::of(&samples, &truth);
+        let errors = SyntheticHandErrors::measure(&samples, &truth);
         assert!(errors.median < 1e-3 && errors.aligned < 1e-3 && errors.above_30 == 0.0);
         let flat: Vec<Hand> = samples.iter().map(|s| flat_hand(s)).collect();
-        assert!(Errors::of(&samples, &flat).median > 20.0);
+        assert!(SyntheticHandErrors::measure(&samples, &flat).median > 20.0);
     }
 
     #[test]
     fn wrist_and_middle_knuckle_are_always_seen() {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
-        let samples: Vec<Sample> = (0..300).map(|_| sample(&mut rng)).collect();
+        let samples: Vec<HandSample> = (0..300).map(|_| sample_hand(&mut rng)).collect();
         assert!(samples.iter().all(|s| s.seen[0].is_some() && s.seen[9].is_some()));
         assert!(samples.iter().any(|s| s.seen[8].is_none()));
     }

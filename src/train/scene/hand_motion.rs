@@ -21,7 +21,7 @@ const N: usize = 15;
 struct Posture([f64; N]);
 
 impl Posture {
-    fn draw(rng: &mut ChaCha8Rng) -> Self {
+    fn sample(rng: &mut ChaCha8Rng) -> Self {
         let curl = rng.random_range(-0.1f64..0.9).max(0.0).powf(1.5);
         let own = if rng.random_bool(0.3) { 0.4 } else { 0.06 };
         let finger = [0; 4].map(|_| own * normal(rng));
@@ -88,14 +88,14 @@ pub struct HandMotion {
 }
 
 impl HandMotion {
-    pub fn draw(rng: &mut ChaCha8Rng, secs: f64) -> Self {
+    pub fn sample(rng: &mut ChaCha8Rng, secs: f64) -> Self {
         let lively = rng.random_range(0.3..1.0);
-        let start = Posture::draw(rng);
+        let start = Posture::sample(rng);
         let (mut last, mut t, mut moves) = (start, -rng.random_range(0.0..1.0), Vec::new());
         while t < secs {
             let takes = rng.random_range(0.25..0.9) / (0.5 + 0.5 * lively);
             let wholly = rng.random_bool(0.5);
-            let next = last.towards(&Posture::draw(rng), if wholly { lively } else { 0.3 * lively });
+            let next = last.towards(&Posture::sample(rng), if wholly { lively } else { 0.3 * lively });
             moves.push((t, t + takes, next));
             last = next;
             t += takes + if rng.random_bool(0.4) { 0.0 } else { rng.random_range(0.0..1.6) };
@@ -106,7 +106,7 @@ impl HandMotion {
     /// Nearly the same, for the other hand.
     pub fn copied(&self, rng: &mut ChaCha8Rng) -> Self {
         let late = rng.random_range(-0.1..0.1);
-        let other = Posture::draw(rng);
+        let other = Posture::sample(rng);
         let near = |posture: &Posture| posture.towards(&other, 0.15);
         let moves = self.moves.iter().map(|(a, b, posture)| (a + late, b + late, near(posture))).collect();
         Self { size: self.size, start: near(&self.start), moves }
@@ -189,7 +189,7 @@ mod tests {
     fn bones_keep_their_lengths_and_fingers_go_smoothly() {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
         for _ in 0..10 {
-            let motion = HandMotion::draw(&mut rng, 20.0);
+            let motion = HandMotion::sample(&mut rng, 20.0);
             let hands = motion.along(&[arm(false); 300], false, 1.0 / 15.0);
             for pair in hands.windows(2) {
                 for joint in 1..N_HAND {

@@ -11,11 +11,11 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 /// A right hand, metres, the wrist at 0, upright: fingers along -y, thumb towards +x, the palm facing -z.
-pub fn draw(rng: &mut ChaCha8Rng) -> Hand {
+pub fn sample_shape(rng: &mut ChaCha8Rng) -> Hand {
     let size = 1.08e-3 * about(rng, 0.08);
     let palm = about(rng, 0.12);
     let mut hand: Hand = [[0.0; 3]; N_HAND];
-    let manner = Manner::draw(rng);
+    let manner = FingerManner::sample(rng);
     // the palm is hollow: its edges lie nearer to the viewer it faces
     let hollow = rng.random_range(0.0..0.07);
     for finger in 1..5 {
@@ -40,7 +40,7 @@ pub fn draw(rng: &mut ChaCha8Rng) -> Hand {
 }
 
 /// What the four fingers have in common: they go together, as the muscles of the forearm move them.
-struct Manner {
+struct FingerManner {
     /// 0 straight, 1 a fist.
     curl: f64,
     /// How much more curled each finger is than its neighbour on the thumb's side.
@@ -54,8 +54,8 @@ struct Manner {
     spread: f64,
 }
 
-impl Manner {
-    fn draw(rng: &mut ChaCha8Rng) -> Self {
+impl FingerManner {
+    fn sample(rng: &mut ChaCha8Rng) -> Self {
         Self {
             curl: rng.random_range(-0.1f64..1.0).max(0.0).powf(1.8),
             slope: 0.04 + 0.08 * normal(rng),
@@ -97,7 +97,7 @@ fn thumb(hand: &mut Hand, size: f64, rng: &mut ChaCha8Rng) {
 }
 
 /// Any turn, all equally likely (Shoemake 1992).
-pub fn any_turn(rng: &mut ChaCha8Rng) -> Rotation {
+pub fn random_rotation(rng: &mut ChaCha8Rng) -> Rotation {
     let axis = std::array::from_fn(|_| normal(rng));
     let w = normal(rng);
     let length = (w * w + vec3::dot(axis, axis)).sqrt().max(1e-12);
@@ -123,7 +123,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let (mut thumb, mut towards, n) = (0, 0, 400);
         for _ in 0..n {
-            let hand = draw(&mut rng);
+            let hand = sample_shape(&mut rng);
             assert!(hand[5][0] > hand[17][0], "the index is on the thumb's side");
             assert!(hand[9][1] < -0.035 && hand[9][1] > -0.18);
             thumb += usize::from(hand[2][0] > hand[17][0]);
@@ -136,7 +136,7 @@ mod tests {
     fn turns_are_turns() {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         for _ in 0..50 {
-            let turned = any_turn(&mut rng).turn([3.0, 4.0, 12.0]);
+            let turned = random_rotation(&mut rng).turn([3.0, 4.0, 12.0]);
             assert!((vec3::norm(turned) - 13.0).abs() < 1e-9);
         }
     }

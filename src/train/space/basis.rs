@@ -1,7 +1,7 @@
 //! The 64 directions in which windows of the corpus vary most: their principal components, found by orthogonal iteration
 //! (Golub and Van Loan, Matrix Computations, 4th edition, 8.2.4).
 
-use super::corpus::{Corpus, Piece};
+use super::corpus::{Corpus, CorpusPiece};
 use crate::formats::checkpoint::Contents;
 use crate::metrics::space::basis;
 use crate::metrics::space::basis::{N, WINDOW};
@@ -23,7 +23,7 @@ const STEPS: usize = 200;
 const ROWS: usize = 2048;
 
 /// What was found.
-pub struct Fitted {
+pub struct FittedBasis {
     pub n_windows: usize,
     /// What the fingers' numbers are multiplied with.
     pub finger_weight: f64,
@@ -34,7 +34,7 @@ pub struct Fitted {
 }
 
 /// Finds the basis of `corpus` and writes it to `out`.
-pub fn fit(corpus: &Corpus, seed: u64, out: &Path) -> Result<Fitted> {
+pub fn fit(corpus: &Corpus, seed: u64, out: &Path) -> Result<FittedBasis> {
     let weights = weights(&corpus.pieces);
     let (n_windows, covariance) = covariance(&corpus.pieces, &weights);
     ensure!(n_windows > 10 * N, "{n_windows} windows of motion are too few for a basis of {N}");
@@ -47,7 +47,7 @@ pub fn fit(corpus: &Corpus, seed: u64, out: &Path) -> Result<Fitted> {
         let (_, covariance) = self::covariance(pieces, &weights);
         (set.clone(), share(&covariance))
     });
-    let fitted = Fitted {
+    let fitted = FittedBasis {
         n_windows,
         finger_weight: f64::from(*weights.last().unwrap_or(&1.0)),
         share: share(&covariance),
@@ -58,13 +58,13 @@ pub fn fit(corpus: &Corpus, seed: u64, out: &Path) -> Result<Fitted> {
         ("basis".to_owned(), Tensor::from_vec(rows, (N, WINDOW * N_NUMBERS), &Device::Cpu)?),
         ("weights".to_owned(), Tensor::from_vec(weights.to_vec(), N_JOINTS_USED, &Device::Cpu)?),
     ]);
-    let facts = json!({ "kind": "motion-basis", "corpus": corpus.facts(), "seed": seed });
+    let facts = json!({ "kind": "motion-basis", "corpus": corpus.metadata(), "seed": seed });
     Contents { facts, tensors }.write(out)?;
     Ok(fitted)
 }
 
 /// 1 for the arms' joints; for the fingers' what gives all of them together the arms' variance.
-fn weights(pieces: &[Piece]) -> Array1<f32> {
+fn weights(pieces: &[CorpusPiece]) -> Array1<f32> {
     let (mut n, mut sum, mut squares) = (0.0, Array1::<f64>::zeros(N_NUMBERS), Array1::<f64>::zeros(N_NUMBERS));
     for piece in pieces {
         for pose in basis::poses(piece.joints.view()).outer_iter() {
@@ -84,7 +84,7 @@ fn weights(pieces: &[Piece]) -> Array1<f32> {
 }
 
 /// Number of windows, and their covariance [2070, 2070].
-fn covariance(pieces: &[Piece], weights: &Array1<f32>) -> (usize, Array2<f64>) {
+fn covariance(pieces: &[CorpusPiece], weights: &Array1<f32>) -> (usize, Array2<f64>) {
     let size = WINDOW * N_NUMBERS;
     let (mut n, mut sum, mut products) = (0, Array1::<f64>::zeros(size), Array2::<f64>::zeros((size, size)));
     let mut rows: Vec<f64> = Vec::new();

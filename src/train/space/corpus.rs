@@ -29,7 +29,7 @@ const TOGETHER: f64 = 0.4;
 const FACING_SECS: f64 = 1.5;
 
 /// One continuous stretch.
-pub struct Piece {
+pub struct CorpusPiece {
     pub name: String,
     /// [T, 49, 3], metres, the neck at the origin, 15 frames a second.
     pub joints: Array3<f32>,
@@ -37,9 +37,9 @@ pub struct Piece {
 
 /// Everything that is learnt from, and sets that are only measured on.
 pub struct Corpus {
-    pub pieces: Vec<Piece>,
-    pub held_out: Vec<(String, Vec<Piece>)>,
-    facts: serde_json::Value,
+    pub pieces: Vec<CorpusPiece>,
+    pub held_out: Vec<(String, Vec<CorpusPiece>)>,
+    metadata: serde_json::Value,
 }
 
 impl Corpus {
@@ -61,21 +61,21 @@ impl Corpus {
         }
         pieces.extend((0..RULES).map(|n| by_rule(n, seed)));
         pieces.extend(speakers.iter().enumerate().map(|(n, (name, motion))| {
-            let piece = Piece::new(name.clone(), motion);
+            let piece = CorpusPiece::new(name.clone(), motion);
             if n / 2 % 2 == 1 { piece.mirrored() } else { piece }
         }));
         let mut sets = Vec::new();
         for (set, takes) in held_out {
-            let takes: Result<Vec<Piece>> = takes.iter().map(|take| captured(take, COPIES, seed)).collect();
+            let takes: Result<Vec<CorpusPiece>> = takes.iter().map(|take| captured(take, COPIES, seed)).collect();
             sets.push((set.clone(), takes?));
         }
         sets.push(("bodies made by rule".into(), (RULES..RULES + RULES / 6).map(|n| by_rule(n, seed)).collect()));
         if !other_speakers.is_empty() {
-            let pieces = other_speakers.iter().map(|(name, motion)| Piece::new(name.clone(), motion)).collect();
+            let pieces = other_speakers.iter().map(|(name, motion)| CorpusPiece::new(name.clone(), motion)).collect();
             sets.push(("speakers made by rule".into(), pieces));
         }
-        let facts = facts(&pieces, &sets, seed);
-        Ok(Self { pieces, held_out: sets, facts })
+        let metadata = metadata(&pieces, &sets, seed);
+        Ok(Self { pieces, held_out: sets, metadata })
     }
 
     /// Frames to learn from.
@@ -84,12 +84,12 @@ impl Corpus {
     }
 
     /// What says of a file what it was learnt from.
-    pub fn facts(&self) -> &serde_json::Value {
-        &self.facts
+    pub fn metadata(&self) -> &serde_json::Value {
+        &self.metadata
     }
 }
 
-fn facts(pieces: &[Piece], held_out: &[(String, Vec<Piece>)], seed: u64) -> serde_json::Value {
+fn metadata(pieces: &[CorpusPiece], held_out: &[(String, Vec<CorpusPiece>)], seed: u64) -> serde_json::Value {
     let mut hash = blake3::Hasher::new();
     for piece in pieces {
         hash.update(piece.name.as_bytes());
@@ -102,7 +102,7 @@ fn facts(pieces: &[Piece], held_out: &[(String, Vec<Piece>)], seed: u64) -> serd
     })
 }
 
-impl Piece {
+impl CorpusPiece {
     fn new(name: String, motion: &Motion) -> Self {
         let whole = Array2::from_elem((motion.n_frames(), N_JOINTS), true);
         Self { name, joints: Frames::new(motion.joints.view(), whole.view(), motion.fps).joints }
@@ -122,21 +122,21 @@ fn dice(seed: u64, name: &str, n: usize) -> ChaCha8Rng {
     ChaCha8Rng::from_seed(*blake3::hash(format!("{seed} {n} {name}").as_bytes()).as_bytes())
 }
 
-fn captured(take: &Take, copy: usize, seed: u64) -> Result<Piece> {
+fn captured(take: &Take, copy: usize, seed: u64) -> Result<CorpusPiece> {
     ensure!(!take.poses.is_empty(), "{} has no frame", take.name);
     let (num, den) = ((take.fps * 1000.0).round() as u32, 1000);
     let poses = faced(&take.poses, take.fps);
     let motion = with_hands(&poses, FrameRate::new(num, den), &mut dice(seed, &take.name, copy))
         .with_context(|| format!("giving hands to {}", take.name))?;
-    Ok(Piece::new(format!("{} {copy}", take.name), &motion))
+    Ok(CorpusPiece::new(format!("{} {copy}", take.name), &motion))
 }
 
-fn by_rule(n: usize, seed: u64) -> Piece {
+fn by_rule(n: usize, seed: u64) -> CorpusPiece {
     let mut dice = dice(seed, "rule", n);
     let poses = body_motion::gesture(&mut dice, RULE_FRAMES, FPS.secs(1));
     let motion =
         with_hands(&poses, FPS, &mut dice).unwrap_or(Motion::from_joints(FPS, Array3::zeros((0, N_JOINTS, 3))));
-    let piece = Piece::new(format!("rule {n}"), &motion);
+    let piece = CorpusPiece::new(format!("rule {n}"), &motion);
     if n % 2 == 1 { piece.mirrored() } else { piece }
 }
 
@@ -175,8 +175,8 @@ fn faced(poses: &[Pose], fps: f64) -> Vec<Pose> {
 /// The 49 joints of a body of nine points, with hands that do something.
 fn with_hands(poses: &[Pose], fps: FrameRate, dice: &mut ChaCha8Rng) -> Result<Motion> {
     let secs = fps.secs(poses.len());
-    let left = HandMotion::draw(dice, secs);
-    let right = if dice.random_bool(TOGETHER) { left.copied(dice) } else { HandMotion::draw(dice, secs) };
+    let left = HandMotion::sample(dice, secs);
+    let right = if dice.random_bool(TOGETHER) { left.copied(dice) } else { HandMotion::sample(dice, secs) };
     let mut joints = Array3::zeros((poses.len(), N_JOINTS, 3));
     let mut put = |t: usize, joint: usize, place: Vec3| (0..3).for_each(|k| joints[[t, joint, k]] = place[k] as f32);
     for (t, pose) in poses.iter().enumerate() {
@@ -218,6 +218,6 @@ mod tests {
         assert_eq!(corpus.pieces[0].joints.shape(), [150, N_JOINTS, 3]);
         let again = Corpus::new(&[], &[], &[], &[], 7).unwrap();
         assert_eq!(again.pieces[3].joints, corpus.pieces[COPIES + 3].joints);
-        assert_ne!(again.facts()["motion"], Corpus::new(&[], &[], &[], &[], 8).unwrap().facts()["motion"]);
+        assert_ne!(again.metadata()["motion"], Corpus::new(&[], &[], &[], &[], 8).unwrap().metadata()["motion"]);
     }
 }

@@ -2,14 +2,14 @@
 //! mean absolute error of the normalised bone directions plus that of their steps from frame to frame (as in the GENEA
 //! evaluation's auto-encoder), the six bones of arms and shoulders together counting as much as the forty of the fingers.
 
-use super::corpus::{Corpus, Piece};
+use super::corpus::{Corpus, CorpusPiece};
 use crate::math::vec3;
 use crate::metrics::space::embedding::{KIND, WINDOW, directions};
 use crate::metrics::space::fixed_rate::{N_JOINTS_USED, N_NUMBERS, joints_used};
 use crate::nn::Mode;
 use crate::nn::motion_encoder::{AutoEncoder, Config};
 use crate::nn::params::Params;
-use crate::train::supervised::Lesson;
+use crate::train::supervised::TrainingTask;
 use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, R_HAND, R_WRIST, parent};
 use anyhow::Result;
 use candle_core::{Device, Tensor};
@@ -25,7 +25,7 @@ const MEASURED_STRIDE: usize = 17;
 const MEASURED: usize = 128;
 
 /// The lesson.
-pub struct EmbeddingLesson {
+pub struct EmbeddingTask {
     params: Params,
     net: AutoEncoder,
     corpus: Corpus,
@@ -39,14 +39,14 @@ pub struct EmbeddingLesson {
 
 /// Mean errors of windows that came back.
 #[derive(Clone, Copy, Debug, Default)]
-struct Errors {
+struct EmbeddingErrors {
     n: usize,
     arms_mm: f64,
     fingers_mm: f64,
     degrees: f64,
 }
 
-impl EmbeddingLesson {
+impl EmbeddingTask {
     /// A network with first values from `seed` that learns from `corpus`.
     pub fn new(corpus: Corpus, seed: u64) -> Result<Self> {
         let mut params = Params::new(seed);
@@ -64,8 +64,8 @@ impl EmbeddingLesson {
     }
 
     /// Errors over the windows of `pieces`: of the network, and of the corpus' mean pose.
-    fn measure(&self, pieces: &[Piece]) -> Result<[Errors; 2]> {
-        let mut errors = [Errors::default(); 2];
+    fn measure(&self, pieces: &[CorpusPiece]) -> Result<[EmbeddingErrors; 2]> {
+        let mut errors = [EmbeddingErrors::default(); 2];
         for piece in pieces {
             let starts: Vec<usize> =
                 (0..(piece.joints.shape()[0] + 1).saturating_sub(WINDOW)).step_by(MEASURED_STRIDE).collect();
@@ -92,7 +92,7 @@ impl EmbeddingLesson {
     }
 }
 
-impl Errors {
+impl EmbeddingErrors {
     /// A window [34, 49, 3] and the directions [34 x 138] that came back for it, put together with its own bone lengths.
     fn add(&mut self, window: ArrayView3<f32>, back: &[f32]) {
         for (frame, back) in window.outer_iter().zip(back.chunks_exact(N_NUMBERS)) {
@@ -161,13 +161,13 @@ fn statistics(pieces: &[Array2<f32>]) -> (Vec<f32>, Vec<f32>) {
     (sums.iter().map(|(sum, _)| (sum / n) as f32).collect(), sums.iter().map(std).collect())
 }
 
-impl Lesson for EmbeddingLesson {
+impl TrainingTask for EmbeddingTask {
     fn kind(&self) -> &'static str {
         KIND
     }
 
-    fn facts(&self) -> Value {
-        json!({ "config": Config::default(), "corpus": self.corpus.facts() })
+    fn metadata(&self) -> Value {
+        json!({ "config": Config::default(), "corpus": self.corpus.metadata() })
     }
 
     fn params(&self) -> &Params {
@@ -182,7 +182,7 @@ impl Lesson for EmbeddingLesson {
         vec![1.0; N_JOINTS_USED * WINDOW]
     }
 
-    fn draw(&self, rng: &mut ChaCha8Rng, x: &mut [f32], _: &mut [f32]) {
+    fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], _: &mut [f32]) {
         let Some(&n) = self.ends.last().filter(|n| **n > 0) else { return };
         let at = rng.random_range(0..n);
         let piece = self.ends.partition_point(|&end| end <= at);
@@ -237,19 +237,19 @@ mod tests {
     fn what_a_training_writes_is_an_encoder_and_the_built_in_one_gives_motion_back() {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("e.safetensors");
-        let mut lesson = EmbeddingLesson::new(Corpus::new(&[], &[], &[], &[], 3).unwrap(), 3).unwrap();
+        let mut training_task = EmbeddingTask::new(Corpus::new(&[], &[], &[], &[], 3).unwrap(), 3).unwrap();
         let built_in = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/motion_embedding.safetensors");
-        start_from(&lesson, &built_in).unwrap();
-        let lines = lesson.errors(false).unwrap();
+        start_from(&training_task, &built_in).unwrap();
+        let lines = training_task.errors(false).unwrap();
         for (network, mean) in mm(&lines[0]).into_iter().zip(mm(&lines[1])) {
             assert!(network < 0.5 * mean, "{lines:?}");
         }
         let schedule =
             Schedule { steps: 3, batch: 8, learning_rate: 1e-3, seed: 3, checkpoint_every: 100, started_from: None };
-        let lines = train(&mut lesson, &schedule, &out, &Silent).unwrap();
+        let lines = train(&mut training_task, &schedule, &out, &Silent).unwrap();
         assert!(lines.len() == 2 && lines[1].contains("the mean pose"), "{lines:?}");
         let encoder = crate::metrics::space::embedding::parse(&std::fs::read(&out).unwrap()).unwrap();
-        let codes = encoder.codes(lesson.directions[0].view(), 4).unwrap();
+        let codes = encoder.codes(training_task.directions[0].view(), 4).unwrap();
         assert!(codes.iter().all(|v| v.is_finite()) && codes.nrows() == (300 - 34) / 4 + 1);
     }
 }

@@ -4,9 +4,9 @@
 use crate::fixtures::skip::real_data;
 use ndarray::{Array2, Array3, Axis, concatenate, s};
 use orator::formats::authors_txt;
-use orator::metrics::catalogue::{Catalogue, Interval};
-use orator::metrics::position::pck::{Axes, Correct};
-use orator::metrics::settings::Settings;
+use orator::metrics::catalogue::{Catalogue, MotionPair};
+use orator::metrics::position::pck::{CorrectKeypoints, PckAxes};
+use orator::metrics::settings::MetricSettings;
 use orator::types::skeleton::{L_SHOULDER, N_JOINTS, R_SHOULDER};
 use orator::types::time::FrameRate;
 use std::path::{Path, PathBuf};
@@ -31,14 +31,14 @@ struct Figures {
 
 impl Figures {
     fn new(pairs: &[(Array3<f32>, Array3<f32>)]) -> Self {
-        let catalogue = Catalogue::new(&Settings { with_neck: true, ..Settings::default() }).unwrap();
+        let catalogue = Catalogue::new(&MetricSettings { with_neck: true, ..MetricSettings::default() }).unwrap();
         let values = |(made, real): &(Array3<f32>, Array3<f32>)| {
             let n = made.len_of(Axis(0)).min(real.len_of(Axis(0)));
             let (made, real) = (made.slice(s![..n, .., ..]), real.slice(s![..n, .., ..]));
             let mask = Array2::from_elem((n, N_JOINTS), true);
-            catalogue.cheap_values(&catalogue.measure(&Interval {
-                made,
-                real,
+            catalogue.values(&catalogue.measure(&MotionPair {
+                predicted: made,
+                ground_truth: real,
                 mask: mask.view(),
                 fps: FPS,
                 onsets: None,
@@ -135,10 +135,10 @@ fn released_predictions_have_the_measured_figures() {
 }
 
 /// PCK at 0.2 of each pair, percent, as training counts it.
-fn pck(axes: Axes, pairs: &[(Array3<f32>, Array3<f32>)]) -> Vec<f64> {
+fn pck(axes: PckAxes, pairs: &[(Array3<f32>, Array3<f32>)]) -> Vec<f64> {
     let share = |(made, real): &(Array3<f32>, Array3<f32>)| {
         let mask = Array2::from_elem((real.len_of(Axis(0)), N_JOINTS), true);
-        let mut correct = Correct::default();
+        let mut correct = CorrectKeypoints::default();
         correct.count_in(axes, made.view(), real.view(), mask.view());
         100.0 * correct.share()
     };
@@ -185,19 +185,19 @@ fn baselines_on_the_released_clips_have_the_measured_figures() {
     let n = |i: usize| real[i].len_of(Axis(0));
     let beside = |made: &dyn Fn(usize) -> Array3<f32>| (0..4).map(|i| (made(i), real[i].clone())).collect::<Vec<_>>();
     let yaw: Vec<_> = (0..4).map(|i| (without_yaw(made[i].clone()), without_yaw(real[i].clone()))).collect();
-    compare("without yaw", &pck(Axes::Xyz, &yaw), "30.5 21.6 9.3 72.5");
+    compare("without yaw", &pck(PckAxes::Xyz, &yaw), "30.5 21.6 9.3 72.5");
     let own_mean = beside(&|i| still(mean(&real[i]), n(i)));
-    compare("own mean", &pck(Axes::Xyz, &own_mean), "6.8 44.3 29.8 59.8");
+    compare("own mean", &pck(PckAxes::Xyz, &own_mean), "6.8 44.3 29.8 59.8");
     let own_median = beside(&|i| still(median(&real[i]), n(i)));
-    compare("own median", &pck(Axes::Xyz, &own_median), "8.7 47.5 36.5 60.7");
-    compare("own median xy", &pck(Axes::Xy, &own_median), "15.43 52.01 49.98 62.49");
+    compare("own median", &pck(PckAxes::Xyz, &own_median), "8.7 47.5 36.5 60.7");
+    compare("own median xy", &pck(PckAxes::Xy, &own_median), "15.43 52.01 49.98 62.49");
     // the prediction some seconds late, what is past the end at the start: every second from 3 s to 3 s before the end
     let late: [Vec<f64>; 4] = std::array::from_fn(|i| {
         let rolled = |by: usize| {
             let (end, start) = (made[i].slice(s![n(i) - by.., .., ..]), made[i].slice(s![..n(i) - by, .., ..]));
             (concatenate(Axis(0), &[end, start]).unwrap(), real[i].clone())
         };
-        pck(Axes::Xyz, &(45..n(i) - 44).step_by(15).map(rolled).collect::<Vec<_>>())
+        pck(PckAxes::Xyz, &(45..n(i) - 44).step_by(15).map(rolled).collect::<Vec<_>>())
     });
     let of_late = |figure: &dyn Fn(&Vec<f64>) -> f64| late.iter().map(figure).collect::<Vec<f64>>();
     compare("late, mean", &of_late(&|v| v.iter().sum::<f64>() / v.len() as f64), "7.3 12.7 6.4 43.1");

@@ -2,7 +2,7 @@
 
 use crate::fixtures::skip::real_data;
 use orator::formats::authors_txt;
-use orator::metrics::position::pck::{Axes, Correct};
+use orator::metrics::position::pck::{CorrectKeypoints, PckAxes};
 use orator::types::time::FrameRate;
 
 #[test]
@@ -13,8 +13,8 @@ fn the_released_predictions_have_their_published_share_of_correct_keypoints() {
             Some(authors_txt::read(&path, FrameRate::new(15, 1)).unwrap())
         };
         let (Some(real), Some(made)) = (clip("gt"), clip("prediction")) else { return };
-        let mut correct = Correct::default();
-        correct.count_in(Axes::Xy, made.joints.view(), real.joints.view(), real.mask.view());
+        let mut correct = CorrectKeypoints::default();
+        correct.count_in(PckAxes::Xy, made.joints.view(), real.joints.view(), real.mask.view());
         assert!((correct.share() - expected).abs() < 1e-4, "{number}: {}", correct.share());
     }
 }

@@ -5,7 +5,7 @@ use crate::fixtures::skip::readers;
 use candle_core::{Device, Tensor};
 use orator::formats::checkpoint::Contents;
 use orator::train::log;
-use orator::train::log::Log;
+use orator::train::log::MetricsLog;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -30,7 +30,7 @@ print(json.dumps([[tag, e.step, e.wall_time, e.value] for tag in log.Tags()['sca
 fn tensorboard_reads_every_number_of_the_log() {
     let Some(readers) = readers("tensorboard") else { return };
     let folder = tempfile::tempdir().unwrap();
-    let mut log = Log::open(folder.path(), 0).unwrap();
+    let mut log = MetricsLog::open(folder.path(), 0).unwrap();
     for i in 1..=300_u64 {
         let x = i as f64;
         log.write(&json!({"step": 10 * i, "l1": x.sqrt() / 7.0, "adversarial": -1e-9 * x, "gradient_norm": 1e12 * x}))
@@ -40,7 +40,7 @@ fn tensorboard_reads_every_number_of_the_log() {
         log.write(&json!({"step": 10 * i, "epoch": i, "validation": validation})).unwrap();
     }
     // resumed: the lines behind step 1,000 go
-    Log::open(folder.path(), 1000).unwrap().write(&json!({"step": 1010, "l1": 0.5})).unwrap();
+    MetricsLog::open(folder.path(), 1000).unwrap().write(&json!({"step": 1010, "l1": 0.5})).unwrap();
 
     let found: Vec<(String, u64, f64, f32)> = serde_json::from_str(&python(&readers, EVENTS, folder.path())).unwrap();
     let mut found: BTreeMap<(String, u64), (f64, f32)> =

@@ -13,10 +13,10 @@ use orator::audio::mel;
 use orator::external::ffmpeg::probe;
 use orator::formats::checkpoint;
 use orator::formats::{authors_txt, npy};
-use orator::generate::Speaker;
+use orator::generate::GestureGenerator;
 use orator::generate::mel_stream::mel_frames;
-use orator::generate::model::{Facts, TrainedSpeaker};
-use orator::generate::normalisation::{N_NUMBERS, Normalisation};
+use orator::generate::model::{SpeakerMetadata, SpeakerModel};
+use orator::generate::normalisation::{N_FEATURES, Normalisation};
 use orator::generate::representation::Representation;
 use orator::nn::gan::generator::{Config, Generator, Preset};
 use orator::nn::params::Params;
@@ -130,20 +130,23 @@ fn a_checkpoint_alone_generates_wherever_it_lies() {
 }
 
 /// A speaker of a preset's full size, its weights and running statistics as good as random.
-fn random_speaker(preset: Preset) -> anyhow::Result<TrainedSpeaker> {
-    let network = Config::of(preset, N_NUMBERS);
+fn random_speaker(preset: Preset) -> anyhow::Result<SpeakerModel> {
+    let network = Config::from_preset(preset, N_FEATURES);
     let mut params = Params::frozen();
     let generator = Generator::new(&mut params, &network)?;
     let tensors = params.all().map(|(name, var)| Ok((name.to_owned(), value(name, var.dims())?)));
     params.load(&tensors.collect::<candle_core::Result<_>>()?)?;
     let motion = swinging(1, 40);
     let mean = motion.joints.mean_axis(Axis(0)).unwrap();
-    let normal = Normalisation::new(&mean, &mean, vec![0.1; N_NUMBERS / 3]);
-    Ok(TrainedSpeaker { facts: Facts::new("host", FPS, "", network, normal, Representation::Positions), generator })
+    let normal = Normalisation::new(&mean, &mean, vec![0.1; N_FEATURES / 3]);
+    Ok(SpeakerModel {
+        metadata: SpeakerMetadata::new("host", FPS, "", network, normal, Representation::Positions),
+        generator,
+    })
 }
 
 /// What the network makes of a whole sound at once, [144, T].
-fn one_pass(speaker: &TrainedSpeaker, sound: &Sound, n_frames: usize) -> anyhow::Result<ndarray::Array2<f32>> {
+fn one_pass(speaker: &SpeakerModel, sound: &Sound, n_frames: usize) -> anyhow::Result<ndarray::Array2<f32>> {
     let padded = (n_frames / 32 + 1) * 32;
     let n_samples = mel::n_samples(mel_frames(FPS, padded));
     // Continued by its mirror image, back and forth.
@@ -153,7 +156,7 @@ fn one_pass(speaker: &TrainedSpeaker, sound: &Sound, n_frames: usize) -> anyhow:
     let (n, bands) = mels.dim();
     let mels = Tensor::from_vec(mels.iter().copied().collect(), (1, n, bands), &Device::Cpu)?.t()?.contiguous()?;
     let poses = speaker.generator.forward(&mels, padded, false)?.flatten_all()?.to_vec1()?;
-    Ok(ndarray::Array2::from_shape_vec((N_NUMBERS, padded), poses)?.slice_move(s![.., ..n_frames]))
+    Ok(ndarray::Array2::from_shape_vec((N_FEATURES, padded), poses)?.slice_move(s![.., ..n_frames]))
 }
 
 /// Sounds of so many seconds in chunks of 64 frames are the same as in one pass.
@@ -163,11 +166,11 @@ fn chunks_are_one_pass(preset: Preset, lengths: &[f64]) -> anyhow::Result<()> {
     let n_frames = |sound: &Sound| (sound.secs() * 15.0 + 1e-6) as usize;
     let wholes = sounds.iter().map(|sound| one_pass(&speaker, sound, n_frames(sound)));
     let wholes = wholes.collect::<anyhow::Result<Vec<_>>>()?;
-    let speaker = Speaker::from(speaker);
+    let speaker = GestureGenerator::from(speaker);
     for (sound, whole) in sounds.iter().zip(wholes) {
         let most = whole.iter().fold(0.0f32, |most, v| most.max(v.abs()));
         let mut first = 0;
-        for part in speaker.numbers(sound, 64)? {
+        for part in speaker.features(sound, 64)? {
             let part = part?;
             let off = &part - &whole.slice(s![.., first..first + part.ncols()]);
             let off = off.iter().fold(0.0f32, |most, v| most.max(v.abs()));

@@ -8,7 +8,7 @@ use orator::external::ffmpeg::audio::read_mono;
 use orator::external::ffmpeg::sound_stream::{SoundStream, n_samples};
 use orator::formats::npy;
 use orator::formats::wav;
-use orator::generate::Speaker;
+use orator::generate::GestureGenerator;
 use orator::types::sound::Sound;
 
 #[test]
@@ -16,7 +16,7 @@ fn a_streamed_sound_gives_the_motion_of_the_whole_one() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path();
     write_untrained_speaker(&dir.join("host.safetensors"));
-    let speaker = Speaker::open(&dir.join("host.safetensors")).unwrap();
+    let speaker = GestureGenerator::open(&dir.join("host.safetensors")).unwrap();
     // more than a chunk of frames; less than the mirrored end; another rate
     for (rate, secs) in [(16_000, 150.0), (16_000, 1.3), (44_100, 3.7)] {
         let mut sound = clips::tone(rate, secs, 220.0);

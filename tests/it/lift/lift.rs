@@ -15,7 +15,7 @@ use orator::stage::artifacts::{self, StageName};
 use orator::stage::ledger::{Kept, Ledger};
 use orator::stage::progress::Silent;
 use orator::stage::{Stage, Unit};
-use orator::train::scene::body::{Filming, Scene};
+use orator::train::scene::body::{FilmedScene, Filming};
 use orator::types::interval::{Interval, Intervals};
 use orator::types::pose2d::Keypoints;
 use orator::types::pose3d::Motion;
@@ -52,7 +52,7 @@ fn known_motion_is_found_again() {
     let lifter = lifter();
     let (mut sum, mut mean_sum, n) = (0.0, 0.0, 20);
     for _ in 0..n {
-        let scene = Scene::of_rule(Filming::Drop, 90, &mut rng);
+        let scene = FilmedScene::from_rule(Filming::Drop, 90, &mut rng);
         let motion = lifter.lift(&keypoints(&scene, &mut rng)).unwrap();
         sum += error_mm(&motion, &scene.truth);
         // a constant pose for comparison: the truth's first frame, better than any mean of strangers
@@ -73,7 +73,7 @@ fn known_motion_is_found_again() {
 #[test]
 fn hands_hang_on_the_wrists_and_bones_keep_their_length() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let scene = Scene::of_rule(Filming::Clean, 60, &mut rng);
+    let scene = FilmedScene::from_rule(Filming::Clean, 60, &mut rng);
     let mut keypoints = keypoints(&scene, &mut rng);
     keypoints.left_hand.slice_mut(s![10..20, .., ..]).fill(0.0); // a short gap: filled
     keypoints.right_hand.slice_mut(s![30.., .., ..]).fill(0.0); // a long one: missing
@@ -106,7 +106,7 @@ fn hands_hang_on_the_wrists_and_bones_keep_their_length() {
 #[test]
 fn intervals_are_lifted_apart_and_outside_is_nothing() {
     let mut rng = ChaCha8Rng::seed_from_u64(6);
-    let keypoints = keypoints(&Scene::of_rule(Filming::Training, 80, &mut rng), &mut rng);
+    let keypoints = keypoints(&FilmedScene::from_rule(Filming::Training, 80, &mut rng), &mut rng);
     let intervals = [Interval { start: 5, end: 30 }, Interval { start: 40, end: 80 }];
     let lifter = lifter();
     let lifted = lifter.lift_intervals(&keypoints, &intervals).unwrap();
@@ -129,7 +129,7 @@ fn intervals_are_lifted_apart_and_outside_is_nothing() {
 #[test]
 fn a_finger_tip_never_seen_is_lifted_all_the_same() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let mut k = keypoints(&Scene::of_rule(Filming::Clean, 40, &mut rng), &mut rng);
+    let mut k = keypoints(&FilmedScene::from_rule(Filming::Clean, 40, &mut rng), &mut rng);
     k.left_hand.slice_mut(s![.., 20, 2]).fill(0.0);
     k.right_hand.slice_mut(s![.., 20, 2]).fill(0.0);
     let lifted = lifter().lift_intervals(&k, &[Interval { start: 0, end: 40 }]).unwrap();
@@ -191,7 +191,7 @@ fn the_frame_rate_does_not_change_the_motion() {
 #[test]
 fn odd_keypoints_do_no_harm() {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
-    let mut k = keypoints(&Scene::of_rule(Filming::Clean, 40, &mut rng), &mut rng);
+    let mut k = keypoints(&FilmedScene::from_rule(Filming::Clean, 40, &mut rng), &mut rng);
     k.body.slice_mut(s![3..6, .., 0]).fill(f32::NAN);
     k.body.slice_mut(s![10..12, .., ..2]).fill(7.0);
     k.left_hand.fill(f32::INFINITY);
@@ -217,7 +217,7 @@ fn the_verb_lifts_a_bare_body_and_says_what_is_wrong() {
     let dir = tempfile::tempdir().unwrap();
     let (npz, out) = (dir.path().join("k.npz"), dir.path().join("j.npy"));
     let mut rng = ChaCha8Rng::seed_from_u64(9);
-    let k = keypoints(&Scene::of_rule(Filming::Clean, 40, &mut rng), &mut rng);
+    let k = keypoints(&FilmedScene::from_rule(Filming::Clean, 40, &mut rng), &mut rng);
     let write = |name: &str, array: &Array3<f32>| {
         let mut file = NpzWriter::new(std::fs::File::create(&npz).unwrap());
         file.add_array(name, array).unwrap();
@@ -255,7 +255,7 @@ fn the_stage_writes_joints_and_bones() {
     let dir = tempfile::tempdir().unwrap();
     let unit = Unit { speaker: "host".into(), video: "clip-00000000".into(), source: "clip.mp4".into() };
     let mut rng = ChaCha8Rng::seed_from_u64(12);
-    let keypoints = keypoints(&Scene::of_rule(Filming::Training, 70, &mut rng), &mut rng);
+    let keypoints = keypoints(&FilmedScene::from_rule(Filming::Training, 70, &mut rng), &mut rng);
     let extras = Extras {
         time_secs: ndarray::Array1::linspace(0.0, 4.6, 70),
         person: ndarray::Array2::zeros((70, 5)),

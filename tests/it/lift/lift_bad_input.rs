@@ -3,7 +3,7 @@
 use crate::fixtures::keypoints::keypoints;
 use ndarray::{Array1, Array3, s};
 use ndarray_npy::{NpzWriter, read_npy};
-use orator::train::scene::body::{Filming, Scene};
+use orator::train::scene::body::{FilmedScene, Filming};
 use orator::types::pose2d::{Keypoints, coco};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -12,7 +12,7 @@ use std::process::Command;
 
 fn talker(n_frames: usize) -> Keypoints {
     let mut rng = ChaCha8Rng::seed_from_u64(9);
-    keypoints(&Scene::of_rule(Filming::Clean, n_frames, &mut rng), &mut rng)
+    keypoints(&FilmedScene::from_rule(Filming::Clean, n_frames, &mut rng), &mut rng)
 }
 
 /// A folder to lift in.

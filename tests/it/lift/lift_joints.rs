@@ -3,7 +3,7 @@
 use crate::fixtures::keypoints::{keypoints, lifter};
 use ndarray::{Array3, s};
 use orator::motion::upper_body::{L_WRIST, R_WRIST, metres_per_unit};
-use orator::train::scene::body::{Filming, Scene};
+use orator::train::scene::body::{FilmedScene, Filming};
 use orator::train::scene::hand_shape;
 use orator::types::interval::Interval;
 use orator::types::pose2d::Keypoints;
@@ -26,7 +26,7 @@ fn spread(motion: &Motion, joint: usize, frames: std::ops::Range<usize>) -> f64 
 
 /// Hands that open and close at the wrists of the scene, with noise.
 fn with_moving_hands(keypoints: &mut Keypoints, rng: &mut ChaCha8Rng) {
-    let (open, closed) = (hand_shape::draw(rng), hand_shape::draw(rng));
+    let (open, closed) = (hand_shape::sample_shape(rng), hand_shape::sample_shape(rng));
     let mut noise = || 0.5 * hand_shape::normal(rng) as f32;
     for hand in [&mut keypoints.left_hand, &mut keypoints.right_hand] {
         for (t, mut frame) in hand.outer_iter_mut().enumerate() {
@@ -47,7 +47,7 @@ fn every_bone_has_one_length_to_the_last_digit() {
     let lifter = lifter();
     let mut worst = 0.0f64;
     for _ in 0..3 {
-        let mut keypoints = keypoints(&Scene::of_rule(Filming::Training, 120, &mut rng), &mut rng);
+        let mut keypoints = keypoints(&FilmedScene::from_rule(Filming::Training, 120, &mut rng), &mut rng);
         with_moving_hands(&mut keypoints, &mut rng);
         let intervals = [Interval { start: 0, end: 70 }, Interval { start: 70, end: 120 }];
         let lifted = lifter.lift_intervals(&keypoints, &intervals).unwrap();
@@ -70,7 +70,7 @@ fn every_bone_has_one_length_to_the_last_digit() {
 fn hands_that_go_and_come_back() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let lifter = lifter();
-    let mut keypoints = keypoints(&Scene::of_rule(Filming::Clean, 150, &mut rng), &mut rng);
+    let mut keypoints = keypoints(&FilmedScene::from_rule(Filming::Clean, 150, &mut rng), &mut rng);
     with_moving_hands(&mut keypoints, &mut rng);
     let whole = lifter.lift(&keypoints).unwrap();
     let told = |motion: &Motion, root: usize| -> Vec<bool> {
@@ -118,7 +118,7 @@ fn wrists_move_as_they_did_and_rest_when_they_rest() {
     let (mut error, mut true_speed, mut n) = (0.0, 0.0, 0);
     let mut still = Vec::new();
     for _ in 0..20 {
-        let scene = Scene::of_rule(Filming::Training, 60, &mut rng);
+        let scene = FilmedScene::from_rule(Filming::Training, 60, &mut rng);
         let joints = lifter.lift(&keypoints(&scene, &mut rng)).unwrap().joints;
         let grow = metres_per_unit(&scene.truth);
         for (joint, point) in [(skeleton::R_WRIST, R_WRIST), (skeleton::L_WRIST, L_WRIST)] {

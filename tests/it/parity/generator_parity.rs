@@ -4,7 +4,7 @@
 
 use crate::fixtures::networks::{phase, value};
 use candle_core::{DType, Result, Tensor, Var};
-use orator::nn::cpu::axis::Walk;
+use orator::nn::cpu::axis::ConvGeometry;
 use orator::nn::gan::discriminator::Discriminator;
 use orator::nn::gan::generator::{Config, Generator, Preset};
 use orator::nn::ops::gradcheck::pattern;
@@ -140,7 +140,7 @@ fn compare(
 
 fn generator(preset: Preset, network: &str, train: bool, dtype: DType) -> anyhow::Result<()> {
     let mut params = Params::with_dtype(0, dtype);
-    let net = Generator::new(&mut params, &Config::of(preset, 147))?;
+    let net = Generator::new(&mut params, &Config::from_preset(preset, 147))?;
     let mels = pattern(&[2, 64, 418], if preset == Preset::Paper { 15.0 } else { 25.0 })?;
     compare(network, train, dtype, &params, &mels, None, |mels| net.forward(mels, 64, train))
 }
@@ -185,13 +185,13 @@ fn the_discriminator_trains_and_evaluates_as_in_pytorch() -> anyhow::Result<()> 
 #[test]
 fn sizes_on_the_way_are_the_published_ones() -> anyhow::Result<()> {
     assert_eq!(orator::audio::mel::n_frames(67_267), 418);
-    let halved = |n: usize| Walk::same(n, 4, 2).n_out(n, 4).unwrap();
+    let halved = |n: usize| ConvGeometry::same(n, 4, 2).n_out(n, 4).unwrap();
     assert_eq!([halved(418), halved(209), halved(105)], [209, 105, 53]);
     assert_eq!([halved(64), halved(32), halved(16)], [32, 16, 8]);
     // Kernels of three frames and eight bands, no padding: 53 x 8 becomes 51 x 1, in either preset's place.
     let mut params = Params::new(0);
-    let net = Generator::new(&mut params, &Config { width: 8, ..Config::of(Preset::Paper, 3) })?;
+    let net = Generator::new(&mut params, &Config { width: 8, ..Config::from_preset(Preset::Paper, 3) })?;
     let mels = pattern(&[2, 64, 418], 1.0)?.to_dtype(DType::F32)?;
-    assert_eq!(net.front(&mels, false)?.dims(), [2, 8, 51]);
+    assert_eq!(net.encode(&mels, false)?.dims(), [2, 8, 51]);
     Ok(())
 }

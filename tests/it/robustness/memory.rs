@@ -10,7 +10,7 @@ use crate::fixtures::untrained::write_untrained_speaker;
 use ndarray::{Array3, s};
 use ndarray_npy::NpzWriter;
 use orator::formats::wav;
-use orator::train::scene::body::{Filming, Scene};
+use orator::train::scene::body::{FilmedScene, Filming};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::process::{Child, Command, Stdio};
@@ -56,7 +56,7 @@ fn peak_memory_stays_with_a_longer_video() {
 /// Peak resident memory in MiB of `orator lift` of so many frames, and of the arrays that it reads and writes.
 fn peak_of_lift(n_frames: usize) -> (f64, f64) {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let minute = keypoints(&Scene::of_rule(Filming::Training, 900, &mut rng), &mut rng);
+    let minute = keypoints(&FilmedScene::from_rule(Filming::Training, 900, &mut rng), &mut rng);
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("k.npz");
     let mut npz = NpzWriter::new(std::fs::File::create(&path).unwrap());

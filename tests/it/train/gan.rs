@@ -6,7 +6,7 @@ use crate::fixtures::write_dataset::write_dataset;
 use orator::config::Gan;
 use orator::config::{AdversarialLoss, MotionRepresentation, NetworkPreset};
 use orator::dataset::{Dataset, Split};
-use orator::generate::Speaker;
+use orator::generate::GestureGenerator;
 use orator::generate::model::BEST;
 use orator::stage::progress::{Progress, Silent, Task};
 use orator::train::gan::train::train;
@@ -186,7 +186,7 @@ fn a_few_windows_are_learnt_by_heart_and_spoken() {
     assert!((0.7..1.3).contains(&made.energy) && made.frechet < still.frechet, "{validation:?}");
     assert!(validation.bone_change_mm < 0.01 && validation.alarm.is_none(), "{validation:?}");
 
-    let speaker = Speaker::open(&out).unwrap();
+    let speaker = GestureGenerator::open(&out).unwrap();
     let motion = speaker.motion(&long.sound).unwrap();
     assert_eq!((speaker.name(), motion.n_frames()), ("host", 99));
     assert!(motion.joints.iter().all(|v| v.is_finite()));
@@ -201,7 +201,7 @@ fn a_few_windows_are_learnt_by_heart_and_spoken() {
     let nothing = Sound { rate: 16_000, samples: Vec::new() };
     assert!(speaker.motion(&nothing).is_err());
     assert!(speaker.motion(&Sound { rate: 8_000, ..short }).is_err());
-    assert!(Speaker::open(&dataset_folder.join("info.json")).is_err());
+    assert!(GestureGenerator::open(&dataset_folder.join("info.json")).is_err());
 }
 
 #[test]

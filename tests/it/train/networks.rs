@@ -41,7 +41,7 @@ fn agree(name: &str, y: &Tensor) -> anyhow::Result<()> {
 #[test]
 fn generator_discriminator_and_lifter_agree_with_pytorch() -> anyhow::Result<()> {
     let mut params = Params::with_dtype(0, DType::F64);
-    let config = Config { width: 16, ..Config::of(Preset::Light, 6) };
+    let config = Config { width: 16, ..Config::from_preset(Preset::Light, 6) };
     let net = Generator::new(&mut params, &config)?;
     fill(&params)?;
     agree("light", &net.forward(&pattern(&[2, 64, 427], 1.0)?, 2 * generator::FRAMES_MULTIPLE, false)?)?;
