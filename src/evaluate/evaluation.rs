@@ -55,7 +55,12 @@ impl Evaluation {
     ///
     /// # Errors
     /// A split without samples, a dataset of another rate than the generator's.
-    pub fn of_generator(dataset: &Dataset, generator: &GestureGenerator, split: Split, progress: &dyn Progress) -> Result<Self> {
+    pub fn of_generator(
+        dataset: &Dataset,
+        generator: &GestureGenerator,
+        split: Split,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let task = progress.begin("evaluating", 0);
         let of_speaker::SpeakerEvaluation { clips, predictors } =
             of_speaker::material(dataset, generator, split, &*task)?;

@@ -145,7 +145,12 @@ fn title(args: &MotionArgs) -> String {
 /// What is measured, from files or from a dataset.
 fn evaluation(args: &MotionArgs, ui: &Ui) -> Result<Evaluation> {
     if let (Some(dataset), Some(checkpoint)) = (&args.dataset, &args.checkpoint) {
-        return Evaluation::of_generator(&Dataset::open(dataset)?, &GestureGenerator::open(checkpoint)?, args.split, ui);
+        return Evaluation::of_generator(
+            &Dataset::open(dataset)?,
+            &GestureGenerator::open(checkpoint)?,
+            args.split,
+            ui,
+        );
     }
     let (Some(truth), Some(prediction)) = (&args.truth, &args.prediction) else {
         bail!("nothing to measure: give --truth and --prediction, or --dataset and --checkpoint")
