@@ -82,10 +82,10 @@ impl TimeAccount {
         };
         let (ledger, waiting) = match standing {
             Standing::Judged => (Ledger::read(&Artifact::LiftLedger.path(work, unit)), 0.0),
-            Standing::Failed { stage, error } => (Ok(Ledger::of_failure(duration, stage.as_str(), error)), 0.0),
+            Standing::Failed { stage, error } => (Ok(Ledger::failed(duration, stage.as_str(), error)), 0.0),
             Standing::Waiting => (Ok(Ledger::default()), duration),
         };
-        let unread = |error| Ledger::of_failure(duration, StageName::Lift.as_str(), &format!("{error:#}"));
+        let unread = |error| Ledger::failed(duration, StageName::Lift.as_str(), &format!("{error:#}"));
         let ledger = ledger.unwrap_or_else(unread);
         // an empty sum is -0
         let (kept, refused, failed) = (ledger.kept_secs() + 0.0, ledger.refused_secs(), ledger.failed_secs() + 0.0);

@@ -8,7 +8,7 @@ use crate::config::videos::Videos;
 use crate::stage::artifacts::{StageName, speaker_dir};
 use crate::stage::fingerprint::HashCache;
 use crate::stage::progress::{Event, Progress};
-use crate::stage::runner::Ended;
+use crate::stage::runner::StageOutcome;
 use crate::stage::{Stage, Unit, runner, workdir};
 use anyhow::{Context, Result, ensure};
 use serde::Serialize;
@@ -167,17 +167,17 @@ impl StageRun<'_> {
             for (&stage, answer) in names.iter().zip(answers) {
                 let counts = self.report.stages.entry(stage).or_default();
                 let (count, state) = match &answer {
-                    Ended::Done(_) => (&mut counts.done, RunState::Done),
-                    Ended::Skipped(_) => (&mut counts.fresh, RunState::Fresh),
-                    Ended::Failed(_) => (&mut counts.failed, RunState::Done),
+                    StageOutcome::Done(_) => (&mut counts.done, RunState::Done),
+                    StageOutcome::Skipped(_) => (&mut counts.fresh, RunState::Fresh),
+                    StageOutcome::Failed(_) => (&mut counts.failed, RunState::Done),
                 };
                 *count += 1;
                 match answer {
-                    Ended::Done(report) | Ended::Skipped(report) => {
+                    StageOutcome::Done(report) | StageOutcome::Skipped(report) => {
                         let (unit, line, facts) = (unit.to_string(), report.line, report.facts);
                         self.report.units.push(UnitReport { unit, stage, state, line, facts });
                     }
-                    Ended::Failed(error) => {
+                    StageOutcome::Failed(error) => {
                         failed.push(unit.speaker.clone());
                         self.report.failures.push(UnitFailure {
                             speaker: None,

@@ -1,7 +1,7 @@
 //! The stages by their names, ready to run, and the units each works on.
 
 use super::dataset::stage::DatasetStage;
-use super::extract::Extract;
+use super::extract::ExtractStage;
 use super::lift::LiftStage;
 use super::pose2d::Pose2dStage;
 use super::segment::SegmentStage;
@@ -23,7 +23,7 @@ use anyhow::Result;
 pub fn build(name: StageName, config: &Config, ready: &[Unit]) -> Result<Box<dyn Stage>> {
     let settings = &config.settings;
     Ok(match name {
-        StageName::Extract => Box::new(Extract::new(&settings.extract)),
+        StageName::Extract => Box::new(ExtractStage::new(&settings.extract)),
         StageName::Pose2d => Box::new(Pose2dStage::new(settings)?),
         StageName::Segment => Box::new(SegmentStage::new(&settings.segment, &settings.work.dir)),
         StageName::Lift => Box::new(LiftStage::new(&settings.lift, &settings.segment, &settings.work.dir)?),

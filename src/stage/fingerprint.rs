@@ -58,12 +58,12 @@ impl Fingerprint {
 /// BLAKE3 of files, remembered between runs by path, size and time of change.
 pub struct HashCache {
     file: PathBuf,
-    known: Mutex<BTreeMap<String, Known>>,
+    known: Mutex<BTreeMap<String, KnownHash>>,
     saved: Mutex<Instant>,
 }
 
 #[derive(Clone, Serialize, Deserialize)]
-struct Known {
+struct KnownHash {
     bytes: u64,
     changed_ns: u64,
     hash: String,
@@ -90,7 +90,7 @@ impl HashCache {
             return Ok(known.hash.clone());
         }
         let hash = hash_file(path)?;
-        self.known().insert(name, Known { bytes: meta.len(), changed_ns, hash: hash.clone() });
+        self.known().insert(name, KnownHash { bytes: meta.len(), changed_ns, hash: hash.clone() });
         Ok(hash)
     }
 
@@ -110,7 +110,7 @@ impl HashCache {
         }
     }
 
-    fn known(&self) -> std::sync::MutexGuard<'_, BTreeMap<String, Known>> {
+    fn known(&self) -> std::sync::MutexGuard<'_, BTreeMap<String, KnownHash>> {
         self.known.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 }

@@ -67,7 +67,7 @@ pub struct Failed {
 
 impl Ledger {
     /// The account of a video whose stage failed: all of its `duration_secs`.
-    pub fn of_failure(duration_secs: f64, stage: &str, error: &str) -> Self {
+    pub fn failed(duration_secs: f64, stage: &str, error: &str) -> Self {
         let failed = Failed { start_secs: 0.0, end_secs: duration_secs, stage: stage.into(), error: error.into() };
         Self { duration_secs, failed: vec![failed], ..Self::default() }
     }

@@ -21,7 +21,7 @@ pub enum State {
 
 /// How a unit came out of a run.
 #[derive(Clone, Debug)]
-pub enum Ended {
+pub enum StageOutcome {
     /// It was fresh already.
     Skipped(Report),
     Done(Report),
@@ -57,7 +57,7 @@ pub fn run(
     hashes: &HashCache,
     limits: (usize, bool),
     progress: &dyn Progress,
-) -> Vec<Ended> {
+) -> Vec<StageOutcome> {
     run_stages(&[stage], units, work, hashes, limits, progress).into_iter().flatten().collect()
 }
 
@@ -71,9 +71,9 @@ pub fn run_stages(
     hashes: &HashCache,
     (jobs, force): (usize, bool),
     progress: &dyn Progress,
-) -> Vec<Vec<Ended>> {
+) -> Vec<Vec<StageOutcome>> {
     let next = AtomicUsize::new(0);
-    let ended: Vec<Mutex<Vec<Ended>>> = units.iter().map(|_| Mutex::new(Vec::new())).collect();
+    let ended: Vec<Mutex<Vec<StageOutcome>>> = units.iter().map(|_| Mutex::new(Vec::new())).collect();
     let names: Vec<&str> = stages.iter().map(|stage| stage.name()).collect();
     let bar = progress.begin(&names.join(" "), units.len() as u64);
     let order = largest_first(units);
@@ -84,7 +84,7 @@ pub fn run_stages(
                     for stage in stages {
                         let answer = run_unit(*stage, &units[at], work, hashes, force, progress);
                         report(&answer, *stage, &units[at], progress);
-                        let has_failed = matches!(answer, Ended::Failed(_));
+                        let has_failed = matches!(answer, StageOutcome::Failed(_));
                         if let Ok(mut answers) = ended[at].lock() {
                             answers.push(answer);
                         }
@@ -99,9 +99,9 @@ pub fn run_stages(
         }
     });
     let answers = ended.into_iter().map(|answers| answers.into_inner().unwrap_or_default());
-    let whole = |mut answers: Vec<Ended>| {
-        if answers.len() < stages.len() && !matches!(answers.last(), Some(Ended::Failed(_))) {
-            answers.push(Ended::Failed(Arc::new(anyhow!("the worker was lost"))));
+    let whole = |mut answers: Vec<StageOutcome>| {
+        if answers.len() < stages.len() && !matches!(answers.last(), Some(StageOutcome::Failed(_))) {
+            answers.push(StageOutcome::Failed(Arc::new(anyhow!("the worker was lost"))));
         }
         answers
     };
@@ -116,12 +116,14 @@ fn largest_first(units: &[Unit]) -> Vec<usize> {
     order
 }
 
-fn report(answer: &Ended, stage: &dyn Stage, unit: &Unit, progress: &dyn Progress) {
+fn report(answer: &StageOutcome, stage: &dyn Stage, unit: &Unit, progress: &dyn Progress) {
     let (stage, unit) = (stage.name(), unit.to_string());
     match answer {
-        Ended::Failed(error) => progress.event(&Event::Failed { stage, unit: &unit, error: &format!("{error:#}") }),
-        Ended::Done(report) => progress.event(&Event::Done { stage, unit: &unit, line: &report.line }),
-        Ended::Skipped(_) => progress.event(&Event::Fresh { stage, unit: &unit }),
+        StageOutcome::Failed(error) => {
+            progress.event(&Event::Failed { stage, unit: &unit, error: &format!("{error:#}") })
+        }
+        StageOutcome::Done(report) => progress.event(&Event::Done { stage, unit: &unit, line: &report.line }),
+        StageOutcome::Skipped(_) => progress.event(&Event::Fresh { stage, unit: &unit }),
     }
 }
 
@@ -132,7 +134,7 @@ fn run_unit(
     hashes: &HashCache,
     force: bool,
     progress: &dyn Progress,
-) -> Ended {
+) -> StageOutcome {
     let folder = unit.dir(&work.join(stage.name()));
     let fingerprint = match guarded(|| Fingerprint::now(stage, unit, hashes)) {
         Ok(now) => now,
@@ -142,10 +144,10 @@ fn run_unit(
         && let Some(record) = Record::read(&folder)
         && record.dirty(&fingerprint, stage.common_folder().unwrap_or(&folder)).is_none()
     {
-        return Ended::Skipped(Report { line: record.line, facts: record.facts });
+        return StageOutcome::Skipped(Report { line: record.line, facts: record.facts });
     }
     match guarded(|| attempt(stage, unit, &folder, &fingerprint, progress)) {
-        Ok(report) => Ended::Done(report),
+        Ok(report) => StageOutcome::Done(report),
         Err(error) => failed(&folder, Some(fingerprint), error),
     }
 }
@@ -184,10 +186,10 @@ fn attempt(
     finished
 }
 
-fn failed(folder: &Path, fingerprint: Option<Fingerprint>, error: anyhow::Error) -> Ended {
+fn failed(folder: &Path, fingerprint: Option<Fingerprint>, error: anyhow::Error) -> StageOutcome {
     // The failure is shown either way; where even this cannot be written the work folder itself is the trouble.
     let _ = Failure { fingerprint, error: format!("{error:#}") }.write(folder);
-    Ended::Failed(Arc::new(error))
+    StageOutcome::Failed(Arc::new(error))
 }
 
 fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {

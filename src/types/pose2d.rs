@@ -8,6 +8,11 @@ pub const N_BODY: usize = 17;
 /// Points of a hand: wrist, then thumb, index, middle, ring, little, each base to tip.
 pub const N_HAND: usize = 21;
 
+/// A keypoint counts as seen from this score on.
+pub const SEEN_SCORE: f32 = 0.3;
+/// A hand's keypoint counts as seen by the hand lifter from this score on.
+pub const HAND_SEEN_SCORE: f32 = 0.2;
+
 /// COCO-17 indices.
 pub mod coco {
     pub const NOSE: usize = 0;

@@ -7,7 +7,7 @@ use orator::config;
 use orator::demo::drawn::folder;
 use orator::demo::drawn::folder::DemoPlan;
 use orator::formats::wav;
-use orator::pipeline::extract::Extract;
+use orator::pipeline::extract::ExtractStage;
 use orator::pipeline::pose2d::Pose2dStage;
 use orator::stage::artifacts::{self, Artifact};
 use orator::stage::fingerprint::{Fingerprint, HashCache};
@@ -114,7 +114,7 @@ fn make(clip: &Path, dir: &Path, n_videos: usize) -> Result<()> {
     let (pattern, (config, units)) = (units(clip)?.1, units(dir)?);
     let [pattern] = &pattern[..] else { anyhow::bail!("the pattern has {} videos", pattern.len()) };
     let hashes = HashCache::open(&artifacts::hashes(&config.settings.work.dir));
-    let extract = Extract::new(&config.settings.extract);
+    let extract = ExtractStage::new(&config.settings.extract);
     let pose2d = Pose2dStage::new(&config.settings)?;
     let stages: [(&dyn Stage, bool); 2] = [(&extract, true), (&pose2d, false)];
     for (stage, writes_sound) in stages {

@@ -5,12 +5,10 @@ use super::figure::{INK, LEFT, RIGHT};
 use crate::external::opencv::draw;
 use crate::math::order::Ordered;
 use crate::types::image::Image;
-use crate::types::pose2d::{Keypoints, N_HAND};
+use crate::types::pose2d::{Keypoints, N_HAND, SEEN_SCORE};
 use anyhow::Result;
 use ndarray::{ArrayView2, Axis};
 
-/// Lowest score of a point that is drawn.
-const FOUND_SCORE: f32 = 0.3;
 /// Bones between the points of COCO-17 that are drawn.
 const BONES: [(usize, usize); 10] =
     [(5, 6), (5, 7), (7, 9), (6, 8), (8, 10), (5, 11), (6, 12), (11, 12), (0, 1), (0, 2)];
@@ -31,7 +29,7 @@ pub fn draw_keypoints(
     width_px: f32,
 ) -> Result<()> {
     let at = |points: ArrayView2<f32>, point: usize| -> Option<[f32; 2]> {
-        let found = points[[point, 2]] > FOUND_SCORE;
+        let found = points[[point, 2]] > SEEN_SCORE;
         found.then(|| [0, 1].map(|axis| points[[point, axis]] * place.scale[axis] + place.shift[axis]))
     };
     let body = keypoints.body.index_axis(Axis(0), frame_idx);
@@ -66,7 +64,7 @@ pub fn extent(keypoints: &Keypoints) -> Option<[f32; 4]> {
     let mut extent: Option<[f32; 4]> = None;
     let arrays = [(&keypoints.body, N_UPPER), (&keypoints.left_hand, N_HAND), (&keypoints.right_hand, N_HAND)];
     for (points, point) in arrays.into_iter().flat_map(|(points, n)| (0..n).map(move |point| (points, point))) {
-        let found = points.outer_iter().filter(|frame| frame[[point, 2]] > FOUND_SCORE);
+        let found = points.outer_iter().filter(|frame| frame[[point, 2]] > SEEN_SCORE);
         let ends = |axis: usize| {
             let places = Ordered::new(found.clone().map(|frame| frame[[point, axis]]));
             Some([places.low_end(50)?, places.high_end(50)?])

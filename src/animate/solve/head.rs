@@ -22,8 +22,7 @@ pub struct Face {
 /// (x to the person's left, y up, z ahead).
 const FACE: [Vec3; 5] =
     [[0.0, -0.020, 0.105], [0.032, 0.030, 0.075], [-0.032, 0.030, 0.075], [0.075, 0.0, 0.0], [-0.075, 0.0, 0.0]];
-/// Lowest score of a keypoint that is used, and fewest of the five that give a head.
-const LEAST_SCORE: f32 = 0.3;
+/// Fewest of the five points that give a head.
 const LEAST_POINTS: usize = 3;
 /// Shoulder width of an adult, metres, for the initial scale.
 const SHOULDERS_METRES: f64 = 0.36;
@@ -100,7 +99,7 @@ struct FacePoints {
 impl FacePoints {
     fn from_keypoints(body: ArrayView2<f32>) -> Option<Self> {
         let at = |point: usize| [f64::from(body[[point, 0]]), -f64::from(body[[point, 1]])];
-        let seen = |point: usize| (0..3).all(|k| body[[point, k]].is_finite()) && body[[point, 2]] >= LEAST_SCORE;
+        let seen = |point: usize| (0..3).all(|k| body[[point, k]].is_finite()) && body[[point, 2]] >= SEEN_SCORE;
         let weights: [f64; 5] =
             std::array::from_fn(|point| if seen(point) { f64::from(body[[point, 2]]).min(1.0).powi(4) } else { 0.0 });
         if weights.iter().filter(|&&weight| weight > 0.0).count() < LEAST_POINTS {

@@ -10,6 +10,7 @@ use crate::demo::drawn::truth::DrawnTruth;
 use crate::formats::keypoints_npz;
 use crate::math::order::{Ordered, upper_median};
 use crate::stage::artifacts::{Artifact, StageName, speaker_dir};
+use crate::types::pose2d::SEEN_SCORE;
 use crate::types::skeleton::{
     L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, NECK, R_ELBOW, R_HAND, R_SHOULDER, R_WRIST, parent,
 };
@@ -131,7 +132,7 @@ pub fn measure_keypoints(dir: &Path) -> Result<PipelineCheck> {
         let truth = truth_of(dir, &unit.file_name().unwrap_or_default().to_string_lossy())?;
         let seen = keypoints_npz::read(&Artifact::Keypoints.within(&unit))?;
         measured.n_drawn += truth.motion.n_frames();
-        body.compare(seen.body.slice(s![.., ..13, ..]), truth.body.view(), FOUND);
+        body.compare(seen.body.slice(s![.., ..13, ..]), truth.body.view(), SEEN_SCORE);
         hands.compare(seen.left_hand.view(), truth.left_hand.view(), 0.0);
         hands.compare(seen.right_hand.view(), truth.right_hand.view(), 0.0);
     }

@@ -4,7 +4,7 @@ use super::sounds::BatchSound;
 use super::stage::BatchStage;
 use crate::stage::fingerprint::HashCache;
 use crate::stage::progress::Progress;
-use crate::stage::runner::Ended;
+use crate::stage::runner::StageOutcome;
 use crate::stage::{artifacts, runner, workdir};
 use anyhow::Result;
 use serde::Serialize;
@@ -91,9 +91,9 @@ impl SpeechBatch {
         let mut report = BatchReport { out_folder: self.folder.clone(), ..BatchReport::default() };
         for (sound, ended) in self.sounds.iter().zip(ended) {
             let (count, ended, error, facts) = match ended {
-                Ended::Done(done) => (&mut report.made, BatchState::Made, None, done.facts),
-                Ended::Skipped(done) => (&mut report.fresh, BatchState::Fresh, None, done.facts),
-                Ended::Failed(error) => {
+                StageOutcome::Done(done) => (&mut report.made, BatchState::Made, None, done.facts),
+                StageOutcome::Skipped(done) => (&mut report.fresh, BatchState::Fresh, None, done.facts),
+                StageOutcome::Failed(error) => {
                     (&mut report.failed, BatchState::Failed, Some(format!("{error:#}")), Map::new())
                 }
             };

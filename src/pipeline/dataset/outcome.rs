@@ -1,6 +1,6 @@
 //! What the user is told of a dataset just written: how much there is, and what to mend.
 
-use super::video::Video;
+use super::video::LiftedVideo;
 use crate::config;
 use crate::dataset::info::DatasetInfo;
 use crate::dataset::leakage::Leakage;
@@ -13,16 +13,16 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// How the writing came out.
-pub struct Outcome<'a> {
+pub struct DatasetOutcome<'a> {
     pub settings: &'a config::DatasetConfig,
-    pub videos: &'a [Video],
+    pub videos: &'a [LiftedVideo],
     pub stats: &'a DatasetStats,
     pub n_failed: usize,
     pub n_left_out: usize,
     pub n_taken_over: usize,
 }
 
-impl Outcome<'_> {
+impl DatasetOutcome<'_> {
     /// The stage's report on the dataset in `out`.
     pub fn report(&self, out: &Path) -> Result<Report> {
         let info: DatasetInfo = serde_json::from_slice(&std::fs::read(out.join(INFO))?).context(INFO)?;
@@ -49,7 +49,7 @@ impl Outcome<'_> {
         let Self { videos, stats, n_failed, n_left_out, .. } = *self;
         let mut warnings = Vec::new();
         // The longest is the one to train on; each of the others is proposed once.
-        let mut by_length: Vec<&Video> = videos.iter().filter(|video| video.ledger.kept_secs() > 0.0).collect();
+        let mut by_length: Vec<&LiftedVideo> = videos.iter().filter(|video| video.ledger.kept_secs() > 0.0).collect();
         by_length.sort_by(|a, b| b.ledger.kept_secs().total_cmp(&a.ledger.kept_secs()));
         let mut others = by_length.iter().skip(1);
         let shares =

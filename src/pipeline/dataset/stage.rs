@@ -1,8 +1,8 @@
 //! The stage: all videos of a speaker, as `extract`, `pose2d`, `segment` and `lift` left them, become one dataset.
 //! What the dataset that was there has of a video already is taken over as it is, so that a new video costs itself alone.
 
-use super::outcome::Outcome;
-use super::video::{FILES, Video};
+use super::outcome::DatasetOutcome;
+use super::video::{FILES, LiftedVideo};
 use crate::config;
 use crate::config::Settings;
 use crate::config::videos::Videos;
@@ -79,7 +79,7 @@ impl DatasetStage {
         failed.into_iter().map(|unit| failure(&self.work, unit)).collect()
     }
 
-    fn about(&self, speaker: &Unit, first: &Video) -> About {
+    fn about(&self, speaker: &Unit, first: &LiftedVideo) -> About {
         let said = self.speakers.iter().find(|said| said.name == speaker.speaker).cloned().unwrap_or_default();
         let config::Speaker { licence, consent, source, .. } = said;
         let models = self.models.clone();
@@ -97,7 +97,7 @@ fn failure(work: &Path, unit: &Unit) -> VideoSource {
     VideoSource {
         name: unit.video.clone(),
         file: unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        ledger: duration_secs.map_or_else(Ledger::default, |secs| Ledger::of_failure(secs, stage, &error)),
+        ledger: duration_secs.map_or_else(Ledger::default, |secs| Ledger::failed(secs, stage, &error)),
         failure: Some(format!("{stage}: {error}")),
         ..VideoSource::default()
     }
@@ -142,13 +142,14 @@ impl Stage for DatasetStage {
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let ready = self.ready(unit);
         let failures = self.failures(unit, &ready);
-        let mut videos = ready.into_iter().map(|video| Video::open(&self.work, video)).collect::<Result<Vec<_>>>()?;
+        let mut videos =
+            ready.into_iter().map(|video| LiftedVideo::open(&self.work, video)).collect::<Result<Vec<_>>>()?;
         videos.sort_by(|a, b| (&a.name, &a.unit.video).cmp(&(&b.name, &b.unit.video)));
         check(unit, &self.work, &videos)?;
 
         let old = dir(&self.work, StageName::Dataset, unit);
-        let mut run = Run { stage: self, out, old: &old, before: parts_of(&old), n_taken_over: 0, progress };
-        let (mut kept, mut left_out): (Vec<&Video>, Vec<(&Video, VideoSource)>) = (Vec::new(), Vec::new());
+        let mut run = DatasetRun { stage: self, out, old: &old, before: parts_of(&old), n_taken_over: 0, progress };
+        let (mut kept, mut left_out): (Vec<&LiftedVideo>, Vec<(&LiftedVideo, VideoSource)>) = (Vec::new(), Vec::new());
         for video in &videos {
             match kept.iter().find(|first| first.content == video.content) {
                 Some(first) => left_out.push((video, run.duplicate(video, &first.name, video.ledger.duration_secs))),
@@ -182,7 +183,7 @@ impl Stage for DatasetStage {
         }
         let n_taken_over = run.n_taken_over;
         let (_, stats) = writer.finish()?;
-        let outcome = Outcome {
+        let outcome = DatasetOutcome {
             settings: &self.settings,
             videos: &videos,
             stats: &stats,
@@ -200,7 +201,7 @@ impl Stage for DatasetStage {
 pub struct NothingKept(pub String);
 
 /// The videos must have something to make a dataset of.
-fn check(unit: &Unit, work: &Path, videos: &[Video]) -> Result<()> {
+fn check(unit: &Unit, work: &Path, videos: &[LiftedVideo]) -> Result<()> {
     ensure!(
         !videos.is_empty(),
         "none of the videos of {} came through the stages before, so there is no dataset; \
@@ -239,7 +240,7 @@ fn parts_of(dir: &Path) -> BTreeMap<String, VideoEntry> {
 type Sounds = BTreeMap<String, String>;
 
 /// What is at hand while a dataset is written.
-struct Run<'a> {
+struct DatasetRun<'a> {
     stage: &'a DatasetStage,
     out: &'a Path,
     /// The dataset that is there, and its videos.
@@ -249,9 +250,9 @@ struct Run<'a> {
     progress: &'a dyn Progress,
 }
 
-impl Run<'_> {
+impl DatasetRun<'_> {
     /// Writes the codes of each video's sound, the old dataset's where the content is the same; their hashes.
-    fn sounds(&self, videos: &[&Video]) -> Result<Sounds> {
+    fn sounds(&self, videos: &[&LiftedVideo]) -> Result<Sounds> {
         let task = self.progress.begin("sound", videos.len() as u64);
         let mut hashes = Sounds::new();
         for video in videos {
@@ -268,7 +269,7 @@ impl Run<'_> {
         Ok(hashes)
     }
 
-    fn compare(&self, videos: &[&Video], sounds: &Sounds) -> Result<SoundComparison> {
+    fn compare(&self, videos: &[&LiftedVideo], sounds: &Sounds) -> Result<SoundComparison> {
         let duplicate_secs = self.stage.settings.duplicate_secs;
         if duplicate_secs <= 0.0 {
             return Ok(SoundComparison::default());
@@ -279,7 +280,7 @@ impl Run<'_> {
         Ok(SoundComparison { duplicate_secs, shared })
     }
 
-    fn place(&self, videos: &[&Video], compared: &SoundComparison) -> Vec<Assignment> {
+    fn place(&self, videos: &[&LiftedVideo], compared: &SoundComparison) -> Vec<Assignment> {
         let named: BTreeMap<&str, Split> = self
             .stage
             .all
@@ -300,7 +301,7 @@ impl Run<'_> {
     fn write(
         &mut self,
         writer: &DatasetWriter,
-        video: &Video,
+        video: &LiftedVideo,
         split: Split,
         by: SplitBy,
         sounds: &Sounds,
@@ -340,7 +341,7 @@ impl Run<'_> {
     }
 
     /// A video that is left out, since what it shows is there already: what was kept of it is refused.
-    fn duplicate(&self, video: &Video, of: &str, secs: f64) -> VideoSource {
+    fn duplicate(&self, video: &LiftedVideo, of: &str, secs: f64) -> VideoSource {
         let threshold = self.stage.settings.duplicate_secs;
         let mut ledger = video.ledger.clone();
         let why = FrameRefusal::new(Refusal::Duplicate, secs, threshold);

@@ -23,7 +23,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 /// A video whose stages are done.
-pub struct Video {
+pub struct LiftedVideo {
     /// `<slug of the file's name>-<8 hex of its content>`: the beginning of its samples' keys.
     pub name: String,
     /// File name of the video.
@@ -53,7 +53,7 @@ pub const FILES: [(Artifact, bool); 6] = [
 ];
 
 /// A sample, and how much silence was appended to its sound.
-pub struct Cut {
+pub struct CutSample {
     pub sample: Sample,
     pub padded_secs: f64,
 }
@@ -68,9 +68,9 @@ fn hash_of(file: Artifact, work: &Path, unit: &Unit) -> Result<String> {
     recorded.map_or_else(|| hash_file(&file.path(work, unit)), |output| Ok(output.hash))
 }
 
-impl Video {
+impl LiftedVideo {
     /// Reads the small files. Hashes are taken from the records of the stages, where there are any.
-    pub fn open(work: &Path, unit: &Unit) -> Result<Video> {
+    pub fn open(work: &Path, unit: &Unit) -> Result<LiftedVideo> {
         let path_of = |file: Artifact| file.path(work, unit);
         let extracted = Record::read(&dir(work, StageName::Extract, unit));
         let content = match extracted.and_then(|record| record.fingerprint.inputs.get("video").cloned()) {
@@ -94,7 +94,7 @@ impl Video {
         }
         let inside = |interval: &Interval| interval.start < interval.end && interval.end <= intervals.n_frames;
         ensure!(intervals.intervals.iter().all(inside), "{}: an interval outside the video", path.display());
-        Ok(Video {
+        Ok(LiftedVideo {
             name: format!("{}-{}", slug(&stem), content.get(..8).unwrap_or(&content)),
             file: unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned(),
             files_hash: hasher.finalize().to_hex().to_string(),
@@ -130,7 +130,7 @@ impl Video {
     }
 
     /// Opens the large files, to cut samples.
-    pub fn samples(&self) -> Result<Samples<'_>> {
+    pub fn samples(&self) -> Result<LiftedSamples<'_>> {
         let keypoints = keypoints_npz::read(&self.keypoints)?;
         let motion = joints_npz::read(&self.joints)?;
         let n_frames = self.intervals.n_frames;
@@ -145,28 +145,28 @@ impl Video {
             "{} is not 16-bit mono at {SAMPLE_RATE} Hz: run the extract stage again",
             self.sound.display()
         );
-        Ok(Samples { video: self, keypoints, motion, sound, next: 0 })
+        Ok(LiftedSamples { video: self, keypoints, motion, sound, next: 0 })
     }
 }
 
 /// The samples of a video one after the other.
-pub struct Samples<'a> {
-    video: &'a Video,
+pub struct LiftedSamples<'a> {
+    video: &'a LiftedVideo,
     keypoints: Keypoints,
     motion: Motion,
     sound: hound::WavReader<BufReader<File>>,
     next: usize,
 }
 
-impl Samples<'_> {
+impl LiftedSamples<'_> {
     /// The next interval's sample; `None` after the last.
-    pub fn next_sample(&mut self) -> Result<Option<Cut>> {
+    pub fn next_sample(&mut self) -> Result<Option<CutSample>> {
         let Some(&interval) = self.video.intervals.intervals.get(self.next) else { return Ok(None) };
         self.next += 1;
         self.cut(interval).map(Some)
     }
 
-    fn cut(&mut self, interval: Interval) -> Result<Cut> {
+    fn cut(&mut self, interval: Interval) -> Result<CutSample> {
         let (fps, frames) = (self.video.intervals.fps, s![interval.start..interval.end, .., ..]);
         let motion = Motion {
             fps,
@@ -195,7 +195,7 @@ impl Samples<'_> {
         });
         let key = format!("{}-{:06}", self.video.name, interval.start);
         let padded_secs = n_padded as f64 / f64::from(SAMPLE_RATE);
-        Ok(Cut { sample: Sample { key, motion, pose2d, sound, meta }, padded_secs })
+        Ok(CutSample { sample: Sample { key, motion, pose2d, sound, meta }, padded_secs })
     }
 
     /// The sound under an interval, and how many samples of silence had to be appended.

@@ -31,7 +31,7 @@ pub fn missing(picture: &Thumbnail, others: &[&Thumbnail], least: f32) -> f64 {
 pub fn moved(from: &Thumbnail, to: &Thumbnail) -> f64 {
     let (mut n, mut n_moved) = (0, 0);
     for block in blocks(from) {
-        let Found { best, there } = block.search(to);
+        let BlockMatch { best, there } = block.search(to);
         n += 1;
         n_moved += usize::from(best >= MOVED && best - there > MOVE_GAIN);
     }
@@ -58,7 +58,7 @@ pub fn same_edges(a: &Thumbnail, b: &Thumbnail) -> f64 {
 }
 
 /// A block of a picture without its mean.
-struct Block {
+struct PictureBlock {
     x: usize,
     y: usize,
     values: Vec<f32>,
@@ -67,12 +67,12 @@ struct Block {
 }
 
 /// Correlation at the best place and at the same place.
-struct Found {
+struct BlockMatch {
     best: f32,
     there: f32,
 }
 
-fn blocks(picture: &Thumbnail) -> impl Iterator<Item = Block> {
+fn blocks(picture: &Thumbnail) -> impl Iterator<Item = PictureBlock> {
     let [width, height] = THUMBNAIL;
     let corners =
         (0..height / BLOCK).flat_map(move |row| (0..width / BLOCK).map(move |col| (col * BLOCK, row * BLOCK)));
@@ -81,7 +81,7 @@ fn blocks(picture: &Thumbnail) -> impl Iterator<Item = Block> {
         let mean = values.iter().sum::<f32>() / values.len() as f32;
         values.iter_mut().for_each(|value| *value -= mean);
         let norm = values.iter().map(|value| value * value).sum::<f32>().sqrt();
-        (norm >= FLAT * BLOCK as f32).then_some(Block { x, y, values, norm })
+        (norm >= FLAT * BLOCK as f32).then_some(PictureBlock { x, y, values, norm })
     })
 }
 
@@ -90,10 +90,10 @@ fn rows(picture: &Thumbnail, x: usize, y: usize) -> impl Iterator<Item = &[f32]>
     (y..y + BLOCK).map(move |row| &picture.gray[row * THUMBNAIL[0] + x..row * THUMBNAIL[0] + x + BLOCK])
 }
 
-impl Block {
-    fn search(&self, other: &Thumbnail) -> Found {
+impl PictureBlock {
+    fn search(&self, other: &Thumbnail) -> BlockMatch {
         let around = |at: usize, side: usize| at.saturating_sub(REACH)..=(at + REACH).min(side - BLOCK);
-        let mut found = Found { best: -1.0, there: -1.0 };
+        let mut found = BlockMatch { best: -1.0, there: -1.0 };
         for y in around(self.y, THUMBNAIL[1]) {
             for x in around(self.x, THUMBNAIL[0]) {
                 let correlation = self.correlation(other, x, y);

@@ -10,4 +10,4 @@ pub mod shots;
 pub mod stage;
 pub mod thumbnail;
 
-pub use stage::Extract;
+pub use stage::ExtractStage;

@@ -32,7 +32,7 @@ pub struct ShotFinder {
     /// Frames of the dataset rate to one at 15 a second.
     pace: usize,
     /// The newest frames that repeat none, the oldest first.
-    recent: VecDeque<Recent>,
+    recent: VecDeque<RecentFrame>,
     /// Frame of each that repeats none.
     frames: Vec<usize>,
     n_frames: usize,
@@ -40,18 +40,18 @@ pub struct ShotFinder {
     changes: Vec<f64>,
     /// The same in scores of cuts, as far as known.
     cuts: Vec<f64>,
-    windows: Vec<Window>,
+    windows: Vec<Transition>,
 }
 
 /// A frame with the way each cell's colour has gone since the film began, modulo 2^32.
-struct Recent {
+struct RecentFrame {
     thumbnail: Thumbnail,
     way: Vec<[u32; 3]>,
 }
 
 /// A gradual transition from one frame to another, counted among those that repeat none.
 #[derive(Clone, Copy)]
-struct Window {
+struct Transition {
     start: usize,
     end: usize,
     score: f64,
@@ -88,7 +88,7 @@ impl ShotFinder {
             }
         }
         self.frames.push(frame);
-        self.recent.push_back(Recent { thumbnail, way });
+        self.recent.push_back(RecentFrame { thumbnail, way });
         self.judge(FLASH * self.pace);
         let longest = WINDOWS.last().map_or(0, |(length, _)| length * self.pace);
         while self.recent.len() > longest + 2 * FLASH * self.pace + 2 {
@@ -122,7 +122,7 @@ impl ShotFinder {
     }
 
     /// The frame `at`, counted among those that repeat none; `None` if it is no longer kept.
-    fn recent(&self, at: usize) -> Option<&Recent> {
+    fn recent(&self, at: usize) -> Option<&RecentFrame> {
         let first = self.frames.len() - self.recent.len();
         self.recent.get(at.checked_sub(first)?)
     }
@@ -141,7 +141,7 @@ impl ShotFinder {
     }
 
     /// The likeliest transition that ends at the frame `end`.
-    fn transition(&self, end: usize) -> Option<Window> {
+    fn transition(&self, end: usize) -> Option<Transition> {
         let last = self.recent(end)?;
         let turned = |length: usize| {
             let first = self.recent(end.checked_sub(length)?)?;
@@ -162,7 +162,7 @@ impl ShotFinder {
         let windows = judged.filter_map(|(start, least, turned)| {
             let frames: Option<Vec<_>> = (start..=end).map(|at| Some(&self.recent(at)?.thumbnail)).collect();
             let score = dissolves::score(&frames?, turned, least);
-            (score > 0.0).then_some(Window { start, end, score })
+            (score > 0.0).then_some(Transition { start, end, score })
         });
         tightest(&windows.collect::<Vec<_>>())
     }
@@ -179,8 +179,8 @@ impl ShotFinder {
 }
 
 /// The windows of which none overlaps a better one.
-fn chosen(mut windows: Vec<Window>) -> Vec<Window> {
-    let apart = |a: &Window, b: &Window| a.end < b.start || b.end < a.start;
+fn chosen(mut windows: Vec<Transition>) -> Vec<Transition> {
+    let apart = |a: &Transition, b: &Transition| a.end < b.start || b.end < a.start;
     let mut chosen = Vec::new();
     windows.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.start.cmp(&b.start)));
     while let Some(best) = windows.first().copied() {
@@ -192,7 +192,7 @@ fn chosen(mut windows: Vec<Window>) -> Vec<Window> {
 }
 
 /// The shortest of the windows that score nearly as well as the best.
-fn tightest(windows: &[Window]) -> Option<Window> {
+fn tightest(windows: &[Transition]) -> Option<Transition> {
     let best = windows.iter().map(|window| window.score).fold(0.0, f64::max);
     let good = windows.iter().filter(|window| window.score >= 0.9 * best);
     good.min_by(|a, b| (a.end - a.start).cmp(&(b.end - b.start)).then(b.score.total_cmp(&a.score))).copied()

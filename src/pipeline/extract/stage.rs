@@ -20,17 +20,17 @@ use std::fs;
 use std::path::Path;
 
 /// Video to sound and timeline.
-pub struct Extract {
+pub struct ExtractStage {
     settings: config::Extract,
 }
 
-impl Extract {
+impl ExtractStage {
     pub fn new(settings: &config::Extract) -> Self {
         Self { settings: settings.clone() }
     }
 }
 
-impl Stage for Extract {
+impl Stage for ExtractStage {
     fn name(&self) -> &'static str {
         StageName::Extract.as_str()
     }
@@ -88,7 +88,7 @@ impl Stage for Extract {
     }
 }
 
-impl Extract {
+impl ExtractStage {
     /// Reads the pictures once; of each only a thumbnail is converted, unless the frames are kept.
     fn timeline(&self, reader: &mut FrameReader, out: &Path, progress: &dyn Progress) -> Result<Timeline> {
         let mut timeline = Timeline::default();

@@ -1,8 +1,8 @@
 //! Arms in 3D: what is seen of the upper body, through the body lifter, to joints of about the reference size.
 
 use super::gaps::long_gaps;
-use super::interval_view::Stretch;
-use super::observed::Sight;
+use super::interval_view::IntervalView;
+use super::observed::ObservedBody;
 use crate::math::order::lower_median;
 use crate::motion::upper_body::{ARMS, L_HIP, L_SHOULDER, NOSE, Pose, R_HIP, R_SHOULDER, REFERENCE_SIZE, Seen, size};
 use crate::nn::lifter::body::BodyLifter;
@@ -33,11 +33,11 @@ pub fn lift(
     keypoints: &Keypoints,
     interval: Interval,
     max_gap: usize,
-    into: &mut Stretch,
+    into: &mut IntervalView,
 ) -> Result<()> {
     let step = keypoints.fps.per_sec() / TRAINED_FPS;
     let frames = |at_trained: f64| (at_trained * step).round() as usize;
-    let sight = Sight::of(keypoints, interval, frames(STRAY_FRAMES).max(2), max_gap);
+    let sight = ObservedBody::from_keypoints(keypoints, interval, frames(STRAY_FRAMES).max(2), max_gap);
     let n_frames = interval.n_frames();
     let mut sizes = vec![f32::NAN; n_frames];
     // a frame is placed by frames that lie within this many
@@ -65,7 +65,7 @@ pub fn lift(
     Ok(())
 }
 
-fn place(pose: &Pose, t: usize, into: &mut Stretch) {
+fn place(pose: &Pose, t: usize, into: &mut IntervalView) {
     into.joints.slice_mut(s![t, NECK, ..]).fill(0.0);
     for joint in ARMS {
         (0..3).for_each(|k| into.joints[[t, joint, k]] = pose[joint][k] as f32);
@@ -76,7 +76,7 @@ fn place(pose: &Pose, t: usize, into: &mut Stretch) {
 }
 
 /// From px to metres: the body's median size over the frames within `reach` becomes the reference size.
-fn to_reference(sizes: &[f32], reach: usize, into: &mut Stretch) {
+fn to_reference(sizes: &[f32], reach: usize, into: &mut IntervalView) {
     for t in 0..sizes.len() {
         let around = sizes[t.saturating_sub(reach)..sizes.len().min(t + reach + 1)].to_vec();
         let grow = lower_median(around).map_or(f32::NAN, |size| REFERENCE_SIZE as f32 / size);
@@ -86,7 +86,7 @@ fn to_reference(sizes: &[f32], reach: usize, into: &mut Stretch) {
 }
 
 /// Makes missing what was not seen for more than `max_gap` frames, with the whole body where that is a shoulder.
-fn forget_long_gaps(sight: &Sight, max_gap: usize, into: &mut Stretch) {
+fn forget_long_gaps(sight: &ObservedBody, max_gap: usize, into: &mut IntervalView) {
     let frames = |point: usize| {
         let long = long_gaps(&sight.seen.column(point).to_vec(), max_gap);
         (0..long.len()).filter(move |&t| long[t])

@@ -4,7 +4,7 @@
 //! lifter was trained with rolls of up to 4) roll was 2.4 and pitch 6.2 degrees off (median, `tests/it/lift_camera.rs`);
 //! torsos that leaned 15.5 degrees as seen leaned 1.7 after levelling. Guessed hips tell no more than no estimate at all.
 
-use super::interval_view::Stretch;
+use super::interval_view::IntervalView;
 use crate::math::order::lower_median;
 use crate::math::rotation::Rotation;
 use crate::math::vec3;
@@ -22,7 +22,7 @@ const FRONTAL: f32 = 0.36;
 
 /// The camera over an interval; `None`: not to be known from what was seen.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Camera {
+pub struct CameraTilt {
     #[serde(flatten)]
     pub interval: Interval,
     /// By how much an upright speaker leans to the right of the picture.
@@ -31,9 +31,9 @@ pub struct Camera {
     pub pitch_degrees: Option<f64>,
 }
 
-impl Camera {
+impl CameraTilt {
     /// From a lifted interval: joints about the neck, extra points nose, right hip, left hip.
-    pub(crate) fn of(interval: Interval, lifted: &Stretch) -> Self {
+    pub(crate) fn estimate(interval: Interval, lifted: &IntervalView) -> Self {
         let up = up_by_hips(lifted);
         let roll = up.map(|up| up[0].atan2(-up[1])).or_else(|| roll_by_shoulders(lifted));
         let pitch = up.map(|up| (-up[2]).atan2(up[0].hypot(up[1])));
@@ -41,7 +41,7 @@ impl Camera {
     }
 
     /// Turns the interval so that it is seen by a level camera, as far as roll and pitch are known.
-    pub(crate) fn level(&self, lifted: &mut Stretch) {
+    pub(crate) fn level(&self, lifted: &mut IntervalView) {
         let angle = |degrees: Option<f64>| degrees.unwrap_or(0.0).to_radians();
         let upright = Rotation::about([0.0, 0.0, 1.0], -angle(self.roll_degrees));
         let ahead = Rotation::about([1.0, 0.0, 0.0], -angle(self.pitch_degrees));
@@ -60,7 +60,7 @@ fn turn_all(points: &mut ArrayViewMut3<f32>, turn: Rotation) {
 }
 
 /// The median direction from the middle of the hips to the neck.
-fn up_by_hips(lifted: &Stretch) -> Option<Vec3> {
+fn up_by_hips(lifted: &IntervalView) -> Option<Vec3> {
     let torso = |hips: ndarray::ArrayView2<f32>| -> Option<Vec3> {
         let middle = [0, 1, 2].map(|k| -0.5 * f64::from(hips[[1, k]] + hips[[2, k]]));
         vec3::unit(middle, 1e-6)
@@ -74,7 +74,7 @@ fn up_by_hips(lifted: &Stretch) -> Option<Vec3> {
 }
 
 /// The median roll of the shoulders, of a speaker who faces the camera.
-fn roll_by_shoulders(lifted: &Stretch) -> Option<f64> {
+fn roll_by_shoulders(lifted: &IntervalView) -> Option<f64> {
     let across = |k: usize| -> Vec<f32> {
         lifted.joints.outer_iter().map(|pose| pose[[L_SHOULDER, k]] - pose[[R_SHOULDER, k]]).collect()
     };

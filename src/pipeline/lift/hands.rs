@@ -8,14 +8,12 @@ use crate::math::vec3;
 use crate::motion::view::hand::{Hand, HandView, N_IN, N_OUT, SeenHand, parent};
 use crate::nn::Mode;
 use crate::nn::lifter::hand::HandLifter;
-use crate::types::pose2d::N_HAND;
+use crate::types::pose2d::{HAND_SEEN_SCORE, N_HAND};
 use crate::types::skeleton::Side;
 use anyhow::Result;
 use candle_core::{Device, Tensor};
 use ndarray::{ArrayView3, ArrayViewMut2, ArrayViewMut3, Axis, s};
 
-/// A hand's keypoint counts as seen from this score on.
-const SEEN_SCORE: f32 = 0.2;
 /// A hand with fewer points seen is not lifted.
 const LEAST_POINTS: usize = 12;
 /// Hands that go through the network together.
@@ -66,7 +64,7 @@ pub fn lift(
 fn seen_points(points: &ArrayView3<f32>, t: usize) -> SeenHand {
     std::array::from_fn(|j| {
         let [x, y, score] = [0, 1, 2].map(|k| points[[t, j, k]]);
-        (score >= SEEN_SCORE && x.abs() <= FARTHEST_PX && y.abs() <= FARTHEST_PX).then_some([x, y])
+        (score >= HAND_SEEN_SCORE && x.abs() <= FARTHEST_PX && y.abs() <= FARTHEST_PX).then_some([x, y])
     })
 }
 

@@ -3,7 +3,7 @@
 use ndarray::{ArrayViewMut2, ArrayViewMut3};
 
 /// The frames of one interval of a `Lifted`.
-pub struct Stretch<'a> {
+pub struct IntervalView<'a> {
     pub joints: ArrayViewMut3<'a, f32>,
     pub extra: ArrayViewMut3<'a, f32>,
     pub mask: ArrayViewMut2<'a, bool>,

@@ -7,8 +7,8 @@
 //! NaN, with all that hangs on it. Size is a convention (`upper_body::REFERENCE_SIZE`), as no picture tells it.
 
 use super::body::TRAINED_FPS;
-use super::camera::Camera;
-use super::interval_view::Stretch;
+use super::camera::CameraTilt;
+use super::interval_view::IntervalView;
 use super::{body, hands, lengths, weights};
 use crate::config;
 use crate::math::gaussian;
@@ -44,7 +44,7 @@ pub struct Lifted {
     /// The video's bone lengths in metres, of joints 1..=48; 0: never seen (and the hand roots).
     pub lengths: [f32; N_BONES],
     /// How the camera was held, an entry an interval.
-    pub cameras: Vec<Camera>,
+    pub cameras: Vec<CameraTilt>,
     /// Frames that have arms.
     pub n_frames: usize,
 }
@@ -101,7 +101,7 @@ impl Lifter {
         lifted.lengths = lengths::measure(&lifted.motion);
         for &interval in intervals {
             let mut stretch = lifted.stretch(interval);
-            let camera = Camera::of(interval, &stretch);
+            let camera = CameraTilt::estimate(interval, &stretch);
             if self.level {
                 camera.level(&mut stretch);
             }
@@ -119,7 +119,7 @@ impl Lifter {
     }
 
     /// One interval, smoothed, of about the reference size; each hand in its own frame, the root at 0.
-    fn lift_stretch(&self, keypoints: &Keypoints, interval: Interval, mut into: Stretch) -> Result<()> {
+    fn lift_stretch(&self, keypoints: &Keypoints, interval: Interval, mut into: IntervalView) -> Result<()> {
         let fps = keypoints.fps.per_sec();
         let max_gap = (MAX_GAP_SECS * fps).round() as usize;
         let frames = |sigma: f64| sigma * fps / TRAINED_FPS;
@@ -160,7 +160,7 @@ impl Lifted {
         for next in intervals.iter().copied().chain([Interval { start: after_all, end: after_all }]) {
             if end < next.start {
                 let stretch = self.stretch(Interval { start: end, end: next.start });
-                let Stretch { mut joints, mut extra, mut mask } = stretch;
+                let IntervalView { mut joints, mut extra, mut mask } = stretch;
                 joints.fill(f32::NAN);
                 extra.fill(f32::NAN);
                 mask.fill(false);
@@ -169,9 +169,9 @@ impl Lifted {
         }
     }
 
-    fn stretch(&mut self, interval: Interval) -> Stretch<'_> {
+    fn stretch(&mut self, interval: Interval) -> IntervalView<'_> {
         let frames = interval.start..interval.end;
-        Stretch {
+        IntervalView {
             joints: self.motion.joints.slice_mut(s![frames.clone(), .., ..]),
             extra: self.extra.slice_mut(s![frames.clone(), .., ..]),
             mask: self.motion.mask.slice_mut(s![frames, ..]),

@@ -1,8 +1,7 @@
 //! What was lifted and what was not, in sentences for the user.
 
 use super::lifter::{Lifted, MAX_GAP_SECS};
-use super::observed::SEEN_SCORE;
-use crate::types::pose2d::{Keypoints, coco};
+use crate::types::pose2d::{Keypoints, SEEN_SCORE, coco};
 
 /// Why joints are missing (NaN), a sentence each; nothing when all are there.
 pub fn notes(keypoints: &Keypoints, lifted: &Lifted) -> Vec<String> {

@@ -22,7 +22,7 @@ pub mod refuse;
 pub mod stage;
 pub mod weights;
 
-pub use camera::Camera;
+pub use camera::CameraTilt;
 pub use lifter::Lifted;
 pub use lifter::Lifter;
 pub use missing::notes;

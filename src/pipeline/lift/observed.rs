@@ -5,12 +5,10 @@ use super::gaps;
 use crate::math::order::{lower_median, median};
 use crate::motion::upper_body::{COCO, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_HIP, R_SHOULDER, R_WRIST, Seen};
 use crate::types::interval::Interval;
-use crate::types::pose2d::{Keypoints, coco};
+use crate::types::pose2d::{Keypoints, SEEN_SCORE, coco};
 use crate::types::skeleton::BODY_BONES;
 use ndarray::{Array2, Array3, s};
 
-/// A body keypoint counts as seen from this score on.
-pub const SEEN_SCORE: f32 = 0.3;
 /// A coordinate beyond this many px is none.
 pub const FARTHEST_PX: f32 = 1e6;
 /// The nose lies this share of the way from the eyes to the neck; a guess that moves lifted joints less than no nose.
@@ -22,17 +20,17 @@ const STRAY: f32 = 0.15;
 const STRAY_SPREAD: f32 = 2.0;
 
 /// The nine points over an interval.
-pub struct Sight {
+pub struct ObservedBody {
     /// px, [T, 9, 2]; NaN: not seen, and no short gap.
     points: Array3<f32>,
     /// [T, 9]; whether the keypoints show the point.
     pub seen: Array2<bool>,
 }
 
-impl Sight {
+impl ObservedBody {
     /// What the keypoints show. A point that jumps away and back within `reach` frames before and after is not seen; a
     /// gap of up to `max_gap` frames between two frames is bridged.
-    pub fn of(keypoints: &Keypoints, interval: Interval, reach: usize, max_gap: usize) -> Self {
+    pub fn from_keypoints(keypoints: &Keypoints, interval: Interval, reach: usize, max_gap: usize) -> Self {
         let mut points = Array3::from_elem((interval.n_frames(), N_POINTS, 2), f32::NAN);
         for (t, mut frame) in points.outer_iter_mut().enumerate() {
             for (j, point) in shown(keypoints, interval.start + t).into_iter().enumerate() {
@@ -164,8 +162,8 @@ mod tests {
         Keypoints { fps, image_size: [1280, 720], body, left_hand: hand.clone(), right_hand: hand }
     }
 
-    fn sight(keypoints: &Keypoints) -> Sight {
-        Sight::of(keypoints, Interval { start: 0, end: keypoints.n_frames() }, 2, 15)
+    fn sight(keypoints: &Keypoints) -> ObservedBody {
+        ObservedBody::from_keypoints(keypoints, Interval { start: 0, end: keypoints.n_frames() }, 2, 15)
     }
 
     #[test]

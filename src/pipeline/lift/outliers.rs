@@ -29,7 +29,7 @@ pub struct BoneChange {
 
 impl BoneChange {
     /// Measures bones as they were lifted, before they are given one length each.
-    pub fn of(raw: &Motion) -> Self {
+    pub fn measure(raw: &Motion) -> Self {
         let mut changes = Array2::from_elem((raw.n_frames(), BODY_BONES.len()), f32::NAN);
         for (i, (from, to)) in BODY_BONES.into_iter().enumerate() {
             let seen = |t: usize| raw.mask[[t, from]] && raw.mask[[t, to]];

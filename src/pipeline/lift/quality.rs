@@ -3,14 +3,12 @@
 //! in 3D was shortened; the ratio of the two lengths says so (perspective alone makes it 0.8 to 0.9 at arm's length).
 
 use crate::math::order::{self, Ordered};
-use crate::types::pose2d::{Keypoints, coco};
+use crate::types::pose2d::{Keypoints, SEEN_SCORE, coco};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton;
 use crate::types::skeleton::{L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_HAND_JOINTS};
 use anyhow::{Result, ensure};
 
-/// A 2D point counts as found from this score on.
-const FOUND_SCORE: f32 = 0.3;
 const MM: f64 = 1000.0;
 
 /// Figures of one arm; NaN where the clip shows nothing to measure.
@@ -51,18 +49,18 @@ pub struct ClipFigures {
 }
 
 /// Joints and COCO points of one side.
-struct Chain {
+struct ArmChain {
     joints: [usize; 3],
     points: [usize; 3],
     hand: usize,
 }
 
-const LEFT: Chain = Chain {
+const LEFT: ArmChain = ArmChain {
     joints: [L_SHOULDER, L_ELBOW, L_WRIST],
     points: [coco::L_SHOULDER, coco::L_ELBOW, coco::L_WRIST],
     hand: L_HAND,
 };
-const RIGHT: Chain = Chain {
+const RIGHT: ArmChain = ArmChain {
     joints: [skeleton::R_SHOULDER, skeleton::R_ELBOW, skeleton::R_WRIST],
     points: [coco::R_SHOULDER, coco::R_ELBOW, coco::R_WRIST],
     hand: skeleton::R_HAND,
@@ -84,7 +82,7 @@ pub fn jitter_around(motion: &Motion, joint: usize, frame_idx: usize) -> f64 {
     median(range.filter_map(|t| second_difference(motion, joint, t)))
 }
 
-fn arm(chain: &Chain, motion: &Motion, keypoints: &Keypoints, fits: &[Option<Fit>]) -> ArmFigures {
+fn arm(chain: &ArmChain, motion: &Motion, keypoints: &Keypoints, fits: &[Option<Fit>]) -> ArmFigures {
     let n_frames = motion.n_frames();
     let [shoulder, elbow, wrist] = chain.joints;
     let all = |of: &dyn Fn(usize) -> f64| -> Vec<f64> { (0..n_frames).map(of).filter(|v| v.is_finite()).collect() };
@@ -196,7 +194,7 @@ fn place(motion: &Motion, joint: usize, t: usize) -> [f64; 3] {
 
 fn found(keypoints: &Keypoints, point: usize, t: usize) -> Option<[f64; 2]> {
     let [x, y, score] = [0, 1, 2].map(|k| keypoints.body[[t, point, k]]);
-    (score > FOUND_SCORE).then_some([f64::from(x), f64::from(y)])
+    (score > SEEN_SCORE).then_some([f64::from(x), f64::from(y)])
 }
 
 fn distance<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {

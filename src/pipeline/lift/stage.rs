@@ -148,7 +148,7 @@ impl LiftStage {
     ) -> Result<(Lifted, Intervals, Ledger)> {
         let (most, min_frames) = (self.settings.max_bone_change, self.rules.min_frames);
         let mut raw = self.lifter.raw(keypoints, &intervals.intervals)?;
-        let change = BoneChange::of(&raw.motion);
+        let change = BoneChange::measure(&raw.motion);
         if change.exceeds(most) {
             let refusals = change.judge(most, max_gap_frames(&self.rules, keypoints.fps), keypoints);
             (intervals, ledger) = exclude_frames(&intervals, &ledger, &refusals, min_frames)?;

@@ -1,7 +1,7 @@
 //! What a person looks like: the colours of head, chest and belly, where the body's points say they are. Two people are
 //! told apart by them, one person at two times is not; faces are not looked at.
 
-use super::decode::Point;
+use super::decode::ScoredPoint;
 use super::patch;
 use crate::types::image::Image;
 use crate::types::pose2d::coco;
@@ -19,7 +19,7 @@ pub struct Appearance(Vec<f32>);
 
 impl Appearance {
     /// Of the body whose points are given; `None` if its shoulders are not surer than `least`.
-    pub fn of(image: &Image, body: &[Point; 17], least: f64) -> Option<Self> {
+    pub fn measure(image: &Image, body: &[ScoredPoint; 17], least: f64) -> Option<Self> {
         let [left, right] = [coco::L_SHOULDER, coco::R_SHOULDER].map(|at| body[at]);
         let width = (left[0] - right[0]).hypot(left[1] - right[1]);
         if left[2].min(right[2]) < least || !(4.0..1e5).contains(&width) {
@@ -85,7 +85,7 @@ mod tests {
     use super::*;
     use crate::external::opencv::draw;
 
-    fn person(shirt: [u8; 3], light: f32, x: f64) -> (Image, [Point; 17]) {
+    fn person(shirt: [u8; 3], light: f32, x: f64) -> (Image, [ScoredPoint; 17]) {
         let lit = |rgb: [u8; 3]| rgb.map(|part| (f32::from(part) * light) as u8);
         let mut image = Image::filled(320, 240, lit([90, 90, 90]));
         let at = |dx: f32, dy: f32| [x as f32 + dx, 100.0 + dy];
@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn another_shirt_is_another_person_and_another_place_or_light_is_not() {
-        let of = |(image, body): (Image, [Point; 17])| Appearance::of(&image, &body, 0.3).unwrap();
+        let of = |(image, body): (Image, [ScoredPoint; 17])| Appearance::measure(&image, &body, 0.3).unwrap();
         let red = of(person([180, 40, 40], 1.0, 100.0));
         let same = red.distance(&of(person([180, 40, 40], 0.9, 200.0)));
         let other = red.distance(&of(person([40, 60, 160], 1.0, 100.0)));

@@ -1,7 +1,7 @@
 //! The body model: the keypoints of the person in a box, and those of both hands where the model gives them.
 
-use super::decode::{Point, heatmap, simcc};
-use super::model_input::Feed;
+use super::decode::{ScoredPoint, heatmap, simcc};
+use super::model_input::ModelInput;
 use crate::external::onnx::{Decode, Fit, KeypointOutputs, ModelEntry, Outputs, Refine, Runtime};
 use crate::external::opencv::blur::GaussianBlur;
 use crate::external::opencv::warp::SrcFromDst;
@@ -22,7 +22,7 @@ impl PointReader {
     }
 
     /// All points the model gives, in px of its input, `size` its height and width.
-    pub fn points(&self, outputs: &Outputs, size: [usize; 2]) -> Result<Vec<Point>> {
+    pub fn points(&self, outputs: &Outputs, size: [usize; 2]) -> Result<Vec<ScoredPoint>> {
         match &self.decode {
             Decode::Heatmap { heatmap: name, refine, .. } => {
                 let (shape, maps) = outputs.floats(name)?;
@@ -35,7 +35,7 @@ impl PointReader {
 }
 
 /// The points a map names, placed in the picture; a point the model did not give is zero.
-pub fn placed<const N: usize>(points: &[Point], map: &[usize], src_from_dst: &SrcFromDst) -> [Point; N] {
+pub fn placed<const N: usize>(points: &[ScoredPoint], map: &[usize], src_from_dst: &SrcFromDst) -> [ScoredPoint; N] {
     std::array::from_fn(|at| {
         let [x, y, score] = map.get(at).and_then(|from| points.get(*from)).copied().unwrap_or_default();
         let [x, y] = src_from_dst.apply([x, y]);
@@ -44,15 +44,15 @@ pub fn placed<const N: usize>(points: &[Point], map: &[usize], src_from_dst: &Sr
 }
 
 /// What the body model gives of one person, in px of the picture.
-pub struct Body {
-    pub points: [Point; 17],
+pub struct DetectedBody {
+    pub points: [ScoredPoint; 17],
     /// Left and right, from a whole-body model.
-    pub hands: Option<[[Point; 21]; 2]>,
+    pub hands: Option<[[ScoredPoint; 21]; 2]>,
 }
 
 /// The body model with its way of reading.
 pub struct BodyModel {
-    feed: Feed,
+    feed: ModelInput,
     reader: PointReader,
     margin: f64,
     map: KeypointOutputs,
@@ -62,7 +62,7 @@ impl BodyModel {
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
         let margin = if let Fit::Box { margin } = entry.fit { margin } else { 1.0 };
         let (reader, map) = (PointReader::new(&entry.decode), entry.points.clone());
-        Ok(Self { feed: Feed::open(runtime, entry, dir)?, reader, margin, map })
+        Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, reader, margin, map })
     }
 
     pub fn secs_inside(&self) -> f64 {
@@ -75,14 +75,14 @@ impl BodyModel {
     }
 
     /// The keypoints of the person in the box (x, y, width, height in px); None for a box that is no place.
-    pub fn find(&mut self, image: &Image, place: [f64; 4]) -> Result<Option<Body>> {
+    pub fn find(&mut self, image: &Image, place: [f64; 4]) -> Result<Option<DetectedBody>> {
         let size = self.feed.size();
         let Some(src_from_dst) = grown(place, size, self.margin) else { return Ok(None) };
         let outputs = self.feed.part(image, &src_from_dst)?;
         let points = self.reader.points(&outputs, size)?;
         let hand = |map: &[usize]| placed::<21>(&points, map, &src_from_dst);
         let hands = (!self.map.left_hand.is_empty()).then(|| [hand(&self.map.left_hand), hand(&self.map.right_hand)]);
-        Ok(Some(Body { points: placed(&points, &self.map.body, &src_from_dst), hands }))
+        Ok(Some(DetectedBody { points: placed(&points, &self.map.body, &src_from_dst), hands }))
     }
 }
 

@@ -1,13 +1,13 @@
 //! The way of one frame: person box (every n-th frame, followed between), body, and each hand from where it was, else
 //! from the arm, else from a detected palm; then guards against the other hand and against one hand taken twice.
 
-use super::body::{Body, BodyModel};
-use super::decode::Point;
-use super::hand::{Hand, HandModel};
+use super::body::{BodyModel, DetectedBody};
+use super::decode::ScoredPoint;
+use super::hand::{DetectedHand, HandModel};
 use super::palm::PalmDetector;
 use super::person::Detector;
 use super::region;
-use super::speaker::Speaker;
+use super::speaker::SpeakerTracker;
 use crate::config;
 use crate::external::onnx::{Manifest, ModelRole, Runtime};
 use crate::external::opencv::warp::Region;
@@ -26,7 +26,7 @@ const SAME_HAND: f64 = 0.08;
 /// The models that look at a frame, and what is followed from frame to frame. One a worker: it runs on one thread.
 pub struct Chain {
     settings: config::Pose2d,
-    speaker: Speaker,
+    speaker: SpeakerTracker,
     body: BodyModel,
     hand: Option<HandModel>,
     palm: Option<PalmDetector>,
@@ -59,7 +59,7 @@ impl Chain {
         );
         Ok(Self {
             settings: settings.clone(),
-            speaker: Speaker::new(person.transpose()?),
+            speaker: SpeakerTracker::new(person.transpose()?),
             body,
             hand: hand.transpose()?,
             palm: palm.transpose()?,
@@ -103,7 +103,7 @@ impl Chain {
             self.hand_regions = [None; 2];
             found = self.look_for_body(image)?;
         }
-        let followed = &self.speaker.followed;
+        let followed = &self.speaker.track;
         let mut pose = Pose2d {
             person: followed.person(),
             n_people: followed.n_people,
@@ -118,11 +118,11 @@ impl Chain {
         let mean = body.points.iter().map(|point| point[2]).sum::<f64>() / body.points.len() as f64;
         self.body_seen = mean >= self.settings.joint_score / 2.0;
         let mut hands = match body.hands {
-            Some(hands) if self.hand.is_none() => hands.map(|points| Some(Hand::of_points(points))),
+            Some(hands) if self.hand.is_none() => hands.map(|points| Some(DetectedHand::from_points(points))),
             _ => self.look_for_hands(image, &body.points, idx)?,
         };
         self.guard(&mut hands, &body.points);
-        self.hand_regions = [0, 1].map(|side| hands[side].as_ref().map(Hand::next_region));
+        self.hand_regions = [0, 1].map(|side| hands[side].as_ref().map(DetectedHand::next_region));
         pose.body = body.points.map(keypoint);
         let [left, right] = hands;
         pose.left_hand = left.map_or(pose.left_hand, |hand| hand.points.map(keypoint));
@@ -130,14 +130,19 @@ impl Chain {
         Ok(pose)
     }
 
-    fn look_for_body(&mut self, image: &Image) -> Result<Option<Body>> {
-        self.speaker.followed.place.map_or(Ok(None), |place| self.body.find(image, place))
+    fn look_for_body(&mut self, image: &Image) -> Result<Option<DetectedBody>> {
+        self.speaker.track.place.map_or(Ok(None), |place| self.body.find(image, place))
     }
 
-    fn look_for_hands(&mut self, image: &Image, body: &[Point; 17], idx: usize) -> Result<[Option<Hand>; 2]> {
+    fn look_for_hands(
+        &mut self,
+        image: &Image,
+        body: &[ScoredPoint; 17],
+        idx: usize,
+    ) -> Result<[Option<DetectedHand>; 2]> {
         let Some(model) = self.hand.as_mut() else { return Ok([None, None]) };
         let enough = self.settings.hand_score;
-        let lost = |hand: &Option<Hand>| hand.as_ref().is_none_or(|hand| hand.score < enough);
+        let lost = |hand: &Option<DetectedHand>| hand.as_ref().is_none_or(|hand| hand.score < enough);
         let shoulder_px = distance(body[coco::L_SHOULDER], body[coco::R_SHOULDER]);
         let mut hands = [None, None];
         for (side, (elbow, wrist)) in ARMS.into_iter().enumerate() {
@@ -171,7 +176,7 @@ impl Chain {
     }
 
     /// Takes out a hand that is not sure, that is not at its arm, or that is the other one again.
-    fn guard(&self, hands: &mut [Option<Hand>; 2], body: &[Point; 17]) {
+    fn guard(&self, hands: &mut [Option<DetectedHand>; 2], body: &[ScoredPoint; 17]) {
         let shoulder_px = distance(body[coco::L_SHOULDER], body[coco::R_SHOULDER]);
         for (hand, (_, wrist)) in hands.iter_mut().zip(ARMS) {
             let guided = body[wrist][2] > self.settings.joint_score;
@@ -181,7 +186,7 @@ impl Chain {
             });
         }
         if let [Some(left), Some(right)] = &hands {
-            let middle = |hand: &Hand| {
+            let middle = |hand: &DetectedHand| {
                 let sum = hand.points.iter().fold([0.0; 2], |sum, point| [sum[0] + point[0], sum[1] + point[1]]);
                 [sum[0] / 21.0, sum[1] / 21.0, 0.0]
             };
@@ -199,18 +204,18 @@ impl Chain {
 }
 
 /// The surer of two hands, the first of two equally sure.
-fn better(a: Option<Hand>, b: Option<Hand>) -> Option<Hand> {
+fn better(a: Option<DetectedHand>, b: Option<DetectedHand>) -> Option<DetectedHand> {
     match (a, b) {
         (Some(a), Some(b)) => Some(if b.score > a.score { b } else { a }),
         (a, b) => a.or(b),
     }
 }
 
-fn distance(a: Point, b: Point) -> f64 {
+fn distance(a: ScoredPoint, b: ScoredPoint) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-fn keypoint([x, y, score]: Point) -> Keypoint {
+fn keypoint([x, y, score]: ScoredPoint) -> Keypoint {
     // The peak of a heat-map may reach a little over 1.
     Keypoint { x: x as f32, y: y as f32, score: score.clamp(0.0, 1.0) as f32 }
 }

@@ -2,8 +2,8 @@
 //! where the model says so.
 
 use super::body::{PointReader, placed};
-use super::decode::{Point, regression};
-use super::model_input::Feed;
+use super::decode::{ScoredPoint, regression};
+use super::model_input::ModelInput;
 use super::region;
 use crate::external::onnx::{Decode, ModelEntry, Runtime};
 use crate::external::opencv::warp::Region;
@@ -13,17 +13,17 @@ use std::path::Path;
 
 /// One hand in px of the picture.
 #[derive(Clone, Debug)]
-pub struct Hand {
-    pub points: [Point; 21],
+pub struct DetectedHand {
+    pub points: [ScoredPoint; 21],
     /// 0..1; the mean of the points' scores where the model gives no other.
     pub score: f64,
     /// Probability that it is a right hand.
     pub right: Option<f64>,
 }
 
-impl Hand {
+impl DetectedHand {
     /// A hand from points that each have a score.
-    pub fn of_points(points: [Point; 21]) -> Self {
+    pub fn from_points(points: [ScoredPoint; 21]) -> Self {
         Self { score: points.iter().map(|point| point[2]).sum::<f64>() / 21.0, points, right: None }
     }
 
@@ -40,7 +40,7 @@ impl Hand {
 
 /// The hand model with its way of reading.
 pub struct HandModel {
-    feed: Feed,
+    feed: ModelInput,
     reader: PointReader,
     decode: Decode,
     map: Vec<usize>,
@@ -49,7 +49,7 @@ pub struct HandModel {
 impl HandModel {
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
         let (reader, map) = (PointReader::new(&entry.decode), entry.points.hand.clone());
-        Ok(Self { feed: Feed::open(runtime, entry, dir)?, reader, decode: entry.decode.clone(), map })
+        Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, reader, decode: entry.decode.clone(), map })
     }
 
     pub fn secs_inside(&self) -> f64 {
@@ -57,7 +57,7 @@ impl HandModel {
     }
 
     /// The hand in the square; None where the square is no place in a picture or the model's numbers are none.
-    pub fn find(&mut self, image: &Image, region: &Region) -> Result<Option<Hand>> {
+    pub fn find(&mut self, image: &Image, region: &Region) -> Result<Option<DetectedHand>> {
         let size = self.feed.size();
         let Some(src_from_dst) = region.src_from_dst(size[0]) else { return Ok(None) };
         let outputs = self.feed.part(image, &src_from_dst)?;
@@ -67,9 +67,9 @@ impl HandModel {
             let n_points = self.map.iter().max().map_or(0, |largest| largest + 1);
             let points = regression::decode(outputs.floats(landmarks)?.1, score, n_points.max(21))?;
             let right = right.as_ref().map(|name| single(name)).transpose()?.map(f64::from);
-            Hand { points: placed(&points, &self.map, &src_from_dst), score: f64::from(score), right }
+            DetectedHand { points: placed(&points, &self.map, &src_from_dst), score: f64::from(score), right }
         } else {
-            Hand::of_points(placed(&self.reader.points(&outputs, size)?, &self.map, &src_from_dst))
+            DetectedHand::from_points(placed(&self.reader.points(&outputs, size)?, &self.map, &src_from_dst))
         };
         Ok((hand.score > 0.0 && hand.score.is_finite()).then_some(hand))
     }

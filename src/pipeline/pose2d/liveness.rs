@@ -1,6 +1,6 @@
 //! Which of the people found in a shot are alive: a drawn or photographed person does not move. The boxes of each look
 //! are tied into tracks, and of each track it is measured how much the picture in its box changes from look to look.
-//! Who of them is followed is `followed`'s business.
+//! `tracker` chooses whom of them to follow.
 
 use super::decode::boxes;
 use super::patch;
@@ -28,9 +28,9 @@ pub struct Movement {
 
 /// The people of a shot, by where they are.
 #[derive(Default)]
-pub struct Tracks(Vec<Track>);
+pub struct LivenessTracks(Vec<LivenessTrack>);
 
-struct Track {
+struct LivenessTrack {
     /// The box that is compared: where the person was first.
     anchor: PersonBox,
     last: PersonBox,
@@ -40,7 +40,7 @@ struct Track {
     n_missed: usize,
 }
 
-impl Tracks {
+impl LivenessTracks {
     /// Takes in the boxes of a look; the movement of each.
     pub fn look(&mut self, image: &Image, found: &[PersonBox]) -> Vec<Movement> {
         self.0.iter_mut().for_each(|track| track.n_missed += 1);
@@ -54,7 +54,7 @@ impl Tracks {
         let nearest = open.map(|track| (boxes::overlap(&track.last, one), track)).max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, track)) = nearest.filter(|(overlap, _)| *overlap >= SAME_TRACK) else {
             let gray = inside(&around(image, one));
-            let track = Track { anchor: *one, last: *one, gray, movement: Movement::default(), n_missed: 0 };
+            let track = LivenessTrack { anchor: *one, last: *one, gray, movement: Movement::default(), n_missed: 0 };
             self.0.push(track);
             return Movement::default();
         };
@@ -130,7 +130,7 @@ mod tests {
     #[test]
     fn what_changes_in_its_box_is_alive() {
         let place = |x: f32| PersonBox { x, y: 10.0, width: 80.0, height: 80.0, score: 0.9 };
-        let mut tracks = Tracks::default();
+        let mut tracks = LivenessTracks::default();
         let mut last = Vec::new();
         for frame in 0..4 {
             // Light and a little of the camera's movement do not make a picture live.

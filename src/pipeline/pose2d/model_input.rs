@@ -9,13 +9,13 @@ use crate::types::image::Image;
 use anyhow::Result;
 use std::path::Path;
 
-pub struct Feed {
+pub struct ModelInput {
     model: Model,
     canvas: Image,
     normaliser: Normaliser,
 }
 
-impl Feed {
+impl ModelInput {
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
         let [height, width] = entry.input_size()?;
         let picture = &entry.picture;

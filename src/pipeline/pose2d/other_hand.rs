@@ -1,17 +1,15 @@
-//! Hands that are not their own arm's: where hands overlap, a hand model may follow the other hand. A hand whose root
-//! lies at the other arm's wrist is taken out.
+//! Swapped hands: where hands overlap, a hand model may track the other hand. A hand whose root lies at the other arm's
+//! wrist is dropped.
 
-use crate::types::pose2d::{Keypoints, coco};
+use crate::types::pose2d::{Keypoints, SEEN_SCORE, coco};
 use ndarray::{Array3, s};
 
-/// Both wrists must score this for a hand to be judged.
-const SEEN_SCORE: f32 = 0.3;
 /// A hand this near to its own wrist is its own, in shoulder widths. Of hands rightly found 99 in 100 are nearer.
 const NEAR: f32 = 0.25;
 
-/// Takes out (all zeros) every hand that begins nearer to the wrist of the other arm than to its own; gives how many
+/// Drops (all zeros) every hand that begins nearer to the wrist of the other arm than to its own; gives how many
 /// frames of each hand, left and right.
-pub fn take_out_others(keypoints: &mut Keypoints) -> [usize; 2] {
+pub fn drop_swapped_hands(keypoints: &mut Keypoints) -> [usize; 2] {
     let Keypoints { body, left_hand, right_hand, .. } = keypoints;
     [(left_hand, coco::L_WRIST, coco::R_WRIST), (right_hand, coco::R_WRIST, coco::L_WRIST)].map(|(hand, own, other)| {
         let astray: Vec<usize> = (0..hand.shape()[0]).filter(|&t| is_others(body, hand, t, own, other)).collect();
@@ -54,10 +52,10 @@ mod tests {
         let mut keypoints = Keypoints { fps, image_size, body, left_hand: hand(192.0), right_hand: hand(110.0) };
         keypoints.left_hand.slice_mut(s![1, .., 0]).fill(112.0);
         keypoints.left_hand.slice_mut(s![2, .., 0]).fill(114.0);
-        assert_eq!(take_out_others(&mut keypoints), [1, 0]);
+        assert_eq!(drop_swapped_hands(&mut keypoints), [1, 0]);
         assert_eq!(keypoints.left_hand[[1, 5, 2]], 0.0);
         keypoints.body.slice_mut(s![0, coco::R_WRIST, 2]).fill(0.1);
         keypoints.right_hand.slice_mut(s![0, .., 0]).fill(190.0);
-        assert_eq!(take_out_others(&mut keypoints), [0, 0], "without both wrists nothing is known");
+        assert_eq!(drop_swapped_hands(&mut keypoints), [0, 0], "without both wrists nothing is known");
     }
 }

@@ -1,7 +1,7 @@
 //! The palm detector: squares of the picture where hands may be, asked when a hand is lost.
 
 use super::decode::ssd_anchors;
-use super::model_input::Feed;
+use super::model_input::ModelInput;
 use super::region;
 use crate::external::onnx::{Decode, ModelEntry, Runtime};
 use crate::external::opencv::warp::Region;
@@ -10,14 +10,14 @@ use anyhow::{Result, bail};
 use std::path::Path;
 
 pub struct PalmDetector {
-    feed: Feed,
+    feed: ModelInput,
     decode: Decode,
     anchors: Vec<[f64; 2]>,
 }
 
 impl PalmDetector {
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
-        let feed = Feed::open(runtime, entry, dir)?;
+        let feed = ModelInput::open(runtime, entry, dir)?;
         let anchors = match &entry.decode {
             Decode::SsdAnchors { strides, .. } => ssd_anchors::anchors(feed.size()[0], strides),
             _ => Vec::new(),

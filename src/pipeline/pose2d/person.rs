@@ -1,7 +1,7 @@
-//! The person detector: all people of a picture. Which of them is the speaker is known to `followed`.
+//! The person detector: all people of a picture. `tracker` chooses the speaker among them.
 
 use super::decode::{detections, yolox_grid};
-use super::model_input::Feed;
+use super::model_input::ModelInput;
 use crate::external::onnx::{Decode, ModelEntry, Runtime};
 use crate::types::image::Image;
 use crate::types::pose2d::PersonBox;
@@ -10,13 +10,13 @@ use std::path::Path;
 
 /// Finds people in a picture.
 pub struct Detector {
-    feed: Feed,
+    feed: ModelInput,
     decode: Decode,
 }
 
 impl Detector {
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
-        Ok(Self { feed: Feed::open(runtime, entry, dir)?, decode: entry.decode.clone() })
+        Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, decode: entry.decode.clone() })
     }
 
     pub fn secs_inside(&self) -> f64 {

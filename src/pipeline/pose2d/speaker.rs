@@ -1,12 +1,12 @@
-//! The one speaker in frame after frame: when to look for people, whom of them to follow (`followed`), and whether it
+//! The one speaker in frame after frame: when to look for people, whom of them to follow (`tracker`), and whether it
 //! still is the same person, which his or her colours tell (`appearance`) where two people cross.
 
 use super::appearance::Appearance;
 use super::body::BodyModel;
-use super::decode::{Point, boxes};
-use super::liveness::Tracks;
+use super::decode::{ScoredPoint, boxes};
+use super::liveness::LivenessTracks;
 use super::person::Detector;
-use super::tracker::{Candidate, Followed, Look};
+use super::tracker::{Candidate, PersonTrack, TrackerStep};
 use crate::config;
 use crate::types::image::Image;
 use crate::types::pose2d::PersonBox;
@@ -21,9 +21,9 @@ const STRANGER: f32 = 7.0;
 const STRANGE_FRAMES: i32 = 2;
 /// Frames for which a body found to be the speaker's after all is not doubted again.
 const TRUSTED_FRAMES: i32 = 6;
-/// A box that overlaps the followed one so much is whom is followed, unless another is so much more like the speaker.
+/// A box that overlaps the followed one so much is whom is followed, unless another's appearance is nearer to the speaker's by this factor.
 const HERE: f32 = 0.6;
-const LIKER: f32 = 0.6;
+const MUCH_NEARER: f32 = 0.6;
 /// Colours and box after a restart that are no further from those before are the same person's.
 const SAME_COLOURS: f32 = 5.0;
 const SAME_BOX: f32 = 0.5;
@@ -31,10 +31,10 @@ const SAME_BOX: f32 = 0.5;
 const FOLLOW_COLOURS: f32 = 0.05;
 
 /// Follows one person.
-pub struct Speaker {
+pub struct SpeakerTracker {
     detector: Option<Detector>,
-    pub followed: Followed,
-    tracks: Tracks,
+    pub track: PersonTrack,
+    tracks: LivenessTracks,
     reference: Option<Appearance>,
     /// What the one followed looks like.
     colours: Option<Appearance>,
@@ -46,13 +46,13 @@ pub struct Speaker {
     before: Option<(PersonBox, Appearance)>,
 }
 
-impl Speaker {
+impl SpeakerTracker {
     /// Without a detector the whole picture is the speaker's.
     pub fn new(detector: Option<Detector>) -> Self {
         Self {
             detector,
-            followed: Followed::default(),
-            tracks: Tracks::default(),
+            track: PersonTrack::default(),
+            tracks: LivenessTracks::default(),
             reference: None,
             colours: None,
             n_strange: 0,
@@ -77,10 +77,10 @@ impl Speaker {
 
     /// Nobody is followed any more.
     pub fn begin_anew(&mut self) {
-        let place = self.followed.place.map(|_| self.followed.person());
+        let place = self.track.place.map(|_| self.track.person());
         self.before = place.zip(self.colours.take());
-        self.followed.begin_anew();
-        self.tracks = Tracks::default();
+        self.track.begin_anew();
+        self.tracks = LivenessTracks::default();
         (self.n_strange, self.several) = (0, false);
     }
 
@@ -94,9 +94,9 @@ impl Speaker {
         settings: &config::Pose2d,
     ) -> Result<()> {
         let every = settings.person_every.max(1);
-        let crowd = self.followed.n_people > 1 && idx.is_multiple_of((every / CROWD_LOOKS).max(1));
+        let crowd = self.track.n_people > 1 && idx.is_multiple_of((every / CROWD_LOOKS).max(1));
         let regular = idx.is_multiple_of(every);
-        if !regular && !crowd && self.followed.place.is_some() && !EARLY.contains(&idx) {
+        if !regular && !crowd && self.track.place.is_some() && !EARLY.contains(&idx) {
             return Ok(());
         }
         let Some(mut found) = self.find(image)? else { return Ok(()) };
@@ -104,10 +104,10 @@ impl Speaker {
             measure(&mut found, reference, image, body, settings.joint_score)?;
         }
         let follow = regular.then_some(settings.person_follow);
-        let was = self.followed.identity();
-        self.followed.look(&found, Look { image_width: image.width, follow, body_seen });
-        self.several |= self.followed.n_people > 1;
-        if self.followed.identity() != was {
+        let was = self.track.identity();
+        self.track.look(&found, TrackerStep { image_width: image.width, follow, body_seen });
+        self.several |= self.track.n_people > 1;
+        if self.track.identity() != was {
             self.colours = None;
         }
         Ok(())
@@ -118,16 +118,16 @@ impl Speaker {
     pub fn recognise(
         &mut self,
         image: &Image,
-        points: &[Point; 17],
+        points: &[ScoredPoint; 17],
         body: &mut BodyModel,
         settings: &config::Pose2d,
     ) -> Result<bool> {
-        let Some(seen) = Appearance::of(image, points, settings.joint_score) else { return Ok(false) };
+        let Some(seen) = Appearance::measure(image, points, settings.joint_score) else { return Ok(false) };
         if let Some((place, colours)) = self.before.take()
-            && boxes::overlap(&place, &self.followed.person()) >= SAME_BOX
+            && boxes::overlap(&place, &self.track.person()) >= SAME_BOX
             && colours.distance(&seen) <= SAME_COLOURS
         {
-            self.followed.is_the_same();
+            self.track.is_the_same();
         }
         let Some(colours) = self.colours.as_mut() else {
             self.colours = Some(seen);
@@ -145,25 +145,25 @@ impl Speaker {
         let colours = colours.clone();
         let Some(mut found) = self.find(image)? else { return Ok(false) };
         measure(&mut found, &colours, image, body, settings.joint_score)?;
-        if is_here(&found, &self.followed.person()) {
+        if is_here(&found, &self.track.person()) {
             self.n_strange = -TRUSTED_FRAMES;
             return Ok(false);
         }
         (self.n_strange, self.colours) = (0, None);
-        self.followed.choose(&found, image.width);
+        self.track.choose(&found, image.width);
         Ok(true)
     }
 
     /// Everybody in the picture; `None` without a detector.
     fn find(&mut self, image: &Image) -> Result<Option<Vec<Candidate>>> {
         let Some(detector) = self.detector.as_mut() else {
-            self.followed.place = Some([0.0, 0.0, image.width as f64, image.height as f64]);
-            (self.followed.score, self.followed.n_people) = (1.0, 1);
+            self.track.place = Some([0.0, 0.0, image.width as f64, image.height as f64]);
+            (self.track.score, self.track.n_people) = (1.0, 1);
             return Ok(None);
         };
         let found = detector.find(image)?;
         let movements = self.tracks.look(image, &found);
-        let candidate = |(person, movement)| Candidate { person, movement, unlike: None };
+        let candidate = |(person, movement)| Candidate { person, movement, appearance_distance: None };
         Ok(Some(found.into_iter().zip(movements).map(candidate).collect()))
     }
 }
@@ -172,8 +172,8 @@ impl Speaker {
 fn is_here(found: &[Candidate], followed: &PersonBox) -> bool {
     let overlap = |one: &Candidate| boxes::overlap(&one.person, followed);
     let Some(here) = found.iter().max_by(|a, b| overlap(a).total_cmp(&overlap(b))) else { return false };
-    let unlike = |one: &Candidate| one.unlike.unwrap_or(f32::INFINITY);
-    overlap(here) >= HERE && found.iter().all(|one| unlike(one) >= LIKER * unlike(here))
+    let appearance_distance = |one: &Candidate| one.appearance_distance.unwrap_or(f32::INFINITY);
+    overlap(here) >= HERE && found.iter().all(|one| appearance_distance(one) >= MUCH_NEARER * appearance_distance(here))
 }
 
 /// How far the colours of everybody found are from those given.
@@ -187,12 +187,12 @@ fn measure(
     for one in found {
         // A box without a body is nobody.
         let seen = colours_of(image, &one.person, body, least)?;
-        one.unlike = Some(seen.map_or(f32::from(u8::MAX), |seen| seen.distance(colours)));
+        one.appearance_distance = Some(seen.map_or(f32::from(u8::MAX), |seen| seen.distance(colours)));
     }
     Ok(())
 }
 
 fn colours_of(image: &Image, one: &PersonBox, body: &mut BodyModel, least: f64) -> Result<Option<Appearance>> {
     let found = body.find(image, [one.x, one.y, one.width, one.height].map(f64::from))?;
-    Ok(found.and_then(|found| Appearance::of(image, &found.points, least)))
+    Ok(found.and_then(|found| Appearance::measure(image, &found.points, least)))
 }

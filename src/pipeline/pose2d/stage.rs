@@ -3,8 +3,7 @@
 
 use super::chain::Chain;
 use super::other_hand;
-use super::store;
-use super::store::Gathered;
+use super::store::KeypointFrames;
 use crate::config;
 use crate::config::Settings;
 use crate::external::ffmpeg;
@@ -12,6 +11,7 @@ use crate::external::ffmpeg::ahead;
 use crate::external::ffmpeg::frames::{FrameReader, FrameTime};
 use crate::external::onnx::{Manifest, ModelEntry, ModelError, Runtime};
 use crate::external::opencv;
+use crate::formats::keypoints_npz;
 use crate::formats::timeline_npz::Timeline;
 use crate::stage::artifacts::{Artifact, StageName};
 use crate::stage::progress::Progress;
@@ -128,11 +128,12 @@ impl Stage for Pose2dStage {
         let [width, height] = reader.image_size();
         let image_size = [u32::try_from(width)?, u32::try_from(height)?];
         let task = progress.begin(&unit.to_string(), restarts.len() as u64);
-        let mut gathered = Gathered::default();
-        let mut seen = Seen::default();
+        let mut gathered = KeypointFrames::default();
+        let mut seen = DetectionCounts::default();
         let mut pose = Pose2d::default();
-        let restart_at =
-            |idx: usize| restarts.get(idx).copied().with_context(|| unlike(&unit.source, idx + 1, restarts.len()));
+        let restart_at = |idx: usize| {
+            restarts.get(idx).copied().with_context(|| frame_count_mismatch(&unit.source, idx + 1, restarts.len()))
+        };
         let pick = |reader: &mut FrameReader, time: FrameTime| {
             let is_new = time.frame_idx == 0 || restart_at(time.frame_idx)? || !time.repeated;
             is_new.then(|| reader.picture(None)).transpose()
@@ -150,21 +151,24 @@ impl Stage for Pose2dStage {
             task.advance(1);
             Ok(())
         })?;
-        ensure!(gathered.n_frames() == restarts.len(), unlike(&unit.source, gathered.n_frames(), restarts.len()));
+        ensure!(
+            gathered.n_frames() == restarts.len(),
+            frame_count_mismatch(&unit.source, gathered.n_frames(), restarts.len())
+        );
         let (mut keypoints, extras) = gathered.finish(self.fps, image_size)?;
-        other_hand::take_out_others(&mut keypoints);
-        store::write(&Artifact::Keypoints.within(out), &keypoints, &extras)?;
+        other_hand::drop_swapped_hands(&mut keypoints);
+        keypoints_npz::write(&Artifact::Keypoints.within(out), &keypoints, &extras)?;
         Ok(seen.report())
     }
 }
 
-fn unlike(video: &Path, found: usize, expected: usize) -> String {
+fn frame_count_mismatch(video: &Path, found: usize, expected: usize) -> String {
     format!("{} gave {found} frames, its timeline has {expected}: run extract again", video.display())
 }
 
 /// How often each part of the speaker was found.
 #[derive(Default)]
-struct Seen {
+struct DetectionCounts {
     n_frames: usize,
     person: usize,
     left_hand: usize,
@@ -172,7 +176,7 @@ struct Seen {
     several: usize,
 }
 
-impl Seen {
+impl DetectionCounts {
     fn count(&mut self, pose: &Pose2d) {
         let any = |points: &[Keypoint]| usize::from(points.iter().any(|point| point.score > 0.0));
         self.n_frames += 1;

@@ -1,16 +1,14 @@
-//! The keypoints of a video as they are gathered, frame by frame, and written down (`motion::keypoints_npz` is the file).
+//! The keypoints of a video as they are gathered, frame by frame.
 
-use crate::formats::keypoints_npz;
 use crate::formats::keypoints_npz::Extras;
 use crate::types::pose2d::{Keypoint, Keypoints, N_BODY, N_HAND, PersonBox, Pose2d};
 use crate::types::time::FrameRate;
 use anyhow::Result;
 use ndarray::{Array1, Array2, Array3};
-use std::path::Path;
 
 /// What was seen so far: plain numbers, 1 kB a frame.
 #[derive(Default)]
-pub struct Gathered {
+pub struct KeypointFrames {
     body: Vec<f32>,
     left_hand: Vec<f32>,
     right_hand: Vec<f32>,
@@ -20,7 +18,7 @@ pub struct Gathered {
     time_secs: Vec<f64>,
 }
 
-impl Gathered {
+impl KeypointFrames {
     /// Takes in one frame and the time of the source frame it shows.
     pub fn push(&mut self, pose: &Pose2d, source_secs: f64) {
         let numbers = |points: &[Keypoint]| points.iter().flat_map(|p| [p.x, p.y, p.score]).collect::<Vec<_>>();
@@ -60,18 +58,13 @@ impl Gathered {
     }
 }
 
-/// Writes `keypoints.npz`.
-pub fn write(path: &Path, keypoints: &Keypoints, extras: &Extras) -> Result<()> {
-    keypoints_npz::write(path, keypoints, extras)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn frames_become_arrays() {
-        let mut gathered = Gathered::default();
+        let mut gathered = KeypointFrames::default();
         let mut pose = Pose2d { n_people: 2, identity: 3, ..Pose2d::default() };
         gathered.push(&pose, 0.0);
         pose.right_hand[20] = Keypoint { x: 5.0, y: 6.0, score: 0.5 };

@@ -1,6 +1,6 @@
 //! Which of the people found is the speaker: in a new shot the largest, most central and surest, who looks most like
 //! the reference if there is one; from then on the one who overlaps the box followed. One who proves to be a picture
-//! gives way to one who is alive, and one unlike the reference to one who is like it.
+//! gives way to one who is alive, and one far from the reference to one who is near it.
 
 use super::decode::boxes;
 use super::liveness::Movement;
@@ -16,8 +16,8 @@ const STILL_LOOKS: usize = 3;
 /// A living person changes by so much at least, and by so many times what a picture does.
 const ALIVE: f32 = 6.0;
 const TIMES_ALIVE: f32 = 2.0;
-/// Unlikeness at which a person's weight is half (`appearance`, 8-bit steps).
-const UNLIKE: f32 = 5.0;
+/// Distance of appearances, in 8-bit steps, at which a person's weight is half.
+const DISTANCE_OF_HALF_WEIGHT: f32 = 5.0;
 /// People smaller than this share of the speaker's box are not counted.
 const RELEVANT: f32 = 0.2;
 
@@ -27,7 +27,7 @@ pub struct Candidate {
     pub person: PersonBox,
     pub movement: Movement,
     /// Distance to the reference, where there is one.
-    pub unlike: Option<f32>,
+    pub appearance_distance: Option<f32>,
 }
 
 impl Candidate {
@@ -45,19 +45,21 @@ impl Candidate {
         let PersonBox { x, width, height, score, .. } = self.person;
         let off = ((x + width / 2.0 - middle) / middle.max(1.0)).abs().min(1.0);
         let alive = if self.is_picture() { 0.1 } else { 1.0 };
-        let likeness = self.unlike.map_or(1.0, |unlike| 1.0 / (1.0 + (unlike / UNLIKE).powi(2)));
+        let likeness = self
+            .appearance_distance
+            .map_or(1.0, |appearance_distance| 1.0 / (1.0 + (appearance_distance / DISTANCE_OF_HALF_WEIGHT).powi(2)));
         score * width * height * (1.0 - 0.5 * off) * alive * likeness
     }
 
     /// Whether this one is so much more like the reference that it was the wrong choice.
     fn gives_way_to(&self, other: &Self) -> bool {
-        matches!((self.unlike, other.unlike), (Some(mine), Some(other)) if other < UNLIKE && mine > 2.0 * other.max(2.5))
+        matches!((self.appearance_distance, other.appearance_distance), (Some(mine), Some(other)) if other < DISTANCE_OF_HALF_WEIGHT && mine > 2.0 * other.max(2.5))
     }
 }
 
-/// What a look is for.
+/// Circumstances of an update of the track.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
+pub struct TrackerStep {
     pub image_width: usize,
     /// Weight of a new box against the followed one; none: the box stays, and a missing one is not missed.
     pub follow: Option<f64>,
@@ -67,7 +69,7 @@ pub struct Look {
 
 /// The box of the one speaker through a shot.
 #[derive(Default)]
-pub struct Followed {
+pub struct PersonTrack {
     /// x, y, width, height in px.
     pub place: Option<[f64; 4]>,
     pub score: f32,
@@ -78,9 +80,9 @@ pub struct Followed {
     n_taken: i64,
 }
 
-impl Followed {
+impl PersonTrack {
     /// Takes in what was found in a picture.
-    pub fn look(&mut self, found: &[Candidate], look: Look) {
+    pub fn look(&mut self, found: &[Candidate], look: TrackerStep) {
         if let Some(place) = self.place {
             self.go_on(found, place, look);
         } else {
@@ -91,7 +93,7 @@ impl Followed {
         self.n_people = u8::try_from(found.iter().filter(counts).count()).unwrap_or(u8::MAX);
     }
 
-    fn go_on(&mut self, found: &[Candidate], place: [f64; 4], look: Look) {
+    fn go_on(&mut self, found: &[Candidate], place: [f64; 4], look: TrackerStep) {
         let [x, y, width, height] = place.map(|px| px as f32);
         let followed = PersonBox { x, y, width, height, score: 0.0 };
         let nearest = found.iter().map(|one| (boxes::overlap(&one.person, &followed), one));
@@ -168,24 +170,24 @@ mod tests {
         Candidate { movement: Movement { n: 3, most }, ..candidate }
     }
 
-    fn look(image_width: usize, body_seen: bool) -> Look {
-        Look { image_width, follow: Some(0.3), body_seen }
+    fn look(image_width: usize, body_seen: bool) -> TrackerStep {
+        TrackerStep { image_width, follow: Some(0.3), body_seen }
     }
 
     #[test]
     fn the_first_choice_is_followed_past_a_better_one() {
-        let mut followed = Followed::default();
+        let mut followed = PersonTrack::default();
         followed.look(&[at(0.0, 100.0, 0.9), at(100.0, 110.0, 0.9)], look(300, false));
         assert_eq!((followed.person().x, followed.n_people), (100.0, 2));
         followed.look(&[at(0.0, 250.0, 0.9), at(120.0, 110.0, 0.5)], look(300, true));
         assert!((followed.person().x - 106.0).abs() < 1e-4 && followed.person().score == 0.5);
-        followed.look(&[at(130.0, 110.0, 0.5)], Look { follow: None, ..look(300, true) });
+        followed.look(&[at(130.0, 110.0, 0.5)], TrackerStep { follow: None, ..look(300, true) });
         assert!((followed.person().x - 106.0).abs() < 1e-4 && followed.identity() == 0);
     }
 
     #[test]
     fn of_two_people_the_followed_one_stays_while_the_other_outgrows_it() {
-        let mut followed = Followed::default();
+        let mut followed = PersonTrack::default();
         for step in 0..30 {
             let grown = step as f32;
             let mut found = [at(40.0 + 0.5 * grown, 130.0 - grown, 0.9), at(180.0 - grown, 110.0 + 2.0 * grown, 0.95)];
@@ -197,14 +199,14 @@ mod tests {
             assert!(x + width / 2.0 < 120.0 && score == 0.9, "step {step}: the box has gone to {x} + {width}");
         }
         // A new follower would take the other by now.
-        let mut anew = Followed::default();
+        let mut anew = PersonTrack::default();
         anew.look(&[at(54.5, 101.0, 0.9), at(151.0, 168.0, 0.95)], look(340, true));
         assert_eq!((anew.person().x, anew.n_people, followed.identity()), (151.0, 2, 0));
     }
 
     #[test]
     fn a_lost_speaker_is_kept_while_the_body_is_seen_then_replaced() {
-        let mut followed = Followed::default();
+        let mut followed = PersonTrack::default();
         followed.look(&[at(100.0, 100.0, 0.9)], look(300, false));
         for _ in 0..5 {
             followed.look(&[], look(300, true));
@@ -220,7 +222,7 @@ mod tests {
     #[test]
     fn a_picture_gives_way_to_a_living_person() {
         let (large, small) = (at(80.0, 200.0, 0.9), at(0.0, 60.0, 0.8));
-        let mut followed = Followed::default();
+        let mut followed = PersonTrack::default();
         followed.look(&[large, small], look(300, false));
         assert_eq!(followed.person().x, 80.0);
         // A person who stands still is no picture yet, and one who stands stiller than noise is.
@@ -232,11 +234,14 @@ mod tests {
 
     #[test]
     fn a_reference_decides() {
-        let like = |candidate: Candidate, unlike: f32| Candidate { unlike: Some(unlike), ..candidate };
-        let mut followed = Followed::default();
+        let like = |candidate: Candidate, appearance_distance: f32| Candidate {
+            appearance_distance: Some(appearance_distance),
+            ..candidate
+        };
+        let mut followed = PersonTrack::default();
         followed.look(&[like(at(80.0, 120.0, 0.9), 40.0), like(at(0.0, 60.0, 0.8), 4.0)], look(300, false));
         assert_eq!(followed.person().x, 0.0);
-        let mut late = Followed::default();
+        let mut late = PersonTrack::default();
         late.look(&[like(at(80.0, 120.0, 0.9), 40.0)], look(300, false));
         late.look(&[like(at(80.0, 120.0, 0.9), 40.0), like(at(0.0, 60.0, 0.8), 4.0)], look(300, true));
         assert_eq!((late.person().x, late.identity()), (0.0, 1));

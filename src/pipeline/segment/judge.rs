@@ -48,7 +48,7 @@ fn apply(
             continue;
         }
         for t in run.start..run.end {
-            let refused = if rule.says_secs {
+            let refused = if rule.measures_secs {
                 FrameRefusal::new(rule.refusal, fps.secs(run.n_frames()), threshold)
             } else {
                 FrameRefusal::new(rule.refusal, f64::from(values[t]), rule.bound.threshold())

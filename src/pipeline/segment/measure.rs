@@ -1,11 +1,9 @@
 //! What the rules look at: a few numbers a frame. They are written beside the verdict (`measures.npz`), so that
 //! thresholds can be judged anew without looking at the video or the keypoints again.
 
-use crate::types::pose2d::{Keypoints, coco};
+use crate::types::pose2d::{Keypoints, SEEN_SCORE, coco};
 use ndarray::{ArrayView2, ArrayView3};
 
-/// A point that scores less lies anywhere: what is measured between points is then not known (NaN).
-const KNOWN_SCORE: f32 = 0.3;
 /// `facing` and `nose_off` are cut off here; they divide by lengths that may vanish.
 const FARTHEST: f32 = 10.0;
 
@@ -49,7 +47,7 @@ pub struct Measures {
 
 impl Measures {
     /// Measures keypoints; the rest is left as in one shot of one person who moves and speaks.
-    pub fn of(keypoints: &Keypoints) -> Self {
+    pub fn from_keypoints(keypoints: &Keypoints) -> Self {
         let mut measures = Self::default();
         let mut before: Option<([f32; 2], f32)> = None;
         for body in keypoints.body.outer_iter() {
@@ -60,7 +58,7 @@ impl Measures {
             measures.face.push(face);
             measures.arms.push(arms.into_iter().fold(f32::INFINITY, f32::min));
             let (neck, width) = shoulders(body);
-            let known = arms[0].min(arms[1]) >= KNOWN_SCORE;
+            let known = arms[0].min(arms[1]) >= SEEN_SCORE;
             let [facing, nose_off] = if known { turn(body, neck) } else { [f32::NAN; 2] };
             measures.facing.push(facing);
             measures.nose_off.push(nose_off);
@@ -106,7 +104,7 @@ fn shoulders(body: ArrayView2<f32>) -> ([f32; 2], f32) {
 
 /// `facing` and `nose_off` of a frame whose shoulders are seen.
 fn turn(body: ArrayView2<f32>, neck: [f32; 2]) -> [f32; 2] {
-    if body[[coco::NOSE, 2]] < KNOWN_SCORE {
+    if body[[coco::NOSE, 2]] < SEEN_SCORE {
         return [f32::NAN; 2];
     }
     let nose = at(body, coco::NOSE);

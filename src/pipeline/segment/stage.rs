@@ -91,7 +91,7 @@ impl SegmentStage {
             timeline.n_frames()
         );
         let (sound, sound_db) = sound::levels(&self.file(Artifact::Sound, unit), video.fps, n_frames)?;
-        let of_body = Measures::of(&keypoints);
+        let of_body = Measures::from_keypoints(&keypoints);
         Ok(Measures {
             sound,
             sound_db,

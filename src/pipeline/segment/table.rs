@@ -29,7 +29,7 @@ pub struct FrameRule {
     pub bound: Bound,
     pub gap: Gap,
     /// The ledger says how long the run is instead of the mean value.
-    pub says_secs: bool,
+    pub measures_secs: bool,
     /// The value compares with the frame before: it says nothing of a shot's first frame.
     pub compares: bool,
 }
@@ -71,10 +71,10 @@ pub fn frame_rules(rules: &config::Segment) -> [FrameRule; 12] {
         values,
         bound,
         gap,
-        says_secs: false,
+        measures_secs: false,
         compares: false,
     };
-    let secs = |rule| FrameRule { says_secs: true, ..rule };
+    let secs = |rule| FrameRule { measures_secs: true, ..rule };
     let (none, body, hand) =
         (Gap::Anywhere(0.0), Gap::Inside(rules.max_body_gap_secs), Gap::Anywhere(rules.max_hand_gap_secs));
     let (quiet, still) = (Gap::Anywhere(rules.max_quiet_secs), Gap::Anywhere(rules.max_still_secs));

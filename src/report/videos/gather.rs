@@ -5,7 +5,7 @@ use super::movement::MovementCounts;
 use super::spread::MeasureCounts;
 use super::thresholds::THRESHOLDS;
 use super::video::VideoSummary;
-use super::what_if::{Judged, Kept, open_frames};
+use super::what_if::{JudgedVideo, KeptByThreshold, open_frames};
 use super::worst::Worst;
 use crate::config::Settings;
 use crate::config::videos::Videos;
@@ -24,7 +24,7 @@ use std::path::Path;
 pub struct ReportData {
     pub videos: Vec<VideoSummary>,
     /// Results of `what_if` by video; `None`: nothing to judge.
-    pub kept: Vec<Option<Kept>>,
+    pub kept: Vec<Option<KeptByThreshold>>,
     pub spread: MeasureCounts,
     pub movement: MovementCounts,
     pub worst: Worst,
@@ -62,7 +62,7 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
 
 impl ReportData {
     /// Adds the measures of a video; what cannot be read becomes a note.
-    fn add(&mut self, settings: &Settings, video: &mut VideoSummary) -> Option<Kept> {
+    fn add(&mut self, settings: &Settings, video: &mut VideoSummary) -> Option<KeptByThreshold> {
         let rules = &settings.segment;
         let (work, unit) = (&settings.work.dir, video.unit.clone());
         self.spread.add_kept(&video.ledger);
@@ -89,8 +89,13 @@ impl ReportData {
         }
         let open = open_frames(&video.ledger, &judged);
         let max_bone_change = settings.lift.max_bone_change;
-        let judged =
-            Judged { measures: &measures, video: &judged, bone_change: &bone_change, max_bone_change, open: &open };
+        let judged = JudgedVideo {
+            measures: &measures,
+            video: &judged,
+            bone_change: &bone_change,
+            max_bone_change,
+            open: &open,
+        };
         let now = judged.kept_secs(rules);
         if (now - video.ledger.kept_secs()).abs() > 1e-6 {
             video.note(

@@ -2,7 +2,7 @@
 
 use super::thresholds::{THRESHOLDS, ThresholdGrid};
 use super::video::VideoSummary;
-use super::what_if::Kept;
+use super::what_if::KeptByThreshold;
 use crate::config::Segment;
 use crate::report::html::chart::curve::curve;
 use crate::report::html::numbers::{length, with_unit};
@@ -10,8 +10,9 @@ use crate::report::html::{Node, node};
 use serde_json::{Value, json};
 
 /// Seconds kept of all videos, by threshold and value.
-fn sums(kept: &[Option<Kept>], rules: &Segment) -> Kept {
-    let zeros = || THRESHOLDS.iter().map(|threshold| vec![0.0; threshold.grid(rules).0.len()]).collect::<Kept>();
+fn sums(kept: &[Option<KeptByThreshold>], rules: &Segment) -> KeptByThreshold {
+    let zeros =
+        || THRESHOLDS.iter().map(|threshold| vec![0.0; threshold.grid(rules).0.len()]).collect::<KeptByThreshold>();
     kept.iter().flatten().fold(zeros(), |mut sums, of| {
         for (sums, of) in sums.iter_mut().zip(of) {
             sums.iter_mut().zip(of).for_each(|(sum, secs)| *sum += secs);
@@ -21,7 +22,7 @@ fn sums(kept: &[Option<Kept>], rules: &Segment) -> Kept {
 }
 
 /// Data of the script: thresholds with their values and sums, videos with their seconds (in tenths, by threshold).
-pub fn data(kept: &[Option<Kept>], videos: &[VideoSummary], rules: &Segment) -> Value {
+pub fn data(kept: &[Option<KeptByThreshold>], videos: &[VideoSummary], rules: &Segment) -> Value {
     let milli = |secs: f64| (secs * 1000.0).round() / 1000.0;
     let row = |(threshold, sums): (&ThresholdGrid, &Vec<f64>)| {
         let (grid, now) = threshold.grid(rules);
@@ -43,7 +44,7 @@ pub fn data(kept: &[Option<Kept>], videos: &[VideoSummary], rules: &Segment) -> 
 }
 
 /// Section of sliders.
-pub fn sliders(kept: &[Option<Kept>], rules: &Segment) -> Vec<Node> {
+pub fn sliders(kept: &[Option<KeptByThreshold>], rules: &Segment) -> Vec<Node> {
     if kept.iter().all(Option::is_none) {
         return vec![node("p").class("empty").text("No video has been judged yet: orator run.")];
     }

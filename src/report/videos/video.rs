@@ -75,7 +75,7 @@ impl VideoSummary {
     fn lose(&mut self, work: &Path, stage: &str, error: &str) {
         let media = MediaInfo::read(&Artifact::MediaInfo.path(work, &self.unit));
         let secs = media.ok().map(|media| media.duration_secs).filter(|secs| *secs > 0.0);
-        self.ledger = secs.map_or_else(Ledger::default, |secs| Ledger::of_failure(secs, stage, error));
+        self.ledger = secs.map_or_else(Ledger::default, |secs| Ledger::failed(secs, stage, error));
         self.has_failed = stage != WAITING;
         match stage {
             WAITING => self.note("No verdict yet: orator run."),

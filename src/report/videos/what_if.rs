@@ -13,10 +13,10 @@ use crate::stage::refusal::{FrameRefusal, Refusal};
 use rayon::prelude::*;
 
 /// Seconds kept of one video: by threshold, by value of its grid.
-pub type Kept = Vec<Vec<f64>>;
+pub type KeptByThreshold = Vec<Vec<f64>>;
 
 /// A video as far as the rules look at it.
-pub struct Judged<'a> {
+pub struct JudgedVideo<'a> {
     pub measures: &'a Measures,
     pub video: &'a MediaInfo,
     /// What lifting measured of each frame's bones; empty where the video is not lifted.
@@ -27,7 +27,7 @@ pub struct Judged<'a> {
     pub open: &'a [Option<FrameRefusal>],
 }
 
-impl Judged<'_> {
+impl JudgedVideo<'_> {
     /// The account under `rules`.
     pub fn ledger(&self, rules: &Segment) -> Ledger {
         let (mut intervals, mut ledger) = segment::judge(self.measures, self.video, rules);
@@ -48,7 +48,7 @@ impl Judged<'_> {
     }
 
     /// Seconds kept at every value of every threshold, on all cores.
-    pub fn table(&self, rules: &Segment) -> Kept {
+    pub fn table(&self, rules: &Segment) -> KeptByThreshold {
         let row = |threshold: &super::thresholds::ThresholdGrid| -> Vec<f64> {
             let (grid, _) = threshold.grid(rules);
             grid.into_par_iter().map(|value| self.kept_secs(&threshold.with(rules, value))).collect()
@@ -106,7 +106,7 @@ mod tests {
         let video = MediaInfo::new(19.99, 300, FrameRate::new(15, 1));
         let (measures, rules) = (measures(), Segment::default());
         let max_bone_change = 0.4;
-        let none = Judged { measures: &measures, video: &video, bone_change: &[], max_bone_change, open: &[] };
+        let none = JudgedVideo { measures: &measures, video: &video, bone_change: &[], max_bone_change, open: &[] };
         assert!((none.kept_secs(&rules) - (19.99 - 1.0 / 15.0)).abs() < 1e-9);
         let why = FrameRefusal::new(Refusal::Open, 3.0, 0.0);
         let refused = vec![Refused::new(12.0, 13.0, why), Refused::new(19.0, 19.99, why)];
@@ -115,7 +115,7 @@ mod tests {
         let mut bone_change = vec![0.1; 300];
         bone_change[150..165].fill(0.9);
         bone_change[20] = 0.9;
-        let some = Judged { bone_change: &bone_change, open: &open, ..none };
+        let some = JudgedVideo { bone_change: &bone_change, open: &open, ..none };
         // frames 0..150 and 201..285: what is left between 165 and 180, and to 200, is too short
         assert!((some.kept_secs(&rules) - (10.0 + 84.0 / 15.0)).abs() < 1e-9);
         let table = some.table(&rules);

@@ -118,7 +118,7 @@ fn farthest(
     frames: std::ops::Range<usize>,
 ) -> Option<(usize, f64, Bound, bool)> {
     let on_frames = frame_rules(rules).into_iter().filter(|rule| rule.refusal == refusal);
-    let on_frames = on_frames.map(|rule| (rule.values, rule.bound, !rule.says_secs));
+    let on_frames = on_frames.map(|rule| (rule.values, rule.bound, !rule.measures_secs));
     // For a minimum share the frames that do not count are the bad ones; for a maximum share those that do.
     let on_pieces = piece_rules(rules).into_iter().filter(|rule| rule.refusal == refusal).map(|rule| {
         let bad = match rule.share {

@@ -7,7 +7,7 @@ use crate::fixtures::support::files_under;
 use ndarray::Array1;
 use ndarray_npy::NpzReader;
 use orator::config;
-use orator::pipeline::extract::Extract;
+use orator::pipeline::extract::ExtractStage;
 use orator::stage::progress::Silent;
 use orator::stage::{Report, Stage, Unit};
 use orator::types::time::FrameRate;
@@ -17,7 +17,7 @@ use std::path::Path;
 fn run(video: &Path, out: &Path, settings: &config::Extract) -> anyhow::Result<Report> {
     fs::create_dir_all(out)?;
     let unit = Unit { speaker: "host".into(), video: "clip".into(), source: video.to_owned() };
-    Extract::new(settings).run(&unit, out, &Silent)
+    ExtractStage::new(settings).run(&unit, out, &Silent)
 }
 
 fn array<T: ndarray_npy::ReadableElement>(out: &Path, name: &str) -> Vec<T> {
@@ -78,7 +78,10 @@ fn one_silent_frame_is_enough() {
     let dir = tempfile::tempdir().unwrap();
     let video = write_numbered(dir.path(), "in.mp4", 1, FrameRate::new(30, 1), None);
     let out = dir.path().join("out");
-    assert_eq!(run(&video, &out, &config::Extract::default()).unwrap().line, "1 frames at 15 fps, no cut, no sound");
+    assert_eq!(
+        run(&video, &out, &config::ExtractStage::default()).unwrap().line,
+        "1 frames at 15 fps, no cut, no sound"
+    );
     assert!(!out.join("audio.wav").exists());
     assert_eq!(media(&out)["has_audio"], false);
 }
@@ -103,7 +106,7 @@ fn a_file_that_is_no_video_is_an_error_that_names_it() {
     let dir = tempfile::tempdir().unwrap();
     let video = dir.path().join("words.mp4");
     fs::write(&video, "These are words.").unwrap();
-    let error = format!("{:#}", run(&video, &dir.path().join("out"), &config::Extract::default()).unwrap_err());
+    let error = format!("{:#}", run(&video, &dir.path().join("out"), &config::ExtractStage::default()).unwrap_err());
     assert!(error.contains("words.mp4") && error.contains("not a media file"), "{error}");
 }
 

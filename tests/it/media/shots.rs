@@ -7,7 +7,7 @@ use crate::fixtures::support::speaker_clip;
 use ndarray::Array1;
 use ndarray_npy::NpzReader;
 use orator::config;
-use orator::pipeline::extract::Extract;
+use orator::pipeline::extract::ExtractStage;
 use orator::stage::progress::Silent;
 use orator::stage::{Stage, Unit};
 use std::fs::File;
@@ -19,7 +19,7 @@ fn cuts(video: &Path, fps: u32) -> Vec<usize> {
     std::fs::create_dir(&out).unwrap();
     let unit = Unit { speaker: "host".into(), video: "clip".into(), source: video.to_owned() };
     let settings = config::Extract { fps, ..Default::default() };
-    Extract::new(&settings).run(&unit, &out, &Silent).unwrap();
+    ExtractStage::new(&settings).run(&unit, &out, &Silent).unwrap();
     let mut npz = NpzReader::new(File::open(out.join("timeline.npz")).unwrap()).unwrap();
     let scores: Array1<f64> = npz.by_name("shot_score").unwrap();
     let threshold = config::Segment::default().shot_threshold;

@@ -10,7 +10,7 @@ use ndarray::Array1;
 use ndarray_npy::NpzReader;
 use orator::config;
 use orator::external::ffmpeg::frames::FrameReader;
-use orator::pipeline::extract::Extract;
+use orator::pipeline::extract::ExtractStage;
 use orator::stage::progress::Silent;
 use orator::stage::{Stage, Unit};
 use orator::types::sound::SAMPLE_RATE;
@@ -53,7 +53,7 @@ fn measure(dir: &Path, kind: &Kind, clip: &Clip, fps: u32) -> Worst {
     let settings = config::Extract { fps, ..Default::default() };
     let rate = settings.rate();
     let unit = Unit { speaker: "host".into(), video: "clip".into(), source: clip.path.clone() };
-    Extract::new(&settings).run(&unit, &out, &Silent).unwrap();
+    ExtractStage::new(&settings).run(&unit, &out, &Silent).unwrap();
     let mut timeline = NpzReader::new(File::open(out.join("timeline.npz")).unwrap()).unwrap();
     let source_secs: Array1<f64> = timeline.by_name("source_secs").unwrap();
     let wav = hound::WavReader::open(out.join("audio.wav")).unwrap();

@@ -9,7 +9,7 @@ use orator::formats::npz::Npz;
 use orator::pipeline::lift::LiftStage;
 use orator::pipeline::segment::{Measures, SegmentStage};
 use orator::report::videos::thresholds::THRESHOLDS;
-use orator::report::videos::what_if::{Judged, open_frames};
+use orator::report::videos::what_if::{JudgedVideo, open_frames};
 use orator::stage::artifacts::Artifact;
 use orator::stage::ledger::Ledger;
 use orator::stage::progress::Silent;
@@ -59,7 +59,7 @@ fn a_slider_says_what_a_run_keeps() {
     let bone_change = Npz::open(&Artifact::BoneChange.path(dir.path(), &unit)).unwrap();
     let bone_change: Vec<f32> = { bone_change }.floats("bone_change", &[None]).unwrap().into_iter().collect();
     let open = open_frames(&now, &video);
-    let judged = |max_bone_change| Judged {
+    let judged = |max_bone_change| JudgedVideo {
         measures: &measures,
         video: &video,
         bone_change: &bone_change,

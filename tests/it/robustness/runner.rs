@@ -2,7 +2,7 @@
 
 use orator::stage::fingerprint::HashCache;
 use orator::stage::progress::{Progress, Silent};
-use orator::stage::runner::{Ended, State, run, state};
+use orator::stage::runner::{StageOutcome, State, run, state};
 use orator::stage::{Input, Report, Stage, Unit};
 use std::path::{Path, PathBuf};
 
@@ -57,15 +57,15 @@ fn fresh_units_are_skipped_and_every_change_has_a_name() {
         State::Failed(error) => error,
     };
     assert_eq!(why(&stage), "never done");
-    assert!(go(&stage, false).iter().all(|ended| matches!(ended, Ended::Done(_))));
+    assert!(go(&stage, false).iter().all(|ended| matches!(ended, StageOutcome::Done(_))));
     assert_eq!(why(&stage), "fresh: 3 letters");
-    assert!(go(&stage, false).iter().all(|ended| matches!(ended, Ended::Skipped(_))));
-    assert!(go(&stage, true).iter().all(|ended| matches!(ended, Ended::Done(_))));
+    assert!(go(&stage, false).iter().all(|ended| matches!(ended, StageOutcome::Skipped(_))));
+    assert!(go(&stage, true).iter().all(|ended| matches!(ended, StageOutcome::Done(_))));
     assert_eq!(why(&Shout { version: 2, ..stage }), "the stage changed from version 1 to 2");
     assert_eq!(why(&Shout { mark: "?", ..stage }), "shout.mark changed from \"!\" to \"?\"");
     std::fs::write(&units[0].source, "three").unwrap();
     assert_eq!(why(&stage), "the text changed");
-    assert!(matches!(go(&stage, false)[..], [Ended::Done(_), Ended::Skipped(_)]));
+    assert!(matches!(go(&stage, false)[..], [StageOutcome::Done(_), StageOutcome::Skipped(_)]));
     std::fs::remove_file(work.join("shout/host/a/loud.txt")).unwrap();
     assert_eq!(why(&stage), "its file loud.txt is missing");
 }
@@ -81,7 +81,7 @@ fn a_failure_stops_no_other_and_keeps_what_was_made() {
     let errors: Vec<Option<String>> = ended
         .iter()
         .map(|ended| match ended {
-            Ended::Failed(error) => Some(format!("{error:#}")),
+            StageOutcome::Failed(error) => Some(format!("{error:#}")),
             _ => None,
         })
         .collect();
@@ -89,7 +89,7 @@ fn a_failure_stops_no_other_and_keeps_what_was_made() {
     let message = |at: usize| errors[at].as_deref().unwrap();
     assert!(message(1).ends_with("bad text") && message(2).contains("a defect"));
     std::fs::write(&made[0].source, "bad").unwrap();
-    assert!(matches!(run(&stage, &made[..1], &work, &hashes, (1, false), &Silent)[0], Ended::Failed(_)));
+    assert!(matches!(run(&stage, &made[..1], &work, &hashes, (1, false), &Silent)[0], StageOutcome::Failed(_)));
     assert!(matches!(state(&stage, &made[0], &work, &hashes), State::Failed(_)));
     assert_eq!(std::fs::read_to_string(work.join("shout/host/a/loud.txt")).unwrap(), "FINE!");
 }

@@ -16,7 +16,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// The measures as the stage takes them, only that the sound is as loud everywhere.
 fn measures(footage: &Footage) -> Measures {
-    let mut measures = Measures::of(&footage.keypoints);
+    let mut measures = Measures::from_keypoints(&footage.keypoints);
     let n_frames = footage.shot.len();
     let sound = footage.sound.clone().unwrap_or_default();
     let secs = sound.len() as f64 / 16_000.0;

@@ -2,7 +2,7 @@
 //! the cells. `dark` is the decoding of Zhang et al. 2020, "Distribution-Aware Coordinate Representation for Human Pose
 //! Estimation", section 3.2: blur, then one Newton step on the logarithm.
 
-use super::point::{LARGEST, Point, finite, peak};
+use super::point::{LARGEST, ScoredPoint, finite, peak};
 use crate::external::onnx::Refine;
 use crate::external::opencv::blur::GaussianBlur;
 use anyhow::{Result, ensure};
@@ -17,7 +17,7 @@ pub fn decode(
     input_size: [usize; 2],
     refine: Refine,
     gaussian: &GaussianBlur,
-) -> Result<Vec<Point>> {
+) -> Result<Vec<ScoredPoint>> {
     let &[1, _, rows @ 1..=LARGEST, columns @ 1..=LARGEST] = shape else {
         anyhow::bail!("heat-maps must have the shape [1, K, rows, columns], not {shape:?}")
     };

@@ -10,4 +10,4 @@ pub mod simcc;
 pub mod ssd_anchors;
 pub mod yolox_grid;
 
-pub use point::Point;
+pub use point::ScoredPoint;

@@ -5,10 +5,10 @@
 pub(crate) const LARGEST: i64 = 1 << 20;
 
 /// A keypoint in pixels of the model's input: x, y, score. All zero where it is not finite.
-pub type Point = [f64; 3];
+pub type ScoredPoint = [f64; 3];
 
 /// The point, or zeros where one of its numbers is not finite.
-pub(crate) fn finite(point: Point) -> Point {
+pub(crate) fn finite(point: ScoredPoint) -> ScoredPoint {
     if point.iter().all(|number| number.is_finite()) { point } else { [0.0; 3] }
 }
 

@@ -1,11 +1,11 @@
 //! Models that name the keypoints outright: a row of numbers a point, x and y first, in pixels of the input, and one
 //! score for them all (MediaPipe's hand).
 
-use super::Point;
+use super::ScoredPoint;
 use anyhow::{Result, ensure};
 
 /// `n_points` points of `landmarks`, each with the one `score`; all zero if any number is not finite.
-pub fn decode(landmarks: &[f32], score: f32, n_points: usize) -> Result<Vec<Point>> {
+pub fn decode(landmarks: &[f32], score: f32, n_points: usize) -> Result<Vec<ScoredPoint>> {
     let fits = n_points > 0 && landmarks.len().is_multiple_of(n_points) && landmarks.len() / n_points >= 2;
     ensure!(fits, "{} numbers are no {n_points} points", landmarks.len());
     if !score.is_finite() || landmarks.iter().any(|number| !number.is_finite()) {

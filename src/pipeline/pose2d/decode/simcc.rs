@@ -1,11 +1,11 @@
 //! SimCC (Li et al. 2022): each keypoint's x and y are two classifications over bins finer than a pixel (RTMPose, RTMW,
 //! DWPose). The fullest bin is the place; the score is the lower of the two peaks.
 
-use super::point::{LARGEST, Point, finite, peak};
+use super::point::{LARGEST, ScoredPoint, finite, peak};
 use anyhow::{Result, bail};
 
 /// The keypoints of `x` [1, K, bins] and `y` [1, K, bins], `split` bins a pixel.
-pub fn decode(x: (&[i64], &[f32]), y: (&[i64], &[f32]), split: f64) -> Result<Vec<Point>> {
+pub fn decode(x: (&[i64], &[f32]), y: (&[i64], &[f32]), split: f64) -> Result<Vec<ScoredPoint>> {
     let (&[1, n_points, x_bins @ 1..=LARGEST], &[1, y_points, y_bins @ 1..=LARGEST]) = (x.0, y.0) else {
         bail!("SimCC outputs must have the shape [1, K, bins], not {:?} and {:?}", x.0, y.0)
     };
