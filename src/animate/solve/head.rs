@@ -8,7 +8,7 @@ use crate::animate::rig::rig::Rig;
 use crate::math::order::upper_median;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::Vec3;
-use crate::types::pose2d::coco;
+use crate::types::pose2d::{SEEN_SCORE, coco};
 use ndarray::{Array3, ArrayView2};
 
 /// Keypoints of the speaker's body, from which the head is turned: COCO's 17 points, one row a frame of the motion.

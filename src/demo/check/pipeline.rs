@@ -33,8 +33,6 @@ pub const LEAST_JOINTS: f64 = 0.95;
 const SEGMENT: usize = 60;
 /// Sum of shoulder width, upper arm and forearm after scaling, metres.
 const ARM_METRES: f32 = 0.90;
-/// Lowest score of a found body point.
-const FOUND: f32 = 0.3;
 
 /// Distance of found keypoints from the truth.
 #[derive(Clone, Copy, Debug, Default)]

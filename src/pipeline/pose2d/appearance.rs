@@ -115,8 +115,8 @@ mod tests {
     fn without_shoulders_there_is_nothing_to_see() {
         let (image, mut body) = person([1, 2, 3], 1.0, 100.0);
         body[coco::L_SHOULDER][2] = 0.1;
-        assert_eq!(Appearance::of(&image, &body, 0.3), None);
+        assert_eq!(Appearance::measure(&image, &body, 0.3), None);
         body[coco::L_SHOULDER] = [f64::NAN, f64::NAN, 0.9];
-        assert_eq!(Appearance::of(&image, &body, 0.3), None);
+        assert_eq!(Appearance::measure(&image, &body, 0.3), None);
     }
 }

@@ -79,7 +79,7 @@ fn one_silent_frame_is_enough() {
     let video = write_numbered(dir.path(), "in.mp4", 1, FrameRate::new(30, 1), None);
     let out = dir.path().join("out");
     assert_eq!(
-        run(&video, &out, &config::ExtractStage::default()).unwrap().line,
+        run(&video, &out, &config::Extract::default()).unwrap().line,
         "1 frames at 15 fps, no cut, no sound"
     );
     assert!(!out.join("audio.wav").exists());
@@ -106,7 +106,7 @@ fn a_file_that_is_no_video_is_an_error_that_names_it() {
     let dir = tempfile::tempdir().unwrap();
     let video = dir.path().join("words.mp4");
     fs::write(&video, "These are words.").unwrap();
-    let error = format!("{:#}", run(&video, &dir.path().join("out"), &config::ExtractStage::default()).unwrap_err());
+    let error = format!("{:#}", run(&video, &dir.path().join("out"), &config::Extract::default()).unwrap_err());
     assert!(error.contains("words.mp4") && error.contains("not a media file"), "{error}");
 }
 
