@@ -78,10 +78,7 @@ fn one_silent_frame_is_enough() {
     let dir = tempfile::tempdir().unwrap();
     let video = write_numbered(dir.path(), "in.mp4", 1, FrameRate::new(30, 1), None);
     let out = dir.path().join("out");
-    assert_eq!(
-        run(&video, &out, &config::Extract::default()).unwrap().line,
-        "1 frames at 15 fps, no cut, no sound"
-    );
+    assert_eq!(run(&video, &out, &config::Extract::default()).unwrap().line, "1 frames at 15 fps, no cut, no sound");
     assert!(!out.join("audio.wav").exists());
     assert_eq!(media(&out)["has_audio"], false);
 }
