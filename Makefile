@@ -24,8 +24,10 @@ readers browser blender validator: ; @.ci/setup/$@.sh
 build: setup runtime
 	cargo build --release --locked
 
-# Groups of integration tests that neither start another program nor run the pipeline.
-QUICK := house:: cli::guide cli::completions lift:: operators:: networks:: metrics:: golden_metrics:: bvh:: motion_files::
+# Integration tests that start no other program, load no ONNX Runtime and end within seconds.
+QUICK := house:: lift:: segment::segment cli::guide cli::completions animate::animate:: animate::bvh animate::motion_files \
+	dataset::shard:: dataset::dataset_verify dataset::import_readers evaluate::metrics evaluate::golden_metrics \
+	train::networks train::operators robustness::runner
 
 check:
 	cargo fmt --check
