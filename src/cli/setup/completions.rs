@@ -15,6 +15,7 @@ use std::path::PathBuf;
 /// ~/.config/fish/completions/orator.fish`. zsh: `orator completions zsh > FOLDER/_orator`, with a FOLDER of `fpath`.
 #[derive(clap::Args)]
 pub struct Args {
+    /// Shell that reads the script.
     shell: Shell,
 }
 
