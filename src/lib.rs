@@ -47,6 +47,8 @@
 //! a video, except for its keypoints. No user input panics.
 
 #![warn(missing_docs)]
+// `[T, 49, 3]` in a comment is a shape, no link.
+#![allow(rustdoc::broken_intra_doc_links)]
 
 #[doc(hidden)]
 pub mod animate;

@@ -1,5 +1,6 @@
 //! Arguments several verbs share.
 
+use orator::Split;
 use std::path::PathBuf;
 
 /// Where the configuration is, and what the command line changes in it.
@@ -21,10 +22,16 @@ impl ConfigArgs {
         self.set.iter().fold(file, |flags, set| format!("{flags} --set {set}"))
     }
 
-    /// Reads it, with every problem at once; a key under a former name is noted on standard error.
+    /// Reads the configuration, with every problem at once; a key under a former name is noted on standard error.
     pub fn load(&self) -> anyhow::Result<orator::config::Config> {
         let config = orator::config::load(&self.config, &self.set)?;
         config.notes.iter().for_each(|note| eprintln!("note    {note}"));
         Ok(config)
     }
+}
+
+/// Reads the name of a split.
+pub fn split(name: &str) -> Result<Split, String> {
+    let found = Split::ALL.into_iter().find(|split| split.name() == name);
+    found.ok_or_else(|| "expected train, validation or test".to_owned())
 }

@@ -24,14 +24,14 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]
-    part: Part,
+    part: DemoVerb,
 }
 
 #[derive(clap::Subcommand)]
-enum Part {
+enum DemoVerb {
     /// Draw videos of the speaker with sound, their truth, the marker models and a pipeline.toml into DIR.
     Draw {
-        /// The demo's folder; made if it is not there.
+        /// The demo's folder; created if it is not there.
         dir: PathBuf,
         /// How many videos.
         #[arg(long, default_value_t = DemoPlan::default().n_videos)]
@@ -90,17 +90,17 @@ enum Part {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.part {
-        Part::Draw { dir, videos, secs, fps, seed } => {
+        DemoVerb::Draw { dir, videos, secs, fps, seed } => {
             let fps = FrameRate::new(fps.clamp(1, 120), 1);
             let plan = DemoPlan { n_videos: videos, secs, fps, seed, ..DemoPlan::default() };
             draw(&dir, &plan, ui)
         }
-        Part::Measure { dir } => measure(&dir, ui),
-        Part::Speaker { dir, hours, seed } => speak(&dir, hours, seed, ui),
-        Part::Learned { dataset, checkpoint, picture } => {
+        DemoVerb::Measure { dir } => measure(&dir, ui),
+        DemoVerb::Speaker { dir, hours, seed } => speak(&dir, hours, seed, ui),
+        DemoVerb::Learned { dataset, checkpoint, picture } => {
             learned(&dataset, checkpoint.as_deref(), picture.as_deref(), ui)
         }
-        Part::Sheet { dir, out, motion } => draw_sheet(&dir, &out, motion.as_deref(), ui),
+        DemoVerb::Sheet { dir, out, motion } => draw_sheet(&dir, &out, motion.as_deref(), ui),
     }
 }
 
@@ -162,17 +162,9 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
 fn speak(dir: &Path, hours: f64, seed: u64, ui: &Ui) -> Result<Outcome> {
     let clips = dataset::clips(hours, seed)?;
     let out = std::path::absolute(dir)?;
-    let taken = out.exists() && std::fs::read_dir(&out).map_or(true, |mut entries| entries.next().is_some());
-    ensure!(!taken, "{} is not empty; choose another folder", dir.display());
-    let attempt = workdir::attempt_folder(&out)?;
-    let written = dataset::write(&attempt, &clips, ui).and_then(|info| {
-        workdir::replace_folder(&attempt, &out)?;
-        Ok(info)
-    });
-    if written.is_err() {
-        let _ = std::fs::remove_dir_all(&attempt);
-    }
-    let secs: Vec<String> = written?.splits.iter().map(|(name, split)| format!("{name} {:.0} s", split.secs)).collect();
+    ensure!(!workdir::has_files(&out), "{} is not empty; choose another folder", dir.display());
+    let info = workdir::build_folder(&out, |attempt| dataset::write(attempt, &clips, ui))?;
+    let secs: Vec<String> = info.splits.iter().map(|(name, split)| format!("{name} {:.0} s", split.secs)).collect();
     let text = format!("{} clips by version {} of the rule: {}", clips.len(), dataset::RULE, secs.join(", "));
     let next = format!("orator demo learned --dataset {}", dir.display());
     ui.summary(&text, Some(&next), json!({ "dataset": dir, "clips": clips.len(), "next": next }));

@@ -9,6 +9,7 @@ pub mod evaluate;
 pub mod generate;
 pub mod motion;
 pub mod outcome;
+pub mod outputs;
 pub mod pipeline;
 pub mod program;
 pub mod setup;

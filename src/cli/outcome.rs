@@ -7,6 +7,6 @@ pub enum Outcome {
     Done,
     /// Some units failed (each was reported); the others are done.
     SomeFailed,
-    /// What was looked at (the set-up, a dataset) is not as it must be; what is wrong was said.
+    /// What was looked at (the set-up, a dataset) is not as it must be; what is wrong was printed.
     Wrong,
 }

@@ -1,4 +1,4 @@
-//! What a verb says: progress bars on standard error, a closing summary (or one JSON object) on standard output.
+//! What a verb prints: progress bars on standard error, a closing summary (or one JSON object) on standard output.
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use orator::stage::progress::{Progress, Task};

@@ -100,6 +100,24 @@ pub fn move_files<'f>(attempt: &Path, folder: &Path, files: impl Iterator<Item =
     fs::remove_dir_all(attempt).with_context(|| format!("cannot remove {}", attempt.display()))
 }
 
+/// Lets `write` fill an empty folder, then puts that in the place of `place`. If `write` fails, what was there stays.
+pub fn build_folder<T>(place: &Path, write: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
+    let attempt = attempt_folder(place)?;
+    let written = write(&attempt).map_err(full_disk).and_then(|written| {
+        replace_folder(&attempt, place)?;
+        Ok(written)
+    });
+    if written.is_err() {
+        let _ = fs::remove_dir_all(&attempt);
+    }
+    written
+}
+
+/// Whether something is in the folder at `path`, or `path` is a file.
+pub fn has_files(path: &Path) -> bool {
+    path.exists() && fs::read_dir(path).map_or(true, |mut entries| entries.next().is_some())
+}
+
 /// Puts back what `replace_folder` had moved aside when it was killed between its two renames.
 pub fn restore_folder(place: &Path) -> Result<()> {
     let old = attempt_beside(place).with_extension("old");

@@ -17,25 +17,25 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 /// A motion not yet read.
-pub struct Input {
+pub struct MotionInput {
     pub name: String,
-    place: Place,
+    location: InputLocation,
 }
 
-enum Place {
+enum InputLocation {
     File(PathBuf),
     Sample(Rc<Dataset>, Box<SampleRef>),
 }
 
 /// A motion with what is beside it.
-pub struct Take {
+pub struct InputMotion {
     pub motion: Motion,
     pub face: Option<Face>,
     pub sound: Option<Sound>,
 }
 
 /// The motions meant by a file, a lifted video's or a speaker's folder, a folder of motions, or a dataset.
-pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result<Vec<Input>> {
+pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result<Vec<MotionInput>> {
     ensure!(path.exists(), "{} is not there", path.display());
     let is_dataset = path.join("info.json").is_file() && path.join("index.jsonl").is_file();
     ensure!(
@@ -48,7 +48,7 @@ pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
     }
     let file = |path: PathBuf, named: &Path| {
         let name = named.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Input { name, place: Place::File(path) }
+        MotionInput { name, location: InputLocation::File(path) }
     };
     if path.is_file() {
         return Ok(vec![file(path.to_owned(), path)]);
@@ -89,18 +89,18 @@ pub fn inputs(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
     Ok(found)
 }
 
-fn of_dataset(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result<Vec<Input>> {
+fn of_dataset(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result<Vec<MotionInput>> {
     let dataset = Rc::new(Dataset::open(path)?);
     let splits = split.map_or(Split::ALL.to_vec(), |split| vec![split]);
     let samples: Vec<SampleRef> = splits.into_iter().flat_map(|split| dataset.samples(split)).collect();
     let keys = || samples.iter().take(5).map(|sample| sample.key.clone()).collect::<Vec<_>>().join(", ");
     let meant = |found: &&SampleRef| sample.is_none_or(|key| found.key == key);
-    let inputs: Vec<Input> = samples
+    let inputs: Vec<MotionInput> = samples
         .iter()
         .filter(meant)
-        .map(|found| Input {
+        .map(|found| MotionInput {
             name: found.key.clone(),
-            place: Place::Sample(Rc::clone(&dataset), Box::new(found.clone())),
+            location: InputLocation::Sample(Rc::clone(&dataset), Box::new(found.clone())),
         })
         .collect();
     match (inputs.is_empty(), sample) {
@@ -110,31 +110,33 @@ fn of_dataset(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
     }
 }
 
-impl Input {
+impl MotionInput {
     /// Whether this is that file.
     pub fn is_at(&self, path: &Path) -> bool {
-        match &self.place {
-            Place::File(file) => {
+        match &self.location {
+            InputLocation::File(file) => {
                 file == path || file.canonicalize().is_ok_and(|a| path.canonicalize().is_ok_and(|b| a == b))
             }
-            Place::Sample(..) => false,
+            InputLocation::Sample(..) => false,
         }
     }
 
     /// Reads the motion; `fps` is that of files without a rate. `keypoints` is where the face is from, else what a run
     /// or a dataset has.
-    pub fn read(&self, fps: FrameRate, keypoints: Option<&Path>) -> Result<Take> {
-        let take = match &self.place {
-            Place::Sample(dataset, sample) => {
+    pub fn read(&self, fps: FrameRate, keypoints: Option<&Path>) -> Result<InputMotion> {
+        let take = match &self.location {
+            InputLocation::Sample(dataset, sample) => {
                 let sample = dataset.read(sample)?;
                 let body = sample.pose2d.slice(ndarray::s![.., ..N_BODY, ..]).to_owned();
-                Take { motion: sample.motion, face: Some(Face { body }), sound: Some(sample.sound) }
+                InputMotion { motion: sample.motion, face: Some(Face { body }), sound: Some(sample.sound) }
             }
-            Place::File(path) => Take { motion: motion_file::read(path, Some(fps))?.motion, face: None, sound: None },
+            InputLocation::File(path) => {
+                InputMotion { motion: motion_file::read(path, Some(fps))?.motion, face: None, sound: None }
+            }
         };
         check(&take.motion).with_context(|| format!("no animation of {}", self.name))?;
         match keypoints.map(Path::to_owned).or_else(|| self.of_run(Artifact::Keypoints)) {
-            Some(path) => Ok(Take { face: Some(read_face(&path, &take.motion)?), ..take }),
+            Some(path) => Ok(InputMotion { face: Some(read_face(&path, &take.motion)?), ..take }),
             None => Ok(take),
         }
     }
@@ -146,7 +148,7 @@ impl Input {
 
     /// `work/lift/SPEAKER/VIDEO/joints.npz` has its keypoints at `work/pose2d/SPEAKER/VIDEO/keypoints.npz`, and so on.
     fn of_run(&self, file: Artifact) -> Option<PathBuf> {
-        let Place::File(path) = &self.place else { return None };
+        let InputLocation::File(path) = &self.location else { return None };
         let folder = path.canonicalize().ok()?.parent()?.to_owned();
         let (video, speaker) = (folder.file_name()?, folder.parent()?.file_name()?);
         let lift = folder.parent()?.parent()?;

@@ -1,7 +1,9 @@
 //! `orator animate`.
 
-use super::input::{Input, Take, inputs};
+use super::input::{InputMotion, MotionInput, inputs};
 use crate::cli::Outcome;
+use crate::cli::config_args::split;
+use crate::cli::outputs::{Outputs, names, next_output, outputs};
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
 use orator::animate::export::file::{ExportContent, ExportFormat};
@@ -87,7 +89,7 @@ pub struct Args {
     shoulder_yaw: ShoulderYaw,
     /// Cubics over 0.6 s (arms) and 1 s (hands), which come not late; the causal one-Euro filter; or none.
     #[arg(long, value_enum, default_value = "savitzky-golay")]
-    smoothing: Kind,
+    smoothing: SmoothingKind,
     /// One-Euro: cut-off of arms at rest, Hz; that of hands is half of it.
     #[arg(long, value_name = "HZ", default_value_t = ONE_EURO.rest_hz)]
     one_euro_hz: f64,
@@ -109,7 +111,7 @@ enum ShoulderYaw {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Kind {
+enum SmoothingKind {
     SavitzkyGolay,
     OneEuro,
     None,
@@ -134,10 +136,15 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             inputs.len()
         );
     };
-    let outputs = outputs(&args, input)?;
+    let is_read =
+        |path: &Path| input.is_at(path) || [&args.audio, &args.beside].into_iter().flatten().any(|read| read == path);
+    let outputs = outputs(&args.out, is_read, "what is read", ", or give --format bvh")?;
     let sound = args.audio.as_deref().map(audio::read_sound).transpose()?;
     let done = animate(&args, input, sound, &outputs, &options, ui)?;
-    let next = next_command(&args, &outputs);
+    let next = next_output(&outputs).map(|out| {
+        let sample = args.sample.as_ref().map(|key| format!(" --sample {key}")).unwrap_or_default();
+        format!("orator animate {}{sample} --out {}", args.input.display(), out.display())
+    });
     let text = format!("{}wrote {}", done.text, names(&outputs).join(", "));
     let mut facts = done.facts;
     facts["next"] = json!(next);
@@ -146,7 +153,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 }
 
 /// Every motion of a folder or dataset; one that fails does not stop the others.
-fn whole_folder(args: &Args, inputs: &[Input], options: &AnimationOptions, ui: &Ui) -> Result<Outcome> {
+fn whole_folder(args: &Args, inputs: &[MotionInput], options: &AnimationOptions, ui: &Ui) -> Result<Outcome> {
     let [folder] = args.out.as_slice() else { bail!("--format writes into one folder; give one --out") };
     ensure!(!folder.is_file(), "{} is a file; with --format --out is a folder", folder.display());
     let endings: Vec<&str> = args.format.iter().map(|ending| ending.trim_start_matches('.')).collect();
@@ -184,7 +191,7 @@ fn whole_folder(args: &Args, inputs: &[Input], options: &AnimationOptions, ui: &
     Ok(if n_failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
 }
 
-/// What a motion's animation is told as.
+/// The report on one animation, for people and for programs.
 struct Done {
     text: String,
     facts: Value,
@@ -192,13 +199,13 @@ struct Done {
 
 fn animate(
     args: &Args,
-    input: &Input,
+    input: &MotionInput,
     sound: Option<Sound>,
-    outputs: &[(PathBuf, ExportFormat)],
+    outputs: &Outputs,
     options: &AnimationOptions,
     ui: &Ui,
 ) -> Result<Done> {
-    let Take { motion, face, sound: own } = input.read(args.in_fps, args.keypoints.as_deref())?;
+    let InputMotion { motion, face, sound: own } = input.read(args.in_fps, args.keypoints.as_deref())?;
     let (sound, face) = (sound.or(own), face.filter(|_| !args.neutral_head));
     let started = Instant::now();
     let performance = perform(&motion, face.as_ref(), options);
@@ -310,9 +317,9 @@ fn seen(report: &AnimationReport) -> String {
 
 fn options(args: &Args) -> Result<AnimationOptions> {
     let smoothing = match args.smoothing {
-        Kind::None => Smoothing::None,
-        Kind::SavitzkyGolay => Smoothing::SavitzkyGolay,
-        Kind::OneEuro => {
+        SmoothingKind::None => Smoothing::None,
+        SmoothingKind::SavitzkyGolay => Smoothing::SavitzkyGolay,
+        SmoothingKind::OneEuro => {
             let (rest_hz, beta) = (args.one_euro_hz, args.one_euro_beta);
             ensure!((0.01..=100.0).contains(&rest_hz), "--one-euro-hz is {rest_hz}, expected 0.01 to 100");
             ensure!((0.0..=100.0).contains(&beta), "--one-euro-beta is {beta}, expected 0 to 100");
@@ -327,43 +334,10 @@ fn options(args: &Args) -> Result<AnimationOptions> {
     Ok(AnimationOptions { smoothing, constraints, yaw, fps: args.fps })
 }
 
-/// Output files with their formats; none may be an input or another output.
-fn outputs(args: &Args, input: &Input) -> Result<Vec<(PathBuf, ExportFormat)>> {
-    for (n, path) in args.out.iter().enumerate() {
-        let is_read = [&args.audio, &args.beside].into_iter().flatten().any(|read| read == path);
-        ensure!(!input.is_at(path) && !is_read, "{} is what is read; write to another file", path.display());
-        ensure!(!args.out[..n].contains(path), "{} is asked for twice", path.display());
-        ensure!(!path.is_dir(), "{} is a folder; name a file in it, or give --format bvh", path.display());
-    }
-    args.out.iter().map(|path| Ok((path.clone(), ExportFormat::from_path(path)?))).collect()
-}
-
 /// The part of a sound from a second on, as much as there is of `secs`.
 fn part(whole: &Sound, from_secs: f64, secs: f64) -> Sound {
     let at = |secs: f64| ((secs * f64::from(whole.rate)).round() as usize).min(whole.samples.len());
     Sound { rate: whole.rate, samples: whole.samples[at(from_secs)..at(from_secs + secs)].to_vec() }
-}
-
-fn names(outputs: &[(PathBuf, ExportFormat)]) -> Vec<String> {
-    outputs.iter().map(|(path, _)| path.display().to_string()).collect()
-}
-
-/// Command that writes the motion as a film, or for an animation program; nothing when both are there.
-fn next_command(args: &Args, outputs: &[(PathBuf, ExportFormat)]) -> Option<String> {
-    let missing = [(ExportFormat::Mp4, "mp4"), (ExportFormat::Bvh, "bvh")]
-        .into_iter()
-        .find(|&(format, _)| outputs.iter().all(|&(_, written)| written != format));
-    let (_, ending) = missing?;
-    let sample = args.sample.as_ref().map(|key| format!(" --sample {key}")).unwrap_or_default();
-    let out = outputs.first()?.0.with_extension(ending);
-    Some(format!("orator animate {}{sample} --out {}", args.input.display(), out.display()))
-}
-
-fn split(name: &str) -> Result<Split, String> {
-    Split::ALL
-        .into_iter()
-        .find(|split| split.name() == name)
-        .ok_or_else(|| "expected train, validation or test".to_owned())
 }
 
 fn names_called(label: &str) -> Result<Names, String> {

@@ -43,7 +43,7 @@ pub struct Args {
 }
 
 /// What is to be done, and where the search looks.
-struct Task {
+struct ForgetTask {
     removals: Vec<Removal>,
     titles: Vec<String>,
     folders: Vec<PathBuf>,
@@ -79,9 +79,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     };
     text.extend(kept.iter().map(|model| format!("kept, though it was trained with it: {}", model.display())));
     text.extend(task.advice.iter().cloned());
-    text.extend(searched.places.iter().map(|place| match place.at {
-        Some(at) => format!("FOUND   {} at byte {at}: {}", place.file, place.what),
-        None => format!("FOUND   {}: {} in its name", place.file, place.what),
+    text.extend(searched.places.iter().map(|found| match found.at {
+        Some(at) => format!("FOUND   {} at byte {at}: {}", found.file, found.what),
+        None => format!("FOUND   {}: {} in its name", found.file, found.what),
     }));
     let Searched { n_files, bytes, inside_bytes, places } = &searched;
     text.push(format!(
@@ -99,7 +99,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     Ok(if places.is_empty() { Outcome::Done } else { Outcome::Wrong })
 }
 
-fn of_dataset(dir: &Path, wanted: &str, dry_run: bool) -> Result<Task> {
+fn of_dataset(dir: &Path, wanted: &str, dry_run: bool) -> Result<ForgetTask> {
     let dir = std::path::absolute(dir)?;
     if !dry_run {
         workdir::restore_folder(&dir)?;
@@ -111,7 +111,7 @@ fn of_dataset(dir: &Path, wanted: &str, dry_run: bool) -> Result<Task> {
     let mut folders = vec![dir.clone()];
     folders.extend(workdir::left_over(&dir));
     let advice = vec!["models trained with this dataset, and its copies, are not looked for".to_owned()];
-    Ok(Task {
+    Ok(ForgetTask {
         titles: vec![video.title().trim_start_matches('/').to_owned()],
         removals: vec![removal],
         folders,
@@ -119,7 +119,7 @@ fn of_dataset(dir: &Path, wanted: &str, dry_run: bool) -> Result<Task> {
     })
 }
 
-fn of_project(args: &Args) -> Result<(Task, Option<File>)> {
+fn of_project(args: &Args) -> Result<(ForgetTask, Option<File>)> {
     let config = args.config.load()?;
     let work = &config.settings.work.dir;
     let lock = if args.dry_run || !work.exists() { None } else { Some(workdir::lock(work)?) };
@@ -149,7 +149,7 @@ fn of_project(args: &Args) -> Result<(Task, Option<File>)> {
     }
     advice.extend(how_to_keep_away(&config, &speaker, &videos, whole));
     let titles = if whole { vec![speaker] } else { videos.iter().map(|video| video.title()).collect() };
-    Ok((Task { titles, removals: vec![removal], folders: vec![work.to_path_buf()], advice }, lock))
+    Ok((ForgetTask { titles, removals: vec![removal], folders: vec![work.to_path_buf()], advice }, lock))
 }
 
 /// What keeps the next run from bringing the videos back; nothing, where it would not.
@@ -169,8 +169,8 @@ fn how_to_keep_away(config: &Config, speaker: &str, gone: &[&KnownVideo], whole:
     }
     let folder = config.file.parent().unwrap_or(Path::new("."));
     let relative = |path: &PathBuf| path.strip_prefix(folder).unwrap_or(path).to_string_lossy().into_owned();
-    let said = config.settings.speaker.iter().find(|s| s.name == speaker);
-    let mut list: Vec<String> = said.map(|speaker| speaker.exclude.clone()).unwrap_or_default();
+    let configured = config.settings.speaker.iter().find(|s| s.name == speaker);
+    let mut list: Vec<String> = configured.map(|speaker| speaker.exclude.clone()).unwrap_or_default();
     list.extend(back.iter().map(relative));
     Some(format!(
         "delete the video file, or write under [[speaker]] {speaker} in {} the line\n  exclude = {list:?}\n\

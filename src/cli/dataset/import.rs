@@ -32,12 +32,12 @@ pub struct Args {
     #[arg(required = true, value_name = "SOURCE")]
     sources: Vec<PathBuf>,
     /// Take only files of this kind; auto: what their contents say.
-    #[arg(long, value_enum, default_value_t = Kind::Auto)]
-    kind: Kind,
+    #[arg(long, value_enum, default_value_t = ImportKind::Auto)]
+    kind: ImportKind,
     /// Name of the speaker in the dataset.
     #[arg(long, value_name = "NAME")]
     speaker: String,
-    /// The dataset's folder, made new.
+    /// The dataset's folder, created anew.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Replace the dataset that is in the folder.
@@ -70,7 +70,7 @@ pub struct Args {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Kind {
+enum ImportKind {
     Auto,
     Authors,
     Ted,
@@ -81,7 +81,7 @@ enum Kind {
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let plan = plan(&args)?;
     let out = std::path::absolute(&args.out)?;
-    let taken = out.exists() && std::fs::read_dir(&out).map_or(true, |mut entries| entries.next().is_some());
+    let taken = workdir::has_files(&out);
     ensure!(
         !taken || args.force,
         "{} is not empty; choose another folder, or --force replaces the dataset",
@@ -92,15 +92,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         let inside = out.exists() && out.starts_with(std::path::absolute(source)?);
         ensure!(!inside, "{} lies in {}, which is imported; choose another folder", out.display(), source.display());
     }
-    let attempt = workdir::attempt_folder(&out)?;
-    let imported = import(&plan, &attempt, ui).and_then(|imported| {
-        workdir::replace_folder(&attempt, &out)?;
-        Ok(imported)
-    });
-    if imported.is_err() {
-        let _ = std::fs::remove_dir_all(&attempt);
-    }
-    close(&imported?, &args.out, ui)
+    let imported = workdir::build_folder(&out, |attempt| import(&plan, attempt, ui))?;
+    close(&imported, &args.out, ui)
 }
 
 fn plan(args: &Args) -> Result<ImportPlan> {
@@ -118,11 +111,11 @@ fn plan(args: &Args) -> Result<ImportPlan> {
     Ok(ImportPlan {
         sources: args.sources.clone(),
         kind: match args.kind {
-            Kind::Auto => None,
-            Kind::Authors => Some(Found::Authors),
-            Kind::Ted => Some(Found::Ted),
-            Kind::Bvh => Some(Found::Bvh),
-            Kind::Shards => Some(Found::Shards),
+            ImportKind::Auto => None,
+            ImportKind::Authors => Some(Found::Authors),
+            ImportKind::Ted => Some(Found::Ted),
+            ImportKind::Bvh => Some(Found::Bvh),
+            ImportKind::Shards => Some(Found::Shards),
         },
         about: About { licence, consent, source, ..About::new(name, fps) },
         limits: TakeLimits { fps, min_frames: args.min_frames.max(1), max_apart_secs: args.max_apart },
@@ -136,24 +129,24 @@ fn plan(args: &Args) -> Result<ImportPlan> {
 
 fn close(imported: &Imported, out: &Path, ui: &Ui) -> Result<Outcome> {
     let count = |ended: &str| imported.lines.iter().filter(|line| line.ended == ended).count();
-    let mut text: Vec<String> = imported.lines.iter().filter(|line| !line.message.is_empty()).map(said).collect();
-    text.extend(imported.notes.iter().cloned());
+    let mut lines: Vec<String> = imported.lines.iter().filter(|line| !line.message.is_empty()).map(text).collect();
+    lines.extend(imported.notes.iter().cloned());
     let secs: BTreeMap<&str, f64> =
         imported.info.splits.iter().map(|(split, info)| (split.as_str(), info.secs)).collect();
     let parts = Split::ALL.map(|split| format!("{} {:.1} s", split.name(), secs.get(split.name()).unwrap_or(&0.0)));
     let (kept, refused, failed) = (count("kept"), count("refused"), count("failed"));
-    text.push(format!("{kept} kept, {refused} refused, {failed} failed; {}", parts.join(", ")));
-    text.push(format!("dataset  {}", out.display()));
+    lines.push(format!("{kept} kept, {refused} refused, {failed} failed; {}", parts.join(", ")));
+    lines.push(format!("dataset  {}", out.display()));
     let next = format!("orator dataset verify --deep {}", out.display());
     let facts = json!({
         "dataset": out, "takes": imported.lines, "notes": imported.notes, "secs": secs,
         "kept": kept, "refused": refused, "failed": failed, "next": next,
     });
-    ui.summary(&text.join("\n"), Some(&next), facts);
+    ui.summary(&lines.join("\n"), Some(&next), facts);
     Ok(if failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
 }
 
-fn said(line: &ImportOutcome) -> String {
+fn text(line: &ImportOutcome) -> String {
     let ImportOutcome { file, ended, reason, message, .. } = line;
     match *ended {
         "kept" => format!("kept     {file}: {message}"),

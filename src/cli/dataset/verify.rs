@@ -74,10 +74,15 @@ fn check(dir: &std::path::Path, deep: bool, ui: &Ui) -> Result<Outcome> {
 fn info(dir: &std::path::Path, ui: &Ui) -> Result<Outcome> {
     let dataset = Dataset::open(dir)?;
     let (info, stats) = (dataset.info(), dataset.stats());
-    let said = |text: &str| if text.is_empty() { "not said".to_owned() } else { text.to_owned() };
+    let or_not_said = |text: &str| if text.is_empty() { "not said".to_owned() } else { text.to_owned() };
     let mut lines = vec![
         format!("{} at {}, made by {}", info.speaker, info.fps, info.tool),
-        format!("licence {}, consent {}, source {}", said(&info.licence), said(&info.consent), said(&info.source)),
+        format!(
+            "licence {}, consent {}, source {}",
+            or_not_said(&info.licence),
+            or_not_said(&info.consent),
+            or_not_said(&info.source)
+        ),
     ];
     for split in Split::ALL {
         let part = info.splits.get(split.name()).cloned().unwrap_or_default();

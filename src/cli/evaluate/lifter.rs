@@ -1,6 +1,7 @@
 //! `orator evaluate lifter`.
 
 use crate::cli::Outcome;
+use crate::cli::train::lifter::LifterPart;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
 use orator::config;
@@ -14,7 +15,7 @@ use std::path::PathBuf;
 pub struct Args {
     /// body or hands.
     #[arg(long, value_enum, default_value = "body")]
-    part: Part,
+    part: LifterPart,
     /// Captured motion, files or folders of them. body: .bvh, CMU or TED .npz; hands: .bvh with fingers, SMPL-X or TED
     /// .npz, ICVL or NYU label .txt.
     #[arg(long, value_name = "PATH", num_args = 1.., required = true)]
@@ -34,16 +35,10 @@ pub struct Args {
     hand_weights: Option<PathBuf>,
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum Part {
-    Body,
-    Hands,
-}
-
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.part {
-        Part::Body => body(args, ui),
-        Part::Hands => hands(args, ui),
+        LifterPart::Body => body(args, ui),
+        LifterPart::Hands => hands(args, ui),
     }
 }
 

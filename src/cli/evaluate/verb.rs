@@ -2,6 +2,7 @@
 
 use super::{compare, lifter};
 use crate::cli::Outcome;
+use crate::cli::config_args::split;
 use crate::cli::ui::Ui;
 use anyhow::{Result, bail, ensure};
 use orator::dataset::{Dataset, Split};
@@ -86,11 +87,6 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         Some(What::Compare(args)) => compare::run(&args, ui),
         None => motion(&args.motion, ui),
     }
-}
-
-fn split(name: &str) -> std::result::Result<Split, String> {
-    let found = Split::ALL.into_iter().find(|split| split.name() == name);
-    found.ok_or_else(|| format!("a split is {}", Split::ALL.map(Split::name).join(", ")))
 }
 
 fn convention(name: &str) -> std::result::Result<Convention, String> {

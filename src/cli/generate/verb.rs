@@ -2,15 +2,15 @@
 
 use super::batch;
 use crate::cli::Outcome;
+use crate::cli::outputs::{is_same_file, names, next_output, outputs};
 use crate::cli::ui::Ui;
-use anyhow::{Context as _, Result, bail, ensure};
-use orator::animate::export::file::ExportFormat;
+use anyhow::{Context as _, Result, bail};
 use orator::generate::GestureGenerator;
 use orator::pipeline::batch::motion_files::{checkpoint_file, write_motion};
 use orator::pipeline::batch::{SpeechBatch, sounds};
 use orator::stage::progress::Progress as _;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Turn speech into motion with a trained speaker.
 ///
@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 ///
 /// Many sounds at once: --audio-folder (everything that sounds below it) or --batch (a table, columns `audio`, `out` and
 /// `checkpoint`, of which the first is needed and paths count from the table's folder), with --out-folder and --format. What
-/// was made before from the same sound and checkpoint is not made again; a sound that fails does not stop the others
+/// is there already from the same sound and checkpoint is not made again; a sound that fails does not stop the others
 /// (exit code 2).
 #[derive(clap::Args)]
 pub struct Args {
@@ -54,7 +54,7 @@ pub struct Args {
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let Some(audio) = &args.audio else { return batch::run(&batch(args)?, ui) };
     let Some(given) = &args.checkpoint else { bail!("give --checkpoint") };
-    let outputs = outputs(&args.out, audio)?;
+    let outputs = outputs(&args.out, |path| is_same_file(path, audio), "the speech itself", "")?;
     let checkpoint = checkpoint_file(given)?;
     if checkpoint != *given {
         ui.say(&format!("checkpoint {}", checkpoint.display()));
@@ -62,7 +62,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let speaker = GestureGenerator::open(&checkpoint)?;
     let written = write_motion(&speaker, audio, &outputs, ui)?;
     let speed = written.secs / written.motion_secs.max(1e-6);
-    let names: Vec<String> = outputs.iter().map(|(path, _)| path.display().to_string()).collect();
+    let names = names(&outputs);
     let note = written.note.as_ref().map_or(String::new(), |note| format!("note: {note}\n"));
     let text = format!(
         "{:.1} s of speech, {} frames of {} at {}, {speed:.0} x real time\n{note}wrote {}",
@@ -72,7 +72,10 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         speaker.fps(),
         names.join(", ")
     );
-    let next = next_command(given, audio, &outputs);
+    let next = next_output(&outputs).map(|out| {
+        let (checkpoint, audio, out) = (given.display(), audio.display(), out.display());
+        format!("orator generate --checkpoint {checkpoint} --audio {audio} --out {out}")
+    });
     let facts = json!({
         "audio_secs": written.secs,
         "n_frames": written.n_frames,
@@ -97,30 +100,4 @@ fn batch(args: Args) -> Result<SpeechBatch> {
         (None, None) => bail!("give --audio, --audio-folder or --batch"),
     };
     Ok(SpeechBatch { sounds, folder, formats: args.format, checkpoint: args.checkpoint, again: args.again })
-}
-
-/// Output files with their formats; none may be the input or another output.
-fn outputs(out: &[PathBuf], audio: &Path) -> Result<Vec<(PathBuf, ExportFormat)>> {
-    let same = |a: &Path, b: &Path| a == b || a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
-    for (n, path) in out.iter().enumerate() {
-        ensure!(!same(path, audio), "{} is the speech itself; write to another file", path.display());
-        ensure!(!out[..n].contains(path), "{} is asked for twice", path.display());
-        ensure!(!path.is_dir(), "{} is a folder; name a file in it", path.display());
-    }
-    out.iter().map(|path| Ok((path.clone(), ExportFormat::from_path(path)?))).collect()
-}
-
-/// Command that writes the motion as a film, or for an animation program; nothing when both are there.
-fn next_command(checkpoint: &Path, audio: &Path, outputs: &[(PathBuf, ExportFormat)]) -> Option<String> {
-    let missing = [(ExportFormat::Mp4, "mp4"), (ExportFormat::Bvh, "bvh")]
-        .into_iter()
-        .find(|&(format, _)| outputs.iter().all(|&(_, written)| written != format));
-    let (_, extension) = missing?;
-    let out = outputs.first()?.0.with_extension(extension);
-    Some(format!(
-        "orator generate --checkpoint {} --audio {} --out {}",
-        checkpoint.display(),
-        audio.display(),
-        out.display()
-    ))
 }

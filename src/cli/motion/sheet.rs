@@ -53,7 +53,7 @@ pub struct Args {
 }
 
 /// The files of one clip.
-struct Files {
+struct SheetFiles {
     title: String,
     video: PathBuf,
     keypoints: PathBuf,
@@ -67,7 +67,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let out = args.out.clone().unwrap_or_else(|| PathBuf::from("sheet.png"));
             ensure!(out.extension().is_some_and(|e| e == "png"), "{}: a sheet is written as .png", out.display());
             let title = video.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            vec![Files { title, video: video.clone(), keypoints: keypoints.clone(), joints: joints.clone(), out }]
+            vec![SheetFiles { title, video: video.clone(), keypoints: keypoints.clone(), joints: joints.clone(), out }]
         }
         _ => of_run(&args)?,
     };
@@ -96,12 +96,12 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 }
 
 /// The lifted clips of a run that are asked for.
-fn of_run(args: &Args) -> Result<Vec<Files>> {
+fn of_run(args: &Args) -> Result<Vec<SheetFiles>> {
     let pipeline = Pipeline::open(args.config.load()?)?;
     let config = pipeline.config();
     let work = &config.settings.work.dir;
     let folder = args.out.clone().unwrap_or_else(|| work.join("sheets"));
-    let wanted = |unit: &Unit| {
+    let is_chosen = |unit: &Unit| {
         let Some(name) = &args.video else { return true };
         name.as_os_str() == unit.video.as_str() || unit.source.file_stem() == Some(name.as_os_str())
     };
@@ -109,8 +109,8 @@ fn of_run(args: &Args) -> Result<Vec<Files>> {
     let mut names = Vec::new();
     for unit in pipeline.videos(&args.speaker)?.into_iter().flat_map(|videos| videos.units) {
         names.push(unit.video.clone());
-        if wanted(&unit) {
-            clips.push(Files {
+        if is_chosen(&unit) {
+            clips.push(SheetFiles {
                 title: unit.to_string(),
                 keypoints: Artifact::Keypoints.path(work, &unit),
                 joints: Artifact::Joints.path(work, &unit),
@@ -131,7 +131,7 @@ fn of_run(args: &Args) -> Result<Vec<Files>> {
 }
 
 /// Draws one clip; the pictures written, and its figures.
-fn draw(files: &Files, every_secs: f64, figure: bool, ui: &Ui) -> Result<(Vec<PathBuf>, ClipFigures)> {
+fn draw(files: &SheetFiles, every_secs: f64, figure: bool, ui: &Ui) -> Result<(Vec<PathBuf>, ClipFigures)> {
     let (keypoints, notes) = keypoints_npz::read_noting(&files.keypoints)?;
     notes.iter().for_each(|note| ui.say(&format!("{}: {note}", files.keypoints.display())));
     // A file without a rate is taken to run as the keypoints do.

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 /// Write a commented pipeline.toml, and the folders for videos and models, into DIR.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The project's folder; made if it is not there.
+    /// The project's folder; created if it is not there.
     dir: PathBuf,
 }
 

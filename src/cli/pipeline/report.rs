@@ -35,10 +35,10 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let pipeline = Pipeline::open(args.config.load()?)?;
     let (videos, settings) = (pipeline.videos(&args.speaker)?, &pipeline.config().settings);
     let out = args.out.unwrap_or_else(|| settings.work.dir.join("report.html"));
-    let wanted = ReportRequest { settings, videos: &videos, n_pictures: args.pictures };
-    let made = report::make(&wanted, ui);
-    workdir::write_file(&out, made.html.as_bytes())?;
-    let (sums, mut facts) = (made.sums, made.facts);
+    let request = ReportRequest { settings, videos: &videos, n_pictures: args.pictures };
+    let page = report::make(&request, ui);
+    workdir::write_file(&out, page.html.as_bytes())?;
+    let (sums, mut facts) = (page.sums, page.facts);
     let text = format!(
         "kept {} of {} ({}), refused {}, failed {}\nwrote {} ({:.1} MB)",
         length(sums.kept),
@@ -47,11 +47,11 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         length(sums.refused_secs()),
         length(sums.failed),
         out.display(),
-        made.html.len() as f64 / 1e6
+        page.html.len() as f64 / 1e6
     );
     let next = format!("xdg-open {}", out.display());
     facts["report"] = json!(out);
-    facts["bytes"] = json!(made.html.len());
+    facts["bytes"] = json!(page.html.len());
     facts["next"] = json!(next);
     ui.summary(&text, Some(&next), facts);
     Ok(Outcome::Done)

@@ -23,9 +23,9 @@ const HELD_OUT: usize = 2;
 const FPS: FrameRate = FrameRate::new(15, 1);
 const CLIP_SECS: f64 = 60.0;
 
-/// Where it comes from.
+/// Where the motion comes from.
 #[derive(clap::Args)]
-pub struct MotionArgs {
+pub struct CorpusArgs {
     /// Captured motion: .bvh or .npz files, or folders of them; may be given several times.
     #[arg(long, value_name = "PATH", num_args = 1.., required = true)]
     mocap: Vec<PathBuf>,
@@ -37,7 +37,7 @@ pub struct MotionArgs {
     pub seed: u64,
 }
 
-pub fn gather(args: &MotionArgs, ui: &Ui) -> Result<Corpus> {
+pub fn gather(args: &CorpusArgs, ui: &Ui) -> Result<Corpus> {
     let task = ui.begin("gathering motion", 0);
     let takes = upper_body::read_all(&args.mocap).context("reading --mocap")?;
     let (held_out, mut takes) = upper_body::divide(takes, &args.hold_out)?;
@@ -57,9 +57,9 @@ pub fn gather(args: &MotionArgs, ui: &Ui) -> Result<Corpus> {
 
 /// A minute of the demo's figure.
 fn gestures(seed: u64) -> Motion {
-    let mut dice = ChaCha8Rng::seed_from_u64(seed);
-    let speech = Speech::new(CLIP_SECS, &mut dice);
-    let gestures = gesture::DrawnGestures::new(&speech, &mut dice);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let speech = Speech::new(CLIP_SECS, &mut rng);
+    let gestures = gesture::DrawnGestures::new(&speech, &mut rng);
     let figures: Vec<DrawnFigure> =
         (0..FPS.frames_in(CLIP_SECS)).map(|t| DrawnFigure::new(&gestures.controls(FPS.secs(t)))).collect();
     let joints = ndarray::Array3::from_shape_fn((figures.len(), N_JOINTS, 3), |(t, joint, k)| {

@@ -17,7 +17,7 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    corpus: corpus::MotionArgs,
+    corpus: corpus::CorpusArgs,
     /// The weights file to write (safetensors).
     #[arg(long, value_name = "FILE")]
     out: PathBuf,

@@ -49,13 +49,13 @@ pub struct Args {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let config = args.config.load()?;
-    let place = |given: Option<PathBuf>, room: &str| -> Result<PathBuf> {
+    let folder_of = |given: Option<PathBuf>, room: &str| -> Result<PathBuf> {
         match given {
             Some(path) => Ok(path),
             None => Ok(config.settings.work.dir.join(room).join(speaker(args.speaker.as_ref(), &config)?)),
         }
     };
-    let (folder, out) = (place(args.dataset, "dataset")?, place(args.out, "gan")?);
+    let (folder, out) = (folder_of(args.dataset, "dataset")?, folder_of(args.out, "gan")?);
     let mut settings = config.settings.gan.clone();
     settings.steps = args.steps.unwrap_or(settings.steps);
     let dataset = Dataset::open(&folder).context("`orator run` makes the dataset to train on")?;
@@ -73,7 +73,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         100.0 * outcome.waiting,
         outcome.n_windows,
         outcome.n_parameters,
-        figures(&outcome.validation),
+        metrics(&outcome.validation),
         outcome.newest.display(),
         outcome.best_step,
         outcome.best.display(),
@@ -99,7 +99,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 }
 
 /// The last validation as a table, and the alarm where there is one.
-fn figures(validation: &Validation) -> String {
+fn metrics(validation: &Validation) -> String {
     let (predicted, still) = (&validation.generator, &validation.mean_pose);
     let row = |name: &str, predicted: f64, still: f64| format!("{name:24}{predicted:9.3}   {still:9.3}\n");
     let distance = |figures: &ValidationMetrics| figures.frechet.unwrap_or(f64::NAN);
@@ -120,7 +120,7 @@ fn figures(validation: &Validation) -> String {
     text
 }
 
-/// Writes the page of the training; the training is done, so what hinders the page is told and no more.
+/// Writes the page of the training; the training is done, so that what hinders the page is only printed.
 fn page(dataset: &Dataset, best: &Path, folder: &Path, ui: &Ui) -> Option<PathBuf> {
     let written = || -> Result<()> {
         let pairs = pairs(dataset, &GestureGenerator::open(best)?)?;

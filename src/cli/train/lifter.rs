@@ -20,7 +20,7 @@ use std::path::PathBuf;
 pub struct Args {
     /// body or hands.
     #[arg(long, value_enum)]
-    part: Part,
+    part: LifterPart,
     /// hands: the network.
     #[arg(long, value_enum, default_value = "coordinates")]
     network: HandNetwork,
@@ -60,8 +60,9 @@ pub struct Args {
     checkpoint_every: usize,
 }
 
+/// Whose networks.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
-enum Part {
+pub enum LifterPart {
     Body,
     Hands,
 }
@@ -78,7 +79,7 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
     ensure!(args.learning_rate > 0.0 && args.learning_rate < 1.0, "--learning-rate must lie between 0 and 1");
     ensure!((1..=4096).contains(&args.width.unwrap_or(256)), "--width must lie between 1 and 4096");
     let (mut training_task, steps): (Box<dyn TrainingTask>, usize) = match args.part {
-        Part::Body => {
+        LifterPart::Body => {
             ensure!(!args.mocap.is_empty(), "the body lifter learns from captured motion: give --mocap PATH");
             ensure!(
                 args.widths.iter().all(|w| w % 2 == 1) && args.widths.iter().product::<usize>() <= 729,
@@ -90,7 +91,7 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
             let config = BodyLifter::config(args.width.unwrap_or(256), &args.widths);
             (Box::new(BodyLifterTask::new(takes, held_out, &config, args.seed)?), 9000)
         }
-        Part::Hands => {
+        LifterPart::Hands => {
             ensure!(
                 args.mocap.is_empty() && args.hold_out.is_empty(),
                 "the hand lifter learns from hands made by rule: no --mocap"
@@ -118,7 +119,7 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
         return Ok(Outcome::Done);
     }
     let text = format!("{} written\n{}", args.out.display(), errors.join("\n"));
-    let key = if args.part == Part::Body { "--body-weights" } else { "--hand-weights" };
+    let key = if args.part == LifterPart::Body { "--body-weights" } else { "--hand-weights" };
     let next = format!("orator lift KEYPOINTS.npz --out JOINTS.npy {key} {}", args.out.display());
     let facts =
         serde_json::json!({ "out": args.out, "parameters": training_task.params().n_parameters(), "errors": errors });
