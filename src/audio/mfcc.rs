@@ -1,4 +1,4 @@
-//! Mel-frequency cepstra as FineMotion computes them (`finemotion.md` section 3, the library python_speech_features): 26
+//! Mel-frequency cepstra as FineMotion computes them (Korzun et al. 2020, with the library python_speech_features): 26
 //! cepstra of 26 bands every 10 ms, the first replaced by the log energy, and their means to 20 a second.
 
 use ndarray::{Array2, Axis, s};
@@ -58,7 +58,7 @@ pub fn mfcc(samples: &[f32], rate: u32) -> Array2<f64> {
     cepstra
 }
 
-/// The same at 20 rows a second [n, 26]: means of 5 in a row, what is left over dropped.
+/// Cepstra at 20 rows a second [n, 26]: means of 5 rows of [`mfcc`], an incomplete last mean dropped.
 pub fn at_20_fps(samples: &[f32], rate: u32) -> Array2<f64> {
     let all = mfcc(samples, rate);
     let rows = all.nrows() / N_AVERAGED;

@@ -218,7 +218,7 @@ fn bands() -> Vec<OnsetBand> {
 mod tests {
     use super::*;
 
-    /// As in the reference script: bursts of falling tones, 6 s.
+    /// Signal of the reference script: bursts of falling tones, 6 s.
     pub fn bursts() -> Vec<f32> {
         let sample = |i: usize| {
             let t = i as f64 / f64::from(SAMPLE_RATE);

@@ -16,7 +16,7 @@ use anyhow::{Result, ensure};
 use ndarray::{Array2, Array3, s};
 use std::path::Path;
 
-/// Frames made at once: with 256 more beside them that are thrown away, a small part.
+/// Frames generated at once; the 256 context frames that are computed beside them and dropped are a small part.
 const CHUNK: usize = 2048;
 
 /// A trained speaker.
@@ -59,14 +59,15 @@ impl GestureGenerator {
         self.motion_with_chunk(sound, CHUNK)
     }
 
-    /// The same in chunks of `chunk` frames, a multiple of 32.
+    /// [`Self::motion`] in chunks of `chunk` frames, a multiple of 32.
     pub fn motion_with_chunk(&self, sound: &Sound, chunk: usize) -> Result<Motion> {
         ensure!(sound.rate == SAMPLE_RATE, "the sound has {} Hz, expected {SAMPLE_RATE}", sound.rate);
         self.joined(pieces(sound), sound.samples.len(), chunk, &mut |_| ())
     }
 
-    /// The same motion for `n_samples` at 16 kHz that come piece by piece: sound of any length takes the same memory, but
-    /// for the motion. `made` hears of every so many frames. Errors as `motion`, and where the pieces are not `n_samples`.
+    /// Motion for `n_samples` at 16 kHz that come piece by piece: memory does not grow with the sound, except
+    /// for the motion. `made` is called with the number of frames of each chunk. Errors of `motion`, and pieces that are
+    /// not `n_samples` together.
     pub fn motion_of_pieces(
         &self,
         pieces: impl Iterator<Item = Result<Vec<f32>>>,
@@ -96,9 +97,9 @@ impl GestureGenerator {
         Ok(Motion::from_joints(self.fps(), joints))
     }
 
-    /// What the network says for `sound`, [144, T] of one chunk after another, `chunk` frames or less each: raw numbers
-    /// that the checkpoint's facts make into motion. The sound is continued by its mirror image up to a multiple of 32
-    /// frames (rebol.md section 6).
+    /// Raw output of the network for `sound`, [144, T] of one chunk after another, `chunk` frames or less each, which
+    /// [`SpeakerMetadata::motion`] turns into motion. The sound is continued by its mirror image up to a multiple of 32
+    /// frames.
     pub fn features<'a>(
         &'a self,
         sound: &'a Sound,

@@ -1,5 +1,5 @@
 //! The sound on its way into the network: pieces come in one after the other, spectrogram frames are asked for in order, and
-//! what is not needed any more is let go. Behind its end the sound goes on as its mirror image (rebol.md section 6), for
+//! what is not needed any more is let go. Behind its end the sound goes on as its mirror image, for
 //! which the tail is kept.
 
 use crate::audio::mel;

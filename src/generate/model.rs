@@ -1,4 +1,4 @@
-//! What a checkpoint of the generator means: the facts that make a new sound into motion, and the network itself.
+//! What a checkpoint of the generator means: the metadata that generation needs, and the network itself.
 
 use super::normalisation::{N_FEATURES, Normalisation};
 use super::representation::Representation;
@@ -25,7 +25,7 @@ const MOST_WIDTH: usize = 1024;
 /// Most frames a second that are believed.
 const MOST_FPS: f64 = 1000.0;
 
-/// Everything beside the tensors that generation needs. Stored under `speaker` in a checkpoint's facts.
+/// Everything beside the tensors that generation needs. Stored under `speaker` in a checkpoint's metadata.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpeakerMetadata {
     pub kind: String,
@@ -41,7 +41,7 @@ pub struct SpeakerMetadata {
     pub dataset: String,
 }
 
-/// How the spectrogram was made.
+/// Parameters of the spectrogram.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpectrogramSettings {
     pub rate: u32,
@@ -54,7 +54,7 @@ pub struct SpectrogramSettings {
 }
 
 impl SpectrogramSettings {
-    /// This program's.
+    /// Parameters of [`mel::log_mel`].
     pub fn current() -> Self {
         Self {
             rate: SAMPLE_RATE,
@@ -69,7 +69,7 @@ impl SpectrogramSettings {
 }
 
 impl SpeakerMetadata {
-    /// This program's skeleton and audio; `name` and `fps` of the speaker, `dataset` as its hash.
+    /// Metadata with the current skeleton and spectrogram; `name` and `fps` of the speaker, `dataset` as its hash.
     pub fn new(
         name: &str,
         fps: FrameRate,

@@ -107,7 +107,7 @@ impl Representation {
         joints
     }
 
-    /// The same on tensors.
+    /// The way from raw features to normalised positions on tensors.
     pub fn decoder(&self, normal: &Normalisation, dtype: DType, device: &Device) -> Result<PoseDecoder> {
         let Self::Bones { mean, std } = self else { return Ok(PoseDecoder { kinematics: None }) };
         let table = |values: Vec<f64>, shape: &[usize]| Tensor::from_vec(values, shape, device)?.to_dtype(dtype);

@@ -1,4 +1,4 @@
-//! Parts of the body: which points a figure is about, and what they are measured from.
+//! Parts of the body: which points a metric is about, and what they are measured from.
 
 use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, R_WRIST, is_duplicate};
 

@@ -17,7 +17,7 @@ pub use super::pair::MotionPair;
 pub use super::settings::Convention;
 pub use super::sums::MetricSums;
 
-/// Numbers that stand before the cheap sums: made joints that are not finite, frames of another rate.
+/// Numbers that stand before the cheap sums: predicted joints that are not finite, frames of another rate.
 const N_FACTS: usize = 2;
 
 /// All numbers of one convention.
@@ -68,7 +68,7 @@ impl Catalogue {
         of_each.nth(index).is_some_and(|metric| metric.is_costly())
     }
 
-    /// For a figure that should be near the real motion's: the index of that figure of the real motion.
+    /// Index of the metric of the ground truth that a metric better near it is compared with.
     pub fn truth_of(&self, index: usize) -> Option<usize> {
         let of = self.definitions.get(index).filter(|definition| definition.better == Better::NearerTruth)?;
         let name = format!("{}_of_real", of.name);
@@ -81,7 +81,7 @@ impl Catalogue {
         self.measure_blocks(interval, usize::MAX).whole
     }
 
-    /// The same, and as blocks of about `n_frames` frames: what begins in a block is counted there, whatever it reaches
+    /// Sums of one interval, whole and as blocks of about `n_frames` frames: what begins in a block is counted there, whatever it reaches
     /// into, so that the blocks add up to the whole and no value depends on how long they are.
     pub fn measure_blocks(&self, interval: &MotionPair, n_frames: usize) -> IntervalSums {
         let pair = PairedFrames::new(interval);
@@ -126,7 +126,7 @@ impl Catalogue {
         self.rows(drawn.outer_iter().map(|row| row.to_vec()).collect(), |row| self.read(Some(row), None))
     }
 
-    /// The same of costly values, NaN in place of the others.
+    /// Costly values of draws of blocks, as in [`Self::draw_cheap`], NaN in place of the others.
     pub fn draw_costly(&self, blocks: &[MetricSums], counts: ArrayView2<f64>) -> Array2<f64> {
         let drawn = sums::draw_costly(blocks, counts);
         self.rows(drawn.outer_iter().map(|row| row.to_vec()).collect(), |row| self.read(None, Some(row)))
@@ -195,7 +195,7 @@ mod tests {
         })
     }
 
-    /// As in the reference script.
+    /// Motion of the reference script.
     fn moving(predicted: bool) -> Array3<f32> {
         let kind = f64::from(u8::from(predicted));
         Array3::from_shape_fn((90, N_JOINTS, 3), |(t, joint, k)| {
@@ -243,7 +243,7 @@ mod tests {
         }
     }
 
-    /// The same number, or both not one.
+    /// Whether two values agree: equal up to rounding, or both NaN.
     fn same(a: f64, b: f64) -> bool {
         (a - b).abs() <= 1e-9 * a.abs().max(1e-6) || (a.is_nan() && b.is_nan())
     }

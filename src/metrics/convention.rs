@@ -1,15 +1,6 @@
-//! Whose definitions, and which figures each convention has: the one table. Where a convention was made for another
-//! frame rate than the data's, what it counts in frames is turned into seconds and back into the nearest number of frames of
-//! the data; the definitions say both.
-//!
-//! | convention | figures | what is peculiar |
-//! |---|---|---|
-//! | `orator` | PCK in space and in the plane, L1, MPJPE, P-MPJPE, acceleration error; speed, acceleration, jerk, diversity, pairwise distance, bone lengths, beat consistency of the made and of the real motion; Hellinger distance of speeds; Frechet distance of poses and of windows in two fixed spaces; CCA | this project's own |
-//! | `speech2gesture` (Ginosar et al. 2019) | PCK in the plane | the 48 keypoints without the neck; `<=`; mean over keypoints, then over frames; the docstring speaks of 0.1, the default is 0.2; positions as they are, scaling cancels |
-//! | `genea` (Kucherenko et al. 2020, 2022) | acceleration, jerk, Hellinger distance of speeds, CCA | centimetres; mean over the intervals of the intervals' means, 49 joints with the one that stands still; speeds of 49 cm/s and more are dropped; the first 8 joints are cut off before the histogram (`[:, 8:]`), here neck, arms and the left hand's root; one CCA over all. Their Frechet distance needs an encoder trained anew for every run, and is not given |
-//! | `emage` (Liu et al. 2024) | L1div, beat consistency | speeds over their mean, local minima above a threshold (not below); positions are replaced by their distances from the mean before, since L1div overwrites them; the threshold is looked up 2 s early; first and last 2 s ignored. Their Frechet distance needs their encoder, and is not given |
-//! | `trimodal` (Yoon et al. 2020; beats: its descendants) | MAJE, acceleration error, beat consistency | the first 4 frames, given as a seed, are left out; accelerations by coordinate and frame, without the frame rate; beats where the angle between bones changes slowly. Their Frechet distance needs their encoder (in which `LeakyReLU(True)` means slope 1, so that it is linear there), and is not given |
-//! | `aist` (Li et al. 2021) | beat alignment | mean over the beats of the MOTION; an interval without any scores 0; every interval weighs the same |
+//! Metrics of each convention: the one table. What a convention counts in frames of its own frame rate is turned into
+//! seconds and back into the nearest number of frames of the data; the definitions say both. What is peculiar to each
+//! convention stands in the guide (`evaluation`).
 
 use super::beat::{aist, angles, consistency};
 use super::body_part::BodyPart;

@@ -12,11 +12,11 @@ use serde_json::Value;
 pub enum Better {
     Higher,
     Lower,
-    /// The nearer to the same figure of the real motion, which is the definition `<name>_of_real` of the same part.
+    /// Better the nearer it is to the metric of the ground truth, which is the definition `<name>_of_real` of the same part.
     NearerTruth,
     /// The nearer to 1.
     One,
-    /// A figure of the real motion alone: says nothing of the made one.
+    /// A metric of the ground truth alone: says nothing of the predicted one.
     Neither,
 }
 
@@ -31,7 +31,7 @@ pub struct Definition {
     /// `1` for a share or a ratio.
     pub unit: &'static str,
     pub better: Better,
-    /// The exact definition in words: g real, p made, t frame, j joint.
+    /// The exact definition in words: g ground truth, p predicted, t frame, j joint.
     pub formula: &'static str,
     /// When there is no value (NaN).
     pub undefined: &'static str,

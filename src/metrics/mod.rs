@@ -1,6 +1,6 @@
-//! How good made motion is beside the real one: pure functions of joints [T, 49, 3] in metres with a mask [T, 49] of
-//! the real joints that were seen. Every figure is a sum that merges, so that it can be resampled; what to compare
-//! with what is not said here. `catalogue` is the way in: it lists all figures with their definitions, measures intervals and
+//! How good predicted motion is beside the ground truth: pure functions of joints [T, 49, 3] in metres with a mask [T, 49] of
+//! the real joints that were seen. Every metric is a sum that merges, so that it can be resampled; what to compare
+//! with what is not said here. `catalogue` is the way in: it lists all metrics with their definitions, measures intervals and
 //! reads values off their sums.
 
 pub mod beat;

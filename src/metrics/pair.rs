@@ -1,18 +1,18 @@
-//! One interval of made motion beside the real one, as the metrics see it. No metric looks across its borders.
+//! One interval of predicted motion beside its ground truth. No metric looks across its borders.
 
 use crate::math::vec3::Vec3;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::time::FrameRate;
 use ndarray::{ArrayView2, ArrayView3};
 
-/// Made and real motion of the same seconds.
+/// Made and ground truth of the same seconds.
 #[derive(Clone, Copy, Debug)]
 pub struct MotionPair<'a> {
     /// [T, 49, 3], metres, house axes.
     pub predicted: ArrayView3<'a, f32>,
     /// [T, 49, 3], metres.
     pub ground_truth: ArrayView3<'a, f32>,
-    /// [T, 49]: where the real joint was seen (and the made one, where it is measured motion as well). What is not
+    /// [T, 49]: where the real joint was seen (and the predicted one, where it is measured motion as well). What is not
     /// seen is left out everywhere, as is a real joint that is not finite.
     pub mask: ArrayView2<'a, bool>,
     pub fps: FrameRate,
@@ -20,7 +20,7 @@ pub struct MotionPair<'a> {
     pub onsets: Option<&'a [f64]>,
 }
 
-/// The same in the form metrics compute with: as many frames as all of it has.
+/// A [`MotionPair`] in f64 with one mask, cut to the shortest of its arrays.
 pub(crate) struct PairedFrames<'a> {
     pub interval: MotionPair<'a>,
     pub predicted: Vec<[Vec3; N_JOINTS]>,
@@ -64,7 +64,7 @@ impl<'a> PairedFrames<'a> {
         self.seen.get(t..t + n).is_some_and(|frames| frames.iter().all(|seen| seen[joint]))
     }
 
-    /// How many seen joints of the made motion are not finite in frame `t`.
+    /// How many seen joints of the predicted motion are not finite in frame `t`.
     pub fn n_broken(&self, t: usize) -> usize {
         let joints = self.predicted[t].iter().zip(&self.seen[t]);
         joints.filter(|(p, seen)| **seen && p.iter().any(|v| !v.is_finite())).count()

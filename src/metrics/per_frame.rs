@@ -1,4 +1,4 @@
-//! The commonest form of a figure: a number of each frame and point, and their mean over all there are. What the number
+//! The commonest form of a metric: a number of each frame and point, and their mean over all there are. What the number
 //! is stands in the file of each metric.
 
 use super::body_part::{BodyPart, MeasuredPoint};
@@ -29,7 +29,7 @@ pub(crate) struct PointWindow<'a> {
 }
 
 impl PointWindow<'_> {
-    /// Where the made point is in frame `k` of the window.
+    /// Position of the predicted point in frame `k` of the window.
     pub fn predicted(&self, k: usize) -> Vec3 {
         self.at(self.predicted, k)
     }
@@ -39,7 +39,7 @@ impl PointWindow<'_> {
         self.at(self.ground_truth, k)
     }
 
-    /// Made less real.
+    /// Prediction minus ground truth.
     pub fn apart(&self, k: usize) -> Vec3 {
         vec3::sub(self.predicted(k), self.ground_truth(k))
     }

@@ -27,7 +27,7 @@ impl Default for MetricSettings {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Convention {
-    /// This project's own.
+    /// Definitions of this project.
     #[default]
     Orator,
     /// Ginosar et al. 2019.
@@ -47,7 +47,7 @@ impl Convention {
     pub const ALL: [Self; 6] =
         [Self::Orator, Self::Speech2gesture, Self::Genea, Self::Emage, Self::Trimodal, Self::Aist];
 
-    /// As on the command line.
+    /// Name on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Orator => "orator",

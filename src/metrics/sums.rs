@@ -53,7 +53,7 @@ impl CostlySums {
         }
     }
 
-    /// As f64.
+    /// All numbers as f64.
     pub fn row(&self) -> Vec<f64> {
         self.part(0..self.len()).collect()
     }
@@ -122,7 +122,7 @@ pub(crate) fn draw_cheap(blocks: &[MetricSums], counts: ArrayView2<f64>) -> Arra
     drawn(width, blocks, counts, |sums, range| Box::new(sums.cheap.get(range).unwrap_or_default().iter().copied()))
 }
 
-/// The same of the costly sums.
+/// One row of costly sums for each draw [n_draws, n_costly].
 pub(crate) fn draw_costly(blocks: &[MetricSums], counts: ArrayView2<f64>) -> Array2<f64> {
     let width = blocks.iter().map(|sums| sums.costly.len()).max().unwrap_or(0);
     drawn(width, blocks, counts, |sums, range| sums.costly.part(range))

@@ -2,9 +2,6 @@
 //! the embedding network of Yoon et al. 2020 (34 frames; 3, 3, 4 by twos, 3 wide; then 256, 128, 32), on all bones.
 //! Every layer has batch norm and leaky ReLU; the code itself is normalised without activation, so that its numbers have
 //! about unit variance over what was learnt from.
-//!
-//! No layer is padded on the way in, so neighbouring windows share their convolutions: `codes` runs these once over a
-//! stretch and only the last layers window by window.
 
 use super::Mode;
 use super::ops::batch_norm::BatchNorm;
@@ -112,6 +109,7 @@ impl MotionEncoder {
     }
 
     /// Codes [n, 32] of the windows of `frames` [T, n_in] that begin at 0, `stride`, 2 `stride` ... (a multiple of 2).
+    /// No layer is padded, so neighbouring windows share the convolutions; only the dense layers run window by window.
     pub fn codes(&self, frames: ArrayView2<f32>, stride: usize) -> Result<Array2<f32>> {
         let (n_frames, n_in) = frames.dim();
         let n = (n_frames + 1).saturating_sub(WINDOW).div_ceil(stride);

@@ -40,7 +40,7 @@ impl Params {
         Self { seed: Some(seed), dtype, device: Device::Cpu, trainable, buffers }
     }
 
-    /// The same set, its tensors on this device. The first values are those of the CPU.
+    /// Moves the tensors that follow to this device. First values do not depend on the device.
     pub fn on(self, device: &Device) -> Self {
         Self { device: device.clone(), ..self }
     }

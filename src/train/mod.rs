@@ -1,8 +1,7 @@
 //! Losses, optimiser, checkpoints, logs, and the training loops.
 //!
-//! The way of a window: `examples` (dataset to normalised poses and log-mels) -> `training` (a step: networks,
-//! `representation`, `losses`, `adam`) -> `checkpoint`; `gan` is the loop around it, `validate` and `score` choose the
-//! best. `speaker` is what a checkpoint of the generator means.
+//! A window: `gan::windows` (dataset to normalised poses and log-mels) -> `gan::step` (networks, `losses`, `optim`) ->
+//! a checkpoint; `gan::train` is the loop, `gan::validate` and `gan::score` choose the best.
 
 pub mod gan;
 pub mod lifter;

@@ -37,7 +37,7 @@ pub trait TrainingTask: Send + Sync {
     /// [B, shape in] to [B, 3 x points].
     fn forward(&self, x: &Tensor, mode: &mut Mode) -> candle_core::Result<Tensor>;
     /// The loss of what came out, [B, points, 3], against what should have; `weights` [1, points] of mean 1. The mean
-    /// distance of the points unless the lesson knows better.
+    /// distance of the points unless the task knows better.
     fn loss(&self, out: &Tensor, wanted: &Tensor, weights: &Tensor) -> candle_core::Result<Tensor> {
         let distance = ((out - wanted)?.sqr()?.sum(2)? + 1e-8)?.sqrt()?;
         distance.broadcast_mul(weights)?.mean_all()
@@ -91,7 +91,7 @@ impl Schedule {
     }
 }
 
-/// Gives the lesson's network the weights of a file; returns their hash. Errors name the file and what does not fit.
+/// Gives the task's network the weights of a file; returns their hash. Errors name the file and what does not fit.
 pub fn start_from(training_task: &dyn TrainingTask, path: &Path) -> Result<String> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read the weights {}", path.display()))?;
     let load = || -> Result<()> {

@@ -22,7 +22,7 @@ use serde_json::json;
 use std::sync::Mutex;
 use std::time::Instant;
 
-/// Evaluation of made motion beside the real one, in memory: all metrics, all baselines, all draws and the page. How long
+/// Evaluation of predicted motion beside the ground truth, in memory: all metrics, all baselines, all draws and the page. How long
 /// each part takes, and the most memory. Motion and sound are those of the synthetic speaker, 15 frames a second.
 #[derive(clap::Args)]
 pub struct Args {
@@ -108,7 +108,7 @@ struct Unheard {
     sound: Sound,
 }
 
-/// Real motion with its whims; the made one is what the rule alone would have it do.
+/// Ground truth with its random variation; the predicted one is what the rule alone would have it do.
 fn speaker(n_clips: usize, n_frames: usize) -> Vec<Unheard> {
     let clip = |number: usize| {
         let rule = Rule { rule: RULE, seed: 1, split: Split::Validation, number, n_frames };

@@ -33,7 +33,7 @@ pub struct Args {
     /// Threads.
     #[arg(long, default_value_t = 1, value_name = "N")]
     threads: usize,
-    /// Frames made at once, a multiple of 32; without: as `orator generate` does.
+    /// Frames generated at once, a multiple of 32; default: that of `orator generate`.
     #[arg(long, value_name = "N")]
     chunk: Option<usize>,
     /// This preset only.

@@ -13,8 +13,8 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// What the spaces of the Frechet gesture distance notice: real motion made worse in known ways, and its distance from
-/// other real motion in raw poses, in the fixed basis and in the trained embedding; and how long an hour takes. Without
+/// What the spaces of the Frechet gesture distance notice: ground truth made worse in known ways, and its distance from
+/// other ground truth in raw poses, in the fixed basis and in the trained embedding; and how long an hour takes. Without
 /// --dataset the motion is the synthetic speaker's.
 #[derive(clap::Args)]
 pub struct Args {

@@ -7,11 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// Files whose `//!` has more than six lines.
 const LONG_HEADS: &[&str] = &[
-    "src/metrics/convention.rs",
-    "src/metrics/distribution/frechet.rs",
     "src/mocap/fingers/files.rs",
-    "src/nn/gan/streaming.rs",
-    "src/nn/motion_encoder.rs",
     "src/pipeline/extract/dissolves.rs",
     "src/pipeline/extract/shots.rs",
     "src/pipeline/lift/lifter.rs",

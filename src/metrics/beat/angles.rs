@@ -35,7 +35,7 @@ pub(crate) fn metric(fps: f64) -> Box<dyn MetricFamily> {
 }
 
 impl AngleBeats {
-    /// Times of the beats of one angle, seconds; `None` where a made joint is not finite.
+    /// Times of the beats of one angle, seconds; `None` where a predicted joint is not finite.
     fn beats(
         &self,
         pair: &PairedFrames,

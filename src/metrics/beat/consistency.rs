@@ -126,7 +126,7 @@ pub(crate) fn emage(fps: f64) -> Box<dyn MetricFamily> {
 }
 
 impl EmageBeatConsistency {
-    /// Times of the beats of one joint from the cut on; `mean_speed` is the real motion's.
+    /// Times of the beats of one joint from the cut on; `mean_speed` is the ground truth's.
     fn beats(&self, places: &[Vec3], mean_speed: f64, fps: f64) -> Vec<f64> {
         let speeds: Vec<f64> = speeds(&folded(places), fps).iter().map(|speed| speed / mean_speed).collect();
         let inner = speeds.get(self.cut..speeds.len().saturating_sub(self.cut)).unwrap_or_default();

@@ -1,11 +1,8 @@
 //! Frechet distance between two sets of single poses, each taken for a normal distribution (Dowson and Landau 1982;
-//! on raw poses as in the GENEA evaluation, so that no trained network stands in between). It sees which poses are
-//! made and how they vary together, not their order. With few poses it is too large, and not comparable between sets
-//! of other sizes: its count belongs beside every value.
-//!
-//! Training validates with the poses of this file: 138 numbers, without the hand roots (which are the wrists again), of
-//! the joints a dataset has. The catalogue's `frechet_pose` is of all 144 and lives in `frechet_sums`: made hand roots may
-//! lie beside the wrists, and that is to be seen. The two are not comparable.
+//! on raw poses as in the GENEA evaluation, without a trained network). It compares which poses occur and how they
+//! vary together, not their order. With few poses it is too large, and not comparable between sets of other sizes.
+//! Training validates on 138 numbers a pose, without the hand roots; `frechet_pose` of the catalogue
+//! (`frechet_metrics`) has all 144. The two are not comparable.
 
 use crate::math::eigen;
 use crate::types::skeleton::{N_JOINTS, NECK, is_duplicate};
@@ -38,7 +35,7 @@ pub fn joints<'a>(masks: impl IntoIterator<Item = ArrayView2<'a, bool>>) -> Vec<
 }
 
 /// The poses of `motion` [T, 49, 3], metres, in which `mask` [T, 49] is true for all of `joints`: rows of x, y, z of each,
-/// centimetres. For a made motion the mask is that of the real one beside it.
+/// centimetres. For a predicted motion the mask is that of the ground truth beside it.
 pub fn poses(motion: ArrayView3<f32>, mask: ArrayView2<bool>, joints: &[usize]) -> Array2<f64> {
     let is_whole = |t: &usize| !joints.is_empty() && joints.iter().all(|joint| mask[[*t, *joint]]);
     let whole: Vec<usize> = (0..mask.nrows()).filter(is_whole).collect();
@@ -89,7 +86,7 @@ pub fn frechet(a: &GaussianFit, b: &GaussianFit) -> f64 {
     between((&a.mean, &a.covariance()), (&b.mean, &b.covariance()))
 }
 
-/// The same of means and covariances. The trace of the root is the sum of the roots of the eigenvalues of `fᵀ C2 f` with
+/// Frechet distance of two means and covariances. The trace of the root is the sum of the roots of the eigenvalues of `fᵀ C2 f` with
 /// `C1 = f fᵀ`, which are those of `C1 C2`: no matrix is inverted, and fewer rows than numbers are no hindrance.
 pub fn between(a: (&Array1<f64>, &Array2<f64>), b: (&Array1<f64>, &Array2<f64>)) -> f64 {
     let ((mean_a, of_a), (mean_b, of_b)) = (a, b);
@@ -112,7 +109,7 @@ mod tests {
     use super::*;
     use ndarray::{Array3, s};
 
-    /// As in the reference script: rows [n, d] that vary together, `kind` a or b.
+    /// Signal of the reference script: rows [n, d] that vary together, `kind` a or b.
     fn rows(n: usize, d: usize, kind: usize) -> Array2<f64> {
         let hash = |i: usize, j: usize| ((i * 7919 + j * 104_729 + kind * 611_953) % 1009) as f64 / 1009.0 - 0.5;
         Array2::from_shape_fn((n, d), |(i, j)| {

@@ -1,4 +1,4 @@
-//! Frechet distances of the catalogue: the normal distributions of made and of real rows as packed moments. A row is a
+//! Frechet distances of the catalogue: the normal distributions of predicted and of ground-truth rows as packed moments. A row is a
 //! single pose, or a window as numbers of a fixed space.
 
 use super::frechet::between;
@@ -149,7 +149,7 @@ impl MetricFamily for FrechetSpace {
         for (i, joints) in [interval.predicted, interval.ground_truth].into_iter().enumerate() {
             let rows = (self.windows)(joints, mask.view(), interval.fps);
             if rows.nrows() != starts.len() {
-                // a made joint that is not finite breaks its window
+                // a predicted joint that is not finite breaks its window
                 blocks.at(0)[i * length] = f64::NAN;
                 continue;
             }

@@ -104,7 +104,7 @@ impl MetricFamily for BoneLengths {
     }
 }
 
-/// Name, name of the real motion's, unit, formula.
+/// Name, name of the ground truth's, unit, formula.
 const METRICS: [(&str, &str, &str, &str); 3] = [
     (
         "bone_change",

@@ -1,5 +1,5 @@
-//! First canonical correlation of made and real poses over time: the largest correlation that a weighted sum of all made
-//! coordinates has with one of all real coordinates. With few frames for many coordinates it is near 1 for anything.
+//! First canonical correlation of predicted and ground-truth poses over time: the largest correlation that a weighted sum of all predicted
+//! coordinates has with one of all ground-truth coordinates. With few frames for many coordinates it is near 1 for anything.
 
 use crate::math::eigen;
 use crate::metrics::body_part::BodyPart;
@@ -149,7 +149,7 @@ impl IndependentDimensions {
 mod tests {
     use super::*;
 
-    /// As in the reference script: rows [n, 2 d], the second half following the first in part.
+    /// Signal of the reference script: rows [n, 2 d], the second half following the first in part.
     fn rows(n: usize, d: usize, constant: bool) -> Array2<f64> {
         let hash =
             |i: usize, j: usize| ((12.9898 * i as f64 + 78.233 * j as f64).sin().abs() * 43_758.545_3).fract() - 0.5;

@@ -1,5 +1,5 @@
 //! How fast, how accelerated and how jerky a motion is: mean norms of its first three differences over time, of the made
-//! and of the real motion. A made motion that stands still has the least error of a poor one; here it shows.
+//! and of the ground truth. A predicted motion that stands still has the least error of a poor one; here it shows.
 
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
@@ -52,14 +52,14 @@ pub(crate) fn metric(order: DerivativeOrder, part: BodyPart) -> Box<dyn MetricFa
     Box::new(Derivative { order, part, points: part.points(), by_interval: false })
 }
 
-/// As the genea evaluation averages.
+/// Mean over intervals of the means of each (GENEA).
 pub(crate) fn by_interval(order: DerivativeOrder) -> Box<dyn MetricFamily> {
     let part = BodyPart::WithNeck;
     Box::new(Derivative { order, part, points: part.points(), by_interval: true })
 }
 
 impl Derivative {
-    /// `[made, real]` norms at frame `t`, or nothing where the point is not seen throughout.
+    /// `[predicted, ground_truth]` norms at frame `t`, or nothing where the point is not seen throughout.
     fn norms(&self, pair: &PairedFrames, t: usize, point: MeasuredPoint) -> Option<[f64; 2]> {
         let weights = self.order.weights();
         let seen = |joint| pair.sees(t, weights.len(), joint);

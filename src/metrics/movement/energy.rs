@@ -1,5 +1,5 @@
-//! How much a motion moves: mean squared speed of its joints. A made motion that falls back to the mean pose hardly
-//! moves, whatever its error; the ratio made / real says so.
+//! How much a motion moves: mean squared speed of its joints. A predicted motion that falls back to the mean pose hardly
+//! moves, whatever its error; the ratio of both energies says so.
 
 use crate::types::skeleton::{N_JOINTS, NECK, is_duplicate};
 use crate::types::time::FrameRate;
@@ -18,7 +18,7 @@ pub struct MotionEnergy {
 
 impl MotionEnergy {
     /// Adds the steps from frame to frame of `joints` [T, 49, 3], metres: of each joint but the neck and the hand
-    /// roots, where `mask` [T, 49] is true in both frames. For a made motion the mask is that of the real one beside
+    /// roots, where `mask` [T, 49] is true in both frames. For a predicted motion the mask is that of the ground truth beside
     /// it, so that both are measured at the same places.
     pub fn add(&mut self, joints: ArrayView3<f32>, mask: ArrayView2<bool>, fps: FrameRate) {
         let per_sec = fps.per_sec();
@@ -38,7 +38,7 @@ impl MotionEnergy {
         self.sum / self.n.max(1) as f64
     }
 
-    /// This motion's energy as a share of the real one's, 1 when they move as much; NaN where the real one stands
+    /// This motion's energy as a share of the ground truth's, 1 when they move as much; NaN where the ground truth stands
     /// still.
     pub fn relative_to(&self, ground_truth: &Self) -> f64 {
         if ground_truth.sum > 0.0 { self.mean() / ground_truth.mean() } else { f64::NAN }

@@ -23,7 +23,7 @@ pub(crate) fn metric(part: BodyPart) -> Box<dyn MetricFamily> {
     Box::new(Hellinger { part: part.name(), joints: part.joints(), bin: 0.05, n_bins: 120, genea: false })
 }
 
-/// As the genea evaluation counts, at the bins of its script for the distance (0.05 cm/s).
+/// Histograms of the GENEA evaluation, at the bins of its script for the distance (0.05 cm/s).
 pub(crate) fn genea() -> Box<dyn MetricFamily> {
     let joints = (GENEA_FIRST..N_JOINTS).collect();
     Box::new(Hellinger { part: "from_joint_8", joints, bin: 0.0005, n_bins: 980, genea: true })
@@ -71,7 +71,7 @@ impl MetricFamily for Hellinger {
                     let speed = vec3::norm(vec3::sub(poses[t + 1][joint], poses[t][joint])) * pair.fps;
                     match (speed / self.bin).floor() {
                         bin if bin < self.n_bins as f64 => sums[from + bin as usize] += 1.0,
-                        // a made joint that is not finite: no distance
+                        // a predicted joint that is not finite: no distance
                         bin if bin.is_nan() => sums[from] = f64::NAN,
                         _ => {}
                     }

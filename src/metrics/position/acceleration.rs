@@ -1,4 +1,4 @@
-//! How far the accelerations of the made motion are from the real ones; and the two errors of the trimodal convention,
+//! How far the accelerations of the predicted motion are from the ground truth; and the two errors of the trimodal convention,
 //! which has its own (Yoon et al. 2020, `train.py` of their repository).
 
 use crate::math::vec3;
@@ -24,7 +24,7 @@ pub(crate) fn metric(part: BodyPart) -> Box<dyn MetricFamily> {
     FrameMean::over(definition, part, 3, |window| vec3::norm(second_difference(window)) * window.fps * window.fps)
 }
 
-/// Of made less real.
+/// Second difference of prediction minus ground truth over three frames.
 fn second_difference(window: &PointWindow) -> Vec3 {
     let [a, b, c] = [0, 1, 2].map(|k| window.apart(k));
     std::array::from_fn(|k| a[k] - 2.0 * b[k] + c[k])

@@ -1,4 +1,4 @@
-//! Position error after the best turn, scale and shift of every frame's made pose: what is wrong with the pose itself,
+//! Position error after the best turn, scale and shift of every frame's predicted pose: what is wrong with the pose itself,
 //! not with where it looks.
 
 use crate::math::procrustes::similarity;
@@ -65,14 +65,14 @@ impl MetricFamily for PMpjpe {
     }
 }
 
-/// Sum of the distances after the best similarity; NaN where a made point is not finite.
+/// Sum of the distances after the best similarity; NaN where a predicted point is not finite.
 fn error(predicted: &[Vec3], ground_truth: &[Vec3]) -> f64 {
     if predicted.iter().flatten().any(|v| !v.is_finite()) {
         return f64::NAN;
     }
     match similarity(predicted, ground_truth) {
         Some(best) => predicted.iter().zip(ground_truth).map(|(p, g)| vec3::norm(vec3::sub(best.apply(*p), *g))).sum(),
-        // all made points in one place: the best is the middle of the real ones
+        // all predicted points in one place: the best is the middle of the ground truth
         None => {
             let n = ground_truth.len() as f64;
             let middle: Vec3 = std::array::from_fn(|k| ground_truth.iter().map(|g| g[k]).sum::<f64>() / n);

@@ -1,5 +1,5 @@
 //! Share of correct keypoints (Ginosar et al. 2019, section 5; Rebol et al. 2021): a joint is correct when it lies within
-//! a share of the real pose's largest extent from the real one. `CorrectKeypoints` counts at a fifth, for training; the metric has any
+//! a share of the real pose's largest extent from the ground truth. `CorrectKeypoints` counts at a fifth, for training; the metric has any
 //! share, in the plane and in space.
 
 use crate::metrics::body_part::BodyPart;
@@ -25,7 +25,7 @@ pub struct KeypointCount {
 /// Correct and counted keypoints.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CorrectKeypoints {
-    /// The published figure: every joint but the neck, the two hand roots (the wrists again) included.
+    /// The published metric: every joint but the neck, the two hand roots (the wrists again) included.
     pub all: KeypointCount,
     /// Shoulders, elbows and wrists.
     pub body: KeypointCount,
@@ -75,7 +75,7 @@ pub(crate) fn metric(axes: &[PckAxes], parts: &[BodyPart], alphas: &[f64]) -> Bo
     Box::new(Pck { variants, neck_in_box: false, by_frame: false })
 }
 
-/// As speech2gesture counts (`common/evaluation.py` of its repository).
+/// PCK of speech2gesture (Ginosar et al. 2019, `common/evaluation.py` of their repository).
 pub(crate) fn by_frame(alphas: &[f64]) -> Box<dyn MetricFamily> {
     let variants = alphas.iter().map(|alpha| (PckAxes::Xy, BodyPart::All, *alpha)).collect();
     Box::new(Pck { variants, neck_in_box: false, by_frame: true })
@@ -183,20 +183,20 @@ fn distance<F: NdFloat>(axes: PckAxes, a: impl Fn(usize) -> F, b: impl Fn(usize)
 }
 
 impl CorrectKeypoints {
-    /// The published figure, 0..1.
+    /// Share of correct keypoints of all joints, 0..1.
     pub fn share(&self) -> f64 {
         self.all.share()
     }
 
-    /// Counts the joints of `made` [T, 49, 3] beside `real` [T, 49, 3], both metres, in space, where `mask` [T, 49] is
+    /// Counts the joints of `predicted` [T, 49, 3] beside `ground_truth` [T, 49, 3], both metres, in space, where `mask` [T, 49] is
     /// true: correct when the distance is at most `ALPHA` of the largest side of the box around all real joints of
-    /// the frame that are seen, the neck left out. The radius is the same for every part. A made joint that is not
+    /// the frame that are seen, the neck left out. The radius is the same for every part. A predicted joint that is not
     /// finite is wrong.
     pub fn count(&mut self, predicted: ArrayView3<f32>, ground_truth: ArrayView3<f32>, mask: ArrayView2<bool>) {
         self.count_in(PckAxes::Xyz, predicted, ground_truth, mask);
     }
 
-    /// As `count`, with distance and box in these axes.
+    /// [`Self::count`] with distance and box in these axes.
     pub fn count_in(
         &mut self,
         axes: PckAxes,

@@ -36,7 +36,7 @@ pub struct Basis {
 static BUILT_IN: LazyLock<Option<Basis>> = LazyLock::new(|| Basis::parse(FILE).ok());
 
 /// Rows [n, 64] of the wholly seen windows of `joints` [T, 49, 3] (metres), `mask` [T, 49]; weighted centimetres. For
-/// a made motion the mask is that of the real one beside it.
+/// a predicted motion the mask is that of the ground truth beside it.
 pub fn windows(joints: ArrayView3<f32>, mask: ArrayView2<bool>, fps: FrameRate) -> Array2<f64> {
     // a test holds that the built-in file is whole
     BUILT_IN.as_ref().map_or_else(|| Array2::zeros((0, N)), |basis| basis.rows(&Frames::new(joints, mask, fps)))

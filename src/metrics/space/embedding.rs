@@ -30,8 +30,8 @@ const TOGETHER: usize = 256;
 
 static BUILT_IN: LazyLock<Option<MotionEncoder>> = LazyLock::new(|| parse(FILE).ok());
 
-/// Rows [n, 32] of the wholly seen windows of `joints` [T, 49, 3] (metres), `mask` [T, 49]. For a made motion the mask is
-/// that of the real one beside it. Where numbers are beyond all sense the row is NaN.
+/// Rows [n, 32] of the wholly seen windows of `joints` [T, 49, 3] (metres), `mask` [T, 49]. For a predicted motion the mask is
+/// that of the ground truth beside it. Where numbers are beyond all sense the row is NaN.
 pub fn windows(joints: ArrayView3<f32>, mask: ArrayView2<bool>, fps: FrameRate) -> Array2<f64> {
     // a test holds that the built-in file is whole
     BUILT_IN.as_ref().map_or_else(|| Array2::zeros((0, N)), |encoder| rows(encoder, &Frames::new(joints, mask, fps)))

@@ -41,7 +41,7 @@ impl ChannelMoments {
         all
     }
 
-    /// Those of both sets of values (Chan et al. 1979).
+    /// Moments of both sets of values (Chan et al. 1979).
     pub fn and(&self, other: &Self) -> Self {
         if self.n == 0.0 {
             return other.clone();

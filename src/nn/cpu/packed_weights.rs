@@ -19,7 +19,7 @@ pub struct WeightPanel {
     first: usize,
     n: usize,
     n_vectors: usize,
-    /// Its width.
+    /// Width of the panel.
     pub columns: usize,
 }
 
@@ -57,7 +57,7 @@ impl<T: Scalar> PackedWeights<T> {
             let mut line = Vec::new();
             for first in channels.clone().step_by(n_at_once) {
                 let some = first..channels.end.min(first + n_at_once);
-                // What lies side by side in memory is fetched at once, before it is strewn.
+                // What lies side by side in memory is fetched at once, then scattered.
                 let of_columns = per_column < per_channel;
                 let (n_lines, in_line) = if of_columns { (some.len(), panel.n) } else { (panel.n, some.len()) };
                 let (per_line, per_place) =

@@ -92,7 +92,7 @@ impl<'a, T> Matrix<'a, T> {
         Self { data, row_stride: n_columns, column_stride: 1 }
     }
 
-    /// The same numbers with rows and columns swapped.
+    /// Transpose: rows and columns swapped, memory untouched.
     pub fn transposed(self) -> Self {
         Self { data: self.data, row_stride: self.column_stride, column_stride: self.row_stride }
     }
@@ -165,7 +165,7 @@ unsafe impl<T: Send> Send for OutputStart<T> {}
 unsafe impl<T: Send> Sync for OutputStart<T> {}
 
 impl<T> OutputStart<T> {
-    /// That of these numbers, which nobody else uses meanwhile.
+    /// Start of `values`, which nobody else uses meanwhile.
     pub fn new(values: &mut [T]) -> Self {
         Self(values.as_mut_ptr())
     }

@@ -1,5 +1,5 @@
 //! The motion discriminator: a patch network over the frame-to-frame differences of normalised poses that scores
-//! about every fourth frame as real or made (Ginosar et al. 2019).
+//! about every fourth frame as real or generated (Ginosar et al. 2019).
 
 use super::conv_block::{Block1d, SLOPE};
 use crate::nn::ops::conv2d::Conv;
@@ -29,7 +29,7 @@ impl Discriminator {
         })
     }
 
-    /// Differences [B, n_in, T - 1] to scores [B, 1, about T / 4]; 1 means real, 0 made.
+    /// Differences [B, n_in, T - 1] to scores [B, 1, about T / 4]; 1 means real, 0 generated.
     pub fn forward(&self, motion: &Tensor, train: bool) -> Result<Tensor> {
         let mut x = candle_nn::ops::leaky_relu(&self.first.forward(&motion.t()?)?, SLOPE)?;
         for block in &self.blocks {

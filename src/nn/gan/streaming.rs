@@ -1,24 +1,24 @@
-//! The generator over a sound of any length in constant memory: the audio front and the UNet each run piece by piece,
+//! The generator over a sound of any length in constant memory: the audio encoder and the UNet each run piece by piece,
 //! every piece with so much beside it that the padding at its ends reaches nothing that is kept. Pieces begin where
-//! every strided layer begins anew, and the resize between front and UNet counts from the beginning of the whole, so
+//! every strided layer begins anew, and the resize between encoder and UNet counts from the beginning of the whole, so
 //! the result is that of one pass.
-//!
-//! What a layer reads follows from kernel and stride. With TensorFlow's "same" padding a layer of kernel 3 and stride 1
-//! computes place `i` from `i - 1..=i + 1`, and one of kernel 4 and stride 2 from `2 i - 1..=2 i + 2`, for even and odd
-//! lengths alike (the padding before is one place for both). Going back layer by layer, result `i` of the front depends
-//! on the spectrogram frames `8 i - 22..=8 i + 29` (`paper`: 45), and 32 frames of poses on 97 more before and behind.
 
 use super::generator::{FRAMES_MULTIPLE, Generator, N_DECODER, N_ENTER, N_LEVELS, Preset};
 use crate::nn::ops::resize;
 use candle_core::{Result, Tensor};
 use std::ops::Range;
 
-/// Spectrogram frames under one result of the front.
+/// Spectrogram frames under one result of the audio encoder.
 const HOPS: usize = 8;
-/// Results of the front that one piece makes: 20 s of sound.
+/// Results of the audio encoder that one piece makes: 20 s of sound.
 const PIECE: usize = 256;
 
 /// Places that are read, first and last.
+///
+/// What a layer reads follows from kernel and stride. With TensorFlow's "same" padding a layer of kernel 3 and stride 1
+/// computes place `i` from `i - 1..=i + 1`, and one of kernel 4 and stride 2 from `2 i - 1..=2 i + 2`, for even and odd
+/// lengths alike (the padding before is one place for both). Going back layer by layer, result `i` of the audio encoder depends
+/// on the spectrogram frames `8 i - 22..=8 i + 29` (`paper`: 45), and 32 frames of poses on 97 more before and behind.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct FrameSpan {
     first: i64,
@@ -46,7 +46,7 @@ impl FrameSpan {
     }
 }
 
-/// Spectrogram frames, relative to `8 * i`, that result `i` of the front depends on.
+/// Spectrogram frames, relative to `8 * i`, that result `i` of the audio encoder depends on.
 fn audio_encoder_field(preset: Preset) -> FrameSpan {
     // The last layer of `paper` is not padded: place i reads i..=i + 2.
     let mut span = FrameSpan { first: 0, last: if preset == Preset::Paper { 2 } else { 0 } }.under_plain();
@@ -77,7 +77,7 @@ fn unet_field() -> FrameSpan {
     span
 }
 
-/// Results of the front for so many spectrogram frames.
+/// Results of the audio encoder for so many spectrogram frames.
 fn n_encoded_frames(preset: Preset, n_mel_frames: usize) -> usize {
     let eighth = (0..3).fold(n_mel_frames, |n, _| n.div_ceil(2));
     if preset == Preset::Paper { eighth.saturating_sub(2) } else { eighth }
@@ -92,9 +92,9 @@ pub struct StreamingGenerator<'a, M> {
     n_mel_frames: usize,
     n_frames: usize,
     chunk: usize,
-    /// First frame that is still to be made.
+    /// First frame that is not generated yet.
     next: usize,
-    /// Results of the front that later chunks need, [1, width, n], and which is the first of them.
+    /// Results of the audio encoder that later chunks need, [1, width, n], and which is the first of them.
     encoded: Option<Tensor>,
     first_encoded: usize,
 }
@@ -136,7 +136,7 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
         poses.narrow(2, frames.start - first, frames.len())
     }
 
-    /// Sees to it that these results of the front are at hand, and lets go of those before them.
+    /// Sees to it that these results of the audio encoder are at hand, and lets go of those before them.
     fn encode_until(&mut self, needed: Range<usize>, n_encoded: usize) -> Result<()> {
         let mut parts = Vec::new();
         let mut end = needed.start;
@@ -155,7 +155,7 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
         Ok(())
     }
 
-    /// These results of the front.
+    /// These results of the audio encoder.
     fn encode(&mut self, piece: Range<usize>, n_encoded: usize) -> Result<Tensor> {
         let field = audio_encoder_field(self.preset);
         let first = piece.start.saturating_sub(((-field.first).max(0) as usize).div_ceil(HOPS));

@@ -66,7 +66,7 @@ impl BatchNorm {
         Ok(y)
     }
 
-    /// The same of the framework's operators, on any device.
+    /// [`Self::forward`] with the framework's operators, on any device.
     pub fn forward_fallback(&self, x: &Tensor, train: bool) -> Result<Tensor> {
         let (mean, variance) = match train {
             true => fallback::statistics(x)?,

@@ -45,7 +45,7 @@ impl Conv1d {
         Ok(Self { weight, bias, stride: 1, dilation: 1, padding: Padding::Same })
     }
 
-    /// The same without bias, without padding, with this dilation.
+    /// `n_in` channels to `n_out`, stride 1, without bias and padding, with this dilation.
     pub fn valid(
         params: &mut Params,
         name: &str,

@@ -17,7 +17,7 @@ pub fn same(x: &Tensor, weight: &Tensor, stride: usize) -> Result<ConvSizes> {
     sizes(x, weight, |n, kernel| ConvAxis::same(n, kernel, stride))
 }
 
-/// The same without padding, every place.
+/// Sizes of a convolution without padding, stride 1.
 pub fn valid(x: &Tensor, weight: &Tensor) -> Result<ConvSizes> {
     sizes(x, weight, ConvAxis::valid)
 }

@@ -42,7 +42,7 @@ pub fn conv_norm(
     Ok(y)
 }
 
-/// Its third input holds bias, norm's weight and norm's bias, one after the other.
+/// Operator of [`conv_norm`]; the third input holds bias, norm's weight and norm's bias, one after the other.
 struct ConvNormOp {
     sizes: ConvSizes,
     eps: f64,

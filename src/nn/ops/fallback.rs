@@ -62,7 +62,7 @@ pub fn conv(x: &Tensor, weight: &Tensor, bias: &Tensor, s: &ConvSizes) -> Result
     last(&conv_first(x, weight, bias, s)?, x.rank())
 }
 
-/// As [`super::resize::twice`].
+/// Every frame twice, as [`super::resize::twice`].
 pub fn twice(x: &Tensor) -> Result<Tensor> {
     let (batch, n_frames, channels) = x.dims3()?;
     let pairs = x.unsqueeze(2)?.broadcast_as((batch, n_frames, 2, channels))?.contiguous()?;

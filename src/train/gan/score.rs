@@ -1,14 +1,14 @@
-//! What a validation says of a generator: figures beside those of the pose that never moves from the mean, the one
+//! What a validation says of a generator: metrics beside those of the pose that never moves from the mean, the one
 //! score that chooses the best checkpoint, and the alarm of a collapse.
 
 use serde::{Deserialize, Serialize};
 
-/// Made motion with less than this share of the data's energy hardly moves.
+/// Generated motion with less than this share of the data's energy hardly moves.
 const LEAST_ENERGY: f64 = 0.3;
-/// Windows of made motion that differ by less than this share of what real windows differ by are alike.
+/// Windows of generated motion that differ by less than this share of what real windows differ by are alike.
 const LEAST_SPREAD: f64 = 0.1;
 
-/// A predictor's figures on the held-out windows.
+/// A predictor's metrics on the held-out windows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ValidationMetrics {
     /// Mean absolute error of normalised coordinates.

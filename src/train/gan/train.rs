@@ -55,7 +55,7 @@ pub struct TrainingOutcome {
 }
 
 /// Trains on `dataset` until `wanted.steps`, going on from the newest checkpoint in `folder`; what the settings of that
-/// checkpoint say counts, and is told where it differs.
+/// checkpoint say counts, and differences are reported.
 ///
 /// # Errors
 /// No window to train on; a checkpoint of another speaker or version; another training at work in `folder`; a loss that

@@ -32,7 +32,7 @@ pub struct ValidationWindows {
     joints: Vec<usize>,
 }
 
-/// A held-out window: what was made for its sound, and what is real. [T, 49, 3] metres; mask [T, 49].
+/// A held-out window: the prediction for its sound, and the ground truth. [T, 49, 3] metres; mask [T, 49].
 pub struct ValidationWindow {
     pub predicted: Array3<f32>,
     pub ground_truth: Array3<f32>,

@@ -43,7 +43,7 @@ pub struct WindowBatch {
 }
 
 impl WindowBatch {
-    /// The same on this device.
+    /// Copy of the batch on this device.
     pub fn on(&self, device: &Device) -> Result<Self> {
         let on = |tensor: &Tensor| tensor.to_device(device);
         Ok(Self { mels: on(&self.mels)?, poses: on(&self.poses)?, mask: on(&self.mask)? })

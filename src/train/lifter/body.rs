@@ -29,7 +29,7 @@ const WINDOWS: usize = 4;
 const MEASURED: usize = 120;
 const MEASURED_BRIEFLY: usize = 40;
 
-/// The lesson.
+/// Training task of the network.
 pub struct BodyLifterTask {
     params: Params,
     lifter: BodyLifter,

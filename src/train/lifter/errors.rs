@@ -144,7 +144,7 @@ fn flat(scene: &FilmedScene) -> Vec<Pose> {
     scene.seen.iter().map(frame).collect()
 }
 
-/// Every point at its mean depth (of `mean`), x and y as seen. Needs a clean scene and is told its scale.
+/// Every point at its mean depth (of `mean`), x and y as seen. Needs a clean scene and knows its scale.
 pub fn with_mean_depth(scene: &FilmedScene, mean: &Pose) -> Vec<Option<Pose>> {
     let deep = |pose: Pose| Some(std::array::from_fn(|j| [pose[j][0], pose[j][1], mean[j][2]]));
     flat(scene).into_iter().map(deep).collect()
@@ -152,7 +152,7 @@ pub fn with_mean_depth(scene: &FilmedScene, mean: &Pose) -> Vec<Option<Pose>> {
 
 /// Depth solved from the bone lengths of the common adult: each joint lies where its line of sight meets the sphere
 /// around its parent, arms on the side of the camera; the shoulders turn to the side that the nose points to. Needs a
-/// clean scene and is told the camera and where the neck is.
+/// clean scene and knows the camera and where the neck is.
 pub fn with_bone_depth(scene: &FilmedScene) -> Vec<Option<Pose>> {
     let bones = Proportions::MEAN;
     let solve = |seen: &Seen| {

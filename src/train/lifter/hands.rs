@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 /// Hands that errors are measured on.
 const MEASURED: usize = 4000;
 
-/// The lesson.
+/// Training task of the network.
 pub struct HandLifterTask {
     params: Params,
     lifter: HandLifter,

@@ -24,7 +24,7 @@ const N_ROWS: usize = N_HAND + 3;
 /// Hands that errors are measured on, few since each takes long.
 const MEASURED: usize = 300;
 
-/// The lesson.
+/// Training task of the network.
 pub struct HeatmapLifterTask {
     params: Params,
     lifter: HeatmapLifter,

@@ -83,7 +83,7 @@ impl Posture {
 pub struct HandMotion {
     size: f64,
     start: Posture,
-    /// It leaves for each posture at one time and has it at another.
+    /// Start and end of the move to each posture, seconds, and the posture.
     moves: Vec<(f64, f64, Posture)>,
 }
 

@@ -29,7 +29,7 @@ pub struct FittedBasis {
     pub finger_weight: f64,
     /// Share of the variance that the 64 directions hold.
     pub share: f64,
-    /// The same of each held-out set.
+    /// Share of the variance of each held-out set.
     pub held_out: Vec<(String, f64)>,
 }
 

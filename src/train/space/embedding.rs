@@ -24,7 +24,7 @@ const LEAST_STD: f32 = 0.05;
 const MEASURED_STRIDE: usize = 17;
 const MEASURED: usize = 128;
 
-/// The lesson.
+/// Training task of the network.
 pub struct EmbeddingTask {
     params: Params,
     net: AutoEncoder,
