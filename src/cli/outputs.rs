@@ -5,11 +5,11 @@ use orator::animate::export::file::ExportFormat;
 use std::path::{Path, PathBuf};
 
 /// Files to write, with their formats.
-pub type Outputs = Vec<(PathBuf, ExportFormat)>;
+pub type OutputFiles = Vec<(PathBuf, ExportFormat)>;
 
 /// The formats of the files `out`, of which none may be asked for twice, a folder, or what the verb reads (`is_read`,
 /// called `input` in the error); `hint` ends the error on a folder.
-pub fn outputs(out: &[PathBuf], is_read: impl Fn(&Path) -> bool, input: &str, hint: &str) -> Result<Outputs> {
+pub fn outputs(out: &[PathBuf], is_read: impl Fn(&Path) -> bool, input: &str, hint: &str) -> Result<OutputFiles> {
     for (n, path) in out.iter().enumerate() {
         ensure!(!is_read(path), "{} is {input}; write to another file", path.display());
         ensure!(!out[..n].contains(path), "{} is asked for twice", path.display());
@@ -24,12 +24,12 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
 }
 
 /// The files' names.
-pub fn names(outputs: &Outputs) -> Vec<String> {
+pub fn names(outputs: &OutputFiles) -> Vec<String> {
     outputs.iter().map(|(path, _)| path.display().to_string()).collect()
 }
 
 /// The file to write next: the first as a film, or for an animation program; none when both are there.
-pub fn next_output(outputs: &Outputs) -> Option<PathBuf> {
+pub fn next_output(outputs: &OutputFiles) -> Option<PathBuf> {
     let kinds = [(ExportFormat::Mp4, "mp4"), (ExportFormat::Bvh, "bvh")];
     let missing = kinds.into_iter().find(|&(format, _)| outputs.iter().all(|&(_, written)| written != format));
     Some(outputs.first()?.0.with_extension(missing?.1))

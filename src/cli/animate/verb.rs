@@ -3,7 +3,7 @@
 use super::input::{InputMotion, MotionInput, inputs};
 use crate::cli::Outcome;
 use crate::cli::config_args::split;
-use crate::cli::outputs::{Outputs, names, next_output, outputs};
+use crate::cli::outputs::{OutputFiles, names, next_output, outputs};
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
 use orator::animate::export::file::{ExportContent, ExportFormat};
@@ -201,7 +201,7 @@ fn animate(
     args: &Args,
     input: &MotionInput,
     sound: Option<Sound>,
-    outputs: &Outputs,
+    outputs: &OutputFiles,
     options: &AnimationOptions,
     ui: &Ui,
 ) -> Result<Done> {

@@ -1,7 +1,7 @@
 //! What makes the description of a model sound: names that exist, a role that fits the decoding, keypoint maps that are
 //! complete. The file itself is checked in `model`.
 
-use super::{Decode, Fit, KeypointOutputs, ModelEntry, ModelRole, TensorAxes};
+use super::{Decode, KeypointOutputs, ModelEntry, ModelRole, PictureFit, TensorAxes};
 use anyhow::{Result, bail, ensure};
 
 impl ModelEntry {
@@ -65,14 +65,18 @@ impl ModelEntry {
         }
         self.decode.check()?;
         let fits = match (self.role, &self.fit, &self.decode) {
-            (ModelRole::Person, Fit::Letterbox { .. }, Decode::Detections { .. } | Decode::YoloxGrid { .. }) => true,
-            (ModelRole::Body, Fit::Box { margin }, Decode::Heatmap { .. } | Decode::Simcc { .. }) => *margin > 0.0,
+            (ModelRole::Person, PictureFit::Letterbox { .. }, Decode::Detections { .. } | Decode::YoloxGrid { .. }) => {
+                true
+            }
+            (ModelRole::Body, PictureFit::Box { margin }, Decode::Heatmap { .. } | Decode::Simcc { .. }) => {
+                *margin > 0.0
+            }
             (
                 ModelRole::Hand,
-                Fit::Region,
+                PictureFit::Region,
                 Decode::Heatmap { .. } | Decode::Simcc { .. } | Decode::Regression { .. },
             ) => height == width,
-            (ModelRole::Palm, Fit::Letterbox { .. }, Decode::SsdAnchors { .. }) => height == width,
+            (ModelRole::Palm, PictureFit::Letterbox { .. }, Decode::SsdAnchors { .. }) => height == width,
             (ModelRole::Other, _, _) => true,
             _ => false,
         };

@@ -27,7 +27,7 @@ pub struct ModelEntry {
     pub inputs: Vec<Port>,
     pub outputs: Vec<Port>,
     pub picture: InputPicture,
-    pub fit: Fit,
+    pub fit: PictureFit,
     pub decode: Decode,
     #[serde(default, skip_serializing_if = "KeypointOutputs::is_empty")]
     pub points: KeypointOutputs,
@@ -97,7 +97,7 @@ pub enum TensorAxes {
 /// How the picture gets into the input.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Fit {
+pub enum PictureFit {
     /// The whole picture, its shape kept, grey level `pad` around it.
     Letterbox { anchor: Anchor, pad: u8 },
     /// A person's box grown to the input's shape, then by `margin`; outside black.

@@ -2,7 +2,7 @@
 
 use super::decode::{ScoredPoint, heatmap, simcc};
 use super::model_input::ModelInput;
-use crate::external::onnx::{Decode, Fit, KeypointOutputs, ModelEntry, Outputs, Refine, Runtime};
+use crate::external::onnx::{Decode, KeypointOutputs, ModelEntry, Outputs, PictureFit, Refine, Runtime};
 use crate::external::opencv::blur::GaussianBlur;
 use crate::external::opencv::warp::SrcFromDst;
 use crate::types::image::Image;
@@ -60,7 +60,7 @@ pub struct BodyModel {
 
 impl BodyModel {
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
-        let margin = if let Fit::Box { margin } = entry.fit { margin } else { 1.0 };
+        let margin = if let PictureFit::Box { margin } = entry.fit { margin } else { 1.0 };
         let (reader, map) = (PointReader::new(&entry.decode), entry.points.clone());
         Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, reader, margin, map })
     }

@@ -1,7 +1,7 @@
 //! A model with the picture it is fed: the crop or letterbox goes into a canvas that is kept, and from there, made
 //! numbers as the manifest says, into the model's input.
 
-use crate::external::onnx::{Anchor, Channels, Fit, Model, ModelEntry, Outputs, Runtime, TensorAxes};
+use crate::external::onnx::{Anchor, Channels, Model, ModelEntry, Outputs, PictureFit, Runtime, TensorAxes};
 use crate::external::opencv::tensor::Normaliser;
 use crate::external::opencv::warp;
 use crate::external::opencv::warp::SrcFromDst;
@@ -40,9 +40,11 @@ impl ModelInput {
     /// Runs the model on the whole picture, letterboxed as its description says.
     pub fn whole(&mut self, image: &Image) -> Result<(SrcFromDst, Outputs<'_>)> {
         let src_from_dst = match self.model.entry().fit {
-            Fit::Letterbox { anchor: Anchor::Centre, pad } => warp::letterbox_centre(image, &mut self.canvas, pad)?,
-            Fit::Letterbox { pad, .. } => warp::letterbox_top_left(image, &mut self.canvas, pad)?,
-            Fit::Box { .. } | Fit::Region => warp::letterbox_top_left(image, &mut self.canvas, 0)?,
+            PictureFit::Letterbox { anchor: Anchor::Centre, pad } => {
+                warp::letterbox_centre(image, &mut self.canvas, pad)?
+            }
+            PictureFit::Letterbox { pad, .. } => warp::letterbox_top_left(image, &mut self.canvas, pad)?,
+            PictureFit::Box { .. } | PictureFit::Region => warp::letterbox_top_left(image, &mut self.canvas, 0)?,
         };
         Ok((src_from_dst, self.run()?))
     }
