@@ -1,13 +1,6 @@
-//! What decides whether work must be done again.
-//!
-//! | part | why it is in the key |
-//! |---|---|
-//! | stage name and version | the code that made the bytes |
-//! | settings | every setting that has a say in the bytes, and the versions of tools that have |
-//! | inputs: role and BLAKE3 of the content | videos, files of earlier stages, models, weights |
-//!
-//! Not in it: paths, times, the number of workers. Contents are hashed once and remembered by size and time of
-//! change (`HashCache`), so that asking again costs nothing.
+//! The key that decides whether work must be done again: stage name and version, every setting that has a say in the bytes,
+//! and the BLAKE3 of every input. Paths, times and the number of workers are not in it. Contents are hashed once and
+//! remembered by size and time of change (`HashCache`), so that asking again costs nothing.
 
 use super::artifacts::StageName;
 use super::{Stage, Unit, workdir};
@@ -100,7 +93,7 @@ impl HashCache {
         workdir::write_file(&self.file, &bytes)
     }
 
-    /// The same once a minute at most, so that a long run that is killed has not hashed for nothing.
+    /// Saves once a minute at most, so that a long run that is killed has not hashed for nothing.
     pub fn save_now_and_then(&self) {
         let Ok(mut saved) = self.saved.try_lock() else { return };
         if saved.elapsed().as_secs() >= 60 {
@@ -123,4 +116,21 @@ pub fn hash_file(path: &Path) -> Result<String> {
         Ok(hasher.finalize().to_hex().to_string())
     };
     read().with_context(|| format!("cannot read {}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_record_under_a_former_name_counts_under_todays() {
+        let of = |name: &str| Fingerprint {
+            stage: name.to_owned(),
+            version: 2,
+            settings: serde_json::json!({ name: { "max_mb": 256 }, "tool": "1" }),
+            inputs: BTreeMap::new(),
+        };
+        assert_eq!(of("shard").renamed(), of("dataset"));
+        assert_eq!(of("lift").renamed(), of("lift"));
+    }
 }

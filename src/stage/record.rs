@@ -66,51 +66,51 @@ impl fmt::Display for DirtyReason {
     }
 }
 
-/// The record of a unit whose folder is `place`: `NAME.record.json` beside it.
-pub fn record_path(place: &Path) -> PathBuf {
-    beside(place, "record.json")
+/// The record of the unit in `folder`: `NAME.record.json` beside it.
+pub fn record_path(folder: &Path) -> PathBuf {
+    beside(folder, "record.json")
 }
 
-/// The failure of a unit whose folder is `place`: `NAME.failed.json` beside it.
-pub fn failure_path(place: &Path) -> PathBuf {
-    beside(place, "failed.json")
+/// The failure of the unit in `folder`: `NAME.failed.json` beside it.
+pub fn failure_path(folder: &Path) -> PathBuf {
+    beside(folder, "failed.json")
 }
 
-fn beside(place: &Path, suffix: &str) -> PathBuf {
-    let name = place.file_name().unwrap_or_default().to_string_lossy();
-    place.with_file_name(format!("{name}.{suffix}"))
+fn beside(folder: &Path, suffix: &str) -> PathBuf {
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    folder.with_file_name(format!("{name}.{suffix}"))
 }
 
 impl Record {
-    /// The record of the unit in `place`; `None` where there is none that can be read.
-    pub fn read(place: &Path) -> Option<Self> {
-        let record: Self = serde_json::from_slice(&fs::read(record_path(place)).ok()?).ok()?;
+    /// The record of the unit in `folder`; `None` where there is none that can be read.
+    pub fn read(folder: &Path) -> Option<Self> {
+        let record: Self = serde_json::from_slice(&fs::read(record_path(folder)).ok()?).ok()?;
         Some(Self { fingerprint: record.fingerprint.renamed(), ..record })
     }
 
-    /// Writes the record of the unit in `place`, and forgets an earlier failure.
-    pub fn write(&self, place: &Path) -> Result<()> {
-        workdir::write_file(&record_path(place), &serde_json::to_vec_pretty(self)?)?;
-        let _ = fs::remove_file(failure_path(place));
+    /// Writes the record of the unit in `folder`, and forgets an earlier failure.
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        workdir::write_file(&record_path(folder), &serde_json::to_vec_pretty(self)?)?;
+        let _ = fs::remove_file(failure_path(folder));
         Ok(())
     }
 
-    /// Takes the record of the unit in `place` away, for good before anything else happens.
-    pub fn forget(place: &Path) -> Result<()> {
-        workdir::remove_file(&record_path(place))
+    /// Takes the record of the unit in `folder` away, for good before anything else happens.
+    pub fn forget(folder: &Path) -> Result<()> {
+        workdir::remove_file(&record_path(folder))
     }
 
-    /// Why the unit in `place` is not fresh under the fingerprint `now`; `None`: it is. Sizes of outputs are
+    /// Why the unit in `folder` is not fresh under the fingerprint `now`; `None`: it is. Sizes of outputs are
     /// compared, not contents.
-    pub fn dirty(&self, now: &Fingerprint, place: &Path) -> Option<DirtyReason> {
-        difference(&self.fingerprint, now).or_else(|| self.outputs.iter().find_map(|output| output.missing(place)))
+    pub fn dirty(&self, now: &Fingerprint, folder: &Path) -> Option<DirtyReason> {
+        difference(&self.fingerprint, now).or_else(|| self.outputs.iter().find_map(|output| output.missing(folder)))
     }
 }
 
 impl Output {
-    fn missing(&self, place: &Path) -> Option<DirtyReason> {
+    fn missing(&self, folder: &Path) -> Option<DirtyReason> {
         let file = self.file.clone();
-        match fs::metadata(place.join(&self.file)) {
+        match fs::metadata(folder.join(&self.file)) {
             Err(_) => Some(DirtyReason::OutputMissing { file }),
             Ok(meta) if meta.len() != self.bytes => Some(DirtyReason::OutputChanged { file }),
             Ok(_) => None,
@@ -140,15 +140,15 @@ fn collect(folder: &Path, prefix: &str, outputs: &mut Vec<Output>) -> Result<()>
 }
 
 impl Failure {
-    /// The failure of the unit in `place`, if its last attempt failed.
-    pub fn read(place: &Path) -> Option<Self> {
-        let failure: Self = serde_json::from_slice(&fs::read(failure_path(place)).ok()?).ok()?;
+    /// The failure of the unit in `folder`, if its last attempt failed.
+    pub fn read(folder: &Path) -> Option<Self> {
+        let failure: Self = serde_json::from_slice(&fs::read(failure_path(folder)).ok()?).ok()?;
         Some(Self { fingerprint: failure.fingerprint.map(Fingerprint::renamed), ..failure })
     }
 
     /// Keeps the failure beside what is there.
-    pub fn write(&self, place: &Path) -> Result<()> {
-        workdir::write_file(&failure_path(place), &serde_json::to_vec_pretty(self)?)
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        workdir::write_file(&failure_path(folder), &serde_json::to_vec_pretty(self)?)
     }
 }
 

@@ -22,7 +22,7 @@ pub enum State {
 /// How a unit came out of a run.
 #[derive(Clone, Debug)]
 pub enum StageOutcome {
-    /// It was fresh already.
+    /// Fresh already.
     Skipped(Report),
     Done(Report),
     Failed(Arc<anyhow::Error>),

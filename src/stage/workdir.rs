@@ -1,4 +1,4 @@
-//! Writing so that a kill at any moment leaves either the old or the new, whole: write an attempt beside the place,
+//! Writing so that a kill at any moment leaves either the old or the new, whole: write an attempt beside the target,
 //! flush it to disk, rename. The only renames of the project are here.
 
 use anyhow::{Context, Result};
@@ -66,22 +66,22 @@ pub fn remove_file(path: &Path) -> Result<()> {
     .with_context(|| format!("cannot remove {}", path.display()))
 }
 
-/// Puts the finished folder `attempt` in the place of `place`, which may exist. Every file is flushed first.
-pub fn replace_folder(attempt: &Path, place: &Path) -> Result<()> {
+/// Puts the finished folder `attempt` in the place of `target`, which may exist. Every file is flushed first.
+pub fn replace_folder(attempt: &Path, target: &Path) -> Result<()> {
     let moved = || -> Result<()> {
         flush_tree(attempt)?;
-        if place.exists() {
-            let old = attempt_beside(place).with_extension("old");
+        if target.exists() {
+            let old = attempt_beside(target).with_extension("old");
             let _ = fs::remove_dir_all(&old);
-            fs::rename(place, &old)?;
-            fs::rename(attempt, place)?;
+            fs::rename(target, &old)?;
+            fs::rename(attempt, target)?;
             let _ = fs::remove_dir_all(&old);
         } else {
-            fs::rename(attempt, place)?;
+            fs::rename(attempt, target)?;
         }
-        flush(&parent(place))
+        flush(&parent(target))
     };
-    moved().map_err(full_disk).with_context(|| format!("cannot put {} in its place", place.display()))
+    moved().map_err(full_disk).with_context(|| format!("cannot put {} in its place", target.display()))
 }
 
 /// Moves finished files, named with `/` between folders, from the folder `attempt` into `folder`, beside what is there;
@@ -119,23 +119,23 @@ pub fn has_files(path: &Path) -> bool {
 }
 
 /// Puts back what `replace_folder` had moved aside when it was killed between its two renames.
-pub fn restore_folder(place: &Path) -> Result<()> {
-    let old = attempt_beside(place).with_extension("old");
-    if place.exists() || !old.is_dir() {
+pub fn restore_folder(target: &Path) -> Result<()> {
+    let old = attempt_beside(target).with_extension("old");
+    if target.exists() || !old.is_dir() {
         return Ok(());
     }
-    fs::rename(&old, place).with_context(|| format!("cannot put {} back", place.display()))
+    fs::rename(&old, target).with_context(|| format!("cannot put {} back", target.display()))
 }
 
-/// What a killed attempt left beside `place`.
-pub fn left_over(place: &Path) -> Vec<PathBuf> {
-    let attempt = attempt_beside(place);
+/// What a killed attempt left beside `target`.
+pub fn left_over(target: &Path) -> Vec<PathBuf> {
+    let attempt = attempt_beside(target);
     [attempt.with_extension("old"), attempt].into_iter().filter(|path| path.exists()).collect()
 }
 
-/// An empty folder beside `place` to work in; what an earlier killed attempt left there is removed.
-pub fn attempt_folder(place: &Path) -> Result<PathBuf> {
-    let attempt = attempt_beside(place);
+/// An empty folder beside `target` to work in; what an earlier killed attempt left there is removed.
+pub fn attempt_folder(target: &Path) -> Result<PathBuf> {
+    let attempt = attempt_beside(target);
     let made = || -> std::io::Result<()> {
         for stale in [attempt.clone(), attempt.with_extension("old")] {
             match fs::remove_dir_all(&stale) {
@@ -147,7 +147,7 @@ pub fn attempt_folder(place: &Path) -> Result<PathBuf> {
     };
     made()
         .map_err(|error| full_disk(error.into()))
-        .with_context(|| format!("cannot write in the work folder {}", parent(place).display()))?;
+        .with_context(|| format!("cannot write in the work folder {}", parent(target).display()))?;
     Ok(attempt)
 }
 
@@ -211,13 +211,13 @@ mod tests {
     #[test]
     fn a_folder_replaces_another() {
         let folder = tempfile::tempdir().unwrap();
-        let place = folder.path().join("unit");
+        let target = folder.path().join("unit");
         for round in ["1", "2"] {
-            let attempt = attempt_folder(&place).unwrap();
+            let attempt = attempt_folder(&target).unwrap();
             fs::write(attempt.join(round), round).unwrap();
-            replace_folder(&attempt, &place).unwrap();
+            replace_folder(&attempt, &target).unwrap();
         }
-        assert!(place.join("2").exists() && !place.join("1").exists());
+        assert!(target.join("2").exists() && !target.join("1").exists());
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 }

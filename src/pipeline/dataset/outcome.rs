@@ -1,4 +1,4 @@
-//! What the user is told of a dataset just written: how much there is, and what to mend.
+//! The report on a dataset just written: how much there is, and what to mend.
 
 use super::video::LiftedVideo;
 use crate::config;

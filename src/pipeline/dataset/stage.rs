@@ -10,7 +10,7 @@ use crate::dataset::info::{About, ModelUsed};
 use crate::dataset::leakage::SoundComparison;
 use crate::dataset::shared_sound;
 use crate::dataset::split::SplitBy;
-use crate::dataset::split::{Assignment, Split, Unassigned, assign as place_in_splits};
+use crate::dataset::split::{Assignment, Split, Unassigned, assign};
 use crate::dataset::write::part;
 use crate::dataset::write::part::{VideoEntry, VideoSource};
 use crate::dataset::write::writer::DatasetWriter;
@@ -158,14 +158,14 @@ impl Stage for DatasetStage {
         }
         let sounds = run.sounds(&kept)?;
         let compared = run.compare(&kept, &sounds)?;
-        let placed = run.place(&kept, &compared);
+        let assigned = run.assign(&kept, &compared);
         let Some(first) = kept.first() else { anyhow::bail!("no video of {unit} is ready") };
         let writer = DatasetWriter::new(out, self.about(unit, first), u64::from(self.settings.max_mb) << 20)
             .with_compared(compared);
         let task = progress.begin(&format!("dataset {unit}"), kept.len() as u64);
-        for (video, placed) in kept.iter().zip(placed) {
+        for (video, assignment) in kept.iter().zip(assigned) {
             task.detail(&video.name);
-            match placed {
+            match assignment {
                 Assignment::In(split, by) => run.write(&writer, video, split, by, &sounds)?,
                 Assignment::Nowhere(with) => {
                     part::remove_sound(out, &video.name)?;
@@ -280,7 +280,7 @@ impl DatasetRun<'_> {
         Ok(SoundComparison { duplicate_secs, shared })
     }
 
-    fn place(&self, videos: &[&LiftedVideo], compared: &SoundComparison) -> Vec<Assignment> {
+    fn assign(&self, videos: &[&LiftedVideo], compared: &SoundComparison) -> Vec<Assignment> {
         let named: BTreeMap<&str, Split> = self
             .stage
             .all
@@ -294,7 +294,7 @@ impl DatasetRun<'_> {
             before: self.before.get(&video.name).filter(|part| part.split.is_some()).map(|part| &part.split_by),
         });
         let waiting: Vec<Unassigned> = waiting.collect();
-        place_in_splits(&waiting, &compared.shared, self.stage.settings.validation, self.stage.settings.test)
+        assign(&waiting, &compared.shared, self.stage.settings.validation, self.stage.settings.test)
     }
 
     /// Writes a video, or takes it over from the old dataset.

@@ -1,16 +1,8 @@
-//! Whether a window of frames is a gradual transition: a dissolve, a wipe, a fade to or from black or white. Five
-//! things are asked of its first frame A, its last B and those between, cheapest first:
-//!
-//! | measure | a transition | what it keeps out |
-//! |---|---|---|
-//! | `turned`: share of cells that go from A's colour to B's without turning back | large | people, noise |
-//! | edges of A and B, place by place | unlike | changes of light and colour |
-//! | the same share of the pixels that changed | most | a camera that moves or zooms: edges pass and go |
-//! | blocks found elsewhere in the next frames | few | a camera that moves |
-//! | blocks of the middle that are in both A and B | few: A and B fade as one grows | all the rest |
-//!
-//! A push or slide is a camera that moves, by these measures, and so is not found. The bounds are set on transitions
-//! made between real clips, and on pans, zooms, shakes and changes of light made of them.
+//! Gradual transitions: a dissolve, a wipe, a fade to or from black or white. Of the first frame A of a window, its last B
+//! and those between: most cells turn from A's colour to B's without turning back, A's edges are not B's, few blocks are
+//! found elsewhere in the next frames (a moving camera), and few blocks of the middle are in both A and B. The bounds are
+//! set on transitions between real clips, and on pans, zooms, shakes and changes of light. A push or slide is a moving
+//! camera by these measures, and so is not found.
 
 use super::block_match;
 use super::thumbnail::{STEP, Thumbnail};

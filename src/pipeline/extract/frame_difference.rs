@@ -1,5 +1,5 @@
-//! How much the picture changes from frame to frame, one number a frame. A still picture (a slide, a paused video, a
-//! drawn person) stays near 0 where a living one does not; the rule that says so is `segment`'s.
+//! Change of the picture from frame to frame, one number a frame: near 0 for a slide, a paused video or a drawn person.
+//! `segment` judges by it.
 
 use crate::types::image::Image;
 

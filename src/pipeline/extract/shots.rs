@@ -1,14 +1,5 @@
-//! Where the film changes its view. Thumbnails come in one after the other, the last few seconds of them are kept, and
-//! for each frame one number comes out: the score of its beginning a shot. How pictures are decoded is not known here.
-//!
-//! A cut is a single step: `change(n)` is the share of cells that differ between frames n - 1 and n (repeated frames
-//! left out), and its score is what it has beyond its surroundings,
-//!
-//! `score(n) = max(0, change(n) - max(change(n-2), change(n-1), change(n+1), change(n+2)))`,
-//!
-//! if the pictures before and after are unlike (`likeness`). Gestures, pans and noise go on for several frames and
-//! cancel out, after a flash the picture is back, another light shows the same things. A gradual transition (`gradual`) scores at
-//! its first frame and at the first frame after it: its own frames are a shot, short as it is.
+//! Shot boundaries. Thumbnails come in one after the other, the last few seconds of them are kept, and each frame gets a
+//! score: how much it looks like the first one of a shot.
 
 use super::block_match;
 use super::dissolves;
@@ -18,27 +9,31 @@ use crate::types::image::Image;
 use crate::types::time::FrameRate;
 use std::collections::VecDeque;
 
-/// From this score on what was followed before is not followed further, whatever counts as a shot later on.
+/// Score from which on tracking begins anew, whatever counts as a shot later on.
 pub const RESTART: f64 = 0.1;
-/// Changes beside a cut that are held against it.
+/// Frames beside a cut whose changes are subtracted from its own.
 const AROUND: usize = 2;
-/// A picture that is back within so many frames at 15 a second was only flashed over.
+/// Frames at 15 a second within which a picture that is back was only flashed over.
 const FLASH: usize = 5;
 /// Least correlation of a block to be found again after a cut.
 const FOUND_AGAIN: f32 = 0.75;
 
-/// Finds where shots begin.
+/// Finds where shots begin. A cut is a single step: with `change(n)` the share of cells that differ between frames n - 1 and
+/// n (repeated frames left out), its score is `max(0, change(n) - max(change(n-2), change(n-1), change(n+1), change(n+2)))`,
+/// if the pictures before and after do not match (`block_match`). Gestures, pans and noise go on for several frames and
+/// cancel out; after a flash the picture is back. A gradual transition (`dissolves`) scores at its first frame and at the
+/// first frame after it.
 pub struct ShotFinder {
-    /// Frames of the dataset rate to one at 15 a second.
+    /// Frames of the dataset rate for one at 15 a second.
     pace: usize,
-    /// The newest frames that repeat none, the oldest first.
+    /// Newest frames that repeat none, the oldest first.
     recent: VecDeque<RecentFrame>,
-    /// Frame of each that repeats none.
+    /// Frame numbers of those that repeat none.
     frames: Vec<usize>,
     n_frames: usize,
-    /// Of each that repeats none: share of changed cells against the one before.
+    /// Share of changed cells against the one before, of each frame that repeats none.
     changes: Vec<f64>,
-    /// The same in scores of cuts, as far as known.
+    /// Scores of cuts, of each frame that repeats none, as far as known.
     cuts: Vec<f64>,
     windows: Vec<Transition>,
 }
@@ -58,7 +53,7 @@ struct Transition {
 }
 
 impl ShotFinder {
-    /// For frames at `rate`.
+    /// A finder for frames at `rate`.
     pub fn new(rate: FrameRate) -> Self {
         Self {
             pace: ((rate.per_sec() / 15.0).round() as usize).max(1),

@@ -1,5 +1,5 @@
-//! A frame as the search for shots keeps it: small, in colour and in gray, and as a coarse grid. How two of them
-//! resemble each other is `likeness`.
+//! A frame as the search for shots keeps it: small, in colour and in gray, and as a coarse grid. `block_match`
+//! compares two of them.
 
 use super::frame_difference::THUMBNAIL;
 use crate::types::image::Image;

@@ -16,7 +16,7 @@ use ndarray::s;
 pub const TRAINED_FPS: f64 = 15.0;
 /// Frames at that rate, before and after, that a body's apparent size is taken over.
 const SIZE_FRAMES: f64 = 15.0;
-/// The same for telling a stray point.
+/// Frames at that rate, before and after, that a stray point is told by.
 const STRAY_FRAMES: f64 = 2.0;
 /// Frames at that rate that are lifted in one go, so that no more poses are held at a time.
 const GO: f64 = 4096.0;
@@ -50,7 +50,7 @@ pub fn lift(
         for (t, pose) in poses.iter().enumerate().take(end - from).skip(first - from) {
             if let Some(pose) = pose {
                 sizes[from + t] = size(pose) as f32;
-                place(pose, from + t, into);
+                write_pose(pose, from + t, into);
             }
         }
     }
@@ -65,7 +65,7 @@ pub fn lift(
     Ok(())
 }
 
-fn place(pose: &Pose, t: usize, into: &mut IntervalView) {
+fn write_pose(pose: &Pose, t: usize, into: &mut IntervalView) {
     into.joints.slice_mut(s![t, NECK, ..]).fill(0.0);
     for joint in ARMS {
         (0..3).for_each(|k| into.joints[[t, joint, k]] = pose[joint][k] as f32);

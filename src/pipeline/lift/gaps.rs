@@ -3,7 +3,7 @@
 
 use ndarray::{ArrayViewMut3, Axis};
 
-/// For each frame whether it lies in a gap of `seen` of more than `longest` frames; gaps at the ends count as well.
+/// Whether each frame lies in a gap of `seen` of more than `longest` frames; gaps at the ends count as well.
 pub fn long_gaps(seen: &[bool], longest: usize) -> Vec<bool> {
     let mut open = vec![false; seen.len()];
     let mut start = 0;

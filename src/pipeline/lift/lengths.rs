@@ -8,7 +8,7 @@ use crate::types::pose2d::N_HAND;
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::{L_ELBOW, L_HAND, L_SHOULDER, L_WRIST, N_BONES, R_ELBOW, R_HAND, R_SHOULDER, R_WRIST};
 
-/// Of a bone's lifted lengths the one that this share of the frames does not exceed counts: bones that point at the
+/// Quantile of a bone's lifted lengths that counts: bones that point at the
 /// camera come out short. Chosen on bodies of known proportions with an earlier body lifter, where it came nearer than
 /// the median, the common adult, a mean of both, and the longest appearance in the picture.
 const QUANTILE: f64 = 0.7;

@@ -1,10 +1,4 @@
-//! Stage 4: 2D keypoints to 3D joints, one straight way for each interval: `sight` (what is seen, strays out) -> `body`
-//! and `hands` (the networks, `hand_depth`) -> smoothing -> `lengths` (one set for the whole video) -> `camera` (levelled on
-//! request) -> every bone given its length, hands joined at the wrists. It is all done in place, in the arrays that come
-//! out. The networks are `nn`'s, their weights `weights`'.
-//!
-//! What is known and what is not: a joint not seen for up to a second is filled and masked; one missing for longer is
-//! NaN, with all that hangs on it. Size is a convention (`upper_body::REFERENCE_SIZE`), as no picture tells it.
+//! The lifter: intervals of keypoints to motion, each interval by itself, all with the same bone lengths.
 
 use super::body::TRAINED_FPS;
 use super::camera::CameraTilt;

@@ -86,8 +86,8 @@ fn arm(chain: &ArmChain, motion: &Motion, keypoints: &Keypoints, fits: &[Option<
     let n_frames = motion.n_frames();
     let [shoulder, elbow, wrist] = chain.joints;
     let all = |of: &dyn Fn(usize) -> f64| -> Vec<f64> { (0..n_frames).map(of).filter(|v| v.is_finite()).collect() };
-    let length = |from: usize, to: usize, t: usize| distance(&place(motion, from, t), &place(motion, to, t));
-    let depth = |joint: usize| mean(&all(&|t| MM * (place(motion, joint, t)[2] - place(motion, shoulder, t)[2])));
+    let length = |from: usize, to: usize, t: usize| distance(&position(motion, from, t), &position(motion, to, t));
+    let depth = |joint: usize| mean(&all(&|t| MM * (position(motion, joint, t)[2] - position(motion, shoulder, t)[2])));
     let ratio = |bone: usize| {
         let in_picture = |t: usize| -> Option<f64> {
             let [from, to] = [0, 1].map(|end| found(keypoints, chain.points[bone + end], t));
@@ -100,13 +100,13 @@ fn arm(chain: &ArmChain, motion: &Motion, keypoints: &Keypoints, fits: &[Option<
     };
     let off = |t: usize| -> Option<f64> {
         let (seen, fit) = (found(keypoints, chain.points[2], t)?, fits[t].as_ref()?);
-        Some(MM * distance(&seen, &fit.project(place(motion, wrist, t))) / fit.scale)
+        Some(MM * distance(&seen, &fit.project(position(motion, wrist, t))) / fit.scale)
     };
     let share = |count: usize, of: usize| count as f64 / of.max(1) as f64;
     let frames = |holds: &dyn Fn(usize) -> bool| share((0..n_frames).filter(|&t| holds(t)).count(), n_frames);
     let hand: Vec<(usize, usize)> = (0..n_frames)
         .flat_map(|t| (1..N_HAND_JOINTS).map(move |j| (t, chain.hand + j)))
-        .filter(|&(t, joint)| place(motion, joint, t)[0].is_finite())
+        .filter(|&(t, joint)| position(motion, joint, t)[0].is_finite())
         .collect();
     let n_hand = n_frames * (N_HAND_JOINTS - 1);
     ArmFigures {
@@ -121,7 +121,7 @@ fn arm(chain: &ArmChain, motion: &Motion, keypoints: &Keypoints, fits: &[Option<
         upper_arm_ratio: ratio(0),
         forearm_ratio: ratio(1),
         wrist_off_mm: median((0..n_frames).filter_map(off)),
-        missing: frames(&|t| !place(motion, wrist, t)[0].is_finite()),
+        missing: frames(&|t| !position(motion, wrist, t)[0].is_finite()),
         masked: frames(&|t| !motion.mask[[t, wrist]]),
         hand_there: share(hand.len(), n_hand),
         hand_seen: share(hand.iter().filter(|&&(t, joint)| motion.mask[[t, joint]]).count(), n_hand),
@@ -141,7 +141,7 @@ impl Fit {
         let pairs: Vec<([f64; 3], [f64; 2])> = [&LEFT, &RIGHT]
             .iter()
             .flat_map(|chain| chain.joints.iter().zip(&chain.points))
-            .filter_map(|(&joint, &point)| Some((place(motion, joint, t), found(keypoints, point, t)?)))
+            .filter_map(|(&joint, &point)| Some((position(motion, joint, t), found(keypoints, point, t)?)))
             .filter(|(joint, _)| joint.iter().all(|v| v.is_finite()))
             .collect();
         let n = pairs.len() as f64;
@@ -170,7 +170,7 @@ impl Fit {
 /// Median second difference over the second in which the joint moves least, mm; NaN in a clip shorter than that.
 fn still_jitter(motion: &Motion, joint: usize) -> f64 {
     let second = (motion.fps.per_sec().round() as usize).max(3);
-    let step = |t: usize| MM * distance(&place(motion, joint, t), &place(motion, joint, t + 1));
+    let step = |t: usize| MM * distance(&position(motion, joint, t), &position(motion, joint, t + 1));
     let moves = |start: &usize| (*start..*start + second - 1).map(step).sum::<f64>();
     let starts = 0..(motion.n_frames() + 1).saturating_sub(second);
     let stillest = starts.filter(|start| moves(start).is_finite()).min_by(|a, b| moves(a).total_cmp(&moves(b)));
@@ -178,17 +178,17 @@ fn still_jitter(motion: &Motion, joint: usize) -> f64 {
     median((start + 1..start + second - 1).filter_map(|t| second_difference(motion, joint, t)))
 }
 
-/// |x(t - 1) - 2 x(t) + x(t + 1)| in mm, where all three are told.
+/// |x(t - 1) - 2 x(t) + x(t + 1)| in mm, where all three are known.
 fn second_difference(motion: &Motion, joint: usize, t: usize) -> Option<f64> {
     if t == 0 || t + 1 >= motion.n_frames() {
         return None;
     }
-    let [before, at, after] = [t - 1, t, t + 1].map(|t| place(motion, joint, t));
+    let [before, at, after] = [t - 1, t, t + 1].map(|t| position(motion, joint, t));
     let square: f64 = (0..3).map(|k| (before[k] - 2.0 * at[k] + after[k]).powi(2)).sum();
     Some(MM * square.sqrt()).filter(|v| v.is_finite())
 }
 
-fn place(motion: &Motion, joint: usize, t: usize) -> [f64; 3] {
+fn position(motion: &Motion, joint: usize, t: usize) -> [f64; 3] {
     std::array::from_fn(|k| f64::from(motion.joints[[t, joint, k]]))
 }
 

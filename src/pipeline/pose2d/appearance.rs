@@ -18,7 +18,7 @@ const BAND: [usize; 2] = [10, 6];
 pub struct Appearance(Vec<f32>);
 
 impl Appearance {
-    /// Of the body whose points are given; `None` if its shoulders are not surer than `least`.
+    /// Measures the body whose points are given; `None` if its shoulders are not surer than `least`.
     pub fn measure(image: &Image, body: &[ScoredPoint; 17], least: f64) -> Option<Self> {
         let [left, right] = [coco::L_SHOULDER, coco::R_SHOULDER].map(|at| body[at]);
         let width = (left[0] - right[0]).hypot(left[1] - right[1]);
@@ -45,7 +45,7 @@ impl Appearance {
         Some(Self(numbers))
     }
 
-    /// How unlike two people are: the mean way colour must go from one to the other, in 8-bit steps.
+    /// Distance of two people: the mean way colour must go from one to the other, in 8-bit steps.
     pub fn distance(&self, other: &Self) -> f32 {
         let way: f32 = self.0.iter().zip(&other.0).map(|(a, b)| (a - b).abs()).sum();
         way * (256.0 / BINS as f32) / CHANNELS as f32

@@ -1,6 +1,6 @@
-//! Stage 2: frames to 2D keypoints of the one speaker: person box, body, both hands, followed through each shot.
+//! Stage 2: frames to 2D keypoints of the one speaker: person box, body, both hands, tracked through each shot.
 //! `decode` reads the models' outputs, one file a kind; `person`, `body`, `hand` and `palm` ask one model each; `speaker`
-//! says who is followed, with `tracker` (the choice), `liveness` and `appearance` (on a `patch` of the picture); `region`
+//! says who is tracked, with `tracker` (the choice), `liveness` and `appearance` (on a `patch` of the picture); `region`
 //! says where to look for a hand; `chain` is the way of one frame; `stage` the way of a video.
 
 pub mod appearance;

@@ -21,7 +21,8 @@ const STRANGER: f32 = 7.0;
 const STRANGE_FRAMES: i32 = 2;
 /// Frames for which a body found to be the speaker's after all is not doubted again.
 const TRUSTED_FRAMES: i32 = 6;
-/// A box that overlaps the followed one so much is whom is followed, unless another's appearance is nearer to the speaker's by this factor.
+/// Least overlap of a box with the tracked one to be the speaker's, unless the appearance of another is nearer by the factor
+/// `MUCH_NEARER`.
 const HERE: f32 = 0.6;
 const MUCH_NEARER: f32 = 0.6;
 /// Colours and box after a restart that are no further from those before are the same person's.
@@ -36,7 +37,7 @@ pub struct SpeakerTracker {
     pub track: PersonTrack,
     tracks: LivenessTracks,
     reference: Option<Appearance>,
-    /// What the one followed looks like.
+    /// Appearance of the tracked person.
     colours: Option<Appearance>,
     /// Frames in a row that showed a stranger; below 0: frames for which that is not believed.
     n_strange: i32,
@@ -75,7 +76,7 @@ impl SpeakerTracker {
         Ok(())
     }
 
-    /// Nobody is followed any more.
+    /// Ends the track.
     pub fn begin_anew(&mut self) {
         let place = self.track.place.map(|_| self.track.person());
         self.before = place.zip(self.colours.take());

@@ -9,7 +9,7 @@ const AROUND_SECS: f64 = 1.0;
 /// Digital silence, dB.
 const NOTHING_DB: f64 = -120.0;
 
-/// Of each frame whether there is sound (1 or 0), and its loudness: the root mean square of the second around it in dB
+/// Whether each frame has sound (1 or 0), and its loudness: the root mean square of the second around it in dB
 /// of full scale, -120 where there is none. A file that is not there has no sound.
 pub fn levels(path: &Path, fps: FrameRate, n_frames: usize) -> Result<(Vec<f32>, Vec<f32>)> {
     let (mut n_samples, mut power) = (vec![0_u64; n_frames], vec![0.0_f64; n_frames]);
