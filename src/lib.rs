@@ -103,7 +103,7 @@ pub use types::sound::Sound;
 pub use types::time::FrameRate;
 
 // Keypoints to motion.
-pub use config::Lift as LiftConfig;
+pub use config::LiftConfig;
 pub use formats::keypoints_npz::read as read_keypoints;
 pub use pipeline::lift::{Lifted, Lifter};
 

@@ -10,7 +10,7 @@ use super::solve::positions::JointPositions;
 use super::solve::rotations::rotations;
 use super::solve::smoothing::Smoothing;
 use super::solve::track::RotationTrack;
-use crate::formats::bvh::write::Clip;
+use crate::formats::bvh::write::BvhClip;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, scale};
 use crate::motion::jerk;
@@ -110,7 +110,7 @@ pub struct Performance {
     /// The skeleton with its bone lengths.
     pub rig: Rig,
     /// The rotations of its joints.
-    pub clip: Clip,
+    pub clip: BvhClip,
     /// What was done to the motion.
     pub report: AnimationReport,
 }
@@ -123,9 +123,9 @@ pub fn perform(motion: &Motion, face: Option<&Face>, options: &AnimationOptions)
     let rig = Rig::from_motion(motion);
     let clip_of = |tracks: &[RotationTrack]| {
         let local = (0..motion.n_frames()).map(|t| tracks.iter().map(|track| track[t]).collect()).collect();
-        Clip { root: rig.root, skeleton: rig.skeleton.clone(), fps: motion.fps, local }
+        BvhClip { root: rig.root, skeleton: rig.skeleton.clone(), fps: motion.fps, local }
     };
-    let constrained = |mut clip: Clip, tally: &mut ClampTally| {
+    let constrained = |mut clip: BvhClip, tally: &mut ClampTally| {
         clip.local.iter_mut().for_each(|frame| options.constraints.apply(&rig, frame, tally));
         clip
     };
@@ -174,7 +174,7 @@ impl Performance {
     }
 }
 
-fn joints(rig: &Rig, clip: &Clip) -> Array3<f32> {
+fn joints(rig: &Rig, clip: &BvhClip) -> Array3<f32> {
     let mut joints = Array3::zeros((clip.n_frames(), N_JOINTS, 3));
     for (frame_idx, mut frame) in joints.outer_iter_mut().enumerate() {
         let positions = clip.positions(frame_idx);
@@ -194,7 +194,7 @@ fn seen(motion: &Motion) -> Array2<bool> {
 }
 
 /// Positions of these joints in a clip of the rig; missing joints stay missing.
-fn moved(positions: &JointPositions, rig: &Rig, clip: &Clip) -> JointPositions {
+fn moved(positions: &JointPositions, rig: &Rig, clip: &BvhClip) -> JointPositions {
     let moved = |(t, frame): (usize, &[Option<Vec3>; N_JOINTS])| {
         let positions = clip.positions(t);
         std::array::from_fn(|joint| frame[joint].map(|_| scale(positions[rig.positions[joint]], 1.0 / CM)))

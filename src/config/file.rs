@@ -7,24 +7,24 @@ use std::fmt;
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
 
-/// Something wrong with one key.
+/// An error in one key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
     /// Dotted, `extract.fps`; a speaker's is `speaker[0].name`.
     pub key: String,
-    pub place: Place,
+    pub location: SourceLocation,
     pub message: String,
 }
 
-/// Where a key was given.
+/// Location at which a key was given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Place {
+pub enum SourceLocation {
     /// Line of the file, from 1.
     Line(usize),
     CommandLine,
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for SourceLocation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Line(line) => write!(f, "line {line}: "),
@@ -35,15 +35,15 @@ impl fmt::Display for Place {
 
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.place)?;
+        write!(f, "{}", self.location)?;
         if self.key.is_empty() { write!(f, "{}", self.message) } else { write!(f, "{}: {}", self.key, self.message) }
     }
 }
 
-/// The settings as given, the place of every key given, and what was wrong with the rest.
+/// Settings as given, the location of every key given, and the errors in the rest.
 pub struct Given {
     pub settings: Settings,
-    pub places: BTreeMap<String, Place>,
+    pub locations: BTreeMap<String, SourceLocation>,
     pub problems: Vec<Problem>,
     /// Keys given under a former name, a line each.
     pub notes: Vec<String>,
@@ -62,17 +62,21 @@ pub struct Folders<'a> {
 
 /// Reads the text of a `pipeline.toml` and `--set key=value` changes over the defaults.
 pub fn read(text: &str, sets: &[String], folders: &Folders) -> Given {
-    let mut reader = Reader { places: BTreeMap::new(), problems: Vec::new(), notes: Vec::new() };
+    let mut reader = Reader { locations: BTreeMap::new(), problems: Vec::new(), notes: Vec::new() };
     let mut table = defaults();
     match DeTable::parse(text) {
         Ok(mut document) => {
-            let place_at = |span| Place::Line(line_of(text, span));
-            reader.rename(document.get_mut(), &place_at);
-            reader.lay(document.get_ref(), &mut table, "", &place_at);
+            let location_at = |span| SourceLocation::Line(line_of(text, span));
+            reader.rename(document.get_mut(), &location_at);
+            reader.lay(document.get_ref(), &mut table, "", &location_at);
         }
         Err(error) => {
             let line = line_of(text, error.span().map_or(0, |span| span.start));
-            reader.problem("", Place::Line(line), format!("not valid TOML: {}", error.message().replace('\n', ", ")));
+            reader.problem(
+                "",
+                SourceLocation::Line(line),
+                format!("not valid TOML: {}", error.message().replace('\n', ", ")),
+            );
         }
     }
     for set in sets {
@@ -81,10 +85,10 @@ pub fn read(text: &str, sets: &[String], folders: &Folders) -> Given {
     reader.drop_refused(&mut table);
     reader.resolve_paths(&mut table, folders);
     let settings = table.try_into::<Settings>().unwrap_or_else(|error| {
-        reader.problem("", Place::Line(1), error.message().to_owned());
+        reader.problem("", SourceLocation::Line(1), error.message().to_owned());
         Settings::default()
     });
-    Given { settings, places: reader.places, problems: reader.problems, notes: reader.notes }
+    Given { settings, locations: reader.locations, problems: reader.problems, notes: reader.notes }
 }
 
 fn defaults() -> Table {
@@ -92,7 +96,7 @@ fn defaults() -> Table {
     Table::try_from(Settings::default()).unwrap_or_default()
 }
 
-/// What a `[[speaker]]` may hold: the lists with an entry that shows its type.
+/// Keys of a `[[speaker]]`: the lists with an entry that shows its type.
 fn speaker_schema() -> Table {
     let text = || Value::String(String::new());
     let words = ["name", "reference", "licence", "consent", "source"].map(|key| (key.to_owned(), text()));
@@ -102,26 +106,26 @@ fn speaker_schema() -> Table {
 }
 
 struct Reader {
-    places: BTreeMap<String, Place>,
+    locations: BTreeMap<String, SourceLocation>,
     problems: Vec<Problem>,
     notes: Vec<String>,
 }
 
 impl Reader {
-    fn problem(&mut self, key: &str, place: Place, message: String) {
-        self.problems.push(Problem { key: key.to_owned(), place, message });
+    fn problem(&mut self, key: &str, location: SourceLocation, message: String) {
+        self.problems.push(Problem { key: key.to_owned(), location, message });
     }
 
     /// Moves what is written under former names to today's; what is there under both counts as today's says.
-    fn rename(&mut self, written: &mut DeTable<'_>, place_at: &dyn Fn(usize) -> Place) {
+    fn rename(&mut self, written: &mut DeTable<'_>, location_at: &dyn Fn(usize) -> SourceLocation) {
         for (former, now) in RENAMED {
             let (from, old) = former.rsplit_once('.').map_or((None, former), |(section, key)| (Some(section), key));
             let (to, new) = now.rsplit_once('.').map_or((None, now), |(section, key)| (Some(section), key));
             let Some((name, value)) = section(written, from).and_then(|table| table.remove_entry(old)) else {
                 continue;
             };
-            let place = place_at(name.span().start);
-            self.notes.push(format!("{place}{former} is called {now} now; it is read as that"));
+            let location = location_at(name.span().start);
+            self.notes.push(format!("{location}{former} is called {now} now; it is read as that"));
             let spanned = |key: &'static str| Spanned::new(name.span(), key.into());
             if let Some(to) = to
                 && !written.contains_key(to)
@@ -143,29 +147,35 @@ impl Reader {
     }
 
     /// Lays what is written over `table`, key by key.
-    fn lay(&mut self, written: &DeTable<'_>, table: &mut Table, prefix: &str, place_at: &dyn Fn(usize) -> Place) {
+    fn lay(
+        &mut self,
+        written: &DeTable<'_>,
+        table: &mut Table,
+        prefix: &str,
+        location_at: &dyn Fn(usize) -> SourceLocation,
+    ) {
         for (name, value) in written {
             let key = format!("{prefix}{}", name.get_ref());
-            let place = place_at(name.span().start);
+            let location = location_at(name.span().start);
             if key == "speaker" {
-                self.lay_speakers(value.get_ref(), table, place, place_at);
+                self.lay_speakers(value.get_ref(), table, location, location_at);
                 continue;
             }
             let Some(default) = table.get_mut(name.get_ref().as_ref()) else {
                 let near = nearest(name.get_ref(), table.keys());
-                self.problem(&key, place, format!("unknown key{near}"));
+                self.problem(&key, location, format!("unknown key{near}"));
                 continue;
             };
             if let (Value::Table(inner), DeValue::Table(written)) = (&mut *default, value.get_ref()) {
-                self.lay(written, inner, &format!("{key}."), place_at);
+                self.lay(written, inner, &format!("{key}."), location_at);
                 continue;
             }
             match typed(value.get_ref(), default) {
                 Ok(value) => {
                     *default = value;
-                    self.places.insert(key, place);
+                    self.locations.insert(key, location);
                 }
-                Err(message) => self.problem(&key, place, message),
+                Err(message) => self.problem(&key, location, message),
             }
         }
     }
@@ -174,26 +184,26 @@ impl Reader {
         &mut self,
         value: &DeValue<'_>,
         table: &mut Table,
-        place: Place,
-        place_at: &dyn Fn(usize) -> Place,
+        location: SourceLocation,
+        location_at: &dyn Fn(usize) -> SourceLocation,
     ) {
         let DeValue::Array(entries) = value else {
-            return self.problem("speaker", place, "expected [[speaker]] tables".to_owned());
+            return self.problem("speaker", location, "expected [[speaker]] tables".to_owned());
         };
         let mut speakers = Vec::new();
         for (at, entry) in entries.iter().enumerate() {
             let key = format!("speaker[{at}]");
-            let place = place_at(entry.span().start);
+            let location = location_at(entry.span().start);
             let DeValue::Table(written) = entry.get_ref() else {
-                self.problem(&key, place, "expected a [[speaker]] table".to_owned());
+                self.problem(&key, location, "expected a [[speaker]] table".to_owned());
                 continue;
             };
             let mut speaker = speaker_schema();
-            self.places.insert(key.clone(), place);
-            self.lay(written, &mut speaker, &format!("{key}."), place_at);
+            self.locations.insert(key.clone(), location);
+            self.lay(written, &mut speaker, &format!("{key}."), location_at);
             let is_written = |name: &str| written.keys().any(|key| key.get_ref() == name);
             for name in ["name", "videos"].iter().filter(|name| !is_written(name)) {
-                self.problem(&key, place, format!("the key {name} is missing"));
+                self.problem(&key, location, format!("the key {name} is missing"));
             }
             speaker.retain(|name, _| is_written(name) || ["name", "videos"].contains(&name));
             speakers.push(Value::Table(speaker));
@@ -204,7 +214,7 @@ impl Reader {
     /// Takes out each value that its setting's type refuses, so that the problem has its key and the others are still
     /// looked at.
     fn drop_refused(&mut self, table: &mut Table) {
-        for (key, place) in self.places.clone() {
+        for (key, location) in self.locations.clone() {
             let Some((section, name)) = key.split_once('.') else { continue };
             let Some(inner) = table.get_mut(section).and_then(Value::as_table_mut) else { continue };
             let Some(value) = inner.get(name).cloned() else { continue };
@@ -212,7 +222,7 @@ impl Reader {
             let alone = Table::from_iter([(section.to_owned(), Value::Table(alone))]);
             if let Err(error) = alone.try_into::<Settings>() {
                 inner.remove(name);
-                self.problem(&key, place, refused(&value, error.message()));
+                self.problem(&key, location, refused(&value, error.message()));
             }
         }
     }
@@ -230,7 +240,7 @@ impl Reader {
                 let texts = inner.iter().filter_map(|(name, value)| Some((name.clone(), value.as_str()?.to_owned())));
                 for (name, path) in texts.filter(|(_, path)| !path.is_empty()).collect::<Vec<_>>() {
                     let key = if is_list { format!("{section}[{at}].{name}") } else { format!("{section}.{name}") };
-                    let is_set = self.places.get(&key) == Some(&Place::CommandLine);
+                    let is_set = self.locations.get(&key) == Some(&SourceLocation::CommandLine);
                     let folder = if is_set { folders.current } else { folders.file };
                     let path = [("folder", folder.to_owned()), ("path", path)];
                     let path = path.map(|(key, text)| (key.to_owned(), Value::String(text)));
@@ -249,10 +259,14 @@ impl Reader {
     /// One `--set key=value`; a value that is no TOML is a string.
     fn set(&mut self, set: &str, table: &mut Table) {
         let Some((key, value)) = set.split_once('=') else {
-            return self.problem("", Place::CommandLine, format!("{set}: expected KEY=VALUE, like extract.fps=15"));
+            return self.problem(
+                "",
+                SourceLocation::CommandLine,
+                format!("{set}: expected KEY=VALUE, like extract.fps=15"),
+            );
         };
         if key.starts_with("speaker") {
-            return self.problem(key, Place::CommandLine, "speakers are written in the file".to_owned());
+            return self.problem(key, SourceLocation::CommandLine, "speakers are written in the file".to_owned());
         }
         let is_key = !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '.');
         let quoted = toml::Value::String(value.to_owned()).to_string();
@@ -261,10 +275,10 @@ impl Reader {
         let parsed = DeTable::parse(&as_toml).or_else(|_| DeTable::parse(&as_string));
         match parsed {
             Ok(mut document) if is_key => {
-                self.rename(document.get_mut(), &|_| Place::CommandLine);
-                self.lay(document.get_ref(), table, "", &|_| Place::CommandLine);
+                self.rename(document.get_mut(), &|_| SourceLocation::CommandLine);
+                self.lay(document.get_ref(), table, "", &|_| SourceLocation::CommandLine);
             }
-            _ => self.problem(key, Place::CommandLine, "not a key of the configuration".to_owned()),
+            _ => self.problem(key, SourceLocation::CommandLine, "not a key of the configuration".to_owned()),
         }
     }
 }
@@ -315,7 +329,7 @@ fn typed(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
     }
 }
 
-/// What is wrong with a value of the right kind that its setting refuses; `message` is serde's.
+/// Message about a value of the right kind that its setting refuses; `message` is serde's.
 fn refused(value: &Value, message: &str) -> String {
     let Value::String(text) = value else { return format!("{value} is too large") };
     let expected = message.strip_prefix(&format!("unknown variant `{text}`, ")).unwrap_or(message);

@@ -66,8 +66,8 @@ fn resolve(text: &str, sets: &[String], file: &Path) -> Result<(Settings, Vec<St
     let folder = unicode(file.parent().unwrap_or(Path::new("")))?;
     let given = file::read(text, sets, &Folders { file: &folder, current: &unicode(&current)? });
     let mut problems = given.problems;
-    problems.extend(rules::check(&given.settings, &given.places));
-    problems.sort_by(|a, b| (a.place, &a.key).cmp(&(b.place, &b.key)));
+    problems.extend(rules::check(&given.settings, &given.locations));
+    problems.sort_by(|a, b| (a.location, &a.key).cmp(&(b.location, &b.key)));
     if problems.is_empty() {
         Ok((given.settings, given.notes))
     } else {
@@ -92,7 +92,7 @@ mod tests {
     fn the_documented_file_is_the_default() {
         let settings = resolve(DEFAULT_FILE, &[], Path::new("pipeline.toml")).unwrap().0;
         assert_eq!(Settings { speaker: Vec::new(), ..settings }, Settings::default());
-        let one_speaker = Settings { speaker: vec![crate::config::Speaker::default()], ..Settings::default() };
+        let one_speaker = Settings { speaker: vec![crate::config::SpeakerConfig::default()], ..Settings::default() };
         let defaults = toml::Table::try_from(one_speaker).unwrap();
         assert_eq!(keys(&DEFAULT_FILE.parse().unwrap()), keys(&defaults));
     }
@@ -219,5 +219,16 @@ mod tests {
         assert!(problems("[extract\nfps = 15", &[])[0].starts_with("line 1: not valid TOML"));
         assert!(problems("extract = 3", &[])[0].contains("expected a table"));
         assert!(problems("speaker = 3", &[])[0].contains("[[speaker]]"));
+    }
+
+    proptest::proptest! {
+        #![proptest_config(proptest::test_runner::Config::with_cases(128))]
+        #[test]
+        fn no_text_panics(
+            text in "(\\[?\\[?(gan|speaker|extract|work|shard|[a-z]{1,4})[\\].=]?[a-z_]{0,6} ?=? ?[\"0-9a-z.\\[\\]{}-]{0,8}\n){0,8}|.{0,60}",
+            set in "(gan|work|lift|speaker)\\.[a-z]{1,8}=.{0,8}|.{0,20}",
+        ) {
+            let _ = resolve(&text, &[set], Path::new("pipeline.toml"));
+        }
     }
 }

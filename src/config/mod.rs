@@ -12,8 +12,8 @@ pub mod videos;
 
 pub use choices::{AdversarialLoss, ComputeDevice, MotionRepresentation, NetworkPreset};
 pub use config_path::ConfigPath;
-pub use file::Place;
 pub use file::Problem;
+pub use file::SourceLocation;
 pub use load::Config;
 pub use load::ConfigError;
 pub use load::DEFAULT_FILE;

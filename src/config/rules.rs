@@ -1,12 +1,12 @@
-//! Which values are possible: one line a key.
+//! Ranges of the settings: one line a key.
 
 use super::Settings;
-use super::file::{Place, Problem};
+use super::file::{Problem, SourceLocation};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Every value out of its range, with what was expected.
-pub fn check(settings: &Settings, places: &BTreeMap<String, Place>) -> Vec<Problem> {
-    let mut rules = Rules { places, problems: Vec::new() };
+pub fn check(settings: &Settings, locations: &BTreeMap<String, SourceLocation>) -> Vec<Problem> {
+    let mut rules = Rules { locations, problems: Vec::new() };
     let s = settings;
     rules.within("extract.fps", f64::from(s.extract.fps), 1.0, 120.0, "frames a second");
     rules.within("pose2d.person_every", s.pose2d.person_every as f64, 1.0, 10_000.0, "frames");
@@ -60,14 +60,14 @@ pub fn check(settings: &Settings, places: &BTreeMap<String, Place>) -> Vec<Probl
 }
 
 struct Rules<'a> {
-    places: &'a BTreeMap<String, Place>,
+    locations: &'a BTreeMap<String, SourceLocation>,
     problems: Vec<Problem>,
 }
 
 impl Rules<'_> {
     fn problem(&mut self, key: &str, message: String) {
-        let place = self.places.get(key).copied().unwrap_or(Place::Line(1));
-        self.problems.push(Problem { key: key.to_owned(), place, message });
+        let location = self.locations.get(key).copied().unwrap_or(SourceLocation::Line(1));
+        self.problems.push(Problem { key: key.to_owned(), location, message });
     }
 
     fn within(&mut self, key: &str, value: f64, low: f64, high: f64, unit: &str) {

@@ -11,21 +11,21 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 #[derive(Default)]
 pub struct Settings {
-    pub work: Work,
-    pub models: Models,
-    pub extract: Extract,
-    pub pose2d: Pose2d,
-    pub segment: Segment,
-    pub lift: Lift,
+    pub work: WorkConfig,
+    pub models: ModelsConfig,
+    pub extract: ExtractConfig,
+    pub pose2d: Pose2dConfig,
+    pub segment: SegmentConfig,
+    pub lift: LiftConfig,
     pub dataset: DatasetConfig,
-    pub gan: Gan,
-    pub speaker: Vec<Speaker>,
+    pub gan: GanConfig,
+    pub speaker: Vec<SpeakerConfig>,
 }
 
 /// `[[speaker]]`: one person, with the videos that show them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Speaker {
+pub struct SpeakerConfig {
     pub name: String,
     /// Paths or glob patterns.
     pub videos: Vec<String>,
@@ -54,13 +54,13 @@ pub struct Speaker {
 /// `[work]`: where the stages write.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Work {
+pub struct WorkConfig {
     pub dir: ConfigPath,
     /// Units worked on side by side; 0: one a core.
     pub jobs: usize,
 }
 
-impl Default for Work {
+impl Default for WorkConfig {
     fn default() -> Self {
         Self { dir: "work".into(), jobs: 0 }
     }
@@ -69,13 +69,13 @@ impl Default for Work {
 /// `[models]`: where the ONNX models and the ONNX Runtime library are.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Models {
+pub struct ModelsConfig {
     pub dir: ConfigPath,
     /// Path of `libonnxruntime.so`; empty: searched for (see `orator doctor`).
     pub onnxruntime: ConfigPath,
 }
 
-impl Default for Models {
+impl Default for ModelsConfig {
     fn default() -> Self {
         Self { dir: "models".into(), onnxruntime: ConfigPath::default() }
     }
@@ -84,21 +84,21 @@ impl Default for Models {
 /// `[extract]`: the dataset's clock.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Extract {
+pub struct ExtractConfig {
     /// Dataset frames a second.
     pub fps: u32,
     /// Write every dataset frame as PNG as well.
     pub keep_frames: bool,
 }
 
-impl Extract {
+impl ExtractConfig {
     /// The dataset rate.
     pub fn rate(&self) -> FrameRate {
         FrameRate::new(self.fps, 1)
     }
 }
 
-impl Default for Extract {
+impl Default for ExtractConfig {
     fn default() -> Self {
         Self { fps: 15, keep_frames: false }
     }
@@ -107,7 +107,7 @@ impl Default for Extract {
 /// `[pose2d]`: which models look at a frame (ids of `models/manifest.toml`), and the tracking of the one speaker.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Pose2d {
+pub struct Pose2dConfig {
     pub person: String,
     pub body: String,
     pub hand: String,
@@ -125,7 +125,7 @@ pub struct Pose2d {
     pub joint_score: f64,
 }
 
-impl Default for Pose2d {
+impl Default for Pose2dConfig {
     fn default() -> Self {
         Self {
             person: "person-rtmdet-nano".into(),
@@ -144,7 +144,7 @@ impl Default for Pose2d {
 /// `[segment]`: which stretches are worth keeping.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Segment {
+pub struct SegmentConfig {
     /// Shot score, 0..1, from which a frame begins a new shot.
     pub shot_threshold: f64,
     /// Shortest interval, in frames (a window of the paper: 64).
@@ -179,7 +179,7 @@ pub struct Segment {
     pub max_jump: f64,
 }
 
-impl Default for Segment {
+impl Default for SegmentConfig {
     fn default() -> Self {
         Self {
             shot_threshold: 0.2,
@@ -205,7 +205,7 @@ impl Default for Segment {
 /// `[lift]`: 2D keypoints to 3D joints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Lift {
+pub struct LiftConfig {
     /// Weights of the body lifter (safetensors); empty: the built-in ones.
     pub body_weights: ConfigPath,
     /// Weights of the hand lifter (safetensors); empty: the built-in ones.
@@ -220,7 +220,7 @@ pub struct Lift {
     pub max_bone_change: f64,
 }
 
-impl Default for Lift {
+impl Default for LiftConfig {
     fn default() -> Self {
         let none = ConfigPath::default();
         let (smooth_arms, smooth_hands, level, max_bone_change) = (0.8, 1.5, false, 0.4);
@@ -250,7 +250,7 @@ impl Default for DatasetConfig {
 /// `[gan]`: the generator's training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Gan {
+pub struct GanConfig {
     pub preset: NetworkPreset,
     pub representation: MotionRepresentation,
     /// Window length in frames.
@@ -278,7 +278,7 @@ pub struct Gan {
     pub device: ComputeDevice,
 }
 
-impl Default for Gan {
+impl Default for GanConfig {
     fn default() -> Self {
         Self {
             preset: NetworkPreset::Light,

@@ -1,7 +1,7 @@
 //! From the `videos` of the speakers to units: patterns are expanded, folders listed, and every video gets its work
 //! name. What names no video is a unit too, so that its failure is reported and the others go on.
 
-use super::{Config, Speaker};
+use super::{Config, SpeakerConfig};
 use crate::stage::Unit;
 use crate::types::split::Split;
 use std::collections::BTreeMap;
@@ -28,7 +28,7 @@ pub fn of(config: &Config) -> Vec<Videos> {
     config.settings.speaker.iter().map(|speaker| of_speaker(speaker, &folder)).collect()
 }
 
-fn of_speaker(speaker: &Speaker, folder: &Path) -> Videos {
+fn of_speaker(speaker: &SpeakerConfig, folder: &Path) -> Videos {
     let mut found = BTreeMap::new();
     let mut missing = Vec::new();
     for entry in &speaker.videos {
@@ -155,7 +155,7 @@ mod tests {
         }
         std::fs::create_dir(dir.path().join("empty")).unwrap();
         let videos = ["*.mp4", ".", "empty", "none-*.mp4", "gone.mp4"].map(str::to_owned).to_vec();
-        let videos = of_speaker(&Speaker { name: "host".into(), videos, ..Speaker::default() }, dir.path());
+        let videos = of_speaker(&SpeakerConfig { name: "host".into(), videos, ..SpeakerConfig::default() }, dir.path());
         let names: Vec<&str> = videos.units.iter().map(|unit| unit.video.split('-').next().unwrap()).collect();
         assert_eq!(names, ["a", "b", "gone"]);
         assert_eq!(videos.missing.len(), 2);
@@ -171,8 +171,12 @@ mod tests {
         assert_eq!((videos.units.len(), videos.missing.len()), (1, 0));
     }
 
-    fn host(videos: &[&str]) -> Speaker {
-        Speaker { name: "host".into(), videos: videos.iter().map(|v| (*v).to_owned()).collect(), ..Speaker::default() }
+    fn host(videos: &[&str]) -> SpeakerConfig {
+        SpeakerConfig {
+            name: "host".into(),
+            videos: videos.iter().map(|v| (*v).to_owned()).collect(),
+            ..SpeakerConfig::default()
+        }
     }
 
     #[test]
@@ -182,7 +186,7 @@ mod tests {
             std::fs::write(dir.path().join(name), "").unwrap();
         }
         let list = |entries: &[&str]| entries.iter().map(|e| (*e).to_owned()).collect::<Vec<_>>();
-        let mut speaker = Speaker { exclude: list(&["c.*", "gone.mp4"]), ..host(&["*.mp4"]) };
+        let mut speaker = SpeakerConfig { exclude: list(&["c.*", "gone.mp4"]), ..host(&["*.mp4"]) };
         (speaker.test, speaker.train) = (list(&["b [1].mp4"]), list(&[&dir.path().join("a.mp4").to_string_lossy()]));
         let videos = of_speaker(&speaker, dir.path());
         let split = |name: &str| videos.splits.iter().find(|(video, _)| video.starts_with(name)).map(|(_, s)| *s);

@@ -13,7 +13,7 @@ use std::path::Path;
 
 /// Numbers on a line.
 const N_NUMBERS: usize = 3 * N_JOINTS;
-/// How far the neck may stand from the origin, metres, before the file is taken for something else.
+/// Distance of the neck from the origin, metres, beyond which the file is refused.
 const NECK_TOLERANCE: f32 = 1e-3;
 
 /// Reads a motion of `fps` (the authors': 15). `nan` marks a missing joint. Errors name the line.
@@ -111,5 +111,12 @@ mod tests {
         assert!(said(&format!("{good}0 0 zero {line}\n")).contains("line 2, number 3: `zero`"));
         assert!(said(&format!("1 0 0 {line}\n")).contains("line 1: the first joint"));
         assert!(said("\n\n").contains("no frame"));
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn no_text_panics(text in "([0-9.eE+-]{1,6}[ \n]){0,30}|.{0,60}") {
+            let _ = parse(&text, FPS);
+        }
     }
 }

@@ -14,7 +14,7 @@ const METADATA: &str = "orator";
 /// Name of a training checkpoint's file for a step.
 const PREFIX: &str = "step-";
 
-/// What a file holds: named tensors, and facts as JSON.
+/// Contents of a file: named tensors, and metadata as JSON.
 pub struct Contents {
     pub facts: Value,
     pub tensors: BTreeMap<String, Tensor>,
@@ -39,7 +39,7 @@ impl Contents {
         Ok(safetensors::serialize(&self.tensors, Some(metadata))?)
     }
 
-    /// What [`Contents::to_bytes`] made.
+    /// Parses the bytes that [`Contents::to_bytes`] gives.
     pub fn from_bytes(bytes: &[u8]) -> anyhow::Result<Self> {
         let (_, header) = safetensors::SafeTensors::read_metadata(bytes)?;
         let facts = header.metadata().as_ref().and_then(|m| m.get(METADATA)).context("it was not written by orator")?;

@@ -50,4 +50,26 @@ mod tests {
         write(&path, &motion).unwrap();
         assert_eq!(read(&path).unwrap(), motion);
     }
+
+    proptest::proptest! {
+        #![proptest_config(proptest::test_runner::Config::with_cases(24))]
+        #[test]
+        fn any_motion_comes_back(
+            n_frames in 0usize..4,
+            (num, den) in (1u32..100_000, 1u32..1_002),
+            numbers in proptest::collection::vec((proptest::num::f32::ANY, proptest::bool::ANY), 49 * 9),
+        ) {
+            let at = |t: usize, j: usize, k: usize| numbers[(t * 147 + j * 3 + k) % numbers.len()];
+            let motion = Motion {
+                fps: FrameRate::new(num, den),
+                joints: ndarray::Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(t, j, k)| at(t, j, k).0),
+                mask: ndarray::Array2::from_shape_fn((n_frames, N_JOINTS), |(t, j)| at(t, j, 0).1),
+            };
+            let path = tempfile::tempdir().unwrap().keep().join("joints.npz");
+            write(&path, &motion).unwrap();
+            let again = read(&path).unwrap();
+            proptest::prop_assert_eq!((again.fps, &again.mask), (motion.fps, &motion.mask));
+            proptest::prop_assert!(again.joints.iter().zip(&motion.joints).all(|(a, b)| a.to_bits() == b.to_bits()));
+        }
+    }
 }

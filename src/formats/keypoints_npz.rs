@@ -13,7 +13,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 
-/// What the file holds beside the keypoints.
+/// Arrays of the file beside the keypoints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Extras {
     /// Source time of each frame in seconds, [T].
@@ -22,7 +22,7 @@ pub struct Extras {
     pub person: Array2<f32>,
     /// People seen in each frame, [T].
     pub n_people: Array1<i64>,
-    /// Which person is followed in each frame, [T]: goes up by one where another is taken, or the follower begins anew.
+    /// Number of the person tracked in each frame, [T]: one higher where another person is taken, or tracking begins anew.
     pub identity: Array1<i64>,
 }
 
@@ -175,5 +175,36 @@ mod tests {
         let path = body_only(dir.path(), &Array3::zeros((2, 18, 3)));
         let text = format!("{:#}", read(&path).unwrap_err());
         assert!(text.contains("[2, 18, 3]") && text.contains("[T, 17, 3]"), "{text}");
+    }
+
+    proptest::proptest! {
+        #![proptest_config(proptest::test_runner::Config::with_cases(24))]
+        #[test]
+        fn any_finite_keypoints_come_back(
+            n_frames in 0usize..4,
+            sides in [1u32..1_000_000, 1u32..1_000_000],
+            numbers in proptest::collection::vec(-1e6f32..1e6, 200),
+        ) {
+            let points = |n: usize| {
+                Array3::from_shape_fn((n_frames, n, 3), |(t, j, k)| numbers[(t * 7 + j * 3 + k) % numbers.len()])
+            };
+            let keypoints = Keypoints {
+                fps: FrameRate::new(30_000, 1001),
+                image_size: sides,
+                body: points(N_BODY),
+                left_hand: points(N_HAND),
+                right_hand: points(N_HAND),
+            };
+            let extras = Extras {
+                time_secs: Array1::from_shape_fn(n_frames, |t| f64::from(numbers[t])),
+                person: Array2::from_shape_fn((n_frames, 5), |(t, k)| numbers[5 * t + k]),
+                n_people: Array1::from_shape_fn(n_frames, |t| t as i64),
+                identity: Array1::from_shape_fn(n_frames, |t| 3 * t as i64),
+            };
+            let path = tempfile::tempdir().unwrap().keep().join("keypoints.npz");
+            write(&path, &keypoints, &extras).unwrap();
+            proptest::prop_assert_eq!(read_noting(&path).unwrap(), (keypoints, Vec::new()));
+            proptest::prop_assert_eq!(read_extras(&path).unwrap(), extras);
+        }
     }
 }

@@ -113,4 +113,29 @@ pub(crate) mod tests {
             assert!(parse::<f32, Ix3>(&bytes[..end]).is_err());
         }
     }
+
+    proptest::proptest! {
+        #![proptest_config(proptest::test_runner::Config::with_cases(24))]
+        #[test]
+        fn any_joints_come_back_bit_for_bit(
+            bits in proptest::collection::vec(proptest::num::f32::ANY, 3 * N_JOINTS..9 * N_JOINTS),
+        ) {
+            let n_frames = bits.len() / (3 * N_JOINTS);
+            let joints = Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(t, j, k)| bits[(t * N_JOINTS + j) * 3 + k]);
+            let motion = Motion::from_joints(FrameRate::new(15, 1), joints);
+            let path = tempfile::tempdir().unwrap().keep().join("a.npy");
+            write(&path, &motion).unwrap();
+            let again = read(&path, motion.fps).unwrap();
+            proptest::prop_assert_eq!(&again.mask, &motion.mask);
+            proptest::prop_assert!(again.joints.iter().zip(&motion.joints).all(|(a, b)| a.to_bits() == b.to_bits()));
+        }
+
+        #[test]
+        fn no_bytes_panic(header in ".{0,100}", bytes in proptest::collection::vec(proptest::num::u8::ANY, 0..100)) {
+            let length = (header.len() as u16).to_le_bytes();
+            let whole = [&b"\x93NUMPY\x01\x00"[..], &length, header.as_bytes(), &bytes].concat();
+            let _ = parse::<f32, IxDyn>(&whole);
+            let _ = parse::<f32, IxDyn>(&bytes);
+        }
+    }
 }

@@ -63,7 +63,7 @@ pub fn write_bool<'a>(shape: &[usize], values: impl Iterator<Item = &'a bool>) -
     bytes
 }
 
-/// Where the rows of an array lie in its file.
+/// Position of the rows of an array in its file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
     pub data_at: usize,

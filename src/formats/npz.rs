@@ -20,7 +20,7 @@ pub struct Npz {
 }
 
 /// Length expected of one axis; `None`: any.
-pub type Axis = Option<usize>;
+pub type AxisLength = Option<usize>;
 
 impl Npz {
     /// Opens the archive. Errors: no such file, no zip archive.
@@ -44,7 +44,7 @@ impl Npz {
     }
 
     /// A number array of any float or integer type as f64. Errors: missing, another shape, another type.
-    pub fn numbers(&mut self, name: &str, shape: &[Axis]) -> Result<ArrayD<f64>> {
+    pub fn numbers(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<f64>> {
         let bytes = self.bytes(name)?;
         let array = if let Some(a) = self.typed::<f32>(name, &bytes)? {
             a.mapv(f64::from)
@@ -64,7 +64,7 @@ impl Npz {
     }
 
     /// A float array as f32. Errors as `numbers`.
-    pub fn floats(&mut self, name: &str, shape: &[Axis]) -> Result<ArrayD<f32>> {
+    pub fn floats(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<f32>> {
         let bytes = self.bytes(name)?;
         if let Some(array) = self.typed::<f32>(name, &bytes)? {
             self.check(name, array.shape(), shape)?;
@@ -74,7 +74,7 @@ impl Npz {
     }
 
     /// An array of truth values. Errors: missing, another shape, another type.
-    pub fn bools(&mut self, name: &str, shape: &[Axis]) -> Result<ArrayD<bool>> {
+    pub fn bools(&mut self, name: &str, shape: &[AxisLength]) -> Result<ArrayD<bool>> {
         let bytes = self.bytes(name)?;
         let Some(array) = self.typed::<bool>(name, &bytes)? else {
             bail!("{}: array `{name}` must be of type bool", self.path.display());
@@ -135,7 +135,7 @@ impl Npz {
     }
 
     /// An empty `expected` takes every shape.
-    fn check(&self, name: &str, shape: &[usize], expected: &[Axis]) -> Result<()> {
+    fn check(&self, name: &str, shape: &[usize], expected: &[AxisLength]) -> Result<()> {
         let fits =
             shape.len() == expected.len() && shape.iter().zip(expected).all(|(&n, want)| want.is_none_or(|w| w == n));
         if !expected.is_empty() && !fits {
@@ -203,5 +203,28 @@ mod tests {
         zip.finish().unwrap();
         let text = format!("{:#}", Npz::open(&path).unwrap().floats("body", &[]).unwrap_err());
         assert!(text.contains("a.npz") && text.contains("body"), "{text}");
+    }
+
+    proptest::proptest! {
+        #![proptest_config(proptest::test_runner::Config::with_cases(24))]
+        #[test]
+        fn arrays_come_back_and_damage_does_not_panic(
+            numbers in proptest::collection::vec(proptest::num::f64::ANY, 1..40),
+            damage in proptest::collection::vec((0usize..1000, proptest::num::u8::ANY), 1..6),
+        ) {
+            let dir = tempfile::tempdir().unwrap();
+            let path = file_with(dir.path(), |npz| npz.add_array("a", &Array1::from(numbers.clone())).unwrap());
+            let found = Npz::open(&path).unwrap().numbers("a", &[Some(numbers.len())]).unwrap();
+            proptest::prop_assert!(found.iter().zip(&numbers).all(|(a, b)| a.to_bits() == b.to_bits()));
+            let mut bytes = std::fs::read(&path).unwrap();
+            for (at, value) in damage {
+                let at = at % bytes.len();
+                bytes[at] = value;
+            }
+            std::fs::write(&path, &bytes).unwrap();
+            if let Ok(mut npz) = Npz::open(&path) {
+                let _ = (npz.numbers("a", &[]), npz.frame_rate("a"), npz.text("a"), npz.bools("a", &[]));
+            }
+        }
     }
 }

@@ -108,4 +108,24 @@ mod tests {
         assert!(n_samples(&bytes[..44], bytes.len() as u64, 22_050).is_err());
         assert!(n_samples(&bytes[..20], 20, 16_000).is_err());
     }
+
+    proptest::proptest! {
+        #[test]
+        fn any_sound_comes_back_within_half_a_step(
+            rate in 1u32..200_000,
+            sound in proptest::collection::vec(-1.0f32..1.0, 0..300),
+        ) {
+            let bytes = to_bytes(&Sound { rate, samples: sound.clone() }).unwrap();
+            proptest::prop_assert_eq!(n_samples(&bytes, bytes.len() as u64, rate).unwrap(), sound.len());
+            let again = samples(&bytes[HEADER_BYTES..]);
+            proptest::prop_assert!(again.iter().zip(&sound).all(|(a, b)| (a - b).abs() <= 1.0 / 32_768.0));
+            proptest::prop_assert_eq!(to_bytes(&Sound { rate, samples: again }).unwrap(), bytes);
+        }
+
+        #[test]
+        fn no_bytes_panic(bytes in proptest::collection::vec(proptest::num::u8::ANY, 0..60), size in 0u64..100) {
+            let _ = n_samples(&bytes, size, 16_000);
+            let _ = n_samples(&[&b"RIFF\x24\0\0\0WAVEfmt "[..], &bytes].concat(), size, 16_000);
+        }
+    }
 }

@@ -3,7 +3,7 @@
 
 use ndarray::{Array1, Array2, Axis, s};
 
-/// What is smaller than this share of the largest diagonal is rounding.
+/// Share of the largest diagonal below which a value is rounding.
 const ROUNDING: f64 = 1e-14;
 /// Most steps until an eigenvalue stands alone; two or three are usual.
 const MOST_STEPS: usize = 60;

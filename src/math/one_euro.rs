@@ -8,7 +8,7 @@ use super::vec3::{Vec3, add, norm, scale, sub};
 pub struct OneEuro {
     /// Cut-off at rest, Hz.
     pub rest_hz: f64,
-    /// How much the cut-off rises with speed: Hz for a unit a second.
+    /// Rise of the cut-off with speed: Hz for a unit a second.
     pub beta: f64,
 }
 

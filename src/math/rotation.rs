@@ -147,13 +147,6 @@ impl Rotation {
         [angle_z.to_degrees(), angle_x.to_degrees(), angle_y.to_degrees()]
     }
 
-    /// The inverse of `euler_zxy_degrees`.
-    pub fn from_euler_zxy_degrees([z, x, y]: Vec3) -> Self {
-        Self::about([0.0, 0.0, 1.0], z.to_radians())
-            * Self::about([1.0, 0.0, 0.0], x.to_radians())
-            * Self::about([0.0, 1.0, 0.0], y.to_radians())
-    }
-
     fn normalised(self) -> Self {
         let length = self.w.hypot(norm(self.v));
         Self { w: self.w / length, v: scale(self.v, 1.0 / length) }
@@ -178,6 +171,12 @@ mod tests {
 
     fn close(a: Vec3, b: Vec3) -> bool {
         norm(sub(a, b)) < 1e-9
+    }
+
+    fn from_euler_zxy_degrees([z, x, y]: Vec3) -> Rotation {
+        Rotation::about([0.0, 0.0, 1.0], z.to_radians())
+            * Rotation::about([1.0, 0.0, 0.0], x.to_radians())
+            * Rotation::about([0.0, 1.0, 0.0], y.to_radians())
     }
 
     fn directions() -> Vec<Vec3> {
@@ -220,14 +219,14 @@ mod tests {
         for r in rotations() {
             let [x, y, z] = r.axes();
             let same = Rotation::from_axes(x, y, z);
-            let euler = Rotation::from_euler_zxy_degrees(r.euler_zxy_degrees());
+            let euler = from_euler_zxy_degrees(r.euler_zxy_degrees());
             for a in [[1.0, 0.0, 0.0], [0.3, -0.5, 0.8]] {
                 assert!(close(same.turn(a), r.turn(a)));
                 assert!(norm(sub(euler.turn(a), r.turn(a))) < 1e-8, "{r:?} {:?}", r.euler_zxy_degrees());
             }
         }
         // Known: a quarter turn about y takes z to x.
-        assert!(close(Rotation::from_euler_zxy_degrees([0.0, 0.0, 90.0]).turn([0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]));
+        assert!(close(from_euler_zxy_degrees([0.0, 0.0, 90.0]).turn([0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]));
     }
 
     #[test]

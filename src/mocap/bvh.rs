@@ -2,7 +2,7 @@
 
 use super::facing::{Bearings, House};
 use super::fingers::bvh;
-use super::take::Captured;
+use super::take::CapturedMotion;
 use crate::formats::bvh::joint_names;
 use crate::formats::bvh::read::{Bvh, Positions};
 use crate::math::vec3;
@@ -37,28 +37,28 @@ const RATE_ROUNDING: f64 = 1.1e-3;
 
 /// Reads a take, turned to face the camera. Errors: not BVH, a skeleton without neck or shoulders, no standing or
 /// sitting person.
-pub fn read(path: &Path) -> Result<Captured> {
+pub fn read(path: &Path) -> Result<CapturedMotion> {
     take(path, |house| house)
 }
 
 /// Reads a take as it stands: y up, facing +z, as `orator animate` writes it, so that it lies beside the motion it came
 /// from. A file with other axes is turned as `read` does, and its facts say so.
-pub fn read_as_it_stands(path: &Path) -> Result<Captured> {
+pub fn read_as_it_stands(path: &Path) -> Result<CapturedMotion> {
     take(path, |house| house.as_it_stands().unwrap_or(house))
 }
 
-fn take(path: &Path, placed: impl Fn(House) -> House) -> Result<Captured> {
+fn take(path: &Path, placed: impl Fn(House) -> House) -> Result<CapturedMotion> {
     let bvh = Bvh::read(path)?;
     of_bvh(&bvh, placed).with_context(|| format!("{} is no speaker's motion", path.display()))
 }
 
-fn of_bvh(bvh: &Bvh, placed: impl Fn(House) -> House) -> Result<Captured> {
+fn of_bvh(bvh: &Bvh, placed: impl Fn(House) -> House) -> Result<CapturedMotion> {
     let map = joint_map(bvh)?;
     let names: Vec<&str> = bvh.joints.iter().map(|joint| joint.name.as_str()).collect();
     let roles = joint_names::find(&names);
     let frames = bvh.positions(Positions::Auto);
     let bearings: Vec<Bearings> = frames.iter().map(|frame| bearings(frame, &map, roles)).collect();
-    let house = placed(House::of(&bearings)?);
+    let house = placed(House::from_bearings(&bearings)?);
     let mut joints = Array3::from_elem((frames.len(), N_JOINTS, 3), f32::NAN);
     for (t, (frame, bearings)) in frames.iter().zip(&bearings).enumerate() {
         for (joint, at) in map.iter().enumerate() {
@@ -76,7 +76,7 @@ fn of_bvh(bvh: &Bvh, placed: impl Fn(House) -> House) -> Result<Captured> {
         "joints_missing": missing,
     });
     let motion = Motion::from_joints(rate(bvh.frame_secs), joints);
-    Ok(Captured { motion, text: None, facts: facts.as_object().cloned().unwrap_or_else(Map::new) })
+    Ok(CapturedMotion { motion, text: None, facts: facts.as_object().cloned().unwrap_or_else(Map::new) })
 }
 
 /// The file's joint for each of the house's.

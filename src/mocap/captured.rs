@@ -2,16 +2,16 @@
 //! bones; and which reader a file needs.
 
 use super::motion_file::USUAL_FPS;
-use super::take::Captured;
+use super::take::CapturedMotion;
 use super::{bvh, ted};
 use crate::formats::authors_txt;
 use anyhow::{Result, bail};
 use serde_json::Map;
 use std::path::Path;
 
-/// What a file of motion is.
+/// Kind of a file of captured motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
+pub enum MotionKind {
     /// The authors' text clips: 147 numbers a line.
     Authors,
     /// TED Expressive: `.npz` with `human_joints`.
@@ -21,7 +21,7 @@ pub enum Kind {
     Shards,
 }
 
-impl Kind {
+impl MotionKind {
     /// Its name on the command line and in facts.
     pub const fn name(self) -> &'static str {
         match self {
@@ -34,14 +34,14 @@ impl Kind {
 }
 
 /// Reads the motion file of a take of that kind.
-pub fn read(kind: Kind, path: &Path) -> Result<Captured> {
+pub fn read(kind: MotionKind, path: &Path) -> Result<CapturedMotion> {
     match kind {
-        Kind::Authors => {
+        MotionKind::Authors => {
             let motion = authors_txt::read(path, USUAL_FPS)?;
-            Ok(Captured { motion, text: None, facts: Map::new() })
+            Ok(CapturedMotion { motion, text: None, facts: Map::new() })
         }
-        Kind::Ted => ted::read(path),
-        Kind::Bvh => bvh::read(path),
-        Kind::Shards => bail!("{} holds samples, no captured motion", path.display()),
+        MotionKind::Ted => ted::read(path),
+        MotionKind::Bvh => bvh::read(path),
+        MotionKind::Shards => bail!("{} holds samples, no captured motion", path.display()),
     }
 }

@@ -16,7 +16,7 @@ const ARM_METRES: f64 = 0.54;
 const MOST_DEGREES: f64 = 60.0;
 const ARM_RANGE: std::ops::Range<f64> = 0.33..0.85;
 
-/// What tells how a skeleton stands: a frame's joints, in the source's unit and axes.
+/// Joints of a frame that define how a skeleton stands, in the source's unit and axes.
 #[derive(Clone, Copy, Debug)]
 pub struct Bearings {
     pub neck: Vec3,
@@ -28,10 +28,10 @@ pub struct Bearings {
     pub arm: Option<f64>,
 }
 
-/// How a skeleton is turned and scaled.
+/// Turn and scale of a skeleton.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct House {
-    /// Where the house's axes x, y, z point in the source.
+    /// Directions of the axes x, y, z of `types::skeleton` in the source.
     axes: [Vec3; 3],
     pub metres: f64,
     pub unit: &'static str,
@@ -48,7 +48,7 @@ impl House {
     /// # Errors
     /// No frame with neck, shoulders and hips; arms that are no person's in any known unit; shoulders that lie above
     /// each other or turn so much that no side is the front.
-    pub fn of(frames: &[Bearings]) -> Result<Self> {
+    pub fn from_bearings(frames: &[Bearings]) -> Result<Self> {
         let frames: Vec<&Bearings> = frames.iter().filter(|f| f.is_finite()).collect();
         ensure!(!frames.is_empty(), "no frame has a neck, shoulders and hips");
         let (unit, metres) = unit(frames.iter().filter_map(|f| f.arm).collect())?;

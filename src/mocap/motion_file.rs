@@ -2,7 +2,7 @@
 //! authors' `.txt`, `.bvh`. Only .npz and .bvh name their rate; the others take the rate that the caller assumes.
 
 use super::bvh;
-use crate::formats::npz::{Axis, Npz};
+use crate::formats::npz::{AxisLength, Npz};
 use crate::formats::{authors_txt, npy};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
@@ -74,7 +74,7 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
 /// `pose3d` [T, 49, 3], with `mask` [T, 49] and `fps` where they are.
 fn of_npz(path: &Path, given: impl FnOnce() -> FrameRate) -> Result<Motion> {
     let mut npz = Npz::open(path)?;
-    let shape: [Axis; 3] = [None, Some(N_JOINTS), Some(3)];
+    let shape: [AxisLength; 3] = [None, Some(N_JOINTS), Some(3)];
     let joints = npz.floats("pose3d", &shape)?.into_dimensionality::<Ix3>()?;
     let fps = if npz.has("fps") { npz.frame_rate("fps")? } else { given() };
     let mut motion = Motion::from_joints(fps, joints);

@@ -5,11 +5,11 @@ use serde_json::{Map, Value};
 
 /// One continuous take.
 #[derive(Clone, Debug)]
-pub struct Captured {
+pub struct CapturedMotion {
     /// At the source's rate; a joint that the source does not have is NaN.
     pub motion: Motion,
-    /// What is said, where the motion's own file says it.
+    /// Words that are spoken, where the motion's own file has them.
     pub text: Option<String>,
-    /// What was done to the joints, for the sample's facts.
+    /// Changes made to the joints, for the sample's metadata.
     pub facts: Map<String, Value>,
 }

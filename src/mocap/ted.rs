@@ -2,7 +2,7 @@
 //! Joint 1 is the neck, joint 0 the spine below it; left arm 2 4 6, right arm 3 5 7; three joints a finger and no tips.
 
 use super::fingers::npz;
-use super::take::Captured;
+use super::take::CapturedMotion;
 use crate::formats::npz::Npz;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
@@ -17,7 +17,7 @@ use std::path::Path;
 const BODY: [usize; 7] = [1, 3, 5, 7, 2, 4, 6];
 
 /// Reads a clip. Joints that the source does not have (finger tips) are NaN.
-pub fn read(path: &Path) -> Result<Captured> {
+pub fn read(path: &Path) -> Result<CapturedMotion> {
     let mut npz = Npz::open(path)?;
     let fps = npz.frame_rate("fps")?;
     let theirs = npz.numbers("human_joints", &[None, Some(43), Some(3)])?;
@@ -37,5 +37,5 @@ pub fn read(path: &Path) -> Result<Captured> {
             fingers.iter().enumerate().filter_map(|(k, p)| Some((k, (*p)?))).for_each(|(k, p)| put(t, root + k, p));
         }
     }
-    Ok(Captured { motion: Motion::from_joints(fps, joints), text: npz.text("sentence"), facts: Map::new() })
+    Ok(CapturedMotion { motion: Motion::from_joints(fps, joints), text: npz.text("sentence"), facts: Map::new() })
 }

@@ -17,13 +17,13 @@ use std::path::{Path, PathBuf};
 
 /// A continuous stretch of captured motion.
 #[derive(Clone, Debug)]
-pub struct Take {
+pub struct BodyTake {
     pub name: String,
     pub fps: f64,
     pub poses: Vec<Pose>,
 }
 
-impl Take {
+impl BodyTake {
     /// Whole frames at another rate.
     pub fn n_frames_at(&self, fps: f64) -> usize {
         ((self.poses.len() as f64 - 1.0) / self.fps * fps + 1.0 + 1e-9) as usize
@@ -44,7 +44,7 @@ const SHORTEST_SECS: f64 = 1.0;
 
 /// All takes below `paths`: BVH or `.npz` files, or folders searched for them, in the order of their names.
 /// Errors: nothing found, a file that cannot be read or whose joints have unknown names.
-pub fn read_all(paths: &[PathBuf]) -> Result<Vec<Take>> {
+pub fn read_all(paths: &[PathBuf]) -> Result<Vec<BodyTake>> {
     let mut files = Vec::new();
     for path in paths {
         if path.is_dir() { files.extend(search::below(path, &["bvh", "npz"])?) } else { files.push(path.clone()) }
@@ -59,7 +59,7 @@ pub fn read_all(paths: &[PathBuf]) -> Result<Vec<Take>> {
 }
 
 /// The takes of one file, by its extension.
-pub fn read(path: &Path) -> Result<Vec<Take>> {
+pub fn read(path: &Path) -> Result<Vec<BodyTake>> {
     match path.extension().and_then(|e| e.to_str()) {
         Some("bvh") => read_bvh(path),
         Some("npz") => read_npz(path),
@@ -68,15 +68,16 @@ pub fn read(path: &Path) -> Result<Vec<Take>> {
 }
 
 /// Takes of one kind, called by the pattern of their names.
-pub type Set = (String, Vec<Take>);
+pub type Set = (String, Vec<BodyTake>);
 
 /// The takes whose names match each of the `patterns` (`*` any letters, `?` one; the first that matches counts), and
 /// the other takes. Errors: a pattern that is none, or matches nothing.
-pub fn divide(mut takes: Vec<Take>, patterns: &[String]) -> Result<(Vec<Set>, Vec<Take>)> {
+pub fn divide(mut takes: Vec<BodyTake>, patterns: &[String]) -> Result<(Vec<Set>, Vec<BodyTake>)> {
     let mut sets = Vec::new();
     for text in patterns {
         let pattern = glob::Pattern::new(text).with_context(|| format!("`{text}` is no pattern of names"))?;
-        let (set, others): (Vec<Take>, Vec<Take>) = takes.into_iter().partition(|take| pattern.matches(&take.name));
+        let (set, others): (Vec<BodyTake>, Vec<BodyTake>) =
+            takes.into_iter().partition(|take| pattern.matches(&take.name));
         if set.is_empty() {
             let names: Vec<&str> = others.iter().take(8).map(|take| take.name.as_str()).collect();
             bail!("no take is called `{text}`; there are {}: {} ...", others.len(), names.join(", "));
@@ -87,7 +88,7 @@ pub fn divide(mut takes: Vec<Take>, patterns: &[String]) -> Result<(Vec<Set>, Ve
     Ok((sets, takes))
 }
 
-fn read_bvh(path: &Path) -> Result<Vec<Take>> {
+fn read_bvh(path: &Path) -> Result<Vec<BodyTake>> {
     let bvh = Bvh::read(path)?;
     let names: Vec<&str> = bvh.joints.iter().map(|joint| joint.name.as_str()).collect();
     let joints = joint_names::upper_body(&names).with_context(|| path.display().to_string())?;
@@ -124,14 +125,14 @@ fn in_metres(bodies: &mut [[Vec3; 10]]) -> Result<()> {
     Ok(())
 }
 
-fn read_npz(path: &Path) -> Result<Vec<Take>> {
+fn read_npz(path: &Path) -> Result<Vec<BodyTake>> {
     let npz = Npz::open(path)?;
     if npz.has("human_joints") { read_ted(path, npz) } else { read_cmu(npz) }
 }
 
 /// TED Expressive: `human_joints` [T, 43, 3] in metres, y down, and `fps`. 0 is the spine, 0.26 m below the neck (1);
 /// there are no hips, so they are put where the spine points.
-fn read_ted(path: &Path, mut npz: Npz) -> Result<Vec<Take>> {
+fn read_ted(path: &Path, mut npz: Npz) -> Result<Vec<BodyTake>> {
     let fps = npz.frame_rate("fps")?.per_sec();
     let joints = npz.numbers("human_joints", &[None, Some(43), Some(3)])?;
     let pose = |t: usize| -> Pose {
@@ -148,7 +149,7 @@ fn read_ted(path: &Path, mut npz: Npz) -> Result<Vec<Take>> {
     Ok(divided(&name, fps, (0..joints.shape()[0]).map(pose).collect()))
 }
 
-fn read_cmu(mut npz: Npz) -> Result<Vec<Take>> {
+fn read_cmu(mut npz: Npz) -> Result<Vec<BodyTake>> {
     let fps = npz.frame_rate("fps")?.per_sec();
     let mut names: Vec<String> =
         npz.names().iter().filter(|n| !["fps", "parents", "offsets_mm"].contains(&n.as_str())).cloned().collect();
@@ -183,13 +184,13 @@ fn upper_body(joints: &[Vec3]) -> Pose {
 }
 
 /// The stretches between jumps that are long enough.
-fn divided(name: &str, fps: f64, poses: Vec<Pose>) -> Vec<Take> {
+fn divided(name: &str, fps: f64, poses: Vec<Pose>) -> Vec<BodyTake> {
     let limit = LARGEST_JUMP * 60.0 / fps;
     let jump =
         |a: &Pose, b: &Pose| (0..N_POINTS).map(|j| vec3::norm(vec3::sub(a[j], b[j]))).sum::<f64>() / N_POINTS as f64;
     let stretches = poses.chunk_by(|a, b| jump(a, b) <= limit);
     let long = stretches.filter(|s| s.len() as f64 >= SHORTEST_SECS * fps);
-    long.enumerate().map(|(i, s)| Take { name: format!("{name}#{i}"), fps, poses: s.to_vec() }).collect()
+    long.enumerate().map(|(i, s)| BodyTake { name: format!("{name}#{i}"), fps, poses: s.to_vec() }).collect()
 }
 
 #[cfg(test)]
@@ -288,7 +289,7 @@ mod tests {
 
     #[test]
     fn takes_are_divided_by_their_names() {
-        let take = |name: &str| Take { name: name.into(), fps: 30.0, poses: Vec::new() };
+        let take = |name: &str| BodyTake { name: name.into(), fps: 30.0, poses: Vec::new() };
         let takes = || ["walk#0", "walk#1", "wave#0"].map(take).to_vec();
         let (sets, others) = divide(takes(), &["*#1".into(), "wave*".into()]).unwrap();
         let names: Vec<&str> = sets.iter().flat_map(|(_, set)| set).map(|t| t.name.as_str()).collect();

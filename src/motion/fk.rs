@@ -11,7 +11,7 @@ pub struct Joint {
     pub parent: Option<usize>,
     /// From the parent, in the parent's axes at rest.
     pub offset: Vec3,
-    /// The end of a bone: it has a place but no rotation of its own and no children (a BVH `End Site`).
+    /// Whether the joint is the end of a bone: a position without a rotation and children (a BVH `End Site`).
     pub end: bool,
 }
 

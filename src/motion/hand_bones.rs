@@ -1,7 +1,7 @@
-//! A mean human hand: lengths of its bones, how the palm fans out, and the hand made of them at given joint angles.
-//! What angles hands take is `train::hand_shape`'s.
+//! A mean human hand: lengths of its bones, how the palm fans out, and the hand made of them at given joint angles. The angles that
+//! hands take are defined in `train::scene::hand_shape`.
 
-use super::view::hand::Hand;
+use super::view::hand::HandJoints;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::types::pose2d::N_HAND;
@@ -31,8 +31,8 @@ pub fn direction(aside: f64, flexion: f64) -> Vec3 {
 
 /// The upright right hand of mean bones at rest, metres, wrist at 0, its size that of measured hands: fingers bent a
 /// little (20, 30 and 18 degrees), the thumb beside and somewhat before the palm.
-pub fn relaxed() -> Hand {
-    let mut hand: Hand = [[0.0; 3]; N_HAND];
+pub fn relaxed() -> HandJoints {
+    let mut hand: HandJoints = [[0.0; 3]; N_HAND];
     for finger in 0..5 {
         let fan = FAN[finger].to_radians();
         let (first, aside, bends) = match finger {

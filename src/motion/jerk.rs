@@ -1,4 +1,4 @@
-//! Jerk: the third difference of places over time, how much motion trembles.
+//! Jerk: the third difference of positions over time.
 
 use ndarray::{ArrayView2, ArrayView3};
 

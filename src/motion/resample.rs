@@ -11,7 +11,7 @@ use ndarray::{Array2, Array3};
 const HALF_WIDTH: f64 = 8.0;
 /// Kaiser's shape: side lobes of -60 dB.
 const BETA: f64 = 6.0;
-/// Where the filter is down to one half, as a share of half the slower rate: with this width all that would fold back
+/// Frequency at which the filter is down to one half, as a share of half the slower rate: with this width all that would fold back
 /// is below -60 dB from half the rate on, and what lies below 0.62 of it (4.6 Hz at 15 frames a second) is untouched.
 const CUTOFF: f64 = 0.81;
 
@@ -28,7 +28,8 @@ pub fn at_rate(motion: &Motion, fps: FrameRate) -> Motion {
     let mut joints = Array3::from_elem((n_frames, N_JOINTS, 3), f32::NAN);
     let mut mask = Array2::from_elem((n_frames, N_JOINTS), false);
     // the kernel of each frame of the result: the same for all joints
-    let kernels: Vec<Kernel> = (0..n_frames).map(|n| Kernel::at(fps.secs(n) * from.per_sec(), from, fps)).collect();
+    let kernels: Vec<ResamplingKernel> =
+        (0..n_frames).map(|n| ResamplingKernel::at(fps.secs(n) * from.per_sec(), from, fps)).collect();
     for joint in 0..N_JOINTS {
         let seen = |frame: usize| motion.mask[[frame.min(n_source - 1), joint]];
         for (start, end) in runs(motion, joint) {
@@ -67,14 +68,14 @@ fn runs(motion: &Motion, joint: usize) -> Vec<(usize, usize)> {
 }
 
 /// Weights of the source's frames around one moment.
-struct Kernel {
+struct ResamplingKernel {
     /// The moment, in frames of the source.
     place: f64,
     first: i64,
     weights: Vec<f64>,
 }
 
-impl Kernel {
+impl ResamplingKernel {
     fn at(place: f64, from: FrameRate, to: FrameRate) -> Self {
         // moments that meet a frame of the source do so exactly
         let place = if (place - place.round()).abs() < 1e-6 { place.round() } else { place };

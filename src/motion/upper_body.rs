@@ -48,7 +48,7 @@ pub const MIRROR: [usize; N_POINTS] = [NOSE, L_SHOULDER, L_ELBOW, L_WRIST, R_SHO
 pub type Pose = [Vec3; N_POINTS];
 
 /// Nine points of a picture, x and y in px; `None`: not seen.
-pub type Seen = [Option<[f32; 2]>; N_POINTS];
+pub type SeenBody = [Option<[f32; 2]>; N_POINTS];
 
 /// Every body is given this size (`size`) in metres: a picture does not tell how large a person is.
 pub const REFERENCE_SIZE: f64 = 0.90;

@@ -1,4 +1,4 @@
-//! A stretch of frames worth keeping, and why a stretch was not.
+//! Runs of frames that are kept.
 
 use super::time::FrameRate;
 use serde::{Deserialize, Serialize};
@@ -16,8 +16,8 @@ impl Interval {
         self.end.saturating_sub(self.start)
     }
 
-    /// How many windows of `n_frames` it holds when one begins every `stride` frames; with `stride == n_frames` they
-    /// lie side by side.
+    /// Number of windows of `n_frames` when one begins every `stride` frames; with `stride == n_frames` they lie side by
+    /// side.
     pub const fn n_windows(self, n_frames: usize, stride: usize) -> usize {
         let length = self.end.saturating_sub(self.start);
         if n_frames == 0 || stride == 0 || length < n_frames { 0 } else { (length - n_frames) / stride + 1 }

@@ -49,14 +49,14 @@ pub struct PersonBox {
     pub score: f32,
 }
 
-/// What was found in one frame. A hand or body not found is all zeros.
+/// Person and keypoints of one frame. A hand or body not found is all zeros.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pose2d {
     /// The followed person.
     pub person: PersonBox,
     /// People in view.
     pub n_people: u8,
-    /// Which person is followed: another number, another person.
+    /// Number of the person that is tracked; it changes with the person.
     pub identity: i64,
     /// COCO-17.
     pub body: [Keypoint; N_BODY],

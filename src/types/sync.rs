@@ -1,4 +1,4 @@
-//! Where sound and motion meet: which samples of sound belong to which frames. Frame `n` begins at `n / fps` seconds;
+//! Synchronisation of sound and frames: the samples of sound that belong to a frame. Frame `n` begins at `n / fps` seconds;
 //! sample counts are never derived from frame counts in any other place.
 
 use super::time::FrameRate;

@@ -14,7 +14,7 @@ pub struct FrameRate {
     pub den: u32,
 }
 
-/// A rate as it stands in a file, where a part may be 0.
+/// Rate as stored in a file, where a part may be 0.
 #[derive(Deserialize)]
 struct Fraction {
     num: u32,
@@ -64,7 +64,7 @@ impl FrameRate {
         frame_idx as f64 * f64::from(self.den) / f64::from(self.num)
     }
 
-    /// How many frames lie wholly or partly inside `secs` seconds: the first n with `n / rate >= secs`.
+    /// Number of frames that lie wholly or partly inside `secs` seconds: the first n with `n / rate >= secs`.
     pub fn frames_in(self, secs: f64) -> usize {
         let frames = secs * self.per_sec();
         (frames - 1e-6).ceil().max(0.0) as usize
@@ -142,5 +142,25 @@ mod tests {
         assert_eq!(read("{\"num\":0,\"den\":0}"), FrameRate::new(1, 1));
         let ntsc = FrameRate::new(30_000, 1_001);
         assert_eq!(read(&serde_json::to_string(&ntsc).unwrap()), ntsc);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn a_printed_rate_is_read_back(num in 1_000u32..1_000_000, den in 1u32..1_002) {
+            let rate = FrameRate::new(num, den);
+            let is_possible = (1.0..=1000.0).contains(&rate.per_sec());
+            proptest::prop_assert_eq!(rate.to_string().parse().ok(), is_possible.then_some(rate));
+        }
+
+        #[test]
+        fn a_decimal_comes_near(thousandths in 1_000u32..1_000_000) {
+            let rate: FrameRate = format!("{}", f64::from(thousandths) / 1000.0).parse().unwrap();
+            proptest::prop_assert!((rate.per_sec() * 1000.0 / f64::from(thousandths) - 1.0).abs() < 1e-5);
+        }
+
+        #[test]
+        fn no_text_panics(text in "[0-9./ fpse+-]{0,12}|.{0,12}") {
+            let _ = text.parse::<FrameRate>();
+        }
     }
 }

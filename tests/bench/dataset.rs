@@ -200,7 +200,7 @@ struct Loaded {
 
 /// Batches as training draws them, then training itself, on the same dataset.
 fn loader(args: &Args, dir: &Path, out: &Path) -> Result<Loaded> {
-    let settings = config::Gan {
+    let settings = config::GanConfig {
         preset: config::NetworkPreset::Light,
         window_frames: 64,
         stride_frames: 5,

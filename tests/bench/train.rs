@@ -7,7 +7,7 @@ use super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
 use orator::audio::mel::N_MELS;
-use orator::config::Gan;
+use orator::config::GanConfig;
 use orator::formats::checkpoint::{self, Contents};
 use orator::generate::mel_stream::mel_frames;
 use orator::generate::model::SpeakerMetadata;
@@ -63,7 +63,7 @@ struct Fixed {
 impl Fixed {
     fn new(args: &Args) -> Result<Self> {
         let preset = serde_json::from_value(json!(args.preset))?;
-        let settings = Gan { preset, batch: args.batch, ..Gan::default() };
+        let settings = GanConfig { preset, batch: args.batch, ..GanConfig::default() };
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let table = |value: f32| ndarray::Array2::from_elem((N_JOINTS, 3), value);
         let length = |joint: usize| if is_duplicate(joint) { 0.0 } else { 0.1 };

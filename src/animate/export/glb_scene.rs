@@ -5,7 +5,7 @@ use super::glb::{BufferUse, GlbBuffer};
 use crate::animate::avatar::{Avatar, AvatarMesh, Material};
 use crate::animate::rig::names::Names;
 use crate::animate::rig::rig::Rig;
-use crate::formats::bvh::write::Clip;
+use crate::formats::bvh::write::BvhClip;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::Vec3;
 use serde_json::{Value, json};
@@ -17,7 +17,7 @@ const STILL: f64 = 1e-7;
 const VRM_LICENSE: &str = "https://vrm.dev/licenses/1.0/";
 
 /// Bytes of the GLB file of a clip on its rig with `avatar` as its skin.
-pub fn file(rig: &Rig, clip: &Clip, avatar: &Avatar, names: Names) -> Vec<u8> {
+pub fn file(rig: &Rig, clip: &BvhClip, avatar: &Avatar, names: Names) -> Vec<u8> {
     let mut buffer = GlbBuffer::default();
     let bones = &rig.skeleton.joints;
     let own = Names::Own.of(&rig.skeleton);
@@ -120,7 +120,7 @@ fn inverse_binds(buffer: &mut GlbBuffer, rig: &Rig, root: Vec3) -> usize {
     buffer.floats(&matrices, "MAT4", BufferUse::Other)
 }
 
-fn animation(buffer: &mut GlbBuffer, clip: &Clip) -> Value {
+fn animation(buffer: &mut GlbBuffer, clip: &BvhClip) -> Value {
     let times: Vec<[f32; 1]> = (0..clip.n_frames()).map(|frame| [clip.fps.secs(frame) as f32]).collect();
     let once = buffer.floats(&times[..1], "SCALAR", BufferUse::Other);
     let mut every = None;
@@ -143,7 +143,7 @@ fn animation(buffer: &mut GlbBuffer, clip: &Clip) -> Value {
 }
 
 /// Quaternions (x, y, z, w) of a joint over time, each with the sign nearest to the one before.
-fn quaternions(clip: &Clip, joint: usize) -> Vec<[f32; 4]> {
+fn quaternions(clip: &BvhClip, joint: usize) -> Vec<[f32; 4]> {
     let mut before = [0.0, 0.0, 0.0, 1.0];
     let next = |local: &Vec<Rotation>| {
         let Rotation { w, v: [x, y, z] } = local[joint];

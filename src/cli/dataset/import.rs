@@ -12,7 +12,7 @@ use orator::dataset::import::write::rate_of;
 use orator::dataset::import::{Imported, import};
 use orator::dataset::info::About;
 use orator::dataset::{INFO, Split};
-use orator::mocap::captured::Kind as Found;
+use orator::mocap::captured::MotionKind as Found;
 use orator::stage::workdir;
 use orator::types::time::FrameRate;
 use serde_json::json;

@@ -42,10 +42,10 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     hand_weights: Option<PathBuf>,
     /// Width of the Gaussian that smooths arms, in frames at 15 fps; 0: none.
-    #[arg(long, default_value_t = config::Lift::default().smooth_arms)]
+    #[arg(long, default_value_t = config::LiftConfig::default().smooth_arms)]
     smooth_arms: f64,
     /// Width of the Gaussian that smooths hands, in frames at 15 fps; 0: none.
-    #[arg(long, default_value_t = config::Lift::default().smooth_hands)]
+    #[arg(long, default_value_t = config::LiftConfig::default().smooth_hands)]
     smooth_hands: f64,
 }
 
@@ -61,13 +61,13 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     for sigma in [args.smooth_arms, args.smooth_hands] {
         ensure!((0.0..=100.0).contains(&sigma), "a smoothing of {sigma} frames; it must lie between 0 and 100");
     }
-    let settings = config::Lift {
+    let settings = config::LiftConfig {
         body_weights: args.body_weights.unwrap_or_default().into(),
         hand_weights: args.hand_weights.unwrap_or_default().into(),
         smooth_arms: args.smooth_arms,
         smooth_hands: args.smooth_hands,
         level: args.level,
-        ..config::Lift::default()
+        ..config::LiftConfig::default()
     };
     let (keypoints, mut notes) = keypoints_npz::read_noting(&args.keypoints)?;
     let lifter = Lifter::new(&settings)?;

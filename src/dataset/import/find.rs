@@ -4,7 +4,7 @@
 use crate::dataset::INFO;
 use crate::dataset::write::part;
 use crate::formats::npz::Npz;
-use crate::mocap::captured::Kind;
+use crate::mocap::captured::MotionKind;
 use anyhow::{Context, Result, ensure};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// Motion file with its sound and transcript.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TakeFiles {
-    pub kind: Kind,
+    pub kind: MotionKind,
     pub motion: PathBuf,
     pub sound: Option<PathBuf>,
     pub transcript: Option<PathBuf>,
@@ -41,7 +41,7 @@ const TRANSCRIPT_FOLDERS: [&str; 8] = ["tsv", "transcript", "transcripts", "text
 ///
 /// # Errors
 /// A source that does not exist, or sources without any motion.
-pub fn find(sources: &[PathBuf], only: Option<Kind>) -> Result<ImportSources> {
+pub fn find(sources: &[PathBuf], only: Option<MotionKind>) -> Result<ImportSources> {
     let (mut files, mut found) = (Vec::new(), ImportSources::default());
     for source in sources {
         ensure!(source.exists(), "{} is not there", source.display());
@@ -52,16 +52,16 @@ pub fn find(sources: &[PathBuf], only: Option<Kind>) -> Result<ImportSources> {
     files.dedup();
     found.datasets.sort();
     found.datasets.dedup();
-    if only.is_some_and(|only| only != Kind::Shards) {
+    if only.is_some_and(|only| only != MotionKind::Shards) {
         found.datasets.clear();
     }
     for path in files {
         match kind(&path) {
             Ok(None) => {}
             Ok(Some(kind)) if only.is_some_and(|only| only != kind) => {}
-            Ok(Some(Kind::Shards)) => found.tars.push(path),
+            Ok(Some(MotionKind::Shards)) => found.tars.push(path),
             Ok(Some(kind)) => found.takes.push(with_company(kind, path)),
-            Err(_) if only.is_some_and(|only| only != Kind::Ted) => {}
+            Err(_) if only.is_some_and(|only| only != MotionKind::Ted) => {}
             Err(why) => found.unknown.push((path, why)),
         }
     }
@@ -97,19 +97,19 @@ fn walk(path: &Path, files: &mut Vec<PathBuf>, datasets: &mut Vec<PathBuf>) -> R
 }
 
 /// Kind of a file; `None`: no motion; an error: not readable as motion although its name suggests it.
-fn kind(path: &Path) -> std::result::Result<Option<Kind>, String> {
+fn kind(path: &Path) -> std::result::Result<Option<MotionKind>, String> {
     match ending(path).as_str() {
-        "bvh" => Ok(Some(Kind::Bvh)),
-        "tar" => Ok(Some(Kind::Shards)),
+        "bvh" => Ok(Some(MotionKind::Bvh)),
+        "tar" => Ok(Some(MotionKind::Shards)),
         "npz" => {
             let npz = Npz::open(path).map_err(|error| format!("{error:#}"))?;
-            let known = npz.has("human_joints").then_some(Kind::Ted);
+            let known = npz.has("human_joints").then_some(MotionKind::Ted);
             let names = npz.names().join(", ");
             known
                 .map(Some)
                 .ok_or_else(|| format!("it holds no `human_joints` [T, 43, 3] (TED Expressive), but: {names}"))
         }
-        "txt" => Ok(has_147_numbers(path).then_some(Kind::Authors)),
+        "txt" => Ok(has_147_numbers(path).then_some(MotionKind::Authors)),
         _ => Ok(None),
     }
 }
@@ -122,7 +122,7 @@ fn has_147_numbers(path: &Path) -> bool {
     read.is_ok() && line.split_whitespace().count() == 147 && line.split_whitespace().all(|w| w.parse::<f64>().is_ok())
 }
 
-fn with_company(kind: Kind, motion: PathBuf) -> TakeFiles {
+fn with_company(kind: MotionKind, motion: PathBuf) -> TakeFiles {
     let stem = motion.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut stems = vec![stem.as_str()];
     // The sound of gt_interval_3821.txt is 3821.wav.
@@ -188,14 +188,14 @@ mod tests {
             transcript,
         };
         let expected = [
-            take(Kind::Authors, &clip, Some(clip_sound), None),
-            take(Kind::Bvh, &flat, Some(flat_sound), Some(flat_words)),
-            take(Kind::Bvh, &apart, Some(apart_sound), Some(apart_words)),
-            take(Kind::Bvh, &alone, None, None),
+            take(MotionKind::Authors, &clip, Some(clip_sound), None),
+            take(MotionKind::Bvh, &flat, Some(flat_sound), Some(flat_words)),
+            take(MotionKind::Bvh, &apart, Some(apart_sound), Some(apart_words)),
+            take(MotionKind::Bvh, &alone, None, None),
         ];
         assert_eq!(found.takes, expected);
         assert_eq!((found.tars, found.unknown[0].0.clone()), (vec![tar], broken));
-        assert_eq!(find(&[dir.path().to_owned()], Some(Kind::Authors)).unwrap().takes.len(), 1);
+        assert_eq!(find(&[dir.path().to_owned()], Some(MotionKind::Authors)).unwrap().takes.len(), 1);
         let text = format!("{:#}", find(&[dir.path().join("flat/a.wav")], None).unwrap_err());
         assert!(text.contains("147 numbers"), "{text}");
         assert!(find(&[dir.path().join("gone")], None).is_err());

@@ -3,7 +3,7 @@
 use crate::config;
 use crate::dataset::import::take::TakeLimits;
 use crate::dataset::info::About;
-use crate::mocap::captured::Kind;
+use crate::mocap::captured::MotionKind;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 pub struct ImportPlan {
     pub sources: Vec<PathBuf>,
     /// Kind of the sources to import; `None`: every kind.
-    pub kind: Option<Kind>,
+    pub kind: Option<MotionKind>,
     /// Description of the dataset; `about.fps` equals `limits.fps`.
     pub about: About,
     pub limits: TakeLimits,

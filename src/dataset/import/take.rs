@@ -8,8 +8,8 @@ use crate::dataset::sample::{N_KEYPOINTS, Sample};
 use crate::external::ffmpeg::audio;
 use crate::math::order::Ordered;
 use crate::mocap::captured;
-use crate::mocap::captured::Kind;
-use crate::mocap::take::Captured;
+use crate::mocap::captured::MotionKind;
+use crate::mocap::take::CapturedMotion;
 use crate::motion::bones;
 use crate::motion::resample;
 use crate::stage::fingerprint::hash_file;
@@ -102,7 +102,7 @@ impl ImportedTake {
 
 fn refusal(n_frames: usize, sound: Option<&Sound>, found: &TakeFiles, limits: &TakeLimits) -> Option<TakeRefusal> {
     let stem = found.motion.file_stem().unwrap_or_default().to_string_lossy();
-    if found.kind == Kind::Authors && stem.starts_with("prediction") {
+    if found.kind == MotionKind::Authors && stem.starts_with("prediction") {
         return Some(TakeRefusal::new(Refusal::Prediction, 0.0, 0.0));
     }
     let Some(sound) = sound else { return Some(no_sound(found)) };
@@ -137,7 +137,13 @@ fn n_common(n_frames: usize, sound: &Sound, fps: FrameRate) -> usize {
     n_frames.min((sound.secs() * fps.per_sec() + 1e-6).floor() as usize)
 }
 
-fn keep(name: &str, found: &TakeFiles, captured: &Captured, mut motion: Motion, mut sound: Sound) -> Result<KeptTake> {
+fn keep(
+    name: &str,
+    found: &TakeFiles,
+    captured: &CapturedMotion,
+    mut motion: Motion,
+    mut sound: Sound,
+) -> Result<KeptTake> {
     let (fps, n_before) = (motion.fps, motion.n_frames());
     let lengths = bones::measure(&captured.motion);
     let n_frames = n_common(n_before, &sound, fps);

@@ -14,7 +14,7 @@ use crate::dataset::stats::DatasetStats;
 use crate::dataset::write::part;
 use crate::dataset::write::writer::DatasetWriter;
 use crate::dataset::{INFO, shared_sound};
-use crate::mocap::captured::Kind;
+use crate::mocap::captured::MotionKind;
 use crate::stage::progress::Progress;
 use anyhow::{Context, Result, ensure};
 use std::collections::{BTreeMap, BTreeSet};
@@ -123,21 +123,21 @@ fn assign(
 
 /// Notes on the kinds of sources for readers of the dataset.
 fn notes(takes: &[TakeFiles]) -> Vec<String> {
-    let there: BTreeSet<Kind> = takes.iter().map(|take| take.kind).collect();
+    let there: BTreeSet<MotionKind> = takes.iter().map(|take| take.kind).collect();
     let mut notes: Vec<String> = there
         .into_iter()
         .map(|kind| match kind {
-            Kind::Authors => {
+            MotionKind::Authors => {
                 "Joints of the authors' text clips: fingers turned to base first, camera axes as they were."
             }
-            Kind::Ted => {
+            MotionKind::Ted => {
                 "Joints of TED Expressive, of a monocular regressor: camera axes as they were, no finger tips."
             }
-            Kind::Bvh => {
+            MotionKind::Bvh => {
                 "Joints of BVH takes: metres, and each take turned about the vertical as a whole so that over it the \
                  speaker faces the camera (`turned_degrees` in a sample's json)."
             }
-            Kind::Shards => "Samples of other datasets of this form, as they were.",
+            MotionKind::Shards => "Samples of other datasets of this form, as they were.",
         })
         .map(str::to_owned)
         .collect();

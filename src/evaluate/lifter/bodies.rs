@@ -34,7 +34,7 @@ pub struct Lifters {
 
 impl Lifters {
     /// Lifters with the weights that `settings` name, or the built-in ones.
-    pub fn new(settings: &config::Lift) -> Result<Self> {
+    pub fn new(settings: &config::LiftConfig) -> Result<Self> {
         Ok(Self { whole: Lifter::new(settings)?, network: weights::body(&settings.body_weights)? })
     }
 }

@@ -10,7 +10,7 @@ use crate::math::vec3;
 use crate::mocap::fingers::files::FingerSet;
 use crate::mocap::fingers::take::Truth;
 use crate::motion::hand_bones::relaxed;
-use crate::motion::view::hand::{Hand, SeenHand, parent};
+use crate::motion::view::hand::{HandJoints, SeenHand, parent};
 use crate::nn::lifter::hand::HandLifter;
 use crate::pipeline::lift::weights;
 use crate::train::lifter::heatmaps;
@@ -35,7 +35,7 @@ const PALM: f64 = 0.093;
 const PX: f64 = 1000.0;
 
 /// Lifter of right hands: keypoints to joints in any unit, the wrist at 0; `None`: not lifted.
-pub type LiftHands<'a> = dyn Fn(&[SeenHand]) -> Result<Vec<Option<Hand>>> + 'a;
+pub type LiftHands<'a> = dyn Fn(&[SeenHand]) -> Result<Vec<Option<HandJoints>>> + 'a;
 
 /// Errors in mm, medians over all compared points of all hands.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -99,9 +99,9 @@ fn row(lift: &LiftHands, set: &FingerSet, n_hands: usize, seed: u64) -> Result<H
     let seen: Vec<SeenHand> = shots.iter().map(|s| s.seen).collect();
     let lifted = lift(&seen)?;
     let whole = set.takes.iter().all(|take| take.has_knuckles());
-    let sized: Vec<Option<Hand>> =
+    let sized: Vec<Option<HandJoints>> =
         shots.iter().zip(&lifted).map(|(s, h)| Some(to_size(&s.truth, h.as_ref()?))).collect();
-    let of = |hands: &[Option<Hand>]| errors(&shots, hands, whole);
+    let of = |hands: &[Option<HandJoints>]| errors(&shots, hands, whole);
     Ok(HandRow {
         set: set.name.clone(),
         size: set.takes.first().map_or("", |take| take.size.text()),
@@ -127,20 +127,20 @@ fn shot(truth: &Truth, rng: &mut ChaCha8Rng) -> ProjectedHand {
 }
 
 /// Lifted hand scaled to the true hand's total bone length.
-fn to_size(truth: &Truth, hand: &Hand) -> Hand {
+fn to_size(truth: &Truth, hand: &HandJoints) -> HandJoints {
     let counts = |j: usize| j == 0 || truth.counted[j];
     let bones: Vec<usize> = (1..N_HAND).filter(|&j| counts(j) && counts(parent(j))).collect();
-    let total = |h: &Hand| bones.iter().map(|&j| vec3::norm(vec3::sub(h[j], h[parent(j)]))).sum::<f64>();
+    let total = |h: &HandJoints| bones.iter().map(|&j| vec3::norm(vec3::sub(h[j], h[parent(j)]))).sum::<f64>();
     let grow = total(&truth.hand) / total(hand).max(1e-9);
     hand.map(|p| vec3::scale(p, grow))
 }
 
-fn flat(seen: &SeenHand) -> Hand {
+fn flat(seen: &SeenHand) -> HandJoints {
     let [x0, y0] = seen[0].unwrap_or_default();
     seen.map(|p| p.map_or([0.0; 3], |[x, y]| [f64::from(x - x0) / PX, f64::from(y - y0) / PX, 0.0]))
 }
 
-fn at_rest(seen: &SeenHand) -> Hand {
+fn at_rest(seen: &SeenHand) -> HandJoints {
     let points = flat(seen);
     let palm = relaxed();
     let back = palm.map(|[x, y, z]| [-x, y, -z]);
@@ -157,7 +157,7 @@ fn at_rest(seen: &SeenHand) -> Hand {
     if palm_fit >= back_fit { palm } else { back }
 }
 
-fn errors(shots: &[ProjectedHand], hands: &[Option<Hand>], whole: bool) -> HandErrors {
+fn errors(shots: &[ProjectedHand], hands: &[Option<HandJoints>], whole: bool) -> HandErrors {
     let (mut plain, mut aligned, mut above, mut n) = (Vec::new(), Vec::new(), 0, 0);
     for (shot, hand) in shots.iter().zip(hands).filter_map(|(s, h)| Some((s, h.as_ref()?))) {
         let counted: Vec<usize> = (1..N_HAND).filter(|&j| shot.truth.counted[j]).collect();
@@ -166,7 +166,7 @@ fn errors(shots: &[ProjectedHand], hands: &[Option<Hand>], whole: bool) -> HandE
         above += usize::from(own.iter().sum::<f32>() > 30.0 * own.len() as f32);
         n += 1;
         plain.extend(own);
-        let with_wrist = |hand: &Hand| [0].iter().chain(&counted).map(|&j| hand[j]).collect::<Vec<_>>();
+        let with_wrist = |hand: &HandJoints| [0].iter().chain(&counted).map(|&j| hand[j]).collect::<Vec<_>>();
         if let Some(fit) = procrustes::similarity(&with_wrist(hand), &with_wrist(&shot.truth.hand)) {
             aligned.extend(counted.iter().map(|&j| off(fit.apply(hand[j]), j)));
         }
@@ -217,7 +217,7 @@ mod tests {
         let truths = set.takes[0].truths()?;
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let shots: Vec<ProjectedHand> = (0..60).map(|_| shot(&truths[0], &mut rng)).collect();
-        let wrong_tip: Vec<Option<Hand>> = shots
+        let wrong_tip: Vec<Option<HandJoints>> = shots
             .iter()
             .map(|s| {
                 let mut hand = s.truth.hand.map(|p| vec3::scale(p, 7.0));

@@ -1,4 +1,4 @@
-//! What the joints of a BVH file are called: every studio, exporter and dataset has names of its own. Names are compared
+//! Names of the joints of a BVH file: every studio, exporter and dataset has names of its own. Names are compared
 //! without prefix, case and separators, so `mixamorig:LeftForeArm`, `CC_Base_L_Forearm`, `LowerArm_L` and
 //! `left_elbow` all are the left elbow.
 
@@ -29,7 +29,7 @@ const ELBOW: &[&str] = &["forearm", "lowerarm", "lowarm", "radius", "elbow"];
 const WRIST: &[&str] = &["wrist", "hand"];
 const HIP: &[&str] = &["upleg", "upperleg", "thigh", "femur", "hip", "leg"];
 
-/// Which of `names` plays each of the ten roles; `None`: nobody.
+/// Index of the name that plays each of the ten roles; `None`: no name does.
 pub fn find(names: &[&str]) -> [Option<usize>; 10] {
     let plain: Vec<String> = names.iter().map(|name| plain(name)).collect();
     let find = |stems: &[&str], side: Option<[&str; 2]>| {
@@ -56,7 +56,7 @@ pub fn find(names: &[&str]) -> [Option<usize>; 10] {
     ]
 }
 
-/// Which of `names`, the root first, plays each of the ten roles; the root stands for both hips where a skeleton has
+/// Index of the name, the root first, that plays each of the ten roles; the root stands for both hips where a skeleton has
 /// none. Errors: the roles nobody plays, and the names there are.
 pub fn upper_body(names: &[&str]) -> Result<[usize; 10]> {
     let mut found = find(names);

@@ -10,7 +10,7 @@ use std::path::Path;
 /// A BVH file in memory, in its own units and axes.
 #[derive(Clone, Debug)]
 pub struct Bvh {
-    pub joints: Vec<Joint>,
+    pub joints: Vec<BvhJoint>,
     /// Seconds between two frames.
     pub frame_secs: f64,
     pub n_frames: usize,
@@ -21,7 +21,7 @@ pub struct Bvh {
 
 /// A joint, or the end of a bone (an `End Site`, named after its parent with `_end`).
 #[derive(Clone, Debug)]
-pub struct Joint {
+pub struct BvhJoint {
     pub name: String,
     pub parent: Option<usize>,
     pub offset: Vec3,
@@ -36,7 +36,7 @@ enum Channel {
     Rotation(usize),
 }
 
-/// What a joint's position channels mean. The format never said, and both kinds are about.
+/// Meaning of a joint's position channels: the format does not define it, and both kinds occur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Positions {
     /// They are added to the OFFSET (the original description; CMU files).
@@ -60,7 +60,7 @@ impl Bvh {
         let mut words = Words(text.split_ascii_whitespace());
         words.expect("HIERARCHY")?;
         words.expect("ROOT")?;
-        let mut joints: Vec<Joint> = Vec::new();
+        let mut joints: Vec<BvhJoint> = Vec::new();
         let mut n_channels = 0;
         let mut open: Vec<usize> = Vec::new();
         push(&mut joints, &mut open, words.next("the root's name")?.to_owned(), &mut words)?;
@@ -95,6 +95,7 @@ impl Bvh {
         ensure!(frame_secs > 0.0 && frame_secs.is_finite(), "Frame Time: {frame_secs}");
         let values: Vec<f64> =
             words.0.map(|w| w.parse().map_err(|_| anyhow!("`{w}` is no number"))).collect::<Result<_>>()?;
+        ensure!(n_frames == 0.0 || n_channels > 0, "{n_frames} frames of no channel");
         let expected = n_frames as usize * n_channels;
         ensure!(
             values.len() == expected,
@@ -164,9 +165,15 @@ impl Bvh {
 }
 
 /// Opens a joint below the innermost open one.
-fn push(joints: &mut Vec<Joint>, open: &mut Vec<usize>, name: String, words: &mut Words) -> Result<()> {
+fn push(joints: &mut Vec<BvhJoint>, open: &mut Vec<usize>, name: String, words: &mut Words) -> Result<()> {
     words.expect("{")?;
-    joints.push(Joint { name, parent: open.last().copied(), offset: [0.0; 3], channels: Vec::new(), first_channel: 0 });
+    joints.push(BvhJoint {
+        name,
+        parent: open.last().copied(),
+        offset: [0.0; 3],
+        channels: Vec::new(),
+        first_channel: 0,
+    });
     open.push(joints.len() - 1);
     Ok(())
 }
@@ -262,6 +269,21 @@ mod tests {
         ] {
             let text = format!("{:#}", Bvh::parse(&broken).unwrap_err());
             assert!(text.contains(says), "{text}");
+        }
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn no_text_panics(
+            words in "((HIERARCHY|ROOT|JOINT|End|Site|OFFSET|CHANNELS|MOTION|Frames:|Frame|Time:|Xposition|[{}]|a|-?[0-9.]{1,3})[ \n]){0,30}",
+            cut in 0usize..200,
+        ) {
+            let good = arm("3 Zrotation Yrotation Xrotation", "0 0 0 0 0 0 0 0 0");
+            for text in [words.clone(), format!("HIERARCHY ROOT a {{ {words}"), format!("{}{words}", &good[..cut.min(good.len())])] {
+                if let Ok(bvh) = Bvh::parse(&text) && bvh.n_frames < 1000 {
+                    let _ = bvh.positions(Positions::Auto);
+                }
+            }
         }
     }
 }

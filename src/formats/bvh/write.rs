@@ -12,16 +12,16 @@ const ROTATION_CHANNELS: &str = "Zrotation Xrotation Yrotation";
 
 /// Rotations of a skeleton over time.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Clip {
+pub struct BvhClip {
     pub skeleton: Skeleton,
     pub fps: FrameRate,
-    /// Place of the root, the same in every frame.
+    /// Position of the root, equal in every frame.
     pub root: Vec3,
     /// Frame by frame one local rotation a joint (ends: anything).
     pub local: Vec<Vec<Rotation>>,
 }
 
-impl Clip {
+impl BvhClip {
     /// Number of frames.
     pub fn n_frames(&self) -> usize {
         self.local.len()
@@ -56,7 +56,7 @@ impl Clip {
         String::from_utf8(text).unwrap_or_default()
     }
 
-    /// Writes the same text frame by frame: that of hours is larger than they are. `named` is the clip's skeleton,
+    /// Writes the text of `to_bvh` frame by frame, so that memory does not grow with the clip. `named` is the clip's skeleton,
     /// maybe under other names.
     pub fn write_bvh(&self, named: &Skeleton, out: &mut dyn io::Write) -> io::Result<()> {
         let mut text = String::from("HIERARCHY\n");
@@ -124,7 +124,7 @@ fn head(text: &mut String, joint: &Joint, depth: usize) {
 mod tests {
     use super::*;
 
-    fn clip() -> Clip {
+    fn clip() -> BvhClip {
         let mut skeleton = Skeleton::default();
         let hips = skeleton.push("Hips", None, [0.0; 3], false);
         let left = skeleton.push("Left", Some(hips), [1.0, 0.0, 0.0], false);
@@ -135,7 +135,7 @@ mod tests {
             let r = Rotation::about([0.0, 0.0, 1.0], degrees.to_radians());
             vec![Rotation::IDENTITY, r, Rotation::IDENTITY, Rotation::IDENTITY, Rotation::IDENTITY]
         };
-        Clip { skeleton, fps: FrameRate::new(15, 1), root: [0.0, 90.0, 0.0], local: vec![turn(0.0), turn(30.0)] }
+        BvhClip { skeleton, fps: FrameRate::new(15, 1), root: [0.0, 90.0, 0.0], local: vec![turn(0.0), turn(30.0)] }
     }
 
     #[test]
@@ -171,5 +171,33 @@ mod tests {
         assert!(degrees[1] > 8.0 && degrees[1] < 15.0 && degrees[5] > 75.0, "{degrees:?}");
         given.local.clear();
         assert_eq!(given.resampled(FrameRate::new(30, 1)).n_frames(), 0);
+    }
+
+    proptest::proptest! {
+        #![proptest_config(proptest::test_runner::Config::with_cases(48))]
+        #[test]
+        fn what_is_written_is_read_back(
+            turns in proptest::collection::vec(([-1.0f64..1.0, -1.0f64..1.0, -1.0f64..1.0], -3.1f64..3.1), 6),
+            offsets in [-50.0f64..50.0, -50.0f64..50.0, -50.0f64..50.0],
+        ) {
+            let mut skeleton = Skeleton::default();
+            let hips = skeleton.push("Hips", None, [0.0; 3], false);
+            let spine = skeleton.push("Spine", Some(hips), offsets, false);
+            skeleton.push("", Some(spine), [0.0, 10.0, 1.0], true);
+            let turn = |(axis, angle): ([f64; 3], f64)| {
+                let axis = crate::math::vec3::unit(axis, 1e-3).unwrap_or([0.0, 1.0, 0.0]);
+                Rotation::about(axis, angle)
+            };
+            let local = turns.chunks(2).map(|t| vec![turn(t[0]), turn(t[1]), Rotation::IDENTITY]).collect();
+            let clip = BvhClip { skeleton, fps: FrameRate::new(30, 1), root: [1.0, 90.0, -2.0], local };
+            let read = crate::formats::bvh::read::Bvh::parse(&clip.to_bvh()).unwrap();
+            proptest::prop_assert_eq!(read.n_frames, clip.n_frames());
+            let positions = read.positions(crate::formats::bvh::read::Positions::Replace);
+            for (frame, found) in positions.iter().enumerate() {
+                for (a, b) in found.iter().zip(clip.positions(frame)) {
+                    proptest::prop_assert!((0..3).all(|k| (a[k] - b[k]).abs() < 1e-4), "{a:?} {b:?}");
+                }
+            }
+        }
     }
 }

@@ -12,9 +12,9 @@ use anyhow::{Context, Result, bail, ensure};
 use std::path::Path;
 
 /// fx, fy, cx, cy of a depth camera, px.
-type Camera = [f64; 4];
-const NYU_CAMERA: Camera = [588.04, 587.08, 320.0, 240.0];
-const ICVL_CAMERA: Camera = [241.42, 241.42, 160.0, 120.0];
+type CameraIntrinsics = [f64; 4];
+const NYU_CAMERA: CameraIntrinsics = [588.04, 587.08, 320.0, 240.0];
+const ICVL_CAMERA: CameraIntrinsics = [241.42, 241.42, 160.0, 120.0];
 
 /// House points of NYU's: tip and middle joint of little, ring, middle and index finger, then the thumb's last three.
 const NYU: [usize; 11] = [20, 18, 16, 14, 12, 10, 8, 6, 4, 3, 2];
@@ -49,7 +49,7 @@ fn parse(text: &str, name: String) -> Result<FingerTake> {
 }
 
 /// The points of a line in mm, axes of the camera (x right, y down, z away).
-fn points(row: &[f64], [fx, fy, cx, cy]: Camera) -> Vec<Vec3> {
+fn points(row: &[f64], [fx, fy, cx, cy]: CameraIntrinsics) -> Vec<Vec3> {
     let (uvds, _) = row.as_chunks::<3>();
     uvds.iter().map(|&[u, v, d]| [(u - cx) * d / fx, (v - cy) * d / fy, d]).collect()
 }
@@ -123,7 +123,7 @@ mod tests {
     use super::*;
     use crate::motion::hand_bones::relaxed;
 
-    fn line(points: &[Vec3], [fx, fy, cx, cy]: Camera) -> String {
+    fn line(points: &[Vec3], [fx, fy, cx, cy]: CameraIntrinsics) -> String {
         let numbers = points.iter().flat_map(|&[x, y, z]| [fx * x / z + cx, fy * y / z + cy, z]);
         numbers.map(|v| format!("{v} ")).collect::<String>() + "\n"
     }

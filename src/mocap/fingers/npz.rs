@@ -58,7 +58,7 @@ fn ted(joints: &ArrayD<f64>, name: &str) -> Vec<FingerTake> {
 /// Degrees by which the fingers of the rest hand fan out, in the order thumb to little, towards the thumb. SMPL-X has
 /// the little finger spread most at rest; motion brings it back.
 const REST_FAN: [f64; 5] = [45.0, 8.0, 0.0, -12.0, -26.0];
-/// Where the fingers begin on the palm, degrees towards the thumb.
+/// Directions of the knuckles on the palm, degrees towards the thumb.
 const REST_PALM: [f64; 5] = [48.0, 15.0, 1.0, -12.0, -25.0];
 
 /// Joints 25..40 are the left hand's, 40..55 the right's, as axis-angle vectors in the axes of the T-pose (left

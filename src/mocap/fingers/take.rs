@@ -1,11 +1,11 @@
 //! Captured or labelled fingers of one hand over time, and how they become hands of one size that errors are measured
-//! on. Where they come from is `finger_files`'.
+//! on. `files` finds them.
 
 use crate::math::order::lower_median;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::motion::hand_bones::{BONES, METRES};
-use crate::motion::view::hand::Hand;
+use crate::motion::view::hand::HandJoints;
 use crate::types::pose2d::N_HAND;
 use crate::types::skeleton::Side;
 use anyhow::{Context, Result};
@@ -22,7 +22,7 @@ pub struct FingerTake {
     pub frames: Vec<Fingers>,
     /// Points that are the source's own; the others only help to see the hand and count in no error.
     pub counted: [bool; N_HAND],
-    /// What is set to the reference length.
+    /// Stretch that is set to the reference length.
     pub size: Size,
 }
 
@@ -39,7 +39,7 @@ pub enum Size {
 }
 
 impl Size {
-    /// What it is, for people.
+    /// Name of the stretch, for people.
     pub const fn text(self) -> &'static str {
         match self {
             Self::Phalanx => "middle proximal phalanx 48 mm",
@@ -48,8 +48,8 @@ impl Size {
         }
     }
 
-    /// Its length in a frame.
-    fn of(self, fingers: &Fingers) -> Option<f64> {
+    /// Length of the stretch in a frame.
+    fn length(self, fingers: &Fingers) -> Option<f64> {
         let between = |a: usize, b: usize| Some(vec3::norm(vec3::sub(fingers[a]?, fingers[b]?)));
         match self {
             Self::Phalanx => between(9, 10),
@@ -58,7 +58,7 @@ impl Size {
         }
     }
 
-    /// Its length in the reference hand, metres.
+    /// Length of the stretch in the reference hand, metres.
     fn reference(self) -> f64 {
         let [palm, first, second, last] = BONES[2];
         METRES
@@ -73,7 +73,7 @@ impl Size {
 /// A right hand in metres with the wrist at 0, and which of its points are there (the others lie on the wrist).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Truth {
-    pub hand: Hand,
+    pub hand: HandJoints,
     pub there: [bool; N_HAND],
     pub counted: [bool; N_HAND],
 }
@@ -87,7 +87,7 @@ impl FingerTake {
     /// All frames with a wrist as right hands of the reference size. Errors: the stretch that gives the size is
     /// nowhere, or of no length.
     pub fn truths(&self) -> Result<Vec<Truth>> {
-        let lengths = self.frames.iter().filter_map(|f| self.size.of(f)).map(|l| l as f32);
+        let lengths = self.frames.iter().filter_map(|f| self.size.length(f)).map(|l| l as f32);
         let length = lower_median(lengths.filter(|l| *l > 0.0));
         let length = length.with_context(|| format!("{}: no frame has its {}", self.name, self.size.text()))?;
         let grow = self.size.reference() / f64::from(length);

@@ -1,11 +1,11 @@
-//! What the body lifter sees: a window of frames centred on its neck, in one scale, beside what a longer stretch tells
+//! The body lifter's input: a window of frames centred on its neck, in one scale, beside what a longer stretch tells
 //! about the body. Training and lifting meet here, so that both show the network the same thing. The scale is the
 //! largest apparent bone of the stretch (a shoulder width would collapse where the speaker turns); the longest
 //! appearance of each kind of bone tells the body's proportions, and with them how far a bone points at the camera.
 
 use crate::math::order::Ordered;
 use crate::math::vec3;
-use crate::motion::upper_body::{L_HIP, L_SHOULDER, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, Seen};
+use crate::motion::upper_body::{L_HIP, L_SHOULDER, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, SeenBody};
 use crate::types::skeleton::BODY_BONES;
 
 /// Frames of the stretch before and after the middle one.
@@ -19,31 +19,31 @@ pub const N_OUT: usize = 3 * N_POINTS;
 
 /// A window as the network sees it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct View {
+pub struct BodyView {
     /// [N_IN][window]: channel `3 * point + k` over time; k: x, y, seen (1) or held from the nearest frame (0).
     pub numbers: Vec<f32>,
     /// px that are 1 in `numbers`.
     pub scale: f32,
 }
 
-impl View {
+impl BodyView {
     /// The view of frame `t`: `window` frames (an odd number), `step` apart, between two frames where that is no whole
     /// number; before the first and after the last frame the body stands still. `None` when a shoulder is never seen
     /// in the window, or everything is one spot.
-    pub fn around(seen: &[Seen], t: usize, window: usize, step: f64) -> Option<Self> {
+    pub fn around(seen: &[SeenBody], t: usize, window: usize, step: f64) -> Option<Self> {
         let last = seen.len().checked_sub(1)? as f64;
         let place = |d: isize| t as f64 + d as f64 * step;
         let half = window as isize / 2;
-        let frames: Vec<Seen> = (-half..=half).map(|d| at(seen, place(d).clamp(0.0, last))).collect();
+        let frames: Vec<SeenBody> = (-half..=half).map(|d| at(seen, place(d).clamp(0.0, last))).collect();
         let inside = |d: &isize| (0.0..=last).contains(&place(*d));
         let reach = AROUND.max(half);
-        let stretch: Vec<Seen> = (-reach..=reach).filter(inside).map(|d| at(seen, place(d))).collect();
-        Self::of(&frames, &longest(&stretch))
+        let stretch: Vec<SeenBody> = (-reach..=reach).filter(inside).map(|d| at(seen, place(d))).collect();
+        Self::from_frames(&frames, &longest(&stretch))
     }
 
     /// The view of `frames` of a body whose bones appear at most so long. A point not seen is held from the nearest
     /// frame that shows it, moving with the neck; one never seen lies on the neck.
-    fn of(frames: &[Seen], longest: &[f32; N_KINDS]) -> Option<Self> {
+    fn from_frames(frames: &[SeenBody], longest: &[f32; N_KINDS]) -> Option<Self> {
         let n = frames.len();
         let right = held(frames.iter().map(|f| f[R_SHOULDER]).collect())?;
         let left = held(frames.iter().map(|f| f[L_SHOULDER]).collect())?;
@@ -119,7 +119,7 @@ pub fn mirror_mean(output: &[f32], of_mirrored: &[f32]) -> Vec<f32> {
 }
 
 /// The points at a place between two frames: in proportion where both show a point, else as in the nearer one.
-fn at(seen: &[Seen], place: f64) -> Seen {
+fn at(seen: &[SeenBody], place: f64) -> SeenBody {
     let (before, after) = (&seen[place.floor() as usize], &seen[place.ceil() as usize]);
     let share = place.fract() as f32;
     std::array::from_fn(|j| match (before[j], after[j]) {
@@ -149,12 +149,12 @@ fn held(mut track: Vec<Option<[f32; 2]>>) -> Option<Vec<[f32; 2]>> {
     track.into_iter().collect()
 }
 
-/// How long each kind of bone appears at most, in px: of each bone the tenth of the frames where it is largest is left
+/// Largest apparent length of each kind of bone, in px: of each bone the tenth of the frames where it is largest is left
 /// out, so that one stray point does not stretch a body. 0: never seen.
-fn longest(frames: &[Seen]) -> [f32; N_KINDS] {
+fn longest(frames: &[SeenBody]) -> [f32; N_KINDS] {
     let apart = |a: Option<[f32; 2]>, b: Option<[f32; 2]>| Some((a?[0] - b?[0]).hypot(a?[1] - b?[1]));
     let middle = |a: Option<[f32; 2]>, b: Option<[f32; 2]>| Some([(a?[0] + b?[0]) / 2.0, (a?[1] + b?[1]) / 2.0]);
-    let neck = |f: &Seen| middle(f[R_SHOULDER], f[L_SHOULDER]);
+    let neck = |f: &SeenBody| middle(f[R_SHOULDER], f[L_SHOULDER]);
     let bone = |(a, b): (usize, usize)| large(frames.iter().filter_map(|f| apart(f[a], f[b])));
     [
         bone(BODY_BONES[0]),
@@ -177,11 +177,11 @@ mod tests {
 
     const WINDOW: usize = 27;
 
-    fn middle_view(frames: &[Seen]) -> Option<View> {
-        View::around(frames, frames.len() / 2, WINDOW, 1.0)
+    fn middle_view(frames: &[SeenBody]) -> Option<BodyView> {
+        BodyView::around(frames, frames.len() / 2, WINDOW, 1.0)
     }
 
-    fn frame(shift: f32) -> Seen {
+    fn frame(shift: f32) -> SeenBody {
         let points = [
             [0., -40.],
             [-50., 0.],
@@ -198,8 +198,8 @@ mod tests {
 
     #[test]
     fn a_view_forgets_place_and_size() {
-        let frames: Vec<Seen> = (0..WINDOW).map(|t| frame(t as f32)).collect();
-        let twice: Vec<Seen> =
+        let frames: Vec<SeenBody> = (0..WINDOW).map(|t| frame(t as f32)).collect();
+        let twice: Vec<SeenBody> =
             frames.iter().map(|f| f.map(|p| p.map(|[x, y]| [2.0 * x + 7.0, 2.0 * y - 9.0]))).collect();
         let (a, b) = (middle_view(&frames).unwrap(), middle_view(&twice).unwrap());
         assert_eq!((a.scale, b.scale), (100.0, 200.0));
@@ -211,8 +211,8 @@ mod tests {
 
     #[test]
     fn the_mirror_swaps_the_sides_and_back() {
-        let frames: Vec<Seen> = (0..WINDOW).map(|t| frame(3.0 * t as f32)).collect();
-        let flipped: Vec<Seen> = frames.iter().map(|f| MIRROR.map(|j| f[j].map(|[x, y]| [900.0 - x, y]))).collect();
+        let frames: Vec<SeenBody> = (0..WINDOW).map(|t| frame(3.0 * t as f32)).collect();
+        let flipped: Vec<SeenBody> = frames.iter().map(|f| MIRROR.map(|j| f[j].map(|[x, y]| [900.0 - x, y]))).collect();
         let (a, b) = (middle_view(&frames).unwrap(), middle_view(&flipped).unwrap());
         assert!(a.mirrored().numbers.iter().zip(&b.numbers).all(|(x, y)| (x - y).abs() < 1e-5));
         let output: Vec<f32> = (0..N_OUT).map(|i| (i * i) as f32).collect();
@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn what_is_not_seen_is_held_beside_the_neck() {
-        let mut frames: Vec<Seen> = (0..WINDOW).map(|t| frame(10.0 * t as f32)).collect();
+        let mut frames: Vec<SeenBody> = (0..WINDOW).map(|t| frame(10.0 * t as f32)).collect();
         for f in &mut frames[5..] {
             f[R_WRIST] = None;
         }
@@ -241,14 +241,14 @@ mod tests {
 
     #[test]
     fn between_two_frames_points_lie_in_proportion() {
-        let frames: Vec<Seen> = vec![[Some([0.0, 4.0]); 9], [Some([2.0, 8.0]); 9], [None; 9]];
+        let frames: Vec<SeenBody> = vec![[Some([0.0, 4.0]); 9], [Some([2.0, 8.0]); 9], [None; 9]];
         assert_eq!(at(&frames, 0.25)[0], Some([0.5, 5.0]));
         assert_eq!((at(&frames, 1.4)[0], at(&frames, 1.6)[0]), (Some([2.0, 8.0]), None));
     }
 
     #[test]
     fn a_longer_stretch_tells_the_proportions() {
-        let mut frames: Vec<Seen> = (0..71).map(|_| frame(0.0)).collect();
+        let mut frames: Vec<SeenBody> = (0..71).map(|_| frame(0.0)).collect();
         // the left forearm is stretched for a while, outside the window of the middle frame
         frames[55..67].iter_mut().for_each(|f| f[L_WRIST] = Some([355.0, 380.0]));
         frames[20][L_WRIST] = Some([3550.0, 380.0]);

@@ -8,7 +8,7 @@ use crate::types::skeleton::Side;
 /// Keypoints of a hand in px, wrist first, then thumb to little finger, each base to tip; `None`: not seen.
 pub type SeenHand = [Option<[f32; 2]>; N_HAND];
 /// A hand in camera axes, the wrist at the origin.
-pub type Hand = [Vec3; N_HAND];
+pub type HandJoints = [Vec3; N_HAND];
 
 /// Numbers in: x, y and whether it was seen, a point.
 pub const N_IN: usize = 3 * N_HAND;
@@ -38,7 +38,7 @@ pub struct HandView {
 impl HandView {
     /// The view of one hand of that side. A point not seen lies on the wrist. `None` when the wrist or all knuckles
     /// are not seen, or everything is one spot.
-    pub fn of(seen: &SeenHand, side: Side) -> Option<Self> {
+    pub fn new(seen: &SeenHand, side: Side) -> Option<Self> {
         let mirrored = side == Side::Left;
         let wrist = seen[0]?;
         let flip = if mirrored { -1.0 } else { 1.0 };
@@ -69,7 +69,7 @@ impl HandView {
     }
 
     /// A hand given in the axes of the picture (px, wrist at 0) as it lies in the view: what the network should say.
-    pub fn wanted(&self, hand: &Hand) -> [f32; N_OUT] {
+    pub fn wanted(&self, hand: &HandJoints) -> [f32; N_OUT] {
         let flip = if self.mirrored { -1.0 } else { 1.0 };
         let mut wanted = [0.0; N_OUT];
         for (j, p) in hand.iter().enumerate() {
@@ -84,7 +84,7 @@ impl HandView {
 
     /// The hand in px, in the axes of the picture, from the network's `output` (N_OUT numbers): x and y are what it
     /// adds to the input.
-    pub fn hand(&self, output: &[f32]) -> Hand {
+    pub fn hand(&self, output: &[f32]) -> HandJoints {
         let place = |j: usize| {
             let (x, y) = (self.numbers[3 * j] + output[3 * j], self.numbers[3 * j + 1] + output[3 * j + 1]);
             let back = self.turn[0] * x + self.turn[1] * y;
@@ -104,14 +104,14 @@ impl HandView {
 mod tests {
     use super::*;
 
-    fn spread_hand() -> Hand {
+    fn spread_hand() -> HandJoints {
         std::array::from_fn(|j| {
             let (finger, phalanx) = (j.div_ceil(4), (j + 3) % 4);
             if j == 0 { [0.0; 3] } else { [10.0 * finger as f64 - 25.0, -40.0 - 12.0 * phalanx as f64, 3.0 * j as f64] }
         })
     }
 
-    fn seen(hand: &Hand, angle: f32) -> SeenHand {
+    fn seen(hand: &HandJoints, angle: f32) -> SeenHand {
         hand.map(|[x, y, _]| {
             let (x, y) = (x as f32, y as f32);
             Some([100.0 + angle.cos() * x - angle.sin() * y, 50.0 + angle.sin() * x + angle.cos() * y])
@@ -121,11 +121,11 @@ mod tests {
     #[test]
     fn a_view_forgets_place_turn_and_size_and_gives_them_back() {
         let hand = spread_hand();
-        let upright = HandView::of(&seen(&hand, 0.0), Side::Right).unwrap();
-        let turned = HandView::of(&seen(&hand.map(|p| p.map(|v| 3.0 * v)), 2.0), Side::Right).unwrap();
+        let upright = HandView::new(&seen(&hand, 0.0), Side::Right).unwrap();
+        let turned = HandView::new(&seen(&hand.map(|p| p.map(|v| 3.0 * v)), 2.0), Side::Right).unwrap();
         assert!(upright.numbers.iter().zip(&turned.numbers).all(|(a, b)| (a - b).abs() < 1e-4));
         for side in [Side::Left, Side::Right] {
-            let view = HandView::of(&seen(&hand, 0.0), side).unwrap();
+            let view = HandView::new(&seen(&hand, 0.0), side).unwrap();
             let back = view.hand(&view.wanted(&hand));
             let worst =
                 (0..N_HAND).flat_map(|j| (0..3).map(move |k| (j, k))).map(|(j, k)| (back[j][k] - hand[j][k]).abs());
@@ -135,18 +135,18 @@ mod tests {
 
     #[test]
     fn a_left_hand_is_a_right_hand_in_the_mirror() {
-        let right = HandView::of(&seen(&spread_hand(), 0.3), Side::Right).unwrap();
+        let right = HandView::new(&seen(&spread_hand(), 0.3), Side::Right).unwrap();
         let mirrored = seen(&spread_hand(), 0.3).map(|p| p.map(|[x, y]| [640.0 - x, y]));
-        let left = HandView::of(&mirrored, Side::Left).unwrap();
+        let left = HandView::new(&mirrored, Side::Left).unwrap();
         assert!(right.numbers.iter().zip(&left.numbers).all(|(a, b)| (a - b).abs() < 1e-4));
     }
 
     #[test]
     fn no_hand_no_view() {
-        assert!(HandView::of(&[None; N_HAND], Side::Left).is_none());
-        assert!(HandView::of(&[Some([5.0, 5.0]); N_HAND], Side::Left).is_none());
+        assert!(HandView::new(&[None; N_HAND], Side::Left).is_none());
+        assert!(HandView::new(&[Some([5.0, 5.0]); N_HAND], Side::Left).is_none());
         let mut one = [None; N_HAND];
         one[0] = Some([1.0, 1.0]);
-        assert!(HandView::of(&one, Side::Left).is_none());
+        assert!(HandView::new(&one, Side::Left).is_none());
     }
 }

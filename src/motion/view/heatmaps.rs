@@ -2,7 +2,7 @@
 //! middle knuckle, and the hand's own frame that its two networks meet in. House point order: the paper's points 11,
 //! 12 and 20 are 10, 9 and 17 here.
 
-use super::hand::{Hand, SeenHand};
+use super::hand::{HandJoints, SeenHand};
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::types::pose2d::N_HAND;
@@ -27,7 +27,7 @@ pub struct Crop {
 impl Crop {
     /// About the middle knuckle (or the middle of the points), so large that all seen points lie inside. `None` when
     /// no two points differ.
-    pub fn of(seen: &SeenHand) -> Option<Self> {
+    pub fn around(seen: &SeenHand) -> Option<Self> {
         let there = || seen.iter().flatten().map(|p| p.map(f64::from));
         let n = there().count().max(1) as f64;
         let middle = || [0, 1].map(|k| there().map(|p| p[k]).sum::<f64>() / n);
@@ -67,7 +67,7 @@ fn profile(at: f64) -> [f64; PLACES] {
 /// A hand in its own frame, the middle finger's first phalanx 1 long, and the three axes of the frame (rows): the
 /// middle knuckle lies on y, the little finger's at z = 0 and x > 0. `right`: z is negated, so that both sides' hands
 /// are alike. `None` where the knuckles and the wrist lie on a line.
-pub fn canonical(hand: &Hand, right: bool) -> Option<(Hand, [Vec3; 3])> {
+pub fn canonical(hand: &HandJoints, right: bool) -> Option<(HandJoints, [Vec3; 3])> {
     let grow = 1.0 / vec3::norm(vec3::sub(hand[9], hand[10]));
     let y = vec3::unit(vec3::sub(hand[9], hand[0]), 1e-9)?;
     let x = vec3::unit(vec3::across(vec3::sub(hand[17], hand[0]), y), 1e-9)?;
@@ -81,7 +81,7 @@ pub fn canonical(hand: &Hand, right: bool) -> Option<(Hand, [Vec3; 3])> {
 }
 
 /// The hand in camera axes from its own frame: rows times the turn, relative to the wrist.
-pub fn assembled(own: &Hand, axes: &[Vec3; 3], right: bool) -> Hand {
+pub fn assembled(own: &HandJoints, axes: &[Vec3; 3], right: bool) -> HandJoints {
     let mirror = if right { -1.0 } else { 1.0 };
     let place = |p: Vec3| {
         let [x, y, z] = [0, 1, 2].map(|k| vec3::scale(axes[k], if k == 2 { mirror * p[k] } else { p[k] }));
@@ -117,7 +117,7 @@ mod tests {
     fn maps_are_the_means_of_the_large_gaussians() {
         let mut seen: SeenHand = [None; N_HAND];
         (seen[9], seen[4], seen[20]) = (Some([100.0, 50.0]), Some([140.0, 80.0]), Some([60.0, 50.0]));
-        let crop = Crop::of(&seen).unwrap();
+        let crop = Crop::around(&seen).unwrap();
         assert!((crop.side - 100.0).abs() < 1e-9);
         let mut maps = vec![9.0; N_MAPS];
         score_maps(&seen, crop, &mut maps);
@@ -130,6 +130,6 @@ mod tests {
             assert!((f64::from(maps[(py * PLACES + px) * N_HAND + 4]) - mean(px, py)).abs() < 1e-6);
         }
         assert!((0..PLACES * PLACES).all(|k| maps[k * N_HAND] == 0.0), "a point not seen has an empty map");
-        assert!(Crop::of(&[Some([3.0, 3.0]); N_HAND]).is_none());
+        assert!(Crop::around(&[Some([3.0, 3.0]); N_HAND]).is_none());
     }
 }

@@ -1,4 +1,4 @@
-//! What the lifters look at: keypoints of body and hands, normalised, and hand heat-maps.
+//! Inputs of the lifters: keypoints of body and hands, normalised, and hand heat-maps.
 
 pub mod body;
 pub mod hand;

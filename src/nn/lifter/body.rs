@@ -2,8 +2,8 @@
 //! poses over time.
 
 use super::temporal::{Config, TemporalLifter};
-use crate::motion::upper_body::{Pose, Seen};
-use crate::motion::view::body::{N_IN, N_OUT, View, mirror_mean};
+use crate::motion::upper_body::{Pose, SeenBody};
+use crate::motion::view::body::{BodyView, N_IN, N_OUT, mirror_mean};
 use crate::nn::Mode;
 use crate::nn::params::Params;
 use candle_core::{Device, Result, Tensor};
@@ -41,14 +41,14 @@ impl BodyLifter {
     /// window. Before the first and after the last frame the body stands still. The frames of a window
     /// lie `step` frames apart: the network knows motion at 15 frames a second. Each window is looked at in the mirror
     /// as well.
-    pub fn poses(&self, seen: &[Seen], step: f64) -> Result<Vec<Option<Pose>>> {
+    pub fn poses(&self, seen: &[SeenBody], step: f64) -> Result<Vec<Option<Pose>>> {
         let window = self.net.config().receptive_field();
-        let view = |t: usize| View::around(seen, t, window, step);
+        let view = |t: usize| BodyView::around(seen, t, window, step);
         let mut poses = Vec::with_capacity(seen.len());
         for first in (0..seen.len()).step_by(BATCH) {
-            let views: Vec<Option<View>> = (first..seen.len().min(first + BATCH)).map(view).collect();
-            let there: Vec<&View> = views.iter().flatten().collect();
-            let mirrored: Vec<View> = there.iter().map(|view| view.mirrored()).collect();
+            let views: Vec<Option<BodyView>> = (first..seen.len().min(first + BATCH)).map(view).collect();
+            let there: Vec<&BodyView> = views.iter().flatten().collect();
+            let mirrored: Vec<BodyView> = there.iter().map(|view| view.mirrored()).collect();
             let outputs = self.outputs(there.iter().copied().chain(&mirrored))?;
             let (own, other) = outputs.split_at(outputs.len() / 2);
             let mut outputs = own.chunks_exact(N_OUT).zip(other.chunks_exact(N_OUT)).map(|(a, b)| mirror_mean(a, b));
@@ -58,7 +58,7 @@ impl BodyLifter {
     }
 
     /// N_OUT numbers a view.
-    fn outputs<'a>(&self, views: impl Iterator<Item = &'a View>) -> Result<Vec<f32>> {
+    fn outputs<'a>(&self, views: impl Iterator<Item = &'a BodyView>) -> Result<Vec<f32>> {
         let numbers: Vec<f32> = views.flat_map(|view| view.numbers.iter().copied()).collect();
         let window = self.net.config().receptive_field();
         let n_views = numbers.len() / (N_IN * window);
@@ -78,7 +78,7 @@ mod tests {
     fn every_frame_gets_a_pose_and_none_where_nobody_is() -> anyhow::Result<()> {
         let mut params = Params::new(1);
         let lifter = BodyLifter::new(&mut params, &BodyLifter::config(16, &[3, 3, 3]))?;
-        let seen: Seen = std::array::from_fn(|j| Some([j as f32 * 10.0, (j * j) as f32]));
+        let seen: SeenBody = std::array::from_fn(|j| Some([j as f32 * 10.0, (j * j) as f32]));
         let mut frames = vec![seen; 300];
         frames[100..200].fill([None; 9]);
         let poses = lifter.poses(&frames, 1.0)?;

@@ -1,7 +1,7 @@
 //! The hand lifter: the 21 keypoints of one hand in one frame to 21 joints. A plain perceptron on coordinates, which
 //! carry all that heat-maps drawn at the same points would (Zimmermann & Brox 2017 used such maps).
 
-use crate::motion::view::hand::{Hand, HandView, SeenHand};
+use crate::motion::view::hand::{HandJoints, HandView, SeenHand};
 use crate::nn::Mode;
 use crate::nn::ops::dropout::dropout;
 use crate::nn::ops::linear::Linear;
@@ -62,8 +62,8 @@ impl HandLifter {
     }
 
     /// Hands of that side in px, the wrist at 0, in the axes of the picture; `None` where too little is seen.
-    pub fn lift(&self, seen: &[SeenHand], side: Side) -> Result<Vec<Option<Hand>>> {
-        let views: Vec<Option<HandView>> = seen.iter().map(|s| HandView::of(s, side)).collect();
+    pub fn lift(&self, seen: &[SeenHand], side: Side) -> Result<Vec<Option<HandJoints>>> {
+        let views: Vec<Option<HandView>> = seen.iter().map(|s| HandView::new(s, side)).collect();
         let x: Vec<f32> = views.iter().flatten().flat_map(|view| view.numbers).collect();
         if x.is_empty() {
             return Ok(vec![None; seen.len()]);

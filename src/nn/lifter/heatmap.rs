@@ -3,7 +3,7 @@
 //! `hand_lifter`; not built into the program.
 
 use super::hand;
-use crate::motion::view::hand::{Hand, SeenHand};
+use crate::motion::view::hand::{HandJoints, SeenHand};
 use crate::motion::view::heatmaps::{Crop, N_MAPS, PLACES, assembled, score_maps};
 use crate::nn::Mode;
 use crate::nn::ops::conv3x3::Conv3x3;
@@ -109,10 +109,10 @@ impl HeatmapLifter {
 
     /// Hands of that side, the wrist at 0, in the axes of the picture, the middle finger's first phalanx about 1 long;
     /// `None` where too little is seen. Left hands go through the networks in the mirror.
-    pub fn lift(&self, seen: &[SeenHand], side: Side) -> Result<Vec<Option<Hand>>> {
+    pub fn lift(&self, seen: &[SeenHand], side: Side) -> Result<Vec<Option<HandJoints>>> {
         let flip = if side == Side::Left { -1.0 } else { 1.0 };
         let mirrored: Vec<SeenHand> = seen.iter().map(|s| s.map(|p| p.map(|[x, y]| [flip * x, y]))).collect();
-        let crops: Vec<Option<Crop>> = mirrored.iter().map(Crop::of).collect();
+        let crops: Vec<Option<Crop>> = mirrored.iter().map(Crop::around).collect();
         let there: Vec<(usize, Crop)> = crops.iter().enumerate().filter_map(|(i, c)| Some((i, (*c)?))).collect();
         let mut hands = vec![None; seen.len()];
         for some in there.chunks(BATCH) {

@@ -28,7 +28,7 @@ use std::path::{Path, PathBuf};
 /// A speaker's videos to shards. Its unit is the speaker.
 pub struct DatasetStage {
     settings: config::DatasetConfig,
-    speakers: Vec<config::Speaker>,
+    speakers: Vec<config::SpeakerConfig>,
     work: PathBuf,
     /// Videos that came through the stages before.
     ready: Vec<Unit>,
@@ -81,7 +81,7 @@ impl DatasetStage {
 
     fn about(&self, speaker: &Unit, first: &LiftedVideo) -> About {
         let said = self.speakers.iter().find(|said| said.name == speaker.speaker).cloned().unwrap_or_default();
-        let config::Speaker { licence, consent, source, .. } = said;
+        let config::SpeakerConfig { licence, consent, source, .. } = said;
         let models = self.models.clone();
         About { models, licence, consent, source, ..About::new(&speaker.speaker, first.intervals.fps) }
     }

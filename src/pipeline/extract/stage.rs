@@ -21,11 +21,11 @@ use std::path::Path;
 
 /// Video to sound and timeline.
 pub struct ExtractStage {
-    settings: config::Extract,
+    settings: config::ExtractConfig,
 }
 
 impl ExtractStage {
-    pub fn new(settings: &config::Extract) -> Self {
+    pub fn new(settings: &config::ExtractConfig) -> Self {
         Self { settings: settings.clone() }
     }
 }

@@ -4,7 +4,9 @@ use super::gaps::long_gaps;
 use super::interval_view::IntervalView;
 use super::observed::ObservedBody;
 use crate::math::order::lower_median;
-use crate::motion::upper_body::{ARMS, L_HIP, L_SHOULDER, NOSE, Pose, R_HIP, R_SHOULDER, REFERENCE_SIZE, Seen, size};
+use crate::motion::upper_body::{
+    ARMS, L_HIP, L_SHOULDER, NOSE, Pose, R_HIP, R_SHOULDER, REFERENCE_SIZE, SeenBody, size,
+};
 use crate::nn::lifter::body::BodyLifter;
 use crate::types::interval::Interval;
 use crate::types::pose2d::Keypoints;
@@ -45,7 +47,7 @@ pub fn lift(
     for first in (0..n_frames).step_by(frames(GO).max(1)) {
         let end = n_frames.min(first + frames(GO).max(1));
         let from = first.saturating_sub(margin);
-        let points: Vec<Seen> = (from..n_frames.min(end + margin)).map(|t| sight.frame(t)).collect();
+        let points: Vec<SeenBody> = (from..n_frames.min(end + margin)).map(|t| sight.frame(t)).collect();
         let poses = lifter.poses(&points, step)?;
         for (t, pose) in poses.iter().enumerate().take(end - from).skip(first - from) {
             if let Some(pose) = pose {

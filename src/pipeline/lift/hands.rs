@@ -5,7 +5,7 @@ use super::gaps;
 use super::hand_depth;
 use super::observed::FARTHEST_PX;
 use crate::math::vec3;
-use crate::motion::view::hand::{Hand, HandView, N_IN, N_OUT, SeenHand, parent};
+use crate::motion::view::hand::{HandJoints, HandView, N_IN, N_OUT, SeenHand, parent};
 use crate::nn::Mode;
 use crate::nn::lifter::hand::HandLifter;
 use crate::types::pose2d::{HAND_SEEN_SCORE, N_HAND};
@@ -34,7 +34,7 @@ pub fn lift(
         let views: Vec<(usize, HandView)> = (start..end)
             .filter_map(|t| {
                 let seen = seen_points(&points, t);
-                let view = enough(&seen).then(|| HandView::of(&seen, side)).flatten()?;
+                let view = enough(&seen).then(|| HandView::new(&seen, side)).flatten()?;
                 (0..N_HAND).for_each(|j| mask[[t, j]] = seen[j].is_some());
                 Some((t, view))
             })
@@ -73,7 +73,7 @@ fn enough(seen: &SeenHand) -> bool {
 }
 
 /// The hand with all its bones together 1 long; `None` of a hand without extent.
-fn unit_size(hand: Hand) -> Option<Hand> {
+fn unit_size(hand: HandJoints) -> Option<HandJoints> {
     let bones: f64 = (1..N_HAND).map(|j| vec3::norm(vec3::sub(hand[j], hand[parent(j)]))).sum();
     (bones.is_finite() && bones > 1e-9).then(|| hand.map(|p| vec3::scale(p, 1.0 / bones)))
 }
@@ -111,7 +111,7 @@ mod tests {
     #[test]
     fn a_hand_without_extent_is_none() {
         assert!(unit_size([[1.0; 3]; N_HAND]).is_none());
-        let straight: Hand =
+        let straight: HandJoints =
             std::array::from_fn(|j| if j == 0 { [0.0; 3] } else { [0.0, -2.0 - ((j - 1) % 4) as f64, 0.0] });
         let hand = unit_size(straight).unwrap();
         assert!((hand[9][1] / hand[10][1] - 2.0 / 3.0).abs() < 1e-9);

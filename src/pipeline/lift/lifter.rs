@@ -45,14 +45,14 @@ pub struct Lifted {
 
 impl Lifter {
     /// Loads the networks that `settings` name, or the built-in ones. Errors name the file.
-    pub fn new(settings: &config::Lift) -> Result<Self> {
+    pub fn new(settings: &config::LiftConfig) -> Result<Self> {
         let (body, hands) = (weights::body(&settings.body_weights)?, weights::hands(&settings.hand_weights)?);
         Ok(Self::from_parts(body, hands, settings))
     }
 
     /// With networks that are there already; of `settings` only what follows the networks counts.
-    pub fn from_parts(body: BodyLifter, hands: HandLifter, settings: &config::Lift) -> Self {
-        let config::Lift { smooth_arms, smooth_hands, level, .. } = *settings;
+    pub fn from_parts(body: BodyLifter, hands: HandLifter, settings: &config::LiftConfig) -> Self {
+        let config::LiftConfig { smooth_arms, smooth_hands, level, .. } = *settings;
         Self { body, hands, smooth_arms, smooth_hands, level }
     }
 

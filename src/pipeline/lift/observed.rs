@@ -3,7 +3,9 @@
 
 use super::gaps;
 use crate::math::order::{lower_median, median};
-use crate::motion::upper_body::{COCO, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_HIP, R_SHOULDER, R_WRIST, Seen};
+use crate::motion::upper_body::{
+    COCO, L_HIP, L_SHOULDER, L_WRIST, N_POINTS, NOSE, R_HIP, R_SHOULDER, R_WRIST, SeenBody,
+};
 use crate::types::interval::Interval;
 use crate::types::pose2d::{Keypoints, SEEN_SCORE, coco};
 use crate::types::skeleton::BODY_BONES;
@@ -48,14 +50,14 @@ impl ObservedBody {
     }
 
     /// A frame as the body lifter takes it.
-    pub fn frame(&self, t: usize) -> Seen {
+    pub fn frame(&self, t: usize) -> SeenBody {
         std::array::from_fn(|j| at(&self.points, t, j))
     }
 }
 
 /// The points of a frame. A wrist that the body model misses is taken from the hand model, a nose from the eyes or,
 /// further, the ears.
-fn shown(keypoints: &Keypoints, t: usize) -> Seen {
+fn shown(keypoints: &Keypoints, t: usize) -> SeenBody {
     let point = |array: &Array3<f32>, j: usize| {
         let [x, y, score] = [0, 1, 2].map(|k| array[[t, j, k]]);
         (score >= SEEN_SCORE && x.abs() <= FARTHEST_PX && y.abs() <= FARTHEST_PX).then_some([x, y])

@@ -10,7 +10,7 @@ use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
 
 /// Whole frames of the longest gap of the body that is filled.
-pub fn max_gap_frames(rules: &config::Segment, fps: FrameRate) -> usize {
+pub fn max_gap_frames(rules: &config::SegmentConfig, fps: FrameRate) -> usize {
     (rules.max_body_gap_secs * fps.per_sec() + 1e-6) as usize
 }
 

@@ -26,15 +26,15 @@ use std::path::{Path, PathBuf};
 /// Lifts videos.
 pub struct LiftStage {
     lifter: Lifter,
-    settings: config::Lift,
-    rules: config::Segment,
+    settings: config::LiftConfig,
+    rules: config::SegmentConfig,
     work: PathBuf,
 }
 
 impl LiftStage {
     /// Lifts and judges the bones as `settings` say; pieces and gaps are judged by `rules`. Reads the earlier stages' files under the folder `work`.
     /// Errors: weights that cannot be loaded.
-    pub fn new(settings: &config::Lift, rules: &config::Segment, work: &Path) -> Result<Self> {
+    pub fn new(settings: &config::LiftConfig, rules: &config::SegmentConfig, work: &Path) -> Result<Self> {
         let lifter = Lifter::new(settings)?;
         Ok(Self { lifter, settings: settings.clone(), rules: rules.clone(), work: work.to_owned() })
     }
@@ -215,7 +215,7 @@ mod tests {
         let (fps, image_size) = (FrameRate::new(15, 1), [640, 480]);
         let mut keypoints = Keypoints { fps, image_size, body, left_hand: none.clone(), right_hand: none };
         unsee(&mut keypoints, &repeated);
-        let motion = Lifter::new(&config::Lift::default()).unwrap().lift(&keypoints).unwrap();
+        let motion = Lifter::new(&config::LiftConfig::default()).unwrap().lift(&keypoints).unwrap();
         let wrist = skeleton::L_WRIST;
         for (t, is_repeated) in repeated.iter().enumerate().take(n_frames - 3).skip(3) {
             assert_eq!(motion.mask[[t, wrist]], !is_repeated, "frame {t}");

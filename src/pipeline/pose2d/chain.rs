@@ -25,7 +25,7 @@ const SAME_HAND: f64 = 0.08;
 
 /// The models that look at a frame, and what is followed from frame to frame. One a worker: it runs on one thread.
 pub struct Chain {
-    settings: config::Pose2d,
+    settings: config::Pose2dConfig,
     speaker: SpeakerTracker,
     body: BodyModel,
     hand: Option<HandModel>,
@@ -41,7 +41,12 @@ impl Chain {
     ///
     /// # Errors
     /// An id that is not in the manifest or has another role; a model that cannot be opened (`onnx::OpenError`).
-    pub fn new(runtime: &Runtime, manifest: &Manifest, models_dir: &Path, settings: &config::Pose2d) -> Result<Self> {
+    pub fn new(
+        runtime: &Runtime,
+        manifest: &Manifest,
+        models_dir: &Path,
+        settings: &config::Pose2dConfig,
+    ) -> Result<Self> {
         let entry =
             |key: &str, id: &str, role: ModelRole| manifest.get_as(id, role).with_context(|| format!("pose2d.{key}"));
         let named = |id: &str| !id.is_empty();

@@ -92,7 +92,7 @@ impl SpeakerTracker {
         idx: usize,
         body: &mut BodyModel,
         body_seen: bool,
-        settings: &config::Pose2d,
+        settings: &config::Pose2dConfig,
     ) -> Result<()> {
         let every = settings.person_every.max(1);
         let crowd = self.track.n_people > 1 && idx.is_multiple_of((every / CROWD_LOOKS).max(1));
@@ -121,7 +121,7 @@ impl SpeakerTracker {
         image: &Image,
         points: &[ScoredPoint; 17],
         body: &mut BodyModel,
-        settings: &config::Pose2d,
+        settings: &config::Pose2dConfig,
     ) -> Result<bool> {
         let Some(seen) = Appearance::measure(image, points, settings.joint_score) else { return Ok(false) };
         if let Some((place, colours)) = self.before.take()

@@ -25,8 +25,8 @@ use std::path::{Path, PathBuf};
 
 /// Stage `pose2d`.
 pub struct Pose2dStage {
-    settings: config::Pose2d,
-    models: config::Models,
+    settings: config::Pose2dConfig,
+    models: config::ModelsConfig,
     fps: FrameRate,
     work: PathBuf,
     manifest: Manifest,
@@ -56,7 +56,7 @@ impl Pose2dStage {
 
     /// The models it asks, with the key of `[pose2d]` that names each.
     pub fn used(&self) -> Result<Vec<(&'static str, &ModelEntry)>> {
-        let config::Pose2d { person, body, hand, palm, .. } = &self.settings;
+        let config::Pose2dConfig { person, body, hand, palm, .. } = &self.settings;
         let keys = [("person", person), ("body", body), ("hand", hand), ("palm", palm)];
         let named = keys.into_iter().filter(|(_, id)| !id.is_empty());
         named.map(|(key, id)| Ok((key, self.manifest.get(id).with_context(|| format!("pose2d.{key}"))?))).collect()

@@ -12,7 +12,7 @@ use crate::types::interval::{Interval, Intervals};
 use crate::types::time::FrameRate;
 
 /// Judges a whole video.
-pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::Segment) -> (Intervals, Ledger) {
+pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::SegmentConfig) -> (Intervals, Ledger) {
     let n_frames = measures.n_frames();
     let begins_shot = |t: usize| {
         let score = f64::from(measures.shot_score[t]);
@@ -64,7 +64,7 @@ fn pieces(
     measures: &Measures,
     begins_shot: &[bool],
     fps: FrameRate,
-    rules: &config::Segment,
+    rules: &config::SegmentConfig,
 ) -> Vec<(Interval, Option<FrameRefusal>)> {
     let reason = |t: usize| refusals[t].map(|refused| refused.refusal);
     let begins = |t: usize| begins_shot[t] || measures.identity[t] > 0.0;
@@ -90,7 +90,7 @@ fn too_short(
     measures: &Measures,
     begins_shot: &[bool],
     fps: FrameRate,
-    rules: &config::Segment,
+    rules: &config::SegmentConfig,
 ) -> Option<FrameRefusal> {
     if piece.n_frames() >= rules.min_frames {
         return None;
@@ -109,7 +109,7 @@ fn too_short(
 }
 
 /// The first rule on pieces that a piece of good frames breaks.
-fn broken_by_piece(piece: Interval, measures: &Measures, rules: &config::Segment) -> Option<FrameRefusal> {
+fn broken_by_piece(piece: Interval, measures: &Measures, rules: &config::SegmentConfig) -> Option<FrameRefusal> {
     piece_rules(rules).into_iter().find_map(|rule| {
         let values = &(rule.values)(measures)[piece.start..piece.end];
         let n = values.iter().filter(|&&value| rule.counted.holds(f64::from(value))).count();

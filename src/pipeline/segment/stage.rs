@@ -19,13 +19,13 @@ use std::path::{Path, PathBuf};
 
 /// Keypoints to intervals worth keeping.
 pub struct SegmentStage {
-    rules: config::Segment,
+    rules: config::SegmentConfig,
     work: PathBuf,
 }
 
 impl SegmentStage {
     /// Judges by `rules`; reads the earlier stages' files under the folder `work`.
-    pub fn new(rules: &config::Segment, work: &Path) -> Self {
+    pub fn new(rules: &config::SegmentConfig, work: &Path) -> Self {
         Self { rules: rules.clone(), work: work.to_owned() }
     }
 

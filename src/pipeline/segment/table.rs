@@ -63,7 +63,7 @@ impl Bound {
 }
 
 /// The rules on frames.
-pub fn frame_rules(rules: &config::Segment) -> [FrameRule; 12] {
+pub fn frame_rules(rules: &config::SegmentConfig) -> [FrameRule; 12] {
     use Bound::{AtLeast, AtMost};
     let score = AtLeast(rules.joint_score);
     let row = |refusal, values: fn(&Measures) -> &[f32], bound, gap| FrameRule {
@@ -95,7 +95,7 @@ pub fn frame_rules(rules: &config::Segment) -> [FrameRule; 12] {
 }
 
 /// The rules on pieces of good frames.
-pub fn piece_rules(rules: &config::Segment) -> [PieceRule; 3] {
+pub fn piece_rules(rules: &config::SegmentConfig) -> [PieceRule; 3] {
     use Bound::{AtLeast, AtMost};
     let row = |refusal, values: fn(&Measures) -> &[f32], counted, share| PieceRule { refusal, values, counted, share };
     let (seen, often) = (AtLeast(rules.joint_score), AtLeast(rules.min_hand_share));

@@ -3,14 +3,14 @@
 use super::thresholds::{THRESHOLDS, ThresholdGrid};
 use super::video::VideoSummary;
 use super::what_if::KeptByThreshold;
-use crate::config::Segment;
+use crate::config::SegmentConfig;
 use crate::report::html::chart::curve::curve;
 use crate::report::html::numbers::{length, with_unit};
 use crate::report::html::{Node, node};
 use serde_json::{Value, json};
 
 /// Seconds kept of all videos, by threshold and value.
-fn sums(kept: &[Option<KeptByThreshold>], rules: &Segment) -> KeptByThreshold {
+fn sums(kept: &[Option<KeptByThreshold>], rules: &SegmentConfig) -> KeptByThreshold {
     let zeros =
         || THRESHOLDS.iter().map(|threshold| vec![0.0; threshold.grid(rules).0.len()]).collect::<KeptByThreshold>();
     kept.iter().flatten().fold(zeros(), |mut sums, of| {
@@ -22,7 +22,7 @@ fn sums(kept: &[Option<KeptByThreshold>], rules: &Segment) -> KeptByThreshold {
 }
 
 /// Data of the script: thresholds with their values and sums, videos with their seconds (in tenths, by threshold).
-pub fn data(kept: &[Option<KeptByThreshold>], videos: &[VideoSummary], rules: &Segment) -> Value {
+pub fn data(kept: &[Option<KeptByThreshold>], videos: &[VideoSummary], rules: &SegmentConfig) -> Value {
     let milli = |secs: f64| (secs * 1000.0).round() / 1000.0;
     let row = |(threshold, sums): (&ThresholdGrid, &Vec<f64>)| {
         let (grid, now) = threshold.grid(rules);
@@ -44,7 +44,7 @@ pub fn data(kept: &[Option<KeptByThreshold>], videos: &[VideoSummary], rules: &S
 }
 
 /// Section of sliders.
-pub fn sliders(kept: &[Option<KeptByThreshold>], rules: &Segment) -> Vec<Node> {
+pub fn sliders(kept: &[Option<KeptByThreshold>], rules: &SegmentConfig) -> Vec<Node> {
     if kept.iter().all(Option::is_none) {
         return vec![node("p").class("empty").text("No video has been judged yet: orator run.")];
     }
@@ -80,7 +80,7 @@ pub fn sliders(kept: &[Option<KeptByThreshold>], rules: &Segment) -> Vec<Node> {
     ]
 }
 
-fn card(i: usize, threshold: &ThresholdGrid, sums: &[f64], most: f64, rules: &Segment) -> Node {
+fn card(i: usize, threshold: &ThresholdGrid, sums: &[f64], most: f64, rules: &SegmentConfig) -> Node {
     let (grid, now) = threshold.grid(rules);
     let id = format!("slider-{}", threshold.key);
     let label = node("label").attr("for", &id).child(node("code").text(threshold.key));

@@ -1,6 +1,6 @@
 //! Thresholds of `[segment]` with sliders: meaning, and grid of values.
 
-use crate::config::Segment;
+use crate::config::SegmentConfig;
 
 /// Steps between the ends of a grid.
 const N_STEPS: u32 = 20;
@@ -15,8 +15,8 @@ pub struct ThresholdGrid {
     /// Ends of the grid.
     pub low: f64,
     pub high: f64,
-    pub get: fn(&Segment) -> f64,
-    pub set: fn(&mut Segment, f64),
+    pub get: fn(&SegmentConfig) -> f64,
+    pub set: fn(&mut SegmentConfig, f64),
 }
 
 /// Grid of a threshold: key, sentence, unit, ends, and the field.
@@ -78,7 +78,7 @@ pub const THRESHOLDS: [ThresholdGrid; 16] = [
 
 impl ThresholdGrid {
     /// Values of the grid, ascending, and the index of the configured one.
-    pub fn grid(&self, rules: &Segment) -> (Vec<f64>, usize) {
+    pub fn grid(&self, rules: &SegmentConfig) -> (Vec<f64>, usize) {
         let configured = (self.get)(rules);
         let step = (self.high - self.low) / f64::from(N_STEPS);
         let round = |value: f64| (value * 1000.0).round() / 1000.0;
@@ -90,7 +90,7 @@ impl ThresholdGrid {
     }
 
     /// Copy of `rules` with this threshold at `value`.
-    pub fn with(&self, rules: &Segment, value: f64) -> Segment {
+    pub fn with(&self, rules: &SegmentConfig, value: f64) -> SegmentConfig {
         let mut other = rules.clone();
         (self.set)(&mut other, value);
         other
@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn every_threshold_can_be_tried_and_every_value_can_be_written() {
-        let rules = Segment::default();
+        let rules = SegmentConfig::default();
         let fields = serde_json::to_value(&rules).unwrap();
         let mut keys: Vec<&str> = fields.as_object().unwrap().keys().map(String::as_str).collect();
         let mut tried = THRESHOLDS.map(|threshold| threshold.key);
@@ -131,7 +131,7 @@ mod tests {
                 assert_eq!(read, threshold.with(&rules, value));
             }
         }
-        let odd = Segment { max_jump: 7.25, ..rules };
+        let odd = SegmentConfig { max_jump: 7.25, ..rules };
         let jump = THRESHOLDS.iter().find(|threshold| threshold.key == "max_jump").unwrap();
         assert_eq!(jump.grid(&odd).0.last(), Some(&7.25));
     }

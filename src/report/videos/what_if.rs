@@ -3,7 +3,7 @@
 //! frames that were never lifted count as good ones.
 
 use super::thresholds::THRESHOLDS;
-use crate::config::Segment;
+use crate::config::SegmentConfig;
 use crate::formats::media_json::MediaInfo;
 use crate::pipeline::lift::refuse::{bone_refusals, exclude_frames, max_gap_frames};
 use crate::pipeline::segment;
@@ -29,7 +29,7 @@ pub struct JudgedVideo<'a> {
 
 impl JudgedVideo<'_> {
     /// The account under `rules`.
-    pub fn ledger(&self, rules: &Segment) -> Ledger {
+    pub fn ledger(&self, rules: &SegmentConfig) -> Ledger {
         let (mut intervals, mut ledger) = segment::judge(self.measures, self.video, rules);
         let bones = bone_refusals(self.bone_change, self.max_bone_change, max_gap_frames(rules, self.video.fps));
         for refusals in [&bones[..], self.open] {
@@ -43,12 +43,12 @@ impl JudgedVideo<'_> {
     }
 
     /// Seconds kept under `rules`.
-    pub fn kept_secs(&self, rules: &Segment) -> f64 {
+    pub fn kept_secs(&self, rules: &SegmentConfig) -> f64 {
         self.ledger(rules).kept_secs()
     }
 
     /// Seconds kept at every value of every threshold, on all cores.
-    pub fn table(&self, rules: &Segment) -> KeptByThreshold {
+    pub fn table(&self, rules: &SegmentConfig) -> KeptByThreshold {
         let row = |threshold: &super::thresholds::ThresholdGrid| -> Vec<f64> {
             let (grid, _) = threshold.grid(rules);
             grid.into_par_iter().map(|value| self.kept_secs(&threshold.with(rules, value))).collect()
@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn other_thresholds_keep_what_the_rules_say_and_what_lifting_refused_stays_out() {
         let video = MediaInfo::new(19.99, 300, FrameRate::new(15, 1));
-        let (measures, rules) = (measures(), Segment::default());
+        let (measures, rules) = (measures(), SegmentConfig::default());
         let max_bone_change = 0.4;
         let none = JudgedVideo { measures: &measures, video: &video, bone_change: &[], max_bone_change, open: &[] };
         assert!((none.kept_secs(&rules) - (19.99 - 1.0 / 15.0)).abs() < 1e-9);

@@ -2,7 +2,7 @@
 //! the worst spans. Ties follow the order of the videos, so the choice is deterministic.
 
 use super::reasons;
-use crate::config::Segment;
+use crate::config::SegmentConfig;
 use crate::formats::media_json::MediaInfo;
 use crate::pipeline::segment::Measures;
 use crate::pipeline::segment::table::{Bound, frame_rules, piece_rules};
@@ -49,7 +49,7 @@ impl Worst {
         ledger: &Ledger,
         (measures, bone_change): (&Measures, &[f32]),
         judged: &MediaInfo,
-        rules: &Segment,
+        rules: &SegmentConfig,
     ) {
         for stretch in &ledger.refused {
             let Some(moment) = moment(video, stretch, (measures, bone_change), judged, rules) else { continue };
@@ -77,7 +77,7 @@ fn moment(
     stretch: &Refused,
     (measures, bone_change): (&Measures, &[f32]),
     judged: &MediaInfo,
-    rules: &Segment,
+    rules: &SegmentConfig,
 ) -> Option<Moment> {
     let n_frames = measures.n_frames();
     let frame = |secs: f64| (secs * judged.fps.per_sec()).round() as usize;
@@ -114,7 +114,7 @@ fn moment(
 fn farthest(
     refusal: Refusal,
     measures: &Measures,
-    rules: &Segment,
+    rules: &SegmentConfig,
     frames: std::ops::Range<usize>,
 ) -> Option<(usize, f64, Bound, bool)> {
     let on_frames = frame_rules(rules).into_iter().filter(|rule| rule.refusal == refusal);
@@ -191,15 +191,15 @@ mod tests {
         let ledger = Ledger { duration_secs: 10.0, refused, ..Ledger::default() };
         let judged = MediaInfo::new(10.0, 100, FrameRate::new(10, 1));
         let mut worst = Worst::new(1);
-        worst.add(0, &ledger, (&measures, &[]), &judged, &Segment::default());
+        worst.add(0, &ledger, (&measures, &[]), &judged, &SegmentConfig::default());
         let frames: Vec<(&str, Vec<usize>)> =
             worst.rules.iter().map(|((_, reason, _), of)| (reason.as_str(), of[0].frames.clone())).collect();
         assert_eq!(frames, [("hands", vec![74]), ("jump", vec![49, 50]), ("too short", vec![92])]);
         assert_eq!(worst.frames_of(0), [49, 50, 74, 92]);
-        worst.add(1, &ledger, (&measures, &[]), &judged, &Segment::default());
+        worst.add(1, &ledger, (&measures, &[]), &judged, &SegmentConfig::default());
         assert!(worst.frames_of(1).is_empty(), "equal ones: the first video's");
         let mut none = Worst::new(0);
-        none.add(0, &ledger, (&measures, &[]), &judged, &Segment::default());
+        none.add(0, &ledger, (&measures, &[]), &judged, &SegmentConfig::default());
         assert!(none.rules.is_empty());
     }
 }

@@ -4,7 +4,7 @@ use super::losses;
 use super::losses::BoneConstancy;
 use super::score::Validation;
 use super::windows::WindowBatch;
-use crate::config::Gan;
+use crate::config::GanConfig;
 use crate::config::{AdversarialLoss, ComputeDevice};
 use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
@@ -50,7 +50,7 @@ pub struct Losses {
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct TrainerState {
     pub speaker: SpeakerMetadata,
-    pub settings: Gan,
+    pub settings: GanConfig,
     /// Steps done.
     pub step: usize,
     /// Step and score of the best validation so far.
@@ -60,7 +60,7 @@ pub struct TrainerState {
 /// Networks, optimisers and where they are.
 pub struct GanTrainer {
     pub metadata: SpeakerMetadata,
-    pub settings: Gan,
+    pub settings: GanConfig,
     pub generator: Generator,
     pub decoder: PoseDecoder,
     generator_params: Params,
@@ -78,7 +78,7 @@ pub struct GanTrainer {
 
 impl GanTrainer {
     /// Networks as the seed makes them.
-    pub fn new(metadata: SpeakerMetadata, settings: Gan) -> Result<Self> {
+    pub fn new(metadata: SpeakerMetadata, settings: GanConfig) -> Result<Self> {
         let device = device::open(settings.device == ComputeDevice::Cuda)?;
         let mut generator_params = Params::new(settings.seed).on(&device);
         let generator = Generator::new(&mut generator_params, &metadata.network)?;
@@ -121,7 +121,7 @@ impl GanTrainer {
     /// `step`, with a call at the end of each phase, by its name: for measuring where the time goes.
     pub fn step_in_phases(&mut self, batch: &WindowBatch, phase: &mut dyn FnMut(&'static str)) -> Result<Losses> {
         let batch = batch.on(self.device())?;
-        let Gan { lambda_l1, lambda_velocity, lambda_gan, lambda_bone, learning_rate, .. } = self.settings;
+        let GanConfig { lambda_l1, lambda_velocity, lambda_gan, lambda_bone, learning_rate, .. } = self.settings;
         let raw = self.generator.forward(&batch.mels, self.settings.window_frames, true)?;
         let generated = self.decoder.poses(&raw)?;
         // Differences count where both frames do, so that a missing joint looks the same in both.
@@ -213,7 +213,7 @@ impl TrainerState {
     }
 
     /// The settings to go on with: the checkpoint's, but for those that may change; and a line for each difference.
-    pub fn settings(&self, requested: &Gan) -> Result<(Gan, Vec<String>)> {
+    pub fn settings(&self, requested: &GanConfig) -> Result<(GanConfig, Vec<String>)> {
         let (mut kept, requested) = (serde_json::to_value(&self.settings)?, serde_json::to_value(requested)?);
         let mut differences = Vec::new();
         for (key, value) in requested.as_object().into_iter().flatten() {

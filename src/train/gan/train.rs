@@ -6,7 +6,7 @@ use super::score::Validation;
 use super::step::{GanTrainer, Losses, TrainerState};
 use super::validate::ValidationWindows;
 use super::windows::WindowLoader;
-use crate::config::Gan;
+use crate::config::GanConfig;
 use crate::config::{ComputeDevice, MotionRepresentation, NetworkPreset};
 use crate::dataset::{Dataset, Split};
 use crate::formats::checkpoint;
@@ -60,7 +60,12 @@ pub struct TrainingOutcome {
 /// # Errors
 /// No window to train on; a checkpoint of another speaker or version; another training at work in `folder`; a loss that
 /// is not finite or explodes (the last good checkpoint stays).
-pub fn train(dataset: &Dataset, requested: &Gan, folder: &Path, progress: &dyn Progress) -> Result<TrainingOutcome> {
+pub fn train(
+    dataset: &Dataset,
+    requested: &GanConfig,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<TrainingOutcome> {
     check(requested)?;
     let _lock = workdir::lock(folder)?;
     let resumed = resume(dataset, requested, folder, progress)?;
@@ -170,7 +175,7 @@ fn run(
 /// The newest checkpoint, and what it says with the settings that count now. Tells where these differ from `wanted`.
 fn resume(
     dataset: &Dataset,
-    requested: &Gan,
+    requested: &GanConfig,
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<Option<(TrainerState, Contents)>> {
@@ -207,7 +212,7 @@ fn resume(
 
 /// Whether the score has not become better for as many epochs as `gan.patience` allows.
 fn is_over(trainer: &GanTrainer) -> bool {
-    let Gan { patience, epoch_steps, .. } = trainer.settings;
+    let GanConfig { patience, epoch_steps, .. } = trainer.settings;
     let since = trainer.step - trainer.best.map_or(trainer.step, |(step, _)| step.min(trainer.step));
     patience > 0 && since >= patience * epoch_steps
 }
@@ -235,7 +240,7 @@ pub const fn preset(preset: NetworkPreset) -> Preset {
     }
 }
 
-fn check(settings: &Gan) -> Result<()> {
+fn check(settings: &GanConfig) -> Result<()> {
     ensure!(
         settings.window_frames > 0 && settings.window_frames.is_multiple_of(FRAMES_MULTIPLE),
         "gan.window_frames is {}: it must be a multiple of {FRAMES_MULTIPLE}",

@@ -5,7 +5,7 @@ use super::score;
 use super::score::{Validation, ValidationMetrics};
 use super::step::GanTrainer;
 use super::windows::{WindowBatch, WindowLoader};
-use crate::config::Gan;
+use crate::config::GanConfig;
 use crate::dataset::{Dataset, Split};
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::metrics::distribution::frechet;
@@ -42,7 +42,12 @@ pub struct ValidationWindow {
 impl ValidationWindows {
     /// Windows side by side, at most `N_WINDOWS` evenly chosen: of the validation split, or where that has none of the
     /// training split, which is said.
-    pub fn load(dataset: &Dataset, settings: &Gan, normal: &Normalisation, progress: &dyn Progress) -> Result<Self> {
+    pub fn load(
+        dataset: &Dataset,
+        settings: &GanConfig,
+        normal: &Normalisation,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let n_frames = settings.window_frames;
         let mut split = Split::Validation;
         let mut loader = WindowLoader::load(dataset, split, normal, n_frames, n_frames)?;

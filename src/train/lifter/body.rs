@@ -1,9 +1,9 @@
 //! What the body lifter learns: windows of captured motion and of motion made by rule, filmed by random cameras.
 
 use super::errors::of_method;
-use crate::mocap::upper_body::{Set, Take};
+use crate::mocap::upper_body::{BodyTake, Set};
 use crate::motion::upper_body::N_POINTS;
-use crate::motion::view::body::{N_IN, N_OUT, View};
+use crate::motion::view::body::{BodyView, N_IN, N_OUT};
 use crate::nn::Mode;
 use crate::nn::lifter::body::BodyLifter;
 use crate::nn::lifter::temporal::Config;
@@ -33,7 +33,7 @@ const MEASURED_BRIEFLY: usize = 40;
 pub struct BodyLifterTask {
     params: Params,
     lifter: BodyLifter,
-    takes: Vec<Take>,
+    takes: Vec<BodyTake>,
     /// Sum of the seconds of `takes` up to and with each: longer takes are drawn more often.
     ends: Vec<f64>,
     /// Takes that are only measured on.
@@ -42,7 +42,7 @@ pub struct BodyLifterTask {
 
 impl BodyLifterTask {
     /// A network with first values from `seed` that learns from `takes`; `held_out` takes are only measured on.
-    pub fn new(mut takes: Vec<Take>, held_out: Vec<Set>, config: &Config, seed: u64) -> Result<Self> {
+    pub fn new(mut takes: Vec<BodyTake>, held_out: Vec<Set>, config: &Config, seed: u64) -> Result<Self> {
         takes.sort_by(|a, b| a.name.cmp(&b.name));
         let mut params = Params::new(seed);
         let lifter = BodyLifter::new(&mut params, config)?;
@@ -54,7 +54,7 @@ impl BodyLifterTask {
         Ok(Self { params, lifter, takes, ends, held_out })
     }
 
-    fn take(&self, rng: &mut ChaCha8Rng) -> Option<&Take> {
+    fn take(&self, rng: &mut ChaCha8Rng) -> Option<&BodyTake> {
         let at = rng.random_range(0.0..*self.ends.last()?);
         self.takes.get(self.ends.partition_point(|&end| end <= at))
     }
@@ -118,7 +118,7 @@ impl TrainingTask for BodyLifterTask {
             // where the shoulders are not seen another scene is drawn; it is rare
             let (t, view) = loop {
                 let t = rng.random_range(0..scene.seen.len());
-                match View::around(&scene.seen, t, window, 1.0) {
+                match BodyView::around(&scene.seen, t, window, 1.0) {
                     Some(view) => break (t, view),
                     None => scene = self.scene(rng),
                 }

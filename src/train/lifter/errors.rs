@@ -6,7 +6,7 @@ use crate::math::procrustes;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::motion::upper_body::{
-    L_SHOULDER, L_WRIST, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, R_WRIST, Seen, metres_per_unit,
+    L_SHOULDER, L_WRIST, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, R_WRIST, SeenBody, metres_per_unit,
 };
 use crate::train::scene::body::FilmedScene;
 use crate::train::scene::body_motion::Proportions;
@@ -133,7 +133,7 @@ pub fn mean_pose(scenes: &[FilmedScene]) -> Pose {
 
 /// x and y of a clean scene in metres at the neck's distance, the neck at 0.
 fn flat(scene: &FilmedScene) -> Vec<Pose> {
-    let frame = |seen: &Seen| {
+    let frame = |seen: &SeenBody| {
         let points: Pose = seen.map(|p| {
             let [x, y] = p.unwrap_or_default();
             [f64::from(x) / scene.px_per_metre, f64::from(y) / scene.px_per_metre, 0.0]
@@ -155,7 +155,7 @@ pub fn with_mean_depth(scene: &FilmedScene, mean: &Pose) -> Vec<Option<Pose>> {
 /// clean scene and knows the camera and where the neck is.
 pub fn with_bone_depth(scene: &FilmedScene) -> Vec<Option<Pose>> {
     let bones = Proportions::MEAN;
-    let solve = |seen: &Seen| {
+    let solve = |seen: &SeenBody| {
         let rays = seen.map(|p| p.map(|[x, y]| [f64::from(x) / scene.focal_px, f64::from(y) / scene.focal_px, 1.0]));
         let mut pose: Pose = [[0.0; 3]; N_POINTS];
         let middle = vec3::scale(vec3::add(rays[R_SHOULDER]?, rays[L_SHOULDER]?), 0.5);

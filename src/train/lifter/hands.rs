@@ -56,7 +56,7 @@ impl TrainingTask for HandLifterTask {
     fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
         let (drawn, view) = loop {
             let drawn = sample_hand(rng);
-            if let Some(view) = HandView::of(&drawn.seen, Side::Right) {
+            if let Some(view) = HandView::new(&drawn.seen, Side::Right) {
                 break (drawn, view);
             }
         };

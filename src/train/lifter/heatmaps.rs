@@ -68,7 +68,7 @@ impl TrainingTask for HeatmapLifterTask {
     fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
         let (drawn, crop, (own, axes)) = loop {
             let drawn = sample_hand(rng);
-            if let (Some(crop), Some(target)) = (Crop::of(&drawn.seen), canonical(&drawn.truth, true)) {
+            if let (Some(crop), Some(target)) = (Crop::around(&drawn.seen), canonical(&drawn.truth, true)) {
                 break (drawn, crop, target);
             }
         };

@@ -6,9 +6,9 @@ use super::body_motion;
 use super::body_motion::{Proportions, turn};
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
-use crate::mocap::upper_body::Take;
+use crate::mocap::upper_body::BodyTake;
 use crate::motion::upper_body::{
-    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, R_WRIST, Seen,
+    L_ELBOW, L_HIP, L_SHOULDER, L_WRIST, MIRROR, N_POINTS, NOSE, Pose, R_HIP, R_SHOULDER, R_WRIST, SeenBody,
 };
 use crate::types::skeleton;
 use rand::{Rng, SeedableRng};
@@ -22,7 +22,7 @@ pub const FPS: f64 = 15.0;
 #[derive(Clone, Debug)]
 pub struct FilmedScene {
     pub truth: Vec<Pose>,
-    pub seen: Vec<Seen>,
+    pub seen: Vec<SeenBody>,
     /// Which side the body is seen from on average, radians; 0: from ahead.
     pub yaw: f64,
     /// The neck in metres before the camera, and the camera's focal length in px; the axis meets the picture at 0, 0.
@@ -47,8 +47,8 @@ impl FilmedScene {
     /// Captured motion: a random stretch of `take`, seen from a random side within 60 degrees. In training an arm may
     /// come from `other`: what the two arms do together is seldom the same twice. `None` when the take is too short.
     pub fn from_take(
-        take: &Take,
-        other: Option<&Take>,
+        take: &BodyTake,
+        other: Option<&BodyTake>,
         filming: Filming,
         n_frames: usize,
         rng: &mut ChaCha8Rng,
@@ -99,7 +99,7 @@ impl FilmedScene {
             let [x, y, z] = vec3::add(p, neck);
             [0, 1].map(|k| (focal_px * [x, y][k] / z.max(0.2)) as f32)
         };
-        let mut seen: Vec<Seen> = truth.iter().map(|pose| pose.map(|p| Some(picture(p)))).collect();
+        let mut seen: Vec<SeenBody> = truth.iter().map(|pose| pose.map(|p| Some(picture(p)))).collect();
         let px_per_metre = focal_px / distance;
         if filming != Filming::Clean {
             spoil(&mut seen, 0.35 * px_per_metre, training, rng);
@@ -110,7 +110,7 @@ impl FilmedScene {
 
 /// Noise, outliers and gaps; `shoulders_px`: the true width of the shoulders. In training a detector may be better or
 /// worse, and off by a steady bias.
-fn spoil(seen: &mut [Seen], shoulders_px: f64, training: bool, rng: &mut ChaCha8Rng) {
+fn spoil(seen: &mut [SeenBody], shoulders_px: f64, training: bool, rng: &mut ChaCha8Rng) {
     // what a detector calls a shoulder or an elbow lies up to a few cm from where a capture has it, all the while
     let bias = if !training {
         0.0
@@ -163,7 +163,7 @@ fn spoil(seen: &mut [Seen], shoulders_px: f64, training: bool, rng: &mut ChaCha8
 }
 
 /// Hips behind a desk or below the picture: many detectors do not miss them but put them straight below the shoulders.
-fn invent_hips(seen: &mut [Seen], shoulders_px: f64, rng: &mut ChaCha8Rng) {
+fn invent_hips(seen: &mut [SeenBody], shoulders_px: f64, rng: &mut ChaCha8Rng) {
     let (below, apart) = (rng.random_range(0.8..1.7), rng.random_range(0.25..0.75));
     let aside = 0.1 * normal(rng);
     for frame in seen.iter_mut() {
@@ -177,7 +177,7 @@ fn invent_hips(seen: &mut [Seen], shoulders_px: f64, rng: &mut ChaCha8Rng) {
 }
 
 /// A random stretch of a take at the dataset's rate, turned so that it faces the camera on average.
-fn stretch(take: &Take, training: bool, n_frames: usize, rng: &mut ChaCha8Rng) -> Option<Vec<Pose>> {
+fn stretch(take: &BodyTake, training: bool, n_frames: usize, rng: &mut ChaCha8Rng) -> Option<Vec<Pose>> {
     let speed = if training { rng.random_range(-0.5f64..0.4).exp() } else { 1.0 };
     let step = speed * take.fps / FPS;
     let room = take.poses.len() as f64 - 1.0 - step * (n_frames as f64 - 1.0);
@@ -205,12 +205,12 @@ const MEASURED_SEED: u64 = 20_000;
 
 /// `n` scenes to measure errors on, of `takes` in turn or, when there are none, of motion made by rule: the same ones
 /// whenever asked. Takes shorter than a scene are left out; nothing when all are.
-pub fn scenes(takes: &[Take], filming: Filming, n: usize) -> Vec<FilmedScene> {
+pub fn scenes(takes: &[BodyTake], filming: Filming, n: usize) -> Vec<FilmedScene> {
     let mut rng = ChaCha8Rng::seed_from_u64(MEASURED_SEED);
     if takes.is_empty() {
         return (0..n).map(|_| FilmedScene::from_rule(filming, MEASURED_FRAMES, &mut rng)).collect();
     }
-    let long: Vec<&Take> = takes.iter().filter(|t| t.n_frames_at(FPS) >= MEASURED_FRAMES).collect();
+    let long: Vec<&BodyTake> = takes.iter().filter(|t| t.n_frames_at(FPS) >= MEASURED_FRAMES).collect();
     (0..if long.is_empty() { 0 } else { n })
         .filter_map(|i| FilmedScene::from_take(long[i % long.len()], None, filming, MEASURED_FRAMES, &mut rng))
         .collect()
@@ -261,11 +261,11 @@ mod tests {
     use super::*;
     use crate::motion::upper_body::R_ELBOW;
 
-    fn take() -> Take {
+    fn take() -> BodyTake {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let poses = body_motion::gesture(&mut rng, 300, 1.0 / 60.0);
         // turned away: a scene turns it back to the camera
-        Take {
+        BodyTake {
             name: "t".into(),
             fps: 60.0,
             poses: poses.iter().map(|p| p.map(|q| turn(2.5, 0.0, 0.0).turn(q))).collect(),

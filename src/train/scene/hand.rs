@@ -5,7 +5,7 @@ use crate::math::order;
 use crate::math::procrustes;
 use crate::math::vec3;
 use crate::motion::hand_bones::PHALANX;
-use crate::motion::view::hand::{Hand, SeenHand, parent};
+use crate::motion::view::hand::{HandJoints, SeenHand, parent};
 use crate::types::pose2d::N_HAND;
 use anyhow::Result;
 use rand::{Rng, SeedableRng};
@@ -13,7 +13,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// A hand in px of the picture with the wrist at 0, and what a detector says of it.
 pub struct HandSample {
-    pub truth: Hand,
+    pub truth: HandJoints,
     pub seen: SeenHand,
 }
 
@@ -66,7 +66,11 @@ fn missing(rng: &mut ChaCha8Rng) -> [bool; N_HAND] {
 
 /// Errors of `lift` (keypoints of right hands to hands in any unit) on `n` held-out hands, a line each; `brief`: on a
 /// tenth of them, without the trivial method beside.
-pub fn errors(lift: impl Fn(&[SeenHand]) -> Result<Vec<Option<Hand>>>, n: usize, brief: bool) -> Result<Vec<String>> {
+pub fn errors(
+    lift: impl Fn(&[SeenHand]) -> Result<Vec<Option<HandJoints>>>,
+    n: usize,
+    brief: bool,
+) -> Result<Vec<String>> {
     let mut rng = ChaCha8Rng::seed_from_u64(20_001);
     let n = if brief { n / 10 } else { n };
     let samples: Vec<HandSample> = (0..n).map(|_| sample_hand(&mut rng)).collect();
@@ -80,14 +84,14 @@ pub fn errors(lift: impl Fn(&[SeenHand]) -> Result<Vec<Option<Hand>>>, n: usize,
     }
     let mut lines = vec![format!("hands made by rule lifter        {}", SyntheticHandErrors::measure(&with, &hands))];
     if !brief {
-        let flat: Vec<Hand> = with.iter().map(|s| flat_hand(s)).collect();
+        let flat: Vec<HandJoints> = with.iter().map(|s| flat_hand(s)).collect();
         lines.push(format!("hands made by rule flat, in scale {}", SyntheticHandErrors::measure(&with, &flat)));
     }
     Ok(lines)
 }
 
 /// The keypoints as they are, without depth.
-fn flat_hand(sample: &HandSample) -> Hand {
+fn flat_hand(sample: &HandSample) -> HandJoints {
     let [x0, y0] = sample.seen[0].unwrap_or_default();
     sample.seen.map(|p| {
         let [x, y] = p.unwrap_or([x0, y0]);
@@ -104,7 +108,7 @@ struct SyntheticHandErrors {
 }
 
 impl SyntheticHandErrors {
-    fn measure(samples: &[&HandSample], hands: &[Hand]) -> Self {
+    fn measure(samples: &[&HandSample], hands: &[HandJoints]) -> Self {
         let (mut plain, mut aligned) = (Vec::new(), Vec::new());
         for (sample, hand) in samples.iter().zip(hands) {
             let to_mm = 1000.0 * PHALANX / vec3::norm(vec3::sub(sample.truth[10], sample.truth[9])).max(1e-9);
@@ -113,7 +117,7 @@ impl SyntheticHandErrors {
                 (to_mm * sum / N_HAND as f64) as f32
             };
             // the size of a hand is known from its bones: compare hands of equal total bone length
-            let bones = |h: &Hand| (1..N_HAND).map(|j| vec3::norm(vec3::sub(h[j], h[parent(j)]))).sum::<f64>();
+            let bones = |h: &HandJoints| (1..N_HAND).map(|j| vec3::norm(vec3::sub(h[j], h[parent(j)]))).sum::<f64>();
             let flat = hand.iter().all(|p| p[2] == 0.0);
             let grow = if flat { 1.0 } else { bones(&sample.truth) / bones(hand).max(1e-9) };
             let scaled = hand.map(|p| vec3::scale(p, grow));
@@ -143,10 +147,10 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let samples: Vec<HandSample> = (0..50).map(|_| sample_hand(&mut rng)).collect();
         let samples: Vec<&HandSample> = samples.iter().collect();
-        let truth: Vec<Hand> = samples.iter().map(|s| s.truth.map(|p| vec3::scale(p, 3.0))).collect();
+        let truth: Vec<HandJoints> = samples.iter().map(|s| s.truth.map(|p| vec3::scale(p, 3.0))).collect();
         let errors = SyntheticHandErrors::measure(&samples, &truth);
         assert!(errors.median < 1e-3 && errors.aligned < 1e-3 && errors.above_30 == 0.0);
-        let flat: Vec<Hand> = samples.iter().map(|s| flat_hand(s)).collect();
+        let flat: Vec<HandJoints> = samples.iter().map(|s| flat_hand(s)).collect();
         assert!(SyntheticHandErrors::measure(&samples, &flat).median > 20.0);
     }
 

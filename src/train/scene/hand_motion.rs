@@ -6,7 +6,7 @@ use crate::math::rotation::Rotation;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::motion::hand_bones::{BONES, FAN, METRES, direction};
-use crate::motion::view::hand::Hand;
+use crate::motion::view::hand::HandJoints;
 use crate::types::pose2d::N_HAND;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -50,10 +50,10 @@ impl Posture {
     }
 
     /// A right hand, metres, the wrist at 0, upright: fingers along -y, thumb towards +x, the palm facing -z.
-    fn hand(&self, size: f64) -> Hand {
+    fn hand(&self, size: f64) -> HandJoints {
         let p = &self.0;
         let bone = |finger: usize, k: usize| size * METRES * BONES[finger][k];
-        let mut hand: Hand = [[0.0; 3]; N_HAND];
+        let mut hand: HandJoints = [[0.0; 3]; N_HAND];
         for finger in 0..5 {
             let fan = FAN[finger].to_radians();
             let (first, aside, bends) = if finger == 0 {
@@ -121,7 +121,7 @@ impl HandMotion {
 
     /// The hand's joints for each frame of an arm (shoulder, elbow, wrist; house axes, metres), `frame_secs` apart. The
     /// thumb at rest lies in the plane of the arm, where this is straight before the body.
-    pub fn along(&self, arm: &[[Vec3; 3]], is_left: bool, frame_secs: f64) -> Vec<Hand> {
+    pub fn along(&self, arm: &[[Vec3; 3]], is_left: bool, frame_secs: f64) -> Vec<HandJoints> {
         let side = if is_left { -1.0 } else { 1.0 };
         let mut thumb = [0.0, -0.7, -0.7];
         let mut last = None;
@@ -193,7 +193,7 @@ mod tests {
             let hands = motion.along(&[arm(false); 300], false, 1.0 / 15.0);
             for pair in hands.windows(2) {
                 for joint in 1..N_HAND {
-                    let length = |hand: &Hand| {
+                    let length = |hand: &HandJoints| {
                         vec3::norm(vec3::sub(hand[joint], hand[if joint % 4 == 1 { 0 } else { joint - 1 }]))
                     };
                     assert!((length(&pair[0]) - length(&pair[1])).abs() < 1e-9);

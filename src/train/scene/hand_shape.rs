@@ -4,17 +4,17 @@ use crate::math::rotation::Rotation;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::motion::hand_bones::{BONES, FAN, direction};
-use crate::motion::view::hand::Hand;
+use crate::motion::view::hand::HandJoints;
 use crate::types::pose2d::N_HAND;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 /// A right hand, metres, the wrist at 0, upright: fingers along -y, thumb towards +x, the palm facing -z.
-pub fn sample_shape(rng: &mut ChaCha8Rng) -> Hand {
+pub fn sample_shape(rng: &mut ChaCha8Rng) -> HandJoints {
     let size = 1.08e-3 * about(rng, 0.08);
     let palm = about(rng, 0.12);
-    let mut hand: Hand = [[0.0; 3]; N_HAND];
+    let mut hand: HandJoints = [[0.0; 3]; N_HAND];
     let manner = FingerManner::sample(rng);
     // the palm is hollow: its edges lie nearer to the viewer it faces
     let hollow = rng.random_range(0.0..0.07);
@@ -78,7 +78,7 @@ impl FingerManner {
 }
 
 /// The thumb roams widely: its saddle joint opens it sideways and lays it before the palm.
-fn thumb(hand: &mut Hand, size: f64, rng: &mut ChaCha8Rng) {
+fn thumb(hand: &mut HandJoints, size: f64, rng: &mut ChaCha8Rng) {
     let mut length = BONES[0].map(|mm| mm * size * about(rng, 0.10));
     length[0] *= about(rng, 0.15);
     let base = direction((FAN[0] + 12.0 * normal(rng)).to_radians(), 0.28 + 0.2 * normal(rng));

@@ -5,7 +5,7 @@
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::metrics::space::fixed_rate::{FPS, Frames};
-use crate::mocap::upper_body::{Set, Take};
+use crate::mocap::upper_body::{BodyTake, Set};
 use crate::motion::upper_body::{ARMS, L_SHOULDER, Pose, R_SHOULDER};
 use crate::train::scene::body_motion;
 use crate::train::scene::hand_motion::HandMotion;
@@ -46,7 +46,7 @@ impl Corpus {
     /// Of captured `takes`, bodies made by rule, and `speakers` made by rule; `held_out` takes and `other_speakers` are only
     /// measured on.
     pub fn new(
-        takes: &[Take],
+        takes: &[BodyTake],
         held_out: &[Set],
         speakers: &[(String, Motion)],
         other_speakers: &[(String, Motion)],
@@ -122,7 +122,7 @@ fn dice(seed: u64, name: &str, n: usize) -> ChaCha8Rng {
     ChaCha8Rng::from_seed(*blake3::hash(format!("{seed} {n} {name}").as_bytes()).as_bytes())
 }
 
-fn captured(take: &Take, copy: usize, seed: u64) -> Result<CorpusPiece> {
+fn captured(take: &BodyTake, copy: usize, seed: u64) -> Result<CorpusPiece> {
     ensure!(!take.poses.is_empty(), "{} has no frame", take.name);
     let (num, den) = ((take.fps * 1000.0).round() as u32, 1000);
     let poses = faced(&take.poses, take.fps);
@@ -205,7 +205,7 @@ mod tests {
             let (sin, cos) = (4.0 * PI * t as f64 / 300.0).sin_cos();
             still.map(|[x, y, z]| [cos * x - sin * z, y, cos * z + sin * x])
         };
-        let take = Take { name: "turn#0".into(), fps: 30.0, poses: (0..300).map(turning).collect() };
+        let take = BodyTake { name: "turn#0".into(), fps: 30.0, poses: (0..300).map(turning).collect() };
         let corpus = Corpus::new(&[take], &[], &[], &[], 7).unwrap();
         assert_eq!(corpus.pieces.len(), COPIES + RULES);
         for piece in &corpus.pieces {

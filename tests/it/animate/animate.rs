@@ -7,7 +7,7 @@ use orator::animate::rig::constraints::ClampTally;
 use orator::animate::rig::limits::{CURL_COHERENCE, ELBOW, FINGERS, Limit, SUPINATION, WRIST};
 use orator::animate::solve::arm_pose::ArmPose;
 use orator::animate::{AnimationOptions, Constraints, Face, Performance, Smoothing, Yaw, perform};
-use orator::formats::bvh::write::Clip;
+use orator::formats::bvh::write::BvhClip;
 use orator::math::one_euro::OneEuro;
 use orator::math::rotation::Rotation;
 use orator::types::pose3d::Motion;
@@ -22,7 +22,8 @@ const UNTOUCHED: AnimationOptions =
 
 fn random_rotation(random: &mut ChaCha8Rng) -> Rotation {
     let [z, x, y] = [180.0, 90.0, 180.0].map(|reach: f64| random.random_range(-reach..reach));
-    Rotation::from_euler_zxy_degrees([z, x, y])
+    let about = |axis: [f64; 3], degrees: f64| Rotation::about(axis, degrees.to_radians());
+    about([0.0, 0.0, 1.0], z) * about([1.0, 0.0, 0.0], x) * about([0.0, 1.0, 0.0], y)
 }
 
 fn is_within(pose: &ArmPose) -> bool {
@@ -104,7 +105,7 @@ fn mirrored(motion: &Motion) -> Motion {
 }
 
 /// The greatest difference between a clip and the mirror image of another.
-fn asymmetry(clip: &Clip, other: &Clip) -> f64 {
+fn asymmetry(clip: &BvhClip, other: &BvhClip) -> f64 {
     let mut worst = 0.0f64;
     for (joint, bone) in clip.skeleton.joints.iter().enumerate() {
         let swapped = match (bone.name.strip_prefix("Left"), bone.name.strip_prefix("Right")) {

@@ -8,7 +8,7 @@ use ndarray::{Array3, s};
 use orator::animate::rig::rig::Rig;
 use orator::animate::{AnimationOptions, Constraints, Performance, Smoothing, perform};
 use orator::formats::authors_txt;
-use orator::formats::bvh::write::Clip;
+use orator::formats::bvh::write::BvhClip;
 use orator::math::rotation::Rotation;
 use orator::types::pose3d::Motion;
 use orator::types::skeleton;
@@ -22,7 +22,7 @@ fn text(motion: &Motion) -> String {
     performed(motion).clip.to_bvh()
 }
 
-fn clip(motion: &Motion) -> Clip {
+fn clip(motion: &Motion) -> BvhClip {
     performed(motion).clip
 }
 

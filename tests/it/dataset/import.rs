@@ -9,8 +9,8 @@ use orator::dataset::info::About;
 use orator::dataset::verify::verify::{accounts, verify};
 use orator::dataset::{Dataset, Sample};
 use orator::mocap::captured;
-use orator::mocap::captured::Kind;
-use orator::mocap::take::Captured;
+use orator::mocap::captured::MotionKind;
+use orator::mocap::take::CapturedMotion;
 use orator::motion::bones;
 use orator::motion::resample;
 use orator::stage::progress::Silent;
@@ -80,7 +80,7 @@ fn is_tar(path: &Path) -> bool {
 }
 
 /// What the dataset must hold of a take: the source's joints at 15 fps, its own bones on every frame.
-fn expected(captured: &Captured, n_frames: usize) -> Motion {
+fn expected(captured: &CapturedMotion, n_frames: usize) -> Motion {
     let lengths = bones::measure(&captured.motion);
     let mut motion = resample::at_rate(&captured.motion, FPS);
     motion.joints = motion.joints.slice(ndarray::s![..n_frames, .., ..]).to_owned();
@@ -134,7 +134,7 @@ fn a_folder_of_bvh_and_sound_becomes_a_dataset() {
     let samples = samples(&out);
     let (sample, _) = samples.values().next().unwrap();
     assert_eq!((samples.len(), sample.n_frames()), (1, 145), "9.7 s of sound");
-    let captured = captured::read(Kind::Bvh, &file("bvh/talk.bvh")).unwrap();
+    let captured = captured::read(MotionKind::Bvh, &file("bvh/talk.bvh")).unwrap();
     assert!(furthest(&sample.motion, &expected(&captured, 145)) < 1e-6);
     assert_eq!(sample.sound.samples.len(), 154_667);
     let facts = &sample.meta["imported"];
@@ -238,7 +238,7 @@ fn the_authors_clips_and_ted_become_datasets() {
     assert_eq!([count(&clips, ""), count(&clips, "no sound"), count(&clips, "prediction")], [3, 1, 4]);
     for (key, (sample, _)) in samples(&dir.path().join("clips")) {
         let name = sample.meta["imported"]["motion"].as_str().unwrap().to_owned();
-        let captured = captured::read(Kind::Authors, &data.join("released_clips").join(name)).unwrap();
+        let captured = captured::read(MotionKind::Authors, &data.join("released_clips").join(name)).unwrap();
         assert_eq!(furthest(&sample.motion, &expected(&captured, sample.n_frames())), 0.0, "{key}");
     }
     let ted = imported(&[&data.join("speech_motion/ted_expressive")], &dir.path().join("ted"));
@@ -246,7 +246,7 @@ fn the_authors_clips_and_ted_become_datasets() {
     for (key, (sample, _)) in samples(&dir.path().join("ted")) {
         let name = sample.meta["imported"]["motion"].as_str().unwrap().to_owned();
         let mut source =
-            captured::read(Kind::Ted, &data.join("speech_motion/ted_expressive").join(name)).unwrap().motion;
+            captured::read(MotionKind::Ted, &data.join("speech_motion/ted_expressive").join(name)).unwrap().motion;
         source.joints = source.joints.slice(ndarray::s![..sample.n_frames(), .., ..]).to_owned();
         source.mask = source.mask.slice(ndarray::s![..sample.n_frames(), ..]).to_owned();
         assert!(furthest(&sample.motion, &source) < 1e-6, "{key}");

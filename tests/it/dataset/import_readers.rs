@@ -3,7 +3,7 @@
 use crate::fixtures::skip::real_data;
 use orator::formats::authors_txt;
 use orator::mocap::captured;
-use orator::mocap::captured::Kind;
+use orator::mocap::captured::MotionKind;
 use orator::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, R_WRIST, authors_from_house};
 use orator::types::time::FrameRate;
 use std::path::Path;
@@ -14,7 +14,7 @@ fn reference(name: &str) -> std::path::PathBuf {
 
 #[test]
 fn a_bvh_take_is_where_the_reference_puts_it() {
-    let take = captured::read(Kind::Bvh, &reference("bvh_take.bvh")).unwrap();
+    let take = captured::read(MotionKind::Bvh, &reference("bvh_take.bvh")).unwrap();
     let golden: serde_json::Value =
         serde_json::from_slice(&std::fs::read(reference("bvh_golden.json")).unwrap()).unwrap();
     assert_eq!(take.motion.fps, FrameRate::new(30, 1));
@@ -36,7 +36,7 @@ fn a_bvh_take_is_where_the_reference_puts_it() {
 #[test]
 fn z_up_inches_and_a_lost_hand_are_the_same_speaker() {
     let text = std::fs::read_to_string(reference("bvh_take.bvh")).unwrap();
-    let whole = captured::read(Kind::Bvh, &reference("bvh_take.bvh")).unwrap().motion;
+    let whole = captured::read(MotionKind::Bvh, &reference("bvh_take.bvh")).unwrap().motion;
     let dir = tempfile::tempdir().unwrap();
     // a root above all that turns y up into z up; every length in inches
     let (head, frames) = text.split_once("Frame Time: 0.0333333\n").unwrap();
@@ -64,7 +64,7 @@ fn z_up_inches_and_a_lost_hand_are_the_same_speaker() {
         .collect();
     let path = dir.path().join("other.bvh");
     std::fs::write(&path, format!("{head}\nFrame Time: 0.0333333\n{}\n", frames.join("\n"))).unwrap();
-    let take = captured::read(Kind::Bvh, &path).unwrap();
+    let take = captured::read(MotionKind::Bvh, &path).unwrap();
     assert_eq!((take.facts["source_unit"].as_str(), take.facts["source_up"].as_str()), (Some("inch"), Some("+z")));
     assert_eq!(take.facts["joints_missing"].as_array().unwrap().len(), 22, "the left wrist and its hand");
     for ((t, j, k), &v) in take.motion.joints.indexed_iter() {
@@ -81,7 +81,7 @@ fn what_is_no_speaker_is_an_error_that_says_why() {
     let text = std::fs::read_to_string(reference("bvh_take.bvh")).unwrap();
     let said = |text: &str| {
         std::fs::write(&path, text).unwrap();
-        format!("{:#}", captured::read(Kind::Bvh, &path).unwrap_err())
+        format!("{:#}", captured::read(MotionKind::Bvh, &path).unwrap_err())
     };
     let named = said(&text.replace("Neck", "Pole"));
     assert!(named.contains("b.bvh") && named.contains("neck") && named.contains("LeftForeArm"), "{named}");
@@ -94,7 +94,7 @@ fn what_is_no_speaker_is_an_error_that_says_why() {
 #[test]
 fn ted_joints_stay_where_they_are() {
     let Some(folder) = real_data("data/speech_motion/ted_expressive") else { return };
-    let take = captured::read(Kind::Ted, &folder.join("_3IOjpSGFqY_164_0_12.npz")).unwrap();
+    let take = captured::read(MotionKind::Ted, &folder.join("_3IOjpSGFqY_164_0_12.npz")).unwrap();
     let mut npz = orator::formats::npz::Npz::open(&folder.join("_3IOjpSGFqY_164_0_12.npz")).unwrap();
     let theirs = npz.numbers("human_joints", &[None, Some(43), Some(3)]).unwrap();
     // (ours, theirs): arms, then base and inter of the left index, left little, right thumb
@@ -118,7 +118,7 @@ fn ted_joints_stay_where_they_are() {
 fn the_authors_clips_are_permuted_and_nothing_else() {
     let Some(folder) = real_data("data/released_clips") else { return };
     let path = folder.join("gt_interval_3821.txt");
-    let take = captured::read(Kind::Authors, &path).unwrap();
+    let take = captured::read(MotionKind::Authors, &path).unwrap();
     let text = std::fs::read_to_string(path).unwrap();
     for (t, line) in text.lines().enumerate() {
         let numbers: Vec<f32> = line.split_whitespace().map(|v| v.parse().unwrap()).collect();

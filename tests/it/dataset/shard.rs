@@ -49,7 +49,7 @@ fn video_with(root: &Path, name: &str, n_frames: usize, seed: u64, sound_seed: u
     write(&work, &unit, &footage, &format!("film {seed}"));
     let segment = artifacts::dir(&work, StageName::Segment, &unit);
     fs::create_dir_all(&segment).unwrap();
-    SegmentStage::new(&config::Segment::default(), &work).run(&unit, &segment, &Silent).unwrap();
+    SegmentStage::new(&config::SegmentConfig::default(), &work).run(&unit, &segment, &Silent).unwrap();
 
     let lift = artifacts::dir(&work, StageName::Lift, &unit);
     fs::create_dir_all(&lift).unwrap();

@@ -4,7 +4,7 @@ use crate::fixtures::skip::real_data;
 use orator::config;
 use orator::evaluate::lifter::bodies::{BodyRow, Lifters, table, text};
 use orator::mocap::upper_body;
-use orator::mocap::upper_body::{Set, Take};
+use orator::mocap::upper_body::{BodyTake, Set};
 use orator::train::scene::body_motion::gesture;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -14,7 +14,7 @@ use std::process::Command;
 fn by_rule() -> Set {
     let take = |seed: u64| {
         let poses = gesture(&mut ChaCha8Rng::seed_from_u64(seed), 240, 1.0 / 30.0);
-        Take { name: format!("rule#{seed}"), fps: 30.0, poses }
+        BodyTake { name: format!("rule#{seed}"), fps: 30.0, poses }
     };
     ("by rule".to_owned(), (900..908).map(take).collect())
 }
@@ -25,7 +25,7 @@ fn mpjpe(rows: &[BodyRow], method: &str, input: &str) -> f64 {
 
 #[test]
 fn the_lifter_beats_what_needs_no_network() {
-    let lifters = Lifters::new(&config::Lift::default()).unwrap();
+    let lifters = Lifters::new(&config::LiftConfig::default()).unwrap();
     let rows = table(&lifters, &[by_rule()], 16).unwrap();
     eprintln!("{}", text(&rows));
     let lifted = mpjpe(&rows, "orator lift", "drop");
@@ -41,7 +41,7 @@ fn the_lifter_beats_what_needs_no_network() {
 fn ted_speakers_are_lifted_within_the_targets() {
     let Some(folder) = real_data("data/speech_motion/ted_expressive") else { return };
     let sets = [("TED".to_owned(), upper_body::read_all(&[folder]).unwrap())];
-    let rows = table(&Lifters::new(&config::Lift::default()).unwrap(), &sets, 56).unwrap();
+    let rows = table(&Lifters::new(&config::LiftConfig::default()).unwrap(), &sets, 56).unwrap();
     eprintln!("{}", text(&rows));
     let lifted = &rows[0].errors;
     assert!(lifted.mpjpe <= 50.0 && lifted.p_mpjpe <= 30.0 && lifted.wrist <= 79.0, "{lifted}");

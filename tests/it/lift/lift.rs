@@ -280,7 +280,7 @@ fn the_stage_writes_joints_and_bones() {
     let ledger = Ledger { duration_secs: 4.4, kept: vec![kept], ..Ledger::default() };
     std::fs::write(segment.join("ledger.json"), serde_json::to_vec(&ledger).unwrap()).unwrap();
 
-    let stage = LiftStage::new(&config::Lift::default(), &config::Segment::default(), dir.path()).unwrap();
+    let stage = LiftStage::new(&config::LiftConfig::default(), &config::SegmentConfig::default(), dir.path()).unwrap();
     assert!(stage.inputs(&unit).unwrap().iter().all(|input| input.path.exists()));
     let report = stage.run(&unit, dir.path(), &Silent).unwrap();
     assert!(report.line.starts_with("66 frames in 1 interval"), "{}", report.line);

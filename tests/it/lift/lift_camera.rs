@@ -60,7 +60,7 @@ fn lean(extra: &Array3<f32>) -> f64 {
 #[test]
 fn known_angles_are_found_and_taken_out() {
     let mut rng = ChaCha8Rng::seed_from_u64(41);
-    let lifters = [false, true].map(|level| Lifter::new(&config::Lift { level, ..Default::default() }).unwrap());
+    let lifters = [false, true].map(|level| Lifter::new(&config::LiftConfig { level, ..Default::default() }).unwrap());
     let (mut roll_off, mut pitch_off, mut leans, mut levelled) = (vec![], vec![], vec![], vec![]);
     for _ in 0..24 {
         let poses = upright(60, rng.random_range(-0.8..0.8), &mut rng);
@@ -89,7 +89,7 @@ fn known_angles_are_found_and_taken_out() {
 #[test]
 fn without_hips_the_pitch_is_not_known() {
     let mut rng = ChaCha8Rng::seed_from_u64(42);
-    let lifter = Lifter::new(&config::Lift { level: true, ..Default::default() }).unwrap();
+    let lifter = Lifter::new(&config::LiftConfig { level: true, ..Default::default() }).unwrap();
     let (mut off, n) = (vec![], 12);
     for _ in 0..n {
         let roll: f64 = rng.random_range(-0.25..0.25);

@@ -22,9 +22,9 @@ fn lifted(footage: &Footage) -> (Vec<(usize, usize)>, Ledger, Motion) {
     let work = dir.path().join("work");
     let unit = Unit { speaker: "host".into(), video: "talk-00000000".into(), source: dir.path().join("talk.mp4") };
     write(&work, &unit, footage, "a");
-    let rules = config::Segment::default();
+    let rules = config::SegmentConfig::default();
     let segment = SegmentStage::new(&rules, &work);
-    let lift = LiftStage::new(&config::Lift::default(), &rules, &work).unwrap();
+    let lift = LiftStage::new(&config::LiftConfig::default(), &rules, &work).unwrap();
     for stage in [&segment as &dyn Stage, &lift] {
         let out = unit.dir(&work.join(stage.name()));
         std::fs::create_dir_all(&out).unwrap();

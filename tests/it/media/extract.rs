@@ -14,7 +14,7 @@ use orator::types::time::FrameRate;
 use std::fs::{self, File};
 use std::path::Path;
 
-fn run(video: &Path, out: &Path, settings: &config::Extract) -> anyhow::Result<Report> {
+fn run(video: &Path, out: &Path, settings: &config::ExtractConfig) -> anyhow::Result<Report> {
     fs::create_dir_all(out)?;
     let unit = Unit { speaker: "host".into(), video: "clip".into(), source: video.to_owned() };
     ExtractStage::new(settings).run(&unit, out, &Silent)
@@ -29,7 +29,7 @@ fn array<T: ndarray_npy::ReadableElement>(out: &Path, name: &str) -> Vec<T> {
 /// Frames that begin a shot.
 fn cuts(out: &Path) -> Vec<usize> {
     let scores = array::<f64>(out, "shot_score");
-    let threshold = config::Segment::default().shot_threshold;
+    let threshold = config::SegmentConfig::default().shot_threshold;
     (0..scores.len()).filter(|n| scores[*n] >= threshold).collect()
 }
 
@@ -42,7 +42,7 @@ fn a_clip_with_sound_gives_all_files_and_the_same_bytes_again() {
     let dir = tempfile::tempdir().unwrap();
     let sound = clips::tone(44_100, 2.0, 440.0);
     let video = write_numbered(dir.path(), "in.mp4", 20, FrameRate::new(10, 1), Some(&sound));
-    let settings = config::Extract { keep_frames: true, ..Default::default() };
+    let settings = config::ExtractConfig { keep_frames: true, ..Default::default() };
     let [a, b] = ["a", "b"].map(|name| dir.path().join(name));
     let report = run(&video, &a, &settings).unwrap();
     run(&video, &b, &settings).unwrap();
@@ -78,7 +78,10 @@ fn one_silent_frame_is_enough() {
     let dir = tempfile::tempdir().unwrap();
     let video = write_numbered(dir.path(), "in.mp4", 1, FrameRate::new(30, 1), None);
     let out = dir.path().join("out");
-    assert_eq!(run(&video, &out, &config::Extract::default()).unwrap().line, "1 frames at 15 fps, no cut, no sound");
+    assert_eq!(
+        run(&video, &out, &config::ExtractConfig::default()).unwrap().line,
+        "1 frames at 15 fps, no cut, no sound"
+    );
     assert!(!out.join("audio.wav").exists());
     assert_eq!(media(&out)["has_audio"], false);
 }
@@ -91,7 +94,7 @@ fn a_truncated_video_keeps_what_it_holds_and_says_so() {
     let bytes = fs::read(&video).unwrap();
     fs::write(&video, &bytes[..bytes.len() / 2]).unwrap();
     let out = dir.path().join("out");
-    let report = run(&video, &out, &config::Extract::default()).unwrap();
+    let report = run(&video, &out, &config::ExtractConfig::default()).unwrap();
     let n_frames = media(&out)["n_frames"].as_u64().unwrap();
     assert!((20..110).contains(&n_frames) && report.facts["damage"].is_string(), "{}", report.line);
     let secs = media(&out)["audio_secs"].as_f64().unwrap();
@@ -103,7 +106,7 @@ fn a_file_that_is_no_video_is_an_error_that_names_it() {
     let dir = tempfile::tempdir().unwrap();
     let video = dir.path().join("words.mp4");
     fs::write(&video, "These are words.").unwrap();
-    let error = format!("{:#}", run(&video, &dir.path().join("out"), &config::Extract::default()).unwrap_err());
+    let error = format!("{:#}", run(&video, &dir.path().join("out"), &config::ExtractConfig::default()).unwrap_err());
     assert!(error.contains("words.mp4") && error.contains("not a media file"), "{error}");
 }
 
@@ -116,7 +119,7 @@ fn the_cuts_of_real_clips_are_found_and_no_others() {
     assert!(clips.len() > 15, "{}", clips.len());
     for (name, video) in &clips {
         for fps in if name.contains("tyson") { &[15, 10][..] } else { &[15] } {
-            let settings = config::Extract { fps: *fps, ..Default::default() };
+            let settings = config::ExtractConfig { fps: *fps, ..Default::default() };
             // 11.60 s and 16.97 s; every other clip is one shot.
             let cut_secs: &[f64] = if name.contains("tyson") { &[11.60, 16.97] } else { &[] };
             let out = dir.path().join(format!("{}-{fps}", name.replace('/', "_")));

@@ -18,11 +18,11 @@ fn cuts(video: &Path, fps: u32) -> Vec<usize> {
     let out = video.with_extension(fps.to_string());
     std::fs::create_dir(&out).unwrap();
     let unit = Unit { speaker: "host".into(), video: "clip".into(), source: video.to_owned() };
-    let settings = config::Extract { fps, ..Default::default() };
+    let settings = config::ExtractConfig { fps, ..Default::default() };
     ExtractStage::new(&settings).run(&unit, &out, &Silent).unwrap();
     let mut npz = NpzReader::new(File::open(out.join("timeline.npz")).unwrap()).unwrap();
     let scores: Array1<f64> = npz.by_name("shot_score").unwrap();
-    let threshold = config::Segment::default().shot_threshold;
+    let threshold = config::SegmentConfig::default().shot_threshold;
     (0..scores.len()).filter(|n| scores[*n] >= threshold).collect()
 }
 

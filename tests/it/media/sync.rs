@@ -50,7 +50,7 @@ impl Worst {
 fn measure(dir: &Path, kind: &Kind, clip: &Clip, fps: u32) -> Worst {
     let out = dir.join(format!("out_{}_{fps}", kind.name));
     fs::create_dir(&out).unwrap();
-    let settings = config::Extract { fps, ..Default::default() };
+    let settings = config::ExtractConfig { fps, ..Default::default() };
     let rate = settings.rate();
     let unit = Unit { speaker: "host".into(), video: "clip".into(), source: clip.path.clone() };
     ExtractStage::new(&settings).run(&unit, &out, &Silent).unwrap();

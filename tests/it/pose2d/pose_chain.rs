@@ -25,12 +25,12 @@ fn any_picture_gives_finite_numbers() {
     let manifest = Manifest::builtin().unwrap();
     // Without a person detector the whole picture is the person, so that every model runs on nonsense.
     for person in ["person-rtmdet-nano", "person-yolox-nano", ""] {
-        let settings = config::Pose2d {
+        let settings = config::Pose2dConfig {
             person: person.into(),
             joint_score: 0.0,
             hand_score: 0.0,
             palm_every: 1,
-            ..config::Pose2d::default()
+            ..config::Pose2dConfig::default()
         };
         let mut chain = Chain::new(&runtime, &manifest, &models, &settings).unwrap();
         for (width, height) in [(1, 1), (3, 200), (641, 7), (320, 241)] {
@@ -50,14 +50,19 @@ fn any_picture_gives_finite_numbers() {
 fn settings_that_name_no_right_model_say_which() {
     let Some((models, runtime)) = models() else { return };
     let manifest = Manifest::builtin().unwrap();
-    let said =
-        |settings: config::Pose2d| format!("{:#}", Chain::new(&runtime, &manifest, &models, &settings).err().unwrap());
-    let unknown = said(config::Pose2d { body: "nothing".into(), ..config::Pose2d::default() });
+    let said = |settings: config::Pose2dConfig| {
+        format!("{:#}", Chain::new(&runtime, &manifest, &models, &settings).err().unwrap())
+    };
+    let unknown = said(config::Pose2dConfig { body: "nothing".into(), ..config::Pose2dConfig::default() });
     assert!(unknown.contains("pose2d.body") && unknown.contains("body-tinypose-256x192"), "{unknown}");
     assert!(
-        said(config::Pose2d { person: "hand-mediapipe-lite".into(), ..config::Pose2d::default() }).contains("Hand")
+        said(config::Pose2dConfig { person: "hand-mediapipe-lite".into(), ..config::Pose2dConfig::default() })
+            .contains("Hand")
     );
-    assert!(said(config::Pose2d { hand: String::new(), ..config::Pose2d::default() }).contains("gives no hands"));
+    assert!(
+        said(config::Pose2dConfig { hand: String::new(), ..config::Pose2dConfig::default() })
+            .contains("gives no hands")
+    );
 }
 
 /// A unit with a video of `n` frames at 30 fps, its timeline at 15 fps, and the settings of a run in `dir`.

@@ -3,7 +3,7 @@
 
 use crate::fixtures::footage::{Footage, good, write};
 use ndarray::s;
-use orator::config::{self, Segment};
+use orator::config::{self, SegmentConfig};
 use orator::formats::media_json::MediaInfo;
 use orator::formats::npz::Npz;
 use orator::pipeline::lift::LiftStage;
@@ -34,7 +34,7 @@ fn footage() -> Footage {
 }
 
 /// What is left of the video when both stages run.
-fn run(work: &Path, unit: &Unit, rules: &Segment, lift: &config::Lift) -> Ledger {
+fn run(work: &Path, unit: &Unit, rules: &SegmentConfig, lift: &config::LiftConfig) -> Ledger {
     let stages: [Box<dyn Stage>; 2] =
         [Box::new(SegmentStage::new(rules, work)), Box::new(LiftStage::new(lift, rules, work).unwrap())];
     for stage in stages {
@@ -50,7 +50,7 @@ fn a_slider_says_what_a_run_keeps() {
     let dir = tempfile::tempdir().unwrap();
     let unit = Unit { speaker: "host".into(), video: "talk-00000000".into(), source: dir.path().join("talk.mp4") };
     write(dir.path(), &unit, &footage(), "a");
-    let (rules, lift) = (Segment::default(), config::Lift::default());
+    let (rules, lift) = (SegmentConfig::default(), config::LiftConfig::default());
     let now = run(dir.path(), &unit, &rules, &lift);
     assert!(now.refused_secs().contains_key("bones"), "{now:?}");
 
@@ -69,7 +69,7 @@ fn a_slider_says_what_a_run_keeps() {
     assert!((judged(lift.max_bone_change).kept_secs(&rules) - now.kept_secs()).abs() < 1e-3);
 
     let mut n_changed = 0;
-    let mut compare = |key: &str, value: f64, rules: &Segment, lift: &config::Lift| {
+    let mut compare = |key: &str, value: f64, rules: &SegmentConfig, lift: &config::LiftConfig| {
         let (slider, again) = (judged(lift.max_bone_change).kept_secs(rules), run(dir.path(), &unit, rules, lift));
         let kept = again.kept_secs();
         assert!((slider - kept).abs() < 1e-3, "{key} = {value}: the slider says {slider} s, a run keeps {kept} s");
@@ -82,7 +82,7 @@ fn a_slider_says_what_a_run_keeps() {
         }
     }
     for max_bone_change in [0.2, 2.0] {
-        compare("max_bone_change", max_bone_change, &rules, &config::Lift { max_bone_change, ..lift.clone() });
+        compare("max_bone_change", max_bone_change, &rules, &config::LiftConfig { max_bone_change, ..lift.clone() });
     }
     assert!(n_changed >= 6, "only {n_changed} of the changes changed what is kept");
 }

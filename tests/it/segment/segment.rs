@@ -31,7 +31,7 @@ fn measures(footage: &Footage) -> Measures {
 
 fn judged_measures(measures: &Measures, duration_secs: f64) -> (Intervals, Ledger) {
     let video = MediaInfo::new(duration_secs, measures.n_frames(), FPS);
-    judge(measures, &video, &config::Segment::default())
+    judge(measures, &video, &config::SegmentConfig::default())
 }
 
 fn judged(footage: &Footage) -> (Intervals, Ledger) {
@@ -182,7 +182,7 @@ fn a_cut_divides_and_the_sounds_end_ends_the_last_interval() {
 #[test]
 fn no_second_is_lost_or_counted_twice() {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
-    let rules = config::Segment::default();
+    let rules = config::SegmentConfig::default();
     for _ in 0..400 {
         let n_frames = rng.random_range(1..500);
         let mut footage = good(n_frames);
@@ -231,7 +231,7 @@ fn the_stage_reads_and_writes_its_files() {
     let mut footage = good(200);
     footage.keypoints.left_hand.slice_mut(s![90..120, .., ..]).fill(0.0);
     write(&work, &unit, &footage, "a");
-    let stage = SegmentStage::new(&config::Segment::default(), &work);
+    let stage = SegmentStage::new(&config::SegmentConfig::default(), &work);
     assert_eq!(stage.inputs(&unit).unwrap().len(), 4);
     let run = |name: &str| {
         let out = dir.path().join(name);

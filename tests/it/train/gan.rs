@@ -3,7 +3,7 @@
 
 use crate::fixtures::gesture_dataset::{FPS, dataset, sample};
 use crate::fixtures::write_dataset::write_dataset;
-use orator::config::Gan;
+use orator::config::GanConfig;
 use orator::config::{AdversarialLoss, MotionRepresentation, NetworkPreset};
 use orator::dataset::{Dataset, Split};
 use orator::generate::GestureGenerator;
@@ -17,8 +17,8 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
-fn settings() -> Gan {
-    Gan { batch: 2, steps: 6, epoch_steps: 3, checkpoint_every: 2, keep_checkpoints: 2, ..Gan::default() }
+fn settings() -> GanConfig {
+    GanConfig { batch: 2, steps: 6, epoch_steps: 3, checkpoint_every: 2, keep_checkpoints: 2, ..GanConfig::default() }
 }
 
 /// Every file of a training but its lock.
@@ -71,7 +71,7 @@ fn a_training_stopped_at_any_step_ends_with_the_same_bytes() {
         (
             "positions",
             vec![4],
-            Gan {
+            GanConfig {
                 representation: MotionRepresentation::Positions,
                 adversarial: AdversarialLoss::Log,
                 lambda_velocity: 0.5,
@@ -109,9 +109,9 @@ fn the_checkpoints_settings_win_and_differences_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");
-    train(&dataset, &Gan { steps: 3, ..settings() }, &out, &Silent).unwrap();
+    train(&dataset, &GanConfig { steps: 3, ..settings() }, &out, &Silent).unwrap();
     let stop = Stop::at(u64::MAX);
-    let other = Gan {
+    let other = GanConfig {
         learning_rate: 1e-3,
         preset: NetworkPreset::Paper,
         representation: MotionRepresentation::Positions,
@@ -135,7 +135,7 @@ fn the_checkpoints_settings_win_and_differences_are_told() {
     let second = folder.path().join("second");
     write_dataset(&second, "host", FPS, &grown).unwrap();
     let stop = Stop::at(u64::MAX);
-    let longer = Gan { steps: 7, ..settings() };
+    let longer = GanConfig { steps: 7, ..settings() };
     train(&Dataset::open(&second).unwrap(), &longer, &out, &Shared(stop.clone())).unwrap();
     assert!(stop.said.lock().unwrap().join("\n").contains("the dataset is another now"));
     let third = folder.path().join("third");
@@ -150,7 +150,8 @@ fn patience_ends_a_training_whose_score_does_not_fall() {
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");
     // Steps too small to change anything: the first score is never beaten.
-    let settings = Gan { steps: 40, epoch_steps: 1, patience: 3, learning_rate: 1e-30, lambda_gan: 0.0, ..settings() };
+    let settings =
+        GanConfig { steps: 40, epoch_steps: 1, patience: 3, learning_rate: 1e-30, lambda_gan: 0.0, ..settings() };
     let outcome = train(&dataset, &settings, &out, &Silent).unwrap();
     assert!(outcome.stopped_early && outcome.steps < 40, "{outcome:?}");
     assert_eq!(outcome.steps, outcome.best_step + 3);
@@ -165,14 +166,14 @@ fn a_few_windows_are_learnt_by_heart_and_spoken() {
     let long = sample("a-00000000-000000", 64 + 7 * 5, 0.0);
     write_dataset(&dataset_folder, "host", FPS, &[(Split::Train, long.clone())]).unwrap();
     let dataset = Dataset::open(&dataset_folder).unwrap();
-    let settings = Gan {
+    let settings = GanConfig {
         batch: 4,
         steps: 60,
         learning_rate: 2e-3,
         lambda_gan: 0.0,
         epoch_steps: 1_000,
         checkpoint_every: 1_000,
-        ..Gan::default()
+        ..GanConfig::default()
     };
     let out = folder.path().join("out");
     let outcome = train(&dataset, &settings, &out, &Silent).unwrap();
@@ -209,10 +210,10 @@ fn a_training_that_explodes_keeps_its_last_good_checkpoint() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");
-    let wild = Gan { learning_rate: 1e30, checkpoint_every: 1, steps: 50, ..settings() };
+    let wild = GanConfig { learning_rate: 1e30, checkpoint_every: 1, steps: 50, ..settings() };
     let error = format!("{:#}", train(&dataset, &wild, &out, &Silent).unwrap_err());
     assert!(error.contains("the training broke") && error.contains("learning_rate"), "{error}");
-    let none = Gan { window_frames: 128, ..settings() };
+    let none = GanConfig { window_frames: 128, ..settings() };
     assert!(format!("{:#}", train(&dataset, &none, &out, &Silent).unwrap_err()).contains("window"));
-    assert!(train(&dataset, &Gan { window_frames: 50, ..settings() }, &out, &Silent).is_err());
+    assert!(train(&dataset, &GanConfig { window_frames: 50, ..settings() }, &out, &Silent).is_err());
 }
