@@ -45,7 +45,7 @@ impl Evaluation {
         }
         clips.notes.splice(0..0, found.notes);
         let mut predictors = vec![Predictor::prediction(&clips, "the motion under test")];
-        let (others, left_out) = baselines::of_files(&clips)?;
+        let (others, left_out) = baselines::from_files(&clips)?;
         predictors.extend(others);
         clips.notes.extend(left_out);
         Ok(Self { clips, predictors })
@@ -63,7 +63,7 @@ impl Evaluation {
     ) -> Result<Self> {
         let task = progress.begin("evaluating", 0);
         let of_speaker::SpeakerEvaluation { clips, predictors } =
-            of_speaker::material(dataset, generator, split, &*task)?;
+            of_speaker::prepare(dataset, generator, split, &*task)?;
         Ok(Self { clips, predictors })
     }
 

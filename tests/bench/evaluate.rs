@@ -127,7 +127,7 @@ fn evaluate(speaker: Vec<Unheard>, watch: &Stopwatch) -> Result<(table::Table, S
     watch.detail("listening");
     let clip = |(number, unheard): (usize, Unheard)| {
         let Unheard { ground_truth, mask, mut predicted, sound } = unheard;
-        let features = Some(sound_features::of_samples(&sound.samples, FPS, ground_truth.shape()[0]));
+        let features = Some(sound_features::from_samples(&sound.samples, FPS, ground_truth.shape()[0]));
         let (mask, _) = compared(&ground_truth, &mask, &mut predicted);
         let audio = Some(ClipAudio::Kept(sound.samples.into_iter().map(pcm).collect()));
         EvalClip { name: format!("clip {number}"), ground_truth, predicted, mask, features, audio }
@@ -136,7 +136,7 @@ fn evaluate(speaker: Vec<Unheard>, watch: &Stopwatch) -> Result<(table::Table, S
     let clips = EvalClips { fps: FPS, clips, notes: Vec::new(), learnt: false };
     watch.detail("making the baselines");
     let mut predictors = vec![Predictor::prediction(&clips, "what the rule alone would do")];
-    predictors.extend(baselines::of_files(&clips)?.0);
+    predictors.extend(baselines::from_files(&clips)?.0);
     let table = table::measure(&clips, &MetricSettings::default(), &predictors, watch)?;
     watch.detail("the verdict and the JSON");
     let length = text::text(&table, true).len() + result::json(&table).to_string().len();

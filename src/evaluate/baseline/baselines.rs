@@ -51,13 +51,13 @@ impl PredictorKind {
 #[derive(Clone, Debug)]
 pub enum ClipMotion {
     /// Prediction of the clip.
-    Own,
+    Prediction,
     /// Ground truth of the clip.
-    Real,
+    GroundTruth,
     /// Constant pose [49, 3].
-    Still(Array2<f32>),
+    Constant(Array2<f32>),
     /// Joints [T, 49, 3].
-    Moves(Array3<f32>),
+    Motion(Array3<f32>),
 }
 
 /// Motion for every clip.
@@ -75,10 +75,10 @@ impl Predictor {
     pub fn motion<'a>(&'a self, clips: &'a EvalClips, clip: usize) -> Option<ArrayView3<'a, f32>> {
         let of = clips.clips.get(clip)?;
         match self.motions.get(clip)? {
-            ClipMotion::Own => Some(of.predicted.view()),
-            ClipMotion::Real => Some(of.ground_truth.view()),
-            ClipMotion::Still(pose) => pose.broadcast((of.n_frames(), pose.nrows(), 3)),
-            ClipMotion::Moves(joints) => Some(joints.view()),
+            ClipMotion::Prediction => Some(of.predicted.view()),
+            ClipMotion::GroundTruth => Some(of.ground_truth.view()),
+            ClipMotion::Constant(pose) => pose.broadcast((of.n_frames(), pose.nrows(), 3)),
+            ClipMotion::Motion(joints) => Some(joints.view()),
         }
     }
 
@@ -86,19 +86,19 @@ impl Predictor {
         Self {
             kind: PredictorKind::Prediction,
             description: description.to_owned(),
-            motions: vec![ClipMotion::Own; clips.clips.len()],
+            motions: vec![ClipMotion::Prediction; clips.clips.len()],
         }
     }
 
     pub fn truth(clips: &EvalClips) -> Self {
         let description =
             "the real motion beside itself: what its own figures are, and where the others end".to_owned();
-        Self { kind: PredictorKind::Truth, description, motions: vec![ClipMotion::Real; clips.clips.len()] }
+        Self { kind: PredictorKind::Truth, description, motions: vec![ClipMotion::GroundTruth; clips.clips.len()] }
     }
 }
 
 /// Baselines that files alone allow, and a sentence for each that is left out.
-pub fn of_files(clips: &EvalClips) -> Result<(Vec<Predictor>, Vec<String>)> {
+pub fn from_files(clips: &EvalClips) -> Result<(Vec<Predictor>, Vec<String>)> {
     let (mut all, mut left_out) = (constant_poses(clips), Vec::new());
     match neighbours(clips, &all[0])? {
         Some(predictor) => all.push(predictor),
@@ -130,7 +130,7 @@ pub fn of_files(clips: &EvalClips) -> Result<(Vec<Predictor>, Vec<String>)> {
 fn late(clips: &EvalClips, still: &Predictor) -> Predictor {
     let of = |clip: &EvalClip| {
         let n_frames = clip.n_frames();
-        ClipMotion::Moves(taken(&clip.predicted, (0..n_frames).map(|t| (t + n_frames / 2) % n_frames)))
+        ClipMotion::Motion(taken(&clip.predicted, (0..n_frames).map(|t| (t + n_frames / 2) % n_frames)))
     };
     let description = "the clip's own prediction half of the clip later, and from the beginning again".to_owned();
     let mut predictor =
@@ -161,8 +161,8 @@ fn constant_poses(clips: &EvalClips) -> Vec<Predictor> {
             complete(&mut mean, || all.mean());
             complete(&mut median, || all.median());
         }
-        means.push(ClipMotion::Still(mean));
-        medians.push(ClipMotion::Still(median));
+        means.push(ClipMotion::Constant(mean));
+        medians.push(ClipMotion::Constant(median));
     }
     let description = |what: &str| match is_alone {
         true => {
@@ -185,7 +185,7 @@ fn complete(pose: &mut Array2<f32>, from: impl FnOnce() -> Array2<f32>) {
 /// Fills missing values with the poses of `still`.
 pub fn fill(predictor: &mut Predictor, still: &Predictor) {
     for (predicted, still) in predictor.motions.iter_mut().zip(&still.motions) {
-        if let (ClipMotion::Moves(joints), ClipMotion::Still(pose)) = (predicted, still) {
+        if let (ClipMotion::Motion(joints), ClipMotion::Constant(pose)) = (predicted, still) {
             for mut frame in joints.outer_iter_mut() {
                 frame.zip_mut_with(pose, |v, still| *v = if v.is_finite() { *v } else { *still });
             }
@@ -225,7 +225,7 @@ fn neighbours(clips: &EvalClips, still: &Predictor) -> Result<Option<Predictor>>
     let Some(predicted) = neighbour::motions(&query, &OtherClips(clips), clips.fps)? else { return Ok(None) };
     let description =
         "for each 4 s of sound the motion of the stretch of another clip that sounds most alike".to_owned();
-    let motions = predicted.into_iter().map(ClipMotion::Moves).collect();
+    let motions = predicted.into_iter().map(ClipMotion::Motion).collect();
     let mut predictor = Predictor { kind: PredictorKind::NearestNeighbour, description, motions };
     fill(&mut predictor, still);
     Ok(Some(predictor))
@@ -243,7 +243,7 @@ pub fn mismatched(clips: &EvalClips, kind: PredictorKind, still: &Predictor) -> 
     let (motions, description): (Vec<ClipMotion>, String) = if n > 1 {
         let motions = lengths.enumerate().map(|(i, n_frames)| {
             let from = of((i + n / 2) % n);
-            ClipMotion::Moves(taken(from, (0..n_frames).map(|t| back_and_forth(t, from.shape()[0]))))
+            ClipMotion::Motion(taken(from, (0..n_frames).map(|t| back_and_forth(t, from.shape()[0]))))
         });
         (motions.collect(), "the same of another clip, played back and forth where that is shorter".to_owned())
     } else {
@@ -253,7 +253,7 @@ pub fn mismatched(clips: &EvalClips, kind: PredictorKind, still: &Predictor) -> 
             return None;
         }
         let description = format!("the same {:.1} s later, and from the beginning again", clips.fps.secs(shift));
-        (vec![ClipMotion::Moves(taken(of(0), (0..n_frames).map(|t| (t + shift) % n_frames)))], description)
+        (vec![ClipMotion::Motion(taken(of(0), (0..n_frames).map(|t| (t + shift) % n_frames)))], description)
     };
     let mut predictor = Predictor { kind, description, motions };
     fill(&mut predictor, still);

@@ -55,7 +55,7 @@ type NearestMatch = (f32, usize, usize);
 /// Motion [T, 49, 3] for each query, NaN where the library's is; `None` where a window finds nothing long enough.
 pub fn motions(queries: &[Query], library: &dyn Library, fps: FrameRate) -> Result<Option<Vec<Array3<f32>>>> {
     let windows: Vec<QueryWindow> =
-        queries.iter().enumerate().flat_map(|(i, query)| stretches(i, query, fps)).collect();
+        queries.iter().enumerate().flat_map(|(i, query)| query_windows(i, query, fps)).collect();
     let best = (0..library.len())
         .into_par_iter()
         .map(|entry| -> Result<Vec<Option<NearestMatch>>> {
@@ -88,7 +88,7 @@ pub fn motions(queries: &[Query], library: &dyn Library, fps: FrameRate) -> Resu
 }
 
 /// Windows of a query, the last one shorter.
-fn stretches(query: usize, sound: &Query, fps: FrameRate) -> Vec<QueryWindow> {
+fn query_windows(query: usize, sound: &Query, fps: FrameRate) -> Vec<QueryWindow> {
     let window = (((WINDOW_SECS * fps.per_sec()) as usize) / POOLED * POOLED).max(POOLED);
     let stretch = |first: usize| {
         let frames = first..(first + window).min(sound.n_frames);

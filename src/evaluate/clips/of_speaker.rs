@@ -34,7 +34,7 @@ pub struct SpeakerEvaluation {
 ///
 /// # Errors
 /// A dataset of another frame rate; a split without intervals.
-pub fn material(
+pub fn prepare(
     dataset: &Dataset,
     speaker: &GestureGenerator,
     split: Split,
@@ -90,7 +90,7 @@ pub fn material(
         )),
     }
     let description = "the same speaker hearing another sound: what is said half of the split later".to_owned();
-    let motions = other.into_iter().map(ClipMotion::Moves).collect();
+    let motions = other.into_iter().map(ClipMotion::Motion).collect();
     all.push(Predictor { kind: PredictorKind::MismatchedPrediction, description, motions });
     match baselines::mismatched(&clips, PredictorKind::MismatchedTruth, &all[1]) {
         Some(predictor) => all.push(predictor),
@@ -114,7 +114,7 @@ fn generated(
 
 fn clip(held_out: HeldOutInterval, predicted: Array3<f32>, fps: FrameRate) -> EvalClip {
     let HeldOutInterval { key, ground_truth, sound } = held_out;
-    let features = Some(sound_features::of_samples(&sound.samples, fps, ground_truth.n_frames()));
+    let features = Some(sound_features::from_samples(&sound.samples, fps, ground_truth.n_frames()));
     let mut predicted = predicted;
     let (mask, _) = compared(&ground_truth.joints, &ground_truth.mask, &mut predicted);
     let audio = Some(ClipAudio::Kept(sound.samples.into_iter().map(pcm).collect()));
@@ -134,7 +134,7 @@ fn constant_poses(dataset: &Dataset, normal: &Normalisation, n_clips: usize) -> 
     let predictor = |kind: PredictorKind, pose: Array2<f32>| Predictor {
         kind,
         description: format!("the {} of the training split in every frame, which never moves", kind.name()),
-        motions: vec![ClipMotion::Still(pose); n_clips],
+        motions: vec![ClipMotion::Constant(pose); n_clips],
     };
     Ok(vec![predictor(PredictorKind::MeanPose, mean), predictor(PredictorKind::MedianPose, median)])
 }
@@ -192,5 +192,5 @@ pub fn copied(
     let library = TrainingLibrary { dataset, normal, samples: dataset.samples(Split::Train), asks_itself };
     let predicted = neighbour::motions(&query, &library, clips.fps)?;
     debug_assert!(predicted.iter().flatten().all(|joints| joints.shape()[1..] == [N_JOINTS, 3]));
-    Ok(predicted.map(|predicted| predicted.into_iter().map(ClipMotion::Moves).collect()))
+    Ok(predicted.map(|predicted| predicted.into_iter().map(ClipMotion::Motion).collect()))
 }

@@ -102,7 +102,7 @@ impl SoundFeatureExtractor {
 }
 
 /// Features of a sound of 16 kHz for `n_frames` of motion.
-pub fn of_samples(samples: &[f32], fps: FrameRate, n_frames: usize) -> SoundFeatures {
+pub fn from_samples(samples: &[f32], fps: FrameRate, n_frames: usize) -> SoundFeatures {
     let mut loudest = Loudest::default();
     loudest.push(samples);
     let mut listener = SoundFeatureExtractor::new(fps, Some(loudest.finish()));
@@ -154,7 +154,7 @@ mod tests {
         };
         let whole = features(sound.len());
         assert_eq!(whole.rows.len(), 188 * mel::N_MELS);
-        assert_eq!(whole, of_samples(&sound, fps, 375));
+        assert_eq!(whole, from_samples(&sound, fps, 375));
         assert!(whole.secs == 25.0 && whole.onsets.len() > 15, "{:?}", whole.onsets);
         for piece in [701, 16_000, 160_001] {
             let pieces = features(piece);

@@ -14,7 +14,8 @@ use serde::Serialize;
 #[serde(rename_all = "snake_case")]
 pub enum Aspect {
     /// Position of the joints at each moment.
-    Place,
+    #[serde(rename = "place")]
+    Position,
     /// Poses and their sequence.
     Poses,
     /// Speed of movement.
@@ -60,17 +61,17 @@ pub struct Verdict {
 pub fn better_than_nothing(table: &Table) -> Verdict {
     let question = "Is it better than doing nothing?";
     let Some(own) = table.row(PredictorKind::Prediction) else { return nothing(question) };
-    let query = [Aspect::Place, Aspect::Poses, Aspect::Movement];
-    let votes = votes(table, own, &query, |index| better_still(table, index));
+    let query = [Aspect::Position, Aspect::Poses, Aspect::Movement];
+    let votes = votes(table, own, &query, |index| better_constant_pose(table, index));
     let of = |aspect: Aspect| summed(votes.iter().filter(|vote| vote.aspect == aspect));
     let asks = |aspect: Aspect| votes.iter().any(|vote| vote.aspect == aspect);
-    let rest = match summed(votes.iter().filter(|vote| vote.aspect != Aspect::Place)) {
+    let rest = match summed(votes.iter().filter(|vote| vote.aspect != Aspect::Position)) {
         // A constant pose that fits better wins by its poses, and has no movement.
         Answer::Yes if asks(Aspect::Movement) && of(Aspect::Movement) != Answer::Yes => Answer::Undecided,
         rest => rest,
     };
-    let n_place = votes.iter().filter(|vote| vote.aspect == Aspect::Place).count();
-    let (word, description) = match (of(Aspect::Place), rest) {
+    let n_place = votes.iter().filter(|vote| vote.aspect == Aspect::Position).count();
+    let (word, description) = match (of(Aspect::Position), rest) {
         _ if table.learnt => return by_heart(question),
         _ if votes.is_empty() => return no_figure(question),
         _ if table.n_blocks < FEW_BLOCKS => return too_few(question, table),
@@ -132,7 +133,7 @@ pub fn better_than_nothing(table: &Table) -> Verdict {
 }
 
 /// Better of the constant poses in a metric.
-fn better_still(table: &Table, index: usize) -> Option<&PredictorRow> {
+fn better_constant_pose(table: &Table, index: usize) -> Option<&PredictorRow> {
     let better = |a: &PredictorRow, b: &PredictorRow| table.gain(a, b, index).value >= 0.0;
     let constant_poses =
         [PredictorKind::MeanPose, PredictorKind::MedianPose].into_iter().filter_map(|kind| table.row(kind));
@@ -141,7 +142,7 @@ fn better_still(table: &Table, index: usize) -> Option<&PredictorRow> {
 
 /// Comparison of the prediction with the better of the constant poses in one metric, whatever its aspect.
 pub fn against_nothing(table: &Table, index: usize) -> Option<Answer> {
-    let gain = table.gain(table.row(PredictorKind::Prediction)?, better_still(table, index)?, index);
+    let gain = table.gain(table.row(PredictorKind::Prediction)?, better_constant_pose(table, index)?, index);
     (gain.value.is_finite() && table.n_blocks >= FEW_BLOCKS).then(|| answer(&gain))
 }
 
@@ -160,7 +161,7 @@ pub fn hears(table: &Table) -> Verdict {
     let other = table.row(PredictorKind::LatePrediction).or_else(|| table.row(PredictorKind::MismatchedPrediction));
     let own = table.row(PredictorKind::Prediction).zip(other);
     let Some((own, other)) = own else { return nothing(question) };
-    let votes = votes(table, own, &[Aspect::Place, Aspect::Beat], |_| Some(other));
+    let votes = votes(table, own, &[Aspect::Position, Aspect::Beat], |_| Some(other));
     let (word, description) = match summed(votes.iter()) {
         _ if table.learnt => return by_heart(question),
         _ if votes.is_empty() => return no_figure(question),
@@ -229,9 +230,9 @@ fn aspect(table: &Table, index: usize) -> Option<Aspect> {
     match definition.better {
         Better::Neither => None,
         // First of several shares, planes and parts.
-        _ if starts("pck") => is_first("pck").then_some(Aspect::Place),
-        _ if starts("maje") => Some(Aspect::Place),
-        _ if starts("mpjpe") => is_first("mpjpe").then_some(Aspect::Place),
+        _ if starts("pck") => is_first("pck").then_some(Aspect::Position),
+        _ if starts("maje") => Some(Aspect::Position),
+        _ if starts("mpjpe") => is_first("mpjpe").then_some(Aspect::Position),
         _ if starts("frechet") => is_whole.then_some(Aspect::Poses),
         _ if starts("hellinger") => is_first("hellinger").then_some(Aspect::Movement),
         _ if starts("jerk") => is_first("jerk").then_some(Aspect::Movement),

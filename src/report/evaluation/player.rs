@@ -5,13 +5,14 @@
 use super::charts::legend;
 use crate::evaluate::clips::clips::{EvalClip, EvalClips};
 use crate::evaluate::table::table::Table;
+use crate::formats::wav;
 use crate::metrics::beat::consistency;
 use crate::report::html::chart::tracks::{Lane, lanes};
 use crate::report::html::numbers::clock;
 use crate::report::html::{Node, node};
 use crate::types::skeleton;
 use crate::types::skeleton::{L_WRIST, N_JOINTS, R_WRIST, is_duplicate};
-use crate::types::sound::SAMPLE_RATE;
+use crate::types::sound::{SAMPLE_RATE, Sound};
 use anyhow::Result;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -94,7 +95,7 @@ fn excerpt(word: &str, error: f64, clip: &EvalClip, frames: Range<usize>, fps: f
         ground_truth: millimetres(clip.ground_truth.view(), &shown),
         predicted: millimetres(clip.predicted.view(), &shown),
         lanes: lanes_of(clip, frames, fps, samples.as_deref()),
-        sound: samples.map(|samples| wav(&samples)),
+        sound: samples.map(|samples| to_wav(&samples)).transpose()?,
     })
 }
 
@@ -105,24 +106,8 @@ fn millimetres(joints: ArrayView3<f32>, frames: &[usize]) -> Vec<u8> {
     numbers.flat_map(i16::to_le_bytes).collect()
 }
 
-/// Mono wav file of 16 bits.
-fn wav(samples: &[i16]) -> Vec<u8> {
-    let n_bytes = 2 * samples.len() as u32;
-    let mut file = Vec::with_capacity(44 + n_bytes as usize);
-    file.extend(b"RIFF");
-    file.extend((36 + n_bytes).to_le_bytes());
-    file.extend(b"WAVEfmt ");
-    file.extend(16u32.to_le_bytes());
-    file.extend(1u16.to_le_bytes());
-    file.extend(1u16.to_le_bytes());
-    file.extend(SAMPLE_RATE.to_le_bytes());
-    file.extend((2 * SAMPLE_RATE).to_le_bytes());
-    file.extend(2u16.to_le_bytes());
-    file.extend(16u16.to_le_bytes());
-    file.extend(b"data");
-    file.extend(n_bytes.to_le_bytes());
-    file.extend(samples.iter().flat_map(|sample| sample.to_le_bytes()));
-    file
+fn to_wav(samples: &[i16]) -> Result<Vec<u8>> {
+    wav::to_bytes(&Sound { rate: SAMPLE_RATE, samples: samples.iter().map(|s| f32::from(*s) / 32_768.0).collect() })
 }
 
 /// Charts of wrist height and speed over time, loudness with onsets, and motion beats.

@@ -11,7 +11,7 @@ use orator::evaluate::baseline::baselines::ClipMotion;
 use orator::evaluate::clips::clips::{EvalClip, EvalClips};
 use orator::evaluate::clips::held_out;
 use orator::evaluate::clips::of_speaker::copied;
-use orator::evaluate::clips::sound_features::of_samples;
+use orator::evaluate::clips::sound_features::from_samples;
 use orator::train::gan::train::normalisation;
 use orator::types::time::FrameRate;
 use std::path::Path;
@@ -103,7 +103,7 @@ fn the_neighbour_by_sound_is_found_where_it_was_taken_from() {
     let ground_truth =
         held_out::read(&dataset, &held_out::samples(&dataset, Split::Validation).unwrap(), &normal).unwrap();
     let held_out::HeldOutInterval { key, ground_truth, sound } = ground_truth.into_iter().next().unwrap();
-    let features = Some(of_samples(&sound.samples, fps, ground_truth.n_frames()));
+    let features = Some(from_samples(&sound.samples, fps, ground_truth.n_frames()));
     let clip = EvalClip {
         name: key,
         predicted: ground_truth.joints.clone(),
@@ -114,7 +114,7 @@ fn the_neighbour_by_sound_is_found_where_it_was_taken_from() {
     };
     let clips = EvalClips { fps, clips: vec![clip], notes: Vec::new(), learnt: false };
     let found = copied(&dataset, &normal, &clips, Split::Validation).unwrap().unwrap();
-    let ClipMotion::Moves(found) = &found[0] else { panic!("it stands still") };
+    let ClipMotion::Motion(found) = &found[0] else { panic!("it stands still") };
     let apart = found.iter().zip(&ground_truth.joints).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
     assert!(apart < found.len() / 20, "{apart} of {} numbers are others", found.len());
 }
