@@ -65,7 +65,8 @@ mod tests {
                 joints: ndarray::Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(t, j, k)| at(t, j, k).0),
                 mask: ndarray::Array2::from_shape_fn((n_frames, N_JOINTS), |(t, j)| at(t, j, 0).1),
             };
-            let path = tempfile::tempdir().unwrap().keep().join("joints.npz");
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("joints.npz");
             write(&path, &motion).unwrap();
             let again = read(&path).unwrap();
             proptest::prop_assert_eq!((again.fps, &again.mask), (motion.fps, &motion.mask));

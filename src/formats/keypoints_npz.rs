@@ -201,7 +201,8 @@ mod tests {
                 n_people: Array1::from_shape_fn(n_frames, |t| t as i64),
                 identity: Array1::from_shape_fn(n_frames, |t| 3 * t as i64),
             };
-            let path = tempfile::tempdir().unwrap().keep().join("keypoints.npz");
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("keypoints.npz");
             write(&path, &keypoints, &extras).unwrap();
             proptest::prop_assert_eq!(read_noting(&path).unwrap(), (keypoints, Vec::new()));
             proptest::prop_assert_eq!(read_extras(&path).unwrap(), extras);

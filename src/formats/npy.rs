@@ -123,7 +123,8 @@ pub(crate) mod tests {
             let n_frames = bits.len() / (3 * N_JOINTS);
             let joints = Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(t, j, k)| bits[(t * N_JOINTS + j) * 3 + k]);
             let motion = Motion::from_joints(FrameRate::new(15, 1), joints);
-            let path = tempfile::tempdir().unwrap().keep().join("a.npy");
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("a.npy");
             write(&path, &motion).unwrap();
             let again = read(&path, motion.fps).unwrap();
             proptest::prop_assert_eq!(&again.mask, &motion.mask);

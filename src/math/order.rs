@@ -4,7 +4,7 @@
 use std::cmp::Ordering;
 
 /// A floating-point number that can be ordered.
-pub trait Scalar: Copy {
+pub trait Sortable: Copy {
     /// Whether the value is neither infinite nor NaN.
     fn is_number(self) -> bool;
     /// Total order of IEEE 754.
@@ -13,7 +13,7 @@ pub trait Scalar: Copy {
     fn mean(self, other: Self) -> Self;
 }
 
-impl Scalar for f32 {
+impl Sortable for f32 {
     fn is_number(self) -> bool {
         self.is_finite()
     }
@@ -25,7 +25,7 @@ impl Scalar for f32 {
     }
 }
 
-impl Scalar for f64 {
+impl Sortable for f64 {
     fn is_number(self) -> bool {
         self.is_finite()
     }
@@ -41,7 +41,7 @@ impl Scalar for f64 {
 #[derive(Clone, Debug)]
 pub struct Ordered<F>(Vec<F>);
 
-impl<F: Scalar> Ordered<F> {
+impl<F: Sortable> Ordered<F> {
     /// Sorts the finite ones of `values`.
     pub fn new(values: impl IntoIterator<Item = F>) -> Self {
         let mut values: Vec<F> = values.into_iter().filter(|value| value.is_number()).collect();
@@ -90,22 +90,22 @@ impl Ordered<f64> {
 }
 
 /// The number in the middle, or the mean of the two there.
-pub fn median<F: Scalar>(values: impl IntoIterator<Item = F>) -> Option<F> {
+pub fn median<F: Sortable>(values: impl IntoIterator<Item = F>) -> Option<F> {
     Ordered::new(values).median()
 }
 
 /// The number in the middle, the smaller of two.
-pub fn lower_median<F: Scalar>(values: impl IntoIterator<Item = F>) -> Option<F> {
+pub fn lower_median<F: Sortable>(values: impl IntoIterator<Item = F>) -> Option<F> {
     lower_quantile(values, 0.5)
 }
 
 /// The number in the middle, the larger of two.
-pub fn upper_median<F: Scalar>(values: impl IntoIterator<Item = F>) -> Option<F> {
+pub fn upper_median<F: Sortable>(values: impl IntoIterator<Item = F>) -> Option<F> {
     Ordered::new(values).upper_median()
 }
 
 /// The number at rank `share * (n - 1)`, rounded down; `share` is 0..=1.
-pub fn lower_quantile<F: Scalar>(values: impl IntoIterator<Item = F>, share: f64) -> Option<F> {
+pub fn lower_quantile<F: Sortable>(values: impl IntoIterator<Item = F>, share: f64) -> Option<F> {
     Ordered::new(values).lower_quantile(share)
 }
 

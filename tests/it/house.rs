@@ -48,7 +48,7 @@ const APART: [(&str, &[&str]); 2] = [
 const COMMON_NAMES: [&str; 2] = ["Args", "Config"];
 
 /// Type names that stand in more than one file; empty once every type has its own noun.
-const STILL_TWICE: &str = "Scalar";
+const STILL_TWICE: &str = "";
 
 /// Folders whose files still import each other.
 const CIRCLES_LEFT: [&str; 0] = [];
