@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod completions;
 pub mod demo;
+pub mod error_texts;
 pub mod examples;
 pub mod guide;
 pub mod library;

@@ -42,7 +42,7 @@ fn transitions(dir: &Path, inputs: &str, kinds: &[(&str, f64)], rates: &[u32]) {
     let same = "fps=30,scale=320:240,setsar=1,settb=1/30,setpts=PTS-STARTPTS";
     for (kind, secs) in kinds {
         let graph = format!(
-            "[0:v]{same},trim=0:6[a];[1:v]{same},trim=0:6[b];[a][b]xfade=transition={kind}:duration={secs}:offset=2[v]"
+            "[0:v]{same},trim=0:4[a];[1:v]{same},trim=0:3.5[b];[a][b]xfade=transition={kind}:duration={secs}:offset=2[v]"
         );
         let video = film(dir, &format!("{kind}-{secs}"), inputs, &graph);
         for &fps in rates {
@@ -64,7 +64,8 @@ fn dissolves_wipes_and_fades_end_a_shot_where_they_are() {
     let inputs = format!("-i {} -f lavfi -i testsrc2=size=320x240:rate=30:duration=5", speaker.display());
     let kinds =
         [("fade", 0.4), ("fade", 1.0), ("dissolve", 0.6), ("wipeleft", 0.6), ("circleopen", 0.6), ("fadeblack", 1.0)];
-    transitions(dir.path(), &inputs, &kinds, &[15, 10]);
+    transitions(dir.path(), &inputs, &kinds, &[15]);
+    transitions(dir.path(), &inputs, &kinds[1..4], &[10]);
 }
 
 #[test]

@@ -23,14 +23,14 @@ fn dataset(work: &Path) -> BTreeMap<String, Vec<u8>> {
 #[test]
 fn killed_anywhere_a_run_resumes_to_the_same_bytes() {
     let n_kills: u32 = std::env::var("ORATOR_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(4);
-    let calm = Project::with_clips("calm", 2, 6.0);
+    let calm = Project::with_clips("calm", 2, 4.6);
     let begun = Instant::now();
     assert_eq!(calm.run(&[]).code, 0);
     let whole = begun.elapsed();
     let expected = dataset(&calm.work());
     assert!(expected.keys().any(|name| name.ends_with(".tar")));
 
-    let killed = Project::with_clips("killed", 2, 6.0);
+    let killed = Project::with_clips("killed", 2, 4.6);
     let (mut before, mut n_killed, mut random) = (BTreeMap::new(), 0, 0x9e37_79b9_7f4a_7c15_u64);
     // A run that ended before its kill is no kill: it is checked, wiped away, and another begun.
     for _ in 0..20 * n_kills {
@@ -67,8 +67,8 @@ fn killed_anywhere_a_run_resumes_to_the_same_bytes() {
 
 #[test]
 fn the_number_of_workers_changes_no_byte() {
-    let one = Project::with_clips("one-worker", 2, 5.0);
-    let two = Project::with_clips("two-workers", 2, 5.0);
+    let one = Project::with_clips("one-worker", 2, 4.6);
+    let two = Project::with_clips("two-workers", 2, 4.6);
     assert_eq!(one.run(&["--jobs", "1"]).code, 0);
     assert_eq!(two.run(&["--jobs", "2"]).code, 0);
     assert!(dataset(&one.work()) == dataset(&two.work()));

@@ -18,7 +18,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 fn settings() -> GanConfig {
-    GanConfig { batch: 2, steps: 6, epoch_steps: 3, checkpoint_every: 2, keep_checkpoints: 2, ..GanConfig::default() }
+    let gan = GanConfig { batch: 2, window_frames: 32, ..GanConfig::default() };
+    GanConfig { steps: 6, epoch_steps: 3, checkpoint_every: 2, keep_checkpoints: 2, ..gan }
 }
 
 /// Every file of a training but its lock.
@@ -63,14 +64,16 @@ impl Task for Shared {
 }
 
 #[test]
-fn a_training_stopped_at_any_step_ends_with_the_same_bytes() {
+fn a_training_stopped_at_a_step_ends_with_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
+    // Behind a checkpoint, and behind a validation; `ORATOR_KILLS` (`make prove`): at every step.
+    let stops = if std::env::var("ORATOR_KILLS").is_ok() { vec![1, 2, 3, 4, 5, 6] } else { vec![3, 4] };
     for (name, stops, settings) in [
-        ("bones", vec![1, 2, 3, 4, 5, 6], settings()),
+        ("bones", stops, settings()),
         (
             "positions",
-            vec![4],
+            vec![5],
             GanConfig {
                 representation: MotionRepresentation::Positions,
                 adversarial: AdversarialLoss::Log,
@@ -81,7 +84,7 @@ fn a_training_stopped_at_any_step_ends_with_the_same_bytes() {
     ] {
         let place = |part: &str| folder.path().join(format!("{name}-{part}"));
         let outcome = train(&dataset, &settings, &place("whole"), &Silent).unwrap();
-        assert_eq!((outcome.steps, outcome.n_windows, outcome.validation.n_windows), (6, 9, 2));
+        assert_eq!((outcome.steps, outcome.n_windows, outcome.validation.n_windows), (6, 21, 4));
         assert_eq!(outcome.validation.split, "validation");
         let whole = bytes(&place("whole"));
         let names: Vec<&str> = whole.iter().map(|(name, _)| name.as_str()).collect();
@@ -150,8 +153,7 @@ fn patience_ends_a_training_whose_score_does_not_fall() {
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");
     // Steps too small to change anything: the first score is never beaten.
-    let settings =
-        GanConfig { steps: 40, epoch_steps: 1, patience: 3, learning_rate: 1e-30, lambda_gan: 0.0, ..settings() };
+    let settings = GanConfig { steps: 40, epoch_steps: 1, patience: 3, learning_rate: 1e-30, lambda_gan: 0.0, ..settings() };
     let outcome = train(&dataset, &settings, &out, &Silent).unwrap();
     assert!(outcome.stopped_early && outcome.steps < 40, "{outcome:?}");
     assert_eq!(outcome.steps, outcome.best_step + 3);

@@ -19,6 +19,7 @@ name = "ben"
 videos = ["videos/ben/*.mp4"]
 [gan]
 batch = 2
+window_frames = 32
 epoch_steps = 4
 checkpoint_every = 3
 "#;

@@ -1,0 +1,164 @@
+//! Files of an earlier version of the program (`fixtures/before`) open: a dataset, a work folder, and a GAN checkpoint,
+//! whose header alone is kept; a formula fills it with numbers.
+
+use crate::fixtures::support::{Project, files_under};
+use crate::fixtures::untrained::generate;
+use orator::dataset::verify::verify::verify;
+use orator::dataset::{Dataset, Split};
+use orator::external::ffmpeg::audio::write_wav;
+use orator::formats::npy;
+use orator::stage::progress::Silent;
+use orator::types::sound::Sound;
+use orator::types::time::FrameRate;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn before(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/before").join(name)
+}
+
+#[test]
+fn a_dataset_verifies_and_reads() {
+    let folder = before("work/dataset/host");
+    let found = verify(&folder, true, &Silent).unwrap();
+    assert!(found.problems.is_empty(), "{:?}", found.problems);
+    let dataset = Dataset::open(&folder).unwrap();
+    assert_eq!((dataset.info().speaker.as_str(), dataset.info().splits["test"].frames), ("host", 5));
+    for (split, sum) in [(Split::Train, TRAIN_SUM), (Split::Test, TEST_SUM)] {
+        let samples = dataset.samples(split);
+        assert_eq!(samples.len(), 1, "{split:?}");
+        let sample = dataset.read(&samples[0]).unwrap();
+        assert_eq!((sample.n_frames(), sample.motion.fps), (5, FrameRate::new(5, 1)));
+        assert_eq!((sample.sound.rate, sample.sound.samples.len()), (16_000, 16_000));
+        let found: f64 = sample.motion.joints.iter().map(|v| f64::from(*v)).sum();
+        assert!((found - sum).abs() < 1e-9, "{split:?}: {found}");
+    }
+}
+
+/// Sums of all coordinates of the train and of the test sample.
+const TRAIN_SUM: f64 = 0.869_040_330_871_939_7;
+const TEST_SUM: f64 = 23.001_238_243_654_37;
+
+/// A project with the earlier work folder and configuration, beside clips drawn anew.
+fn project() -> Project {
+    let project = Project::with_clips("before", 2, 1.0);
+    for (name, path) in files_under(&before("work")) {
+        let to = project.work().join(name);
+        fs::create_dir_all(to.parent().unwrap()).unwrap();
+        fs::copy(path, to).unwrap();
+    }
+    fs::copy(before("pipeline.toml"), project.dir().join("pipeline.toml")).unwrap();
+    project
+}
+
+#[test]
+fn a_work_folder_has_a_status() {
+    let project = project();
+    let status = project.answer(&["status", "--why"]);
+    assert_eq!(status.code, 0, "{}", status.errors);
+    let units = status.json["units"].as_array().unwrap();
+    let state = |unit: &str, stage: &str| {
+        let is_it = |fact: &&Value| fact["unit"].as_str().unwrap().starts_with(unit) && fact["stage"] == stage;
+        let fact = units.iter().find(is_it).unwrap_or_else(|| panic!("{unit} {stage}: {}", status.json));
+        (fact["state"].as_str().unwrap().to_owned(), fact["why"].as_str().unwrap_or_default().to_owned())
+    };
+    // The clips are drawn anew: their bytes may differ from those of then, and whatever follows waits for them.
+    for (unit, stage) in
+        [("host/clip-1", "extract"), ("host/clip-1", "lift"), ("host/clip-2", "extract"), ("host", "dataset")]
+    {
+        let (word, why) = state(unit, stage);
+        assert!(
+            ["fresh", "stale", "waits", "-"].contains(&word.as_str()),
+            "{unit} {stage}: {word}: {why}"
+        );
+        eprintln!("{unit} {stage}: {word}: {why}");
+    }
+    assert!(status.errors.contains("max_bone_change"), "the key under its former name is told: {}", status.errors);
+}
+
+#[test]
+fn a_video_is_forgotten_with_its_files_of_former_names() {
+    let project = project();
+    let measures = |files: &[(String, PathBuf)]| {
+        files.iter().any(|(name, _)| name.ends_with("lift/host/clip-1-f39adeef/measures.npz"))
+    };
+    assert!(measures(&files_under(&project.work())));
+    let others = |project: &Project| -> BTreeMap<String, Vec<u8>> {
+        let files = files_under(&project.work()).into_iter();
+        files.filter(|(name, _)| name.ends_with(".tar")).map(|(name, path)| (name, fs::read(path).unwrap())).collect()
+    };
+    let shards = others(&project);
+    let answer = project.answer(&["forget", "--video", "clip-1.mp4"]);
+    assert_eq!(answer.code, 0, "{} {}", answer.json, answer.errors);
+    assert!(answer.json["found"].as_array().unwrap().is_empty(), "{}", answer.json);
+    let left: Vec<String> = files_under(&project.work()).into_iter().map(|(name, _)| name).collect();
+    assert!(!left.iter().any(|name| name.contains("clip-1")), "{left:?}");
+    let kept = others(&project);
+    assert_eq!(kept.len(), 1, "{left:?}");
+    assert!(kept.iter().all(|(name, bytes)| shards[name] == *bytes));
+    let found = verify(&project.work().join("dataset/host"), true, &Silent).unwrap();
+    assert!(found.problems.is_empty(), "{:?}", found.problems);
+}
+
+/// Number `index` of the tensor `name`: 24 bits of a hash (FNV-1a of the name, then SplitMix64) as 0..1.
+fn hashed(name: &str, index: u64) -> f32 {
+    let seed = name
+        .bytes()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
+    let mut z = seed.wrapping_add(index).wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 40) as f32 / 16_777_216.0
+}
+
+/// The values of a tensor: weights of a spread that suits their number of inputs, norms about one.
+fn filled(name: &str, shape: &[u64]) -> Vec<f32> {
+    let fan_in: u64 = shape.iter().skip(1).product();
+    let value = |index: u64| {
+        let (share, about_zero) = (hashed(name, index), hashed(name, index) - 0.5);
+        match name {
+            _ if name.ends_with(".second") => share,
+            _ if name.ends_with("running_var") => 1.0 + about_zero * 0.5,
+            _ if name.ends_with("norm.weight") => 1.0 + about_zero * 0.25,
+            _ if shape.len() <= 1 => about_zero * 0.125,
+            _ => about_zero * (4.0 / f32::from(1_u16 << (fan_in.ilog2() / 2))),
+        }
+    };
+    (0..shape.iter().product()).map(value).collect()
+}
+
+/// Writes the kept header and the numbers of the formula as a safetensors file.
+fn write_checkpoint(path: &Path) {
+    let kept: Value = serde_json::from_slice(&fs::read(before("checkpoint.json")).unwrap()).unwrap();
+    let mut header = json!({ "__metadata__": kept["metadata"] });
+    let mut data: Vec<u8> = Vec::new();
+    for (name, shape) in kept["tensors"].as_object().unwrap() {
+        let shape: Vec<u64> = serde_json::from_value(shape.clone()).unwrap();
+        let first = data.len();
+        data.extend(filled(name, &shape).into_iter().flat_map(f32::to_le_bytes));
+        header[name] = json!({ "dtype": "F32", "shape": shape, "data_offsets": [first, data.len()] });
+    }
+    let mut header = header.to_string().into_bytes();
+    header.resize(header.len().next_multiple_of(8), b' ');
+    fs::write(path, [&(header.len() as u64).to_le_bytes()[..], &header, &data].concat()).unwrap();
+}
+
+#[test]
+fn a_checkpoint_generates_the_motion_of_then() {
+    let folder = tempfile::tempdir().unwrap();
+    write_checkpoint(&folder.path().join("host.safetensors"));
+    let samples = (0..16_000_i32).map(|i| (((i64::from(i).pow(2) * 7) >> 6) % 20_001 - 10_000) as f32 / 32_768.0);
+    let sound = Sound { rate: 16_000, samples: samples.collect() };
+    write_wav(&folder.path().join("speech.wav"), &sound).unwrap();
+    let output = generate(folder.path(), "--checkpoint host.safetensors --audio speech.wav --out motion.npy");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let fps = FrameRate::new(15, 1);
+    let [then, now] =
+        [before("motion.npy"), folder.path().join("motion.npy")].map(|file| npy::read(&file, fps).unwrap());
+    assert_eq!(then.joints.dim(), now.joints.dim());
+    let apart = then.joints.iter().zip(&now.joints).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    eprintln!("{apart:e} m at most");
+    assert!(apart <= 1e-6, "{apart:e} m");
+}
