@@ -1,12 +1,8 @@
-//! Finds captured or labelled fingers: files and folders of them, each kind told apart by what it holds.
-//!
-//! | file | fingers | size |
-//! |---|---|---|
-//! | `.bvh` | joints found by their names (`finger_bvh`) | middle proximal phalanx 48 mm |
-//! | `.npz` with SMPL-X `poses` [T,165] | rotations on an assumed rest hand (`finger_npz`) | the same |
-//! | `.npz` with `human_joints` [T,43,3] | TED speakers, no tips | wrist to middle knuckle 93.2 mm |
-//! | `.txt` of 48 numbers a line | ICVL labels, joints worked out of the middles of bones (`finger_labels`) | middle proximal phalanx 48 mm |
-//! | `.txt` of 42 numbers a line | NYU labels, no knuckles: errors after alignment only | middle finger's last two bones 51.3 mm |
+//! Finds captured or labelled fingers in files and folders, each kind told apart by what it holds: `.bvh` by joint
+//! names (`bvh`); `.npz` with SMPL-X `poses` [T, 165] on an assumed rest hand, or with `human_joints` [T, 43, 3] of TED
+//! speakers, without tips (`npz`); `.txt` of 48 numbers a line, ICVL labels from the middles of bones, or of 42, NYU
+//! labels without knuckles, whose errors are after alignment only (`labels`). Sizes: the middle proximal phalanx 48 mm;
+//! TED wrist to middle knuckle 93.2 mm; NYU the middle finger's last two bones 51.3 mm.
 
 use super::take::FingerTake;
 use super::{bvh, labels, npz};

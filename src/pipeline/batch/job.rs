@@ -69,7 +69,7 @@ pub enum BatchState {
     Made,
     /// Its motion was there already.
     Fresh,
-    /// It failed; the others are not stopped.
+    /// Failed; the others are not stopped.
     Failed,
 }
 

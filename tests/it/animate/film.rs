@@ -1,7 +1,7 @@
 //! The drawn figure: left is left, everything fits, gaps do no harm, and the mp4 has its frames and its sound.
 
 use crate::fixtures::figures::{FPS, swinging};
-use crate::fixtures::sync_clips::{Kind, PLAIN, chirp, chirp_begins, make};
+use crate::fixtures::media::sync_clips::{Kind, PLAIN, chirp, chirp_begins, make};
 use ndarray::s;
 use orator::animate::draw::figure::{LEFT, PAPER, RIGHT};
 use orator::animate::export::film;

@@ -250,7 +250,7 @@ fn the_released_sounds_have_the_measured_onsets() {
         let sound =
             orator::external::ffmpeg::audio::read_mono(&folder.join(format!("{clip}.wav")), 44_100).unwrap().unwrap();
         let mut at_16_khz = Vec::new();
-        let mut resampler = crate::fixtures::librosa_resampler::Resampler::new(44_100, 16_000);
+        let mut resampler = crate::fixtures::media::librosa_resampler::Resampler::new(44_100, 16_000);
         resampler.push(&sound.samples, &mut at_16_khz);
         resampler.finish(&mut at_16_khz);
         let onsets = orator::audio::onset::onsets(&at_16_khz);

@@ -5,7 +5,7 @@
 //! goes on (or off) between the last picture without and the first with it, at best knowledge midway; so in the clip,
 //! where its chirp begins, and so in the dataset.
 
-use crate::fixtures::sync_clips::{Clip, Kind, PLAIN, Pace, chirp_begins, make, read_picture};
+use crate::fixtures::media::sync_clips::{Clip, Kind, PLAIN, Pace, chirp_begins, make, read_picture};
 use ndarray::Array1;
 use ndarray_npy::NpzReader;
 use orator::config;

@@ -69,10 +69,7 @@ fn a_work_folder_has_a_status() {
         [("host/clip-1", "extract"), ("host/clip-1", "lift"), ("host/clip-2", "extract"), ("host", "dataset")]
     {
         let (word, why) = state(unit, stage);
-        assert!(
-            ["fresh", "stale", "waits", "-"].contains(&word.as_str()),
-            "{unit} {stage}: {word}: {why}"
-        );
+        assert!(["fresh", "stale", "waits", "-"].contains(&word.as_str()), "{unit} {stage}: {word}: {why}");
         eprintln!("{unit} {stage}: {word}: {why}");
     }
     assert!(status.errors.contains("max_bone_change"), "the key under its former name is told: {}", status.errors);
