@@ -5,8 +5,8 @@ use crate::fixtures::support::{Project, files_under};
 use crate::fixtures::untrained::generate;
 use orator::dataset::verify::verify::verify;
 use orator::dataset::{Dataset, Split};
-use orator::external::ffmpeg::audio::write_wav;
-use orator::formats::npy;
+
+use orator::formats::{npy, wav};
 use orator::stage::progress::Silent;
 use orator::types::sound::Sound;
 use orator::types::time::FrameRate;
@@ -148,7 +148,7 @@ fn a_checkpoint_generates_the_motion_of_then() {
     write_checkpoint(&folder.path().join("host.safetensors"));
     let samples = (0..16_000_i32).map(|i| (((i64::from(i).pow(2) * 7) >> 6) % 20_001 - 10_000) as f32 / 32_768.0);
     let sound = Sound { rate: 16_000, samples: samples.collect() };
-    write_wav(&folder.path().join("speech.wav"), &sound).unwrap();
+    wav::write(&folder.path().join("speech.wav"), &sound).unwrap();
     let output = generate(folder.path(), "--checkpoint host.safetensors --audio speech.wav --out motion.npy");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let fps = FrameRate::new(15, 1);
