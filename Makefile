@@ -15,6 +15,8 @@ ORATOR := $(TARGET)/release/orator
 SKIPPED := $(abspath $(TARGET))/skipped-tests.txt
 export ORATOR_READERS ?= $(abspath $(TARGET)/readers)
 export ORATOR_BLENDER ?= $(abspath $(TARGET)/blender)
+# A text that differs from its snapshot is an error.
+export INSTA_UPDATE := no
 export ORATOR_GLTF_VALIDATOR ?= $(abspath $(TARGET)/validator)
 
 setup: ; @.ci/setup/system.sh
@@ -25,7 +27,7 @@ build: setup runtime
 	cargo build --release --locked
 
 # Integration tests that start no other program, load no ONNX Runtime and end within seconds.
-QUICK := house:: lift:: segment::segment cli::guide cli::completions animate::animate:: animate::bvh animate::motion_files \
+QUICK := house:: wording:: lift:: segment::segment cli::guide cli::completions animate::animate:: animate::bvh animate::motion_files \
 	dataset::shard:: dataset::dataset_verify dataset::import_readers evaluate::metrics evaluate::golden_metrics \
 	train::networks train::operators robustness::runner
 

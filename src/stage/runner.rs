@@ -120,7 +120,7 @@ fn report(answer: &StageOutcome, stage: &dyn Stage, unit: &Unit, progress: &dyn 
     let (stage, unit) = (stage.name(), unit.to_string());
     match answer {
         StageOutcome::Failed(error) => {
-            progress.event(&Event::Failed { stage, unit: &unit, error: &format!("{error:#}") })
+            progress.event(&Event::Failed { stage, unit: &unit, error: &format!("{error:#}") });
         }
         StageOutcome::Done(report) => progress.event(&Event::Done { stage, unit: &unit, line: &report.line }),
         StageOutcome::Skipped(_) => progress.event(&Event::Fresh { stage, unit: &unit }),

@@ -4,6 +4,8 @@
 //! cargo run --release --example generate_motion -- work/gan/host speech.wav gestures.bvh
 //! ```
 
+#![allow(clippy::print_stdout)]
+
 use anyhow::{Result, bail};
 use orator::{
     AnimationOptions, ExportContent, ExportFormat, GestureGenerator, Silent, UnreadableMedia, perform, read_sound,

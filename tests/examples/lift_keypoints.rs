@@ -4,6 +4,8 @@
 //! cargo run --release --example lift_keypoints -- work/pose2d/host/VIDEO/keypoints.npz lifted.bvh
 //! ```
 
+#![allow(clippy::print_stdout)]
+
 use anyhow::{Result, bail};
 use orator::{AnimationOptions, ExportContent, ExportFormat, LiftConfig, Lifter, Silent, perform, read_keypoints};
 use std::path::{Path, PathBuf};

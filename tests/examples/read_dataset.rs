@@ -4,6 +4,8 @@
 //! cargo run --release --example read_dataset -- work/dataset/host
 //! ```
 
+#![allow(clippy::print_stdout)]
+
 use anyhow::{Result, bail};
 use orator::{Dataset, Split};
 use std::path::{Path, PathBuf};

@@ -1,5 +1,8 @@
 //! The integration tests: one binary, a module a concern.
 
+// The benchmark, tested by `cli::bench`, shares a fixture with the tests.
+#![allow(clippy::duplicate_mod)]
+
 mod animate;
 /// The benchmark's own modules, so that its parts are tested without a release build.
 #[path = "../bench/main.rs"]

@@ -71,10 +71,10 @@ struct WristMove {
 /// the target of vowel v:
 ///
 /// * stroke: from s = t_k + d_h for 0.4 s, x_h <- x_h + u((t - s) / 0.4) (goal - x_h), goal = REST + g_k
-/// (PLACES[v_k][h] - REST), g_k = 0.45 + 0.4 (a_k - 0.4) / 0.6;
+///   (PLACES[v_k][h] - REST), g_k = 0.45 + 0.4 (a_k - 0.4) / 0.6;
 /// * hold for 0.5 s, then return over 0.6 s with goal = REST, unless the next stroke of the hand begins;
-/// * lift: both wrists rise by 0.2 m times L(t) = integral of E(t - r) w(r) dr, w a raised cosine over r = 0.2 .. 0.8
-/// s.
+/// * lift: both wrists rise by 0.2 m times L(t) = integral of E(t - r) w(r) dr, w a raised cosine over
+///   r = 0.2 .. 0.8 s.
 ///
 /// The right hand leads with d = 0.2 s (peak speed 0.4 s after an onset), the left follows with d = 0.4 s (0.6 s);
 /// nothing depends on the sound of the present moment. Variation, with a seed of its own: skipped accents, strokes

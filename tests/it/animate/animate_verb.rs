@@ -194,7 +194,7 @@ fn what_is_wrong_is_said_and_nothing_is_written() {
     std::fs::create_dir(dir.join("nothing")).unwrap();
     for (args, words) in [
         ("gone.npy --out x.bvh", "gone.npy is not there"),
-        ("nan.npy --out x.bvh", "no arm is seen in any of its 10 frames"),
+        ("nan.npy --out x.bvh", "all joints of all 10 frames are missing"),
         ("empty.npy --out x.bvh", "no frames"),
         ("few.npy --out x.bvh", "[10, 43, 3], expected [frames, 49, 3]"),
         ("millimetres.npy --out x.bvh", "must be in metres"),
@@ -206,7 +206,7 @@ fn what_is_wrong_is_said_and_nothing_is_written() {
         ("good.npy --out good.npy", "is what is read"),
         ("good.npy --out x.bvh x.bvh", "asked for twice"),
         ("good.npy --out nothing", "is a folder"),
-        ("good.npy --out x.bvh --in-fps 0", "between 1 and 240"),
+        ("good.npy --out x.bvh --in-fps 0", "1 to 1000 frames"),
         ("good.npy --out x.bvh --fps 1001", "1 to 1000 frames"),
         ("good.npy --out x.bvh --fps fast", "1 to 1000 frames"),
         ("good.npy --out x.bvh --sample one", "is no dataset"),
