@@ -58,7 +58,7 @@ enum DemoVerb {
         /// Hours of the training split; validation and test have ten minutes each.
         #[arg(long, default_value_t = 2.0)]
         hours: f64,
-        /// Another seed is another speech with other whims.
+        /// Seed of the speech and of the speaker's variation.
         #[arg(long, default_value_t = 1)]
         seed: u64,
     },
@@ -186,7 +186,7 @@ fn learned(dataset: &Path, checkpoint: Option<&Path>, picture: Option<&Path>, ui
         text += "\n";
     }
     text += "speed: correlation of a wrist's speed (m/s, frame by frame, not smoothed, all clips in a row) with that of the\n\
-             rule without whims; PCK, energy (mean squared joint speed, share of the data's) and L1 (normalised): against the data;\n\
+             rule without variation; PCK, energy (mean squared joint speed, share of the data's) and L1 (normalised): against the data;\n\
              pauses: the energy where the rule holds both wrists still, which no sound tells.";
     if let Some(good) = learned.good {
         text += &format!(

@@ -9,7 +9,7 @@ use serde_json::json;
 use std::fs;
 use std::path::PathBuf;
 
-/// How busy `orator run` keeps the processor: the whole road of the videos of a project, into a work folder of its own.
+/// How busy `orator run` keeps the processor: all stages for the videos of a project, into a work folder of its own.
 #[derive(clap::Args)]
 pub struct Args {
     /// The project's configuration.

@@ -2,6 +2,7 @@
 //! look like. `FLOORS` is the table of `src/lib.rs`.
 
 use crate::fixtures::imports::{SourceFile, Sources, rust_files, scan, tokens, without_comments, without_tests};
+use orator::stage::refusal::Refusal;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -257,22 +258,35 @@ fn stages_and_their_files_are_spelt_in_one_file() {
     let names = ["extract", "pose2d", "segment", "lift"];
     let files = ["audio.wav", "timeline.npz", "media.json", "keypoints.npz", "measures.npz", "joints.npz"];
     let files = [&files[..], &["bones.json", "camera.json", "bone_change.npz", "hashes.json"]].concat();
+    // The settings of a stage are a section of the fingerprint: a key of JSON.
+    none(&spelt_outside("stage/artifacts.rs", |string, is_key| {
+        files.contains(&string) || names.contains(&string) && !is_key
+    }));
+}
+
+#[test]
+fn reasons_of_refusals_are_worded_in_one_file() {
+    // Reasons that are a single word of everyday use ("arms", "face") are also names of body parts and of measures.
+    let common = ["quiet", "still", "face", "arms", "bones", "hands", "cut", "open", "jump", "no sound"];
+    let reasons = Refusal::JUDGED.map(Refusal::reason);
+    let is_reason = |string: &str| reasons.contains(&string) && !common.contains(&string);
+    none(&spelt_outside("stage/refusal.rs", |string, _| is_reason(string)));
+}
+
+/// Strings in code of the library and the program, outside `home` and outside tests, for which `is_wrong` holds; its
+/// second argument says whether a colon follows, as behind a key of JSON.
+fn spelt_outside(home: &str, is_wrong: impl Fn(&str, bool) -> bool) -> Vec<String> {
     let mut wrong = Vec::new();
-    for path in rust_files(&root().join("src")) {
-        if path.ends_with("stage/artifacts.rs") {
-            continue;
-        }
+    for path in rust_files(&root().join("src")).into_iter().filter(|path| !path.ends_with(home)) {
         let (code, strings) = scan(&fs::read_to_string(&path).unwrap());
         let n_code = without_tests(&code).len();
         for (string, end) in strings.into_iter().filter(|(_, end)| *end <= n_code) {
-            // The settings of a stage are a section of the fingerprint: a key of JSON.
-            let is_key = code[end..].trim_start().starts_with(':');
-            if files.contains(&string.as_str()) || names.contains(&string.as_str()) && !is_key {
+            if is_wrong(&string, code[end..].trim_start().starts_with(':')) {
                 wrong.push(format!("{}: \"{string}\"", below_root(&path)));
             }
         }
     }
-    none(&wrong);
+    wrong
 }
 
 #[test]

@@ -20,7 +20,7 @@ use serde::de::IntoDeserializer as _;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// Measure made motion beside the real one, and say what the figures are worth.
+/// Measure predicted motion beside the ground truth, and say what the metrics are worth.
 ///
 /// Files or folders of motion (.npy, .npz, the authors' .txt, .bvh), or a checkpoint on a split of a dataset. Beside each
 /// figure stands the same for poses that never move, the nearest neighbour, mismatched motion and the truth itself; with its
@@ -45,7 +45,7 @@ struct MotionArgs {
     /// The real motion: a file, or a folder of files that are paired by name.
     #[arg(long, value_name = "PATH")]
     truth: Option<PathBuf>,
-    /// The made motion of the same sound: a file or a folder (it may be the same one: gt_interval_7.txt belongs to
+    /// The predicted motion of the same sound: a file or a folder (it may be the same one: gt_interval_7.txt belongs to
     /// prediction_interval_7.txt).
     #[arg(long, value_name = "PATH", requires = "truth")]
     prediction: Option<PathBuf>,

@@ -114,7 +114,7 @@ pub fn measure(dataset: &Dataset, speaker: Option<&GestureGenerator>, progress: 
     });
     rows.push(row("nearest training window by sound", each(&|test| baselines.nearest(&test.sound))));
     rows.push(row("the data itself", each(&|test| test.sample.motion.joints.clone())));
-    rows.push(row("the rule without whims", each(&|test| test.predictable.clone())));
+    rows.push(row("the rule without variation", each(&|test| test.predictable.clone())));
     let n_frames: usize = tests.iter().map(|test| test.sample.n_frames()).sum();
     Ok(Learned {
         n_clips: tests.len(),

@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_dice_give_the_same_whims_and_others_do_not() {
+    fn a_seed_gives_its_variation_and_another_seed_another() {
         let speech = speech(2);
         let with = |seed| {
             RuleGestures::with_variation(&speech, SECS, &mut ChaCha8Rng::seed_from_u64(seed))

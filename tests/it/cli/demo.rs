@@ -22,7 +22,7 @@ fn the_clip_has_its_pictures_its_sound_and_its_truth() {
 /// The 3D error is held to its target by `make demo`, on longer clips.
 #[test]
 fn a_run_finds_every_joint_through_the_chain_of_real_models() {
-    let project = Project::with_clips("road", 1, 5.0);
+    let project = Project::with_clips("pipeline", 1, 5.0);
     let ran = project.run(&[]);
     assert_eq!(ran.code, 0, "{}", ran.errors);
     let folder = project.dir().to_string_lossy().into_owned();

@@ -30,11 +30,11 @@ fn neither_the_mean_pose_nor_the_sound_of_the_moment_explains_the_gestures() {
             assert!(number(&row(ridge), hand) < 0.5, "{ridge}: {measured}");
         }
     }
-    let rule = row("the rule without whims");
+    let rule = row("the rule without variation");
     assert!(number(&rule, "/poses/pck") > 0.7 && number(&rule, "/speed_correlation/0") > 0.999, "{rule}");
     let data = row("the data itself");
     assert!((number(&data, "/poses/energy") - 1.0).abs() < 1e-9 && number(&data, "/poses/l1") == 0.0, "{data}");
-    assert!(number(&data, "/speed_correlation/1") < 0.95, "without whims there is nothing to tell apart: {data}");
+    assert!(number(&data, "/speed_correlation/1") < 0.95, "without variation there is nothing to tell apart: {data}");
 }
 
 #[test]
