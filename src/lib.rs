@@ -35,8 +35,8 @@
 //! | 6 | `pipeline` | the five stages, their order, the files in which they meet; batches of speech to motion | `types math stage config external audio motion formats nn generate animate dataset` |
 //! | 6 | `train` | optimiser, GAN, lifters, synthetic scenes, spaces of movement | `types math stage config audio motion formats nn mocap dataset metrics generate` |
 //! | 6 | `demo` | the synthetic speaker: drawn, with a known rule, and the checks against it | `types math stage audio motion formats external animate dataset metrics generate` |
-//! | 7 | `evaluate` | clips, baselines, table, verdict; the lifters' errors | `types math stage config external audio motion formats nn mocap metrics generate animate dataset pipeline train` |
-//! | 8 | `report` | pages for people | `types math stage config external audio motion formats nn mocap metrics generate animate dataset pipeline train evaluate` |
+//! | 7 | `evaluate` | clips, baselines, table, verdict; the lifters' errors | `types math stage config external audio motion formats nn mocap metrics generate dataset pipeline train` |
+//! | 8 | `report` | pages for people | `types stage config external formats metrics animate pipeline train evaluate` |
 //! | - | `guide` | the pages of the guide, in Markdown | nothing |
 //!
 //! `cli` (in the program only) imports everything and is the one place that prints. `tests/it/house.rs` holds the code to

@@ -29,14 +29,9 @@ const FLOORS: [(u8, &str, &str); 19] = [
     (
         7,
         "evaluate",
-        "types math stage config external audio motion formats nn mocap metrics generate animate dataset pipeline train",
+        "types math stage config external audio motion formats nn mocap metrics generate dataset pipeline train",
     ),
-    (
-        8,
-        "report",
-        "types math stage config external audio motion formats nn mocap metrics generate animate dataset pipeline \
-         train evaluate",
-    ),
+    (8, "report", "types stage config external formats metrics animate pipeline train evaluate"),
 ];
 
 /// Folders that import nothing of each other: pairwise siblings under a room.

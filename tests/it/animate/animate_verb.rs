@@ -195,11 +195,11 @@ fn what_is_wrong_is_said_and_nothing_is_written() {
     for (args, words) in [
         ("gone.npy --out x.bvh", "gone.npy is not there"),
         ("nan.npy --out x.bvh", "all joints of all 10 frames are missing"),
-        ("empty.npy --out x.bvh", "no frames"),
+        ("empty.npy --out x.bvh", "has no frame"),
         ("few.npy --out x.bvh", "[10, 43, 3], expected [frames, 49, 3]"),
         ("millimetres.npy --out x.bvh", "must be in metres"),
         ("words.txt --out x.bvh", "line 1, number 1: `a` is no number"),
-        ("picture.png --out x.bvh", "motion is read from .npy"),
+        ("picture.png --out x.bvh", "is no motion file: expected .npy"),
         ("nothing --out x --format bvh", "holds no motion"),
         ("good.npy --out x.mov", "give the file one of these endings"),
         ("good.npy --out x --format mov", "give the file one of these endings"),
