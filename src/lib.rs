@@ -47,6 +47,7 @@
 //! a video, except for its keypoints. No user input panics.
 
 #![warn(missing_docs)]
+#![cfg_attr(not(test), deny(clippy::print_stderr))]
 // `[T, 49, 3]` in a comment is a shape, no link.
 #![allow(rustdoc::broken_intra_doc_links)]
 

@@ -1,5 +1,7 @@
 //! The `orator` program: parse, run the verb, print the error, set the exit code.
 
+#![cfg_attr(not(test), deny(clippy::print_stderr))]
+
 mod cli;
 
 #[global_allocator]
@@ -17,6 +19,9 @@ fn main() -> std::process::ExitCode {
     // A training step takes and frees the same gigabytes over and over; fresh pages cost more than all its norms.
     // SAFETY: an option of the allocator that is linked above, by its number in its header.
     unsafe { mi_option_set(PURGE_DELAY, -1) };
+    // ONNX Runtime reports its use to its maker unless this is set before it is loaded.
+    // SAFETY: no other thread has been started yet.
+    unsafe { std::env::set_var(orator::external::onnx::TELEMETRY_OFF, "1") };
     // The tensor library's own threads spin while they wait, which costs more than they help beside rayon's.
     if std::env::var_os("CANDLE_NUM_THREADS").is_none() {
         // SAFETY: no other thread has been started yet.

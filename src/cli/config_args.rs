@@ -25,7 +25,7 @@ impl ConfigArgs {
     /// Reads the configuration, with every problem at once; a key under a former name is noted on standard error.
     pub fn load(&self) -> anyhow::Result<orator::config::Config> {
         let config = orator::config::load(&self.config, &self.set)?;
-        config.notes.iter().for_each(|note| eprintln!("note    {note}"));
+        config.notes.iter().for_each(|note| crate::cli::ui::note(&format!("note    {note}")));
         Ok(config)
     }
 }

@@ -76,6 +76,7 @@ pub fn main() -> ExitCode {
         Verb::Man(args) => completions::run_man(&args, Cli::command(), &ui),
     };
     match outcome {
+        Ok(_) if ui.has_lost_output() => ExitCode::from(1),
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::SomeFailed) => ExitCode::from(2),
         Ok(Outcome::Wrong) => ExitCode::from(1),

@@ -2,44 +2,60 @@
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use orator::stage::progress::{Progress, Task};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// The terminal, or its absence.
+/// The terminal, or its absence. An output that cannot be written never ends the work.
 pub struct Ui {
     json: bool,
     bars: MultiProgress,
+    has_lost_output: AtomicBool,
 }
 
 impl Ui {
     /// With `json` the summary is one JSON object; bars go to standard error and hide themselves where that is no terminal.
     pub fn new(json: bool) -> Self {
-        Self { json, bars: MultiProgress::new() }
+        Self { json, bars: MultiProgress::new(), has_lost_output: AtomicBool::new(false) }
     }
 
     /// The closing words of a verb: the summary for people and the next command to type, or `facts` for programs.
     pub fn summary(&self, text: &str, next: Option<&str>, facts: serde_json::Value) {
         if self.json {
-            return say(&facts.to_string());
+            return self.print(&facts.to_string());
         }
-        say(text.trim_end());
-        if let Some(next) = next {
-            say(&format!("next: {next}"));
-        }
+        let next = next.map(|next| format!("\nnext: {next}")).unwrap_or_default();
+        self.print(&format!("{}{next}", text.trim_end()));
     }
 
     /// An error that ended the verb.
     pub fn error(&self, error: &anyhow::Error) {
-        eprintln!("error: {error:#}");
+        note(&format!("error: {error:#}"));
         if self.json {
-            say(&serde_json::json!({ "error": format!("{error:#}") }).to_string());
+            self.print(&serde_json::json!({ "error": format!("{error:#}") }).to_string());
+        }
+    }
+
+    /// Whether standard output could not take all that was written to it (a full disk).
+    pub fn has_lost_output(&self) -> bool {
+        self.has_lost_output.load(Ordering::Relaxed)
+    }
+
+    /// Writes a line on standard output. A reader who has gone away (`orator status | head`) is no failure.
+    fn print(&self, line: &str) {
+        let mut out = std::io::stdout();
+        if let Err(error) = writeln!(out, "{line}").and_then(|()| out.flush())
+            && error.kind() != ErrorKind::BrokenPipe
+        {
+            self.has_lost_output.store(true, Ordering::Relaxed);
+            note(&format!("error: cannot write to standard output: {error}"));
         }
     }
 }
 
-/// A line on standard output. That nobody reads it any more (`orator status | head`) is no failure.
-fn say(line: &str) {
-    let _ = writeln!(std::io::stdout(), "{line}");
+/// Writes a line on standard error, where that can still be written.
+pub fn note(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 impl Progress for Ui {
@@ -57,7 +73,12 @@ impl Progress for Ui {
     }
 
     fn say(&self, line: &str) {
-        self.bars.suspend(|| eprintln!("{line}"));
+        // `MultiProgress::suspend` would panic on a terminal that is gone.
+        if self.bars.is_hidden() {
+            note(line);
+        } else {
+            let _ = self.bars.println(line);
+        }
     }
 }
 

@@ -18,5 +18,6 @@ pub use model::Outputs;
 pub use model::sha256_of;
 pub use runtime::LIBRARY;
 pub use runtime::Runtime;
+pub use runtime::TELEMETRY_OFF;
 pub use runtime::find_library;
 pub use store::{FetchSource, ModelState, ModelStore};

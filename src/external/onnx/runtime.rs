@@ -10,6 +10,11 @@ pub const LIBRARY: &str = "libonnxruntime.so";
 /// Names a library outright, before any search.
 const VARIABLE: &str = "ORT_DYLIB_PATH";
 
+/// The variable that stops ONNX Runtime from reporting its use to its maker, read by the library when it is loaded:
+/// its own switch comes after the first report. The program sets it before its first thread starts; a program that
+/// uses this crate does so itself.
+pub const TELEMETRY_OFF: &str = "ORT_DISABLE_TELEMETRY";
+
 /// ONNX Runtime, loaded.
 #[derive(Clone)]
 pub struct Runtime {
