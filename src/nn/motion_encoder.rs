@@ -8,7 +8,7 @@ use super::ops::batch_norm::BatchNorm;
 use super::ops::conv1d::Conv1d;
 use super::ops::linear::Linear;
 use super::params::Params;
-use candle_core::{Device, Result, Tensor, Var};
+use candle_core::{Device, Module, Result, Tensor, Var};
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
@@ -58,6 +58,11 @@ fn norm(params: &mut Params, name: &str, n: usize, slope: f64) -> Result<BatchNo
     BatchNorm::new(params, &format!("{name}.norm"), n, 1e-5, MOMENTUM, slope)
 }
 
+/// Layer and norm, one pair after the other.
+fn through<L: Module>(layers: &[(L, BatchNorm)], x: &Tensor, mode: &Mode) -> Result<Tensor> {
+    layers.iter().try_fold(x.clone(), |x, (layer, norm)| norm.forward(&layer.forward(&x)?, mode.trains()))
+}
+
 impl MotionEncoder {
     /// Makes the network's tensors in `params`.
     pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
@@ -69,7 +74,7 @@ impl MotionEncoder {
             [(config.n_in, a, 3, 1), (a, b, 3, 1), (b, c, 4, STEP), (c, LAST, 3, 1)].into_iter().enumerate()
         {
             let name = format!("{NAME}conv{i}");
-            let conv = Conv1d::valid(params, &name, n_in, n_out, kernel, 1)?.with_stride(stride);
+            let conv = Conv1d::valid(params, &name, [n_in, n_out], kernel, stride, 1)?;
             convs.push((conv, norm(params, &name, n_out, SLOPE)?));
         }
         let [d, e] = config.hidden;
@@ -105,7 +110,7 @@ impl MotionEncoder {
 
     /// Windows [B, n_in, 34], normalised, to codes [B, 32].
     pub fn forward(&self, x: &Tensor, mode: &Mode) -> Result<Tensor> {
-        self.finish(&self.convolve(x, mode)?.flatten_from(1)?, mode)
+        through(&self.dense, &through(&self.convs, x, mode)?.flatten_from(1)?, mode)
     }
 
     /// Codes [n, 32] of the windows of `frames` [T, n_in] that begin at 0, `stride`, 2 `stride` ... (a multiple of 2).
@@ -118,20 +123,13 @@ impl MotionEncoder {
         }
         let values: Vec<f32> = frames.t().iter().copied().collect();
         let x = self.normalised(&Tensor::from_vec(values, (1, n_in, n_frames), &Device::Cpu)?)?;
-        let y = self.convolve(&x, &Mode::Eval)?.squeeze(0)?.to_vec2::<f32>()?;
+        let y = through(&self.convs, &x, &Mode::Eval)?.squeeze(0)?.to_vec2::<f32>()?;
         let window = |i: usize| y.iter().flat_map(move |row| &row[i * stride / STEP..][..PLACES]).copied();
         let windows: Vec<f32> = (0..n).flat_map(window).collect();
-        let codes = self.finish(&Tensor::from_vec(windows, (n, LAST * PLACES), &Device::Cpu)?, &Mode::Eval)?;
+        let windows = Tensor::from_vec(windows, (n, LAST * PLACES), &Device::Cpu)?;
+        let codes = through(&self.dense, &windows, &Mode::Eval)?;
         let codes = codes.flatten_all()?.to_vec1()?;
         Array2::from_shape_vec((n, N_CODE), codes).map_err(candle_core::Error::wrap)
-    }
-
-    fn convolve(&self, x: &Tensor, mode: &Mode) -> Result<Tensor> {
-        self.convs.iter().try_fold(x.clone(), |x, (conv, norm)| norm.forward(&conv.forward(&x)?, mode.trains()))
-    }
-
-    fn finish(&self, x: &Tensor, mode: &Mode) -> Result<Tensor> {
-        self.dense.iter().try_fold(x.clone(), |x, (linear, norm)| norm.forward(&linear.forward(&x)?, mode.trains()))
     }
 
     fn set_momentum(&mut self, momentum: f64) {
@@ -170,13 +168,8 @@ impl AutoEncoder {
     /// Windows [B, n_in, 34], normalised, to what is left of them after the code, the same shape.
     pub fn forward(&self, x: &Tensor, mode: &Mode) -> Result<Tensor> {
         let code = self.encoder.forward(x, mode)?;
-        let y = self
-            .dense
-            .iter()
-            .try_fold(code, |x, (linear, norm)| norm.forward(&linear.forward(&x)?, mode.trains()))?
-            .reshape((x.dim(0)?, LAST, WINDOW))?;
-        let y = self.convs.iter().try_fold(y, |x, (conv, norm)| norm.forward(&conv.forward(&x)?, mode.trains()))?;
-        self.last.forward(&y)
+        let y = through(&self.dense, &code, mode)?.reshape((x.dim(0)?, LAST, WINDOW))?;
+        self.last.forward(&through(&self.convs, &y, mode)?)
     }
 
     /// How much a batch counts in the running statistics.

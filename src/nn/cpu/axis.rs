@@ -103,16 +103,24 @@ impl ConvGeometry {
     /// Every frame, no padding.
     pub const VALID: Self = Self { stride: 1, dilation: 1, pad: (0, 0) };
 
-    /// TensorFlow's "same": ceil(n_frames / stride) frames come out; the smaller half of the padding goes first.
-    pub fn same(n_frames: usize, kernel: usize, stride: usize) -> Self {
-        let total = ((n_frames.div_ceil(stride).max(1) - 1) * stride + kernel).saturating_sub(n_frames);
-        Self { stride, dilation: 1, pad: (total / 2, total - total / 2) }
-    }
-
     /// Frames that come out of `n_frames`; `None` when the kernel does not fit.
     pub fn n_out(&self, n_frames: usize, kernel: usize) -> Option<usize> {
         let receptive_field = self.dilation * kernel.checked_sub(1)? + 1;
         let padded = n_frames + self.pad.0 + self.pad.1;
         Some(padded.checked_sub(receptive_field)? / self.stride.max(1) + 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn same_padding_is_tensorflows() {
+        let same = |n_in, kernel, stride| ConvAxis::same(n_in, kernel, stride);
+        let first =
+            [(209, 4, 2), (63, 4, 2), (64, 4, 2), (16, 4, 1)].map(|(n, kernel, stride)| same(n, kernel, stride));
+        assert_eq!(first.map(|axis| axis.pad), [1, 1, 1, 1]);
+        assert_eq!(first.map(|axis| axis.n_out), [105, 32, 32, 16]);
     }
 }

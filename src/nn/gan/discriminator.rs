@@ -1,7 +1,7 @@
 //! The motion discriminator: a patch network over the frame-to-frame differences of normalised poses that scores
 //! about every fourth frame as real or generated (Ginosar et al. 2019).
 
-use super::conv_block::{Block1d, SLOPE};
+use super::conv_block::{ConvBlock, MOMENTUM, SLOPE};
 use crate::nn::ops::conv2d::Conv;
 use crate::nn::params::Params;
 use candle_core::{Result, Tensor};
@@ -12,7 +12,7 @@ const WIDTH: usize = 64;
 /// Two halvings of time, then two layers at that rate.
 pub struct Discriminator {
     first: Conv,
-    blocks: [Block1d; 2],
+    blocks: [ConvBlock; 2],
     last: Conv,
 }
 
@@ -22,8 +22,8 @@ impl Discriminator {
         Ok(Self {
             first: Conv::new(params, "first", &[WIDTH, n_in, KERNEL], 2)?,
             blocks: [
-                Block1d::new(params, "block.0", WIDTH, 2 * WIDTH, KERNEL, 2)?,
-                Block1d::new(params, "block.1", 2 * WIDTH, 4 * WIDTH, KERNEL, 1)?,
+                ConvBlock::new(params, "block.0", &[2 * WIDTH, WIDTH, KERNEL], 2, MOMENTUM)?,
+                ConvBlock::new(params, "block.1", &[4 * WIDTH, 2 * WIDTH, KERNEL], 1, MOMENTUM)?,
             ],
             last: Conv::new(params, "last", &[1, 4 * WIDTH, KERNEL], 1)?,
         })

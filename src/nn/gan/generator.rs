@@ -2,7 +2,7 @@
 //! audio encoder turns the spectrogram into one vector a pose frame; a UNet over time with additive skips turns those
 //! into motion. Fully convolutional: any number of frames that is a multiple of [`FRAMES_MULTIPLE`].
 
-use super::conv_block::{Block1d, Block2d};
+use super::conv_block::ConvBlock;
 use crate::nn::ops::conv2d::Conv;
 use crate::nn::ops::resize;
 use crate::nn::params::Params;
@@ -65,34 +65,40 @@ impl Config {
     }
 }
 
-/// Log-mel spectrograms to poses.
+/// Log-mel spectrograms to poses: convolutions over the spectrogram that shorten time by 8, one vector a step; then a UNet
+/// over time with additive skips.
 pub struct Generator {
-    audio_encoder: AudioEncoder,
-    unet: MotionUnet,
-}
-
-/// Convolutions over the spectrogram that shorten time by 8, one vector a step.
-enum AudioEncoder {
-    Light(Vec<Block1d>),
-    Paper(Vec<Block2d>),
-}
-
-/// A UNet over time with additive skips.
-struct MotionUnet {
-    enter: Vec<Block1d>,
-    downs: Vec<Block1d>,
-    ups: Vec<Block1d>,
-    decoder: Vec<Block1d>,
+    preset: Preset,
+    audio_encoder: Vec<ConvBlock>,
+    enter: Vec<ConvBlock>,
+    downs: Vec<ConvBlock>,
+    ups: Vec<ConvBlock>,
+    decoder: Vec<ConvBlock>,
     last: Conv,
 }
 
-/// A block of so many channels in and out.
-type MakeBlock = fn(&mut Params, &str, usize, usize) -> Result<Block1d>;
+/// Kernel and stride of a layer that keeps the number of frames, and of one that halves it.
+const PLAIN: (usize, usize) = (3, 1);
+const DOWN: (usize, usize) = (4, 2);
 
 impl Generator {
     /// Makes the network's tensors.
     pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
-        Ok(Self { audio_encoder: AudioEncoder::new(params, config)?, unet: MotionUnet::new(params, config)? })
+        let (n, momentum) = (config.width, config.norm_momentum);
+        let audio_encoder = audio_encoder(params, config)?;
+        let mut row = |name: &str, n_blocks: usize, (kernel, stride): (usize, usize)| {
+            let block = |i| ConvBlock::new(params, &format!("{name}.{i}"), &[n, n, kernel], stride, momentum);
+            (0..n_blocks).map(block).collect::<Result<Vec<_>>>()
+        };
+        Ok(Self {
+            preset: config.preset,
+            audio_encoder,
+            enter: row("enter", N_ENTER, PLAIN)?,
+            downs: row("down", N_LEVELS, DOWN)?,
+            ups: row("up", N_LEVELS, PLAIN)?,
+            decoder: row("decoder", N_DECODER, PLAIN)?,
+            last: Conv::new(params, "last", &[config.n_out, n, 1], 1)?,
+        })
     }
 
     /// `mels` [B, n_mels, T_mel] to poses [B, n_out, n_frames]; `n_frames` is a multiple of [`FRAMES_MULTIPLE`] and
@@ -106,37 +112,17 @@ impl Generator {
 
     /// `mels` [B, n_mels, T_mel] to encoded sound [B, width, about T_mel / 8].
     pub fn encode(&self, mels: &Tensor, train: bool) -> Result<Tensor> {
-        self.audio_encoder.forward(mels, train)?.t()?.contiguous()
+        let encoded = match self.preset {
+            Preset::Light => through(&self.audio_encoder, mels.t()?, train)?,
+            Preset::Paper => through(&self.audio_encoder, mels.t()?.unsqueeze(3)?, train)?.squeeze(2)?,
+        };
+        encoded.t()?.contiguous()
     }
 
     /// Encoded sound at every pose frame, [B, width, T], to poses [B, n_out, T]; T is a multiple of
     /// [`FRAMES_MULTIPLE`].
     pub fn decode(&self, x: &Tensor, train: bool) -> Result<Tensor> {
-        self.unet.forward(&x.t()?, train)?.t()?.contiguous()
-    }
-}
-
-impl MotionUnet {
-    fn new(params: &mut Params, config: &Config) -> Result<Self> {
-        let n = config.width;
-        let mut row = |name: &str, n_blocks: usize, make: MakeBlock| {
-            let block = |i| Ok(make(params, &format!("{name}.{i}"), n, n)?.with_momentum(config.norm_momentum));
-            (0..n_blocks).map(block).collect::<Result<Vec<_>>>()
-        };
-        let enter = row("enter", N_ENTER, Block1d::plain)?;
-        let downs = row("down", N_LEVELS, Block1d::down)?;
-        let ups = row("up", N_LEVELS, Block1d::plain)?;
-        let decoder = row("decoder", N_DECODER, Block1d::plain)?;
-        let last = Conv::new(params, "last", &[config.n_out, n, 1], 1)?;
-        Ok(Self { enter, downs, ups, decoder, last })
-    }
-
-    /// [B, T, width] to [B, T, n_out].
-    fn forward(&self, x: &Tensor, train: bool) -> Result<Tensor> {
-        let mut x = x.clone();
-        for block in &self.enter {
-            x = block.forward(&x, train)?;
-        }
+        let mut x = through(&self.enter, x.t()?, train)?;
         let mut skips = Vec::new();
         for block in &self.downs {
             let down = block.forward(&x, train)?;
@@ -145,58 +131,34 @@ impl MotionUnet {
         for (block, skip) in self.ups.iter().zip(skips.iter().rev()) {
             x = block.forward(&(resize::twice(&x)? + skip)?, train)?;
         }
-        for block in &self.decoder {
-            x = block.forward(&x, train)?;
-        }
-        self.last.forward(&x)
+        self.last.forward(&through(&self.decoder, x, train)?)?.t()?.contiguous()
     }
 }
 
-impl AudioEncoder {
-    fn new(params: &mut Params, config: &Config) -> Result<Self> {
-        let (mels, n) = (config.n_mels, config.width);
-        let name = |i: usize| format!("front.{i}");
-        let momentum = config.norm_momentum;
-        Ok(match config.preset {
-            Preset::Light => {
-                let (narrow, wide) = (n * 3 / 8, n / 2);
-                let blocks = vec![
-                    Block1d::plain(params, &name(0), mels, narrow)?,
-                    Block1d::down(params, &name(1), narrow, narrow)?,
-                    Block1d::plain(params, &name(2), narrow, wide)?,
-                    Block1d::down(params, &name(3), wide, wide)?,
-                    Block1d::plain(params, &name(4), wide, wide)?,
-                    Block1d::down(params, &name(5), wide, n)?,
-                    Block1d::plain(params, &name(6), n, n)?,
-                ];
-                AudioEncoder::Light(blocks.into_iter().map(|block| block.with_momentum(momentum)).collect())
-            }
-            Preset::Paper => {
-                let blocks = vec![
-                    Block2d::plain(params, &name(0), 1, n / 4)?,
-                    Block2d::down(params, &name(1), n / 4, n / 4)?,
-                    Block2d::plain(params, &name(2), n / 4, n / 2)?,
-                    Block2d::down(params, &name(3), n / 2, n / 2)?,
-                    Block2d::plain(params, &name(4), n / 2, n)?,
-                    Block2d::down(params, &name(5), n, n)?,
-                    Block2d::plain(params, &name(6), n, n)?,
-                    Block2d::across(params, &name(7), [n, n, 3, mels / 8])?,
-                ];
-                AudioEncoder::Paper(blocks.into_iter().map(|block| block.with_momentum(momentum)).collect())
-            }
-        })
-    }
+/// One block after the other.
+fn through(blocks: &[ConvBlock], x: Tensor, train: bool) -> Result<Tensor> {
+    blocks.iter().try_fold(x, |x, block| block.forward(&x, train))
+}
 
-    /// [B, n_mels, T_mel] to [B, T_mel / 8, width].
-    fn forward(&self, mels: &Tensor, train: bool) -> Result<Tensor> {
-        match self {
-            AudioEncoder::Light(blocks) => blocks.iter().try_fold(mels.t()?, |x, block| block.forward(&x, train)),
-            AudioEncoder::Paper(blocks) => {
-                let image = mels.t()?.unsqueeze(3)?;
-                blocks.iter().try_fold(image, |x, block| block.forward(&x, train))?.squeeze(2)
-            }
-        }
+/// Plain layers and layers that halve time in turn; those of `paper` run over frequency as well, until a last one joins
+/// what is left of it.
+fn audio_encoder(params: &mut Params, config: &Config) -> Result<Vec<ConvBlock>> {
+    let (mels, n, momentum) = (config.n_mels, config.width, config.norm_momentum);
+    let (narrow, wide) = (n * 3 / 8, n / 2);
+    let (widths, n_axes) = match config.preset {
+        Preset::Light => ([mels, narrow, narrow, wide, wide, wide, n, n], 1),
+        Preset::Paper => ([1, n / 4, n / 4, n / 2, n / 2, n, n, n], 2),
+    };
+    let mut blocks = Vec::new();
+    for (i, pair) in widths.windows(2).enumerate() {
+        let (kernel, stride) = if i % 2 == 0 { PLAIN } else { DOWN };
+        let shape = [&[pair[1], pair[0]], &[kernel; 2][..n_axes]].concat();
+        blocks.push(ConvBlock::new(params, &format!("front.{i}"), &shape, stride, momentum)?);
     }
+    if config.preset == Preset::Paper {
+        blocks.push(ConvBlock::across(params, "front.7", [n, n, 3, mels / 8], momentum)?);
+    }
+    Ok(blocks)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use crate::nn::ops::dropout::dropout;
 use crate::nn::ops::linear::Linear;
 use crate::nn::params::Params;
 use crate::types::skeleton::Side;
-use candle_core::{Device, Result, Tensor};
+use candle_core::{Device, Module, Result, Tensor};
 use serde::{Deserialize, Serialize};
 
 /// Prefix of the network's tensors in a weights file.

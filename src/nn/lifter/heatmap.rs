@@ -8,9 +8,10 @@ use crate::motion::view::heatmaps::{Crop, N_MAPS, PLACES, assembled, score_maps}
 use crate::nn::Mode;
 use crate::nn::ops::conv3x3::Conv3x3;
 use crate::nn::ops::dropout::dropout;
+use crate::nn::ops::linear::Linear;
 use crate::nn::params::{Init, Params};
 use crate::types::skeleton::Side;
-use candle_core::{D, Device, Result, Tensor};
+use candle_core::{D, Device, Module, Result, Tensor};
 
 /// Prefix of the network's tensors in a weights file.
 pub const NAME: &str = hand::NAME;
@@ -31,27 +32,9 @@ pub struct HeatmapLifter {
 /// last, dropout between the fully connected ones.
 struct Tower {
     convolutions: Vec<Conv3x3>,
-    layers: Vec<Dense>,
+    /// First values: Glorot uniform, bias 1e-4.
+    layers: Vec<Linear>,
     dropout: f64,
-}
-
-/// `<name>.weight` [out, in] (Glorot uniform) and `<name>.bias` [out] (1e-4).
-struct Dense {
-    weight: Tensor,
-    bias: Tensor,
-}
-
-impl Dense {
-    fn new(params: &mut Params, name: &str, n_in: usize, n_out: usize) -> Result<Self> {
-        Ok(Self {
-            weight: params.trainable(&format!("{name}.weight"), &[n_out, n_in], Init::Glorot)?,
-            bias: params.trainable(&format!("{name}.bias"), &[n_out], Init::Constant(1e-4))?,
-        })
-    }
-
-    fn forward(&self, x: &Tensor) -> Result<Tensor> {
-        x.contiguous()?.matmul(&self.weight.t()?)?.broadcast_add(&self.bias)
-    }
 }
 
 impl Tower {
@@ -67,7 +50,7 @@ impl Tower {
         let mut n_in = (PLACES / 8) * (PLACES / 8) * n_in + 2;
         let mut layers = Vec::new();
         for (i, n_out) in widths.into_iter().enumerate() {
-            layers.push(Dense::new(params, &format!("{name}.dense{i}"), n_in, n_out)?);
+            layers.push(Linear::with_init(params, &format!("{name}.dense{i}"), [n_in, n_out], Init::Glorot, 1e-4)?);
             n_in = n_out;
         }
         Ok(Self { convolutions, layers, dropout })

@@ -7,7 +7,7 @@ use crate::nn::ops::batch_norm::BatchNorm;
 use crate::nn::ops::conv1d::Conv1d;
 use crate::nn::ops::dropout::dropout;
 use crate::nn::params::Params;
-use candle_core::{Result, Tensor};
+use candle_core::{Module, Result, Tensor};
 use serde::{Deserialize, Serialize};
 
 /// Weight of the first batches in the running statistics; a training lowers it (`set_momentum`).
@@ -58,7 +58,7 @@ struct ConvUnit {
 impl ConvUnit {
     fn new(params: &mut Params, name: &str, n: [usize; 2], width: usize, dilation: usize) -> Result<Self> {
         Ok(Self {
-            conv: Conv1d::valid(params, &format!("{name}.conv"), n[0], n[1], width, dilation)?,
+            conv: Conv1d::valid(params, &format!("{name}.conv"), n, width, 1, dilation)?,
             norm: BatchNorm::new(params, &format!("{name}.norm"), n[1], 1e-5, MOMENTUM, 0.0)?,
         })
     }

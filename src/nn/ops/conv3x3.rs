@@ -1,11 +1,9 @@
 //! Convolution of pictures with kernels of 3 x 3, padding "same", channels last: every output place's patch becomes a
-//! row, and the layer one matrix product. Own forward and backward for the patches.
+//! row, and the layer one matrix product.
 
-use crate::nn::cpu::axis::ConvGeometry;
-use crate::nn::cpu::tensor::{Scalar, is_f64, read, slice};
+use crate::nn::cpu::axis::ConvAxis;
 use crate::nn::params::{Init, Params};
-use candle_core::backend::BackendStorage;
-use candle_core::{CpuStorage, CustomOp1, Layout, Result, Shape, Tensor};
+use candle_core::{Result, Tensor};
 
 /// `<name>.weight` [O, C, 3, 3] (Glorot uniform) and `<name>.bias` [O] (1e-4).
 pub struct Conv3x3 {
@@ -25,90 +23,28 @@ impl Conv3x3 {
     pub fn forward(&self, x: &Tensor) -> Result<Tensor> {
         let (batch, height, width, n_in) = x.dims4()?;
         let n_out = self.bias.dim(0)?;
-        let rows = x.contiguous()?.apply_op1(Patches { stride: self.stride })?;
+        let [down, across] = [height, width].map(|n| ConvAxis::same(n, 3, self.stride));
+        let places = Tensor::new(places(batch, down, across), x.device())?;
+        let patches = x.reshape((batch * height * width, n_in))?.index_select(&places, 0)?.reshape(((), 9 * n_in))?;
         let weight = self.weight.permute((2, 3, 1, 0))?.contiguous()?.reshape((9 * n_in, n_out))?;
-        let y = rows.matmul(&weight)?.broadcast_add(&self.bias)?;
-        y.reshape((batch, height.div_ceil(self.stride), width.div_ceil(self.stride), n_out))
+        patches.matmul(&weight)?.broadcast_add(&self.bias)?.reshape((batch, down.n_out, across.n_out, n_out))
     }
 }
 
-/// [B, H, W, C] to [B * H' * W', 9 * C]: the 3 x 3 places under each output, row by row, zero outside.
-struct Patches {
-    stride: usize,
-}
-
-/// A picture's sizes: batch, height, width, channels.
-type PictureSizes = (usize, usize, usize, usize);
-
-impl Patches {
-    /// Calls `each` with (start of a place's channels in the patches, start of them in the pictures).
-    fn for_each_offset(&self, (batch, height, width, n_in): PictureSizes, mut each: impl FnMut(usize, usize)) {
-        let (down, across) = (ConvGeometry::same(height, 3, self.stride), ConvGeometry::same(width, 3, self.stride));
-        let (n_down, n_across) = (height.div_ceil(self.stride), width.div_ceil(self.stride));
-        for b in 0..batch {
-            for row in 0..n_down {
-                for column in 0..n_across {
-                    let patch = ((b * n_down + row) * n_across + column) * 9;
-                    for kernel_offset in 0..9 {
-                        let y = (row * self.stride + kernel_offset / 3).checked_sub(down.pad.0).filter(|y| *y < height);
-                        let x =
-                            (column * self.stride + kernel_offset % 3).checked_sub(across.pad.0).filter(|x| *x < width);
-                        if let (Some(y), Some(x)) = (y, x) {
-                            each((patch + kernel_offset) * n_in, ((b * height + y) * width + x) * n_in);
-                        }
-                    }
-                }
-            }
+/// Numbers of the 3 x 3 places under each output, row by row; `u32::MAX`, which selects zeros, outside.
+fn places(batch: usize, down: ConvAxis, across: ConvAxis) -> Vec<u32> {
+    let at = |axis: ConvAxis, out: usize, offset: usize| {
+        (out * axis.stride + offset).checked_sub(axis.pad).filter(|at| *at < axis.n_in)
+    };
+    let mut places = Vec::with_capacity(batch * down.n_out * across.n_out * 9);
+    for (b, row) in (0..batch).flat_map(|b| (0..down.n_out).map(move |row| (b, row))) {
+        for (column, offset) in (0..across.n_out).flat_map(|column| (0..9).map(move |offset| (column, offset))) {
+            let (y, x) = (at(down, row, offset / 3), at(across, column, offset % 3));
+            let place = y.zip(x).map(|(y, x)| ((b * down.n_in + y) * across.n_in + x) as u32);
+            places.push(place.unwrap_or(u32::MAX));
         }
     }
-
-    fn n_rows(&self, (batch, height, width, _): PictureSizes) -> usize {
-        batch * height.div_ceil(self.stride) * width.div_ceil(self.stride)
-    }
-
-    fn gather<T: Scalar>(&self, x: &[T], sizes: PictureSizes) -> Vec<T> {
-        let n_in = sizes.3;
-        let mut patches = vec![T::zero(); self.n_rows(sizes) * 9 * n_in];
-        self.for_each_offset(sizes, |to, from| patches[to..to + n_in].copy_from_slice(&x[from..from + n_in]));
-        patches
-    }
-
-    /// The transpose of `gather`.
-    fn spread<T: Scalar>(&self, patches: &[T], sizes: PictureSizes) -> Vec<T> {
-        let (batch, height, width, n_in) = sizes;
-        let mut x = vec![T::zero(); batch * height * width * n_in];
-        self.for_each_offset(sizes, |from, to| {
-            x[to..to + n_in].iter_mut().zip(&patches[from..from + n_in]).for_each(|(x, g)| *x += *g);
-        });
-        x
-    }
-}
-
-impl CustomOp1 for Patches {
-    fn name(&self) -> &'static str {
-        "patches of 3 x 3"
-    }
-
-    fn cpu_fwd(&self, x: &CpuStorage, layout: &Layout) -> Result<(CpuStorage, Shape)> {
-        let sizes = layout.shape().dims4()?;
-        let patches = if is_f64(x.dtype())? {
-            CpuStorage::F64(self.gather(slice(x, layout)?, sizes))
-        } else {
-            CpuStorage::F32(self.gather(slice(x, layout)?, sizes))
-        };
-        Ok((patches, Shape::from((self.n_rows(sizes), 9 * sizes.3))))
-    }
-
-    fn bwd(&self, x: &Tensor, _y: &Tensor, grad: &Tensor) -> Result<Option<Tensor>> {
-        let sizes = x.dims4()?;
-        Ok(Some(if is_f64(grad.dtype())? {
-            let spread = read::<f64, _>(grad, |grad| Ok(self.spread(grad, sizes)))?;
-            Tensor::from_vec(spread, x.shape(), x.device())?
-        } else {
-            let spread = read::<f32, _>(grad, |grad| Ok(self.spread(grad, sizes)))?;
-            Tensor::from_vec(spread, x.shape(), x.device())?
-        }))
-    }
+    places
 }
 
 #[cfg(test)]

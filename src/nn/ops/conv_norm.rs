@@ -5,12 +5,12 @@
 use super::batch_norm::{BatchNorm, Statistics};
 use super::conv2d;
 use super::fallback;
+use super::operator::{CpuOperator, CustomOperator, Operand};
 use crate::nn::cpu::channel_stats::{ChannelMoments, Norm};
 use crate::nn::cpu::direct_conv;
 use crate::nn::cpu::direct_conv::ConvSizes;
-use crate::nn::cpu::tensor::{Scalar, is_f64, read, slice};
-use candle_core::backend::BackendStorage;
-use candle_core::{CpuStorage, CustomOp3, Layout, Result, Shape, Tensor};
+use crate::nn::cpu::tensor::Scalar;
+use candle_core::{CpuStorage, Result, Shape, Tensor};
 use std::sync::{Arc, Mutex, OnceLock};
 
 /// `x` [B, T, C] or [B, T, F, C] through the convolution of these sizes, then `norm` with its activation. Training uses
@@ -35,7 +35,7 @@ pub fn conv_norm(
     let keeps = [&x, weight, &channels].iter().any(|tensor| tensor.track_op());
     let kept = keeps.then(|| Mutex::new(None));
     let op = ConvNormOp { sizes, eps: norm.eps, slope: norm.slope, train, statistics: statistics.clone(), kept };
-    let y = x.apply_op3(weight, &channels, op)?;
+    let y = x.apply_op3(weight, &channels, CustomOperator(op))?;
     if let (true, Some(batch)) = (train, statistics.get()) {
         norm.follow(batch, y.elem_count() / sizes.n_out)?;
     }
@@ -69,7 +69,7 @@ impl ConvNormOp {
     }
 
     /// The result and, where there is a way back, what was before the norm.
-    fn forward<T: Scalar>(&self, x: &[T], weight: &[T], channels: &[T]) -> (Vec<T>, Option<Vec<T>>) {
+    fn normalised<T: Scalar>(&self, x: &[T], weight: &[T], channels: &[T]) -> (Vec<T>, Option<Vec<T>>) {
         let (s, bias) = (&self.sizes, &channels[..self.sizes.n_out]);
         if let (None, Some(statistics)) = (&self.kept, self.statistics.get()) {
             let norm = self.norm(channels, statistics);
@@ -94,7 +94,7 @@ impl ConvNormOp {
     }
 
     /// Overwrites `z` with its gradient; gives those of bias, norm's weight and norm's bias.
-    fn backward<T: Scalar>(&self, z: &mut [T], channels: &[T], statistics: &Statistics, grad: &[T]) -> Vec<T> {
+    fn overwrite<T: Scalar>(&self, z: &mut [T], channels: &[T], statistics: &Statistics, grad: &[T]) -> Vec<T> {
         let norm = self.norm(channels, statistics);
         let (plain, product) = norm.sums_of_gradient(z, grad);
         let n = (z.len() / self.sizes.n_out) as f64;
@@ -113,61 +113,31 @@ impl ConvNormOp {
     }
 }
 
-impl CustomOp3 for ConvNormOp {
-    fn name(&self) -> &'static str {
-        "convolution, batch norm and leaky ReLU"
-    }
+impl CpuOperator for ConvNormOp {
+    const NAME: &'static str = "convolution, batch norm and leaky ReLU";
 
-    fn cpu_fwd(
-        &self,
-        x: &CpuStorage,
-        lx: &Layout,
-        w: &CpuStorage,
-        lw: &Layout,
-        c: &CpuStorage,
-        lc: &Layout,
-    ) -> Result<(CpuStorage, Shape)> {
-        let (y, z) = if is_f64(x.dtype())? {
-            let (y, z) = self.forward::<f64>(slice(x, lx)?, slice(w, lw)?, slice(c, lc)?);
-            (CpuStorage::F64(y), z.map(CpuStorage::F64))
-        } else {
-            let (y, z) = self.forward::<f32>(slice(x, lx)?, slice(w, lw)?, slice(c, lc)?);
-            (CpuStorage::F32(y), z.map(CpuStorage::F32))
-        };
+    fn forward<T: Scalar>(&self, [x, weight, channels]: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)> {
+        let (y, z) = self.normalised(x.values, weight.values, channels.values);
         if let Some(Ok(mut kept)) = self.kept.as_ref().map(Mutex::lock) {
-            *kept = z;
+            *kept = z.map(T::to_cpu_storage_owned);
         }
-        Ok((y, conv2d::shape_out(&self.sizes, lx.dims().len())))
+        Ok((y, conv2d::shape_out(&self.sizes, x.dims.len())))
     }
 
-    fn bwd(
+    fn backward<T: Scalar>(
         &self,
-        x: &Tensor,
-        weight: &Tensor,
-        channels: &Tensor,
-        _y: &Tensor,
-        grad: &Tensor,
-    ) -> Result<(Option<Tensor>, Option<Tensor>, Option<Tensor>)> {
-        fn typed<T: Scalar>(
-            op: &ConvNormOp,
-            (x, weight, channels): (&Tensor, &Tensor, &Tensor),
-            mut z: Vec<T>,
-            statistics: &Statistics,
-            grad: &Tensor,
-        ) -> Result<(Option<Tensor>, Option<Tensor>, Option<Tensor>)> {
-            let of_channels = read::<T, _>(channels, |channels| {
-                read::<T, _>(grad, |grad| Ok(op.backward(&mut z, channels, statistics, grad)))
-            })?;
-            let [of_x, of_weight] = conv2d::gradients(&op.sizes, x, weight, &z)?;
-            Ok((of_x, of_weight, Some(Tensor::from_vec(of_channels, channels.shape(), channels.device())?)))
-        }
+        [x, weight, channels]: [Operand<T>; 3],
+        _: &[T],
+        grad: &[T],
+    ) -> Result<[Option<Vec<T>>; 3]> {
         let kept = self.kept.as_ref().and_then(|kept| kept.lock().ok()?.take());
-        let inputs = (x, weight, channels);
-        match (kept, self.statistics.get()) {
-            (Some(CpuStorage::F32(z)), Some(statistics)) => typed(self, inputs, z, statistics, grad),
-            (Some(CpuStorage::F64(z)), Some(statistics)) => typed(self, inputs, z, statistics, grad),
-            _ => candle_core::bail!("a layer's way back can be gone once only"),
-        }
+        let (Some(z), Some(statistics)) = (kept, self.statistics.get()) else {
+            candle_core::bail!("a layer's way back can be gone once only");
+        };
+        let mut z = T::cpu_storage_data(z)?;
+        let of_channels = self.overwrite(&mut z, channels.values, statistics, grad);
+        let [of_x, of_weight] = conv2d::gradients(&self.sizes, &x, &weight, &z);
+        Ok([of_x, of_weight, Some(of_channels)])
     }
 }
 
@@ -186,76 +156,63 @@ pub fn fallback_conv_norm(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::ops::gradcheck::{pattern, worst};
+    use crate::nn::ops::gradcheck::{any_threads_give_the_same, apart, pattern};
     use crate::nn::params::Params;
+    use candle_core::{DType, Var};
+
+    /// Inputs and kernels of the networks' layers, small: over time, over time and frequency, even and odd.
+    const LAYERS: [(&[usize], &[usize], usize); 8] = [
+        (&[2, 9, 2], &[3, 2, 3], 1),
+        (&[2, 12, 2], &[3, 2, 4], 2),
+        (&[2, 13, 2], &[3, 2, 4], 2),
+        (&[3, 16, 2], &[3, 2, 4], 1),
+        (&[2, 7, 2], &[3, 2, 1], 1),
+        (&[2, 6, 5, 2], &[3, 2, 3, 3], 1),
+        (&[2, 9, 8, 2], &[3, 2, 4, 4], 2),
+        (&[2, 7, 7, 1], &[3, 1, 4, 4], 2),
+    ];
 
     #[test]
-    fn gradients_are_right() -> Result<()> {
-        for (train, slope) in [(true, 0.2), (true, 1.0), (false, 0.2)] {
-            let inputs = [
-                pattern(&[2, 7, 6, 3], 0.0)?,
-                pattern(&[5, 3, 4, 4], 1.0)?,
-                Tensor::cat(&[pattern(&[5], 2.0)?, (pattern(&[5], 5.0)? + 1.5)?, pattern(&[5], 9.0)?], 0)?,
-            ];
-            let sizes = conv2d::same(&inputs[0], &inputs[1], 2)?;
-            let fixed = Statistics { mean: vec![0.2, -0.3, 0.1, 0.0, 0.4], variance: vec![0.5, 1.5, 2.0, 1.0, 0.7] };
-            let error = worst(&inputs, |v| {
-                let statistics = Arc::new(OnceLock::new());
-                if !train {
-                    let _ = statistics.set(fixed.clone());
+    fn it_is_what_the_framework_gives_with_its_gradients_and_running_statistics() -> Result<()> {
+        for ((shape, kernel, stride), (train, slope)) in LAYERS
+            .into_iter()
+            .flat_map(|layer| [(true, 0.2), (true, 1.0), (false, 0.2)].map(|settings| (layer, settings)))
+        {
+            let inputs = [pattern(shape, 0.0)?, pattern(kernel, 7.0)?, pattern(&kernel[..1], 3.0)?];
+            let s = conv2d::same(&inputs[0], &inputs[1], stride)?;
+            // Weights and running statistics as those of a layer in training.
+            let norm = || -> Result<(Params, BatchNorm)> {
+                let mut params = Params::with_dtype(0, DType::F64);
+                let norm = BatchNorm::new(&mut params, "n", 3, 1e-3, 0.1, slope)?;
+                for (i, (name, var)) in params.all().enumerate() {
+                    let around = if name.ends_with("bias") || name.ends_with("mean") { 0.0 } else { 1.5 };
+                    var.set(&(pattern(&[3], 5.0 + i as f64)? + around)?)?;
                 }
-                let op = ConvNormOp { sizes, eps: 1e-3, slope, train, statistics, kept: Some(Mutex::new(None)) };
-                v[0].apply_op3(&v[1], &v[2], op)
-            })?;
-            assert!(error < 1e-7, "train {train}, slope {slope}: {error}");
+                Ok((params, norm))
+            };
+            let ((_, own), (_, other)) = (norm()?, norm()?);
+            let off = apart(
+                &inputs,
+                |v| conv_norm(&v[0], &v[1], &v[2], &own, s, train),
+                |v| fallback_conv_norm(&v[0], &v[1], &v[2], &other, &s, train),
+            )?;
+            assert!(off < 1e-11, "{shape:?} {kernel:?} {train} {slope}: {off:e}");
+            let (own, other) = (own.running()?, other.running()?);
+            let pairs = own.mean.iter().chain(&own.variance).zip(other.mean.iter().chain(&other.variance));
+            assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-12), "{own:?} {other:?}");
         }
         Ok(())
     }
 
     #[test]
-    fn it_is_the_convolution_and_the_norm_after_each_other() -> anyhow::Result<()> {
-        let mut params = Params::with_dtype(0, candle_core::DType::F64);
-        let norm = BatchNorm::new(&mut params, "n", 6, 1e-3, 0.3, 0.2)?;
-        let (x, weight) = (pattern(&[3, 5, 4], 0.0)?, pattern(&[6, 4, 3], 1.0)?);
-        let bias = pattern(&[6], 2.0)?;
-        let sizes = conv2d::same(&x, &weight, 1)?;
-        let zeros = Tensor::zeros(6, candle_core::DType::F64, x.device())?;
-        for train in [true, false, true, false] {
-            let before = params.tensors()?;
-            let fused = conv_norm(&x, &weight, &bias, &norm, sizes, train)?;
-            let after = params.tensors()?;
-            params.load(&before)?;
-            // A convolution alone, as one with a norm that changes nothing.
-            let mut plain = Params::with_dtype(0, candle_core::DType::F64);
-            let nothing = BatchNorm::new(&mut plain, "n", 6, 0.0, 0.3, 1.0)?;
-            let z = conv_norm(&x, &weight, &zeros, &nothing, sizes, false)?;
-            let z = z.broadcast_add(&bias)?.transpose(1, 2)?;
-            let apart = norm.forward(&z, train)?.transpose(1, 2)?;
-            assert!((fused - apart)?.abs()?.max_all()?.to_scalar::<f64>()? < 1e-12);
-            for (name, tensor) in params.tensors()? {
-                assert!((tensor - &after[&name])?.abs()?.max_all()?.to_scalar::<f64>()? < 1e-12, "{name}");
-            }
-        }
-        Ok(())
-    }
-
-    #[test]
-    fn any_number_of_threads_gives_the_same_bits() -> anyhow::Result<()> {
-        let f32s = |shape: &[usize], phase| pattern(shape, phase)?.to_dtype(candle_core::DType::F32);
+    fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
+        let f32s = |shape: &[usize], phase| pattern(shape, phase)?.to_dtype(DType::F32);
         let (x, bias) = (f32s(&[3, 40, 10, 20], 0.0)?, f32s(&[70], 5.0)?);
-        let weight = candle_core::Var::from_tensor(&f32s(&[70, 20, 3, 3], 1.0)?)?;
+        let weight = Var::from_tensor(&f32s(&[70, 20, 3, 3], 1.0)?)?;
         let sizes = conv2d::same(&x, &weight, 1)?;
-        let run = |n_threads| -> anyhow::Result<Vec<Vec<f32>>> {
+        any_threads_give_the_same(&weight, || {
             let norm = BatchNorm::new(&mut Params::new(0), "n", 70, 1e-3, 0.3, 0.2)?;
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build()?;
-            pool.install(|| {
-                let y = conv_norm(&x, &weight, &bias, &norm, sizes, true)?;
-                let gradients = y.sqr()?.sum_all()?.backward()?;
-                let gradient = gradients.get(&weight).ok_or_else(|| candle_core::Error::msg("no gradient"))?;
-                Ok(vec![y.flatten_all()?.to_vec1()?, gradient.flatten_all()?.to_vec1()?])
-            })
-        };
-        assert_eq!(run(1)?, run(3)?);
-        Ok(())
+            conv_norm(&x, &weight, &bias, &norm, sizes, true)
+        })
     }
 }

@@ -43,3 +43,40 @@ pub fn worst(inputs: &[Tensor], f: impl Fn(&[Tensor]) -> Result<Tensor>) -> Resu
     }
     Ok(worst)
 }
+
+/// Largest difference between `a` and `b` of `inputs`: of the results and of the gradients of all inputs.
+pub fn apart(
+    inputs: &[Tensor],
+    a: impl Fn(&[Tensor]) -> Result<Tensor>,
+    b: impl Fn(&[Tensor]) -> Result<Tensor>,
+) -> Result<f64> {
+    let vars = inputs.iter().map(Var::from_tensor).collect::<Result<Vec<_>>>()?;
+    let inputs: Vec<Tensor> = vars.iter().map(|var| var.as_tensor().clone()).collect();
+    let (a, b) = (a(&inputs)?, b(&inputs)?);
+    let most = |a: &Tensor, b: &Tensor| (a - b)?.abs()?.max_all()?.to_scalar::<f64>();
+    let backward = |y: &Tensor| (y * pattern(y.dims(), 0.5)?)?.sum_all()?.backward();
+    let (of_a, of_b) = (backward(&a)?, backward(&b)?);
+    let mut worst = most(&a, &b)?;
+    for var in &vars {
+        let (Some(a), Some(b)) = (of_a.get(var), of_b.get(var)) else { candle_core::bail!("no gradient") };
+        worst = worst.max(most(a, b)?);
+    }
+    Ok(worst)
+}
+
+/// Errors unless the result of `f` (f32) and the gradient of `weight` have the same bits for one and for three threads.
+pub fn any_threads_give_the_same(weight: &Var, f: impl Fn() -> Result<Tensor> + Sync) -> Result<()> {
+    let run = |n_threads| -> Result<[Vec<f32>; 2]> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().map_err(candle_core::Error::wrap)?;
+        pool.install(|| {
+            let y = f()?;
+            let gradients = y.sqr()?.sum_all()?.backward()?;
+            let Some(gradient) = gradients.get(weight) else { candle_core::bail!("no gradient") };
+            Ok([y.flatten_all()?.to_vec1()?, gradient.flatten_all()?.to_vec1()?])
+        })
+    };
+    if run(1)? != run(3)? {
+        candle_core::bail!("one thread and three give different numbers");
+    }
+    Ok(())
+}

@@ -1,5 +1,6 @@
-//! Operators with forward and backward passes: convolutions, batch norm, linear, dropout, resize; `fallback` is what
-//! runs on a device without the kernels of `nn::cpu`, `gradcheck` the finite differences that prove the gradients.
+//! Operators with forward and backward passes: convolutions, batch norm, linear, dropout, resize; `operator` is how the
+//! framework runs them, `fallback` what runs on a device without the kernels of `nn::cpu`, `gradcheck` the finite
+//! differences that prove the gradients.
 
 pub mod batch_norm;
 pub mod conv1d;
@@ -10,4 +11,5 @@ pub mod dropout;
 pub mod fallback;
 pub mod gradcheck;
 pub mod linear;
+pub mod operator;
 pub mod resize;

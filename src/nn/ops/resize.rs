@@ -1,62 +1,12 @@
 //! Changing the number of frames: twice as many by repetition, any number by linear interpolation.
 
-use super::fallback;
-use crate::nn::cpu::tensor::{Scalar, is_f64, read, slice};
-use candle_core::backend::BackendStorage;
-use candle_core::{CpuStorage, CustomOp1, Layout, Result, Shape, Tensor};
+use candle_core::{Result, Tensor};
 use std::ops::Range;
 
-/// Every frame twice: [B, T, C] to [B, 2T, C]. An own operator: the stock one overwrites the gradient where `x` is
-/// used again.
+/// Every frame twice: [B, T, C] to [B, 2T, C]. By index: the stock resize overwrites the gradient where `x` is used again.
 pub fn twice(x: &Tensor) -> Result<Tensor> {
-    if crate::nn::device::needs_fallback(x) {
-        return fallback::twice(x);
-    }
-    x.contiguous()?.apply_op1(Twice)
-}
-
-struct Twice;
-
-impl CustomOp1 for Twice {
-    fn name(&self) -> &'static str {
-        "every frame twice"
-    }
-
-    fn cpu_fwd(&self, x: &CpuStorage, layout: &Layout) -> Result<(CpuStorage, Shape)> {
-        fn repeat<T: Scalar>(x: &[T], n_channels: usize) -> Vec<T> {
-            let mut y = Vec::with_capacity(2 * x.len());
-            for frame in x.chunks_exact(n_channels) {
-                y.extend_from_slice(frame);
-                y.extend_from_slice(frame);
-            }
-            y
-        }
-        let (batch, n_frames, channels) = layout.shape().dims3()?;
-        let y = if is_f64(x.dtype())? {
-            CpuStorage::F64(repeat(slice(x, layout)?, channels))
-        } else {
-            CpuStorage::F32(repeat(slice(x, layout)?, channels))
-        };
-        Ok((y, Shape::from((batch, 2 * n_frames, channels))))
-    }
-
-    fn bwd(&self, x: &Tensor, _y: &Tensor, grad: &Tensor) -> Result<Option<Tensor>> {
-        fn typed<T: Scalar>(grad: &Tensor) -> Result<Vec<T>> {
-            let n = grad.dim(2)?;
-            read::<T, _>(grad, |grad| {
-                let mut sums = Vec::with_capacity(grad.len() / 2);
-                for (a, b) in grad.chunks_exact(2 * n).map(|pair| pair.split_at(n)) {
-                    sums.extend(a.iter().zip(b).map(|(a, b)| *a + *b));
-                }
-                Ok(sums)
-            })
-        }
-        Ok(Some(if is_f64(grad.dtype())? {
-            Tensor::from_vec(typed::<f64>(grad)?, x.shape(), x.device())?
-        } else {
-            Tensor::from_vec(typed::<f32>(grad)?, x.shape(), x.device())?
-        }))
-    }
+    let frames = Tensor::from_iter((0..2 * x.dim(1)? as u32).map(|i| i / 2), x.device())?;
+    x.contiguous()?.index_select(&frames, 1)
 }
 
 /// Linear interpolation to `n_out` frames, [B, C, T] to [B, C, n_out], as TensorFlow 1 does without aligned corners:
