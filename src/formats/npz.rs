@@ -4,10 +4,10 @@
 use super::npy;
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result, bail};
-use ndarray::{ArrayD, IxDyn};
-use ndarray_npy::{ReadNpyError, ReadableElement};
+use ndarray::{Array1, ArrayD, IxDyn, array};
+use ndarray_npy::{NpzWriter, ReadNpyError, ReadableElement, WriteNpzError};
 use std::fs::File;
-use std::io::{BufReader, Read as _};
+use std::io::{BufReader, BufWriter, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 
@@ -147,17 +147,35 @@ impl Npz {
     }
 }
 
+/// Writes a file of the arrays that `add` adds; the same arrays give the same bytes.
+pub fn write<F>(path: &Path, add: F) -> Result<()>
+where
+    F: FnOnce(&mut NpzWriter<BufWriter<File>>) -> Result<(), WriteNpzError>,
+{
+    let attempt = || -> Result<()> {
+        let mut npz = NpzWriter::new(BufWriter::new(File::create(path)?));
+        add(&mut npz)?;
+        Ok(npz.finish()?.flush()?)
+    };
+    attempt().with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// Numerator and denominator, as [`Npz::frame_rate`] reads them.
+pub fn rate(fps: FrameRate) -> Array1<f64> {
+    array![f64::from(fps.num), f64::from(fps.den)]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ndarray::{Array1, arr0};
-    use ndarray_npy::NpzWriter;
+    use ndarray::arr0;
 
-    fn file_with(dir: &Path, write: impl FnOnce(&mut NpzWriter<File>)) -> PathBuf {
+    fn file_with(
+        dir: &Path,
+        add: impl FnOnce(&mut NpzWriter<BufWriter<File>>) -> Result<(), WriteNpzError>,
+    ) -> PathBuf {
         let path = dir.join("a.npz");
-        let mut npz = NpzWriter::new(File::create(&path).unwrap());
-        write(&mut npz);
-        npz.finish().unwrap();
+        write(&path, add).unwrap();
         path
     }
 
@@ -165,10 +183,10 @@ mod tests {
     fn rates_come_as_one_number_or_as_a_fraction() {
         let dir = tempfile::tempdir().unwrap();
         let path = file_with(dir.path(), |npz| {
-            npz.add_array("one", &arr0(15i64)).unwrap();
-            npz.add_array("ntsc", &Array1::from(vec![29.97f64])).unwrap();
-            npz.add_array("pair", &Array1::from(vec![30000.0f64, 1001.0])).unwrap();
-            npz.add_array("bad", &Array1::from(vec![f64::NAN])).unwrap();
+            npz.add_array("one", &arr0(15i64))?;
+            npz.add_array("ntsc", &array![29.97f64])?;
+            npz.add_array("pair", &rate(FrameRate::new(30000, 1001)))?;
+            npz.add_array("bad", &array![f64::NAN])
         });
         let mut npz = Npz::open(&path).unwrap();
         assert_eq!(npz.frame_rate("one").unwrap(), FrameRate::new(15, 1));
@@ -180,7 +198,7 @@ mod tests {
     #[test]
     fn errors_name_the_file_the_array_and_the_shape() {
         let dir = tempfile::tempdir().unwrap();
-        let path = file_with(dir.path(), |npz| npz.add_array("body", &Array1::<f32>::zeros(5)).unwrap());
+        let path = file_with(dir.path(), |npz| npz.add_array("body", &Array1::<f32>::zeros(5)));
         let mut npz = Npz::open(&path).unwrap();
         let text = format!("{:#}", npz.floats("body", &[None, Some(17)]).unwrap_err());
         assert!(text.contains("a.npz") && text.contains("[5]") && text.contains("[T, 17]"), "{text}");
@@ -190,10 +208,11 @@ mod tests {
         assert!(Npz::open(&dir.path().join("b.npz")).is_err());
         assert!(Npz::open(&dir.path().join("none.npz")).is_err());
     }
+
     #[test]
     fn a_header_that_promises_too_much_is_an_error() {
         let dir = tempfile::tempdir().unwrap();
-        let path = file_with(dir.path(), |npz| npz.add_array("body", &Array1::<f32>::zeros(5)).unwrap());
+        let path = file_with(dir.path(), |npz| npz.add_array("body", &Array1::<f32>::zeros(5)));
         let mut bytes = Vec::new();
         ndarray_npy::WriteNpyExt::write_npy(&Array1::<f32>::zeros(5), &mut bytes).unwrap();
         let promising = npy::tests::with_shape(&bytes, "(5,)", "(1000000000000,)");
@@ -213,7 +232,7 @@ mod tests {
             damage in proptest::collection::vec((0usize..1000, proptest::num::u8::ANY), 1..6),
         ) {
             let dir = tempfile::tempdir().unwrap();
-            let path = file_with(dir.path(), |npz| npz.add_array("a", &Array1::from(numbers.clone())).unwrap());
+            let path = file_with(dir.path(), |npz| npz.add_array("a", &Array1::from(numbers.clone())));
             let found = Npz::open(&path).unwrap().numbers("a", &[Some(numbers.len())]).unwrap();
             proptest::prop_assert!(found.iter().zip(&numbers).all(|(a, b)| a.to_bits() == b.to_bits()));
             let mut bytes = std::fs::read(&path).unwrap();

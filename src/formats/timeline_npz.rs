@@ -1,12 +1,10 @@
 //! `timeline.npz`: the frames of a video at the dataset rate, one value each. Arrays: `source_secs` f64 [T], `repeated`
 //! bool [T], `shot_score` f64 [T], `restart` bool [T], `still` f32 [T].
 
+use super::npz;
 use super::npz::Npz;
-use anyhow::{Context, Result};
-use ndarray::Array1;
-use ndarray_npy::NpzWriter;
-use std::fs::File;
-use std::io::{BufWriter, Write as _};
+use anyhow::Result;
+use ndarray::aview1;
 use std::path::Path;
 
 /// The frames of a video, one value each; all of the same length T.
@@ -46,16 +44,13 @@ impl Timeline {
 
     /// Writes `timeline.npz`; the same timeline gives the same bytes.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let written = || -> Result<()> {
-            let mut npz = NpzWriter::new(BufWriter::new(File::create(path)?));
-            npz.add_array("source_secs", &Array1::from_vec(self.source_secs.clone()))?;
-            npz.add_array("repeated", &Array1::from_vec(self.repeated.clone()))?;
-            npz.add_array("shot_score", &Array1::from_vec(self.shot_score.clone()))?;
-            npz.add_array("restart", &Array1::from_vec(self.restart.clone()))?;
-            npz.add_array("still", &Array1::from_vec(self.frame_difference.clone()))?;
-            Ok(npz.finish()?.flush()?)
-        };
-        written().with_context(|| format!("cannot write {}", path.display()))
+        npz::write(path, |npz| {
+            npz.add_array("source_secs", &aview1(&self.source_secs))?;
+            npz.add_array("repeated", &aview1(&self.repeated))?;
+            npz.add_array("shot_score", &aview1(&self.shot_score))?;
+            npz.add_array("restart", &aview1(&self.restart))?;
+            npz.add_array("still", &aview1(&self.frame_difference))
+        })
     }
 }
 
@@ -76,9 +71,7 @@ mod tests {
         };
         timeline.write(&path).unwrap();
         assert_eq!(Timeline::read(&path).unwrap(), timeline);
-        let mut npz = NpzWriter::new(File::create(&path).unwrap());
-        npz.add_array("repeated", &Array1::from_vec(vec![false; 3])).unwrap();
-        npz.finish().unwrap();
+        npz::write(&path, |npz| npz.add_array("repeated", &aview1(&[false; 3]))).unwrap();
         let text = format!("{:#}", Timeline::read(&path).unwrap_err());
         assert!(text.contains("a.npz") && text.contains("source_secs"), "{text}");
     }

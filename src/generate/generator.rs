@@ -4,9 +4,9 @@ use super::mel_stream::MelStream;
 use super::mel_stream::mel_frames;
 use super::model;
 use super::model::BEST;
-use super::model::{SpeakerMetadata, SpeakerModel};
+use super::model::SpeakerMetadata;
 use super::normalisation::N_FEATURES;
-use crate::nn::gan::generator::FRAMES_MULTIPLE;
+use crate::nn::gan::generator::{FRAMES_MULTIPLE, Generator};
 use crate::nn::gan::streaming::StreamingGenerator;
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
@@ -17,17 +17,13 @@ use ndarray::{Array2, Array3, s};
 use std::path::Path;
 
 /// Frames generated at once; the 256 context frames that are computed beside them and dropped are a small part.
-const CHUNK: usize = 2048;
+pub const CHUNK: usize = 2048;
 
 /// A trained speaker.
 pub struct GestureGenerator {
-    model: SpeakerModel,
-}
-
-impl From<SpeakerModel> for GestureGenerator {
-    fn from(model: SpeakerModel) -> Self {
-        Self { model }
-    }
+    /// What the checkpoint says of it.
+    pub metadata: SpeakerMetadata,
+    pub generator: Generator,
 }
 
 impl GestureGenerator {
@@ -35,49 +31,32 @@ impl GestureGenerator {
     pub fn open(path: &Path) -> Result<Self> {
         let file = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
         ensure!(file.is_file(), "there is no checkpoint {}; `orator train gan` writes one", file.display());
-        Ok(Self { model: model::load(&file)? })
+        let (metadata, generator) = model::load(&file)?;
+        Ok(Self { metadata, generator })
     }
 
     /// The speaker's name.
     pub fn name(&self) -> &str {
-        &self.model.metadata.name
-    }
-
-    /// What its checkpoint says of it.
-    pub fn metadata(&self) -> &SpeakerMetadata {
-        &self.model.metadata
+        &self.metadata.name
     }
 
     /// The rate of the motion it makes.
     pub fn fps(&self) -> FrameRate {
-        self.model.metadata.fps
+        self.metadata.fps
     }
 
     /// Motion for `sound` (16 kHz): as many whole frames as fit into it, bones of the speaker's lengths. Errors on another
     /// rate, and on sound shorter than a frame.
     pub fn motion(&self, sound: &Sound) -> Result<Motion> {
-        self.motion_with_chunk(sound, CHUNK)
-    }
-
-    /// [`Self::motion`] in chunks of `chunk` frames, a multiple of 32.
-    pub fn motion_with_chunk(&self, sound: &Sound, chunk: usize) -> Result<Motion> {
         ensure!(sound.rate == SAMPLE_RATE, "the sound has {} Hz, expected {SAMPLE_RATE}", sound.rate);
-        self.joined(pieces(sound), sound.samples.len(), chunk, &mut |_| ())
+        let pieces = sound.samples.chunks(SAMPLE_RATE as usize).map(|piece| Ok(piece.to_vec()));
+        self.motion_of_pieces(pieces, sound.samples.len(), CHUNK, &mut |_| ())
     }
 
-    /// Motion for `n_samples` at 16 kHz that come piece by piece: memory does not grow with the sound, except
-    /// for the motion. `made` is called with the number of frames of each chunk. Errors of `motion`, and pieces that are
-    /// not `n_samples` together.
+    /// Motion for `n_samples` at 16 kHz that come piece by piece, made `chunk` frames at a time: memory does not grow with
+    /// the sound, except for the motion. `made` is called with the number of frames of each chunk. Errors of `motion`,
+    /// pieces that are not `n_samples` together, and a `chunk` that is no multiple of 32.
     pub fn motion_of_pieces(
-        &self,
-        pieces: impl Iterator<Item = Result<Vec<f32>>>,
-        n_samples: usize,
-        made: &mut dyn FnMut(usize),
-    ) -> Result<Motion> {
-        self.joined(pieces, n_samples, CHUNK, made)
-    }
-
-    fn joined(
         &self,
         pieces: impl Iterator<Item = Result<Vec<f32>>>,
         n_samples: usize,
@@ -87,9 +66,9 @@ impl GestureGenerator {
         let n_frames = self.n_frames(n_samples)?;
         let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
         let mut first = 0;
-        for poses in self.features_of(pieces, n_samples, chunk)? {
+        for poses in self.features(pieces, n_samples, chunk)? {
             let poses = poses?;
-            let part = self.model.metadata.motion(poses.view());
+            let part = self.metadata.motion(poses.view());
             joints.slice_mut(s![first..first + poses.ncols(), .., ..]).assign(&part.joints);
             first += poses.ncols();
             made(poses.ncols());
@@ -97,32 +76,22 @@ impl GestureGenerator {
         Ok(Motion::from_joints(self.fps(), joints))
     }
 
-    /// Raw output of the network for `sound`, [144, T] of one chunk after another, `chunk` frames or less each, which
-    /// [`SpeakerMetadata::motion`] turns into motion. The sound is continued by its mirror image up to a multiple of 32
-    /// frames.
-    pub fn features<'a>(
-        &'a self,
-        sound: &'a Sound,
-        chunk: usize,
-    ) -> Result<impl Iterator<Item = Result<Array2<f32>>> + 'a> {
-        ensure!(sound.rate == SAMPLE_RATE, "the sound has {} Hz, expected {SAMPLE_RATE}", sound.rate);
-        self.features_of(pieces(sound), sound.samples.len(), chunk)
-    }
-
-    fn features_of<'a>(
-        &'a self,
-        pieces: impl Iterator<Item = Result<Vec<f32>>> + 'a,
+    /// Raw output of the network for sound that comes as in [`Self::motion_of_pieces`], [144, T] of one chunk after another,
+    /// `chunk` frames or less each, which [`SpeakerMetadata::motion`] turns into motion. The sound is continued by its
+    /// mirror image up to a multiple of 32 frames.
+    pub fn features(
+        &self,
+        pieces: impl Iterator<Item = Result<Vec<f32>>>,
         n_samples: usize,
         chunk: usize,
-    ) -> Result<impl Iterator<Item = Result<Array2<f32>>> + 'a> {
-        let metadata = &self.model.metadata;
+    ) -> Result<impl Iterator<Item = Result<Array2<f32>>>> {
         let n_frames = self.n_frames(n_samples)?;
         let padded = (n_frames / FRAMES_MULTIPLE + 1) * FRAMES_MULTIPLE;
-        let n_mel_frames = mel_frames(metadata.fps, padded);
+        let n_mel_frames = mel_frames(self.fps(), padded);
         let mut stream = MelStream::new(pieces, n_samples, n_mel_frames);
         let mels = move |frames| stream.log_mels(frames).map_err(|error| candle_core::Error::Msg(format!("{error:#}")));
-        let chunks =
-            StreamingGenerator::new(&self.model.generator, metadata.network.preset, n_mel_frames, padded, chunk, mels)?;
+        let preset = self.metadata.network.preset;
+        let chunks = StreamingGenerator::new(&self.generator, preset, n_mel_frames, padded, chunk, mels)?;
         Ok(chunks.zip((0..n_frames).step_by(chunk)).map(move |(poses, first)| {
             let n = chunk.min(n_frames - first);
             let poses = poses?.narrow(2, 0, n)?.flatten_all()?.to_vec1()?;
@@ -137,9 +106,4 @@ impl GestureGenerator {
         ensure!(n_frames > 0, "the sound is {secs:.3} s long: too short for one frame of motion");
         Ok(n_frames)
     }
-}
-
-/// Sound in memory as if it came in.
-fn pieces(sound: &Sound) -> impl Iterator<Item = Result<Vec<f32>>> {
-    sound.samples.chunks(SAMPLE_RATE as usize).map(|piece| Ok(piece.to_vec()))
 }

@@ -100,19 +100,13 @@ impl SpeakerMetadata {
     }
 }
 
-/// A trained generator, ready to use.
-pub struct SpeakerModel {
-    pub metadata: SpeakerMetadata,
-    pub generator: Generator,
-}
-
 /// Reads a checkpoint of `orator train gan`. Errors name the file and what is wrong with it.
-pub fn load(path: &Path) -> Result<SpeakerModel> {
+pub fn load(path: &Path) -> Result<(SpeakerMetadata, Generator)> {
     let contents = Contents::read(path)?;
     build(&contents).with_context(|| format!("{} is no checkpoint of `orator train gan`", path.display()))
 }
 
-fn build(contents: &Contents) -> Result<SpeakerModel> {
+fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {
     let kind = &contents.facts["speaker"]["kind"];
     ensure!(kind == KIND, "its kind is {kind}, this program reads {KIND:?}");
     let metadata: SpeakerMetadata =
@@ -137,7 +131,7 @@ fn build(contents: &Contents) -> Result<SpeakerModel> {
     let mut params = Params::frozen();
     let generator = Generator::new(&mut params, &metadata.network)?;
     params.load(&contents.part(GENERATOR))?;
-    Ok(SpeakerModel { metadata, generator })
+    Ok((metadata, generator))
 }
 
 /// The best checkpoint by the validation's score: the generator alone, to generate with.

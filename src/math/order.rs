@@ -1,41 +1,12 @@
 //! Order statistics: median, quantile and the trimmed ends of a set of numbers. Numbers that are not finite are left out
 //! everywhere. `median` and `quantile` may lie between two numbers; the `lower_` and `upper_` ones occur in the set.
 
-use std::cmp::Ordering;
+use std::ops::{Add, Div};
 
-/// A floating-point number that can be ordered.
-pub trait Sortable: Copy {
-    /// Whether the value is neither infinite nor NaN.
-    fn is_number(self) -> bool;
-    /// Total order of IEEE 754.
-    fn order(&self, other: &Self) -> Ordering;
-    /// Mean of two numbers.
-    fn mean(self, other: Self) -> Self;
-}
+/// A floating-point number that can be ordered: f32 or f64.
+pub trait Sortable: Copy + From<u8> + Into<f64> + Add<Output = Self> + Div<Output = Self> {}
 
-impl Sortable for f32 {
-    fn is_number(self) -> bool {
-        self.is_finite()
-    }
-    fn order(&self, other: &Self) -> Ordering {
-        self.total_cmp(other)
-    }
-    fn mean(self, other: Self) -> Self {
-        (self + other) / 2.0
-    }
-}
-
-impl Sortable for f64 {
-    fn is_number(self) -> bool {
-        self.is_finite()
-    }
-    fn order(&self, other: &Self) -> Ordering {
-        self.total_cmp(other)
-    }
-    fn mean(self, other: Self) -> Self {
-        (self + other) / 2.0
-    }
-}
+impl<F: Copy + From<u8> + Into<f64> + Add<Output = F> + Div<Output = F>> Sortable for F {}
 
 /// Finite numbers in ascending order. Every method gives `None` of an empty set.
 #[derive(Clone, Debug)]
@@ -44,8 +15,8 @@ pub struct Ordered<F>(Vec<F>);
 impl<F: Sortable> Ordered<F> {
     /// Sorts the finite ones of `values`.
     pub fn new(values: impl IntoIterator<Item = F>) -> Self {
-        let mut values: Vec<F> = values.into_iter().filter(|value| value.is_number()).collect();
-        values.sort_unstable_by(F::order);
+        let mut values: Vec<F> = values.into_iter().filter(|&value| value.into().is_finite()).collect();
+        values.sort_unstable_by(|&a, &b| a.into().total_cmp(&b.into()));
         Self(values)
     }
 
@@ -56,7 +27,7 @@ impl<F: Sortable> Ordered<F> {
 
     /// The number in the middle, or the mean of the two there.
     pub fn median(&self) -> Option<F> {
-        Some(self.lower_quantile(0.5)?.mean(self.upper_median()?))
+        Some((self.lower_quantile(0.5)? + self.upper_median()?) / F::from(2))
     }
 
     /// The number in the middle, the larger of two.

@@ -5,7 +5,8 @@ use super::report::{Report, median};
 use anyhow::{Result, ensure};
 use orator::demo::drawn::speech::Speech;
 use orator::generate::GestureGenerator;
-use orator::generate::model::{SpeakerMetadata, SpeakerModel};
+use orator::generate::generator::CHUNK;
+use orator::generate::model::SpeakerMetadata;
 use orator::generate::normalisation::{N_FEATURES, Normalisation};
 use orator::generate::representation::Representation;
 use orator::nn::gan::generator::{Config, Generator, Preset};
@@ -59,10 +60,9 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         let mut secs = Vec::new();
         for _ in 0..args.rounds {
             let start = Instant::now();
-            let motion = pool.install(|| match args.chunk {
-                Some(chunk) => speaker.motion_with_chunk(&sound, chunk),
-                None => speaker.motion(&sound),
-            })?;
+            let whole = std::iter::once(Ok(sound.samples.clone()));
+            let chunk = args.chunk.unwrap_or(CHUNK);
+            let motion = pool.install(|| speaker.motion_of_pieces(whole, sound.samples.len(), chunk, &mut |_| ()))?;
             secs.push(start.elapsed().as_secs_f64());
             ensure!(motion.joints.iter().all(|v| v.is_finite()), "the motion made is not finite");
             task.advance(1);
@@ -104,5 +104,5 @@ fn untrained(preset: Preset) -> Result<GestureGenerator> {
     let table = ndarray::Array2::from_elem((N_JOINTS, 3), 0.1);
     let normalisation = Normalisation::new(&table, &table, vec![0.1; N_BONES]);
     let facts = SpeakerMetadata::new("untrained", FPS, "", network, normalisation, Representation::Positions);
-    Ok(GestureGenerator::from(SpeakerModel { metadata: facts, generator }))
+    Ok(GestureGenerator { metadata: facts, generator })
 }

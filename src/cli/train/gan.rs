@@ -141,7 +141,7 @@ fn pairs(dataset: &Dataset, speaker: &GestureGenerator) -> Result<Vec<HeldOutPai
     let samples = splits.into_iter().find(|samples| !samples.is_empty()).unwrap_or_default();
     let n = samples.len().min(N_PAIRS);
     let chosen: Vec<_> = (0..n).map(|i| samples[i * samples.len() / n].clone()).collect();
-    let intervals = held_out::read(dataset, &chosen, &speaker.metadata().normalisation)?;
+    let intervals = held_out::read(dataset, &chosen, &speaker.metadata.normalisation)?;
     let pair = |interval: HeldOutInterval| {
         let n_frames = interval.ground_truth.n_frames();
         let span = ((PAIR_SECS * speaker.fps().per_sec()) as usize).min(n_frames);

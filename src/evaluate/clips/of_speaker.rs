@@ -46,7 +46,7 @@ pub fn prepare(
         "{} moves at {of_dataset}, the checkpoint's speaker at {of_speaker}: it was trained on another dataset",
         dataset.dir().display()
     );
-    let normal = &speaker.metadata().normalisation;
+    let normal = &speaker.metadata.normalisation;
     task.detail("reading the intervals");
     let held_out = held_out::read(dataset, &held_out::samples(dataset, split)?, normal)?;
     task.detail("generating motion");

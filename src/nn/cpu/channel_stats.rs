@@ -2,9 +2,8 @@
 //! such rows: plain memory in, plain memory out. Sums run over blocks of fixed size in one order.
 
 use super::tensor::{GRAIN, LANES, OutputStart, Scalar, written};
-use super::thread_team::parallel_for;
+use super::thread_team::{parallel_for, parallel_map};
 use rayon::prelude::*;
-use std::sync::OnceLock;
 
 /// Numbers summed before the sum goes on in f64, and numbers one task takes.
 const BLOCK: usize = 16 * 1024;
@@ -207,11 +206,7 @@ impl<T: Scalar> Norm<T> {
         };
         let chunk = whole_rows(TASK, n);
         let tasks: Vec<_> = z.chunks(chunk).zip(grad.chunks(chunk)).collect();
-        let sums: Vec<OnceLock<Vec<f64>>> = tasks.iter().map(|_| OnceLock::new()).collect();
-        parallel_for(tasks.len(), |task| {
-            let _ = sums[task].set(of_task(tasks[task]));
-        });
-        let mut plain = add_up(sums.into_iter().filter_map(OnceLock::into_inner).collect(), 2 * n);
+        let mut plain = add_up(parallel_map(tasks.len(), |task| of_task(tasks[task])), 2 * n);
         let product = plain.split_off(n);
         (plain, product)
     }

@@ -39,6 +39,21 @@ pub struct TileKernel<T> {
     pub run: unsafe fn(&TileJob<T>, usize, usize),
 }
 
+/// The tile of so many rows.
+macro_rules! rows {
+    ($job:ident, $n_rows:ident, $tile:ident, $vectors:literal) => {
+        match $n_rows {
+            1 => $tile::<1, $vectors>($job),
+            2 => $tile::<2, $vectors>($job),
+            3 => $tile::<3, $vectors>($job),
+            4 => $tile::<4, $vectors>($job),
+            5 => $tile::<5, $vectors>($job),
+            6 => $tile::<6, $vectors>($job),
+            _ => unreachable!("a tile of {} rows", $n_rows),
+        }
+    };
+}
+
 /// A tile's loop and the choice of its size, for one kind of processor and one type of number.
 macro_rules! kernel {
     ($(#[$attribute:meta])* $tile:ident, $choose:ident, $number:ty, $lanes:literal, $vectors:literal, $zero:path, $load:path, $store:path, $spread:path,
@@ -87,26 +102,11 @@ macro_rules! kernel {
         pub(crate) unsafe fn $choose(job: &TileJob<$number>, n_rows: usize, n_vectors: usize) {
             // SAFETY: the caller's.
             unsafe {
-                match (n_rows, n_vectors) {
-                    (1, 1) => $tile::<1, 1>(job),
-                    (2, 1) => $tile::<2, 1>(job),
-                    (3, 1) => $tile::<3, 1>(job),
-                    (4, 1) => $tile::<4, 1>(job),
-                    (5, 1) => $tile::<5, 1>(job),
-                    (6, 1) => $tile::<6, 1>(job),
-                    (1, 2) => $tile::<1, 2>(job),
-                    (2, 2) => $tile::<2, 2>(job),
-                    (3, 2) => $tile::<3, 2>(job),
-                    (4, 2) => $tile::<4, 2>(job),
-                    (5, 2) => $tile::<5, 2>(job),
-                    (6, 2) => $tile::<6, 2>(job),
-                    (1, $vectors) => $tile::<1, $vectors>(job),
-                    (2, $vectors) => $tile::<2, $vectors>(job),
-                    (3, $vectors) => $tile::<3, $vectors>(job),
-                    (4, $vectors) => $tile::<4, $vectors>(job),
-                    (5, $vectors) => $tile::<5, $vectors>(job),
-                    (6, $vectors) => $tile::<6, $vectors>(job),
-                    _ => unreachable!("a tile of {n_rows} rows and {n_vectors} vectors"),
+                match n_vectors {
+                    1 => rows!(job, n_rows, $tile, 1),
+                    2 => rows!(job, n_rows, $tile, 2),
+                    $vectors => rows!(job, n_rows, $tile, $vectors),
+                    _ => unreachable!("a tile of {n_vectors} vectors"),
                 }
             }
         }

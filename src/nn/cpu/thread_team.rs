@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 use std::cell::{Cell, UnsafeCell};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
 
 /// A piece's work by its number, as the team sees it: alive as long as `ThreadTeam::run` has not returned.
@@ -67,6 +68,15 @@ pub fn parallel_for(n: usize, f: impl Fn(usize) + Sync) {
     if let Err(panic) = result {
         resume_unwind(panic);
     }
+}
+
+/// What `f` gives for 0..n, in this order, worked out on all threads at hand.
+pub fn parallel_map<R: Send + Sync>(n: usize, f: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    let results: Vec<OnceLock<R>> = (0..n).map(|_| OnceLock::new()).collect();
+    parallel_for(n, |i| {
+        let _ = results[i].set(f(i));
+    });
+    results.into_iter().filter_map(OnceLock::into_inner).collect()
 }
 
 impl ThreadTeam {

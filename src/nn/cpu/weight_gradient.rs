@@ -4,10 +4,9 @@
 use super::direct_conv::ConvSizes;
 use super::kernel::{MOST_ROWS, TileJob, TileSteps, panels};
 use super::tensor::{OutputStart, Scalar, written};
-use super::thread_team::parallel_for;
+use super::thread_team::{parallel_for, parallel_map};
 use rayon::prelude::*;
 use std::ops::Range;
-use std::sync::OnceLock;
 
 /// Places of a piece, whose gradients stay in the first-level cache.
 const PLACES: usize = 128;
@@ -35,12 +34,10 @@ pub fn gradient_of_weight<T: Scalar>(s: &ConvSizes, x: &[T], grad: &[T]) -> Vec<
         })
         .collect();
     let chunk = |chunk: usize| chunk * CHANNELS..s.n_in.min((chunk + 1) * CHANNELS);
-    let sums: Vec<OnceLock<Vec<T>>> = tasks.iter().map(|_| OnceLock::new()).collect();
-    parallel_for(tasks.len(), |task| {
+    let sums: Vec<Vec<T>> = parallel_map(tasks.len(), |task| {
         let (panel, kernel_offset, of_chunk) = tasks[task];
-        let _ = sums[task].set(sum_products(s, x, grad, n_columns, panels[panel], kernel_offset, chunk(of_chunk)));
+        sum_products(s, x, grad, n_columns, panels[panel], kernel_offset, chunk(of_chunk))
     });
-    let sums: Vec<Vec<T>> = sums.into_iter().filter_map(OnceLock::into_inner).collect();
     let spread = |gradient: OutputStart<T>, (panel, of_chunk): (usize, usize)| {
         let ((first, n_vectors), channels) = (panels[panel], chunk(of_chunk));
         let width = n_vectors * kernel.lanes;

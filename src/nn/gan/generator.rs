@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 
 /// The UNet halves time five times.
 pub const FRAMES_MULTIPLE: usize = 32;
-pub const N_ENTER: usize = 2;
-pub const N_LEVELS: usize = 5;
-pub const N_DECODER: usize = 4;
+const N_ENTER: usize = 2;
+const N_LEVELS: usize = 5;
+const N_DECODER: usize = 4;
 
 /// How the spectrogram is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -3,7 +3,7 @@
 //! every strided layer begins anew, and the resize between encoder and UNet counts from the beginning of the whole, so
 //! the result is that of one pass.
 
-use super::generator::{FRAMES_MULTIPLE, Generator, N_DECODER, N_ENTER, N_LEVELS, Preset};
+use super::generator::{FRAMES_MULTIPLE, Generator, Preset};
 use crate::nn::ops::resize;
 use candle_core::{Result, Tensor};
 use std::ops::Range;
@@ -13,68 +13,23 @@ const HOPS: usize = 8;
 /// Results of the audio encoder that one piece makes: 20 s of sound.
 const PIECE: usize = 256;
 
-/// Places that are read, first and last.
+/// Result `i` of the audio encoder depends on this many spectrogram frames before `8 i`, and on those up to `8 i` plus
+/// [`heard_behind`].
 ///
 /// What a layer reads follows from kernel and stride. With TensorFlow's "same" padding a layer of kernel 3 and stride 1
 /// computes place `i` from `i - 1..=i + 1`, and one of kernel 4 and stride 2 from `2 i - 1..=2 i + 2`, for even and odd
-/// lengths alike (the padding before is one place for both). Going back layer by layer, result `i` of the audio encoder depends
-/// on the spectrogram frames `8 i - 22..=8 i + 29` (`paper`: 45), and 32 frames of poses on 97 more before and behind.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct FrameSpan {
-    first: i64,
-    last: i64,
-}
+/// lengths alike (the padding before is one place for both); the last layer of `paper` is not padded and reads
+/// `i..=i + 2`.
+const HEARD_BEFORE: usize = 22;
+/// Frames before and behind 32 of poses that the UNet reads for them: 97, made whole pieces.
+const BESIDE: usize = 97usize.next_multiple_of(FRAMES_MULTIPLE);
 
-impl FrameSpan {
-    /// What a layer of kernel 3, stride 1 reads for these.
-    fn under_plain(self) -> Self {
-        Self { first: self.first - 1, last: self.last + 1 }
+/// Spectrogram frames from `8 i` on that result `i` of the audio encoder depends on, less one.
+const fn heard_behind(preset: Preset) -> usize {
+    match preset {
+        Preset::Light => 29,
+        Preset::Paper => 45,
     }
-
-    /// What a layer of kernel 4, stride 2 reads for these.
-    fn under_down(self) -> Self {
-        Self { first: 2 * self.first - 1, last: 2 * self.last + 2 }
-    }
-
-    /// What is repeated twice for these.
-    fn under_twice(self) -> Self {
-        Self { first: self.first.div_euclid(2), last: self.last.div_euclid(2) }
-    }
-
-    fn with(self, other: Self) -> Self {
-        Self { first: self.first.min(other.first), last: self.last.max(other.last) }
-    }
-}
-
-/// Spectrogram frames, relative to `8 * i`, that result `i` of the audio encoder depends on.
-fn audio_encoder_field(preset: Preset) -> FrameSpan {
-    // The last layer of `paper` is not padded: place i reads i..=i + 2.
-    let mut span = FrameSpan { first: 0, last: if preset == Preset::Paper { 2 } else { 0 } }.under_plain();
-    for _ in 0..3 {
-        span = span.under_down().under_plain();
-    }
-    span
-}
-
-/// Frames of its input, relative to the first of 32, that these 32 of its results depend on.
-fn unet_field() -> FrameSpan {
-    let mut span = FrameSpan { first: 0, last: FRAMES_MULTIPLE as i64 - 1 };
-    for _ in 0..N_DECODER {
-        span = span.under_plain();
-    }
-    let mut skips = Vec::new();
-    for _ in 0..N_LEVELS {
-        span = span.under_plain();
-        skips.push(span);
-        span = span.under_twice();
-    }
-    for skip in skips.into_iter().rev() {
-        span = span.under_down().with(skip);
-    }
-    for _ in 0..N_ENTER {
-        span = span.under_plain();
-    }
-    span
 }
 
 /// Results of the audio encoder for so many spectrogram frames.
@@ -122,10 +77,7 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
     }
 
     fn chunk(&mut self, frames: Range<usize>) -> Result<Tensor> {
-        let field = unet_field();
-        let beside = |n: i64| (n.max(0) as usize).next_multiple_of(FRAMES_MULTIPLE);
-        let first = frames.start.saturating_sub(beside(-field.first));
-        let end = (frames.end + beside(field.last + 1 - FRAMES_MULTIPLE as i64)).min(self.n_frames);
+        let (first, end) = (frames.start.saturating_sub(BESIDE), (frames.end + BESIDE).min(self.n_frames));
         let n_encoded = n_encoded_frames(self.preset, self.n_mel_frames);
         let part = resize::ResizedPart { frames: first..end, n_out: self.n_frames, n_in: n_encoded };
         let needed = part.needed();
@@ -157,11 +109,10 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
 
     /// These results of the audio encoder.
     fn encode(&mut self, piece: Range<usize>, n_encoded: usize) -> Result<Tensor> {
-        let field = audio_encoder_field(self.preset);
-        let first = piece.start.saturating_sub(((-field.first).max(0) as usize).div_ceil(HOPS));
+        let first = piece.start.saturating_sub(HEARD_BEFORE.div_ceil(HOPS));
         let end = match piece.end {
             end if end == n_encoded => self.n_mel_frames,
-            end => ((end - 1) * HOPS + field.last.max(0) as usize + 1).min(self.n_mel_frames),
+            end => ((end - 1) * HOPS + heard_behind(self.preset) + 1).min(self.n_mel_frames),
         };
         let encoded = self.generator.encode(&(self.mels)(first * HOPS..end)?, false)?;
         encoded.narrow(2, piece.start - first, piece.len())
@@ -195,10 +146,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     #[test]
-    fn what_is_read_follows_from_the_layers() {
-        assert_eq!(audio_encoder_field(Preset::Light), FrameSpan { first: -22, last: 29 });
-        assert_eq!(audio_encoder_field(Preset::Paper), FrameSpan { first: -22, last: 45 });
-        assert_eq!(unet_field(), FrameSpan { first: -97, last: 31 + 97 });
+    fn results_are_counted() {
         assert_eq!([418, 425, 8, 1].map(|n| n_encoded_frames(Preset::Light, n)), [53, 54, 1, 1]);
         assert_eq!([418, 425, 17, 16].map(|n| n_encoded_frames(Preset::Paper, n)), [51, 52, 1, 0]);
     }

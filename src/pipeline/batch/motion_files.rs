@@ -10,6 +10,7 @@ use crate::external::ffmpeg::sound_stream::SoundStream;
 use crate::external::ffmpeg::{audio, probe};
 use crate::formats::checkpoint;
 use crate::generate::GestureGenerator;
+use crate::generate::generator::CHUNK;
 use crate::generate::model::BEST;
 use crate::stage::progress::Progress;
 use crate::types::sound::SAMPLE_RATE;
@@ -68,7 +69,7 @@ pub fn write_motion(
     task.detail(&format!("{secs:.1} s of sound"));
     let pieces = SoundStream::open(audio, SAMPLE_RATE);
     let motion =
-        speaker.motion_of_pieces(pieces, n_samples, &mut |n| task.advance(n as u64)).with_context(no_motion)?;
+        speaker.motion_of_pieces(pieces, n_samples, CHUNK, &mut |n| task.advance(n as u64)).with_context(no_motion)?;
     drop(task);
     let motion_secs = started.elapsed().as_secs_f64();
     // Files of joints hold what the network gave, before it is put on a figure.

@@ -5,13 +5,11 @@ use super::gaps;
 use super::hand_depth;
 use super::observed::FARTHEST_PX;
 use crate::math::vec3;
-use crate::motion::view::hand::{HandJoints, HandView, N_IN, N_OUT, SeenHand, parent};
-use crate::nn::Mode;
+use crate::motion::view::hand::{HandJoints, SeenHand, parent};
 use crate::nn::lifter::hand::HandLifter;
 use crate::types::pose2d::{HAND_SEEN_SCORE, N_HAND};
 use crate::types::skeleton::Side;
 use anyhow::Result;
-use candle_core::{Device, Tensor};
 use ndarray::{ArrayView3, ArrayViewMut2, ArrayViewMut3, Axis, s};
 
 /// A hand with fewer points seen is not lifted.
@@ -29,29 +27,15 @@ pub fn lift(
     mut joints: ArrayViewMut3<f32>,
     mut mask: ArrayViewMut2<bool>,
 ) -> Result<()> {
-    for start in (0..points.len_of(Axis(0))).step_by(BATCH) {
-        let end = points.len_of(Axis(0)).min(start + BATCH);
-        let views: Vec<(usize, HandView)> = (start..end)
-            .filter_map(|t| {
-                let seen = seen_points(&points, t);
-                let view = enough(&seen).then(|| HandView::new(&seen, side)).flatten()?;
-                (0..N_HAND).for_each(|j| mask[[t, j]] = seen[j].is_some());
-                Some((t, view))
-            })
-            .collect();
-        if views.is_empty() {
-            continue;
-        }
-        let x: Vec<f32> = views.iter().flat_map(|(_, view)| view.numbers).collect();
-        let x = Tensor::from_vec(x, (views.len(), N_IN), &Device::Cpu)?;
-        let out = lifter.forward(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1::<f32>()?;
-        for ((t, view), out) in views.iter().zip(out.chunks_exact(N_OUT)) {
-            match unit_size(view.hand(out)) {
-                Some(hand) => {
-                    joints.slice_mut(s![*t, .., ..]).indexed_iter_mut().for_each(|((j, k), v)| *v = hand[j][k] as f32);
-                }
-                None => mask.slice_mut(s![*t, ..]).fill(false),
-            }
+    let n_frames = points.len_of(Axis(0));
+    for start in (0..n_frames).step_by(BATCH) {
+        let enough = |seen: SeenHand| if seen.iter().flatten().count() < LEAST_POINTS { [None; N_HAND] } else { seen };
+        let seen: Vec<SeenHand> =
+            (start..n_frames.min(start + BATCH)).map(|t| enough(seen_points(&points, t))).collect();
+        for (t, (hand, seen)) in (start..).zip(lifter.lift(&seen, side)?.into_iter().zip(&seen)) {
+            let Some(hand) = hand.and_then(unit_size) else { continue };
+            (0..N_HAND).for_each(|j| mask[[t, j]] = seen[j].is_some());
+            joints.slice_mut(s![t, .., ..]).indexed_iter_mut().for_each(|((j, k), v)| *v = hand[j][k] as f32);
         }
     }
     hand_depth::settle(joints.view_mut(), frame_secs);
@@ -66,10 +50,6 @@ fn seen_points(points: &ArrayView3<f32>, t: usize) -> SeenHand {
         let [x, y, score] = [0, 1, 2].map(|k| points[[t, j, k]]);
         (score >= HAND_SEEN_SCORE && x.abs() <= FARTHEST_PX && y.abs() <= FARTHEST_PX).then_some([x, y])
     })
-}
-
-fn enough(seen: &SeenHand) -> bool {
-    seen.iter().flatten().count() >= LEAST_POINTS
 }
 
 /// The hand with all its bones together 1 long; `None` of a hand without extent.

@@ -47,13 +47,8 @@ impl Lifter {
     /// Loads the networks that `settings` name, or the built-in ones. Errors name the file.
     pub fn new(settings: &config::LiftConfig) -> Result<Self> {
         let (body, hands) = (weights::body(&settings.body_weights)?, weights::hands(&settings.hand_weights)?);
-        Ok(Self::from_parts(body, hands, settings))
-    }
-
-    /// With networks that are there already; of `settings` only what follows the networks counts.
-    pub fn from_parts(body: BodyLifter, hands: HandLifter, settings: &config::LiftConfig) -> Self {
         let config::LiftConfig { smooth_arms, smooth_hands, level, .. } = *settings;
-        Self { body, hands, smooth_arms, smooth_hands, level }
+        Ok(Self { body, hands, smooth_arms, smooth_hands, level })
     }
 
     /// The motion of the whole video, taken as one continuous stretch.

@@ -8,7 +8,7 @@ use super::refuse::{exclude_frames, max_gap_frames};
 use super::{Lifted, Lifter};
 use crate::config;
 use crate::formats::timeline_npz::Timeline;
-use crate::formats::{joints_npz, keypoints_npz};
+use crate::formats::{joints_npz, keypoints_npz, npz};
 use crate::stage::artifacts::{Artifact, StageName};
 use crate::stage::ledger::Ledger;
 use crate::stage::progress::Progress;
@@ -17,10 +17,7 @@ use crate::types::interval::Intervals;
 use crate::types::pose2d::Keypoints;
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array1, s};
-use ndarray_npy::NpzWriter;
 use serde_json::json;
-use std::fs::File;
-use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 /// Lifts videos.
@@ -138,7 +135,8 @@ impl Stage for LiftStage {
 }
 
 impl LiftStage {
-    /// Lifts, and takes out of intervals and ledger what lifting shows to be wrong; writes `bone_change.npz`.
+    /// Lifts, and takes out of intervals and ledger what lifting shows to be wrong; writes `bone_change.npz`: `bone_change` f32
+    /// [T], the farthest that a bone of the frame is from its length in the video, as a share of it.
     fn lift(
         &self,
         keypoints: &mut Keypoints,
@@ -156,19 +154,10 @@ impl LiftStage {
         }
         let open = outliers::open_refusals(&raw.motion, &intervals.intervals);
         (intervals, ledger) = exclude_frames(&intervals, &ledger, &open, min_frames)?;
-        write_measures(&Artifact::BoneChange.within(out), change.farthest())?;
+        let farthest = Array1::from_vec(change.farthest());
+        npz::write(&Artifact::BoneChange.within(out), |npz| npz.add_array("bone_change", &farthest))?;
         Ok((self.lifter.finish(raw, &intervals.intervals), intervals, ledger))
     }
-}
-
-/// `bone_change` f32 [T]: the farthest that a bone of the frame is from its length in the video, as a share of it.
-fn write_measures(path: &Path, bone_change: Vec<f32>) -> Result<()> {
-    let written = || -> Result<()> {
-        let mut npz = NpzWriter::new(BufWriter::new(File::create(path)?));
-        npz.add_array("bone_change", &Array1::from_vec(bone_change))?;
-        Ok(npz.finish()?.flush()?)
-    };
-    written().with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// A frame that only repeats the one before shows nothing new: its points count as not seen, so that the motion between

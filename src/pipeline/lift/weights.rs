@@ -1,15 +1,13 @@
 //! The lifters' weights: built into the program, or from files of `orator train lifter`.
 
+use crate::formats::checkpoint::Contents;
 use crate::nn::lifter::body::BodyLifter;
 use crate::nn::lifter::hand;
 use crate::nn::lifter::hand::HandLifter;
 use crate::nn::lifter::temporal;
 use crate::nn::params::Params;
 use anyhow::{Context, Result, ensure};
-use candle_core::safetensors::load_buffer;
-use candle_core::{Device, Tensor};
 use serde_json::Value;
-use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The built-in weights; `models/body_lifter.md` says how they were made.
@@ -61,13 +59,10 @@ fn load<T>(
 }
 
 fn parse<T>(bytes: &[u8], kind: &str, make: impl Fn(Value, &mut Params) -> Result<T>) -> Result<T> {
-    let (_, header) = safetensors::SafeTensors::read_metadata(bytes)?;
-    let facts = header.metadata().as_ref().and_then(|m| m.get("orator")).context("it was not written by orator")?;
-    let facts: Value = serde_json::from_str(facts)?;
+    let Contents { facts, tensors } = Contents::from_bytes(bytes)?;
     ensure!(facts["kind"] == kind, "it is of kind {}, expected {kind}", facts["kind"]);
     let mut params = Params::frozen();
     let net = make(facts["lesson"]["config"].clone(), &mut params)?;
-    let tensors: BTreeMap<String, Tensor> = load_buffer(bytes, &Device::Cpu)?.into_iter().collect();
     params.load(&tensors)?;
     Ok(net)
 }

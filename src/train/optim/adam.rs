@@ -3,14 +3,14 @@
 
 use super::adam_fallback;
 use super::adam_fallback::AdamScalars;
-use crate::nn::cpu::thread_team::parallel_for;
+use crate::nn::cpu::thread_team::{parallel_for, parallel_map};
 use crate::nn::params::Params;
 use anyhow::{Context, ensure};
 use candle_core::backprop::GradStore;
 use candle_core::{CpuStorage, Device, InplaceOp2, Layout, Result, Tensor, Var};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::sync::{Mutex, OnceLock};
+use std::sync::Mutex;
 
 /// Numbers one task updates.
 const GRAIN: usize = 32 * 1024;
@@ -187,11 +187,7 @@ fn sum_of_squares(values: &[f32]) -> f64 {
         lanes.iter().map(|lane| f64::from(*lane)).sum::<f64>()
     };
     let pieces: Vec<&[f32]> = values.chunks(GRAIN).collect();
-    let sums: Vec<OnceLock<f64>> = pieces.iter().map(|_| OnceLock::new()).collect();
-    parallel_for(pieces.len(), |piece| {
-        let _ = sums[piece].set(of_piece(pieces[piece]));
-    });
-    sums.iter().filter_map(OnceLock::get).sum()
+    parallel_map(pieces.len(), |piece| of_piece(pieces[piece])).into_iter().sum()
 }
 
 struct AdamUpdate<'a> {

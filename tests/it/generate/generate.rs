@@ -15,7 +15,7 @@ use orator::formats::checkpoint;
 use orator::formats::{authors_txt, npy};
 use orator::generate::GestureGenerator;
 use orator::generate::mel_stream::mel_frames;
-use orator::generate::model::{SpeakerMetadata, SpeakerModel};
+use orator::generate::model::SpeakerMetadata;
 use orator::generate::normalisation::{N_FEATURES, Normalisation};
 use orator::generate::representation::Representation;
 use orator::nn::gan::generator::{Config, Generator, Preset};
@@ -130,7 +130,7 @@ fn a_checkpoint_alone_generates_wherever_it_lies() {
 }
 
 /// A speaker of a preset's full size, its weights and running statistics as good as random.
-fn random_speaker(preset: Preset) -> anyhow::Result<SpeakerModel> {
+fn random_speaker(preset: Preset) -> anyhow::Result<GestureGenerator> {
     let network = Config::from_preset(preset, N_FEATURES);
     let mut params = Params::frozen();
     let generator = Generator::new(&mut params, &network)?;
@@ -139,14 +139,14 @@ fn random_speaker(preset: Preset) -> anyhow::Result<SpeakerModel> {
     let motion = swinging(1, 40);
     let mean = motion.joints.mean_axis(Axis(0)).unwrap();
     let normal = Normalisation::new(&mean, &mean, vec![0.1; N_FEATURES / 3]);
-    Ok(SpeakerModel {
+    Ok(GestureGenerator {
         metadata: SpeakerMetadata::new("host", FPS, "", network, normal, Representation::Positions),
         generator,
     })
 }
 
 /// What the network makes of a whole sound at once, [144, T].
-fn one_pass(speaker: &SpeakerModel, sound: &Sound, n_frames: usize) -> anyhow::Result<ndarray::Array2<f32>> {
+fn one_pass(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> anyhow::Result<ndarray::Array2<f32>> {
     let padded = (n_frames / 32 + 1) * 32;
     let n_samples = mel::n_samples(mel_frames(FPS, padded));
     // Continued by its mirror image, back and forth.
@@ -166,11 +166,11 @@ fn chunks_are_one_pass(preset: Preset, lengths: &[f64]) -> anyhow::Result<()> {
     let n_frames = |sound: &Sound| (sound.secs() * 15.0 + 1e-6) as usize;
     let wholes = sounds.iter().map(|sound| one_pass(&speaker, sound, n_frames(sound)));
     let wholes = wholes.collect::<anyhow::Result<Vec<_>>>()?;
-    let speaker = GestureGenerator::from(speaker);
+    let pieces = |sound: &Sound| std::iter::once(Ok(sound.samples.clone()));
     for (sound, whole) in sounds.iter().zip(wholes) {
         let most = whole.iter().fold(0.0f32, |most, v| most.max(v.abs()));
         let mut first = 0;
-        for part in speaker.features(sound, 64)? {
+        for part in speaker.features(pieces(sound), sound.samples.len(), 64)? {
             let part = part?;
             let off = &part - &whole.slice(s![.., first..first + part.ncols()]);
             let off = off.iter().fold(0.0f32, |most, v| most.max(v.abs()));
@@ -180,7 +180,7 @@ fn chunks_are_one_pass(preset: Preset, lengths: &[f64]) -> anyhow::Result<()> {
         assert_eq!(first, n_frames(sound));
     }
     assert_eq!(speaker.motion(&sounds[0])?.n_frames(), n_frames(&sounds[0]));
-    assert!(speaker.motion_with_chunk(&sounds[0], 33).is_err());
+    assert!(speaker.features(pieces(&sounds[0]), sounds[0].samples.len(), 33).is_err());
     Ok(())
 }
 

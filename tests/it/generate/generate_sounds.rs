@@ -9,6 +9,7 @@ use orator::external::ffmpeg::sound_stream::{SoundStream, n_samples};
 use orator::formats::npy;
 use orator::formats::wav;
 use orator::generate::GestureGenerator;
+use orator::generate::generator::CHUNK;
 use orator::types::sound::Sound;
 
 #[test]
@@ -29,7 +30,8 @@ fn a_streamed_sound_gives_the_motion_of_the_whole_one() {
         let n = n_samples(&path, 16_000).unwrap().unwrap();
         assert_eq!(n, whole.samples.len());
         let mut n_made = 0;
-        let streamed = speaker.motion_of_pieces(SoundStream::open(&path, 16_000), n, &mut |n| n_made += n).unwrap();
+        let streamed =
+            speaker.motion_of_pieces(SoundStream::open(&path, 16_000), n, CHUNK, &mut |n| n_made += n).unwrap();
         assert_eq!(streamed, speaker.motion(&whole).unwrap());
         assert_eq!(n_made, streamed.n_frames());
         assert!(generate(dir, "--checkpoint host.safetensors --audio speech.wav --out a.npy").status.success());
