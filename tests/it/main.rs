@@ -9,6 +9,7 @@ mod animate;
 #[allow(dead_code)]
 mod bench;
 mod cli;
+mod convert;
 mod dataset;
 mod evaluate;
 mod fixtures;

@@ -1,8 +1,9 @@
 //! The only room that knows ONNX Runtime: finding its library, sessions, the manifest that describes the models, checks
-//! of hashes, names and shapes, and the folder of models. What the numbers of an output mean is written in the manifest and
-//! read in `pose2d`.
+//! of hashes, names and shapes, the folder of models, and the conversion of other formats. What the numbers of an output
+//! mean is written in the manifest and read in `pose2d`.
 
 pub mod check;
+pub mod convert;
 pub mod entry;
 pub mod manifest;
 pub mod model;

@@ -1,0 +1,179 @@
+//! An ONNX graph while it grows: operators in the order in which they run, weights beside them, equal ones once.
+
+use super::protobuf::{bytes, float, number};
+use anyhow::{Result, ensure};
+use std::collections::BTreeMap;
+
+/// The numbers of a tensor, with ONNX's numbers for them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ElementType {
+    F32 = 1,
+    I64 = 7,
+    F16 = 10,
+}
+
+/// The value of an operator's attribute.
+#[derive(Clone, Copy)]
+pub enum AttributeValue<'a> {
+    Int(i64),
+    Float(f32),
+    Text(&'a str),
+    Ints(&'a [i64]),
+}
+
+/// Operators and weights so far.
+pub struct OnnxGraph {
+    nodes: Vec<u8>,
+    n_ops: usize,
+    weights: Vec<u8>,
+    constants: BTreeMap<(ElementType, Vec<usize>, Vec<u8>), String>,
+    n_weight_bytes_left: usize,
+}
+
+impl OnnxGraph {
+    /// An empty graph for a source of `n_bytes`: no honest conversion gives more than twice as many bytes of weights.
+    pub fn new(n_bytes: usize) -> Self {
+        let n_weight_bytes_left = n_bytes.saturating_mul(2).saturating_add(1 << 20);
+        Self { nodes: Vec::new(), n_ops: 0, weights: Vec::new(), constants: BTreeMap::new(), n_weight_bytes_left }
+    }
+
+    /// An operator with one output, whose name is given back.
+    pub fn op(&mut self, kind: &str, inputs: &[&str], attributes: &[(&str, AttributeValue)]) -> String {
+        let output = format!("t{}", self.n_ops + 1);
+        self.add(kind, inputs, std::slice::from_ref(&output), attributes);
+        output
+    }
+
+    /// An operator whose output is the graph's output `name`.
+    pub fn output(&mut self, name: &str, kind: &str, inputs: &[&str], attributes: &[(&str, AttributeValue)]) {
+        self.add(kind, inputs, &[name.to_owned()], attributes);
+    }
+
+    /// An operator with `n` outputs.
+    pub fn ops(&mut self, n: usize, kind: &str, inputs: &[&str], attributes: &[(&str, AttributeValue)]) -> Vec<String> {
+        let outputs: Vec<String> = (0..n).map(|k| format!("t{}_{k}", self.n_ops + 1)).collect();
+        self.add(kind, inputs, &outputs, attributes);
+        outputs
+    }
+
+    fn add(&mut self, kind: &str, inputs: &[&str], outputs: &[String], attributes: &[(&str, AttributeValue)]) {
+        self.n_ops += 1;
+        let mut node = Vec::new();
+        inputs.iter().for_each(|input| bytes(&mut node, 1, input.as_bytes()));
+        outputs.iter().for_each(|output| bytes(&mut node, 2, output.as_bytes()));
+        bytes(&mut node, 3, format!("n{}", self.n_ops).as_bytes());
+        bytes(&mut node, 4, kind.as_bytes());
+        let mut sorted = attributes.to_vec();
+        sorted.sort_by_key(|(name, _)| *name);
+        sorted.iter().for_each(|(name, value)| bytes(&mut node, 5, &attribute(name, *value)));
+        bytes(&mut self.nodes, 1, &node);
+    }
+
+    /// The name of a constant, as float32 where it is given as float16; equal ones share it.
+    ///
+    /// # Errors
+    /// `raw` (little-endian) has another length than `dims` says; the weights grow beyond the source's size.
+    pub fn constant(&mut self, element: ElementType, dims: &[usize], raw: &[u8]) -> Result<String> {
+        let size = match element {
+            ElementType::F16 => 2,
+            ElementType::F32 => 4,
+            ElementType::I64 => 8,
+        };
+        let n_bytes = dims.iter().try_fold(size, |product: usize, dim| product.checked_mul(*dim));
+        ensure!(
+            n_bytes == Some(raw.len()),
+            "a weight of shape {dims:?} and {size} bytes a number does not have {} bytes",
+            raw.len()
+        );
+        let key = (element, dims.to_vec(), raw.to_vec());
+        if let Some(name) = self.constants.get(&key) {
+            return Ok(name.clone());
+        }
+        ensure!(
+            raw.len() <= self.n_weight_bytes_left,
+            "its weights are used over and over, in one shape after the other"
+        );
+        self.n_weight_bytes_left -= raw.len();
+        let mut name = format!("w{}", self.constants.len());
+        let mut tensor = Vec::with_capacity(raw.len() + 64);
+        dims.iter().for_each(|dim| number(&mut tensor, 1, *dim as i64));
+        number(&mut tensor, 2, element as i64);
+        bytes(&mut tensor, 8, name.as_bytes());
+        bytes(&mut tensor, 9, raw);
+        bytes(&mut self.weights, 5, &tensor);
+        if element == ElementType::F16 {
+            name = self.op("Cast", &[&name], &[("to", AttributeValue::Int(ElementType::F32 as i64))]);
+        }
+        self.constants.insert(key, name.clone());
+        Ok(name)
+    }
+
+    /// A constant of floats.
+    pub fn floats(&mut self, dims: &[usize], values: &[f32]) -> Result<String> {
+        self.constant(ElementType::F32, dims, &values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<_>>())
+    }
+
+    /// A constant row of integers.
+    pub fn ints(&mut self, values: &[i64]) -> Result<String> {
+        let raw: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+        self.constant(ElementType::I64, &[values.len()], &raw)
+    }
+
+    /// The bytes of the model file with these inputs and outputs (name and sizes), all float32.
+    pub fn model(self, inputs: &[(&str, &[usize])], outputs: &[(&str, &[usize])]) -> Vec<u8> {
+        let mut graph = self.nodes;
+        bytes(&mut graph, 2, b"pose");
+        graph.extend_from_slice(&self.weights);
+        inputs.iter().for_each(|(name, dims)| bytes(&mut graph, 11, &port(name, dims)));
+        outputs.iter().for_each(|(name, dims)| bytes(&mut graph, 12, &port(name, dims)));
+        let (mut opset, mut model) = (Vec::new(), Vec::with_capacity(graph.len() + 64));
+        bytes(&mut opset, 1, b"");
+        number(&mut opset, 2, 13);
+        number(&mut model, 1, 8);
+        bytes(&mut model, 2, b"orator");
+        bytes(&mut model, 7, &graph);
+        bytes(&mut model, 8, &opset);
+        model
+    }
+}
+
+fn attribute(name: &str, value: AttributeValue) -> Vec<u8> {
+    let mut out = Vec::new();
+    bytes(&mut out, 1, name.as_bytes());
+    let kind = match value {
+        AttributeValue::Float(value) => {
+            float(&mut out, 2, value);
+            1
+        }
+        AttributeValue::Int(value) => {
+            number(&mut out, 3, value);
+            2
+        }
+        AttributeValue::Text(value) => {
+            bytes(&mut out, 4, value.as_bytes());
+            3
+        }
+        AttributeValue::Ints(values) => {
+            values.iter().for_each(|value| number(&mut out, 8, *value));
+            7
+        }
+    };
+    number(&mut out, 20, kind);
+    out
+}
+
+/// A float32 tensor by name and sizes, as inputs and outputs are declared.
+fn port(name: &str, dims: &[usize]) -> Vec<u8> {
+    let (mut shape, mut tensor, mut kind, mut port) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for dim in dims {
+        let mut size = Vec::new();
+        number(&mut size, 1, *dim as i64);
+        bytes(&mut shape, 1, &size);
+    }
+    number(&mut tensor, 1, ElementType::F32 as i64);
+    bytes(&mut tensor, 2, &shape);
+    bytes(&mut kind, 1, &tensor);
+    bytes(&mut port, 1, name.as_bytes());
+    bytes(&mut port, 2, &kind);
+    port
+}

@@ -1,0 +1,107 @@
+//! Sizes of windows, and the order of a tensor's axes: pictures are channels first (NCHW) in ONNX, channels last (NHWC) in
+//! TensorFlow.
+
+use anyhow::{Context, Result, ensure};
+
+/// The largest size of one axis; products of two stay far below an overflow.
+pub const MAX_SIZE: usize = 1 << 24;
+
+/// Where each axis of NCHW stands in NHWC.
+pub const CHANNELS_FIRST: [usize; 4] = [0, 3, 1, 2];
+
+/// A size read from a file.
+///
+/// # Errors
+/// The number is not in 1..=`MAX_SIZE`.
+pub fn size(number: i64) -> Result<usize> {
+    let size = usize::try_from(number).ok().filter(|size| (1..=MAX_SIZE).contains(size));
+    size.with_context(|| format!("a size is 1 to {MAX_SIZE}, not {number}"))
+}
+
+/// The four sizes of a 4-D tensor.
+///
+/// # Errors
+/// Another number of axes; the message names `what`.
+pub fn four(what: &str, dims: &[usize]) -> Result<[usize; 4]> {
+    dims.try_into().ok().with_context(|| format!("{what} has 4 axes, not the sizes {dims:?}"))
+}
+
+/// The bytes of a tensor with `dims` whose axis `k` comes from axis `order[k]`.
+///
+/// # Errors
+/// `raw` has another length than `dims` and `n_bytes` a number say.
+pub fn transposed(raw: &[u8], n_bytes: usize, dims: [usize; 4], order: [usize; 4]) -> Result<Vec<u8>> {
+    let expected = dims.iter().try_fold(n_bytes, |product: usize, dim| product.checked_mul(*dim));
+    ensure!(
+        expected == Some(raw.len()) && !raw.is_empty(),
+        "a weight of shape {dims:?} and {n_bytes} bytes a number does not have {} bytes",
+        raw.len()
+    );
+    let steps = [dims[1] * dims[2] * dims[3], dims[2] * dims[3], dims[3], 1];
+    let (sizes, steps) = (order.map(|axis| dims[axis]), order.map(|axis| steps[axis] * n_bytes));
+    let mut out = Vec::with_capacity(raw.len());
+    for i in 0..sizes[0] {
+        for j in 0..sizes[1] {
+            for k in 0..sizes[2] {
+                let row = i * steps[0] + j * steps[1] + k * steps[2];
+                for l in 0..sizes[3] {
+                    let start = row + l * steps[3];
+                    out.extend_from_slice(&raw[start..start + n_bytes]);
+                }
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// A window that slides over one axis.
+#[derive(Clone, Copy, Debug)]
+pub struct SlidingWindow {
+    pub kernel: usize,
+    pub stride: usize,
+    pub dilation: usize,
+}
+
+impl SlidingWindow {
+    /// The numbers of zeros before and after an axis of `size`, so that the result has `size / stride` steps, rounded up.
+    pub fn same_padding(self, size: usize) -> (usize, usize) {
+        let reach = (size.div_ceil(self.stride) - 1) * self.stride + (self.kernel - 1) * self.dilation + 1;
+        let total = reach.saturating_sub(size);
+        (total / 2, total - total / 2)
+    }
+
+    /// The number of steps over an axis of `size`, padding included.
+    ///
+    /// # Errors
+    /// The window does not fit in once.
+    pub fn n_steps(self, size: usize) -> Result<usize> {
+        let reach = (self.kernel - 1) * self.dilation + 1;
+        ensure!(reach <= size, "a window of {reach} cells does not fit into {size}");
+        Ok((size - reach) / self.stride + 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_change_places() {
+        let raw: Vec<u8> = (0..12).collect();
+        // [1, 2, 3, 2] channels last to [1, 2, 2, 3]
+        let out = transposed(&raw, 1, [1, 2, 3, 2], CHANNELS_FIRST).unwrap();
+        assert_eq!(out, [0, 2, 4, 6, 8, 10, 1, 3, 5, 7, 9, 11]);
+        assert_eq!(transposed(&raw, 2, [1, 1, 3, 2], [0, 1, 3, 2]).unwrap()[..6], [0, 1, 4, 5, 8, 9]);
+        assert!(transposed(&raw, 2, [1, 2, 3, 2], CHANNELS_FIRST).is_err());
+        assert!(transposed(&raw, 2, [usize::MAX, 2, 3, 2], CHANNELS_FIRST).is_err());
+    }
+
+    #[test]
+    fn a_window_is_padded_to_the_size_it_should_give() {
+        let window = SlidingWindow { kernel: 3, stride: 2, dilation: 1 };
+        assert_eq!((window.same_padding(8), window.same_padding(7)), ((0, 1), (1, 1)));
+        assert_eq!(window.n_steps(9).unwrap(), 4);
+        assert!(window.n_steps(2).is_err());
+        assert_eq!(SlidingWindow { dilation: 4, stride: 1, ..window }.same_padding(5), (4, 4));
+    }
+}

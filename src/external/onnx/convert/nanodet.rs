@@ -1,0 +1,82 @@
+//! NanoDet to boxes of people. Each cell of three grids foretells four distances to the sides of a box, each as a
+//! distribution over whole multiples of the grid's stride, whose mean counts (Li et al. 2020, section 3.2).
+
+use super::graph::AttributeValue::{Int, Ints};
+use super::graph::OnnxGraph;
+use super::options::ConversionOptions;
+use super::tfjs::{TfConverter, TfValue};
+use super::tfjs_file::TfGraph;
+use anyhow::{Result, bail, ensure};
+
+/// The ends of the heads with the pixels of a cell's side: classes, then distributions.
+const HEADS: [(&str, usize); 3] =
+    [("PartitionedCall/Add_29", 8), ("PartitionedCall/Add_33", 16), ("PartitionedCall/Add_37", 32)];
+/// Classes of COCO; the first one is a person.
+const N_CLASSES: usize = 80;
+
+/// Whether the graph has the nodes of a NanoDet.
+pub fn is_nanodet(source: &TfGraph) -> bool {
+    HEADS.iter().all(|(node, _)| source.nodes.contains_key(*node))
+}
+
+/// The model as ONNX: image [1, 3, S, S] to rows [1, cells, 5] of x0, y0, x1, y1 in pixels of the input and the score of
+/// a person, 0..1.
+pub fn convert(source: &TfGraph, graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
+    let (shape, output) = (options.shape()?, options.only_output()?);
+    let [1, 3, side, width] = shape[..] else { bail!("the input has the sizes 1, 3, S, S, not {shape:?}") };
+    ensure!(side == width && source.input_shape()? == shape, "the input has the sizes {:?}", source.input_shape()?);
+    let image = TfValue { name: options.input.name.clone(), shape: shape.clone(), channels_first: false };
+    let mut source = TfConverter::new(source, graph, source.input()?.0, image);
+
+    let (mut scores, mut distances, mut columns, mut rows) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for (node, stride) in HEADS {
+        let head = source.value(node)?;
+        let [_, _, _, channels] = head.shape[..] else { bail!("{node:?} gives a picture, not {:?}", head.shape) };
+        let n_side = side / stride;
+        let n_bins = channels.saturating_sub(N_CLASSES) / 4;
+        ensure!(
+            head.channels_first && n_bins >= 2 && head.shape == [1, n_side, n_side, N_CLASSES + 4 * n_bins],
+            "{node:?} has the sizes {:?}, expected 1, {n_side}, {n_side}, {N_CLASSES} + 4 bins",
+            head.shape
+        );
+        let n_cells = n_side * n_side;
+        let graph = &mut source.graph;
+        let person = slice(graph, &head.name, 1, [0, 1])?;
+        let flat = graph.ints(&[1, 1, n_cells as i64])?;
+        scores.push(graph.op("Reshape", &[&person, &flat], &[]));
+
+        let bins = slice(graph, &head.name, 1, [N_CLASSES, channels])?;
+        let by_side = graph.ints(&[1, 4, n_bins as i64, n_cells as i64])?;
+        let bins = graph.op("Reshape", &[&bins, &by_side], &[]);
+        let likely = graph.op("Softmax", &[&bins], &[("axis", Int(2))]);
+        let lengths: Vec<f32> = (0..n_bins).map(|bin| (bin * stride) as f32).collect();
+        let lengths = graph.floats(&[1, 1, n_bins, 1], &lengths)?;
+        let likely = graph.op("Mul", &[&likely, &lengths], &[]);
+        let axis = graph.ints(&[2])?;
+        distances.push(graph.op("ReduceSum", &[&likely, &axis], &[("keepdims", Int(0))]));
+        let centre = |cell: usize| (cell as f32 + 0.5) * stride as f32;
+        columns.extend((0..n_cells).map(|cell| centre(cell % n_side)));
+        rows.extend((0..n_cells).map(|cell| centre(cell / n_side)));
+    }
+    let n_cells = columns.len();
+    let graph = &mut source.graph;
+    let join = |graph: &mut OnnxGraph, parts: &[String], axis: i64| {
+        graph.op("Concat", &parts.iter().map(String::as_str).collect::<Vec<_>>(), &[("axis", Int(axis))])
+    };
+    let scores = join(graph, &scores, 2);
+    let scores = graph.op("Sigmoid", &[&scores], &[]);
+    let distances = join(graph, &distances, 2);
+    let centres = graph.floats(&[1, 2, n_cells], &[columns, rows].concat())?;
+    let (before, after) = (slice(graph, &distances, 1, [0, 2])?, slice(graph, &distances, 1, [2, 4])?);
+    let low = graph.op("Sub", &[&centres, &before], &[]);
+    let high = graph.op("Add", &[&centres, &after], &[]);
+    let boxes = join(graph, &[low, high, scores], 1);
+    graph.output(output, "Transpose", &[&boxes], &[("perm", Ints(&[0, 2, 1]))]);
+    Ok(source.graph.model(&[(&options.input.name, &shape)], &[(output, &[1, n_cells, 5])]))
+}
+
+/// Part of an axis.
+fn slice(graph: &mut OnnxGraph, value: &str, axis: i64, [start, end]: [usize; 2]) -> Result<String> {
+    let (start, end, axis) = (graph.ints(&[start as i64])?, graph.ints(&[end as i64])?, graph.ints(&[axis])?);
+    Ok(graph.op("Slice", &[value, &start, &end, &axis], &[]))
+}

@@ -1,0 +1,248 @@
+//! ncnn: layers over blobs of channels, rows and columns, without a batch.
+
+use super::graph::AttributeValue::{Int, Ints, Text};
+use super::graph::{ElementType, OnnxGraph};
+use super::layout::{SlidingWindow, size};
+use super::ncnn_file::{NcnnLayer, NcnnWeight, NcnnWeights, layers};
+use super::options::ConversionOptions;
+use anyhow::{Context, Result, bail, ensure};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Stands for "the rest" in the sizes of a slice.
+const REST: f64 = -233.0;
+
+/// A blob: its name in the result; channels, rows, columns.
+#[derive(Clone, Debug)]
+struct NcnnBlob {
+    name: String,
+    shape: [usize; 3],
+}
+
+/// A conversion under way.
+struct NcnnConverter<'a> {
+    blobs: BTreeMap<&'a str, NcnnBlob>,
+    weights: NcnnWeights<'a>,
+    graph: OnnxGraph,
+    input: NcnnBlob,
+}
+
+/// The model as ONNX; its outputs are the blobs that no layer reads.
+pub fn convert(parameters: &[u8], weights: &[u8], graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
+    let sizes = options.shape()?;
+    let [1, channels, height, width] = sizes[..] else { bail!("the input has 1 picture, not the sizes {sizes:?}") };
+    let layers = layers(parameters)?;
+    ensure!(layers.iter().filter(|layer| layer.kind == "Input").count() == 1, "there is one layer of the kind Input");
+    let input = NcnnBlob { name: options.input.name.clone(), shape: [channels, height, width] };
+    let weights = NcnnWeights::new(weights);
+    let mut converter = NcnnConverter { blobs: BTreeMap::new(), weights, graph, input };
+    for layer in &layers {
+        let place = || format!("the layer {:?} ({})", layer.name, layer.kind);
+        let outputs = converter.layer(layer).with_context(place)?;
+        ensure!(outputs.len() == layer.outputs.len(), "{} has {} outputs", place(), outputs.len());
+        converter.blobs.extend(layer.outputs.iter().copied().zip(outputs));
+    }
+    converter.weights.end()?;
+    let read: BTreeSet<&str> = layers.iter().flat_map(|layer| layer.inputs.iter().copied()).collect();
+    let unread: Vec<&str> =
+        layers.iter().flat_map(|layer| &layer.outputs).copied().filter(|blob| !read.contains(blob)).collect();
+    ensure!(
+        unread.len() == options.outputs.len(),
+        "the model gives {unread:?}, the description names {:?}",
+        options.outputs
+    );
+    let mut ports = Vec::new();
+    for (blob, name) in unread.into_iter().zip(&options.outputs).filter(|(_, name)| !name.is_empty()) {
+        let NcnnBlob { name: value, shape: [channels, height, width] } = converter.blob(blob)?;
+        converter.graph.output(name, "Identity", &[&value], &[]);
+        ports.push((name.as_str(), [1, channels, height, width]));
+    }
+    let ports: Vec<(&str, &[usize])> = ports.iter().map(|(name, shape)| (*name, shape.as_slice())).collect();
+    Ok(converter.graph.model(&[(&options.input.name, &sizes)], &ports))
+}
+
+impl<'a> NcnnConverter<'a> {
+    fn blob(&self, name: &str) -> Result<NcnnBlob> {
+        self.blobs.get(name).cloned().with_context(|| format!("no layer before gives {name:?}"))
+    }
+
+    /// What a layer gives, one blob an output.
+    fn layer(&mut self, layer: &NcnnLayer<'a>) -> Result<Vec<NcnnBlob>> {
+        let inputs = layer.inputs.iter().map(|name| self.blob(name)).collect::<Result<Vec<_>>>()?;
+        let first = || inputs.first().cloned().context("it has no input");
+        let result = match layer.kind {
+            "Input" => {
+                layer.knows(&[0, 1, 2])?;
+                let said = [layer.int(2, 0)?, layer.int(1, 0)?, layer.int(0, 0)?];
+                let described = self.input.shape;
+                let agrees = said.iter().zip(described).all(|(said, size)| *said == 0 || *said == size as i64);
+                ensure!(agrees, "the input has the sizes {said:?}, the description says {described:?}");
+                self.input.clone()
+            }
+            "Split" => {
+                layer.knows(&[])?;
+                return Ok(vec![first()?; layer.outputs.len()]);
+            }
+            "Slice" => return self.slice(layer, first()?),
+            "Convolution" | "ConvolutionDepthWise" => self.convolution(layer, first()?)?,
+            "ReLU" => {
+                layer.knows(&[])?;
+                let NcnnBlob { name, shape } = first()?;
+                NcnnBlob { name: self.graph.op("Relu", &[&name], &[]), shape }
+            }
+            "BinaryOp" => {
+                layer.knows(&[0])?;
+                let [a, b] = inputs.as_slice() else { bail!("it has 2 inputs, not {}", inputs.len()) };
+                ensure!(layer.int(0, 0)? == 0, "the operation is an addition (0), not {}", layer.int(0, 0)?);
+                ensure!(a.shape == b.shape, "the sizes of its inputs differ: {:?} and {:?}", a.shape, b.shape);
+                NcnnBlob { name: self.graph.op("Add", &[&a.name, &b.name], &[]), shape: a.shape }
+            }
+            "Concat" => self.concatenation(layer, &inputs)?,
+            "Reshape" => {
+                layer.knows(&[0, 1, 2])?;
+                let NcnnBlob { name, shape } = first()?;
+                let new = [size(layer.int(2, 0)?)?, size(layer.int(1, 0)?)?, size(layer.int(0, 0)?)?];
+                ensure!(count(new) == count(shape), "the sizes {shape:?} cannot become {new:?}");
+                let sizes = self.graph.ints(&[1, new[0] as i64, new[1] as i64, new[2] as i64])?;
+                NcnnBlob { name: self.graph.op("Reshape", &[&name, &sizes], &[]), shape: new }
+            }
+            "Permute" => {
+                layer.knows(&[0])?;
+                let NcnnBlob { name, shape: [channels, height, width] } = first()?;
+                ensure!(layer.int(0, 0)? == 2, "rows and channels change places (2), not {}", layer.int(0, 0)?);
+                let name = self.graph.op("Transpose", &[&name], &[("perm", Ints(&[0, 2, 1, 3]))]);
+                NcnnBlob { name, shape: [height, channels, width] }
+            }
+            "Interp" => self.resize(layer, first()?)?,
+            _ => bail!("no layer of this kind is known"),
+        };
+        Ok(vec![result])
+    }
+
+    fn slice(&mut self, layer: &NcnnLayer, NcnnBlob { name, shape }: NcnnBlob) -> Result<Vec<NcnnBlob>> {
+        layer.knows(&[0, 1])?;
+        let axis = axis(layer.int(1, 0)?)?;
+        let (parts, mut left, mut sizes) = (layer.list(0), shape[axis], Vec::new());
+        for (k, part) in parts.iter().enumerate() {
+            let rest = left / (parts.len() - k);
+            let part = if *part == REST { rest } else { size(*part as i64)? };
+            ensure!(part >= 1 && part <= left, "the parts {parts:?} do not fit into {}", shape[axis]);
+            left -= part;
+            sizes.push(part);
+        }
+        ensure!(left == 0 && !sizes.is_empty(), "the parts {parts:?} leave {left} of {} over", shape[axis]);
+        let lengths = self.graph.ints(&sizes.iter().map(|size| *size as i64).collect::<Vec<_>>())?;
+        let names = self.graph.ops(sizes.len(), "Split", &[&name, &lengths], &[("axis", Int(1 + axis as i64))]);
+        let part = |(name, size): (String, usize)| {
+            let mut shape = shape;
+            shape[axis] = size;
+            NcnnBlob { name, shape }
+        };
+        Ok(names.into_iter().zip(sizes).map(part).collect())
+    }
+
+    fn concatenation(&mut self, layer: &NcnnLayer, parts: &[NcnnBlob]) -> Result<NcnnBlob> {
+        layer.knows(&[0])?;
+        let axis = axis(layer.int(0, 0)?)?;
+        let mut shape = parts.first().context("it has no inputs")?.shape;
+        shape[axis] = 0;
+        for part in parts {
+            let mut others = part.shape;
+            others[axis] = shape[axis];
+            ensure!(others == shape, "the sizes of its inputs differ: {:?} and {:?}", parts[0].shape, part.shape);
+            shape[axis] = size((shape[axis] + part.shape[axis]) as i64)?;
+        }
+        let names: Vec<&str> = parts.iter().map(|part| part.name.as_str()).collect();
+        Ok(NcnnBlob { name: self.graph.op("Concat", &names, &[("axis", Int(1 + axis as i64))]), shape })
+    }
+
+    fn weight(&mut self, dims: &[usize], weight: NcnnWeight) -> Result<String> {
+        self.graph.constant(if weight.half { ElementType::F16 } else { ElementType::F32 }, dims, weight.raw)
+    }
+
+    fn convolution(&mut self, layer: &NcnnLayer, NcnnBlob { name, shape }: NcnnBlob) -> Result<NcnnBlob> {
+        layer.knows(&[0, 1, 2, 3, 4, 5, 6, 7, 9, 11, 12, 13, 14, 15, 16])?;
+        let of = |key: i32, absent: usize| size(layer.int(key, absent as i64)?);
+        let channels = of(0, 0)?;
+        let group = if layer.kind == "Convolution" { 1 } else { of(7, 1)? };
+        ensure!(
+            shape[0] % group == 0 && channels % group == 0,
+            "{} to {channels} channels cannot be in {group} groups",
+            shape[0]
+        );
+        let along = SlidingWindow { kernel: of(1, 0)?, stride: of(3, 1)?, dilation: of(2, 1)? };
+        let down = SlidingWindow {
+            kernel: of(11, along.kernel)?,
+            stride: of(13, along.stride)?,
+            dilation: of(12, along.dilation)?,
+        };
+        let left = layer.int(4, 0)?;
+        let top = layer.int(14, left)?;
+        let pads = [top, left, layer.int(16, top)?, layer.int(15, left)?];
+        ensure!(pads.iter().all(|n_zeros| (0..4096).contains(n_zeros)), "the zeros at the sides are {pads:?}");
+        let padded = |size: usize, before: i64, after: i64| size + (before + after) as usize;
+        let height = down.n_steps(padded(shape[1], pads[0], pads[2]))?;
+        let width = along.n_steps(padded(shape[2], pads[1], pads[3]))?;
+
+        let dims = [channels, shape[0] / group, down.kernel, along.kernel];
+        let n_weights = dims.iter().try_fold(1, |product: usize, dim| product.checked_mul(*dim));
+        ensure!(
+            n_weights.is_some_and(|n| layer.int(6, 0).is_ok_and(|said| said == n as i64)),
+            "a weight of the sizes {dims:?} does not have {} numbers",
+            layer.int(6, 0)?
+        );
+        let weight = self.weights.tagged(n_weights.unwrap_or_default())?;
+        let mut inputs = vec![name, self.weight(&dims, weight)?];
+        if layer.int(5, 0)? != 0 {
+            let bias = self.weights.plain(channels)?;
+            inputs.push(self.weight(&[channels], bias)?);
+        }
+        let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
+        let mut name = self.graph.op(
+            "Conv",
+            &inputs,
+            &[
+                ("kernel_shape", Ints(&[down.kernel, along.kernel].map(|size| size as i64))),
+                ("strides", Ints(&[down.stride, along.stride].map(|size| size as i64))),
+                ("dilations", Ints(&[down.dilation, along.dilation].map(|size| size as i64))),
+                ("pads", Ints(&pads)),
+                ("group", Int(group as i64)),
+            ],
+        );
+        match layer.int(9, 0)? {
+            0 => {}
+            1 => name = self.graph.op("Relu", &[&name], &[]),
+            other => bail!("the activations known are none (0) and ReLU (1), not {other}"),
+        }
+        Ok(NcnnBlob { name, shape: [channels, height, width] })
+    }
+
+    /// Nearest cell by a whole factor, or bilinear with the corners on each other.
+    fn resize(&mut self, layer: &NcnnLayer, NcnnBlob { name, shape }: NcnnBlob) -> Result<NcnnBlob> {
+        layer.knows(&[0, 1, 2, 3, 4, 6])?;
+        let said = [size(layer.int(3, 0)?.max(1))?, size(layer.int(4, 0)?.max(1))?];
+        let factor = [size(layer.int(1, 1)?)?, size(layer.int(2, 1)?)?];
+        let (sides, mode) = match (layer.int(0, 0)?, layer.int(3, 0)?, layer.int(6, 0)?) {
+            (1, 0, 0) => ([shape[1] * factor[0], shape[2] * factor[1]], ["nearest", "asymmetric"]),
+            (2, 1.., 1) => (said, ["linear", "align_corners"]),
+            (kind, _, _) => bail!("nearest (1) by a factor, bilinear (2) to a size with the corners kept, not {kind}"),
+        };
+        let [height, width] = [size(sides[0] as i64)?, size(sides[1] as i64)?];
+        let sizes = self.graph.ints(&[1, shape[0] as i64, height as i64, width as i64])?;
+        let [mode, corners] = mode;
+        let mut attributes = vec![("mode", Text(mode)), ("coordinate_transformation_mode", Text(corners))];
+        if mode == "nearest" {
+            attributes.push(("nearest_mode", Text("floor")));
+        }
+        let name = self.graph.op("Resize", &[&name, "", "", &sizes], &attributes);
+        Ok(NcnnBlob { name, shape: [shape[0], height, width] })
+    }
+}
+
+/// Channels, rows or columns.
+fn axis(number: i64) -> Result<usize> {
+    usize::try_from(number).ok().filter(|axis| *axis < 3).with_context(|| format!("there is no axis {number} among 3"))
+}
+
+fn count(shape: [usize; 3]) -> Option<usize> {
+    shape[0].checked_mul(shape[1])?.checked_mul(shape[2])
+}

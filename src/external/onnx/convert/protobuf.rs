@@ -1,0 +1,46 @@
+//! Fields of protobuf messages, written.
+
+/// Appends an unsigned number, seven bits a byte, the lowest first.
+pub fn varint(out: &mut Vec<u8>, mut number: u64) {
+    while number > 127 {
+        out.push(number as u8 & 127 | 128);
+        number >>= 7;
+    }
+    out.push(number as u8);
+}
+
+/// Appends a field with a number.
+pub fn number(out: &mut Vec<u8>, field: u64, number: i64) {
+    varint(out, field << 3);
+    varint(out, number as u64);
+}
+
+/// Appends a field with a text or a message.
+pub fn bytes(out: &mut Vec<u8>, field: u64, bytes: &[u8]) {
+    varint(out, field << 3 | 2);
+    varint(out, bytes.len() as u64);
+    out.extend_from_slice(bytes);
+}
+
+/// Appends a field with a 32-bit float.
+pub fn float(out: &mut Vec<u8>, field: u64, number: f32) {
+    varint(out, field << 3 | 5);
+    out.extend_from_slice(&number.to_le_bytes());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_have_the_bytes_of_the_format() {
+        let mut out = Vec::new();
+        number(&mut out, 1, 150);
+        bytes(&mut out, 2, b"ab");
+        float(&mut out, 3, 1.0);
+        assert_eq!(out, [8, 150, 1, 18, 2, b'a', b'b', 29, 0, 0, 128, 63]);
+        let mut negative = Vec::new();
+        number(&mut negative, 1, -1);
+        assert_eq!(negative, [8, 255, 255, 255, 255, 255, 255, 255, 255, 255, 1]);
+    }
+}

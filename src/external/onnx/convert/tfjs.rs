@@ -1,0 +1,314 @@
+//! Nodes of a TensorFlow.js graph to ONNX operators: those that a wanted node needs, each once. A picture that is channels
+//! last in TensorFlow is channels first in the result; transpositions between the two cost nothing.
+
+use super::graph::AttributeValue::{Float, Int, Ints, Text};
+use super::graph::{ElementType, OnnxGraph};
+use super::layout::{CHANNELS_FIRST, SlidingWindow, four, size, transposed};
+use super::tfjs_file::{TfElement, TfGraph, TfNode, TfTensor};
+use anyhow::{Context, Result, bail, ensure};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What a node gives: its name in the result, its sizes in TensorFlow.
+#[derive(Clone, Debug)]
+pub struct TfValue {
+    pub name: String,
+    pub shape: Vec<usize>,
+    /// NHWC in TensorFlow, NCHW in the result.
+    pub channels_first: bool,
+}
+
+/// A conversion under way.
+pub struct TfConverter<'a> {
+    pub source: &'a TfGraph<'a>,
+    pub graph: OnnxGraph,
+    values: BTreeMap<String, TfValue>,
+}
+
+impl<'a> TfConverter<'a> {
+    /// A conversion in which the node `name` is done already.
+    pub fn new(source: &'a TfGraph<'a>, graph: OnnxGraph, name: &str, value: TfValue) -> Self {
+        Self { source, graph, values: BTreeMap::from([(name.to_owned(), value)]) }
+    }
+
+    /// A weight, its axes reordered, or with the sizes `dims` instead of its own.
+    pub fn weight(&mut self, tensor: &TfTensor, order: Option<[usize; 4]>, dims: Option<&[usize]>) -> Result<String> {
+        let (element, n_bytes) = match tensor.element {
+            TfElement::F16 => (ElementType::F16, 2),
+            TfElement::F32 => (ElementType::F32, 4),
+            TfElement::I32 => bail!("a weight is float16 or float32, not int32"),
+        };
+        let Some(order) = order else {
+            return self.graph.constant(element, dims.unwrap_or(&tensor.shape), tensor.raw);
+        };
+        let shape = four("the weight", &tensor.shape)?;
+        let raw = transposed(tensor.raw, n_bytes, shape, order)?;
+        self.graph.constant(element, &order.map(|axis| shape[axis]), &raw)
+    }
+
+    /// What the node `wanted` gives, after all that it needs.
+    ///
+    /// # Errors
+    /// A node that is missing, needs itself, or is of an unknown kind.
+    pub fn value(&mut self, wanted: &str) -> Result<TfValue> {
+        let source = self.source;
+        let (mut waiting, mut begun) = (vec![wanted], BTreeSet::new());
+        while let Some(name) = waiting.last().copied() {
+            if self.values.contains_key(name) {
+                waiting.pop();
+                continue;
+            }
+            let node = source.nodes.get(name).with_context(|| format!("there is no node {name:?}"))?;
+            let missing = |input: &&str| !source.tensors.contains_key(*input) && !self.values.contains_key(*input);
+            let missing: Vec<&str> = node.inputs.iter().map(String::as_str).filter(missing).collect();
+            if missing.is_empty() {
+                let value = self.node(node).with_context(|| format!("the node {name:?} ({})", node.op))?;
+                self.values.insert(name.to_owned(), value);
+                waiting.pop();
+            } else {
+                ensure!(begun.insert(name), "the node {name:?} needs its own result");
+                waiting.extend(missing);
+            }
+        }
+        self.values.get(wanted).cloned().context("a node without a result")
+    }
+
+    fn input(&self, node: &TfNode, k: usize) -> Result<TfValue> {
+        let name = node.inputs.get(k).with_context(|| format!("input {k} is missing"))?;
+        self.values.get(name).cloned().with_context(|| format!("input {k} ({name:?}) is the result of a node"))
+    }
+
+    /// A picture among the inputs, with its height, width and channels.
+    fn picture(&self, node: &TfNode) -> Result<(TfValue, [usize; 3])> {
+        let value = self.input(node, 0)?;
+        let [_, height, width, channels] = four("the input", &value.shape)?;
+        ensure!(value.channels_first, "the input is a picture with the channels last");
+        Ok((value, [height, width, channels]))
+    }
+
+    fn constant(&self, node: &TfNode, k: usize) -> Result<&'a TfTensor<'a>> {
+        let name = node.inputs.get(k).with_context(|| format!("input {k} is missing"))?;
+        self.source.tensor(name).with_context(|| format!("input {k}"))
+    }
+
+    fn node(&mut self, node: &TfNode) -> Result<TfValue> {
+        match node.op.as_str() {
+            "Conv2D" | "_FusedConv2D" => self.convolution(node, false),
+            "DepthwiseConv2dNative" | "FusedDepthwiseConv2dNative" => self.convolution(node, true),
+            "Add" | "AddV2" => self.elementwise(node, "Add"),
+            "Sub" => self.elementwise(node, "Sub"),
+            "Mul" => self.elementwise(node, "Mul"),
+            "LeakyRelu" => {
+                let (value, alpha) = (self.input(node, 0)?, node.number("alpha")?);
+                let name = self.graph.op("LeakyRelu", &[&value.name], &[("alpha", Float(alpha))]);
+                Ok(TfValue { name, ..value })
+            }
+            "MaxPool" => {
+                let (value, [height, width, channels]) = self.picture(node)?;
+                let windows = windows(node, along_picture(&node.integers("ksize")?)?)?;
+                let (pads, height, width) = padding(node, windows, [height, width])?;
+                let kernel = windows.map(|window| window.kernel as i64);
+                let strides = windows.map(|window| window.stride as i64);
+                let attributes = [("kernel_shape", Ints(&kernel)), ("strides", Ints(&strides)), ("pads", Ints(&pads))];
+                let name = self.graph.op("MaxPool", &[&value.name], &attributes);
+                Ok(TfValue { name, shape: vec![value.shape[0], height, width, channels], ..value })
+            }
+            "Pad" | "PadV2" => self.pad(node),
+            "Transpose" => self.transpose(node),
+            "ConcatV2" => self.concatenation(node),
+            "ResizeBilinear" => {
+                let (value, [height, width, channels]) = self.picture(node)?;
+                ensure!(
+                    node.is("half_pixel_centers") && !node.is("align_corners"),
+                    "the corners of pixels, not their centres, lie on each other"
+                );
+                let [new_height, new_width] = self.constant(node, 1)?.integers()?[..] else {
+                    bail!("a size is 2 numbers")
+                };
+                let (new_height, new_width) = (size(new_height)?, size(new_width)?);
+                let scales = [1.0, 1.0, new_height as f64 / height as f64, new_width as f64 / width as f64];
+                let scales = self.graph.floats(&[4], &scales.map(|scale| scale as f32))?;
+                let mode = [("mode", Text("linear")), ("coordinate_transformation_mode", Text("half_pixel"))];
+                let name = self.graph.op("Resize", &[&value.name, "", &scales], &mode);
+                Ok(TfValue { name, shape: vec![value.shape[0], new_height, new_width, channels], ..value })
+            }
+            _ => bail!("no node of this kind is known"),
+        }
+    }
+
+    fn convolution(&mut self, node: &TfNode, depthwise: bool) -> Result<TfValue> {
+        let (value, [height, width, channels]) = self.picture(node)?;
+        let weight = self.constant(node, 1)?;
+        let [kernel_height, kernel_width, n_inputs, n_outputs] = four("the weight", &weight.shape)?;
+        let windows = windows(node, [kernel_height, kernel_width])?;
+        ensure!(
+            n_inputs == channels && (!depthwise || n_outputs == 1) && weight.raw.len() > 1,
+            "a weight of the sizes {:?} does not suit {channels} channels",
+            weight.shape
+        );
+        ensure!(node.integers("dilations").unwrap_or_default().iter().all(|step| *step == 1), "there are no dilations");
+        let (pads, height, width) = padding(node, windows, [height, width])?;
+        let order = if depthwise { [2, 3, 0, 1] } else { [3, 2, 0, 1] };
+        let mut inputs = vec![value.name.clone(), self.weight(weight, Some(order), None)?];
+        for k in 2..node.inputs.len() {
+            inputs.push(self.weight(self.constant(node, k)?, None, None)?);
+        }
+        let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
+        let mut name = self.graph.op(
+            "Conv",
+            &inputs,
+            &[
+                ("kernel_shape", Ints(&windows.map(|window| window.kernel as i64))),
+                ("strides", Ints(&windows.map(|window| window.stride as i64))),
+                ("pads", Ints(&pads)),
+                ("group", Int(if depthwise { channels as i64 } else { 1 })),
+            ],
+        );
+        let fused = node.texts("fused_ops")?;
+        let fused: Vec<&str> = fused.iter().map(String::as_str).collect();
+        ensure!(
+            fused.contains(&"BiasAdd") == (inputs.len() == 3) && inputs.len() <= 3,
+            "a fused BiasAdd has one input"
+        );
+        match fused.as_slice() {
+            [] | ["BiasAdd"] => {}
+            ["BiasAdd", "Relu"] => name = self.graph.op("Relu", &[&name], &[]),
+            ["BiasAdd", "Relu6"] => {
+                let (low, high) = (self.graph.floats(&[], &[0.0])?, self.graph.floats(&[], &[6.0])?);
+                name = self.graph.op("Clip", &[&name, &low, &high], &[]);
+            }
+            _ => bail!("the fused operators are not known: {fused:?}"),
+        }
+        let channels = if depthwise { channels } else { n_outputs };
+        Ok(TfValue { name, shape: vec![value.shape[0], height, width, channels], channels_first: true })
+    }
+
+    /// Two results of the same sizes, or one and a constant that is repeated along it.
+    fn elementwise(&mut self, node: &TfNode, kind: &str) -> Result<TfValue> {
+        let [a, b] = node.inputs.as_slice() else { bail!("it has 2 inputs, not {}", node.inputs.len()) };
+        let (mut names, mut result) = (Vec::new(), None::<TfValue>);
+        for input in [a, b] {
+            if let Some(value) = self.values.get(input) {
+                let same = result
+                    .as_ref()
+                    .is_none_or(|other| (&other.shape, other.channels_first) == (&value.shape, value.channels_first));
+                ensure!(same, "the sizes of its inputs differ: {:?} and {:?}", result.map(|r| r.shape), value.shape);
+                result = Some(value.clone());
+            }
+        }
+        let result = result.context("both inputs are constants")?;
+        for input in [a, b] {
+            names.push(match self.source.tensors.get(input) {
+                Some(tensor) => self.repeated(tensor, &result)?,
+                None => self.values.get(input).map(|value| value.name.clone()).unwrap_or_default(),
+            });
+        }
+        let name = self.graph.op(kind, &[&names[0], &names[1]], &[]);
+        Ok(TfValue { name, ..result })
+    }
+
+    /// A constant whose axes, the last ones of `value`, have its sizes or 1.
+    fn repeated(&mut self, tensor: &TfTensor, value: &TfValue) -> Result<String> {
+        let suits = tensor.shape.len() <= value.shape.len()
+            && tensor.shape.iter().rev().zip(value.shape.iter().rev()).all(|(size, whole)| *size == 1 || size == whole);
+        ensure!(suits, "a constant of the sizes {:?} does not suit {:?}", tensor.shape, value.shape);
+        match tensor.shape.as_slice() {
+            [channels] if value.channels_first => self.weight(tensor, None, Some(&[*channels, 1, 1])),
+            [_, _, _, _] if value.channels_first => self.weight(tensor, Some(CHANNELS_FIRST), None),
+            [_, ..] if value.channels_first => bail!("a constant of the sizes {:?} is not known", tensor.shape),
+            _ => self.weight(tensor, None, None),
+        }
+    }
+
+    fn pad(&mut self, node: &TfNode) -> Result<TfValue> {
+        let mut value = self.input(node, 0)?;
+        let pads = self.constant(node, 1)?.integers()?;
+        let n_axes = value.shape.len();
+        ensure!(pads.len() == 2 * n_axes, "{n_axes} axes are padded, before and after, not by {} numbers", pads.len());
+        for (dim, pads) in value.shape.iter_mut().zip(pads.chunks_exact(2)) {
+            ensure!(pads[0] >= 0 && pads[1] >= 0, "padding is not negative");
+            *dim = size(*dim as i64 + pads[0] + pads[1])?;
+        }
+        if pads.iter().all(|n_cells| *n_cells == 0) {
+            return Ok(value);
+        }
+        let order: Vec<usize> = if value.channels_first { CHANNELS_FIRST.to_vec() } else { (0..n_axes).collect() };
+        let (before, after) = (order.iter().map(|axis| pads[2 * axis]), order.iter().map(|axis| pads[2 * axis + 1]));
+        let pads = self.graph.ints(&before.chain(after).collect::<Vec<_>>())?;
+        let mut inputs = vec![value.name.clone(), pads];
+        if node.op == "PadV2" {
+            inputs.push(self.weight(self.constant(node, 2)?, None, Some(&[]))?);
+        }
+        let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
+        value.name = self.graph.op("Pad", &inputs, &[("mode", Text("constant"))]);
+        Ok(value)
+    }
+
+    fn transpose(&mut self, node: &TfNode) -> Result<TfValue> {
+        let value = self.input(node, 0)?;
+        let order = self.constant(node, 1)?.integers()?;
+        let shape = four("the input", &value.shape)?;
+        match (order.as_slice(), value.channels_first) {
+            ([0, 3, 1, 2], true) => {
+                Ok(TfValue { shape: CHANNELS_FIRST.map(|axis| shape[axis]).to_vec(), channels_first: false, ..value })
+            }
+            ([0, 2, 3, 1], false) => {
+                Ok(TfValue { shape: [0, 2, 3, 1].map(|axis| shape[axis]).to_vec(), channels_first: true, ..value })
+            }
+            _ => bail!("only the channels are moved, from last to second or back, not the axes {order:?}"),
+        }
+    }
+
+    fn concatenation(&mut self, node: &TfNode) -> Result<TfValue> {
+        let n_parts = node.inputs.len().saturating_sub(1);
+        let parts = (0..n_parts).map(|k| self.input(node, k)).collect::<Result<Vec<_>>>()?;
+        let [axis] = self.constant(node, n_parts)?.integers()?[..] else { bail!("the axis is one number") };
+        let mut result = parts.first().context("it has no inputs")?.clone();
+        let n_axes = result.shape.len() as i64;
+        ensure!((-n_axes..n_axes).contains(&axis), "there is no axis {axis} among {n_axes}");
+        let axis = axis.rem_euclid(n_axes) as usize;
+        let mut total = 0;
+        for part in &parts {
+            let mut shape = part.shape.clone();
+            total += shape.get(axis).copied().unwrap_or_default();
+            if let Some(dim) = shape.get_mut(axis) {
+                *dim = result.shape[axis];
+            }
+            ensure!(
+                shape == result.shape && part.channels_first == result.channels_first,
+                "the sizes of its inputs differ: {:?} and {:?}",
+                result.shape,
+                part.shape
+            );
+        }
+        result.shape[axis] = size(total as i64)?;
+        let axis = if result.channels_first { [0, 2, 3, 1][axis] } else { axis as i64 };
+        let names: Vec<&str> = parts.iter().map(|part| part.name.as_str()).collect();
+        result.name = self.graph.op("Concat", &names, &[("axis", Int(axis))]);
+        Ok(result)
+    }
+}
+
+/// The two numbers of four that belong to height and width.
+fn along_picture(numbers: &[i64]) -> Result<[usize; 2]> {
+    let [1, down, along, 1] = *numbers else { bail!("1, height, width, 1 are expected, not {numbers:?}") };
+    Ok([size(down)?, size(along)?])
+}
+
+/// The windows over height and width.
+fn windows(node: &TfNode, kernel: [usize; 2]) -> Result<[SlidingWindow; 2]> {
+    let strides = along_picture(&node.integers("strides")?)?;
+    let kernel = [size(kernel[0] as i64)?, size(kernel[1] as i64)?];
+    Ok([0, 1].map(|axis| SlidingWindow { kernel: kernel[axis], stride: strides[axis], dilation: 1 }))
+}
+
+/// Zeros at the top, left, bottom and right, and the height and width of the result.
+fn padding(node: &TfNode, windows: [SlidingWindow; 2], sizes: [usize; 2]) -> Result<([i64; 4], usize, usize)> {
+    let pads = match node.text("padding")?.as_str() {
+        "SAME" => [0, 1].map(|axis| windows[axis].same_padding(sizes[axis])),
+        "VALID" => [(0, 0); 2],
+        other => bail!("padding is SAME or VALID, not {other:?}"),
+    };
+    let n_steps = |axis: usize| windows[axis].n_steps(sizes[axis] + pads[axis].0 + pads[axis].1);
+    let zeros = [pads[0].0, pads[1].0, pads[0].1, pads[1].1].map(|n_zeros| n_zeros as i64);
+    Ok((zeros, n_steps(0)?, n_steps(1)?))
+}

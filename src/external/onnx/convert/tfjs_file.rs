@@ -1,0 +1,176 @@
+//! The two files of a TensorFlow.js graph model: nodes in JSON, and their constants one after the other.
+
+use super::layout::{MAX_SIZE, size};
+use anyhow::{Context, Result, bail, ensure};
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// What the numbers of a constant are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TfElement {
+    F16,
+    F32,
+    I32,
+}
+
+/// A constant: sizes and little-endian numbers.
+#[derive(Clone, Debug)]
+pub struct TfTensor<'a> {
+    pub element: TfElement,
+    pub shape: Vec<usize>,
+    pub raw: &'a [u8],
+}
+
+/// A node that computes something.
+#[derive(Clone, Debug)]
+pub struct TfNode {
+    pub op: String,
+    pub inputs: Vec<String>,
+    attributes: Value,
+}
+
+/// Nodes and constants by name.
+#[derive(Clone, Debug)]
+pub struct TfGraph<'a> {
+    pub nodes: BTreeMap<String, TfNode>,
+    pub tensors: BTreeMap<String, TfTensor<'a>>,
+}
+
+impl<'a> TfGraph<'a> {
+    /// The graph in the JSON `topology`, its constants in `weights`.
+    ///
+    /// # Errors
+    /// No such JSON, or the constants have together another length than `weights`.
+    pub fn read(topology: &[u8], weights: &'a [u8]) -> Result<Self> {
+        let json: Value = serde_json::from_slice(topology).context("its first file is no JSON")?;
+        let (mut tensors, mut rest) = (BTreeMap::new(), weights);
+        for tensor in list(&json, "/weightsManifest")?.iter().map(|group| list(group, "/weights")) {
+            for tensor in tensor? {
+                let name = text(tensor, "/name")?;
+                let (tensor, after) = read_tensor(tensor, rest).with_context(|| format!("the constant {name:?}"))?;
+                tensors.insert(name.to_owned(), tensor);
+                rest = after;
+            }
+        }
+        ensure!(rest.is_empty(), "{} bytes of its second file belong to no constant", rest.len());
+        let mut nodes = BTreeMap::new();
+        for node in list(&json, "/modelTopology/node")? {
+            let inputs = node.get("input").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+            let inputs: Option<Vec<String>> = inputs.iter().map(|input| Some(input.as_str()?.to_owned())).collect();
+            let name = text(node, "/name")?;
+            let inputs = inputs.with_context(|| format!("the node {name:?} has an input without a name"))?;
+            let attributes = node.get("attr").cloned().unwrap_or_default();
+            nodes.insert(name.to_owned(), TfNode { op: text(node, "/op")?.to_owned(), inputs, attributes });
+        }
+        Ok(Self { nodes, tensors })
+    }
+
+    /// A constant.
+    pub fn tensor(&self, name: &str) -> Result<&TfTensor<'a>> {
+        self.tensors.get(name).with_context(|| format!("there is no constant {name:?}"))
+    }
+
+    /// The sizes of the graph's only input.
+    pub fn input_shape(&self) -> Result<Vec<usize>> {
+        let (_, input) = self.input()?;
+        let sizes = list(&input.attributes, "/shape/shape/dim")?;
+        sizes.iter().map(|dim| size(integer(dim.get("size").unwrap_or(dim))?)).collect()
+    }
+
+    /// The node that stands for the graph's only input, with its name.
+    pub fn input(&self) -> Result<(&str, &TfNode)> {
+        let mut inputs = self.nodes.iter().filter(|(_, node)| node.op == "Placeholder");
+        match (inputs.next(), inputs.next()) {
+            (Some((name, node)), None) => Ok((name, node)),
+            _ => bail!("there is one Placeholder, the input"),
+        }
+    }
+}
+
+impl TfTensor<'_> {
+    /// The numbers of a row of 32-bit integers, or of a single one.
+    ///
+    /// # Errors
+    /// Other numbers, or more than 64 of them.
+    pub fn integers(&self) -> Result<Vec<i64>> {
+        ensure!(self.element == TfElement::I32 && self.raw.len() <= 256, "it holds a few 32-bit integers");
+        Ok(self.raw.chunks_exact(4).map(|int| i32::from_le_bytes([int[0], int[1], int[2], int[3]]).into()).collect())
+    }
+}
+
+impl TfNode {
+    /// An attribute that is a list of integers.
+    pub fn integers(&self, name: &str) -> Result<Vec<i64>> {
+        list(&self.attributes, &format!("/{name}/list/i"))?.iter().map(integer).collect()
+    }
+
+    /// An attribute that is a text.
+    pub fn text(&self, name: &str) -> Result<String> {
+        decoded(
+            self.attributes.pointer(&format!("/{name}/s")).with_context(|| format!("it has no attribute {name:?}"))?,
+        )
+    }
+
+    /// An attribute that is a list of texts; absent: none.
+    pub fn texts(&self, name: &str) -> Result<Vec<String>> {
+        let texts = self.attributes.pointer(&format!("/{name}/list/s")).and_then(Value::as_array);
+        texts.map_or(&[][..], Vec::as_slice).iter().map(decoded).collect()
+    }
+
+    /// An attribute that is yes or no; absent: no.
+    pub fn is(&self, name: &str) -> bool {
+        self.attributes.pointer(&format!("/{name}/b")).and_then(Value::as_bool).unwrap_or(false)
+    }
+
+    /// An attribute that is a number.
+    pub fn number(&self, name: &str) -> Result<f32> {
+        let number = self.attributes.pointer(&format!("/{name}/f")).and_then(Value::as_f64);
+        Ok(number.with_context(|| format!("it has no attribute {name:?}"))? as f32)
+    }
+}
+
+/// A constant at the start of `rest`, and what follows.
+fn read_tensor<'a>(described: &Value, rest: &'a [u8]) -> Result<(TfTensor<'a>, &'a [u8])> {
+    let quantized = described.pointer("/quantization/dtype").map(|kind| kind.as_str().unwrap_or("of no name"));
+    let element = match (text(described, "/dtype")?, quantized) {
+        ("float32", Some("float16")) => TfElement::F16,
+        ("float32", None) if described.get("quantization").is_none() => TfElement::F32,
+        ("int32", None) if described.get("quantization").is_none() => TfElement::I32,
+        (kind, quantized) => {
+            bail!("numbers are float16, float32 or int32, not {kind} {}", quantized.unwrap_or_default())
+        }
+    };
+    let shape = list(described, "/shape")?.iter().map(integer).collect::<Result<Vec<_>>>()?;
+    ensure!(shape.len() <= 6 && shape.iter().all(|dim| (0..=MAX_SIZE as i64).contains(dim)), "its sizes are {shape:?}");
+    let shape: Vec<usize> = shape.into_iter().map(|dim| dim as usize).collect();
+    let n_bytes = if element == TfElement::F16 { 2 } else { 4 };
+    let n_bytes = shape.iter().try_fold(n_bytes, |product: usize, dim| product.checked_mul(*dim));
+    let (raw, after) = n_bytes
+        .and_then(|n_bytes| rest.split_at_checked(n_bytes))
+        .with_context(|| format!("the second file ends within it, its sizes are {shape:?}"))?;
+    Ok((TfTensor { element, shape, raw }, after))
+}
+
+fn list<'j>(json: &'j Value, pointer: &str) -> Result<&'j [Value]> {
+    let found = json.pointer(pointer).and_then(Value::as_array);
+    Ok(found.with_context(|| format!("there is no list at {pointer}"))?)
+}
+
+fn text<'j>(json: &'j Value, pointer: &str) -> Result<&'j str> {
+    json.pointer(pointer).and_then(Value::as_str).with_context(|| format!("there is no text at {pointer}"))
+}
+
+/// An integer, which may be written as a text.
+fn integer(json: &Value) -> Result<i64> {
+    let number = json.as_i64().or_else(|| json.as_str()?.parse().ok());
+    number.with_context(|| format!("{json} is no integer"))
+}
+
+/// A text in Base64.
+fn decoded(json: &Value) -> Result<String> {
+    let bytes = json.as_str().and_then(|text| STANDARD.decode(text).ok());
+    let decoded = bytes.and_then(|bytes| String::from_utf8(bytes).ok());
+    decoded.with_context(|| format!("{json} is no text in Base64"))
+}

@@ -1,0 +1,369 @@
+//! TFLite: a flatbuffer of tensors, buffers and operators in the order in which they run. Inside the result, 4-D tensors
+//! are channels first.
+
+use super::flatbuffer::FlatTable;
+use super::graph::AttributeValue::{Int, Ints, Text};
+use super::graph::{ElementType, OnnxGraph};
+use super::layout::{CHANNELS_FIRST, SlidingWindow, four, size, transposed};
+use super::options::ConversionOptions;
+use anyhow::{Context, Result, bail, ensure};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The most axes of a tensor, and the most inputs of an operator.
+const MAX_AXES: usize = 6;
+const MAX_INPUTS: usize = 64;
+
+/// The bytes of a constant and TFLite's number for its elements.
+#[derive(Clone, Copy)]
+struct Constant<'a> {
+    raw: &'a [u8],
+    element: i8,
+}
+
+struct TfliteTensor {
+    shape: Vec<usize>,
+}
+
+struct TfliteOperator<'a> {
+    code: i32,
+    inputs: Vec<i32>,
+    output: usize,
+    options: Option<FlatTable<'a>>,
+}
+
+/// A conversion under way.
+struct TfliteConverter<'a> {
+    tensors: Vec<TfliteTensor>,
+    constants: BTreeMap<usize, Constant<'a>>,
+    /// Names in the graph of what operators gave.
+    values: BTreeMap<usize, String>,
+    graph: OnnxGraph,
+}
+
+/// The model as ONNX.
+pub fn convert(file: &[u8], graph: OnnxGraph, options: &ConversionOptions) -> Result<Vec<u8>> {
+    let model = FlatTable::root(file)?;
+    let code = |code: FlatTable| Ok(code.int(3, 0)?.max(i32::from(code.byte(0)?)));
+    let codes: Vec<i32> = model.tables(1)?.into_iter().map(code).collect::<Result<_>>()?;
+    let network = model.tables(2)?.into_iter().next().context("it holds no graph")?;
+    let buffers = model.tables(4)?;
+    let (mut tensors, mut constants) = (Vec::new(), BTreeMap::new());
+    for (k, tensor) in network.tables(0)?.into_iter().enumerate() {
+        let shape = tensor.ints(0, MAX_AXES)?.into_iter().map(|dim| size(dim.into())).collect::<Result<_>>();
+        tensors.push(TfliteTensor { shape: shape.with_context(|| format!("tensor {k}"))? });
+        let buffer = usize::try_from(tensor.int(2, 0)?).ok().and_then(|buffer| buffers.get(buffer));
+        let raw = buffer.with_context(|| format!("tensor {k} has no buffer among the {}", buffers.len()))?.bytes(0)?;
+        if !raw.is_empty() {
+            constants.insert(k, Constant { raw, element: tensor.byte(1)? });
+        }
+    }
+    let index = |tensor: i32| {
+        let found = usize::try_from(tensor).ok().filter(|tensor| *tensor < tensors.len());
+        found.with_context(|| format!("there is no tensor {tensor} among the {}", tensors.len()))
+    };
+    let outputs = network.ints(2, MAX_INPUTS)?.into_iter().map(index).collect::<Result<Vec<_>>>()?;
+    ensure!(
+        outputs.len() == options.outputs.len(),
+        "the model has {} outputs, the description names {:?}",
+        outputs.len(),
+        options.outputs
+    );
+    let named: Vec<(usize, &str)> = outputs.into_iter().zip(options.outputs.iter().map(String::as_str)).collect();
+    let named: Vec<(usize, &str)> = named.into_iter().filter(|(_, name)| !name.is_empty()).collect();
+    let first = index(network.ints(1, MAX_INPUTS)?.first().copied().context("the model has no input")?)?;
+
+    let mut operators = Vec::new();
+    for (k, operator) in network.tables(3)?.into_iter().enumerate() {
+        let code = usize::try_from(operator.int(0, 0)?).ok().and_then(|code| codes.get(code));
+        let code = *code.with_context(|| format!("operator {k} has no kind among the {}", codes.len()))?;
+        let outputs = operator.ints(2, MAX_INPUTS)?;
+        let [output] = outputs.as_slice() else {
+            bail!("operator {k} ({}) has one output, not {}", kind(code), outputs.len())
+        };
+        let inputs = operator.ints(1, MAX_INPUTS)?;
+        operators.push(TfliteOperator { code, inputs, output: index(*output)?, options: operator.table(4)? });
+    }
+    // Only what the named outputs need.
+    let mut needed: BTreeSet<usize> = named.iter().map(|(tensor, _)| *tensor).collect();
+    let mut used = vec![false; operators.len()];
+    for (used, operator) in used.iter_mut().zip(&operators).rev() {
+        *used = needed.contains(&operator.output);
+        if *used {
+            needed.extend(operator.inputs.iter().filter_map(|input| usize::try_from(*input).ok()));
+        }
+    }
+
+    let shape = tensors[first].shape.clone();
+    ensure!(
+        shape.len() == 4 && shape == options.shape()?,
+        "the input has the sizes {shape:?}, the description says {:?}",
+        options.input.shape
+    );
+    let mut converter = TfliteConverter { tensors, constants, values: BTreeMap::new(), graph };
+    let image = converter.graph.op("Transpose", &[&options.input.name], &[("perm", Ints(&[0, 3, 1, 2]))]);
+    converter.values.insert(first, image);
+    for (k, (operator, _)) in operators.iter().zip(used).enumerate().filter(|(_, (_, used))| *used) {
+        converter.operator(operator).with_context(|| format!("operator {k} ({})", kind(operator.code)))?;
+    }
+    let mut ports = Vec::new();
+    for (tensor, name) in named {
+        let (value, shape) = (converter.value(tensor)?, converter.tensors[tensor].shape.clone());
+        match shape.len() {
+            4 => converter.graph.output(name, "Transpose", &[&value], &[("perm", Ints(&[0, 2, 3, 1]))]),
+            _ => converter.graph.output(name, "Identity", &[&value], &[]),
+        }
+        ports.push((name, shape));
+    }
+    let ports: Vec<(&str, &[usize])> = ports.iter().map(|(name, shape)| (*name, shape.as_slice())).collect();
+    Ok(converter.graph.model(&[(&options.input.name, &shape)], &ports))
+}
+
+/// TFLite's name of an operator.
+fn kind(code: i32) -> String {
+    let known = match code {
+        0 => "ADD",
+        2 => "CONCATENATION",
+        3 => "CONV_2D",
+        4 => "DEPTHWISE_CONV_2D",
+        6 => "DEQUANTIZE",
+        9 => "FULLY_CONNECTED",
+        14 => "LOGISTIC",
+        17 => "MAX_POOL_2D",
+        22 => "RESHAPE",
+        23 => "RESIZE_BILINEAR",
+        34 => "PAD",
+        40 => "MEAN",
+        54 => "PRELU",
+        _ => return format!("builtin operator {code}"),
+    };
+    known.to_owned()
+}
+
+impl<'a> TfliteConverter<'a> {
+    fn value(&self, tensor: usize) -> Result<String> {
+        self.values.get(&tensor).cloned().with_context(|| format!("no operator before gives tensor {tensor}"))
+    }
+
+    /// The value as TFLite has it: channels last.
+    fn channels_last(&mut self, tensor: usize) -> Result<String> {
+        let value = self.value(tensor)?;
+        match self.tensors[tensor].shape.as_slice() {
+            [_, 1, 1, _] => Ok(value),
+            [_, _, _, _] => Ok(self.graph.op("Transpose", &[&value], &[("perm", Ints(&[0, 2, 3, 1]))])),
+            _ => Ok(value),
+        }
+    }
+
+    fn constant_of(&self, tensor: usize) -> Result<Constant<'a>> {
+        self.constants.get(&tensor).copied().with_context(|| format!("tensor {tensor} holds no numbers"))
+    }
+
+    /// A weight, its axes reordered, or with the sizes `dims` instead of its own.
+    fn weight(&mut self, tensor: usize, order: Option<[usize; 4]>, dims: Option<&[usize]>) -> Result<String> {
+        let Constant { raw, element } = self.constant_of(tensor)?;
+        let (element, n_bytes) = match element {
+            0 => (ElementType::F32, 4),
+            1 => (ElementType::F16, 2),
+            _ => bail!("weights are float32 or float16, not TFLite's type {element} (tensor {tensor})"),
+        };
+        let shape = &self.tensors[tensor].shape;
+        let Some(order) = order else {
+            return self.graph.constant(element, dims.unwrap_or(shape), raw);
+        };
+        let shape = four("the weight", shape)?;
+        let raw = transposed(raw, n_bytes, shape, order)?;
+        self.graph.constant(element, &order.map(|axis| shape[axis]), &raw)
+    }
+
+    /// The integers in a constant.
+    fn integers(&self, tensor: usize) -> Result<Vec<i64>> {
+        let Constant { raw, element } = self.constant_of(tensor)?;
+        ensure!(element == 2 && raw.len() <= 8 * 2 * MAX_AXES, "tensor {tensor} holds a few 32-bit integers");
+        Ok(raw.chunks_exact(4).map(|int| i32::from_le_bytes([int[0], int[1], int[2], int[3]]).into()).collect())
+    }
+
+    /// The activation that is fused with an operator.
+    fn activated(&mut self, value: String, activation: i8) -> Result<String> {
+        match activation {
+            0 => Ok(value),
+            1 => Ok(self.graph.op("Relu", &[&value], &[])),
+            3 => {
+                let (low, high) = (self.graph.floats(&[], &[0.0])?, self.graph.floats(&[], &[6.0])?);
+                Ok(self.graph.op("Clip", &[&value, &low, &high], &[]))
+            }
+            _ => bail!("the activations known are none, RELU and RELU6, not {activation}"),
+        }
+    }
+
+    fn operator(&mut self, operator: &TfliteOperator) -> Result<()> {
+        let n_tensors = self.tensors.len();
+        let input = |k: usize| {
+            let tensor = operator.inputs.get(k).and_then(|tensor| usize::try_from(*tensor).ok());
+            tensor.filter(|tensor| *tensor < n_tensors)
+        };
+        let needed = |k: usize| input(k).with_context(|| format!("input {k} is missing"));
+        let first = needed(0)?;
+        let options = || operator.options.context("its options are missing");
+        let fused = |field: usize| operator.options.map_or(Ok(0), |options| options.byte(field));
+        let output = self.tensors[operator.output].shape.clone();
+        let value = match operator.code {
+            0 => {
+                let (a, b) = (self.value(first)?, self.value(needed(1)?)?);
+                let sum = self.graph.op("Add", &[&a, &b], &[]);
+                self.activated(sum, fused(0)?)?
+            }
+            2 => {
+                let axis = options()?.int(0, 0)?.rem_euclid(output.len().max(1) as i32) as usize;
+                let axis = if output.len() == 4 { [0, 2, 3, 1][axis] } else { axis as i64 };
+                let parts = (0..operator.inputs.len()).map(|k| self.value(needed(k)?)).collect::<Result<Vec<_>>>()?;
+                let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
+                self.graph.op("Concat", &parts, &[("axis", Int(axis))])
+            }
+            3 | 4 => self.convolution(operator.code == 4, first, needed(1)?, input(2), options()?)?,
+            6 => {
+                let constant = self.constant_of(first)?;
+                self.constants.insert(operator.output, constant);
+                return Ok(());
+            }
+            9 => {
+                let weight = needed(1)?;
+                let [_, n_inputs] = self.tensors[weight].shape[..] else { bail!("the weight has 2 axes") };
+                let flat = self.channels_last(first)?;
+                let shape = self.graph.ints(&[-1, n_inputs as i64])?;
+                let flat = self.graph.op("Reshape", &[&flat, &shape], &[]);
+                let mut inputs = vec![flat, self.weight(weight, None, None)?];
+                if let Some(bias) = input(2) {
+                    inputs.push(self.weight(bias, None, None)?);
+                }
+                let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
+                let product = self.graph.op("Gemm", &inputs, &[("transB", Int(1))]);
+                let product = self.activated(product, fused(0)?)?;
+                if output.len() == 2 { product } else { self.reshaped(&product, &output)? }
+            }
+            14 => {
+                let value = self.value(first)?;
+                self.graph.op("Sigmoid", &[&value], &[])
+            }
+            17 => self.max_pool(first, options()?)?,
+            22 => {
+                let value = self.channels_last(first)?;
+                let value = self.reshaped(&value, &output)?;
+                match output.len() {
+                    4 => self.graph.op("Transpose", &[&value], &[("perm", Ints(&[0, 3, 1, 2]))]),
+                    _ => value,
+                }
+            }
+            23 => {
+                let mode = match (options()?.byte(2)?, options()?.byte(3)?) {
+                    (0, 0) => "asymmetric",
+                    (0, _) => "half_pixel",
+                    _ => "align_corners",
+                };
+                let [n, height, width, channels] = four("the output", &output)?.map(|size| size as i64);
+                let (value, sizes) = (self.value(first)?, self.graph.ints(&[n, channels, height, width])?);
+                let mode = [("mode", Text("linear")), ("coordinate_transformation_mode", Text(mode))];
+                self.graph.op("Resize", &[&value, "", "", &sizes], &mode)
+            }
+            34 => {
+                let pads = self.integers(needed(1)?)?;
+                ensure!(pads.len() == 8, "4 axes are padded, before and after, not {} numbers", pads.len());
+                let ends = CHANNELS_FIRST.map(|axis| 2 * axis).into_iter();
+                let pads: Vec<i64> = ends.clone().map(|k| pads[k]).chain(ends.map(|k| pads[k + 1])).collect();
+                let (value, pads) = (self.value(first)?, self.graph.ints(&pads)?);
+                self.graph.op("Pad", &[&value, &pads], &[("mode", Text("constant"))])
+            }
+            40 => {
+                let mut axes: Vec<i64> = self.integers(needed(1)?)?.iter().map(|axis| axis.rem_euclid(4)).collect();
+                axes.sort_unstable();
+                let n_axes = self.tensors[first].shape.len();
+                ensure!(
+                    axes == [1, 2] && n_axes == 4,
+                    "the mean goes over height and width, not over the axes {axes:?}"
+                );
+                let keep = i64::from(fused(0)? != 0);
+                let value = self.value(first)?;
+                self.graph.op("ReduceMean", &[&value], &[("axes", Ints(&[2, 3])), ("keepdims", Int(keep))])
+            }
+            54 => {
+                let slope = needed(1)?;
+                let channels = *self.tensors[slope].shape.last().context("the slope has no axes")?;
+                let (value, slope) = (self.value(first)?, self.weight(slope, None, Some(&[channels, 1, 1]))?);
+                self.graph.op("PRelu", &[&value, &slope], &[])
+            }
+            _ => bail!("no operator of this kind is known"),
+        };
+        self.values.insert(operator.output, value);
+        Ok(())
+    }
+
+    fn reshaped(&mut self, value: &str, shape: &[usize]) -> Result<String> {
+        let shape = self.graph.ints(&shape.iter().map(|size| *size as i64).collect::<Vec<_>>())?;
+        Ok(self.graph.op("Reshape", &[value, &shape], &[]))
+    }
+
+    fn convolution(
+        &mut self,
+        depthwise: bool,
+        image: usize,
+        weight: usize,
+        bias: Option<usize>,
+        options: FlatTable,
+    ) -> Result<String> {
+        let dilations = if depthwise { 5 } else { 4 };
+        let [_, height, width, channels] = four("the input", &self.tensors[image].shape)?;
+        let [_, kernel_height, kernel_width, _] = four("the weight", &self.tensors[weight].shape)?;
+        let window = |kernel, stride, dilation| -> Result<_> {
+            let [stride, dilation] = [size(options.int(stride, 1)?.into())?, size(options.int(dilation, 1)?.into())?];
+            Ok(SlidingWindow { kernel, stride, dilation })
+        };
+        let [down, along] = [window(kernel_height, 2, dilations + 1)?, window(kernel_width, 1, dilations)?];
+        let pads = padding(options, [(down, height), (along, width)])?;
+        let order = if depthwise { [3, 0, 1, 2] } else { CHANNELS_FIRST };
+        let mut inputs = vec![self.value(image)?, self.weight(weight, Some(order), None)?];
+        if let Some(bias) = bias {
+            inputs.push(self.weight(bias, None, None)?);
+        }
+        let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
+        let result = self.graph.op(
+            "Conv",
+            &inputs,
+            &[
+                ("kernel_shape", Ints(&[down.kernel, along.kernel].map(|size| size as i64))),
+                ("strides", Ints(&[down.stride, along.stride].map(|size| size as i64))),
+                ("dilations", Ints(&[down.dilation, along.dilation].map(|size| size as i64))),
+                ("pads", Ints(&pads)),
+                ("group", Int(if depthwise { channels as i64 } else { 1 })),
+            ],
+        );
+        self.activated(result, options.byte(if depthwise { 4 } else { 3 })?)
+    }
+
+    fn max_pool(&mut self, image: usize, options: FlatTable) -> Result<String> {
+        let [_, height, width, _] = four("the input", &self.tensors[image].shape)?;
+        let window = |kernel, stride| -> Result<_> {
+            let [kernel, stride] = [size(options.int(kernel, 0)?.into())?, size(options.int(stride, 0)?.into())?];
+            Ok(SlidingWindow { kernel, stride, dilation: 1 })
+        };
+        let [down, along] = [window(4, 2)?, window(3, 1)?];
+        let pads = padding(options, [(down, height), (along, width)])?;
+        let value = self.value(image)?;
+        let pooled = self.graph.op(
+            "MaxPool",
+            &[&value],
+            &[
+                ("kernel_shape", Ints(&[down.kernel, along.kernel].map(|size| size as i64))),
+                ("strides", Ints(&[down.stride, along.stride].map(|size| size as i64))),
+                ("pads", Ints(&pads)),
+            ],
+        );
+        self.activated(pooled, options.byte(5)?)
+    }
+}
+
+/// Top, left, bottom, right: none, or what keeps the size (padding `SAME`), of a window an axis and the axis's size.
+fn padding(options: FlatTable, windows: [(SlidingWindow, usize); 2]) -> Result<[i64; 4]> {
+    let padded = options.byte(0)? == 0;
+    let [(top, bottom), (left, right)] =
+        windows.map(|(window, size)| if padded { window.same_padding(size) } else { (0, 0) });
+    Ok([top, left, bottom, right].map(|n_zeros| n_zeros as i64))
+}
