@@ -37,6 +37,19 @@ pub enum AdversarialLoss {
     Log,
 }
 
+/// What is put into a split.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SplitUnit {
+    /// Blocks of time for a speaker with few videos, whole videos otherwise; what was chosen first stays.
+    #[default]
+    Auto,
+    /// Whole videos.
+    Video,
+    /// Blocks of time of each video, with gaps between the splits.
+    Time,
+}
+
 /// Processor that holds the tensors of a training.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

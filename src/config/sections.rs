@@ -1,7 +1,7 @@
 //! The sections of `pipeline.toml` with their defaults. What each key means, its unit and its reason stand in the
 //! top level `pipeline.toml`; here are the types.
 
-use super::choices::{AdversarialLoss, ComputeDevice, MotionRepresentation, NetworkPreset};
+use super::choices::{AdversarialLoss, ComputeDevice, MotionRepresentation, NetworkPreset, SplitUnit};
 use super::config_path::ConfigPath;
 use crate::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
@@ -234,7 +234,9 @@ impl Default for LiftConfig {
 pub struct DatasetConfig {
     /// A shard is closed when it holds this many megabytes.
     pub max_mb: u32,
-    /// Shares of the videos for validation and test, 0..1; the rest trains.
+    /// What is put into a split: whole videos, or blocks of their time.
+    pub split_by: SplitUnit,
+    /// Shares of the seconds for validation and test, 0..1; the rest trains.
     pub validation: f64,
     pub test: f64,
     /// Seconds of equal sound from which two videos belong to one split; 0: sound is not compared.
@@ -243,7 +245,7 @@ pub struct DatasetConfig {
 
 impl Default for DatasetConfig {
     fn default() -> Self {
-        Self { max_mb: 256, validation: 0.15, test: 0.15, duplicate_secs: 5.0 }
+        Self { max_mb: 256, split_by: SplitUnit::Auto, validation: 0.15, test: 0.15, duplicate_secs: 5.0 }
     }
 }
 

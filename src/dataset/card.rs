@@ -2,8 +2,9 @@
 
 use super::info::DatasetInfo;
 use super::leakage::Leakage;
-use super::split::Split;
+use super::split::{Split, SplitRule};
 use super::stats::DatasetStats;
+use crate::config::choices::SplitUnit;
 use std::fmt::Write;
 
 /// Text of the card.
@@ -56,7 +57,8 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
     let _ = write!(
         text,
         "\n`ledger.jsonl` says of every second of every video which it was, with what was measured.\n\n## Splits\n\n\
-         A video is in one split as a whole; its content's hash, or the maker, chooses which. {}\n",
+         {} {}\n",
+        splits(info.split_rule.as_ref()),
         leaks(leakage)
     );
     let said = |text: &str| if text.is_empty() { "not said".to_owned() } else { text.to_owned() };
@@ -73,6 +75,23 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
     info.notes.iter().for_each(|note| text += &format!(" {note}"));
     text.push('\n');
     text
+}
+
+/// What the splits are made of.
+fn splits(rule: Option<&SplitRule>) -> String {
+    match rule {
+        None => "A video is in one split as a whole; its content's hash, or the maker, chooses which.".to_owned(),
+        Some(SplitRule { unit: SplitUnit::Time, why, guard_secs }) => format!(
+            "Videos are divided by time, in blocks of one split each ({why}). Two splits of a video are at least \
+             {guard_secs:.2} s apart: that is longer than a training window with all that its numbers were made from, so \
+             none was made from sound or motion of another split. Person, room and camera are those of the training \
+             split: the test is of new speech, not of a new recording."
+        ),
+        Some(SplitRule { why, .. }) => format!(
+            "A video is in one split as a whole ({why}). New videos fill the splits toward their shares by seconds, or \
+             the maker chooses; no video changes its split."
+        ),
+    }
 }
 
 /// YAML header. Values are quoted as JSON, which is valid YAML.

@@ -2,8 +2,7 @@
 
 use super::index::ShardRef;
 use super::sample::N_KEYPOINTS;
-use super::split::Split;
-use super::split::SplitBy;
+use super::split::{Split, SplitBy, SplitRule, TimeBlock};
 use crate::types::skeleton;
 use crate::types::skeleton::{N_JOINTS, Side};
 use crate::types::time::FrameRate;
@@ -38,6 +37,9 @@ pub struct DatasetInfo {
     pub source: String,
     /// Further notes for readers, a sentence each.
     pub notes: Vec<String>,
+    /// What the splits are made of, and why; `None`: an earlier version wrote the dataset.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub split_rule: Option<SplitRule>,
     pub splits: BTreeMap<String, SplitInfo>,
     /// Videos by name, those without a sample too.
     pub videos: Vec<DatasetVideo>,
@@ -50,9 +52,12 @@ pub struct DatasetVideo {
     pub file: String,
     /// BLAKE3 of the file.
     pub content: String,
-    /// Split; `None`: no sample.
+    /// Split; `None`: no sample, or samples in several splits (`blocks`).
     pub split: Option<Split>,
     pub split_by: SplitBy,
+    /// Blocks of time that belong to the splits; empty for a whole video.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub blocks: Vec<TimeBlock>,
     pub samples: usize,
     pub secs: f64,
 }
@@ -112,6 +117,7 @@ pub struct About {
     pub consent: String,
     pub source: String,
     pub notes: Vec<String>,
+    pub split_rule: Option<SplitRule>,
 }
 
 impl About {
@@ -127,6 +133,7 @@ impl About {
             consent: nothing(),
             source: nothing(),
             notes: Vec::new(),
+            split_rule: None,
         }
     }
 }
@@ -134,7 +141,7 @@ impl About {
 impl DatasetInfo {
     /// Contents for a dataset `about` with these videos and bones (48 lengths, metres).
     pub fn new(about: &About, bones: &[f32], splits: BTreeMap<Split, SplitInfo>, videos: Vec<DatasetVideo>) -> Self {
-        let About { speaker, tool, fps, models, licence, consent, source, notes } = about.clone();
+        let About { speaker, tool, fps, models, licence, consent, source, notes, split_rule } = about.clone();
         Self {
             schema: super::SCHEMA,
             speaker,
@@ -157,6 +164,7 @@ impl DatasetInfo {
             consent,
             source,
             notes,
+            split_rule,
             splits: splits.into_iter().map(|(split, info)| (split.name().to_owned(), info)).collect(),
             videos,
         }
@@ -164,8 +172,8 @@ impl DatasetInfo {
 
     /// Description apart from the videos.
     pub fn about(&self) -> About {
-        let DatasetInfo { speaker, tool, fps, models, licence, consent, source, notes, .. } = self.clone();
-        About { speaker, tool, fps, models, licence, consent, source, notes }
+        let DatasetInfo { speaker, tool, fps, models, licence, consent, source, notes, split_rule, .. } = self.clone();
+        About { speaker, tool, fps, models, licence, consent, source, notes, split_rule }
     }
 
     /// Shards of all splits.

@@ -1,7 +1,7 @@
 //! Leakage file `leakage.json`: videos that share sound, and those of them in different splits.
 
 use super::shared_sound::SharedSound;
-use super::split::Split;
+use super::split::{Split, TimeBlock, blocks};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -26,6 +26,7 @@ pub struct Leak {
     pub a_split: Split,
     pub b: String,
     pub b_split: Split,
+    /// Seconds of it in different splits.
     pub secs: f64,
 }
 
@@ -37,12 +38,17 @@ pub struct SoundComparison {
 }
 
 impl Leakage {
-    /// Report on videos of these splits.
-    pub fn new(compared: &SoundComparison, splits: &BTreeMap<String, Split>) -> Self {
+    /// Report on videos with these blocks of splits.
+    pub fn new(compared: &SoundComparison, splits: &BTreeMap<String, Vec<TimeBlock>>) -> Self {
         let leak = |shared: &SharedSound| {
-            let (a_split, b_split) = (*splits.get(&shared.a)?, *splits.get(&shared.b)?);
-            let SharedSound { a, b, secs, .. } = shared.clone();
-            (a_split != b_split).then_some(Leak { a, a_split, b, b_split, secs })
+            let SharedSound { a, b, a_secs, b_secs, secs } = shared.clone();
+            let span = (a_secs, a_secs + secs);
+            let conflicts = blocks::conflicts(splits.get(&a)?, span, splits.get(&b)?, b_secs - a_secs);
+            let (_, a_split, b_split) = *conflicts.first()?;
+            let apart: f64 = conflicts.iter().map(|((start, end), ..)| end - start).sum();
+            // Sums of parts are rounded; a whole is not.
+            let secs = if conflicts.len() == 1 && conflicts[0].0 == span { secs } else { apart };
+            Some(Leak { a, a_split, b, b_split, secs })
         };
         Self {
             duplicate_secs: compared.duplicate_secs,

@@ -91,7 +91,8 @@ impl Default for StatsCollector {
 impl StatsCollector {
     /// Adds a video.
     pub fn push(&mut self, part: &VideoEntry) {
-        if part.split == Some(Split::Train) {
+        // Of a video in several splits they are those of its training samples.
+        if part.split.map_or(!part.samples.is_empty(), |split| split == Split::Train) {
             self.moments.merge(&part.moments);
         }
         for sample in &part.samples {

@@ -3,6 +3,7 @@
 use super::dataset::stage::DatasetStage;
 use super::extract::ExtractStage;
 use super::lift::LiftStage;
+use super::lift::lifter::reach_secs;
 use super::pose2d::Pose2dStage;
 use super::segment::SegmentStage;
 use crate::config::videos::Videos;
@@ -28,7 +29,9 @@ pub fn build(name: StageName, config: &Config, ready: &[Unit]) -> Result<Box<dyn
         StageName::Segment => Box::new(SegmentStage::new(&settings.segment, &settings.work.dir)),
         StageName::Lift => Box::new(LiftStage::new(&settings.lift, &settings.segment, &settings.work.dir)?),
         StageName::Dataset => Box::new(
-            DatasetStage::new(settings, ready).with_videos(videos::of(config)).with_models(models_used(settings)?),
+            DatasetStage::new(settings, ready, reach_secs(&settings.lift))
+                .with_videos(videos::of(config))
+                .with_models(models_used(settings)?),
         ),
     })
 }

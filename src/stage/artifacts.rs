@@ -145,6 +145,11 @@ pub fn speaker_dir(work: &Path, stage: StageName, speaker: &str) -> PathBuf {
     work.join(stage.as_str()).join(speaker)
 }
 
+/// The record of the splits of a speaker's videos, which outlives the dataset.
+pub fn splits(work: &Path, speaker: &str) -> PathBuf {
+    work.join("splits").join(format!("{speaker}.json"))
+}
+
 /// The table of known hashes of a work folder.
 pub fn hashes(work: &Path) -> PathBuf {
     work.join("hashes.json")

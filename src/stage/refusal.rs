@@ -43,6 +43,8 @@ pub enum Refusal {
     Open,
     /// Seconds that another video of the dataset has as well.
     Duplicate,
+    /// Seconds left out between two splits of a video.
+    Guard,
     /// An imported take without a sound, or the rest of one behind the end of its sound.
     NoSoundFile,
     /// An imported take that a model predicted.
@@ -103,6 +105,7 @@ impl Refusal {
             Self::Bones => "bones",
             Self::Open => "open",
             Self::Duplicate => "duplicate",
+            Self::Guard => "between splits",
             Self::Prediction => "prediction",
             Self::OutOfStep => "out of step",
             Self::NotImported => "not here",
@@ -118,6 +121,7 @@ impl Refusal {
             | Self::Identity
             | Self::TooShort
             | Self::Duplicate
+            | Self::Guard
             | Self::NoSoundFile
             | Self::OutOfStep
             | Self::NotImported => "s",
@@ -159,6 +163,7 @@ impl Refusal {
             Self::Bones => "a lifted bone is far off its length",
             Self::Open => "joints stay unseen for too long",
             Self::Duplicate => "another video has it already",
+            Self::Guard => "left out between two splits",
             Self::NoSoundFile => "no sound was found, or it has ended",
             Self::Prediction => "a model predicted it",
             Self::OutOfStep => "sound and motion differ in length",
@@ -194,6 +199,7 @@ impl Refusal {
             Self::Bones => format!("a bone was lifted {m:.2} off its length in the video, {t:.2} is allowed"),
             Self::Open => format!("{m:.0} of the joints are not seen for longer than can be filled"),
             Self::Duplicate => format!("{m:.1} s are in another video"),
+            Self::Guard => format!("{m:.1} s are left out: two splits are at least {t:.1} s apart"),
             Self::NoSoundFile => "the sound ends here".to_owned(),
             Self::Prediction => "it is what a model predicted, not how a person moved".to_owned(),
             Self::OutOfStep => format!("sound and motion are {m:.3} s apart, at most {t} s are believed"),

@@ -3,6 +3,8 @@
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
+use orator::config::SplitUnit;
+use orator::dataset::split::SplitRule;
 use orator::dataset::verify::verify;
 use orator::dataset::verify::verify::accounts;
 use orator::dataset::{Dataset, Split};
@@ -84,6 +86,12 @@ fn info(dir: &std::path::Path, ui: &Ui) -> Result<Outcome> {
             or_not_said(&info.source)
         ),
     ];
+    if let Some(SplitRule { unit, why, guard_secs }) = &info.split_rule {
+        lines.push(match unit {
+            SplitUnit::Time => format!("splits by time, {guard_secs:.2} s apart ({why})"),
+            SplitUnit::Video | SplitUnit::Auto => format!("splits by video ({why})"),
+        });
+    }
     for split in Split::ALL {
         let part = info.splits.get(split.name()).cloned().unwrap_or_default();
         let windows = stats.windows.strided.get(split.name()).copied().unwrap_or(0);
@@ -108,7 +116,7 @@ fn info(dir: &std::path::Path, ui: &Ui) -> Result<Outcome> {
         lines.push(format!(
             "  {:40} {:10} kept {:7.1} of {:7.1} s{}",
             account.name,
-            account.split.map_or("-", Split::name),
+            account.split.map_or(if account.blocks.is_empty() { "-" } else { "by time" }, Split::name),
             account.ledger.kept_secs(),
             account.ledger.duration_secs,
             account.failure.map(|failure| format!("; {failure}")).unwrap_or_default()

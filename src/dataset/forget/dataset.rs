@@ -89,7 +89,7 @@ fn silenced(part: &VideoEntry, names: &BTreeSet<String>) -> VideoEntry {
     let mut part = part.clone();
     if matches!(&part.split_by, SplitBy::SoundOf(other) if names.contains(other)) {
         // Its split does not change.
-        part.split_by = SplitBy::Name;
+        part.split_by = SplitBy::Share;
     }
     for refused in &mut part.ledger.refused {
         names.iter().for_each(|name| refused.message = refused.message.replace(name.as_str(), FORGOTTEN));

@@ -2,8 +2,10 @@
 //! name or work name.
 
 use crate::config::{Config, videos};
+use crate::dataset::split::SplitRecord;
 use crate::dataset::write::part;
 use crate::dataset::write::part::VideoEntry;
+use crate::stage::artifacts;
 use crate::stage::artifacts::{StageName, speaker_dir};
 use crate::stage::fingerprint::hash_file;
 use crate::stage::record::Record;
@@ -84,8 +86,37 @@ pub fn of_project(config: &Config) -> Result<Vec<KnownVideo>> {
     for speaker in folders(&work.join(StageName::Dataset.as_str())) {
         add_dataset(&speaker_dir(work, StageName::Dataset, &speaker), &speaker, &mut known)?;
     }
+    for speaker in recorded(work) {
+        let Ok(Some(record)) = SplitRecord::read(&artifacts::splits(work, &speaker)) else { continue };
+        for (content, video) in record.videos {
+            let is_it = |k: &KnownVideo| {
+                k.speaker == speaker && (k.content.as_ref() == Some(&content) || k.parts.contains(&video.name))
+            };
+            if !known.iter().any(is_it) {
+                let (speaker, parts) = (speaker.clone(), [video.name.clone()].into());
+                known.push(KnownVideo {
+                    speaker,
+                    content: Some(content),
+                    file: video.name,
+                    parts,
+                    ..KnownVideo::default()
+                });
+            }
+        }
+    }
     known.sort();
     Ok(known)
+}
+
+/// Speakers with a record of splits.
+fn recorded(work: &Path) -> Vec<String> {
+    let files = artifacts::splits(work, "");
+    let entries = std::fs::read_dir(files.parent().unwrap_or(work)).into_iter().flatten().flatten();
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    names
+        .filter_map(|name| name.strip_suffix(".json").map(str::to_owned))
+        .filter(|name| !name.starts_with('.'))
+        .collect()
 }
 
 /// Videos of the dataset in `dir`.

@@ -5,6 +5,7 @@
 use super::dataset;
 use super::known::KnownVideo;
 use super::search::SearchTerm;
+use crate::dataset::split::SplitRecord;
 use crate::stage::artifacts;
 use crate::stage::artifacts::{StageName, speaker_dir};
 use crate::stage::fingerprint::hash_file;
@@ -29,6 +30,8 @@ pub struct Removal {
     pub dataset: Option<(PathBuf, BTreeSet<String>)>,
     /// Table of content hashes, and the number of its entries to remove.
     pub hashes: Option<(PathBuf, usize)>,
+    /// Record of the splits, and the number of its videos to remove.
+    pub splits: Option<(PathBuf, usize)>,
     /// Search terms of the videos.
     pub terms: Vec<SearchTerm>,
 }
@@ -78,6 +81,17 @@ impl Removal {
                 .extend([record::record_path(&dir), record::failure_path(&dir)].into_iter().filter(|p| p.exists()));
         }
         removal.paths.extend(left_over);
+        let splits = artifacts::splits(work, speaker);
+        removal.paths.extend(workdir::left_over(&splits));
+        match SplitRecord::read(&splits) {
+            Ok(Some(mut record)) if !whole => {
+                let n = removal.clean_record(&mut record);
+                removal.splits = (n > 0).then_some((splits, n));
+            }
+            Ok(None) => {}
+            // One that cannot be read may hold the video.
+            Ok(Some(_)) | Err(_) => removal.paths.push(splits),
+        }
         removal.hashes = hashes(&artifacts::hashes(work), &removal);
         Ok(removal)
     }
@@ -91,13 +105,20 @@ impl Removal {
 
     /// Whether there is nothing to remove.
     pub fn is_empty(&self) -> bool {
-        self.paths.is_empty() && self.models.is_empty() && self.dataset.is_none() && self.hashes.is_none()
+        self.paths.is_empty()
+            && self.models.is_empty()
+            && self.dataset.is_none()
+            && self.hashes.is_none()
+            && self.splits.is_none()
     }
 
     /// Description of what is removed, a line each.
     pub fn lines(&self, keep_models: bool) -> Vec<String> {
         let mut lines: Vec<String> = self.paths.iter().map(|path| path.display().to_string()).collect();
         if let Some((path, n)) = &self.hashes {
+            lines.push(format!("{n} entries of {}", path.display()));
+        }
+        if let Some((path, n)) = &self.splits {
             lines.push(format!("{n} entries of {}", path.display()));
         }
         if let Some((dir, names)) = &self.dataset {
@@ -128,10 +149,24 @@ impl Removal {
         if let Some((path, _)) = &self.hashes {
             self.clean_hashes(path)?;
         }
+        if let Some((path, _)) = &self.splits
+            && let Some(mut record) = SplitRecord::read(path)?
+        {
+            self.clean_record(&mut record);
+            if record.videos.is_empty() { remove(path)? } else { record.write(path)? }
+        }
         if let Some((dir, names)) = &self.dataset {
             dataset::without(dir, names)?;
         }
         Ok(())
+    }
+
+    /// Removes the videos from a record of splits; returns how many there were.
+    fn clean_record(&self, record: &mut SplitRecord) -> usize {
+        let is_named = |name: &str| self.dataset.as_ref().is_some_and(|(_, names)| names.contains(name));
+        record.forget(|content, video| {
+            is_named(&video.name) || super::search::is_in(format!("{content}\n{}", video.name).as_bytes(), &self.terms)
+        })
     }
 
     fn clean_hashes(&self, path: &Path) -> Result<()> {

@@ -38,8 +38,6 @@ pub struct LooseSample {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LooseVideo {
     pub name: String,
-    /// Split by the names of the tars; `None`: unknown.
-    pub split: Option<Split>,
     /// Samples in the order of their keys.
     pub samples: Vec<LooseSample>,
 }
@@ -78,8 +76,7 @@ pub fn open(tars: &[PathBuf]) -> Loose {
     let mut videos: BTreeMap<String, LooseVideo> = BTreeMap::new();
     for (key, sample) in samples {
         let name = key.rsplit_once('-').map_or(key.as_str(), |(video, _)| video).to_owned();
-        let video = videos.entry(name.clone()).or_insert(LooseVideo { name, split: None, samples: Vec::new() });
-        video.split = video.split.or_else(|| sample.members.iter().flatten().find_map(|place| split_of(&place.tar)));
+        let video = videos.entry(name.clone()).or_insert(LooseVideo { name, samples: Vec::new() });
         video.samples.push(sample);
     }
     loose.videos = videos.into_values().collect();
@@ -134,6 +131,11 @@ fn read_place(place: &MemberLocation) -> Result<Vec<u8>> {
 }
 
 impl LooseSample {
+    /// Split by the names of its tars; `None`: unknown.
+    pub fn split(&self) -> Option<Split> {
+        self.members.iter().flatten().find_map(|place| split_of(&place.tar))
+    }
+
     /// Sample, and the unchanged bytes of its JSON.
     ///
     /// # Errors

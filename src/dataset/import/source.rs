@@ -4,14 +4,14 @@
 use super::find::{ImportSources, TakeFiles};
 use super::plan::{ImportOutcome, ImportPlan};
 use super::shards;
-use super::shards::LooseVideo;
+use super::shards::{LooseSample, LooseVideo};
 use super::take::{ImportedTake, TakeOutcome};
 use crate::audio::fingerprint::Fingerprinter;
 use crate::config::videos::slug;
 use crate::dataset::bones::{VideoBones, of_speaker};
 use crate::dataset::info::DatasetInfo;
 use crate::dataset::shared_sound::SharedSound;
-use crate::dataset::split::SplitBy;
+use crate::dataset::split::{Assignment, SplitBy, TimeBlock};
 use crate::dataset::write::part;
 use crate::dataset::write::part::{VideoEntry, VideoSource};
 use crate::dataset::write::writer::DatasetWriter;
@@ -42,8 +42,8 @@ pub enum ImportItem {
 #[derive(Clone, Debug, Default)]
 pub struct InspectedItem {
     pub source: VideoSource,
-    /// Split of the source, later the assigned one.
-    pub split: Option<(Split, SplitBy)>,
+    /// Split, or blocks, of the source, later the assigned one.
+    pub split: Option<Assignment>,
     pub codes: Option<Vec<u32>>,
     /// Remark for the user on a kept take.
     pub remark: String,
@@ -134,14 +134,19 @@ impl ImportItem {
         writer: &DatasetWriter,
         out: &Path,
     ) -> Result<()> {
-        let Some((split, by)) = inspected.split.clone().filter(|_| inspected.is_kept()) else {
-            writer.video(inspected.source.clone(), Split::Train, SplitBy::Content)?.finish(None)?;
-            return Ok(());
-        };
-        if let Self::Part(dir, name) = self {
+        let source = inspected.source.clone();
+        let placed = inspected.split.clone().filter(|_| inspected.is_kept());
+        if let (Self::Part(dir, name), Some(_)) = (self, &placed) {
             return VideoEntry::read(&VideoEntry::path(dir, name))?.take_over(dir, out);
         }
-        let mut part = writer.video(inspected.source.clone(), split, by)?;
+        let (whole, mut part) = match placed {
+            Some(Assignment::In(split, by)) => (Some(split), writer.video(source, split, by)?),
+            Some(Assignment::Blocks(blocks)) => (None, writer.video_in_blocks(source, blocks)?),
+            Some(Assignment::Nowhere(_)) | None => {
+                writer.video(source, Split::Train, SplitBy::Share)?.finish(None)?;
+                return Ok(());
+            }
+        };
         match self {
             Self::Take(found) => {
                 let TakeOutcome::Kept(kept) = ImportedTake::read(found, &plan.limits)?.ended else {
@@ -152,7 +157,8 @@ impl ImportItem {
             Self::Loose(video) => {
                 for waiting in &video.samples {
                     let (sample, json) = waiting.read()?;
-                    part.push_as_it_was(&sample, json)?;
+                    let split = whole.or(waiting.split()).unwrap_or(Split::Train);
+                    part.push_as_it_was(split, &sample, json)?;
                 }
             }
             Self::Part(..) | Self::Unknown(..) => {}
@@ -223,7 +229,10 @@ fn look_at_part(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedIt
         "{name}: its files are not what was written; orator dataset verify says what is wrong"
     );
     let codes = part.codes(dir)?;
-    let split = part.split.map(|split| (split, part.split_by.clone()));
+    let split = match part.split {
+        Some(split) => Some(Assignment::In(split, part.split_by.clone())),
+        None => Some(Assignment::Blocks(part.blocks.clone())).filter(|_| !part.samples.is_empty()),
+    };
     let VideoEntry { name, file, content, made_from, ledger, bones, failure, .. } = part;
     let source = VideoSource { name, file, content, made_from, ledger, bones, failure };
     Ok(InspectedItem {
@@ -236,7 +245,9 @@ fn look_at_part(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedIt
 
 fn look_at_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem> {
     let fps = plan.limits.fps;
-    let (mut stretches, mut measured, mut fingerprinter) = (Vec::new(), Vec::new(), Fingerprinter::default());
+    let (mut stretches, mut measured, mut fingerprinter) =
+        (Vec::<(f64, f64)>::new(), Vec::new(), Fingerprinter::default());
+    let mut blocks: Vec<TimeBlock> = Vec::new();
     let mut content = String::new();
     for waiting in &video.samples {
         let (sample, _) = waiting.read()?;
@@ -244,6 +255,9 @@ fn look_at_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem>
         ensure!(own == fps, "{key} runs at {own}, the dataset at {fps}: import it with the same --fps");
         let n_frames = sample.n_frames();
         let start = sample.meta["start_secs"].as_f64().unwrap_or(0.0);
+        let start_secs = stretches.last().map_or(start, |(before, secs)| start.max(before + secs));
+        let end_secs = start_secs + fps.secs(n_frames);
+        blocks.push(TimeBlock { split: waiting.split().or(Some(Split::Train)), start_secs, end_secs });
         stretches.push((start, fps.secs(n_frames)));
         measured.push(VideoBones { lengths_metres: bones::measure(&sample.motion).map(f64::from).to_vec(), n_frames });
         fingerprinter.push(&sample.sound.samples);
@@ -262,12 +276,15 @@ fn look_at_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem>
         },
         ..VideoSource::default()
     };
-    Ok(InspectedItem {
-        source,
-        split: video.split.map(|split| (split, SplitBy::Name)),
-        codes: Some(fingerprinter.finish()),
-        ..InspectedItem::default()
-    })
+    let mut named: Vec<Option<Split>> = video.samples.iter().map(LooseSample::split).collect();
+    named.sort();
+    named.dedup();
+    let split = match named.as_slice() {
+        [] | [None] => None,
+        [Some(split)] | [None, Some(split)] => Some(Assignment::In(*split, SplitBy::Name)),
+        _ => Some(Assignment::Blocks(blocks)),
+    };
+    Ok(InspectedItem { source, split, codes: Some(fingerprinter.finish()), ..InspectedItem::default() })
 }
 
 fn codes<'a>(sounds: impl IntoIterator<Item = &'a Sound>) -> Vec<u32> {

@@ -6,15 +6,17 @@ use super::find::TakeFiles;
 use super::plan::{ImportOutcome, ImportPlan};
 use super::source::{ImportItem, InspectedItem};
 use crate::config;
+use crate::config::SplitUnit;
 use crate::dataset::info::DatasetInfo;
 use crate::dataset::leakage::SoundComparison;
 use crate::dataset::split;
-use crate::dataset::split::{Assignment, Unassigned};
+use crate::dataset::split::{Assignment, RecordedSplit, SplitBy, SplitPlan, SplitRule, Unassigned, blocks};
 use crate::dataset::stats::DatasetStats;
 use crate::dataset::write::part;
 use crate::dataset::write::writer::DatasetWriter;
 use crate::dataset::{INFO, shared_sound};
 use crate::mocap::captured::MotionKind;
+use crate::stage::ledger::Ledger;
 use crate::stage::progress::Progress;
 use anyhow::{Context, Result, ensure};
 use std::collections::{BTreeMap, BTreeSet};
@@ -68,13 +70,14 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
     let compared = compare(&inspected, &kept, out, plan.dataset.duplicate_secs)?;
     for (&at, assigned) in kept.iter().zip(assign(&inspected, &kept, &compared, &plan.dataset)) {
         match assigned {
-            Assignment::In(split, by) => inspected[at].split = Some((split, by)),
+            Assignment::In(..) | Assignment::Blocks(_) => inspected[at].split = Some(assigned),
             Assignment::Nowhere(with) => {
                 part::remove_sound(out, &inspected[at].source.name)?;
                 inspected[at].refuse_shared(&with, plan.dataset.duplicate_secs);
             }
         }
     }
+    about.split_rule = Some(rule(&inspected));
     let max_shard_bytes = u64::from(plan.dataset.max_mb) << 20;
     let writer = DatasetWriter::new(out, about, max_shard_bytes).with_compared(compared);
     let task = progress.begin("write", items.len() as u64);
@@ -100,25 +103,60 @@ fn compare(inspected: &[InspectedItem], kept: &[usize], out: &Path, duplicate_se
     Ok(SoundComparison { duplicate_secs, shared })
 }
 
-/// Assigns each kept video to a split; one of a dataset keeps its split.
+/// Assigns each kept video to a split; one of a dataset keeps its split or its blocks.
 fn assign(
     inspected: &[InspectedItem],
     kept: &[usize],
     compared: &SoundComparison,
     settings: &config::DatasetConfig,
 ) -> Vec<Assignment> {
-    let waiting = kept.iter().map(|&at| {
+    let recorded: Vec<Option<RecordedSplit>> = kept.iter().map(|&at| recorded(&inspected[at])).collect();
+    let waiting = kept.iter().zip(&recorded).map(|(&at, before)| {
         let InspectedItem { source, split, .. } = &inspected[at];
         // Without a content hash the name decides.
         let content = if source.content.is_empty() { &source.name } else { &source.content };
-        Unassigned { name: &source.name, content, named: split.as_ref().map(|(split, _)| *split), before: None }
+        let named = match split {
+            Some(Assignment::In(split, _)) => Some(*split),
+            Some(Assignment::Blocks(_) | Assignment::Nowhere(_)) | None => None,
+        };
+        let (duration_secs, kept) = (source.ledger.duration_secs, spans(&source.ledger));
+        Unassigned { name: &source.name, content, duration_secs, kept, named, before: before.as_ref() }
     });
-    let assigned = split::assign(&waiting.collect::<Vec<_>>(), &compared.shared, settings.validation, settings.test);
-    let as_before = |(at, assigned): (&usize, Assignment)| match (&inspected[*at].split, assigned) {
-        (Some((split, by)), _) => Assignment::In(*split, by.clone()),
-        (None, assigned) => assigned,
-    };
+    let config::DatasetConfig { validation, test, .. } = *settings;
+    let plan = SplitPlan { unit: SplitUnit::Video, validation, test, guard_secs: 0.0, least_secs: 0.0 };
+    let assigned = split::assign(&waiting.collect::<Vec<_>>(), &compared.shared, &plan);
+    let as_before = |(at, assigned): (&usize, Assignment)| inspected[*at].split.clone().unwrap_or(assigned);
     kept.iter().zip(assigned).map(as_before).collect()
+}
+
+/// Blocks of a video that came in several splits.
+fn recorded(item: &InspectedItem) -> Option<RecordedSplit> {
+    match &item.split {
+        Some(Assignment::Blocks(blocks)) => {
+            let (name, blocks) = (item.source.name.clone(), blocks.clone());
+            Some(RecordedSplit { name, split: None, by: SplitBy::Time, blocks })
+        }
+        Some(Assignment::In(..) | Assignment::Nowhere(_)) | None => None,
+    }
+}
+
+fn spans(ledger: &Ledger) -> Vec<(f64, f64)> {
+    ledger.kept.iter().map(|kept| (kept.start_secs, kept.end_secs)).collect()
+}
+
+/// What the splits of the assigned videos are made of: divided by time where a dataset was, else whole.
+fn rule(inspected: &[InspectedItem]) -> SplitRule {
+    let mut guard_secs: Option<f64> = None;
+    let mut unit = SplitUnit::Video;
+    for item in inspected {
+        if let Some(Assignment::Blocks(blocks)) = &item.split {
+            unit = SplitUnit::Time;
+            let gap = blocks::least_gap(blocks, &spans(&item.source.ledger));
+            guard_secs = [guard_secs, gap].into_iter().flatten().min_by(f64::total_cmp);
+        }
+    }
+    let why = if unit == SplitUnit::Time { "as the imported datasets are" } else { "imported takes are whole" };
+    SplitRule { unit, why: why.to_owned(), guard_secs: guard_secs.unwrap_or(0.0) }
 }
 
 /// Notes on the kinds of sources for readers of the dataset.

@@ -1,4 +1,5 @@
-//! Check of a dataset: checksums, samples, arrays.
+//! Check of a dataset: checksums, splits, samples, arrays.
 
+pub mod blocks;
 pub mod sample;
 pub mod verify;

@@ -4,6 +4,7 @@
 //! Files assembled from the entries of the videos are assembled again and compared, which detects wrong numbers in any
 //! of them.
 
+use super::blocks;
 use super::sample::check_sample;
 use crate::dataset::info::DatasetInfo;
 use crate::dataset::leakage::Leakage;
@@ -139,7 +140,8 @@ fn listed(there: &BTreeMap<String, u64>, wanted: &BTreeMap<String, String>, foun
 
 /// Checks the sums of each video.
 fn videos(dir: &Path, found: &mut Verified) -> Result<()> {
-    let fps = read_json::<DatasetInfo>(dir, INFO)?.fps;
+    let info = read_json::<DatasetInfo>(dir, INFO)?;
+    let fps = info.fps;
     let mut keys = BTreeSet::new();
     for name in part::names(dir)? {
         let file = format!("{}/{name}.json", part::FOLDER);
@@ -165,12 +167,14 @@ fn videos(dir: &Path, found: &mut Verified) -> Result<()> {
         }
         for sample in &part.samples {
             let in_shard = part.shards.iter().any(|shard| shard.file == sample.shard && sample.fits(shard.bytes));
-            let same_split = part.split == Some(sample.split) && sample.shard.starts_with(sample.split.name());
+            let same_split = part.split.is_none_or(|split| split == sample.split);
+            let same_split = same_split && sample.shard.starts_with(sample.split.name());
             if !in_shard || !same_split || !sample.key.starts_with(&name) || !keys.insert(sample.key.clone()) {
                 found.wrong(&file, format!("the place of the sample {} cannot be", sample.key));
             }
         }
         found.note(&file, account(&part, fps));
+        found.note(&file, blocks::check_blocks(&part, &info));
     }
     Ok(())
 }

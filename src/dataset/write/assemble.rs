@@ -8,7 +8,7 @@ use super::part::VideoEntry;
 use crate::dataset::bones::{VideoBones, of_speaker};
 use crate::dataset::info::{About, DatasetInfo, DatasetVideo, SplitInfo};
 use crate::dataset::leakage::{Leakage, SoundComparison};
-use crate::dataset::split::Split;
+use crate::dataset::split::{Split, TimeBlock};
 use crate::dataset::stats::{DatasetStats, StatsCollector};
 use crate::dataset::{CHECKSUMS, INDEX, INFO, LEAKAGE, LEDGER, README, STATS, card};
 use crate::stage::ledger::Ledger;
@@ -24,7 +24,11 @@ use std::path::Path;
 pub struct LedgerLine {
     pub name: String,
     pub file: String,
+    /// Split; `None`: no sample, or samples in several splits (`blocks`).
     pub split: Option<Split>,
+    /// Blocks of time that belong to the splits; empty for a whole video.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub blocks: Vec<TimeBlock>,
     /// Reason why the video has no result.
     pub failure: Option<String>,
     #[serde(flatten)]
@@ -55,6 +59,7 @@ pub fn assemble_into(
     let mut ledger = HashedFile::new(open(LEDGER)?);
     let mut splits: BTreeMap<Split, SplitInfo> = Split::ALL.map(|split| (split, SplitInfo::default())).into();
     let (mut videos, mut bones, mut gatherer) = (Vec::new(), Vec::<VideoBones>::new(), StatsCollector::default());
+    let mut placed: BTreeMap<String, Vec<TimeBlock>> = BTreeMap::new();
     for name in part::names(dir)? {
         let path = VideoEntry::path(dir, &name);
         let part = VideoEntry::read(&path)?;
@@ -63,13 +68,17 @@ pub fn assemble_into(
         gatherer.push(&part);
         part.samples.iter().try_for_each(|sample| index.line(sample))?;
         let n_frames: usize = part.samples.iter().map(|sample| sample.n_frames).sum();
-        if let Some(split) = part.split {
+        if !part.samples.is_empty() {
             bones.push(part.bones.clone());
+            placed.insert(name.clone(), part.placed());
+        }
+        for split in Split::ALL.into_iter().filter(|split| part.samples.iter().any(|sample| sample.split == *split)) {
+            let own = part.samples.iter().filter(|sample| sample.split == split);
             let info = splits.entry(split).or_default();
-            info.shards.extend(part.shards);
+            info.shards.extend(part.shards.iter().filter(|shard| part.split_of(shard) == Some(split)).cloned());
             info.videos.push(name.clone());
-            info.samples += part.samples.len();
-            info.frames += n_frames;
+            info.samples += own.clone().count();
+            info.frames += own.map(|sample| sample.n_frames).sum::<usize>();
             info.secs = about.fps.secs(info.frames);
         }
         videos.push(DatasetVideo {
@@ -78,16 +87,17 @@ pub fn assemble_into(
             content: part.content,
             split: part.split,
             split_by: part.split_by,
+            blocks: part.blocks.clone(),
             samples: part.samples.len(),
             secs: about.fps.secs(n_frames),
         });
         let (file, split, failure, of_video) = (part.file, part.split, part.failure, part.ledger);
-        ledger.line(&LedgerLine { name, file, split, failure, ledger: of_video })?;
+        let blocks = part.blocks;
+        ledger.line(&LedgerLine { name, file, split, blocks, failure, ledger: of_video })?;
     }
     checksums.insert(INDEX.to_owned(), index.finish()?);
     checksums.insert(LEDGER.to_owned(), ledger.finish()?);
-    let of_video = videos.iter().filter_map(|video| Some((video.name.clone(), video.split?))).collect();
-    let leakage = Leakage::new(compared, &of_video);
+    let leakage = Leakage::new(compared, &placed);
     let info = DatasetInfo::new(about, &of_speaker(&bones), splits, videos);
     let stats = gatherer.finish();
     let texts = [

@@ -10,7 +10,7 @@ use crate::dataset::sample::Sample;
 use crate::dataset::split::SplitBy;
 use crate::stage::fingerprint::hash_file;
 use crate::stage::ledger::Ledger;
-use crate::types::split::Split;
+use crate::types::split::{Split, TimeBlock};
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -32,10 +32,13 @@ pub struct VideoEntry {
     pub content: String,
     /// BLAKE3 of all inputs of its shards; shards of equal inputs are reused.
     pub made_from: String,
-    /// Split; `None`: no sample.
+    /// Split; `None`: no sample, or samples in several splits (`blocks`).
     pub split: Option<Split>,
     /// Reason of the split.
     pub split_by: SplitBy,
+    /// Blocks of time that belong to the splits; empty for a whole video.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub blocks: Vec<TimeBlock>,
     pub ledger: Ledger,
     /// Reason without result: the stage and its error.
     pub failure: Option<String>,
@@ -47,6 +50,7 @@ pub struct VideoEntry {
     pub samples: Vec<SampleRef>,
     /// Silence appended where the sound ended before the motion, seconds.
     pub padded_sound_secs: f64,
+    /// Moments of the samples; of a video in several splits, those of its training samples.
     pub moments: JointMoments,
 }
 
@@ -67,27 +71,36 @@ pub struct VideoSource {
 pub struct EntryWriter {
     dir: PathBuf,
     part: VideoEntry,
-    shards: ShardWriter,
+    max_shard_bytes: u64,
+    /// Shards of each split.
+    shards: BTreeMap<Split, ShardWriter>,
 }
 
 impl EntryWriter {
-    /// Begins a video of the dataset in `dir`. A shard is closed before it would exceed `max_shard_bytes`.
-    pub fn new(dir: &Path, source: VideoSource, split: Split, split_by: SplitBy, max_shard_bytes: u64) -> Result<Self> {
+    /// Begins a video of the dataset in `dir`: in `split` as a whole, or (`None`) with samples in several. A shard is
+    /// closed before it would exceed `max_shard_bytes`.
+    pub fn new(
+        dir: &Path,
+        source: VideoSource,
+        split: Option<Split>,
+        split_by: SplitBy,
+        max_shard_bytes: u64,
+    ) -> Result<Self> {
         let VideoSource { name, file, content, made_from, ledger, bones, failure } = source;
         let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
         ensure!(
             !name.is_empty() && name.len() <= 64 && name.chars().all(plain),
             "{name:?} is no name of a video in a dataset: expected 1 to 64 of a-z, 0-9, - and _"
         );
-        let shards = ShardWriter::new(dir, &name, split, max_shard_bytes);
         let part = VideoEntry {
             schema: crate::dataset::SCHEMA,
             name,
             file,
             content,
             made_from,
-            split: Some(split),
+            split,
             split_by,
+            blocks: Vec::new(),
             ledger,
             failure,
             bones,
@@ -97,36 +110,54 @@ impl EntryWriter {
             padded_sound_secs: 0.0,
             moments: JointMoments::default(),
         };
-        Ok(Self { dir: dir.to_owned(), part, shards })
+        Ok(Self { dir: dir.to_owned(), part, max_shard_bytes, shards: BTreeMap::new() })
+    }
+
+    /// Names the blocks of time that the samples are cut from.
+    pub fn with_blocks(mut self, blocks: Vec<TimeBlock>) -> Self {
+        self.part.blocks = blocks;
+        self
     }
 
     /// Adds an interval; shards keep the order of the calls. `padded_secs` of its sound are appended silence.
     pub fn push(&mut self, sample: &Sample, padded_secs: f64) -> Result<()> {
+        self.push_to(self.part.split.unwrap_or(Split::Train), sample, padded_secs)
+    }
+
+    /// Adds an interval to a split, where the video is in several.
+    pub fn push_to(&mut self, split: Split, sample: &Sample, padded_secs: f64) -> Result<()> {
         self.part.padded_sound_secs += padded_secs;
-        self.push_members(sample, &sample.members()?)
+        self.push_members(split, sample, &sample.members()?)
     }
 
     /// Adds an interval of another dataset with its JSON unchanged.
-    pub fn push_as_it_was(&mut self, sample: &Sample, json: Vec<u8>) -> Result<()> {
+    pub fn push_as_it_was(&mut self, split: Split, sample: &Sample, json: Vec<u8>) -> Result<()> {
         let mut members = sample.members()?;
         members[0] = json;
-        self.push_members(sample, &members)
+        self.push_members(split, sample, &members)
     }
 
-    fn push_members(&mut self, sample: &Sample, members: &[Vec<u8>; 5]) -> Result<()> {
+    fn push_members(&mut self, split: Split, sample: &Sample, members: &[Vec<u8>; 5]) -> Result<()> {
         let name = &self.part.name;
         ensure!(sample.key.starts_with(name), "the key {} does not begin with its video's name {name}", sample.key);
-        self.shards.push_members(sample, members)?;
-        self.part.moments.learn(&sample.motion);
+        let (dir, max_bytes) = (&self.dir, self.max_shard_bytes);
+        let shards = self.shards.entry(split).or_insert_with(|| ShardWriter::new(dir, name, split, max_bytes));
+        shards.push_members(sample, members)?;
+        if self.part.split.is_some() || split == Split::Train {
+            self.part.moments.learn(&sample.motion);
+        }
         Ok(())
     }
 
     /// Closes the shards and writes the video's JSON; `sound` is the result of `write_sound`, if it has sound. A video
     /// without a sample has no split.
     pub fn finish(mut self, sound: Option<String>) -> Result<VideoEntry> {
-        let (shards, samples) = self.shards.finish()?;
-        self.part.split = self.part.split.filter(|_| !samples.is_empty());
-        (self.part.shards, self.part.samples) = (shards, samples);
+        for shards in std::mem::take(&mut self.shards).into_values() {
+            let (shards, samples) = shards.finish()?;
+            self.part.shards.extend(shards);
+            self.part.samples.extend(samples);
+        }
+        self.part.split = self.part.split.filter(|_| !self.part.samples.is_empty());
         let folder = self.dir.join(FOLDER);
         fs::create_dir_all(&folder).with_context(|| format!("making the folder {}", folder.display()))?;
         self.part.sound = sound;
@@ -162,6 +193,19 @@ impl VideoEntry {
     /// Sound codes from the dataset in `dir`; empty without sound.
     pub fn codes(&self, dir: &Path) -> Result<Vec<u32>> {
         if self.sound.is_none() { Ok(Vec::new()) } else { read_sound(dir, &self.name) }
+    }
+
+    /// Split of one of its shards, that of its samples.
+    pub fn split_of(&self, shard: &ShardRef) -> Option<Split> {
+        self.samples.iter().find(|sample| sample.shard == shard.file).map(|sample| sample.split)
+    }
+
+    /// Stretches of it that belong to a split; a whole video has one that it does not outlast.
+    pub fn placed(&self) -> Vec<TimeBlock> {
+        match self.split {
+            Some(split) => vec![TimeBlock::whole(split)],
+            None => self.blocks.clone(),
+        }
     }
 
     /// Files by path in the dataset's folder, without the JSON, with their hashes.

@@ -4,8 +4,7 @@ use super::assemble::assemble;
 use super::part::{EntryWriter, VideoSource};
 use crate::dataset::info::{About, DatasetInfo};
 use crate::dataset::leakage::SoundComparison;
-use crate::dataset::split::Split;
-use crate::dataset::split::SplitBy;
+use crate::dataset::split::{Split, SplitBy, TimeBlock};
 use crate::dataset::stats::DatasetStats;
 use anyhow::Result;
 use std::path::{Path, PathBuf};
@@ -32,7 +31,13 @@ impl DatasetWriter {
 
     /// Begins a video, which `finish` of the result ends. Videos may be written in any order.
     pub fn video(&self, source: VideoSource, split: Split, split_by: SplitBy) -> Result<EntryWriter> {
-        EntryWriter::new(&self.dir, source, split, split_by, self.max_shard_bytes)
+        EntryWriter::new(&self.dir, source, Some(split), split_by, self.max_shard_bytes)
+    }
+
+    /// Begins a video with samples in several splits, cut from `blocks`.
+    pub fn video_in_blocks(&self, source: VideoSource, blocks: Vec<TimeBlock>) -> Result<EntryWriter> {
+        let writer = EntryWriter::new(&self.dir, source, None, SplitBy::Time, self.max_shard_bytes)?;
+        Ok(writer.with_blocks(blocks))
     }
 
     /// Assembles the dataset from its videos.

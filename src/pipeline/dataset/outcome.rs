@@ -2,9 +2,10 @@
 
 use super::video::LiftedVideo;
 use crate::config;
+use crate::config::SplitUnit;
 use crate::dataset::info::DatasetInfo;
 use crate::dataset::leakage::Leakage;
-use crate::dataset::split::Split;
+use crate::dataset::split::{Split, SplitRule};
 use crate::dataset::stats::DatasetStats;
 use crate::dataset::{INFO, LEAKAGE};
 use crate::stage::{Report, counted};
@@ -15,6 +16,7 @@ use std::path::Path;
 /// How the writing came out.
 pub struct DatasetOutcome<'a> {
     pub settings: &'a config::DatasetConfig,
+    pub rule: &'a SplitRule,
     pub videos: &'a [LiftedVideo],
     pub stats: &'a DatasetStats,
     pub n_failed: usize,
@@ -34,13 +36,19 @@ impl DatasetOutcome<'_> {
         };
         let n_windows: usize = self.stats.windows.strided.values().sum();
         let mut line = format!("{}; {n_windows} windows of 64 frames", Split::ALL.map(part).join(", "));
+        let SplitRule { unit, why, guard_secs } = self.rule;
+        line += &match unit {
+            SplitUnit::Time => format!("; splits by time, {guard_secs:.1} s apart ({why})"),
+            SplitUnit::Video | SplitUnit::Auto => format!("; splits by video ({why})"),
+        };
         if self.n_taken_over > 0 {
             line += &format!("; {} taken over as they were", counted(self.n_taken_over, "video"));
         }
         warnings.iter().for_each(|warning| line += &format!("; warning: {warning}"));
         let secs: BTreeMap<_, _> = info.splits.iter().map(|(name, split)| (name, split.secs)).collect();
         let DatasetStats { windows, footage, .. } = self.stats;
-        let facts = serde_json::json!({ "secs": secs, "windows": windows, "footage": footage, "warnings": warnings });
+        let facts = serde_json::json!({ "secs": secs, "windows": windows, "footage": footage, "warnings": warnings,
+            "split_rule": self.rule });
         Ok(Report { line, facts: facts.as_object().cloned().unwrap_or_default() })
     }
 
@@ -61,11 +69,17 @@ impl DatasetOutcome<'_> {
                 _ => others.next(),
             };
             warnings.push(match file {
+                Some(_) | None if self.rule.unit == SplitUnit::Time => {
+                    format!("no sample for {name}: too little is kept to be divided, so add footage")
+                }
                 Some(video) => format!(
-                    "no video for {name} (a video's content chooses its split): add under [[speaker]] the line  {name} = [{:?}]",
+                    "no video for {name}: add videos, or under [[speaker]] the line  {name} = [{:?}], or divide all anew \
+                     by  split_by = \"time\"  under [dataset]",
                     video.file
                 ),
-                None => format!("no video for {name}: a video is in one split as a whole, so add more videos"),
+                None => format!(
+                    "no video for {name}: add videos, or divide all anew by  split_by = \"time\"  under [dataset]"
+                ),
             });
         }
         for leak in &leakage.leaks {

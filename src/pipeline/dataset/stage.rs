@@ -1,26 +1,27 @@
 //! The stage: all videos of a speaker, as `extract`, `pose2d`, `segment` and `lift` left them, become one dataset.
 //! What the dataset that was there has of a video already is taken over as it is, so that a new video costs itself alone.
 
+use super::division;
+use super::division::Division;
 use super::outcome::DatasetOutcome;
+use super::run::DatasetRun;
 use super::video::{FILES, LiftedVideo};
 use crate::config;
 use crate::config::Settings;
 use crate::config::videos::Videos;
 use crate::dataset::info::{About, ModelUsed};
-use crate::dataset::leakage::SoundComparison;
-use crate::dataset::shared_sound;
-use crate::dataset::split::SplitBy;
-use crate::dataset::split::{Assignment, Split, Unassigned, assign};
+use crate::dataset::split::{Assignment, Split, SplitBy};
 use crate::dataset::write::part;
-use crate::dataset::write::part::{VideoEntry, VideoSource};
+use crate::dataset::write::part::VideoSource;
 use crate::dataset::write::writer::DatasetWriter;
 use crate::formats::media_json::MediaInfo;
+use crate::stage::artifacts;
 use crate::stage::artifacts::{Artifact, StageName, dir, speaker_dir};
-use crate::stage::ledger::{Ledger, Refused, longest_first};
+use crate::stage::ledger::{Ledger, longest_first};
 use crate::stage::progress::Progress;
 use crate::stage::record::Failure;
-use crate::stage::refusal::{FrameRefusal, Refusal};
 use crate::stage::{Input, Report, Stage, Unit, counted};
+use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -35,11 +36,17 @@ pub struct DatasetStage {
     /// All videos of all speakers, with the splits that the configuration names.
     all: Vec<Videos>,
     models: Vec<ModelUsed>,
+    /// Frames between two splits of a video that is divided by time.
+    guard_frames: usize,
+    fps: FrameRate,
+    /// Frames of the shortest sample of such a video.
+    window_frames: usize,
 }
 
 impl DatasetStage {
-    /// `ready` are the units of videos that came through the stages before, of one speaker or of several.
-    pub fn new(settings: &Settings, ready: &[Unit]) -> Self {
+    /// `ready` are the units of videos that came through the stages before, of one speaker or of several; the keypoints
+    /// within `reach_secs` of a frame had a say in its joints.
+    pub fn new(settings: &Settings, ready: &[Unit], reach_secs: f64) -> Self {
         Self {
             settings: settings.dataset.clone(),
             speakers: settings.speaker.clone(),
@@ -47,6 +54,9 @@ impl DatasetStage {
             ready: ready.to_vec(),
             all: Vec::new(),
             models: Vec::new(),
+            guard_frames: division::guard_frames(settings, reach_secs),
+            fps: settings.extract.rate(),
+            window_frames: division::window_frames(settings),
         }
     }
 
@@ -79,6 +89,16 @@ impl DatasetStage {
         failed.into_iter().map(|unit| failure(&self.work, unit)).collect()
     }
 
+    /// How the speaker's videos are divided: as they are on record, else as the configuration asks.
+    fn division(&self, speaker: &Unit) -> Result<Division> {
+        let videos = self.videos(speaker);
+        let n_videos = videos.map_or_else(|| self.ready(speaker).len(), |videos| videos.units.len());
+        let are_named = videos.is_some_and(|videos| !videos.splits.is_empty());
+        let before = division::on_record(&self.work, speaker)?;
+        let record = division::chosen(self.settings.split_by, before, n_videos, are_named);
+        Ok(Division { record, guard_frames: self.guard_frames, least_frames: self.window_frames })
+    }
+
     fn about(&self, speaker: &Unit, first: &LiftedVideo) -> About {
         let said = self.speakers.iter().find(|said| said.name == speaker.speaker).cloned().unwrap_or_default();
         let config::SpeakerConfig { licence, consent, source, .. } = said;
@@ -109,7 +129,7 @@ impl Stage for DatasetStage {
     }
 
     fn version(&self) -> u32 {
-        2
+        3
     }
 
     fn settings(&self, unit: &Unit) -> serde_json::Value {
@@ -118,7 +138,11 @@ impl Stage for DatasetStage {
         // What became of the videos that are not ready stands in the ledger.
         let others = self.failures(unit, &self.ready(unit));
         let others: BTreeMap<String, Option<String>> = others.into_iter().map(|s| (s.name, s.failure)).collect();
+        // A damaged record is an error of the run.
+        let rule = self.division(unit).ok().map(|division| division.rule(self.fps));
+        let guard_secs = rule.as_ref().map_or(0.0, |rule| rule.guard_secs);
         serde_json::json!({
+            "unit": rule.map(|rule| rule.unit), "guard_secs": guard_secs,
             "dataset": self.settings, "models": self.models, "tool": env!("CARGO_PKG_VERSION"),
             "speaker": { "licence": said.licence, "consent": said.consent, "source": said.source },
             "splits": videos.map(|videos| &videos.splits), "others": others,
@@ -148,7 +172,8 @@ impl Stage for DatasetStage {
         check(unit, &self.work, &videos)?;
 
         let old = dir(&self.work, StageName::Dataset, unit);
-        let mut run = DatasetRun { stage: self, out, old: &old, before: parts_of(&old), n_taken_over: 0, progress };
+        let mut division = self.division(unit)?;
+        let mut run = DatasetRun::new(&self.settings, out, &old, progress);
         let (mut kept, mut left_out): (Vec<&LiftedVideo>, Vec<(&LiftedVideo, VideoSource)>) = (Vec::new(), Vec::new());
         for video in &videos {
             match kept.iter().find(|first| first.content == video.content) {
@@ -158,15 +183,21 @@ impl Stage for DatasetStage {
         }
         let sounds = run.sounds(&kept)?;
         let compared = run.compare(&kept, &sounds)?;
-        let assigned = run.assign(&kept, &compared);
         let Some(first) = kept.first() else { anyhow::bail!("no video of {unit} is ready") };
-        let writer = DatasetWriter::new(out, self.about(unit, first), u64::from(self.settings.max_mb) << 20)
-            .with_compared(compared);
+        let fps = first.intervals.fps;
+        let named = self.all.iter().flat_map(|videos| &videos.splits).map(|(video, split)| (video.as_str(), *split));
+        let assigned = division.assign(&kept, &named.collect(), &compared.shared, &self.settings);
+        // From here on the videos stay where they are, also when the run ends before the dataset is in its place.
+        division.record.write(&artifacts::splits(&self.work, &unit.speaker))?;
+        let rule = division.rule(fps);
+        let about = About { split_rule: Some(rule.clone()), ..self.about(unit, first) };
+        let writer = DatasetWriter::new(out, about, u64::from(self.settings.max_mb) << 20).with_compared(compared);
         let task = progress.begin(&format!("dataset {unit}"), kept.len() as u64);
         for (video, assignment) in kept.iter().zip(assigned) {
             task.detail(&video.name);
             match assignment {
                 Assignment::In(split, by) => run.write(&writer, video, split, by, &sounds)?,
+                Assignment::Blocks(blocks) => run.write_blocks(&writer, video, blocks, &division, &sounds)?,
                 Assignment::Nowhere(with) => {
                     part::remove_sound(out, &video.name)?;
                     let secs = with.first().map_or(0.0, |shared| shared.secs);
@@ -179,12 +210,13 @@ impl Stage for DatasetStage {
         let n_left_out = left_out.len();
         let empty = left_out.into_iter().map(|(_, source)| source).chain(failures.clone());
         for source in empty {
-            writer.video(source, Split::Train, SplitBy::Content)?.finish(None)?;
+            writer.video(source, Split::Train, SplitBy::Share)?.finish(None)?;
         }
         let n_taken_over = run.n_taken_over;
         let (_, stats) = writer.finish()?;
         let outcome = DatasetOutcome {
             settings: &self.settings,
+            rule: &rule,
             videos: &videos,
             stats: &stats,
             n_failed: failures.len(),
@@ -226,132 +258,4 @@ fn check(unit: &Unit, work: &Path, videos: &[LiftedVideo]) -> Result<()> {
         speaker_dir(work, StageName::Lift, &unit.speaker).display()
     );
     Err(NothingKept(message).into())
-}
-
-/// The videos of the dataset that is there; one with a damaged file is as good as not there.
-fn parts_of(dir: &Path) -> BTreeMap<String, VideoEntry> {
-    let stated = part::stated_hashes(dir);
-    let parts = part::names(dir).unwrap_or_default().into_iter();
-    let parts = parts.filter_map(|name| VideoEntry::read(&VideoEntry::path(dir, &name)).ok().map(|part| (name, part)));
-    parts.filter(|(_, part)| part.is_sound(dir, &stated)).collect()
-}
-
-/// Hashes of the codes of the videos that have sound.
-type Sounds = BTreeMap<String, String>;
-
-/// What is at hand while a dataset is written.
-struct DatasetRun<'a> {
-    stage: &'a DatasetStage,
-    out: &'a Path,
-    /// The dataset that is there, and its videos.
-    old: &'a Path,
-    before: BTreeMap<String, VideoEntry>,
-    n_taken_over: usize,
-    progress: &'a dyn Progress,
-}
-
-impl DatasetRun<'_> {
-    /// Writes the codes of each video's sound, the old dataset's where the content is the same; their hashes.
-    fn sounds(&self, videos: &[&LiftedVideo]) -> Result<Sounds> {
-        let task = self.progress.begin("sound", videos.len() as u64);
-        let mut hashes = Sounds::new();
-        for video in videos {
-            let before = self.before.get(&video.name).filter(|part| part.content == video.content);
-            let codes = match before.map(|part| part.codes(self.old)) {
-                Some(Ok(codes)) if !codes.is_empty() => Some(codes),
-                _ => video.sound_codes()?,
-            };
-            if let Some(codes) = codes {
-                hashes.insert(video.name.clone(), part::write_sound(self.out, &video.name, &codes)?);
-            }
-            task.advance(1);
-        }
-        Ok(hashes)
-    }
-
-    fn compare(&self, videos: &[&LiftedVideo], sounds: &Sounds) -> Result<SoundComparison> {
-        let duplicate_secs = self.stage.settings.duplicate_secs;
-        if duplicate_secs <= 0.0 {
-            return Ok(SoundComparison::default());
-        }
-        let audible = videos.iter().filter(|v| !v.intervals.intervals.is_empty() && sounds.contains_key(&v.name));
-        let names: Vec<String> = audible.map(|video| video.name.clone()).collect();
-        let shared = shared_sound::find(&names, |n| part::read_sound(self.out, &names[n]), duplicate_secs)?;
-        Ok(SoundComparison { duplicate_secs, shared })
-    }
-
-    fn assign(&self, videos: &[&LiftedVideo], compared: &SoundComparison) -> Vec<Assignment> {
-        let named: BTreeMap<&str, Split> = self
-            .stage
-            .all
-            .iter()
-            .flat_map(|videos| videos.splits.iter().map(|(video, split)| (video.as_str(), *split)))
-            .collect();
-        let waiting = videos.iter().map(|video| Unassigned {
-            name: &video.name,
-            content: &video.content,
-            named: named.get(video.unit.video.as_str()).copied(),
-            before: self.before.get(&video.name).filter(|part| part.split.is_some()).map(|part| &part.split_by),
-        });
-        let waiting: Vec<Unassigned> = waiting.collect();
-        assign(&waiting, &compared.shared, self.stage.settings.validation, self.stage.settings.test)
-    }
-
-    /// Writes a video, or takes it over from the old dataset.
-    fn write(
-        &mut self,
-        writer: &DatasetWriter,
-        video: &LiftedVideo,
-        split: Split,
-        by: SplitBy,
-        sounds: &Sounds,
-    ) -> Result<()> {
-        let made_from = serde_json::json!([
-            crate::dataset::SCHEMA,
-            video.file,
-            video.files_hash,
-            split,
-            by,
-            self.stage.settings.max_mb
-        ]);
-        let made_from = blake3::hash(made_from.to_string().as_bytes()).to_hex().to_string();
-        let same = self.before.get(&video.name).filter(|part| part.made_from == made_from);
-        if let Some(part) = same {
-            self.n_taken_over += 1;
-            return part.take_over(self.old, self.out);
-        }
-        let source = VideoSource {
-            name: video.name.clone(),
-            file: video.file.clone(),
-            content: video.content.clone(),
-            made_from,
-            ledger: video.ledger.clone(),
-            bones: video.bones.clone(),
-            failure: None,
-        };
-        let mut part = writer.video(source, split, by)?;
-        if !video.intervals.intervals.is_empty() {
-            let mut samples = video.samples()?;
-            while let Some(cut) = samples.next_sample()? {
-                part.push(&cut.sample, cut.padded_secs)?;
-            }
-        }
-        part.finish(sounds.get(&video.name).cloned())?;
-        Ok(())
-    }
-
-    /// A video that is left out, since what it shows is there already: what was kept of it is refused.
-    fn duplicate(&self, video: &LiftedVideo, of: &str, secs: f64) -> VideoSource {
-        let threshold = self.stage.settings.duplicate_secs;
-        let mut ledger = video.ledger.clone();
-        let why = FrameRefusal::new(Refusal::Duplicate, secs, threshold);
-        let refused = ledger.kept.drain(..).map(|kept| {
-            Refused::with_message(kept.start_secs, kept.end_secs, why, format!("the same {secs:.1} s are in {of}"))
-        });
-        let refused: Vec<Refused> = refused.collect();
-        ledger.refused.extend(refused);
-        ledger.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
-        let (name, file, content) = (video.unit.video.clone(), video.file.clone(), video.content.clone());
-        VideoSource { name, file, content, ledger, ..VideoSource::default() }
-    }
 }

@@ -129,8 +129,11 @@ impl LiftedVideo {
         Ok(Some(fingerprinter.finish()))
     }
 
-    /// Opens the large files, to cut samples.
-    pub fn samples(&self) -> Result<LiftedSamples<'_>> {
+    /// Opens the large files, to cut samples of `intervals`, which lie within the video's own.
+    pub fn samples<'a>(&'a self, intervals: &'a [Interval]) -> Result<Option<LiftedSamples<'a>>> {
+        if intervals.is_empty() {
+            return Ok(None);
+        }
         let keypoints = keypoints_npz::read(&self.keypoints)?;
         let motion = joints_npz::read(&self.joints)?;
         let n_frames = self.intervals.n_frames;
@@ -145,7 +148,7 @@ impl LiftedVideo {
             "{} is not 16-bit mono at {SAMPLE_RATE} Hz: run the extract stage again",
             self.sound.display()
         );
-        Ok(LiftedSamples { video: self, keypoints, motion, sound, next: 0 })
+        Ok(Some(LiftedSamples { video: self, keypoints, motion, sound, waiting: intervals.iter() }))
     }
 }
 
@@ -155,15 +158,13 @@ pub struct LiftedSamples<'a> {
     keypoints: Keypoints,
     motion: Motion,
     sound: hound::WavReader<BufReader<File>>,
-    next: usize,
+    waiting: std::slice::Iter<'a, Interval>,
 }
 
 impl LiftedSamples<'_> {
     /// The next interval's sample; `None` after the last.
     pub fn next_sample(&mut self) -> Result<Option<CutSample>> {
-        let Some(&interval) = self.video.intervals.intervals.get(self.next) else { return Ok(None) };
-        self.next += 1;
-        self.cut(interval).map(Some)
+        self.waiting.next().map(|interval| self.cut(*interval)).transpose()
     }
 
     fn cut(&mut self, interval: Interval) -> Result<CutSample> {

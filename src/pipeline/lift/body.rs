@@ -17,9 +17,9 @@ use ndarray::s;
 /// Frames a second that the lifter was trained on.
 pub const TRAINED_FPS: f64 = 15.0;
 /// Frames at that rate, before and after, that a body's apparent size is taken over.
-const SIZE_FRAMES: f64 = 15.0;
+pub const SIZE_FRAMES: f64 = 15.0;
 /// Frames at that rate, before and after, that a stray point is told by.
-const STRAY_FRAMES: f64 = 2.0;
+pub const STRAY_FRAMES: f64 = 2.0;
 /// Frames at that rate that are lifted in one go, so that no more poses are held at a time.
 const GO: f64 = 4096.0;
 /// Frames at that rate, before and after, that the lifter may look at beyond its window.

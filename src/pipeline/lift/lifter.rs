@@ -1,6 +1,6 @@
 //! The lifter: intervals of keypoints to motion, each interval by itself, all with the same bone lengths.
 
-use super::body::TRAINED_FPS;
+use super::body::{SIZE_FRAMES, STRAY_FRAMES, TRAINED_FPS};
 use super::camera::CameraTilt;
 use super::interval_view::IntervalView;
 use super::{body, hands, lengths, weights};
@@ -19,6 +19,19 @@ use ndarray::{Array2, Array3, s};
 
 /// A gap up to this long is filled; a longer one stays open. `config` lets `[segment]` keep no longer ones.
 pub(crate) const MAX_GAP_SECS: f64 = 1.0;
+
+/// Seconds before and after a frame whose keypoints have a say in its joints: strays are told by the frames around, gaps
+/// are filled from both sides, the network has a window, the size of the body is a median, and the result is smoothed.
+/// Beyond that the frames of a video share their bone lengths, the way the camera was held, and the choice between two
+/// mirrored shapes of a hand.
+pub fn reach_secs(settings: &config::LiftConfig) -> f64 {
+    // Weights that cannot be read are an error of the stage itself.
+    let window = weights::body(&settings.body_weights)
+        .map_or(weights::MOST_FRAMES, |body| body.net().config().receptive_field());
+    let smooth = (3.0 * settings.smooth_arms.max(settings.smooth_hands)).ceil();
+    let frames = STRAY_FRAMES + (window / 2) as f64 + SIZE_FRAMES + smooth;
+    MAX_GAP_SECS + frames / TRAINED_FPS
+}
 
 /// Turns 2D keypoints into 3D motion.
 pub struct Lifter {
@@ -165,5 +178,57 @@ impl Lifted {
             extra: self.extra.slice_mut(s![frames.clone(), .., ..]),
             mask: self.motion.mask.slice_mut(s![frames, ..]),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::pose2d::coco;
+    use crate::types::time::FrameRate;
+
+    /// A body that sways; from frame `change` on it moves otherwise and is larger.
+    fn keypoints(n_frames: usize, change: usize) -> Keypoints {
+        let places = [
+            (coco::NOSE, 320.0, 100.0),
+            (coco::L_SHOULDER, 380.0, 200.0),
+            (coco::R_SHOULDER, 260.0, 200.0),
+            (coco::L_ELBOW, 400.0, 300.0),
+            (coco::R_ELBOW, 240.0, 300.0),
+            (coco::L_WRIST, 360.0, 340.0),
+            (coco::R_WRIST, 280.0, 340.0),
+        ];
+        let at = |t: usize, x: f32, y: f32| {
+            let (size, pace) = if t < change { (1.0, 0.3) } else { (1.6, 0.9) };
+            [320.0 + size * (x - 320.0) + 9.0 * (pace * t as f32).sin(), size * y + 5.0 * (pace * t as f32).cos(), 0.9]
+        };
+        let mut body = Array3::zeros((n_frames, 17, 3));
+        for t in 0..n_frames {
+            for (joint, x, y) in places {
+                body.slice_mut(s![t, joint, ..]).assign(&ndarray::arr1(&at(t, x, y)));
+            }
+        }
+        let hand = |x: f32| {
+            Array3::from_shape_fn((n_frames, N_HAND, 3), |(t, point, k)| {
+                at(t, x + (point % 4) as f32 * 7.0, 340.0 + point as f32 * 4.0)[k]
+            })
+        };
+        let fps = FrameRate::new(15, 1);
+        Keypoints { fps, image_size: [640, 480], body, left_hand: hand(360.0), right_hand: hand(280.0) }
+    }
+
+    #[test]
+    fn keypoints_beyond_the_reach_have_no_say() {
+        let (n_frames, change) = (240, 160);
+        let settings = config::LiftConfig::default();
+        let lifter = Lifter::new(&settings).unwrap();
+        let whole = [Interval { start: 0, end: n_frames }];
+        let raw = |change| lifter.raw(&keypoints(n_frames, change), &whole).unwrap().motion;
+        let (plain, changed) = (raw(n_frames), raw(change));
+        let last = change - (reach_secs(&settings) * 15.0).ceil() as usize;
+        assert!(last > 80, "a reach of {} s", reach_secs(&settings));
+        let until = |motion: &Motion, end: usize| motion.joints.slice(s![..end, .., ..]).to_owned();
+        assert_eq!(until(&plain, last), until(&changed, last));
+        assert_ne!(until(&plain, change), until(&changed, change), "nothing reaches back");
     }
 }

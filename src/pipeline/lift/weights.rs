@@ -16,7 +16,7 @@ pub const HANDS: &[u8] = include_bytes!("../../../models/hand_lifter.safetensors
 /// Widest layer that is believed; the published ones have 1024 channels.
 const MOST_WIDTH: usize = 2048;
 /// Longest window that is believed, in frames; the published ones have up to 243.
-const MOST_FRAMES: usize = 729;
+pub const MOST_FRAMES: usize = 729;
 
 /// The body lifter of a file, or the built-in one where `path` is empty.
 pub fn body(path: &Path) -> Result<BodyLifter> {

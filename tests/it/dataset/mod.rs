@@ -7,3 +7,5 @@ pub mod import;
 pub mod import_readers;
 pub mod shard;
 pub mod shared_sound;
+pub mod splits;
+pub mod splits_by_time;

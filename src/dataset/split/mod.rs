@@ -1,0 +1,11 @@
+//! Division of a speaker's videos into splits: `fill` (toward which share), `blocks` (a video in blocks of time),
+//! `assign` (all videos), `record` (what stays when others are added, and why).
+
+pub mod assign;
+pub mod blocks;
+pub mod fill;
+pub mod record;
+
+pub use crate::types::split::{Split, TimeBlock};
+pub use assign::{Assignment, SplitPlan, Unassigned, assign};
+pub use record::{RecordedSplit, SplitBy, SplitRecord, SplitRule};

@@ -1,0 +1,198 @@
+//! Which video, or which block of a video's time, is in which split: what is on record, what the configuration asks, and
+//! the gap between two splits of a video. A window of one split, with all frames that its numbers were made from, ends
+//! before the first frame of a sample of another.
+
+use super::video::LiftedVideo;
+use crate::config;
+use crate::config::{Settings, SplitUnit};
+use crate::dataset::info::DatasetInfo;
+use crate::dataset::shared_sound::SharedSound;
+use crate::dataset::split::{
+    Assignment, RecordedSplit, Split, SplitBy, SplitPlan, SplitRecord, SplitRule, TimeBlock, Unassigned, assign, blocks,
+};
+use crate::dataset::{INFO, WINDOW_FRAMES};
+use crate::stage::artifacts::{self, StageName, dir};
+use crate::stage::ledger::{Kept, Ledger, Refused};
+use crate::stage::refusal::{FrameRefusal, Refusal};
+use crate::stage::{Unit, counted};
+use crate::types::interval::{Interval, Intervals};
+use crate::types::time::FrameRate;
+use anyhow::{Result, ensure};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Videos from which whole videos are put into splits.
+const MANY_VIDEOS: usize = 8;
+/// Windows that the shortest block has room for.
+const LEAST_WINDOWS: usize = 2;
+
+/// Division of a speaker's videos.
+pub struct Division {
+    pub record: SplitRecord,
+    /// Frames between two splits of a video.
+    pub guard_frames: usize,
+    /// Frames of the shortest sample that is cut from a block.
+    pub least_frames: usize,
+}
+
+/// Samples of a video in blocks, and the account of its seconds.
+pub struct DividedVideo {
+    pub pieces: Vec<(Split, Interval)>,
+    pub ledger: Ledger,
+}
+
+/// Frames of a training window, at least those of the published one.
+pub fn window_frames(settings: &Settings) -> usize {
+    settings.gan.window_frames.max(WINDOW_FRAMES)
+}
+
+/// Frames between two splits of a video: a training window, and the `reach_secs` beside a sample that its joints were
+/// made from. Features of sound look less far, and only at the sample's own sound.
+pub fn guard_frames(settings: &Settings, reach_secs: f64) -> usize {
+    let reach = reach_secs * settings.extract.rate().per_sec();
+    window_frames(settings) + reach.ceil() as usize + 1
+}
+
+/// Splits on record: of the work folder, else of the dataset that is there.
+///
+/// # Errors
+/// A damaged record.
+pub fn on_record(work: &Path, speaker: &Unit) -> Result<Option<SplitRecord>> {
+    let record = SplitRecord::read(&artifacts::splits(work, &speaker.speaker))?;
+    Ok(record.or_else(|| of_dataset(&dir(work, StageName::Dataset, speaker))))
+}
+
+/// Splits of the dataset in `dir`, if it says any.
+fn of_dataset(dir: &Path) -> Option<SplitRecord> {
+    let info: DatasetInfo = serde_json::from_slice(&std::fs::read(dir.join(INFO)).ok()?).ok()?;
+    let (unit, why) = match info.split_rule {
+        Some(rule) => (rule.unit, rule.why),
+        None => (SplitUnit::Video, "as it was before".to_owned()),
+    };
+    let mut record = SplitRecord::new(unit, why);
+    for video in info.videos.into_iter().filter(|video| video.split.is_some() || !video.blocks.is_empty()) {
+        let (name, split, by, blocks) = (video.name, video.split, video.split_by, video.blocks);
+        record.videos.insert(video.content, RecordedSplit { name, split, by, blocks });
+    }
+    Some(record).filter(|record| !record.videos.is_empty())
+}
+
+/// Record to go on from: the one there, unless the configuration now asks for another unit; else a new one.
+pub fn chosen(asked: SplitUnit, before: Option<SplitRecord>, n_videos: usize, are_named: bool) -> SplitRecord {
+    let before = before.filter(|before| !before.videos.is_empty());
+    match (asked, before) {
+        (SplitUnit::Auto, Some(before)) => before,
+        (SplitUnit::Auto, None) if are_named => {
+            SplitRecord::new(SplitUnit::Video, "the configuration names the split of videos".to_owned())
+        }
+        (SplitUnit::Auto, None) => {
+            let few = n_videos < MANY_VIDEOS;
+            let unit = if few { SplitUnit::Time } else { SplitUnit::Video };
+            let fewer = if few { "fewer than" } else { "at least" };
+            let why = format!("chosen for {}, {fewer} {MANY_VIDEOS}", counted(n_videos, "video"));
+            SplitRecord::new(unit, why)
+        }
+        (unit, Some(before)) if before.unit == unit => before,
+        (unit, _) => SplitRecord::new(unit, "the configuration says so".to_owned()),
+    }
+}
+
+impl Division {
+    /// What the splits are made of, and why.
+    pub fn rule(&self, fps: FrameRate) -> SplitRule {
+        let by_time = self.record.unit == SplitUnit::Time;
+        let guard_secs = if by_time { fps.secs(self.guard_frames) } else { 0.0 };
+        SplitRule { unit: self.record.unit, why: self.record.why.clone(), guard_secs }
+    }
+
+    /// Assigns the videos, in their order, and puts them on record. `named`: splits that the configuration names, by the
+    /// video's name in the work folder.
+    pub fn assign(
+        &mut self,
+        videos: &[&LiftedVideo],
+        named: &BTreeMap<&str, Split>,
+        shared: &[SharedSound],
+        settings: &config::DatasetConfig,
+    ) -> Vec<Assignment> {
+        let Some(first) = videos.first() else { return Vec::new() };
+        let fps = first.intervals.fps;
+        let waiting = videos.iter().map(|video| Unassigned {
+            name: &video.name,
+            content: &video.content,
+            duration_secs: video.ledger.duration_secs,
+            kept: video.ledger.kept.iter().map(|kept| (kept.start_secs, kept.end_secs)).collect(),
+            named: named.get(video.unit.video.as_str()).copied(),
+            before: self.record.videos.get(&video.content),
+        });
+        let plan = SplitPlan {
+            unit: self.record.unit,
+            validation: settings.validation,
+            test: settings.test,
+            guard_secs: fps.secs(self.guard_frames),
+            least_secs: fps.secs(LEAST_WINDOWS * self.least_frames),
+        };
+        let assigned = assign(&waiting.collect::<Vec<_>>(), shared, &plan);
+        for (video, assignment) in videos.iter().zip(&assigned) {
+            let (split, by, blocks) = match assignment {
+                _ if video.ledger.kept.is_empty() => continue,
+                Assignment::In(split, by) => (Some(*split), by.clone(), Vec::new()),
+                Assignment::Blocks(blocks) => (None, SplitBy::Time, blocks.clone()),
+                Assignment::Nowhere(_) => continue,
+            };
+            let recorded = RecordedSplit { name: video.name.clone(), split, by, blocks };
+            self.record.videos.insert(video.content.clone(), recorded);
+        }
+        assigned
+    }
+
+    /// Cuts a video's intervals along its blocks.
+    ///
+    /// # Errors
+    /// Intervals that do not agree with the ledger.
+    pub fn divide(&self, intervals: &Intervals, ledger: &Ledger, blocks: &[TimeBlock]) -> Result<DividedVideo> {
+        let fps = intervals.fps;
+        ensure!(
+            intervals.intervals.len() == ledger.kept.len(),
+            "a video has {} intervals and {} kept stretches in its ledger: run its stage lift again",
+            intervals.intervals.len(),
+            ledger.kept.len()
+        );
+        let usable = blocks::usable(blocks, fps, intervals.n_frames, self.guard_frames);
+        let mut divided = DividedVideo { pieces: Vec::new(), ledger: Ledger { kept: Vec::new(), ..ledger.clone() } };
+        for (interval, kept) in intervals.intervals.iter().zip(&ledger.kept) {
+            let mut at = kept.start_secs;
+            for (split, block) in &usable {
+                let piece = Interval { start: interval.start.max(block.start), end: interval.end.min(block.end) };
+                if piece.n_frames() < self.least_frames.min(interval.n_frames()) {
+                    continue;
+                }
+                // The ends of an interval are those of its ledger, where a partly filled last frame counts.
+                let start_secs = if piece.start == interval.start { kept.start_secs } else { fps.secs(piece.start) };
+                let end_secs = if piece.end == interval.end { kept.end_secs } else { fps.secs(piece.end) };
+                divided.ledger.refused.extend(self.left_out(at, start_secs, blocks, fps));
+                divided.ledger.kept.push(Kept { start_secs, end_secs });
+                divided.pieces.push((*split, piece));
+                at = end_secs;
+            }
+            divided.ledger.refused.extend(self.left_out(at, kept.end_secs, blocks, fps));
+        }
+        divided.ledger.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+        Ok(divided)
+    }
+
+    /// Entry of the ledger for seconds between two samples, if there are any.
+    fn left_out(&self, start_secs: f64, end_secs: f64, blocks: &[TimeBlock], fps: FrameRate) -> Option<Refused> {
+        if end_secs <= start_secs {
+            return None;
+        }
+        let is_shared =
+            |block: &TimeBlock| block.split.is_none() && block.start_secs < end_secs && start_secs < block.end_secs;
+        if blocks.iter().any(is_shared) {
+            let why = FrameRefusal::new(Refusal::Duplicate, end_secs - start_secs, 0.0);
+            let message = "another video has the same sound in another split".to_owned();
+            return Some(Refused::with_message(start_secs, end_secs, why, message));
+        }
+        let why = FrameRefusal::new(Refusal::Guard, end_secs - start_secs, fps.secs(self.guard_frames));
+        Some(Refused::new(start_secs, end_secs, why))
+    }
+}

@@ -1,0 +1,182 @@
+//! Writing of a speaker's dataset, video by video: what the dataset that was there has of a video already is taken over.
+
+use super::division::Division;
+use super::video::LiftedVideo;
+use crate::config;
+use crate::dataset::leakage::SoundComparison;
+use crate::dataset::shared_sound;
+use crate::dataset::split::{Split, SplitBy, TimeBlock};
+use crate::dataset::write::part;
+use crate::dataset::write::part::{VideoEntry, VideoSource};
+use crate::dataset::write::writer::DatasetWriter;
+use crate::stage::ledger::{Ledger, Refused};
+use crate::stage::progress::Progress;
+use crate::stage::refusal::{FrameRefusal, Refusal};
+use crate::types::interval::Interval;
+use anyhow::Result;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Hashes of the codes of the videos that have sound.
+pub type Sounds = BTreeMap<String, String>;
+
+/// What is at hand while a dataset is written.
+pub struct DatasetRun<'a> {
+    settings: &'a config::DatasetConfig,
+    out: &'a Path,
+    /// The dataset that is there, and its videos.
+    old: &'a Path,
+    before: BTreeMap<String, VideoEntry>,
+    /// Videos that were taken over from it.
+    pub n_taken_over: usize,
+    progress: &'a dyn Progress,
+}
+
+impl<'a> DatasetRun<'a> {
+    /// Begins a dataset in the folder `out` beside the one in `old`.
+    pub fn new(settings: &'a config::DatasetConfig, out: &'a Path, old: &'a Path, progress: &'a dyn Progress) -> Self {
+        Self { settings, out, old, before: parts_of(old), n_taken_over: 0, progress }
+    }
+
+    /// Writes the codes of each video's sound, the old dataset's where the content is the same; their hashes.
+    pub fn sounds(&self, videos: &[&LiftedVideo]) -> Result<Sounds> {
+        let task = self.progress.begin("sound", videos.len() as u64);
+        let mut hashes = Sounds::new();
+        for video in videos {
+            let before = self.before.get(&video.name).filter(|part| part.content == video.content);
+            let codes = match before.map(|part| part.codes(self.old)) {
+                Some(Ok(codes)) if !codes.is_empty() => Some(codes),
+                _ => video.sound_codes()?,
+            };
+            if let Some(codes) = codes {
+                hashes.insert(video.name.clone(), part::write_sound(self.out, &video.name, &codes)?);
+            }
+            task.advance(1);
+        }
+        Ok(hashes)
+    }
+
+    pub fn compare(&self, videos: &[&LiftedVideo], sounds: &Sounds) -> Result<SoundComparison> {
+        let duplicate_secs = self.settings.duplicate_secs;
+        if duplicate_secs <= 0.0 {
+            return Ok(SoundComparison::default());
+        }
+        let audible = videos.iter().filter(|v| !v.intervals.intervals.is_empty() && sounds.contains_key(&v.name));
+        let names: Vec<String> = audible.map(|video| video.name.clone()).collect();
+        let shared = shared_sound::find(&names, |n| part::read_sound(self.out, &names[n]), duplicate_secs)?;
+        Ok(SoundComparison { duplicate_secs, shared })
+    }
+
+    /// Writes a video as a whole, or takes it over from the old dataset.
+    pub fn write(
+        &mut self,
+        writer: &DatasetWriter,
+        video: &LiftedVideo,
+        split: Split,
+        by: SplitBy,
+        sounds: &Sounds,
+    ) -> Result<()> {
+        let made_from = made_from(&serde_json::json!([
+            crate::dataset::SCHEMA,
+            video.file,
+            video.files_hash,
+            split,
+            by,
+            self.settings.max_mb
+        ]));
+        if self.is_taken_over(video, &made_from)? {
+            return Ok(());
+        }
+        let mut part = writer.video(source(video, made_from, video.ledger.clone()), split, by)?;
+        if let Some(mut samples) = video.samples(&video.intervals.intervals)? {
+            while let Some(cut) = samples.next_sample()? {
+                part.push(&cut.sample, cut.padded_secs)?;
+            }
+        }
+        part.finish(sounds.get(&video.name).cloned())?;
+        Ok(())
+    }
+
+    /// Writes a video in blocks of time, or takes it over from the old dataset.
+    pub fn write_blocks(
+        &mut self,
+        writer: &DatasetWriter,
+        video: &LiftedVideo,
+        blocks: Vec<TimeBlock>,
+        division: &Division,
+        sounds: &Sounds,
+    ) -> Result<()> {
+        let made_from = made_from(&serde_json::json!([
+            crate::dataset::SCHEMA,
+            video.file,
+            video.files_hash,
+            blocks,
+            [division.guard_frames, division.least_frames],
+            self.settings.max_mb
+        ]));
+        if self.is_taken_over(video, &made_from)? {
+            return Ok(());
+        }
+        let divided = division.divide(&video.intervals, &video.ledger, &blocks)?;
+        let mut part = writer.video_in_blocks(source(video, made_from, divided.ledger), blocks)?;
+        let intervals: Vec<Interval> = divided.pieces.iter().map(|(_, interval)| *interval).collect();
+        if let Some(mut samples) = video.samples(&intervals)? {
+            for (split, _) in divided.pieces {
+                let Some(cut) = samples.next_sample()? else { break };
+                part.push_to(split, &cut.sample, cut.padded_secs)?;
+            }
+        }
+        part.finish(sounds.get(&video.name).cloned())?;
+        Ok(())
+    }
+
+    /// Takes a video over from the old dataset, if it was made from the same there.
+    fn is_taken_over(&mut self, video: &LiftedVideo, made_from: &str) -> Result<bool> {
+        let Some(part) = self.before.get(&video.name).filter(|part| part.made_from == made_from) else {
+            return Ok(false);
+        };
+        self.n_taken_over += 1;
+        part.take_over(self.old, self.out)?;
+        Ok(true)
+    }
+
+    /// A video that is left out, since what it shows is there already: what was kept of it is refused.
+    pub fn duplicate(&self, video: &LiftedVideo, of: &str, secs: f64) -> VideoSource {
+        let threshold = self.settings.duplicate_secs;
+        let mut ledger = video.ledger.clone();
+        let why = FrameRefusal::new(Refusal::Duplicate, secs, threshold);
+        let refused = ledger.kept.drain(..).map(|kept| {
+            Refused::with_message(kept.start_secs, kept.end_secs, why, format!("the same {secs:.1} s are in {of}"))
+        });
+        let refused: Vec<Refused> = refused.collect();
+        ledger.refused.extend(refused);
+        ledger.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+        let (name, file, content) = (video.unit.video.clone(), video.file.clone(), video.content.clone());
+        VideoSource { name, file, content, ledger, ..VideoSource::default() }
+    }
+}
+
+/// Hash of what a video's shards are made from.
+fn made_from(inputs: &serde_json::Value) -> String {
+    blake3::hash(inputs.to_string().as_bytes()).to_hex().to_string()
+}
+
+fn source(video: &LiftedVideo, made_from: String, ledger: Ledger) -> VideoSource {
+    VideoSource {
+        name: video.name.clone(),
+        file: video.file.clone(),
+        content: video.content.clone(),
+        made_from,
+        ledger,
+        bones: video.bones.clone(),
+        failure: None,
+    }
+}
+
+/// The videos of the dataset that is there; one with a damaged file is as good as not there.
+fn parts_of(dir: &Path) -> BTreeMap<String, VideoEntry> {
+    let stated = part::stated_hashes(dir);
+    let parts = part::names(dir).unwrap_or_default().into_iter();
+    let parts = parts.filter_map(|name| VideoEntry::read(&VideoEntry::path(dir, &name)).ok().map(|part| (name, part)));
+    parts.filter(|(_, part)| part.is_sound(dir, &stated)).collect()
+}
