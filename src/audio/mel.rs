@@ -4,6 +4,7 @@
 use crate::types::sound::SAMPLE_RATE;
 use ndarray::Array2;
 use realfft::RealFftPlanner;
+use std::ops::RangeInclusive;
 use std::sync::LazyLock;
 
 /// Samples of a window, between the starts of two windows, and of the Fourier transform: 25 ms, 10 ms, 32 ms.
@@ -60,16 +61,26 @@ fn mel_of(hz: f64) -> f64 {
     1127.0 * (1.0 + hz / 700.0).ln()
 }
 
-static BANDS: LazyLock<Vec<MelBand>> = LazyLock::new(bands);
+static BANDS: LazyLock<Vec<Band>> = LazyLock::new(bands);
 
 /// The bins of one band that have a weight.
-struct MelBand {
-    first: usize,
-    weights: Vec<f32>,
+pub struct Band {
+    pub first: usize,
+    pub weights: Vec<f32>,
+}
+
+impl Band {
+    /// Of those of `bins` whose `weight` is above 0.
+    pub fn new(bins: RangeInclusive<usize>, weight: impl Fn(usize) -> f64) -> Self {
+        let inside: Vec<(usize, f64)> =
+            bins.map(|bin| (bin, weight(bin))).filter(|(_, weight)| *weight > 0.0).collect();
+        let first = inside.first().map_or(0, |(bin, _)| *bin);
+        Self { first, weights: inside.into_iter().map(|(_, weight)| weight as f32).collect() }
+    }
 }
 
 /// Triangles with corners equally spaced in mel; the zero bin belongs to none.
-fn bands() -> Vec<MelBand> {
+fn bands() -> Vec<Band> {
     let (low, high) = (mel_of(LOWEST_HZ), mel_of(HIGHEST_HZ));
     let corner = |i: usize| low + (high - low) * i as f64 / (N_MELS + 1) as f64;
     let weight = |band: usize, bin: usize| {
@@ -77,12 +88,7 @@ fn bands() -> Vec<MelBand> {
         let (left, middle, right) = (corner(band), corner(band + 1), corner(band + 2));
         ((at - left) / (middle - left)).min((right - at) / (right - middle)).max(0.0)
     };
-    let band = |band: usize| {
-        let inside: Vec<usize> = (1..=FFT / 2).filter(|bin| weight(band, *bin) > 0.0).collect();
-        let first = inside.first().copied().unwrap_or(0);
-        MelBand { first, weights: inside.iter().map(|bin| weight(band, *bin) as f32).collect() }
-    };
-    (0..N_MELS).map(band).collect()
+    (0..N_MELS).map(|band| Band::new(1..=FFT / 2, |bin| weight(band, bin))).collect()
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! Decibels are cut 80 below the loudest of the whole sound, so a sound is heard twice: `Loudest`, then `Onsets`. Both
 //! take it in pieces; only the strength of each hop is kept, 4 bytes every 32 ms.
 
+use super::mel::Band;
 use crate::types::sound::SAMPLE_RATE;
 use realfft::{RealFftPlanner, RealToComplex, num_complex::Complex};
 use std::sync::Arc;
@@ -137,17 +138,11 @@ fn peaks(strengths: &[f32]) -> Vec<usize> {
 struct Spectra {
     samples: Vec<f32>,
     window: Vec<f32>,
-    bands: Vec<OnsetBand>,
+    bands: Vec<Band>,
     fft: Arc<dyn RealToComplex<f32>>,
     frame: Vec<f32>,
     spectrum: Vec<Complex<f32>>,
     work: Vec<Complex<f32>>,
-}
-
-/// The bins of one band that have a weight.
-struct OnsetBand {
-    first: usize,
-    weights: Vec<f32>,
 }
 
 impl Spectra {
@@ -189,7 +184,7 @@ impl Spectra {
 
 /// Triangles of equal area with corners equally spaced on Slaney's mel scale, 0 to 8000 Hz: linear below 1000 Hz,
 /// logarithmic above (Slaney, Auditory Toolbox, 1998).
-fn bands() -> Vec<OnsetBand> {
+fn bands() -> Vec<Band> {
     const LINEAR: f64 = 200.0 / 3.0;
     const BREAK_HZ: f64 = 1000.0;
     let step = 6.4f64.ln() / 27.0;
@@ -205,11 +200,9 @@ fn bands() -> Vec<OnsetBand> {
         let weight = |bin: usize| {
             let at = bin as f64 * f64::from(SAMPLE_RATE) / WINDOW as f64;
             let height = ((at - left) / (middle - left)).min((right - at) / (right - middle));
-            (height.max(0.0) * 2.0 / (right - left)) as f32
+            height.max(0.0) * 2.0 / (right - left)
         };
-        let bins: Vec<usize> = (0..=WINDOW / 2).filter(|bin| weight(*bin) > 0.0).collect();
-        let first = bins.first().copied().unwrap_or(0);
-        OnsetBand { first, weights: bins.into_iter().map(weight).collect() }
+        Band::new(0..=WINDOW / 2, weight)
     };
     (0..N_MELS).map(band).collect()
 }

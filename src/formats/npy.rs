@@ -80,18 +80,9 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_back_and_a_wrong_shape_is_refused() {
+    fn a_wrong_shape_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("motion.npy");
-        let mut joints = Array3::from_shape_fn((4, N_JOINTS, 3), |(t, j, k)| (t * 1000 + j * 3 + k) as f32);
-        joints[[2, 48, 0]] = f32::NAN;
-        let motion = Motion::from_joints(FrameRate::new(15, 1), joints);
-        assert!(!motion.mask[[2, 48]] && motion.mask[[1, 48]]);
-        write(&path, &motion).unwrap();
-        let again = read(&path, FrameRate::new(15, 1)).unwrap();
-        assert_eq!(again.mask, motion.mask);
-        assert!(again.joints.iter().zip(&motion.joints).all(|(a, b)| a.to_bits() == b.to_bits()));
-
         Array3::<f32>::zeros((4, 43, 3)).write_npy(File::create(&path).unwrap()).unwrap();
         let error = read(&path, FrameRate::new(15, 1)).unwrap_err().to_string();
         assert!(error.contains("[4, 43, 3]"), "{error}");
@@ -123,6 +114,8 @@ pub(crate) mod tests {
             let n_frames = bits.len() / (3 * N_JOINTS);
             let joints = Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(t, j, k)| bits[(t * N_JOINTS + j) * 3 + k]);
             let motion = Motion::from_joints(FrameRate::new(15, 1), joints);
+            let there = |t: usize, j: usize| (0..3).all(|k| motion.joints[[t, j, k]].is_finite());
+            proptest::prop_assert!(motion.mask.indexed_iter().all(|((t, j), seen)| *seen == there(t, j)));
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("a.npy");
             write(&path, &motion).unwrap();

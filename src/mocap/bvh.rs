@@ -18,21 +18,10 @@ use std::path::Path;
 
 /// The role (`joint_names::ROLES`) of each of the house's joints 0..7.
 const BODY: [usize; 7] = [0, 2, 3, 4, 5, 6, 7];
-/// The rates of cameras and studios. Files round the seconds of a frame, so a rate this near (relative) is meant.
-const RATES: [(u32, u32); 12] = [
-    (15, 1),
-    (20, 1),
-    (24_000, 1001),
-    (24, 1),
-    (25, 1),
-    (30_000, 1001),
-    (30, 1),
-    (50, 1),
-    (60_000, 1001),
-    (60, 1),
-    (100, 1),
-    (120, 1),
-];
+/// The rates of cameras and studios, whole, and in 1001sts of a thousand. Files round the seconds of a frame, so a rate this
+/// near (relative) is meant.
+const RATES: [u32; 9] = [15, 20, 24, 25, 30, 50, 60, 100, 120];
+const BROADCAST_RATES: [u32; 3] = [24, 30, 60];
 const RATE_ROUNDING: f64 = 1.1e-3;
 
 /// Reads a take, turned to face the camera. Errors: not BVH, a skeleton without neck or shoulders, no standing or
@@ -53,9 +42,9 @@ fn take(path: &Path, placed: impl Fn(House) -> House) -> Result<CapturedMotion> 
 }
 
 fn of_bvh(bvh: &Bvh, placed: impl Fn(House) -> House) -> Result<CapturedMotion> {
-    let map = joint_map(bvh)?;
     let names: Vec<&str> = bvh.joints.iter().map(|joint| joint.name.as_str()).collect();
     let roles = joint_names::find(&names);
+    let map = joint_map(bvh, &names, roles)?;
     let frames = bvh.positions(Positions::Auto);
     let bearings: Vec<Bearings> = frames.iter().map(|frame| bearings(frame, &map, roles)).collect();
     let house = placed(House::from_bearings(&bearings)?);
@@ -80,9 +69,7 @@ fn of_bvh(bvh: &Bvh, placed: impl Fn(House) -> House) -> Result<CapturedMotion> 
 }
 
 /// The file's joint for each of the house's.
-fn joint_map(bvh: &Bvh) -> Result<[Option<usize>; N_JOINTS]> {
-    let names: Vec<&str> = bvh.joints.iter().map(|joint| joint.name.as_str()).collect();
-    let roles = joint_names::find(&names);
+fn joint_map(bvh: &Bvh, names: &[&str], roles: [Option<usize>; 10]) -> Result<[Option<usize>; N_JOINTS]> {
     let needed: Vec<&str> =
         [0, 2, 5].into_iter().filter(|&role| roles[role].is_none()).map(|role| joint_names::ROLES[role]).collect();
     ensure!(
@@ -129,7 +116,8 @@ fn bearings(frame: &[Vec3], map: &[Option<usize>; N_JOINTS], roles: [Option<usiz
 /// The rate that a file's seconds of a frame mean.
 fn rate(frame_secs: f64) -> FrameRate {
     let off = |(num, den): (u32, u32)| (f64::from(num) / f64::from(den) * frame_secs - 1.0).abs();
-    let nearest = RATES.into_iter().min_by(|&a, &b| off(a).total_cmp(&off(b)));
+    let rates = RATES.map(|rate| (rate, 1)).into_iter().chain(BROADCAST_RATES.map(|rate| (1000 * rate, 1001)));
+    let nearest = rates.min_by(|&a, &b| off(a).total_cmp(&off(b)));
     match nearest.filter(|&rate| off(rate) < RATE_ROUNDING) {
         Some((num, den)) => FrameRate::new(num, den),
         None => FrameRate::nearest(1.0 / frame_secs).unwrap_or(FrameRate::new(1, 1)),

@@ -29,6 +29,19 @@ pub fn direction(aside: f64, flexion: f64) -> Vec3 {
     [aside.sin() * flexion.cos(), -aside.cos() * flexion.cos(), -flexion.sin()]
 }
 
+/// Puts the joints of a finger on an upright right hand: the first at `root`, the others along phalanges of `lengths` 1 to
+/// 3, each bent by so many radians more than the one before.
+pub fn put_finger(hand: &mut HandJoints, finger: usize, root: Vec3, aside: f64, bends: [f64; 3], lengths: [f64; 4]) {
+    let first = 1 + 4 * finger;
+    hand[first] = root;
+    let mut flexion = 0.0;
+    for (k, bend) in bends.into_iter().enumerate() {
+        flexion += bend;
+        let phalanx = vec3::scale(direction(aside, flexion), lengths[k + 1]);
+        hand[first + k + 1] = vec3::add(hand[first + k], phalanx);
+    }
+}
+
 /// The upright right hand of mean bones at rest, metres, wrist at 0, its size that of measured hands: fingers bent a
 /// little (20, 30 and 18 degrees), the thumb beside and somewhat before the palm.
 pub fn relaxed() -> HandJoints {
@@ -39,14 +52,8 @@ pub fn relaxed() -> HandJoints {
             0 => (direction(fan, 0.25), 38f64.to_radians(), [0.45, 0.15, 0.15]),
             _ => (direction(fan, 0.0), 0.5 * fan, [20f64, 30.0, 18.0].map(f64::to_radians)),
         };
-        let root = 1 + 4 * finger;
-        hand[root] = vec3::scale(first, METRES * BONES[finger][0]);
-        let mut flexion = 0.0;
-        for (k, bend) in bends.into_iter().enumerate() {
-            flexion += bend;
-            let bone = vec3::scale(direction(aside, flexion), METRES * BONES[finger][k + 1]);
-            hand[root + k + 1] = vec3::add(hand[root + k], bone);
-        }
+        let lengths = BONES[finger].map(|mm| METRES * mm);
+        put_finger(&mut hand, finger, vec3::scale(first, lengths[0]), aside, bends, lengths);
     }
     hand
 }

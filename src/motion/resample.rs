@@ -53,18 +53,14 @@ pub fn at_rate(motion: &Motion, fps: FrameRate) -> Motion {
 /// Stretches of frames in which a joint is there.
 fn runs(motion: &Motion, joint: usize) -> Vec<(usize, usize)> {
     let there = |t: usize| (0..3).all(|k| motion.joints[[t, joint, k]].is_finite());
-    let (mut runs, mut start) = (Vec::new(), None);
-    for t in 0..=motion.n_frames() {
-        match (t < motion.n_frames() && there(t), start) {
-            (true, None) => start = Some(t),
-            (false, Some(from)) => {
-                runs.push((from, t));
-                start = None;
-            }
-            _ => {}
-        }
-    }
-    runs
+    let there: Vec<bool> = (0..motion.n_frames()).map(there).collect();
+    let mut end = 0;
+    let runs = there.chunk_by(|a, b| a == b).map(|run| {
+        let start = end;
+        end += run.len();
+        (run[0], start, end)
+    });
+    runs.filter(|(there, ..)| *there).map(|(_, start, end)| (start, end)).collect()
 }
 
 /// Weights of the source's frames around one moment.

@@ -58,6 +58,17 @@ fn norm(params: &mut Params, name: &str, n: usize, slope: f64) -> Result<BatchNo
     BatchNorm::new(params, &format!("{name}.norm"), n, 1e-5, MOMENTUM, slope)
 }
 
+/// Fully connected layers from each of `widths` to the next, with their norms; `last`: slope of the last one.
+fn dense(params: &mut Params, prefix: &str, widths: &[usize], last: f64) -> Result<Vec<(Linear, BatchNorm)>> {
+    let mut layers = Vec::new();
+    for (i, pair) in widths.windows(2).enumerate() {
+        let name = format!("{prefix}dense{i}");
+        let slope = if i + 2 == widths.len() { last } else { SLOPE };
+        layers.push((Linear::new(params, &name, pair[0], pair[1])?, norm(params, &name, pair[1], slope)?));
+    }
+    Ok(layers)
+}
+
 /// Layer and norm, one pair after the other.
 fn through<L: Module>(layers: &[(L, BatchNorm)], x: &Tensor, mode: &Mode) -> Result<Tensor> {
     layers.iter().try_fold(x.clone(), |x, (layer, norm)| norm.forward(&layer.forward(&x)?, mode.trains()))
@@ -74,17 +85,11 @@ impl MotionEncoder {
             [(config.n_in, a, 3, 1), (a, b, 3, 1), (b, c, 4, STEP), (c, LAST, 3, 1)].into_iter().enumerate()
         {
             let name = format!("{NAME}conv{i}");
-            let conv = Conv1d::valid(params, &name, [n_in, n_out], kernel, stride, 1)?;
+            let conv = Conv1d::valid(params, &name, [n_in, n_out], kernel, stride)?;
             convs.push((conv, norm(params, &name, n_out, SLOPE)?));
         }
         let [d, e] = config.hidden;
-        let mut dense = Vec::new();
-        for (i, (n_in, n_out, slope)) in
-            [(LAST * PLACES, d, SLOPE), (d, e, SLOPE), (e, N_CODE, 1.0)].into_iter().enumerate()
-        {
-            let name = format!("{NAME}dense{i}");
-            dense.push((Linear::new(params, &name, n_in, n_out)?, norm(params, &name, n_out, slope)?));
-        }
+        let dense = dense(params, NAME, &[LAST * PLACES, d, e, N_CODE], 1.0)?;
         Ok(Self { mean, std, convs, dense })
     }
 
@@ -151,11 +156,7 @@ impl AutoEncoder {
     /// Makes both halves' tensors in `params`.
     pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
         let encoder = MotionEncoder::new(params, config)?;
-        let mut dense = Vec::new();
-        for (i, (n_in, n_out)) in [(N_CODE, 128), (128, LAST * WINDOW)].into_iter().enumerate() {
-            let name = format!("{DECODER}dense{i}");
-            dense.push((Linear::new(params, &name, n_in, n_out)?, norm(params, &name, n_out, SLOPE)?));
-        }
+        let dense = dense(params, DECODER, &[N_CODE, 128, LAST * WINDOW], SLOPE)?;
         let mut convs = Vec::new();
         for (i, (n_in, n_out)) in [(LAST, 64), (64, 64)].into_iter().enumerate() {
             let name = format!("{DECODER}conv{i}");

@@ -43,7 +43,7 @@ pub trait TrainingTask: Send + Sync {
         distance.broadcast_mul(weights)?.mean_all()
     }
     /// How much a batch counts in running statistics, if the network has such.
-    fn set_momentum(&mut self, momentum: f64);
+    fn set_momentum(&mut self, _momentum: f64) {}
     /// Errors on held-out samples, a line each; `brief`: of the network alone, on fewer.
     fn errors(&self, brief: bool) -> Result<Vec<String>>;
 }
@@ -122,8 +122,7 @@ pub fn train(
     }
     // inside the pool: its own thread does not sleep and wake for every small piece of work
     rayon::scope(|_| train_until(training_task, schedule, out, schedule.steps, progress))?;
-    let facts =
-        json!({ "kind": training_task.kind(), "lesson": training_task.metadata(), "schedule": schedule.metadata() });
+    let facts = facts(training_task, schedule);
     let weights = halved(training_task.params().tensors()?)?;
     // the errors are those of the weights as they are kept
     training_task.params().load(&weights)?;
@@ -136,6 +135,11 @@ pub fn train(
         std::fs::remove_file(&checkpoint).with_context(|| format!("cannot remove {}", checkpoint.display()))?;
     }
     Ok(errors)
+}
+
+/// What a file of the training says of it.
+fn facts(training_task: &dyn TrainingTask, schedule: &Schedule) -> Value {
+    json!({ "kind": training_task.kind(), "lesson": training_task.metadata(), "schedule": schedule.metadata() })
 }
 
 /// The part of a training up to `end`, with a checkpoint there.
@@ -188,7 +192,8 @@ fn train_until(
             (sum, n_summed) = (0.0, 0);
         }
         if (step + 1) % schedule.checkpoint_every.max(1) == 0 || step + 1 == end {
-            let facts = json!({ "kind": training_task.kind(), "lesson": training_task.metadata(), "schedule": schedule.metadata(), "step": step + 1 });
+            let mut facts = facts(training_task, schedule);
+            facts["step"] = json!(step + 1);
             let mut contents = Contents { facts, tensors: BTreeMap::new() };
             contents.add("net.", training_task.params().tensors()?);
             contents.add("", adam.tensors("adam.")?);
@@ -206,9 +211,9 @@ fn resume(training_task: &dyn TrainingTask, schedule: &Schedule, out: &Path, ada
     }
     let contents = Contents::read(&path)?;
     let fit = || -> Result<usize> {
-        expect_same(&contents.facts, "kind", &json!(training_task.kind()))?;
-        expect_same(&contents.facts, "lesson", &training_task.metadata())?;
-        expect_same(&contents.facts, "schedule", &schedule.metadata())?;
+        for (key, expected) in facts(training_task, schedule).as_object().into_iter().flatten() {
+            expect_same(&contents.facts, key, expected)?;
+        }
         training_task.params().load(&contents.part("net."))?;
         Ok(contents.facts["step"].as_u64().context("it names no step")? as usize)
     };

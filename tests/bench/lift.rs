@@ -90,11 +90,11 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
 
 /// What the networks do for so many frames: a window and its mirror image, and two hands.
 fn networks(body: &BodyLifter, hands: &HandLifter, n_frames: usize) -> Result<()> {
-    let config = body.net().config();
+    let config = body.net.config();
     let batches = |batch: usize| (0..2 * n_frames).step_by(batch).map(move |first| batch.min(2 * n_frames - first));
     for n in batches(BATCH.0) {
         let x = Tensor::ones((n, config.n_in, config.receptive_field()), DType::F32, &Device::Cpu)?;
-        body.net().forward_windows(&x, &mut Mode::Eval)?;
+        body.net.forward(&x, &mut Mode::Eval)?;
     }
     for n in batches(BATCH.1) {
         let x = Tensor::ones((n, hands.config().n_in), DType::F32, &Device::Cpu)?;

@@ -228,15 +228,16 @@ fn animate(
         (Some(path), None) => SecondPanel::Video { path, from_secs: args.beside_from },
     };
     let is_film = outputs.iter().any(|&(_, format)| format == ExportFormat::Mp4);
+    let motion_secs = motion.fps.secs(motion.n_frames());
+    let of_file = |path: &Path, from_secs: f64| -> Result<Option<Sound>> {
+        Ok(audio::read_mono(path, SAMPLE_RATE)?.map(|whole| part(&whole, from_secs, motion_secs)))
+    };
     let sound = match (sound, beside) {
-        (None, SecondPanel::Video { path, from_secs }) if is_film => audio::read_mono(path, SAMPLE_RATE)?
-            .map(|whole| part(&whole, from_secs, motion.fps.secs(motion.n_frames()))),
+        (None, SecondPanel::Video { path, from_secs }) if is_film => of_file(path, from_secs)?,
         (sound, _) => sound,
     };
     let sound = match (sound, input.sound_of_run()) {
-        (None, Some(path)) if is_film => {
-            audio::read_mono(&path, SAMPLE_RATE)?.map(|whole| part(&whole, 0.0, motion.fps.secs(motion.n_frames())))
-        }
+        (None, Some(path)) if is_film => of_file(&path, 0.0)?,
         (sound, _) => sound,
     };
     let silence = match (is_film && sound.is_none(), args.format.is_empty()) {
@@ -248,7 +249,6 @@ fn animate(
     for (path, format) in outputs {
         format.write(path, &performance, &sources, ui).with_context(|| format!("cannot write {}", path.display()))?;
     }
-    let motion_secs = motion.fps.secs(motion.n_frames());
     let Performance { report, clip, .. } = &performance;
     let text = format!(
         "{} frames at {}, {motion_secs:.1} s; written: {} frames at {}\n{}{silence}",

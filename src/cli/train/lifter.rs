@@ -37,9 +37,9 @@ pub struct Args {
     /// Start from these weights instead of the seed's; with `--steps 0` their errors are measured, nothing is written.
     #[arg(long, value_name = "FILE")]
     start: Option<PathBuf>,
-    /// Training steps [default: 9000]
-    #[arg(long, hide_default_value = true)]
-    steps: Option<usize>,
+    /// Training steps.
+    #[arg(long, default_value_t = 9000)]
+    steps: usize,
     /// Samples a step.
     #[arg(long, default_value_t = 512)]
     batch: usize,
@@ -78,7 +78,7 @@ enum HandNetwork {
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
     ensure!(args.learning_rate > 0.0 && args.learning_rate < 1.0, "--learning-rate must lie between 0 and 1");
     ensure!((1..=4096).contains(&args.width.unwrap_or(256)), "--width must lie between 1 and 4096");
-    let (mut training_task, steps): (Box<dyn TrainingTask>, usize) = match args.part {
+    let mut training_task: Box<dyn TrainingTask> = match args.part {
         LifterPart::Body => {
             ensure!(!args.mocap.is_empty(), "the body lifter learns from captured motion: give --mocap PATH");
             ensure!(
@@ -89,7 +89,7 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
             let (held_out, takes) = upper_body::divide(takes, &args.hold_out)?;
             ensure!(!takes.is_empty(), "--hold-out leaves nothing to learn from");
             let config = BodyLifter::config(args.width.unwrap_or(256), &args.widths);
-            (Box::new(BodyLifterTask::new(takes, held_out, &config, args.seed)?), 9000)
+            Box::new(BodyLifterTask::new(takes, held_out, &config, args.seed)?)
         }
         LifterPart::Hands => {
             ensure!(
@@ -97,16 +97,14 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
                 "the hand lifter learns from hands made by rule: no --mocap"
             );
             match args.network {
-                HandNetwork::Coordinates => {
-                    (Box::new(HandLifterTask::new(args.width.unwrap_or(896), args.seed)?), 9000)
-                }
-                HandNetwork::Heatmap => (Box::new(HeatmapLifterTask::new(args.seed)?), 9000),
+                HandNetwork::Coordinates => Box::new(HandLifterTask::new(args.width.unwrap_or(896), args.seed)?),
+                HandNetwork::Heatmap => Box::new(HeatmapLifterTask::new(args.seed)?),
             }
         }
     };
     let started_from = args.start.as_deref().map(|path| start_from(&*training_task, path)).transpose()?;
     let schedule = Schedule {
-        steps: args.steps.unwrap_or(steps),
+        steps: args.steps,
         batch: args.batch,
         learning_rate: args.learning_rate,
         seed: args.seed,

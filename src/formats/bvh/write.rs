@@ -105,19 +105,15 @@ impl BvhClip {
 fn head(text: &mut String, joint: &Joint, depth: usize) {
     let indent = "\t".repeat(depth);
     let [x, y, z] = joint.offset;
-    let _ = match (joint.end, joint.parent) {
-        (true, _) => writeln!(text, "{indent}End Site"),
-        (false, None) => writeln!(text, "{indent}ROOT {}", joint.name),
-        (false, Some(_)) => writeln!(text, "{indent}JOINT {}", joint.name),
+    let (kind, channels) = match (joint.end, joint.parent) {
+        (true, _) => ("End Site".to_owned(), String::new()),
+        (false, None) => (
+            format!("ROOT {}", joint.name),
+            format!("{indent}\tCHANNELS 6 Xposition Yposition Zposition {ROTATION_CHANNELS}\n"),
+        ),
+        (false, Some(_)) => (format!("JOINT {}", joint.name), format!("{indent}\tCHANNELS 3 {ROTATION_CHANNELS}\n")),
     };
-    let _ = writeln!(text, "{indent}{{\n{indent}\tOFFSET {x:.6} {y:.6} {z:.6}");
-    let _ = match (joint.end, joint.parent) {
-        (true, _) => Ok(()),
-        (false, None) => {
-            writeln!(text, "{indent}\tCHANNELS 6 Xposition Yposition Zposition {ROTATION_CHANNELS}")
-        }
-        (false, Some(_)) => writeln!(text, "{indent}\tCHANNELS 3 {ROTATION_CHANNELS}"),
-    };
+    let _ = write!(text, "{indent}{kind}\n{indent}{{\n{indent}\tOFFSET {x:.6} {y:.6} {z:.6}\n{channels}");
 }
 
 #[cfg(test)]

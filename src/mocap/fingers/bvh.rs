@@ -28,16 +28,12 @@ pub fn read(path: &Path) -> Result<Vec<FingerTake>> {
         );
     }
     let positions = bvh.positions(Positions::Auto);
-    Ok(found
-        .into_iter()
-        .map(|(side, joints)| FingerTake {
-            name: format!("{name} {side:?}"),
-            side,
-            frames: positions.iter().map(|p| joints.map(|j| j.map(|j| p[j]))).collect::<Vec<Fingers>>(),
-            counted: [true; N_HAND],
-            size: if joints[9].is_some() && joints[10].is_some() { Size::Phalanx } else { Size::Palm },
-        })
-        .collect())
+    let take = |(side, joints): (Side, [Option<usize>; N_HAND])| {
+        let frames: Vec<Fingers> = positions.iter().map(|p| joints.map(|j| j.map(|j| p[j]))).collect();
+        let size = if joints[9].is_some() && joints[10].is_some() { Size::Phalanx } else { Size::Palm };
+        FingerTake::whole(&name, side, frames, size)
+    };
+    Ok(found.into_iter().map(take).collect())
 }
 
 /// The joints of a side's hand, wrist first, then thumb to little finger, each base to tip; `None` where there are no

@@ -45,13 +45,8 @@ fn ted(joints: &ArrayD<f64>, name: &str) -> Vec<FingerTake> {
         }
         fingers
     };
-    let take = |side, wrist, first| FingerTake {
-        name: format!("{name} {side:?}"),
-        side,
-        frames: (0..joints.shape()[0]).map(|t| hand(t, wrist, first)).collect(),
-        counted: [true; N_HAND],
-        size: Size::Palm,
-    };
+    let frames = |wrist, first| (0..joints.shape()[0]).map(|t| hand(t, wrist, first)).collect();
+    let take = |side, wrist, first| FingerTake::whole(name, side, frames(wrist, first), Size::Palm);
     vec![take(Side::Left, 6, 8), take(Side::Right, 7, 23)]
 }
 
@@ -92,14 +87,9 @@ fn smplx(poses: &ArrayD<f64>, name: &str) -> Vec<FingerTake> {
         }
         fingers
     };
-    let take = |side, first, left| FingerTake {
-        name: format!("{name} {side:?}"),
-        side,
-        frames: (0..poses.shape()[0]).map(|t| hand(t, first, left)).collect(),
-        counted: [true; N_HAND],
-        size: Size::Phalanx,
-    };
-    vec![take(Side::Left, 25, true), take(Side::Right, 40, false)]
+    let frames = |first, side| (0..poses.shape()[0]).map(|t| hand(t, first, side == Side::Left)).collect();
+    let take = |side, first| FingerTake::whole(name, side, frames(first, side), Size::Phalanx);
+    vec![take(Side::Left, 25), take(Side::Right, 40)]
 }
 
 #[cfg(test)]

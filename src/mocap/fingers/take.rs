@@ -79,6 +79,11 @@ pub struct Truth {
 }
 
 impl FingerTake {
+    /// One hand of the file `name`, all of whose points count.
+    pub fn whole(name: &str, side: Side, frames: Vec<Fingers>, size: Size) -> Self {
+        Self { name: format!("{name} {side:?}"), side, frames, counted: [true; N_HAND], size }
+    }
+
     /// Whether errors without alignment mean anything: not without knuckles, from which the palm's place follows.
     pub fn has_knuckles(&self) -> bool {
         [5, 9, 13, 17].iter().any(|&j| self.counted[j])
@@ -117,19 +122,13 @@ mod tests {
         fingers[4] = None;
         for size in [Size::Phalanx, Size::Palm, Size::MiddleEnd] {
             let frames = vec![fingers; 3];
-            let take = FingerTake { name: "a".into(), side: Side::Left, frames, counted: [true; N_HAND], size };
+            let take = FingerTake::whole("a", Side::Left, frames, size);
             let truths = take.truths().unwrap();
             assert!(!truths[0].there[4] && !truths[0].counted[0] && truths[0].counted[20]);
             let off = (0..N_HAND).filter(|&j| j != 4).map(|j| vec3::norm(vec3::sub(truths[0].hand[j], relaxed()[j])));
             assert!(off.fold(0.0, f64::max) < 1e-6);
         }
-        let take = FingerTake {
-            name: "none".into(),
-            side: Side::Left,
-            frames: vec![[None; N_HAND]],
-            counted: [true; N_HAND],
-            size: Size::Palm,
-        };
+        let take = FingerTake::whole("none", Side::Left, vec![[None; N_HAND]], Size::Palm);
         assert!(format!("{:#}", take.truths().unwrap_err()).contains("none"));
     }
 }

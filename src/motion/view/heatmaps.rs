@@ -65,26 +65,24 @@ fn profile(at: f64) -> [f64; PLACES] {
 }
 
 /// A hand in its own frame, the middle finger's first phalanx 1 long, and the three axes of the frame (rows): the
-/// middle knuckle lies on y, the little finger's at z = 0 and x > 0. `right`: z is negated, so that both sides' hands
-/// are alike. `None` where the knuckles and the wrist lie on a line.
-pub fn canonical(hand: &HandJoints, right: bool) -> Option<(HandJoints, [Vec3; 3])> {
+/// middle knuckle lies on y, the little finger's at z = 0 and x > 0; z is negated, as the paper has it for right hands
+/// (left ones are seen in the mirror). `None` where the knuckles and the wrist lie on a line.
+pub fn canonical(hand: &HandJoints) -> Option<(HandJoints, [Vec3; 3])> {
     let grow = 1.0 / vec3::norm(vec3::sub(hand[9], hand[10]));
     let y = vec3::unit(vec3::sub(hand[9], hand[0]), 1e-9)?;
     let x = vec3::unit(vec3::across(vec3::sub(hand[17], hand[0]), y), 1e-9)?;
     let z = vec3::cross(x, y);
-    let mirror = if right { -1.0 } else { 1.0 };
     let own = hand.map(|p| {
         let p = vec3::scale(vec3::sub(p, hand[0]), grow);
-        [vec3::dot(p, x), vec3::dot(p, y), mirror * vec3::dot(p, z)]
+        [vec3::dot(p, x), vec3::dot(p, y), -vec3::dot(p, z)]
     });
     own.iter().flatten().all(|v| v.is_finite()).then_some((own, [x, y, z]))
 }
 
 /// The hand in camera axes from its own frame: rows times the turn, relative to the wrist.
-pub fn assembled(own: &HandJoints, axes: &[Vec3; 3], right: bool) -> HandJoints {
-    let mirror = if right { -1.0 } else { 1.0 };
+pub fn assembled(own: &HandJoints, axes: &[Vec3; 3]) -> HandJoints {
     let place = |p: Vec3| {
-        let [x, y, z] = [0, 1, 2].map(|k| vec3::scale(axes[k], if k == 2 { mirror * p[k] } else { p[k] }));
+        let [x, y, z] = [0, 1, 2].map(|k| vec3::scale(axes[k], if k == 2 { -p[k] } else { p[k] }));
         vec3::add(x, vec3::add(y, z))
     };
     let wrist = place(own[0]);
@@ -98,19 +96,14 @@ mod tests {
     use crate::motion::hand_bones::{PHALANX, relaxed};
 
     #[test]
-    fn a_hand_comes_back_from_its_own_frame_and_sides_are_alike() {
+    fn a_hand_comes_back_from_its_own_frame() {
         let turn = Rotation::about([0.6, 0.0, 0.8], 1.2);
-        let right = relaxed().map(|p| turn.turn(p));
-        let left = right.map(|[x, y, z]| [-x, y, z]);
-        let (own, axes) = canonical(&right, true).unwrap();
-        let (own_left, axes_left) = canonical(&left, false).unwrap();
+        let hand = relaxed().map(|p| turn.turn(p));
+        let (own, axes) = canonical(&hand).unwrap();
         assert!(own[9][0].abs() + own[9][2].abs() + own[17][2].abs() < 1e-12 && own[17][0] > 0.0);
-        for (hand, own, axes, is_right) in [(right, own, axes, true), (left, own_left, axes_left, false)] {
-            let back = assembled(&own, &axes, is_right);
-            assert!((0..N_HAND).all(|j| vec3::norm(vec3::sub(vec3::scale(back[j], PHALANX), hand[j])) < 1e-12));
-        }
-        assert!((0..N_HAND).all(|j| vec3::norm(vec3::sub(own[j], own_left[j])) < 1e-12));
-        assert!(canonical(&[[0.0; 3]; N_HAND], true).is_none());
+        let back = assembled(&own, &axes);
+        assert!((0..N_HAND).all(|j| vec3::norm(vec3::sub(vec3::scale(back[j], PHALANX), hand[j])) < 1e-12));
+        assert!(canonical(&[[0.0; 3]; N_HAND]).is_none());
     }
 
     #[test]

@@ -22,9 +22,9 @@ impl ConvAxis {
         Self { n_in, n_out, kernel, stride, pad: total / 2 }
     }
 
-    /// Every place the kernel fits on; none where it does not.
-    pub fn valid(n_in: usize, kernel: usize) -> Self {
-        Self { n_in, n_out: (n_in + 1).saturating_sub(kernel), kernel, stride: 1, pad: 0 }
+    /// Every `stride`-th place the kernel fits on; none where it does not.
+    pub fn valid(n_in: usize, kernel: usize, stride: usize) -> Self {
+        Self { n_in, n_out: (n_in + stride).saturating_sub(kernel) / stride, kernel, stride, pad: 0 }
     }
 
     pub fn forward(&self) -> AxisWindows {
@@ -90,27 +90,6 @@ impl AxisWindows {
     }
 }
 
-/// How a kernel walks over the frames.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ConvGeometry {
-    pub stride: usize,
-    pub dilation: usize,
-    /// Zero frames put before and after the input.
-    pub pad: (usize, usize),
-}
-
-impl ConvGeometry {
-    /// Every frame, no padding.
-    pub const VALID: Self = Self { stride: 1, dilation: 1, pad: (0, 0) };
-
-    /// Frames that come out of `n_frames`; `None` when the kernel does not fit.
-    pub fn n_out(&self, n_frames: usize, kernel: usize) -> Option<usize> {
-        let receptive_field = self.dilation * kernel.checked_sub(1)? + 1;
-        let padded = n_frames + self.pad.0 + self.pad.1;
-        Some(padded.checked_sub(receptive_field)? / self.stride.max(1) + 1)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -122,5 +101,6 @@ mod tests {
             [(209, 4, 2), (63, 4, 2), (64, 4, 2), (16, 4, 1)].map(|(n, kernel, stride)| same(n, kernel, stride));
         assert_eq!(first.map(|axis| axis.pad), [1, 1, 1, 1]);
         assert_eq!(first.map(|axis| axis.n_out), [105, 32, 32, 16]);
+        assert_eq!([9, 11, 2].map(|n| ConvAxis::valid(n, 3, 3).n_out), [3, 3, 0]);
     }
 }

@@ -56,8 +56,8 @@ macro_rules! rows {
 
 /// A tile's loop and the choice of its size, for one kind of processor and one type of number.
 macro_rules! kernel {
-    ($(#[$attribute:meta])* $tile:ident, $choose:ident, $number:ty, $lanes:literal, $vectors:literal, $zero:path, $load:path, $store:path, $spread:path,
-     $add_product:expr) => {
+    ($(#[$attribute:meta])* $tile:ident, $choose:ident, $number:ty, $lanes:literal, $vectors:literal;
+     $zero:path, $load:path, $store:path, $spread:path, $add_product:expr) => {
         $(#[$attribute])*
         unsafe fn $tile<const ROWS: usize, const VECTORS: usize>(job: &TileJob<$number>) {
             // SAFETY: the caller's.
@@ -142,8 +142,8 @@ fn add_product<T: std::ops::Mul<Output = T> + std::ops::Add<Output = T> + Copy>(
     std::array::from_fn(|i| a[i] * b[i] + sum[i])
 }
 
-kernel!(any_tile_f32, any_f32, f32, 4, 2, any::zero, any::load, any::store, any::spread, add_product);
-kernel!(any_tile_f64, any_f64, f64, 4, 2, any::zero, any::load, any::store, any::spread, add_product);
+kernel!(any_tile_f32, any_f32, f32, 4, 2; any::zero, any::load, any::store, any::spread, add_product);
+kernel!(any_tile_f64, any_f64, f64, 4, 2; any::zero, any::load, any::store, any::spread, add_product);
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
@@ -153,55 +153,23 @@ mod x86 {
 
     kernel!(
         #[target_feature(enable = "avx512f")]
-        wide_tile_f32,
-        wide_f32,
-        f32,
-        16,
-        4,
-        _mm512_setzero_ps,
-        _mm512_loadu_ps,
-        _mm512_storeu_ps,
-        _mm512_set1_ps,
-        _mm512_fmadd_ps
+        wide_tile_f32, wide_f32, f32, 16, 4;
+        _mm512_setzero_ps, _mm512_loadu_ps, _mm512_storeu_ps, _mm512_set1_ps, _mm512_fmadd_ps
     );
     kernel!(
         #[target_feature(enable = "avx512f")]
-        wide_tile_f64,
-        wide_f64,
-        f64,
-        8,
-        4,
-        _mm512_setzero_pd,
-        _mm512_loadu_pd,
-        _mm512_storeu_pd,
-        _mm512_set1_pd,
-        _mm512_fmadd_pd
+        wide_tile_f64, wide_f64, f64, 8, 4;
+        _mm512_setzero_pd, _mm512_loadu_pd, _mm512_storeu_pd, _mm512_set1_pd, _mm512_fmadd_pd
     );
     kernel!(
         #[target_feature(enable = "avx2,fma")]
-        half_tile_f32,
-        half_f32,
-        f32,
-        8,
-        2,
-        _mm256_setzero_ps,
-        _mm256_loadu_ps,
-        _mm256_storeu_ps,
-        _mm256_set1_ps,
-        _mm256_fmadd_ps
+        half_tile_f32, half_f32, f32, 8, 2;
+        _mm256_setzero_ps, _mm256_loadu_ps, _mm256_storeu_ps, _mm256_set1_ps, _mm256_fmadd_ps
     );
     kernel!(
         #[target_feature(enable = "avx2,fma")]
-        half_tile_f64,
-        half_f64,
-        f64,
-        4,
-        2,
-        _mm256_setzero_pd,
-        _mm256_loadu_pd,
-        _mm256_storeu_pd,
-        _mm256_set1_pd,
-        _mm256_fmadd_pd
+        half_tile_f64, half_f64, f64, 4, 2;
+        _mm256_setzero_pd, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_set1_pd, _mm256_fmadd_pd
     );
 }
 

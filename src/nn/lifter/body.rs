@@ -15,7 +15,7 @@ const NAME: &str = "body";
 
 /// The network that turns a window of keypoints into the pose of its middle frame.
 pub struct BodyLifter {
-    net: TemporalLifter,
+    pub net: TemporalLifter,
 }
 
 impl BodyLifter {
@@ -27,14 +27,6 @@ impl BodyLifter {
     /// Makes the network's tensors in `params`.
     pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
         Ok(Self { net: TemporalLifter::new(params, NAME, config)? })
-    }
-
-    pub fn net(&self) -> &TemporalLifter {
-        &self.net
-    }
-
-    pub fn net_mut(&mut self) -> &mut TemporalLifter {
-        &mut self.net
     }
 
     /// A pose for every frame, in px of the picture, the neck at 0: `None` where a shoulder is not seen within half a
@@ -66,7 +58,7 @@ impl BodyLifter {
             return Ok(Vec::new());
         }
         let x = Tensor::from_vec(numbers, (n_views, N_IN, window), &Device::Cpu)?;
-        self.net.forward_windows(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1::<f32>()
+        self.net.forward(&x, &mut Mode::Eval)?.flatten_all()?.to_vec1::<f32>()
     }
 }
 

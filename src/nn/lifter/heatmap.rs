@@ -108,7 +108,7 @@ impl HeatmapLifter {
             for ((i, _), row) in some.iter().zip(rows) {
                 let at = |j: usize| std::array::from_fn(|k| f64::from(row[3 * j + k]));
                 let axes = std::array::from_fn(|k| at(MAPS + k));
-                let hand = assembled(&std::array::from_fn(at), &axes, true);
+                let hand = assembled(&std::array::from_fn(at), &axes);
                 hands[*i] = Some(hand.map(|[x, y, z]| [f64::from(flip) * x, y, z]));
             }
         }

@@ -1,6 +1,5 @@
 //! The temporal-convolution lifter of VideoPose3D (Pavllo et al. 2019): 2D keypoints over time to 3D joints of the
-//! middle frame. One set of weights has two forms: dilated, for a whole sequence in one pass; and strided, for
-//! training windows of exactly one receptive field, without wasted work.
+//! middle frame, in its strided form: windows of exactly one receptive field, without wasted work.
 
 use crate::nn::Mode;
 use crate::nn::ops::batch_norm::BatchNorm;
@@ -41,9 +40,8 @@ pub struct TemporalLifter {
     shrink: Conv1d,
 }
 
-/// A convolution over `width` frames that lie `dilation` apart, then one of width 1.
+/// A convolution over each `width` frames, then one of width 1.
 struct ResidualBlock {
-    dilation: usize,
     width: usize,
     over_time: ConvUnit,
     mix: ConvUnit,
@@ -56,16 +54,15 @@ struct ConvUnit {
 }
 
 impl ConvUnit {
-    fn new(params: &mut Params, name: &str, n: [usize; 2], width: usize, dilation: usize) -> Result<Self> {
+    fn new(params: &mut Params, name: &str, n: [usize; 2], width: usize) -> Result<Self> {
         Ok(Self {
-            conv: Conv1d::valid(params, &format!("{name}.conv"), n, width, 1, dilation)?,
+            conv: Conv1d::valid(params, &format!("{name}.conv"), n, width, width)?,
             norm: BatchNorm::new(params, &format!("{name}.norm"), n[1], 1e-5, MOMENTUM, 0.0)?,
         })
     }
 
-    fn forward(&self, x: &Tensor, strided: bool, p: f64, mode: &mut Mode) -> Result<Tensor> {
-        let x = if strided { self.conv.forward_strided(x)? } else { self.conv.forward(x)? };
-        dropout(&self.norm.forward(&x, mode.trains())?, p, mode)
+    fn forward(&self, x: &Tensor, p: f64, mode: &mut Mode) -> Result<Tensor> {
+        dropout(&self.norm.forward(&self.conv.forward(x)?, mode.trains())?, p, mode)
     }
 }
 
@@ -78,17 +75,13 @@ impl TemporalLifter {
         if config.widths.iter().any(|width| width % 2 == 0) {
             candle_core::bail!("the widths of a temporal lifter are odd, got {:?}", config.widths);
         }
-        let (n, mut dilation) = (config.channels, *first);
-        let expand = ConvUnit::new(params, &format!("{name}.expand"), [config.n_in, n], *first, 1)?;
+        let n = config.channels;
+        let expand = ConvUnit::new(params, &format!("{name}.expand"), [config.n_in, n], *first)?;
         let mut blocks = Vec::new();
-        for (i, width) in others.iter().enumerate() {
-            blocks.push(ResidualBlock {
-                dilation,
-                width: *width,
-                over_time: ConvUnit::new(params, &format!("{name}.block{i}.over_time"), [n, n], *width, dilation)?,
-                mix: ConvUnit::new(params, &format!("{name}.block{i}.mix"), [n, n], 1, 1)?,
-            });
-            dilation *= width;
+        for (i, &width) in others.iter().enumerate() {
+            let over_time = ConvUnit::new(params, &format!("{name}.block{i}.over_time"), [n, n], width)?;
+            let mix = ConvUnit::new(params, &format!("{name}.block{i}.mix"), [n, n], 1)?;
+            blocks.push(ResidualBlock { width, over_time, mix });
         }
         let shrink = Conv1d::new(params, &format!("{name}.shrink"), n, config.n_out, 1)?;
         Ok(Self { config: config.clone(), expand, blocks, shrink })
@@ -98,32 +91,20 @@ impl TemporalLifter {
         &self.config
     }
 
-    /// A whole sequence [B, n_in, T] to [B, n_out, T - receptive field + 1].
-    pub fn forward(&self, x: &Tensor, mode: &mut Mode) -> Result<Tensor> {
-        let p = self.config.dropout;
-        let mut x = self.expand.forward(x, false, p, mode)?;
-        for block in &self.blocks {
-            let y = block.over_time.forward(&x, false, p, mode)?;
-            let y = block.mix.forward(&y, false, p, mode)?;
-            x = (x.narrow(2, block.dilation * (block.width / 2), y.dim(2)?)? + y)?;
-        }
-        self.shrink.forward(&x)
-    }
-
     /// Windows of one receptive field [B, n_in, RF] to their middle frames [B, n_out]. The windows lie end to end in one
     /// sequence: since every kernel steps by its own width, none reaches into the next window, and all work is done on
     /// long rows.
-    pub fn forward_windows(&self, x: &Tensor, mode: &mut Mode) -> Result<Tensor> {
+    pub fn forward(&self, x: &Tensor, mode: &mut Mode) -> Result<Tensor> {
         let p = self.config.dropout;
         let (n_windows, n, n_frames) = x.dims3()?;
         let x = x.transpose(0, 1)?.reshape((1, n, n_windows * n_frames))?;
-        let mut x = self.expand.forward(&x, true, p, mode)?;
+        let mut x = self.expand.forward(&x, p, mode)?;
         for block in &self.blocks {
             let (_, n, n_frames) = x.dims3()?;
             let middle = x.reshape((1, n, n_frames / block.width, block.width))?;
             let middle = middle.narrow(3, block.width / 2, 1)?.squeeze(3)?;
-            let y = block.over_time.forward(&x, true, p, mode)?;
-            x = (middle + block.mix.forward(&y, true, p, mode)?)?;
+            let y = block.over_time.forward(&x, p, mode)?;
+            x = (middle + block.mix.forward(&y, p, mode)?)?;
         }
         self.shrink.forward(&x)?.squeeze(0)?.t()?.contiguous()
     }
@@ -144,29 +125,11 @@ mod tests {
     use crate::nn::ops::gradcheck::{pattern, worst};
     use candle_core::DType;
 
-    fn config(channels: usize) -> Config {
-        Config { n_in: 34, n_out: 51, channels, widths: vec![3, 3, 3], dropout: 0.0 }
-    }
-
-    #[test]
-    fn both_forms_agree() -> anyhow::Result<()> {
-        let mut params = Params::new(5);
-        let net = TemporalLifter::new(&mut params, "lifter", &config(32))?;
-        let x = pattern(&[2, 34, 31], 0.0)?.to_dtype(DType::F32)?;
-        let whole = net.forward(&x, &mut Mode::Eval)?;
-        assert_eq!(whole.dims(), [2, 51, 5]);
-        for t in 0..5 {
-            let window = net.forward_windows(&x.narrow(2, t, 27)?, &mut Mode::Eval)?;
-            let apart = (whole.narrow(2, t, 1)?.squeeze(2)? - window)?.abs()?.max_all()?.to_scalar::<f32>()?;
-            assert!(apart < 1e-5, "frame {t}: {apart}");
-        }
-        Ok(())
-    }
-
     #[test]
     fn it_has_the_published_size() -> anyhow::Result<()> {
         let mut params = Params::frozen();
-        let net = TemporalLifter::new(&mut params, "lifter", &config(1024))?;
+        let config = Config { n_in: 34, n_out: 51, channels: 1024, widths: vec![3, 3, 3], dropout: 0.0 };
+        let net = TemporalLifter::new(&mut params, "lifter", &config)?;
         assert_eq!(net.config().receptive_field(), 27);
         assert!((params.n_parameters() as f64 / 8.56e6 - 1.0).abs() < 0.001, "{}", params.n_parameters());
         Ok(())
@@ -178,9 +141,7 @@ mod tests {
         let small = Config { n_in: 2, n_out: 3, channels: 4, widths: vec![3, 3], dropout: 0.0 };
         let net = TemporalLifter::new(&mut params, "l", &small)?;
         let windows = pattern(&[3, 2, 9], 1.0)?;
-        assert!(worst(&[windows], |v| net.forward_windows(&v[0], &mut Mode::Eval))? < 1e-7);
-        let sequence = pattern(&[2, 2, 12], 1.0)?;
-        assert!(worst(&[sequence], |v| net.forward(&v[0], &mut Mode::Eval))? < 1e-7);
+        assert!(worst(&[windows], |v| net.forward(&v[0], &mut Mode::Eval))? < 1e-7);
         assert!(TemporalLifter::new(&mut params, "even", &Config { widths: vec![3, 4], ..small }).is_err());
         Ok(())
     }

@@ -51,9 +51,6 @@ impl BatchNorm {
 
     /// [B, C, ...] to the same shape. Training moves the running statistics.
     pub fn forward(&self, x: &Tensor, train: bool) -> Result<Tensor> {
-        if crate::nn::device::needs_fallback(x) {
-            return self.forward_fallback(x, train);
-        }
         let statistics = Arc::new(OnceLock::new());
         if !train {
             let _ = statistics.set(self.running()?);

@@ -19,11 +19,11 @@ pub fn same(x: &Tensor, weight: &Tensor, stride: usize) -> Result<ConvSizes> {
 
 /// Sizes of a convolution without padding, stride 1.
 pub fn valid(x: &Tensor, weight: &Tensor) -> Result<ConvSizes> {
-    sizes(x, weight, ConvAxis::valid)
+    sizes(x, weight, |n, kernel| ConvAxis::valid(n, kernel, 1))
 }
 
 fn sizes(x: &Tensor, weight: &Tensor, axis: impl Fn(usize, usize) -> ConvAxis) -> Result<ConvSizes> {
-    let alone = ConvAxis::valid(1, 1);
+    let alone = ConvAxis::valid(1, 1, 1);
     let (batch, channels, axes) = match (x.dims(), weight.dims()) {
         ([b, t, c], [_, _, kernel]) => (*b, *c, [axis(*t, *kernel), alone]),
         ([b, t, f, c], [_, _, down, across]) => (*b, *c, [axis(*t, *down), axis(*f, *across)]),
@@ -122,7 +122,7 @@ mod tests {
     #[test]
     fn it_is_what_the_framework_gives_and_gradients_are_right() -> Result<()> {
         let same = ConvAxis::same;
-        let alone = ConvAxis::valid(1, 1);
+        let alone = ConvAxis::valid(1, 1, 1);
         for (n_in, n_out, axes) in [
             (3, 5, [same(9, 3, 1), alone]),
             (2, 3, [same(9, 1, 1), alone]),
@@ -132,7 +132,7 @@ mod tests {
             (1, 9, [same(5, 3, 1), same(6, 3, 1)]),
             (3, 2, [same(7, 4, 2), same(6, 4, 2)]),
             (2, 3, [same(6, 4, 2), same(9, 4, 2)]),
-            (7, 1, [ConvAxis::valid(5, 3), ConvAxis::valid(4, 4)]),
+            (7, 1, [ConvAxis::valid(5, 3, 1), ConvAxis::valid(4, 4, 1)]),
         ] {
             let s = ConvSizes { batch: 2, n_in, n_out, axes };
             let own = |v: &[Tensor]| conv(&v[0], &v[1], &v[2], s);

@@ -3,7 +3,6 @@
 //! they give what the room's own operators give.
 
 use crate::nn::cpu::axis::ConvAxis;
-use crate::nn::cpu::axis::ConvGeometry;
 use crate::nn::cpu::direct_conv::ConvSizes;
 use candle_core::{D, Result, Tensor};
 
@@ -15,19 +14,6 @@ fn fitted(x: &Tensor, dim: usize, before: usize, len: usize) -> Result<Tensor> {
         return x.narrow(dim, 0, end)?.pad_with_zeros(dim, before, 0);
     }
     x.pad_with_zeros(dim, before, end - n)
-}
-
-/// A convolution of pictures one place high.
-pub fn conv1d(x: &Tensor, weight: &Tensor, bias: &Tensor, geometry: ConvGeometry) -> Result<Tensor> {
-    let (n, kernel) = (x.dim(2)?, weight.dim(2)?);
-    let Some(n_out) = geometry.n_out(n, kernel) else {
-        candle_core::bail!("a kernel of {kernel} does not fit into {n} frames with {geometry:?}");
-    };
-    let len = (n_out - 1) * geometry.stride + geometry.dilation * (kernel - 1) + 1;
-    let x = fitted(x, 2, geometry.pad.0, len)?.unsqueeze(2)?.contiguous()?;
-    let weight = weight.unsqueeze(2)?.contiguous()?;
-    let y = x.conv2d(&weight, 0, geometry.stride, geometry.dilation, 1)?.squeeze(2)?;
-    y.broadcast_add(&bias.reshape((1, (), 1))?)
 }
 
 /// A convolution of `x` [B, T, C] or [B, T, F, C] with `weight` [O, C, K] or [O, C, K, K'], and `bias` [O]: channels

@@ -1,8 +1,7 @@
 //! Whether two pictures show the same place, whatever the light and however the camera has moved: normalised
 //! correlation of gray blocks, searched for nearby. Thumbnails come in; when they are compared is not known here.
 
-use super::frame_difference::THUMBNAIL;
-use super::thumbnail::Thumbnail;
+use super::thumbnail::{THUMBNAIL, Thumbnail};
 
 /// Side of a block, px.
 const BLOCK: usize = 16;

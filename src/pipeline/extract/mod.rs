@@ -1,11 +1,10 @@
 //! Stage 1: a video to its sound at 16 kHz mono, the frame timeline at the dataset rate, and where shots begin, in one
 //! pass over the pictures and one over the sound. `shots` finds cuts and, with `dissolves`, gradual transitions, all on
-//! `thumbnail`s by `block_match`; `frame_difference` measures movement, `stage` writes the files.
+//! `thumbnail`s by `block_match`; `stage` writes the files.
 
 pub mod audio_file;
 pub mod block_match;
 pub mod dissolves;
-pub mod frame_difference;
 pub mod shots;
 pub mod stage;
 pub mod thumbnail;

@@ -196,8 +196,7 @@ fn tightest(windows: &[Transition]) -> Option<Transition> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::extract::frame_difference::THUMBNAIL;
-    use crate::pipeline::extract::thumbnail::scene;
+    use crate::pipeline::extract::thumbnail::{THUMBNAIL, scene};
 
     fn dim(seed: usize, light: f64) -> Option<Image> {
         Some(scene(seed, 0, light))

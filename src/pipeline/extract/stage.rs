@@ -1,9 +1,8 @@
 //! The stage. Writes the sound (16 kHz mono s16, its first sample at the first picture; absent without sound), the
 //! `Timeline` at the dataset rate, `MediaInfo`, and, only if asked, the pictures as PNG.
 
-use super::frame_difference;
-use super::frame_difference::THUMBNAIL;
 use super::shots::{RESTART, ShotFinder};
+use super::thumbnail::{THUMBNAIL, mean_change};
 use crate::config;
 use crate::external::ffmpeg;
 use crate::external::ffmpeg::frames::FrameReader;
@@ -12,7 +11,7 @@ use crate::formats::media_json::MediaInfo;
 use crate::formats::timeline_npz::Timeline;
 use crate::stage::artifacts::{Artifact, StageName};
 use crate::stage::progress::Progress;
-use crate::stage::{Input, Report, Stage, Unit};
+use crate::stage::{Input, Report, Stage, Unit, counted};
 use crate::types::sound::SAMPLE_RATE;
 use anyhow::{Context, Result};
 use serde_json::json;
@@ -75,11 +74,7 @@ impl Stage for ExtractStage {
         media.write(&Artifact::MediaInfo.within(out))?;
 
         let sound = audio_secs.map_or("no sound".to_owned(), |secs| format!("{secs:.1} s of sound"));
-        let cuts = match n_cuts {
-            0 => "no cut".to_owned(),
-            1 => "1 cut".to_owned(),
-            n => format!("{n} cuts"),
-        };
+        let cuts = if n_cuts == 0 { "no cut".to_owned() } else { counted(n_cuts, "cut") };
         let mut facts = serde_json::to_value(&media)?.as_object().cloned().unwrap_or_default();
         facts.insert("n_cuts".into(), n_cuts.into());
         let kept = |damage: &String| format!("; damaged, what could be read is kept: {damage}");
@@ -104,7 +99,7 @@ impl ExtractStage {
             let picture = if time.repeated { None } else { Some(reader.picture(Some(THUMBNAIL))?) };
             shots.push(picture.clone());
             let pair = before.as_ref().zip(picture.as_ref());
-            timeline.frame_difference.push(pair.map_or(0.0, |(a, b)| frame_difference::mean_change(a, b)));
+            timeline.frame_difference.push(pair.map_or(0.0, |(a, b)| mean_change(a, b)));
             before = picture.or(before);
             if self.settings.keep_frames {
                 png::write(&frames.join(format!("{:06}.png", time.frame_idx)), &reader.picture(None)?)?;

@@ -1,9 +1,10 @@
 //! A frame as the search for shots keeps it: small, in colour and in gray, and as a coarse grid. `block_match`
-//! compares two of them.
+//! compares two of them; their mean change from frame to frame is what `segment` knows of movement.
 
-use super::frame_difference::THUMBNAIL;
 use crate::types::image::Image;
 
+/// Width and height of the pictures to compare, in cells: fine enough that a person who moves is seen to.
+pub const THUMBNAIL: [usize; 2] = [64, 64];
 /// Cells a side of the grid, each the mean of a block of the picture.
 pub const CELLS: usize = 16;
 /// Steps of 8-bit colour that count as a change: above what compression and soft light do to a cell's mean.
@@ -44,6 +45,13 @@ impl Thumbnail {
     }
 }
 
+/// Mean absolute difference of two pictures of one size, in 8-bit steps: near 0 for a slide, a paused video or a drawn
+/// person.
+pub fn mean_change(a: &Image, b: &Image) -> f32 {
+    let sum: u64 = a.data.iter().zip(&b.data).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
+    sum as f32 / a.data.len().max(1) as f32
+}
+
 /// A picture without pattern of its own `seed`, seen `shift` px to the right and made darker by `light`.
 #[cfg(test)]
 pub fn scene(seed: usize, shift: usize, light: f64) -> Image {
@@ -55,4 +63,19 @@ pub fn scene(seed: usize, shift: usize, light: f64) -> Image {
         *byte = (light * ((bits >> 40) & 255) as f64) as u8;
     }
     image
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_difference_is_the_mean_over_the_picture() {
+        let a = Image::filled(4, 2, [10, 20, 30]);
+        let mut b = a.clone();
+        assert_eq!(mean_change(&a, &b), 0.0);
+        b.data[5] = 54;
+        assert_eq!(mean_change(&a, &b), 1.0);
+        assert_eq!(mean_change(&Image::filled(0, 0, [0; 3]), &Image::filled(0, 0, [0; 3])), 0.0);
+    }
 }

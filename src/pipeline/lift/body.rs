@@ -43,7 +43,7 @@ pub fn lift(
     let n_frames = interval.n_frames();
     let mut sizes = vec![f32::NAN; n_frames];
     // a frame is placed by frames that lie within this many
-    let margin = frames(MARGIN.max(lifter.net().config().receptive_field() as f64)).max(1);
+    let margin = frames(MARGIN.max(lifter.net.config().receptive_field() as f64)).max(1);
     for first in (0..n_frames).step_by(frames(GO).max(1)) {
         let end = n_frames.min(first + frames(GO).max(1));
         let from = first.saturating_sub(margin);

@@ -52,7 +52,7 @@ pub struct DetectedBody {
 
 /// The body model with its way of reading.
 pub struct BodyModel {
-    feed: ModelInput,
+    pub feed: ModelInput,
     reader: PointReader,
     margin: f64,
     map: KeypointOutputs,
@@ -63,10 +63,6 @@ impl BodyModel {
         let margin = if let PictureFit::Box { margin } = entry.fit { margin } else { 1.0 };
         let (reader, map) = (PointReader::new(&entry.decode), entry.points.clone());
         Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, reader, margin, map })
-    }
-
-    pub fn secs_inside(&self) -> f64 {
-        self.feed.secs_inside()
     }
 
     /// Whether it gives hands as well.

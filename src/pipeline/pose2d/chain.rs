@@ -4,6 +4,7 @@
 use super::body::{BodyModel, DetectedBody};
 use super::decode::ScoredPoint;
 use super::hand::{DetectedHand, HandModel};
+use super::model_input::ModelInput;
 use super::palm::PalmDetector;
 use super::person::Detector;
 use super::region;
@@ -90,10 +91,13 @@ impl Chain {
 
     /// Seconds inside ONNX Runtime so far, over all models.
     pub fn secs_inside(&self) -> f64 {
-        self.body.secs_inside()
-            + self.speaker.secs_inside()
-            + self.hand.as_ref().map_or(0.0, HandModel::secs_inside)
-            + self.palm.as_ref().map_or(0.0, PalmDetector::secs_inside)
+        let feeds = [
+            Some(&self.body.feed),
+            self.speaker.detector.as_ref().map(|detector| &detector.feed),
+            self.hand.as_ref().map(|hand| &hand.feed),
+            self.palm.as_ref().map(|palm| &palm.feed),
+        ];
+        feeds.into_iter().flatten().map(ModelInput::secs_inside).sum()
     }
 
     /// What is seen of the speaker in the next frame of the shot.
@@ -166,12 +170,7 @@ impl Chain {
         if let Some(palm) = self.palm.as_mut().filter(|_| due) {
             for region in palm.find(image)? {
                 let Some(hand) = model.find(image, &region)?.filter(|hand| hand.score >= enough) else { continue };
-                let to_wrist = |at: usize| distance(hand.points[0], body[at]);
-                let right = match hand.right {
-                    Some(right) => right > 0.5,
-                    None => to_wrist(coco::R_WRIST) < to_wrist(coco::L_WRIST),
-                };
-                let place = &mut hands[usize::from(right)];
+                let place = &mut hands[usize::from(is_right(&hand, body))];
                 if lost(place) {
                     *place = Some(hand);
                 }
@@ -196,16 +195,17 @@ impl Chain {
                 [sum[0] / 21.0, sum[1] / 21.0, 0.0]
             };
             if distance(middle(left), middle(right)) < SAME_HAND * shoulder_px {
-                let is_right = match left.right {
-                    Some(right) => right > 0.5,
-                    None => {
-                        distance(left.points[0], body[coco::R_WRIST]) < distance(left.points[0], body[coco::L_WRIST])
-                    }
-                };
+                let is_right = is_right(left, body);
                 hands[usize::from(!is_right)] = None;
             }
         }
     }
+}
+
+/// Whether it is a right hand: as the model says, else by the nearer wrist.
+fn is_right(hand: &DetectedHand, body: &[ScoredPoint; 17]) -> bool {
+    let to_wrist = |at: usize| distance(hand.points[0], body[at]);
+    hand.right.map_or_else(|| to_wrist(coco::R_WRIST) < to_wrist(coco::L_WRIST), |right| right > 0.5)
 }
 
 /// The surer of two hands, the first of two equally sure.

@@ -40,7 +40,7 @@ impl DetectedHand {
 
 /// The hand model with its way of reading.
 pub struct HandModel {
-    feed: ModelInput,
+    pub feed: ModelInput,
     reader: PointReader,
     decode: Decode,
     map: Vec<usize>,
@@ -50,10 +50,6 @@ impl HandModel {
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
         let (reader, map) = (PointReader::new(&entry.decode), entry.points.hand.clone());
         Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, reader, decode: entry.decode.clone(), map })
-    }
-
-    pub fn secs_inside(&self) -> f64 {
-        self.feed.secs_inside()
     }
 
     /// The hand in the square; None where the square is no place in a picture or the model's numbers are none.

@@ -10,7 +10,7 @@ use anyhow::{Result, bail};
 use std::path::Path;
 
 pub struct PalmDetector {
-    feed: ModelInput,
+    pub feed: ModelInput,
     decode: Decode,
     anchors: Vec<[f64; 2]>,
 }
@@ -23,10 +23,6 @@ impl PalmDetector {
             _ => Vec::new(),
         };
         Ok(Self { feed, decode: entry.decode.clone(), anchors })
-    }
-
-    pub fn secs_inside(&self) -> f64 {
-        self.feed.secs_inside()
     }
 
     /// The squares around the palms of the picture, surest first.

@@ -10,17 +10,13 @@ use std::path::Path;
 
 /// Finds people in a picture.
 pub struct Detector {
-    feed: ModelInput,
+    pub feed: ModelInput,
     decode: Decode,
 }
 
 impl Detector {
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self> {
         Ok(Self { feed: ModelInput::open(runtime, entry, dir)?, decode: entry.decode.clone() })
-    }
-
-    pub fn secs_inside(&self) -> f64 {
-        self.feed.secs_inside()
     }
 
     /// The people in the picture, surest first, in px.

@@ -33,7 +33,7 @@ const FOLLOW_COLOURS: f32 = 0.05;
 
 /// Follows one person.
 pub struct SpeakerTracker {
-    detector: Option<Detector>,
+    pub detector: Option<Detector>,
     pub track: PersonTrack,
     tracks: LivenessTracks,
     reference: Option<Appearance>,
@@ -60,10 +60,6 @@ impl SpeakerTracker {
             several: false,
             before: None,
         }
-    }
-
-    pub fn secs_inside(&self) -> f64 {
-        self.detector.as_ref().map_or(0.0, Detector::secs_inside)
     }
 
     /// A picture that shows the speaker, as its largest person. Errors: nobody is found in it.

@@ -4,8 +4,7 @@ use super::losses;
 use super::losses::BoneConstancy;
 use super::score::Validation;
 use super::windows::WindowBatch;
-use crate::config::GanConfig;
-use crate::config::{AdversarialLoss, ComputeDevice};
+use crate::config::{ComputeDevice, GanConfig};
 use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
 use crate::generate::model::BEST;
@@ -36,7 +35,7 @@ const LOSS_LIMIT: f64 = 1e4;
 const FREE: [&str; 5] = ["steps", "patience", "checkpoint_every", "keep_checkpoints", "device"];
 
 /// Losses of one step, unweighted, and the norm of the generator's gradient.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Losses {
     pub l1: f64,
     pub velocity: f64,
@@ -69,7 +68,6 @@ pub struct GanTrainer {
     adam_g: Adam,
     adam_d: Adam,
     bones: BoneConstancy,
-    adversarial: AdversarialLoss,
     /// Steps done.
     pub step: usize,
     /// Step and score of the best validation so far.
@@ -89,7 +87,6 @@ impl GanTrainer {
         Ok(Self {
             decoder: metadata.representation.decoder(&metadata.normalisation, DType::F32, &device)?,
             bones: BoneConstancy::new(&metadata.normalisation, DType::F32, &device)?,
-            adversarial: settings.adversarial,
             adam_g: Adam::new(&generator_params, adam)?,
             adam_d: Adam::new(&discriminator_params, adam)?,
             generator_params,
@@ -133,7 +130,7 @@ impl GanTrainer {
         if lambda_gan > 0.0 {
             let real_scores = self.discriminator.forward(&(motion(&batch.poses)? * &mask)?, true)?;
             let generated_scores = self.discriminator.forward(&generated_motion.detach(), true)?;
-            let loss = self.adversarial.discriminator(&real_scores, &generated_scores)?;
+            let loss = self.settings.adversarial.discriminator(&real_scores, &generated_scores)?;
             of_discriminator = number(&loss)?;
             self.adam_d.step(&loss.backward()?, learning_rate)?;
         }
@@ -154,7 +151,7 @@ impl GanTrainer {
         }
         if lambda_gan > 0.0 {
             let scores = self.discriminator.forward(&generated_motion, true)?;
-            adversarial = add(self.adversarial.generator(&scores)?, lambda_gan)?;
+            adversarial = add(self.settings.adversarial.generator(&scores)?, lambda_gan)?;
         }
         phase("generator's losses");
         let gradients = total.backward()?;
@@ -247,15 +244,11 @@ impl Losses {
 
     /// A line of the log.
     pub fn line(&self, step: usize) -> Value {
-        json!({
-            "step": step,
-            "l1": self.l1,
-            "velocity": self.velocity,
-            "bone": self.bone,
-            "adversarial": self.adversarial,
-            "discriminator": self.discriminator,
-            "gradient_norm": self.gradient_norm,
-        })
+        let mut line = json!({ "step": step });
+        if let (Some(line), Ok(Value::Object(losses))) = (line.as_object_mut(), serde_json::to_value(self)) {
+            line.extend(losses);
+        }
+        line
     }
 }
 

@@ -20,7 +20,7 @@ use crate::nn::cpu::thread_team::with_spinning_workers;
 use crate::nn::device;
 use crate::nn::gan::generator::Preset;
 use crate::nn::gan::generator::{Config, FRAMES_MULTIPLE};
-use crate::stage::progress::{Progress, Task};
+use crate::stage::progress::Progress;
 use crate::stage::workdir;
 use crate::train::log::MetricsLog;
 use crate::types::skeleton::N_BONES;
@@ -126,7 +126,9 @@ fn run(
         losses.check(step).with_context(|| kept(folder))?;
         task.advance(1);
         if step.is_multiple_of(LOG_EVERY) {
-            show(&*task, &losses, (step - began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9));
+            let Losses { l1, adversarial, discriminator, .. } = losses;
+            let speed = (step - began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
+            task.detail(&format!("L1 {l1:.3} adv {adversarial:.3} D {discriminator:.3}  {speed:.2} steps/s"));
             log.write(&losses.line(step))?;
         }
         let is_last = step == settings.steps;
@@ -223,13 +225,6 @@ fn kept(folder: &Path) -> String {
         Some((step, path)) => format!("the checkpoint of step {step} is kept: {}; {advice}", path.display()),
         None => format!("there is no checkpoint yet; {advice}"),
     }
-}
-
-fn show(task: &dyn Task, losses: &Losses, steps_per_sec: f64) {
-    task.detail(&format!(
-        "L1 {:.3} adv {:.3} D {:.3}  {steps_per_sec:.2} steps/s",
-        losses.l1, losses.adversarial, losses.discriminator
-    ));
 }
 
 /// The network of a preset of the configuration.

@@ -88,7 +88,7 @@ impl TrainingTask for BodyLifterTask {
             }
         }
         json!({
-            "config": self.lifter.net().config(),
+            "config": self.lifter.net.config(),
             "takes": self.takes.len(), "frames": self.takes.iter().map(|t| t.poses.len()).sum::<usize>(),
             "held_out": self.held_out.iter().map(|(set, _)| set).collect::<Vec<_>>(),
             "motion": hash.finalize().to_hex().as_str(),
@@ -100,7 +100,7 @@ impl TrainingTask for BodyLifterTask {
     }
 
     fn shape_in(&self) -> Vec<usize> {
-        vec![N_IN, self.lifter.net().config().receptive_field()]
+        vec![N_IN, self.lifter.net.config().receptive_field()]
     }
 
     fn weights(&self) -> Vec<f32> {
@@ -112,7 +112,7 @@ impl TrainingTask for BodyLifterTask {
     }
 
     fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
-        let window = self.lifter.net().config().receptive_field();
+        let window = self.lifter.net.config().receptive_field();
         let mut scene = self.scene(rng);
         for (x, y) in x.chunks_exact_mut(N_IN * window).zip(y.chunks_exact_mut(N_OUT)) {
             // where the shoulders are not seen another scene is drawn; it is rare
@@ -136,11 +136,11 @@ impl TrainingTask for BodyLifterTask {
 
     fn forward(&self, x: &Tensor, mode: &mut Mode) -> candle_core::Result<Tensor> {
         debug_assert_eq!(N_OUT, 3 * N_POINTS);
-        self.lifter.net().forward_windows(x, mode)
+        self.lifter.net.forward(x, mode)
     }
 
     fn set_momentum(&mut self, momentum: f64) {
-        self.lifter.net_mut().set_momentum(momentum);
+        self.lifter.net.set_momentum(momentum);
     }
 
     fn errors(&self, brief: bool) -> Result<Vec<String>> {

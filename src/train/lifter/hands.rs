@@ -68,8 +68,6 @@ impl TrainingTask for HandLifterTask {
         self.lifter.forward(x, mode)
     }
 
-    fn set_momentum(&mut self, _momentum: f64) {}
-
     fn errors(&self, brief: bool) -> Result<Vec<String>> {
         errors(|seen| Ok(self.lifter.lift(seen, Side::Right)?), MEASURED, brief)
     }

@@ -68,7 +68,7 @@ impl TrainingTask for HeatmapLifterTask {
     fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]) {
         let (drawn, crop, (own, axes)) = loop {
             let drawn = sample_hand(rng);
-            if let (Some(crop), Some(target)) = (Crop::around(&drawn.seen), canonical(&drawn.truth, true)) {
+            if let (Some(crop), Some(target)) = (Crop::around(&drawn.seen), canonical(&drawn.truth)) {
                 break (drawn, crop, target);
             }
         };
@@ -88,8 +88,6 @@ impl TrainingTask for HeatmapLifterTask {
         let off = (out - wanted)?.sqr()?;
         off.narrow(1, 0, N_HAND)?.mean_all()? + off.narrow(1, N_HAND, 3)?.mean_all()?
     }
-
-    fn set_momentum(&mut self, _momentum: f64) {}
 
     fn errors(&self, brief: bool) -> Result<Vec<String>> {
         errors(|seen| Ok(self.lifter.lift(seen, Side::Right)?), MEASURED, brief)

@@ -4,6 +4,7 @@
 
 use super::body_motion;
 use super::body_motion::{Proportions, turn};
+use super::hand_shape::normal;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::mocap::upper_body::BodyTake;
@@ -13,7 +14,6 @@ use crate::motion::upper_body::{
 use crate::types::skeleton;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 
 /// Dataset frames a second, the rate the lifter sees.
 pub const FPS: f64 = 15.0;
@@ -214,10 +214,6 @@ pub fn scenes(takes: &[BodyTake], filming: Filming, n: usize) -> Vec<FilmedScene
     (0..if long.is_empty() { 0 } else { n })
         .filter_map(|i| FilmedScene::from_take(long[i % long.len()], None, filming, MEASURED_FRAMES, &mut rng))
         .collect()
-}
-
-fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    rng.sample(StandardNormal)
 }
 
 /// The pose at a time between two frames.

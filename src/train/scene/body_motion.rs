@@ -93,17 +93,7 @@ pub fn gesture(rng: &mut ChaCha8Rng, n_frames: usize, frame_secs: f64) -> Vec<Po
     };
     let joined = rng.random_bool(0.12);
     let swivel = Swivel::sample(rng, habit.back);
-    let sway: [SlowSwing; 9] = [
-        SlowSwing::sample(rng, 0.14),
-        SlowSwing::sample(rng, 0.10),
-        SlowSwing::sample(rng, 0.08),
-        SlowSwing::sample(rng, 0.55),
-        SlowSwing::sample(rng, 0.30),
-        SlowSwing::sample(rng, 0.2),
-        SlowSwing::sample(rng, 0.025),
-        SlowSwing::sample(rng, 0.02),
-        SlowSwing::sample(rng, 0.04),
-    ];
+    let sway = [0.14, 0.10, 0.08, 0.55, 0.30, 0.2, 0.025, 0.02, 0.04].map(|most| SlowSwing::sample(rng, most));
     let lean = rng.random_range(-0.1..0.6);
     let reach = rng.random_range(0.0..0.06);
     let beat = BeatStroke::sample(rng);

@@ -5,7 +5,7 @@ use super::hand_shape::normal;
 use crate::math::rotation::Rotation;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
-use crate::motion::hand_bones::{BONES, FAN, METRES, direction};
+use crate::motion::hand_bones::{BONES, FAN, METRES, direction, put_finger};
 use crate::motion::view::hand::HandJoints;
 use crate::types::pose2d::N_HAND;
 use rand::Rng;
@@ -52,7 +52,6 @@ impl Posture {
     /// A right hand, metres, the wrist at 0, upright: fingers along -y, thumb towards +x, the palm facing -z.
     fn hand(&self, size: f64) -> HandJoints {
         let p = &self.0;
-        let bone = |finger: usize, k: usize| size * METRES * BONES[finger][k];
         let mut hand: HandJoints = [[0.0; 3]; N_HAND];
         for finger in 0..5 {
             let fan = FAN[finger].to_radians();
@@ -65,14 +64,8 @@ impl Posture {
                 let second = (100.0 * curl + p[8] + 8.0).clamp(-5.0, 108.0);
                 (direction(fan, 0.0), aside, [first, second, 0.55 * second].map(f64::to_radians))
             };
-            let root = 1 + 4 * finger;
-            hand[root] = vec3::scale(first, bone(finger, 0));
-            let mut flexion = 0.0;
-            for (k, bend) in bends.into_iter().enumerate() {
-                flexion += bend;
-                let part = vec3::scale(direction(aside, flexion), bone(finger, k + 1));
-                hand[root + k + 1] = vec3::add(hand[root + k], part);
-            }
+            let lengths = BONES[finger].map(|mm| size * METRES * mm);
+            put_finger(&mut hand, finger, vec3::scale(first, lengths[0]), aside, bends, lengths);
         }
         hand
     }

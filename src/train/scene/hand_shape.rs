@@ -3,7 +3,7 @@
 use crate::math::rotation::Rotation;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
-use crate::motion::hand_bones::{BONES, FAN, direction};
+use crate::motion::hand_bones::{BONES, FAN, direction, put_finger};
 use crate::motion::view::hand::HandJoints;
 use crate::types::pose2d::N_HAND;
 use rand::Rng;
@@ -23,14 +23,9 @@ pub fn sample_shape(rng: &mut ChaCha8Rng) -> HandJoints {
         length[0] *= palm;
         let fan = (FAN[finger] + 3.0 * normal(rng)).to_radians();
         let edge = ((finger as f64 - 2.3).abs() - 0.7).max(0.0);
-        let root = 1 + 4 * finger;
-        hand[root] = vec3::scale(direction(fan, (hollow * edge + 0.015 * normal(rng)).asin()), length[0]);
+        let root = vec3::scale(direction(fan, (hollow * edge + 0.015 * normal(rng)).asin()), length[0]);
         let (abduction, bends) = manner.finger(finger, fan, rng);
-        let mut flexion = 0.0;
-        for (k, bend) in bends.into_iter().enumerate() {
-            flexion += bend.to_radians();
-            hand[root + k + 1] = vec3::add(hand[root + k], vec3::scale(direction(abduction, flexion), length[k + 1]));
-        }
+        put_finger(&mut hand, finger, root, abduction, bends.map(f64::to_radians), length);
     }
     thumb(&mut hand, size, rng);
     // what people and detectors call the wrist is not one point

@@ -1,8 +1,8 @@
-//! The lifters give what the same networks in PyTorch give (`fixtures/reference/lifter_reference.py`), both forms of the
-//! temporal network in f32 as they are used, and its training pass with gradients in f64. The networks are small and
+//! The lifters give what the same networks in PyTorch give (`fixtures/reference/lifter_reference.py`), the temporal network
+//! (there in both its forms) in f32 as it is used, and its training pass with gradients in f64. The networks are small and
 //! filled by the formula: the built-in weights do not matter here.
 
-use crate::fixtures::networks::fill;
+use crate::fixtures::networks::{every_window, fill};
 use candle_core::{DType, Device, Result, Tensor};
 use orator::nn::Mode;
 use orator::nn::lifter::hand;
@@ -42,18 +42,18 @@ fn network(dtype: DType) -> anyhow::Result<(Params, TemporalLifter)> {
 }
 
 #[test]
-fn both_forms_of_the_temporal_lifter_agree_with_pytorch() -> anyhow::Result<()> {
+fn the_temporal_lifter_agrees_with_both_forms_in_pytorch() -> anyhow::Result<()> {
     let (_params, net) = network(DType::F32)?;
     let input = |shape: &[usize], phase: f64| -> Result<Tensor> { pattern(shape, phase)?.to_dtype(DType::F32) };
-    agree("dilated", &net.forward(&input(&[2, 8, 53], 3.0)?, &mut Mode::Eval)?)?;
-    agree("strided", &net.forward_windows(&input(&[4, 8, 45], 4.0)?, &mut Mode::Eval)?)
+    agree("dilated", &every_window(&net, &input(&[2, 8, 53], 3.0)?)?)?;
+    agree("strided", &net.forward(&input(&[4, 8, 45], 4.0)?, &mut Mode::Eval)?)
 }
 
 #[test]
 fn a_training_pass_agrees_with_pytorch() -> anyhow::Result<()> {
     let (params, net) = network(DType::F64)?;
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let y = net.forward_windows(&pattern(&[4, 8, 45], 4.0)?, &mut Mode::Train(&mut rng))?;
+    let y = net.forward(&pattern(&[4, 8, 45], 4.0)?, &mut Mode::Train(&mut rng))?;
     agree("train", &y)?;
     let off = (y.reshape((4, 3, 3))? - pattern(&[4, 3, 3], 5.0)?)?;
     let weights = Tensor::new(&[[0.5, 1.0, 1.5]], &Device::Cpu)?;

@@ -1,7 +1,7 @@
 //! The networks give what the same networks in PyTorch give (`fixtures/reference/networks_reference.py`), weights and
 //! inputs being filled by one formula on both sides.
 
-use crate::fixtures::networks::fill;
+use crate::fixtures::networks::{every_window, fill};
 use candle_core::{DType, Device, Tensor};
 use orator::nn::Mode;
 use orator::nn::gan::discriminator::Discriminator;
@@ -55,7 +55,7 @@ fn generator_discriminator_and_lifter_agree_with_pytorch() -> anyhow::Result<()>
     let config = temporal::Config { n_in: 8, n_out: 9, channels: 12, widths: vec![3, 3, 3], dropout: 0.25 };
     let net = TemporalLifter::new(&mut params, "lifter", &config)?;
     fill(&params)?;
-    agree("temporal_lifter", &net.forward(&pattern(&[2, 8, 31], 3.0)?, &mut Mode::Eval)?)
+    agree("temporal_lifter", &every_window(&net, &pattern(&[2, 8, 31], 3.0)?)?)
 }
 
 #[test]
