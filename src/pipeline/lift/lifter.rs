@@ -26,8 +26,8 @@ pub(crate) const MAX_GAP_SECS: f64 = 1.0;
 /// mirrored shapes of a hand.
 pub fn reach_secs(settings: &config::LiftConfig) -> f64 {
     // Weights that cannot be read are an error of the stage itself.
-    let window = weights::body(&settings.body_weights)
-        .map_or(weights::MOST_FRAMES, |body| body.net.config().receptive_field());
+    let window =
+        weights::body(&settings.body_weights).map_or(weights::MOST_FRAMES, |body| body.net.config().receptive_field());
     let smooth = (3.0 * settings.smooth_arms.max(settings.smooth_hands)).ceil();
     let frames = STRAY_FRAMES + (window / 2) as f64 + SIZE_FRAMES + smooth;
     MAX_GAP_SECS + frames / TRAINED_FPS
