@@ -22,6 +22,16 @@ impl ConfigArgs {
         self.set.iter().fold(file, |flags, set| format!("{flags} --set {set}"))
     }
 
+    /// Reads the configuration; where the usual file is not there, the defaults count.
+    pub fn load_or_default(&self) -> anyhow::Result<orator::config::Config> {
+        let is_usual = self.config == std::path::Path::new("pipeline.toml");
+        if is_usual && !self.config.exists() {
+            orator::config::load_default(&self.config, &self.set)
+        } else {
+            self.load()
+        }
+    }
+
     /// Reads the configuration, with every problem at once; a key under a former name is noted on standard error.
     pub fn load(&self) -> anyhow::Result<orator::config::Config> {
         let config = orator::config::load(&self.config, &self.set)?;

@@ -54,6 +54,16 @@ pub fn load(file: &Path, sets: &[String]) -> Result<Config> {
     Ok(Config { settings, file, notes })
 }
 
+/// The configuration of an empty file in the place of `file`, with the `--set` changes.
+///
+/// # Errors
+/// `ConfigError` with every problem at once.
+pub fn load_default(file: &Path, sets: &[String]) -> Result<Config> {
+    let file = std::path::absolute(file)?;
+    let (settings, notes) = resolve("", sets, &file)?;
+    Ok(Config { settings, file, notes })
+}
+
 /// The settings that the text of `file` gives, and notes on former keys.
 fn resolve(text: &str, sets: &[String], file: &Path) -> Result<(Settings, Vec<String>)> {
     let current = std::env::current_dir()?;
@@ -199,7 +209,7 @@ mod tests {
         assert_eq!(&*settings.lift.hand_weights, std::env::current_dir().unwrap().join("hands.safetensors"));
         let speaker = &settings.speaker[0];
         assert_eq!((&*speaker.reference, speaker.source.as_str()), (Path::new("/project/face.jpg"), "disk"));
-        assert_eq!((speaker.name.as_str(), settings.pose2d.person.as_str()), ("work", "person-rtmdet-nano"));
+        assert_eq!((speaker.name.as_str(), settings.pose2d.person.as_str()), ("work", "auto"));
         assert!(settings.speaker[0].licence.is_empty());
     }
 

@@ -17,5 +17,5 @@ pub use file::SourceLocation;
 pub use load::Config;
 pub use load::ConfigError;
 pub use load::DEFAULT_FILE;
-pub use load::load;
+pub use load::{load, load_default};
 pub use sections::*;

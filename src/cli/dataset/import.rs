@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 ///
 /// Sources are files, or folders that are searched: the authors' text clips (147 numbers a line), TED Expressive (.npz
 /// with `human_joints`), BVH, and WebDataset shards or dataset folders of this program, to merge them or to take them
-/// back. Sound (.wav, .flac, ...) and transcript (.tsv, .json, .txt) have the motion's name and lie beside it or in
+/// back. Sound (.wav, .flac, ...) and transcript (.tsv, .json, .TextGrid, .srt, .vtt, .txt) have the motion's name and lie beside it or in
 /// folders beside its own (bvh/, wav/, tsv/). Each take ends kept, refused with its reason, or failed; exit code 2 says
 /// that some failed.
 #[derive(clap::Args)]
@@ -137,13 +137,18 @@ fn close(imported: &Imported, out: &Path, ui: &Ui) -> Result<Outcome> {
     let (kept, refused, failed) = (count("kept"), count("refused"), count("failed"));
     lines.push(format!("{kept} kept, {refused} refused, {failed} failed; {}", parts.join(", ")));
     lines.push(format!("dataset  {}", out.display()));
-    let next = format!("orator dataset verify --deep {}", out.display());
+    let next = train_gan(out);
     let facts = json!({
         "dataset": out, "takes": imported.lines, "notes": imported.notes, "secs": secs,
         "kept": kept, "refused": refused, "failed": failed, "next": next,
     });
     ui.summary(&lines.join("\n"), Some(&next), facts);
     Ok(if failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
+}
+
+/// The command that trains on a dataset anywhere.
+pub fn train_gan(dataset: &Path) -> String {
+    format!("orator train gan --dataset {0} --out {0}-gan", dataset.display())
 }
 
 fn text(line: &ImportOutcome) -> String {

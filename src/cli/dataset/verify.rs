@@ -1,5 +1,6 @@
 //! `orator dataset`: what is in a dataset, and whether it is what was written.
 
+use super::import::train_gan;
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
@@ -61,7 +62,7 @@ fn check(dir: &std::path::Path, deep: bool, ui: &Ui) -> Result<Outcome> {
     ));
     let next = match (good, deep) {
         (true, false) => format!("orator dataset verify --deep {}", dir.display()),
-        (true, true) => format!("orator dataset info {}", dir.display()),
+        (true, true) => train_gan(dir),
         (false, _) => "orator run --from dataset --force".to_owned(),
     };
     let problems: Vec<_> = found.problems.iter().map(|p| json!({ "file": p.file, "what": p.what })).collect();
@@ -122,7 +123,7 @@ fn info(dir: &std::path::Path, ui: &Ui) -> Result<Outcome> {
             account.failure.map(|failure| format!("; {failure}")).unwrap_or_default()
         ));
     }
-    let next = format!("orator dataset verify --deep {}", dir.display());
+    let next = train_gan(dir);
     ui.summary(&lines.join("\n"), Some(&next), json!({ "info": info, "stats": stats, "next": next }));
     Ok(Outcome::Done)
 }

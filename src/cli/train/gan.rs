@@ -48,7 +48,7 @@ pub struct Args {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    let config = args.config.load()?;
+    let config = if args.dataset.is_some() { args.config.load_or_default()? } else { args.config.load()? };
     let folder_of = |given: Option<PathBuf>, room: &str| -> Result<PathBuf> {
         match given {
             Some(path) => Ok(path),

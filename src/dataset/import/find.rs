@@ -32,10 +32,23 @@ pub struct ImportSources {
 }
 
 const SOUND: [&str; 7] = ["wav", "flac", "mp3", "m4a", "ogg", "opus", "aac"];
-const TRANSCRIPT: [&str; 3] = ["tsv", "json", "txt"];
+const TRANSCRIPT: [&str; 6] = ["tsv", "json", "TextGrid", "srt", "vtt", "txt"];
 /// Names of neighbouring folders, in lower case.
 const SOUND_FOLDERS: [&str; 6] = ["wav", "wavs", "audio", "audios", "sound", "speech"];
-const TRANSCRIPT_FOLDERS: [&str; 8] = ["tsv", "transcript", "transcripts", "text", "texts", "txt", "json", "words"];
+const TRANSCRIPT_FOLDERS: [&str; 12] = [
+    "tsv",
+    "transcript",
+    "transcripts",
+    "text",
+    "texts",
+    "txt",
+    "json",
+    "words",
+    "textgrid",
+    "srt",
+    "vtt",
+    "subtitles",
+];
 
 /// Searches `sources`, files or folders; with `only`, files of other kinds are left out.
 ///

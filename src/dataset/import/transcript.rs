@@ -1,18 +1,11 @@
 //! Transcripts: words with times from `.tsv` (start, end, word: GENEA 2022 and 2023) and `.json` (output of speech
-//! recognisers with `words`: GENEA 2020, and plain lists), or words alone from `.txt`.
+//! recognisers with `words`: GENEA 2020, and plain lists), `.srt`, `.vtt` and `.TextGrid`, or words alone from `.txt`.
 
+use super::word::Word;
+use super::{subtitles, textgrid};
 use anyhow::{Context, Result, bail, ensure};
-use serde::Serialize;
 use serde_json::Value;
 use std::path::Path;
-
-/// Word with its time, seconds after the take's beginning.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Word {
-    pub start_secs: f64,
-    pub end_secs: f64,
-    pub word: String,
-}
 
 /// Transcript; `words` is empty without times.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -41,6 +34,8 @@ impl Transcript {
         let read = match ending.as_str() {
             "tsv" => tsv(text),
             "json" => json(text),
+            "srt" | "vtt" => subtitles::read(text).map(Self::of_words),
+            "textgrid" => textgrid::read(text).map(Self::of_words),
             _ => Ok(Self::of_text(text)),
         };
         read.with_context(|| format!("{} is no transcript", path.display()))

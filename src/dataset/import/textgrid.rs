@@ -1,0 +1,103 @@
+//! Praat's TextGrid, long and short text format: the words of its tier of words.
+
+use super::word::Word;
+use anyhow::{Context, Result, ensure};
+
+/// The intervals with text of the tier whose name has `word` in it, else of the first tier of intervals.
+///
+/// # Errors
+/// No tier of intervals; an interval without its two times.
+pub fn read(text: &str) -> Result<Vec<Word>> {
+    let values = values(text);
+    let mut tiers = Vec::new();
+    let mut at = 0;
+    while at < values.len() {
+        let is_tier = matches!(&values[at], TextGridValue::Text(kind) if kind == "IntervalTier");
+        at += 1;
+        if is_tier {
+            tiers.push(tier(&values, &mut at)?);
+        }
+    }
+    let spoken = tiers.iter().position(|(name, _)| name.to_lowercase().contains("word")).unwrap_or(0);
+    ensure!(!tiers.is_empty(), "it has no tier of intervals");
+    Ok(tiers.swap_remove(spoken).1)
+}
+
+/// Numbers and quoted texts, which both formats have in the same order; labels such as `xmin =` and `[1]` are not values.
+enum TextGridValue {
+    Number(f64),
+    Text(String),
+}
+
+fn values(text: &str) -> Vec<TextGridValue> {
+    let mut values = Vec::new();
+    for line in text.lines().map(str::trim) {
+        if let (Some(first), Some(last)) = (line.find('"'), line.rfind('"'))
+            && first < last
+        {
+            values.push(TextGridValue::Text(line[first + 1..last].replace("\"\"", "\"")));
+        } else if let Some(number) = line.rsplit(['=', ' ']).find_map(|word| word.parse::<f64>().ok()) {
+            values.push(TextGridValue::Number(number));
+        }
+    }
+    values
+}
+
+/// Name and intervals of a tier: its name, its span, the number of intervals, then two times and a text for each.
+fn tier(values: &[TextGridValue], at: &mut usize) -> Result<(String, Vec<Word>)> {
+    let mut next = || {
+        *at += 1;
+        values.get(*at - 1).context("it ends in the middle of a tier")
+    };
+    let name = match next()? {
+        TextGridValue::Text(name) => name.clone(),
+        TextGridValue::Number(_) => anyhow::bail!("a tier has no name"),
+    };
+    let mut number = |what: &str| match next()? {
+        TextGridValue::Number(number) => Ok(*number),
+        TextGridValue::Text(text) => Err(anyhow::anyhow!("tier {name}: {what} expected, found `{text}`")),
+    };
+    let n_intervals = (number("its beginning")?, number("its end")?, number("a number of intervals")?).2;
+    let mut words = Vec::new();
+    for n in 1..=n_intervals as u64 {
+        let time = |value: &TextGridValue| match value {
+            TextGridValue::Number(number) => Some(*number),
+            TextGridValue::Text(_) => None,
+        };
+        let (start_secs, end_secs) = (time(next()?), time(next()?));
+        let (Some(start_secs), Some(end_secs), TextGridValue::Text(word)) = (start_secs, end_secs, next()?) else {
+            anyhow::bail!("tier {name}: interval {n} needs two times and a text");
+        };
+        ensure!(end_secs >= start_secs, "tier {name}: interval {n} ends before it begins");
+        if !word.trim().is_empty() {
+            words.push(Word { start_secs, end_secs, word: word.trim().to_owned() });
+        }
+    }
+    Ok((name, words))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LONG: &str = "File type = \"ooTextFile\"\nObject class = \"TextGrid\"\n\nxmin = 0\nxmax = 2\ntiers? <exists>\n\
+        size = 2\nitem []:\n    item [1]:\n        class = \"IntervalTier\"\n        name = \"phones\"\n        xmin = 0\n\
+        xmax = 2\n        intervals: size = 1\n        intervals [1]:\n            xmin = 0\n            xmax = 2\n\
+        text = \"s\"\n    item [2]:\n        class = \"IntervalTier\"\n        name = \"words\"\n        xmin = 0\n\
+        xmax = 2\n        intervals: size = 2\n        intervals [1]:\n            xmin = 0\n            xmax = 0.5\n\
+        text = \"\"\n        intervals [2]:\n            xmin = 0.5\n            xmax = 2\n            text = \"so\"\n";
+    const SHORT: &str = "File type = \"ooTextFile\"\nObject class = \"TextGrid\"\n\n0\n2\n<exists>\n1\n\"IntervalTier\"\n\
+        \"words\"\n0\n2\n2\n0\n0.5\n\"\"\n0.5\n2\n\"so\"\n";
+
+    #[test]
+    fn both_formats_give_the_words() {
+        for text in [LONG, SHORT] {
+            let words = read(text).unwrap();
+            assert_eq!(words, [Word { start_secs: 0.5, end_secs: 2.0, word: "so".into() }]);
+        }
+        assert!(read("File type = \"ooTextFile\"\n").is_err());
+        for end in 0..SHORT.len() {
+            let _ = read(&SHORT[..end]);
+        }
+    }
+}
