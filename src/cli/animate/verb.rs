@@ -139,6 +139,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let is_read =
         |path: &Path| input.is_at(path) || [&args.audio, &args.beside].into_iter().flatten().any(|read| read == path);
     let outputs = outputs(&args.out, is_read, "what is read", ", or give --format bvh")?;
+    check_effect(&args, &outputs)?;
     let sound = args.audio.as_deref().map(audio::read_sound).transpose()?;
     let done = animate(&args, input, sound, &outputs, &options, ui)?;
     let next = next_output(&outputs).map(|out| {
@@ -189,6 +190,23 @@ fn whole_folder(args: &Args, inputs: &[MotionInput], options: &AnimationOptions,
     }
     ui.summary(&text, None, json!({ "motions": facts, "failed": n_failed, "out": folder }));
     Ok(if n_failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
+}
+
+/// Errors on an option that changes nothing in these outputs.
+fn check_effect(args: &Args, outputs: &OutputFiles) -> Result<()> {
+    let has = |formats: &[ExportFormat]| outputs.iter().any(|(_, format)| formats.contains(format));
+    let is_film = has(&[ExportFormat::Mp4]);
+    for (option, is_given) in [("--beside", args.beside.is_some()), ("--audio", args.audio.is_some())] {
+        ensure!(is_film || !is_given, "{option} is for films: name an .mp4 at --out, or leave it away");
+    }
+    let has_names = has(&[ExportFormat::Bvh, ExportFormat::Glb, ExportFormat::Json]);
+    ensure!(has_names || args.names == Names::Own, "--names is for .bvh, .glb and .json: name one at --out");
+    let is_tuned = args.one_euro_hz != ONE_EURO.rest_hz || args.one_euro_beta != ONE_EURO.beta;
+    ensure!(
+        !is_tuned || args.smoothing == SmoothingKind::OneEuro,
+        "--one-euro-hz and --one-euro-beta are for --smoothing one-euro"
+    );
+    Ok(())
 }
 
 /// The report on one animation, for people and for programs.

@@ -211,11 +211,13 @@ fn what_is_wrong_is_said_and_nothing_is_written() {
         ("good.npy --out x.bvh --fps fast", "1 to 1000 frames"),
         ("good.npy --out x.bvh --sample one", "is no dataset"),
         ("good.npy --out x.bvh --smoothing one-euro --one-euro-hz 0", "expected 0.01 to 100"),
-        ("good.npy --out x.bvh --audio picture.png", "picture.png"),
+        ("good.npy --out x.mp4 --audio picture.png", "picture.png"),
+        ("good.npy --out x.bvh --audio good.npy", "--audio is for films"),
+        ("good.npy --out x.npy --names vrm", "--names is for .bvh"),
         ("good.npy --out x.bvh --keypoints good.npy", "good.npy"),
     ] {
         let (code, _, errors) = animate(dir, args);
         assert!(code != 0 && errors.contains(words), "{args}: {code} {errors}");
     }
-    assert!(!dir.join("x.bvh").exists() && !dir.join("x").exists());
+    assert!(!dir.join("x.bvh").exists() && !dir.join("x.mp4").exists() && !dir.join("x").exists());
 }
