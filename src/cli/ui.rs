@@ -1,9 +1,11 @@
 //! What a verb prints: progress bars on standard error, a closing summary (or one JSON object) on standard output.
 
-use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
-use orator::stage::progress::{Progress, Task};
-use std::io::{ErrorKind, Write};
-use std::sync::atomic::{AtomicBool, Ordering};
+use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressState, ProgressStyle};
+use orator::stage::progress::{PARTS, Progress, Task};
+use std::fmt;
+use std::io::{ErrorKind, IsTerminal, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 /// The terminal, or its absence. An output that cannot be written never ends the work.
@@ -36,6 +38,26 @@ impl Ui {
         }
     }
 
+    /// From here on Ctrl-C ends the program with exit code 130 and says what is kept: `kept`, and how to go on.
+    pub fn tell_when_stopped(&self, kept: &'static str) {
+        // A second handler of this process is none: the first goes on telling.
+        let _ = ctrlc::set_handler(move || {
+            note(&format!("\nstopped; {kept}"));
+            std::process::exit(130);
+        });
+    }
+
+    /// Asks a question that is answered by y or n; no, where nobody is at the terminal.
+    pub fn asks(&self, question: &str) -> bool {
+        let is_attended = std::io::stdin().is_terminal() && std::io::stderr().is_terminal();
+        if self.json || !is_attended {
+            return false;
+        }
+        note(&format!("{question} [y/N]"));
+        let mut answer = String::new();
+        std::io::stdin().read_line(&mut answer).is_ok() && answer.trim().eq_ignore_ascii_case("y")
+    }
+
     /// Whether standard output could not take all that was written to it (a full disk).
     pub fn has_lost_output(&self) -> bool {
         self.has_lost_output.load(Ordering::Relaxed)
@@ -59,17 +81,25 @@ pub fn note(line: &str) {
 }
 
 impl Progress for Ui {
-    fn begin(&self, label: &str, total: u64) -> Box<dyn Task> {
-        let template = if total == 0 {
-            "{prefix:28!} {spinner} {pos} in {elapsed} {wide_msg}"
-        } else {
-            "{prefix:28!} {bar:24} {pos}/{len} {elapsed} left {eta} {wide_msg}"
+    fn begin(&self, label: &str, total: u64) -> Box<dyn Task + '_> {
+        let (template, bar) = match total {
+            0 => ("{prefix:40!} {spinner} {pos} in {elapsed} {wide_msg}", ProgressBar::new_spinner()),
+            PARTS => ("{prefix:40!} {bar:12} {percent:>3} % {elapsed} left {left} {wide_msg}", ProgressBar::new(total)),
+            _ => ("{prefix:40!} {bar:12} {pos}/{len} {elapsed} left {left} {wide_msg}", ProgressBar::new(total)),
+        };
+        let n_skipped = Arc::new(AtomicU64::new(0));
+        let skipped = n_skipped.clone();
+        let left = move |state: &ProgressState, out: &mut dyn fmt::Write| {
+            let left = secs_left(state, skipped.load(Ordering::Relaxed));
+            let _ = match left {
+                Some(left) => write!(out, "{}", HumanDuration(left)),
+                None => write!(out, "?"),
+            };
         };
         let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-        let bar = if total == 0 { ProgressBar::new_spinner() } else { ProgressBar::new(total) };
-        let bar = self.bars.add(bar.with_style(style).with_prefix(label.to_owned()));
+        let bar = self.bars.add(bar.with_style(style.with_key("left", left)).with_prefix(label.to_owned()));
         bar.enable_steady_tick(Duration::from_millis(200));
-        Box::new(Bar(bar))
+        Box::new(Bar { bar, n_skipped })
     }
 
     fn say(&self, line: &str) {
@@ -82,19 +112,34 @@ impl Progress for Ui {
     }
 }
 
-struct Bar(ProgressBar);
+/// Time that is left at the pace so far; none where nothing has been done that took time.
+fn secs_left(state: &ProgressState, n_skipped: u64) -> Option<Duration> {
+    let done = state.pos().saturating_sub(n_skipped);
+    let left = state.len()?.saturating_sub(state.pos());
+    (done > 0).then(|| state.elapsed().mul_f64(left as f64 / done as f64))
+}
+
+struct Bar {
+    bar: ProgressBar,
+    /// Steps that needed no work.
+    n_skipped: Arc<AtomicU64>,
+}
 
 impl Task for Bar {
     fn advance(&self, steps: u64) {
-        self.0.inc(steps);
+        self.bar.inc(steps);
+    }
+    fn skip(&self, steps: u64) {
+        self.n_skipped.fetch_add(steps, Ordering::Relaxed);
+        self.bar.inc(steps);
     }
     fn detail(&self, text: &str) {
-        self.0.set_message(text.to_owned());
+        self.bar.set_message(text.to_owned());
     }
 }
 
 impl Drop for Bar {
     fn drop(&mut self) {
-        self.0.finish_and_clear();
+        self.bar.finish_and_clear();
     }
 }

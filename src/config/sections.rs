@@ -104,7 +104,8 @@ impl Default for ExtractConfig {
     }
 }
 
-/// `[pose2d]`: which models look at a frame (ids of `models/manifest.toml`), and the tracking of the one speaker.
+/// `[pose2d]`: which models look at a frame (ids of `models/manifest.toml`; `auto`: the best that is there), and the
+/// tracking of the one speaker.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Pose2dConfig {
@@ -128,10 +129,10 @@ pub struct Pose2dConfig {
 impl Default for Pose2dConfig {
     fn default() -> Self {
         Self {
-            person: "person-rtmdet-nano".into(),
-            body: "body-tinypose-256x192".into(),
-            hand: "hand-mediapipe-lite".into(),
-            palm: "palm-mediapipe-full".into(),
+            person: "auto".into(),
+            body: "auto".into(),
+            hand: "auto".into(),
+            palm: "auto".into(),
             person_every: 15,
             palm_every: 5,
             person_follow: 0.3,
@@ -288,15 +289,15 @@ impl Default for GanConfig {
             window_frames: 64,
             stride_frames: 5,
             batch: 32,
-            steps: 6000,
-            learning_rate: 1e-4,
+            steps: 1500,
+            learning_rate: 5e-4,
             adversarial: AdversarialLoss::LeastSquares,
             lambda_l1: 1.0,
             lambda_velocity: 0.0,
-            lambda_gan: 1.0,
+            lambda_gan: 0.15,
             lambda_bone: 0.1,
             seed: 1337,
-            epoch_steps: 300,
+            epoch_steps: 100,
             patience: 0,
             checkpoint_every: 100,
             keep_checkpoints: 3,

@@ -79,7 +79,7 @@ pub struct StagePlan {
 impl fmt::Display for UnitState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
-            Self::Fresh => "fresh",
+            Self::Fresh => "up to date",
             Self::Stale => "stale",
             Self::Failed | Self::NoVideo => "failed",
             Self::Waits => "waits",

@@ -125,7 +125,7 @@ impl Ledger {
 
 /// `reason 3.2 s, reason 1.0 s`, the longest first.
 pub fn longest_first(secs: &BTreeMap<String, f64>) -> String {
-    let mut reasons: Vec<_> = secs.iter().collect();
+    let mut reasons: Vec<_> = secs.iter().filter(|(_, secs)| **secs >= 0.05).collect();
     reasons.sort_by(|a, b| b.1.total_cmp(a.1).then(a.0.cmp(b.0)));
     reasons.iter().map(|(reason, secs)| format!("{reason} {secs:.1} s")).collect::<Vec<_>>().join(", ")
 }

@@ -4,6 +4,7 @@
 pub mod artifacts;
 pub mod fingerprint;
 pub mod ledger;
+pub mod overall;
 pub mod progress;
 pub mod record;
 pub mod refusal;

@@ -1,9 +1,13 @@
 //! How long work reports itself. The library only speaks to these traits; the bars are drawn in `cli`.
 
+/// Steps of a task that counts shares of a whole: a hundredth of a percent is 100.
+pub const PARTS: u64 = 1_000_000;
+
 /// Something that can show work going on.
 pub trait Progress: Send + Sync {
-    /// A piece of work of `total` steps begins (0: length unknown). It ends when the task is dropped.
-    fn begin(&self, label: &str, total: u64) -> Box<dyn Task>;
+    /// A piece of work of `total` steps begins (0: length unknown; `PARTS`: shares of a whole). It ends when the task is
+    /// dropped.
+    fn begin(&self, label: &str, total: u64) -> Box<dyn Task + '_>;
     /// A line the user should see while work goes on (a warning, a milestone).
     fn say(&self, line: &str);
     /// Something happened to a unit; says its message unless overridden.
@@ -46,6 +50,10 @@ impl Event<'_> {
 pub trait Task: Send + Sync {
     /// `steps` more steps are done.
     fn advance(&self, steps: u64);
+    /// `steps` more steps needed no work: they say nothing of the time that is left.
+    fn skip(&self, steps: u64) {
+        self.advance(steps);
+    }
     /// A short text beside the bar (a loss, the unit at hand).
     fn detail(&self, text: &str);
 }
@@ -54,7 +62,7 @@ pub trait Task: Send + Sync {
 pub struct Silent;
 
 impl Progress for Silent {
-    fn begin(&self, _label: &str, _total: u64) -> Box<dyn Task> {
+    fn begin(&self, _label: &str, _total: u64) -> Box<dyn Task + '_> {
         Box::new(Silent)
     }
     fn say(&self, _line: &str) {}

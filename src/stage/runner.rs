@@ -2,6 +2,7 @@
 //! stop the others. What a unit makes does not depend on who made it.
 
 use super::fingerprint::{Fingerprint, HashCache};
+use super::overall::OverallProgress;
 use super::progress::{Event, Progress};
 use super::record::{DirtyReason, Failure, Output, Record};
 use super::{Report, Stage, Unit, workdir};
@@ -74,25 +75,24 @@ pub fn run_stages(
 ) -> Vec<Vec<StageOutcome>> {
     let next = AtomicUsize::new(0);
     let ended: Vec<Mutex<Vec<StageOutcome>>> = units.iter().map(|_| Mutex::new(Vec::new())).collect();
-    let names: Vec<&str> = stages.iter().map(|stage| stage.name()).collect();
-    let bar = progress.begin(&names.join(" "), units.len() as u64);
+    let overall = OverallProgress::begin(stages, units, progress);
     let order = largest_first(units);
     std::thread::scope(|scope| {
         for _ in 0..jobs.clamp(1, units.len().max(1)) {
             scope.spawn(|| {
                 while let Some(&at) = order.get(next.fetch_add(1, Ordering::SeqCst)) {
-                    for stage in stages {
-                        let answer = run_unit(*stage, &units[at], work, hashes, force, progress);
+                    for (idx, stage) in stages.iter().enumerate() {
+                        let answer = run_unit(*stage, &units[at], work, hashes, force, &overall);
                         report(&answer, *stage, &units[at], progress);
                         let has_failed = matches!(answer, StageOutcome::Failed(_));
                         if let Ok(mut answers) = ended[at].lock() {
                             answers.push(answer);
                         }
                         if has_failed {
+                            overall.skip(&stages[idx + 1..], &units[at]);
                             break;
                         }
                     }
-                    bar.advance(1);
                     hashes.save_now_and_then();
                 }
             });
@@ -133,20 +133,24 @@ fn run_unit(
     work: &Path,
     hashes: &HashCache,
     force: bool,
-    progress: &dyn Progress,
+    overall: &OverallProgress,
 ) -> StageOutcome {
     let folder = unit.dir(&work.join(stage.name()));
     let fingerprint = match guarded(|| Fingerprint::now(stage, unit, hashes)) {
         Ok(now) => now,
-        Err(error) => return failed(&folder, None, error),
+        Err(error) => {
+            overall.skip(&[stage], unit);
+            return failed(&folder, None, error);
+        }
     };
     if !force
         && let Some(record) = Record::read(&folder)
         && record.dirty(&fingerprint, stage.common_folder().unwrap_or(&folder)).is_none()
     {
+        overall.skip(&[stage], unit);
         return StageOutcome::Skipped(Report { line: record.line, facts: record.facts });
     }
-    match guarded(|| attempt(stage, unit, &folder, &fingerprint, progress)) {
+    match guarded(|| attempt(stage, unit, &folder, &fingerprint, &overall.of(stage, unit))) {
         Ok(report) => StageOutcome::Done(report),
         Err(error) => failed(&folder, Some(fingerprint), error),
     }

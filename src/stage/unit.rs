@@ -53,6 +53,10 @@ pub trait Stage: Sync {
     fn name(&self) -> &'static str;
     /// Goes up when the bytes it writes change their meaning.
     fn version(&self) -> u32;
+    /// Time it takes for a video, relative to other stages.
+    fn cost(&self) -> u32 {
+        1
+    }
     /// Every setting that has a say in the bytes made of `unit`, and the versions of the tools that have.
     fn settings(&self, unit: &Unit) -> serde_json::Value;
     /// The files it reads for `unit`; their contents are part of the fingerprint.

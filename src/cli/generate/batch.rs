@@ -11,6 +11,7 @@ use serde_json::json;
 const MOST_LISTED: usize = 30;
 
 pub fn run(batch: &SpeechBatch, ui: &Ui) -> Result<Outcome> {
+    ui.tell_when_stopped("every sound that is done is kept, and the same command goes on from there");
     let report = batch.run(ui)?;
     ui.summary(&text(&report), None, json!(report));
     Ok(if report.failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
@@ -23,7 +24,7 @@ fn text(report: &BatchReport) -> String {
         let facts = |key: &str| sound.facts.get(key).cloned().unwrap_or_default();
         let word = match (sound.ended, &sound.error) {
             (BatchState::Made, _) => "made",
-            (BatchState::Fresh, _) => "fresh",
+            (BatchState::Fresh, _) => "up to date",
             (BatchState::Failed, error) => {
                 text += &format!("{:width$}  failed  {}\n", sound.out, error.as_deref().unwrap_or_default());
                 continue;
@@ -33,7 +34,7 @@ fn text(report: &BatchReport) -> String {
         if n_listed <= MOST_LISTED {
             let note = facts("note").as_str().map_or(String::new(), |note| format!("  note: {note}"));
             text += &format!(
-                "{:width$}  {word:6}  {:8.1} s {:7} frames  {}{note}\n",
+                "{:width$}  {word:10}  {:8.1} s {:7} frames  {}{note}\n",
                 sound.out,
                 facts("secs").as_f64().unwrap_or(0.0),
                 facts("n_frames"),
@@ -46,5 +47,5 @@ fn text(report: &BatchReport) -> String {
     }
     let BatchReport { made, fresh, failed, out_folder, sounds } = report;
     let sounds = counted(sounds.len(), "sound");
-    text + &format!("{sounds}: {made} made, {fresh} fresh, {failed} failed; in {}", out_folder.display())
+    text + &format!("{sounds}: {made} made, {fresh} up to date, {failed} failed; in {}", out_folder.display())
 }

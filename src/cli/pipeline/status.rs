@@ -12,7 +12,7 @@ use serde_json::json;
 /// Reasons of a stage's plan that are written out; `--json` has all.
 const REASONS_SHOWN: usize = 3;
 
-/// Show every stage of every video (fresh, stale, failed, or waiting for an earlier stage), and what became of every
+/// Show every stage of every video (up to date, stale, failed, or waiting for an earlier stage), and what became of every
 /// second: kept, refused for which reason, lost to a failed stage, or waiting for a verdict.
 #[derive(clap::Args)]
 pub struct Args {
@@ -21,7 +21,7 @@ pub struct Args {
     /// Only this speaker; may be given several times.
     #[arg(long, value_name = "NAME")]
     speaker: Vec<String>,
-    /// Say why a stage is stale, what the error was, what a fresh stage reported, and what a run would do.
+    /// Say why a stage is stale, what the error was, what a stage that is up to date reported, and what a run would do.
     #[arg(long)]
     why: bool,
 }
@@ -42,7 +42,7 @@ fn text(report: &StatusReport, why: bool) -> String {
     let names = units.iter().map(|unit| &unit.unit).chain(report.account.iter().map(|account| &account.of));
     let width = names.map(|name| name.chars().count()).max().unwrap_or(0).max("seconds".len());
     let row = |name: &str, words: [String; StageName::ALL.len()]| {
-        format!("{name:width$} {}", words.map(|word| format!("{word:8}")).join(" ")).trim_end().to_owned()
+        format!("{name:width$} {}", words.map(|word| format!("{word:10}")).join(" ")).trim_end().to_owned()
     };
     let mut lines = vec![row("", StageName::ALL.map(|stage| stage.to_string()))];
     for of_unit in rows {
@@ -92,5 +92,5 @@ fn plan(plan: &StagePlan) -> String {
     let more = because.len().saturating_sub(shown.len());
     let more = if more == 0 { String::new() } else { format!("; {more} other reasons") };
     let why = if *would_run == 0 { String::new() } else { format!(": {}{more}", shown.join("; ")) };
-    format!("{stage:8} {stay_fresh} stay fresh, {would_run} would run{why}")
+    format!("{stage:8} {stay_fresh} stay up to date, {would_run} would run{why}")
 }

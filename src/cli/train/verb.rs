@@ -20,6 +20,7 @@ enum Network {
 }
 
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
+    ui.tell_when_stopped("the newest checkpoint is kept, and the same command goes on from it");
     match args.network {
         Network::Basis(args) => basis::run(args, ui),
         Network::Embedding(args) => embedding::run(args, ui),

@@ -1,0 +1,184 @@
+//! The bar of a whole run: it moves while a stage works on a video, by that stage's share of all the work.
+
+use super::progress::{PARTS, Progress, Task};
+use super::{Stage, Unit};
+use std::sync::Mutex;
+
+/// The work on all units at all stages as one task of `PARTS` steps.
+pub struct OverallProgress<'a> {
+    progress: &'a dyn Progress,
+    task: Box<dyn Task + 'a>,
+    whole: f64,
+    /// Work done so far, and the steps of the task it came to.
+    done: Mutex<(f64, u64)>,
+}
+
+impl<'a> OverallProgress<'a> {
+    /// Begins the task. The work on a unit at a stage is the bytes of its source times the cost of the stage.
+    pub fn begin(stages: &[&dyn Stage], units: &[Unit], progress: &'a dyn Progress) -> Self {
+        let whole = units.iter().flat_map(|unit| stages.iter().map(|stage| work(*stage, unit))).sum();
+        let label = format!("{} of {}", names(stages), super::counted(units.len(), "unit"));
+        Self { progress, task: progress.begin(&label, PARTS), whole, done: Mutex::new((0.0, 0)) }
+    }
+
+    /// What the stage reports its work on the unit to.
+    pub fn of(&'a self, stage: &dyn Stage, unit: &Unit) -> UnitProgress<'a> {
+        let label = format!("{} {unit}", stage.name());
+        UnitProgress { overall: self, label, left: Mutex::new(work(stage, unit)) }
+    }
+
+    /// The unit needs no work at these stages, or gets none.
+    pub fn skip(&self, stages: &[&dyn Stage], unit: &Unit) {
+        self.count(stages.iter().map(|stage| work(*stage, unit)).sum(), |task, steps| task.skip(steps));
+    }
+
+    fn count(&self, work: f64, report: impl FnOnce(&dyn Task, u64)) {
+        let Ok(mut done) = self.done.lock() else { return };
+        done.0 += work;
+        let steps = (done.0 / self.whole * PARTS as f64).round().clamp(0.0, PARTS as f64) as u64;
+        report(&*self.task, steps.saturating_sub(done.1));
+        done.1 = done.1.max(steps);
+    }
+}
+
+fn work(stage: &dyn Stage, unit: &Unit) -> f64 {
+    let bytes = std::fs::metadata(&unit.source).map_or(0, |meta| meta.len());
+    f64::from(stage.cost()) * bytes.max(1) as f64
+}
+
+fn names(stages: &[&dyn Stage]) -> String {
+    match stages {
+        [first, .., last] => format!("{} to {}", first.name(), last.name()),
+        _ => stages.iter().map(|stage| stage.name()).collect(),
+    }
+}
+
+/// The work of one stage on one unit. When it is dropped, all of it is done.
+pub struct UnitProgress<'a> {
+    overall: &'a OverallProgress<'a>,
+    label: String,
+    left: Mutex<f64>,
+}
+
+impl UnitProgress<'_> {
+    fn count(&self, work: f64) {
+        let Ok(mut left) = self.left.lock() else { return };
+        let work = work.min(*left);
+        *left -= work;
+        self.overall.count(work, |task, steps| task.advance(steps));
+    }
+}
+
+impl Progress for UnitProgress<'_> {
+    fn begin(&self, _label: &str, total: u64) -> Box<dyn Task + '_> {
+        let whole = self.left.lock().map_or(0.0, |left| *left);
+        let task = self.overall.progress.begin(&self.label, total);
+        Box::new(UnitTask { task, unit: self, step: if total == 0 { 0.0 } else { whole / total as f64 } })
+    }
+
+    fn say(&self, line: &str) {
+        self.overall.progress.say(line);
+    }
+}
+
+impl Drop for UnitProgress<'_> {
+    fn drop(&mut self) {
+        self.count(f64::INFINITY);
+    }
+}
+
+struct UnitTask<'a> {
+    task: Box<dyn Task + 'a>,
+    unit: &'a UnitProgress<'a>,
+    /// Work a step stands for.
+    step: f64,
+}
+
+impl Task for UnitTask<'_> {
+    fn advance(&self, steps: u64) {
+        self.task.advance(steps);
+        self.unit.count(self.step * steps as f64);
+    }
+    fn detail(&self, text: &str) {
+        self.task.detail(text);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stage::{Input, Report};
+    use anyhow::Result;
+    use std::path::Path;
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    struct Costly(u32);
+
+    impl Stage for Costly {
+        fn name(&self) -> &'static str {
+            "costly"
+        }
+        fn version(&self) -> u32 {
+            1
+        }
+        fn cost(&self) -> u32 {
+            self.0
+        }
+        fn settings(&self, _: &Unit) -> serde_json::Value {
+            serde_json::Value::Null
+        }
+        fn inputs(&self, _: &Unit) -> Result<Vec<Input>> {
+            Ok(Vec::new())
+        }
+        fn run(&self, _: &Unit, _: &Path, _: &dyn Progress) -> Result<Report> {
+            anyhow::bail!("not run")
+        }
+    }
+
+    #[derive(Default)]
+    struct Counted([AtomicU64; 2]);
+
+    impl Progress for Counted {
+        fn begin(&self, label: &str, _total: u64) -> Box<dyn Task + '_> {
+            if label.contains(" of ") {
+                Box::new(CountedTask(&self.0))
+            } else {
+                Box::new(super::super::progress::Silent)
+            }
+        }
+        fn say(&self, _line: &str) {}
+    }
+
+    struct CountedTask<'a>(&'a [AtomicU64; 2]);
+
+    impl Task for CountedTask<'_> {
+        fn advance(&self, steps: u64) {
+            self.0[0].fetch_add(steps, Ordering::Relaxed);
+        }
+        fn skip(&self, steps: u64) {
+            self.0[1].fetch_add(steps, Ordering::Relaxed);
+        }
+        fn detail(&self, _text: &str) {}
+    }
+
+    #[test]
+    fn the_bar_moves_within_a_unit_and_ends_at_the_whole() {
+        let unit = |video: &str| Unit { speaker: "host".into(), video: video.into(), source: "nothing".into() };
+        let (units, stages) = ([unit("a"), unit("b")], [Costly(1), Costly(3)]);
+        let stages = [&stages[0] as &dyn Stage, &stages[1]];
+        let counted = Counted::default();
+        let overall = OverallProgress::begin(&stages, &units, &counted);
+        let seen = || counted.0.each_ref().map(|n| n.load(Ordering::Relaxed) * 8 / PARTS);
+        overall.skip(&stages, &units[0]);
+        drop(overall.of(stages[0], &units[1]));
+        assert_eq!(seen(), [1, 4]);
+        let costly = overall.of(stages[1], &units[1]);
+        let task = costly.begin("", 3);
+        task.advance(1);
+        assert_eq!(seen(), [2, 4]);
+        task.advance(5);
+        drop(task);
+        drop(costly);
+        assert_eq!(counted.0.each_ref().map(|n| n.load(Ordering::Relaxed)).iter().sum::<u64>(), PARTS);
+    }
+}
