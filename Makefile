@@ -8,12 +8,13 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: setup runtime readers browser blender validator build check test prove prove-rule demo clean-demo
+.PHONY: setup runtime models readers browser blender validator build check test prove prove-rule demo clean-demo
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
 SKIPPED := $(abspath $(TARGET))/skipped-tests.txt
 export ORATOR_READERS ?= $(abspath $(TARGET)/readers)
+export ORATOR_MODELS ?= $(abspath $(TARGET)/models)
 export ORATOR_BLENDER ?= $(abspath $(TARGET)/blender)
 # A text that differs from its snapshot is an error.
 export INSTA_UPDATE := no
@@ -22,6 +23,7 @@ export ORATOR_GLTF_VALIDATOR ?= $(abspath $(TARGET)/validator)
 setup: ; @.ci/setup/system.sh
 runtime: ; @.ci/setup/onnxruntime.sh
 readers browser blender validator: ; @.ci/setup/$@.sh
+models: build ; @.ci/setup/models.sh
 
 build: setup runtime
 	cargo build --release --locked
@@ -37,7 +39,7 @@ check:
 	cargo test --locked --lib --bins
 	cargo test --locked --test it -- $(QUICK)
 
-test: build readers browser blender validator
+test: build models readers browser blender validator
 	@rm -f $(SKIPPED)
 	cargo fmt --check
 	cargo clippy --locked --all-targets -- -D warnings
@@ -46,7 +48,7 @@ test: build readers browser blender validator
 	@if [ -s $(SKIPPED) ]; then echo 'skipped tests:'; sort -u $(SKIPPED); else echo 'no test was skipped'; fi
 	@echo 'make test: all passed'
 
-prove prove-rule: build
+prove prove-rule: build models
 	.ci/$@
 
 # The synthetic speaker from its videos to its motion. DEMO: the folder; DRAW and STEPS: how much of it.

@@ -4,7 +4,7 @@ use super::report::{Report, median};
 use anyhow::{Context, Result, bail, ensure};
 use orator::config::Settings;
 use orator::external::ffmpeg::frames::FrameReader;
-use orator::external::onnx::{Manifest, Runtime};
+use orator::external::onnx::{ModelStore, Runtime};
 use orator::pipeline::pose2d::Chain;
 use orator::stage::progress::Progress;
 use orator::types::image::Image;
@@ -41,8 +41,7 @@ pub struct Args {
 struct Bench<'a> {
     video: &'a Path,
     runtime: Runtime,
-    manifest: Manifest,
-    models_dir: PathBuf,
+    store: ModelStore,
     settings: Settings,
     images: Vec<Image>,
 }
@@ -56,7 +55,7 @@ struct Run {
 
 impl Bench<'_> {
     fn chain(&self) -> Result<Chain> {
-        Chain::new(&self.runtime, &self.manifest, &self.models_dir, &self.settings.pose2d)
+        Chain::new(&self.runtime, &self.store, &self.settings.pose2d)
     }
 
     /// Frames that are in memory already, through one chain.
@@ -108,8 +107,7 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let bench = Bench {
         video: &args.video,
         runtime: Runtime::load(&settings.models.onnxruntime, &models_dir)?,
-        manifest: Manifest::load(&models_dir)?,
-        models_dir,
+        store: ModelStore::open(&models_dir)?,
         settings,
         images,
     };
@@ -124,7 +122,7 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         streamed.push(bench.streamed(&mut chains[0])?);
         two_streamed.push(Bench::side_by_side(&mut chains, |chain| bench.streamed(chain))?);
         if let Some(script) = &args.python {
-            python.push(reference(script, &args.video, &bench.models_dir)?);
+            python.push(reference(script, &args.video, bench.store.dir())?);
         }
         task.advance(1);
     }
@@ -178,7 +176,10 @@ fn reference(script: &Path, video: &Path, models_dir: &Path) -> Result<f64> {
     if can_hold {
         command.args(["--cpu-list", "0", &python]);
     }
-    command.arg(script).arg(video).arg(&out).env("MODELS", models_dir);
+    command.arg(script).arg(video).arg(&out);
+    if std::env::var_os("MODELS").is_none() {
+        command.env("MODELS", models_dir);
+    }
     for (variable, one) in
         [("OMP_NUM_THREADS", "1"), ("OPENCV_FOR_THREADS_NUM", "1"), ("OPENCV_FFMPEG_CAPTURE_OPTIONS", "threads;1")]
     {

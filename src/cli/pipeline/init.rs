@@ -23,13 +23,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     }
     workdir::write_file(&file, DEFAULT_FILE.as_bytes())?;
-    let text = format!(
-        "wrote {}\nput the videos of one speaker into {}\nput the pose models into {} (`orator models list` says which, `orator models fetch` gets them)",
-        file.display(),
-        args.dir.join("videos/host").display(),
-        args.dir.join("models").display()
-    );
-    let next = format!("orator run -c {}", file.display());
+    let videos = args.dir.join("videos/host");
+    let text = format!("wrote {}\nput the videos of one speaker into {}", file.display(), videos.display());
+    let next = format!("orator models fetch -c {}", file.display());
     ui.summary(&text, Some(&next), json!({ "file": file, "next": next }));
     Ok(Outcome::Done)
 }

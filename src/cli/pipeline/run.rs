@@ -2,16 +2,20 @@
 
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
+use crate::cli::setup::models::fetch;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use orator::config::Settings;
+use orator::external::onnx::{ModelError, ModelStore};
+use orator::pipeline::pose2d::models::wanted;
 use orator::pipeline::{Pipeline, Selection};
 use orator::stage::artifacts::StageName;
 use serde_json::json;
 
 /// Run the stages extract, pose2d, segment, lift, dataset for every video of every speaker.
 ///
-/// What is fresh is not done again: a run that was killed goes on where it was. A video that fails is reported and
+/// What is up to date is not done again: a run that was killed goes on where it was. A video that fails is reported and
 /// the others go on. Exit code 2 says that some failed or that a speaker ended with no interval.
 #[derive(clap::Args)]
 pub struct Args {
@@ -32,7 +36,7 @@ pub struct Args {
     /// Videos worked on side by side; 0: one a processor core. Default: work.jobs of the configuration.
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
-    /// Do the chosen stages again, also where they are fresh.
+    /// Do the chosen stages again, also where they are up to date.
     #[arg(long)]
     force: bool,
 }
@@ -43,15 +47,28 @@ fn stage_parser() -> impl TypedValueParser<Value = StageName> {
     PossibleValuesParser::new(StageName::ALL.map(name)).try_map(|name| name.parse::<StageName>())
 }
 
+fn is_missing_model(error: &anyhow::Error) -> bool {
+    matches!(error.downcast_ref(), Some(ModelError::Missing { .. }))
+}
+
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let flags = args.config.flags();
     let default = args.only.map_or_else(Selection::default, Selection::only);
     let (from, to) = (args.from.unwrap_or(default.from), args.to.unwrap_or(default.to));
     let selection = Selection { from, to, speakers: args.speaker, jobs: args.jobs, force: args.force };
-    let report = Pipeline::open(args.config.load()?)?.run(&selection, ui)?;
+    let pipeline = Pipeline::open(args.config.load()?)?;
+    ui.tell_when_stopped("every stage of a video that is done is kept, and the same command goes on from there");
+    let report = match pipeline.run(&selection, ui) {
+        Err(error) if is_missing_model(&error) && ui.asks(&format!("{error:#}\nget the models now?")) => {
+            let Settings { models, pose2d, .. } = &pipeline.config().settings;
+            fetch(&ModelStore::open(&models.dir)?, &wanted(pose2d), None, ui)?;
+            pipeline.run(&selection, ui)?
+        }
+        ended => ended?,
+    };
 
     let counts = |(stage, n): (&StageName, &orator::pipeline::StageCounts)| {
-        format!("{stage:8} {} done, {} fresh already, {} failed", n.done, n.fresh, n.failed)
+        format!("{stage:8} {} done, {} up to date, {} failed", n.done, n.fresh, n.failed)
     };
     let mut lines: Vec<String> = report.stages.iter().map(counts).collect();
     lines.extend(report.datasets.iter().map(|dir| format!("dataset  {}", dir.display())));

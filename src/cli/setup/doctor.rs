@@ -5,7 +5,8 @@ use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator::config::{Config, Settings};
-use orator::external::onnx::{Manifest, Model, Runtime};
+use orator::external::onnx::{ModelStore, Runtime};
+use orator::pipeline::pose2d::models;
 use serde_json::json;
 use std::path::Path;
 
@@ -36,7 +37,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match config {
         Ok(config) => {
             checks.push(ok("configuration", config.file.display().to_string()));
-            checks.extend(models(&config.settings));
+            checks.extend(model_checks(&config.settings));
             checks.push(work(&config.settings.work.dir));
         }
         Err(error) => {
@@ -75,15 +76,16 @@ fn wrong(name: &str, what: String, fix: &str) -> Check {
 }
 
 /// ONNX Runtime, and the models the configuration chooses.
-fn models(settings: &Settings) -> Vec<Check> {
+fn model_checks(settings: &Settings) -> Vec<Check> {
     let dir = &settings.models.dir;
     let runtime = match Runtime::load(&settings.models.onnxruntime, dir) {
         Ok(runtime) => runtime,
         Err(error) => return vec![wrong("ONNX Runtime", format!("{error:#}"), "make runtime")],
     };
     let mut checks = vec![ok("ONNX Runtime", format!("{} ({})", runtime.version(), runtime.library().display()))];
-    let manifest = match Manifest::load(dir) {
-        Ok(manifest) => manifest,
+    let chosen = ModelStore::open(dir).and_then(|store| Ok((models::choose(&settings.pose2d, &store)?, store)));
+    let (pose2d, store) = match chosen {
+        Ok(chosen) => chosen,
         Err(error) => {
             checks.push(wrong(
                 "model manifest",
@@ -93,9 +95,8 @@ fn models(settings: &Settings) -> Vec<Check> {
             return checks;
         }
     };
-    let chosen = [&settings.pose2d.person, &settings.pose2d.body, &settings.pose2d.hand, &settings.pose2d.palm];
-    for id in chosen.into_iter().filter(|id| !id.is_empty()) {
-        let opened = manifest.get(id).and_then(|entry| Ok(Model::open(&runtime, entry, dir)?));
+    for (_, _, id) in models::keys(&pose2d).into_iter().filter(|(_, _, id)| !id.is_empty()) {
+        let opened = store.manifest().get(id).and_then(|entry| Ok(store.check(&runtime, entry)?));
         checks.push(match opened {
             Ok(model) => ok(&format!("model {id}"), dir.join(&model.entry().file).display().to_string()),
             Err(error) => wrong(&format!("model {id}"), format!("{error:#}"), "orator models fetch"),

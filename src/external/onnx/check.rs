@@ -1,7 +1,7 @@
 //! What makes the description of a model sound: names that exist, a role that fits the decoding, keypoint maps that are
 //! complete. The file itself is checked in `model`.
 
-use super::{Decode, KeypointOutputs, ModelEntry, ModelRole, PictureFit, TensorAxes};
+use super::{Decode, KeypointOutputs, ModelEntry, ModelRole, ModelSource, PictureFit, TensorAxes};
 use anyhow::{Result, bail, ensure};
 
 impl ModelEntry {
@@ -45,6 +45,7 @@ impl ModelEntry {
         );
         let hex = self.sha256.len() == 64 && self.sha256.bytes().all(|byte| byte.is_ascii_hexdigit());
         ensure!(hex, "sha256 must be 64 hex digits, not {:?}", self.sha256);
+        self.sources.iter().try_for_each(ModelSource::check)?;
         ensure!(!self.origin.licence.is_empty(), "origin must name repository, commit, path and licence");
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! The description of one model: where it comes from, how its input is made and its outputs are read. Typed, strict (an
 //! unknown key is an error) and data only.
 
+use super::{Conversion, ModelSource, Port};
 use serde::{Deserialize, Serialize};
 
 /// One model file: what it is, where it is from, how it is fed and read.
@@ -21,7 +22,13 @@ pub struct ModelEntry {
     /// Serves exactly the pinned bytes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub url: Option<String>,
-    /// Tool and steps that made the file from its origin.
+    /// Where the files it is made of are, in the order in which they are tried; after `url`.
+    #[serde(default, rename = "source", skip_serializing_if = "Vec::is_empty")]
+    pub sources: Vec<ModelSource>,
+    /// How it is made of the files of a source; none: the one file of a source is the model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub convert: Option<Conversion>,
+    /// Tool and steps that made the file from its origin, where no source has what it is made of.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub conversion: Option<String>,
     pub inputs: Vec<Port>,
@@ -56,14 +63,6 @@ pub struct ModelOrigin {
     pub licence: String,
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub note: String,
-}
-
-/// A named tensor; -1 stands for any size.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Port {
-    pub name: String,
-    pub shape: Vec<i64>,
 }
 
 /// Pixel to tensor: `(pixel * scale - mean) / std`, in the order of `channels`.
@@ -182,6 +181,15 @@ pub struct KeypointOutputs {
     pub left_hand: Vec<usize>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub right_hand: Vec<usize>,
+}
+
+impl ModelEntry {
+    /// What the model is, where it comes from and under which terms, for people.
+    pub fn terms(&self) -> String {
+        let ModelOrigin { repository, commit, path, licence, note } = &self.origin;
+        let note = if note.is_empty() { String::new() } else { format!("\n{note}") };
+        format!("{}\nsha256 {}\nfrom {repository} @ {commit} : {path}\nlicence {licence}{note}\n", self.id, self.sha256)
+    }
 }
 
 impl KeypointOutputs {

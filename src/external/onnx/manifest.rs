@@ -94,10 +94,11 @@ mod tests {
     #[test]
     fn the_builtin_manifest_reads_and_writes_itself() {
         let manifest = Manifest::builtin().unwrap();
-        assert_eq!((manifest.models.len(), manifest.layouts.len()), (13, 5));
+        assert_eq!((manifest.models.len(), manifest.layouts.len()), (15, 5));
         assert_eq!(Manifest::parse(&toml::to_string(&manifest).unwrap()).unwrap(), manifest);
         for entry in &manifest.models {
-            assert!(entry.url.is_some() != entry.conversion.is_some(), "{}: url or conversion", entry.id);
+            let is_served = entry.url.is_some() || !entry.sources.is_empty();
+            assert!(is_served != entry.conversion.is_some(), "{}: served, or how it was made", entry.id);
         }
     }
 
@@ -123,7 +124,7 @@ mod tests {
         let text = toml::to_string(&Manifest { models: vec![own.clone()], layouts: Vec::new() }).unwrap();
         std::fs::write(dir.path().join(MANIFEST_FILE), text).unwrap();
         let manifest = Manifest::load(dir.path()).unwrap();
-        assert_eq!((manifest.models.len(), manifest.get("person-mine").unwrap()), (14, &own));
+        assert_eq!((manifest.models.len(), manifest.get("person-mine").unwrap()), (16, &own));
         assert!(manifest.get("nobody").unwrap_err().to_string().contains("known are"));
         assert!(manifest.get_as("person-mine", ModelRole::Hand).is_err());
     }

@@ -5,20 +5,27 @@
 pub mod check;
 pub mod convert;
 pub mod entry;
+mod fetch;
 pub mod manifest;
 pub mod model;
+mod package;
+pub mod port;
 pub mod runtime;
+pub mod source;
 pub mod store;
 
 pub use entry::*;
+pub use fetch::FetchSource;
 pub use manifest::MANIFEST_FILE;
 pub use manifest::Manifest;
 pub use model::Model;
 pub use model::ModelError;
 pub use model::Outputs;
 pub use model::sha256_of;
+pub use port::Port;
 pub use runtime::LIBRARY;
 pub use runtime::Runtime;
 pub use runtime::TELEMETRY_OFF;
 pub use runtime::find_library;
-pub use store::{FetchSource, ModelState, ModelStore};
+pub use source::{Conversion, ModelSource, SourceFile, SourceKind};
+pub use store::{AUTO, Fetched, ModelState, ModelStore, Wanted};

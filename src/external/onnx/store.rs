@@ -1,16 +1,19 @@
 //! The folder of models: what is there, getting what is missing, registering other models, checking all. Every file is
-//! pinned by its SHA-256; a server or mirror with other bytes is refused.
+//! pinned by its SHA-256; a source with other bytes is refused.
 
-use super::{MANIFEST_FILE, Manifest, Model, ModelEntry, ModelError, ModelOrigin, Runtime, sha256_of};
+use super::fetch::{FetchSource, Fetcher};
+use super::{MANIFEST_FILE, Manifest, Model, ModelEntry, ModelError, ModelOrigin, ModelRole, Runtime, sha256_of};
 use crate::stage::progress::Progress;
 use crate::stage::workdir;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, bail};
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Most bytes of a model file, 1 GiB.
-const MAX_BYTES: u64 = 1 << 30;
+/// In the place of a model's id: the first of its role, in the order of the manifest, whose file is there.
+pub const AUTO: &str = "auto";
+/// Folder of downloads under way, inside the folder of models.
+const DOWNLOADS: &str = ".downloads";
 
 /// A folder of model files with the manifest that describes them.
 #[derive(Clone, Debug)]
@@ -33,15 +36,22 @@ pub enum ModelState {
     Missing,
 }
 
-/// Where `ModelStore::fetch` had a file from.
+/// A model to fetch.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum FetchSource {
-    /// The folder of models had it.
-    Present,
-    /// A file of the mirror.
-    Mirror(PathBuf),
-    /// The address of the manifest.
-    Url(String),
+pub enum Wanted {
+    /// The model of this id.
+    Id(String),
+    /// One of this role: the one that is there, else the first that can be had, in the order of the manifest.
+    Role(ModelRole),
+}
+
+/// A model that was looked for.
+#[derive(Debug)]
+pub struct Fetched<'a> {
+    /// The model.
+    pub entry: &'a ModelEntry,
+    /// Where it was had from, or why it could not be had.
+    pub source: Result<FetchSource>,
 }
 
 impl fmt::Display for ModelState {
@@ -51,16 +61,6 @@ impl fmt::Display for ModelState {
             Self::WrongHash => "wrong hash",
             Self::Missing => "missing",
         })
-    }
-}
-
-impl fmt::Display for FetchSource {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Present => write!(f, "there already"),
-            Self::Mirror(path) => write!(f, "copied from {}", path.display()),
-            Self::Url(url) => write!(f, "downloaded from {url}"),
-        }
     }
 }
 
@@ -117,29 +117,81 @@ impl ModelStore {
         Model::open(runtime, entry, &self.dir)
     }
 
-    /// Gets each model that is not there with the right bytes: from the folder `mirror`, whose files may have any name,
-    /// else from its address. The answers stand in the order of `entries`; one that fails does not stop the others.
+    /// The model of that id and role. `auto` is the first of the role, in the order of the manifest, whose file is
+    /// there; where none is, the first.
     ///
     /// # Errors
-    /// A mirror that cannot be read.
-    pub fn fetch(
-        &self,
-        entries: &[&ModelEntry],
-        mirror: Option<&Path>,
-        progress: &dyn Progress,
-    ) -> Result<Vec<Result<FetchSource>>> {
-        let offered = mirror.map(offered).transpose()?.unwrap_or_default();
-        let task = progress.begin("models", entries.len() as u64);
-        let fetched = entries.iter().map(|entry| {
-            task.detail(&entry.id);
-            let source = match self.state(entry) {
-                ModelState::Present => Ok(FetchSource::Present),
-                _ => get(entry, &self.path(entry), &offered),
+    /// An id the manifest does not have, or of another role.
+    pub fn choose(&self, id: &str, role: ModelRole) -> Result<&ModelEntry> {
+        if id != AUTO {
+            return self.manifest.get_as(id, role);
+        }
+        let mut of_role = self.of_role(role);
+        let there = self.of_role(role).find(|entry| self.path(entry).is_file());
+        there.or_else(|| of_role.next()).with_context(|| format!("the manifest has no {role:?} model"))
+    }
+
+    fn of_role(&self, role: ModelRole) -> impl Iterator<Item = &ModelEntry> {
+        self.manifest.models.iter().filter(move |entry| entry.role == role)
+    }
+
+    /// Gets each model that is not there with the right bytes: from the folder `mirror`, whose files may have any name
+    /// and may be what the model is made of, else from its sources. One that fails does not stop the others.
+    ///
+    /// # Errors
+    /// A mirror that cannot be read, a folder that cannot be written, another fetch into the same folder.
+    pub fn fetch(&self, wanted: &[Wanted], mirror: Option<&Path>, progress: &dyn Progress) -> Result<Vec<Fetched<'_>>> {
+        let _lock = workdir::lock(&self.dir)?;
+        let downloads = self.dir.join(DOWNLOADS);
+        let _ = std::fs::remove_dir_all(&downloads);
+        let mut fetcher = Fetcher::new(mirror, &downloads)?;
+        let task = progress.begin("models", wanted.len() as u64);
+        let mut fetched = Vec::new();
+        for one in wanted {
+            let (known, candidates): (Vec<_>, Vec<_>) = match one {
+                Wanted::Id(id) => (vec![self.manifest.get(id)?], vec![self.manifest.get(id)?]),
+                Wanted::Role(role) => (self.of_role(*role).collect(), self.candidates(*role).collect()),
             };
+            if let Some(entry) = known.into_iter().find(|entry| self.state(entry) == ModelState::Present) {
+                fetched.push(Fetched { entry, source: Ok(FetchSource::Present) });
+                continue;
+            }
+            for entry in candidates {
+                task.detail(&entry.id);
+                let source = fetcher.get(entry, &self.path(entry));
+                let is_had = source.is_ok();
+                fetched.push(Fetched { entry, source });
+                if is_had {
+                    break;
+                }
+            }
             task.advance(1);
-            source
-        });
-        Ok(fetched.collect())
+        }
+        let _ = std::fs::remove_dir_all(&downloads);
+        Ok(fetched)
+    }
+
+    /// What `fetch` may get for `wanted`: every model that is asked for by its id or is a candidate for a role, and is
+    /// not there.
+    ///
+    /// # Errors
+    /// An id the manifest does not have.
+    pub fn missing(&self, wanted: &[Wanted]) -> Result<Vec<&ModelEntry>> {
+        let is_there = |entry: &&ModelEntry| self.state(entry) == ModelState::Present;
+        let mut missing = Vec::new();
+        for one in wanted {
+            match one {
+                Wanted::Id(id) => missing.extend(Some(self.manifest.get(id)?).filter(|entry| !is_there(entry))),
+                Wanted::Role(role) if self.of_role(*role).any(|entry| is_there(&entry)) => {}
+                Wanted::Role(role) => missing.extend(self.candidates(*role)),
+            }
+        }
+        Ok(missing)
+    }
+
+    /// Models of a role that can be had, the best first.
+    pub fn candidates(&self, role: ModelRole) -> impl Iterator<Item = &ModelEntry> {
+        self.of_role(role).filter(|entry| entry.url.is_some() || !entry.sources.is_empty())
     }
 
     /// Registers the ONNX file `file`, which is fed and read like the model or layout `like`: copies it into the folder
@@ -181,49 +233,6 @@ impl ModelStore {
     }
 }
 
-/// Hash and path of every file of a folder that may be a model.
-fn offered(mirror: &Path) -> Result<Vec<(String, PathBuf)>> {
-    let cannot = || format!("cannot read the folder {}", mirror.display());
-    let mut offered = Vec::new();
-    for file in std::fs::read_dir(mirror).with_context(cannot)? {
-        let file = file.with_context(cannot)?;
-        if file.metadata().is_ok_and(|meta| meta.is_file() && meta.len() <= MAX_BYTES) {
-            offered.push((sha256_of(&file.path())?, file.path()));
-        }
-    }
-    offered.sort();
-    Ok(offered)
-}
-
-/// Writes a model's file to `path`, from the mirror or its address.
-fn get(entry: &ModelEntry, path: &Path, offered: &[(String, PathBuf)]) -> Result<FetchSource> {
-    if let Some((_, found)) = offered.iter().find(|(hash, _)| hash.eq_ignore_ascii_case(&entry.sha256)) {
-        copy(found, path)?;
-        return Ok(FetchSource::Mirror(found.clone()));
-    }
-    let Some(url) = &entry.url else {
-        let steps = entry.conversion.as_deref().unwrap_or("no conversion is written down");
-        bail!(
-            "no address serves these bytes. They were made from {} @ {} : {} by: {steps}. A folder that has the file \
-             (sha256 {}): --mirror DIR",
-            entry.origin.repository,
-            entry.origin.commit,
-            entry.origin.path,
-            entry.sha256
-        )
-    };
-    let download =
-        || -> Result<Vec<u8>> { Ok(ureq::get(url).call()?.body_mut().with_config().limit(MAX_BYTES).read_to_vec()?) };
-    let bytes = download().with_context(|| format!("cannot download {url}"))?;
-    workdir::replace(path, |attempt| {
-        std::fs::write(attempt, &bytes)?;
-        let found = sha256_of(attempt)?;
-        ensure!(found.eq_ignore_ascii_case(&entry.sha256), "{url} serves sha256 {found}, expected {}", entry.sha256);
-        Ok(())
-    })?;
-    Ok(FetchSource::Url(url.clone()))
-}
-
 fn copy(from: &Path, to: &Path) -> Result<()> {
     workdir::replace(to, |attempt| {
         std::io::copy(&mut std::fs::File::open(from)?, &mut std::fs::File::create(attempt)?)?;
@@ -244,6 +253,8 @@ fn described(file: &Path, like: &ModelEntry, id: Option<&str>, licence: &str) ->
         sha256: sha256_of(file)?,
         bytes,
         url: None,
+        sources: Vec::new(),
+        convert: None,
         conversion: Some("none: registered as it was".to_owned()),
         origin: ModelOrigin {
             repository: "registered by hand".to_owned(),

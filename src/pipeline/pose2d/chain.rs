@@ -10,12 +10,11 @@ use super::person::Detector;
 use super::region;
 use super::speaker::SpeakerTracker;
 use crate::config;
-use crate::external::onnx::{Manifest, ModelRole, Runtime};
+use crate::external::onnx::{ModelRole, ModelStore, Runtime};
 use crate::external::opencv::warp::Region;
 use crate::types::image::Image;
 use crate::types::pose2d::{Keypoint, Pose2d, coco};
 use anyhow::{Context, Result, ensure};
-use std::path::Path;
 
 /// Elbow and wrist of the left and the right arm.
 const ARMS: [(usize, usize); 2] = [(coco::L_ELBOW, coco::L_WRIST), (coco::R_ELBOW, coco::R_WRIST)];
@@ -38,18 +37,14 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// Opens the models the settings name, from the folder `models_dir`.
+    /// Opens the models the settings name, from the folder of `store`.
     ///
     /// # Errors
     /// An id that is not in the manifest or has another role; a model that cannot be opened (`onnx::OpenError`).
-    pub fn new(
-        runtime: &Runtime,
-        manifest: &Manifest,
-        models_dir: &Path,
-        settings: &config::Pose2dConfig,
-    ) -> Result<Self> {
+    pub fn new(runtime: &Runtime, store: &ModelStore, settings: &config::Pose2dConfig) -> Result<Self> {
+        let models_dir = store.dir();
         let entry =
-            |key: &str, id: &str, role: ModelRole| manifest.get_as(id, role).with_context(|| format!("pose2d.{key}"));
+            |key: &str, id: &str, role: ModelRole| store.choose(id, role).with_context(|| format!("pose2d.{key}"));
         let named = |id: &str| !id.is_empty();
         let body = BodyModel::open(runtime, entry("body", &settings.body, ModelRole::Body)?, models_dir)?;
         let person = named(&settings.person)

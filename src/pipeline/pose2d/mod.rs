@@ -10,6 +10,7 @@ pub mod decode;
 pub mod hand;
 pub mod liveness;
 pub mod model_input;
+pub mod models;
 pub mod other_hand;
 pub mod palm;
 pub mod patch;

@@ -2,6 +2,7 @@
 //! shot, into `keypoints.npz`. A frame that repeats the one before is not looked at again.
 
 use super::chain::Chain;
+use super::models;
 use super::other_hand;
 use super::store::KeypointFrames;
 use crate::config;
@@ -9,7 +10,7 @@ use crate::config::Settings;
 use crate::external::ffmpeg;
 use crate::external::ffmpeg::ahead;
 use crate::external::ffmpeg::frames::{FrameReader, FrameTime};
-use crate::external::onnx::{Manifest, ModelEntry, ModelError, Runtime};
+use crate::external::onnx::{ModelEntry, ModelError, ModelStore, Runtime};
 use crate::external::opencv;
 use crate::formats::keypoints_npz;
 use crate::formats::timeline_npz::Timeline;
@@ -22,6 +23,11 @@ use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Frames after which the time that a video takes is told.
+const N_MEASURED: usize = 150;
 
 /// Stage `pose2d`.
 pub struct Pose2dStage {
@@ -29,37 +35,36 @@ pub struct Pose2dStage {
     models: config::ModelsConfig,
     fps: FrameRate,
     work: PathBuf,
-    manifest: Manifest,
+    store: ModelStore,
     /// The picture that shows a speaker, by the speaker's name.
     references: BTreeMap<String, PathBuf>,
+    has_told_speed: AtomicBool,
 }
 
 impl Pose2dStage {
-    /// Reads the manifest; opens no model.
+    /// Reads the manifest and looks which models are there; opens none.
     ///
     /// # Errors
     /// A manifest that is not sound; a model that is not in it.
     pub fn new(settings: &Settings) -> Result<Self> {
         let named = settings.speaker.iter().filter(|speaker| !speaker.reference.as_os_str().is_empty());
         let references = named.map(|speaker| (speaker.name.clone(), speaker.reference.to_path_buf()));
-        let stage = Self {
-            settings: settings.pose2d.clone(),
+        let store = ModelStore::open(&settings.models.dir)?;
+        Ok(Self {
+            settings: models::choose(&settings.pose2d, &store)?,
             models: settings.models.clone(),
             fps: settings.extract.rate(),
             work: settings.work.dir.to_path_buf(),
-            manifest: Manifest::load(&settings.models.dir)?,
+            store,
             references: references.collect(),
-        };
-        stage.used()?;
-        Ok(stage)
+            has_told_speed: AtomicBool::new(false),
+        })
     }
 
     /// The models it asks, with the key of `[pose2d]` that names each.
     pub fn used(&self) -> Result<Vec<(&'static str, &ModelEntry)>> {
-        let config::Pose2dConfig { person, body, hand, palm, .. } = &self.settings;
-        let keys = [("person", person), ("body", body), ("hand", hand), ("palm", palm)];
-        let named = keys.into_iter().filter(|(_, id)| !id.is_empty());
-        named.map(|(key, id)| Ok((key, self.manifest.get(id).with_context(|| format!("pose2d.{key}"))?))).collect()
+        let named = models::keys(&self.settings).into_iter().filter(|(_, _, id)| !id.is_empty());
+        named.map(|(key, role, id)| Ok((key, self.store.choose(id, role)?))).collect()
     }
 
     fn runtime(&self) -> Result<Runtime> {
@@ -74,6 +79,10 @@ impl Stage for Pose2dStage {
 
     fn version(&self) -> u32 {
         3
+    }
+
+    fn cost(&self) -> u32 {
+        40
     }
 
     fn settings(&self, _unit: &Unit) -> Value {
@@ -116,7 +125,7 @@ impl Stage for Pose2dStage {
 
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let restarts = Timeline::read(&Artifact::Timeline.path(&self.work, unit))?.restart;
-        let mut chain = Chain::new(&self.runtime()?, &self.manifest, &self.models.dir, &self.settings)?;
+        let mut chain = Chain::new(&self.runtime()?, &self.store, &self.settings)?;
         if let Some(path) = self.references.get(&unit.speaker) {
             let mut reference = FrameReader::open(path, FrameRate::new(1, 1))?;
             let picture = reference.next().with_context(|| format!("{} holds no picture", path.display()))??;
@@ -128,6 +137,7 @@ impl Stage for Pose2dStage {
         let [width, height] = reader.image_size();
         let image_size = [u32::try_from(width)?, u32::try_from(height)?];
         let task = progress.begin(&unit.to_string(), restarts.len() as u64);
+        let begun = Instant::now();
         let mut gathered = KeypointFrames::default();
         let mut seen = DetectionCounts::default();
         let mut pose = Pose2d::default();
@@ -145,6 +155,13 @@ impl Stage for Pose2dStage {
             }
             if let Some(picture) = picture {
                 pose = chain.frame(&picture).with_context(|| format!("frame {idx}"))?;
+            }
+            if idx + 1 == N_MEASURED
+                && restarts.len() >= 6 * N_MEASURED
+                && !self.has_told_speed.swap(true, Ordering::Relaxed)
+            {
+                let hours = begun.elapsed().as_secs_f64() / (N_MEASURED as f64 / self.fps.per_sec());
+                progress.say(&format!("an hour of video takes about {hours:.1} h here, one at a time"));
             }
             seen.count(&pose);
             gathered.push(&pose, time.source_secs);

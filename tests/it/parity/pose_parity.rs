@@ -6,7 +6,6 @@ use crate::fixtures::onnx_models::models;
 use crate::fixtures::skip::{python, real_data};
 use orator::config;
 use orator::external::ffmpeg::frames::FrameReader;
-use orator::external::onnx::Manifest;
 use orator::formats::keypoints_npz;
 use orator::formats::npz::Npz;
 use orator::pipeline::pose2d::Chain;
@@ -40,7 +39,9 @@ fn median(mut numbers: Vec<f32>) -> f32 {
 
 #[track_caller]
 fn compare(name: &str, secs: u32) {
-    let (Some((models, runtime)), Some(python)) = (models(), python("onnxruntime, cv2, numpy")) else {
+    let (Some((store, runtime)), Some(models), Some(python)) =
+        (models(), real_data("models"), python("onnxruntime, cv2, numpy"))
+    else {
         return;
     };
     let dir = tempfile::tempdir().unwrap();
@@ -54,7 +55,7 @@ fn compare(name: &str, secs: u32) {
     let times = Npz::open(&written).unwrap().numbers("time_secs", &[None]).unwrap();
 
     let settings = config::Pose2dConfig { person: "person-yolox-nano".into(), ..config::Pose2dConfig::default() };
-    let mut chain = Chain::new(&runtime, &Manifest::builtin().unwrap(), &models, &settings).unwrap();
+    let mut chain = Chain::new(&runtime, &store, &settings).unwrap();
     let rate = FrameReader::open(&clip, orator::types::time::FrameRate::new(1, 1)).unwrap();
     let rate = rate.info().video.as_ref().and_then(|video| video.fps).unwrap();
     let wanted: Vec<usize> = times.iter().map(|secs| (secs * rate.per_sec()).round() as usize).collect();

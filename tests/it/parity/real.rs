@@ -2,7 +2,7 @@
 //! reason, one of two people is followed, HEVC works.
 
 use crate::fixtures::clips::ffmpeg;
-use crate::fixtures::skip::real_data;
+use crate::fixtures::skip::{fetched_models, real_data};
 use crate::fixtures::support::{Project, files_under};
 use orator::formats::keypoints_npz;
 use orator::formats::keypoints_npz::Extras;
@@ -19,7 +19,7 @@ fn project(name: &str, models: &Path, clips: &[&Path]) -> Project {
 
 #[test]
 fn hands_never_visible_is_a_refusal_not_a_failure() {
-    let (Some(clip), Some(models)) = (real_data("data/videos/talk_kim_7s_1080p.mp4"), real_data("models")) else {
+    let (Some(clip), Some(models)) = (real_data("data/videos/talk_kim_7s_1080p.mp4"), fetched_models()) else {
         return;
     };
     let project = project("kim", &models, &[&clip]);
@@ -34,7 +34,7 @@ fn hands_never_visible_is_a_refusal_not_a_failure() {
 
 #[test]
 fn one_of_two_people_is_followed() {
-    let (Some(videos), Some(models)) = (real_data("data/videos"), real_data("models")) else { return };
+    let (Some(videos), Some(models)) = (real_data("data/videos"), fetched_models()) else { return };
     let (tyson, oliver) = ("talk_tyson_2cam_17s_720p.mp4", "talk_latentsync_demo1_1080x1920_hevc.mp4");
     if [tyson, oliver].iter().any(|name| real_data(&format!("data/videos/{name}")).is_none()) {
         return;
@@ -81,7 +81,7 @@ fn one_of_two_people_is_followed() {
 
 /// What pose2d says of a film put together of real clips: two inputs through a filter graph that ends in `[v]`.
 fn followed(name: &str, inputs: &str, graph: &str) -> Option<Extras> {
-    let (videos, models) = (real_data("data/videos")?, real_data("models")?);
+    let (videos, models) = (real_data("data/videos")?, fetched_models()?);
     let project = project(name, &models, &[Path::new("videos/host/film.mp4")]);
     if name == "reference" {
         let picture = project.dir().join("speaker.png");

@@ -4,7 +4,6 @@ use crate::fixtures::clips;
 use crate::fixtures::onnx_models::models;
 use orator::config;
 use orator::config::Settings;
-use orator::external::onnx::Manifest;
 use orator::formats::keypoints_npz;
 use orator::formats::timeline_npz::Timeline;
 use orator::pipeline::pose2d::{Chain, Pose2dStage};
@@ -21,8 +20,7 @@ fn noise(width: usize, height: usize) -> Image {
 
 #[test]
 fn any_picture_gives_finite_numbers() {
-    let Some((models, runtime)) = models() else { return };
-    let manifest = Manifest::builtin().unwrap();
+    let Some((store, runtime)) = models() else { return };
     // Without a person detector the whole picture is the person, so that every model runs on nonsense.
     for person in ["person-rtmdet-nano", "person-yolox-nano", ""] {
         let settings = config::Pose2dConfig {
@@ -32,7 +30,7 @@ fn any_picture_gives_finite_numbers() {
             palm_every: 1,
             ..config::Pose2dConfig::default()
         };
-        let mut chain = Chain::new(&runtime, &manifest, &models, &settings).unwrap();
+        let mut chain = Chain::new(&runtime, &store, &settings).unwrap();
         for (width, height) in [(1, 1), (3, 200), (641, 7), (320, 241)] {
             for image in [noise(width, height), Image::filled(width, height, [0; 3])] {
                 let pose = chain.frame(&image).unwrap();
@@ -48,11 +46,8 @@ fn any_picture_gives_finite_numbers() {
 
 #[test]
 fn settings_that_name_no_right_model_say_which() {
-    let Some((models, runtime)) = models() else { return };
-    let manifest = Manifest::builtin().unwrap();
-    let said = |settings: config::Pose2dConfig| {
-        format!("{:#}", Chain::new(&runtime, &manifest, &models, &settings).err().unwrap())
-    };
+    let Some((store, runtime)) = models() else { return };
+    let said = |settings: config::Pose2dConfig| format!("{:#}", Chain::new(&runtime, &store, &settings).err().unwrap());
     let unknown = said(config::Pose2dConfig { body: "nothing".into(), ..config::Pose2dConfig::default() });
     assert!(unknown.contains("pose2d.body") && unknown.contains("body-tinypose-256x192"), "{unknown}");
     assert!(
@@ -91,9 +86,9 @@ fn write_timeline(settings: &Settings, unit: &Unit, restart: Vec<bool>) {
 
 #[test]
 fn a_video_without_a_person_is_zeros_and_no_failure() {
-    let Some((models, _)) = models() else { return };
+    let Some((store, _)) = models() else { return };
     let dir = tempfile::tempdir().unwrap();
-    let (unit, settings) = unit(dir.path(), 20, &models);
+    let (unit, settings) = unit(dir.path(), 20, store.dir());
     write_timeline(&settings, &unit, (0..10).map(|t| t == 6).collect());
     let stage = Pose2dStage::new(&settings).unwrap();
     let roles: Vec<_> = stage.inputs(&unit).unwrap().into_iter().map(|input| input.role).collect();
@@ -118,9 +113,9 @@ fn a_video_without_a_person_is_zeros_and_no_failure() {
 
 #[test]
 fn a_timeline_of_another_video_and_a_missing_model_are_errors() {
-    let Some((models, _)) = models() else { return };
+    let Some((store, _)) = models() else { return };
     let dir = tempfile::tempdir().unwrap();
-    let (unit, mut settings) = unit(dir.path(), 20, &models);
+    let (unit, mut settings) = unit(dir.path(), 20, store.dir());
     for n_frames in [3, 12] {
         write_timeline(&settings, &unit, vec![false; n_frames]);
         let said = Pose2dStage::new(&settings).unwrap().run(&unit, dir.path(), &Silent).unwrap_err().to_string();

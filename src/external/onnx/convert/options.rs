@@ -1,6 +1,6 @@
 //! What the result of a conversion looks like from outside.
 
-use crate::external::onnx::entry::Port;
+use crate::external::onnx::port::Port;
 use anyhow::{Context, Result, bail};
 
 /// What the result looks like from outside.

@@ -1,0 +1,104 @@
+//! Published packages: downloaded by the user's own `npm` or `pip`, so that mirrors and proxies work, and read without
+//! running anything that is in them.
+
+use super::{ModelSource, SourceKind};
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{ErrorKind, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// Most bytes of a file inside a package, 1 GiB.
+const MAX_BYTES: u64 = 1 << 30;
+
+/// Downloads the file of the package `source` into the empty folder `dir` and gives its path; its bytes are not yet checked.
+///
+/// # Errors
+/// No `npm` or `pip`, or what it says.
+pub fn download(source: &ModelSource, dir: &Path) -> Result<PathBuf> {
+    let folder = dir.to_str().with_context(|| format!("{} is not UTF-8", dir.display()))?;
+    match source.from {
+        SourceKind::Npm => {
+            let arguments = [
+                "pack",
+                &source.name,
+                "--pack-destination",
+                folder,
+                "--ignore-scripts",
+                "--silent",
+                "--fetch-retries=1",
+            ];
+            run(&[&["npm"]], &arguments, "npm is not installed (the Debian package npm)")?;
+        }
+        SourceKind::Pip => {
+            let mut arguments = vec!["download", "--no-deps", "--only-binary=:all:", "--quiet", "--retries=1"];
+            if let [python, abi, platform] = source.wheel.split('-').collect::<Vec<_>>()[..] {
+                let version = python.trim_start_matches(|letter: char| letter.is_ascii_alphabetic());
+                arguments.extend(["--implementation=cp", "--python-version", version, "--abi", abi]);
+                arguments.extend(["--platform", platform]);
+            }
+            arguments.extend(["--dest", folder, &source.name]);
+            let known: [&[&str]; 2] = [&["pip3"], &["python3", "-m", "pip"]];
+            run(&known, &arguments, "pip is not installed (the Debian package python3-pip)")?;
+        }
+        SourceKind::Address => bail!("{} is no package", source.name),
+    }
+    let file = std::fs::read_dir(dir)?.next().with_context(|| format!("{source}: nothing was downloaded"))??;
+    Ok(file.path())
+}
+
+/// Runs the first of the programs that is there.
+fn run(programs: &[&[&str]], arguments: &[&str], missing: &str) -> Result<()> {
+    for words in programs {
+        let mut command = Command::new(words[0]);
+        let called = command.args(&words[1..]).args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).output();
+        match called {
+            Ok(output) if output.status.success() => return Ok(()),
+            Ok(output) => {
+                let message = String::from_utf8_lossy(&output.stderr);
+                let lines = message.lines().map(str::trim).filter(|line| !line.is_empty());
+                bail!("{} failed: {}", words.join(" "), lines.take(3).collect::<Vec<_>>().join("; "))
+            }
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) => return Err(error).with_context(|| format!("cannot run {}", words[0])),
+        }
+    }
+    Err(anyhow!("{missing}"))
+}
+
+/// The content of the members `paths` of the package file, in their order.
+///
+/// # Errors
+/// No archive, a member that is not in it or larger than 1 GiB.
+pub fn members(kind: SourceKind, package: &Path, paths: &[&str]) -> Result<Vec<Vec<u8>>> {
+    let file = File::open(package)?;
+    let mut found = BTreeMap::new();
+    if kind == SourceKind::Npm {
+        let mut archive = tar::Archive::new(flate2::read::GzDecoder::new(file));
+        for member in archive.entries()? {
+            let member = member?;
+            let name = member.path()?.to_string_lossy().into_owned();
+            if paths.contains(&name.as_str()) && member.header().entry_type().is_file() {
+                found.insert(name, content(member)?);
+            }
+            if found.len() == paths.len() {
+                break;
+            }
+        }
+    } else {
+        let mut archive = zip::ZipArchive::new(file)?;
+        for &path in paths {
+            let member = archive.by_name(path).with_context(|| format!("it holds no {path}"))?;
+            found.insert(path.to_owned(), content(member)?);
+        }
+    }
+    paths.iter().map(|path| found.get(*path).cloned().with_context(|| format!("it holds no {path}"))).collect()
+}
+
+fn content(member: impl Read) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    member.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
+    ensure!(bytes.len() as u64 <= MAX_BYTES, "a file in it is larger than 1 GiB");
+    Ok(bytes)
+}
