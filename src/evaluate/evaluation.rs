@@ -62,8 +62,7 @@ impl Evaluation {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let task = progress.begin("evaluating", 0);
-        let of_speaker::SpeakerEvaluation { clips, predictors } =
-            of_speaker::prepare(dataset, generator, split, &*task)?;
+        let (clips, predictors) = of_speaker::prepare(dataset, generator, split, &*task)?;
         Ok(Self { clips, predictors })
     }
 

@@ -22,10 +22,8 @@ const N_FACTS: usize = 2;
 
 /// All numbers of one convention.
 pub struct Catalogue {
-    metrics: Vec<Box<dyn MetricFamily>>,
+    metrics: Vec<MetricFamily>,
     definitions: Vec<Definition>,
-    /// How many definitions each metric has.
-    n_values: Vec<usize>,
     fps: FrameRate,
 }
 
@@ -46,14 +44,12 @@ impl Catalogue {
             );
         }
         let metrics = convention::metrics(settings);
-        let of_each: Vec<_> = metrics.iter().map(|metric| metric.definitions()).collect();
-        let n_values = of_each.iter().map(Vec::len).collect();
-        let mut definitions = of_each.concat();
+        let mut definitions: Vec<Definition> = metrics.iter().flat_map(|metric| metric.definitions.clone()).collect();
         for definition in &mut definitions {
             definition.parameters["convention"] = serde_json::to_value(settings.convention)?;
             definition.parameters["fps"] = settings.fps.per_sec().into();
         }
-        Ok(Self { metrics, definitions, n_values, fps: settings.fps })
+        Ok(Self { metrics, definitions, fps: settings.fps })
     }
 
     /// What `values` gives, in order.
@@ -63,9 +59,8 @@ impl Catalogue {
 
     /// Whether definition `index` is of those for which few draws are taken.
     pub fn is_costly(&self, index: usize) -> bool {
-        let mut of_each =
-            self.metrics.iter().zip(&self.n_values).flat_map(|(metric, n)| std::iter::repeat_n(metric, *n));
-        of_each.nth(index).is_some_and(|metric| metric.is_costly())
+        let mut of_each = self.metrics.iter().flat_map(|metric| metric.definitions.iter().map(|_| metric.is_costly));
+        of_each.nth(index) == Some(true)
     }
 
     /// Index of the metric of the ground truth that a metric better near it is compared with.
@@ -93,12 +88,12 @@ impl Catalogue {
             facts.at(t)[1] += f64::from(u8::from(other_rate));
         }
         let start = if other_rate { f64::NAN } else { 0.0 };
-        let measure = |metric: &dyn MetricFamily| {
-            let mut blocks = BlockSums::new(n, metric.n_sums(), pair.n_frames(), start);
-            metric.measure(&pair, &mut blocks);
-            (metric.is_costly(), blocks)
+        let measure = |metric: &MetricFamily| {
+            let mut blocks = BlockSums::new(n, metric.n_sums, pair.n_frames(), start);
+            (metric.measure)(&pair, &mut blocks);
+            (metric.is_costly, blocks)
         };
-        let of_each: Vec<_> = self.metrics.par_iter().map(|metric| measure(metric.as_ref())).collect();
+        let of_each: Vec<_> = self.metrics.par_iter().map(measure).collect();
         let (mut cheap, mut costly) = (vec![facts], Vec::new());
         for (is_costly, blocks) in of_each {
             if is_costly { &mut costly } else { &mut cheap }.push(blocks);
@@ -155,13 +150,13 @@ impl Catalogue {
     fn read(&self, cheap: Option<&[f64]>, costly: Option<&[f64]>) -> Vec<f64> {
         let (mut at_cheap, mut at_costly) = (N_FACTS, 0);
         let mut values = Vec::with_capacity(self.definitions.len());
-        for (metric, n) in self.metrics.iter().zip(&self.n_values) {
-            let (row, at) = if metric.is_costly() { (costly, &mut at_costly) } else { (cheap, &mut at_cheap) };
-            let own = row.and_then(|row| row.get(*at..*at + metric.n_sums()));
-            *at += metric.n_sums();
+        for metric in &self.metrics {
+            let (row, at) = if metric.is_costly { (costly, &mut at_costly) } else { (cheap, &mut at_cheap) };
+            let own = row.and_then(|row| row.get(*at..*at + metric.n_sums));
+            *at += metric.n_sums;
             match own {
-                Some(own) => values.extend(metric.values(own)),
-                None => values.extend(std::iter::repeat_n(f64::NAN, *n)),
+                Some(own) => values.extend((metric.values)(own)),
+                None => values.extend(metric.definitions.iter().map(|_| f64::NAN)),
             }
         }
         values

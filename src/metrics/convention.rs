@@ -5,18 +5,16 @@
 use super::beat::{aist, angles, consistency};
 use super::body_part::BodyPart;
 use super::definition::MetricFamily;
-use super::distribution::pairwise;
 use super::distribution::{diversity, frechet_metrics};
 use super::movement::hellinger;
 use super::movement::{bone_change, cca, derivatives};
-use super::position::acceleration;
 use super::position::pck::PckAxes;
-use super::position::{l1, mpjpe, p_mpjpe, pck};
+use super::position::{errors, p_mpjpe, pck};
 use super::settings::Convention;
 use super::settings::MetricSettings;
 
 /// The metrics of the settings' convention.
-pub(crate) fn metrics(settings: &MetricSettings) -> Vec<Box<dyn MetricFamily>> {
+pub(crate) fn metrics(settings: &MetricSettings) -> Vec<MetricFamily> {
     let fps = settings.fps.per_sec();
     match settings.convention {
         Convention::Orator => own(settings),
@@ -27,15 +25,15 @@ pub(crate) fn metrics(settings: &MetricSettings) -> Vec<Box<dyn MetricFamily>> {
             hellinger::genea(),
             cca::metric(BodyPart::WithNeck),
         ],
-        Convention::Emage => vec![diversity::metric(BodyPart::All), consistency::emage(fps)],
+        Convention::Emage => vec![diversity::l1div(BodyPart::All), consistency::emage(fps)],
         Convention::Trimodal => {
-            vec![acceleration::maje(fps), acceleration::by_coordinate(), angles::metric(fps)]
+            vec![errors::maje(fps), errors::acceleration_by_coordinate(), angles::metric(fps)]
         }
         Convention::Aist => vec![aist::metric(fps)],
     }
 }
 
-fn own(settings: &MetricSettings) -> Vec<Box<dyn MetricFamily>> {
+fn own(settings: &MetricSettings) -> Vec<MetricFamily> {
     let parts = [BodyPart::All, BodyPart::Body, BodyPart::Hands];
     let mut measured =
         vec![BodyPart::All, BodyPart::Body, BodyPart::Hands, BodyPart::Wrists, BodyPart::FingersFromWrist];
@@ -46,16 +44,16 @@ fn own(settings: &MetricSettings) -> Vec<Box<dyn MetricFamily>> {
     if settings.with_neck {
         all.push(pck::neck_in_box(&settings.alphas));
     }
-    all.extend(measured.iter().map(|part| l1::metric(*part)));
-    all.extend(measured.iter().map(|part| mpjpe::metric(*part)));
+    all.extend(measured.iter().map(|part| errors::l1(*part)));
+    all.extend(measured.iter().map(|part| errors::mpjpe(*part)));
     all.extend(parts.iter().map(|part| p_mpjpe::metric(*part)));
-    all.extend(measured.iter().map(|part| acceleration::metric(*part)));
+    all.extend(measured.iter().map(|part| errors::acceleration(*part)));
     for order in derivatives::DerivativeOrder::ALL {
         all.extend(measured.iter().map(|part| derivatives::metric(order, *part)));
     }
     all.extend(parts.iter().map(|part| hellinger::metric(*part)));
-    all.extend(parts.iter().map(|part| diversity::metric(*part)));
-    all.extend(parts.iter().map(|part| pairwise::metric(*part)));
+    all.extend(parts.iter().map(|part| diversity::l1div(*part)));
+    all.extend(parts.iter().map(|part| diversity::pairwise(*part)));
     all.push(bone_change::metric());
     all.push(consistency::metric(settings.fps.per_sec()));
     all.push(frechet_metrics::poses(BodyPart::All));

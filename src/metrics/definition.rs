@@ -14,8 +14,6 @@ pub enum Better {
     Lower,
     /// Better the nearer it is to the metric of the ground truth, which is the definition `<name>_of_real` of the same part.
     NearerTruth,
-    /// The nearer to 1.
-    One,
     /// A metric of the ground truth alone: says nothing of the predicted one.
     Neither,
 }
@@ -50,6 +48,12 @@ impl Definition {
         hasher.finalize().to_hex()[..16].to_owned()
     }
 
+    /// This definition and, under the name `of_real`, the same number of the ground truth.
+    pub fn with_truth(self, of_real: &'static str) -> [Self; 2] {
+        let truth = Self { name: of_real, better: Better::Neither, ..self.clone() };
+        [self, truth]
+    }
+
     /// For people: name, what it is set to where one name has several, part; `pck_3d@0.2 hands`.
     pub fn label(&self) -> String {
         match self.parameters.get("alpha") {
@@ -76,20 +80,48 @@ fn canonical(value: &Value) -> String {
     }
 }
 
+/// Adds one interval to the sums of its blocks, which start at 0. What belongs to several frames goes to the block of
+/// the first.
+type Measure = Box<dyn Fn(&PairedFrames, &mut BlockSums) + Send + Sync>;
+/// The numbers from added sums; NaN where undefined.
+type Values = Box<dyn Fn(&[f64]) -> Vec<f64> + Send + Sync>;
+
 /// A family of numbers that share their sums.
-pub(crate) trait MetricFamily: Send + Sync {
+pub(crate) struct MetricFamily {
     /// What `values` gives, in order.
-    fn definitions(&self) -> Vec<Definition>;
+    pub definitions: Vec<Definition>,
     /// How many sums it takes.
-    fn n_sums(&self) -> usize;
-    /// Adds one interval to the sums, `n_sums` numbers in each block that start at 0. What belongs to several frames
-    /// goes to the block of the first.
-    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums);
-    /// The numbers from added sums; NaN where undefined.
-    fn values(&self, sums: &[f64]) -> Vec<f64>;
+    pub n_sums: usize,
+    pub measure: Measure,
+    pub values: Values,
     /// Whether the sums are large and the numbers slow (matrices): fewer draws.
-    fn is_costly(&self) -> bool {
-        false
+    pub is_costly: bool,
+}
+
+impl MetricFamily {
+    pub fn new(
+        definitions: Vec<Definition>,
+        n_sums: usize,
+        measure: impl Fn(&PairedFrames, &mut BlockSums) + Send + Sync + 'static,
+        values: impl Fn(&[f64]) -> Vec<f64> + Send + Sync + 'static,
+    ) -> Self {
+        Self { definitions, n_sums, measure: Box::new(measure), values: Box::new(values), is_costly: false }
+    }
+
+    /// One number: the first sum over the second.
+    pub fn mean(
+        definition: Definition,
+        measure: impl Fn(&PairedFrames, &mut BlockSums) + Send + Sync + 'static,
+    ) -> Self {
+        Self::new(vec![definition], 2, measure, |sums| vec![sums[0] / sums[1]])
+    }
+
+    /// A number of the prediction and that of the ground truth: the first two sums over the third.
+    pub fn mean_of_both(
+        definitions: [Definition; 2],
+        measure: impl Fn(&PairedFrames, &mut BlockSums) + Send + Sync + 'static,
+    ) -> Self {
+        Self::new(definitions.into(), 3, measure, |sums| vec![sums[0] / sums[2], sums[1] / sums[2]])
     }
 }
 

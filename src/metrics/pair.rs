@@ -1,5 +1,6 @@
 //! One interval of predicted motion beside its ground truth. No metric looks across its borders.
 
+use super::sums::BlockSums;
 use crate::math::vec3::Vec3;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::time::FrameRate;
@@ -62,6 +63,15 @@ impl<'a> PairedFrames<'a> {
     /// Whether the joint is seen in all of `n` frames from `t` on; false where the interval ends.
     pub fn sees(&self, t: usize, n: usize, joint: usize) -> bool {
         self.seen.get(t..t + n).is_some_and(|frames| frames.iter().all(|seen| seen[joint]))
+    }
+
+    /// By block the frames in which all of `joints` are seen.
+    pub fn whole_frames(&self, joints: &[usize], blocks: &BlockSums) -> Vec<Vec<usize>> {
+        let mut frames = vec![Vec::new(); blocks.n()];
+        for t in (0..self.n_frames()).filter(|t| joints.iter().all(|joint| self.seen[*t][*joint])) {
+            frames[blocks.of(t)].push(t);
+        }
+        frames
     }
 
     /// How many seen joints of the predicted motion are not finite in frame `t`.

@@ -1,42 +1,50 @@
-//! The commonest form of a metric: a number of each frame and point, and their mean over all there are. What the number
-//! is stands in the file of each metric.
+//! Windows of a few frames in a row in which one point is seen: what most metrics take a number of, and the mean of
+//! these numbers over all there are.
 
 use super::body_part::{BodyPart, MeasuredPoint};
 use super::definition::{Definition, MetricFamily};
 use super::pair::PairedFrames;
-use super::sums::BlockSums;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::types::skeleton::N_JOINTS;
 
-/// Mean over frames and points.
-pub(crate) struct FrameMean {
-    definition: Definition,
-    points: Vec<MeasuredPoint>,
-    /// How many frames in a row it looks at.
-    n_frames: usize,
-    of: fn(&PointWindow) -> f64,
-}
-
-/// What such a number is computed from: one point in a few frames in a row, all of them seen.
-pub(crate) struct PointWindow<'a> {
-    predicted: &'a [[Vec3; N_JOINTS]],
-    ground_truth: &'a [[Vec3; N_JOINTS]],
-    t: usize,
+/// One point in a few frames in a row, all of them seen.
+pub(crate) struct PointWindow<'a, 'b> {
+    pair: &'a PairedFrames<'b>,
+    /// First frame.
+    pub t: usize,
     point: MeasuredPoint,
-    /// Frames a second.
-    pub fps: f64,
 }
 
-impl PointWindow<'_> {
+/// All windows of `n_frames` frames from frame `first` on, by frame and point.
+pub(crate) fn windows<'a, 'b>(
+    pair: &'a PairedFrames<'b>,
+    points: &'a [MeasuredPoint],
+    n_frames: usize,
+    first: usize,
+) -> impl Iterator<Item = PointWindow<'a, 'b>> {
+    let at = move |t: usize| points.iter().map(move |&point| PointWindow { pair, t, point });
+    let is_seen = move |window: &PointWindow| {
+        let seen = |joint| pair.sees(window.t, n_frames, joint);
+        seen(window.point.joint) && window.point.origin.is_none_or(seen)
+    };
+    (first..(pair.n_frames() + 1).saturating_sub(n_frames)).flat_map(at).filter(is_seen)
+}
+
+impl PointWindow<'_, '_> {
+    /// Frames a second.
+    pub fn fps(&self) -> f64 {
+        self.pair.fps
+    }
+
     /// Position of the predicted point in frame `k` of the window.
     pub fn predicted(&self, k: usize) -> Vec3 {
-        self.at(self.predicted, k)
+        self.at(&self.pair.predicted, k)
     }
 
     /// Where the real point is in frame `k` of the window.
     pub fn ground_truth(&self, k: usize) -> Vec3 {
-        self.at(self.ground_truth, k)
+        self.at(&self.pair.ground_truth, k)
     }
 
     /// Prediction minus ground truth.
@@ -53,47 +61,20 @@ impl PointWindow<'_> {
     }
 }
 
-impl FrameMean {
-    /// Of `of` over all points of `part` and all `n_frames` frames in a row.
-    pub fn over(
-        definition: Definition,
-        part: BodyPart,
-        n_frames: usize,
-        of: fn(&PointWindow) -> f64,
-    ) -> Box<dyn MetricFamily> {
-        Box::new(Self { definition, points: part.points(), n_frames, of })
-    }
-}
-
-impl MetricFamily for FrameMean {
-    fn definitions(&self) -> Vec<Definition> {
-        vec![self.definition.clone()]
-    }
-
-    fn n_sums(&self) -> usize {
-        2
-    }
-
-    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
-        for t in 0..(pair.n_frames() + 1).saturating_sub(self.n_frames) {
-            let sums = blocks.at(t);
-            for &point in &self.points {
-                let seen = |joint| pair.sees(t, self.n_frames, joint);
-                if seen(point.joint) && point.origin.is_none_or(seen) {
-                    sums[0] += (self.of)(&PointWindow {
-                        predicted: &pair.predicted,
-                        ground_truth: &pair.ground_truth,
-                        t,
-                        point,
-                        fps: pair.fps,
-                    });
-                    sums[1] += 1.0;
-                }
-            }
+/// Mean of `of` over all points of `part` and all `n_frames` frames in a row from frame `first` on.
+pub(crate) fn mean(
+    definition: Definition,
+    part: BodyPart,
+    n_frames: usize,
+    first: usize,
+    of: fn(&PointWindow) -> f64,
+) -> MetricFamily {
+    let points = part.points();
+    MetricFamily::mean(definition, move |pair, blocks| {
+        for window in windows(pair, &points, n_frames, first) {
+            let sums = blocks.at(window.t);
+            sums[0] += of(&window);
+            sums[1] += 1.0;
         }
-    }
-
-    fn values(&self, sums: &[f64]) -> Vec<f64> {
-        vec![sums[0] / sums[1]]
-    }
+    })
 }

@@ -45,6 +45,11 @@ impl PredictorKind {
             Self::Truth => "truth",
         }
     }
+
+    /// Key in a result file.
+    pub fn key(self) -> String {
+        self.name().replace(' ', "_")
+    }
 }
 
 /// Motion of one clip by a predictor.
@@ -80,6 +85,19 @@ impl Predictor {
             ClipMotion::Constant(pose) => pose.broadcast((of.n_frames(), pose.nrows(), 3)),
             ClipMotion::Motion(joints) => Some(joints.view()),
         }
+    }
+
+    /// With the poses of `still` in place of missing values.
+    #[must_use]
+    pub fn filled(mut self, still: &Self) -> Self {
+        for (predicted, still) in self.motions.iter_mut().zip(&still.motions) {
+            if let (ClipMotion::Motion(joints), ClipMotion::Constant(pose)) = (predicted, still) {
+                for mut frame in joints.outer_iter_mut() {
+                    frame.zip_mut_with(pose, |v, still| *v = if v.is_finite() { *v } else { *still });
+                }
+            }
+        }
+        self
     }
 
     pub fn prediction(clips: &EvalClips, description: &str) -> Self {
@@ -133,10 +151,8 @@ fn late(clips: &EvalClips, still: &Predictor) -> Predictor {
         ClipMotion::Motion(taken(&clip.predicted, (0..n_frames).map(|t| (t + n_frames / 2) % n_frames)))
     };
     let description = "the clip's own prediction half of the clip later, and from the beginning again".to_owned();
-    let mut predictor =
-        Predictor { kind: PredictorKind::LatePrediction, description, motions: clips.clips.iter().map(of).collect() };
-    fill(&mut predictor, still);
-    predictor
+    let motions = clips.clips.iter().map(of).collect();
+    Predictor { kind: PredictorKind::LatePrediction, description, motions }.filled(still)
 }
 
 /// Reason why a mismatched motion is left out.
@@ -182,39 +198,6 @@ fn complete(pose: &mut Array2<f32>, from: impl FnOnce() -> Array2<f32>) {
     }
 }
 
-/// Fills missing values with the poses of `still`.
-pub fn fill(predictor: &mut Predictor, still: &Predictor) {
-    for (predicted, still) in predictor.motions.iter_mut().zip(&still.motions) {
-        if let (ClipMotion::Motion(joints), ClipMotion::Constant(pose)) = (predicted, still) {
-            for mut frame in joints.outer_iter_mut() {
-                frame.zip_mut_with(pose, |v, still| *v = if v.is_finite() { *v } else { *still });
-            }
-        }
-    }
-}
-
-/// Library of all other clips.
-struct OtherClips<'a>(&'a EvalClips);
-
-impl Library for OtherClips<'_> {
-    fn len(&self) -> usize {
-        self.0.clips.len()
-    }
-
-    fn features(&self, entry: usize) -> Result<Option<(Vec<f32>, usize)>> {
-        let clip = &self.0.clips[entry];
-        Ok(clip.features.as_ref().map(|features| (features.rows.clone(), clip.n_frames())))
-    }
-
-    fn joints(&self, entry: usize) -> Result<Array3<f32>> {
-        Ok(self.0.clips[entry].ground_truth.clone())
-    }
-
-    fn may_answer(&self, query: usize, entry: usize) -> bool {
-        query != entry
-    }
-}
-
 fn neighbours(clips: &EvalClips, still: &Predictor) -> Result<Option<Predictor>> {
     let query: Option<Vec<Query>> = clips
         .clips
@@ -222,13 +205,20 @@ fn neighbours(clips: &EvalClips, still: &Predictor) -> Result<Option<Predictor>>
         .map(|clip| clip.features.as_ref().map(|features| Query { rows: &features.rows, n_frames: clip.n_frames() }))
         .collect();
     let Some(query) = query.filter(|query| query.len() > 1) else { return Ok(None) };
-    let Some(predicted) = neighbour::motions(&query, &OtherClips(clips), clips.fps)? else { return Ok(None) };
+    let library = Library {
+        n: clips.clips.len(),
+        asks_itself: true,
+        features: &|entry| {
+            let clip = &clips.clips[entry];
+            Ok(clip.features.as_ref().map(|features| (features.rows.clone(), clip.n_frames())))
+        },
+        joints: &|entry| Ok(clips.clips[entry].ground_truth.clone()),
+    };
+    let Some(predicted) = neighbour::motions(&query, &library, clips.fps)? else { return Ok(None) };
     let description =
         "for each 4 s of sound the motion of the stretch of another clip that sounds most alike".to_owned();
     let motions = predicted.into_iter().map(ClipMotion::Motion).collect();
-    let mut predictor = Predictor { kind: PredictorKind::NearestNeighbour, description, motions };
-    fill(&mut predictor, still);
-    Ok(Some(predictor))
+    Ok(Some(Predictor { kind: PredictorKind::NearestNeighbour, description, motions }.filled(still)))
 }
 
 /// For each clip the motion (`Prediction` or `Truth`) of another, played back and forth where it is shorter; for a
@@ -255,9 +245,7 @@ pub fn mismatched(clips: &EvalClips, kind: PredictorKind, still: &Predictor) -> 
         let description = format!("the same {:.1} s later, and from the beginning again", clips.fps.secs(shift));
         (vec![ClipMotion::Motion(taken(of(0), (0..n_frames).map(|t| (t + shift) % n_frames)))], description)
     };
-    let mut predictor = Predictor { kind, description, motions };
-    fill(&mut predictor, still);
-    Some(predictor)
+    Some(Predictor { kind, description, motions }.filled(still))
 }
 
 fn taken(from: &Array3<f32>, frames: impl Iterator<Item = usize>) -> Array3<f32> {

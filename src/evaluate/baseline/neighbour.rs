@@ -24,22 +24,15 @@ pub struct Query<'a> {
 }
 
 /// Entries among which neighbours are searched.
-pub trait Library: Sync {
+pub struct Library<'a> {
     /// Number of entries.
-    fn len(&self) -> usize;
-
-    fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
+    pub n: usize,
+    /// Whether the queries are the entries, in the same order: a clip must not copy itself.
+    pub asks_itself: bool,
     /// Pooled spectrogram of an entry and its number of motion frames; `None`: no sound.
-    fn features(&self, entry: usize) -> Result<Option<(Vec<f32>, usize)>>;
-
+    pub features: &'a (dyn Fn(usize) -> Result<Option<(Vec<f32>, usize)>> + Sync),
     /// Joints of an entry [T, 49, 3].
-    fn joints(&self, entry: usize) -> Result<Array3<f32>>;
-
-    /// Whether an entry may answer a query; a clip must not copy itself.
-    fn may_answer(&self, query: usize, entry: usize) -> bool;
+    pub joints: &'a dyn Fn(usize) -> Result<Array3<f32>>,
 }
 
 /// Window of a query.
@@ -53,15 +46,17 @@ struct QueryWindow {
 type NearestMatch = (f32, usize, usize);
 
 /// Motion [T, 49, 3] for each query, NaN where the library's is; `None` where a window finds nothing long enough.
-pub fn motions(queries: &[Query], library: &dyn Library, fps: FrameRate) -> Result<Option<Vec<Array3<f32>>>> {
+pub fn motions(queries: &[Query], library: &Library, fps: FrameRate) -> Result<Option<Vec<Array3<f32>>>> {
     let windows: Vec<QueryWindow> =
         queries.iter().enumerate().flat_map(|(i, query)| query_windows(i, query, fps)).collect();
-    let best = (0..library.len())
+    let Library { n, asks_itself, features, joints } = *library;
+    let best = (0..n)
         .into_par_iter()
         .map(|entry| -> Result<Vec<Option<NearestMatch>>> {
-            let Some((rows, n_frames)) = library.features(entry)? else { return Ok(vec![None; windows.len()]) };
-            let find = |window: &QueryWindow| {
-                library.may_answer(window.query, entry).then(|| nearest(&rows, n_frames, window, entry)).flatten()
+            let Some((rows, n_frames)) = features(entry)? else { return Ok(vec![None; windows.len()]) };
+            let find = |window: &QueryWindow| match asks_itself && window.query == entry {
+                true => None,
+                false => nearest(&rows, n_frames, window, entry),
             };
             Ok(windows.par_iter().map(find).collect())
         })
@@ -78,7 +73,7 @@ pub fn motions(queries: &[Query], library: &dyn Library, fps: FrameRate) -> Resu
     }
     places.sort_by_key(|(entry, _, _)| *entry);
     for of_entry in places.chunk_by(|a, b| a.0 == b.0) {
-        let joints = library.joints(of_entry[0].0)?;
+        let joints = joints(of_entry[0].0)?;
         for (_, first, window) in of_entry {
             let from = joints.slice(s![*first..first + window.frames.len(), .., ..]);
             predicted[window.query].slice_mut(s![window.frames.clone(), .., ..]).assign(&from);

@@ -22,18 +22,15 @@ pub fn motion(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> Res
 pub fn turned(sounds: &[&Sound], which: usize) -> Sound {
     let length = |sounds: &[&Sound]| sounds.iter().map(|sound| sound.samples.len()).sum::<usize>();
     let (all, before) = (length(sounds), length(&sounds[..which]));
-    let own = sounds[which];
-    let (mut samples, mut at) = (Vec::with_capacity(own.samples.len()), before + all / 2);
-    while samples.len() < own.samples.len() {
-        let mut start = at % all;
-        for sound in sounds {
-            if start < sound.samples.len() {
-                let n = (sound.samples.len() - start).min(own.samples.len() - samples.len());
-                samples.extend_from_slice(&sound.samples[start..start + n]);
-                at += n;
-                break;
-            }
-            start -= sound.samples.len();
+    let (own, n) = (sounds[which], sounds[which].samples.len());
+    let mut skipped = (before + all / 2) % all.max(1);
+    let mut samples = Vec::with_capacity(n);
+    for sound in sounds.iter().cycle().take_while(|_| n > 0) {
+        let rest = sound.samples.get(skipped..).unwrap_or_default();
+        skipped -= sound.samples.len() - rest.len();
+        samples.extend(rest.iter().take(n - samples.len()));
+        if samples.len() == n {
+            break;
         }
     }
     Sound { rate: own.rate, samples }

@@ -6,7 +6,6 @@ use super::held_out;
 use super::held_out::HeldOutInterval;
 use super::sound_features;
 use super::sound_features::SoundFeatureExtractor;
-use crate::dataset::index::SampleRef;
 use crate::dataset::{Dataset, Split};
 use crate::evaluate::baseline::baselines;
 use crate::evaluate::baseline::baselines::{ClipMotion, Predictor, PredictorKind};
@@ -24,13 +23,7 @@ use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3, s};
 use rayon::prelude::*;
 
-/// Clips and predictors to evaluate, the speaker's own motion first.
-pub struct SpeakerEvaluation {
-    pub clips: EvalClips,
-    pub predictors: Vec<Predictor>,
-}
-
-/// Evaluates the speaker of a checkpoint on a split of `dataset`.
+/// Clips and predictors of the speaker of a checkpoint on a split of `dataset`, the speaker's own motion first.
 ///
 /// # Errors
 /// A dataset of another frame rate; a split without intervals.
@@ -39,7 +32,7 @@ pub fn prepare(
     speaker: &GestureGenerator,
     split: Split,
     task: &dyn Task,
-) -> Result<SpeakerEvaluation> {
+) -> Result<(EvalClips, Vec<Predictor>)> {
     let (of_dataset, of_speaker) = (dataset.info().fps, speaker.fps());
     ensure!(
         of_dataset == of_speaker,
@@ -79,10 +72,9 @@ pub fn prepare(
         Some(motions) => {
             let description =
                 "for each 4 s of sound the motion of the stretch of the training split that sounds most alike";
-            let mut predictor =
+            let copied =
                 Predictor { kind: PredictorKind::NearestNeighbour, description: description.to_owned(), motions };
-            baselines::fill(&mut predictor, &all[1]);
-            all.push(predictor);
+            all.push(copied.filled(&all[1]));
         }
         None => clips.notes.push(format!(
             "{}: left out, since no interval of the training split is long enough to copy from",
@@ -96,7 +88,7 @@ pub fn prepare(
         Some(predictor) => all.push(predictor),
         None => clips.notes.push(baselines::too_short(PredictorKind::MismatchedTruth)),
     }
-    Ok(SpeakerEvaluation { clips, predictors: all })
+    Ok((clips, all))
 }
 
 fn generated(
@@ -139,45 +131,8 @@ fn constant_poses(dataset: &Dataset, normal: &Normalisation, n_clips: usize) -> 
     Ok(vec![predictor(PredictorKind::MeanPose, mean), predictor(PredictorKind::MedianPose, median)])
 }
 
-/// Training split as a library, read again for every query, so that memory does not grow with its length.
-struct TrainingLibrary<'a> {
-    dataset: &'a Dataset,
-    normal: &'a Normalisation,
-    samples: Vec<SampleRef>,
-    /// Whether the queries are the library's own entries, in the same order.
-    asks_itself: bool,
-}
-
-impl TrainingLibrary<'_> {
-    fn read(&self, entry: usize) -> Result<HeldOutInterval> {
-        let sample = self.samples.get(entry).context("no such interval")?;
-        held_out::read(self.dataset, std::slice::from_ref(sample), self.normal)?.pop().context("no such interval")
-    }
-}
-
-impl Library for TrainingLibrary<'_> {
-    fn len(&self) -> usize {
-        self.samples.len()
-    }
-
-    fn features(&self, entry: usize) -> Result<Option<(Vec<f32>, usize)>> {
-        let interval = self.read(entry)?;
-        let mut listener = SoundFeatureExtractor::new(interval.ground_truth.fps, None);
-        listener.push(&interval.sound.samples);
-        let n_frames = interval.ground_truth.n_frames();
-        Ok(Some((listener.finish(n_frames).rows, n_frames)))
-    }
-
-    fn joints(&self, entry: usize) -> Result<Array3<f32>> {
-        Ok(self.read(entry)?.ground_truth.joints)
-    }
-
-    fn may_answer(&self, query: usize, entry: usize) -> bool {
-        !self.asks_itself || query != entry
-    }
-}
-
-/// Motion of the nearest neighbours; NaN where the copied motion is missing.
+/// Motion of the nearest neighbours in the training split, which is read again for every query, so that memory does not
+/// grow with its length; NaN where the copied motion is missing.
 pub fn copied(
     dataset: &Dataset,
     normal: &Normalisation,
@@ -188,8 +143,22 @@ pub fn copied(
     let rows: Vec<Vec<f32>> = clips.clips.iter().map(rows).collect();
     let query: Vec<Query> =
         clips.clips.iter().zip(&rows).map(|(clip, rows)| Query { rows, n_frames: clip.n_frames() }).collect();
-    let asks_itself = split == Split::Train;
-    let library = TrainingLibrary { dataset, normal, samples: dataset.samples(Split::Train), asks_itself };
+    let samples = dataset.samples(Split::Train);
+    let read = |entry: usize| -> Result<HeldOutInterval> {
+        held_out::read(dataset, &samples[entry..=entry], normal)?.pop().context("no such interval")
+    };
+    let library = Library {
+        n: samples.len(),
+        asks_itself: split == Split::Train,
+        features: &|entry| {
+            let interval = read(entry)?;
+            let mut listener = SoundFeatureExtractor::new(interval.ground_truth.fps, None);
+            listener.push(&interval.sound.samples);
+            let n_frames = interval.ground_truth.n_frames();
+            Ok(Some((listener.finish(n_frames).rows, n_frames)))
+        },
+        joints: &|entry| Ok(read(entry)?.ground_truth.joints),
+    };
     let predicted = neighbour::motions(&query, &library, clips.fps)?;
     debug_assert!(predicted.iter().flatten().all(|joints| joints.shape()[1..] == [N_JOINTS, 3]));
     Ok(predicted.map(|predicted| predicted.into_iter().map(ClipMotion::Motion).collect()))

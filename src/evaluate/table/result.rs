@@ -43,13 +43,12 @@ fn metric(table: &Table, index: usize) -> Value {
     let mut values = Map::new();
     for row in &table.rows {
         let estimate = &row.values[index];
-        let name = serde_json::to_value(row.kind).ok().and_then(|name| name.as_str().map(str::to_owned));
         let value = match (estimate.value.is_finite(), row.reasons[index].as_str()) {
             (true, _) => json!(estimate),
             (false, "") => json!({ "value": null }),
             (false, reason) => json!({ "value": null, "undefined": reason }),
         };
-        values.insert(name.unwrap_or_default(), value);
+        values.insert(row.kind.key(), value);
     }
     json!({
         "name": definition.name,
@@ -110,8 +109,7 @@ impl StoredResult {
 impl StoredMetric {
     /// Value of a predictor with its interval, if any.
     pub fn value(&self, kind: PredictorKind) -> Option<Estimate> {
-        let name = serde_json::to_value(kind).ok()?;
-        let value = self.values.get(name.as_str()?)?;
+        let value = self.values.get(&kind.key())?;
         let number = |key: &str| value.get(key).and_then(Value::as_f64);
         let (low, high) = (number("low").unwrap_or(f64::NAN), number("high").unwrap_or(f64::NAN));
         Some(Estimate { value: number("value")?, low, high })

@@ -169,7 +169,6 @@ impl Table {
             Some(Better::Higher) => value,
             Some(Better::Lower) => -value,
             Some(Better::NearerTruth) => -(value - truth).abs(),
-            Some(Better::One) => -(value - 1.0).abs(),
             Some(Better::Neither) | None => f64::NAN,
         };
         let truth = self.truth_of.get(index).copied().flatten().unwrap_or(index);

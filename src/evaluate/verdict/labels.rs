@@ -4,21 +4,18 @@ use crate::evaluate::table::bootstrap::Estimate;
 use crate::metrics::catalogue::{Better, Definition};
 
 /// Names of metric families; of common prefixes the longest comes first.
-const NAMES: [(&str, &str); 26] = [
+const NAMES: [(&str, &str); 21] = [
     ("pck_3d", "correct keypoints"),
     ("pck_2d", "correct keypoints, front view"),
     ("l1div", "diversity within a clip"),
     ("l1", "mean coordinate error"),
     ("mpjpe", "joint error"),
     ("p_mpjpe", "joint error after alignment"),
-    ("pa_mpjpe", "joint error after alignment"),
     ("acceleration_error", "acceleration error"),
     ("acceleration", "acceleration"),
     ("jerk", "jerk"),
     ("speed", "speed"),
     ("hellinger", "speeds unlike the truth's (Hellinger)"),
-    ("diversity", "diversity within a clip"),
-    ("pairwise_distance", "distance between poses"),
     ("average_pairwise_distance", "distance between poses"),
     ("bone_change", "bone change per frame"),
     ("bone_deviation", "bone deviation"),
@@ -28,9 +25,7 @@ const NAMES: [(&str, &str); 26] = [
     ("frechet_pose", "Frechet distance, poses"),
     ("frechet_window", "Frechet distance, movements of a second"),
     ("frechet_embedding", "Frechet distance, movements, embedded"),
-    ("frechet", "Frechet distance"),
     ("cca", "canonical correlation"),
-    ("energy", "motion energy"),
 ];
 
 /// Name with the part of the body, like `correct keypoints at 0.2, fingers`.
@@ -74,13 +69,12 @@ pub fn part(definition: &Definition) -> &'static str {
     }
 }
 
-/// Short sign of the better direction: more, less, as the ground truth, near one.
+/// Short sign of the better direction: more, less, as the ground truth.
 pub const fn direction(better: Better) -> &'static str {
     match better {
         Better::Higher => "more is better",
         Better::Lower => "less is better",
         Better::NearerTruth => "as the truth is best",
-        Better::One => "1 is best",
         Better::Neither => "",
     }
 }

@@ -7,21 +7,6 @@ use crate::evaluate::table::table::{FEW_BLOCKS, N_COSTLY_DRAWS, N_DRAWS, Predict
 use crate::metrics::catalogue::Better;
 use std::fmt::Write as _;
 
-/// Column heads, two lines each.
-const fn heads(kind: PredictorKind) -> [&'static str; 2] {
-    match kind {
-        PredictorKind::Prediction => ["", "prediction"],
-        PredictorKind::MeanPose => ["mean", "pose"],
-        PredictorKind::MedianPose => ["median", "pose"],
-        PredictorKind::NearestNeighbour => ["nearest", "neighbour"],
-        PredictorKind::MismatchedPrediction => ["mismatched", "prediction"],
-        PredictorKind::LatePrediction => ["late", "prediction"],
-        PredictorKind::MismatchedTruth => ["mismatched", "truth"],
-        PredictorKind::TruthHalves => ["truth", "halves"],
-        PredictorKind::Truth => ["", "truth"],
-    }
-}
-
 /// Table, descriptions of its columns, and conclusions.
 ///
 /// `all` shows every metric; otherwise arms, fingers and wrists are shown for correct keypoints and joint errors only.
@@ -53,7 +38,7 @@ pub fn text(table: &Table, all: bool) -> String {
         text,
         "\nin brackets: 95 % intervals, {N_DRAWS} draws of the blocks (Frechet distances, correlations: {N_COSTLY_DRAWS}){few}"
     );
-    text += "which way is better stands before each name: more, less, like the truth, near to one\n";
+    text += "which way is better stands before each name: more, less, like the truth\n";
     if !all {
         text += "--all shows the other figures of arms, fingers and wrists too\n";
     }
@@ -104,7 +89,6 @@ fn named(table: &Table, index: usize) -> String {
         Better::Higher => "more",
         Better::Lower => "less",
         Better::NearerTruth => "like",
-        Better::One => "one ",
         Better::Neither => "    ",
     };
     let unit = labels::unit(definition);
@@ -112,7 +96,7 @@ fn named(table: &Table, index: usize) -> String {
     format!("{sign}  {}{unit}", labels::name(definition))
 }
 
-/// Two heads and a cell a metric; the prediction's cells have intervals.
+/// Head in two lines and a cell a metric; the prediction's cells have intervals.
 fn column(table: &Table, row: &PredictorRow, shown: &[usize]) -> Vec<String> {
     let cell = |index: &usize| {
         let (definition, estimate) = (&table.definitions[*index], &row.values[*index]);
@@ -121,7 +105,8 @@ fn column(table: &Table, row: &PredictorRow, shown: &[usize]) -> Vec<String> {
             _ => labels::number(definition, estimate.value),
         }
     };
-    heads(row.kind).iter().map(|head| (*head).to_owned()).chain(shown.iter().map(cell)).collect()
+    let (first, second) = row.kind.name().split_once(' ').unwrap_or(("", row.kind.name()));
+    [first, second].map(str::to_owned).into_iter().chain(shown.iter().map(cell)).collect()
 }
 
 fn pad(text: &str, width: usize) -> String {

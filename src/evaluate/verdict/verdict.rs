@@ -60,71 +60,69 @@ pub struct Verdict {
 /// Compares the prediction with the better of the constant poses.
 pub fn better_than_nothing(table: &Table) -> Verdict {
     let question = "Is it better than doing nothing?";
-    let Some(own) = table.row(PredictorKind::Prediction) else { return nothing(question) };
-    let query = [Aspect::Position, Aspect::Poses, Aspect::Movement];
-    let votes = votes(table, own, &query, |index| better_constant_pose(table, index));
-    let of = |aspect: Aspect| summed(votes.iter().filter(|vote| vote.aspect == aspect));
-    let asks = |aspect: Aspect| votes.iter().any(|vote| vote.aspect == aspect);
-    let rest = match summed(votes.iter().filter(|vote| vote.aspect != Aspect::Position)) {
+    let Some(own) = table.row(PredictorKind::Prediction) else { return undecided(question, NOTHING) };
+    let asked = [Aspect::Position, Aspect::Poses, Aspect::Movement];
+    let votes = votes(table, own, &asked, |index| better_constant_pose(table, index));
+    if let Some(why) = hindrance(table, &votes) {
+        return undecided(question, &why);
+    }
+    let of = |aspect: Aspect| votes.iter().filter(move |vote| vote.aspect == aspect);
+    let others = || votes.iter().filter(|vote| vote.aspect != Aspect::Position);
+    let rest = match summed(others()) {
         // A constant pose that fits better wins by its poses, and has no movement.
-        Answer::Yes if asks(Aspect::Movement) && of(Aspect::Movement) != Answer::Yes => Answer::Undecided,
+        Answer::Yes if of(Aspect::Movement).next().is_some() && summed(of(Aspect::Movement)) != Answer::Yes => {
+            Answer::Undecided
+        }
         rest => rest,
     };
-    let n_place = votes.iter().filter(|vote| vote.aspect == Aspect::Position).count();
-    let (word, description) = match (of(Aspect::Position), rest) {
-        _ if table.learnt => return by_heart(question),
-        _ if votes.is_empty() => return no_figure(question),
-        _ if table.n_blocks < FEW_BLOCKS => return too_few(question, table),
-        (place, _) if n_place == votes.len() => match place {
-            Answer::Yes => (
-                "in part",
-                "it is nearer to where the speaker is than a pose that never moves; how it moves, no figure of this convention says",
-            ),
-            Answer::No => (
-                "no",
-                "a pose that never moves is nearer to where the speaker is; how it moves, no figure of this convention says",
-            ),
-            Answer::Undecided => ("undecided", "no figure tells it apart from a pose that never moves"),
-        },
-        (_, rest) if n_place == 0 => match rest {
-            Answer::Yes => (
-                "in part",
-                "its poses and movements are more like the speaker's than a pose that never moves; whether it is nearer to where the speaker is, no figure of this convention says",
-            ),
-            Answer::No => ("no", "its poses or movements are less like the speaker's than a pose that never moves"),
-            Answer::Undecided => ("undecided", "no figure tells it apart from a pose that never moves"),
-        },
-        (Answer::Yes, Answer::Yes) => (
+    // `None`: the convention has no metric of it.
+    let place = of(Aspect::Position).next().map(|_| summed(of(Aspect::Position)));
+    let rest = others().next().map(|_| rest);
+    let (word, description) = match (place, rest) {
+        (Some(Answer::Yes), None) => (
+            "in part",
+            "it is nearer to where the speaker is than a pose that never moves; how it moves, no figure of this convention says",
+        ),
+        (Some(Answer::No), None) => (
+            "no",
+            "a pose that never moves is nearer to where the speaker is; how it moves, no figure of this convention says",
+        ),
+        (None, Some(Answer::Yes)) => (
+            "in part",
+            "its poses and movements are more like the speaker's than a pose that never moves; whether it is nearer to where the speaker is, no figure of this convention says",
+        ),
+        (None, Some(Answer::No)) => {
+            ("no", "its poses or movements are less like the speaker's than a pose that never moves")
+        }
+        (Some(Answer::Yes), Some(Answer::Yes)) => (
             "yes",
             "it is nearer to where the speaker is, and moves more like the speaker, than a pose that never moves",
         ),
-        (Answer::Yes, Answer::Undecided) => (
+        (Some(Answer::Yes), Some(Answer::Undecided)) => (
             "in part",
             "it is nearer to where the speaker is than a pose that never moves; that it moves like the speaker is not shown",
         ),
-        (Answer::Yes, Answer::No) => (
+        (Some(Answer::Yes), Some(Answer::No)) => (
             "in part",
             "it is nearer to where the speaker is than a pose that never moves, but its poses or movements are less like the speaker's",
         ),
-        (Answer::No, Answer::Yes) => (
+        (Some(Answer::No), Some(Answer::Yes)) => (
             "in part",
             "its poses and movements are more like the speaker's than a pose that never moves, but that pose is nearer to where the speaker is",
         ),
-        (Answer::Undecided, Answer::Yes) => (
+        (Some(Answer::Undecided), Some(Answer::Yes)) => (
             "in part",
             "its poses and movements are more like the speaker's than a pose that never moves, but it is not shown to be nearer to where the speaker is",
         ),
-        (Answer::No, _) => (
+        (Some(Answer::No), Some(_)) => (
             "no",
             "a pose that never moves is nearer to where the speaker is, and its poses and movements are not shown to be more like the speaker's",
         ),
-        (Answer::Undecided, Answer::No) => (
+        (Some(Answer::Undecided), Some(Answer::No)) => (
             "no",
             "its poses or movements are less like the speaker's than a pose that never moves, and it is not shown to be nearer to where the speaker is",
         ),
-        (Answer::Undecided, Answer::Undecided) => {
-            ("undecided", "no figure tells it apart from a pose that never moves")
-        }
+        (Some(Answer::Undecided) | None, _) => ("undecided", "no figure tells it apart from a pose that never moves"),
     };
     let oracle = table.row(PredictorKind::MeanPose).is_some_and(|row| row.description.contains("oracle"));
     let oracle =
@@ -160,12 +158,12 @@ pub fn hears(table: &Table) -> Verdict {
     let question = "Does it hear?";
     let other = table.row(PredictorKind::LatePrediction).or_else(|| table.row(PredictorKind::MismatchedPrediction));
     let own = table.row(PredictorKind::Prediction).zip(other);
-    let Some((own, other)) = own else { return nothing(question) };
+    let Some((own, other)) = own else { return undecided(question, NOTHING) };
     let votes = votes(table, own, &[Aspect::Position, Aspect::Beat], |_| Some(other));
+    if let Some(why) = hindrance(table, &votes) {
+        return undecided(question, &why);
+    }
     let (word, description) = match summed(votes.iter()) {
-        _ if table.learnt => return by_heart(question),
-        _ if votes.is_empty() => return no_figure(question),
-        _ if table.n_blocks < FEW_BLOCKS => return too_few(question, table),
         Answer::Yes => ("yes", "its motion fits its own sound better than a motion made for another sound or moment"),
         Answer::No => ("no", "a motion made for another sound or moment fits better"),
         Answer::Undecided if votes.iter().any(|vote| vote.answer == Answer::Yes) => {
@@ -179,27 +177,23 @@ pub fn hears(table: &Table) -> Verdict {
     Verdict { word, sentence: format!("{question} {}: {description}.", capital(word)), votes }
 }
 
-fn nothing(question: &str) -> Verdict {
-    let sentence = format!("{question} Undecided: there is nothing to hold it against.");
-    Verdict { word: "undecided", sentence, votes: Vec::new() }
+const NOTHING: &str = "there is nothing to hold it against";
+
+fn undecided(question: &str, why: &str) -> Verdict {
+    Verdict { word: "undecided", sentence: format!("{question} Undecided: {why}."), votes: Vec::new() }
 }
 
-fn by_heart(question: &str) -> Verdict {
-    let sentence = format!("{question} Undecided: the speaker was trained on these very clips; use another split.");
-    Verdict { word: "undecided", sentence, votes: Vec::new() }
-}
-
-fn no_figure(question: &str) -> Verdict {
-    let sentence = format!("{question} Undecided: this convention has no figure that could say.");
-    Verdict { word: "undecided", sentence, votes: Vec::new() }
-}
-
-fn too_few(question: &str, table: &Table) -> Verdict {
-    let sentence = format!(
-        "{question} Undecided: {} blocks of about {} s are too few to say (at least {FEW_BLOCKS}).",
-        table.n_blocks, table.block_secs
-    );
-    Verdict { word: "undecided", sentence, votes: Vec::new() }
+/// Why these votes say nothing.
+fn hindrance(table: &Table, votes: &[Vote]) -> Option<String> {
+    if table.learnt {
+        return Some("the speaker was trained on these very clips; use another split".to_owned());
+    }
+    if votes.is_empty() {
+        return Some("this convention has no figure that could say".to_owned());
+    }
+    let Table { n_blocks, block_secs, .. } = table;
+    (*n_blocks < FEW_BLOCKS)
+        .then(|| format!("{n_blocks} blocks of about {block_secs} s are too few to say (at least {FEW_BLOCKS})"))
 }
 
 /// Votes of the metrics of these aspects, each against its own row.

@@ -7,7 +7,6 @@ use crate::math::vec3::Vec3;
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
 use crate::metrics::pair::PairedFrames;
-use crate::metrics::sums::BlockSums;
 use crate::types::skeleton::N_JOINTS;
 use serde_json::json;
 
@@ -16,13 +15,45 @@ const FPS: f64 = 60.0;
 const SIGMA_FRAMES: f64 = 3.0;
 const ORDER: f64 = 10.0;
 
-struct BeatAlignment {
-    order: usize,
-}
-
 /// For data of this frame rate.
-pub(crate) fn metric(fps: f64) -> Box<dyn MetricFamily> {
-    Box::new(BeatAlignment { order: ((ORDER / FPS * fps).round() as usize).max(1) })
+pub(crate) fn metric(fps: f64) -> MetricFamily {
+    let order = ((ORDER / FPS * fps).round() as usize).max(1);
+    let definition = Definition {
+        name: "beat_alignment",
+        part: BodyPart::Body.name(),
+        unit: "1",
+        better: Better::NearerTruth,
+        formula: "per interval the mean over the beats of the MOTION of exp(-d^2 / 2 sigma^2), d to the nearest onset, \
+                  both in whole frames; 0 for an interval without a beat; mean over intervals, long or short alike. \
+                  Beats: strict local minima of the summed way of joints 1-6 from frame to frame (0 in the first), \
+                  among `order` frames on either side (10 at 60 frames a second); sigma 3 frames at 60 a second. \
+                  Theirs: beats of music instead of onsets, 24 joints of SMPL",
+        undefined: "no interval has sound with an onset",
+        parameters: json!({"sigma_secs": SIGMA_FRAMES / FPS, "order_frames": order, "joints": BodyPart::Body.joints()}),
+    };
+    MetricFamily::mean_of_both(definition.with_truth("beat_alignment_of_real"), move |pair, blocks| {
+        let Some(onsets) = pair.interval.onsets else { return };
+        let n = pair.n_frames();
+        let frames = onsets.iter().map(|onset| (onset * pair.fps).round()).filter(|t| *t < n as f64);
+        let onsets: Vec<f64> = frames.collect();
+        if onsets.is_empty() {
+            return;
+        }
+        let sigma = SIGMA_FRAMES / FPS * pair.fps;
+        for (i, poses) in [&pair.predicted, &pair.ground_truth].into_iter().enumerate() {
+            let beats = minima(&envelope(pair, poses), order);
+            for &t in &beats {
+                blocks.at(t)[i] += nearness(t as f64, &onsets, sigma) / beats.len() as f64;
+            }
+        }
+        if (0..n).any(|t| pair.n_broken(t) > 0) {
+            blocks.at(0)[0] = f64::NAN;
+        }
+        // every frame has its share of the interval's weight
+        for t in 0..n {
+            blocks.at(t)[2] += 1.0 / n as f64;
+        }
+    })
 }
 
 /// Sum over joints 1-6 of the way since the frame before, 0 in the first; NaN where one is not seen.
@@ -36,55 +67,4 @@ fn envelope(pair: &PairedFrames, poses: &[[Vec3; N_JOINTS]]) -> Vec<f64> {
         _ => f64::NAN,
     };
     (0..pair.n_frames()).map(at).collect()
-}
-
-impl MetricFamily for BeatAlignment {
-    fn definitions(&self) -> Vec<Definition> {
-        let definition = |name, better| Definition {
-            name,
-            part: BodyPart::Body.name(),
-            unit: "1",
-            better,
-            formula: "per interval the mean over the beats of the MOTION of exp(-d^2 / 2 sigma^2), d to the nearest onset, \
-                      both in whole frames; 0 for an interval without a beat; mean over intervals, long or short alike. \
-                      Beats: strict local minima of the summed way of joints 1-6 from frame to frame (0 in the first), \
-                      among `order` frames on either side (10 at 60 frames a second); sigma 3 frames at 60 a second. \
-                      Theirs: beats of music instead of onsets, 24 joints of SMPL",
-            undefined: "no interval has sound with an onset",
-            parameters: json!({"sigma_secs": SIGMA_FRAMES / FPS, "order_frames": self.order, "joints": BodyPart::Body.joints()}),
-        };
-        vec![definition("beat_alignment", Better::NearerTruth), definition("beat_alignment_of_real", Better::Neither)]
-    }
-
-    fn n_sums(&self) -> usize {
-        3
-    }
-
-    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
-        let Some(onsets) = pair.interval.onsets else { return };
-        let n = pair.n_frames();
-        let frames = onsets.iter().map(|onset| (onset * pair.fps).round()).filter(|t| *t < n as f64);
-        let onsets: Vec<f64> = frames.collect();
-        if onsets.is_empty() {
-            return;
-        }
-        let sigma = SIGMA_FRAMES / FPS * pair.fps;
-        for (i, poses) in [&pair.predicted, &pair.ground_truth].into_iter().enumerate() {
-            let beats = minima(&envelope(pair, poses), self.order);
-            for &t in &beats {
-                blocks.at(t)[i] += nearness(t as f64, &onsets, sigma) / beats.len() as f64;
-            }
-        }
-        if (0..n).any(|t| pair.n_broken(t) > 0) {
-            blocks.at(0)[0] = f64::NAN;
-        }
-        // every frame has its share of the interval's weight
-        for t in 0..n {
-            blocks.at(t)[2] += 1.0 / n as f64;
-        }
-    }
-
-    fn values(&self, sums: &[f64]) -> Vec<f64> {
-        vec![sums[0] / sums[2], sums[1] / sums[2]]
-    }
 }

@@ -24,80 +24,28 @@ const SIGMA: f64 = 0.1;
 /// A minimum must lie this far below one of its neighbours.
 const DROP: f64 = 0.01;
 
-struct AngleBeats {
-    /// Average change of an angle in a frame of the data's rate, over that of theirs.
-    per_frame: f64,
-}
-
 /// For data of this frame rate.
-pub(crate) fn metric(fps: f64) -> Box<dyn MetricFamily> {
-    Box::new(AngleBeats { per_frame: FPS / fps })
-}
-
-impl AngleBeats {
-    /// Times of the beats of one angle, seconds; `None` where a predicted joint is not finite.
-    fn beats(
-        &self,
-        pair: &PairedFrames,
-        poses: &[[Vec3; N_JOINTS]],
-        joints: [usize; 3],
-        usual: f64,
-    ) -> Option<Vec<f64>> {
-        let seen = |t: usize| joints.iter().all(|joint| pair.seen[t][*joint]);
-        let angle = |t: usize| {
-            let [a, b, c] = joints.map(|joint| poses[t][joint]);
-            let (first, second) = (vec3::sub(b, a), vec3::sub(c, b));
-            let cosine = (0..3).map(|k| first[k] * second[k]).sum::<f64>() / (vec3::norm(first) * vec3::norm(second));
-            cosine.clamp(-1.0, 1.0).acos() / PI
-        };
-        if (0..pair.n_frames()).any(|t| seen(t) && joints.iter().any(|joint| !poses[t][*joint][0].is_finite())) {
-            return None;
-        }
-        let change = |t: usize| match t {
-            0 => 0.0,
-            _ if seen(t) && seen(t - 1) => {
-                (angle(t) - angle(t - 1)).abs() / (usual * self.per_frame) / ANGLES.len() as f64
-            }
-            _ => f64::NAN,
-        };
-        let changes: Vec<f64> = (0..pair.n_frames()).map(change).collect();
-        let is_beat = |w: &[f64]| w[1] < w[0] && w[1] < w[2] && (w[0] - w[1] >= DROP || w[2] - w[1] >= DROP);
-        let beats = changes.windows(3).enumerate().filter(|(_, w)| is_beat(w));
-        Some(beats.map(|(i, _)| (i + 1) as f64 / pair.fps).collect())
-    }
-}
-
-impl MetricFamily for AngleBeats {
-    fn definitions(&self) -> Vec<Definition> {
-        let definition = |name, better| Definition {
-            name,
-            part: "arms",
-            unit: "1",
-            better,
-            formula: "sum over intervals, angles and onsets of exp(-d^2 / 2 sigma^2), d to the nearest beat of the angle, \
-                      divided by the number of onsets of all angles that have a beat in the interval (an angle without \
-                      is left out). Angles in half turns between neck-shoulder, upper arm and forearm; |change from frame \
-                      to frame| / average change / 4, 0 in the first frame; beats: minima among 3 frames at least `drop` \
-                      below one neighbour",
-            undefined: "there is no sound, no onset in it, or no angle has a beat",
-            parameters: json!({
-                "sigma_secs": SIGMA, "drop": DROP,
-                "average_change": ANGLES.map(|(_, usual)| usual * self.per_frame),
-            }),
-        };
-        let of_real = "beat_consistency_of_real";
-        vec![definition("beat_consistency", Better::NearerTruth), definition(of_real, Better::Neither)]
-    }
-
-    fn n_sums(&self) -> usize {
-        4
-    }
-
-    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
+pub(crate) fn metric(fps: f64) -> MetricFamily {
+    // their average change of an angle, in a frame of the data's rate
+    let angles = ANGLES.map(|(joints, usual)| (joints, usual * (FPS / fps)));
+    let definition = Definition {
+        name: "beat_consistency",
+        part: "arms",
+        unit: "1",
+        better: Better::NearerTruth,
+        formula: "sum over intervals, angles and onsets of exp(-d^2 / 2 sigma^2), d to the nearest beat of the angle, \
+                  divided by the number of onsets of all angles that have a beat in the interval (an angle without \
+                  is left out). Angles in half turns between neck-shoulder, upper arm and forearm; |change from frame \
+                  to frame| / average change / 4, 0 in the first frame; beats: minima among 3 frames at least `drop` \
+                  below one neighbour",
+        undefined: "there is no sound, no onset in it, or no angle has a beat",
+        parameters: json!({"sigma_secs": SIGMA, "drop": DROP, "average_change": angles.map(|(_, usual)| usual)}),
+    };
+    let measure = move |pair: &PairedFrames, blocks: &mut BlockSums| {
         let Some(onsets) = pair.interval.onsets else { return };
-        for (joints, usual) in ANGLES {
+        for (joints, usual) in angles {
             for (i, poses) in [&pair.predicted, &pair.ground_truth].into_iter().enumerate() {
-                let beats = self.beats(pair, poses, joints, usual);
+                let beats = beats(pair, poses, joints, usual);
                 for &onset in onsets.iter().filter(|onset| (**onset * pair.fps) < pair.n_frames() as f64) {
                     let sums = &mut blocks.at((onset * pair.fps) as usize)[2 * i..2 * i + 2];
                     match &beats {
@@ -111,9 +59,31 @@ impl MetricFamily for AngleBeats {
                 }
             }
         }
-    }
+    };
+    let definitions = definition.with_truth("beat_consistency_of_real").into();
+    MetricFamily::new(definitions, 4, measure, |sums| vec![sums[0] / sums[1], sums[2] / sums[3]])
+}
 
-    fn values(&self, sums: &[f64]) -> Vec<f64> {
-        vec![sums[0] / sums[1], sums[2] / sums[3]]
+/// Times of the beats of one angle, which usually changes by `usual` half turns a frame, seconds; `None` where a
+/// predicted joint is not finite.
+fn beats(pair: &PairedFrames, poses: &[[Vec3; N_JOINTS]], joints: [usize; 3], usual: f64) -> Option<Vec<f64>> {
+    let seen = |t: usize| joints.iter().all(|joint| pair.seen[t][*joint]);
+    let angle = |t: usize| {
+        let [a, b, c] = joints.map(|joint| poses[t][joint]);
+        let (first, second) = (vec3::sub(b, a), vec3::sub(c, b));
+        let cosine = (0..3).map(|k| first[k] * second[k]).sum::<f64>() / (vec3::norm(first) * vec3::norm(second));
+        cosine.clamp(-1.0, 1.0).acos() / PI
+    };
+    if (0..pair.n_frames()).any(|t| seen(t) && joints.iter().any(|joint| !poses[t][*joint][0].is_finite())) {
+        return None;
     }
+    let change = |t: usize| match t {
+        0 => 0.0,
+        _ if seen(t) && seen(t - 1) => (angle(t) - angle(t - 1)).abs() / usual / ANGLES.len() as f64,
+        _ => f64::NAN,
+    };
+    let changes: Vec<f64> = (0..pair.n_frames()).map(change).collect();
+    let is_beat = |w: &[f64]| w[1] < w[0] && w[1] < w[2] && (w[0] - w[1] >= DROP || w[2] - w[1] >= DROP);
+    let beats = changes.windows(3).enumerate().filter(|(_, w)| is_beat(w));
+    Some(beats.map(|(i, _)| (i + 1) as f64 / pair.fps).collect())
 }

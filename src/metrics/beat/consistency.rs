@@ -6,7 +6,6 @@ use crate::math::vec3::Vec3;
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
 use crate::metrics::pair::PairedFrames;
-use crate::metrics::sums::BlockSums;
 use crate::types::skeleton::{L_ELBOW, L_WRIST, N_JOINTS, R_ELBOW, R_WRIST};
 use serde_json::json;
 
@@ -42,6 +41,7 @@ fn track(pair: &PairedFrames, poses: &[[Vec3; N_JOINTS]], joint: usize) -> Vec<V
     poses.iter().zip(&pair.seen).map(|(pose, seen)| if seen[joint] { pose[joint] } else { [f64::NAN; 3] }).collect()
 }
 
+const OF_REAL: &str = "beat_consistency_of_real";
 /// Joints whose speed has beats.
 const JOINTS: [usize; 4] = [R_ELBOW, R_WRIST, L_ELBOW, L_WRIST];
 /// How near a beat must be to an onset, seconds.
@@ -50,46 +50,26 @@ const SIGMA: f64 = 0.1;
 const ORDER: f64 = 7.0;
 const ORDER_FPS: f64 = 30.0;
 
-struct BeatConsistency {
-    order: usize,
-}
-
 /// For data of this frame rate.
-pub(crate) fn metric(fps: f64) -> Box<dyn MetricFamily> {
-    Box::new(BeatConsistency { order: order(fps) })
-}
-
-fn order(fps: f64) -> usize {
-    ((ORDER / ORDER_FPS * fps).round() as usize).max(1)
-}
-
-impl MetricFamily for BeatConsistency {
-    fn definitions(&self) -> Vec<Definition> {
-        let definition = |name, better| Definition {
-            name,
-            part: "arms",
-            unit: "1",
-            better,
-            formula: "mean over the onsets of the sound and over the joints of exp(-d^2 / 2 sigma^2), d the time to the nearest \
-                      beat of the joint: a strict local minimum, among `order` frames on either side, of its speed by \
-                      central differences; 0 where a joint has no beat in the interval; onsets where the joint is not \
-                      seen left out. Onsets: spectral flux, `audio::onset`",
-            undefined: "there is no sound, no onset in it, or no elbow or wrist is seen at one",
-            parameters: json!({"joints": JOINTS, "sigma_secs": SIGMA, "order_frames": self.order}),
-        };
-        let of_real = "beat_consistency_of_real";
-        vec![definition("beat_consistency", Better::NearerTruth), definition(of_real, Better::Neither)]
-    }
-
-    fn n_sums(&self) -> usize {
-        3
-    }
-
-    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
+pub(crate) fn metric(fps: f64) -> MetricFamily {
+    let order = order(fps);
+    let definition = Definition {
+        name: "beat_consistency",
+        part: "arms",
+        unit: "1",
+        better: Better::NearerTruth,
+        formula: "mean over the onsets of the sound and over the joints of exp(-d^2 / 2 sigma^2), d the time to the nearest \
+                  beat of the joint: a strict local minimum, among `order` frames on either side, of its speed by \
+                  central differences; 0 where a joint has no beat in the interval; onsets where the joint is not \
+                  seen left out. Onsets: spectral flux, `audio::onset`",
+        undefined: "there is no sound, no onset in it, or no elbow or wrist is seen at one",
+        parameters: json!({"joints": JOINTS, "sigma_secs": SIGMA, "order_frames": order}),
+    };
+    MetricFamily::mean_of_both(definition.with_truth(OF_REAL), move |pair, blocks| {
         let Some(onsets) = pair.interval.onsets else { return };
         for joint in JOINTS {
             let [predicted, ground_truth] = [&pair.predicted, &pair.ground_truth].map(|poses| {
-                let beats = minima(&speeds(&track(pair, poses, joint), pair.fps), self.order);
+                let beats = minima(&speeds(&track(pair, poses, joint), pair.fps), order);
                 beats.into_iter().map(|t| t as f64 / pair.fps).collect::<Vec<_>>()
             });
             for &onset in onsets {
@@ -103,11 +83,11 @@ impl MetricFamily for BeatConsistency {
                 }
             }
         }
-    }
+    })
+}
 
-    fn values(&self, sums: &[f64]) -> Vec<f64> {
-        vec![sums[0] / sums[2], sums[1] / sums[2]]
-    }
+fn order(fps: f64) -> usize {
+    ((ORDER / ORDER_FPS * fps).round() as usize).max(1)
 }
 
 const EMAGE_SIGMA: f64 = 0.3;
@@ -115,77 +95,50 @@ const EMAGE_THRESHOLD: f64 = 0.3;
 /// What is left out at both ends, seconds.
 const EMAGE_CUT: f64 = 2.0;
 
-struct EmageBeatConsistency {
-    order: usize,
-    cut: usize,
-}
-
 /// Emage's, for data of this frame rate.
-pub(crate) fn emage(fps: f64) -> Box<dyn MetricFamily> {
-    Box::new(EmageBeatConsistency { order: order(fps), cut: (EMAGE_CUT * fps).round() as usize })
-}
-
-impl EmageBeatConsistency {
-    /// Times of the beats of one joint from the cut on; `mean_speed` is the ground truth's.
-    fn beats(&self, places: &[Vec3], mean_speed: f64, fps: f64) -> Vec<f64> {
-        let speeds: Vec<f64> = speeds(&folded(places), fps).iter().map(|speed| speed / mean_speed).collect();
-        let inner = speeds.get(self.cut..speeds.len().saturating_sub(self.cut)).unwrap_or_default();
-        // theirs looks the threshold up at the index within the cut, so 2 s early
-        let beats = minima(inner, self.order).into_iter().filter(|t| speeds[*t] > EMAGE_THRESHOLD);
-        beats.map(|t| t as f64 / fps).collect()
-    }
-}
-
-/// Distances from the mean by coordinate, which is what L1div leaves in the array that is then searched for beats.
-fn folded(places: &[Vec3]) -> Vec<Vec3> {
-    let seen: Vec<&Vec3> = places.iter().filter(|p| p.iter().all(|v| v.is_finite())).collect();
-    let mean: Vec3 = std::array::from_fn(|k| seen.iter().map(|p| p[k]).sum::<f64>() / seen.len() as f64);
-    places.iter().map(|p| std::array::from_fn(|k| (p[k] - mean[k]).abs())).collect()
-}
-
-impl MetricFamily for EmageBeatConsistency {
-    fn definitions(&self) -> Vec<Definition> {
-        let definition = |name, better| Definition {
-            name,
-            part: BodyPart::Body.name(),
-            unit: "1",
-            better,
-            formula: "per interval the mean over joints 1-6 and over onsets of exp(-d^2 / 2 sigma^2), d to the nearest beat \
-                      of the joint; intervals weigh by their frames without the cut. Beats: strict local minima of speed \
-                      (central differences) / the joint's mean speed in the real interval (theirs: of their dataset), \
-                      among `order` frames on either side, with speed / mean above the threshold, looked up `cut` frames \
-                      early; positions first replaced by |x - mean| by coordinate; first and last 2 s of motion and \
-                      onsets left out (theirs finds onsets in the sound thus cut)",
-            undefined: "no interval has an onset and a seen joint further than 2 s from both its ends",
-            parameters: json!({
-                "joints": BodyPart::Body.joints(), "sigma_secs": EMAGE_SIGMA, "order_frames": self.order,
-                "threshold": EMAGE_THRESHOLD, "cut_frames": self.cut,
-            }),
-        };
-        let of_real = "beat_consistency_of_real";
-        vec![definition("beat_consistency", Better::NearerTruth), definition(of_real, Better::Neither)]
-    }
-
-    fn n_sums(&self) -> usize {
-        3
-    }
-
-    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
+pub(crate) fn emage(fps: f64) -> MetricFamily {
+    let (order, cut) = (order(fps), (EMAGE_CUT * fps).round() as usize);
+    let definition = Definition {
+        name: "beat_consistency",
+        part: BodyPart::Body.name(),
+        unit: "1",
+        better: Better::NearerTruth,
+        formula: "per interval the mean over joints 1-6 and over onsets of exp(-d^2 / 2 sigma^2), d to the nearest beat \
+                  of the joint; intervals weigh by their frames without the cut. Beats: strict local minima of speed \
+                  (central differences) / the joint's mean speed in the real interval (theirs: of their dataset), \
+                  among `order` frames on either side, with speed / mean above the threshold, looked up `cut` frames \
+                  early; positions first replaced by |x - mean| by coordinate; first and last 2 s of motion and \
+                  onsets left out (theirs finds onsets in the sound thus cut)",
+        undefined: "no interval has an onset and a seen joint further than 2 s from both its ends",
+        parameters: json!({
+            "joints": BodyPart::Body.joints(), "sigma_secs": EMAGE_SIGMA, "order_frames": order,
+            "threshold": EMAGE_THRESHOLD, "cut_frames": cut,
+        }),
+    };
+    MetricFamily::mean_of_both(definition.with_truth(OF_REAL), move |pair, blocks| {
         let Some(onsets) = pair.interval.onsets else { return };
-        let n_inner = pair.n_frames().saturating_sub(2 * self.cut);
-        let (from, to) = (self.cut as f64 / pair.fps, (self.cut + n_inner) as f64 / pair.fps);
+        let n_inner = pair.n_frames().saturating_sub(2 * cut);
+        let (from, to) = (cut as f64 / pair.fps, (cut + n_inner) as f64 / pair.fps);
         let inner: Vec<f64> = onsets.iter().copied().filter(|onset| (from..to).contains(onset)).collect();
         for joint in BodyPart::Body.joints() {
             let ground_truth = track(pair, &pair.ground_truth, joint);
-            let speeds: Vec<f64> =
+            let real: Vec<f64> =
                 speeds(&ground_truth, pair.fps).into_iter().filter(|speed| speed.is_finite()).collect();
-            let mean_speed = speeds.iter().sum::<f64>() / speeds.len() as f64;
-            let beats = |places: &[Vec3]| self.beats(places, mean_speed, pair.fps);
-            let (predicted, ground_truth) = (beats(&track(pair, &pair.predicted, joint)), beats(&ground_truth));
-            let broken = (0..pair.n_frames()).any(|t| pair.seen[t][joint] && !pair.predicted[t][joint][0].is_finite());
-            if speeds.is_empty() {
+            if real.is_empty() {
                 continue;
             }
+            let mean_speed = real.iter().sum::<f64>() / real.len() as f64;
+            // times of the beats from the cut on
+            let beats = |places: &[Vec3]| -> Vec<f64> {
+                let speeds = speeds(&folded(places), pair.fps);
+                let speeds: Vec<f64> = speeds.iter().map(|speed| speed / mean_speed).collect();
+                let inner = speeds.get(cut..speeds.len().saturating_sub(cut)).unwrap_or_default();
+                // theirs looks the threshold up at the index within the cut, so 2 s early
+                let beats = minima(inner, order).into_iter().filter(|t| speeds[*t] > EMAGE_THRESHOLD);
+                beats.map(|t| t as f64 / pair.fps).collect()
+            };
+            let (predicted, ground_truth) = (beats(&track(pair, &pair.predicted, joint)), beats(&ground_truth));
+            let broken = (0..pair.n_frames()).any(|t| pair.seen[t][joint] && !pair.predicted[t][joint][0].is_finite());
             let weight = n_inner as f64 / inner.len() as f64;
             for onset in &inner {
                 let sums = blocks.at((onset * pair.fps) as usize);
@@ -195,11 +148,14 @@ impl MetricFamily for EmageBeatConsistency {
                 sums[2] += weight;
             }
         }
-    }
+    })
+}
 
-    fn values(&self, sums: &[f64]) -> Vec<f64> {
-        vec![sums[0] / sums[2], sums[1] / sums[2]]
-    }
+/// Distances from the mean by coordinate, which is what L1div leaves in the array that is then searched for beats.
+fn folded(places: &[Vec3]) -> Vec<Vec3> {
+    let seen: Vec<&Vec3> = places.iter().filter(|p| p.iter().all(|v| v.is_finite())).collect();
+    let mean: Vec3 = std::array::from_fn(|k| seen.iter().map(|p| p[k]).sum::<f64>() / seen.len() as f64);
+    places.iter().map(|p| std::array::from_fn(|k| (p[k] - mean[k]).abs())).collect()
 }
 
 #[cfg(test)]

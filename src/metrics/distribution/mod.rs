@@ -4,4 +4,3 @@ pub mod diversity;
 pub mod frechet;
 pub mod frechet_metrics;
 pub mod moments;
-pub mod pairwise;

@@ -20,45 +20,15 @@ const N_OF_BONE: usize = N_CHANGES + 1;
 
 const PARTS: [BodyPart; 2] = [BodyPart::Body, BodyPart::Hands];
 
-struct BoneLengths {
-    /// The joint at the end of each bone, and its parent.
-    bones: Vec<(usize, usize)>,
-}
-
-pub(crate) fn metric() -> Box<dyn MetricFamily> {
+pub(crate) fn metric() -> MetricFamily {
+    // the joint at the end of each bone, and its parent
     let joints = PARTS.iter().flat_map(|part| part.joints());
-    Box::new(BoneLengths { bones: joints.filter_map(|joint| Some((joint, parent(joint)?))).collect() })
-}
-
-impl MetricFamily for BoneLengths {
-    fn definitions(&self) -> Vec<Definition> {
-        let mut all = Vec::new();
-        for part in PARTS {
-            for (name, of_real, unit, formula) in METRICS {
-                for (name, better) in [(name, Better::Lower), (of_real, Better::Neither)] {
-                    all.push(Definition {
-                        name,
-                        part: part.name(),
-                        unit,
-                        better,
-                        formula,
-                        undefined: "no bone of the part is seen (for changes: in 2 frames in a row), or one has no length",
-                        parameters: json!({"bones": part.joints()}),
-                    });
-                }
-            }
-        }
-        all
-    }
-
-    fn n_sums(&self) -> usize {
-        self.bones.len() * N_OF_BONE
-    }
-
-    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
+    let bones: Vec<(usize, usize)> = joints.filter_map(|joint| Some((joint, parent(joint)?))).collect();
+    let n_sums = bones.len() * N_OF_BONE;
+    let measure = move |pair: &PairedFrames, blocks: &mut BlockSums| {
         for t in 0..pair.n_frames() {
             let sums = blocks.at(t);
-            for (sums, &(joint, parent)) in sums.chunks_exact_mut(N_OF_BONE).zip(&self.bones) {
+            for (sums, &(joint, parent)) in sums.chunks_exact_mut(N_OF_BONE).zip(&bones) {
                 let seen = |n| pair.sees(t, n, joint) && pair.sees(t, n, parent);
                 if !seen(1) {
                     continue;
@@ -76,32 +46,45 @@ impl MetricFamily for BoneLengths {
                 sums[N_CHANGES] += f64::from(u8::from(seen(2)));
             }
         }
-    }
-
-    fn values(&self, sums: &[f64]) -> Vec<f64> {
+    };
+    MetricFamily::new(PARTS.into_iter().flat_map(definitions).collect(), n_sums, measure, |sums| {
         let (body, hands) = sums.split_at(BodyPart::Body.joints().len() * N_OF_BONE);
-        let mut values = Vec::new();
-        for part in [body, hands] {
-            let mean = |of: &dyn Fn(&[f64]) -> f64, needs: usize| {
-                let all: Vec<f64> = part.chunks_exact(N_OF_BONE).filter(|bone| bone[needs] != 0.0).map(of).collect();
-                all.iter().sum::<f64>() / all.len() as f64
-            };
-            let mean_length = |bone: &[f64], i: usize| bone[i + LENGTH] / bone[N_LENGTHS];
-            let mean_change = |bone: &[f64], i: usize| bone[i + CHANGE] / bone[N_CHANGES];
-            let [predicted, ground_truth] = [0, N_OF_MOTION];
-            values.extend([predicted, ground_truth].map(|i| 1000.0 * mean(&|bone| mean_change(bone, i), N_CHANGES)));
-            values.extend(
-                [predicted, ground_truth]
-                    .map(|i| 100.0 * mean(&|bone| mean_change(bone, i) / mean_length(bone, i), N_CHANGES)),
-            );
-            let deviation = |bone: &[f64], i: usize| {
-                let variance = bone[i + SQUARE] / bone[N_LENGTHS] - mean_length(bone, i).powi(2);
-                variance.max(0.0).sqrt() / mean_length(bone, i)
-            };
-            values.extend([predicted, ground_truth].map(|i| 100.0 * mean(&|bone| deviation(bone, i), N_LENGTHS)));
-        }
-        values
-    }
+        [values(body), values(hands)].concat()
+    })
+}
+
+fn definitions(part: BodyPart) -> Vec<Definition> {
+    let both = |(name, of_real, unit, formula)| {
+        let definition = Definition {
+            name,
+            part: part.name(),
+            unit,
+            better: Better::Lower,
+            formula,
+            undefined: "no bone of the part is seen (for changes: in 2 frames in a row), or one has no length",
+            parameters: json!({"bones": part.joints()}),
+        };
+        definition.with_truth(of_real)
+    };
+    METRICS.into_iter().flat_map(both).collect()
+}
+
+/// Values of one part from the sums of its bones.
+fn values(part: &[f64]) -> Vec<f64> {
+    let mean = |of: &dyn Fn(&[f64]) -> f64, needs: usize| {
+        let all: Vec<f64> = part.chunks_exact(N_OF_BONE).filter(|bone| bone[needs] != 0.0).map(of).collect();
+        all.iter().sum::<f64>() / all.len() as f64
+    };
+    let mean_length = |bone: &[f64], i: usize| bone[i + LENGTH] / bone[N_LENGTHS];
+    let mean_change = |bone: &[f64], i: usize| bone[i + CHANGE] / bone[N_CHANGES];
+    let deviation = |bone: &[f64], i: usize| {
+        let variance = bone[i + SQUARE] / bone[N_LENGTHS] - mean_length(bone, i).powi(2);
+        variance.max(0.0).sqrt() / mean_length(bone, i)
+    };
+    let both = [0, N_OF_MOTION];
+    let changes = both.map(|i| 1000.0 * mean(&|bone| mean_change(bone, i), N_CHANGES));
+    let shares = both.map(|i| 100.0 * mean(&|bone| mean_change(bone, i) / mean_length(bone, i), N_CHANGES));
+    [changes, shares, both.map(|i| 100.0 * mean(&|bone| deviation(bone, i), N_LENGTHS))].concat()
 }
 
 /// Name, name of the ground truth's, unit, formula.

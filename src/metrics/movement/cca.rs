@@ -15,61 +15,36 @@ const CONSTANT: f64 = 1e-8;
 /// A coordinate that the others determine up to this share of its variance is left out.
 const DETERMINED: f64 = 1e-10;
 
-struct Cca {
-    part: BodyPart,
-    joints: Vec<usize>,
-}
-
-pub(crate) fn metric(part: BodyPart) -> Box<dyn MetricFamily> {
-    Box::new(Cca { part, joints: part.joints() })
-}
-
-impl MetricFamily for Cca {
-    fn definitions(&self) -> Vec<Definition> {
-        vec![Definition {
-            name: "cca",
-            part: self.part.name(),
-            unit: "1",
-            better: Better::Higher,
-            formula: "first canonical correlation (one component) of the poses of made and real motion in the same frames, all \
-                      intervals together: x, y, z of all joints of the part, frames in which all are seen; coordinates \
-                      with a standard deviation of at most 1e-8 m are dropped, and those that the others determine up to \
-                      1e-10 of their variance (which changes nothing)",
-            undefined: "fewer frames with all joints of the part than there are coordinates, or nothing in one motion moves",
-            parameters: json!({"n_numbers": 3 * self.joints.len(), "n_components": 1}),
-        }]
-    }
-
-    fn n_sums(&self) -> usize {
-        moments::packed_len(6 * self.joints.len())
-    }
-
-    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
-        let mut frames = vec![Vec::new(); blocks.n()];
-        for t in 0..pair.n_frames() {
-            if self.joints.iter().all(|joint| pair.seen[t][*joint]) {
-                frames[blocks.of(t)].push(t);
-            }
-        }
-        let d = 3 * self.joints.len();
-        for (block, frames) in frames.iter().enumerate() {
+pub(crate) fn metric(part: BodyPart) -> MetricFamily {
+    let joints = part.joints();
+    let d = 3 * joints.len();
+    let definition = Definition {
+        name: "cca",
+        part: part.name(),
+        unit: "1",
+        better: Better::Higher,
+        formula: "first canonical correlation (one component) of the poses of made and real motion in the same frames, all \
+                  intervals together: x, y, z of all joints of the part, frames in which all are seen; coordinates \
+                  with a standard deviation of at most 1e-8 m are dropped, and those that the others determine up to \
+                  1e-10 of their variance (which changes nothing)",
+        undefined: "fewer frames with all joints of the part than there are coordinates, or nothing in one motion moves",
+        parameters: json!({"n_numbers": d, "n_components": 1}),
+    };
+    let measure = move |pair: &PairedFrames, blocks: &mut BlockSums| {
+        for (block, frames) in pair.whole_frames(&joints, blocks).iter().enumerate() {
             let rows = Array2::from_shape_fn((frames.len(), 2 * d), |(row, i)| {
                 let poses = if i < d { &pair.predicted } else { &pair.ground_truth };
-                poses[frames[row]][self.joints[i % d / 3]][i % 3]
+                poses[frames[row]][joints[i % d / 3]][i % 3]
             });
             moments::add(rows.view(), blocks.row(block));
         }
-    }
-
-    fn values(&self, sums: &[f64]) -> Vec<f64> {
-        let d = 3 * self.joints.len();
+    };
+    let values = move |sums: &[f64]| {
         let value = moments::read(sums, 2 * d).filter(|(n, ..)| *n > d as f64);
         vec![value.map_or(f64::NAN, |(_, _, covariance)| correlation(covariance.view(), d))]
-    }
-
-    fn is_costly(&self) -> bool {
-        true
-    }
+    };
+    let family = MetricFamily::new(vec![definition], moments::packed_len(2 * d), measure, values);
+    MetricFamily { is_costly: true, ..family }
 }
 
 /// First canonical correlation of the first `d` dimensions with the others; NaN where nothing varies on one side.

@@ -6,48 +6,30 @@ use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::metrics::body_part::BodyPart;
 use crate::metrics::definition::{Better, Definition, MetricFamily};
-use crate::metrics::pair::PairedFrames;
-use crate::metrics::sums::BlockSums;
 use crate::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
 use serde_json::json;
 
-struct PMpjpe {
-    part: BodyPart,
-    /// What is laid onto the real joints together.
-    groups: Vec<Vec<usize>>,
-}
-
 /// All, body, or each hand (its 21 joints) for itself.
-pub(crate) fn metric(part: BodyPart) -> Box<dyn MetricFamily> {
-    let groups = match part {
+pub(crate) fn metric(part: BodyPart) -> MetricFamily {
+    // what is laid onto the real joints together
+    let groups: Vec<Vec<usize>> = match part {
         BodyPart::Hands => [L_HAND, R_HAND].map(|root| (root..root + N_HAND_JOINTS).collect()).to_vec(),
         _ => vec![part.joints()],
     };
-    Box::new(PMpjpe { part, groups })
-}
-
-impl MetricFamily for PMpjpe {
-    fn definitions(&self) -> Vec<Definition> {
-        vec![Definition {
-            name: "p_mpjpe",
-            part: self.part.name(),
-            unit: "mm",
-            better: Better::Lower,
-            formula: "1000 times the mean over t and j of |S_t p - g|, S_t the turn, uniform scale and shift without \
-                      reflection that bring the seen joints of the part in frame t nearest to those of g (least \
-                      squares); part hands: each hand for itself, all its 21 joints, the wrist among them",
-            undefined: "no frame has 3 seen joints of the part",
-            parameters: json!({"scale": true, "reflection": false}),
-        }]
-    }
-
-    fn n_sums(&self) -> usize {
-        2
-    }
-
-    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
+    let definition = Definition {
+        name: "p_mpjpe",
+        part: part.name(),
+        unit: "mm",
+        better: Better::Lower,
+        formula: "1000 times the mean over t and j of |S_t p - g|, S_t the turn, uniform scale and shift without \
+                  reflection that bring the seen joints of the part in frame t nearest to those of g (least \
+                  squares); part hands: each hand for itself, all its 21 joints, the wrist among them",
+        undefined: "no frame has 3 seen joints of the part",
+        parameters: json!({"scale": true, "reflection": false}),
+    };
+    MetricFamily::mean(definition, move |pair, blocks| {
         for t in 0..pair.n_frames() {
-            for group in &self.groups {
+            for group in &groups {
                 let seen = group.iter().copied().filter(|joint| pair.seen[t][*joint]);
                 let (predicted, ground_truth): (Vec<Vec3>, Vec<Vec3>) =
                     seen.map(|joint| (pair.predicted[t][joint], pair.ground_truth[t][joint])).unzip();
@@ -58,11 +40,7 @@ impl MetricFamily for PMpjpe {
                 }
             }
         }
-    }
-
-    fn values(&self, sums: &[f64]) -> Vec<f64> {
-        vec![sums[0] / sums[1]]
-    }
+    })
 }
 
 /// Sum of the distances after the best similarity; NaN where a predicted point is not finite.

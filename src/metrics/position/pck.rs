@@ -54,92 +54,72 @@ impl KeypointCount {
     }
 }
 
-/// Shares at several alphas, in several axes, of several parts.
-struct Pck {
-    /// One a share.
-    variants: Vec<(PckAxes, BodyPart, f64)>,
-    /// Whether the box is around the neck as well.
-    neck_in_box: bool,
-    /// The speech2gesture convention: every frame weighs the same, however many joints are seen.
-    by_frame: bool,
-}
-
 /// For each of `axes`, each alpha and each of `parts` one share.
-pub(crate) fn metric(axes: &[PckAxes], parts: &[BodyPart], alphas: &[f64]) -> Box<dyn MetricFamily> {
+pub(crate) fn metric(axes: &[PckAxes], parts: &[BodyPart], alphas: &[f64]) -> MetricFamily {
     let mut variants = Vec::new();
     for axes in axes {
         for alpha in alphas {
             variants.extend(parts.iter().map(|part| (*axes, *part, *alpha)));
         }
     }
-    Box::new(Pck { variants, neck_in_box: false, by_frame: false })
+    family(variants, false, false)
 }
 
-/// PCK of speech2gesture (Ginosar et al. 2019, `common/evaluation.py` of their repository).
-pub(crate) fn by_frame(alphas: &[f64]) -> Box<dyn MetricFamily> {
-    let variants = alphas.iter().map(|alpha| (PckAxes::Xy, BodyPart::All, *alpha)).collect();
-    Box::new(Pck { variants, neck_in_box: false, by_frame: true })
+/// PCK of speech2gesture (Ginosar et al. 2019, `common/evaluation.py` of their repository): every frame weighs the same,
+/// however many joints are seen.
+pub(crate) fn by_frame(alphas: &[f64]) -> MetricFamily {
+    family(alphas.iter().map(|alpha| (PckAxes::Xy, BodyPart::All, *alpha)).collect(), false, true)
 }
 
 /// In space, of all joints, with the neck in the box.
-pub(crate) fn neck_in_box(alphas: &[f64]) -> Box<dyn MetricFamily> {
-    let variants = alphas.iter().map(|alpha| (PckAxes::Xyz, BodyPart::All, *alpha)).collect();
-    Box::new(Pck { variants, neck_in_box: true, by_frame: false })
+pub(crate) fn neck_in_box(alphas: &[f64]) -> MetricFamily {
+    family(alphas.iter().map(|alpha| (PckAxes::Xyz, BodyPart::All, *alpha)).collect(), true, false)
 }
 
-impl MetricFamily for Pck {
-    fn definitions(&self) -> Vec<Definition> {
-        let definition = |(axes, part, alpha): &(PckAxes, BodyPart, f64)| Definition {
-            name: match axes {
-                PckAxes::Xyz if self.neck_in_box => "pck_3d_neck_in_box",
-                PckAxes::Xyz => "pck_3d",
-                PckAxes::Xy => "pck_2d",
-            },
-            part: part.name(),
-            unit: "1",
-            better: Better::Higher,
-            formula: match axes {
-                PckAxes::Xy if self.by_frame => {
-                    "mean over frames of the share of the 48 joints without the neck with |p - g| <= alpha * max(width, \
-                     height) of the box around those of g in the frame; x and y alone; metres, not scaled to another \
-                     speaker (a scale cancels); not seen joints left out"
-                }
-                PckAxes::Xyz if self.neck_in_box => {
-                    "share of all seen joints of the part in all frames with |p - g| <= alpha * the largest of the sides \
-                     x, y, z of the box around all seen joints of g in the frame, the neck among them; a made joint that \
-                     is not finite is wrong"
-                }
-                PckAxes::Xyz => {
-                    "share of all seen joints of the part in all frames with |p - g| <= alpha * the largest of the sides \
-                     x, y, z of the box around all seen joints of g in the frame but the neck, whatever the part; a made \
-                     joint that is not finite is wrong"
-                }
-                PckAxes::Xy => {
-                    "share of all seen joints of the part in all frames with |p - g| <= alpha * the larger of the sides \
-                     x, y of the box around all seen joints of g in the frame but the neck, whatever the part; distances \
-                     in x and y alone; a made joint that is not finite is wrong"
-                }
-            },
-            undefined: "no joint of the part is seen",
-            parameters: json!({"alpha": alpha}),
+/// One share of each variant.
+fn family(variants: Vec<(PckAxes, BodyPart, f64)>, neck_in_box: bool, by_frame: bool) -> MetricFamily {
+    let definition = |(axes, part, alpha): &(PckAxes, BodyPart, f64)| {
+        let (name, formula) = match axes {
+            PckAxes::Xy if by_frame => (
+                "pck_2d",
+                "mean over frames of the share of the 48 joints without the neck with |p - g| <= alpha * max(width, \
+                 height) of the box around those of g in the frame; x and y alone; metres, not scaled to another \
+                 speaker (a scale cancels); not seen joints left out",
+            ),
+            PckAxes::Xyz if neck_in_box => (
+                "pck_3d_neck_in_box",
+                "share of all seen joints of the part in all frames with |p - g| <= alpha * the largest of the sides \
+                 x, y, z of the box around all seen joints of g in the frame, the neck among them; a made joint that \
+                 is not finite is wrong",
+            ),
+            PckAxes::Xyz => (
+                "pck_3d",
+                "share of all seen joints of the part in all frames with |p - g| <= alpha * the largest of the sides \
+                 x, y, z of the box around all seen joints of g in the frame but the neck, whatever the part; a made \
+                 joint that is not finite is wrong",
+            ),
+            PckAxes::Xy => (
+                "pck_2d",
+                "share of all seen joints of the part in all frames with |p - g| <= alpha * the larger of the sides \
+                 x, y of the box around all seen joints of g in the frame but the neck, whatever the part; distances \
+                 in x and y alone; a made joint that is not finite is wrong",
+            ),
         };
-        self.variants.iter().map(definition).collect()
-    }
-
-    fn n_sums(&self) -> usize {
-        2 * self.variants.len()
-    }
-
-    fn measure(&self, pair: &PairedFrames, blocks: &mut BlockSums) {
-        let variants: Vec<_> = self.variants.iter().map(|(axes, part, alpha)| (*axes, part.joints(), *alpha)).collect();
+        let (part, undefined) = (part.name(), "no joint of the part is seen");
+        let parameters = json!({"alpha": alpha});
+        Definition { name, part, unit: "1", better: Better::Higher, formula, undefined, parameters }
+    };
+    let definitions: Vec<Definition> = variants.iter().map(definition).collect();
+    let variants: Vec<_> = variants.into_iter().map(|(axes, part, alpha)| (axes, part.joints(), alpha)).collect();
+    let first_boxed = if neck_in_box { NECK } else { NECK + 1 };
+    let measure = move |pair: &PairedFrames, blocks: &mut BlockSums| {
         for t in 0..pair.n_frames() {
             let (predicted, ground_truth, seen) = (&pair.predicted[t], &pair.ground_truth[t], &pair.seen[t]);
             for (row, (axes, joints, alpha)) in blocks.at(t).chunks_exact_mut(2).zip(&variants) {
-                let from = if self.neck_in_box { NECK } else { NECK + 1 };
-                let boxed = (from..N_JOINTS).filter(|joint| seen[*joint]);
+                let boxed = (first_boxed..N_JOINTS).filter(|joint| seen[*joint]);
                 let radius = alpha * extent(*axes, boxed, |joint, k| ground_truth[joint][k]);
                 let n_seen = joints.iter().filter(|joint| seen[**joint]).count();
-                let weight = if self.by_frame { 1.0 / n_seen as f64 } else { 1.0 };
+                let weight = if by_frame { 1.0 / n_seen as f64 } else { 1.0 };
                 for &joint in joints.iter().filter(|joint| seen[**joint]) {
                     let correct = distance(*axes, |k| predicted[joint][k], |k| ground_truth[joint][k]) <= radius;
                     row[0] += if correct { weight } else { 0.0 };
@@ -147,11 +127,9 @@ impl MetricFamily for Pck {
                 }
             }
         }
-    }
-
-    fn values(&self, sums: &[f64]) -> Vec<f64> {
-        sums.chunks_exact(2).map(|row| row[0] / row[1]).collect()
-    }
+    };
+    let values = |sums: &[f64]| sums.chunks_exact(2).map(|row| row[0] / row[1]).collect();
+    MetricFamily::new(definitions.clone(), 2 * definitions.len(), measure, values)
 }
 
 impl PckAxes {

@@ -3,10 +3,11 @@
 
 use crate::evaluate::clips::clips::{EvalClip, EvalClips};
 use crate::evaluate::table::table::Table;
-use crate::report::html::chart::dots::{AxisLabel, ChartDot, dots};
+use crate::report::html::chart::dots::{ChartDot, dots};
 use crate::report::html::chart::histogram::Counts;
-use crate::report::html::chart::profile::profile;
-use crate::report::html::{Node, node};
+use crate::report::html::chart::profile;
+use crate::report::html::numbers::number;
+use crate::report::html::{Node, legend, node};
 use crate::types::skeleton;
 use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_SHOULDER, is_duplicate};
 use ndarray::ArrayView3;
@@ -37,7 +38,7 @@ pub fn joints(table: &Table, clips: &EvalClips) -> Vec<Node> {
         let known: Vec<f64> = joints.map(|joint| shares[joint]).filter(|share| share.is_finite()).collect();
         known.iter().sum::<f64>() / known.len() as f64
     };
-    let label = |at: [f64; 2], what: &str, share: f64| AxisLabel { at, text: format!("{what} {:.0} %", 100.0 * share) };
+    let label = |at: [f64; 2], what: &str, share: f64| (at, format!("{what} {:.0} %", 100.0 * share));
     let hand = |root: usize| mean(&mut (root + 1..root + skeleton::N_HAND_JOINTS));
     let labels = [
         label([180.0, 268.0], "arms", mean(&mut (R_SHOULDER..=L_WRIST))),
@@ -125,18 +126,14 @@ pub fn speeds(clips: &EvalClips) -> Vec<Node> {
         let (ground_truth, predicted) = (count(|clip| clip.ground_truth.view()), count(|clip| clip.predicted.view()));
         let medians = format!(
             "median: truth {}, prediction {} {unit}",
-            crate::report::html::numbers::number(ground_truth.quantile(0.5)),
-            crate::report::html::numbers::number(predicted.quantile(0.5))
+            number(ground_truth.quantile(0.5)),
+            number(predicted.quantile(0.5))
         );
-        node("div")
-            .class("card speed")
-            .child(node("h3").text(title))
-            .child(profile(&format!("{title}: {medians}"), unit, &[("real", &ground_truth), ("made", &predicted)]))
-            .child(node("small").text(medians))
+        profile::card(title, unit, &[("real", &ground_truth), ("made", &predicted)], medians)
     };
     let about = "How often each value occurs (heights go with the square root of the share, so that rare values are seen; the \
                  last bin holds what is beyond). Dashed: the medians.";
-    vec![node("p").text(about), legend(), node("div").class("grid").children(charts.into_iter().map(card))]
+    vec![node("p").text(about), colours(), node("div").class("grid").children(charts.into_iter().map(card))]
 }
 
 /// Norms of a joint's differences of this order, per second to that power, where it is seen throughout.
@@ -158,9 +155,6 @@ fn derivative<'a>(
 }
 
 /// Legend of the colours.
-pub fn legend() -> Node {
-    let key = |class: &str, name: &str| {
-        node("li").child(node("span").class(format!("swatch line {class}"))).child(node("span").text(name))
-    };
-    node("ul").class("legend").children([key("real", "truth"), key("made", "prediction")])
+pub fn colours() -> Node {
+    legend([("line real", "truth"), ("line made", "prediction")])
 }

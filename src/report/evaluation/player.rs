@@ -2,7 +2,7 @@
 //! side with the sound, and charts of wrists and beats over time. At most a minute in all and motion in whole
 //! millimetres, which bounds the page's size.
 
-use super::charts::legend;
+use super::charts::colours;
 use crate::evaluate::clips::clips::{EvalClip, EvalClips};
 use crate::evaluate::table::table::Table;
 use crate::formats::wav;
@@ -244,5 +244,5 @@ pub fn body(excerpts: &[Excerpt], table: &Table) -> Vec<Node> {
          you{}. The lines under them are of the same excerpt.",
         if table.with_sound { "" } else { "; no sound was given" }
     );
-    [node("p").text(about), player, legend()].into_iter().chain(charts).collect()
+    [node("p").text(about), player, colours()].into_iter().chain(charts).collect()
 }

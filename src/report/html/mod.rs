@@ -9,4 +9,4 @@ pub mod numbers;
 pub mod picture;
 
 pub use document::{Page, Section};
-pub use node::{Node, node};
+pub use node::{Node, legend, node, table};

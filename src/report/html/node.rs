@@ -16,6 +16,21 @@ pub fn node(name: &'static str) -> Node {
     Node { name, attributes: String::new(), inner: String::new() }
 }
 
+/// Legend of colours: the CSS classes of each swatch and its meaning.
+pub fn legend<C: Display, M: Display>(keys: impl IntoIterator<Item = (C, M)>) -> Node {
+    let key = |(class, meaning): (C, M)| {
+        let swatch = node("span").class(format!("swatch {class}"));
+        node("li").child(swatch).child(node("span").text(meaning))
+    };
+    node("ul").class("legend").children(keys.into_iter().map(key))
+}
+
+/// Table of the class `name` with the cells of its head and its rows.
+pub fn table(name: &str, head: impl IntoIterator<Item = Node>, rows: impl IntoIterator<Item = Node>) -> Node {
+    let head = node("thead").child(node("tr").children(head));
+    node("table").class(name).child(head).child(node("tbody").children(rows))
+}
+
 /// Text with markup characters replaced by entities.
 pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());

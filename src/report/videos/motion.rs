@@ -1,10 +1,10 @@
 //! Charts of joint positions and speeds.
 
 use super::movement::{MovementCounts, PAIRS};
-use crate::report::html::chart::profile::profile;
+use crate::report::html::chart::profile;
 use crate::report::html::chart::ranges::{ValueRange, ranges};
 use crate::report::html::numbers::{counted, number};
-use crate::report::html::{Node, node};
+use crate::report::html::{Node, legend, node};
 
 /// Axis with the labels of its ends.
 const AXES: [(&str, [&str; 2]); 3] = [
@@ -24,12 +24,7 @@ pub fn motion(movement: &MovementCounts) -> Vec<Node> {
          highest place, the box holds nine tenths of them, the notch is the median.",
         counted(movement.n_frames, "frame")
     );
-    let key = |side: &str| {
-        node("li")
-            .child(node("span").class(format!("swatch side {side}")))
-            .child(node("span").text(format!("speaker's {side}")))
-    };
-    let legend = node("ul").class("legend").children(SIDES.map(key));
+    let legend = legend(SIDES.map(|side| (format!("side {side}"), format!("speaker's {side}"))));
     let charts = [("Arms", true), ("Finger tips", false)].into_iter().flat_map(|(name, is_arm)| {
         AXES.iter()
             .enumerate()
@@ -43,12 +38,7 @@ pub fn motion(movement: &MovementCounts) -> Vec<Node> {
             .collect();
         let medians = format!("median {}", medians.join(", "));
         let lines: Vec<_> = SIDES.iter().zip(joints).map(|(side, joint)| (*side, &joint.speeds)).collect();
-        let label = format!("Speed of the {}: {medians}", pair.name);
-        node("div")
-            .class("card speed")
-            .child(node("h3").text(format!("Speed of the {}", pair.name)))
-            .child(profile(&label, "m/s", &lines))
-            .child(node("small").text(medians))
+        profile::card(&format!("Speed of the {}", pair.name), "m/s", &lines, medians)
     });
     vec![
         node("p").text(about),

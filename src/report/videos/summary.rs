@@ -5,7 +5,8 @@ use super::reasons::WAITING;
 use super::video::VideoSummary;
 use crate::report::html::chart::bars::{StackedBar, bars};
 use crate::report::html::numbers::{counted, length, percent};
-use crate::report::html::{Node, node};
+use crate::report::html;
+use crate::report::html::{Node, legend, node};
 use std::collections::BTreeMap;
 
 /// Seconds of all videos together.
@@ -98,11 +99,9 @@ pub fn table(videos: &[VideoSummary]) -> Vec<Node> {
         let ledger = &video.ledger;
         let mut refused: Vec<(String, f64)> = ledger.refused_secs().into_iter().collect();
         refused.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        let why = refused.iter().take(3).map(|(reason, secs)| {
-            let swatch = node("span").class(format!("swatch {}", reasons::class(reason)));
-            node("li").child(swatch).child(node("span").text(format!("{reason} {}", length(*secs))))
-        });
-        let why = node("ul").class("legend").children(why);
+        let longest = refused.iter().take(3);
+        let why =
+            legend(longest.map(|(reason, secs)| (reasons::class(reason), format!("{reason} {}", length(*secs)))));
         let state = match ledger.failed.first() {
             Some(failed) if failed.stage == WAITING => node("span").text("not done yet"),
             Some(failed) => node("span").text(format!("failed at {}", failed.stage)),
@@ -118,16 +117,6 @@ pub fn table(videos: &[VideoSummary]) -> Vec<Node> {
             .child(node("td").class("num").text(percent(ledger.kept_secs(), ledger.duration_secs)))
             .child(node("td").child(state))
     };
-    let table = node("table")
-        .class("videos")
-        .child(node("thead").child(node("tr").children(head)))
-        .child(node("tbody").children(videos.iter().map(row)));
-    vec![
-        node("div")
-            .class("scroll")
-            .attr("tabindex", "0")
-            .attr("role", "region")
-            .attr("aria-label", "Videos")
-            .child(table),
-    ]
+    let around = node("div").class("scroll").attr("tabindex", "0").attr("role", "region").attr("aria-label", "Videos");
+    vec![around.child(html::table("videos", head, videos.iter().map(row)))]
 }

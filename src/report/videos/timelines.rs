@@ -5,6 +5,7 @@ use super::reasons::WAITING;
 use super::video::VideoSummary;
 use crate::report::html::chart::timeline::{TimelineSpan, timeline};
 use crate::report::html::numbers::{clock, counted, length, number, with_unit};
+use crate::report::html;
 use crate::report::html::{Node, node};
 use std::collections::BTreeSet;
 
@@ -105,7 +106,5 @@ fn legend(videos: &[VideoSummary]) -> Node {
     if stages.contains(WAITING) {
         entries.push(("waiting".to_owned(), WAITING));
     }
-    node("ul").class("legend").attr("aria-label", "Legend").children(entries.into_iter().map(|(class, name)| {
-        node("li").child(node("span").class(format!("swatch {class}"))).child(node("span").text(name))
-    }))
+    html::legend(entries).attr("aria-label", "Legend")
 }

@@ -1,6 +1,6 @@
 //! Line over a few steps with one step marked: what each value of a threshold would keep.
 
-use super::scale::{Scale, drawing, line, px};
+use super::scale::{Scale, circle, drawing, line, px, stroke, through};
 use crate::report::html::node::{Node, node};
 
 const WIDTH: f64 = 300.0;
@@ -16,19 +16,18 @@ pub fn curve(label: &str, values: &[f64], most: f64, marked: usize) -> Node {
     let x = Scale { low: 0.0, high: values.len().saturating_sub(1) as f64, from: LEFT, to: RIGHT };
     let y = Scale { low: 0.0, high: most.max(1e-9), from: FLOOR, to: TOP };
     let places: Vec<[f64; 2]> = values.iter().enumerate().map(|(i, &value)| [x.at(i as f64), y.at(value)]).collect();
-    let path: Vec<String> = places.iter().map(|[x, y]| format!("{} {}", px(*x), px(*y))).collect();
-    let [at_x, at_y] = places.get(marked).copied().unwrap_or([LEFT, FLOOR]);
+    let at = places.get(marked).copied().unwrap_or([LEFT, FLOOR]);
     let all = |axis: usize| places.iter().map(|place| px(place[axis])).collect::<Vec<_>>().join(" ");
-    let outline = format!("M{} L{} {} L{} {}Z", path.join(" L"), px(RIGHT), px(FLOOR), px(LEFT), px(FLOOR));
+    let outline = through(places.iter().copied().chain([[RIGHT, FLOOR], [LEFT, FLOOR]])) + "Z";
     drawing(WIDTH, HEIGHT, label)
         .class("curve")
         .attr("data-xs", all(0))
         .attr("data-ys", all(1))
         .child(node("path").class("area").attr("d", outline))
-        .child(node("path").class("stroke").attr("d", format!("M{}", path.join(" L"))))
+        .child(stroke("", places))
         .child(line("axis", [LEFT, FLOOR], [RIGHT, FLOOR]))
-        .child(line("configured", [at_x, TOP], [at_x, FLOOR]))
-        .child(node("circle").class("dot").attr("cx", px(at_x)).attr("cy", px(at_y)).attr("r", "4.5"))
+        .child(line("configured", [at[0], TOP], [at[0], FLOOR]))
+        .child(circle("dot", at, 4.5))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Dots on a line drawing, each coloured by a share.
 
-use super::scale::{drawing, line, px, words};
+use super::scale::{circle, drawing, line, words};
 use crate::report::html::node::{Node, node};
 
 /// Dot of the drawing.
@@ -14,32 +14,26 @@ pub struct ChartDot {
     pub description: String,
 }
 
-/// Text on the drawing.
-#[derive(Clone, Debug)]
-pub struct AxisLabel {
-    pub at: [f64; 2],
-    pub text: String,
-}
-
-/// Drawing of `size` units.
-pub fn dots(label: &str, size: [f64; 2], edges: &[[[f64; 2]; 2]], dots: &[ChartDot], labels: &[AxisLabel]) -> Node {
+/// Drawing of `size` units, with words at some places.
+pub fn dots(
+    label: &str,
+    size: [f64; 2],
+    edges: &[[[f64; 2]; 2]],
+    dots: &[ChartDot],
+    labels: &[([f64; 2], String)],
+) -> Node {
     let mut svg = drawing(size[0], size[1], label).class("dots");
     for [from, to] in edges {
         svg = svg.child(line("edge", *from, *to));
     }
     for dot in dots {
-        let circle = node("g").child(node("title").text(&dot.description)).child(
-            node("circle")
-                .class(if dot.share.is_nan() { "share unknown" } else { "share" })
-                .attr("cx", px(dot.at[0]))
-                .attr("cy", px(dot.at[1]))
-                .attr("r", px(dot.radius))
-                .attr("style", format!("--share:{:.0}%", 100.0 * dot.share.clamp(0.0, 1.0))),
-        );
-        svg = svg.child(circle);
+        let class = if dot.share.is_nan() { "share unknown" } else { "share" };
+        let style = format!("--share:{:.0}%", 100.0 * dot.share.clamp(0.0, 1.0));
+        let drawn = circle(class, dot.at, dot.radius).attr("style", style);
+        svg = svg.child(node("g").child(node("title").text(&dot.description)).child(drawn));
     }
-    for label in labels {
-        svg = svg.child(words("name", label.at, "middle", &label.text));
+    for (at, text) in labels {
+        svg = svg.child(words("name", *at, "middle", text));
     }
     svg
 }
@@ -51,9 +45,9 @@ mod tests {
     #[test]
     fn a_dot_has_its_share_and_its_words() {
         let dot = |share| ChartDot { at: [3.0, 4.0], share, radius: 2.0, description: "R<Wrist>: 40 %".to_owned() };
-        let label = AxisLabel { at: [1.0, 1.0], text: "hand".to_owned() };
+        let labels = [([1.0, 1.0], "hand".to_owned())];
         let drawn =
-            dots("a", [9.0, 9.0], &[[[0.0, 0.0], [3.0, 4.0]]], &[dot(0.4), dot(f64::NAN)], &[label]).to_string();
+            dots("a", [9.0, 9.0], &[[[0.0, 0.0], [3.0, 4.0]]], &[dot(0.4), dot(f64::NAN)], &labels).to_string();
         assert!(drawn.contains("--share:40%") && drawn.contains("<title>R&lt;Wrist&gt;: 40 %</title>"), "{drawn}");
         assert!(drawn.contains("share unknown") && drawn.contains("edge"), "{drawn}");
     }

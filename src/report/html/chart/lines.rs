@@ -1,7 +1,7 @@
 //! Lines over the steps of a training, with constant levels for comparison and one step marked.
 
-use super::scale::{Scale, drawing, line, px, words};
-use crate::report::html::node::{Node, node};
+use super::scale::{Scale, circle, drawing, line, stroke, words};
+use crate::report::html::node::{Node, legend, node};
 use crate::report::html::numbers::number;
 
 const WIDTH: f64 = 360.0;
@@ -73,15 +73,9 @@ impl LineChart {
         if !self.description.is_empty() {
             card = card.child(node("p").class("small").text(&self.description));
         }
-        let key = |class: &str, colour: usize, name: &str| {
-            node("li")
-                .child(node("span").class(format!("swatch {class} colour-{colour}")))
-                .child(node("span").text(name))
-        };
-        let legend = node("ul").class("legend");
-        let legend = legend.children(self.lines.iter().map(|line| key("drawn", line.colour, &line.name)));
-        let legend = legend.children(self.levels.iter().map(|level| key("level", level.colour, &level.name)));
-        card.child(self.svg()).child(legend)
+        let lines = self.lines.iter().map(|line| (format!("drawn colour-{}", line.colour), &line.name));
+        let levels = self.levels.iter().map(|level| (format!("level colour-{}", level.colour), &level.name));
+        card.child(self.svg()).child(legend(lines.chain(levels)))
     }
 
     fn svg(&self) -> Node {
@@ -106,15 +100,12 @@ impl LineChart {
         }
         for drawn in &self.lines {
             let finite = drawn.places.iter().filter(|place| place.iter().all(|v| v.is_finite()));
-            let places: Vec<String> =
-                finite.map(|[step, value]| format!("{} {}", px(x.at(*step)), px(y.at(*value)))).collect();
+            let places: Vec<[f64; 2]> = finite.map(|[step, value]| [x.at(*step), y.at(*value)]).collect();
             if !places.is_empty() {
-                let class = format!("stroke colour-{}", drawn.colour);
-                svg = svg.child(node("path").class(class).attr("d", format!("M{}", places.join(" L"))));
+                svg = svg.child(stroke(&format!("colour-{}", drawn.colour), places.iter().copied()));
             }
-            if let ([only], true) = (drawn.places.as_slice(), places.len() == 1) {
-                let dot = node("circle").class("dot").attr("cx", px(x.at(only[0]))).attr("cy", px(y.at(only[1])));
-                svg = svg.child(dot.attr("r", "3"));
+            if let ([only], 1) = (&places[..], drawn.places.len()) {
+                svg = svg.child(circle("dot", *only, 3.0));
             }
         }
         svg

@@ -1,7 +1,7 @@
 //! Two distributions over one another as lines.
 
 use super::histogram::Counts;
-use super::scale::{Scale, drawing, line, px, words};
+use super::scale::{Scale, drawing, line, stroke, words};
 use crate::report::html::node::{Node, node};
 use crate::report::html::numbers::number;
 
@@ -12,8 +12,17 @@ const FLOOR: f64 = 100.0;
 const LEFT: f64 = 8.0;
 const RIGHT: f64 = 332.0;
 
+/// Card of two or more distributions; `medians` says their medians in words.
+pub fn card(title: &str, unit: &str, lines: &[(&str, &Counts)], medians: String) -> Node {
+    node("div")
+        .class("card speed")
+        .child(node("h3").text(title))
+        .child(profile(&format!("{title}: {medians}"), unit, lines))
+        .child(node("small").text(medians))
+}
+
 /// Lines with their class; heights follow the square root of the share. All have the bins of the first.
-pub fn profile(label: &str, unit: &str, lines: &[(&str, &Counts)]) -> Node {
+fn profile(label: &str, unit: &str, lines: &[(&str, &Counts)]) -> Node {
     let mut svg = drawing(WIDTH, HEIGHT, label);
     let Some((_, first)) = lines.first() else { return svg };
     let x = Scale { low: first.low, high: first.high, from: LEFT, to: RIGHT };
@@ -23,9 +32,7 @@ pub fn profile(label: &str, unit: &str, lines: &[(&str, &Counts)]) -> Node {
     for (class, counts) in lines.iter().filter(|(_, counts)| counts.total() > 0) {
         let y = |bin: usize| FLOOR - (share(counts, bin) / most).sqrt() * (FLOOR - TOP);
         let middle = |bin: usize| (counts.edge(bin) + counts.edge(bin + 1)) / 2.0;
-        let places: Vec<String> =
-            (0..counts.bins.len()).map(|bin| format!("{} {}", px(x.at(middle(bin))), px(y(bin)))).collect();
-        svg = svg.child(node("path").class(format!("stroke {class}")).attr("d", format!("M{}", places.join(" L"))));
+        svg = svg.child(stroke(class, (0..counts.bins.len()).map(|bin| [x.at(middle(bin)), y(bin)])));
         let median = x.at(counts.quantile(0.5));
         svg = svg.child(line(&format!("middle {class}"), [median, TOP], [median, FLOOR]));
     }

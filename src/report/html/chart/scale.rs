@@ -49,6 +49,21 @@ pub fn drawing(width: f64, height: f64, label: &str) -> Node {
         .attr("style", format!("aspect-ratio:{} / {}", px(width), px(height)))
 }
 
+/// Path through these points, as the attribute `d`.
+pub fn through(points: impl IntoIterator<Item = [f64; 2]>) -> String {
+    let points: Vec<String> = points.into_iter().map(|[x, y]| format!("{} {}", px(x), px(y))).collect();
+    format!("M{}", points.join(" L"))
+}
+
+/// Line through these points.
+pub fn stroke(class: &str, points: impl IntoIterator<Item = [f64; 2]>) -> Node {
+    node("path").class(format!("stroke {class}").trim_end()).attr("d", through(points))
+}
+
+pub fn circle(class: &str, [x, y]: [f64; 2], radius: f64) -> Node {
+    node("circle").class(class).attr("cx", px(x)).attr("cy", px(y)).attr("r", px(radius))
+}
+
 pub fn rect(class: &str, [x, y]: [f64; 2], [width, height]: [f64; 2]) -> Node {
     let sides = [("x", x), ("y", y), ("width", width), ("height", height)];
     sides.into_iter().fold(node("rect").class(class), |rect, (name, value)| rect.attr(name, px(value)))

@@ -1,7 +1,7 @@
 //! Tracks below one another over the same seconds: lines, and events as short strokes. A script may move the line `at`
 //! over them (`data-left`, `data-right`: positions of the first and last second).
 
-use super::scale::{Scale, drawing, line, px, words};
+use super::scale::{Scale, drawing, line, px, through, words};
 use crate::report::html::node::{Node, node};
 use crate::report::html::numbers::number;
 
@@ -41,13 +41,8 @@ pub fn lanes(label: &str, secs: f64, lanes: &[Lane]) -> Node {
         let y = Scale { low, high, from: floor - 2.0, to: top };
         for (class, places) in &lane.lines {
             let runs = places.split(|place| place.iter().any(|v| !v.is_finite())).filter(|run| run.len() > 1);
-            let drawn: Vec<String> = runs
-                .map(|run| {
-                    let places: Vec<String> =
-                        run.iter().map(|[s, v]| format!("{} {}", px(x.at(*s)), px(y.at(*v)))).collect();
-                    format!("M{}", places.join(" L"))
-                })
-                .collect();
+            let drawn: Vec<String> =
+                runs.map(|run| through(run.iter().map(|[secs, value]| [x.at(*secs), y.at(*value)]))).collect();
             if !drawn.is_empty() {
                 svg = svg.child(node("path").class(format!("stroke {class}")).attr("d", drawn.join(" ")));
             }
