@@ -1,8 +1,8 @@
 //! All sums of some intervals: two rows of numbers, so that resampling intervals with replacement is adding rows.
 
-use ndarray::{Array2, ArrayView2, Axis, s};
+use ndarray::{Array2, ArrayView2, Axis};
 use rayon::prelude::*;
-use std::ops::{AddAssign, Range};
+use std::ops::AddAssign;
 
 /// What one interval, or many added, come to. `Default` is nothing. Costly sums (packed matrices) stand apart, since
 /// they are large and fewer draws are taken of them.
@@ -28,17 +28,6 @@ pub(crate) struct BlockSums {
     rows: Vec<f64>,
 }
 
-impl MetricSums {
-    /// Memory of these sums, bytes.
-    pub fn n_bytes(&self) -> usize {
-        let costly = match &self.costly {
-            CostlySums::Block(row) => size_of_val(&row[..]),
-            CostlySums::Added(row) => size_of_val(&row[..]),
-        };
-        size_of_val(&self.cheap[..]) + costly
-    }
-}
-
 impl Default for CostlySums {
     fn default() -> Self {
         Self::Added(Vec::new())
@@ -55,37 +44,30 @@ impl CostlySums {
 
     /// All numbers as f64.
     pub fn row(&self) -> Vec<f64> {
-        self.part(0..self.len()).collect()
+        (0..self.len()).map(|i| self.at(i)).collect()
     }
 
-    fn part(&self, range: Range<usize>) -> Box<dyn Iterator<Item = f64> + '_> {
+    fn at(&self, i: usize) -> f64 {
         match self {
-            Self::Block(row) => Box::new(row.get(range).unwrap_or_default().iter().map(|v| f64::from(*v))),
-            Self::Added(row) => Box::new(row.get(range).unwrap_or_default().iter().copied()),
+            Self::Block(row) => row.get(i).copied().map_or(0.0, f64::from),
+            Self::Added(row) => row.get(i).copied().unwrap_or(0.0),
         }
     }
 }
 
 impl AddAssign<&Self> for MetricSums {
     fn add_assign(&mut self, other: &Self) {
-        add(&mut self.cheap, other.cheap.iter().copied());
-        if let CostlySums::Block(row) = &self.costly {
-            self.costly = CostlySums::Added(row.iter().map(|v| f64::from(*v)).collect());
-        }
-        if let CostlySums::Added(row) = &mut self.costly {
-            add(row, other.costly.part(0..other.costly.len()));
-        }
+        add(&mut self.cheap, &other.cheap);
+        let mut costly = self.costly.row();
+        add(&mut costly, &other.costly.row());
+        self.costly = CostlySums::Added(costly);
     }
 }
 
 /// What is not there yet is 0.
-fn add(own: &mut Vec<f64>, others: impl Iterator<Item = f64>) {
-    for (i, other) in others.enumerate() {
-        match own.get_mut(i) {
-            Some(own) => *own += other,
-            None => own.push(other),
-        }
-    }
+fn add(own: &mut Vec<f64>, others: &[f64]) {
+    own.resize(own.len().max(others.len()), 0.0);
+    own.iter_mut().zip(others).for_each(|(own, other)| *own += other);
 }
 
 impl BlockSums {
@@ -119,29 +101,30 @@ impl BlockSums {
 /// drawn.
 pub(crate) fn draw_cheap(blocks: &[MetricSums], counts: ArrayView2<f64>) -> Array2<f64> {
     let width = blocks.iter().map(|sums| sums.cheap.len()).max().unwrap_or(0);
-    drawn(width, blocks, counts, |sums, range| Box::new(sums.cheap.get(range).unwrap_or_default().iter().copied()))
+    drawn(width, blocks, counts, |sums, i| sums.cheap.get(i).copied().unwrap_or(0.0))
 }
 
 /// One row of costly sums for each draw [n_draws, n_costly].
 pub(crate) fn draw_costly(blocks: &[MetricSums], counts: ArrayView2<f64>) -> Array2<f64> {
     let width = blocks.iter().map(|sums| sums.costly.len()).max().unwrap_or(0);
-    drawn(width, blocks, counts, |sums, range| sums.costly.part(range))
+    drawn(width, blocks, counts, |sums, i| sums.costly.at(i))
 }
 
 /// Columns at a time, so that the copy stays small.
 const N_COLUMNS: usize = 1024;
 
-type CostlyColumns = for<'a> fn(&'a MetricSums, Range<usize>) -> Box<dyn Iterator<Item = f64> + 'a>;
-
-fn drawn(width: usize, blocks: &[MetricSums], counts: ArrayView2<f64>, part: CostlyColumns) -> Array2<f64> {
+fn drawn(
+    width: usize,
+    blocks: &[MetricSums],
+    counts: ArrayView2<f64>,
+    at: fn(&MetricSums, usize) -> f64,
+) -> Array2<f64> {
     let mut all = Array2::zeros((counts.nrows(), width));
     all.axis_chunks_iter_mut(Axis(1), N_COLUMNS).into_par_iter().enumerate().for_each(|(i, mut all)| {
-        let from = i * N_COLUMNS;
-        let mut columns = Array2::zeros((counts.ncols(), all.ncols()));
-        for (sums, mut row) in blocks.iter().zip(columns.outer_iter_mut()) {
-            row.iter_mut().zip(part(sums, from..from + all.ncols())).for_each(|(to, from)| *to = from);
-        }
-        all.assign(&counts.dot(&columns.slice(s![.., ..])));
+        let columns = Array2::from_shape_fn((counts.ncols(), all.ncols()), |(block, k)| {
+            blocks.get(block).map_or(0.0, |sums| at(sums, i * N_COLUMNS + k))
+        });
+        all.assign(&counts.dot(&columns));
     });
     all
 }

@@ -99,13 +99,6 @@ impl Surface {
         });
         all
     }
-
-    /// Six times the volume inside, positive where the triangles face outwards.
-    #[cfg(test)]
-    pub fn volume6(&self) -> f64 {
-        let at = |i: u32| self.points[i as usize];
-        self.triangles.iter().map(|&[a, b, c]| dot(at(a), crate::math::vec3::cross(at(b), at(c)))).sum()
-    }
 }
 
 /// Point of the surface near `point`, and the outward normal there.
@@ -214,12 +207,19 @@ impl Grid {
 mod tests {
     use super::*;
     use crate::animate::avatar::field::RoundCone;
+    use crate::math::vec3::cross;
 
     #[test]
     fn a_ball_is_round_closed_and_faces_outwards() {
         let ball = RoundCone::new([[0.3, -0.2, 0.1]; 2], [2.0; 2]);
         let surface = Surface::from_field(&|at| ball.distance(at), [[-1.7, -2.2, -1.9], [2.3, 1.8, 2.1]], 0.3);
-        assert!((surface.volume6() / 6.0 - 4.0 / 3.0 * std::f64::consts::PI * 8.0).abs() < 0.6);
+        // positive where the triangles face outwards
+        let six = |corners: &[u32; 3]| {
+            let [a, b, c] = corners.map(|i| surface.points[i as usize]);
+            dot(a, cross(b, c))
+        };
+        let volume = surface.triangles.iter().map(six).sum::<f64>() / 6.0;
+        assert!((volume - 4.0 / 3.0 * std::f64::consts::PI * 8.0).abs() < 0.6);
         for (&point, &normal) in surface.points.iter().zip(&surface.normals) {
             assert!(ball.distance(point).abs() < 1e-3);
             assert!(norm(sub(normal, scale(sub(point, [0.3, -0.2, 0.1]), 0.5))) < 1e-2);

@@ -23,51 +23,41 @@ impl GlbBuffer {
     /// Adds vectors of `N` floats with their minimum and maximum; returns the accessor's index. `kind` is one of
     /// `SCALAR`, `VEC3`, `VEC4`, `MAT4`.
     pub fn floats<const N: usize>(&mut self, values: &[[f32; N]], kind: &str, purpose: BufferUse) -> usize {
-        let view = self.view(values.iter().flatten().flat_map(|v| v.to_le_bytes()), purpose);
         let bound = |pick: fn(f32, f32) -> f32| -> Vec<f32> {
             (0..N).map(|k| values.iter().map(|value| value[k]).reduce(pick).unwrap_or(0.0)).collect()
         };
-        self.accessors.push(json!({
-            "bufferView": view, "componentType": 5126, "count": values.len(), "type": kind,
+        let accessor = json!({
+            "componentType": 5126, "count": values.len(), "type": kind,
             "min": bound(f32::min), "max": bound(f32::max),
-        }));
-        self.accessors.len() - 1
+        });
+        self.add(values.iter().flatten().flat_map(|v| v.to_le_bytes()), purpose, accessor)
     }
 
     /// Adds vectors of four bytes (joints); returns the accessor's index.
     pub fn bytes4(&mut self, values: &[[u8; 4]]) -> usize {
-        let view = self.view(values.iter().flatten().copied(), BufferUse::Vertices);
-        self.accessors
-            .push(json!({ "bufferView": view, "componentType": 5121, "count": values.len(), "type": "VEC4" }));
-        self.accessors.len() - 1
+        let accessor = json!({ "componentType": 5121, "count": values.len(), "type": "VEC4" });
+        self.add(values.iter().flatten().copied(), BufferUse::Vertices, accessor)
     }
 
     /// Adds vectors of four 16-bit fixed-point fractions (weights); returns the accessor's index.
     pub fn shares4(&mut self, values: &[[u16; 4]]) -> usize {
-        let view = self.view(values.iter().flatten().flat_map(|v| v.to_le_bytes()), BufferUse::Vertices);
-        self.accessors.push(json!({
-            "bufferView": view, "componentType": 5123, "normalized": true, "count": values.len(), "type": "VEC4",
-        }));
-        self.accessors.len() - 1
+        let accessor = json!({ "componentType": 5123, "normalized": true, "count": values.len(), "type": "VEC4" });
+        self.add(values.iter().flatten().flat_map(|v| v.to_le_bytes()), BufferUse::Vertices, accessor)
     }
 
     /// Adds triangle corners, as 16-bit numbers where they fit; returns the accessor's index.
     pub fn indices(&mut self, triangles: &[[u32; 3]]) -> usize {
         let flat = || triangles.iter().flatten();
-        let small = flat().all(|&v| v < u32::from(u16::MAX));
-        let view = if small {
-            self.view(flat().flat_map(|&v| (v as u16).to_le_bytes()), BufferUse::Indices)
+        let accessor = |kind: u32| json!({ "componentType": kind, "count": 3 * triangles.len(), "type": "SCALAR" });
+        if flat().all(|&v| v < u32::from(u16::MAX)) {
+            self.add(flat().flat_map(|&v| (v as u16).to_le_bytes()), BufferUse::Indices, accessor(5123))
         } else {
-            self.view(flat().flat_map(|&v| v.to_le_bytes()), BufferUse::Indices)
-        };
-        self.accessors.push(json!({
-            "bufferView": view, "componentType": if small { 5123 } else { 5125 },
-            "count": 3 * triangles.len(), "type": "SCALAR",
-        }));
-        self.accessors.len() - 1
+            self.add(flat().flat_map(|&v| v.to_le_bytes()), BufferUse::Indices, accessor(5125))
+        }
     }
 
-    fn view(&mut self, bytes: impl Iterator<Item = u8>, purpose: BufferUse) -> usize {
+    /// Adds a view of these bytes and its accessor; returns the accessor's index.
+    fn add(&mut self, bytes: impl Iterator<Item = u8>, purpose: BufferUse, accessor: Value) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let offset = self.bytes.len();
         self.bytes.extend(bytes);
@@ -75,8 +65,13 @@ impl GlbBuffer {
         if purpose != BufferUse::Other {
             view["target"] = json!(purpose as u32);
         }
+        let mut placed = json!({ "bufferView": self.views.len() });
+        if let (Some(placed), Value::Object(accessor)) = (placed.as_object_mut(), accessor) {
+            placed.extend(accessor);
+        }
         self.views.push(view);
-        self.views.len() - 1
+        self.accessors.push(placed);
+        self.accessors.len() - 1
     }
 
     /// Bytes of the file of a scene that refers to these accessors.

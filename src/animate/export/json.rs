@@ -28,24 +28,27 @@ pub fn write(text: &mut impl Write, performance: &Performance, names: Names) -> 
     });
     let head = head.to_string();
     write!(text, "{},\n\"positions\":[", head.trim_end_matches('}'))?;
-    for frame in 0..clip.n_frames() {
-        text.write_all(if frame == 0 { b"\n[" } else { b",\n[" })?;
-        for (joint, place) in clip.positions(frame).into_iter().enumerate() {
-            let [x, y, z]: Vec3 = place.map(|cm| cm / 100.0);
-            let comma = if joint == 0 { "" } else { "," };
-            write!(text, "{comma}[{x:.6},{y:.6},{z:.6}]")?;
-        }
-        text.write_all(b"]")?;
-    }
+    rows(text, (0..clip.n_frames()).map(|frame| clip.positions(frame)), |_, place: Vec3| {
+        let [x, y, z] = place.map(|cm| cm / 100.0);
+        format!("[{x:.6},{y:.6},{z:.6}]")
+    })?;
     text.write_all(b"],\n\"rotations\":[")?;
-    for (frame, local) in clip.local.iter().enumerate() {
-        text.write_all(if frame == 0 { b"\n[" } else { b",\n[" })?;
-        for (joint, (rotation, bone)) in local.iter().zip(bones).enumerate() {
-            let Rotation { w, v: [x, y, z] } = if bone.end { Rotation::IDENTITY } else { *rotation };
-            let comma = if joint == 0 { "" } else { "," };
-            write!(text, "{comma}[{x:.7},{y:.7},{z:.7},{w:.7}]")?;
-        }
-        text.write_all(b"]")?;
-    }
+    rows(text, clip.local.iter().cloned(), |joint, rotation: Rotation| {
+        let Rotation { w, v: [x, y, z] } = if bones[joint].end { Rotation::IDENTITY } else { rotation };
+        format!("[{x:.7},{y:.7},{z:.7},{w:.7}]")
+    })?;
     text.write_all(b"]}\n")
+}
+
+/// Writes a line a frame of what `shown` makes of every joint.
+fn rows<T>(
+    text: &mut impl Write,
+    frames: impl Iterator<Item = Vec<T>>,
+    shown: impl Fn(usize, T) -> String,
+) -> io::Result<()> {
+    for (n, frame) in frames.enumerate() {
+        let joints: Vec<String> = frame.into_iter().enumerate().map(|(joint, value)| shown(joint, value)).collect();
+        write!(text, "{}\n[{}]", if n == 0 { "" } else { "," }, joints.join(","))?;
+    }
+    Ok(())
 }

@@ -115,57 +115,57 @@ mod tests {
         Rig::from_motion(&motion).skeleton
     }
 
-    fn called(names: Names) -> BTreeSet<String> {
-        let all = names.of(&skeleton());
-        let set: BTreeSet<String> = all.iter().cloned().collect();
-        assert_eq!(set.len(), all.len(), "a name is given twice");
-        set
-    }
-
-    /// Both sides, and the trunk.
-    fn all_of(trunk: &[&str], sides: [&str; 2], parts: &[String]) -> Vec<String> {
-        let both = sides.iter().flat_map(|side| parts.iter().map(move |part| format!("{side}{part}")));
-        trunk.iter().map(ToString::to_string).chain(both).collect()
-    }
-
-    fn missing(expected: Vec<String>, names: Names) -> Vec<String> {
-        let called = called(names);
-        expected.into_iter().filter(|name| !called.contains(name)).collect()
-    }
-
     #[test]
-    fn unitys_bones_are_all_there() {
-        // HumanBodyBones without those it calls optional and we have nothing for: eyes, jaw, toes, UpperChest.
-        let limbs = ["UpperLeg", "LowerLeg", "Foot", "Shoulder", "UpperArm", "LowerArm", "Hand"].map(String::from);
-        let fingers = FINGERS.iter().flat_map(|f| ["Proximal", "Intermediate", "Distal"].map(|b| format!("{f}{b}")));
-        let parts: Vec<String> = limbs.into_iter().chain(fingers).collect();
-        let expected = all_of(&["Hips", "Spine", "Chest", "Neck", "Head"], ["Left", "Right"], &parts);
-        assert_eq!((expected.len(), missing(expected, Names::UnityHumanoid)), (49, vec![]));
-    }
-
-    #[test]
-    fn vrms_bones_are_all_there() {
-        // VRM 1.0, humanoid.md, without upperChest, eyes, jaw and toes, which it does not require.
-        let limbs = ["UpperLeg", "LowerLeg", "Foot", "Shoulder", "UpperArm", "LowerArm", "Hand"].map(String::from);
+    fn the_bones_of_every_convention_are_all_there() {
+        let limbs = ["UpperLeg", "LowerLeg", "Foot", "Shoulder", "UpperArm", "LowerArm", "Hand"];
+        let bones = ["Proximal", "Intermediate", "Distal"];
         let thumb = ["ThumbMetacarpal", "ThumbProximal", "ThumbDistal"].map(String::from);
-        let fingers =
-            FINGERS[1..].iter().flat_map(|f| ["Proximal", "Intermediate", "Distal"].map(|b| format!("{f}{b}")));
-        let parts: Vec<String> = limbs.into_iter().chain(thumb).chain(fingers).collect();
-        let expected = all_of(&["hips", "spine", "chest", "neck", "head"], ["left", "right"], &parts);
-        assert_eq!((expected.len(), missing(expected, Names::Vrm)), (49, vec![]));
-    }
-
-    #[test]
-    fn mixamos_bones_are_all_there() {
-        // Its 65 bones without Spine2 and the ends of the toes.
-        let limbs = ["UpLeg", "Leg", "Foot", "ToeBase", "Shoulder", "Arm", "ForeArm", "Hand"].map(String::from);
-        let fingers = ["Thumb", "Index", "Middle", "Ring", "Pinky"];
-        let fingers = fingers.iter().flat_map(|f| (1..=4).map(move |k| format!("Hand{f}{k}")));
-        let parts: Vec<String> = limbs.into_iter().chain(fingers).collect();
-        let trunk = ["Hips", "Spine", "Spine1", "Neck", "Head", "HeadTop_End"];
-        let expected = all_of(&trunk, ["Left", "Right"], &parts).into_iter().map(|name| format!("mixamorig:{name}"));
-        let expected: Vec<String> = expected.collect();
-        assert_eq!((expected.len(), missing(expected, Names::Mixamo)), (62, vec![]));
+        let fingers = |names: &[&str]| names.iter().flat_map(|f| bones.map(|b| format!("{f}{b}"))).collect::<Vec<_>>();
+        let mixamo = ["UpLeg", "Leg", "Foot", "ToeBase", "Shoulder", "Arm", "ForeArm", "Hand"];
+        let mixamos_fingers = ["Thumb", "Index", "Middle", "Ring", "Pinky"];
+        let mixamos_fingers = mixamos_fingers.iter().flat_map(|f| (1..=4).map(move |k| format!("Hand{f}{k}")));
+        for (names, n, start, trunk, sides, limbs, fingers) in [
+            // HumanBodyBones without those it calls optional and we have nothing for: eyes, jaw, toes, UpperChest.
+            (
+                Names::UnityHumanoid,
+                49,
+                "",
+                "Hips Spine Chest Neck Head",
+                ["Left", "Right"],
+                &limbs[..],
+                fingers(&FINGERS),
+            ),
+            // VRM 1.0, humanoid.md, without upperChest, eyes, jaw and toes, which it does not require.
+            (
+                Names::Vrm,
+                49,
+                "",
+                "hips spine chest neck head",
+                ["left", "right"],
+                &limbs[..],
+                [&thumb[..], &fingers(&FINGERS[1..])].concat(),
+            ),
+            // Its 65 bones without Spine2 and the ends of the toes.
+            (
+                Names::Mixamo,
+                62,
+                "mixamorig:",
+                "Hips Spine Spine1 Neck Head HeadTop_End",
+                ["Left", "Right"],
+                &mixamo[..],
+                mixamos_fingers.collect(),
+            ),
+        ] {
+            let all = names.of(&skeleton());
+            let called: BTreeSet<&String> = all.iter().collect();
+            assert_eq!(called.len(), all.len(), "a name is given twice");
+            let parts: Vec<String> = limbs.iter().map(ToString::to_string).chain(fingers).collect();
+            let both = sides.iter().flat_map(|side| parts.iter().map(move |part| format!("{side}{part}")));
+            let expected: Vec<String> = trunk.split(' ').map(String::from).chain(both).collect();
+            let expected = expected.into_iter().map(|name| format!("{start}{name}"));
+            let missing: Vec<String> = expected.clone().filter(|name| !called.contains(name)).collect();
+            assert_eq!((expected.len(), missing), (n, vec![]), "{names:?}");
+        }
     }
 
     #[test]

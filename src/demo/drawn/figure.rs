@@ -46,6 +46,15 @@ pub struct ArmControls {
     pub spread: f64,
 }
 
+/// Number of controls of an arm.
+pub const N_ARM: usize = 8;
+
+impl From<[f64; N_ARM]> for ArmControls {
+    fn from([out, down, away, roll, raise, curl, index, spread]: [f64; N_ARM]) -> Self {
+        Self { wrist: [out, down, away], roll, raise, curl, index, spread }
+    }
+}
+
 /// Controls of the whole figure; angles in radians.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Controls {

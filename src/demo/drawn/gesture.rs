@@ -1,14 +1,12 @@
 //! Gestures for speech: every phrase has strokes to new positions in front of the body, every stressed syllable a beat
 //! of hands and head, every longer pause a rest. Controls are smooth functions of time.
 
-use super::figure::{ArmControls, Controls};
+use super::figure::{ArmControls, Controls, N_ARM};
 use super::speech::Speech;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
 
-/// Number of controls of an arm.
-const N_ARM: usize = 8;
 /// Rest pose: hands folded low in front of the body.
 const REST: [f64; N_ARM] = [0.17, 0.35, -0.19, 0.6, 0.45, 0.35, 0.0, 0.06];
 
@@ -116,16 +114,12 @@ impl DrawnGestures {
         }
         let slow = |k: usize, hz: f64| (2.0 * PI * hz * secs + self.sway[k]).sin();
         Controls {
-            arms: arms.map(arm),
+            arms: arms.map(ArmControls::from),
             torso: [0.06 * slow(0, 0.11), 0.02 * slow(1, 0.17) - 0.02, 0.015 * slow(2, 0.13)],
             head,
             neck: [0.015 * slow(2, 0.13), 0.004 * slow(3, 0.24), 0.012 * slow(1, 0.17)],
         }
     }
-}
-
-fn arm([out, down, away, roll, raise, curl, index, spread]: [f64; N_ARM]) -> ArmControls {
-    ArmControls { wrist: [out, down, away], roll, raise, curl, index, spread }
 }
 
 /// Minimum-jerk profile from 0 to 1 (Flash and Hogan 1985).

@@ -5,6 +5,7 @@ use crate::types::sound::{SAMPLE_RATE, Sound};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
 /// First three formants of a few vowels, Hz (Peterson and Barney 1952, men).
 const VOWELS: [[f64; 3]; 5] = [
@@ -46,42 +47,44 @@ pub struct Speech {
 impl Speech {
     /// Phrases that fill `secs` seconds, each followed by a pause.
     pub fn new(secs: f64, rng: &mut ChaCha8Rng) -> Self {
-        let mut speech = Self::default();
-        let mut now = 0.25;
-        while now < secs - 0.5 {
-            let first = speech.syllables.len();
-            let count = rng.random_range(5..13);
-            let base = rng.random_range(105.0..125.0);
-            for k in 0..count {
-                let stress = if k % 3 == 1 { rng.random_range(0.7..1.0) } else { rng.random_range(0.0..0.35) };
-                let length = rng.random_range(0.13..0.2) + 0.08 * stress;
-                if now + length > secs - 0.1 {
-                    break;
-                }
-                let fall = 1.0 - 0.2 * f64::from(k) / f64::from(count);
-                let pitch = base * fall * (1.0 + 0.18 * stress);
-                let vowel = rng.random_range(0..VOWELS.len());
-                speech.syllables.push(Syllable { start: now, end: now + length, stress, vowel, pitch, volume: 1.0 });
-                now += length + 0.02;
-            }
-            speech.phrases.push(Phrase { first, last: speech.syllables.len() });
-            now += rng.random_range(0.3..0.9);
-        }
-        speech
+        let stress = |k: i32, _: f64, rng: &mut ChaCha8Rng| match k % 3 {
+            1 => rng.random_range(0.7..1.0),
+            _ => rng.random_range(0.0..0.35),
+        };
+        Self::phrases([0.25, secs], 5..13, 0.3..0.9, |_| 1.0, stress, rng)
     }
 
     /// Free speech of `secs` seconds: phrases of any length, soft and loud, with irregular accents (stress at least
     /// 0.7, all others at most 0.2) at least half a second apart.
     pub fn free(secs: f64, rng: &mut ChaCha8Rng) -> Self {
+        let (start, mut last_accent) = (rng.random_range(0.2..0.8), f64::NEG_INFINITY);
+        let stress = |_: i32, now: f64, rng: &mut ChaCha8Rng| {
+            if now - last_accent > 0.5 && rng.random_bool(0.4) {
+                last_accent = now;
+                return rng.random_range(0.7..1.0);
+            }
+            rng.random_range(0.0..0.2)
+        };
+        Self::phrases([start, secs], 5..22, 0.3..1.5, |rng| rng.random_range(0.7..1.0), stress, rng)
+    }
+
+    /// Phrases from one second to another: ranges of the number of syllables and of the pause, seconds; the volume of a
+    /// phrase; the stress of its syllable `k` at a second.
+    fn phrases(
+        [mut now, secs]: [f64; 2],
+        counts: Range<i32>,
+        pauses: Range<f64>,
+        volume: impl Fn(&mut ChaCha8Rng) -> f64,
+        mut stress: impl FnMut(i32, f64, &mut ChaCha8Rng) -> f64,
+        rng: &mut ChaCha8Rng,
+    ) -> Self {
         let mut speech = Self::default();
-        let (mut now, mut last_accent) = (rng.random_range(0.2..0.8), f64::NEG_INFINITY);
         while now < secs - 0.5 {
             let first = speech.syllables.len();
-            let (count, volume) = (rng.random_range(5..22), rng.random_range(0.7..1.0));
+            let (count, volume) = (rng.random_range(counts.clone()), volume(rng));
             let base = rng.random_range(105.0..125.0);
             for k in 0..count {
-                let accent = now - last_accent > 0.5 && rng.random_bool(0.4);
-                let stress = if accent { rng.random_range(0.7..1.0) } else { rng.random_range(0.0..0.2) };
+                let stress = stress(k, now, rng);
                 let length = rng.random_range(0.13..0.2) + 0.08 * stress;
                 if now + length > secs - 0.1 {
                     break;
@@ -89,13 +92,10 @@ impl Speech {
                 let pitch = base * (1.0 - 0.2 * f64::from(k) / f64::from(count)) * (1.0 + 0.18 * stress);
                 let vowel = rng.random_range(0..VOWELS.len());
                 speech.syllables.push(Syllable { start: now, end: now + length, stress, vowel, pitch, volume });
-                if accent {
-                    last_accent = now;
-                }
                 now += length + 0.02;
             }
             speech.phrases.push(Phrase { first, last: speech.syllables.len() });
-            now += rng.random_range(0.3..1.5);
+            now += rng.random_range(pauses.clone());
         }
         speech
     }

@@ -4,7 +4,6 @@
 use super::ridge::{Ridge, RidgeSums};
 use crate::audio::mel;
 use crate::dataset::{Dataset, Sample, Split};
-use crate::types::pose3d::Motion;
 use crate::types::skeleton::{L_WRIST, N_JOINTS, R_WRIST};
 use crate::types::sound::Sound;
 use crate::types::sync;
@@ -45,7 +44,6 @@ pub fn wrist_speeds(joints: ArrayView3<f32>, fps: FrameRate) -> Array2<f64> {
 
 /// Baselines fitted to the training split.
 pub struct RuleBaselines {
-    fps: FrameRate,
     /// Regression to the speeds of both wrists, m/s.
     speed: Ridge,
     /// Regression to the 147 joint coordinates, metres.
@@ -93,7 +91,6 @@ impl RuleBaselines {
             })
         });
         Ok(Self {
-            fps,
             speed: sums[0].ridge(strengths[0]),
             pose: sums[1].ridge(strengths[1]),
             strengths,
@@ -134,11 +131,6 @@ impl RuleBaselines {
     /// Mean pose for `n_frames`.
     pub fn still(&self, n_frames: usize) -> Array3<f32> {
         Array3::from_shape_fn((n_frames, N_JOINTS, 3), |(_, joint, k)| self.mean[[joint, k]])
-    }
-
-    /// Joints as a motion.
-    pub fn motion(&self, joints: Array3<f32>) -> Motion {
-        Motion::from_joints(self.fps, joints)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Gesture rule of the synthetic speaker: a deterministic function of its speech (the predictable part), and random
 //! variation on top.
 
-use crate::demo::drawn::figure::{ArmControls, Controls, DrawnFigure};
+use crate::demo::drawn::figure::{ArmControls, Controls, DrawnFigure, N_ARM};
 use crate::demo::drawn::gesture::minimum_jerk;
 use crate::demo::drawn::speech::{Speech, Syllable};
 use crate::math::vec3::sub;
@@ -26,8 +26,7 @@ const LIFT: f64 = 0.2;
 /// Stress above which a syllable is an accent.
 const ACCENT: f64 = 0.5;
 
-/// Number of controls of an arm: wrist out, down, away (metres), roll, raise, curl, index, spread.
-const N_ARM: usize = 8;
+/// Wrist out, down, away (metres), roll, raise, curl, index, spread.
 type ArmTarget = [f64; N_ARM];
 /// Rest pose: hands in the lap.
 const REST: ArmTarget = [0.16, 0.36, -0.2, 0.9, 0.3, 0.45, 0.0, 0.05];
@@ -146,8 +145,7 @@ impl<'a> RuleGestures<'a> {
             });
             place[1] -= lift;
             (0..3).for_each(|k| place[k] += SWAY * sway(3 * hand + k));
-            let [out, down, away, roll, raise, curl, index, spread] = place;
-            ArmControls { wrist: [out, down, away], roll, raise, curl, index, spread }
+            ArmControls::from(place)
         };
         let torso = [0, 1, 2].map(|k| TORSO * sway(6 + k));
         Controls { arms: [arm(0), arm(1)], torso, ..Controls::default() }

@@ -171,8 +171,8 @@ fn clip(pair: &FilePair, given: Option<FrameRate>, fps: FrameRate) -> Result<(Ev
     }
     notes.extend(other_unit(&ground_truth, &predicted).map(|note| format!("{}: {note}", pair.name)));
     ground_truth.mask = ground_truth.mask.slice(s![..n_frames, ..]).to_owned();
-    let (ground_truth_joints, mut predicted_joints) =
-        (cut(ground_truth.joints, n_frames), cut(predicted.joints, n_frames));
+    let [ground_truth_joints, mut predicted_joints] =
+        [ground_truth.joints, predicted.joints].map(|joints| joints.slice_move(s![..n_frames, .., ..]));
     let (mask, n_missing) = compared(&ground_truth_joints, &ground_truth.mask, &mut predicted_joints);
     let n_seen = ground_truth.mask.iter().filter(|seen| **seen).count().max(1);
     let share = n_missing as f64 / n_seen as f64;
@@ -190,15 +190,15 @@ fn clip(pair: &FilePair, given: Option<FrameRate>, fps: FrameRate) -> Result<(Ev
             pair.name
         ));
     }
-    let features = match &pair.sound {
-        Some(path) => sound_features::extract(path, fps, n_frames)?,
-        None => None,
-    };
-    if let (Some(path), features) = (&pair.sound, &features) {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let mut features = None;
+    if let Some(path) = &pair.sound {
+        features = sound_features::extract(path, fps, n_frames)?;
         let secs = fps.secs(n_frames);
-        match features {
-            None => notes.push(format!("{name} holds no sound: {} is not part of what needs sound", pair.name)),
+        match &features {
+            None => {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                notes.push(format!("{name} holds no sound: {} is not part of what needs sound", pair.name));
+            }
             Some(features) => ensure!(
                 features.secs >= secs - MOST_APART_SECS.max(MOST_APART * secs),
                 "{} lasts {:.2} s, the motion {secs:.2} s: is it the sound of another clip?",
@@ -219,10 +219,6 @@ fn clip(pair: &FilePair, given: Option<FrameRate>, fps: FrameRate) -> Result<(Ev
         },
         notes,
     ))
-}
-
-fn cut(joints: Array3<f32>, n_frames: usize) -> Array3<f32> {
-    if joints.shape()[0] == n_frames { joints } else { joints.slice(s![..n_frames, .., ..]).to_owned() }
 }
 
 /// Mask of the compared joints, those seen in the ground truth, and the number of them that the prediction misses.

@@ -25,7 +25,7 @@ pub fn text(table: &Table, all: bool) -> String {
         columns.iter().map(|cells| cells.iter().map(|cell| cell.chars().count()).max().unwrap_or(0) + 2).collect();
     let line = |head: &str, cells: &mut dyn Iterator<Item = &str>| {
         let cells: String = cells.zip(&widths).map(|(cell, width)| format!("{cell:>width$}")).collect();
-        format!("{}{cells}", pad(head, width)).trim_end().to_owned() + "\n"
+        format!("{head:width$}{cells}").trim_end().to_owned() + "\n"
     };
     for k in 0..2 {
         text += &line("", &mut columns.iter().map(|cells| cells[k].as_str()));
@@ -107,9 +107,4 @@ fn column(table: &Table, row: &PredictorRow, shown: &[usize]) -> Vec<String> {
     };
     let (first, second) = row.kind.name().split_once(' ').unwrap_or(("", row.kind.name()));
     [first, second].map(str::to_owned).into_iter().chain(shown.iter().map(cell)).collect()
-}
-
-fn pad(text: &str, width: usize) -> String {
-    let n = text.chars().count();
-    format!("{text}{}", " ".repeat(width.saturating_sub(n)))
 }

@@ -116,16 +116,8 @@ fn origin(joint: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metrics::space::fixed_rate::FPS;
+    use crate::metrics::space::fixed_rate::{FPS, moving};
     use crate::types::skeleton::N_JOINTS;
-    use ndarray::Array3;
-
-    fn moving(n: usize) -> Array3<f32> {
-        Array3::from_shape_fn((n, N_JOINTS, 3), |(t, joint, k)| {
-            let phase = (joint * 7 + k * 3) as f32;
-            0.1 * (phase + t as f32 * (0.05 + 0.01 * joint as f32)).sin() + 0.01 * joint as f32
-        })
-    }
 
     #[test]
     fn the_built_in_basis_is_orthonormal() {

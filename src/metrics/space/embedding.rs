@@ -96,15 +96,8 @@ const _: () = assert!(FPS.num == 15 && FPS.den == 1 && STRIDE.is_multiple_of(mot
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::metrics::space::fixed_rate::moving;
     use crate::types::skeleton::N_JOINTS;
-    use ndarray::Array3;
-
-    fn moving(n: usize) -> Array3<f32> {
-        Array3::from_shape_fn((n, N_JOINTS, 3), |(t, joint, k)| {
-            let phase = (joint * 7 + k * 3) as f32;
-            0.1 * (phase + t as f32 * (0.05 + 0.01 * joint as f32)).sin() + 0.01 * joint as f32
-        })
-    }
 
     #[test]
     fn rows_do_not_depend_on_what_lies_beside_their_window_nor_on_size() {

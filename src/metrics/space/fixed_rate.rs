@@ -84,6 +84,15 @@ fn stretches(seen: &[bool]) -> Vec<Range<usize>> {
     found
 }
 
+/// Motion without meaning in which every joint moves, [n, 49, 3].
+#[cfg(test)]
+pub(super) fn moving(n: usize) -> Array3<f32> {
+    Array3::from_shape_fn((n, N_JOINTS, 3), |(t, joint, k)| {
+        let phase = (joint * 7 + k * 3) as f32;
+        0.1 * (phase + t as f32 * (0.05 + 0.01 * joint as f32)).sin() + 0.01 * joint as f32
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

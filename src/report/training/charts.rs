@@ -26,9 +26,15 @@ impl<'a> TrainingLog<'a> {
 
     /// Curves that are not 0 throughout.
     pub fn charts(&self) -> Vec<LineChart> {
-        let made = |name: &str, colour, of: &str| self.validated(name, colour, &format!("/validation/generator/{of}"));
-        let still = |name: &str, colour, of: &str| self.level(name, colour, &format!("/validation/mean_pose/{of}"));
+        let trained = |name: &str, colour, of: &str| curve(&self.steps, name, colour, &format!("/{of}"));
+        let made =
+            |name: &str, colour, of: &str| curve(&self.epochs, name, colour, &format!("/validation/generator/{of}"));
         let level = |name: &str, colour, value| ChartLevel { name: name.to_owned(), colour, value };
+        // the mean pose's value, which all validations share
+        let still = |name: &str, colour, of: &str| {
+            let last = self.epochs.last().and_then(|line| line["validation"]["mean_pose"][of].as_f64());
+            level(name, colour, last.unwrap_or(f64::NAN))
+        };
         let chart = |title: &str, description: &str, lines: Vec<ChartLine>, levels: Vec<ChartLevel>| LineChart {
             title: title.to_owned(),
             description: description.to_owned(),
@@ -40,7 +46,7 @@ impl<'a> TrainingLog<'a> {
             chart(
                 "L1 error",
                 "Of normalised coordinates; lower is better.",
-                vec![self.trained("training", 2, "l1"), made("held out", 0, "l1")],
+                vec![trained("training", 2, "l1"), made("held out", 0, "l1")],
                 vec![still("mean pose, held out", 0, "l1")],
             ),
             chart(
@@ -64,45 +70,33 @@ impl<'a> TrainingLog<'a> {
             chart(
                 "Score",
                 "What chooses the best checkpoint, which the dashed line marks; lower is better.",
-                vec![self.validated("held out", 0, "/validation/score")],
+                vec![curve(&self.epochs, "held out", 0, "/validation/score")],
                 vec![],
             ),
             chart(
                 "Adversarial losses",
                 "Of the generator against the discriminator, and of the discriminator itself.",
-                vec![self.trained("generator", 0, "adversarial"), self.trained("discriminator", 1, "discriminator")],
+                vec![trained("generator", 0, "adversarial"), trained("discriminator", 1, "discriminator")],
                 vec![],
             ),
             chart(
                 "Bone and velocity losses",
                 "",
-                vec![self.trained("bone lengths", 0, "bone"), self.trained("velocity", 1, "velocity")],
+                vec![trained("bone lengths", 0, "bone"), trained("velocity", 1, "velocity")],
                 vec![],
             ),
-            chart("Gradient norm", "Before clipping.", vec![self.trained("generator", 0, "gradient_norm")], vec![]),
+            chart("Gradient norm", "Before clipping.", vec![trained("generator", 0, "gradient_norm")], vec![]),
         ];
         let says_something =
             |chart: &LineChart| chart.lines.iter().flat_map(|line| &line.places).any(|[_, value]| *value != 0.0);
         charts.into_iter().filter(says_something).collect()
     }
+}
 
-    /// Curve of a value of the training lines.
-    fn trained(&self, name: &str, colour: usize, of: &str) -> ChartLine {
-        let places = self.steps.iter().filter_map(|line| Some([line["step"].as_f64()?, line[of].as_f64()?]));
-        ChartLine { name: name.to_owned(), colour, places: thinned(&places.collect::<Vec<_>>()) }
-    }
-
-    /// Curve of a value of the validations.
-    fn validated(&self, name: &str, colour: usize, at: &str) -> ChartLine {
-        let places = self.epochs.iter().filter_map(|line| Some([line["step"].as_f64()?, line.pointer(at)?.as_f64()?]));
-        ChartLine { name: name.to_owned(), colour, places: thinned(&places.collect::<Vec<_>>()) }
-    }
-
-    /// Level of a value that all validations share.
-    fn level(&self, name: &str, colour: usize, at: &str) -> ChartLevel {
-        let last = self.epochs.last().and_then(|line| line.pointer(at)).and_then(Value::as_f64);
-        ChartLevel { name: name.to_owned(), colour, value: last.unwrap_or(f64::NAN) }
-    }
+/// Curve of the values at a JSON pointer.
+fn curve(lines: &[&Value], name: &str, colour: usize, at: &str) -> ChartLine {
+    let places = lines.iter().filter_map(|line| Some([line["step"].as_f64()?, line.pointer(at)?.as_f64()?]));
+    ChartLine { name: name.to_owned(), colour, places: thinned(&places.collect::<Vec<_>>()) }
 }
 
 fn thinned(places: &[[f64; 2]]) -> Vec<[f64; 2]> {

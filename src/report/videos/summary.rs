@@ -3,9 +3,9 @@
 use super::reasons;
 use super::reasons::WAITING;
 use super::video::VideoSummary;
+use crate::report::html;
 use crate::report::html::chart::bars::{StackedBar, bars};
 use crate::report::html::numbers::{counted, length, percent};
-use crate::report::html;
 use crate::report::html::{Node, legend, node};
 use std::collections::BTreeMap;
 
@@ -100,8 +100,7 @@ pub fn table(videos: &[VideoSummary]) -> Vec<Node> {
         let mut refused: Vec<(String, f64)> = ledger.refused_secs().into_iter().collect();
         refused.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let longest = refused.iter().take(3);
-        let why =
-            legend(longest.map(|(reason, secs)| (reasons::class(reason), format!("{reason} {}", length(*secs)))));
+        let why = legend(longest.map(|(reason, secs)| (reasons::class(reason), format!("{reason} {}", length(*secs)))));
         let state = match ledger.failed.first() {
             Some(failed) if failed.stage == WAITING => node("span").text("not done yet"),
             Some(failed) => node("span").text(format!("failed at {}", failed.stage)),

@@ -19,17 +19,17 @@ pub struct ThresholdGrid {
     pub set: fn(&mut SegmentConfig, f64),
 }
 
-/// Grid of a threshold: key, sentence, unit, ends, and the field.
+/// Grid of a threshold: key, sentence, unit, ends, and the type of the field where it is a whole number.
 macro_rules! row {
-    ($key:ident, $description:literal, $unit:literal, $low:literal, $high:literal) => {
+    ($key:ident, $description:literal, $unit:literal, $low:literal, $high:literal $(, $whole:ty)?) => {
         ThresholdGrid {
             key: stringify!($key),
             description: $description,
             unit: $unit,
             low: $low,
             high: $high,
-            get: |rules| rules.$key,
-            set: |rules, value| rules.$key = value,
+            get: |rules| rules.$key $(as $whole as f64)?,
+            set: |rules, value| rules.$key = value $(as $whole)?,
         }
     };
 }
@@ -55,25 +55,9 @@ pub const THRESHOLDS: [ThresholdGrid; 16] = [
     row!(min_hand_share, "share of a stretch in which each hand is seen", "", 0.0, 1.0),
     row!(max_jump, "farthest the neck may move between two frames", "shoulder widths", 0.1, 2.1),
     row!(shot_threshold, "shot score from which a frame begins a new shot", "", 0.0, 1.0),
-    ThresholdGrid {
-        key: "max_people",
-        description: "people in view that are not too many",
-        unit: "people",
-        low: 1.0,
-        high: 21.0,
-        get: |rules| f64::from(rules.max_people),
-        set: |rules, value| rules.max_people = value as u32,
-    },
+    row!(max_people, "people in view that are not too many", "people", 1.0, 21.0, u32),
     row!(max_crowd_share, "share of a stretch that may show more people", "", 0.0, 1.0),
-    ThresholdGrid {
-        key: "min_frames",
-        description: "shortest stretch that is kept",
-        unit: "frames",
-        low: 16.0,
-        high: 176.0,
-        get: |rules| rules.min_frames as f64,
-        set: |rules, value| rules.min_frames = value as usize,
-    },
+    row!(min_frames, "shortest stretch that is kept", "frames", 16.0, 176.0, usize),
 ];
 
 impl ThresholdGrid {

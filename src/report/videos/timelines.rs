@@ -3,9 +3,9 @@
 use super::reasons;
 use super::reasons::WAITING;
 use super::video::VideoSummary;
+use crate::report::html;
 use crate::report::html::chart::timeline::{TimelineSpan, timeline};
 use crate::report::html::numbers::{clock, counted, length, number, with_unit};
-use crate::report::html;
 use crate::report::html::{Node, node};
 use std::collections::BTreeSet;
 

@@ -46,8 +46,7 @@ mod tests {
     fn a_dot_has_its_share_and_its_words() {
         let dot = |share| ChartDot { at: [3.0, 4.0], share, radius: 2.0, description: "R<Wrist>: 40 %".to_owned() };
         let labels = [([1.0, 1.0], "hand".to_owned())];
-        let drawn =
-            dots("a", [9.0, 9.0], &[[[0.0, 0.0], [3.0, 4.0]]], &[dot(0.4), dot(f64::NAN)], &labels).to_string();
+        let drawn = dots("a", [9.0, 9.0], &[[[0.0, 0.0], [3.0, 4.0]]], &[dot(0.4), dot(f64::NAN)], &labels).to_string();
         assert!(drawn.contains("--share:40%") && drawn.contains("<title>R&lt;Wrist&gt;: 40 %</title>"), "{drawn}");
         assert!(drawn.contains("share unknown") && drawn.contains("edge"), "{drawn}");
     }
