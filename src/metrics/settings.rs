@@ -41,21 +41,3 @@ pub enum Convention {
     /// Li et al. 2021.
     Aist,
 }
-
-impl Convention {
-    /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Orator, Self::Speech2gesture, Self::Genea, Self::Emage, Self::Trimodal, Self::Aist];
-
-    /// Name on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Orator => "orator",
-            Self::Speech2gesture => "speech2gesture",
-            Self::Genea => "genea",
-            Self::Emage => "emage",
-            Self::Trimodal => "trimodal",
-            Self::Aist => "aist",
-        }
-    }
-}

@@ -35,14 +35,10 @@ impl Surface {
         let grid = Grid::sample(field, bounds, cell);
         let mut surface = Self::default();
         let mut vertex_of = vec![u32::MAX; grid.values.len()];
-        for z in 0..grid.n[2] - 1 {
-            for y in 0..grid.n[1] - 1 {
-                for x in 0..grid.n[0] - 1 {
-                    if let Some(point) = grid.vertex([x, y, z]) {
-                        vertex_of[grid.index([x, y, z])] = surface.points.len() as u32;
-                        surface.points.push(point);
-                    }
-                }
+        for (z, y, x) in ndarray::indices((grid.n[2] - 1, grid.n[1] - 1, grid.n[0] - 1)) {
+            if let Some(point) = grid.vertex([x, y, z]) {
+                vertex_of[grid.index([x, y, z])] = surface.points.len() as u32;
+                surface.points.push(point);
             }
         }
         grid.quads(|corners, inwards| {
@@ -183,20 +179,16 @@ impl Grid {
         for axis in 0..3 {
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
             let step = |k: usize| [1, self.n[0], self.n[0] * self.n[1]][k];
-            for z in 0..self.n[2] {
-                for y in 0..self.n[1] {
-                    for x in 0..self.n[0] {
-                        let at = [x, y, z];
-                        if at[axis] + 1 >= self.n[axis] || at[u] == 0 || at[v] == 0 {
-                            continue;
-                        }
-                        let here = self.index(at);
-                        let inside = self.values[here] < 0.0;
-                        if inside != (self.values[here + step(axis)] < 0.0) {
-                            let cells = [here - step(u) - step(v), here - step(v), here, here - step(u)];
-                            see(cells, !inside);
-                        }
-                    }
+            for (z, y, x) in ndarray::indices((self.n[2], self.n[1], self.n[0])) {
+                let at = [x, y, z];
+                if at[axis] + 1 >= self.n[axis] || at[u] == 0 || at[v] == 0 {
+                    continue;
+                }
+                let here = self.index(at);
+                let inside = self.values[here] < 0.0;
+                if inside != (self.values[here + step(axis)] < 0.0) {
+                    let cells = [here - step(u) - step(v), here - step(v), here, here - step(u)];
+                    see(cells, !inside);
                 }
             }
         }

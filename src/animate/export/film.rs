@@ -60,22 +60,19 @@ impl<'a> Film<'a> {
     pub fn new(motion: &'a Motion, sound: Option<&Sound>, beside: SecondPanel<'a>) -> Self {
         let trunk = trunk_of(motion);
         let panel = |motion, view, label, label_px| FilmPanel { motion, view, label, label_px };
+        let own = |area, yaw, label, label_px| panel(motion, fitting(&[motion], area, yaw, trunk), label, label_px);
         let panels = match beside {
-            SecondPanel::Itself => vec![
-                panel(motion, fitting(&[motion], SIDE, 90.0, trunk), "from the left", SIDE[0] + 20.0),
-                panel(motion, fitting(&[motion], FRONT, 0.0, trunk), "", FRONT[0]),
-            ],
-            SecondPanel::Video { .. } => {
-                vec![panel(motion, fitting(&[motion], HALVES[1], 0.0, trunk), "", HALVES[1][0])]
+            SecondPanel::Itself => {
+                vec![own(SIDE, 90.0, "from the left", SIDE[0] + 20.0), own(FRONT, 0.0, "", FRONT[0])]
             }
-            SecondPanel::Motion { motion: other, labels } => [(motion, labels[0]), (other, labels[1])]
-                .into_iter()
-                .zip(HALVES)
-                .map(|((shown, label), area)| {
+            SecondPanel::Video { .. } => vec![own(HALVES[1], 0.0, "", HALVES[1][0])],
+            SecondPanel::Motion { motion: other, labels } => {
+                let half = |((shown, label), area): ((&'a Motion, _), Area)| {
                     let view = fitting(&[motion, other], area, 0.0, trunk);
                     panel(shown, FigureView { trunk: trunk_of(shown), ..view }, label, (area[0] + area[2]) / 2.0 - 40.0)
-                })
-                .collect(),
+                };
+                [motion, other].into_iter().zip(labels).zip(HALVES).map(half).collect()
+            }
         };
         let secs = motion.fps.secs(motion.n_frames());
         Self { motion, panels, wave: sound.map(|sound| loudness(sound, secs)).unwrap_or_default() }

@@ -28,6 +28,24 @@ impl Default for Constraints {
 
 impl Constraints {
     pub const NONE: Self = Self { limits: false, curl_coherence: false };
+
+    /// Constrains one frame of local rotations.
+    pub fn apply(self, rig: &Rig, local: &mut [Rotation], tally: &mut ClampTally) {
+        if self == Self::NONE {
+            return;
+        }
+        tally.n_frames += 1;
+        for arm in &rig.arms {
+            let mut pose = ArmPose::from_rotations(arm, local);
+            if self.limits {
+                limit(&mut pose, tally);
+            }
+            if self.curl_coherence {
+                cohere(&mut pose, tally);
+            }
+            pose.write(arm, local);
+        }
+    }
 }
 
 /// Kinds of clamps, with the number of such angles in both arms.
@@ -100,26 +118,6 @@ impl ClampTally {
                 largest_excess_degrees,
             })
             .collect()
-    }
-}
-
-impl Constraints {
-    /// Constrains one frame of local rotations.
-    pub fn apply(self, rig: &Rig, local: &mut [Rotation], tally: &mut ClampTally) {
-        if self == Self::NONE {
-            return;
-        }
-        tally.n_frames += 1;
-        for arm in &rig.arms {
-            let mut pose = ArmPose::from_rotations(arm, local);
-            if self.limits {
-                limit(&mut pose, tally);
-            }
-            if self.curl_coherence {
-                cohere(&mut pose, tally);
-            }
-            pose.write(arm, local);
-        }
     }
 }
 

@@ -8,7 +8,7 @@ use crate::demo::rule::dataset::SpokenClip;
 use crate::demo::rule::ridge::correlation;
 use crate::generate::GestureGenerator;
 use crate::metrics::movement::energy::MotionEnergy;
-use crate::metrics::position::pck::CorrectKeypoints;
+use crate::metrics::position::pck::{CorrectKeypoints, PckAxes};
 use crate::stage::progress::Progress;
 use crate::types::skeleton::{NECK, is_duplicate};
 use crate::types::time::FrameRate;
@@ -159,7 +159,7 @@ impl Judge<'_> {
         let mut errors = (0.0, 0.0);
         for (predicted, test) in predicted.iter().zip(self.tests) {
             let ground_truth = &test.sample.motion;
-            correct.count(predicted.view(), ground_truth.joints.view(), ground_truth.mask.view());
+            correct.count(PckAxes::Xyz, predicted.view(), ground_truth.joints.view(), ground_truth.mask.view());
             energy.add(predicted.view(), ground_truth.mask.view(), self.fps);
             reference_energy.add(ground_truth.joints.view(), ground_truth.mask.view(), self.fps);
             let held = held(test, self.fps);

@@ -62,17 +62,15 @@ pub fn table(lifters: &Lifters, sets: &[Set], n_scenes: usize) -> Result<Vec<Bod
         let (drop, clean) = (scenes(takes, Filming::Drop, n_scenes), scenes(takes, Filming::Clean, n_scenes));
         ensure!(!drop.is_empty(), "{set}: no take lasts for a scene of 4 s");
         let mean = mean_pose(&clean);
+        let (drop, clean) = (("drop", &drop[..]), ("clean", &clean[..]));
         let network = |scene: &FilmedScene| Ok(lifters.network.poses(&scene.seen, 1.0)?);
         rows.extend([
-            row(set, "orator lift", &drop, |scene| whole(&lifters.whole, scene))?,
-            row(set, "network alone", &drop, network)?,
-            BodyRow { input: "clean", ..row(set, "orator lift", &clean, |scene| whole(&lifters.whole, scene))? },
-            BodyRow { input: "clean", ..row(set, "bone-length depth", &clean, |s| Ok(with_bone_depth(s)))? },
-            BodyRow { input: "clean", ..row(set, "mean depth per joint", &clean, |s| Ok(with_mean_depth(s, &mean)))? },
-            BodyRow {
-                input: "clean",
-                ..row(set, "constant mean pose", &clean, |s| Ok(vec![Some(mean); s.truth.len()]))?
-            },
+            row(set, "orator lift", drop, |scene| whole(&lifters.whole, scene))?,
+            row(set, "network alone", drop, network)?,
+            row(set, "orator lift", clean, |scene| whole(&lifters.whole, scene))?,
+            row(set, "bone-length depth", clean, |scene| Ok(with_bone_depth(scene)))?,
+            row(set, "mean depth per joint", clean, |scene| Ok(with_mean_depth(scene, &mean)))?,
+            row(set, "constant mean pose", clean, |scene| Ok(vec![Some(mean); scene.truth.len()]))?,
         ]);
     }
     Ok(rows)
@@ -81,7 +79,7 @@ pub fn table(lifters: &Lifters, sets: &[Set], n_scenes: usize) -> Result<Vec<Bod
 fn row(
     set: &str,
     method: &'static str,
-    scenes: &[FilmedScene],
+    (input, scenes): (&'static str, &[FilmedScene]),
     lift: impl Fn(&FilmedScene) -> Result<Vec<Option<Pose>>>,
 ) -> Result<BodyRow> {
     let lifted = scenes.iter().map(|scene| Ok((scene, lift(scene)?))).collect::<Result<Vec<_>>>()?;
@@ -93,7 +91,7 @@ fn row(
     let by_yaw = BANDS.iter().map(band).collect();
     let n_frames: usize = scenes.iter().map(|s| s.truth.len()).sum();
     let complete_share = errors.n_frames as f64 / n_frames.max(1) as f64;
-    Ok(BodyRow { set: set.to_owned(), method, input: "drop", errors, by_yaw, complete_share })
+    Ok(BodyRow { set: set.to_owned(), method, input, errors, by_yaw, complete_share })
 }
 
 /// Lifts a scene with the whole of `orator lift`.

@@ -93,14 +93,10 @@ fn differences(path: &str, a: &Value, b: &Value, differ: &mut Vec<String>) {
             }
         }
         _ if a == b => {}
-        _ => differ.push(format!("{path} is {} in A and {} in B", shown(a), shown(b))),
-    }
-}
-
-fn shown(value: &Value) -> String {
-    match value {
-        Value::Null => "not set".to_owned(),
-        value => value.to_string(),
+        _ => {
+            let [a, b] = [a, b].map(|value| if value.is_null() { "not set".to_owned() } else { value.to_string() });
+            differ.push(format!("{path} is {a} in A and {b} in B"));
+        }
     }
 }
 

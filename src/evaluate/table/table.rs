@@ -162,6 +162,12 @@ impl Table {
         self.rows.iter().find(|row| row.kind == kind)
     }
 
+    /// Whether a metric of the prediction has a value in any row.
+    pub fn is_shown(&self, index: usize) -> bool {
+        let has_value = self.rows.iter().any(|row| row.values[index].value.is_finite());
+        self.definitions[index].better != Better::Neither && has_value
+    }
+
     /// Gain of `a` over `b` in a metric, in its unit, positive where `a` is better, with the interval of paired draws.
     /// NaN where neither direction of the metric is better.
     pub fn gain(&self, a: &PredictorRow, b: &PredictorRow, index: usize) -> Estimate {

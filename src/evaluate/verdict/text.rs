@@ -15,8 +15,7 @@ pub fn text(table: &Table, all: bool) -> String {
     let clips = if *n_clips == 1 { "clip" } else { "clips" };
     let mut text =
         format!("{n_clips} {clips}, {secs:.1} s, {n_frames} frames, {n_blocks} blocks of about {block_secs} s\n\n");
-    let is_shown =
-        |i: &usize| (all || is_main(table, *i)) && table.definitions[*i].better != Better::Neither && any(table, *i);
+    let is_shown = |i: &usize| (all || is_main(table, *i)) && table.is_shown(*i);
     let shown: Vec<usize> = (0..table.definitions.len()).filter(is_shown).collect();
     let first: Vec<String> = shown.iter().map(|i| named(table, *i)).collect();
     let width = first.iter().map(|name| name.chars().count()).max().unwrap_or(0);
@@ -77,10 +76,6 @@ fn is_main(table: &Table, index: usize) -> bool {
     let first = table.definitions.iter().position(|other| labels::whole_name(other) == name);
     let is_place = ["pck_3d", "mpjpe"].iter().any(|start| definition.name.starts_with(start));
     first == Some(index) || (is_place && ["body", "hands"].contains(&definition.part))
-}
-
-fn any(table: &Table, index: usize) -> bool {
-    table.rows.iter().any(|row| row.values[index].value.is_finite())
 }
 
 fn named(table: &Table, index: usize) -> String {

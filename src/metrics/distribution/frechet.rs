@@ -6,7 +6,7 @@
 
 use crate::math::eigen;
 use crate::types::skeleton::{N_JOINTS, NECK, is_duplicate};
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayView3, Axis};
+use ndarray::{Array1, Array2, ArrayView2, ArrayView3, Axis};
 use std::ops::AddAssign;
 
 const CM: f64 = 100.0;
@@ -71,7 +71,8 @@ impl AddAssign<&Self> for GaussianFit {
         let (own, others) = (self.n as f64 / n, other.n as f64 / n);
         let apart = &other.mean - &self.mean;
         self.scatter += &other.scatter;
-        self.scatter.scaled_add(own * others * n, &outer(apart.view()));
+        let column = apart.view().insert_axis(Axis(1));
+        self.scatter.scaled_add(own * others * n, &column.dot(&column.t()));
         self.mean.scaled_add(others, &apart);
         self.n += other.n;
     }
@@ -97,11 +98,6 @@ pub fn between(a: (&Array1<f64>, &Array2<f64>), b: (&Array1<f64>, &Array2<f64>))
     let root: f64 = eigenvalues.iter().map(|value| value.max(0.0).sqrt()).sum();
     let distance = apart.dot(&apart) + of_a.diag().sum() + of_b.diag().sum() - 2.0 * root;
     if distance.is_nan() { distance } else { distance.max(0.0) }
-}
-
-fn outer(v: ArrayView1<f64>) -> Array2<f64> {
-    let column = v.insert_axis(Axis(1));
-    column.dot(&column.t())
 }
 
 #[cfg(test)]

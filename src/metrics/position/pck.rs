@@ -166,16 +166,11 @@ impl CorrectKeypoints {
         self.all.share()
     }
 
-    /// Counts the joints of `predicted` [T, 49, 3] beside `ground_truth` [T, 49, 3], both metres, in space, where `mask` [T, 49] is
+    /// Counts the joints of `predicted` [T, 49, 3] beside `ground_truth` [T, 49, 3], both metres, where `mask` [T, 49] is
     /// true: correct when the distance is at most `ALPHA` of the largest side of the box around all real joints of
-    /// the frame that are seen, the neck left out. The radius is the same for every part. A predicted joint that is not
-    /// finite is wrong.
-    pub fn count(&mut self, predicted: ArrayView3<f32>, ground_truth: ArrayView3<f32>, mask: ArrayView2<bool>) {
-        self.count_in(PckAxes::Xyz, predicted, ground_truth, mask);
-    }
-
-    /// [`Self::count`] with distance and box in these axes.
-    pub fn count_in(
+    /// the frame that are seen, the neck left out, both in these axes. The radius is the same for every part. A
+    /// predicted joint that is not finite is wrong.
+    pub fn count(
         &mut self,
         axes: PckAxes,
         predicted: ArrayView3<f32>,
@@ -232,12 +227,12 @@ mod tests {
         let mut mask = Array2::from_elem((1, N_JOINTS), true);
         mask[[0, 4]] = false;
         let mut correct = CorrectKeypoints::default();
-        correct.count(predicted.view(), ground_truth.view(), mask.view());
+        correct.count(PckAxes::Xyz, predicted.view(), ground_truth.view(), mask.view());
         let count = |n_correct, n| KeypointCount { n_correct, n };
         assert_eq!(correct, CorrectKeypoints { all: count(45, 47), body: count(4, 5), hands: count(39, 40) });
         // without z, the box is a point
         let mut flat = CorrectKeypoints::default();
-        flat.count_in(PckAxes::Xy, predicted.view(), ground_truth.view(), mask.view());
+        flat.count(PckAxes::Xy, predicted.view(), ground_truth.view(), mask.view());
         assert_eq!(flat.body, count(3, 5));
         let mut twice = correct;
         twice += correct;

@@ -150,12 +150,11 @@ fn lanes_of(clip: &EvalClip, frames: Range<usize>, fps: f64, samples: Option<&[i
         let onsets = features.onsets.iter().filter(|onset| (start..end).contains(*onset)).map(|onset| onset - start);
         marks.push(("onset", onsets.collect()));
     }
-    let name =
-        "beats: from above the onsets of the sound, where the prediction's wrists are slowest, where the truth's are";
-    let name = if marks.len() == 3 {
-        name
-    } else {
-        "beats: above, where the prediction's wrists are slowest; below, where the truth's are"
+    let name = match marks.len() {
+        3 => {
+            "beats: from above the onsets of the sound, where the prediction's wrists are slowest, where the truth's are"
+        }
+        _ => "beats: above, where the prediction's wrists are slowest; below, where the truth's are",
     };
     all.push(Lane { name: name.to_owned(), lines: Vec::new(), marks });
     all

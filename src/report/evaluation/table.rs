@@ -4,7 +4,7 @@ use crate::evaluate::baseline::baselines::PredictorKind;
 use crate::evaluate::table::table::{N_COSTLY_DRAWS, N_DRAWS, Table};
 use crate::evaluate::verdict::labels;
 use crate::evaluate::verdict::verdict::{Answer, against_nothing};
-use crate::metrics::catalogue::{Better, Definition};
+use crate::metrics::catalogue::Definition;
 use crate::report::html;
 use crate::report::html::{Node, node};
 
@@ -55,8 +55,7 @@ fn group_of(definition: &Definition) -> usize {
 /// the part.
 fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
     let definition = &table.definitions[index];
-    let has_value = table.rows.iter().any(|row| row.values[index].value.is_finite());
-    if definition.better == Better::Neither || !has_value {
+    if !table.is_shown(index) {
         return None;
     }
     let whole = labels::whole_name(definition);

@@ -66,26 +66,22 @@ pub fn totals(sums: &ReportTotals, videos: &[VideoSummary], missing: &[String]) 
 
 /// Bar for each reason, the longest first.
 pub fn by_reason(sums: &ReportTotals) -> Vec<Node> {
-    let bar = |(reason, secs): (&String, &f64)| StackedBar {
-        name: reason.clone(),
-        class: reasons::class(reason),
-        secs: *secs,
-        description: reasons::heading(reason).to_owned(),
-    };
-    let mut parts: Vec<StackedBar> = sums.refused.iter().map(bar).collect();
-    parts.sort_by(|a, b| b.secs.total_cmp(&a.secs).then(a.name.cmp(&b.name)));
-    let other = |name: &str, class: &str, secs: f64, description: &str| StackedBar {
-        name: name.into(),
-        class: class.into(),
+    let bar = |name: &str, class: &str, secs: f64, description: &'static str| StackedBar {
+        name: name.to_owned(),
+        class: class.to_owned(),
         secs,
-        description: description.into(),
+        description,
     };
-    parts.insert(0, other("kept", "kept", sums.kept, "worth learning from"));
+    let of_reason =
+        |(reason, secs): (&String, &f64)| bar(reason, &reasons::class(reason), *secs, reasons::heading(reason));
+    let mut parts: Vec<StackedBar> = sums.refused.iter().map(of_reason).collect();
+    parts.sort_by(|a, b| b.secs.total_cmp(&a.secs).then(a.name.cmp(&b.name)));
+    parts.insert(0, bar("kept", "kept", sums.kept, "worth learning from"));
     if sums.failed > 0.0 {
-        parts.push(other("failed", "failed", sums.failed, "a stage failed"));
+        parts.push(bar("failed", "failed", sums.failed, "a stage failed"));
     }
     if sums.waiting > 0.0 {
-        parts.push(other(WAITING, "waiting", sums.waiting, "no verdict yet"));
+        parts.push(bar(WAITING, "waiting", sums.waiting, "no verdict yet"));
     }
     vec![bars("Seconds kept, refused by reason, and failed", &parts, sums.whole)]
 }

@@ -11,7 +11,7 @@ use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::metrics::distribution::frechet;
 use crate::metrics::distribution::frechet::{GaussianFit, frechet};
 use crate::metrics::movement::energy::MotionEnergy;
-use crate::metrics::position::pck::CorrectKeypoints;
+use crate::metrics::position::pck::{CorrectKeypoints, PckAxes};
 use crate::stage::progress::Progress;
 use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WRIST, is_duplicate, parent};
 use crate::types::time::FrameRate;
@@ -153,7 +153,7 @@ impl PredictorSums {
     }
 
     fn add(&mut self, predicted: ArrayView3<f32>, window: &ValidationWindow, of: &ValidationWindows) {
-        self.correct.count(predicted, window.ground_truth.view(), window.mask.view());
+        self.correct.count(PckAxes::Xyz, predicted, window.ground_truth.view(), window.mask.view());
         self.energy.add(predicted, window.mask.view(), of.fps);
         self.poses += &GaussianFit::fit(frechet::poses(predicted, window.mask.view(), &of.joints).view());
     }

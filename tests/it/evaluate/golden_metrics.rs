@@ -139,7 +139,7 @@ fn pck(axes: PckAxes, pairs: &[(Array3<f32>, Array3<f32>)]) -> Vec<f64> {
     let share = |(made, real): &(Array3<f32>, Array3<f32>)| {
         let mask = Array2::from_elem((real.len_of(Axis(0)), N_JOINTS), true);
         let mut correct = CorrectKeypoints::default();
-        correct.count_in(axes, made.view(), real.view(), mask.view());
+        correct.count(axes, made.view(), real.view(), mask.view());
         100.0 * correct.share()
     };
     pairs.iter().map(share).collect()

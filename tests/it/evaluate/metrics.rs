@@ -14,7 +14,7 @@ fn the_released_predictions_have_their_published_share_of_correct_keypoints() {
         };
         let (Some(real), Some(made)) = (clip("gt"), clip("prediction")) else { return };
         let mut correct = CorrectKeypoints::default();
-        correct.count_in(PckAxes::Xy, made.joints.view(), real.joints.view(), real.mask.view());
+        correct.count(PckAxes::Xy, made.joints.view(), real.joints.view(), real.mask.view());
         assert!((correct.share() - expected).abs() < 1e-4, "{number}: {}", correct.share());
     }
 }

@@ -10,7 +10,7 @@ pub struct StackedBar {
     pub class: String,
     pub secs: f64,
     /// Meaning in a sentence; may be empty.
-    pub description: String,
+    pub description: &'static str,
 }
 
 /// Table with a row a part in the given order; shares are of `whole_secs`.
@@ -21,7 +21,7 @@ pub fn bars(caption: &str, parts: &[StackedBar], whole_secs: f64) -> Node {
             .class(format!("bar {}", part.class))
             .attr("style", format!("width:{:.2}%", 100.0 * part.secs / longest));
         let name = node("th").attr("scope", "row").text(&part.name);
-        let name = if part.description.is_empty() { name } else { name.child(node("small").text(&part.description)) };
+        let name = if part.description.is_empty() { name } else { name.child(node("small").text(part.description)) };
         node("tr")
             .child(name)
             .child(node("td").class("barcell").child(bar))
