@@ -82,9 +82,9 @@ fn canonical(value: &Value) -> String {
 
 /// Adds one interval to the sums of its blocks, which start at 0. What belongs to several frames goes to the block of
 /// the first.
-type Measure = Box<dyn Fn(&PairedFrames, &mut BlockSums) + Send + Sync>;
+type IntervalMeasure = Box<dyn Fn(&PairedFrames, &mut BlockSums) + Send + Sync>;
 /// The numbers from added sums; NaN where undefined.
-type Values = Box<dyn Fn(&[f64]) -> Vec<f64> + Send + Sync>;
+type SumValues = Box<dyn Fn(&[f64]) -> Vec<f64> + Send + Sync>;
 
 /// A family of numbers that share their sums.
 pub(crate) struct MetricFamily {
@@ -92,8 +92,8 @@ pub(crate) struct MetricFamily {
     pub definitions: Vec<Definition>,
     /// How many sums it takes.
     pub n_sums: usize,
-    pub measure: Measure,
-    pub values: Values,
+    pub measure: IntervalMeasure,
+    pub values: SumValues,
     /// Whether the sums are large and the numbers slow (matrices): fewer draws.
     pub is_costly: bool,
 }
