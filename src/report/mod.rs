@@ -3,7 +3,9 @@
 
 pub mod evaluation;
 pub mod html;
+pub mod preview;
 pub mod sheet;
+pub mod splits;
 pub mod training;
 pub mod videos;
 

@@ -10,11 +10,11 @@ use crate::external::opencv::draw;
 use crate::pipeline::lift::quality::jitter_around;
 use crate::stage::progress::Progress;
 use crate::types::image::Image;
-use crate::types::pose2d::Keypoints;
+use crate::types::pose2d::{Keypoints, coco};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::{L_HAND, L_WRIST, N_HAND_JOINTS, R_HAND, R_WRIST};
 use anyhow::{Context, Result, ensure};
-use ndarray::Axis;
+use ndarray::{Array3, Axis};
 use std::path::Path;
 
 /// Rows of moments on a page.
@@ -164,17 +164,23 @@ impl SheetClip<'_> {
         draw::text(page, &self.words(frame_idx), [left as f32 + 6.0, (top + WORDS_PX - 6) as f32], 10.0, INK)
     }
 
-    /// Text over a moment: `3.0 s   wrists shake L 2.1 R 0.9 mm   not seen: left hand`.
+    /// Text over a moment: `3.0 s   wrists shake L 2.1 R 0.9 mm   refused: left hand`:
+    /// keypoints were found there, the joints are left out.
     fn words(&self, frame_idx: usize) -> String {
         let mask = self.motion.mask.row(frame_idx);
         let half_seen = |root: usize| (1..N_HAND_JOINTS).filter(|j| mask[root + j]).count() * 2 >= N_HAND_JOINTS;
-        let unseen = [
-            ("right wrist", mask[R_WRIST]),
-            ("left wrist", mask[L_WRIST]),
-            ("right hand", half_seen(R_HAND)),
-            ("left hand", half_seen(L_HAND)),
+        let Keypoints { body, left_hand, right_hand, .. } = self.keypoints;
+        let found = |points: &Array3<f32>, point: usize| points[[frame_idx, point, 2]] > 0.0;
+        let parts = [
+            ("right wrist", mask[R_WRIST], found(body, coco::R_WRIST)),
+            ("left wrist", mask[L_WRIST], found(body, coco::L_WRIST)),
+            ("right hand", half_seen(R_HAND), found(right_hand, 0)),
+            ("left hand", half_seen(L_HAND), found(left_hand, 0)),
         ];
-        let unseen: Vec<&str> = unseen.iter().filter(|(_, seen)| !seen).map(|(name, _)| *name).collect();
+        let without = |is_found: bool| {
+            let names = parts.iter().filter(|part| !part.1 && part.2 == is_found).map(|part| part.0);
+            names.collect::<Vec<_>>().join(", ")
+        };
         let shake = |joint: usize| jitter_around(self.motion, joint, frame_idx);
         let mut words = format!(
             "{:.1} s   wrists shake L {:.1} R {:.1} mm",
@@ -182,8 +188,10 @@ impl SheetClip<'_> {
             shake(L_WRIST),
             shake(R_WRIST)
         );
-        if !unseen.is_empty() {
-            words += &format!("   not seen: {}", unseen.join(", "));
+        for (why, parts) in [("refused", without(true)), ("not seen", without(false))] {
+            if !parts.is_empty() {
+                words += &format!("   {why}: {parts}");
+            }
         }
         words
     }

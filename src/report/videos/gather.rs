@@ -13,6 +13,8 @@ use crate::formats::joints_npz;
 use crate::formats::media_json::MediaInfo;
 use crate::formats::npz::Npz;
 use crate::pipeline::segment::Measures;
+use crate::report::preview::MotionPreview;
+use crate::report::preview::motion::MOST_PREVIEWS;
 use crate::stage::Unit;
 use crate::stage::artifacts::Artifact;
 use crate::stage::progress::Progress;
@@ -28,6 +30,8 @@ pub struct ReportData {
     pub spread: MeasureCounts,
     pub movement: MovementCounts,
     pub worst: Worst,
+    /// Moving previews of the first videos that have kept motion.
+    pub previews: Vec<MotionPreview>,
     /// Entries of the configuration without a video.
     pub missing: Vec<String>,
 }
@@ -41,6 +45,7 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
         spread: MeasureCounts::new(),
         movement: MovementCounts::new(),
         worst: Worst::new(n_pictures),
+        previews: Vec::new(),
         missing: missing.collect(),
     };
     let units: Vec<&Unit> = videos.iter().flat_map(|of| &of.units).collect();
@@ -83,7 +88,13 @@ impl ReportData {
         self.worst.add(self.videos.len(), &video.ledger, (&measures, &bone_change), &judged, rules);
         if video.is_lifted {
             match motion(work, &unit) {
-                Ok((motion, intervals)) => self.movement.add(&motion, &intervals.intervals),
+                Ok((motion, intervals)) => {
+                    self.movement.add(&motion, &intervals.intervals);
+                    if self.previews.len() < MOST_PREVIEWS {
+                        let preview = MotionPreview::new(&video.file, video.anchor(), &motion, &intervals.intervals);
+                        self.previews.extend(preview);
+                    }
+                }
                 Err(error) => video.note(&format!("Its motion is not shown: {error:#}")),
             }
         }

@@ -76,3 +76,55 @@
     setTimeout(() => { button.textContent = "Copy"; }, 1500);
   });
 })();
+
+// The previews: each figure moves while it is in view.
+(() => {
+  const { previews } = JSON.parse(document.getElementById("data").textContent);
+  const JOINTS = 49, MISSING = -32768;
+  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  const inView = new Set();
+  const figures = [...document.querySelectorAll("canvas[data-preview]")].map((canvas) => {
+    const { fps, joints } = previews.motions[Number(canvas.dataset.preview)];
+    const bytes = Uint8Array.from(atob(joints), (letter) => letter.charCodeAt(0));
+    const numbers = new Int16Array(bytes.buffer);
+    let [reach, top, bottom] = [300, -250, 350];
+    for (let i = 0; i < numbers.length; i += 2) {
+      if (numbers[i] === MISSING) continue;
+      reach = Math.max(reach, Math.abs(numbers[i]));
+      top = Math.min(top, numbers[i + 1]); bottom = Math.max(bottom, numbers[i + 1]);
+    }
+    return { canvas, fps, numbers, n: numbers.length / (2 * JOINTS), reach, top, bottom };
+  });
+  const draw = ({ canvas, fps, numbers, n, reach, top, bottom }, secs) => {
+    const pen = canvas.getContext("2d"), frame = Math.floor(secs * fps) % n;
+    const scale = 0.92 * Math.min(canvas.width / (2 * reach), canvas.height / (bottom - top));
+    const place = (joint) => {
+      const i = 2 * (frame * JOINTS + joint);
+      return numbers[i] === MISSING ? null
+        : [canvas.width / 2 + scale * numbers[i], (canvas.height - scale * (bottom + top)) / 2 + scale * numbers[i + 1]];
+    };
+    pen.clearRect(0, 0, canvas.width, canvas.height);
+    pen.lineCap = "round";
+    const colours = [colour("--ink"), colour("--left"), colour("--right")];
+    for (const [joint, parent, side] of previews.bones) {
+      const [from, to] = [place(parent), place(joint)];
+      if (!from || !to) continue;
+      pen.strokeStyle = colours[side];
+      pen.lineWidth = joint < 7 ? 4 : 1.6;
+      pen.beginPath(); pen.moveTo(...from); pen.lineTo(...to); pen.stroke();
+    }
+    canvas.dataset.frame = frame;
+  };
+  for (const figure of figures) draw(figure, 0);
+  if (still || !figures.length) return;
+  const watch = new IntersectionObserver((entries) => {
+    for (const { target, isIntersecting } of entries) inView[isIntersecting ? "add" : "delete"](target);
+  });
+  for (const { canvas } of figures) watch.observe(canvas);
+  const tick = (now) => {
+    for (const figure of figures) if (inView.has(figure.canvas)) draw(figure, now / 1000);
+    requestAnimationFrame(tick);
+  };
+  requestAnimationFrame(tick);
+})();

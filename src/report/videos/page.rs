@@ -9,6 +9,8 @@ use crate::config::Settings;
 use crate::config::videos::Videos;
 use crate::report::html::numbers::counted;
 use crate::report::html::{Page, Section};
+use crate::report::preview;
+use crate::report::splits;
 use crate::stage::progress::Progress;
 use serde_json::json;
 
@@ -68,7 +70,10 @@ fn draw(settings: &Settings, gathered: &mut ReportData, progress: &dyn Progress)
 fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sums: &ReportTotals) -> Page {
     let rules = &request.settings.segment;
     let per_sec = request.settings.extract.rate().per_sec();
-    let ReportData { videos, kept, spread, movement, worst, missing } = gathered;
+    let ReportData { videos, kept, spread, movement, worst, previews, missing } = gathered;
+    let splits = splits::of_videos(request.settings, request.videos);
+    let mut data = sliders::data(kept, videos, rules);
+    data["previews"] = preview::motion::data(previews);
     let names: Vec<&str> = request.videos.iter().map(|videos| videos.speaker.as_str()).collect();
     let section = |id, title, body| Section { id, title, body };
     Page {
@@ -80,7 +85,8 @@ fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sum
         sections: vec![
             section("totals", "Totals", summary::totals(sums, videos, missing)),
             section("reasons", "By reason", summary::by_reason(sums)),
-            section("videos", "Videos", summary::table(videos)),
+            section("videos", "Videos", summary::table(videos, &splits)),
+            section("previews", "Kept motion", preview::motion::section(previews)),
             section("timelines", "Timelines", timelines::lines(videos)),
             section("thresholds", "Thresholds", sliders::sliders(kept, rules)),
             section("frames", "Worst frames", gallery(worst, pictures, videos)),
@@ -89,6 +95,6 @@ fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sum
         ],
         style: include_str!("page.css"),
         script: include_str!("page.js"),
-        data: sliders::data(kept, videos, rules),
+        data,
     }
 }

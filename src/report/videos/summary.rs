@@ -7,6 +7,7 @@ use crate::report::html;
 use crate::report::html::chart::bars::{StackedBar, bars};
 use crate::report::html::numbers::{counted, length, percent};
 use crate::report::html::{Node, legend, node};
+use crate::report::splits::VideoSplits;
 use std::collections::BTreeMap;
 
 /// Seconds of all videos together.
@@ -52,7 +53,7 @@ pub fn totals(sums: &ReportTotals, videos: &[VideoSummary], missing: &[String]) 
     let share = |secs: f64| percent(secs, sums.whole);
     let n_failed = videos.iter().filter(|video| video.has_failed).count();
     let mut tiles = vec![
-        tile("Kept", "kept-secs", sums.kept, format!("{} in {}", share(sums.kept), counted(sums.n_kept, "stretch"))),
+        tile("Kept", "kept-secs", sums.kept, format!("{} in {}", share(sums.kept), counted(sums.n_kept, "interval"))),
         tile("Refused", "refused-secs", sums.refused_secs(), share(sums.refused_secs())),
         tile("Failed", "failed-secs", sums.failed, counted(n_failed, "video")),
         tile("All", "all-secs", sums.whole, counted(videos.len(), "video")),
@@ -60,8 +61,9 @@ pub fn totals(sums: &ReportTotals, videos: &[VideoSummary], missing: &[String]) 
     if sums.waiting > 0.0 {
         tiles.insert(3, tile("Not done yet", "waiting-secs", sums.waiting, share(sums.waiting)));
     }
+    let speakers = by_speaker(videos);
     let notes = missing.iter().map(|text| node("p").class("note").text(text));
-    std::iter::once(node("div").class("tiles").children(tiles)).chain(notes).collect()
+    std::iter::once(node("div").class("tiles").children(tiles)).chain(speakers).chain(notes).collect()
 }
 
 /// Bar for each reason, the longest first.
@@ -86,10 +88,32 @@ pub fn by_reason(sums: &ReportTotals) -> Vec<Node> {
     vec![bars("Seconds kept, refused by reason, and failed", &parts, sums.whole)]
 }
 
-/// Table of videos, linked to their timelines.
-pub fn table(videos: &[VideoSummary]) -> Vec<Node> {
-    let heads = [("Video", ""), ("Length", "num"), ("Kept", "num"), ("", "num"), ("Most refused for", "")];
-    let head = heads.into_iter().map(|(name, class)| node("th").class(class).attr("scope", "col").text(name));
+/// Table of the speakers, where there are several.
+fn by_speaker(videos: &[VideoSummary]) -> Option<Node> {
+    let mut of_speakers: BTreeMap<&str, Vec<VideoSummary>> = BTreeMap::new();
+    for video in videos {
+        of_speakers.entry(&video.unit.speaker).or_default().push(video.clone());
+    }
+    let row = |(speaker, videos): (&&str, &Vec<VideoSummary>)| {
+        let sums = ReportTotals::sum(videos);
+        node("tr")
+            .child(node("th").attr("scope", "row").class("name").text(speaker))
+            .child(node("td").class("num").text(counted(videos.len(), "video")))
+            .children([sums.whole, sums.kept].map(|secs| node("td").class("num").text(length(secs))))
+            .child(node("td").class("num").text(percent(sums.kept, sums.whole)))
+    };
+    let heads = [("Speaker", ""), ("", "num"), ("Length", "num"), ("Kept", "num"), ("", "num")];
+    (of_speakers.len() > 1).then(|| html::table("speakers", heads.map(head), of_speakers.iter().map(row)))
+}
+
+fn head((name, class): (&str, &str)) -> Node {
+    node("th").class(class).attr("scope", "col").text(name)
+}
+
+/// Table of videos, linked to their timelines. `splits` are the splits of each, where a dataset has it.
+pub fn table(videos: &[VideoSummary], splits: &VideoSplits) -> Vec<Node> {
+    let heads =
+        [("Video", ""), ("Length", "num"), ("Kept", "num"), ("", "num"), ("Split", ""), ("Most refused for", "")];
     let row = |video: &VideoSummary| {
         let link = node("a").attr("href", format!("#{}", video.anchor())).text(&video.file);
         let ledger = &video.ledger;
@@ -110,8 +134,9 @@ pub fn table(videos: &[VideoSummary]) -> Vec<Node> {
             .child(node("td").class("num").text(length(ledger.duration_secs)))
             .child(node("td").class("num").text(length(ledger.kept_secs())))
             .child(node("td").class("num").text(percent(ledger.kept_secs(), ledger.duration_secs)))
+            .child(node("td").text(splits.get(&video.unit.to_string()).map_or("", String::as_str)))
             .child(node("td").child(state))
     };
     let around = node("div").class("scroll").attr("tabindex", "0").attr("role", "region").attr("aria-label", "Videos");
-    vec![around.child(html::table("videos", head, videos.iter().map(row)))]
+    vec![around.child(html::table("videos", heads.map(head), videos.iter().map(row)))]
 }

@@ -51,6 +51,9 @@ fn look(project: &Project, facts: &Value) {
         (16.into(), 15.into(), 6.into())
     );
     assert!(facts["n_pictures"].as_u64().unwrap() > 0);
+    let drawn = "[...document.querySelectorAll('canvas[data-preview]')].filter(c => c.getContext('2d')\
+                 .getImageData(0, 0, c.width, c.height).data.some(v => v > 0)).length";
+    assert_eq!(browser.value(drawn), 1, "one video has kept motion, and it is drawn");
     let flat = "[...document.querySelectorAll('svg, .timeline > li, .bar')].filter(e => { const b = e.getBoundingClientRect(); \
                 return !(b.width > 0 && b.height > 0) }).length";
     let unread =

@@ -1,0 +1,5 @@
+//! Moving previews of lifted motion on a page.
+
+pub mod motion;
+
+pub use motion::MotionPreview;

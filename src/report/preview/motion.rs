@@ -1,0 +1,107 @@
+//! A few seconds of a kept interval as a figure that moves: joints from the front in whole millimetres, which bounds the
+//! page's size.
+
+use crate::report::evaluation::player::bones;
+use crate::report::html::{Node, node};
+use crate::types::interval::Interval;
+use crate::types::pose3d::Motion;
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::{Value, json};
+
+/// Longest preview, seconds, and its highest frame rate.
+const MOST_SECS: f64 = 8.0;
+const MOST_FPS: f64 = 10.0;
+/// Most previews on a page: 12 of them take 0.5 MB.
+pub const MOST_PREVIEWS: usize = 12;
+/// Value of a missing joint.
+const MISSING: i16 = i16::MIN;
+
+/// Beginning of the longest kept interval of a video.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MotionPreview {
+    name: String,
+    anchor: String,
+    fps: f64,
+    /// x and y of the joints, [T, 49, 2] in millimetres, i16, little endian.
+    joints: Vec<u8>,
+}
+
+impl MotionPreview {
+    /// Preview of the longest of `intervals`; none without an interval. `anchor` is the video's place on the page.
+    pub fn new(name: &str, anchor: String, motion: &Motion, intervals: &[Interval]) -> Option<Self> {
+        let longest = intervals.iter().max_by_key(|interval| (interval.n_frames(), usize::MAX - interval.start))?;
+        let fps = motion.fps.per_sec();
+        let step = (fps / MOST_FPS).ceil().max(1.0) as usize;
+        let most = (MOST_SECS * fps) as usize;
+        let end = longest.end.min(longest.start + most).min(motion.n_frames());
+        let millimetres =
+            |v: f32| if v.is_finite() { (1000.0 * v).round().clamp(-32_000.0, 32_000.0) as i16 } else { MISSING };
+        let mut joints = Vec::new();
+        for frame in (longest.start..end).step_by(step) {
+            for (joint, seen) in
+                motion.joints.index_axis(ndarray::Axis(0), frame).outer_iter().zip(motion.mask.row(frame))
+            {
+                let [x, y] = if *seen { [joint[0], joint[1]] } else { [f32::NAN; 2] }.map(millimetres);
+                joints.extend([x, y].map(i16::to_le_bytes).concat());
+            }
+        }
+        Some(Self { name: name.to_owned(), anchor, fps: fps / step as f64, joints })
+    }
+
+    fn data(&self) -> Value {
+        json!({ "fps": self.fps, "joints": STANDARD.encode(&self.joints) })
+    }
+}
+
+/// Data of the page's script.
+pub fn data(previews: &[MotionPreview]) -> Value {
+    json!({ "bones": bones(), "motions": previews.iter().map(MotionPreview::data).collect::<Vec<_>>() })
+}
+
+/// Section of previews; each moves while it is in view, and stands still where the reader asks for less motion.
+pub fn section(previews: &[MotionPreview]) -> Vec<Node> {
+    if previews.is_empty() {
+        return vec![node("p").class("empty").text("No interval is kept and lifted yet.")];
+    }
+    let figure = |(i, preview): (usize, &MotionPreview)| {
+        let label = format!("Kept motion of {}", preview.name);
+        let canvas =
+            node("canvas").attr("width", 240).attr("height", 240).attr("role", "img").attr("aria-label", label);
+        let link = node("a").attr("href", format!("#{}", preview.anchor)).text(&preview.name);
+        node("figure").class("preview card").child(canvas.attr("data-preview", i)).child(node("figcaption").child(link))
+    };
+    let about = format!(
+        "The beginning of the longest kept interval of each video (the first {MOST_PREVIEWS}), at most {MOST_SECS} s, as \
+         the camera sees it. Joints that are not seen are left out."
+    );
+    let shown = node("div").class("previews").children(previews.iter().enumerate().map(figure));
+    vec![node("p").text(about), shown]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::time::FrameRate;
+    use ndarray::{Array2, Array3};
+
+    #[test]
+    fn the_longest_interval_is_shown_from_its_beginning() {
+        let mut motion = Motion {
+            fps: FrameRate::new(20, 1),
+            joints: Array3::from_shape_fn(
+                (400, 49, 3),
+                |(t, joint, k)| if (joint, k) == (2, 1) { t as f32 / 1000.0 } else { 0.1 },
+            ),
+            mask: Array2::from_elem((400, 49), true),
+        };
+        motion.mask[[52, 3]] = false;
+        let intervals = [Interval { start: 0, end: 40 }, Interval { start: 50, end: 400 }];
+        let preview = MotionPreview::new("a.mp4", "a".into(), &motion, &intervals).unwrap();
+        let number = |i: usize| i16::from_le_bytes([preview.joints[2 * i], preview.joints[2 * i + 1]]);
+        assert_eq!((preview.fps, preview.joints.len()), (10.0, 80 * 49 * 4));
+        assert_eq!([number(5), number(4), number(98 + 5)], [50, 100, 52]);
+        assert_eq!([number(98 + 6), number(98 + 7), number(6)], [MISSING, MISSING, 100]);
+        assert_eq!(MotionPreview::new("a.mp4", "a".into(), &motion, &[]), None);
+    }
+}

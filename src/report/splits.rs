@@ -1,0 +1,30 @@
+//! Splits of the videos, from the datasets that were made of them.
+
+use crate::config::Settings;
+use crate::config::videos::Videos;
+use crate::dataset::Dataset;
+use crate::dataset::info::DatasetVideo;
+use crate::stage::artifacts::{StageName, speaker_dir};
+use crate::types::split::Split;
+use std::collections::BTreeMap;
+
+/// The splits of a video in words, by `speaker/video`.
+pub type VideoSplits = BTreeMap<String, String>;
+
+/// Splits of all videos that are in a dataset; a speaker without a dataset has none.
+pub fn of_videos(settings: &Settings, videos: &[Videos]) -> VideoSplits {
+    let mut splits = VideoSplits::new();
+    for Videos { speaker, .. } in videos {
+        let Ok(dataset) = Dataset::open(speaker_dir(&settings.work.dir, StageName::Dataset, speaker)) else { continue };
+        let named = dataset.info().videos.iter().filter(|video| video.samples > 0);
+        splits.extend(named.map(|video| (format!("{speaker}/{}", video.name), in_words(video))));
+    }
+    splits
+}
+
+/// Its split, or those of its blocks of time.
+fn in_words(video: &DatasetVideo) -> String {
+    let has =
+        |split: &Split| video.split == Some(*split) || video.blocks.iter().any(|block| block.split == Some(*split));
+    Split::ALL.into_iter().filter(has).map(Split::name).collect::<Vec<_>>().join(", ")
+}
