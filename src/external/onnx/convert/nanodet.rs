@@ -1,5 +1,5 @@
 //! NanoDet to boxes of people. Each cell of three grids foretells four distances to the sides of a box, each as a
-//! distribution over whole multiples of the grid's stride, whose mean counts (Li et al. 2020, section 3.2).
+//! distribution over whole multiples of the grid's stride, whose mean counts (Li et al. 2020, section 3).
 
 use super::graph::AttributeValue::{Int, Ints};
 use super::graph::OnnxGraph;
