@@ -37,6 +37,19 @@ pub enum AdversarialLoss {
     Log,
 }
 
+/// What tells speech from other sound.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SpeechRule {
+    /// The speech model where it is there, else loudness alone.
+    #[default]
+    Auto,
+    /// Loudness alone.
+    Loudness,
+    /// The speech model beside loudness; without the model nothing runs.
+    Vad,
+}
+
 /// What is put into a split.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -10,7 +10,7 @@ pub mod rules;
 pub mod sections;
 pub mod videos;
 
-pub use choices::{AdversarialLoss, ComputeDevice, MotionRepresentation, NetworkPreset, SplitUnit};
+pub use choices::{AdversarialLoss, ComputeDevice, MotionRepresentation, NetworkPreset, SpeechRule, SplitUnit};
 pub use config_path::ConfigPath;
 pub use file::Problem;
 pub use file::SourceLocation;

@@ -1,7 +1,7 @@
 //! The sections of `pipeline.toml` with their defaults. What each key means, its unit and its reason stand in the
 //! top level `pipeline.toml`; here are the types.
 
-use super::choices::{AdversarialLoss, ComputeDevice, MotionRepresentation, NetworkPreset, SplitUnit};
+use super::choices::{AdversarialLoss, ComputeDevice, MotionRepresentation, NetworkPreset, SpeechRule, SplitUnit};
 use super::config_path::ConfigPath;
 use crate::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
@@ -162,7 +162,11 @@ pub struct SegmentConfig {
     pub min_shoulder_px: f64,
     /// Least loudness of the second around a frame, dB of full scale.
     pub min_sound_db: f64,
-    /// Longest quiet stretch that is a pause of speech, seconds.
+    /// What tells speech from other sound.
+    pub speech: SpeechRule,
+    /// Least share of speech in the 4 s around a frame, 0..1, as the speech model tells it.
+    pub min_speech: f64,
+    /// Longest stretch, quiet or without speech, that is a pause of speech, seconds.
     pub max_quiet_secs: f64,
     /// Least change of a moving picture from frame to frame, steps of 8-bit colour.
     pub min_change: f64,
@@ -191,6 +195,8 @@ impl Default for SegmentConfig {
             min_hand_share: 0.5,
             min_shoulder_px: 40.0,
             min_sound_db: -50.0,
+            speech: SpeechRule::Auto,
+            min_speech: 0.4,
             max_quiet_secs: 3.0,
             min_change: 0.03,
             max_still_secs: 0.5,

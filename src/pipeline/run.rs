@@ -1,6 +1,7 @@
 //! A run of the pipeline: the stages of videos, video by video, then the datasets of the speakers.
 
 use super::pipeline::Pipeline;
+use super::segment::speech_rule::SpeechListener;
 use super::selection::Selection;
 use super::stages;
 use crate::config::Config;
@@ -111,6 +112,9 @@ impl Pipeline {
             0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
             n => n,
         };
+        if let Some(line) = SpeechListener::advice(settings)?.filter(|_| selection.has(StageName::Segment)) {
+            progress.event(&Event::Advice { line });
+        }
         let report = RunReport { n_speakers: alive.len(), ..RunReport::default() };
         let hashes = self.hashes();
         let mut run = StageRun { config: self.config(), hashes: &hashes, limits: (jobs, force), progress, report };

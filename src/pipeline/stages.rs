@@ -6,6 +6,7 @@ use super::lift::LiftStage;
 use super::lift::lifter::reach_secs;
 use super::pose2d::Pose2dStage;
 use super::segment::SegmentStage;
+use super::segment::speech_rule::SpeechListener;
 use crate::config::videos::Videos;
 use crate::config::{Config, Settings, videos};
 use crate::dataset::info::ModelUsed;
@@ -26,12 +27,15 @@ pub fn build(name: StageName, config: &Config, ready: &[Unit]) -> Result<Box<dyn
     Ok(match name {
         StageName::Extract => Box::new(ExtractStage::new(&settings.extract)),
         StageName::Pose2d => Box::new(Pose2dStage::new(settings)?),
-        StageName::Segment => Box::new(SegmentStage::new(&settings.segment, &settings.work.dir)),
+        StageName::Segment => Box::new(
+            SegmentStage::new(&settings.segment, &settings.work.dir).with_speech(SpeechListener::find(settings)?),
+        ),
         StageName::Lift => Box::new(LiftStage::new(&settings.lift, &settings.segment, &settings.work.dir)?),
         StageName::Dataset => Box::new(
             DatasetStage::new(settings, ready, reach_secs(&settings.lift))
                 .with_videos(videos::of(config))
-                .with_models(models_used(settings)?),
+                .with_models(models_used(settings)?)
+                .with_note(SpeechListener::note(settings)?),
         ),
     })
 }
@@ -73,5 +77,5 @@ fn models_used(settings: &Settings) -> Result<Vec<ModelUsed>> {
     let used = stage.used()?.into_iter();
     let named =
         used.map(|(role, entry)| ModelUsed { role: role.into(), id: entry.id.clone(), sha256: entry.sha256.clone() });
-    Ok(named.collect())
+    Ok(named.chain(SpeechListener::find(settings)?.map(|listener| listener.used())).collect())
 }

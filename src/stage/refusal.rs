@@ -9,6 +9,8 @@ pub enum Refusal {
     NoSound,
     /// Loudness, dB of full scale.
     Quiet,
+    /// Share of the sound that is speech.
+    NoSpeech,
     /// Seconds for which the picture stands still.
     Still,
     /// Best score of face and arms.
@@ -59,9 +61,10 @@ pub enum Refusal {
 
 impl Refusal {
     /// The reasons that `segment` and `lift` judge frames by.
-    pub const JUDGED: [Self; 18] = [
+    pub const JUDGED: [Self; 19] = [
         Self::NoSound,
         Self::Quiet,
+        Self::NoSpeech,
         Self::Still,
         Self::NoPerson,
         Self::Small,
@@ -90,6 +93,7 @@ impl Refusal {
         match self {
             Self::NoSound | Self::NoSoundFile => "no sound",
             Self::Quiet => "quiet",
+            Self::NoSpeech => "no speech",
             Self::Still => "still",
             Self::NoPerson => "no person",
             Self::Small => "too small",
@@ -134,6 +138,7 @@ impl Refusal {
             Self::NoseOff => "half shoulder widths",
             Self::Jump => "shoulder widths",
             Self::NoSound
+            | Self::NoSpeech
             | Self::NoPerson
             | Self::Face
             | Self::Arms
@@ -148,6 +153,7 @@ impl Refusal {
         match self {
             Self::NoSound => "no sound track, or it has ended",
             Self::Quiet => "the sound is too quiet for speech",
+            Self::NoSpeech => "the sound is not speech",
             Self::Still => "the picture stands still",
             Self::NoPerson => "nobody is seen",
             Self::Small => "the speaker is too small in the picture",
@@ -178,6 +184,9 @@ impl Refusal {
         match self {
             Self::NoSound => "no sound: there is no track, or it has ended".to_owned(),
             Self::Quiet => format!("too quiet: the sound is at {m:.0} dB, {t:.0} dB is needed"),
+            Self::NoSpeech => {
+                format!("no speech: {:.0} % of the sound is speech, at least {:.0} % are needed", 100.0 * m, 100.0 * t)
+            }
             Self::Still => format!("the picture stands still for {m:.1} s, {t:.1} s are allowed"),
             Self::NoPerson => format!("no person: face and arms score {m:.2} at best, {t:.2} is needed"),
             Self::Small => format!("too small: {m:.0} px between the shoulders, {t:.0} px are needed"),

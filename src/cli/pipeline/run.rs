@@ -9,6 +9,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use orator::config::Settings;
 use orator::external::onnx::{ModelError, ModelStore};
 use orator::pipeline::pose2d::models::wanted;
+use orator::pipeline::segment::speech_rule::SpeechListener;
 use orator::pipeline::{Pipeline, Selection};
 use orator::stage::artifacts::StageName;
 use serde_json::json;
@@ -60,8 +61,10 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     ui.tell_when_stopped("every stage of a video that is done is kept, and the same command goes on from there");
     let report = match pipeline.run(&selection, ui) {
         Err(error) if is_missing_model(&error) && ui.asks(&format!("{error:#}\nget the models now?")) => {
-            let Settings { models, pose2d, .. } = &pipeline.config().settings;
-            fetch(&ModelStore::open(&models.dir)?, &wanted(pose2d), None, ui)?;
+            let settings = &pipeline.config().settings;
+            let Settings { models, pose2d, .. } = settings;
+            let wanted: Vec<_> = wanted(pose2d).into_iter().chain(SpeechListener::wanted(settings)).collect();
+            fetch(&ModelStore::open(&models.dir)?, &wanted, None, ui)?;
             pipeline.run(&selection, ui)?
         }
         ended => ended?,

@@ -8,6 +8,7 @@ use orator::config::Settings;
 use orator::external::onnx::{Fetched, MANIFEST_FILE, ModelEntry, ModelError, ModelOrigin, ModelState, ModelStore};
 use orator::external::onnx::{Runtime, Wanted};
 use orator::pipeline::pose2d::models;
+use orator::pipeline::segment::speech_rule::SpeechListener;
 use orator::stage::progress::Progress as _;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -67,17 +68,18 @@ enum ModelsVerb {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    let Settings { models: place, pose2d, .. } = settings(&args)?;
+    let settings = settings(&args)?;
+    let Settings { models: place, pose2d, .. } = &settings;
     let mut store = ModelStore::open(&place.dir)?;
     let runtime = || Runtime::load(&place.onnxruntime, &place.dir);
-    let resolved = models::choose(&pose2d, &store)?;
+    let resolved = models::choose(pose2d, &store)?;
     let chosen = models::keys(&resolved).map(|(_, _, id)| id.clone());
     match &args.verb {
         ModelsVerb::List => list(&store, &chosen, ui),
         ModelsVerb::Fetch { ids, all, mirror } => {
-            let wanted = match (all, ids.as_slice()) {
+            let wanted: Vec<Wanted> = match (all, ids.as_slice()) {
                 (true, _) => store.entries(&[])?.into_iter().map(|entry| Wanted::Id(entry.id.clone())).collect(),
-                (false, []) => models::wanted(&pose2d),
+                (false, []) => models::wanted(pose2d).into_iter().chain(SpeechListener::wanted(&settings)).collect(),
                 (false, ids) => ids.iter().cloned().map(Wanted::Id).collect(),
             };
             fetch(&store, &wanted, mirror.as_deref(), ui)

@@ -36,6 +36,9 @@ body = "body-marker"
 hand = "hand-marker"
 palm = ""
 
+[segment]
+speech = "loudness"                # its speech is made of tones, which the speech model rightly takes for none
+
 [gan]
 learning_rate = 5e-4               # for hundreds of steps on a minute of speech; the defaults are for hours of it
 lambda_gan = 0.15                  # 1 moves nearly three times as much as the data after 600 steps

@@ -53,6 +53,9 @@ impl ModelEntry {
     /// Says what is wrong with the description, before any file is opened.
     pub(crate) fn check(&self) -> Result<()> {
         ensure!(plain(&self.id), "id must be a plain name");
+        if self.role == ModelRole::Speech {
+            return super::speech::check(self);
+        }
         ensure!(self.inputs.len() == 1, "it must have exactly one input, not {}", self.inputs.len());
         let [height, width] = self.input_size()?;
         let numbers = [self.picture.scale].into_iter().chain(self.picture.mean).chain(self.picture.std);

@@ -33,8 +33,12 @@ pub struct ModelEntry {
     pub conversion: Option<String>,
     pub inputs: Vec<Port>,
     pub outputs: Vec<Port>,
+    /// What a model of pictures is fed; a speech model has none of these three.
+    #[serde(default)]
     pub picture: InputPicture,
+    #[serde(default)]
     pub fit: PictureFit,
+    #[serde(default)]
     pub decode: Decode,
     #[serde(default, skip_serializing_if = "KeypointOutputs::is_empty")]
     pub points: KeypointOutputs,
@@ -50,6 +54,7 @@ pub enum ModelRole {
     Body,
     Hand,
     Palm,
+    Speech,
     Other,
 }
 
@@ -79,6 +84,12 @@ pub struct InputPicture {
     pub std: [f64; 3],
 }
 
+impl Default for InputPicture {
+    fn default() -> Self {
+        Self { channels: Channels::Rgb, axes: TensorAxes::Nchw, scale: one(), mean: [0.0; 3], std: ones() }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Channels {
@@ -94,7 +105,7 @@ pub enum TensorAxes {
 }
 
 /// How the picture gets into the input.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum PictureFit {
     /// The whole picture, its shape kept, grey level `pad` around it.
@@ -102,6 +113,7 @@ pub enum PictureFit {
     /// A person's box grown to the input's shape, then by `margin`; outside black.
     Box { margin: f64 },
     /// A rotated square; outside black.
+    #[default]
     Region,
 }
 
@@ -113,7 +125,7 @@ pub enum Anchor {
 }
 
 /// What the outputs mean; the names are names of outputs.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Decode {
     Detections {
@@ -156,7 +168,8 @@ pub enum Decode {
         wrist: usize,
         middle: usize,
     },
-    /// Read by no stage.
+    /// Read by no stage, or by the code of its role.
+    #[default]
     None,
 }
 

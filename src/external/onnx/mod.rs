@@ -12,6 +12,7 @@ mod package;
 pub mod port;
 pub mod runtime;
 pub mod source;
+pub mod speech;
 pub mod store;
 
 pub use entry::*;

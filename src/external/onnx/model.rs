@@ -1,7 +1,7 @@
 //! One opened model: its file was checked against the manifest (there, the right bytes, the right names and shapes), it
 //! owns its input buffer, and it counts the seconds spent inside ONNX Runtime.
 
-use super::{ModelEntry, Port, Runtime};
+use super::{ModelEntry, ModelRole, Port, Runtime};
 use anyhow::{Context, Result, anyhow};
 use ort::session::builder::GraphOptimizationLevel;
 use ort::session::{Session, SessionOutputs};
@@ -56,29 +56,7 @@ impl Model {
     /// # Errors
     /// Each an `ModelError`: missing, unreadable, wrong hash, not ONNX, wrong layout.
     pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self, ModelError> {
-        let path = dir.join(&entry.file);
-        let id = || entry.id.clone();
-        if !path.exists() {
-            return Err(ModelError::Missing { id: id(), path });
-        }
-        let bytes = match std::fs::read(&path) {
-            Ok(bytes) => bytes,
-            Err(error) => return Err(ModelError::Unreadable { id: id(), path, error: error.to_string() }),
-        };
-        let found = hex(&Sha256::digest(&bytes));
-        if !found.eq_ignore_ascii_case(&entry.sha256) {
-            return Err(ModelError::WrongHash { id: id(), path, expected: entry.sha256.clone(), found });
-        }
-        let session = session(runtime, &bytes).map_err(|error| ModelError::NotOnnx {
-            id: id(),
-            path: path.clone(),
-            error: error.to_string(),
-        })?;
-        let differs = mismatch("input", session.inputs(), &entry.inputs, true)
-            .or_else(|| mismatch("output", session.outputs(), &entry.outputs, false));
-        if let Some((port, expected, found)) = differs {
-            return Err(ModelError::WrongLayout { id: id(), path, port, expected, found });
-        }
+        let session = open_session(runtime, entry, dir)?;
         let shape = entry.inputs.first().map(|port| port.shape.clone()).unwrap_or_default();
         let size = shape.iter().map(|side| usize::try_from(*side).unwrap_or(0)).product();
         let input = vec![0.0; size];
@@ -161,6 +139,36 @@ fn hex(bytes: &[u8]) -> String {
         let _ = write!(text, "{byte:02x}");
         text
     })
+}
+
+/// Opens the file of `entry` in the folder `dir`: the right bytes, names and shapes.
+pub(super) fn open_session(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Session, ModelError> {
+    // The rate of sound is a whole number; pictures are not.
+    let is_speech = entry.role == ModelRole::Speech;
+    let path = dir.join(&entry.file);
+    let id = || entry.id.clone();
+    if !path.exists() {
+        return Err(ModelError::Missing { id: id(), path });
+    }
+    let bytes = match std::fs::read(&path) {
+        Ok(bytes) => bytes,
+        Err(error) => return Err(ModelError::Unreadable { id: id(), path, error: error.to_string() }),
+    };
+    let found = hex(&Sha256::digest(&bytes));
+    if !found.eq_ignore_ascii_case(&entry.sha256) {
+        return Err(ModelError::WrongHash { id: id(), path, expected: entry.sha256.clone(), found });
+    }
+    let session = session(runtime, &bytes).map_err(|error| ModelError::NotOnnx {
+        id: id(),
+        path: path.clone(),
+        error: error.to_string(),
+    })?;
+    let differs = mismatch("input", session.inputs(), &entry.inputs, !is_speech)
+        .or_else(|| mismatch("output", session.outputs(), &entry.outputs, false));
+    if let Some((port, expected, found)) = differs {
+        return Err(ModelError::WrongLayout { id: id(), path, port, expected, found });
+    }
+    Ok(session)
 }
 
 /// One thread, no spinning, everything optimised, the same numbers on every run.

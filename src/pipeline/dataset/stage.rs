@@ -36,6 +36,7 @@ pub struct DatasetStage {
     /// All videos of all speakers, with the splits that the configuration names.
     all: Vec<Videos>,
     models: Vec<ModelUsed>,
+    notes: Vec<String>,
     /// Frames between two splits of a video that is divided by time.
     guard_frames: usize,
     fps: FrameRate,
@@ -54,6 +55,7 @@ impl DatasetStage {
             ready: ready.to_vec(),
             all: Vec::new(),
             models: Vec::new(),
+            notes: Vec::new(),
             guard_frames: division::guard_frames(settings, reach_secs),
             fps: settings.extract.rate(),
             window_frames: division::window_frames(settings),
@@ -68,6 +70,12 @@ impl DatasetStage {
     /// Names the models that looked at the videos in `info.json`.
     pub fn with_models(self, models: Vec<ModelUsed>) -> Self {
         Self { models, ..self }
+    }
+
+    /// Adds a sentence for the readers of the dataset.
+    pub fn with_note(mut self, note: String) -> Self {
+        self.notes.push(note);
+        self
     }
 
     fn ready(&self, speaker: &Unit) -> Vec<&Unit> {
@@ -102,8 +110,8 @@ impl DatasetStage {
     fn about(&self, speaker: &Unit, first: &LiftedVideo) -> About {
         let said = self.speakers.iter().find(|said| said.name == speaker.speaker).cloned().unwrap_or_default();
         let config::SpeakerConfig { licence, consent, source, .. } = said;
-        let models = self.models.clone();
-        About { models, licence, consent, source, ..About::new(&speaker.speaker, first.intervals.fps) }
+        let (models, notes) = (self.models.clone(), self.notes.clone());
+        About { models, notes, licence, consent, source, ..About::new(&speaker.speaker, first.intervals.fps) }
     }
 }
 
@@ -143,7 +151,7 @@ impl Stage for DatasetStage {
         let guard_secs = rule.as_ref().map_or(0.0, |rule| rule.guard_secs);
         serde_json::json!({
             "unit": rule.map(|rule| rule.unit), "guard_secs": guard_secs,
-            "dataset": self.settings, "models": self.models, "tool": env!("CARGO_PKG_VERSION"),
+            "dataset": self.settings, "models": self.models, "notes": self.notes, "tool": env!("CARGO_PKG_VERSION"),
             "speaker": { "licence": said.licence, "consent": said.consent, "source": said.source },
             "splits": videos.map(|videos| &videos.splits), "others": others,
         })

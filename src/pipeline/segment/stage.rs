@@ -5,6 +5,7 @@ use super::judge::judge;
 use super::measure;
 use super::measure::Measures;
 use super::sound;
+use super::speech_rule::SpeechListener;
 use crate::config;
 use crate::formats::keypoints_npz;
 use crate::formats::media_json::MediaInfo;
@@ -21,12 +22,19 @@ use std::path::{Path, PathBuf};
 pub struct SegmentStage {
     rules: config::SegmentConfig,
     work: PathBuf,
+    /// The speech model; `None`: loudness alone tells speech.
+    speech: Option<SpeechListener>,
 }
 
 impl SegmentStage {
     /// Judges by `rules`; reads the earlier stages' files under the folder `work`.
     pub fn new(rules: &config::SegmentConfig, work: &Path) -> Self {
-        Self { rules: rules.clone(), work: work.to_owned() }
+        Self { rules: rules.clone(), work: work.to_owned(), speech: None }
+    }
+
+    /// Listens for speech with this model.
+    pub fn with_speech(self, speech: Option<SpeechListener>) -> Self {
+        Self { speech, ..self }
     }
 
     fn file(&self, file: Artifact, unit: &Unit) -> PathBuf {
@@ -40,11 +48,12 @@ impl Stage for SegmentStage {
     }
 
     fn version(&self) -> u32 {
-        5
+        6
     }
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
-        serde_json::json!({ "segment": self.rules })
+        let model = self.speech.as_ref().map(SpeechListener::used);
+        serde_json::json!({ "segment": self.rules, "speech_model": model })
     }
 
     fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
@@ -68,7 +77,10 @@ impl Stage for SegmentStage {
         write_json(&Artifact::SegmentIntervals.within(out), &intervals)?;
         write_json(&Artifact::SegmentLedger.within(out), &ledger)?;
         measures.write(&Artifact::Measures.within(out))?;
-        Ok(report(&intervals, &ledger))
+        let mut report = report(&intervals, &ledger);
+        let rule = if self.speech.is_some() { "vad" } else { "loudness" };
+        report.facts.insert("speech".to_owned(), rule.into());
+        Ok(report)
     }
 }
 
@@ -92,9 +104,14 @@ impl SegmentStage {
         );
         let (sound, sound_db) = sound::levels(&self.file(Artifact::Sound, unit), video.fps, n_frames)?;
         let of_body = Measures::from_keypoints(&keypoints);
+        let speech = match &self.speech {
+            Some(listener) => listener.shares(&self.file(Artifact::Sound, unit), video.fps, n_frames)?,
+            None => vec![f32::NAN; n_frames],
+        };
         Ok(Measures {
             sound,
             sound_db,
+            speech,
             frame_difference: timeline.frame_difference,
             n_people: extras.n_people.iter().map(|&n| n as f32).collect(),
             identity: measure::identity(&extras.identity.to_vec(), &timeline.restart, &of_body.jump),

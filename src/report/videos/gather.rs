@@ -34,6 +34,8 @@ pub struct ReportData {
     pub previews: Vec<MotionPreview>,
     /// Entries of the configuration without a video.
     pub missing: Vec<String>,
+    /// Videos whose sound the speech model listened to, and videos that were measured.
+    pub n_heard: (usize, usize),
 }
 
 /// Collects the data of all `videos`, at most `n_pictures` moments a rule.
@@ -47,6 +49,7 @@ pub fn gather(settings: &Settings, videos: &[Videos], n_pictures: usize, progres
         worst: Worst::new(n_pictures),
         previews: Vec::new(),
         missing: missing.collect(),
+        n_heard: (0, 0),
     };
     let units: Vec<&Unit> = videos.iter().flat_map(|of| &of.units).collect();
     let task = progress.begin("reading", units.len() as u64);
@@ -78,6 +81,8 @@ impl ReportData {
                 return None;
             }
         };
+        self.n_heard.0 += usize::from(measures.speech.iter().any(|share| !share.is_nan()));
+        self.n_heard.1 += 1;
         self.spread.add_frames(&measures);
         let bones = if video.is_lifted { bone_change(work, &unit) } else { Ok(Vec::new()) };
         let bone_change = bones.unwrap_or_else(|error| {

@@ -70,12 +70,16 @@ fn draw(settings: &Settings, gathered: &mut ReportData, progress: &dyn Progress)
 fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sums: &ReportTotals) -> Page {
     let rules = &request.settings.segment;
     let per_sec = request.settings.extract.rate().per_sec();
-    let ReportData { videos, kept, spread, movement, worst, previews, missing } = gathered;
+    let ReportData { videos, kept, spread, movement, worst, previews, missing, n_heard } = gathered;
     let splits = splits::of_videos(request.settings, request.videos);
     let mut data = sliders::data(kept, videos, rules);
     data["previews"] = preview::motion::data(previews);
     let names: Vec<&str> = request.videos.iter().map(|videos| videos.speaker.as_str()).collect();
     let section = |id, title, body| Section { id, title, body };
+    let mut reasons = summary::by_reason(sums);
+    if n_heard.1 > 0 {
+        reasons.push(summary::speech(*n_heard));
+    }
     Page {
         title: format!("Report on {}", names.join(", ")),
         lead: format!(
@@ -84,7 +88,7 @@ fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sum
         ),
         sections: vec![
             section("totals", "Totals", summary::totals(sums, videos, missing)),
-            section("reasons", "By reason", summary::by_reason(sums)),
+            section("reasons", "By reason", reasons),
             section("videos", "Videos", summary::table(videos, &splits)),
             section("previews", "Kept motion", preview::motion::section(previews)),
             section("timelines", "Timelines", timelines::lines(videos)),

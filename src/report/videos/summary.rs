@@ -66,6 +66,18 @@ pub fn totals(sums: &ReportTotals, videos: &[VideoSummary], missing: &[String]) 
     std::iter::once(node("div").class("tiles").children(tiles)).chain(speakers).chain(notes).collect()
 }
 
+/// What told speech from other sound.
+pub fn speech((n_heard, n_videos): (usize, usize)) -> Node {
+    let text = match n_heard {
+        0 => "Speech was told by loudness alone; min_speech changes nothing.".to_owned(),
+        n if n == n_videos => "Speech was told by the speech model beside loudness.".to_owned(),
+        n => {
+            format!("Speech was told by the speech model in {n} of {n_videos} videos, by loudness alone in the others.")
+        }
+    };
+    node("p").class("note").text(text)
+}
+
 /// Bar for each reason, the longest first.
 pub fn by_reason(sums: &ReportTotals) -> Vec<Node> {
     let bar = |name: &str, class: &str, secs: f64, description: &'static str| StackedBar {

@@ -85,6 +85,7 @@ mod tests {
         Measures {
             sound: of(1.0),
             sound_db: of(-20.0),
+            speech: of(0.9),
             frame_difference: of(5.0),
             person: of(0.9),
             shoulder_px: of(120.0),

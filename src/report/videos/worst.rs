@@ -151,6 +151,7 @@ fn said(refusal: Refusal, value: f64) -> String {
     let value = number(value);
     match refusal {
         Refusal::Quiet => format!("{value} dB here"),
+        Refusal::NoSpeech => format!("share of speech {value} here"),
         Refusal::Still => format!("change of {value} steps here"),
         Refusal::Small => format!("{value} px here"),
         Refusal::Turned => format!("{value} neck-nose distances here"),

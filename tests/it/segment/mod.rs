@@ -2,3 +2,4 @@
 
 pub mod redecide;
 pub mod segment;
+pub mod speech;

@@ -1,0 +1,93 @@
+//! The model that tells speech (Silero VAD, version 6, 16 kHz): it is fed windows of sound one after the other, beside a
+//! little of the window before and the state that its last answer left.
+
+use super::model::open_session;
+use super::{ModelEntry, ModelError, Port, Runtime};
+use anyhow::{Context, Result, anyhow, ensure};
+use ort::session::Session;
+use ort::value::TensorRef;
+use std::path::Path;
+
+/// Samples of a window, at 16 kHz.
+pub const WINDOW: usize = 512;
+/// Samples of the window before that are fed again.
+const CONTEXT: usize = 64;
+/// Shape of the state.
+const STATE: [i64; 3] = [2, 1, 128];
+/// Rate, which is an input of its own.
+const RATE: i64 = 16_000;
+/// Names of its inputs and outputs.
+const INPUTS: [&str; 3] = ["input", "state", "sr"];
+const OUTPUTS: [&str; 2] = ["output", "stateN"];
+
+/// The model ready to listen to a sound from its beginning, on one thread.
+pub struct SpeechModel {
+    id: String,
+    session: Session,
+    /// Context, then the window.
+    input: [f32; CONTEXT + WINDOW],
+    state: Vec<f32>,
+}
+
+impl SpeechModel {
+    /// Opens the file of `entry` in the folder `dir`.
+    ///
+    /// # Errors
+    /// What is wrong with the file.
+    pub fn open(runtime: &Runtime, entry: &ModelEntry, dir: &Path) -> Result<Self, ModelError> {
+        let session = open_session(runtime, entry, dir)?;
+        let n_state: i64 = STATE.iter().product();
+        Ok(Self {
+            id: entry.id.clone(),
+            session,
+            input: [0.0; CONTEXT + WINDOW],
+            state: vec![0.0; usize::try_from(n_state).unwrap_or_default()],
+        })
+    }
+
+    /// Probability of speech, 0..1, in the next window of the sound; one of fewer than 512 samples ends in silence.
+    ///
+    /// # Errors
+    /// A window that is too long; an answer of another shape.
+    pub fn probability(&mut self, window: &[f32]) -> Result<f32> {
+        ensure!(window.len() <= WINDOW, "a window of {} samples, expected {WINDOW}", window.len());
+        let (sound, silence) = self.input[CONTEXT..].split_at_mut(window.len());
+        sound.copy_from_slice(window);
+        silence.fill(0.0);
+        let failed = |error: &dyn std::fmt::Display| anyhow!("the model {} failed: {error}", self.id);
+        let shape = [1, (CONTEXT + WINDOW) as i64];
+        let inputs = ort::inputs![
+            INPUTS[0] => TensorRef::from_array_view((shape, self.input.as_slice())).map_err(|e| failed(&e))?,
+            INPUTS[1] => TensorRef::from_array_view((STATE, self.state.as_slice())).map_err(|e| failed(&e))?,
+            INPUTS[2] => TensorRef::from_array_view(((), [RATE].as_slice())).map_err(|e| failed(&e))?,
+        ];
+        let outputs = self.session.run(inputs).map_err(|error| anyhow!("the model {} failed: {error}", self.id))?;
+        let read = |name: &str| -> Result<&[f32]> {
+            let value = outputs.get(name).with_context(|| format!("the model {} gave no output {name:?}", self.id))?;
+            Ok(value.try_extract_tensor::<f32>().map_err(|error| anyhow!("the model {}: {error}", self.id))?.1)
+        };
+        let (probability, state) = (read(OUTPUTS[0])?, read(OUTPUTS[1])?);
+        ensure!(
+            probability.len() == 1 && state.len() == self.state.len(),
+            "the model {} gave {} probabilities and a state of {} numbers",
+            self.id,
+            probability.len(),
+            state.len()
+        );
+        let probability = probability[0];
+        self.state.copy_from_slice(state);
+        self.input.copy_within(WINDOW.., 0);
+        Ok(probability)
+    }
+}
+
+/// Says what is wrong with the description of a speech model: its inputs and outputs are those of this file.
+pub(super) fn check(entry: &ModelEntry) -> Result<()> {
+    let shapes: [&[i64]; 3] = [&[1, (CONTEXT + WINDOW) as i64], &STATE, &[]];
+    let is_it = |(port, (name, shape)): (&Port, (&str, &[i64]))| port.name == name && port.shape == shape;
+    let is_fed = entry.inputs.len() == 3 && entry.inputs.iter().zip(INPUTS.into_iter().zip(shapes)).all(is_it);
+    ensure!(is_fed, "a speech model has the inputs input [1, 576], state [2, 1, 128] and sr []");
+    let answers = |name: &str| entry.outputs.iter().any(|port| port.name == name);
+    ensure!(OUTPUTS.into_iter().all(answers), "a speech model has the outputs output and stateN");
+    Ok(())
+}
