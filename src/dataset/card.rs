@@ -1,6 +1,6 @@
 //! Dataset card `README.md`: a YAML header in the hubs' form, and a description for readers.
 
-use super::info::DatasetInfo;
+use super::info::{DatasetInfo, ModelUsed};
 use super::leakage::Leakage;
 use super::split::{Split, SplitRule};
 use super::stats::DatasetStats;
@@ -42,8 +42,10 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
     );
     let _ = write!(
         text,
-        "\n## Reading it\n\n```python\nfrom datasets import load_dataset\n\
-         # sound is decoded by torchcodec\nmotion = load_dataset(\"webdataset\", data_files={{\"train\": \"train-*.tar\"}}, split=\"train\")\n```\n\n\
+        "\n## Reading it\n\n```python\nfrom datasets import Audio, load_dataset\n\
+         Audio.encode_example = lambda self, value: value  # the sound stays a wav file: no torchcodec is needed\n\
+         rows = load_dataset(\"webdataset\", data_files={{\"train\": \"train-*.tar\"}}, split=\"train\")\n\
+         rows = rows.cast_column(\"wav\", Audio(decode=False))\n```\n\n\
          ```python\nimport glob, webdataset\n\
          motion = webdataset.WebDataset(sorted(glob.glob(\"train-*.tar\")), shardshuffle=False).decode()\n```\n\n\
          `orator dataset verify --deep .` checks every byte; so does `b3sum --check checksums.b3`.\n\n\
@@ -69,7 +71,9 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
         said(&info.consent),
         said(&info.source)
     );
-    let models: Vec<String> = info.models.iter().map(|model| format!("{} ({})", model.id, model.role)).collect();
+    let terms = |licence: &str| if licence.is_empty() { String::new() } else { format!(", licence {licence}") };
+    let model = |model: &ModelUsed| format!("{} ({}{})", model.id, model.role, terms(&model.licence));
+    let models: Vec<String> = info.models.iter().map(model).collect();
     let models = if models.is_empty() { String::new() } else { format!(" with the models {}", models.join(", ")) };
     let _ = write!(text, "\nMade by {}{models}.", info.tool);
     info.notes.iter().for_each(|note| text += &format!(" {note}"));

@@ -94,6 +94,9 @@ pub struct ModelUsed {
     pub role: String,
     pub id: String,
     pub sha256: String,
+    /// Terms of the weights; empty in older datasets.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub licence: String,
 }
 
 /// Size of a split.

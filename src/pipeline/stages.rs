@@ -10,7 +10,7 @@ use super::segment::speech_rule::SpeechListener;
 use crate::config::videos::Videos;
 use crate::config::{Config, Settings, videos};
 use crate::dataset::info::ModelUsed;
-use crate::external::onnx::{Model, Runtime};
+use crate::external::onnx::{Model, ModelEntry, Runtime};
 use crate::stage::artifacts::StageName;
 use crate::stage::fingerprint::HashCache;
 use crate::stage::runner;
@@ -74,8 +74,9 @@ pub fn check_models(settings: &Settings) -> Result<()> {
 
 fn models_used(settings: &Settings) -> Result<Vec<ModelUsed>> {
     let stage = Pose2dStage::new(settings)?;
-    let used = stage.used()?.into_iter();
-    let named =
-        used.map(|(role, entry)| ModelUsed { role: role.into(), id: entry.id.clone(), sha256: entry.sha256.clone() });
+    let named = stage.used()?.into_iter().map(|(role, entry)| {
+        let ModelEntry { id, sha256, origin, .. } = entry.clone();
+        ModelUsed { role: role.into(), id, sha256, licence: origin.licence }
+    });
     Ok(named.chain(SpeechListener::find(settings)?.map(|listener| listener.used())).collect())
 }

@@ -80,7 +80,7 @@ fn model_checks(settings: &Settings) -> Vec<Check> {
     let dir = &settings.models.dir;
     let runtime = match Runtime::load(&settings.models.onnxruntime, dir) {
         Ok(runtime) => runtime,
-        Err(error) => return vec![wrong("ONNX Runtime", format!("{error:#}"), "make runtime")],
+        Err(error) => return vec![wrong("ONNX Runtime", format!("{error:#}"), "orator models fetch")],
     };
     let mut checks = vec![ok("ONNX Runtime", format!("{} ({})", runtime.version(), runtime.library().display()))];
     let chosen = ModelStore::open(dir).and_then(|store| Ok((models::choose(&settings.pose2d, &store)?, store)));

@@ -6,7 +6,7 @@ use anyhow::Result;
 use orator::config;
 use orator::config::Settings;
 use orator::external::onnx::{Fetched, MANIFEST_FILE, ModelEntry, ModelError, ModelOrigin, ModelState, ModelStore};
-use orator::external::onnx::{Runtime, Wanted};
+use orator::external::onnx::{Runtime, Wanted, find_library};
 use orator::pipeline::pose2d::models;
 use orator::pipeline::segment::speech_rule::SpeechListener;
 use orator::stage::progress::Progress as _;
@@ -82,6 +82,10 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
                 (false, []) => models::wanted(pose2d).into_iter().chain(SpeechListener::wanted(&settings)).collect(),
                 (false, ids) => ids.iter().cloned().map(Wanted::Id).collect(),
             };
+            if find_library(&place.onnxruntime, &place.dir).is_err() {
+                let source = store.fetch_runtime(mirror.as_deref(), ui)?;
+                ui.say(&format!("ONNX Runtime               {source}, into {}/lib", place.dir.display()));
+            }
             fetch(&store, &wanted, mirror.as_deref(), ui)
         }
         ModelsVerb::Add { file, like, id, licence } => {

@@ -2,7 +2,7 @@
 //! Every file is pinned by its SHA-256 before it is converted, and the result after it.
 
 use super::convert::{ConversionOptions, convert};
-use super::{ModelEntry, ModelSource, SourceKind, package, sha256_of};
+use super::{ModelEntry, ModelSource, RuntimeEntry, SourceKind, package, sha256_of};
 use crate::stage::workdir;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use sha2::{Digest, Sha256};
@@ -105,6 +105,34 @@ impl<'a> Fetcher<'a> {
             );
         }
         bail!("it could not be had:{refused}\n      a folder that has the file (sha256 {}): --mirror DIR", entry.sha256)
+    }
+
+    /// Writes the library of ONNX Runtime to `path`.
+    ///
+    /// # Errors
+    /// No source that has it; the message says why of each.
+    pub fn get_library(&mut self, runtime: &RuntimeEntry, path: &Path) -> Result<FetchSource> {
+        if let Some(found) = self.offered(&runtime.sha256) {
+            let source = FetchSource::Mirror(found.to_owned());
+            workdir::write_file(path, &std::fs::read(found)?)?;
+            return Ok(source);
+        }
+        let mut refused = String::new();
+        for source in &runtime.sources {
+            let files = match self.has_mirrored(source) {
+                true => self.mirrored(source),
+                false => self.files(source),
+            };
+            match files.map(|(files, _)| files.concat()) {
+                Ok(bytes) => {
+                    pinned(&bytes, &runtime.sha256, &runtime.file)?;
+                    workdir::write_file(path, &bytes)?;
+                    return Ok(FetchSource::Source(source.clone()));
+                }
+                Err(error) => _ = write!(refused, "\n      {source}: {error:#}"),
+            }
+        }
+        bail!("{} could not be had:{refused}", runtime.file)
     }
 
     fn offered(&self, sha256: &str) -> Option<&Path> {

@@ -1,7 +1,7 @@
 //! `manifest.toml`: the models known, built in and beside the model files. One model's description is in `entry`, what
 //! makes it sound in `check`; `model` opens what is described here.
 
-use super::{ModelEntry, ModelRole};
+use super::{ModelEntry, ModelRole, ModelSource, RuntimeEntry};
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -17,6 +17,9 @@ const BUILTIN: &str = include_str!("../../../models/manifest.toml");
 pub struct Manifest {
     #[serde(default, rename = "model", skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<ModelEntry>,
+    /// The ONNX Runtime library, for machines that have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub runtime: Option<RuntimeEntry>,
     /// Descriptions without a file: forms to register other models by.
     #[serde(default, rename = "layout", skip_serializing_if = "Vec::is_empty")]
     pub layouts: Vec<ModelEntry>,
@@ -35,6 +38,7 @@ impl Manifest {
         match std::fs::read_to_string(&path) {
             Ok(text) => {
                 let own = Self::parse(&text).with_context(|| format!("in {}", path.display()))?;
+                manifest.runtime = own.runtime.or(manifest.runtime);
                 own.models.into_iter().for_each(|entry| put(&mut manifest.models, entry));
                 own.layouts.into_iter().for_each(|entry| put(&mut manifest.layouts, entry));
             }
@@ -52,6 +56,7 @@ impl Manifest {
             let known = manifest.models[..idx].iter().any(|other| other.id == entry.id);
             ensure!(!known, "model {:?} stands in it twice", entry.id);
         }
+        manifest.runtime.iter().flat_map(|runtime| &runtime.sources).try_for_each(ModelSource::check)?;
         for entry in &manifest.layouts {
             entry.check().with_context(|| format!("layout {:?}", entry.id))?;
         }
@@ -121,7 +126,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let mut own = Manifest::builtin().unwrap().get("person-rtmdet-nano").unwrap().clone();
         own.id = "person-mine".into();
-        let text = toml::to_string(&Manifest { models: vec![own.clone()], layouts: Vec::new() }).unwrap();
+        let text = toml::to_string(&Manifest { models: vec![own.clone()], ..Manifest::default() }).unwrap();
         std::fs::write(dir.path().join(MANIFEST_FILE), text).unwrap();
         let manifest = Manifest::load(dir.path()).unwrap();
         assert_eq!((manifest.models.len(), manifest.get("person-mine").unwrap()), (16, &own));

@@ -88,7 +88,7 @@ pub fn find_library(explicit: &Path, models_dir: &Path) -> Result<PathBuf> {
     let beside = program.ancestors().skip(1).map(|folder| folder.join("lib"));
     beside.chain([models_dir.join("lib")]).find_map(|folder| library_in(&folder)).ok_or_else(|| {
         anyhow!(
-            "the ONNX Runtime library ({LIBRARY}) was not found; `make runtime` gets it, models.onnxruntime or {VARIABLE} \
+            "the ONNX Runtime library ({LIBRARY}) was not found; `orator models fetch` gets it, models.onnxruntime or {VARIABLE} \
              names another"
         )
     })

@@ -29,6 +29,21 @@ pub struct ModelSource {
     pub licence: Option<String>,
 }
 
+/// The shared library of ONNX Runtime, and the places that have it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RuntimeEntry {
+    /// Its name in the folder `lib` of the models.
+    pub file: String,
+    /// SHA-256 of its content, 64 hex digits.
+    pub sha256: String,
+    /// The terms it is used under.
+    pub licence: String,
+    /// Where it is, in the order in which the places are tried.
+    #[serde(rename = "source")]
+    pub sources: Vec<ModelSource>,
+}
+
 /// What kind of place has the files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

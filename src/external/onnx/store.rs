@@ -171,6 +171,22 @@ impl ModelStore {
         Ok(fetched)
     }
 
+    /// Puts the ONNX Runtime library of the manifest into the folder `lib` of the models, where `Runtime::load` finds it.
+    /// A file of the mirror serves as well.
+    ///
+    /// # Errors
+    /// No place that has it.
+    pub fn fetch_runtime(&self, mirror: Option<&Path>, progress: &dyn Progress) -> Result<FetchSource> {
+        let runtime = self.manifest.runtime.as_ref().context("the manifest names no ONNX Runtime")?;
+        let _lock = workdir::lock(&self.dir)?;
+        let _task = progress.begin("ONNX Runtime", 0);
+        let downloads = self.dir.join(DOWNLOADS);
+        let _ = std::fs::remove_dir_all(&downloads);
+        let had = Fetcher::new(mirror, &downloads)?.get_library(runtime, &self.dir.join("lib").join(&runtime.file));
+        let _ = std::fs::remove_dir_all(&downloads);
+        had
+    }
+
     /// What `fetch` may get for `wanted`: every model that is asked for by its id or is a candidate for a role, and is
     /// not there.
     ///

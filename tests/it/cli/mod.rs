@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod completions;
+pub mod container;
 pub mod demo;
 pub mod error_texts;
 pub mod examples;

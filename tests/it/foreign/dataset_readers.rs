@@ -56,11 +56,8 @@ for sample in wds.WebDataset(sorted(glob.glob('train-*.tar')), shardshuffle=Fals
 ";
 
 const DATASETS: &str = r"
-from datasets import Audio, load_dataset
-# datasets wants torchcodec (and torch) at hand even to store the bytes of a sound as they are
-Audio.encode_example = lambda self, value: value
-rows = load_dataset(os.getcwd(), split='train', cache_dir=sys.argv[1])
-if isinstance(rows.features.get('wav'), Audio): rows = rows.cast_column('wav', Audio(decode=False))
+example = open('README.md').read().split('```python')[1].split('```')[0]
+exec(example)
 for row in rows:
     wav = row['wav']['bytes'] if isinstance(row['wav'], dict) else row['wav']
     def array(name, dtype):

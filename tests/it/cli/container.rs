@@ -1,0 +1,26 @@
+//! The container file names the libraries that the program links.
+
+use std::process::Command;
+
+#[test]
+fn its_packages_are_those_of_the_libraries_that_the_program_links() {
+    let file = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/.ci/Containerfile")).unwrap();
+    let output = |program: &str, argument: &str| {
+        let output =
+            Command::new(program).arg(if program == "dpkg" { "-S" } else { "--" }).arg(argument).output().ok()?;
+        Some(String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    let (Some(linked), Some(_)) = (output("ldd", env!("CARGO_BIN_EXE_orator")), output("dpkg", "libc.so.6")) else {
+        return crate::fixtures::skip::skip("no ldd and dpkg");
+    };
+    let ours = |line: &&str| ["libav", "libsw", "libopencv"].iter().any(|name| line.trim_start().starts_with(name));
+    let paths: Vec<&str> = linked.lines().filter(ours).filter_map(|line| line.split_whitespace().nth(2)).collect();
+    assert!(paths.len() >= 6, "{linked}");
+    for path in paths {
+        let name = path.rsplit('/').next().unwrap();
+        let package = output("dpkg", &format!("*/{name}")).unwrap();
+        let package = package.split(':').next().unwrap().trim().to_owned();
+        // libavutil comes with libavcodec.
+        assert!(package.starts_with("libavutil") || file.contains(&package), "{name} is in {package}");
+    }
+}
