@@ -37,6 +37,9 @@ pub struct DatasetInfo {
     pub source: String,
     /// Further notes for readers, a sentence each.
     pub notes: Vec<String>,
+    /// Whether silence stands in the place of the sound (`orator import --no-sound`).
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub no_sound: bool,
     /// What the splits are made of, and why; `None`: an earlier version wrote the dataset.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub split_rule: Option<SplitRule>,
@@ -120,6 +123,7 @@ pub struct About {
     pub consent: String,
     pub source: String,
     pub notes: Vec<String>,
+    pub no_sound: bool,
     pub split_rule: Option<SplitRule>,
 }
 
@@ -136,6 +140,7 @@ impl About {
             consent: nothing(),
             source: nothing(),
             notes: Vec::new(),
+            no_sound: false,
             split_rule: None,
         }
     }
@@ -144,7 +149,7 @@ impl About {
 impl DatasetInfo {
     /// Contents for a dataset `about` with these videos and bones (48 lengths, metres).
     pub fn new(about: &About, bones: &[f32], splits: BTreeMap<Split, SplitInfo>, videos: Vec<DatasetVideo>) -> Self {
-        let About { speaker, tool, fps, models, licence, consent, source, notes, split_rule } = about.clone();
+        let About { speaker, tool, fps, models, licence, consent, source, notes, no_sound, split_rule } = about.clone();
         Self {
             schema: super::SCHEMA,
             speaker,
@@ -167,6 +172,7 @@ impl DatasetInfo {
             consent,
             source,
             notes,
+            no_sound,
             split_rule,
             splits: splits.into_iter().map(|(split, info)| (split.name().to_owned(), info)).collect(),
             videos,
@@ -175,8 +181,9 @@ impl DatasetInfo {
 
     /// Description apart from the videos.
     pub fn about(&self) -> About {
-        let DatasetInfo { speaker, tool, fps, models, licence, consent, source, notes, split_rule, .. } = self.clone();
-        About { speaker, tool, fps, models, licence, consent, source, notes, split_rule }
+        let DatasetInfo { speaker, tool, fps, models, licence, consent, source, notes, no_sound, split_rule, .. } =
+            self.clone();
+        About { speaker, tool, fps, models, licence, consent, source, notes, no_sound, split_rule }
     }
 
     /// Shards of all splits.

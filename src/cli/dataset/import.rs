@@ -52,6 +52,9 @@ pub struct Args {
     /// Most seconds by which sound and motion may differ in length.
     #[arg(long, default_value_t = 0.5, value_name = "SECS")]
     max_apart: f64,
+    /// Take silent captures: sound is left out, silence stands in its place. Such a dataset is for lifters and evaluation.
+    #[arg(long, conflicts_with = "max_apart")]
+    no_sound: bool,
     /// Share of the takes for validation, by their content.
     #[arg(long, default_value_t = 0.15, value_name = "SHARE")]
     validation: f64,
@@ -118,7 +121,12 @@ fn plan(args: &Args) -> Result<ImportPlan> {
             ImportKind::Shards => Some(Found::Shards),
         },
         about: About { licence, consent, source, ..About::new(name, fps) },
-        limits: TakeLimits { fps, min_frames: args.min_frames.max(1), max_apart_secs: args.max_apart },
+        limits: TakeLimits {
+            fps,
+            min_frames: args.min_frames.max(1),
+            max_apart_secs: args.max_apart,
+            no_sound: args.no_sound,
+        },
         dataset: config::DatasetConfig {
             validation: args.validation,
             test: args.test,
@@ -137,13 +145,18 @@ fn close(imported: &Imported, out: &Path, ui: &Ui) -> Result<Outcome> {
     let (kept, refused, failed) = (count("kept"), count("refused"), count("failed"));
     lines.push(format!("{kept} kept, {refused} refused, {failed} failed; {}", parts.join(", ")));
     lines.push(format!("dataset  {}", out.display()));
-    let next = train_gan(out);
+    let next = if imported.info.no_sound { verify_deep(out) } else { train_gan(out) };
     let facts = json!({
         "dataset": out, "takes": imported.lines, "notes": imported.notes, "secs": secs,
         "kept": kept, "refused": refused, "failed": failed, "next": next,
     });
     ui.summary(&lines.join("\n"), Some(&next), facts);
     Ok(if failed > 0 { Outcome::SomeFailed } else { Outcome::Done })
+}
+
+/// The command that checks every byte of a dataset.
+pub fn verify_deep(dataset: &Path) -> String {
+    format!("orator dataset verify --deep {}", dataset.display())
 }
 
 /// The command that trains on a dataset anywhere.

@@ -1,6 +1,6 @@
 //! `orator dataset`: what is in a dataset, and whether it is what was written.
 
-use super::import::train_gan;
+use super::import::{train_gan, verify_deep};
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
@@ -61,7 +61,7 @@ fn check(dir: &std::path::Path, deep: bool, ui: &Ui) -> Result<Outcome> {
         if good { "nothing wrong".to_owned() } else { format!("{} things wrong", found.problems.len()) }
     ));
     let next = match (good, deep) {
-        (true, false) => format!("orator dataset verify --deep {}", dir.display()),
+        (true, false) => verify_deep(dir),
         (true, true) => train_gan(dir),
         (false, _) => "orator run --from dataset --force".to_owned(),
     };

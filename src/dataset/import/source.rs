@@ -199,7 +199,8 @@ fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
                 }
                 _ => String::new(),
             };
-            Ok(InspectedItem { source, remark, codes: Some(codes([&kept.sample.sound])), ..InspectedItem::default() })
+            let codes = (!plan.limits.no_sound).then(|| codes([&kept.sample.sound]));
+            Ok(InspectedItem { source, remark, codes, ..InspectedItem::default() })
         }
     }
 }
@@ -208,7 +209,13 @@ fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
 fn made_from(found: &TakeFiles, plan: &ImportPlan) -> Result<String> {
     let files = [Some(&found.motion), found.sound.as_ref(), found.transcript.as_ref()];
     let hashes = files.into_iter().flatten().map(|path| hash_file(path)).collect::<Result<Vec<_>>>()?;
-    let all = serde_json::json!([env!("CARGO_PKG_VERSION"), hashes, plan.limits.fps, plan.dataset.max_mb]);
+    let all = serde_json::json!([
+        env!("CARGO_PKG_VERSION"),
+        hashes,
+        plan.limits.fps,
+        plan.dataset.max_mb,
+        plan.limits.no_sound
+    ]);
     Ok(blake3::hash(all.to_string().as_bytes()).to_hex().to_string())
 }
 

@@ -33,6 +33,8 @@ pub struct TakeLimits {
     pub min_frames: usize,
     /// Largest difference between the lengths of sound and motion, seconds.
     pub max_apart_secs: f64,
+    /// Whether sound is left out: every take gets silence.
+    pub no_sound: bool,
 }
 
 /// Take with its outcome.
@@ -89,6 +91,10 @@ impl ImportedTake {
         let motion = resample::at_rate(&captured.motion, limits.fps);
         let n_frames = motion.n_frames();
         let sound = match &found.sound {
+            _ if limits.no_sound => {
+                let n_samples = sync::sample_at(limits.fps, SAMPLE_RATE, n_frames);
+                Some(Sound { rate: SAMPLE_RATE, samples: vec![0.0; n_samples] })
+            }
             Some(path) => audio::read_mono(path, SAMPLE_RATE)?.filter(|sound| !sound.samples.is_empty()),
             None => None,
         };

@@ -38,6 +38,10 @@ pub fn rate_of(sources: &[PathBuf]) -> Option<crate::types::time::FrameRate> {
     serde_json::from_slice::<DatasetInfo>(&info).ok().map(|info| info.fps)
 }
 
+/// Note on a dataset of silent captures.
+const NO_SOUND: &str =
+    "There is no sound: silence stands in its place. The motion serves lifters and evaluation, not speech to gesture.";
+
 /// Imports into the empty folder `out`.
 ///
 /// # Errors
@@ -46,6 +50,10 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
     let sources = find::find(&plan.sources, plan.kind)?;
     let (mut about, notes) = (plan.about.clone(), notes(&sources.takes));
     about.notes.extend(notes);
+    about.no_sound = plan.limits.no_sound;
+    if about.no_sound {
+        about.notes.push(NO_SOUND.to_owned());
+    }
     let (items, left_out) = ImportItem::all(&sources);
     let task = progress.begin("look", items.len() as u64);
     let mut names = BTreeSet::new();

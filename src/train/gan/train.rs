@@ -67,6 +67,11 @@ pub fn train(
     progress: &dyn Progress,
 ) -> Result<TrainingOutcome> {
     check(requested)?;
+    ensure!(
+        !dataset.info().no_sound,
+        "{} was imported without sound, so that there is no speech to learn from; import it with its sound files",
+        dataset.dir().display()
+    );
     let _lock = workdir::lock(folder)?;
     let resumed = resume(dataset, requested, folder, progress)?;
     let (settings, normal) = match &resumed {

@@ -54,7 +54,7 @@ fn plan(sources: &[&Path]) -> ImportPlan {
         sources: sources.iter().map(|path| path.to_path_buf()).collect(),
         kind: None,
         about: About::new("host", FPS),
-        limits: TakeLimits { fps: FPS, min_frames: 64, max_apart_secs: 0.5 },
+        limits: TakeLimits { fps: FPS, min_frames: 64, max_apart_secs: 0.5, no_sound: false },
         dataset: orator::config::DatasetConfig { validation: 0.0, test: 0.0, ..Default::default() },
     }
 }
@@ -281,4 +281,26 @@ fn the_verb_says_what_failed_and_replaces_only_datasets() {
     let (code, json) = run(&["in/bad.bvh", "--out", "none"]);
     assert!(code == Some(1) && json["error"].as_str().unwrap().contains("bad.bvh"), "{json}");
     assert!(!dir.path().join("none").exists() && !dir.path().join(".none.attempt").exists());
+}
+
+#[test]
+fn silent_captures_become_a_dataset_that_no_speech_is_learnt_from() {
+    let dir = tempfile::tempdir().unwrap();
+    let source = dir.path().join("trn");
+    for (name, n_frames) in [("one", 200), ("two", 230)] {
+        write(source.join(format!("{name}.bvh")), &bvh(n_frames));
+    }
+    let out = dir.path().join("out");
+    fs::create_dir_all(&out).unwrap();
+    let mut plan = plan(&[&source]);
+    plan.limits.no_sound = true;
+    let answer = import(&plan, &out, &Silent).unwrap();
+    assert!(answer.lines.iter().all(|line| line.ended == "kept"), "{:?}", answer.lines);
+    assert_eq!(verify(&out, true, &Silent).unwrap().problems, []);
+    assert!(samples(&out).values().all(|(sample, _)| sample.sound.samples.iter().all(|s| *s == 0.0)));
+    assert!(fs::read_to_string(out.join("README.md")).unwrap().contains("There is no sound"));
+    let dataset = orator::dataset::Dataset::open(&out).unwrap();
+    let settings = orator::config::Settings::default().gan;
+    let refused = orator::train::gan::train(&dataset, &settings, &dir.path().join("gan"), &Silent).err().unwrap();
+    assert!(refused.to_string().contains("imported without sound"), "{refused:#}");
 }
