@@ -36,7 +36,7 @@
 //! | 6 | `train` | optimiser, GAN, lifters, synthetic scenes, spaces of movement | `types math stage config audio motion formats nn mocap dataset metrics generate` |
 //! | 6 | `demo` | the synthetic speaker: drawn, with a known rule, and the checks against it | `types math stage audio motion formats external animate dataset metrics generate` |
 //! | 7 | `evaluate` | clips, baselines, table, verdict; the lifters' errors | `types math stage config external audio motion formats nn mocap metrics generate dataset pipeline train` |
-//! | 8 | `report` | pages for people | `types stage config external formats metrics animate pipeline train evaluate` |
+//! | 8 | `report` | pages for people | `types stage config external formats metrics animate dataset pipeline train evaluate` |
 //! | - | `guide` | the pages of the guide, in Markdown | nothing |
 //!
 //! `cli` (in the program only) imports everything and is the one place that prints. `tests/it/house.rs` holds the code to

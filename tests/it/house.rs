@@ -31,7 +31,7 @@ const FLOORS: [(u8, &str, &str); 19] = [
         "evaluate",
         "types math stage config external audio motion formats nn mocap metrics generate dataset pipeline train",
     ),
-    (8, "report", "types stage config external formats metrics animate pipeline train evaluate"),
+    (8, "report", "types stage config external formats metrics animate dataset pipeline train evaluate"),
 ];
 
 /// Folders that import nothing of each other: pairwise siblings under a room.

@@ -80,6 +80,7 @@ impl SpeechListener {
 
     /// The model as it is named in a dataset.
     pub fn used(&self) -> ModelUsed {
-        ModelUsed { role: "speech".into(), id: self.entry.id.clone(), sha256: self.entry.sha256.clone() }
+        let ModelEntry { id, sha256, origin, .. } = self.entry.clone();
+        ModelUsed { role: "speech".into(), id, sha256, licence: origin.licence }
     }
 }

@@ -301,6 +301,7 @@ fn silent_captures_become_a_dataset_that_no_speech_is_learnt_from() {
     assert!(fs::read_to_string(out.join("README.md")).unwrap().contains("There is no sound"));
     let dataset = orator::dataset::Dataset::open(&out).unwrap();
     let settings = orator::config::Settings::default().gan;
-    let refused = orator::train::gan::train::train(&dataset, &settings, &dir.path().join("gan"), &Silent).err().unwrap();
+    let refused =
+        orator::train::gan::train::train(&dataset, &settings, &dir.path().join("gan"), &Silent).err().unwrap();
     assert!(refused.to_string().contains("imported without sound"), "{refused:#}");
 }
