@@ -4,5 +4,6 @@ pub mod generator_parity;
 pub mod golden;
 pub mod heatmap_parity;
 pub mod lifter_parity;
+pub mod packages;
 pub mod pose_parity;
 pub mod real;
