@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn the_builtin_manifest_reads_and_writes_itself() {
         let manifest = Manifest::builtin().unwrap();
-        assert_eq!((manifest.models.len(), manifest.layouts.len()), (15, 5));
+        assert_eq!((manifest.models.len(), manifest.layouts.len()), (16, 5));
         assert_eq!(Manifest::parse(&toml::to_string(&manifest).unwrap()).unwrap(), manifest);
         for entry in &manifest.models {
             let is_served = entry.url.is_some() || !entry.sources.is_empty();
@@ -129,7 +129,7 @@ mod tests {
         let text = toml::to_string(&Manifest { models: vec![own.clone()], ..Manifest::default() }).unwrap();
         std::fs::write(dir.path().join(MANIFEST_FILE), text).unwrap();
         let manifest = Manifest::load(dir.path()).unwrap();
-        assert_eq!((manifest.models.len(), manifest.get("person-mine").unwrap()), (16, &own));
+        assert_eq!((manifest.models.len(), manifest.get("person-mine").unwrap()), (17, &own));
         assert!(manifest.get("nobody").unwrap_err().to_string().contains("known are"));
         assert!(manifest.get_as("person-mine", ModelRole::Hand).is_err());
     }

@@ -35,8 +35,9 @@ const ONE: [f64; 2] = [0.0, 1.0];
 const BONES: &str = "bone_change";
 const LENGTHS: &str = "interval_secs";
 
-const ROWS: [Measure; 15] = [
+const ROWS: [Measure; 16] = [
     row("sound_db", "Loudness of the second", "dB", [-100.0, 0.0], 50, "min_sound_db"),
+    row("speech", "Share of speech in the 4 s around", "", ONE, 50, "min_speech"),
     row("still", "Change of the picture", "8-bit steps", [0.0, 4.0], 80, "min_change"),
     row("person", "Best score of face and arms", "", ONE, 40, "joint_score"),
     row("shoulder_px", "Between the shoulders", "px", [0.0, 600.0], 60, "min_shoulder_px"),
@@ -50,13 +51,13 @@ const ROWS: [Measure; 15] = [
     row("shot_score", "Shot score", "", ONE, 50, "shot_threshold"),
     row("n_people", "People in view", "people", [-0.5, 10.5], 11, "max_people"),
     row(BONES, "Lifted bone off its length", "of its length", [0.0, 1.5], 60, "max_bone_change"),
-    row(LENGTHS, "Length of kept stretches", "s", [0.0, 60.0], 60, "min_frames"),
+    row(LENGTHS, "Length of kept intervals", "s", [0.0, 60.0], 60, "min_frames"),
 ];
 
 impl Measure {
     /// Noun of what is counted.
     pub fn of(&self) -> &'static str {
-        if self.name == LENGTHS { "stretch" } else { "frame" }
+        if self.name == LENGTHS { "interval" } else { "frame" }
     }
 
     /// Threshold under `settings`, for videos of `per_sec` frames a second.
