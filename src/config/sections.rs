@@ -116,7 +116,7 @@ pub struct Pose2dConfig {
     pub palm: String,
     /// The person detector looks at every n-th frame of a shot.
     pub person_every: usize,
-    /// The palm detector looks at every n-th frame while a hand is missing.
+    /// The palm detector looks at every n-th frame while a hand is missing; more rarely while it finds none.
     pub palm_every: usize,
     /// Weight of a new person box against the followed one, 0..1.
     pub person_follow: f64,

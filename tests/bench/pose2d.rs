@@ -2,24 +2,32 @@
 
 use super::report::{Report, median};
 use anyhow::{Context, Result, bail, ensure};
+use ndarray::{ArrayView1, Axis};
 use orator::config::Settings;
 use orator::external::ffmpeg::frames::FrameReader;
 use orator::external::onnx::{ModelStore, Runtime};
+use orator::formats::keypoints_npz;
+use orator::math::order::Ordered;
 use orator::pipeline::pose2d::Chain;
 use orator::stage::progress::Progress;
 use orator::types::image::Image;
+use orator::types::pose2d::{SEEN_SCORE, coco};
 use orator::types::time::FrameRate;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-/// Frames to keypoints: time a frame, the share of it inside ONNX Runtime, one worker against two, and (with
-/// `--python`) against the Python reference of the same chain. Every worker is one thread.
+/// Frames to keypoints: time a frame, the share of it inside ONNX Runtime, how often each model is asked, one worker
+/// against two, and (with `--python`) against the Python reference of the same chain. Every worker is one thread.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A video of a speaker.
+    /// A video of a speaker; with `--beside`, its `keypoints.npz`.
     video: PathBuf,
+    /// Keypoints of the same video that another version or other settings gave: says how far both are apart, instead
+    /// of how fast they are found.
+    #[arg(long, value_name = "KEYPOINTS")]
+    beside: Option<PathBuf>,
     /// The folder of the models.
     #[arg(long, default_value = "models", value_name = "DIR")]
     models_dir: PathBuf,
@@ -95,7 +103,58 @@ fn rate(settings: &Settings) -> FrameRate {
     settings.extract.rate()
 }
 
+/// How far the keypoints of two files are apart, in % of the shoulder width: each seen point of the arms, and the mean of
+/// each hand that both have.
+fn beside(one: &Path, other: &Path) -> Result<Report> {
+    let [one, other] = [keypoints_npz::read(one)?, keypoints_npz::read(other)?];
+    let n_frames = one.n_frames();
+    ensure!(other.n_frames() == n_frames, "the files have {n_frames} and {} frames", other.n_frames());
+    let away = |a: ArrayView1<f32>, b: ArrayView1<f32>| f64::from((a[0] - b[0]).hypot(a[1] - b[1]));
+    let (mut arms, mut hands) = (Vec::new(), Vec::new());
+    // Hands in the first file, in the second, in both.
+    let mut n_hands = [0_usize; 3];
+    for t in 0..n_frames {
+        let [body, other_body] = [&one.body, &other.body].map(|body| body.index_axis(Axis(0), t));
+        let width = away(body.row(coco::L_SHOULDER), body.row(coco::R_SHOULDER)).max(1.0);
+        for joint in coco::L_SHOULDER..=coco::R_WRIST {
+            let [a, b] = [body.row(joint), other_body.row(joint)];
+            if a[2].min(b[2]) >= SEEN_SCORE {
+                arms.push(100.0 * away(a, b) / width);
+            }
+        }
+        for [a, b] in [[&one.left_hand, &other.left_hand], [&one.right_hand, &other.right_hand]] {
+            let [a, b] = [a, b].map(|hand| hand.index_axis(Axis(0), t));
+            let found = [a[[0, 2]] > 0.0, b[[0, 2]] > 0.0];
+            let both = found[0] && found[1];
+            n_hands = [0, 1, 2].map(|at| n_hands[at] + usize::from(*found.get(at).unwrap_or(&both)));
+            if both {
+                let sum: f64 = a.outer_iter().zip(b.outer_iter()).map(|(a, b)| away(a, b)).sum();
+                hands.push(100.0 * sum / a.nrows() as f64 / width);
+            }
+        }
+    }
+    let of = |distances: Vec<f64>| {
+        let ordered = Ordered::new(distances);
+        [ordered.median(), ordered.quantile(0.95)].map(|value| value.unwrap_or(f64::NAN))
+    };
+    let ([arm, arm_95], [hand, hand_95], [first, second, both]) = (of(arms), of(hands), n_hands);
+    let text = format!(
+        "{n_frames} frames, distances in % of the shoulder width\n\
+         arms   median {arm:.2}, 95 % below {arm_95:.2}\n\
+         hands  median {hand:.2}, 95 % below {hand_95:.2}\n\
+         found  {first} hands in the first, {second} in the second, {both} in both",
+    );
+    let facts = json!({
+        "n_frames": n_frames, "arm_median": arm, "arm_95": arm_95, "hand_median": hand, "hand_95": hand_95,
+        "n_hands": [first, second], "n_both": both,
+    });
+    Ok(Report { text, facts })
+}
+
 pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+    if let Some(other) = &args.beside {
+        return beside(&args.video, other);
+    }
     let mut settings = Settings::default();
     if let Some(person) = &args.person {
         settings.pose2d.person.clone_from(person);
@@ -115,6 +174,7 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let n_frames = bench.images.len() as f64;
     let task = progress.begin("pose2d", args.rounds as u64);
     bench.decoded(&mut chains[0])?;
+    let asked = chains[0].n_runs().map(|n| n as f64 / n_frames);
     let (mut one, mut streamed, mut two, mut two_streamed, mut python) = (vec![], vec![], vec![], vec![], vec![]);
     for _ in 0..args.rounds {
         one.push(bench.decoded(&mut chains[0])?);
@@ -137,8 +197,10 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let real_time = |frames: f64, secs: f64| frames / fps / secs;
     let one_real_time = real_time(n_frames, whole(&streamed));
     let two_real_time = real_time(2.0 * n_frames, whole(&two_streamed));
+    let [person, body, hand, palm] = asked;
     let mut text = format!(
         "{n_frames} frames, median of {} rounds, {}\n\
+         models asked a frame           person {person:.2}, body {body:.2}, hand {hand:.2}, palm {palm:.2}\n\
          one worker, frames in memory   {:6.1} ms a frame, {:.1} of it inside ONNX Runtime: ratio {ratio:.3}\n\
          one worker, decoding           {:6.1} ms a frame: {one_real_time:.1} x real time at {fps} fps\n\
          two workers, frames in memory  {speed_up:.2} x one worker\n\
@@ -153,6 +215,7 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         "n_frames": n_frames, "ms_a_frame": per_frame(whole(&one)), "ms_inside": per_frame(inside), "ratio": ratio,
         "ms_a_frame_decoding": per_frame(whole(&streamed)), "speed_up_of_two": speed_up,
         "real_time_one": one_real_time, "real_time_two": two_real_time,
+        "asked": { "person": person, "body": body, "hand": hand, "palm": palm },
     });
     if !python.is_empty() {
         let theirs = median(python.clone());

@@ -37,6 +37,11 @@ impl ModelInput {
         self.model.secs_inside()
     }
 
+    /// How often the model ran so far.
+    pub fn n_runs(&self) -> u64 {
+        self.model.n_runs()
+    }
+
     /// Runs the model on the whole picture, letterboxed as its description says.
     pub fn whole(&mut self, image: &Image) -> Result<(SrcFromDst, Outputs<'_>)> {
         let src_from_dst = match self.model.entry().fit {

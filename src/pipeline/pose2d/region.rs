@@ -45,6 +45,14 @@ pub fn beyond_wrist(elbow: [f64; 2], wrist: [f64; 2], shoulder_px: f64) -> Regio
     }
 }
 
+/// Whether two squares show a hand so much alike that a look at the second tells nothing new: middles within a tenth of
+/// the side, sides within a fifth, 20 degrees.
+pub fn are_alike(a: &Region, b: &Region) -> bool {
+    let away = (a.centre[0] - b.centre[0]).hypot(a.centre[1] - b.centre[1]);
+    let turned = (a.rotation - b.rotation).rem_euclid(TAU);
+    away < 0.1 * b.side && (a.side - b.side).abs() < 0.2 * b.side && turned.min(TAU - turned) < PI / 9.0
+}
+
 /// The square around a hand whose palm was detected: its box's corners, its wrist and the base of its middle finger.
 pub fn around_palm(low: [f64; 2], high: [f64; 2], wrist: [f64; 2], middle: [f64; 2]) -> Region {
     let (width, height) = (high[0] - low[0], high[1] - low[1]);
@@ -87,6 +95,15 @@ mod tests {
         assert!(arm.rotation.abs() < 1e-6 && (arm.centre[1] - (50.0 - 13.5)).abs() < 1e-6 && arm.side == 80.0);
         let palm = around_palm([0.0, 0.0], [20.0, 20.0], [10.0, 10.0], [20.0, 10.0]);
         assert!((palm.rotation - PI / 2.0).abs() < 1e-9 && (palm.centre[0] - 20.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn squares_are_alike_by_middle_side_and_turn() {
+        let square = |x: f64, side: f64, rotation: f64| Region { centre: [x, 0.0], side, rotation };
+        let one = square(0.0, 100.0, 3.1);
+        assert!(are_alike(&one, &square(5.0, 110.0, -3.1)));
+        assert!(!are_alike(&one, &square(15.0, 100.0, 3.1)) && !are_alike(&one, &square(0.0, 60.0, 3.1)));
+        assert!(!are_alike(&one, &square(0.0, 100.0, 2.5)) && !are_alike(&one, &square(f64::NAN, 100.0, 3.1)));
     }
 
     #[test]

@@ -3,7 +3,6 @@
 
 use super::chain::Chain;
 use super::models;
-use super::other_hand;
 use super::store::KeypointFrames;
 use crate::config;
 use crate::config::Settings;
@@ -78,7 +77,7 @@ impl Stage for Pose2dStage {
     }
 
     fn version(&self) -> u32 {
-        3
+        4
     }
 
     fn cost(&self) -> u32 {
@@ -172,8 +171,7 @@ impl Stage for Pose2dStage {
             gathered.n_frames() == restarts.len(),
             frame_count_mismatch(&unit.source, gathered.n_frames(), restarts.len())
         );
-        let (mut keypoints, extras) = gathered.finish(self.fps, image_size)?;
-        other_hand::drop_swapped_hands(&mut keypoints);
+        let (keypoints, extras) = gathered.finish(self.fps, image_size)?;
         keypoints_npz::write(&Artifact::Keypoints.within(out), &keypoints, &extras)?;
         Ok(seen.report())
     }
