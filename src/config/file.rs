@@ -100,7 +100,7 @@ fn defaults() -> Table {
 fn speaker_schema() -> Table {
     let text = || Value::String(String::new());
     let words = ["name", "reference", "licence", "consent", "source"].map(|key| (key.to_owned(), text()));
-    let lists = ["videos", "exclude", "train", "validation", "test"];
+    let lists = ["videos", "exclude", "mirrored", "train", "validation", "test"];
     let lists = lists.map(|key| (key.to_owned(), Value::Array(vec![text()])));
     words.into_iter().chain(lists).collect()
 }

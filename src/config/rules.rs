@@ -9,6 +9,7 @@ pub fn check(settings: &Settings, locations: &BTreeMap<String, SourceLocation>) 
     let mut rules = Rules { locations, problems: Vec::new() };
     let s = settings;
     rules.within("extract.fps", f64::from(s.extract.fps), 1.0, 120.0, "frames a second");
+    rules.within("extract.audio_track", s.extract.audio_track as f64, 0.0, 100.0, "");
     rules.within("pose2d.person_every", s.pose2d.person_every as f64, 1.0, 10_000.0, "frames");
     rules.within("pose2d.palm_every", s.pose2d.palm_every as f64, 1.0, 10_000.0, "frames");
     rules.within("pose2d.person_follow", s.pose2d.person_follow, 0.0, 1.0, "");

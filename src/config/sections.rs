@@ -32,9 +32,12 @@ pub struct SpeakerConfig {
     /// A picture that shows the speaker as its largest person; empty: none.
     #[serde(default)]
     pub reference: ConfigPath,
-    /// Videos to leave out, though `videos` names them: paths, file names or patterns. So are the next three.
+    /// Videos to leave out, though `videos` names them: paths, file names or patterns. So are the next four.
     #[serde(default)]
     pub exclude: Vec<String>,
+    /// Videos that show the speaker as a mirror does.
+    #[serde(default)]
+    pub mirrored: Vec<String>,
     /// Videos whose split is not left to chance.
     #[serde(default)]
     pub train: Vec<String>,
@@ -87,6 +90,8 @@ impl Default for ModelsConfig {
 pub struct ExtractConfig {
     /// Dataset frames a second.
     pub fps: u32,
+    /// Which of several sound tracks, from 1; 0: the first that the file marks as its default, else the first.
+    pub audio_track: usize,
     /// Write every dataset frame as PNG as well.
     pub keep_frames: bool,
 }
@@ -100,7 +105,7 @@ impl ExtractConfig {
 
 impl Default for ExtractConfig {
     fn default() -> Self {
-        Self { fps: 15, keep_frames: false }
+        Self { fps: 15, audio_track: 0, keep_frames: false }
     }
 }
 

@@ -42,6 +42,12 @@ fn of_speaker(speaker: &SpeakerConfig, folder: &Path) -> Videos {
         }
     }
     found.retain(|_, unit: &mut Unit| !speaker.exclude.iter().any(|entry| names(entry, &unit.source, folder)));
+    for entry in speaker.mirrored.iter().filter(|entry| !entry.contains(['*', '?', '['])) {
+        if !found.values().any(|unit| names(entry, &unit.source, folder)) {
+            missing
+                .push(format!("mirrored = [{entry:?}]: none of the videos is called so; correct or remove the entry"));
+        }
+    }
     let mut splits = BTreeMap::new();
     let lists = [&speaker.train, &speaker.validation, &speaker.test];
     for (split, entries) in Split::ALL.into_iter().zip(lists) {

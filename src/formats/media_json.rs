@@ -1,5 +1,7 @@
 //! `media.json`: what a video is, as far as the stages after the first need it and people want to know.
 
+use crate::types::image::{PictureOptions, PixelArea};
+use crate::types::sound::AudioTracks;
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
@@ -33,6 +35,26 @@ pub struct MediaInfo {
     /// What could not be read of the file.
     #[serde(default)]
     pub damage: Option<String>,
+    /// How its pictures are to be read.
+    #[serde(default, skip_serializing_if = "PictureOptions::is_plain")]
+    pub pictures: PictureOptions,
+    /// Part of the pictures between bars, px of the upright picture; `None` without bars.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub active_area: Option<PixelArea>,
+    /// HDR transfer function, `PQ` or `HLG`; `None` for SDR.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hdr: Option<String>,
+    /// Number of times the size of the pictures changes.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub n_resizes: usize,
+    /// The sound tracks, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub audio_tracks: Option<AudioTracks>,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde passes a reference
+fn is_zero(n: &usize) -> bool {
+    *n == 0
 }
 
 impl MediaInfo {
@@ -49,6 +71,11 @@ impl MediaInfo {
             has_audio: false,
             audio_secs: None,
             damage: None,
+            pictures: PictureOptions { deinterlace: false, mirrored: false },
+            active_area: None,
+            hdr: None,
+            n_resizes: 0,
+            audio_tracks: None,
         }
     }
 

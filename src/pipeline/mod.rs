@@ -1,11 +1,12 @@
-//! The pipeline as a value (`pipeline`, run by `run`, looked at by `status`), its five stages, and speech to motion files in
-//! batches. The stages never import each other: they meet in the files that they write.
+//! The pipeline as a value (`pipeline`, run by `run`, looked at by `status`), its five stages, how the `pictures` of its
+//! videos are read, and speech to motion files in batches. The stages never import each other: they meet in the files that they write.
 
 pub mod account;
 pub mod batch;
 pub mod dataset;
 pub mod extract;
 pub mod lift;
+pub mod pictures;
 pub mod pipeline;
 pub mod pose2d;
 pub mod run;

@@ -25,7 +25,7 @@ use anyhow::Result;
 pub fn build(name: StageName, config: &Config, ready: &[Unit]) -> Result<Box<dyn Stage>> {
     let settings = &config.settings;
     Ok(match name {
-        StageName::Extract => Box::new(ExtractStage::new(&settings.extract)),
+        StageName::Extract => Box::new(ExtractStage::of_config(config)),
         StageName::Pose2d => Box::new(Pose2dStage::new(settings)?),
         StageName::Segment => Box::new(
             SegmentStage::new(&settings.segment, &settings.work.dir).with_speech(SpeechListener::find(settings)?),

@@ -1,4 +1,6 @@
-//! A picture in memory.
+//! A picture in memory, and how those of a video are to be read.
+
+use serde::{Deserialize, Serialize};
 
 /// 8-bit RGB, rows from the top without padding: `data.len() == 3 * width * height`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -14,9 +16,76 @@ impl Image {
         Self { width, height, data: rgb.repeat(width * height) }
     }
 
+    /// The part of the picture within `area`, which is cut to the picture.
+    pub fn cropped(&self, area: PixelArea) -> Self {
+        let [x, y] = [area.x.min(self.width), area.y.min(self.height)];
+        let [width, height] = [area.width.min(self.width - x), area.height.min(self.height - y)];
+        let rows = (y..y + height).flat_map(|row| {
+            let start = 3 * (row * self.width + x);
+            &self.data[start..start + 3 * width]
+        });
+        Self { width, height, data: rows.copied().collect() }
+    }
+
+    /// The picture in the middle of a black one of `size` (width, height), which is no smaller.
+    pub fn framed(&self, [width, height]: [usize; 2]) -> Self {
+        let mut framed = Self::filled(width, height, [0; 3]);
+        let [left, top] = [width.saturating_sub(self.width) / 2, height.saturating_sub(self.height) / 2];
+        let n_bytes = 3 * self.width.min(width);
+        for (y, row) in self.data.chunks_exact((3 * self.width).max(1)).take(height).enumerate() {
+            let to = 3 * ((top + y) * width + left);
+            framed.data[to..to + n_bytes].copy_from_slice(&row[..n_bytes]);
+        }
+        framed
+    }
+
     /// The pixel in column `x`, row `y`. Panics outside the picture, like indexing.
     pub fn pixel(&self, x: usize, y: usize) -> [u8; 3] {
         let at = 3 * (y * self.width + x);
         [self.data[at], self.data[at + 1], self.data[at + 2]]
+    }
+}
+
+/// Rectangle of a picture, px.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PixelArea {
+    pub x: usize,
+    pub y: usize,
+    pub width: usize,
+    pub height: usize,
+}
+
+/// How the pictures of a video are to be read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct PictureOptions {
+    /// The two fields of a frame were taken one after the other: one is kept, the other interpolated where they differ.
+    pub deinterlace: bool,
+    /// Left and right are exchanged.
+    pub mirrored: bool,
+}
+
+impl PictureOptions {
+    /// Whether pictures are read as they are.
+    pub fn is_plain(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_crop_is_cut_to_the_picture() {
+        let image = Image { width: 3, height: 2, data: (0..18).collect() };
+        let area = |x, y, width, height| PixelArea { x, y, width, height };
+        assert_eq!(image.cropped(area(0, 0, 3, 2)), image);
+        assert_eq!(image.cropped(area(1, 1, 9, 9)).data, (12..18).collect::<Vec<u8>>());
+        assert_eq!(image.cropped(area(7, 7, 1, 1)).data, [0; 0]);
+        let framed = image.framed([5, 4]);
+        assert_eq!((framed.width, framed.height, framed.pixel(0, 0), framed.pixel(1, 1)), (5, 4, [0; 3], [0, 1, 2]));
+        assert_eq!(framed.cropped(area(1, 1, 3, 2)), image);
+        assert_eq!(image.framed([3, 2]), image);
     }
 }

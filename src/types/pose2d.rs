@@ -66,6 +66,22 @@ pub struct Pose2d {
     pub right_hand: [Keypoint; N_HAND],
 }
 
+impl Pose2d {
+    /// What is seen in a part of a picture, as px of the whole: the part's corner is at `x`, `y`.
+    #[must_use]
+    pub fn moved(mut self, [x, y]: [usize; 2]) -> Self {
+        let [x, y] = [x as f32, y as f32];
+        let points = self.body.iter_mut().chain(&mut self.left_hand).chain(&mut self.right_hand);
+        for point in points.filter(|point| point.score > 0.0) {
+            (point.x, point.y) = (point.x + x, point.y + y);
+        }
+        if self.person.score > 0.0 {
+            (self.person.x, self.person.y) = (self.person.x + x, self.person.y + y);
+        }
+        self
+    }
+}
+
 impl Default for Pose2d {
     fn default() -> Self {
         Self {

@@ -1,5 +1,7 @@
 //! Sound in memory.
 
+use serde::{Deserialize, Serialize};
+
 /// The rate of all sound inside the pipeline, in samples a second.
 pub const SAMPLE_RATE: u32 = 16_000;
 
@@ -17,4 +19,14 @@ impl Sound {
     pub fn secs(&self) -> f64 {
         self.samples.len() as f64 / f64::from(self.rate.max(1))
     }
+}
+
+/// Sound tracks of a file, and the one taken.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct AudioTracks {
+    pub n_tracks: usize,
+    /// Number of the track, from 1.
+    pub taken: usize,
+    /// Language of each, as the file names it; empty: not named.
+    pub languages: Vec<String>,
 }

@@ -11,10 +11,12 @@ use orator::mocap::motion_file;
 use orator::pipeline::Pipeline;
 use orator::pipeline::lift::quality;
 use orator::pipeline::lift::quality::{ArmFigures, ClipFigures};
+use orator::pipeline::pictures;
 use orator::report::sheet::sheet::SheetClip;
 use orator::stage::artifacts::Artifact;
 use orator::stage::progress::Progress as _;
 use orator::stage::{Unit, workdir};
+use orator::types::image::PictureOptions;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -56,6 +58,7 @@ pub struct Args {
 struct SheetFiles {
     title: String,
     video: PathBuf,
+    pictures: PictureOptions,
     keypoints: PathBuf,
     joints: PathBuf,
     out: PathBuf,
@@ -67,7 +70,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let out = args.out.clone().unwrap_or_else(|| PathBuf::from("sheet.png"));
             ensure!(out.extension().is_some_and(|e| e == "png"), "{}: a sheet is written as .png", out.display());
             let title = video.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            vec![SheetFiles { title, video: video.clone(), keypoints: keypoints.clone(), joints: joints.clone(), out }]
+            let pictures = PictureOptions::default();
+            let (video, keypoints, joints) = (video.clone(), keypoints.clone(), joints.clone());
+            vec![SheetFiles { title, video, pictures, keypoints, joints, out }]
         }
         _ => of_run(&args)?,
     };
@@ -112,6 +117,7 @@ fn of_run(args: &Args) -> Result<Vec<SheetFiles>> {
         if is_chosen(&unit) {
             clips.push(SheetFiles {
                 title: unit.to_string(),
+                pictures: pictures::options(work, &unit),
                 keypoints: Artifact::Keypoints.path(work, &unit),
                 joints: Artifact::Joints.path(work, &unit),
                 out: folder.join(&unit.speaker).join(format!("{}.png", unit.video)),
@@ -138,7 +144,8 @@ fn draw(files: &SheetFiles, every_secs: f64, figure: bool, ui: &Ui) -> Result<(V
     let motion = motion_file::read(&files.joints, Some(keypoints.fps))?.motion;
     let figure = figure.then(|| perform(&motion, None, &AnimationOptions::default()).motion());
     let figure = figure.as_ref();
-    let clip = SheetClip { title: &files.title, video: &files.video, keypoints: &keypoints, motion: &motion, figure };
+    let (title, video, pictures) = (&files.title, &files.video, files.pictures);
+    let clip = SheetClip { title, video, pictures, keypoints: &keypoints, motion: &motion, figure };
     let mut written = Vec::new();
     clip.pages(every_secs, ui, |number, n_pages, page| {
         let path = if n_pages == 1 { files.out.clone() } else { numbered(&files.out, number) };

@@ -8,7 +8,7 @@ use super::origin;
 use super::resample::{Resampler, first_not_finite, format_of};
 use super::source;
 use super::source::{LONGEST_GAP_SECS, LONGEST_SECS, UnreadableMedia};
-use crate::types::sound::{SAMPLE_RATE, Sound};
+use crate::types::sound::{AudioTracks, SAMPLE_RATE, Sound};
 use anyhow::{Context, Result, bail};
 use ffmpeg_next::frame;
 use std::path::Path;
@@ -26,7 +26,7 @@ const STRETCH_SECS: f64 = 1.0;
 /// sound.
 pub fn read_mono(path: &Path, rate: u32) -> Result<Option<Sound>> {
     let mut samples = Vec::new();
-    let streamed = stream_mono(path, rate, &mut |piece| {
+    let streamed = stream_mono(path, 0, rate, &mut |piece| {
         samples.extend_from_slice(piece);
         Ok(())
     })?;
@@ -53,6 +53,8 @@ pub fn read_sound(path: &Path) -> Result<Sound> {
 pub struct StreamedSound {
     /// Number of samples handed on.
     pub n_samples: u64,
+    /// Track that was read, and the others.
+    pub tracks: AudioTracks,
     n_misplaced: u64,
 }
 
@@ -63,15 +65,17 @@ impl StreamedSound {
     }
 }
 
-/// Decodes the sound of `path` and hands it to `sink` piece by piece; `None` without sound. A sample that is no number is
-/// an error that names its second.
+/// Decodes the sound track `track` of `path` (from 1; 0: the automatic choice) and hands it to `sink` piece by piece;
+/// `None` without sound. A sample that is no number is an error that names its second.
 pub(crate) fn stream_mono(
     path: &Path,
+    track: usize,
     rate: u32,
     sink: &mut dyn FnMut(&[f32]) -> Result<()>,
 ) -> Result<Option<StreamedSound>> {
     let input = source::open(path)?;
-    let Some(stream) = source::audio_stream(&input) else { return Ok(None) };
+    let chosen = source::audio_track(&input, track).with_context(|| path.display().to_string())?;
+    let Some((stream, tracks)) = chosen else { return Ok(None) };
     let stream_idx = stream.index();
     let latest_secs = source::latest_secs(&input, &stream);
     let mut zero_secs = origin::first_picture_secs(path)?;
@@ -111,14 +115,14 @@ pub(crate) fn stream_mono(
         }
     }
     if n_frames == 0 {
-        let misplaced = StreamedSound { n_samples: 0, n_misplaced }.damage();
+        let misplaced = StreamedSound { n_samples: 0, tracks: AudioTracks::default(), n_misplaced }.damage();
         let Some(damage) = misplaced.or_else(|| decode.damage()) else { return Ok(None) };
         let name = path.display();
         let problem = format!("no sound of {name} can be decoded ({damage}): copy or download it again");
         return Err(UnreadableMedia(problem).into());
     }
     timeline.end_run()?;
-    Ok(Some(StreamedSound { n_samples: timeline.n_written, n_misplaced }))
+    Ok(Some(StreamedSound { n_samples: timeline.n_written, tracks, n_misplaced }))
 }
 
 /// Difference of timestamps and sample count.

@@ -1,19 +1,27 @@
 //! Pictures of a video as a stream at the dataset's rate by presentation time: output frame n shows the source frame
 //! nearest n / rate, the earlier one of two equally near. Only shown frames are converted. Time 0 is the first source
 //! frame that decodes. The last frame lasts as long as its packet says (else one source frame, ten minutes at most),
-//! which gives `duration_secs`; there are `FrameRate::frames_in(duration_secs)` output frames.
+//! which gives `duration_secs`; there are `FrameRate::frames_in(duration_secs)` output frames. All pictures have the size
+//! of the first; those of another shape stand in black bars.
 
 use super::decode::StreamDecoder;
-use super::picture::{Converter, Orientation};
+use super::orientation::Orientation;
+use super::picture::Converter;
 use super::probe;
 use super::probe::ProbedMedia;
 use super::source;
 use super::source::{LONGEST_GAP_SECS, UnreadableMedia};
-use crate::types::image::Image;
+use super::tone_map::HdrTransfer;
+use crate::types::image::{Image, PictureOptions};
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result};
 use ffmpeg_next::frame;
 use std::path::{Path, PathBuf};
+
+/// Largest number of sizes whose conversion is kept ready.
+const MOST_CONVERTERS: usize = 8;
+/// Shapes whose sides' ratios differ by less than this share are one.
+const SAME_SHAPE: f64 = 0.01;
 
 /// One picture at the dataset rate.
 #[derive(Clone, Debug)]
@@ -33,6 +41,20 @@ pub struct FrameTime {
     pub frame_idx: usize,
     pub source_secs: f64,
     pub repeated: bool,
+    /// How the size of the file's picture differs from that of the previous output frame.
+    pub resize: Resize,
+}
+
+/// Change of the picture's size inside a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Resize {
+    /// The size is that of the frame before.
+    #[default]
+    None,
+    /// The shape is the same: what is seen stays in its place.
+    Scaled,
+    /// The shape is another one.
+    Reshaped,
 }
 
 /// A source frame and its time in ticks from the first one.
@@ -49,6 +71,7 @@ pub struct FrameReader {
     decode: StreamDecoder,
     info: ProbedMedia,
     orientation: Orientation,
+    options: PictureOptions,
     image_size: [usize; 2],
     converters: Vec<([usize; 2], Converter)>,
     /// Ticks of the stream's clock at the first frame.
@@ -58,6 +81,7 @@ pub struct FrameReader {
     following: Option<SourceFrame>,
     next_idx: usize,
     last_shown: Option<i64>,
+    last_size: [usize; 2],
     /// Latest plausible time, seconds.
     latest_secs: f64,
     n_misplaced: usize,
@@ -88,8 +112,7 @@ impl FrameReader {
             let problem = format!("no picture of {name} can be decoded ({why}): copy or download it again");
             return Err(UnreadableMedia(problem).into());
         }
-        let size = [first.width() as usize, first.height() as usize];
-        let image_size = orientation.upright_size(probe::square_pixels(size, first.aspect_ratio()));
+        let image_size = upright_size(&first, orientation);
         let origin = first.timestamp().unwrap_or(0);
         let shown = SourceFrame { frame: first, ticks: 0 };
         let mut reader = Self {
@@ -98,6 +121,7 @@ impl FrameReader {
             decode,
             info,
             orientation,
+            options: PictureOptions::default(),
             image_size,
             converters: Vec::new(),
             origin,
@@ -105,12 +129,34 @@ impl FrameReader {
             following: None,
             next_idx: 0,
             last_shown: None,
+            last_size: image_size,
             latest_secs,
             n_misplaced: 0,
             failed: false,
         };
         reader.following = reader.decode_after(0)?;
         Ok(reader)
+    }
+
+    /// Reads the pictures by `options` from now on.
+    #[must_use]
+    pub fn with_options(mut self, options: PictureOptions) -> Self {
+        if options.mirrored != self.options.mirrored {
+            self.orientation = self.orientation.mirrored();
+        }
+        self.options = options;
+        self.converters.clear();
+        self
+    }
+
+    /// Name of the HDR transfer function of the shown frame, `PQ` or `HLG`; `None` for SDR.
+    pub fn hdr(&self) -> Option<&'static str> {
+        HdrTransfer::of(&self.shown.frame).map(HdrTransfer::name)
+    }
+
+    /// Whether the shown frame says that it is interlaced.
+    pub fn is_flagged_interlaced(&self) -> bool {
+        self.shown.frame.is_interlaced()
     }
 
     /// Information of the headers.
@@ -165,18 +211,47 @@ impl FrameReader {
         }
         self.next_idx += 1;
         let repeated = self.last_shown.replace(self.shown.ticks) == Some(self.shown.ticks);
-        Ok(Some(FrameTime { frame_idx, source_secs: self.secs(self.shown.ticks), repeated }))
+        let resize = self.resize();
+        Ok(Some(FrameTime { frame_idx, source_secs: self.secs(self.shown.ticks), repeated, resize }))
     }
 
     /// Shown picture, upright: in full, or scaled to `size` (width, height in px).
     pub fn picture(&mut self, size: Option<[usize; 2]>) -> Result<Image> {
         let size = size.unwrap_or(self.image_size);
-        let at = self.converters.iter().position(|(of, _)| *of == size).unwrap_or_else(|| {
-            self.converters.push((size, Converter::new(size, self.orientation)));
+        let fitted = self.fitted(size);
+        let at = self.converters.iter().position(|(of, _)| *of == fitted).unwrap_or_else(|| {
+            if self.converters.len() == MOST_CONVERTERS {
+                self.converters.clear();
+            }
+            self.converters.push((fitted, Converter::new(fitted, self.orientation, self.options)));
             self.converters.len() - 1
         });
         let picture = self.converters[at].1.picture(&self.shown.frame);
-        picture.with_context(|| format!("{}, at {:.3} s", self.path.display(), self.secs(self.shown.ticks)))
+        let picture =
+            picture.with_context(|| format!("{}, at {:.3} s", self.path.display(), self.secs(self.shown.ticks)))?;
+        Ok(if fitted == size { picture } else { picture.framed(size) })
+    }
+
+    /// Size of the shown frame within a picture of `size`: all of it, unless its shape is not that of the first frame.
+    fn fitted(&self, size: [usize; 2]) -> [usize; 2] {
+        let shown = upright_size(&self.shown.frame, self.orientation);
+        if is_one_shape(shown, self.image_size) {
+            return size;
+        }
+        let shares = [0, 1].map(|axis| shown[axis].max(1) as f64 / self.image_size[axis].max(1) as f64);
+        let most = shares[0].max(shares[1]);
+        [0, 1].map(|axis| ((size[axis] as f64 * shares[axis] / most).round() as usize).clamp(1, size[axis].max(1)))
+    }
+
+    /// Change of size since the previous output frame.
+    fn resize(&mut self) -> Resize {
+        let size = upright_size(&self.shown.frame, self.orientation);
+        let before = std::mem::replace(&mut self.last_size, size);
+        match (before == size, is_one_shape(before, size)) {
+            (true, _) => Resize::None,
+            (false, true) => Resize::Scaled,
+            (false, false) => Resize::Reshaped,
+        }
     }
 
     /// Whether output frame `frame_idx` is at most as far from `early` as from `late` (ticks), exactly.
@@ -219,6 +294,17 @@ impl FrameReader {
     }
 }
 
+/// Width and height of a frame, upright and with square pixels.
+fn upright_size(frame: &frame::Video, orientation: Orientation) -> [usize; 2] {
+    let size = [frame.width() as usize, frame.height() as usize];
+    orientation.upright_size(probe::square_pixels(size, frame.aspect_ratio()))
+}
+
+fn is_one_shape(a: [usize; 2], b: [usize; 2]) -> bool {
+    let [a, b] = [a, b].map(|[width, height]| width.max(1) as f64 / height.max(1) as f64);
+    (a / b - 1.0).abs() < SAME_SHAPE
+}
+
 impl Iterator for FrameReader {
     type Item = Result<TimedFrame>;
 
@@ -227,7 +313,7 @@ impl Iterator for FrameReader {
             return None;
         }
         let frame = self.advance().and_then(|time| {
-            let Some(FrameTime { frame_idx, source_secs, repeated }) = time else { return Ok(None) };
+            let Some(FrameTime { frame_idx, source_secs, repeated, .. }) = time else { return Ok(None) };
             Ok(Some(TimedFrame { frame_idx, image: self.picture(None)?, source_secs, repeated }))
         });
         self.failed = frame.is_err();

@@ -1,136 +1,132 @@
-//! Conversion of a decoded frame to an upright RGB `Image`: colour conversion and scaling by swscale, then rotation.
+//! Conversion of a decoded frame to an upright RGB `Image`: colour conversion and scaling by swscale, tone mapping of
+//! HDR, deinterlacing, rotation.
 
-use crate::types::image::Image;
+use super::deinterlace;
+use super::orientation::Orientation;
+use super::tone_map::{HdrTransfer, ToneMapper};
+use crate::types::image::{Image, PictureOptions};
 use anyhow::{Context, Result, bail};
 use ffmpeg_next as ffmpeg;
-use ffmpeg_next::codec::packet::side_data::Type as SideData;
-use ffmpeg_next::format::{Pixel, stream::Stream};
+use ffmpeg_next::format::Pixel;
 use ffmpeg_next::software::scaling;
 use ffmpeg_next::{color, frame};
-
-/// Rotation of the coded picture to the upright one: its x axis points along `x` and its y axis along `y` of the
-/// upright picture, each a unit step (right and down are positive). Mirroring is possible, other angles are not.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Orientation {
-    x: [i8; 2],
-    y: [i8; 2],
-}
-
-impl Orientation {
-    pub const UPRIGHT: Self = Self { x: [1, 0], y: [0, 1] };
-
-    /// Orientation by the display matrix of a stream (nine 16.16 numbers; the first two rows are the images of the
-    /// axes), snapped to right angles.
-    pub fn from_stream(stream: &Stream) -> Self {
-        let matrix = stream.side_data().find(|side| side.kind() == SideData::DisplayMatrix);
-        let Some(numbers) = matrix.filter(|side| side.data().len() >= 36).map(|side| {
-            side.data().as_chunks::<4>().0.iter().map(|bytes| i32::from_ne_bytes(*bytes)).collect::<Vec<i32>>()
-        }) else {
-            return Self::UPRIGHT;
-        };
-        let [a, b, c, d] = [numbers[0], numbers[1], numbers[3], numbers[4]];
-        let unit = |v: i32| v.signum() as i8;
-        let turned = b.unsigned_abs() > a.unsigned_abs();
-        let (x, y) = if turned { ([0, unit(b)], [unit(c), 0]) } else { ([unit(a), 0], [0, unit(d)]) };
-        if x == [0, 0] || y == [0, 0] { Self::UPRIGHT } else { Self { x, y } }
-    }
-
-    /// Degrees clockwise from coded to upright: 0, 90, 180 or 270.
-    pub fn degrees(self) -> u32 {
-        match self.x {
-            [1, _] => 0,
-            [_, 1] => 90,
-            [-1, _] => 180,
-            _ => 270,
-        }
-    }
-
-    /// Width and height after rotation.
-    pub fn upright_size(self, [width, height]: [usize; 2]) -> [usize; 2] {
-        if self.x[0] == 0 { [height, width] } else { [width, height] }
-    }
-
-    fn apply(self, coded: Image) -> Image {
-        if self == Self::UPRIGHT {
-            return coded;
-        }
-        let [width, height] = self.upright_size([coded.width, coded.height]);
-        let mut upright = Image::filled(width, height, [0; 3]);
-        // Position of coded pixel 0, 0: at the far side of every reversed axis.
-        let origin = |back: bool, n: usize| if back { n as isize - 1 } else { 0 };
-        let x0 = origin(self.x[0] + self.y[0] < 0, width);
-        let y0 = origin(self.x[1] + self.y[1] < 0, height);
-        let at = |step: [i8; 2]| 3 * (isize::from(step[0]) + isize::from(step[1]) * width as isize);
-        let (dx, dy, start) = (at(self.x), at(self.y), 3 * (x0 + y0 * width as isize));
-        for (row_idx, row) in coded.data.chunks_exact(3 * coded.width).enumerate() {
-            let row_start = start + row_idx as isize * dy;
-            for (column, pixel) in row.as_chunks::<3>().0.iter().enumerate() {
-                let to = (row_start + column as isize * dx) as usize;
-                upright.data[to..to + 3].copy_from_slice(pixel);
-            }
-        }
-        upright
-    }
-}
 
 /// Converter of one stream's frames to pictures of one size; swscale's tables are kept between frames.
 pub(crate) struct Converter {
     orientation: Orientation,
+    deinterlace: bool,
     /// Size of the pictures before rotation.
     coded_size: [usize; 2],
-    scaler: Option<(scaling::Context, [i32; 2])>,
-    rgb: frame::Video,
+    scaler: Option<Scaler>,
 }
-
-// SAFETY: swscale's context is plain memory without ties to a thread, and only `picture(&mut self)` touches it.
-unsafe impl Send for Converter {}
 
 impl Converter {
     /// Pictures of `size` (width, height in px, upright).
-    pub fn new(size: [usize; 2], orientation: Orientation) -> Self {
-        Self { orientation, coded_size: orientation.upright_size(size), scaler: None, rgb: frame::Video::empty() }
+    pub fn new(size: [usize; 2], orientation: Orientation, options: PictureOptions) -> Self {
+        let coded_size = orientation.upright_size(size);
+        Self { orientation, deinterlace: options.deinterlace, coded_size, scaler: None }
     }
 
-    /// `frame`, upright, in the size this converter was made for.
+    /// `frame`, upright, in the size this converter was made for. Of an interlaced frame at its full height both fields
+    /// are converted by themselves, so that their colours do not mix; any other height is scaled from the first field.
     pub fn picture(&mut self, frame: &frame::Video) -> Result<Image> {
         let [width, height] = self.coded_size;
-        let colour = [colour_matrix(frame.color_space()), i32::from(frame.color_range() == color::Range::JPEG)];
-        let fits = self.scaler.as_ref().is_some_and(|(scaler, of)| {
-            let input = scaler.input();
-            *of == colour
-                && input.format == frame.format()
-                && [input.width, input.height] == [frame.width(), frame.height()]
-        });
-        if !fits {
-            self.scaler = Some((new_scaler(frame, [width, height], colour)?, colour));
+        let fields = if self.deinterlace { deinterlace::fields(frame) } else { None };
+        let coded = match fields {
+            None => self.convert(frame, [width, height])?,
+            Some([top, bottom]) => {
+                let keeps_top = frame.is_top_first() || !frame.is_interlaced();
+                if height == frame.height() as usize {
+                    let fields =
+                        [self.convert(&top, [width, height / 2])?, self.convert(&bottom, [width, height / 2])?];
+                    deinterlace::interpolate(&deinterlace::woven(&fields), keeps_top)
+                } else {
+                    self.convert(if keeps_top { &top } else { &bottom }, [width, height])?
+                }
+            }
+        };
+        Ok(self.orientation.apply(coded))
+    }
+
+    fn convert(&mut self, frame: &frame::Video, size: [usize; 2]) -> Result<Image> {
+        let source = SourceFormat::of(frame);
+        if self.scaler.as_ref().is_none_or(|scaler| scaler.source != source || scaler.size != size) {
+            self.scaler = Some(Scaler::new(source, size)?);
         }
-        let (scaler, _) = self.scaler.as_mut().context("the scaler was just made")?;
-        scaler.run(frame, &mut self.rgb).context("swscale failed")?;
-        let mut data = Vec::with_capacity(3 * width * height);
-        // Rows of the frame are padded to a multiple of 32 bytes.
-        for row in self.rgb.data(0).chunks(self.rgb.stride(0)).take(height) {
-            data.extend_from_slice(&row[..3 * width]);
-        }
-        Ok(self.orientation.apply(Image { width, height, data }))
+        self.scaler.as_mut().context("the scaler was just made")?.convert(frame)
     }
 }
 
-fn new_scaler(frame: &frame::Video, [width, height]: [usize; 2], colour: [i32; 2]) -> Result<scaling::Context> {
-    let shrinks = 2 * width <= frame.width() as usize;
-    let flags = if shrinks { scaling::Flags::AREA } else { scaling::Flags::BICUBIC };
-    let (w, h) = (u32::try_from(width)?, u32::try_from(height)?);
-    if w == 0 || h == 0 {
-        bail!("a picture of {w} x {h} px was asked for");
+/// What swscale must know of a frame.
+#[derive(Clone, Copy, PartialEq)]
+struct SourceFormat {
+    format: Pixel,
+    size: [u32; 2],
+    /// Matrix number of swscale, and whether the values use the full range.
+    colour: [i32; 2],
+    hdr: Option<HdrTransfer>,
+    has_wide_gamut: bool,
+}
+
+impl SourceFormat {
+    fn of(frame: &frame::Video) -> Self {
+        Self {
+            format: frame.format(),
+            size: [frame.width(), frame.height()],
+            colour: [colour_matrix(frame.color_space()), i32::from(frame.color_range() == color::Range::JPEG)],
+            hdr: HdrTransfer::of(frame),
+            has_wide_gamut: frame.color_primaries() == color::Primaries::BT2020,
+        }
     }
-    let mut scaler = scaling::Context::get(frame.format(), frame.width(), frame.height(), Pixel::RGB24, w, h, flags)
-        .with_context(|| format!("cannot turn {:?} pictures into RGB", frame.format()))?;
-    // SAFETY: the context is live, the tables are swscale's own static ones; one = 1.0 in 16.16.
-    unsafe {
-        let table = ffmpeg::ffi::sws_getCoefficients(colour[0]);
-        let one = 1 << 16;
-        ffmpeg::ffi::sws_setColorspaceDetails(scaler.as_mut_ptr(), table, colour[1], table, 0, 0, one, one);
+}
+
+/// swscale for frames of one format to RGB of one size.
+struct Scaler {
+    source: SourceFormat,
+    size: [usize; 2],
+    context: scaling::Context,
+    rgb: frame::Video,
+    tones: Option<ToneMapper>,
+}
+
+// SAFETY: swscale's context is plain memory without ties to a thread, and only `convert(&mut self)` touches it.
+unsafe impl Send for Scaler {}
+
+impl Scaler {
+    fn new(source: SourceFormat, size: [usize; 2]) -> Result<Self> {
+        let [width, height] = source.size;
+        let shrinks = 2 * size[0] <= width as usize;
+        let flags = if shrinks { scaling::Flags::AREA } else { scaling::Flags::BICUBIC };
+        let (w, h) = (u32::try_from(size[0])?, u32::try_from(size[1])?);
+        if w == 0 || h == 0 {
+            bail!("a picture of {w} x {h} px was asked for");
+        }
+        let tones = source.hdr.map(|transfer| ToneMapper::new(transfer, source.has_wide_gamut));
+        let rgb = if tones.is_some() { Pixel::RGB48LE } else { Pixel::RGB24 };
+        let mut context = scaling::Context::get(source.format, width, height, rgb, w, h, flags)
+            .with_context(|| format!("cannot turn {:?} pictures into RGB", source.format))?;
+        // SAFETY: the context is live, the tables are swscale's own static ones; one = 1.0 in 16.16.
+        unsafe {
+            let table = ffmpeg::ffi::sws_getCoefficients(source.colour[0]);
+            let one = 1 << 16;
+            ffmpeg::ffi::sws_setColorspaceDetails(context.as_mut_ptr(), table, source.colour[1], table, 0, 0, one, one);
+        }
+        Ok(Self { source, size, context, rgb: frame::Video::empty(), tones })
     }
-    Ok(scaler)
+
+    fn convert(&mut self, frame: &frame::Video) -> Result<Image> {
+        let [width, height] = self.size;
+        self.context.run(frame, &mut self.rgb).context("swscale failed")?;
+        let mut data = Vec::with_capacity(3 * width * height);
+        // Rows of the frame are padded to a multiple of 32 bytes.
+        for row in self.rgb.data(0).chunks(self.rgb.stride(0)).take(height) {
+            match &self.tones {
+                None => data.extend_from_slice(&row[..3 * width]),
+                Some(tones) => tones.push_row(&row[..6 * width], &mut data),
+            }
+        }
+        Ok(Image { width, height, data })
+    }
 }
 
 /// Matrix number of swscale; unspecified spaces are BT.601, its default.
@@ -141,38 +137,5 @@ fn colour_matrix(space: color::Space) -> i32 {
         color::Space::SMPTE240M => ffmpeg::ffi::SWS_CS_SMPTE240M,
         color::Space::FCC => ffmpeg::ffi::SWS_CS_FCC,
         _ => ffmpeg::ffi::SWS_CS_DEFAULT,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn two_by_three() -> Image {
-        Image { width: 2, height: 3, data: (0..6u8).flat_map(|v| [v; 3]).collect() }
-    }
-
-    fn reds(image: &Image) -> Vec<u8> {
-        image.data.iter().step_by(3).copied().collect()
-    }
-
-    #[test]
-    fn turns_and_mirrors() {
-        // 0 1        4 2 0        5 4        1 3 5        1 0
-        // 2 3  cw->  5 3 1   180  3 2   ccw  0 2 4  flip  3 2
-        // 4 5                     1 0                     5 4
-        let cases = [
-            (Orientation { x: [0, 1], y: [-1, 0] }, 90, [3, 2], [4, 2, 0, 5, 3, 1]),
-            (Orientation { x: [-1, 0], y: [0, -1] }, 180, [2, 3], [5, 4, 3, 2, 1, 0]),
-            (Orientation { x: [0, -1], y: [1, 0] }, 270, [3, 2], [1, 3, 5, 0, 2, 4]),
-            (Orientation { x: [-1, 0], y: [0, 1] }, 180, [2, 3], [1, 0, 3, 2, 5, 4]),
-            (Orientation::UPRIGHT, 0, [2, 3], [0, 1, 2, 3, 4, 5]),
-        ];
-        for (orientation, degrees, size, expected) in cases {
-            let upright = orientation.apply(two_by_three());
-            assert_eq!(orientation.degrees(), degrees);
-            assert_eq!([upright.width, upright.height], size);
-            assert_eq!(reds(&upright), expected);
-        }
     }
 }

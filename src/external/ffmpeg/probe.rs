@@ -1,7 +1,7 @@
 //! Headers of a media file, without decoding. Missing values stay unknown; a file with neither pictures nor sound is an
 //! error.
 
-use super::picture::Orientation;
+use super::orientation::Orientation;
 use super::source;
 use crate::types::time::FrameRate;
 use anyhow::Result;
@@ -51,7 +51,7 @@ pub fn probe(path: &Path) -> Result<ProbedMedia> {
 
 pub(crate) fn describe(input: &Input) -> ProbedMedia {
     let video = source::video_stream(input);
-    let audio = source::audio_stream(input);
+    let audio = source::automatic_track(input);
     let duration_secs = video.as_ref().or(audio.as_ref()).and_then(|stream| source::stated_secs(input, stream));
     ProbedMedia {
         duration_secs,

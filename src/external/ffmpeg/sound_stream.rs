@@ -12,7 +12,7 @@ const AHEAD: usize = 8;
 /// Number of samples of the sound of `path` as mono at `rate`, by decoding all of it; `None` without sound.
 pub fn n_samples(path: &Path, rate: u32) -> Result<Option<usize>> {
     let mut n = 0;
-    let streamed = stream_mono(path, rate, &mut |piece| {
+    let streamed = stream_mono(path, 0, rate, &mut |piece| {
         n += piece.len();
         Ok(())
     })?;
@@ -44,7 +44,7 @@ impl Iterator for SoundStream {
 
 fn decode(path: PathBuf, rate: u32, sender: &SyncSender<Result<Vec<f32>>>) {
     let mut has_left = false;
-    let ended = stream_mono(&path, rate, &mut |streamed| {
+    let ended = stream_mono(&path, 0, rate, &mut |streamed| {
         for piece in streamed.chunks(PIECE) {
             if sender.send(Ok(piece.to_vec())).is_err() {
                 has_left = true;

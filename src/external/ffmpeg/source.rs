@@ -1,6 +1,7 @@
 //! Opening of a media file: its streams, or an error that names the file, the defect and what was expected.
 
-use anyhow::{Context, Result};
+use crate::types::sound::AudioTracks;
+use anyhow::{Context, Result, bail};
 use ffmpeg_next as ffmpeg;
 use ffmpeg_next::format::context::Input;
 use ffmpeg_next::format::stream::{Disposition, Stream};
@@ -54,7 +55,7 @@ pub(crate) fn open_with(path: &Path, options: &[(&str, &str)]) -> Result<Input> 
         Err(ffmpeg::Error::InvalidData) => return unreadable(format!("{name} is not a media file: {EXPECTED}")),
         Err(error) => return unreadable(format!("cannot open {name} ({error}): {EXPECTED}")),
     };
-    match video_stream(&input).is_none() && audio_stream(&input).is_none() {
+    match video_stream(&input).is_none() && automatic_track(&input).is_none() {
         false => Ok(input),
         true if is_mp4 => unreadable(cut_short()),
         true => unreadable(format!("{name} holds neither pictures nor sound: {EXPECTED}")),
@@ -74,9 +75,45 @@ pub(crate) fn video_stream(input: &Input) -> Option<Stream<'_>> {
     (!stream.disposition().contains(Disposition::ATTACHED_PIC)).then_some(stream)
 }
 
-/// The stream of sound, if there is one.
-pub(crate) fn audio_stream(input: &Input) -> Option<Stream<'_>> {
-    input.streams().best(ffmpeg::media::Type::Audio)
+/// Streams of sound in the order of the file, those without a rate or a channel left out.
+fn audio_streams(input: &Input) -> Vec<Stream<'_>> {
+    let is_sound = |stream: &Stream| {
+        // SAFETY: the parameters belong to `stream` and are only read here.
+        let [rate, n_channels] = unsafe {
+            let parameters = stream.parameters();
+            let parameters = parameters.as_ptr();
+            [(*parameters).sample_rate, (*parameters).ch_layout.nb_channels]
+        };
+        stream.parameters().medium() == ffmpeg::media::Type::Audio && rate > 0 && n_channels > 0
+    };
+    input.streams().filter(is_sound).collect()
+}
+
+/// Stream of sound that is taken where nobody chose: the first one that is marked as the default, else the first.
+pub(crate) fn automatic_track(input: &Input) -> Option<Stream<'_>> {
+    let streams = audio_streams(input);
+    let is_default = |stream: &Stream| stream.disposition().contains(Disposition::DEFAULT);
+    let at = streams.iter().position(is_default).unwrap_or(0);
+    streams.into_iter().nth(at)
+}
+
+/// Stream of the sound track `track`, from 1 (0: the automatic one), with what it was chosen from; `None` without sound.
+/// A file with one track has no choice. Errors: fewer tracks.
+pub(crate) fn audio_track(input: &Input, track: usize) -> Result<Option<(Stream<'_>, AudioTracks)>> {
+    let streams = audio_streams(input);
+    let Some(automatic) = automatic_track(input) else { return Ok(None) };
+    let n_tracks = streams.len();
+    let language =
+        |stream: &Stream| stream.metadata().get("language").filter(|name| *name != "und").unwrap_or("").to_owned();
+    let languages: Vec<String> = streams.iter().map(language).collect();
+    let chosen = match track {
+        0 => streams.iter().position(|stream| stream.index() == automatic.index()).unwrap_or(0),
+        _ if n_tracks == 1 => 0,
+        track if track <= n_tracks => track - 1,
+        track => bail!("there is no sound track {track}, the file has {n_tracks}: change extract.audio_track"),
+    };
+    let stream = streams.into_iter().nth(chosen);
+    Ok(stream.map(|stream| (stream, AudioTracks { n_tracks, taken: chosen + 1, languages })))
 }
 
 /// Length in seconds as the container states it for this stream, or else for the whole file.

@@ -2,6 +2,7 @@
 
 use crate::external::ffmpeg::audio::stream_mono;
 use crate::formats::wav::WavWriter;
+use crate::types::sound::AudioTracks;
 use anyhow::Result;
 use std::path::Path;
 
@@ -10,15 +11,17 @@ use std::path::Path;
 pub struct Extracted {
     /// Length in seconds.
     pub secs: f64,
+    /// Track that was read, and the others.
+    pub tracks: AudioTracks,
     /// Sentence about what was left out.
     pub damage: Option<String>,
 }
 
-/// Writes the sound of `path` to the 16-bit mono wav `out`, a piece at a time; `None` (and no file) when there is no
-/// sound.
-pub fn extract_wav(path: &Path, out: &Path, rate: u32) -> Result<Option<Extracted>> {
+/// Writes the sound track `track` of `path` (from 1; 0: the automatic choice) to the 16-bit mono wav `out`, a piece at a
+/// time; `None` (and no file) when there is no sound.
+pub fn extract_wav(path: &Path, track: usize, out: &Path, rate: u32) -> Result<Option<Extracted>> {
     let mut wav = None;
-    let heard = stream_mono(path, rate, &mut |piece| {
+    let heard = stream_mono(path, track, rate, &mut |piece| {
         if wav.is_none() {
             wav = Some(WavWriter::create(out, rate)?);
         }
@@ -27,5 +30,8 @@ pub fn extract_wav(path: &Path, out: &Path, rate: u32) -> Result<Option<Extracte
     if let Some(wav) = wav {
         wav.finish()?;
     }
-    Ok(heard.map(|heard| Extracted { secs: heard.n_samples as f64 / f64::from(rate), damage: heard.damage() }))
+    Ok(heard.map(|heard| {
+        let (secs, damage) = (heard.n_samples as f64 / f64::from(rate), heard.damage());
+        Extracted { secs, tracks: heard.tracks, damage }
+    }))
 }

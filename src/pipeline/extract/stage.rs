@@ -1,31 +1,46 @@
 //! The stage. Writes the sound (16 kHz mono s16, its first sample at the first picture; absent without sound), the
 //! `Timeline` at the dataset rate, `MediaInfo`, and, only if asked, the pictures as PNG.
 
-use super::shots::{RESTART, ShotFinder};
-use super::thumbnail::{THUMBNAIL, mean_change};
+use super::reading;
+use super::survey::PictureSurvey;
 use crate::config;
+use crate::config::{Config, videos};
 use crate::external::ffmpeg;
 use crate::external::ffmpeg::frames::FrameReader;
-use crate::external::opencv::png;
 use crate::formats::media_json::MediaInfo;
-use crate::formats::timeline_npz::Timeline;
 use crate::stage::artifacts::{Artifact, StageName};
 use crate::stage::progress::Progress;
 use crate::stage::{Input, Report, Stage, Unit, counted};
+use crate::types::image::PictureOptions;
 use crate::types::sound::SAMPLE_RATE;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use serde_json::json;
-use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Video to sound and timeline.
 pub struct ExtractStage {
     settings: config::ExtractConfig,
+    /// Speakers with the entries that name their mirrored videos, and the folder these count from.
+    mirrored: Vec<(String, Vec<String>)>,
+    folder: PathBuf,
 }
 
 impl ExtractStage {
+    /// No video is mirrored.
     pub fn new(settings: &config::ExtractConfig) -> Self {
-        Self { settings: settings.clone() }
+        Self { settings: settings.clone(), mirrored: Vec::new(), folder: PathBuf::new() }
+    }
+
+    /// Settings of a whole configuration, with the videos that it calls mirrored.
+    pub fn of_config(config: &Config) -> Self {
+        let mirrored = config.settings.speaker.iter().map(|speaker| (speaker.name.clone(), speaker.mirrored.clone()));
+        let folder = config.file.parent().unwrap_or(Path::new(".")).to_owned();
+        Self { settings: config.settings.extract.clone(), mirrored: mirrored.collect(), folder }
+    }
+
+    fn is_mirrored(&self, unit: &Unit) -> bool {
+        let of_speaker = self.mirrored.iter().filter(|(speaker, _)| *speaker == unit.speaker);
+        of_speaker.flat_map(|(_, entries)| entries).any(|entry| videos::names(entry, &unit.source, &self.folder))
     }
 }
 
@@ -35,24 +50,45 @@ impl Stage for ExtractStage {
     }
 
     fn version(&self) -> u32 {
-        2
+        3
     }
 
-    fn settings(&self, _unit: &Unit) -> serde_json::Value {
-        json!({ "extract": self.settings, "sample_rate": SAMPLE_RATE, "ffmpeg": ffmpeg::version() })
+    fn settings(&self, unit: &Unit) -> serde_json::Value {
+        json!({
+            "extract": self.settings,
+            "sample_rate": SAMPLE_RATE,
+            "mirrored": self.is_mirrored(unit),
+            "ffmpeg": ffmpeg::version(),
+        })
     }
 
     fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
         Ok(vec![Input { role: "video".into(), path: unit.source.clone() }])
     }
 
+    /// Reads the pictures once; a second time where only a part of each counts, or where they are kept.
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let rate = self.settings.rate();
-        let mut reader = FrameReader::open(&unit.source, rate)?;
-        let timeline = self.timeline(&mut reader, out, progress)?;
+        let mut pictures = PictureOptions { mirrored: self.is_mirrored(unit), deinterlace: false };
+        let open = |pictures| Ok::<_, anyhow::Error>(FrameReader::open(&unit.source, rate)?.with_options(pictures));
+        let mut reader = open(pictures)?;
+        let hdr = reader.hdr().map(str::to_owned);
+        let mut survey = PictureSurvey::new(rate);
+        let mut read = reading::read(&mut reader, rate, None, Some(&mut survey), progress)?;
+        pictures.deinterlace = survey.is_interlaced();
+        let active_area = survey.active_area();
+        if active_area.is_some() {
+            read = reading::read(&mut open(pictures)?, rate, active_area, None, progress)?;
+        }
+        if self.settings.keep_frames {
+            reading::write_pictures(&mut open(pictures)?, &Artifact::Frames.within(out), progress)?;
+        }
+        let timeline = read.timeline;
         timeline.write(&Artifact::Timeline.within(out))?;
-        let sound = super::audio_file::extract_wav(&unit.source, &Artifact::Sound.within(out), SAMPLE_RATE)?;
+        let sound = Artifact::Sound.within(out);
+        let sound = super::audio_file::extract_wav(&unit.source, self.settings.audio_track, &sound, SAMPLE_RATE)?;
         let audio_secs = sound.as_ref().map(|sound| sound.secs);
+        let audio_tracks = sound.as_ref().map(|sound| sound.tracks.clone()).filter(|tracks| tracks.n_tracks > 1);
 
         let n_frames = timeline.n_frames();
         let n_cuts = timeline.restart.iter().filter(|restart| **restart).count();
@@ -70,6 +106,11 @@ impl Stage for ExtractStage {
             has_audio: audio_secs.is_some(),
             audio_secs,
             damage,
+            pictures,
+            active_area,
+            hdr,
+            n_resizes: read.n_resizes,
+            audio_tracks,
         };
         media.write(&Artifact::MediaInfo.within(out))?;
 
@@ -79,35 +120,34 @@ impl Stage for ExtractStage {
         facts.insert("n_cuts".into(), n_cuts.into());
         let kept = |damage: &String| format!("; damaged, what could be read is kept: {damage}");
         let damage = media.damage.as_ref().map(kept).unwrap_or_default();
-        Ok(Report { line: format!("{n_frames} frames at {rate}, {cuts}, {sound}{damage}"), facts })
+        let special: String = specials(&media).iter().map(|special| format!("; {special}")).collect();
+        Ok(Report { line: format!("{n_frames} frames at {rate}, {cuts}, {sound}{special}{damage}"), facts })
     }
 }
 
-impl ExtractStage {
-    /// Reads the pictures once; of each only a thumbnail is converted, unless the frames are kept.
-    fn timeline(&self, reader: &mut FrameReader, out: &Path, progress: &dyn Progress) -> Result<Timeline> {
-        let mut timeline = Timeline::default();
-        let (mut shots, mut before) = (ShotFinder::new(self.settings.rate()), None);
-        let frames = Artifact::Frames.within(out);
-        if self.settings.keep_frames {
-            fs::create_dir(&frames).with_context(|| format!("cannot make the folder {}", frames.display()))?;
-        }
-        let task = progress.begin("frames", reader.expected_frames().unwrap_or(0) as u64);
-        while let Some(time) = reader.advance()? {
-            timeline.source_secs.push(time.source_secs);
-            timeline.repeated.push(time.repeated);
-            let picture = if time.repeated { None } else { Some(reader.picture(Some(THUMBNAIL))?) };
-            shots.push(picture.clone());
-            let pair = before.as_ref().zip(picture.as_ref());
-            timeline.frame_difference.push(pair.map_or(0.0, |(a, b)| mean_change(a, b)));
-            before = picture.or(before);
-            if self.settings.keep_frames {
-                png::write(&frames.join(format!("{:06}.png", time.frame_idx)), &reader.picture(None)?)?;
-            }
-            task.advance(1);
-        }
-        timeline.shot_score = shots.finish();
-        timeline.restart = timeline.shot_score.iter().map(|score| *score >= RESTART).collect();
-        Ok(timeline)
+/// What is out of the ordinary about a file, and what was done about it.
+fn specials(media: &MediaInfo) -> Vec<String> {
+    let mut specials = Vec::new();
+    if media.pictures.deinterlace {
+        specials.push("interlaced, deinterlaced".to_owned());
     }
+    if media.pictures.mirrored {
+        specials.push("mirrored, turned back".to_owned());
+    }
+    if let Some(hdr) = &media.hdr {
+        specials.push(format!("HDR ({hdr}), tone-mapped"));
+    }
+    if media.n_resizes > 0 {
+        let times = if media.n_resizes == 1 { "once".to_owned() } else { format!("{} times", media.n_resizes) };
+        specials.push(format!("the pictures change their size {times}, brought to the first"));
+    }
+    if let Some(area) = media.active_area {
+        specials.push(format!("bars, {}x{} px between them looked at", area.width, area.height));
+    }
+    if let Some(tracks) = &media.audio_tracks {
+        let named: Vec<&str> = tracks.languages.iter().map(|name| if name.is_empty() { "?" } else { name }).collect();
+        let (n, taken) = (tracks.n_tracks, tracks.taken);
+        specials.push(format!("{n} sound tracks ({}), number {taken} taken: extract.audio_track", named.join(", ")));
+    }
+    specials
 }

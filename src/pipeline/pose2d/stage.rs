@@ -12,6 +12,7 @@ use crate::external::ffmpeg::frames::{FrameReader, FrameTime};
 use crate::external::onnx::{ModelEntry, ModelError, ModelStore, Runtime};
 use crate::external::opencv;
 use crate::formats::keypoints_npz;
+use crate::formats::media_json::MediaInfo;
 use crate::formats::timeline_npz::Timeline;
 use crate::stage::artifacts::{Artifact, StageName};
 use crate::stage::progress::Progress;
@@ -108,6 +109,7 @@ impl Stage for Pose2dStage {
         let mut inputs = vec![
             input("video".into(), unit.source.clone()),
             input("timeline".into(), Artifact::Timeline.path(&self.work, unit)),
+            input("media".into(), Artifact::MediaInfo.path(&self.work, unit)),
         ];
         if let Some(path) = self.references.get(&unit.speaker) {
             inputs.push(input("reference".into(), path.clone()));
@@ -132,7 +134,9 @@ impl Stage for Pose2dStage {
                 .set_reference(&picture.image)
                 .with_context(|| format!("the speaker's reference {}", path.display()))?;
         }
-        let reader = FrameReader::open(&unit.source, self.fps)?;
+        let media = MediaInfo::read(&Artifact::MediaInfo.path(&self.work, unit))?;
+        let reader = FrameReader::open(&unit.source, self.fps)?.with_options(media.pictures);
+        let corner = media.active_area.map_or([0; 2], |area| [area.x, area.y]);
         let [width, height] = reader.image_size();
         let image_size = [u32::try_from(width)?, u32::try_from(height)?];
         let task = progress.begin(&unit.to_string(), restarts.len() as u64);
@@ -145,7 +149,11 @@ impl Stage for Pose2dStage {
         };
         let pick = |reader: &mut FrameReader, time: FrameTime| {
             let is_new = time.frame_idx == 0 || restart_at(time.frame_idx)? || !time.repeated;
-            is_new.then(|| reader.picture(None)).transpose()
+            let whole = is_new.then(|| reader.picture(None)).transpose()?;
+            Ok(match (whole, media.active_area) {
+                (Some(whole), Some(area)) => Some(whole.cropped(area)),
+                (whole, _) => whole,
+            })
         };
         ahead::for_each(reader, pick, |time, picture| {
             let idx = time.frame_idx;
@@ -153,7 +161,7 @@ impl Stage for Pose2dStage {
                 chain.begin_shot();
             }
             if let Some(picture) = picture {
-                pose = chain.frame(&picture).with_context(|| format!("frame {idx}"))?;
+                pose = chain.frame(&picture).with_context(|| format!("frame {idx}"))?.moved(corner);
             }
             if idx + 1 == N_MEASURED
                 && restarts.len() >= 6 * N_MEASURED

@@ -9,7 +9,7 @@ use crate::external::ffmpeg::frames::FrameReader;
 use crate::external::opencv::draw;
 use crate::pipeline::lift::quality::jitter_around;
 use crate::stage::progress::Progress;
-use crate::types::image::Image;
+use crate::types::image::{Image, PictureOptions};
 use crate::types::pose2d::{Keypoints, coco};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::{L_HAND, L_WRIST, N_HAND_JOINTS, R_HAND, R_WRIST};
@@ -29,6 +29,8 @@ const TITLE_PX: usize = 36;
 pub struct SheetClip<'a> {
     pub title: &'a str,
     pub video: &'a Path,
+    /// How its pictures are read.
+    pub pictures: PictureOptions,
     pub keypoints: &'a Keypoints,
     pub motion: &'a Motion,
     /// Motion of the animated rig, frame by frame that of `motion`, if it is shown too.
@@ -45,7 +47,7 @@ impl SheetClip<'_> {
         mut page_done: impl FnMut(usize, usize, &Image) -> Result<()>,
     ) -> Result<()> {
         let moments = self.moments(every_secs)?;
-        let mut reader = FrameReader::open_with(self.video, self.motion.fps, 0)?;
+        let mut reader = FrameReader::open_with(self.video, self.motion.fps, 0)?.with_options(self.pictures);
         self.check_length(&reader)?;
         let crop = SheetCrop::around(self.keypoints, reader.image_size());
         let task = progress.begin("drawing", moments.len() as u64);

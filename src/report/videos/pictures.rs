@@ -8,6 +8,7 @@ use crate::external::ffmpeg::frames::FrameReader;
 use crate::external::ffmpeg::jpeg;
 use crate::external::opencv::draw;
 use crate::formats::keypoints_npz;
+use crate::pipeline::pictures;
 use crate::stage::Unit;
 use crate::stage::artifacts::Artifact;
 use crate::types::image::Image;
@@ -39,7 +40,8 @@ pub fn thumbnails(
     let moments: Vec<&Vec<usize>> =
         worst.rules.values().flatten().filter(|m| m.video == video).map(|m| &m.frames).collect();
     let frames = worst.frames_of(video);
-    let mut reader = FrameReader::open_with(&unit.source, keypoints.fps, 0)?;
+    let mut reader =
+        FrameReader::open_with(&unit.source, keypoints.fps, 0)?.with_options(pictures::options(work, unit));
     let n_wide = |frame: &usize| if moments.iter().any(|m| m.len() > 1 && m.contains(frame)) { 2 } else { 1 };
     let mut thumbs = BTreeMap::new();
     for frame_idx in &frames {

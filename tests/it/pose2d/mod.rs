@@ -1,3 +1,4 @@
 //! The chain of 2D models.
 
 pub mod pose_chain;
+pub mod real_life;

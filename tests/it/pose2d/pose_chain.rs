@@ -5,6 +5,7 @@ use crate::fixtures::onnx_models::models;
 use orator::config;
 use orator::config::Settings;
 use orator::formats::keypoints_npz;
+use orator::formats::media_json::MediaInfo;
 use orator::formats::timeline_npz::Timeline;
 use orator::pipeline::pose2d::{Chain, Pose2dStage};
 use orator::stage::progress::Silent;
@@ -82,6 +83,7 @@ fn write_timeline(settings: &Settings, unit: &Unit, restart: Vec<bool>) {
         frame_difference: vec![1.0; n_frames],
     };
     timeline.write(&folder.join("timeline.npz")).unwrap();
+    MediaInfo::new(n_frames as f64 / 15.0, n_frames, FrameRate::new(15, 1)).write(&folder.join("media.json")).unwrap();
 }
 
 #[test]
@@ -92,7 +94,7 @@ fn a_video_without_a_person_is_zeros_and_no_failure() {
     write_timeline(&settings, &unit, (0..10).map(|t| t == 6).collect());
     let stage = Pose2dStage::new(&settings).unwrap();
     let roles: Vec<_> = stage.inputs(&unit).unwrap().into_iter().map(|input| input.role).collect();
-    assert_eq!(roles, ["video", "timeline", "model:person", "model:body", "model:hand", "model:palm"]);
+    assert_eq!(roles, ["video", "timeline", "media", "model:person", "model:body", "model:hand", "model:palm"]);
     assert!(stage.settings(&unit)["models"]["body"]["sha256"].is_string());
     let written: Vec<_> = ["a", "b"]
         .iter()

@@ -41,7 +41,7 @@ fn keypoints(motion: &Motion) -> Keypoints {
 }
 
 fn pages(video: &Path, keypoints: &Keypoints, motion: &Motion, every_secs: f64) -> anyhow::Result<Vec<Image>> {
-    let clip = SheetClip { title: "a clip", video, keypoints, motion, figure: None };
+    let clip = SheetClip { title: "a clip", video, pictures: Default::default(), keypoints, motion, figure: None };
     let mut pages = Vec::new();
     clip.pages(every_secs, &Silent, |number, n_pages, page| {
         assert!(number == pages.len() && number < n_pages);

@@ -1,0 +1,213 @@
+//! Bars beside the picture proper: black ones, or smooth ones (a blurred copy of the picture, a plain colour). They are
+//! the outer columns, or rows, on both sides alike, that are black or without detail in the whole video and end at a
+//! straight seam. Dark or plain walls end at no seam.
+
+use crate::types::image::{Image, PixelArea};
+
+/// Bands across an axis, in each of which a position has one mean.
+const BANDS: usize = 32;
+/// Brightness of a black bar at most, and of a band that is lit at least, 8-bit steps.
+const BLACK: f32 = 24.0;
+const LIT: f32 = 48.0;
+/// Difference of neighbours in a smooth bar at most, and across a seam at least, 8-bit steps, means over the video.
+const SMOOTH: f32 = 1.0;
+const SEAM: f32 = 5.0;
+/// Least share of the bands that are lit inside a black bar, or that show the seam of a smooth one.
+const MOST_BANDS: f32 = 0.5;
+/// Pixels over which an encoder smears a seam.
+const SMEAR: usize = 10;
+/// Largest share of an axis by which the bars of its two sides differ.
+const UNEVEN: f32 = 0.02;
+/// Largest share of an axis that is left between smooth bars, and of the picture that is worth a crop.
+const BETWEEN_SMOOTH: f32 = 0.65;
+const WORTH: f32 = 0.8;
+
+/// Search for bars, fed with some pictures of a video.
+#[derive(Default)]
+pub struct BarFinder {
+    size: [usize; 2],
+    columns: AxisProfile,
+    rows: AxisProfile,
+}
+
+impl BarFinder {
+    /// Takes in a picture; all have one size.
+    pub fn push(&mut self, image: &Image) {
+        let [width, height] = [image.width, image.height];
+        let green = |x: usize, y: usize| image.data[3 * (y * width + x) + 1];
+        self.size = [width, height];
+        self.columns.push(width, height, |x, y| green(x, y));
+        self.rows.push(height, width, |y, x| green(x, y));
+    }
+
+    /// Area between the bars; `None` without any that are worth a crop.
+    pub fn finish(&self) -> Option<PixelArea> {
+        let [width, height] = self.size;
+        let ([left, right], [top, bottom]) = (self.columns.bars(), self.rows.bars());
+        let area = PixelArea { x: left, y: top, width: width - left - right, height: height - top - bottom };
+        let share = (area.width * area.height) as f32 / (width * height).max(1) as f32;
+        (share > 0.0 && share <= WORTH).then_some(area)
+    }
+}
+
+/// Measures of the positions along one axis: its columns from the left, or its rows from the top.
+#[derive(Default)]
+struct AxisProfile {
+    n_pictures: usize,
+    /// Brightest mean of each band at each position, band by band.
+    brightest: Vec<f32>,
+    /// Sums over the pictures: mean difference to the next position; difference of each band's mean across each position.
+    detail: Vec<f32>,
+    seam: Vec<f32>,
+}
+
+impl AxisProfile {
+    fn push(&mut self, n: usize, n_across: usize, value: impl Fn(usize, usize) -> u8) {
+        if n < 2 * SMEAR || n_across < BANDS {
+            return;
+        }
+        if self.detail.len() != n {
+            let zeros = |n| vec![0.0; n];
+            *self = Self { n_pictures: 0, brightest: zeros(BANDS * n), detail: zeros(n), seam: zeros(BANDS * n) };
+        }
+        self.n_pictures += 1;
+        for band in 0..BANDS {
+            let across = band * n_across / BANDS..(band + 1) * n_across / BANDS;
+            let n_values = across.len() as f32;
+            let mut sums = vec![0u32; n];
+            for at in across {
+                let mut before = value(0, at);
+                for position in 0..n {
+                    let here = value(position, at);
+                    sums[position] += u32::from(here);
+                    self.detail[position.saturating_sub(1)] += f32::from(here.abs_diff(before)) / n_across as f32;
+                    before = here;
+                }
+            }
+            let mean = |position: usize| sums[position.min(n - 1)] as f32 / n_values;
+            for position in 0..n {
+                let slot = band * n + position;
+                self.brightest[slot] = self.brightest[slot].max(mean(position));
+                self.seam[slot] += (mean(position + 1) - mean(position.saturating_sub(1))).abs();
+            }
+        }
+    }
+
+    /// Widths of the bars at both ends, 0 where there are none.
+    fn bars(&self) -> [usize; 2] {
+        let n = self.detail.len();
+        // One picture alone is no video.
+        if self.n_pictures < 2 {
+            return [0; 2];
+        }
+        let even = |[low, high]: &[usize; 2]| {
+            low.min(high) > &0 && low + high < n && low.abs_diff(*high) as f32 <= UNEVEN * n as f32 + 2.0
+        };
+        let smooth = || {
+            let widths = self.smooth_bars()?;
+            ((n - widths[0] - widths[1]) as f32 <= BETWEEN_SMOOTH * n as f32).then_some(widths)
+        };
+        self.black_bars().filter(even).or_else(|| smooth().filter(even)).unwrap_or_default()
+    }
+
+    fn black_bars(&self) -> Option<[usize; 2]> {
+        let n = self.detail.len();
+        let brightest = |position: usize, band: usize| self.brightest[band * n + position];
+        let is_black = |position: &usize| (0..BANDS).all(|band| brightest(*position, band) <= BLACK);
+        let low = (0..n).take_while(is_black).count();
+        let high = (0..n).rev().take_while(is_black).count();
+        let lit = |start: usize, end: usize| {
+            share(|band| (start..end).any(|position| brightest(position, band) >= LIT)) >= MOST_BANDS
+        };
+        (low + high + SMEAR < n && lit(low, low + SMEAR) && lit(n - high - SMEAR, n - high)).then_some([low, high])
+    }
+
+    fn smooth_bars(&self) -> Option<[usize; 2]> {
+        let (n, n_pictures) = (self.detail.len(), self.n_pictures as f32);
+        let is_smooth = |position: &usize| self.detail[*position] <= SMOOTH * n_pictures;
+        let low = (0..n).take_while(is_smooth).count();
+        let high = (0..n).rev().skip(1).take_while(is_smooth).count();
+        if low + high + SMEAR >= n {
+            return None;
+        }
+        let shown = |position: usize| share(|band| self.seam[band * n + position] >= SEAM * n_pictures);
+        let strength = |position: usize| (0..BANDS).map(|band| self.seam[band * n + position]).sum::<f32>();
+        let sharpest = |start: usize, end: usize| {
+            let seams = (start..end.min(n)).filter(|position| shown(*position) >= MOST_BANDS);
+            seams.max_by(|a, b| strength(*a).total_cmp(&strength(*b)))
+        };
+        let first = sharpest(low, low + SMEAR)?;
+        let last = sharpest((n - high).saturating_sub(SMEAR), n - high)?;
+        (first < last).then(|| [first, n - 1 - last])
+    }
+}
+
+/// Share of the bands for which `holds`.
+fn share(holds: impl Fn(usize) -> bool) -> f32 {
+    (0..BANDS).filter(|band| holds(*band)).count() as f32 / BANDS as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Content without pattern between `left` and `right` of 320 x 180, `beside` everywhere else.
+    fn picture(seed: usize, [left, right]: [usize; 2], beside: impl Fn(usize, usize) -> u8) -> Image {
+        let mut image = Image::filled(320, 180, [0; 3]);
+        for (at, pixel) in image.data.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            let (x, y) = (at % 320, at / 320);
+            let bits = ((seed * 64 + x / 3) * 64 + y / 3).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+            *pixel = [if x < left || x >= 320 - right { beside(x, y) } else { (bits >> 40) as u8 }; 3];
+        }
+        image
+    }
+
+    fn found(bars: [usize; 2], beside: impl Fn(usize, usize) -> u8) -> Option<PixelArea> {
+        let mut finder = BarFinder::default();
+        (0..5).for_each(|seed| finder.push(&picture(seed, bars, &beside)));
+        finder.finish()
+    }
+
+    #[test]
+    fn black_and_smooth_bars_are_found_to_the_pixel() {
+        let smooth = |x: usize, y: usize| (60 + x / 4 + y / 4) as u8;
+        for beside in [&(|_, _| 3) as &dyn Fn(usize, usize) -> u8, &smooth] {
+            let area = found([110, 109], beside).unwrap();
+            assert!(area.x.abs_diff(110) <= 1 && (area.x + area.width).abs_diff(211) <= 1, "{area:?}");
+            assert_eq!((area.y, area.height), (0, 180));
+        }
+    }
+
+    #[test]
+    fn whole_pictures_have_no_bars() {
+        assert_eq!(found([0, 0], |_, _| 0), None);
+        // Too narrow to be worth a crop, on one side alone, uneven.
+        assert_eq!(found([10, 10], |_, _| 0), None);
+        assert_eq!(found([120, 0], |_, _| 0), None);
+        assert_eq!(found([120, 40], |_, _| 0), None);
+        let mut dark = BarFinder::default();
+        (0..5).for_each(|_| dark.push(&Image::filled(320, 180, [4; 3])));
+        assert_eq!(dark.finish(), None);
+        // A lit figure before a dark wall ends at no straight seam.
+        let mut figure = BarFinder::default();
+        for seed in 0..5 {
+            let mut image = picture(seed, [100, 100], |_, _| 2);
+            for (at, pixel) in image.data.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+                let (x, y) = ((at % 320) as f64 - 160.0, (at / 320) as f64 - 90.0);
+                if (x / 60.0).hypot(y / 85.0) > 1.0 {
+                    *pixel = [2; 3];
+                }
+            }
+            figure.push(&image);
+        }
+        assert_eq!(figure.finish(), None);
+        assert_eq!(BarFinder::default().finish(), None);
+    }
+
+    #[test]
+    fn tiny_pictures_have_none_either() {
+        let mut finder = BarFinder::default();
+        (0..3).for_each(|_| finder.push(&Image::filled(3, 2, [9; 3])));
+        assert_eq!(finder.finish(), None);
+    }
+}

@@ -1,0 +1,82 @@
+//! A pass over the pictures of a video: thumbnails for shots and movement, and, the first time, a survey.
+
+use super::shots::{RESTART, ShotFinder};
+use super::survey::PictureSurvey;
+use super::thumbnail::{THUMBNAIL, mean_change};
+use crate::external::ffmpeg::frames::{FrameReader, Resize};
+use crate::external::opencv::png;
+use crate::formats::timeline_npz::Timeline;
+use crate::stage::progress::Progress;
+use crate::types::image::{Image, PixelArea};
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result};
+use std::fs;
+use std::path::Path;
+
+/// Timeline of a video and the number of times its pictures change their size.
+pub struct PictureReading {
+    pub timeline: Timeline,
+    pub n_resizes: usize,
+}
+
+/// Reads the pictures once; of each only a thumbnail of `area` (all of it without) is looked at, unless the survey wants
+/// more. Where the size changes tracking begins anew, where the shape changes a shot begins.
+pub fn read(
+    reader: &mut FrameReader,
+    rate: FrameRate,
+    area: Option<PixelArea>,
+    mut survey: Option<&mut PictureSurvey>,
+    progress: &dyn Progress,
+) -> Result<PictureReading> {
+    let (mut timeline, mut n_resizes) = (Timeline::default(), 0);
+    let (mut shots, mut before) = (ShotFinder::new(rate), None);
+    let mut resizes = Vec::new();
+    let task = progress.begin("frames", reader.expected_frames().unwrap_or(0) as u64);
+    while let Some(time) = reader.advance()? {
+        timeline.source_secs.push(time.source_secs);
+        timeline.repeated.push(time.repeated);
+        let picture = if time.repeated { None } else { Some(thumbnail(reader, area)?) };
+        if let (Some(survey), false) = (survey.as_deref_mut(), time.repeated) {
+            let whole = survey.wants_picture().then(|| reader.picture(None)).transpose()?;
+            survey.push(whole, reader.is_flagged_interlaced());
+        }
+        shots.push(picture.clone());
+        let pair = before.as_ref().zip(picture.as_ref());
+        timeline.frame_difference.push(pair.map_or(0.0, |(a, b)| mean_change(a, b)));
+        before = picture.or(before);
+        n_resizes += usize::from(time.resize != Resize::None);
+        resizes.push(time.resize);
+        task.advance(1);
+    }
+    timeline.shot_score = shots.finish();
+    for (score, resize) in timeline.shot_score.iter_mut().zip(&resizes) {
+        *score = if *resize == Resize::Reshaped { 1.0 } else { *score };
+    }
+    let frames = timeline.shot_score.iter().zip(&resizes);
+    timeline.restart = frames.map(|(score, resize)| *score >= RESTART || *resize != Resize::None).collect();
+    Ok(PictureReading { timeline, n_resizes })
+}
+
+/// Small picture of `area`: the whole is scaled so that the area has the size of a thumbnail.
+fn thumbnail(reader: &mut FrameReader, area: Option<PixelArea>) -> Result<Image> {
+    let Some(area) = area else { return reader.picture(Some(THUMBNAIL)) };
+    let scales = [(0, area.width), (1, area.height)].map(|(axis, px)| THUMBNAIL[axis] as f64 / px.max(1) as f64);
+    let whole = reader.image_size();
+    let scaled = |px: usize, axis: usize| (px as f64 * scales[axis]).round() as usize;
+    let size = [0, 1].map(|axis| scaled(whole[axis], axis).max(THUMBNAIL[axis]));
+    let corner = [scaled(area.x, 0), scaled(area.y, 1)];
+    let [x, y] = [0, 1].map(|axis| corner[axis].min(size[axis] - THUMBNAIL[axis]));
+    let [width, height] = THUMBNAIL;
+    Ok(reader.picture(Some(size))?.cropped(PixelArea { x, y, width, height }))
+}
+
+/// Writes every picture as PNG into the new folder `folder`.
+pub fn write_pictures(reader: &mut FrameReader, folder: &Path, progress: &dyn Progress) -> Result<()> {
+    fs::create_dir(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let task = progress.begin("pictures", reader.expected_frames().unwrap_or(0) as u64);
+    while let Some(time) = reader.advance()? {
+        png::write(&folder.join(format!("{:06}.png", time.frame_idx)), &reader.picture(None)?)?;
+        task.advance(1);
+    }
+    Ok(())
+}

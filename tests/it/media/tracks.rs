@@ -1,0 +1,64 @@
+//! Which of several sound tracks is taken.
+
+use crate::fixtures::clips::{ffmpeg, write_numbered};
+use orator::config;
+use orator::external::ffmpeg::audio;
+use orator::pipeline::extract::ExtractStage;
+use orator::stage::progress::Silent;
+use orator::stage::{Report, Stage, Unit};
+use orator::types::time::FrameRate;
+use std::path::Path;
+
+fn run(video: &Path, out: &Path, audio_track: usize) -> anyhow::Result<Report> {
+    std::fs::create_dir_all(out)?;
+    let unit = Unit { speaker: "host".into(), video: "clip".into(), source: video.to_owned() };
+    let settings = config::ExtractConfig { audio_track, ..Default::default() };
+    ExtractStage::new(&settings).run(&unit, out, &Silent)
+}
+
+/// Hertz by the sign changes of a sound.
+fn pitch(path: &Path) -> f64 {
+    let sound = audio::read_mono(path, 16_000).unwrap().unwrap();
+    let n = sound.samples.windows(2).filter(|pair| (pair[0] < 0.0) != (pair[1] < 0.0)).count();
+    n as f64 / 2.0 / sound.secs()
+}
+
+#[test]
+fn the_default_track_is_taken_or_the_one_asked_for() {
+    let dir = tempfile::tempdir().unwrap();
+    write_numbered(dir.path(), "in.mp4", 60, FrameRate::new(30, 1), None);
+    let tones = "-f lavfi -i sine=frequency=300:duration=2 -f lavfi -i sine=frequency=900:duration=2";
+    let maps = "-map 0:v -map 1:a -map 2:a -c:v copy -metadata:s:a:0 language=deu -metadata:s:a:1 language=eng";
+    for (name, default, hertz) in [
+        ("second.mkv", "-disposition:a:0 0 -disposition:a:1 default", [900.0, 300.0, 900.0]),
+        ("none.mkv", "-default_mode passthrough -disposition:a:0 0 -disposition:a:1 0", [300.0, 300.0, 900.0]),
+        ("both.mkv", "-disposition:a:0 default -disposition:a:1 default", [300.0, 300.0, 900.0]),
+    ] {
+        if !ffmpeg(dir.path(), &format!("-i in.mp4 {tones} {maps} {default} {name}")) {
+            continue;
+        }
+        let video = dir.path().join(name);
+        for (track, expected) in hertz.into_iter().enumerate() {
+            let out = dir.path().join(format!("{name}-{track}"));
+            let report = run(&video, &out, track).unwrap();
+            let heard = pitch(&out.join("audio.wav"));
+            assert!((heard - expected).abs() < 20.0, "{name}, track {track}: {heard} Hz");
+            let taken = if expected == 300.0 { 1 } else { 2 };
+            let tracks = &report.facts["audio_tracks"];
+            assert_eq!((&tracks["n_tracks"], &tracks["taken"]), (&2.into(), &taken.into()), "{tracks}");
+            let words = format!("2 sound tracks (deu, eng), number {taken} taken: extract.audio_track");
+            assert!(report.line.contains(&words), "{}", report.line);
+        }
+        let error = format!("{:#}", run(&video, &dir.path().join("gone"), 3).unwrap_err());
+        assert!(error.contains("no sound track 3, the file has 2") && error.contains(name), "{error}");
+    }
+    // One track leaves no choice.
+    if ffmpeg(dir.path(), &format!("-i in.mp4 {tones} -map 0:v -map 1:a -c:v copy one.mkv")) {
+        let report = run(&dir.path().join("one.mkv"), &dir.path().join("one"), 2).unwrap();
+        assert!(
+            report.facts.get("audio_tracks").is_none() && report.line.ends_with("2.0 s of sound"),
+            "{}",
+            report.line
+        );
+    }
+}
