@@ -79,6 +79,34 @@ impl MediaInfo {
         }
     }
 
+    /// What is out of the ordinary about a file, and what was done about it.
+    pub fn remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if self.pictures.deinterlace {
+            remarks.push("interlaced, deinterlaced".to_owned());
+        }
+        if self.pictures.mirrored {
+            remarks.push("mirrored, turned back".to_owned());
+        }
+        if let Some(hdr) = &self.hdr {
+            remarks.push(format!("HDR ({hdr}), tone-mapped"));
+        }
+        if self.n_resizes > 0 {
+            let times = if self.n_resizes == 1 { "once".to_owned() } else { format!("{} times", self.n_resizes) };
+            remarks.push(format!("the pictures change their size {times}, brought to the first"));
+        }
+        if let Some(area) = self.active_area {
+            remarks.push(format!("bars, {}x{} px between them looked at", area.width, area.height));
+        }
+        if let Some(tracks) = &self.audio_tracks {
+            let named: Vec<&str> =
+                tracks.languages.iter().map(|name| if name.is_empty() { "?" } else { name }).collect();
+            let (n, taken) = (tracks.n_tracks, tracks.taken);
+            remarks.push(format!("{n} sound tracks ({}), number {taken} taken: extract.audio_track", named.join(", ")));
+        }
+        remarks
+    }
+
     /// Reads `media.json`. Errors: unreadable, incomplete, or a duration that is none.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;

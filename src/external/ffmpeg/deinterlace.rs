@@ -6,8 +6,10 @@ use crate::types::image::Image;
 use ffmpeg_next::format::Pixel;
 use ffmpeg_next::{ffi, frame};
 
-/// Least difference of neighbouring lines in a comb, 8-bit steps of green.
+/// Least difference of neighbouring lines in a comb, 8-bit steps of green: one that is counted, and one that is removed
+/// in a video that is known to be interlaced.
 const STEP: i32 = 10;
+const FAINT_STEP: i32 = 5;
 /// Pixels to each side, and lines of the other field above and below, that a comb spreads to.
 const SPREAD_PX: usize = 4;
 /// Farthest step sideways along an edge, px.
@@ -52,7 +54,7 @@ pub(crate) fn woven([top, bottom]: &[Image; 2]) -> Image {
 }
 
 /// Share of the pixels of `image` that are in a comb and have changed in the picture `after` it: lines that alternate
-/// four times, by more than what stands still like a striped cloth explains. Every second column is looked at.
+/// four times, by more than what stands still like a striped cloth explains. Every fourth column is looked at.
 pub fn comb_share(image: &Image, after: &Image) -> f64 {
     let [width, height] = [image.width, image.height];
     if height < 5 || width == 0 || [after.width, after.height] != [width, height] {
@@ -63,14 +65,14 @@ pub fn comb_share(image: &Image, after: &Image) -> f64 {
     for y in 2..height - 2 {
         let lines = [row(y - 2), row(y - 1), row(y), row(y + 1), row(y + 2)];
         let next = &after.data[3 * y * width..3 * (y + 1) * width];
-        for at in (1..3 * width).step_by(6) {
+        for at in (1..3 * width).step_by(12) {
             let [a, b, c, d, e] = lines.map(|line| i32::from(line[at]));
             let steps = [b - a, b - c, d - c, d - e];
             let alternates = steps.iter().all(|step| *step > STEP) || steps.iter().all(|step| *step < -STEP);
             n_combed += usize::from(alternates && (c - i32::from(next[at])).abs() > STEP);
         }
     }
-    n_combed as f64 / (width.div_ceil(2) * (height - 4)) as f64
+    n_combed as f64 / (width.div_ceil(4) * (height - 4)) as f64
 }
 
 /// Picture without combs: the lines of one field stay (the even ones if `keeps_even`), the others are interpolated where
@@ -107,7 +109,7 @@ fn combed_line(image: &Image, y: usize) -> Vec<bool> {
     }
     let is_combed = |x: usize| {
         let (up, down) = (green(x, y) - green(x, y - 1), green(x, y) - green(x, y + 1));
-        up.signum() == down.signum() && up.abs().min(down.abs()) > STEP
+        up.signum() == down.signum() && up.abs().min(down.abs()) > FAINT_STEP
     };
     let combed: Vec<bool> = (0..image.width).map(is_combed).collect();
     let beside = |x: usize| combed[x.saturating_sub(1)..(x + 2).min(image.width)].contains(&true);

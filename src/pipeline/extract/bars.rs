@@ -4,18 +4,21 @@
 
 use crate::types::image::{Image, PixelArea};
 
-/// Bands across an axis, in each of which a position has one mean.
+/// Bands across an axis, in each of which a position has one mean, and pixels of a position that are looked at.
 const BANDS: usize = 32;
+const MOST_ACROSS: usize = 256;
 /// Brightness of a black bar at most, and of a band that is lit at least, 8-bit steps.
 const BLACK: f32 = 24.0;
 const LIT: f32 = 48.0;
 /// Difference of neighbours in a smooth bar at most, and across a seam at least, 8-bit steps, means over the video.
 const SMOOTH: f32 = 1.0;
 const SEAM: f32 = 5.0;
-/// Least share of the bands that are lit inside a black bar, or that show the seam of a smooth one.
-const MOST_BANDS: f32 = 0.5;
-/// Pixels over which an encoder smears a seam.
-const SMEAR: usize = 10;
+/// Least share of the bands that are lit beside a black bar, and that show the seam of a smooth one.
+const LIT_BANDS: f32 = 0.5;
+const SEAM_BANDS: f32 = 0.6;
+/// Pixels over which an encoder smears a seam, and over which a scaler of the blurred copy does.
+const SMEAR: usize = 4;
+const REACH: usize = 12;
 /// Largest share of an axis by which the bars of its two sides differ.
 const UNEVEN: f32 = 0.02;
 /// Largest share of an axis that is left between smooth bars, and of the picture that is worth a crop.
@@ -62,8 +65,11 @@ struct AxisProfile {
 }
 
 impl AxisProfile {
-    fn push(&mut self, n: usize, n_across: usize, value: impl Fn(usize, usize) -> u8) {
-        if n < 2 * SMEAR || n_across < BANDS {
+    /// Takes in `n` positions of `n_px` px each, of which about `MOST_ACROSS` count.
+    fn push(&mut self, n: usize, n_px: usize, value: impl Fn(usize, usize) -> u8) {
+        let step = (n_px / MOST_ACROSS).max(1);
+        let n_across = n_px / step;
+        if n < 2 * REACH || n_across < BANDS {
             return;
         }
         if self.detail.len() != n {
@@ -76,6 +82,7 @@ impl AxisProfile {
             let n_values = across.len() as f32;
             let mut sums = vec![0u32; n];
             for at in across {
+                let at = at * step;
                 let mut before = value(0, at);
                 for position in 0..n {
                     let here = value(position, at);
@@ -117,7 +124,7 @@ impl AxisProfile {
         let low = (0..n).take_while(is_black).count();
         let high = (0..n).rev().take_while(is_black).count();
         let lit = |start: usize, end: usize| {
-            share(|band| (start..end).any(|position| brightest(position, band) >= LIT)) >= MOST_BANDS
+            share(|band| (start..end).any(|position| brightest(position, band) >= LIT)) >= LIT_BANDS
         };
         (low + high + SMEAR < n && lit(low, low + SMEAR) && lit(n - high - SMEAR, n - high)).then_some([low, high])
     }
@@ -127,17 +134,18 @@ impl AxisProfile {
         let is_smooth = |position: &usize| self.detail[*position] <= SMOOTH * n_pictures;
         let low = (0..n).take_while(is_smooth).count();
         let high = (0..n).rev().skip(1).take_while(is_smooth).count();
-        if low + high + SMEAR >= n {
+        if low + high + REACH >= n {
             return None;
         }
         let shown = |position: usize| share(|band| self.seam[band * n + position] >= SEAM * n_pictures);
-        let strength = |position: usize| (0..BANDS).map(|band| self.seam[band * n + position]).sum::<f32>();
-        let sharpest = |start: usize, end: usize| {
-            let seams = (start..end.min(n)).filter(|position| shown(*position) >= MOST_BANDS);
-            seams.max_by(|a, b| strength(*a).total_cmp(&strength(*b)))
+        let strength = |position: &usize| (0..BANDS).map(|band| self.seam[band * n + *position]).sum::<f32>();
+        // From the bar on inward, the strongest of the first few positions that show a seam.
+        let sharpest = |inward: &mut dyn Iterator<Item = usize>| {
+            let seams = inward.take(REACH).skip_while(|position| shown(*position) < SEAM_BANDS).take(SMEAR);
+            seams.max_by(|a, b| strength(a).total_cmp(&strength(b)))
         };
-        let first = sharpest(low, low + SMEAR)?;
-        let last = sharpest((n - high).saturating_sub(SMEAR), n - high)?;
+        let first = sharpest(&mut (low..n))?;
+        let last = sharpest(&mut (0..n - high).rev())?;
         (first < last).then(|| [first, n - 1 - last])
     }
 }
@@ -169,11 +177,11 @@ mod tests {
     }
 
     #[test]
-    fn black_and_smooth_bars_are_found_to_the_pixel() {
-        let smooth = |x: usize, y: usize| (60 + x / 4 + y / 4) as u8;
-        for beside in [&(|_, _| 3) as &dyn Fn(usize, usize) -> u8, &smooth] {
+    fn black_and_smooth_bars_are_found() {
+        let smooth = |x: usize, y: usize| (60 + (x + y) / 8) as u8;
+        for beside in [&(|_, _| 3u8) as &dyn Fn(usize, usize) -> u8, &smooth] {
             let area = found([110, 109], beside).unwrap();
-            assert!(area.x.abs_diff(110) <= 1 && (area.x + area.width).abs_diff(211) <= 1, "{area:?}");
+            assert!(area.x.abs_diff(110) <= SMEAR && (area.x + area.width).abs_diff(211) <= SMEAR, "{area:?}");
             assert_eq!((area.y, area.height), (0, 180));
         }
     }

@@ -120,34 +120,7 @@ impl Stage for ExtractStage {
         facts.insert("n_cuts".into(), n_cuts.into());
         let kept = |damage: &String| format!("; damaged, what could be read is kept: {damage}");
         let damage = media.damage.as_ref().map(kept).unwrap_or_default();
-        let special: String = specials(&media).iter().map(|special| format!("; {special}")).collect();
-        Ok(Report { line: format!("{n_frames} frames at {rate}, {cuts}, {sound}{special}{damage}"), facts })
+        let remarks: String = media.remarks().iter().map(|remark| format!("; {remark}")).collect();
+        Ok(Report { line: format!("{n_frames} frames at {rate}, {cuts}, {sound}{remarks}{damage}"), facts })
     }
-}
-
-/// What is out of the ordinary about a file, and what was done about it.
-fn specials(media: &MediaInfo) -> Vec<String> {
-    let mut specials = Vec::new();
-    if media.pictures.deinterlace {
-        specials.push("interlaced, deinterlaced".to_owned());
-    }
-    if media.pictures.mirrored {
-        specials.push("mirrored, turned back".to_owned());
-    }
-    if let Some(hdr) = &media.hdr {
-        specials.push(format!("HDR ({hdr}), tone-mapped"));
-    }
-    if media.n_resizes > 0 {
-        let times = if media.n_resizes == 1 { "once".to_owned() } else { format!("{} times", media.n_resizes) };
-        specials.push(format!("the pictures change their size {times}, brought to the first"));
-    }
-    if let Some(area) = media.active_area {
-        specials.push(format!("bars, {}x{} px between them looked at", area.width, area.height));
-    }
-    if let Some(tracks) = &media.audio_tracks {
-        let named: Vec<&str> = tracks.languages.iter().map(|name| if name.is_empty() { "?" } else { name }).collect();
-        let (n, taken) = (tracks.n_tracks, tracks.taken);
-        specials.push(format!("{n} sound tracks ({}), number {taken} taken: extract.audio_track", named.join(", ")));
-    }
-    specials
 }

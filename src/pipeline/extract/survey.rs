@@ -52,9 +52,11 @@ impl PictureSurvey {
         self.n_frames += 1;
         self.n_flagged += usize::from(is_flagged);
         let Some(picture) = picture else { return };
-        self.bars.push(&picture);
         match self.first.take() {
-            None => self.first = Some(picture),
+            None => {
+                self.bars.push(&picture);
+                self.first = Some(picture);
+            }
             Some(first) => {
                 self.combs.push(comb_share(&first, &picture));
                 let step = if self.combs.len() < EARLY_LOOKS { EARLY_STEP } else { self.frames_per_sec };

@@ -44,6 +44,9 @@ impl VideoSummary {
         if !unit.source.exists() {
             video.note("The file is gone: there are no pictures of it.");
         }
+        if let Ok(media) = MediaInfo::read(&Artifact::MediaInfo.path(work, unit)) {
+            media.remarks().iter().for_each(|remark| video.note(&format!("In the file: {remark}.")));
+        }
         let failure = StageName::OF_VIDEOS
             .into_iter()
             .find_map(|stage| Some((stage, Failure::read(&dir(work, stage, unit))?.error)));
