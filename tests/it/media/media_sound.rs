@@ -119,7 +119,7 @@ fn a_jump_in_time_is_damage_not_an_hour_of_silence() {
     wav::write(&dir.path().join("tone.wav"), &tone(48_000, 3.0, 500.0)).unwrap();
     let jump = "asetpts=if(gte(T\\,1)\\,PTS+3600/TB\\,PTS)";
     if ffmpeg(dir.path(), &format!("-i tone.wav -af {jump} -c:a pcm_s16le jump.mkv")) {
-        let extracted = extract_wav(&dir.path().join("jump.mkv"), &dir.path().join("out.wav"), RATE).unwrap().unwrap();
+        let extracted = extract_wav(&dir.path().join("jump.mkv"), 0, &dir.path().join("out.wav"), RATE).unwrap().unwrap();
         assert!((extracted.secs - 1.0).abs() < 0.05, "{} s", extracted.secs);
         assert!(extracted.damage.unwrap().contains("impossible times"));
     }
@@ -158,7 +158,7 @@ fn wavs_round_trip_to_the_bit_and_streaming_gives_the_same() {
     let dir = tempfile::tempdir().unwrap();
     let (path, out) = (dir.path().join("in.wav"), dir.path().join("out.wav"));
     wav::write(&path, &tone(RATE, 1.2345, 300.0)).unwrap();
-    let extracted = extract_wav(&path, &out, RATE).unwrap().unwrap();
+    let extracted = extract_wav(&path, 0, &out, RATE).unwrap().unwrap();
     assert_eq!((extracted.secs, extracted.damage), ((1.2345f64 * 16_000.0).round() / 16_000.0, None));
     assert_eq!(std::fs::read(&path).unwrap(), std::fs::read(&out).unwrap());
 }
@@ -186,7 +186,7 @@ fn a_sample_that_is_no_number_is_named_with_its_second() {
     ] {
         let out = dir.path().join("out.wav");
         let pieces = SoundStream::open(&path, RATE).last().unwrap().map(drop);
-        for read in [read_mono(&path, RATE).map(drop), extract_wav(&path, &out, RATE).map(drop), pieces] {
+        for read in [read_mono(&path, RATE).map(drop), extract_wav(&path, 0, &out, RATE).map(drop), pieces] {
             let words = format!("{} is damaged: a sample that is no number at second {second};", path.display());
             let error = format!("{:#}", read.unwrap_err());
             assert!(error.contains(&words), "{error}");
@@ -199,7 +199,7 @@ fn no_sound_is_none_and_no_file() {
     let dir = tempfile::tempdir().unwrap();
     let path = write_numbered(dir.path(), "in.mp4", 5, PICTURES, None);
     let out = dir.path().join("out.wav");
-    assert_eq!(extract_wav(&path, &out, RATE).unwrap(), None);
+    assert_eq!(extract_wav(&path, 0, &out, RATE).unwrap(), None);
     assert!(!out.exists());
     assert_eq!(read_mono(&path, RATE).unwrap(), None);
 }
