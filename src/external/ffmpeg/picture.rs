@@ -49,7 +49,7 @@ impl Converter {
     }
 
     fn convert(&mut self, frame: &frame::Video, size: [usize; 2]) -> Result<Image> {
-        let source = SourceFormat::of(frame);
+        let source = FrameFormat::of(frame);
         if self.scaler.as_ref().is_none_or(|scaler| scaler.source != source || scaler.size != size) {
             self.scaler = Some(Scaler::new(source, size)?);
         }
@@ -59,7 +59,7 @@ impl Converter {
 
 /// What swscale must know of a frame.
 #[derive(Clone, Copy, PartialEq)]
-struct SourceFormat {
+struct FrameFormat {
     format: Pixel,
     size: [u32; 2],
     /// Matrix number of swscale, and whether the values use the full range.
@@ -68,7 +68,7 @@ struct SourceFormat {
     has_wide_gamut: bool,
 }
 
-impl SourceFormat {
+impl FrameFormat {
     fn of(frame: &frame::Video) -> Self {
         Self {
             format: frame.format(),
@@ -82,7 +82,7 @@ impl SourceFormat {
 
 /// swscale for frames of one format to RGB of one size.
 struct Scaler {
-    source: SourceFormat,
+    source: FrameFormat,
     size: [usize; 2],
     context: scaling::Context,
     rgb: frame::Video,
@@ -93,7 +93,7 @@ struct Scaler {
 unsafe impl Send for Scaler {}
 
 impl Scaler {
-    fn new(source: SourceFormat, size: [usize; 2]) -> Result<Self> {
+    fn new(source: FrameFormat, size: [usize; 2]) -> Result<Self> {
         let [width, height] = source.size;
         let shrinks = 2 * size[0] <= width as usize;
         let flags = if shrinks { scaling::Flags::AREA } else { scaling::Flags::BICUBIC };
