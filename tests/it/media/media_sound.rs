@@ -119,7 +119,8 @@ fn a_jump_in_time_is_damage_not_an_hour_of_silence() {
     wav::write(&dir.path().join("tone.wav"), &tone(48_000, 3.0, 500.0)).unwrap();
     let jump = "asetpts=if(gte(T\\,1)\\,PTS+3600/TB\\,PTS)";
     if ffmpeg(dir.path(), &format!("-i tone.wav -af {jump} -c:a pcm_s16le jump.mkv")) {
-        let extracted = extract_wav(&dir.path().join("jump.mkv"), 0, &dir.path().join("out.wav"), RATE).unwrap().unwrap();
+        let extracted =
+            extract_wav(&dir.path().join("jump.mkv"), 0, &dir.path().join("out.wav"), RATE).unwrap().unwrap();
         assert!((extracted.secs - 1.0).abs() < 0.05, "{} s", extracted.secs);
         assert!(extracted.damage.unwrap().contains("impossible times"));
     }
