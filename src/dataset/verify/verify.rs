@@ -12,7 +12,7 @@ use crate::dataset::read::Dataset;
 use crate::dataset::write::assemble::{LedgerLine, assemble_into};
 use crate::dataset::write::part;
 use crate::dataset::write::part::VideoEntry;
-use crate::dataset::{CHECKSUMS, INFO, LEAKAGE};
+use crate::dataset::{CHECKSUMS, INFO, LEAKAGE, README};
 use crate::stage::fingerprint::hash_file;
 use crate::stage::progress::Progress;
 use crate::types::time::FrameRate;
@@ -92,7 +92,12 @@ fn assembled(dir: &Path, there: &BTreeMap<String, u64>, found: &mut Verified) ->
         Ok(if name == CHECKSUMS { Box::new(SharedBuffer(written.clone())) } else { Box::new(std::io::sink()) })
     };
     assemble_into(dir, &info.about(), &leakage.compared(), &mut open)?;
-    let text = String::from_utf8(written.borrow().clone()).context("checksums are text")?;
+    let mut text = String::from_utf8(written.borrow().clone()).context("checksums are text")?;
+    if let Some(card) = card_line(dir)
+        && let Some(now) = text.lines().find(|line| is_card(line)).map(str::to_owned)
+    {
+        text = text.replace(&now, &card);
+    }
     let wanted: BTreeMap<String, String> =
         text.lines().filter_map(|line| line.split_once("  ")).map(|(hash, file)| (file.into(), hash.into())).collect();
     if there.contains_key(CHECKSUMS) {
@@ -112,6 +117,18 @@ fn assembled(dir: &Path, there: &BTreeMap<String, u64>, found: &mut Verified) ->
         }
     }
     Ok(wanted)
+}
+
+/// Line of the card in the dataset's list of checksums: its words are those of the version that wrote it.
+fn card_line(dir: &Path) -> Option<String> {
+    let stated = std::fs::read_to_string(dir.join(CHECKSUMS)).ok()?;
+    let line = stated.lines().find(|line| is_card(line))?;
+    let is_hash = line.split_once("  ").is_some_and(|(hash, _)| hash.len() == 64 && hash.is_ascii());
+    is_hash.then(|| line.to_owned())
+}
+
+fn is_card(line: &str) -> bool {
+    line.split_once("  ").is_some_and(|(_, file)| file == README)
 }
 
 /// Writer into shared memory.

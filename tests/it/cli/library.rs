@@ -39,7 +39,8 @@ fn a_program_runs_the_pipeline_and_asks_how_it_stands() {
     assert_eq!(report.stages[&StageName::Lift].done, 1);
     let [failure] = &report.failures[..] else { panic!("the pattern that names no video") };
     assert_eq!(failure.speaker.as_deref(), Some("host"));
-    let events = heard.0.into_inner().unwrap();
+    let mut events = heard.0.into_inner().unwrap();
+    events.retain(|event| !event.starts_with("Advice"));
     assert!(events[0].starts_with("NoVideo") && events[2].starts_with("Done { stage: \"lift\""), "{events:?}");
     assert_eq!(pipeline.run(&selection, &Silent).unwrap().units[1].state, RunState::Fresh);
 
