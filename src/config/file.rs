@@ -99,10 +99,11 @@ fn defaults() -> Table {
 /// Keys of a `[[speaker]]`: the lists with an entry that shows its type.
 fn speaker_schema() -> Table {
     let text = || Value::String(String::new());
-    let words = ["name", "reference", "licence", "consent", "source"].map(|key| (key.to_owned(), text()));
-    let lists = ["videos", "exclude", "mirrored", "train", "validation", "test"];
+    let words = ["name", "reference", "size", "licence", "consent", "source"].map(|key| (key.to_owned(), text()));
+    let lists = ["videos", "keypoints", "audio", "exclude", "mirrored", "train", "validation", "test"];
     let lists = lists.map(|key| (key.to_owned(), Value::Array(vec![text()])));
-    words.into_iter().chain(lists).collect()
+    let rate = [("fps".to_owned(), Value::Float(0.0))];
+    words.into_iter().chain(lists).chain(rate).collect()
 }
 
 struct Reader {
@@ -202,7 +203,8 @@ impl Reader {
             self.locations.insert(key.clone(), location);
             self.lay(written, &mut speaker, &format!("{key}."), location_at);
             let is_written = |name: &str| written.keys().any(|key| key.get_ref() == name);
-            for name in ["name", "videos"].iter().filter(|name| !is_written(name)) {
+            let is_needed = |name: &str| !is_written(name) && (name == "name" || !is_written("keypoints"));
+            for name in ["name", "videos"].into_iter().filter(|name| is_needed(name)) {
                 self.problem(&key, location, format!("the key {name} is missing"));
             }
             speaker.retain(|name, _| is_written(name) || ["name", "videos"].contains(&name));
@@ -323,7 +325,8 @@ fn typed(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
             let model = Value::String(String::new());
             items.iter().map(|item| typed(item.get_ref(), &model)).collect::<Result<_, _>>().map(Value::Array)
         }
-        (Value::Array(_), _) => wrong("a list of strings"),
+        (Value::Array(_), DeValue::String(s)) => Ok(Value::Array(vec![Value::String(s.to_string())])),
+        (Value::Array(_), _) => wrong("a string or a list of strings"),
         (Value::Table(_), _) => wrong("a table"),
         (Value::Datetime(_), _) => wrong("another value"),
     }

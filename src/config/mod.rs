@@ -5,7 +5,9 @@
 pub mod choices;
 pub mod config_path;
 pub mod file;
+pub mod keypoints;
 pub mod load;
+pub mod patterns;
 pub mod rules;
 pub mod sections;
 pub mod videos;
@@ -14,6 +16,7 @@ pub use choices::{AdversarialLoss, ComputeDevice, MotionRepresentation, NetworkP
 pub use config_path::ConfigPath;
 pub use file::Problem;
 pub use file::SourceLocation;
+pub use keypoints::KeypointSource;
 pub use load::Config;
 pub use load::ConfigError;
 pub use load::DEFAULT_FILE;

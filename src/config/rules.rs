@@ -90,7 +90,16 @@ impl Rules<'_> {
             } else if !seen.insert(speaker.name.to_ascii_lowercase()) {
                 self.problem(&key, format!("{:?} is there twice", speaker.name));
             }
-            if speaker.videos.is_empty() {
+            if speaker.fps != 0.0 && !(1.0..=1000.0).contains(&speaker.fps) {
+                let message = format!("{} is no frame rate: expected 1 to 1000 frames a second", speaker.fps);
+                self.problem(&format!("speaker[{at}].fps"), message);
+            }
+            if !speaker.size.is_empty() && speaker.image_size().is_none() {
+                let message =
+                    format!("{:?} is no size: expected width and height in pixels, \"1280x720\"", speaker.size);
+                self.problem(&format!("speaker[{at}].size"), message);
+            }
+            if speaker.videos.is_empty() && speaker.keypoints.is_empty() {
                 self.problem(&format!("speaker[{at}].videos"), "no video named".to_owned());
             }
         }

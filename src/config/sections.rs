@@ -22,13 +22,26 @@ pub struct Settings {
     pub speaker: Vec<SpeakerConfig>,
 }
 
-/// `[[speaker]]`: one person, with the videos that show them.
+/// `[[speaker]]`: one person, with the videos that show them, or keypoints of such videos.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SpeakerConfig {
     pub name: String,
     /// Paths or glob patterns.
+    #[serde(default)]
     pub videos: Vec<String>,
+    /// Keypoints that other programs found, named as videos are.
+    #[serde(default)]
+    pub keypoints: Vec<String>,
+    /// Sounds of the keypoints, found by their names.
+    #[serde(default)]
+    pub audio: Vec<String>,
+    /// Frames a second of the keypoints; 0: their files say.
+    #[serde(default)]
+    pub fps: f64,
+    /// Width and height of the keypoints' picture in px, `1280x720`; empty: their files say.
+    #[serde(default)]
+    pub size: String,
     /// A picture that shows the speaker as its largest person; empty: none.
     #[serde(default)]
     pub reference: ConfigPath,
@@ -52,6 +65,20 @@ pub struct SpeakerConfig {
     pub consent: String,
     #[serde(default)]
     pub source: String,
+}
+
+impl SpeakerConfig {
+    /// `size` as width and height; `None` where it is empty or no size.
+    pub fn image_size(&self) -> Option<[u32; 2]> {
+        image_size(&self.size)
+    }
+}
+
+/// Width and height in px of `1280x720`; `None`: it is no size.
+pub fn image_size(text: &str) -> Option<[u32; 2]> {
+    let (width, height) = text.split_once('x')?;
+    let px = |text: &str| text.trim().parse().ok().filter(|px| (1..=100_000).contains(px));
+    Some([px(width)?, px(height)?])
 }
 
 /// `[work]`: where the stages write.

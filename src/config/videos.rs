@@ -1,14 +1,13 @@
 //! From the `videos` of the speakers to units: patterns are expanded, folders listed, and every video gets its work
 //! name. What names no video is a unit too, so that its failure is reported and the others go on.
 
+use super::keypoints::{self, KeypointSource};
+use super::patterns;
 use super::{Config, SpeakerConfig};
 use crate::stage::Unit;
 use crate::types::split::Split;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-
-/// Endings taken for videos when a folder is named.
-const ENDINGS: [&str; 10] = ["mp4", "mkv", "mov", "webm", "avi", "m4v", "mpg", "mpeg", "ts", "wmv"];
+use std::path::Path;
 
 /// The videos of one speaker.
 #[derive(Clone, Debug)]
@@ -16,10 +15,19 @@ pub struct Videos {
     pub speaker: String,
     /// Sorted by their work names, each once.
     pub units: Vec<Unit>,
+    /// The videos that are keypoints of other programs, by their work names.
+    pub keypoints: BTreeMap<String, KeypointSource>,
     /// The split of each video that the configuration puts into one, by its work name.
     pub splits: BTreeMap<String, Split>,
     /// Entries of the configuration that lead to no video, each with what to do.
     pub missing: Vec<String>,
+}
+
+impl Videos {
+    /// Whether the models have pictures to look at: not all are keypoints.
+    pub fn have_pictures(&self) -> bool {
+        self.keypoints.is_empty() || self.units.len() > self.keypoints.len()
+    }
 }
 
 /// The videos of every speaker of the configuration.
@@ -32,7 +40,8 @@ fn of_speaker(speaker: &SpeakerConfig, folder: &Path) -> Videos {
     let mut found = BTreeMap::new();
     let mut missing = Vec::new();
     for entry in &speaker.videos {
-        let paths = expand(entry, folder, &mut missing).unwrap_or_else(|message| {
+        let videos = ("video", &patterns::OF_VIDEOS[..]);
+        let paths = patterns::expand(entry, folder, videos, &mut missing).unwrap_or_else(|message| {
             missing.push(message);
             Vec::new()
         });
@@ -40,6 +49,12 @@ fn of_speaker(speaker: &SpeakerConfig, folder: &Path) -> Videos {
             let video = work_name(&path, folder);
             found.insert(video.clone(), Unit { speaker: speaker.name.clone(), video, source: path });
         }
+    }
+    let mut given = BTreeMap::new();
+    for (path, source) in keypoints::of_speaker(speaker, folder, &mut missing) {
+        let video = work_name(&path, folder);
+        given.insert(video.clone(), source);
+        found.insert(video.clone(), Unit { speaker: speaker.name.clone(), video, source: path });
     }
     found.retain(|_, unit: &mut Unit| !speaker.exclude.iter().any(|entry| names(entry, &unit.source, folder)));
     for entry in speaker.mirrored.iter().filter(|entry| !entry.contains(['*', '?', '['])) {
@@ -66,7 +81,9 @@ fn of_speaker(speaker: &SpeakerConfig, folder: &Path) -> Videos {
             }
         }
     }
-    Videos { speaker: speaker.name.clone(), units: found.into_values().collect(), splits, missing }
+    given.retain(|video, _| found.contains_key(video));
+    let units = found.into_values().collect();
+    Videos { speaker: speaker.name.clone(), units, keypoints: given, splits, missing }
 }
 
 /// Whether an entry means the video: its path, its file name, or a pattern of one of them.
@@ -77,40 +94,6 @@ pub fn names(entry: &str, video: &Path, folder: &Path) -> bool {
     }
     let relative = video.strip_prefix(folder).unwrap_or(video).to_string_lossy();
     glob::Pattern::new(entry).is_ok_and(|pattern| pattern.matches(&relative) || pattern.matches(&file_name))
-}
-
-/// The files an entry names: itself, the videos of the folder it is, or what its pattern matches. A plain path is
-/// taken as it is, so that a missing file fails by itself. A folder that a pattern could not look into is `missing`.
-fn expand(entry: &str, folder: &Path, missing: &mut Vec<String>) -> Result<Vec<PathBuf>, String> {
-    let path = folder.join(entry);
-    if path.is_dir() {
-        let mut paths: Vec<PathBuf> = std::fs::read_dir(&path)
-            .map_err(|error| format!("{entry}: cannot list the folder: {error}"))?
-            .filter_map(|entry| entry.ok().map(|entry| entry.path()))
-            .filter(|path| has_video_ending(path))
-            .collect();
-        paths.sort();
-        let nothing = || format!("{entry}: the folder holds no video ({})", ENDINGS.join(", "));
-        return if paths.is_empty() { Err(nothing()) } else { Ok(paths) };
-    }
-    if path.exists() || !entry.contains(['*', '?', '[']) {
-        return Ok(vec![path]);
-    }
-    let pattern = Path::new(&glob::Pattern::escape(&folder.to_string_lossy())).join(entry);
-    let matches = glob::glob(&pattern.to_string_lossy()).map_err(|error| format!("{entry}: no pattern: {error}"))?;
-    let n_missing = missing.len();
-    let mut unread = |error: glob::GlobError| missing.push(format!("{entry}: cannot look there: {error}"));
-    let paths: Vec<PathBuf> = matches.filter_map(|found| found.map_err(&mut unread).ok()).collect();
-    if paths.is_empty() && missing.len() == n_missing {
-        Err(format!("{entry}: no file matches, looked in {}", folder.display()))
-    } else {
-        Ok(paths)
-    }
-}
-
-fn has_video_ending(path: &Path) -> bool {
-    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-    ending.is_some_and(|ending| ENDINGS.contains(&ending.as_str()))
 }
 
 /// `<slug of the stem>-<8 hex of BLAKE3 of the path relative to the configuration>`: stable when other videos come,

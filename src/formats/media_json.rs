@@ -50,12 +50,18 @@ pub struct MediaInfo {
     /// The sound tracks, where there are several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub audio_tracks: Option<AudioTracks>,
+    /// Format of the keypoints that stand in for the pictures, `OpenPose, 25 points`; `None`: a video with pictures.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub keypoints_from: Option<String>,
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref)] // serde passes a reference
 fn is_zero(n: &usize) -> bool {
     *n == 0
 }
+
+/// Properties that only pictures tell, for people.
+const OF_PICTURES: &str = "cuts, still pictures and whether the person is a picture";
 
 impl MediaInfo {
     /// A video of which nothing but its length is known.
@@ -76,6 +82,7 @@ impl MediaInfo {
             hdr: None,
             n_resizes: 0,
             audio_tracks: None,
+            keypoints_from: None,
         }
     }
 
@@ -105,6 +112,12 @@ impl MediaInfo {
             remarks.push(format!("{n} sound tracks ({}), number {taken} taken: extract.audio_track", named.join(", ")));
         }
         remarks
+    }
+
+    /// Sentence about what is not judged, as there are no pictures; `None`: all of it is.
+    pub fn not_judged(&self) -> Option<String> {
+        let format = self.keypoints_from.as_ref()?;
+        Some(format!("from keypoints ({format}), without pictures: {OF_PICTURES} are not judged"))
     }
 
     /// Reads `media.json`. Errors: unreadable, incomplete, or a duration that is none.

@@ -4,6 +4,7 @@ pub mod authors_txt;
 pub mod bvh;
 pub mod checkpoint;
 pub mod joints_npz;
+pub mod keypoints;
 pub mod keypoints_npz;
 pub mod media_json;
 pub mod npy;

@@ -8,6 +8,8 @@ pub use topics::{TOPICS, Topic};
 pub mod dataset {}
 #[doc = include_str!("lifting.md")]
 pub mod lifting {}
+#[doc = include_str!("keypoints.md")]
+pub mod keypoints {}
 #[doc = include_str!("training.md")]
 pub mod training {}
 #[doc = include_str!("animation.md")]

@@ -1,10 +1,12 @@
 //! The pipeline as a value (`pipeline`, run by `run`, looked at by `status`), its five stages, how the `pictures` of its
-//! videos are read, and speech to motion files in batches. The stages never import each other: they meet in the files that they write.
+//! videos are read, and speech to motion files in batches. The stages never import each other: they meet in the files that
+//! they write. `keypoints` stands in for the first two where other programs looked at the pictures.
 
 pub mod account;
 pub mod batch;
 pub mod dataset;
 pub mod extract;
+pub mod keypoints;
 pub mod lift;
 pub mod pictures;
 pub mod pipeline;

@@ -2,6 +2,7 @@
 
 use super::dataset::stage::DatasetStage;
 use super::extract::ExtractStage;
+use super::keypoints::by_source::StageBySource;
 use super::lift::LiftStage;
 use super::lift::lifter::reach_secs;
 use super::pose2d::Pose2dStage;
@@ -25,8 +26,12 @@ use anyhow::Result;
 pub fn build(name: StageName, config: &Config, ready: &[Unit]) -> Result<Box<dyn Stage>> {
     let settings = &config.settings;
     Ok(match name {
-        StageName::Extract => Box::new(ExtractStage::of_config(config)),
-        StageName::Pose2d => Box::new(Pose2dStage::new(settings)?),
+        StageName::Extract => {
+            StageBySource::extract(Box::new(ExtractStage::of_config(config)), settings, &videos::of(config))
+        }
+        StageName::Pose2d => {
+            StageBySource::pose2d(Box::new(Pose2dStage::new(settings)?), settings, &videos::of(config))
+        }
         StageName::Segment => Box::new(
             SegmentStage::new(&settings.segment, &settings.work.dir).with_speech(SpeechListener::find(settings)?),
         ),

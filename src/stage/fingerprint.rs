@@ -69,21 +69,18 @@ impl HashCache {
         Self { file: file.to_owned(), known: Mutex::new(known), saved: Mutex::new(Instant::now()) }
     }
 
-    /// BLAKE3 of the content of `path`, in hex.
+    /// BLAKE3 of the content of `path`, in hex; of a folder as `hash_file` says.
     pub fn hash(&self, path: &Path) -> Result<String> {
-        let meta = fs::metadata(path).with_context(|| format!("cannot read {}", path.display()))?;
-        anyhow::ensure!(meta.is_file(), "{} is not a file", path.display());
-        let changed = meta.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
-        let changed_ns = changed.map_or(0, |age| age.as_nanos() as u64);
+        let (bytes, changed_ns) = size_and_change(path)?;
         let name = path.to_string_lossy().into_owned();
         if let Some(known) = self.known().get(&name)
-            && known.bytes == meta.len()
+            && known.bytes == bytes
             && known.changed_ns == changed_ns
         {
             return Ok(known.hash.clone());
         }
         let hash = hash_file(path)?;
-        self.known().insert(name, KnownHash { bytes: meta.len(), changed_ns, hash: hash.clone() });
+        self.known().insert(name, KnownHash { bytes, changed_ns, hash: hash.clone() });
         Ok(hash)
     }
 
@@ -108,8 +105,44 @@ impl HashCache {
     }
 }
 
-/// BLAKE3 of a file's content, in hex, read in pieces.
+/// Bytes of a file, and its time of change in ns; of a folder the sum over its files, and a digest of their names and
+/// times.
+fn size_and_change(path: &Path) -> Result<(u64, u64)> {
+    let meta = fs::metadata(path).with_context(|| format!("cannot read {}", path.display()))?;
+    if !meta.is_dir() {
+        anyhow::ensure!(meta.is_file(), "{} is not a file", path.display());
+        let changed = meta.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+        return Ok((meta.len(), changed.map_or(0, |age| age.as_nanos() as u64)));
+    }
+    let (mut bytes, mut digest) = (0, blake3::Hasher::new());
+    for file in files_in(path)? {
+        let (file_bytes, changed_ns) = size_and_change(&file)?;
+        bytes += file_bytes;
+        digest.update(file.as_os_str().as_encoded_bytes()).update(&changed_ns.to_le_bytes());
+    }
+    let digest = *digest.finalize().as_bytes();
+    Ok((bytes, digest.iter().take(8).fold(0, |number, byte| number << 8 | u64::from(*byte))))
+}
+
+/// The files of a folder, sorted; folders in it are passed over.
+fn files_in(folder: &Path) -> Result<Vec<PathBuf>> {
+    let listed = fs::read_dir(folder).with_context(|| format!("cannot list {}", folder.display()))?;
+    let mut files: Vec<PathBuf> = listed.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
+    files.retain(|path| path.is_file());
+    files.sort();
+    Ok(files)
+}
+
+/// BLAKE3 of a file's content, in hex, read in pieces; of a folder that of the names and hashes of its files.
 pub fn hash_file(path: &Path) -> Result<String> {
+    if path.is_dir() {
+        let mut hasher = blake3::Hasher::new();
+        for file in files_in(path)? {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            hasher.update(format!("{name} {}\n", hash_file(&file)?).as_bytes());
+        }
+        return Ok(hasher.finalize().to_hex().to_string());
+    }
     let read = || -> std::io::Result<String> {
         let mut hasher = blake3::Hasher::new();
         hasher.update_reader(fs::File::open(path)?)?;

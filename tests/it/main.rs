@@ -16,6 +16,7 @@ mod fixtures;
 mod foreign;
 mod generate;
 mod house;
+mod keypoints;
 mod lift;
 mod media;
 mod parity;

@@ -4,18 +4,25 @@ use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, ensure};
 use orator::config;
+use orator::formats::keypoints;
+use orator::formats::keypoints::CoordinateUnit;
+use orator::formats::npz::Npz;
 use orator::formats::{keypoints_npz, npy};
+use orator::pipeline::keypoints::take_in;
 use orator::pipeline::lift::Lifter;
 use orator::stage::progress::Progress;
 use orator::stage::workdir;
+use orator::types::pose2d::Keypoints;
 use orator::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST};
+use orator::types::time::FrameRate;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Lift 2D keypoints to 3D joints, outside a run.
 ///
-/// KEYPOINTS.npz holds `body` [T,17,3] (COCO-17; x px, y px, score) and, if known, `left_hand` and `right_hand`
+/// KEYPOINTS is ours or another program's: a folder of OpenPose (a JSON file a frame), JSON of MMPose, AlphaPose or
+/// COCO-WholeBody, arrays of MediaPipe or PATS (.npy, .npz); the kind is told by the content. Ours is a .npz that holds `body` [T,17,3] (COCO-17; x px, y px, score) and, if known, `left_hand` and `right_hand`
 /// [T,21,3] (wrist, then thumb to little finger, each base to tip), `fps` and `image_size`. JOINTS.npy becomes
 /// float32 [T,49,3]: metres, x image right, y down, z away from the camera, the neck at the origin; neck, right arm,
 /// left arm, left hand, right hand. A joint not seen for up to a second is filled; one missing for longer is NaN. Legs,
@@ -24,8 +31,14 @@ use std::time::Instant;
 #[derive(clap::Args)]
 pub struct Args {
     /// The keypoints.
-    #[arg(value_name = "KEYPOINTS.npz")]
+    #[arg(value_name = "KEYPOINTS")]
     keypoints: PathBuf,
+    /// Frames a second of another program's keypoints.
+    #[arg(long)]
+    fps: Option<FrameRate>,
+    /// Width and height in pixels of the picture of another program's keypoints, like 1280x720.
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
+    size: Option<[u32; 2]>,
     /// The joints to write.
     #[arg(long, value_name = "JOINTS.npy")]
     out: PathBuf,
@@ -49,6 +62,38 @@ pub struct Args {
     smooth_hands: f64,
 }
 
+fn size(text: &str) -> Result<[u32; 2], String> {
+    config::image_size(text).ok_or_else(|| "expected width and height in pixels, like 1280x720".to_owned())
+}
+
+/// Whether the file is one of this program's; of a `.npz` file that cannot be opened its reader says why.
+fn is_ours(path: &Path) -> bool {
+    match Npz::open(path) {
+        Ok(npz) => npz.has("body"),
+        Err(_) => !path.is_dir() && path.extension().is_some_and(|end| end == "npz"),
+    }
+}
+
+/// Keypoints of another program at their own rate, with what is to be said of them.
+fn taken(args: &Args) -> Result<(Keypoints, Vec<String>)> {
+    let file = args.keypoints.display();
+    let found = keypoints::read(&args.keypoints)?;
+    let fps = args.fps.or(found.fps);
+    let fps = fps.with_context(|| format!("{file}: it does not say its frames a second; give them with --fps"))?;
+    let mut notes = vec![format!("{} at {fps}", found.format)];
+    let size = match args.size.or(found.image_size) {
+        Some(size) => size,
+        None if found.unit == CoordinateUnit::Pixels => {
+            notes.push("no size of the picture: taken from the farthest points (--size gives it)".to_owned());
+            found.extent()
+        }
+        None => anyhow::bail!("{file}: it does not say its picture's size; give it with --size, like --size 1280x720"),
+    };
+    let taken = take_in(found, fps, size, fps)?;
+    notes.extend(taken.notes);
+    Ok((taken.keypoints, notes))
+}
+
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     for path in [Some(&args.out), args.extra.as_ref()].into_iter().flatten() {
         ensure!(
@@ -61,6 +106,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     for sigma in [args.smooth_arms, args.smooth_hands] {
         ensure!((0.0..=100.0).contains(&sigma), "a smoothing of {sigma} frames; it must lie between 0 and 100");
     }
+    let (keypoints, mut notes) =
+        if is_ours(&args.keypoints) { keypoints_npz::read_noting(&args.keypoints)? } else { taken(&args)? };
     let settings = config::LiftConfig {
         body_weights: args.body_weights.unwrap_or_default().into(),
         hand_weights: args.hand_weights.unwrap_or_default().into(),
@@ -69,7 +116,6 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         level: args.level,
         ..config::LiftConfig::default()
     };
-    let (keypoints, mut notes) = keypoints_npz::read_noting(&args.keypoints)?;
     let lifter = Lifter::new(&settings)?;
     ensure!(
         keypoints.n_frames() > 0,

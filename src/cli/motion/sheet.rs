@@ -5,6 +5,7 @@ use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
 use anyhow::{Result, bail, ensure};
 use orator::animate::{AnimationOptions, perform};
+use orator::config::videos::Videos;
 use orator::external::opencv::png;
 use orator::formats::keypoints_npz;
 use orator::mocap::motion_file;
@@ -112,7 +113,11 @@ fn of_run(args: &Args) -> Result<Vec<SheetFiles>> {
     };
     let mut clips = Vec::new();
     let mut names = Vec::new();
-    for unit in pipeline.videos(&args.speaker)?.into_iter().flat_map(|videos| videos.units) {
+    let with_pictures = |videos: Videos| {
+        let Videos { units, keypoints, .. } = videos;
+        units.into_iter().filter(move |unit| !keypoints.contains_key(&unit.video))
+    };
+    for unit in pipeline.videos(&args.speaker)?.into_iter().flat_map(with_pictures) {
         names.push(unit.video.clone());
         if is_chosen(&unit) {
             clips.push(SheetFiles {
@@ -128,7 +133,7 @@ fn of_run(args: &Args) -> Result<Vec<SheetFiles>> {
     if let (true, Some(name)) = (clips.is_empty(), &args.video) {
         bail!("no video is called {}; there are: {}", name.display(), names.join(", "));
     }
-    ensure!(!clips.is_empty(), "{} names no video", config.file.display());
+    ensure!(!clips.is_empty(), "{} names no video with pictures", config.file.display());
     let (lifted, waiting): (Vec<_>, Vec<_>) = clips.into_iter().partition(|files| files.joints.exists());
     let first = waiting.first().map(|files| files.title.clone()).unwrap_or_default();
     let flags = args.config.flags();

@@ -23,7 +23,7 @@ use crate::stage::record::Failure;
 use crate::stage::{Input, Report, Stage, Unit, counted};
 use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// A speaker's videos to shards. Its unit is the speaker.
@@ -110,7 +110,17 @@ impl DatasetStage {
     fn about(&self, speaker: &Unit, first: &LiftedVideo) -> About {
         let said = self.speakers.iter().find(|said| said.name == speaker.speaker).cloned().unwrap_or_default();
         let config::SpeakerConfig { licence, consent, source, .. } = said;
-        let (models, notes) = (self.models.clone(), self.notes.clone());
+        let ready = self.ready(speaker);
+        let media = ready.iter().filter_map(|video| MediaInfo::read(&Artifact::MediaInfo.path(&self.work, video)).ok());
+        let not_judged: Vec<String> = media.filter_map(|media| media.not_judged()).collect();
+        let (mut models, mut notes) = (self.models.clone(), self.notes.clone());
+        if not_judged.len() == ready.len() {
+            // No model has looked at pictures.
+            models.retain(|model| model.role == "speech");
+        }
+        let kinds: BTreeSet<&String> = not_judged.iter().collect();
+        let count = |kind: &str| not_judged.iter().filter(|other| *other == kind).count();
+        notes.extend(kinds.into_iter().map(|kind| format!("{} made {kind}.", counted(count(kind), "video"))));
         About { models, notes, licence, consent, source, ..About::new(&speaker.speaker, first.intervals.fps) }
     }
 }

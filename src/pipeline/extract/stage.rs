@@ -111,6 +111,7 @@ impl Stage for ExtractStage {
             hdr,
             n_resizes: read.n_resizes,
             audio_tracks,
+            keypoints_from: None,
         };
         media.write(&Artifact::MediaInfo.within(out))?;
 

@@ -80,6 +80,7 @@ impl Stage for SegmentStage {
         let mut report = report(&intervals, &ledger);
         let rule = if self.speech.is_some() { "vad" } else { "loudness" };
         report.facts.insert("speech".to_owned(), rule.into());
+        report.line.extend(video.not_judged().map(|said| format!("; {said}")));
         Ok(report)
     }
 }

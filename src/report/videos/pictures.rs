@@ -1,5 +1,5 @@
 //! Thumbnails of the chosen moments: small video frames under their keypoints. A video is read once, up to its last
-//! moment.
+//! moment. Keypoints of other programs stand on an empty picture.
 
 use super::worst::Worst;
 use crate::animate::draw::overlay;
@@ -8,6 +8,7 @@ use crate::external::ffmpeg::frames::FrameReader;
 use crate::external::ffmpeg::jpeg;
 use crate::external::opencv::draw;
 use crate::formats::keypoints_npz;
+use crate::formats::media_json::MediaInfo;
 use crate::pipeline::pictures;
 use crate::stage::Unit;
 use crate::stage::artifacts::Artifact;
@@ -21,6 +22,7 @@ use std::path::Path;
 const MOST_PX: [f64; 2] = [400.0, 260.0];
 const GAP_PX: usize = 4;
 const GAP_RGB: [u8; 3] = [255; 3];
+const EMPTY_RGB: [u8; 3] = [70; 3];
 
 /// Thumbnail of a moment.
 #[derive(Clone, Debug)]
@@ -40,13 +42,17 @@ pub fn thumbnails(
     let moments: Vec<&Vec<usize>> =
         worst.rules.values().flatten().filter(|m| m.video == video).map(|m| &m.frames).collect();
     let frames = worst.frames_of(video);
-    let mut reader =
-        FrameReader::open_with(&unit.source, keypoints.fps, 0)?.with_options(pictures::options(work, unit));
+    let media = MediaInfo::read(&Artifact::MediaInfo.path(work, unit)).ok();
+    let has_pictures = media.is_none_or(|media| media.keypoints_from.is_none());
+    let open = || -> Result<FrameReader> {
+        Ok(FrameReader::open_with(&unit.source, keypoints.fps, 0)?.with_options(pictures::options(work, unit)))
+    };
+    let mut reader = has_pictures.then(open).transpose()?;
     let n_wide = |frame: &usize| if moments.iter().any(|m| m.len() > 1 && m.contains(frame)) { 2 } else { 1 };
     let mut thumbs = BTreeMap::new();
     for frame_idx in &frames {
         ensure!(*frame_idx < keypoints.n_frames(), "the keypoints end before frame {frame_idx}");
-        loop {
+        while let Some(reader) = &mut reader {
             let time = reader.advance()?.with_context(|| {
                 format!("{} ends before frame {frame_idx}: it is not the video that was judged", unit.source.display())
             })?;
@@ -54,7 +60,7 @@ pub fn thumbnails(
                 break;
             }
         }
-        thumbs.insert(*frame_idx, thumb(&mut reader, &keypoints, *frame_idx, n_wide(frame_idx))?);
+        thumbs.insert(*frame_idx, thumb(reader.as_mut(), &keypoints, *frame_idx, n_wide(frame_idx))?);
     }
     let picture = |frames: &Vec<usize>| -> Result<MomentThumbnail> {
         let image = side_by_side(frames.iter().filter_map(|frame| thumbs.get(frame)));
@@ -63,13 +69,16 @@ pub fn thumbnails(
     moments.into_iter().map(|frames| Ok((frames.clone(), picture(frames)?))).collect()
 }
 
-/// Current frame under its keypoints, `n_wide` of which stand side by side.
-fn thumb(reader: &mut FrameReader, keypoints: &Keypoints, frame_idx: usize, n_wide: usize) -> Result<Image> {
-    let size = reader.image_size();
+/// Current frame under its keypoints, `n_wide` of which stand side by side; without a reader an empty picture.
+fn thumb(reader: Option<&mut FrameReader>, keypoints: &Keypoints, frame_idx: usize, n_wide: usize) -> Result<Image> {
+    let size = reader.as_ref().map_or(keypoints.image_size.map(|px| px as usize), |reader| reader.image_size());
     let whole = size.map(|px| px.max(1) as f64);
     let scale = (MOST_PX[0] / n_wide as f64 / whole[0]).min(MOST_PX[1] / whole[1]).min(1.0);
     let small = whole.map(|px| ((px * scale).round() as usize).max(2));
-    let mut image = reader.picture(Some(small))?;
+    let mut image = match reader {
+        Some(reader) => reader.picture(Some(small))?,
+        None => Image::filled(small[0], small[1], EMPTY_RGB),
+    };
     let scale = [0, 1].map(|axis| small[axis] as f32 / keypoints.image_size[axis].max(1) as f32);
     overlay::draw_keypoints(&mut image, keypoints, frame_idx, ImageTransform { scale, shift: [0.0; 2] }, 2.0)?;
     Ok(image)

@@ -46,6 +46,9 @@ impl VideoSummary {
         }
         if let Ok(media) = MediaInfo::read(&Artifact::MediaInfo.path(work, unit)) {
             media.remarks().iter().for_each(|remark| video.note(&format!("In the file: {remark}.")));
+            if let Some(said) = media.not_judged() {
+                video.note(&format!("Made {said}."));
+            }
         }
         let failure = StageName::OF_VIDEOS
             .into_iter()

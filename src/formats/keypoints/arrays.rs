@@ -1,0 +1,106 @@
+//! Arrays of keypoints in `.npy` and `.npz` files, told apart by their shapes: MediaPipe's landmarks, PATS, and our own
+//! `keypoints.npz`.
+
+use super::entry::point;
+use super::found::{CoordinateUnit, FoundKeypoints, FoundPerson};
+use super::{mediapipe, pats};
+use crate::formats::keypoints_npz;
+use crate::formats::npy;
+use crate::formats::npz::Npz;
+use crate::types::pose2d::Keypoint;
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, bail};
+use ndarray::{Array3, ArrayD, ArrayView2, Axis, IxDyn};
+use ndarray_npy::ReadNpyError;
+use std::path::Path;
+
+/// Arrays of a file by their names; the only one of a `.npy` file has none.
+pub type NamedArrays = Vec<(String, ArrayD<f32>)>;
+
+/// Reads the one array of a `.npy` file.
+pub fn read_npy(path: &Path, bytes: &[u8]) -> Result<FoundKeypoints> {
+    let array = numbers(bytes).with_context(|| {
+        format!("{} is no .npy file of numbers (float32, float64 or integers; no objects)", path.display())
+    })?;
+    of_arrays(path, vec![(String::new(), array)])
+}
+
+/// Reads a `.npz` file; `fps` (one number, or numerator and denominator) and `image_size` (width, height) are read with
+/// every kind.
+pub fn read_npz(path: &Path) -> Result<FoundKeypoints> {
+    let mut npz = Npz::open(path)?;
+    let fps = if npz.has("fps") { Some(npz.frame_rate("fps")?) } else { None };
+    if npz.has("body") {
+        return ours(path, fps);
+    }
+    let names: Vec<String> = npz.names().to_vec();
+    // Texts and objects beside the arrays say nothing here.
+    let arrays = names.into_iter().filter_map(|name| npz.floats(&name, &[]).ok().map(|array| (name, array)));
+    let arrays: NamedArrays = arrays.collect();
+    let size = arrays.iter().find(|(name, array)| name == "image_size" && array.len() == 2);
+    let size = size.map(|(_, array)| array.iter().map(|px| *px as u32).collect::<Vec<_>>());
+    let mut found = of_arrays(path, arrays)?;
+    found.fps = fps.or(found.fps);
+    found.image_size = size.map(|size| [size[0], size[1]]).filter(|size| size.iter().all(|px| *px > 0));
+    Ok(found)
+}
+
+fn of_arrays(path: &Path, arrays: NamedArrays) -> Result<FoundKeypoints> {
+    let shapes: Vec<String> = arrays.iter().map(|(name, array)| format!("{name} {:?}", array.shape())).collect();
+    let read = match mediapipe::read(&arrays) {
+        Ok(None) => pats::read(&arrays),
+        read => read,
+    };
+    match read.with_context(|| path.display().to_string())? {
+        Some(found) => Ok(found),
+        None => bail!(
+            "{} has no array `body` [T, 17, 3], nor MediaPipe's landmarks ([T, 33, 3..5] with hands [T, 21, 3] beside it, \
+             [T, 75, 3..4], [T, 543, 3], [T, 1662]), nor PATS ([T, 2, 52], [T, 104]); it has: {}",
+            path.display(),
+            shapes.iter().map(|shape| shape.trim()).collect::<Vec<_>>().join(", ")
+        ),
+    }
+}
+
+/// Our own file.
+fn ours(path: &Path, fps: Option<FrameRate>) -> Result<FoundKeypoints> {
+    let (keypoints, notes) = keypoints_npz::read_noting(path)?;
+    let person = |t: usize| {
+        let points = |array: &Array3<f32>| -> Vec<Keypoint> { triples(array.index_axis(Axis(0), t)) };
+        let hand = |array: &Array3<f32>| points(array).try_into().unwrap_or_default();
+        let body = points(&keypoints.body).try_into().unwrap_or_default();
+        FoundPerson { body, left_hand: hand(&keypoints.left_hand), right_hand: hand(&keypoints.right_hand) }
+    };
+    let frames = (0..keypoints.n_frames()).map(|t| vec![person(t)]).collect();
+    let says_size = !notes.iter().any(|note| note.contains("image_size"));
+    // What the caller says of rate and size takes the place of these two.
+    let notes = notes.into_iter().filter(|note| !note.contains("`fps`") && !note.contains("image_size")).collect();
+    Ok(FoundKeypoints {
+        fps,
+        image_size: says_size.then_some(keypoints.image_size),
+        unit: CoordinateUnit::Pixels,
+        ..FoundKeypoints::new("orator, 17 points".to_owned(), frames, notes)
+    })
+}
+
+fn triples(points: ArrayView2<f32>) -> Vec<Keypoint> {
+    points.outer_iter().map(|p| point(p[0], p[1], p[2])).collect()
+}
+
+/// The array of a `.npy` file, of any usual type, as f32.
+fn numbers(bytes: &[u8]) -> Result<ArrayD<f32>, ReadNpyError> {
+    let other = |error: ReadNpyError| matches!(error, ReadNpyError::WrongDescriptor(_)).then_some(()).ok_or(error);
+    match npy::parse::<f32, IxDyn>(bytes).map_err(other) {
+        Ok(array) => return Ok(array),
+        Err(wrong) => wrong?,
+    }
+    match npy::parse::<f64, IxDyn>(bytes).map_err(other) {
+        Ok(array) => return Ok(array.mapv(|v| v as f32)),
+        Err(wrong) => wrong?,
+    }
+    match npy::parse::<i32, IxDyn>(bytes).map_err(other) {
+        Ok(array) => return Ok(array.mapv(|v| v as f32)),
+        Err(wrong) => wrong?,
+    }
+    Ok(npy::parse::<i64, IxDyn>(bytes)?.mapv(|v| v as f32))
+}

@@ -1,0 +1,197 @@
+//! A JSON file of keypoints: OpenPose's frame, MMPose's results and its inferencer's lists, AlphaPose's and COCO's results,
+//! COCO-WholeBody's annotations. Python writes NaN into JSON, which is read as a missing number.
+
+use super::entry::{ImageName, JsonEntry};
+use super::found::{FoundKeypoints, FoundPerson};
+use super::frames::{in_order, number_of};
+use anyhow::{Context, Result, bail, ensure};
+use serde::Deserialize;
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A file whose top is an object.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct JsonObject {
+    people: Option<Vec<JsonEntry>>,
+    instance_info: Option<Vec<JsonEntry>>,
+    annotations: Option<Vec<JsonEntry>>,
+    images: Vec<AnnotatedImage>,
+}
+
+/// Picture of an annotation file.
+#[derive(Debug, Deserialize)]
+struct AnnotatedImage {
+    id: ImageName,
+    #[serde(default)]
+    file_name: String,
+    #[serde(default)]
+    width: u32,
+    #[serde(default)]
+    height: u32,
+}
+
+/// People of a file.
+pub struct JsonPeople {
+    /// The program in a word: `OpenPose`.
+    program: &'static str,
+    image_size: Option<[u32; 2]>,
+    pub people: FramePeople,
+}
+
+/// People, with or without frames.
+pub enum FramePeople {
+    /// Everybody in the one picture of the file.
+    Picture(Vec<JsonEntry>),
+    /// Everybody in each frame, by its number.
+    Frames(BTreeMap<u64, Vec<JsonEntry>>),
+}
+
+/// The keypoints of a whole video in the bytes of its JSON file. Errors name line and column, or frame and person.
+pub fn parse(bytes: &[u8]) -> Result<FoundKeypoints> {
+    let JsonPeople { program, image_size, people } = people(bytes)?;
+    let frames = match people {
+        FramePeople::Frames(frames) => frames,
+        FramePeople::Picture(people) => BTreeMap::from([(0, people)]),
+    };
+    let mut found = of_frames(program, frames)?;
+    found.image_size = image_size;
+    Ok(found)
+}
+
+/// Numbered frames of entries as keypoints.
+pub fn of_frames(program: &str, frames: BTreeMap<u64, Vec<JsonEntry>>) -> Result<FoundKeypoints> {
+    let mut counts = BTreeSet::new();
+    let mut numbered = BTreeMap::new();
+    for (number, entries) in frames {
+        let mut people: Vec<FoundPerson> = Vec::with_capacity(entries.len());
+        for (at, entry) in entries.iter().enumerate() {
+            let person = entry.person().map_err(|message| anyhow::anyhow!("frame {number}, person {at}: {message}"))?;
+            if let Some((person, n_points)) = person {
+                counts.insert(n_points);
+                people.push(person);
+            }
+        }
+        numbered.insert(number, people);
+    }
+    let (frames, notes) = in_order(numbered)?;
+    let counts = counts.into_iter().map(|n| n.to_string()).collect::<Vec<_>>().join(" and ");
+    Ok(FoundKeypoints::new(format!("{program}, {counts} points"), frames, notes))
+}
+
+/// The people in the bytes of a JSON file.
+pub fn people(bytes: &[u8]) -> Result<JsonPeople> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let bytes = without_nan(bytes);
+    let mut signs = bytes.iter().filter(|byte| !byte.is_ascii_whitespace());
+    match (signs.next(), signs.next()) {
+        (Some(b'{'), _) => of_object(read(&bytes)?),
+        (Some(b'['), Some(b'[')) => {
+            let frames: Vec<Vec<JsonEntry>> = read(&bytes)?;
+            Ok(JsonPeople::new("MMPose", FramePeople::Frames((0..).zip(frames).collect())))
+        }
+        (Some(b'['), _) => of_list(read(&bytes)?),
+        _ => bail!("no JSON: it begins neither with {{ nor with ["),
+    }
+}
+
+impl JsonPeople {
+    fn new(program: &'static str, people: FramePeople) -> Self {
+        Self { program, image_size: None, people }
+    }
+
+    /// The program in a word.
+    pub fn program(&self) -> &'static str {
+        self.program
+    }
+}
+
+fn read<'de, T: Deserialize<'de>>(bytes: &'de [u8]) -> Result<T> {
+    serde_json::from_slice(bytes).context("the JSON is cut off, damaged or of another kind")
+}
+
+fn of_object(object: JsonObject) -> Result<JsonPeople> {
+    let JsonObject { people, instance_info, annotations, images } = object;
+    if let Some(people) = people {
+        return Ok(JsonPeople::new("OpenPose", FramePeople::Picture(people)));
+    }
+    if let Some(instances) = instance_info {
+        return Ok(JsonPeople { program: "MMPose", ..of_list(instances)? });
+    }
+    let Some(annotations) = annotations else {
+        bail!(
+            "no keypoints are known in it: expected `people` (OpenPose), `instance_info` (MMPose), `annotations` and \
+             `images` (COCO-WholeBody) or a list of people (AlphaPose, MMPose)"
+        );
+    };
+    let numbers = annotated_numbers(&images);
+    let mut frames: BTreeMap<u64, Vec<JsonEntry>> = numbers.iter().map(|(_, number)| (*number, Vec::new())).collect();
+    for (at, entry) in annotations.into_iter().enumerate() {
+        let known = |name: &ImageName| numbers.iter().find(|(id, _)| *id == name).map(|(_, number)| *number);
+        let number = match &entry.image_id {
+            Some(name) if images.is_empty() => number_of_image(name)?,
+            Some(name) => {
+                known(name).with_context(|| format!("annotation {at}: `images` has no picture {}", shown(name)))?
+            }
+            None => bail!("annotation {at}: the key image_id is missing"),
+        };
+        frames.entry(number).or_default().push(entry);
+    }
+    let size = images.iter().map(|image| [image.width, image.height]).find(|size| size.iter().all(|px| *px > 0));
+    Ok(JsonPeople { program: "COCO-WholeBody", image_size: size, people: FramePeople::Frames(frames) })
+}
+
+/// Frame number of each picture: the digits of its name, else its place in the list.
+fn annotated_numbers(images: &[AnnotatedImage]) -> Vec<(&ImageName, u64)> {
+    let by_name: Option<Vec<u64>> = images.iter().map(|image| number_of(&image.file_name)).collect();
+    let are_apart = |numbers: &Vec<u64>| numbers.iter().collect::<BTreeSet<_>>().len() == numbers.len();
+    let numbers = by_name.filter(are_apart).unwrap_or_else(|| (0..images.len() as u64).collect());
+    images.iter().map(|image| &image.id).zip(numbers).collect()
+}
+
+fn of_list(entries: Vec<JsonEntry>) -> Result<JsonPeople> {
+    if entries.iter().any(|entry| entry.instances.is_some()) {
+        let mut frames = BTreeMap::new();
+        for (at, entry) in (0..).zip(entries) {
+            let number = entry.frame_id.unwrap_or(at);
+            let before = frames.insert(number, entry.instances.unwrap_or_default());
+            ensure!(before.is_none(), "two frames have the frame_id {number}; expected the frames of one video");
+        }
+        return Ok(JsonPeople::new("MMPose", FramePeople::Frames(frames)));
+    }
+    if entries.iter().all(|entry| entry.image_id.is_none()) {
+        return Ok(JsonPeople::new("MMPose", FramePeople::Picture(entries)));
+    }
+    let mut frames: BTreeMap<u64, Vec<JsonEntry>> = BTreeMap::new();
+    for (at, entry) in entries.into_iter().enumerate() {
+        let Some(name) = &entry.image_id else { bail!("person {at} of the list: the key image_id is missing") };
+        frames.entry(number_of_image(name)?).or_default().push(entry);
+    }
+    Ok(JsonPeople::new("AlphaPose", FramePeople::Frames(frames)))
+}
+
+fn number_of_image(name: &ImageName) -> Result<u64> {
+    match name {
+        ImageName::Number(number) => Ok(*number),
+        ImageName::Name(text) => {
+            number_of(text).with_context(|| format!("image_id {text:?} holds no digits: which frame is it?"))
+        }
+    }
+}
+
+fn shown(name: &ImageName) -> String {
+    match name {
+        ImageName::Number(number) => number.to_string(),
+        ImageName::Name(text) => format!("{text:?}"),
+    }
+}
+
+/// The text with Python's NaN and Infinity as `null`.
+fn without_nan(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let text = String::from_utf8_lossy(bytes);
+    if !text.contains("NaN") && !text.contains("Infinity") {
+        return Cow::Borrowed(bytes);
+    }
+    let text = text.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null");
+    Cow::Owned(text.into_bytes())
+}

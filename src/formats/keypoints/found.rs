@@ -1,0 +1,118 @@
+//! Keypoints as another program found them: everybody in every frame, at the program's own rate and in its own unit.
+
+use crate::math::order::Ordered;
+use crate::types::pose2d::{Keypoint, N_BODY, N_HAND, PersonBox};
+use crate::types::time::FrameRate;
+
+/// Points of the body that every format shows and every camera sees: face and arms.
+const UPPER_BODY: usize = 11;
+/// Points that are looked at for the unit.
+const MOST_LOOKED_AT: usize = 20_000;
+/// Median coordinate up to which coordinates are shares of the picture; a person of two pixels is none.
+const MOST_SHARE: f64 = 1.5;
+
+/// One person of a frame in our orders of points; a point with score 0 is missing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FoundPerson {
+    /// COCO-17.
+    pub body: [Keypoint; N_BODY],
+    /// The person's left hand.
+    pub left_hand: [Keypoint; N_HAND],
+    /// The person's right hand.
+    pub right_hand: [Keypoint; N_HAND],
+}
+
+impl FoundPerson {
+    /// Every point: body, left hand, right hand.
+    pub fn points_mut(&mut self) -> impl Iterator<Item = &mut Keypoint> {
+        self.body.iter_mut().chain(&mut self.left_hand).chain(&mut self.right_hand)
+    }
+
+    /// Box around the points of the body that are there, with their mean score; `None` without one.
+    pub fn area(&self) -> Option<PersonBox> {
+        let seen: Vec<&Keypoint> = self.body.iter().filter(|point| point.score > 0.0).collect();
+        let side = |of: fn(&Keypoint) -> f32| {
+            seen.iter().fold([f32::MAX, f32::MIN], |[low, high], point| [low.min(of(point)), high.max(of(point))])
+        };
+        let ([left, right], [top, bottom]) = (side(|p| p.x), side(|p| p.y));
+        let score = seen.iter().map(|point| point.score).sum::<f32>() / seen.len().max(1) as f32;
+        let area = PersonBox { x: left, y: top, width: right - left, height: bottom - top, score };
+        (!seen.is_empty()).then_some(area)
+    }
+}
+
+/// Unit and origin of coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CoordinateUnit {
+    Pixels,
+    /// 0..1 of width and height of the picture.
+    Share,
+    /// Pixels from the person's neck.
+    FromNeck,
+}
+
+/// Keypoints of a video.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FoundKeypoints {
+    /// The format in words: `OpenPose, 25 points`.
+    pub format: String,
+    /// Frames a second, where the file says.
+    pub fps: Option<FrameRate>,
+    /// Width and height of the picture in px, where the file says.
+    pub image_size: Option<[u32; 2]>,
+    pub unit: CoordinateUnit,
+    /// Everybody in each frame.
+    pub frames: Vec<Vec<FoundPerson>>,
+    /// What stands in for what is missing, a sentence each.
+    pub notes: Vec<String>,
+}
+
+impl FoundKeypoints {
+    /// Keypoints of a file that says neither rate nor size; the unit is told by the coordinates.
+    pub fn new(format: String, frames: Vec<Vec<FoundPerson>>, notes: Vec<String>) -> Self {
+        let points = seen_points(&frames);
+        let sizes = points.map(|point| f64::from(point.x.abs().max(point.y.abs())));
+        let is_share = Ordered::new(sizes).median().is_some_and(|median| median <= MOST_SHARE);
+        let unit = if is_share { CoordinateUnit::Share } else { CoordinateUnit::Pixels };
+        Self { format, fps: None, image_size: None, unit, frames, notes }
+    }
+
+    /// Share of the points looked at that have a negative coordinate, 0..1.
+    pub fn negative_share(&self) -> f64 {
+        let (mut n, mut n_negative) = (0_usize, 0_usize);
+        for point in seen_points(&self.frames) {
+            n += 1;
+            n_negative += usize::from(point.x < 0.0 || point.y < 0.0);
+        }
+        n_negative as f64 / n.max(1) as f64
+    }
+
+    /// The farthest point of a body as a picture's size, px: the least that shows all of them.
+    pub fn extent(&self) -> [u32; 2] {
+        let points = || self.frames.iter().flatten().flat_map(|person| &person.body).filter(|point| point.score > 0.0);
+        let farthest = |of: fn(&Keypoint) -> f32| points().fold(1.0_f32, |most, point| most.max(of(point)));
+        [farthest(|p| p.x), farthest(|p| p.y)].map(|px| px.min(1e6).ceil() as u32)
+    }
+
+    /// Turns the coordinates into pixels of a picture of that size; a neck that is the origin gets a place in its
+    /// upper half.
+    pub fn to_pixels(&mut self, image_size: [u32; 2]) {
+        let [width, height] = image_size.map(|px| px as f32);
+        let (scale, shift) = match self.unit {
+            CoordinateUnit::Pixels => return,
+            CoordinateUnit::Share => ([width, height], [-0.5; 2]),
+            CoordinateUnit::FromNeck => ([1.0; 2], [width / 2.0, 0.4 * height]),
+        };
+        for point in self.frames.iter_mut().flatten().flat_map(FoundPerson::points_mut) {
+            if point.score > 0.0 {
+                (point.x, point.y) = (scale[0] * point.x + shift[0], scale[1] * point.y + shift[1]);
+            }
+        }
+        self.unit = CoordinateUnit::Pixels;
+    }
+}
+
+fn seen_points(frames: &[Vec<FoundPerson>]) -> impl Iterator<Item = &Keypoint> {
+    let upper = frames.iter().flatten().flat_map(|person| &person.body[..UPPER_BODY]);
+    upper.filter(|point| point.score > 0.0).take(MOST_LOOKED_AT)
+}

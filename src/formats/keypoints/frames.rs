@@ -1,0 +1,89 @@
+//! Numbered frames in order: what is missing between them counts as not seen, and is said.
+
+use super::found::FoundPerson;
+use anyhow::{Result, bail};
+use std::collections::BTreeMap;
+
+/// Most frames for each one that is there; a file of fewer frames than `FEW` may have longer gaps.
+const MOST_EMPTY: u64 = 20;
+const FEW: u64 = 10_000;
+
+/// Everybody in each frame, the first one numbered 0 or 1; and notes on gaps. Errors: no frame; numbers that are too
+/// far apart to be one video's.
+pub fn in_order(numbered: BTreeMap<u64, Vec<FoundPerson>>) -> Result<(Vec<Vec<FoundPerson>>, Vec<String>)> {
+    let (Some(&first), Some(&last)) = (numbered.keys().next(), numbered.keys().next_back()) else {
+        bail!("no frames");
+    };
+    let base = first.min(1);
+    let (n_there, n_frames) = (numbered.len() as u64, (last - base).saturating_add(1));
+    if n_frames > FEW && n_frames / MOST_EMPTY > n_there {
+        bail!(
+            "{n_there} frames with numbers from {first} to {last}; expected the frames of one video, one after the other"
+        );
+    }
+    let mut notes = Vec::new();
+    if first > base {
+        notes.push(format!("the first frame has the number {first}: {} before it count as not seen", first - base));
+    }
+    let n_gaps = n_frames - n_there - (first - base);
+    if n_gaps > 0 {
+        let missing = (first..last).find(|number| !numbered.contains_key(number)).unwrap_or(first);
+        notes.push(format!("{n_gaps} frames are missing, the first has the number {missing}: taken as not seen"));
+    }
+    let mut frames = vec![Vec::new(); n_frames as usize];
+    for (number, people) in numbered {
+        frames[(number - base) as usize] = people;
+    }
+    Ok((frames, notes))
+}
+
+/// The last run of digits in a file name without its ending: the number of a frame.
+pub fn number_of(name: &str) -> Option<u64> {
+    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+    let stem = ["_keypoints", "_predictions"].iter().fold(stem, |stem, end| stem.strip_suffix(end).unwrap_or(stem));
+    let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
+    let digits = &stem[..end];
+    let start = digits.rfind(|c: char| !c.is_ascii_digit()).map_or(0, |at| at + 1);
+    let start = start + digits[start..].len().saturating_sub(18);
+    digits.get(start..)?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_numbered_by_the_last_digits_of_their_names() {
+        for (name, number) in [
+            ("talk2_000000000012_keypoints.json", Some(12)),
+            ("0.jpg", Some(0)),
+            ("frame7.png", Some(7)),
+            ("7", Some(7)),
+            ("a.json", None),
+            ("20240101123456789012345_5.json", Some(5)),
+            ("99999999999999999999999", Some(999_999_999_999_999_999)),
+            ("é1é.json", Some(1)),
+        ] {
+            assert_eq!(number_of(name), number, "{name}");
+        }
+    }
+
+    #[test]
+    fn gaps_are_empty_frames_and_are_said() {
+        let frames = |numbers: &[u64]| in_order(numbers.iter().map(|n| (*n, vec![FoundPerson::default()])).collect());
+        let (found, notes) = frames(&[1, 2, 3]).unwrap();
+        assert_eq!((found.len(), notes.len()), (3, 0));
+        let (found, notes) = frames(&[2, 5]).unwrap();
+        assert_eq!(found.iter().map(Vec::len).collect::<Vec<_>>(), [0, 1, 0, 0, 1]);
+        assert_eq!(
+            notes,
+            [
+                "the first frame has the number 2: 1 before it count as not seen",
+                "2 frames are missing, the first has the number 3: taken as not seen"
+            ]
+        );
+        assert!(frames(&[]).is_err());
+        let text = frames(&[3, u64::MAX]).unwrap_err().to_string();
+        assert!(text.contains("2 frames with numbers from 3 to"), "{text}");
+    }
+}

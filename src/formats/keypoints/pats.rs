@@ -1,0 +1,42 @@
+//! Arrays of PATS (Ahuja et al. 2020): 52 joints at 15 frames a second, [T, 104] or [T, 2, 52] (all x, then all y) or
+//! [T, 52, 2], with `confidence` [T, 52] where it was exported too. Where the neck lies at 0, 0 throughout, the
+//! coordinates count from it. The set's HDF5 files are not read: their `pose/data` is saved as an array first.
+
+use super::arrays::NamedArrays;
+use super::entry::point;
+use super::found::{CoordinateUnit, FoundKeypoints};
+use super::layout::PATS;
+use crate::types::pose2d::Keypoint;
+use crate::types::time::FrameRate;
+use anyhow::{Result, ensure};
+
+const N: usize = PATS.n_points;
+const RATE: FrameRate = FrameRate::new(15, 1);
+
+/// The keypoints; `None` where no array has a shape of PATS. Errors: a confidence of another length.
+pub fn read(arrays: &NamedArrays) -> Result<Option<FoundKeypoints>> {
+    let is_pats = |shape: &[usize]| matches!(shape, [_, 2, N] | [_, N, 2]) || matches!(shape, [_, n] if *n == 2 * N);
+    let Some((_, array)) = arrays.iter().find(|(_, array)| is_pats(array.shape())) else { return Ok(None) };
+    let confidence = arrays.iter().find(|(name, array)| name.contains("confidence") && array.ndim() == 2);
+    let n_frames = array.shape()[0];
+    if let Some((name, scores)) = confidence {
+        let shape = scores.shape();
+        ensure!(shape == [n_frames, N], "`{name}` has the shape {shape:?}, expected [{n_frames}, {N}]");
+    }
+    let score = |t: usize, j: usize| confidence.map_or(1.0, |(_, scores)| scores[[t, j]]);
+    let place = |t: usize, j: usize| match array.shape() {
+        [_, N, 2] => [array[[t, j, 0]], array[[t, j, 1]]],
+        [_, 2, N] => [array[[t, 0, j]], array[[t, 1, j]]],
+        _ => [array[[t, j]], array[[t, N + j]]],
+    };
+    let frame = |t: usize| {
+        let points: Vec<Keypoint> =
+            (0..N).map(|j| (place(t, j), score(t, j))).map(|([x, y], s)| point(x, y, s)).collect();
+        let person = PATS.person(&points);
+        if person.area().is_some() { vec![person] } else { Vec::new() }
+    };
+    let found = FoundKeypoints::new("PATS, 52 points".to_owned(), (0..n_frames).map(frame).collect(), Vec::new());
+    let from_neck = (0..n_frames).all(|t| place(t, 0) == [0.0; 2]);
+    let unit = if from_neck { CoordinateUnit::FromNeck } else { found.unit };
+    Ok(Some(FoundKeypoints { fps: Some(RATE), unit, ..found }))
+}

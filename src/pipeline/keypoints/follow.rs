@@ -1,0 +1,159 @@
+//! Of several people the one to follow: people of neighbouring frames are joined to tracks by overlap, else by nearness; then
+//! the heaviest track (large, sure, central, long) is taken, and what it leaves of the video goes to the next.
+
+use crate::formats::keypoints::FoundPerson;
+use crate::pipeline::pose2d::decode::boxes::overlap;
+use crate::types::pose2d::PersonBox;
+
+/// Least overlap of two boxes of the same person.
+const SAME_PERSON: f32 = 0.2;
+/// Largest distance of their centres where they overlap less, in widths of the wider box.
+const NEAR: f32 = 0.5;
+/// Likeness of two boxes with one centre that overlap less: below that of any that overlap enough.
+const NEAR_WEIGHT: f32 = 0.1;
+
+/// The person followed through a video, a value a frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FollowedPerson {
+    /// Index among the frame's people.
+    pub chosen: Vec<Option<usize>>,
+    /// Number of the track; goes up where another is followed.
+    pub identity: Vec<i64>,
+    /// People in view.
+    pub n_people: Vec<usize>,
+}
+
+/// People of frames that are one person.
+struct PersonTrackOfBoxes {
+    /// Frame and index among its people, in order.
+    seen: Vec<(usize, usize)>,
+    last: PersonBox,
+    weight: f64,
+}
+
+/// Follows one person through `frames` of a picture `image_width` px wide. A person who is gone for more than `max_gap`
+/// frames is another one.
+pub fn follow(frames: &[Vec<FoundPerson>], image_width: f32, max_gap: usize) -> FollowedPerson {
+    let mut tracks = tracks(frames, image_width, max_gap);
+    // A tie goes to the track that begins first.
+    tracks.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    let mut owner: Vec<Option<usize>> = vec![None; frames.len()];
+    let mut chosen = vec![None; frames.len()];
+    for (number, track) in tracks.iter().enumerate() {
+        let free: Vec<(usize, usize)> = track.seen.iter().copied().filter(|(t, _)| owner[*t].is_none()).collect();
+        free.iter().for_each(|&(t, person)| chosen[t] = Some(person));
+        // Frames between two of a track belong to it, so that nobody else is taken while it is hidden.
+        for pair in track.seen.windows(2) {
+            owner[pair[0].0..=pair[1].0].iter_mut().for_each(|place| *place = place.or(Some(number)));
+        }
+        free.iter().for_each(|&(t, _)| owner[t] = Some(number));
+    }
+    let (mut identity, mut n_taken, mut before) = (Vec::with_capacity(frames.len()), 0, None);
+    for place in owner {
+        if place.is_some() && place != before {
+            n_taken += i64::from(before.is_some());
+            before = place;
+        }
+        identity.push(n_taken);
+    }
+    FollowedPerson { chosen, identity, n_people: frames.iter().map(Vec::len).collect() }
+}
+
+fn tracks(frames: &[Vec<FoundPerson>], image_width: f32, max_gap: usize) -> Vec<PersonTrackOfBoxes> {
+    let mut tracks: Vec<PersonTrackOfBoxes> = Vec::new();
+    let mut active: Vec<usize> = Vec::new();
+    for (t, people) in frames.iter().enumerate() {
+        active.retain(|track| tracks[*track].seen.last().is_some_and(|(last, _)| t - last <= max_gap));
+        let areas: Vec<(usize, PersonBox)> =
+            people.iter().enumerate().filter_map(|(k, person)| Some((k, person.area()?))).collect();
+        let mut pairs: Vec<(f32, usize, usize)> = Vec::new();
+        for (at, (_, area)) in areas.iter().enumerate() {
+            let near = active.iter().map(|track| (likeness(&tracks[*track].last, area), at, *track));
+            pairs.extend(near.filter(|(likeness, _, _)| *likeness > 0.0));
+        }
+        pairs.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.2, a.1).cmp(&(b.2, b.1))));
+        let mut track_of: Vec<Option<usize>> = vec![None; areas.len()];
+        for (_, at, track) in pairs {
+            if track_of[at].is_none() && !track_of.contains(&Some(track)) {
+                track_of[at] = Some(track);
+            }
+        }
+        for ((person, area), track) in areas.into_iter().zip(track_of) {
+            let track = track.unwrap_or_else(|| {
+                tracks.push(PersonTrackOfBoxes { seen: Vec::new(), last: area, weight: 0.0 });
+                active.push(tracks.len() - 1);
+                tracks.len() - 1
+            });
+            let track = &mut tracks[track];
+            track.seen.push((t, person));
+            track.last = area;
+            track.weight += weight(&area, image_width);
+        }
+    }
+    tracks
+}
+
+/// How much two boxes look like one person's: their overlap, or little where they are only near; 0: not at all.
+fn likeness(a: &PersonBox, b: &PersonBox) -> f32 {
+    let shared = overlap(a, b);
+    if shared >= SAME_PERSON {
+        return shared;
+    }
+    let centre = |area: &PersonBox| [area.x + area.width / 2.0, area.y + area.height / 2.0];
+    let ([ax, ay], [bx, by]) = (centre(a), centre(b));
+    let distance = (ax - bx).hypot(ay - by) / a.width.max(b.width).max(1.0);
+    if distance <= NEAR { NEAR_WEIGHT * (1.0 - distance) } else { 0.0 }
+}
+
+/// Weight of a frame of a person: size, score, nearness to the middle.
+fn weight(area: &PersonBox, image_width: f32) -> f64 {
+    let middle = image_width / 2.0;
+    let off = ((area.x + area.width / 2.0 - middle) / middle.max(1.0)).abs().min(1.0);
+    f64::from(area.score * area.width * area.height * (1.0 - 0.5 * off))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::pose2d::Keypoint;
+
+    /// A body between two corners.
+    fn at(x: f32, size: f32) -> FoundPerson {
+        let mut person = FoundPerson::default();
+        person.body[0] = Keypoint { x, y: 10.0, score: 0.9 };
+        person.body[5] = Keypoint { x: x + size, y: 10.0 + size, score: 0.9 };
+        person
+    }
+
+    #[test]
+    fn the_larger_one_is_followed_whatever_the_order_and_through_a_gap() {
+        let frames: Vec<Vec<FoundPerson>> = (0..30)
+            .map(|t| {
+                let (speaker, guest) = (at(100.0 + t as f32, 100.0), at(300.0 - t as f32, 60.0));
+                match t {
+                    10..14 => vec![guest],
+                    t if t % 2 == 0 => vec![speaker, guest],
+                    _ => vec![guest, speaker],
+                }
+            })
+            .collect();
+        let followed = follow(&frames, 400.0, 15);
+        for (t, chosen) in followed.chosen.iter().enumerate() {
+            let expected = if (10..14).contains(&t) { None } else { Some(t % 2) };
+            assert_eq!(*chosen, expected, "frame {t}");
+        }
+        assert!(followed.identity.iter().all(|number| *number == 0) && followed.n_people[0] == 2);
+        // Gone for longer than the gap, the guest is followed in between and each of the three is another person.
+        let followed = follow(&frames, 400.0, 3);
+        assert_eq!((followed.chosen[12], followed.identity[9], followed.identity[29]), (Some(0), 0, 2));
+    }
+
+    #[test]
+    fn a_cut_to_another_place_is_another_person_and_nobody_is_nobody() {
+        let frames: Vec<Vec<FoundPerson>> = (0..20).map(|t| vec![at(if t < 10 { 0.0 } else { 500.0 }, 80.0)]).collect();
+        let followed = follow(&frames, 600.0, 15);
+        assert_eq!((followed.identity[9], followed.identity[10], followed.chosen[10]), (0, 1, Some(0)));
+        let nobody = follow(&[Vec::new(), vec![FoundPerson::default()]], 600.0, 15);
+        assert_eq!((nobody.chosen, nobody.identity), (vec![None; 2], vec![0; 2]));
+    }
+}

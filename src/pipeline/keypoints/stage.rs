@@ -1,0 +1,181 @@
+//! The first two stages for keypoints of other programs. `extract` reads them and writes sound, timeline and `MediaInfo` as of
+//! a video, and the keypoints at the dataset rate; `pose2d` hands these on. What pictures alone tell is NaN, not known.
+
+use super::taken::{TakenKeypoints, take_in};
+use crate::config::videos::Videos;
+use crate::config::{ExtractConfig, KeypointSource};
+use crate::formats::media_json::MediaInfo;
+use crate::formats::timeline_npz::Timeline;
+use crate::formats::{keypoints, keypoints_npz};
+use crate::pipeline::extract::audio_file::extract_wav;
+use crate::stage::artifacts::{Artifact, StageName, dir};
+use crate::stage::progress::Progress;
+use crate::stage::{Input, Report, Stage, Unit};
+use crate::types::sound::SAMPLE_RATE;
+use anyhow::{Context, Result, anyhow, bail};
+use ndarray::{Array3, s};
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Version of what is read of other programs' files; goes up when the same file gives other keypoints.
+const READERS: u32 = 1;
+
+/// Keypoints to sound, timeline and keypoints at the dataset rate.
+pub struct KeypointExtractStage {
+    settings: ExtractConfig,
+    /// What the configuration says, by speaker and video.
+    sources: BTreeMap<(String, String), KeypointSource>,
+}
+
+/// Keypoints of the stage before, handed on.
+pub struct KeypointPose2dStage {
+    work: PathBuf,
+}
+
+impl KeypointExtractStage {
+    pub fn new(settings: &ExtractConfig, videos: &[Videos]) -> Self {
+        let of = |videos: &Videos| {
+            let key = |video: &String| (videos.speaker.clone(), video.clone());
+            videos.keypoints.iter().map(|(video, source)| (key(video), source.clone())).collect::<Vec<_>>()
+        };
+        Self { settings: settings.clone(), sources: videos.iter().flat_map(of).collect() }
+    }
+
+    fn source(&self, unit: &Unit) -> Option<&KeypointSource> {
+        self.sources.get(&(unit.speaker.clone(), unit.video.clone()))
+    }
+
+    fn sound(&self, unit: &Unit) -> Result<PathBuf> {
+        let source = self.source(unit).with_context(|| format!("{unit} is no keypoints"))?;
+        source.sound.clone().map_err(|message| anyhow!("{}: {message}", unit.source.display()))
+    }
+}
+
+impl Stage for KeypointExtractStage {
+    fn name(&self) -> &'static str {
+        StageName::Extract.as_str()
+    }
+
+    fn version(&self) -> u32 {
+        READERS
+    }
+
+    fn settings(&self, unit: &Unit) -> serde_json::Value {
+        let source = self.source(unit);
+        json!({
+            "readers": READERS, "rate": self.settings.rate(), "sample_rate": SAMPLE_RATE,
+            "audio_track": self.settings.audio_track,
+            "fps": source.and_then(|source| source.fps), "size": source.and_then(|source| source.image_size),
+        })
+    }
+
+    fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
+        let sound = Input { role: "sound".into(), path: self.sound(unit)? };
+        Ok(vec![Input { role: "video".into(), path: unit.source.clone() }, sound])
+    }
+
+    fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
+        let file = unit.source.display();
+        let found = keypoints::read(&unit.source)?;
+        let source = self.source(unit).with_context(|| format!("{unit} is no keypoints"))?;
+        let Some(source_fps) = source.fps.or(found.fps) else {
+            bail!("{file}: it does not say its frames a second; write `fps = 25` (or what it has) beside `keypoints`");
+        };
+        let Some(image_size) = source.image_size.or(found.image_size) else {
+            bail!(
+                "{file}: it does not say its picture's size; write `size = \"1280x720\"` (or what it has) beside `keypoints`"
+            );
+        };
+        let format = format!("{} at {source_fps}", found.format);
+        let fps = self.settings.rate();
+        let TakenKeypoints { keypoints, extras, duration_secs, notes } = take_in(found, source_fps, image_size, fps)?;
+        let n_frames = keypoints.n_frames();
+        keypoints_npz::write(&Artifact::Keypoints.within(out), &keypoints, &extras)?;
+        without_pictures(extras.time_secs.to_vec()).write(&Artifact::Timeline.within(out))?;
+        let sound =
+            extract_wav(&self.sound(unit)?, self.settings.audio_track, &Artifact::Sound.within(out), SAMPLE_RATE)?;
+        let audio_secs = sound.as_ref().map(|sound| sound.secs);
+        let media = MediaInfo {
+            image_size: image_size.map(|px| px as usize),
+            source_fps: Some(source_fps),
+            has_audio: audio_secs.is_some(),
+            audio_secs,
+            damage: sound.and_then(|sound| sound.damage),
+            keypoints_from: Some(format),
+            ..MediaInfo::new(duration_secs, n_frames, fps)
+        };
+        media.write(&Artifact::MediaInfo.within(out))?;
+        let sound = audio_secs.map_or("no sound".to_owned(), |secs| format!("{secs:.1} s of sound"));
+        let said = media.not_judged().into_iter().chain(media.damage.clone()).chain(notes.clone());
+        let said = said.collect::<Vec<_>>().join("; ");
+        let mut facts = serde_json::to_value(&media)?.as_object().cloned().unwrap_or_default();
+        facts.insert("notes".into(), notes.into());
+        Ok(Report { line: format!("{n_frames} frames at {fps}, {sound}; {said}"), facts })
+    }
+}
+
+/// The timeline of frames that no picture was seen of: movement and shots are not known.
+fn without_pictures(source_secs: Vec<f64>) -> Timeline {
+    let n_frames = source_secs.len();
+    Timeline {
+        source_secs,
+        repeated: vec![false; n_frames],
+        shot_score: vec![f64::NAN; n_frames],
+        restart: vec![false; n_frames],
+        frame_difference: vec![f32::NAN; n_frames],
+    }
+}
+
+impl KeypointPose2dStage {
+    pub fn new(work: &Path) -> Self {
+        Self { work: work.to_owned() }
+    }
+
+    fn taken(&self, unit: &Unit) -> PathBuf {
+        Artifact::Keypoints.within(&dir(&self.work, StageName::Extract, unit))
+    }
+}
+
+impl Stage for KeypointPose2dStage {
+    fn name(&self) -> &'static str {
+        StageName::Pose2d.as_str()
+    }
+
+    fn version(&self) -> u32 {
+        READERS
+    }
+
+    fn settings(&self, _unit: &Unit) -> serde_json::Value {
+        json!({ "keypoints": "as found by another program" })
+    }
+
+    fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
+        Ok(vec![Input { role: "keypoints".into(), path: self.taken(unit) }])
+    }
+
+    fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
+        let (from, to) = (self.taken(unit), Artifact::Keypoints.within(out));
+        std::fs::copy(&from, &to).with_context(|| format!("cannot copy {} to {}", from.display(), to.display()))?;
+        let (keypoints, extras) = (keypoints_npz::read(&to)?, keypoints_npz::read_extras(&to)?);
+        let share = |points: &Array3<f32>| {
+            let seen =
+                points.slice(s![.., .., 2]).outer_iter().filter(|scores| scores.iter().any(|s| *s > 0.0)).count();
+            seen as f64 / keypoints.n_frames().max(1) as f64
+        };
+        let [body, left, right] = [&keypoints.body, &keypoints.left_hand, &keypoints.right_hand].map(share);
+        let several = extras.n_people.iter().filter(|n| **n > 1).count() as f64 / keypoints.n_frames().max(1) as f64;
+        let line = format!(
+            "{} frames: person in {:.0} %, left hand {:.0} %, right hand {:.0} %, as another program found them",
+            keypoints.n_frames(),
+            100.0 * body,
+            100.0 * left,
+            100.0 * right
+        );
+        let facts = json!({
+            "n_frames": keypoints.n_frames(), "person": body, "left_hand": left, "right_hand": right,
+            "several_people": several,
+        });
+        Ok(Report { line, facts: facts.as_object().cloned().unwrap_or_default() })
+    }
+}

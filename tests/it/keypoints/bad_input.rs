@@ -1,0 +1,206 @@
+//! What is wrong with a file of another program is said with the file, the place and what was expected.
+
+use crate::fixtures::media::foreign_keypoints as foreign;
+use crate::fixtures::media::foreign_keypoints::OpenPoseOrder;
+use ndarray::{Array2, Array3};
+use ndarray_npy::write_npy;
+use orator::formats::keypoints::read;
+use orator::types::time::FrameRate;
+use serde_json::json;
+use std::path::Path;
+use std::process::Command;
+
+const RATE: FrameRate = FrameRate::new(15, 1);
+
+/// The error's text, or the notes, with the folder's name taken out.
+fn said(dir: &Path, name: &str) -> String {
+    let path = dir.join(name);
+    let text = match read(&path) {
+        Ok(found) => format!("read: {:?}", found.notes),
+        Err(error) => format!("{error:#}"),
+    };
+    text.replace(&format!("{}/", dir.display()), "")
+}
+
+#[test]
+fn every_kind_of_damage_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| {
+        let path = dir.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    };
+    let person = |n: usize| json!({ "image_id": "0.jpg", "keypoints": vec![5.0; n], "score": 1.0 });
+    write("empty.json", "");
+    write("text.json", "keypoints follow");
+    write("cut.json", "[{\"image_id\": \"0.jpg\", \"keypoints\": [1, 2,");
+    write("string.json", "[{\"image_id\": \"0.jpg\", \"keypoints\": \"none\"}]");
+    write("other.json", "{\"bodies\": []}");
+    write("nothing.json", "[]");
+    write("count.json", &json!([person(57)]).to_string());
+    write("uneven.json", &json!([person(50)]).to_string());
+    write("nameless.json", "[{\"image_id\": \"first.jpg\", \"keypoints\": []}]");
+    write("half.json", "[{\"image_id\": 0, \"keypoints\": []}, {\"keypoints\": []}]");
+    write("twice.json", "[{\"frame_id\": 3, \"instances\": []}, {\"frame_id\": 3, \"instances\": []}]");
+    write(
+        "three.json",
+        &json!([{ "frame_id": 0, "instances": [{ "keypoints": vec![[1.0; 3]; 17], "keypoint_scores": vec![0.5; 17] }] }])
+            .to_string(),
+    );
+    write("picture.json", "{\"images\": [], \"annotations\": [{\"keypoints\": []}]}");
+    write(
+        "unknown.json",
+        "{\"images\": [{\"id\": 1, \"file_name\": \"1.jpg\"}], \"annotations\": [{\"image_id\": 2}]}",
+    );
+    write("sparse.json", "[{\"image_id\": 397133, \"keypoints\": []}, {\"image_id\": 900, \"keypoints\": []}]");
+    write("nobody/a_0_keypoints.json", "{\"people\": []}");
+    write("mixed/a_0_keypoints.json", "{\"people\": []}");
+    write("mixed/b_0_keypoints.json", "{\"people\": []}");
+    write("many/talk1.json", "[{\"frame_id\": 0, \"instances\": []}, {\"frame_id\": 1, \"instances\": []}]");
+    write("unnumbered/first.json", "{\"people\": []}");
+    write(
+        "hands/a_0_keypoints.json",
+        &json!({ "people": [{ "pose_keypoints_2d": vec![5.0; 75], "hand_left_keypoints_2d": [1, 2, 1] }] }).to_string(),
+    );
+    std::fs::create_dir(dir.path().join("void")).unwrap();
+    write("set.h5", "\u{89}HDF");
+    std::fs::write(dir.path().join("set.h5"), b"\x89HDF\r\n").unwrap();
+    write("list.npy", "\u{93}NUM");
+    std::fs::write(dir.path().join("list.npy"), b"\x93NUMPY\x01\x00").unwrap();
+    write_npy(dir.path().join("shape.npy"), &Array3::<f32>::ones((4, 49, 3))).unwrap();
+    write_npy(dir.path().join("missing.npy"), &Array2::<f32>::from_elem((4, 104), f32::NAN)).unwrap();
+    let mut signed = Array3::<f32>::zeros((4, 33, 4));
+    for ((_, j, k), value) in signed.indexed_iter_mut() {
+        *value = if k < 2 { 0.5 - 0.1 * j as f32 } else { 1.0 };
+    }
+    write_npy(dir.path().join("signed.npy"), &signed).unwrap();
+    for (name, expected) in [
+        ("empty.json", "empty.json: no keypoints can be read: no JSON: it begins neither with { nor with ["),
+        ("text.json", "text.json: no keypoints can be read: no JSON: it begins neither with { nor with ["),
+        (
+            "cut.json",
+            "cut.json: no keypoints can be read: the JSON is cut off, damaged or of another kind: EOF while parsing a list at line 1 column 43",
+        ),
+        ("string.json", "invalid type: string \"none\", expected numbers or lists of numbers at line 1 column 42"),
+        (
+            "other.json",
+            "other.json: no keypoints can be read: no keypoints are known in it: expected `people` (OpenPose)",
+        ),
+        ("nothing.json", "nothing.json: nobody is seen in any frame"),
+        (
+            "count.json",
+            "count.json: no keypoints can be read: frame 0, person 0: 19 points a person; orders of 17, 18, 25, 26, 133, 136 points are known",
+        ),
+        ("uneven.json", "frame 0, person 0: `keypoints` holds 50 numbers, expected x, y and score of each point"),
+        ("nameless.json", "image_id \"first.jpg\" holds no digits: which frame is it?"),
+        ("half.json", "person 1 of the list: the key image_id is missing"),
+        ("twice.json", "two frames have the frame_id 3; expected the frames of one video"),
+        ("three.json", "frame 0, person 0: `keypoints` holds 51 numbers for 17 scores, expected x and y for each (2D)"),
+        ("picture.json", "annotation 0: the key image_id is missing"),
+        ("unknown.json", "annotation 0: `images` has no picture 2"),
+        (
+            "sparse.json",
+            "2 frames with numbers from 900 to 397133; expected the frames of one video, one after the other",
+        ),
+        ("nobody", "nobody: nobody is seen in any frame"),
+        (
+            "mixed",
+            "mixed/a_0_keypoints.json and mixed/b_0_keypoints.json are both frame 0; each video needs a folder of its own",
+        ),
+        ("many", "many/talk1.json holds 2 frames, expected one a file in a folder; name the file itself"),
+        ("unnumbered", "unnumbered/first.json: no digits in its name say which frame it is"),
+        ("hands", "hands: frame 0, person 0: `hand_left_keypoints_2d` holds 1 points, expected 21 of a hand"),
+        ("void", "void holds no .json file of a frame"),
+        ("absent.json", "cannot read absent.json: No such file"),
+        ("set.h5", "set.h5 is HDF5, which is not read; save its arrays with numpy.savez, for PATS `pose/data`"),
+        ("list.npy", "list.npy is no .npy file of numbers"),
+        ("shape.npy", "shape.npy has no array `body` [T, 17, 3], nor MediaPipe's landmarks"),
+        ("shape.npy", "it has: [4, 49, 3]"),
+        ("missing.npy", "missing.npy: nobody is seen in any frame"),
+        (
+            "signed.npy",
+            "signed.npy: its coordinates lie between -1 and 1; write them in pixels (OpenPose: --keypoint_scale 0)",
+        ),
+    ] {
+        let said = said(dir.path(), name);
+        assert!(said.contains(expected), "{name}: {said}");
+    }
+}
+
+#[test]
+fn gaps_and_numbers_that_are_none_are_points_not_seen() {
+    let dir = tempfile::tempdir().unwrap();
+    let sample = foreign::sample(8, RATE);
+    let folder = dir.path().join("gap");
+    foreign::openpose(&folder, &sample, OpenPoseOrder::Body25);
+    for t in [3, 4] {
+        std::fs::remove_file(folder.join(format!("gap_{t:012}_keypoints.json"))).unwrap();
+    }
+    let found = read(&folder).unwrap();
+    assert_eq!(found.notes, ["2 frames are missing, the first has the number 3: taken as not seen"]);
+    assert_eq!((found.frames.len(), found.frames[3].len(), found.frames[5].len()), (8, 0, 1));
+
+    // Python writes a number that is none as NaN.
+    let path = dir.path().join("nan.json");
+    foreign::alphapose(&path, &sample, 17);
+    let text = std::fs::read_to_string(&path).unwrap().replacen("320.0,110.0,", "NaN,-Infinity,", 1);
+    std::fs::write(&path, text).unwrap();
+    let found = read(&path).unwrap();
+    let scores: Vec<f32> = found.frames[0][0].body.iter().map(|point| point.score).collect();
+    assert!(scores[0] == 0.0 && scores[1..].iter().all(|score| *score > 0.0), "{scores:?}");
+}
+
+#[test]
+fn the_verb_asks_for_what_the_format_does_not_say() {
+    let dir = tempfile::tempdir().unwrap();
+    let sample = foreign::sample(20, RATE);
+    let (folder, npz, out) = (dir.path().join("op"), dir.path().join("mp.npy"), dir.path().join("j.npy"));
+    foreign::openpose(&folder, &sample, OpenPoseOrder::Body25);
+    foreign::holistic(&npz, &sample, foreign::HolisticOrder::NoFace);
+    let lift = |file: &Path, args: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+        let output = command.arg("lift").arg(file).arg("--out").arg(&out).args(args).output().unwrap();
+        let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+        (output.status.code(), text)
+    };
+    let fails = |file: &Path, args: &[&str], expected: &str| {
+        let (code, text) = lift(file, args);
+        assert!(code.is_some_and(|code| code != 0) && text.contains(expected), "{text}");
+    };
+    fails(&folder, &[], "op: it does not say its frames a second; give them with --fps");
+    fails(
+        &npz,
+        &["--fps", "15"],
+        "mp.npy: it does not say its picture's size; give it with --size, like --size 1280x720",
+    );
+    fails(&folder, &["--fps", "15", "--size", "wide"], "expected width and height in pixels, like 1280x720");
+    let (code, text) = lift(&folder, &["--fps", "15"]);
+    assert!(code == Some(0) && text.contains("OpenPose, 25 points at 15 fps"), "{text}");
+    assert!(text.contains("no size of the picture: taken from the farthest points"), "{text}");
+    let first = std::fs::read(&out).unwrap();
+    let (code, text) = lift(&npz, &["--fps", "15", "--size", "640x480"]);
+    assert!(code == Some(0) && text.contains("20 frames at 15 fps lifted"), "{text}");
+    assert_eq!(first.len(), std::fs::read(&out).unwrap().len());
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::test_runner::Config::with_cases(200))]
+    #[test]
+    fn no_bytes_panic(
+        text in "\\{?\\[?(\"(people|instance_info|keypoints|image_id|frame_id|annotations|images|id)\" ?: ?)?[\\[{]{0,3}[0-9.,NaIfinty\"-]{0,12}[\\]}]{0,4}|.{0,40}",
+        damage in proptest::collection::vec((0usize..4000, proptest::num::u8::ANY), 1..4),
+    ) {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.json");
+        std::fs::write(&path, &text).unwrap();
+        let _ = read(&path);
+        foreign::alphapose(&path, &foreign::sample(2, RATE), 17);
+        let mut bytes = std::fs::read(&path).unwrap();
+        for (at, value) in damage {
+            let at = at % bytes.len();
+            bytes[at] = value;
+        }
+        std::fs::write(&path, &bytes).unwrap();
+        let _ = read(&path);
+    }
+}

@@ -1,0 +1,192 @@
+//! Every format: written by its own definition, read back, brought to another rate, one of several people followed.
+
+use crate::fixtures::media::foreign_keypoints as foreign;
+use crate::fixtures::media::foreign_keypoints::{HolisticOrder, OpenPoseOrder};
+use ndarray::Array3;
+use orator::formats::keypoints::{CoordinateUnit, FoundKeypoints, read};
+use orator::formats::keypoints_npz;
+use orator::pipeline::keypoints::{TakenKeypoints, take_in};
+use orator::types::pose2d::Keypoints;
+use orator::types::time::FrameRate;
+use std::path::Path;
+
+const RATE: FrameRate = FrameRate::new(15, 1);
+const SIZE: [u32; 2] = [640, 480];
+/// Points of the body that PATS does not have: ears, hips, knees, ankles.
+const NOT_IN_PATS: [usize; 8] = [3, 4, 11, 12, 13, 14, 15, 16];
+
+/// What of the sample a format holds.
+#[derive(Clone, Copy, PartialEq)]
+enum Holds {
+    All,
+    BodyAlone,
+    /// All, with visibilities or places alone: scores are 1.
+    NoScores,
+    /// All, with scores of the body alone.
+    BodyScores,
+}
+
+fn taken(found: FoundKeypoints) -> TakenKeypoints {
+    take_in(found, RATE, SIZE, RATE).unwrap()
+}
+
+fn same(what: &str, found: &Array3<f32>, expected: &Array3<f32>, scores: Option<f32>, left_out: &[usize]) {
+    assert_eq!(found.shape(), expected.shape(), "{what}");
+    for ((at, &value), &wanted) in found.indexed_iter().zip(expected) {
+        let wanted = match scores {
+            _ if left_out.contains(&at.1) => 0.0,
+            Some(score) if at.2 == 2 => score,
+            _ => wanted,
+        };
+        assert!((value - wanted).abs() < 1e-3, "{what} {at:?}: {value}, expected {wanted}");
+    }
+}
+
+fn compare(what: &str, found: &Keypoints, expected: &Keypoints, holds: Holds) {
+    let left_out: Vec<usize> = if holds == Holds::BodyAlone { (0..21).collect() } else { Vec::new() };
+    let body_scores = (holds == Holds::NoScores).then_some(1.0);
+    let hand_scores = matches!(holds, Holds::NoScores | Holds::BodyScores).then_some(1.0);
+    same(&format!("{what}: body"), &found.body, &expected.body, body_scores, &[]);
+    same(&format!("{what}: left hand"), &found.left_hand, &expected.left_hand, hand_scores, &left_out);
+    same(&format!("{what}: right hand"), &found.right_hand, &expected.right_hand, hand_scores, &left_out);
+}
+
+#[test]
+fn every_format_comes_back_as_it_was_written() {
+    let dir = tempfile::tempdir().unwrap();
+    let sample = foreign::sample(6, RATE);
+    let at = |name: &str| dir.path().join(name);
+    foreign::openpose(&at("body25"), &sample, OpenPoseOrder::Body25);
+    foreign::openpose(&at("coco18"), &sample, OpenPoseOrder::Coco18);
+    for (name, n_points) in [("17", 17), ("133", 133)] {
+        foreign::mmpose(&at(&format!("mm{name}.json")), &sample, n_points);
+        foreign::mmpose_list(&at(&format!("list{name}.json")), &sample, n_points);
+        foreign::mmpose_old(&at(&format!("old{name}.json")), &sample, n_points);
+    }
+    for n_points in [17, 26, 136] {
+        foreign::alphapose(&at(&format!("alpha{n_points}.json")), &sample, n_points);
+    }
+    foreign::wholebody(&at("wholebody.json"), &sample);
+    foreign::mediapipe(&at("mediapipe.npz"), &sample);
+    for order in [HolisticOrder::NoFace, HolisticOrder::PoseFirst, HolisticOrder::FaceFirst, HolisticOrder::Flat] {
+        foreign::holistic(&at(&format!("{order:?}.npy")), &sample, order);
+    }
+    for (name, format, holds) in [
+        ("body25", "OpenPose, 25 points", Holds::All),
+        ("coco18", "OpenPose, 18 points", Holds::All),
+        ("mm17.json", "MMPose, 17 points", Holds::BodyAlone),
+        ("mm133.json", "MMPose, 133 points", Holds::All),
+        ("list17.json", "MMPose, 17 points", Holds::BodyAlone),
+        ("list133.json", "MMPose, 133 points", Holds::All),
+        ("old17.json", "MMPose, 17 points", Holds::BodyAlone),
+        ("old133.json", "MMPose, 133 points", Holds::All),
+        ("alpha17.json", "AlphaPose, 17 points", Holds::BodyAlone),
+        ("alpha26.json", "AlphaPose, 26 points", Holds::BodyAlone),
+        ("alpha136.json", "AlphaPose, 136 points", Holds::All),
+        ("wholebody.json", "COCO-WholeBody, 17 points", Holds::NoScores),
+        ("mediapipe.npz", "MediaPipe, pose and hands", Holds::BodyScores),
+        ("NoFace.npy", "MediaPipe, pose and hands", Holds::NoScores),
+        ("PoseFirst.npy", "MediaPipe, pose and hands", Holds::NoScores),
+        ("FaceFirst.npy", "MediaPipe, pose and hands", Holds::NoScores),
+        ("Flat.npy", "MediaPipe, pose and hands", Holds::BodyScores),
+    ] {
+        let found = read(&at(name)).unwrap();
+        assert_eq!((found.format.as_str(), found.notes.len()), (format, 0), "{name}: {:?}", found.notes);
+        let taken = taken(found);
+        compare(name, &taken.keypoints, &sample, holds);
+        assert_eq!((taken.notes.len(), taken.extras.n_people[3], taken.keypoints.image_size), (0, 1, SIZE), "{name}");
+    }
+    let says = |name: &str| read(&at(name)).map(|found| (found.fps, found.image_size)).unwrap();
+    assert_eq!(says("mediapipe.npz"), (Some(RATE), Some(SIZE)));
+    assert_eq!((says("wholebody.json"), says("body25")), ((None, Some(SIZE)), (None, None)));
+}
+
+#[test]
+fn pats_is_read_in_pixels_and_about_the_neck() {
+    let dir = tempfile::tempdir().unwrap();
+    let sample = foreign::sample(5, RATE);
+    let path = dir.path().join("pats.npz");
+    foreign::pats(&path, &sample, false);
+    let found = read(&path).unwrap();
+    assert_eq!((found.unit, found.fps), (CoordinateUnit::Pixels, Some(RATE)));
+    let pixels = taken(found).keypoints;
+    same("body", &pixels.body, &sample.body, None, &NOT_IN_PATS);
+    same("left hand", &pixels.left_hand, &sample.left_hand, None, &[]);
+    same("right hand", &pixels.right_hand, &sample.right_hand, None, &[]);
+    foreign::pats(&path, &sample, true);
+    let found = read(&path).unwrap();
+    assert_eq!(found.unit, CoordinateUnit::FromNeck);
+    let body = taken(found).keypoints.body;
+    let to = |body: &Array3<f32>, a: usize, b: usize| [0, 1].map(|k| body[[2, b, k]] - body[[2, a, k]]);
+    let (moved, was) = (to(&body, 5, 9), to(&sample.body, 5, 9));
+    assert!((moved[0] - was[0]).abs() < 1e-3 && (moved[1] - was[1]).abs() < 1e-3);
+    let neck = (body[[2, 5, 0]] + body[[2, 6, 0]]) / 2.0;
+    assert!((neck - 320.0).abs() < 1e-3, "{neck}");
+}
+
+#[test]
+fn our_own_keypoints_are_one_more_format() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("ours.npz");
+    let first = taken(sample_found(dir.path()));
+    keypoints_npz::write(&path, &first.keypoints, &first.extras).unwrap();
+    let found = read(&path).unwrap();
+    assert_eq!((found.fps, found.image_size, found.notes.len()), (Some(RATE), Some(SIZE), 0));
+    assert_eq!(taken(found).keypoints, first.keypoints);
+}
+
+fn sample_found(dir: &Path) -> FoundKeypoints {
+    foreign::openpose(&dir.join("sample"), &foreign::sample(6, RATE), OpenPoseOrder::Body25);
+    read(&dir.join("sample")).unwrap()
+}
+
+#[test]
+fn known_motion_stays_known_at_another_rate() {
+    let dir = tempfile::tempdir().unwrap();
+    for (num, den) in [(30, 1), (25, 1), (30_000, 1001), (25, 2), (15, 1), (60, 1)] {
+        let source = FrameRate::new(num, den);
+        let n_frames = 4 * num as usize / den as usize;
+        let folder = dir.path().join(format!("at{num}"));
+        foreign::openpose(&folder, &foreign::sample(n_frames, source), OpenPoseOrder::Body25);
+        let taken = take_in(read(&folder).unwrap(), source, SIZE, RATE).unwrap();
+        let keypoints = &taken.keypoints;
+        assert_eq!(keypoints.n_frames(), RATE.frames_in(source.secs(n_frames)), "{source}");
+        assert!((taken.duration_secs - source.secs(n_frames)).abs() < 1e-9);
+        // The last frame may stand behind the source's last.
+        for t in 0..keypoints.n_frames() - 1 {
+            let moved = (RATE.secs(t) * source.per_sec()) as f32;
+            for array in [&keypoints.body, &keypoints.right_hand] {
+                let found = [0, 1].map(|k| array[[t, 7, k]] - array[[0, 7, k]]);
+                let off = (found[0] - 0.5 * moved).hypot(found[1] + 0.25 * moved);
+                assert!(off < 1e-2, "{source}, frame {t}: {found:?} after {moved} frames");
+            }
+        }
+    }
+}
+
+#[test]
+fn of_several_people_the_large_one_is_followed_and_the_others_are_counted() {
+    let dir = tempfile::tempdir().unwrap();
+    let sample = foreign::sample(30, RATE);
+    let mut guest = sample.clone();
+    for points in [&mut guest.body, &mut guest.left_hand, &mut guest.right_hand] {
+        for mut point in points.lanes_mut(ndarray::Axis(2)) {
+            (point[0], point[1]) = (point[0] * 0.2 + 500.0, point[1] * 0.2 + 300.0);
+        }
+    }
+    let folder = dir.path().join("two");
+    foreign::openpose_folder(&folder, 30, |t| {
+        let mut people = vec![
+            foreign::openpose_person(&sample, t, OpenPoseOrder::Body25),
+            foreign::openpose_person(&guest, t, OpenPoseOrder::Body25),
+        ];
+        people.rotate_left(t % 2);
+        people.truncate(if (20..22).contains(&t) { 1 + t % 2 } else { 2 });
+        people
+    });
+    let taken = taken(read(&folder).unwrap());
+    compare("two people", &taken.keypoints, &sample, Holds::All);
+    assert_eq!(taken.notes, ["up to 2 people in a frame (97 % of the frames show several); one is followed"]);
+    assert!(taken.extras.identity.iter().all(|number| *number == 0));
+    assert_eq!((taken.extras.n_people[0], taken.extras.n_people[20]), (2, 1));
+}
