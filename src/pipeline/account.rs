@@ -52,6 +52,9 @@ pub struct TimeAccount {
     /// Videos whose seconds do not add up to their duration, to one frame.
     #[serde(rename = "adds_up", serialize_with = "is_none")]
     pub n_wrong: usize,
+    /// Sentence about what is not judged of a video without pictures.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_judged: Option<String>,
     /// Whether it is of one video or of a speaker.
     pub kind: AccountKind,
 }
@@ -77,6 +80,8 @@ impl TimeAccount {
     pub(super) fn of_video(work: &Path, unit: &Unit, standing: Standing, is_extracted: bool) -> Self {
         let account = Self { of: unit.to_string(), kind: AccountKind::Video, ..Self::default() };
         let media = if is_extracted { MediaInfo::read(&Artifact::MediaInfo.path(work, unit)).ok() } else { None };
+        let not_judged = media.as_ref().and_then(MediaInfo::not_judged);
+        let account = Self { not_judged, ..account };
         let Some(duration) = media.as_ref().map(|media| media.duration_secs).or_else(|| probed(&unit.source)) else {
             return Self { n_unknown: 1, ..account };
         };

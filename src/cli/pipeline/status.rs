@@ -53,6 +53,8 @@ fn text(report: &StatusReport, why: bool) -> String {
     lines.extend([String::new(), format!("{:width$}{headings}  refused for", "seconds")]);
     lines.extend(report.account.iter().map(|account| seconds(account, width)));
     lines.push(verdict(&report.total));
+    let not_judged = |account: &TimeAccount| account.not_judged.as_ref().map(|said| format!("{}: {said}", account.of));
+    lines.extend(report.account.iter().filter_map(not_judged));
     if why {
         lines.push(String::new());
         lines.extend(report.units.iter().map(|UnitStatus { unit, stage, state, why }| match state {

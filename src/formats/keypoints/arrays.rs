@@ -2,7 +2,7 @@
 //! `keypoints.npz`.
 
 use super::entry::point;
-use super::found::{CoordinateUnit, FoundKeypoints, FoundPerson};
+use super::found::{CoordinateUnit, FoundKeypoints, FoundPerson, NamedArrays};
 use super::{mediapipe, pats};
 use crate::formats::keypoints_npz;
 use crate::formats::npy;
@@ -13,9 +13,6 @@ use anyhow::{Context, Result, bail};
 use ndarray::{Array3, ArrayD, ArrayView2, Axis, IxDyn};
 use ndarray_npy::ReadNpyError;
 use std::path::Path;
-
-/// Arrays of a file by their names; the only one of a `.npy` file has none.
-pub type NamedArrays = Vec<(String, ArrayD<f32>)>;
 
 /// Reads the one array of a `.npy` file.
 pub fn read_npy(path: &Path, bytes: &[u8]) -> Result<FoundKeypoints> {

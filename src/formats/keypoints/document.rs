@@ -125,14 +125,13 @@ fn of_object(object: JsonObject) -> Result<JsonPeople> {
         );
     };
     let numbers = annotated_numbers(&images);
-    let mut frames: BTreeMap<u64, Vec<JsonEntry>> = numbers.iter().map(|(_, number)| (*number, Vec::new())).collect();
+    let mut frames: BTreeMap<u64, Vec<JsonEntry>> = numbers.values().map(|number| (*number, Vec::new())).collect();
     for (at, entry) in annotations.into_iter().enumerate() {
-        let known = |name: &ImageName| numbers.iter().find(|(id, _)| *id == name).map(|(_, number)| *number);
         let number = match &entry.image_id {
             Some(name) if images.is_empty() => number_of_image(name)?,
-            Some(name) => {
-                known(name).with_context(|| format!("annotation {at}: `images` has no picture {}", shown(name)))?
-            }
+            Some(name) => *numbers
+                .get(name)
+                .with_context(|| format!("annotation {at}: `images` has no picture {}", shown(name)))?,
             None => bail!("annotation {at}: the key image_id is missing"),
         };
         frames.entry(number).or_default().push(entry);
@@ -142,7 +141,7 @@ fn of_object(object: JsonObject) -> Result<JsonPeople> {
 }
 
 /// Frame number of each picture: the digits of its name, else its place in the list.
-fn annotated_numbers(images: &[AnnotatedImage]) -> Vec<(&ImageName, u64)> {
+fn annotated_numbers(images: &[AnnotatedImage]) -> BTreeMap<&ImageName, u64> {
     let by_name: Option<Vec<u64>> = images.iter().map(|image| number_of(&image.file_name)).collect();
     let are_apart = |numbers: &Vec<u64>| numbers.iter().collect::<BTreeSet<_>>().len() == numbers.len();
     let numbers = by_name.filter(are_apart).unwrap_or_else(|| (0..images.len() as u64).collect());

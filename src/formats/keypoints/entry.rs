@@ -30,7 +30,7 @@ pub struct JsonEntry {
 }
 
 /// Name or number of a picture.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 #[serde(untagged)]
 pub enum ImageName {
     Number(u64),

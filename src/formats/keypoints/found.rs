@@ -3,6 +3,7 @@
 use crate::math::order::Ordered;
 use crate::types::pose2d::{Keypoint, N_BODY, N_HAND, PersonBox};
 use crate::types::time::FrameRate;
+use ndarray::ArrayD;
 
 /// Points of the body that every format shows and every camera sees: face and arms.
 const UPPER_BODY: usize = 11;
@@ -10,6 +11,9 @@ const UPPER_BODY: usize = 11;
 const MOST_LOOKED_AT: usize = 20_000;
 /// Median coordinate up to which coordinates are shares of the picture; a person of two pixels is none.
 const MOST_SHARE: f64 = 1.5;
+
+/// Arrays of a file by their names; the only one of a `.npy` file has none.
+pub type NamedArrays = Vec<(String, ArrayD<f32>)>;
 
 /// One person of a frame in our orders of points; a point with score 0 is missing.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -43,7 +43,7 @@ pub fn number_of(name: &str) -> Option<u64> {
     let stem = ["_keypoints", "_predictions"].iter().fold(stem, |stem, end| stem.strip_suffix(end).unwrap_or(stem));
     let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
     let digits = &stem[..end];
-    let start = digits.rfind(|c: char| !c.is_ascii_digit()).map_or(0, |at| at + 1);
+    let start = digits.trim_end_matches(|c: char| c.is_ascii_digit()).len();
     let start = start + digits[start..].len().saturating_sub(18);
     digits.get(start..)?.parse().ok()
 }

@@ -3,9 +3,8 @@
 //! irises), also flat with 4 numbers a pose landmark [T, 1662]; or face, left hand, pose, right hand, another usual order.
 //! Coordinates are shares of the picture, 0..1. Where no visibility is there, a landmark with a place has the score 1.
 
-use super::arrays::NamedArrays;
 use super::entry::point;
-use super::found::{FoundKeypoints, FoundPerson};
+use super::found::{FoundKeypoints, FoundPerson, NamedArrays};
 use super::layout::MEDIAPIPE;
 use crate::types::pose2d::{Keypoint, N_HAND};
 use anyhow::{Result, ensure};

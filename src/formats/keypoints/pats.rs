@@ -2,9 +2,8 @@
 //! [T, 52, 2], with `confidence` [T, 52] where it was exported too. Where the neck lies at 0, 0 throughout, the
 //! coordinates count from it. The set's HDF5 files are not read: their `pose/data` is saved as an array first.
 
-use super::arrays::NamedArrays;
 use super::entry::point;
-use super::found::{CoordinateUnit, FoundKeypoints};
+use super::found::{CoordinateUnit, FoundKeypoints, NamedArrays};
 use super::layout::PATS;
 use crate::types::pose2d::Keypoint;
 use crate::types::time::FrameRate;

@@ -79,9 +79,9 @@ fn every_kind_of_damage_is_named() {
         ("text.json", "text.json: no keypoints can be read: no JSON: it begins neither with { nor with ["),
         (
             "cut.json",
-            "cut.json: no keypoints can be read: the JSON is cut off, damaged or of another kind: EOF while parsing a list at line 1 column 43",
+            "cut.json: no keypoints can be read: the JSON is cut off, damaged or of another kind: EOF while parsing a",
         ),
-        ("string.json", "invalid type: string \"none\", expected numbers or lists of numbers at line 1 column 42"),
+        ("string.json", "invalid type: string \"none\", expected numbers or lists of numbers at line 1 column"),
         (
             "other.json",
             "other.json: no keypoints can be read: no keypoints are known in it: expected `people` (OpenPose)",

@@ -146,7 +146,7 @@ fn known_motion_stays_known_at_another_rate() {
     for (num, den) in [(30, 1), (25, 1), (30_000, 1001), (25, 2), (15, 1), (60, 1)] {
         let source = FrameRate::new(num, den);
         let n_frames = 4 * num as usize / den as usize;
-        let folder = dir.path().join(format!("at{num}"));
+        let folder = dir.path().join(format!("at{num}of{den}"));
         foreign::openpose(&folder, &foreign::sample(n_frames, source), OpenPoseOrder::Body25);
         let taken = take_in(read(&folder).unwrap(), source, SIZE, RATE).unwrap();
         let keypoints = &taken.keypoints;

@@ -68,7 +68,7 @@ fn keypoints_lead_to_nearly_the_joints_of_their_video() {
     assert!(mm < 1.0, "{mm} mm");
 
     // Status, report and card say what was not judged; the dataset names no model.
-    let (_, status) = orator(dir.path(), &["status", "--why"]);
+    let (_, status) = orator(dir.path(), &["status"]);
     let not_judged = "cuts, still pictures and whether the person is a picture are not judged";
     assert!(status.contains("OpenPose, 25 points at 15 fps") && status.contains(not_judged), "{status}");
     let dataset = dir.path().join("work/dataset/host");
