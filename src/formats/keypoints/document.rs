@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// A file whose top is an object.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-struct JsonObject {
+struct KeypointDocument {
     people: Option<Vec<JsonEntry>>,
     instance_info: Option<Vec<JsonEntry>>,
     annotations: Option<Vec<JsonEntry>>,
@@ -110,8 +110,8 @@ fn read<'de, T: Deserialize<'de>>(bytes: &'de [u8]) -> Result<T> {
     serde_json::from_slice(bytes).context("the JSON is cut off, damaged or of another kind")
 }
 
-fn of_object(object: JsonObject) -> Result<JsonPeople> {
-    let JsonObject { people, instance_info, annotations, images } = object;
+fn of_object(object: KeypointDocument) -> Result<JsonPeople> {
+    let KeypointDocument { people, instance_info, annotations, images } = object;
     if let Some(people) = people {
         return Ok(JsonPeople::new("OpenPose", FramePeople::Picture(people)));
     }
