@@ -125,7 +125,10 @@ fn interlaced_fields_are_found_and_combs_removed() {
     let dir = tempfile::tempdir().unwrap();
     // A disc on a textured wall, 6 px to the side each 50th of a second.
     let disc = "geq=lum='if(lt(hypot(mod(6*N,W)-X,Y-H/2),60),220,60+20*sin(X/9)*cos(Y/7))':cb=128:cr=128";
-    let source = "-f lavfi -i color=gray:s=480x320:r=50:d=3";
+    let drawn = format!("-f lavfi -i color=gray:s=480x320:r=50:d=2.4 -vf {disc} -c:v ffv1 drawn.mkv");
+    if !ffmpeg(dir.path(), &drawn) {
+        return;
+    }
     let kept = PictureOptions::default();
     let wanted = PictureOptions { deinterlace: true, ..kept };
     for (name, fields, codec) in [
@@ -134,13 +137,13 @@ fn interlaced_fields_are_found_and_combs_removed() {
         ("silent.mp4", "tinterlace=interleave_top,setfield=prog", "libx264 -crf 12"),
         ("deep.mkv", "tinterlace=interleave_top,format=yuv422p10le", "ffv1"),
     ] {
-        if !ffmpeg(dir.path(), &format!("{source} -vf {disc},{fields} -c:v {codec} {name}")) {
+        if !ffmpeg(dir.path(), &format!("-i drawn.mkv -vf {fields} -c:v {codec} {name}")) {
             continue;
         }
         let path = dir.path().join(name);
         let [before, after] = [kept, wanted].map(|pictures| combs(&path, pictures));
         eprintln!("{name}: combs {before:.5} before, {after:.6} after");
-        assert!(before > 0.003 && after < 0.05 * before, "{name}: {before} to {after}");
+        assert!(before > 0.001 && after < 0.05 * before, "{name}: {before} to {after}");
         let (media, _, line) = extract(&path);
         assert!(media.pictures.deinterlace && line.contains("interlaced, deinterlaced"), "{name}: {line}");
         // Every frame shows the disc as it was when the earlier field was taken.
@@ -155,7 +158,7 @@ fn interlaced_fields_are_found_and_combs_removed() {
             }
         }
     }
-    if ffmpeg(dir.path(), &format!("{source} -vf {disc} -c:v libx264 -crf 12 plain.mp4")) {
+    if ffmpeg(dir.path(), "-i drawn.mkv -c:v libx264 -crf 12 plain.mp4") {
         let (media, _, line) = extract(&dir.path().join("plain.mp4"));
         assert!(media.pictures.is_plain() && media.active_area.is_none() && !line.contains(';'), "{line}");
     }
