@@ -38,15 +38,6 @@ impl Ui {
         }
     }
 
-    /// From here on Ctrl-C ends the program with exit code 130 and says what is kept: `kept`, and how to go on.
-    pub fn tell_when_stopped(&self, kept: &'static str) {
-        // A second handler of this process is none: the first goes on telling.
-        let _ = ctrlc::set_handler(move || {
-            note(&format!("\nstopped; {kept}"));
-            std::process::exit(130);
-        });
-    }
-
     /// Asks a question that is answered by y or n; no, where nobody is at the terminal.
     pub fn asks(&self, question: &str) -> bool {
         let is_attended = std::io::stdin().is_terminal() && std::io::stderr().is_terminal();
@@ -73,6 +64,15 @@ impl Ui {
             note(&format!("error: cannot write to standard output: {error}"));
         }
     }
+}
+
+/// From here on Ctrl-C ends the program with exit code 130 and says what is kept: `kept`, and how to go on.
+pub fn tell_when_stopped(kept: &'static str) {
+    // A second handler of this process is none: the first goes on telling.
+    let _ = ctrlc::set_handler(move || {
+        note(&format!("\nstopped; {kept}"));
+        std::process::exit(130);
+    });
 }
 
 /// Writes a line on standard error, where that can still be written.

@@ -1,6 +1,7 @@
 //! Many sounds to motions in one call.
 
 use crate::cli::Outcome;
+use crate::cli::ui;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator::pipeline::batch::{BatchReport, BatchState, SpeechBatch};
@@ -11,7 +12,7 @@ use serde_json::json;
 const MOST_LISTED: usize = 30;
 
 pub fn run(batch: &SpeechBatch, ui: &Ui) -> Result<Outcome> {
-    ui.tell_when_stopped("every sound that is done is kept, and the same command goes on from there");
+    ui::tell_when_stopped("every sound that is done is kept, and the same command goes on from there");
     let report = batch.run(ui)?;
     ui.summary(&text(&report), None, json!(report));
     Ok(if report.failed > 0 { Outcome::SomeFailed } else { Outcome::Done })

@@ -2,6 +2,7 @@
 
 use super::{basis, embedding, gan, lifter};
 use crate::cli::Outcome;
+use crate::cli::ui;
 use crate::cli::ui::Ui;
 
 /// Train the lifters, a speaker's generator, or the spaces that `evaluate` compares motion in.
@@ -20,7 +21,7 @@ enum Network {
 }
 
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
-    ui.tell_when_stopped("the newest checkpoint is kept, and the same command goes on from it");
+    ui::tell_when_stopped("the newest checkpoint is kept, and the same command goes on from it");
     match args.network {
         Network::Basis(args) => basis::run(args, ui),
         Network::Embedding(args) => embedding::run(args, ui),

@@ -200,7 +200,7 @@ fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
                 _ => String::new(),
             };
             let codes = (!plan.limits.no_sound).then(|| codes([&kept.sample.sound]));
-            Ok(InspectedItem { source, remark, codes, ..InspectedItem::default() })
+            Ok(InspectedItem { source, codes, remark, ..InspectedItem::default() })
         }
     }
 }

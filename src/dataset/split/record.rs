@@ -106,10 +106,12 @@ impl SplitRecord {
     /// Forgets videos by content or by name; what followed one of them keeps its split. Returns how many went.
     pub fn forget(&mut self, is_gone: impl Fn(&str, &RecordedSplit) -> bool) -> usize {
         let n_before = self.videos.len();
-        let gone: Vec<RecordedSplit> =
-            self.videos.extract_if(.., |content, video| is_gone(content, video)).map(|(_, v)| v).collect();
+        let (gone, kept): (BTreeMap<_, _>, BTreeMap<_, _>) =
+            std::mem::take(&mut self.videos).into_iter().partition(|(content, video)| is_gone(content, video));
+        self.videos = kept;
         for video in self.videos.values_mut() {
-            if matches!(&video.by, SplitBy::SoundOf(other) if gone.iter().any(|gone| gone.name == *other)) {
+            if matches!(&video.by, SplitBy::SoundOf(other) if gone.values().any(|gone: &RecordedSplit| gone.name == *other))
+            {
                 video.by = SplitBy::Share;
             }
         }

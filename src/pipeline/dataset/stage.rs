@@ -121,7 +121,7 @@ impl DatasetStage {
         let kinds: BTreeSet<&String> = not_judged.iter().collect();
         let count = |kind: &str| not_judged.iter().filter(|other| *other == kind).count();
         notes.extend(kinds.into_iter().map(|kind| format!("{} made {kind}.", counted(count(kind), "video"))));
-        About { models, notes, licence, consent, source, ..About::new(&speaker.speaker, first.intervals.fps) }
+        About { models, licence, consent, source, notes, ..About::new(&speaker.speaker, first.intervals.fps) }
     }
 }
 

@@ -39,7 +39,7 @@ impl BarFinder {
         let [width, height] = [image.width, image.height];
         let green = |x: usize, y: usize| image.data[3 * (y * width + x) + 1];
         self.size = [width, height];
-        self.columns.push(width, height, |x, y| green(x, y));
+        self.columns.push(width, height, green);
         self.rows.push(height, width, |y, x| green(x, y));
     }
 
@@ -84,9 +84,9 @@ impl AxisProfile {
             for at in across {
                 let at = at * step;
                 let mut before = value(0, at);
-                for position in 0..n {
+                for (position, sum) in sums.iter_mut().enumerate() {
                     let here = value(position, at);
-                    sums[position] += u32::from(here);
+                    *sum += u32::from(here);
                     self.detail[position.saturating_sub(1)] += f32::from(here.abs_diff(before)) / n_across as f32;
                     before = here;
                 }

@@ -19,16 +19,29 @@ pub struct ThresholdGrid {
     pub set: fn(&mut SegmentConfig, f64),
 }
 
+/// A field as f64, where it is a whole number.
+macro_rules! as_number {
+    ($value:expr, usize) => {
+        $value as f64
+    };
+    ($value:expr, $whole:ident) => {
+        f64::from($value)
+    };
+    ($value:expr) => {
+        $value
+    };
+}
+
 /// Grid of a threshold: key, sentence, unit, ends, and the type of the field where it is a whole number.
 macro_rules! row {
-    ($key:ident, $description:literal, $unit:literal, $low:literal, $high:literal $(, $whole:ty)?) => {
+    ($key:ident, $description:literal, $unit:literal, $low:literal, $high:literal $(, $whole:ident)?) => {
         ThresholdGrid {
             key: stringify!($key),
             description: $description,
             unit: $unit,
             low: $low,
             high: $high,
-            get: |rules| rules.$key $(as $whole as f64)?,
+            get: |rules| as_number!(rules.$key $(, $whole)?),
             set: |rules, value| rules.$key = value $(as $whole)?,
         }
     };

@@ -16,7 +16,7 @@ use std::path::Path;
 const PLAN: SplitPlan =
     SplitPlan { unit: SplitUnit::Video, validation: 0.15, test: 0.1, guard_secs: 8.0, least_secs: 9.0 };
 
-fn new<'a>(name: &'a str, secs: f64) -> Unassigned<'a> {
+fn new(name: &str, secs: f64) -> Unassigned<'_> {
     Unassigned { name, content: name, duration_secs: secs, kept: vec![(0.0, secs)], named: None, before: None }
 }
 

@@ -129,8 +129,8 @@ fn a_division_that_cannot_be_is_found() {
     let dir = tempfile::tempdir().unwrap();
     let (_, out) = shard(dir.path(), &[talk(dir.path())], "out");
     let info = fs::read_to_string(out.join("info.json")).unwrap();
-    let entry = fs::read_dir(out.join("videos")).unwrap().map(|entry| entry.unwrap().path());
-    let entry = entry.filter(|path| path.extension().is_some_and(|end| end == "json")).next().unwrap();
+    let mut entry = fs::read_dir(out.join("videos")).unwrap().map(|entry| entry.unwrap().path());
+    let entry = entry.find(|path| path.extension().is_some_and(|end| end == "json")).unwrap();
     let whole = fs::read_to_string(&entry).unwrap();
     let found = |what: &str| {
         let problems = problems(&out);
@@ -159,7 +159,7 @@ fn a_division_that_cannot_be_is_found() {
 fn a_new_talk_moves_no_block_and_short_clips_fill_splits() {
     let dir = tempfile::tempdir().unwrap();
     let talk = talk(dir.path());
-    let (_, first) = shard(dir.path(), &[talk.clone()], "first");
+    let (_, first) = shard(dir.path(), std::slice::from_ref(&talk), "first");
     let place = dir.path().join("work/dataset/host");
     fs::create_dir_all(place.parent().unwrap()).unwrap();
     fs::rename(&first, &place).unwrap();

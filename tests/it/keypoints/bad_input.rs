@@ -22,14 +22,16 @@ fn said(dir: &Path, name: &str) -> String {
     text.replace(&format!("{}/", dir.display()), "")
 }
 
+fn write_into(dir: &Path, name: &str, text: &str) {
+    let path = dir.join(name);
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    std::fs::write(path, text).unwrap();
+}
+
 #[test]
 fn every_kind_of_damage_is_named() {
     let dir = tempfile::tempdir().unwrap();
-    let write = |name: &str, text: &str| {
-        let path = dir.path().join(name);
-        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-        std::fs::write(path, text).unwrap();
-    };
+    let write = |name: &str, text: &str| write_into(dir.path(), name, text);
     let person = |n: usize| json!({ "image_id": "0.jpg", "keypoints": vec![5.0; n], "score": 1.0 });
     write("empty.json", "");
     write("text.json", "keypoints follow");

@@ -41,7 +41,7 @@ fn times(secs: usize) -> impl Iterator<Item = f64> {
 fn syllables() -> Vec<f32> {
     let of = |t: f64| {
         let buzz: f64 = (1..20).map(|k| (TAU * 120.0 * f64::from(k) * t).sin() / f64::from(k)).sum();
-        let open = if t < 2.0 || t > 4.0 { (TAU * 4.0 * t).sin().max(0.0) } else { 0.0 };
+        let open = if (2.0..=4.0).contains(&t) { 0.0 } else { (TAU * 4.0 * t).sin().max(0.0) };
         (0.1 * buzz * open) as f32
     };
     times(6).map(of).collect()
