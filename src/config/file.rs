@@ -207,7 +207,7 @@ impl Reader {
             for name in ["name", "videos"].into_iter().filter(|name| is_needed(name)) {
                 self.problem(&key, location, format!("the key {name} is missing"));
             }
-            speaker.retain(|name, _| is_written(name) || ["name", "videos"].contains(&name));
+            speaker.retain(|name, _| is_written(name) || (["name", "videos"].contains(&name) && is_needed(name)));
             speakers.push(Value::Table(speaker));
         }
         table.insert("speaker".to_owned(), Value::Array(speakers));
