@@ -7,6 +7,7 @@ use anyhow::Result;
 use orator::config::{Config, Settings};
 use orator::external::onnx::{ModelStore, Runtime};
 use orator::pipeline::pose2d::models;
+use orator::pipeline::segment::speech_rule::SpeechListener;
 use serde_json::json;
 use std::path::Path;
 
@@ -101,6 +102,11 @@ fn model_checks(settings: &Settings) -> Vec<Check> {
             Ok(model) => ok(&format!("model {id}"), dir.join(&model.entry().file).display().to_string()),
             Err(error) => wrong(&format!("model {id}"), format!("{error:#}"), "orator models fetch"),
         });
+    }
+    match SpeechListener::advice(settings) {
+        Ok(None) => {}
+        Ok(Some(advice)) => checks.push(wrong("speech model", advice.to_owned(), "orator models fetch")),
+        Err(error) => checks.push(wrong("speech model", format!("{error:#}"), "orator models fetch")),
     }
     checks
 }

@@ -38,7 +38,7 @@ enum ModelsVerb {
     Fetch {
         /// Ids; none: the models the configuration chooses.
         ids: Vec<String>,
-        /// Every model known.
+        /// Every model that some place serves; with --mirror every model known.
         #[arg(long, conflicts_with = "ids")]
         all: bool,
         /// A folder with the models, the files they are made of or the packages, under any name; it is looked at first.
@@ -78,7 +78,11 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         ModelsVerb::List => list(&store, &chosen, ui),
         ModelsVerb::Fetch { ids, all, mirror } => {
             let wanted: Vec<Wanted> = match (all, ids.as_slice()) {
-                (true, _) => store.entries(&[])?.into_iter().map(|entry| Wanted::Id(entry.id.clone())).collect(),
+                (true, _) => {
+                    let can_be_had = |entry: &&ModelEntry| mirror.is_some() || entry.is_served();
+                    let entries = store.manifest().models.iter().filter(can_be_had);
+                    entries.map(|entry| Wanted::Id(entry.id.clone())).collect()
+                }
                 (false, []) => models::wanted(pose2d).into_iter().chain(SpeechListener::wanted(&settings)).collect(),
                 (false, ids) => ids.iter().cloned().map(Wanted::Id).collect(),
             };

@@ -215,8 +215,7 @@ fn neighbours(clips: &EvalClips, still: &Predictor) -> Result<Option<Predictor>>
         joints: &|entry| Ok(clips.clips[entry].ground_truth.clone()),
     };
     let Some(predicted) = neighbour::motions(&query, &library, clips.fps)? else { return Ok(None) };
-    let description =
-        "for each 4 s of sound the motion of the stretch of another clip that sounds most alike".to_owned();
+    let description = "for each 4 s of sound the motion of the part of another clip that sounds most alike".to_owned();
     let motions = predicted.into_iter().map(ClipMotion::Motion).collect();
     Ok(Some(Predictor { kind: PredictorKind::NearestNeighbour, description, motions }.filled(still)))
 }

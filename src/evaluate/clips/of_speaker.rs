@@ -71,7 +71,7 @@ pub fn prepare(
     match copied(dataset, normal, &clips, split)? {
         Some(motions) => {
             let description =
-                "for each 4 s of sound the motion of the stretch of the training split that sounds most alike";
+                "for each 4 s of sound the motion of the part of the training split that sounds most alike";
             let copied =
                 Predictor { kind: PredictorKind::NearestNeighbour, description: description.to_owned(), motions };
             all.push(copied.filled(&all[1]));

@@ -197,6 +197,11 @@ pub struct KeypointOutputs {
 }
 
 impl ModelEntry {
+    /// Whether some place serves it, or what it is made of.
+    pub fn is_served(&self) -> bool {
+        self.url.is_some() || !self.sources.is_empty()
+    }
+
     /// What the model is, where it comes from and under which terms, for people.
     pub fn terms(&self) -> String {
         let ModelOrigin { repository, commit, path, licence, note } = &self.origin;

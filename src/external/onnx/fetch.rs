@@ -44,6 +44,13 @@ impl fmt::Display for FetchSource {
     }
 }
 
+/// A file that was had, with what its source says of its licence.
+struct Obtained {
+    bytes: Vec<u8>,
+    licence: Option<String>,
+    source: FetchSource,
+}
+
 /// Gets files of models into a folder. A package is downloaded once.
 pub(super) struct Fetcher<'a> {
     /// SHA-256 and path of every file of the mirror.
@@ -75,11 +82,6 @@ impl<'a> Fetcher<'a> {
             let source = FetchSource::Mirror(found.to_owned());
             return write(entry, path, &bytes, None, source);
         }
-        if let Some(source) = entry.sources.iter().find(|source| self.has_mirrored(source)) {
-            let (files, licence) = self.mirrored(source)?;
-            let bytes = made(entry, &files)?;
-            return write(entry, path, &bytes, licence, FetchSource::MirrorOf(source.clone()));
-        }
         let mut refused = String::new();
         if let Some(url) = &entry.url {
             match download(url).and_then(|bytes| pinned(&bytes, &entry.sha256, url).map(|()| bytes)) {
@@ -87,14 +89,9 @@ impl<'a> Fetcher<'a> {
                 Err(error) => _ = write!(refused, "\n      {url}: {error:#}"),
             }
         }
-        for source in &entry.sources {
-            match self.files(source).and_then(|(files, licence)| Ok((made(entry, &files)?, licence))) {
-                Ok((bytes, licence)) => {
-                    return write(entry, path, &bytes, licence, FetchSource::Source(source.clone()));
-                }
-                Err(error) if source.from == SourceKind::Address => _ = write!(refused, "\n      {error:#}"),
-                Err(error) => _ = write!(refused, "\n      {source}: {error:#}"),
-            }
+        match self.first_of(&entry.sources, |files| made(entry, files)) {
+            Ok(Obtained { bytes, licence, source }) => return write(entry, path, &bytes, licence, source),
+            Err(reasons) => refused += &reasons,
         }
         if refused.is_empty() {
             let steps = entry.conversion.as_deref().unwrap_or("no conversion is written down");
@@ -112,27 +109,40 @@ impl<'a> Fetcher<'a> {
     /// # Errors
     /// No source that has it; the message says why of each.
     pub fn get_library(&mut self, runtime: &RuntimeEntry, path: &Path) -> Result<FetchSource> {
-        if let Some(found) = self.offered(&runtime.sha256) {
-            let source = FetchSource::Mirror(found.to_owned());
-            workdir::write_file(path, &std::fs::read(found)?)?;
-            return Ok(source);
-        }
+        let library = |files: &[Vec<u8>]| {
+            let bytes = files.concat();
+            pinned(&bytes, &runtime.sha256, &runtime.file).map(|()| bytes)
+        };
+        let obtained = self.first_of(&runtime.sources, library);
+        let Obtained { bytes, source, .. } =
+            obtained.map_err(|refused| anyhow!("{} could not be had:{refused}", runtime.file))?;
+        workdir::write_file(path, &bytes)?;
+        Ok(source)
+    }
+
+    /// What `make` gives of the files of the first source that has them; those in the mirror come first. An error says why
+    /// of each source.
+    fn first_of(
+        &mut self,
+        sources: &[ModelSource],
+        make: impl Fn(&[Vec<u8>]) -> Result<Vec<u8>>,
+    ) -> Result<Obtained, String> {
         let mut refused = String::new();
-        for source in &runtime.sources {
-            let files = match self.has_mirrored(source) {
-                true => self.mirrored(source),
-                false => self.files(source),
+        let (mirrored, others): (Vec<_>, Vec<_>) = sources.iter().partition(|source| self.has_mirrored(source));
+        let of_mirror = mirrored.into_iter().map(|source| (source, FetchSource::MirrorOf(source.clone())));
+        let of_others = others.into_iter().map(|source| (source, FetchSource::Source(source.clone())));
+        for (source, from) in of_mirror.chain(of_others) {
+            let files = match from {
+                FetchSource::MirrorOf(_) => self.mirrored(source),
+                _ => self.files(source),
             };
-            match files.map(|(files, _)| files.concat()) {
-                Ok(bytes) => {
-                    pinned(&bytes, &runtime.sha256, &runtime.file)?;
-                    workdir::write_file(path, &bytes)?;
-                    return Ok(FetchSource::Source(source.clone()));
-                }
+            match files.and_then(|(files, licence)| Ok((make(&files)?, licence))) {
+                Ok((bytes, licence)) => return Ok(Obtained { bytes, licence, source: from }),
+                Err(error) if source.from == SourceKind::Address => _ = write!(refused, "\n      {error:#}"),
                 Err(error) => _ = write!(refused, "\n      {source}: {error:#}"),
             }
         }
-        bail!("{} could not be had:{refused}", runtime.file)
+        Err(refused)
     }
 
     fn offered(&self, sha256: &str) -> Option<&Path> {

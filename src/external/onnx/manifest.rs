@@ -102,8 +102,7 @@ mod tests {
         assert_eq!((manifest.models.len(), manifest.layouts.len()), (16, 5));
         assert_eq!(Manifest::parse(&toml::to_string(&manifest).unwrap()).unwrap(), manifest);
         for entry in &manifest.models {
-            let is_served = entry.url.is_some() || !entry.sources.is_empty();
-            assert!(is_served != entry.conversion.is_some(), "{}: served, or how it was made", entry.id);
+            assert!(entry.is_served() != entry.conversion.is_some(), "{}: served, or how it was made", entry.id);
         }
     }
 

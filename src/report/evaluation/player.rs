@@ -202,7 +202,7 @@ pub fn bones() -> Vec<[usize; 3]> {
 /// Player and the charts under it.
 pub fn body(excerpts: &[Excerpt], table: &Table) -> Vec<Node> {
     if excerpts.is_empty() {
-        return vec![node("p").class("empty").text("There is no stretch with motion on both sides to show.")];
+        return vec![node("p").class("empty").text("There is no interval with motion on both sides to show.")];
     }
     let option = |(i, excerpt): (usize, &Excerpt)| node("option").attr("value", i).text(&excerpt.name);
     let select = node("select").id("excerpt").children(excerpts.iter().enumerate().map(option));

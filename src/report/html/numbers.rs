@@ -45,12 +45,6 @@ pub fn percent(part: f64, whole: f64) -> String {
     if whole > 0.0 { format!("{:.1} %", 100.0 * part / whole + 0.0) } else { "\u{2013}".to_owned() }
 }
 
-/// Number with a noun: `1 video`, `2 videos`, `3 stretches`.
-pub fn counted(n: usize, what: &str) -> String {
-    let ending = if what.ends_with("ch") { "es" } else { "s" };
-    if n == 1 { format!("1 {what}") } else { format!("{n} {what}{ending}") }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -58,7 +52,6 @@ mod tests {
     #[test]
     fn numbers_read_well() {
         assert_eq!([41.24, 744.0, 11_772.0, -0.0].map(length), ["41.2 s", "12.4 min", "3.27 h", "0.0 s"]);
-        assert_eq!([1, 2].map(|n| counted(n, "stretch")), ["1 stretch", "2 stretches"]);
         assert_eq!([4.8, 59.96, 3723.0].map(clock), ["0:04.8", "1:00.0", "1:02:03.0"]);
         assert_eq!(
             [0.34, 1.0, 98.712, 4.267, -50.0, 1234.5, -0.0001].map(number),

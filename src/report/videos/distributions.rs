@@ -3,8 +3,9 @@
 use super::spread::{Measure, MeasureCounts};
 use crate::config::Settings;
 use crate::report::html::chart::histogram::{Counts, ThresholdLine, histogram};
-use crate::report::html::numbers::{counted, percent};
+use crate::report::html::numbers::percent;
 use crate::report::html::{Node, node};
+use crate::stage::counted;
 
 /// Card for each measure.
 pub fn distributions(spread: &MeasureCounts, settings: &Settings, per_sec: f64) -> Vec<Node> {

@@ -4,8 +4,9 @@ use super::pictures::MomentThumbnail;
 use super::reasons;
 use super::video::VideoSummary;
 use super::worst::{Moment, Worst};
-use crate::report::html::numbers::{clock, counted};
+use crate::report::html::numbers::clock;
 use crate::report::html::{Node, node, picture};
+use crate::stage::counted;
 use std::collections::BTreeMap;
 
 /// Pictures by video and by the frames of their moment.
@@ -16,13 +17,13 @@ pub fn gallery(worst: &Worst, pictures: &Pictures, videos: &[VideoSummary]) -> V
     if worst.rules.is_empty() {
         return vec![node("p").class("empty").text("Nothing was refused, or no pictures were asked for.")];
     }
-    let about = "Of each rule the refused stretches that break it most, each at its worst frame, with the keypoints that were \
+    let about = "Of each rule the refused intervals that break it most, each at its worst frame, with the keypoints that were \
                  found. Two pictures side by side are a frame and the next.";
     let mut shown = vec![node("p").text(about)];
     for ((_, reason, unit), moments) in &worst.rules {
         let swatch = node("span").class(format!("swatch {}", reasons::class(reason)));
         let measured = if unit.is_empty() { String::new() } else { format!(", measured in {unit}") };
-        let about = format!("{}{measured}", counted(moments.len(), "stretch"));
+        let about = format!("{}{measured}", counted(moments.len(), "interval"));
         let title =
             node("h3").class("rule").child(swatch).child(node("span").text(reason)).child(node("small").text(about));
         let cards = moments.iter().filter_map(|moment| Some(card(moment, videos.get(moment.video)?, pictures)));

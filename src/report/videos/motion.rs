@@ -3,8 +3,9 @@
 use super::movement::{MovementCounts, PAIRS};
 use crate::report::html::chart::profile;
 use crate::report::html::chart::ranges::{ValueRange, ranges};
-use crate::report::html::numbers::{counted, number};
+use crate::report::html::numbers::number;
 use crate::report::html::{Node, legend, node};
+use crate::stage::counted;
 
 /// Axis with the labels of its ends.
 const AXES: [(&str, [&str; 2]); 3] = [

@@ -7,10 +7,10 @@ use super::summary::ReportTotals;
 use super::{distributions, motion, pictures, sliders, timelines};
 use crate::config::Settings;
 use crate::config::videos::Videos;
-use crate::report::html::numbers::counted;
 use crate::report::html::{Page, Section};
 use crate::report::preview;
 use crate::report::splits;
+use crate::stage::counted;
 use crate::stage::progress::Progress;
 use serde_json::json;
 

@@ -5,9 +5,10 @@ use super::reasons::WAITING;
 use super::video::VideoSummary;
 use crate::report::html;
 use crate::report::html::chart::bars::{StackedBar, bars};
-use crate::report::html::numbers::{counted, length, percent};
+use crate::report::html::numbers::{length, percent};
 use crate::report::html::{Node, legend, node};
 use crate::report::splits::VideoSplits;
+use crate::stage::counted;
 use std::collections::BTreeMap;
 
 /// Seconds of all videos together.

@@ -66,12 +66,12 @@ pub const THRESHOLDS: [ThresholdGrid; 17] = [
     row!(max_nose_off, "farthest the nose may be beside the neck", "half shoulder widths", 0.0, 4.0),
     row!(max_body_gap_secs, "longest gap of face or arms that is filled", "s", 0.0, 1.0),
     row!(max_hand_gap_secs, "longest gap of a hand that is masked", "s", 0.0, 1.0),
-    row!(min_hand_share, "share of a stretch in which each hand is seen", "", 0.0, 1.0),
+    row!(min_hand_share, "share of an interval in which each hand is seen", "", 0.0, 1.0),
     row!(max_jump, "farthest the neck may move between two frames", "shoulder widths", 0.1, 2.1),
     row!(shot_threshold, "shot score from which a frame begins a new shot", "", 0.0, 1.0),
     row!(max_people, "people in view that are not too many", "people", 1.0, 21.0, u32),
-    row!(max_crowd_share, "share of a stretch that may show more people", "", 0.0, 1.0),
-    row!(min_frames, "shortest stretch that is kept", "frames", 16.0, 176.0, usize),
+    row!(max_crowd_share, "share of an interval that may show more people", "", 0.0, 1.0),
+    row!(min_frames, "shortest interval that is kept", "frames", 16.0, 176.0, usize),
 ];
 
 impl ThresholdGrid {

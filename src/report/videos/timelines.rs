@@ -5,8 +5,9 @@ use super::reasons::WAITING;
 use super::video::VideoSummary;
 use crate::report::html;
 use crate::report::html::chart::timeline::{TimelineSpan, timeline};
-use crate::report::html::numbers::{clock, counted, length, number, with_unit};
+use crate::report::html::numbers::{clock, length, number, with_unit};
 use crate::report::html::{Node, node};
+use crate::stage::counted;
 use std::collections::BTreeSet;
 
 /// Largest number of parts of all timelines together, which bounds the page, and smallest number of each.
@@ -25,7 +26,7 @@ pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
         .text(" every line at full width");
     let mut shown = vec![
         node("p").text(
-            "Lines are as long as their videos. Point at a stretch, or walk a line with the arrow keys, to read what was \
+            "Lines are as long as their videos. Point at an interval, or walk a line with the arrow keys, to read what was \
              measured.",
         ),
         legend(videos),
@@ -37,7 +38,7 @@ pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
             "{} kept of {} in {}",
             length(ledger.kept_secs()),
             length(ledger.duration_secs),
-            counted(ledger.kept.len(), "stretch")
+            counted(ledger.kept.len(), "interval")
         );
         let share = (ledger.duration_secs / longest).max(NARROWEST);
         let title = node("h3").child(node("span").text(&video.file)).child(node("small").text(about));

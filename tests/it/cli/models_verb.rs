@@ -107,7 +107,7 @@ fn package_models(dir: &Path, order: &[&str]) -> String {
         };
         let pin = if file.is_empty() { String::new() } else { sha256_of(&dir.join(file)).unwrap() };
         format!(
-            "[[model.source]]\nfrom = {from:?}\nname = {name:?}\nsha256 = {pin:?}\nbytes = 1\n\
+            "[[model.source]]\nfrom = {from:?}\nname = {name:?}\nsha256 = {pin:?}\n\
              files = [{{ path = \"package/person.onnx\", sha256 = {sha256:?} }}]\nlicence = \"package/LICENSE\"\n"
         )
     };

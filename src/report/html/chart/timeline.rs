@@ -56,7 +56,7 @@ fn drawn(stretches: &[TimelineSpan], whole: f64, most: usize) -> Vec<TimelineSpa
     let merged = drawn.into_iter().map(|(stretch, n, _)| match n {
         0 | 1 => stretch,
         n => TimelineSpan {
-            description: format!("{n} short stretches, the longest: {}", stretch.description),
+            description: format!("{n} short intervals, the longest: {}", stretch.description),
             ..stretch
         },
     });
@@ -82,7 +82,7 @@ mod tests {
         assert_eq!(of(10).matches("<li").count(), 10);
         assert!(of(10).contains("left:90.000%;width:10.000%") && of(10).contains("title=\"&lt;one&gt;\""));
         let many = of(100_000);
-        assert!(many.matches("<li").count() <= 1001 && many.contains("short stretches, the longest"));
+        assert!(many.matches("<li").count() <= 1001 && many.contains("short intervals, the longest"));
         assert_eq!(timeline("", 0.0, &[], 9).to_string().matches("<li").count(), 0);
     }
 }
