@@ -2,15 +2,12 @@
 
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
-use crate::cli::setup::models::fetch;
+use crate::cli::setup::models::{chosen_models, fetch};
 use crate::cli::ui;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use orator::config::Settings;
-use orator::external::onnx::{ModelError, ModelStore};
-use orator::pipeline::pose2d::models::wanted;
-use orator::pipeline::segment::speech_rule::SpeechListener;
+use orator::external::onnx::ModelError;
 use orator::pipeline::{Pipeline, Selection};
 use orator::stage::artifacts::StageName;
 use serde_json::json;
@@ -50,7 +47,7 @@ fn stage_parser() -> impl TypedValueParser<Value = StageName> {
 }
 
 fn is_missing_model(error: &anyhow::Error) -> bool {
-    matches!(error.downcast_ref(), Some(ModelError::Missing { .. }))
+    matches!(error.downcast_ref(), Some(ModelError::Missing { .. } | ModelError::NoLibrary { .. }))
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
@@ -63,9 +60,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let report = match pipeline.run(&selection, ui) {
         Err(error) if is_missing_model(&error) && ui.asks(&format!("{error:#}\nget the models now?")) => {
             let settings = &pipeline.config().settings;
-            let Settings { models, pose2d, .. } = settings;
-            let wanted: Vec<_> = wanted(pose2d).into_iter().chain(SpeechListener::wanted(settings)).collect();
-            fetch(&ModelStore::open(&models.dir)?, &wanted, None, ui)?;
+            fetch(&settings.models, &chosen_models(settings), None, ui)?;
             pipeline.run(&selection, ui)?
         }
         ended => ended?,

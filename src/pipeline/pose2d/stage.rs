@@ -78,7 +78,7 @@ impl Stage for Pose2dStage {
     }
 
     fn version(&self) -> u32 {
-        4
+        5
     }
 
     fn cost(&self) -> u32 {
