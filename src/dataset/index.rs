@@ -1,6 +1,7 @@
 //! Index file `index.jsonl`: a line for each sample with its location in a shard and its BLAKE3 hash, for random access
 //! and checks. Shards are listed in `info.json`.
 
+use crate::types::file_name::FileName;
 use crate::types::split::Split;
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShardRef {
     /// Name in the dataset's folder.
-    pub file: String,
+    pub file: FileName,
     /// Size.
     pub bytes: u64,
     /// Samples in it.
@@ -21,11 +22,11 @@ pub struct ShardRef {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SampleRef {
     /// Name, once in the dataset.
-    pub key: String,
+    pub key: FileName,
     /// The part it belongs to.
     pub split: Split,
     /// File name of the shard.
-    pub shard: String,
+    pub shard: FileName,
     /// Start of the sample with its tar headers, a valid tar stream by itself.
     pub offset: u64,
     /// Bytes from `offset` on.

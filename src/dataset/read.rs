@@ -10,6 +10,7 @@ use super::{CHECKSUMS, INDEX, INFO, STATS};
 use crate::formats::npy_slice;
 use crate::formats::npy_slice::{Element, Layout};
 use crate::formats::wav;
+use crate::types::file_name::FileName;
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::{SAMPLE_RATE, Sound};
@@ -28,7 +29,7 @@ pub struct Dataset {
     info: DatasetInfo,
     stats: DatasetStats,
     samples: Vec<SampleRef>,
-    shards: BTreeMap<String, File>,
+    shards: BTreeMap<FileName, File>,
 }
 
 impl Dataset {
@@ -52,8 +53,8 @@ impl Dataset {
         );
         let info: DatasetInfo = read_json(&dir.join(INFO))?;
         ensure!(
-            info.sound_rate == SAMPLE_RATE && info.fps.num > 0 && info.fps.den > 0 && info.joints.len() == N_JOINTS,
-            "{}: expected sound at {SAMPLE_RATE} Hz, a frame rate and {N_JOINTS} joints",
+            info.sound_rate == SAMPLE_RATE && info.fps.is_plausible() && info.joints.len() == N_JOINTS,
+            "{}: expected sound at {SAMPLE_RATE} Hz, 1 to 1000 frames a second and {N_JOINTS} joints",
             dir.join(INFO).display()
         );
         let stats: DatasetStats = read_json(&dir.join(STATS))?;
@@ -132,7 +133,7 @@ impl Dataset {
         let pose2d = Array3::from_shape_vec((frames.len(), N_KEYPOINTS, 3), pose2d).context("shaping keypoints")?;
         let n_samples = (sample.wav.size.saturating_sub(wav::HEADER_BYTES as u64) / 2) as usize;
         let sound = self.sound(sample, 0..n_samples)?;
-        Ok(Sample { key: sample.key.clone(), motion: self.motion(sample, frames)?, pose2d, sound, meta })
+        Ok(Sample { key: sample.key.to_string(), motion: self.motion(sample, frames)?, pose2d, sound, meta })
     }
 
     /// Motion of the frames `frames` of a sample; only these are read, no hash is checked.
@@ -141,11 +142,12 @@ impl Dataset {
         let joints =
             npy_slice::floats(&self.rows(sample, sample.pose3d, Element::F32, &[N_JOINTS, 3], frames.clone())?);
         let mask = npy_slice::bools(&self.rows(sample, sample.mask, Element::Bool, &[N_JOINTS], frames)?);
-        Ok(Motion {
+        let motion = Motion {
             fps: self.info.fps,
             joints: Array3::from_shape_vec((n_frames, N_JOINTS, 3), joints).context("shaping joints")?,
             mask: Array2::from_shape_vec((n_frames, N_JOINTS), mask).context("shaping the mask")?,
-        })
+        };
+        motion.in_range().with_context(|| format!("{} in {}", sample.key, self.dir.join(&sample.shard).display()))
     }
 
     fn sound(&self, sample: &SampleRef, range: Range<usize>) -> Result<Sound> {

@@ -94,12 +94,12 @@ fn of_dataset(path: &Path, sample: Option<&str>, split: Option<Split>) -> Result
     let splits = split.map_or(Split::ALL.to_vec(), |split| vec![split]);
     let samples: Vec<SampleRef> = splits.into_iter().flat_map(|split| dataset.samples(split)).collect();
     let keys = || samples.iter().take(5).map(|sample| sample.key.clone()).collect::<Vec<_>>().join(", ");
-    let meant = |found: &&SampleRef| sample.is_none_or(|key| found.key == key);
+    let meant = |found: &&SampleRef| sample.is_none_or(|key| *found.key == *key);
     let inputs: Vec<MotionInput> = samples
         .iter()
         .filter(meant)
         .map(|found| MotionInput {
-            name: found.key.clone(),
+            name: found.key.to_string(),
             location: InputLocation::Sample(Rc::clone(&dataset), Box::new(found.clone())),
         })
         .collect();

@@ -241,7 +241,7 @@ fn look_at_part(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedIt
         None => Some(Assignment::Blocks(part.blocks.clone())).filter(|_| !part.samples.is_empty()),
     };
     let VideoEntry { name, file, content, made_from, ledger, bones, failure, .. } = part;
-    let source = VideoSource { name, file, content, made_from, ledger, bones, failure };
+    let source = VideoSource { name: name.into(), file, content, made_from, ledger, bones, failure };
     Ok(InspectedItem {
         source,
         split,

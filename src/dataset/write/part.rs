@@ -10,6 +10,7 @@ use crate::dataset::sample::Sample;
 use crate::dataset::split::SplitBy;
 use crate::stage::fingerprint::hash_file;
 use crate::stage::ledger::Ledger;
+use crate::types::file_name::FileName;
 use crate::types::split::{Split, TimeBlock};
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
@@ -25,7 +26,7 @@ pub const FOLDER: &str = "videos";
 pub struct VideoEntry {
     pub schema: u32,
     /// Name `<slug of the file's name>-<8 hex of its content>`, the prefix of its samples' keys.
-    pub name: String,
+    pub name: FileName,
     /// File name of the video.
     pub file: String,
     /// BLAKE3 of the video file; empty: unreadable.
@@ -94,7 +95,7 @@ impl EntryWriter {
         );
         let part = VideoEntry {
             schema: crate::dataset::SCHEMA,
-            name,
+            name: FileName::new(name)?,
             file,
             content,
             made_from,
@@ -139,7 +140,7 @@ impl EntryWriter {
 
     fn push_members(&mut self, split: Split, sample: &Sample, members: &[Vec<u8>; 5]) -> Result<()> {
         let name = &self.part.name;
-        ensure!(sample.key.starts_with(name), "the key {} does not begin with its video's name {name}", sample.key);
+        ensure!(sample.key.starts_with(&**name), "the key {} does not begin with its video's name {name}", sample.key);
         let (dir, max_bytes) = (&self.dir, self.max_shard_bytes);
         let shards = self.shards.entry(split).or_insert_with(|| ShardWriter::new(dir, name, split, max_bytes));
         shards.push_members(sample, members)?;
@@ -210,7 +211,7 @@ impl VideoEntry {
 
     /// Files by path in the dataset's folder, without the JSON, with their hashes.
     pub fn files(&self) -> Vec<(String, String)> {
-        let shards = self.shards.iter().map(|shard| (shard.file.clone(), shard.blake3.clone()));
+        let shards = self.shards.iter().map(|shard| (shard.file.to_string(), shard.blake3.clone()));
         let sound = self.sound.iter().map(|hash| (format!("{FOLDER}/{}.sound", self.name), hash.clone()));
         shards.chain(sound).collect()
     }

@@ -4,6 +4,7 @@
 use crate::dataset::index::{ByteRange, SampleRef, ShardRef};
 use crate::dataset::sample::{EXTENSIONS, Sample};
 use crate::dataset::split::Split;
+use crate::types::file_name::FileName;
 use anyhow::{Context, Result};
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -36,8 +37,8 @@ impl ShardWriter {
         Self { dir, video, split, max_bytes, open: None, shards: Vec::new(), samples: Vec::new() }
     }
 
-    fn file_name(&self) -> String {
-        format!("{}-{}-{:04}.tar", self.split.name(), self.video, self.shards.len())
+    fn file_name(&self) -> Result<FileName> {
+        Ok(FileName::new(format!("{}-{}-{:04}.tar", self.split.name(), self.video, self.shards.len()))?)
     }
 
     /// Appends a sample.
@@ -51,7 +52,8 @@ impl ShardWriter {
         if self.open.as_ref().is_some_and(|open| open.bytes + (bytes + 2 * BLOCK) as u64 > self.max_bytes) {
             self.close()?;
         }
-        let path = self.dir.join(self.file_name());
+        let shard = self.file_name()?;
+        let path = self.dir.join(&shard);
         let open = match &mut self.open {
             Some(open) => open,
             None => {
@@ -76,9 +78,9 @@ impl ShardWriter {
         open.n_samples += 1;
         let [json, mask, pose2d, pose3d, wav] = spans.try_into().unwrap_or([ByteRange::default(); 5]);
         self.samples.push(SampleRef {
-            key: sample.key.clone(),
+            key: FileName::new(&*sample.key)?,
             split: self.split,
-            shard: self.file_name(),
+            shard,
             offset,
             size: bytes as u64,
             n_frames: sample.n_frames(),
@@ -93,8 +95,8 @@ impl ShardWriter {
     }
 
     fn close(&mut self) -> Result<()> {
-        let file = self.file_name();
         let Some(mut open) = self.open.take() else { return Ok(()) };
+        let file = self.file_name()?;
         let written =
             open.push(&[0; 2 * BLOCK]).and_then(|()| open.file.into_inner().map_err(|error| error.into_error()));
         let shard = written.with_context(|| format!("writing {}", self.dir.join(&file).display()))?;

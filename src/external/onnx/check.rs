@@ -2,6 +2,7 @@
 //! complete. The file itself is checked in `model`.
 
 use super::{Decode, KeypointOutputs, ModelEntry, ModelRole, ModelSource, PictureFit, TensorAxes};
+use crate::types::file_name::FileName;
 use anyhow::{Result, bail, ensure};
 
 impl ModelEntry {
@@ -148,7 +149,7 @@ impl Decode {
     }
 }
 
-/// A name that stays in its folder.
+/// Whether the name stays in its folder.
 fn plain(name: &str) -> bool {
-    !name.is_empty() && !name.contains(['/', '\\']) && !name.starts_with('.')
+    FileName::new(name).is_ok()
 }

@@ -1,0 +1,105 @@
+//! Names that a file gives to other files.
+
+use serde::{Deserialize, Serialize};
+use std::borrow::Borrow;
+use std::fmt;
+use std::ops::Deref;
+
+/// Most bytes of a name, those of common file systems.
+const MOST_BYTES: usize = 255;
+
+/// Name of one file or folder within its folder: 1 to 255 bytes, no separator (`/` or `\`), no dot at the beginning, no
+/// control character. A path that such a name is joined to is not left.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct FileName(String);
+
+/// Text that is no [`FileName`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{0:?} is no name of a file: expected 1 to {MOST_BYTES} bytes without /, \\, control characters or a dot at the beginning"
+)]
+pub struct FileNameError(String);
+
+impl FileName {
+    /// Checks a name.
+    pub fn new(name: impl Into<String>) -> Result<Self, FileNameError> {
+        let name = name.into();
+        let is_plain = (1..=MOST_BYTES).contains(&name.len())
+            && !name.starts_with('.')
+            && !name.contains(|letter: char| matches!(letter, '/' | '\\') || letter.is_control());
+        // An error of a name of many pages shows its beginning.
+        if is_plain { Ok(Self(name)) } else { Err(FileNameError(name.chars().take(MOST_BYTES).collect())) }
+    }
+}
+
+impl TryFrom<String> for FileName {
+    type Error = FileNameError;
+
+    fn try_from(name: String) -> Result<Self, FileNameError> {
+        Self::new(name)
+    }
+}
+
+impl From<FileName> for String {
+    fn from(name: FileName) -> Self {
+        name.0
+    }
+}
+
+impl Deref for FileName {
+    type Target = str;
+
+    fn deref(&self) -> &str {
+        &self.0
+    }
+}
+
+impl Borrow<str> for FileName {
+    fn borrow(&self) -> &str {
+        &self.0
+    }
+}
+
+impl AsRef<std::path::Path> for FileName {
+    fn as_ref(&self) -> &std::path::Path {
+        self.0.as_ref()
+    }
+}
+
+impl PartialEq<str> for FileName {
+    fn eq(&self, other: &str) -> bool {
+        self.0 == other
+    }
+}
+
+impl PartialEq<String> for FileName {
+    fn eq(&self, other: &String) -> bool {
+        self.0 == *other
+    }
+}
+
+impl fmt::Display for FileName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_stays_in_its_folder() {
+        for name in ["a", "train-clip-1-ef0a7ac8-0000.tar", "Vortrag über Öl.mp4", "a..b", &"x".repeat(255)] {
+            let quoted = serde_json::to_string(name).unwrap();
+            let read: FileName = serde_json::from_str(&quoted).unwrap();
+            assert_eq!((&*read, serde_json::to_string(&read).unwrap()), (name, quoted));
+        }
+        for name in ["", ".", "..", ".hidden", "a/b", "/abs/x", "../../x", "a\\b", "a\nb", "a\0", &"x".repeat(256)] {
+            let text = FileName::new(name).unwrap_err().to_string();
+            assert!(text.contains("no name of a file") && text.len() < 500, "{text}");
+            assert!(serde_json::from_str::<FileName>(&serde_json::to_string(name).unwrap()).is_err(), "{name:?}");
+        }
+    }
+}
