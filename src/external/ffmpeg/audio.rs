@@ -96,6 +96,7 @@ pub(crate) fn stream_mono(
         if frame.samples() == 0 || frame.rate() == 0 {
             continue;
         }
+        source::check_rate(path, frame.rate())?;
         let at = frame.timestamp().map(|ticks| ticks as f64 * secs_per_tick);
         let zero = *zero_secs.get_or_insert(at.unwrap_or(0.0));
         // A time far beyond the file's stated end is broken; the sound continues without a gap.

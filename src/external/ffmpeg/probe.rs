@@ -57,17 +57,8 @@ pub(crate) fn describe(input: &Input) -> ProbedMedia {
         duration_secs,
         video: video.map(|stream| describe_video(&stream)),
         audio: audio.map(|stream| {
-            // SAFETY: the parameters live as long as the input, which is borrowed here.
-            let (rate, n_channels) = unsafe {
-                let parameters = stream.parameters();
-                let parameters = parameters.as_ptr();
-                ((*parameters).sample_rate, (*parameters).ch_layout.nb_channels)
-            };
-            AudioInfo {
-                codec: codec_name(&stream),
-                rate: u32::try_from(rate).unwrap_or(0),
-                n_channels: u32::try_from(n_channels).unwrap_or(0),
-            }
+            let [rate, n_channels] = source::sound_numbers(&stream);
+            AudioInfo { codec: codec_name(&stream), rate, n_channels }
         }),
     }
 }

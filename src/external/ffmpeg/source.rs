@@ -6,7 +6,15 @@ use ffmpeg_next as ffmpeg;
 use ffmpeg_next::format::context::Input;
 use ffmpeg_next::format::stream::{Disposition, Stream};
 use std::io::Read;
+use std::ops::RangeInclusive;
 use std::path::Path;
+
+/// Containers that hold all they need. ffmpeg opens others too: playlists and lists (hls, dash, concat, sdp, numbered
+/// pictures) make it read whatever files they name.
+const FORMATS: &str = "mov,matroska,webm,avi,mpegts,mpeg,mpegvideo,h264,hevc,flv,ogg,wav,w64,mp3,flac,aac,ac3,eac3,aiff,au,caf,amr,\
+    asf,mxf,gif,jpeg_pipe,png_pipe";
+/// Rates of sound that are believed, samples a second.
+const SOUND_RATES: RangeInclusive<u32> = 4_000..=768_000;
 
 const EXPECTED: &str = "expected a video or sound file (mp4, mov, mkv, webm, avi, wav, flac, mp3, ...)";
 
@@ -26,7 +34,7 @@ pub(crate) fn open(path: &Path) -> Result<Input> {
     open_with(path, &[])
 }
 
-/// Opens `path` with options for the container's reader.
+/// Opens `path` with options for the container's reader. Every file of pictures or sound is opened here.
 pub(crate) fn open_with(path: &Path, options: &[(&str, &str)]) -> Result<Input> {
     super::library::init();
     let name = path.display();
@@ -49,12 +57,23 @@ pub(crate) fn open_with(path: &Path, options: &[(&str, &str)]) -> Result<Input> 
             "{name} is cut short: it begins like an mp4 but its index (moov) is missing or broken; copy or download it again"
         )
     };
-    let input = match ffmpeg::format::input_with_dictionary(&url(path)?, options.iter().copied().collect()) {
+    let safe = [("format_whitelist", FORMATS), ("protocol_whitelist", "file")];
+    let options = safe.iter().chain(options).copied().collect();
+    let input = match ffmpeg::format::input_with_dictionary(&url(path)?, options) {
         Ok(input) => input,
+        // So the list of formats refuses one.
+        Err(ffmpeg::Error::Other { errno: ffmpeg::error::EINVAL }) => {
+            return unreadable(format!(
+                "{name} is of a kind that is not read (a playlist or list that names other files, or an unusual container): {EXPECTED}"
+            ));
+        }
         Err(ffmpeg::Error::InvalidData) if is_mp4 => return unreadable(cut_short()),
         Err(ffmpeg::Error::InvalidData) => return unreadable(format!("{name} is not a media file: {EXPECTED}")),
         Err(error) => return unreadable(format!("cannot open {name} ({error}): {EXPECTED}")),
     };
+    for stream in input.streams().filter(|stream| stream.parameters().medium() == ffmpeg::media::Type::Audio) {
+        check_rate(path, sound_numbers(&stream)[0])?;
+    }
     match video_stream(&input).is_none() && automatic_track(&input).is_none() {
         false => Ok(input),
         true if is_mp4 => unreadable(cut_short()),
@@ -78,15 +97,31 @@ pub(crate) fn video_stream(input: &Input) -> Option<Stream<'_>> {
 /// Streams of sound in the order of the file, those without a rate or a channel left out.
 fn audio_streams(input: &Input) -> Vec<Stream<'_>> {
     let is_sound = |stream: &Stream| {
-        // SAFETY: the parameters belong to `stream` and are only read here.
-        let [rate, n_channels] = unsafe {
-            let parameters = stream.parameters();
-            let parameters = parameters.as_ptr();
-            [(*parameters).sample_rate, (*parameters).ch_layout.nb_channels]
-        };
-        stream.parameters().medium() == ffmpeg::media::Type::Audio && rate > 0 && n_channels > 0
+        let is_whole = sound_numbers(stream).into_iter().all(|number| number > 0);
+        stream.parameters().medium() == ffmpeg::media::Type::Audio && is_whole
     };
     input.streams().filter(is_sound).collect()
+}
+
+/// Samples a second and channels of a stream of sound; 0 where unknown.
+pub(crate) fn sound_numbers(stream: &Stream) -> [u32; 2] {
+    // SAFETY: the parameters belong to `stream` and are only read here.
+    let numbers = unsafe {
+        let parameters = stream.parameters();
+        let parameters = parameters.as_ptr();
+        [(*parameters).sample_rate, (*parameters).ch_layout.nb_channels]
+    };
+    numbers.map(|number| u32::try_from(number).unwrap_or(0))
+}
+
+/// Errors on a rate of sound that no recording has; 0 is unknown.
+pub(crate) fn check_rate(path: &Path, rate: u32) -> Result<()> {
+    if rate == 0 || SOUND_RATES.contains(&rate) {
+        return Ok(());
+    }
+    let (name, least, most) = (path.display(), SOUND_RATES.start(), SOUND_RATES.end());
+    let problem = format!("{name} says that its sound has {rate} samples a second, expected {least} to {most}");
+    Err(UnreadableMedia(problem).into())
 }
 
 /// Stream of sound that is taken where nobody chose: the first one that is marked as the default, else the first.
