@@ -1,11 +1,15 @@
 //! Entries of the configuration that name files: a path, a folder, or a pattern.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Endings taken for videos when a folder is named.
 pub const OF_VIDEOS: [&str; 10] = ["mp4", "mkv", "mov", "webm", "avi", "m4v", "mpg", "mpeg", "ts", "wmv"];
 /// Endings taken for sounds, beside those of videos.
 pub const OF_SOUNDS: [&str; 8] = ["wav", "mp3", "flac", "ogg", "opus", "m4a", "aac", "wma"];
+
+/// Most folders within each other that `**` looks into.
+const MAX_DEPTH: usize = 64;
 
 /// The files an entry names: itself, those of the folder it is that end like one of `endings`, or what its pattern matches.
 /// `what` is a word for such a file. A plain path is taken as it is, so that a missing file fails by itself.
@@ -35,15 +39,44 @@ pub fn matches(entry: &str, folder: &Path, missing: &mut Vec<String>) -> Result<
     if path.exists() || !entry.contains(['*', '?', '[']) {
         return Ok(vec![path]);
     }
-    let pattern = Path::new(&glob::Pattern::escape(&folder.to_string_lossy())).join(entry);
-    let matches = glob::glob(&pattern.to_string_lossy()).map_err(|error| format!("{entry}: no pattern: {error}"))?;
     let n_missing = missing.len();
-    let mut unread = |error: glob::GlobError| missing.push(format!("{entry}: cannot look there: {error}"));
-    let paths: Vec<PathBuf> = matches.filter_map(|found| found.map_err(&mut unread).ok()).collect();
+    let mut found = |folders: &[PathBuf], pattern: &str| -> Result<Vec<PathBuf>, String> {
+        let mut paths = Vec::new();
+        for folder in folders {
+            let pattern = Path::new(&glob::Pattern::escape(&folder.to_string_lossy())).join(pattern);
+            let matches =
+                glob::glob(&pattern.to_string_lossy()).map_err(|error| format!("{entry}: no pattern: {error}"))?;
+            let mut unread = |error: glob::GlobError| missing.push(format!("{entry}: cannot look there: {error}"));
+            paths.extend(matches.filter_map(|found| found.map_err(&mut unread).ok()));
+        }
+        Ok(paths)
+    };
+    // The library would follow links that lead back without end.
+    let (mut folders, mut rest) = (vec![folder.to_owned()], entry);
+    while let Some((before, after)) =
+        rest.split_once("**/").filter(|(before, _)| before.is_empty() || before.ends_with('/'))
+    {
+        let tops = if before.is_empty() { folders } else { found(&folders, before)? };
+        folders = Vec::new();
+        let mut seen = BTreeSet::new();
+        tops.iter().for_each(|top| add_below(top, MAX_DEPTH, &mut seen, &mut folders));
+        rest = after;
+    }
+    let paths = found(&folders, rest)?;
     if paths.is_empty() && missing.len() == n_missing {
         Err(format!("{entry}: no file matches, looked in {}", folder.display()))
     } else {
         Ok(paths)
+    }
+}
+
+/// Adds `folder` and the folders below it, each once, whatever links lead to it; hidden ones too.
+fn add_below(folder: &Path, depth: usize, seen: &mut BTreeSet<PathBuf>, folders: &mut Vec<PathBuf>) {
+    let is_new = folder.canonicalize().is_ok_and(|path| path.is_dir() && seen.insert(path));
+    if is_new && depth > 0 {
+        folders.push(folder.to_owned());
+        // A folder that cannot be listed is reported where its files are looked for.
+        list(folder).unwrap_or_default().iter().for_each(|path| add_below(path, depth - 1, seen, folders));
     }
 }
 
@@ -59,4 +92,31 @@ pub fn list(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
 pub fn has_ending(path: &Path, endings: &[&str]) -> bool {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
     ending.is_some_and(|ending| endings.contains(&ending.as_str()))
+}
+
+#[cfg(test)]
+#[cfg(unix)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::symlink;
+
+    #[test]
+    fn folders_that_lead_back_are_looked_into_once() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        std::fs::create_dir_all(at("a/b/c")).unwrap();
+        ["a/b/c/1.mp4", "a/2.mp4", "3.mp4"].iter().for_each(|name| std::fs::write(at(name), "").unwrap());
+        symlink(".", at("one")).unwrap();
+        symlink(".", at("two")).unwrap();
+        let found = |entry: &str| {
+            let mut paths = matches(entry, dir.path(), &mut Vec::new())?;
+            paths.sort();
+            Ok::<_, String>(paths)
+        };
+        assert_eq!(found("**/*.mp4").unwrap(), [at("3.mp4"), at("a/2.mp4"), at("a/b/c/1.mp4")]);
+        assert_eq!(found("a/**/c/*.mp4").unwrap(), [at("a/b/c/1.mp4")]);
+        assert_eq!(found("*/b/**/1.mp4").unwrap(), [at("a/b/c/1.mp4")]);
+        assert!(found("a**/*.mp4").unwrap_err().contains("no pattern"));
+        assert!(found("**/*.mkv").unwrap_err().contains("no file matches"));
+    }
 }

@@ -4,6 +4,7 @@
 use crate::dataset::INFO;
 use crate::dataset::write::part;
 use crate::formats::npz::Npz;
+use crate::formats::search;
 use crate::mocap::captured::MotionKind;
 use anyhow::{Context, Result, ensure};
 use std::fs::File;
@@ -95,17 +96,12 @@ fn walk(path: &Path, files: &mut Vec<PathBuf>, datasets: &mut Vec<PathBuf>) -> R
         files.push(path.to_owned());
         return Ok(());
     }
-    if path.join(INFO).is_file() && path.join(part::FOLDER).is_dir() {
-        datasets.push(path.to_owned());
-        return Ok(());
-    }
-    for entry in std::fs::read_dir(path)? {
-        let path = entry?.path();
-        let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
-        if !hidden {
-            walk(&path, files, datasets)?;
-        }
-    }
+    let mut enter = |folder: &Path| {
+        let is_dataset = folder.join(INFO).is_file() && folder.join(part::FOLDER).is_dir();
+        datasets.extend(is_dataset.then(|| folder.to_owned()));
+        !is_dataset
+    };
+    files.extend(search::files(path, &mut enter)?);
     Ok(())
 }
 

@@ -2,6 +2,7 @@
 //! semicolons and tabs are understood too).
 
 use crate::animate::export::file::ExportFormat;
+use crate::formats::search;
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -34,8 +35,14 @@ pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
         folder.display(),
         folder.join("motions").display()
     );
-    let mut files = Vec::new();
-    collect(folder, "", out.as_deref(), &mut files)?;
+    let mut enter = |folder: &Path| folder.canonicalize().ok() != out;
+    let sounds = |path: &PathBuf| {
+        let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        SOUNDS.contains(&ending.as_str())
+    };
+    let named = |path: PathBuf| (path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned(), path);
+    let files: Vec<(String, PathBuf)> =
+        search::files(folder, &mut enter)?.into_iter().filter(sounds).map(named).collect();
     ensure!(!files.is_empty(), "{} holds no file that sounds ({})", folder.display(), SOUNDS.join(", "));
     let stem = |file: &str| file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned();
     let mut called = BTreeMap::<String, usize>::new();
@@ -49,25 +56,6 @@ pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
         }
     });
     distinct(rows.collect())
-}
-
-fn collect(folder: &Path, before: &str, without: Option<&Path>, files: &mut Vec<(String, PathBuf)>) -> Result<()> {
-    let entries = std::fs::read_dir(folder).with_context(|| format!("cannot list {}", folder.display()))?;
-    let mut entries = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>()?;
-    entries.sort();
-    for path in entries {
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        if name.starts_with('.') || (path.is_dir() && path.canonicalize().ok().as_deref() == without) {
-            continue;
-        }
-        if path.is_dir() {
-            collect(&path, &format!("{before}{name}/"), without, files)?;
-        } else if SOUNDS.contains(&ending.as_str()) {
-            files.push((format!("{before}{name}"), path));
-        }
-    }
-    Ok(())
 }
 
 /// The rows of the table `path`: columns `audio`, and if they are there `out` and `checkpoint` (or `speaker`). Paths count
