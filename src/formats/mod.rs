@@ -10,6 +10,7 @@ pub mod media_json;
 pub mod npy;
 pub mod npy_slice;
 pub mod npz;
+pub mod npz_output;
 pub mod search;
 pub mod tfevents;
 pub mod timeline_npz;

@@ -32,6 +32,23 @@ pub fn read(path: &Path, fps: FrameRate) -> anyhow::Result<Motion> {
     Ok(Motion::from_joints(fps, joints))
 }
 
+/// Most bytes of a header, its magic string and length included.
+pub(crate) const MOST_HEADER_BYTES: u64 = 1 << 16;
+
+/// Bytes of a whole file that begins with `head`, as its header promises; `None` where it has no numbers.
+pub(crate) fn file_bytes(head: &[u8]) -> Option<u64> {
+    if !has_small_header(head) {
+        return None;
+    }
+    let mut rest = head;
+    let header = Header::from_reader(&mut rest).ok()?;
+    let n_header = (head.len() - rest.len()) as u64;
+    // `<f4`, `|b1`: the last digits are the bytes of a number.
+    let kind = header.type_descriptor.as_string()?;
+    let bytes: u64 = kind.trim_start_matches(['<', '>', '|', '=']).strip_prefix(['f', 'i', 'u', 'b'])?.parse().ok()?;
+    header.shape.iter().try_fold(bytes, |n, &axis| n.checked_mul(axis as u64))?.checked_add(n_header)
+}
+
 /// An array from the bytes of its file. What the header promises is held against these bytes before anything is
 /// allocated for it.
 pub(crate) fn parse<T: ReadableElement, D: Dimension>(bytes: &[u8]) -> Result<Array<T, D>, ReadNpyError> {

@@ -2,14 +2,18 @@
 //! The files of the pipeline (`keypoints_npz`, `joints_npz`) say what their arrays mean; this file does not.
 
 use super::npy;
+use super::npz_output::NpzOutput;
 use crate::types::time::FrameRate;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Array1, ArrayD, IxDyn, array};
 use ndarray_npy::{NpzWriter, ReadNpyError, ReadableElement, WriteNpzError};
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Read as _, Write as _};
+use std::io::{BufReader, BufWriter, Read as _};
 use std::path::{Path, PathBuf};
 use zip::ZipArchive;
+
+/// Most bytes of the arrays of a file together: a day of keypoints at 30 frames a second.
+const MOST_BYTES: u64 = 2 << 30;
 
 /// An open `.npz` file.
 pub struct Npz {
@@ -26,8 +30,22 @@ impl Npz {
     /// Opens the archive. Errors: no such file, no zip archive.
     pub fn open(path: &Path) -> Result<Self> {
         let file = File::open(path).with_context(|| format!("cannot open {}", path.display()))?;
-        let archive = ZipArchive::new(BufReader::new(file))
+        let n_file_bytes = file.metadata().with_context(|| format!("cannot open {}", path.display()))?.len();
+        let mut archive = ZipArchive::new(BufReader::new(file))
             .with_context(|| format!("{} is no .npz file (numpy.savez writes one)", path.display()))?;
+        let mut n_bytes = 0u64;
+        for at in 0..archive.len() {
+            let entry = archive.by_index_raw(at).with_context(|| format!("{} is damaged", path.display()))?;
+            n_bytes = n_bytes.saturating_add(entry.size());
+        }
+        // What is not compressed takes no more memory than disk.
+        let most = MOST_BYTES.max(n_file_bytes);
+        ensure!(
+            n_bytes <= most,
+            "{}: its arrays unpack to more than {} MiB, which is not read; save fewer arrays in one file",
+            path.display(),
+            most >> 20
+        );
         let name = |i| archive.name_for_index(i).unwrap_or_default();
         let names = (0..archive.len()).map(|i| name(i).strip_suffix(".npy").unwrap_or(name(i)).to_owned()).collect();
         Ok(Self { path: path.to_owned(), names, archive })
@@ -119,9 +137,22 @@ impl Npz {
         let Some(at) = self.names.iter().position(|n| n == name) else {
             bail!("{} has no array `{name}`; it has: {}", self.path.display(), self.names.join(", "));
         };
+        let unreadable = || format!("{}: array `{name}` cannot be read", self.path.display());
+        let entry = self.archive.by_index(at).with_context(unreadable)?;
+        let stated = entry.size();
+        // The unpacked bytes may be more than the archive states; they end where it says.
+        let mut entry = entry.take(stated.saturating_add(1));
         let mut bytes = Vec::new();
-        let read = self.archive.by_index(at).map_err(std::io::Error::from).and_then(|mut e| e.read_to_end(&mut bytes));
-        read.with_context(|| format!("{}: array `{name}` cannot be read", self.path.display()))?;
+        entry.by_ref().take(npy::MOST_HEADER_BYTES).read_to_end(&mut bytes).with_context(unreadable)?;
+        if let Some(promised) = npy::file_bytes(&bytes) {
+            ensure!(
+                promised == stated,
+                "{}: array `{name}` has {stated} bytes, its header promises {promised}: copy or save the file again",
+                self.path.display()
+            );
+        }
+        entry.read_to_end(&mut bytes).with_context(unreadable)?;
+        ensure!(bytes.len() as u64 == stated, "{}: it has other than the {stated} bytes stated", unreadable());
         Ok(bytes)
     }
 
@@ -150,12 +181,12 @@ impl Npz {
 /// Writes a file of the arrays that `add` adds; the same arrays give the same bytes.
 pub fn write<F>(path: &Path, add: F) -> Result<()>
 where
-    F: FnOnce(&mut NpzWriter<BufWriter<File>>) -> Result<(), WriteNpzError>,
+    F: FnOnce(&mut NpzWriter<NpzOutput>) -> Result<(), WriteNpzError>,
 {
     let attempt = || -> Result<()> {
-        let mut npz = NpzWriter::new(BufWriter::new(File::create(path)?));
+        let mut npz = NpzWriter::new(NpzOutput::new(BufWriter::new(File::create(path)?)));
         add(&mut npz)?;
-        Ok(npz.finish()?.flush()?)
+        npz.finish()?.finish()
     };
     attempt().with_context(|| format!("cannot write {}", path.display()))
 }
@@ -170,10 +201,7 @@ mod tests {
     use super::*;
     use ndarray::arr0;
 
-    fn file_with(
-        dir: &Path,
-        add: impl FnOnce(&mut NpzWriter<BufWriter<File>>) -> Result<(), WriteNpzError>,
-    ) -> PathBuf {
+    fn file_with(dir: &Path, add: impl FnOnce(&mut NpzWriter<NpzOutput>) -> Result<(), WriteNpzError>) -> PathBuf {
         let path = dir.join("a.npz");
         write(&path, add).unwrap();
         path
@@ -222,6 +250,46 @@ mod tests {
         zip.finish().unwrap();
         let text = format!("{:#}", Npz::open(&path).unwrap().floats("body", &[]).unwrap_err());
         assert!(text.contains("a.npz") && text.contains("body"), "{text}");
+    }
+
+    /// An archive of one array whose `n_bytes` are zeros behind the header of another shape.
+    fn packed(path: &Path, shape: &str, n_bytes: usize) {
+        let mut bytes = Vec::new();
+        ndarray_npy::WriteNpyExt::write_npy(&Array1::<f32>::zeros(5), &mut bytes).unwrap();
+        let mut bytes = npy::tests::with_shape(&bytes, "(5,)", shape);
+        bytes.resize(n_bytes, 0);
+        let options = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Deflated);
+        let mut zip = zip::ZipWriter::new(File::create(path).unwrap());
+        zip.start_file("body.npy", options).unwrap();
+        std::io::Write::write_all(&mut zip, &bytes).unwrap();
+        zip.finish().unwrap();
+    }
+
+    #[test]
+    fn what_unpacks_to_more_than_it_states_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.npz");
+        packed(&path, "(2097120,)", 8 << 20);
+        assert!(std::fs::metadata(&path).unwrap().len() < 20_000);
+        Npz::open(&path).unwrap().floats("body", &[]).unwrap();
+        // The sizes in the local header and in the archive's list.
+        let stated = |n: u32| {
+            let bytes = std::fs::read(&path).unwrap();
+            let old = (8u32 << 20).to_le_bytes();
+            let places: Vec<usize> = (0..bytes.len() - 4).filter(|&at| bytes[at..at + 4] == old).collect();
+            let mut bytes = bytes.clone();
+            places.iter().for_each(|&at| bytes[at..at + 4].copy_from_slice(&n.to_le_bytes()));
+            let changed = dir.path().join("b.npz");
+            std::fs::write(&changed, bytes).unwrap();
+            Npz::open(&changed).and_then(|mut npz| npz.floats("body", &[])).map(drop)
+        };
+        let text = format!("{:#}", stated(1 << 20).unwrap_err());
+        assert!(text.contains("b.npz") && text.contains("`body` has 1048576 bytes, its header promises"), "{text}");
+        let text = format!("{:#}", stated(u32::MAX - 1).unwrap_err());
+        assert!(text.contains("b.npz") && text.contains("unpack to more than 2048 MiB"), "{text}");
+        packed(&path, "(8,)", 8 << 20);
+        let text = format!("{:#}", Npz::open(&path).unwrap().floats("body", &[]).unwrap_err());
+        assert!(text.contains("has 8388608 bytes, its header promises 160"), "{text}");
     }
 
     proptest::proptest! {

@@ -3,14 +3,13 @@
 
 use super::paint;
 use super::scene::DrawnScene;
+use crate::formats::npz;
 use crate::formats::npz::Npz;
 use crate::math::vec3::{Vec3, sub};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::{L_HAND, N_HAND_JOINTS, N_JOINTS, NECK, R_HAND};
 use crate::types::time::FrameRate;
-use anyhow::Context;
-use ndarray::{Array3, Ix3, arr1, s};
-use ndarray_npy::NpzWriter;
+use ndarray::{Array3, Ix3, aview1, s};
 use std::path::Path;
 
 /// Ground truth of a clip.
@@ -54,17 +53,16 @@ impl DrawnTruth {
 
     /// Writes `joints`, `body`, `left_hand`, `right_hand` and `fps` [num, den].
     pub fn write(&self, path: &Path) -> anyhow::Result<()> {
+        let fps = [self.motion.fps.num, self.motion.fps.den].map(i64::from);
         crate::stage::workdir::replace(path, |attempt| {
-            let mut npz = NpzWriter::new(std::fs::File::create(attempt)?);
-            npz.add_array("joints", &self.motion.joints)?;
-            npz.add_array("body", &self.body)?;
-            npz.add_array("left_hand", &self.left_hand)?;
-            npz.add_array("right_hand", &self.right_hand)?;
-            npz.add_array("fps", &arr1(&[i64::from(self.motion.fps.num), i64::from(self.motion.fps.den)]))?;
-            npz.finish()?;
-            Ok(())
+            npz::write(attempt, |npz| {
+                npz.add_array("joints", &self.motion.joints)?;
+                npz.add_array("body", &self.body)?;
+                npz.add_array("left_hand", &self.left_hand)?;
+                npz.add_array("right_hand", &self.right_hand)?;
+                npz.add_array("fps", &aview1(&fps))
+            })
         })
-        .with_context(|| format!("cannot write {}", path.display()))
     }
 
     /// Reads a file of `write`.

@@ -1,12 +1,10 @@
 //! `measures.npz`: every array of `Measures` by its name, float32 [T].
 
 use super::measure::Measures;
+use crate::formats::npz;
 use crate::formats::npz::Npz;
-use anyhow::{Context, Result};
-use ndarray::Array1;
-use ndarray_npy::NpzWriter;
-use std::fs::File;
-use std::io::{BufWriter, Write as _};
+use anyhow::Result;
+use ndarray::aview1;
 use std::path::Path;
 
 impl Measures {
@@ -34,14 +32,9 @@ impl Measures {
 
     /// Writes `measures.npz`.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let written = || -> Result<()> {
-            let mut npz = NpzWriter::new(BufWriter::new(File::create(path)?));
-            for (name, values) in self.arrays() {
-                npz.add_array(name, &Array1::from_vec(values.to_vec()))?;
-            }
-            Ok(npz.finish()?.flush()?)
-        };
-        written().with_context(|| format!("cannot write {}", path.display()))
+        npz::write(path, |npz| {
+            self.arrays().into_iter().try_for_each(|(name, values)| npz.add_array(name, &aview1(values)))
+        })
     }
 
     /// Reads `measures.npz`. Errors name the file and the array that is missing or of another length.
