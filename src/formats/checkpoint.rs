@@ -4,7 +4,7 @@
 use crate::stage::workdir;
 use anyhow::{Context, ensure};
 use candle_core::safetensors::Load;
-use candle_core::{Device, Tensor};
+use candle_core::{DType, Device, Tensor};
 use serde_json::Value;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
@@ -27,6 +27,13 @@ impl Contents {
         self.tensors.iter().filter_map(strip).collect()
     }
 
+    /// Checks that a network of at least `least` weights may be in it, before memory is taken for one.
+    pub fn expect_numbers(&self, least: usize) -> anyhow::Result<()> {
+        let n_numbers: usize = self.tensors.values().map(Tensor::elem_count).sum();
+        ensure!(least <= n_numbers, "its network has {least} weights or more, the file {n_numbers}");
+        Ok(())
+    }
+
     /// Adds tensors with `prefix` before their names.
     pub fn add(&mut self, prefix: &str, tensors: BTreeMap<String, Tensor>) {
         self.tensors.extend(tensors.into_iter().map(|(name, tensor)| (format!("{prefix}{name}"), tensor)));
@@ -44,7 +51,14 @@ impl Contents {
         let (_, header) = safetensors::SafeTensors::read_metadata(bytes)?;
         let facts = header.metadata().as_ref().and_then(|m| m.get(METADATA)).context("it was not written by orator")?;
         let file = safetensors::SafeTensors::deserialize(bytes)?;
-        let load = |(name, view): (String, safetensors::tensor::TensorView)| Ok((name, view.load(&Device::Cpu)?));
+        let load = |(name, view): (String, safetensors::tensor::TensorView)| {
+            let tensor = view.load(&Device::Cpu)?;
+            ensure!(
+                is_finite(&tensor)?,
+                "the tensor {name} holds a number that is not finite: it was damaged, or its training failed"
+            );
+            Ok((name, tensor))
+        };
         let tensors = file.tensors().into_iter().map(load).collect::<anyhow::Result<_>>()?;
         Ok(Self { facts: serde_json::from_str(facts)?, tensors })
     }
@@ -59,6 +73,14 @@ impl Contents {
         let bytes = std::fs::read(path).with_context(|| format!("cannot read the weights {}", path.display()))?;
         Self::from_bytes(&bytes).with_context(|| format!("{} is not a checkpoint or weights file", path.display()))
     }
+}
+
+fn is_finite(tensor: &Tensor) -> anyhow::Result<bool> {
+    if !tensor.dtype().is_float() {
+        return Ok(true);
+    }
+    let numbers = tensor.flatten_all()?.to_dtype(DType::F32)?.to_vec1::<f32>()?;
+    Ok(numbers.iter().all(|number| number.is_finite()))
 }
 
 /// The checkpoint of `step` inside the folder of a training.
@@ -124,6 +146,19 @@ mod tests {
         assert_eq!(read.to_bytes()?, std::fs::read(&file)?);
         assert!(expect_same(&read.facts, "step", &json!(7)).is_ok());
         assert!(expect_same(&read.facts, "step", &json!(8)).is_err());
+        Ok(())
+    }
+
+    #[test]
+    fn a_weight_that_is_no_number_is_named() -> anyhow::Result<()> {
+        let folder = tempfile::tempdir()?;
+        let file = path(folder.path(), 1);
+        for wrong in [f32::NAN, f32::INFINITY] {
+            let tensors = BTreeMap::from([("net.w".to_owned(), Tensor::new(&[1.0, wrong, 2.0], &Device::Cpu)?)]);
+            Contents { facts: json!({}), tensors }.write(&file)?;
+            let text = format!("{:#}", Contents::read(&file).err().context("it was read")?);
+            assert!(text.contains("step-0000001.safetensors") && text.contains("net.w"), "{text}");
+        }
         Ok(())
     }
 

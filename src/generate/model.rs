@@ -22,8 +22,6 @@ const KIND: &str = "orator speaker 2";
 const SKELETON: &str = "49 joints, house order";
 /// Most channels of a network that is believed; the published one has 256.
 const MOST_WIDTH: usize = 1024;
-/// Most frames a second that are believed.
-const MOST_FPS: f64 = 1000.0;
 
 /// Everything beside the tensors that generation needs. Stored under `speaker` in a checkpoint's metadata.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -125,7 +123,8 @@ fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {
     let (network, fps) = (&metadata.network, metadata.fps);
     ensure!(network.n_mels == mel::N_MELS, "it reads {} mel bands, not {}", network.n_mels, mel::N_MELS);
     ensure!((4..=MOST_WIDTH).contains(&network.width), "its width is {}, expected 4 to {MOST_WIDTH}", network.width);
-    ensure!(fps.per_sec() <= MOST_FPS, "it moves at {fps}, expected {MOST_FPS} at most");
+    contents.expect_numbers(network.width * network.width)?;
+    ensure!(fps.is_plausible(), "it moves at {fps}, expected 1 to 1000 frames a second");
     metadata.normalisation.check()?;
     metadata.representation.check()?;
     let mut params = Params::frozen();

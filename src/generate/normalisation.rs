@@ -33,6 +33,8 @@ impl Normalisation {
     pub fn check(&self) -> anyhow::Result<()> {
         let lengths = [self.mean.len(), self.std.len(), self.bone_lengths.len()];
         ensure!(lengths == [N_FEATURES, N_FEATURES, N_BONES], "its normalisation has {lengths:?} numbers");
+        let mut metres = self.mean.iter().chain(&self.std).chain(&self.bone_lengths);
+        ensure!(metres.all(|v| v.abs() <= 100.0), "its normalisation has numbers beyond 100 m");
         Ok(())
     }
 

@@ -5,7 +5,7 @@ use super::motion_file::USUAL_FPS;
 use super::take::CapturedMotion;
 use super::{bvh, ted};
 use crate::formats::authors_txt;
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use serde_json::Map;
 use std::path::Path;
 
@@ -35,13 +35,16 @@ impl MotionKind {
 
 /// Reads the motion file of a take of that kind.
 pub fn read(kind: MotionKind, path: &Path) -> Result<CapturedMotion> {
-    match kind {
+    let captured = match kind {
         MotionKind::Authors => {
             let motion = authors_txt::read(path, USUAL_FPS)?;
-            Ok(CapturedMotion { motion, text: None, facts: Map::new() })
+            CapturedMotion { motion, text: None, facts: Map::new() }
         }
-        MotionKind::Ted => ted::read(path),
-        MotionKind::Bvh => bvh::read(path),
+        MotionKind::Ted => ted::read(path)?,
+        MotionKind::Bvh => bvh::read(path)?,
         MotionKind::Shards => bail!("{} holds samples, no captured motion", path.display()),
-    }
+    };
+    captured.motion.fps.checked().with_context(|| path.display().to_string())?;
+    let motion = captured.motion.in_range().with_context(|| path.display().to_string())?;
+    Ok(CapturedMotion { motion, ..captured })
 }

@@ -68,6 +68,8 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
         path.display(),
         motion.n_frames()
     );
+    motion.fps.checked().with_context(|| path.display().to_string())?;
+    let motion = motion.in_range().with_context(|| path.display().to_string())?;
     Ok(MotionFile { motion, notes })
 }
 

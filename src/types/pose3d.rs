@@ -1,5 +1,6 @@
 //! 3D motion: joints over time in camera axes, metres, the neck at the origin.
 
+use super::skeleton;
 use super::time::FrameRate;
 use ndarray::{Array2, Array3};
 
@@ -15,11 +16,42 @@ pub struct Motion {
     pub mask: Array2<bool>,
 }
 
+/// Farthest that a joint lies from the neck, metres: far more than any body, far less than what overflows.
+const FARTHEST: f32 = 100.0;
+
+/// Joint beyond all sense.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "frame {frame}, joint {joint} ({}): {position:?} lies more than {FARTHEST} m from the neck; joints must be in metres",
+    skeleton::name(*joint)
+)]
+pub struct FarJoint {
+    /// Frame, from 0.
+    pub frame: usize,
+    /// Joint, 0..49.
+    pub joint: usize,
+    /// Position as read.
+    pub position: [f32; 3],
+}
+
 impl Motion {
     /// From joints [T, 49, 3] alone: what is not finite was not seen.
     pub fn from_joints(fps: FrameRate, joints: Array3<f32>) -> Self {
         let mask = joints.map_axis(ndarray::Axis(2), |place| place.iter().all(|v| v.is_finite()));
         Self { fps, joints, mask }
+    }
+
+    /// Checks that every joint lies within 100 m of the neck or is missing; done once, where a file is read.
+    pub fn in_range(self) -> Result<Self, FarJoint> {
+        for (frame, joints) in self.joints.outer_iter().enumerate() {
+            for (joint, at) in joints.outer_iter().enumerate() {
+                let position = std::array::from_fn(|k| at[k]);
+                if position.iter().all(|v: &f32| v.is_finite()) && position.iter().any(|v| v.abs() > FARTHEST) {
+                    return Err(FarJoint { frame, joint, position });
+                }
+            }
+        }
+        Ok(self)
     }
 
     /// Number of frames T.

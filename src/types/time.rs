@@ -14,6 +14,11 @@ pub struct FrameRate {
     pub den: u32,
 }
 
+/// Rate that neither camera nor studio has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0} is no frame rate of motion: expected 1 to 1000 frames a second")]
+pub struct ImplausibleRate(pub FrameRate);
+
 /// Rate as stored in a file, where a part may be 0.
 #[derive(Deserialize)]
 struct Fraction {
@@ -54,6 +59,16 @@ impl FrameRate {
         Some(Self::new(num, den))
     }
 
+    /// Whether a camera or a studio has such a rate: 1 to 1000 frames a second.
+    pub fn is_plausible(self) -> bool {
+        (1.0..=1000.0).contains(&self.per_sec())
+    }
+
+    /// The rate if it is plausible, else what is wrong with it.
+    pub fn checked(self) -> Result<Self, ImplausibleRate> {
+        if self.is_plausible() { Ok(self) } else { Err(ImplausibleRate(self)) }
+    }
+
     /// The rate in frames a second.
     pub fn per_sec(self) -> f64 {
         f64::from(self.num) / f64::from(self.den)
@@ -84,7 +99,7 @@ impl FromStr for FrameRate {
             },
             None => number.parse().ok().and_then(Self::nearest),
         };
-        rate.filter(|rate| (1.0..=1000.0).contains(&rate.per_sec())).ok_or_else(|| {
+        rate.filter(|rate| rate.is_plausible()).ok_or_else(|| {
             format!("`{text}` is no frame rate: expected 1 to 1000 frames a second, like 15, 29.97 or 30000/1001")
         })
     }

@@ -2,12 +2,15 @@
 
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
-use crate::cli::setup::models::{chosen_models, fetch};
+use crate::cli::setup::models::fetch;
 use crate::cli::ui;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use orator::external::onnx::ModelError;
+use orator::config::Settings;
+use orator::external::onnx::{ModelError, ModelStore};
+use orator::pipeline::pose2d::models::wanted;
+use orator::pipeline::segment::speech_rule::SpeechListener;
 use orator::pipeline::{Pipeline, Selection};
 use orator::stage::artifacts::StageName;
 use serde_json::json;
@@ -47,7 +50,7 @@ fn stage_parser() -> impl TypedValueParser<Value = StageName> {
 }
 
 fn is_missing_model(error: &anyhow::Error) -> bool {
-    matches!(error.downcast_ref(), Some(ModelError::Missing { .. } | ModelError::NoLibrary { .. }))
+    matches!(error.downcast_ref(), Some(ModelError::Missing { .. }))
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
@@ -60,7 +63,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let report = match pipeline.run(&selection, ui) {
         Err(error) if is_missing_model(&error) && ui.asks(&format!("{error:#}\nget the models now?")) => {
             let settings = &pipeline.config().settings;
-            fetch(&settings.models, &chosen_models(settings), None, ui)?;
+            let Settings { models, pose2d, .. } = settings;
+            let wanted: Vec<_> = wanted(pose2d).into_iter().chain(SpeechListener::wanted(settings)).collect();
+            fetch(&ModelStore::open(&models.dir)?, &wanted, None, ui)?;
             pipeline.run(&selection, ui)?
         }
         ended => ended?,

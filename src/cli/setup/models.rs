@@ -4,7 +4,7 @@ use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator::config;
-use orator::config::{ModelsConfig, Settings};
+use orator::config::Settings;
 use orator::external::onnx::{Fetched, MANIFEST_FILE, ModelEntry, ModelError, ModelOrigin, ModelState, ModelStore};
 use orator::external::onnx::{Runtime, Wanted, find_library};
 use orator::pipeline::pose2d::models;
@@ -83,10 +83,14 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
                     let entries = store.manifest().models.iter().filter(can_be_had);
                     entries.map(|entry| Wanted::Id(entry.id.clone())).collect()
                 }
-                (false, []) => chosen_models(&settings),
+                (false, []) => models::wanted(pose2d).into_iter().chain(SpeechListener::wanted(&settings)).collect(),
                 (false, ids) => ids.iter().cloned().map(Wanted::Id).collect(),
             };
-            fetch(place, &wanted, mirror.as_deref(), ui)
+            if find_library(&place.onnxruntime, &place.dir).is_err() {
+                let source = store.fetch_runtime(mirror.as_deref(), ui)?;
+                ui.say(&format!("ONNX Runtime               {source}, into {}/lib", place.dir.display()));
+            }
+            fetch(&store, &wanted, mirror.as_deref(), ui)
         }
         ModelsVerb::Add { file, like, id, licence } => {
             let entry = store.add(&runtime()?, file, like, id.as_deref(), licence)?;
@@ -115,18 +119,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     }
 }
 
-/// The models that the configuration chooses, of pictures and of sound.
-pub fn chosen_models(settings: &Settings) -> Vec<Wanted> {
-    models::wanted(&settings.pose2d).into_iter().chain(SpeechListener::wanted(settings)).collect()
-}
-
-/// Gets ONNX Runtime where it is missing. Says under which terms the models are that come, gets them, and says what was had.
-pub fn fetch(place: &ModelsConfig, wanted: &[Wanted], mirror: Option<&Path>, ui: &Ui) -> Result<Outcome> {
-    let store = ModelStore::open(&place.dir)?;
-    if find_library(&place.onnxruntime, &place.dir).is_err() {
-        let source = store.fetch_runtime(mirror, ui)?;
-        ui.say(&format!("ONNX Runtime               {source}, into {}/lib", place.dir.display()));
-    }
+/// Says under which terms the models are that come, gets them, and says what was had.
+pub fn fetch(store: &ModelStore, wanted: &[Wanted], mirror: Option<&Path>, ui: &Ui) -> Result<Outcome> {
     let mut terms = String::new();
     for entry in store.missing(wanted)? {
         let size = entry.bytes as f64 / 1e6;
@@ -148,7 +142,7 @@ pub fn fetch(place: &ModelsConfig, wanted: &[Wanted], mirror: Option<&Path>, ui:
             ModelLine { is_failure: other.is_none(), ..ModelLine::new(one.entry, "had", false, message) }
         }
     });
-    close(&lines.collect::<Vec<_>>(), ["orator run", "orator models fetch --mirror DIR"], &store, ui)
+    close(&lines.collect::<Vec<_>>(), ["orator run", "orator models fetch --mirror DIR"], store, ui)
 }
 
 fn settings(args: &Args) -> Result<Settings> {

@@ -170,7 +170,9 @@ impl LooseSample {
         let pose2d =
             Array3::from_shape_vec((n_rows, N_KEYPOINTS, 3), npy_slice::floats(&pose2d[at..])).context("pose2d.npy")?;
         let sound = read_wav(sound).context("wav")?;
-        let sample = Sample { key: self.key.clone(), motion: Motion { fps, joints, mask }, pose2d, sound, meta };
+        fps.checked().context("json: fps")?;
+        let motion = Motion { fps, joints, mask }.in_range().context("pose3d.npy")?;
+        let sample = Sample { key: self.key.clone(), motion, pose2d, sound, meta };
         sample.members()?;
         Ok(sample)
     }

@@ -26,9 +26,9 @@ pub fn read(text: &str) -> Result<Vec<Word>> {
 /// Hours, minutes and seconds with `:` between, a decimal comma or point.
 fn seconds(time: &str) -> Result<f64> {
     let mut secs = 0.0;
-    for part in time.replace(',', ".").split(':') {
+    for part in time.replace(',', ".").splitn(3, ':') {
         match part.parse::<f64>() {
-            Ok(number) if number.is_finite() && number >= 0.0 => secs = secs * 60.0 + number,
+            Ok(number) if (0.0..1e9).contains(&number) => secs = secs * 60.0 + number,
             _ => bail!("`{time}` is no time; expected 00:01:02,345"),
         }
     }

@@ -68,7 +68,10 @@ fn tier(values: &[TextGridValue], at: &mut usize) -> Result<(String, Vec<Word>)>
         let (Some(start_secs), Some(end_secs), TextGridValue::Text(word)) = (start_secs, end_secs, next()?) else {
             anyhow::bail!("tier {name}: interval {n} needs two times and a text");
         };
-        ensure!(end_secs >= start_secs, "tier {name}: interval {n} ends before it begins");
+        ensure!(
+            start_secs.is_finite() && end_secs.is_finite() && end_secs >= start_secs,
+            "tier {name}: interval {n} goes from {start_secs} to {end_secs} s"
+        );
         if !word.trim().is_empty() {
             words.push(Word { start_secs, end_secs, word: word.trim().to_owned() });
         }

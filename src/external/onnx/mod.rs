@@ -5,7 +5,6 @@
 pub mod check;
 pub mod convert;
 pub mod entry;
-pub mod error;
 mod fetch;
 pub mod manifest;
 pub mod model;
@@ -17,11 +16,11 @@ pub mod speech;
 pub mod store;
 
 pub use entry::*;
-pub use error::ModelError;
 pub use fetch::FetchSource;
 pub use manifest::MANIFEST_FILE;
 pub use manifest::Manifest;
 pub use model::Model;
+pub use model::ModelError;
 pub use model::Outputs;
 pub use model::sha256_of;
 pub use port::Port;

@@ -1,7 +1,7 @@
 //! One opened model: its file was checked against the manifest (there, the right bytes, the right names and shapes), it
 //! owns its input buffer, and it counts the seconds spent inside ONNX Runtime.
 
-use super::{ModelEntry, ModelError, ModelRole, Port, Runtime};
+use super::{ModelEntry, ModelRole, Port, Runtime};
 use anyhow::{Context, Result, anyhow};
 use ort::session::builder::GraphOptimizationLevel;
 use ort::session::{Session, SessionOutputs};
@@ -9,8 +9,36 @@ use ort::value::{Outlet, TensorElementType, TensorRef, ValueType};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 use std::io::Read as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+
+/// Why a model cannot be used: `id` is the model, `path` its file, `found` what is there instead of `expected`.
+#[derive(Debug, thiserror::Error)]
+pub enum ModelError {
+    /// The file is not there.
+    #[error(
+        "the model {id} is missing: {path} is not there; `orator models fetch` gets it, models.dir names another folder"
+    )]
+    Missing { id: String, path: PathBuf },
+    /// The file cannot be read.
+    #[error("the model {id} cannot be read: {path}: {error}")]
+    Unreadable { id: String, path: PathBuf, error: String },
+    /// The file has other bytes than those pinned.
+    #[error(
+        "the model {id} is not the one described: {path} has sha256 {found}, expected {expected}; `orator models fetch` gets the \
+         right one, `orator models add` registers this one"
+    )]
+    WrongHash { id: String, path: PathBuf, expected: String, found: String },
+    /// ONNX Runtime does not open the file.
+    #[error("the model {id} is no ONNX model this ONNX Runtime can open: {path}: {error}")]
+    NotOnnx { id: String, path: PathBuf, error: String },
+    /// An input or output, `port`, has another name, type or shape.
+    #[error(
+        "the model {id} has another layout than described: {path}: {port}: expected {expected}, found {found}; describe it in \
+         manifest.toml (`orator models add FILE --like ID`)"
+    )]
+    WrongLayout { id: String, path: PathBuf, port: String, expected: String, found: String },
+}
 
 /// A model ready to run, on one thread.
 pub struct Model {

@@ -1,6 +1,5 @@
 //! ONNX Runtime itself: its shared library is looked for and loaded when it is first needed, once a process.
 
-use super::ModelError;
 use anyhow::{Result, anyhow, bail};
 use ort::environment::Environment;
 use std::path::{Path, PathBuf};
@@ -77,10 +76,7 @@ pub fn find_library(explicit: &Path, models_dir: &Path) -> Result<PathBuf> {
         if explicit.is_file() {
             return Ok(explicit.to_owned());
         }
-        bail!(
-            "models.onnxruntime names {}, which is not a file; `orator models fetch` gets the library where it is empty",
-            explicit.display()
-        );
+        bail!("models.onnxruntime names {}, which is not a file; `make runtime` gets the library", explicit.display());
     }
     if let Some(named) = std::env::var_os(VARIABLE).map(PathBuf::from) {
         if named.is_file() {
@@ -90,10 +86,12 @@ pub fn find_library(explicit: &Path, models_dir: &Path) -> Result<PathBuf> {
     }
     let program = std::env::current_exe().and_then(std::fs::canonicalize).unwrap_or_default();
     let beside = program.ancestors().skip(1).map(|folder| folder.join("lib"));
-    beside
-        .chain([models_dir.join("lib")])
-        .find_map(|folder| library_in(&folder))
-        .ok_or_else(|| ModelError::NoLibrary { library: LIBRARY, variable: VARIABLE }.into())
+    beside.chain([models_dir.join("lib")]).find_map(|folder| library_in(&folder)).ok_or_else(|| {
+        anyhow!(
+            "the ONNX Runtime library ({LIBRARY}) was not found; `orator models fetch` gets it, models.onnxruntime or {VARIABLE} \
+             names another"
+        )
+    })
 }
 
 /// The library in a folder; of several versions the last by name.

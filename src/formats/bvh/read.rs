@@ -48,6 +48,11 @@ pub enum Positions {
     Auto,
 }
 
+/// Positions (frames times joints) that every file may have, and those for each of its bytes: a joint that moves takes
+/// six bytes a frame at least.
+const FEW_POSITIONS: usize = 1 << 20;
+const POSITIONS_PER_BYTE: usize = 4;
+
 impl Bvh {
     /// Reads a file. Errors: unreadable, or not BVH (the message names what was expected).
     pub fn read(path: &Path) -> Result<Self> {
@@ -92,15 +97,26 @@ impl Bvh {
         words.expect("Frame")?;
         words.expect("Time:")?;
         let frame_secs = words.number()?;
-        ensure!(frame_secs > 0.0 && frame_secs.is_finite(), "Frame Time: {frame_secs}");
+        // Files round the seconds of a frame.
+        ensure!(
+            (0.000_99..=1.01).contains(&frame_secs),
+            "Frame Time: {frame_secs:?} seconds, expected 0.001 to 1 (1000 to 1 frames a second)"
+        );
+        ensure!(n_frames == 0.0 || n_channels > 0, "{n_frames} frames of no channel");
         let values: Vec<f64> =
             words.0.map(|w| w.parse().map_err(|_| anyhow!("`{w}` is no number"))).collect::<Result<_>>()?;
-        ensure!(n_frames == 0.0 || n_channels > 0, "{n_frames} frames of no channel");
         let expected = n_frames as usize * n_channels;
         ensure!(
             values.len() == expected,
             "{} numbers after Frame Time, expected {n_frames} frames x {n_channels}",
             values.len()
+        );
+        // Positions of all joints are held in memory; a file of fewer than one number for several of them is none of a body.
+        let n_positions = n_frames as usize * joints.len();
+        ensure!(
+            n_positions <= FEW_POSITIONS.max(POSITIONS_PER_BYTE * text.len()),
+            "{n_frames} frames of {} joints with {n_channels} channels together: too few numbers for so many positions",
+            joints.len()
         );
         Ok(Self { joints, frame_secs, n_frames: n_frames as usize, values, n_channels })
     }
@@ -263,6 +279,8 @@ mod tests {
             (good.replace("Frames: 1", "Frames: 2"), "9 numbers"),
             (good.replace("Frames: 1", "Frames: -1"), "Frames: -1"),
             (good.replace("0.04", "0"), "Frame Time"),
+            (good.replace("0.04", "1e-300"), "Frame Time: 1"),
+            (good.replace("0.04", "1.1"), "expected 0.001 to 1"),
             (good.replace("MOTION", "}"), "MOTION"),
             (good.replace("OFFSET 10 0 0", "OFFSET ten 0 0"), "`ten`"),
             (good[..20].to_owned(), "ends before"),
@@ -270,6 +288,22 @@ mod tests {
             let text = format!("{:#}", Bvh::parse(&broken).unwrap_err());
             assert!(text.contains(says), "{text}");
         }
+    }
+
+    #[test]
+    fn counts_beyond_the_file_take_no_memory() {
+        let joints = "JOINT a { OFFSET 0 0 0 ".repeat(200) + &"} ".repeat(200);
+        let file = |channels: &str, n_frames: usize, values: &str| {
+            format!(
+                "HIERARCHY ROOT a {{ OFFSET 0 0 0 CHANNELS {channels} {joints} }} MOTION Frames: {n_frames} \
+                 Frame Time: 0.04 {values}"
+            )
+        };
+        let says = |text: &str| format!("{:#}", Bvh::parse(text).unwrap_err());
+        assert!(says(&file("0", 99_999_999, "")).contains("99999999 frames of no channel"));
+        let many = says(&file("1 Xposition", 20_000, &"0 ".repeat(20_000)));
+        assert!(many.contains("20000 frames of 201 joints with 1 channels"), "{many}");
+        assert_eq!(Bvh::parse(&file("1 Xposition", 100, &"0 ".repeat(100))).unwrap().n_frames, 100);
     }
 
     proptest::proptest! {

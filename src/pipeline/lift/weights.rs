@@ -7,7 +7,7 @@ use crate::nn::lifter::hand::HandLifter;
 use crate::nn::lifter::temporal;
 use crate::nn::params::Params;
 use anyhow::{Context, Result, ensure};
-use serde_json::Value;
+use serde::de::DeserializeOwned;
 use std::path::Path;
 
 /// The built-in weights; `models/body_lifter.md` says how they were made.
@@ -20,8 +20,8 @@ pub const MOST_FRAMES: usize = 729;
 
 /// The body lifter of a file, or the built-in one where `path` is empty.
 pub fn body(path: &Path) -> Result<BodyLifter> {
-    load(path, BODY, "body-lifter", "body", |config, params| {
-        let config: temporal::Config = serde_json::from_value(config)?;
+    load(path, BODY, "body-lifter", "body", |contents, params| {
+        let config: temporal::Config = config(contents)?;
         let own = BodyLifter::config(config.channels.clamp(1, MOST_WIDTH), &config.widths);
         let window = config.receptive_field();
         ensure!(
@@ -29,16 +29,20 @@ pub fn body(path: &Path) -> Result<BodyLifter> {
             "its network looks at {window} frames, expected 1 to {MOST_FRAMES}"
         );
         ensure!(config == own, "its network is {config:?}, expected {own:?}");
+        let (channels, blocks) = (config.channels, config.widths.len().saturating_sub(1));
+        let first = config.n_in * channels * config.widths.first().copied().unwrap_or(1);
+        contents.expect_numbers(first.saturating_add(blocks.saturating_mul(channels * channels)))?;
         Ok(BodyLifter::new(params, &config)?)
     })
 }
 
 /// The hand lifter of a file, or the built-in one where `path` is empty.
 pub fn hands(path: &Path) -> Result<HandLifter> {
-    load(path, HANDS, "hand-lifter", "hands", |config, params| {
-        let config: hand::Config = serde_json::from_value(config)?;
+    load(path, HANDS, "hand-lifter", "hands", |contents, params| {
+        let config: hand::Config = config(contents)?;
         let own = hand::Config { hidden: config.hidden.clamp(1, MOST_WIDTH), ..Default::default() };
         ensure!(config == own, "its network is {config:?}, expected {own:?}");
+        contents.expect_numbers(config.hidden * config.hidden)?;
         Ok(HandLifter::new(params, hand::NAME, &config)?)
     })
 }
@@ -48,7 +52,7 @@ fn load<T>(
     builtin: &[u8],
     kind: &str,
     part: &str,
-    make: impl Fn(Value, &mut Params) -> Result<T>,
+    make: impl Fn(&Contents, &mut Params) -> Result<T>,
 ) -> Result<T> {
     if path.as_os_str().is_empty() {
         return parse(builtin, kind, make).with_context(|| format!("the built-in {kind} does not fit this program"));
@@ -58,13 +62,18 @@ fn load<T>(
         .with_context(|| format!("{} does not hold weights of `orator train lifter --part {part}`", path.display()))
 }
 
-fn parse<T>(bytes: &[u8], kind: &str, make: impl Fn(Value, &mut Params) -> Result<T>) -> Result<T> {
-    let Contents { facts, tensors } = Contents::from_bytes(bytes)?;
-    ensure!(facts["kind"] == kind, "it is of kind {}, expected {kind}", facts["kind"]);
+fn parse<T>(bytes: &[u8], kind: &str, make: impl Fn(&Contents, &mut Params) -> Result<T>) -> Result<T> {
+    let contents = Contents::from_bytes(bytes)?;
+    let found = &contents.facts["kind"];
+    ensure!(found == kind, "it is of kind {found}, expected {kind}");
     let mut params = Params::frozen();
-    let net = make(facts["lesson"]["config"].clone(), &mut params)?;
-    params.load(&tensors)?;
+    let net = make(&contents, &mut params)?;
+    params.load(&contents.tensors)?;
     Ok(net)
+}
+
+fn config<T: DeserializeOwned>(contents: &Contents) -> Result<T> {
+    Ok(serde_json::from_value(contents.facts["lesson"]["config"].clone())?)
 }
 
 #[cfg(test)]

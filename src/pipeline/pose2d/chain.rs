@@ -7,9 +7,8 @@ use super::hands;
 use super::hands::HandTracker;
 use super::model_input::ModelInput;
 use super::palm::PalmDetector;
-use super::sides::{SideGuard, Sides};
-use super::tracking::person::Detector;
-use super::tracking::speaker::SpeakerTracker;
+use super::person::Detector;
+use super::speaker::SpeakerTracker;
 use crate::config;
 use crate::external::onnx::{ModelRole, ModelStore, Runtime};
 use crate::types::image::Image;
@@ -22,7 +21,6 @@ pub struct Chain {
     speaker: SpeakerTracker,
     body: BodyModel,
     hands: Option<HandTracker>,
-    sides: SideGuard,
     body_seen: bool,
     /// Frames since the shot began.
     n_frames: usize,
@@ -56,7 +54,6 @@ impl Chain {
             speaker: SpeakerTracker::new(person.transpose()?),
             body,
             hands: hand.transpose()?.map(|hand| HandTracker::new(hand, palm)),
-            sides: SideGuard::default(),
             body_seen: false,
             n_frames: 0,
         })
@@ -71,7 +68,6 @@ impl Chain {
     /// A new shot begins: nothing of the one before is followed.
     pub fn begin_shot(&mut self) {
         self.speaker.begin_anew();
-        self.sides.begin_anew();
         self.body_seen = false;
         self.forget_hands();
         self.n_frames = 0;
@@ -112,7 +108,6 @@ impl Chain {
             && self.speaker.recognise(image, &body.points, &mut self.body, &self.settings)?
         {
             self.forget_hands();
-            self.sides.begin_anew();
             found = self.look_for_body(image)?;
         }
         let followed = &self.speaker.track;
@@ -122,16 +117,11 @@ impl Chain {
             identity: followed.identity(),
             ..Pose2d::default()
         };
-        let Some(mut body) = found else {
+        let Some(body) = found else {
             self.forget_hands();
             self.body_seen = false;
             return Ok(pose);
         };
-        match self.sides.apply(&mut body.points, self.settings.joint_score) {
-            Sides::Kept => {}
-            Sides::Swapped => body.hands = body.hands.map(|[left, right]| [right, left]),
-            Sides::Corrected => self.forget_hands(),
-        }
         let mean = body.points.iter().map(|point| point[2]).sum::<f64>() / body.points.len() as f64;
         self.body_seen = mean >= self.settings.joint_score / 2.0;
         let [left, right] = match (&mut self.hands, body.hands) {

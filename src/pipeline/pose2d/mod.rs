@@ -1,21 +1,25 @@
 //! Stage 2: frames to 2D keypoints of the one speaker: person box, body, both hands, tracked through each shot.
-//! `decode` reads the models' outputs, one file a kind; `tracking` finds people and says who is the speaker; `body`,
-//! `hand` and `palm` ask one model each; `sides` undoes swapped sides; `region` and `hands` say where to look for a hand
-//! and when; `chain` is the way of one frame; `stage` the way of a video.
+//! `decode` reads the models' outputs, one file a kind; `person`, `body`, `hand` and `palm` ask one model each; `speaker`
+//! says who is tracked, with `tracker` (the choice), `liveness` and `appearance` (on a `patch` of the picture); `region`
+//! and `hands` say where to look for a hand and when; `chain` is the way of one frame; `stage` the way of a video.
 
+pub mod appearance;
 pub mod body;
 pub mod chain;
 pub mod decode;
 pub mod hand;
 pub mod hands;
+pub mod liveness;
 pub mod model_input;
 pub mod models;
 pub mod palm;
+pub mod patch;
+pub mod person;
 pub mod region;
-pub mod sides;
+pub mod speaker;
 pub mod stage;
 pub mod store;
-pub mod tracking;
+pub mod tracker;
 
 pub use chain::Chain;
 pub use stage::Pose2dStage;

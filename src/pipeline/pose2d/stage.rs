@@ -78,7 +78,7 @@ impl Stage for Pose2dStage {
     }
 
     fn version(&self) -> u32 {
-        5
+        4
     }
 
     fn cost(&self) -> u32 {

@@ -2,13 +2,12 @@
 //! still is the same person, which his or her colours tell (`appearance`) where two people cross.
 
 use super::appearance::Appearance;
+use super::body::BodyModel;
+use super::decode::{ScoredPoint, boxes};
 use super::liveness::LivenessTracks;
 use super::person::Detector;
 use super::tracker::{Candidate, PersonTrack, TrackerStep};
 use crate::config;
-use crate::pipeline::pose2d::body::BodyModel;
-use crate::pipeline::pose2d::decode::boxes;
-use crate::pipeline::pose2d::decode::point::ScoredPoint;
 use crate::types::image::Image;
 use crate::types::pose2d::PersonBox;
 use anyhow::{Context, Result};

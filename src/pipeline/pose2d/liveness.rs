@@ -2,8 +2,8 @@
 //! are tied into tracks, and of each track it is measured how much the picture in its box changes from look to look.
 //! `tracker` chooses whom of them to follow.
 
+use super::decode::boxes;
 use super::patch;
-use crate::pipeline::pose2d::decode::boxes;
 use crate::types::image::Image;
 use crate::types::pose2d::PersonBox;
 
@@ -112,7 +112,7 @@ fn change(before: &[f32], now: &[f32]) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use crate::pipeline::pose2d::tracking::liveness::*;
+    use super::*;
 
     /// Two boxes of noise; the right one is drawn anew in each picture.
     fn picture(frame: usize, light: u8, shift: usize) -> Image {

@@ -1,8 +1,8 @@
 //! What a person looks like: the colours of head, chest and belly, where the body's points say they are. Two people are
 //! told apart by them, one person at two times is not; faces are not looked at.
 
+use super::decode::ScoredPoint;
 use super::patch;
-use crate::pipeline::pose2d::decode::point::ScoredPoint;
 use crate::types::image::Image;
 use crate::types::pose2d::coco;
 
@@ -82,8 +82,8 @@ fn cumulated(values: impl Iterator<Item = f32>) -> [f32; BINS] {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::external::opencv::draw;
-    use crate::pipeline::pose2d::tracking::appearance::*;
 
     fn person(shirt: [u8; 3], light: f32, x: f64) -> (Image, [ScoredPoint; 17]) {
         let lit = |rgb: [u8; 3]| rgb.map(|part| (f32::from(part) * light) as u8);

@@ -2,8 +2,8 @@
 //! the reference if there is one; from then on the one who overlaps the box followed. One who proves to be a picture
 //! gives way to one who is alive, and one far from the reference to one who is near it.
 
+use super::decode::boxes;
 use super::liveness::Movement;
-use crate::pipeline::pose2d::decode::boxes;
 use crate::types::pose2d::PersonBox;
 
 /// Least overlap of a found box with the followed one to be the same person.
@@ -160,7 +160,7 @@ fn numbers(one: &PersonBox) -> [f64; 4] {
 
 #[cfg(test)]
 mod tests {
-    use crate::pipeline::pose2d::tracking::tracker::*;
+    use super::*;
 
     fn at(x: f32, width: f32, score: f32) -> Candidate {
         Candidate { person: PersonBox { x, y: 0.0, width, height: 100.0, score }, ..Candidate::default() }

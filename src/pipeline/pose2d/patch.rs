@@ -35,7 +35,7 @@ pub fn colours(image: &Image, [x, y, width, height]: [f64; 4], [columns, rows]: 
 
 #[cfg(test)]
 mod tests {
-    use crate::pipeline::pose2d::tracking::patch::*;
+    use super::*;
 
     #[test]
     fn cells_are_means_and_edges_go_on() {

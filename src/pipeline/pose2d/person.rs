@@ -1,8 +1,8 @@
 //! The person detector: all people of a picture. `tracker` chooses the speaker among them.
 
+use super::decode::{detections, yolox_grid};
+use super::model_input::ModelInput;
 use crate::external::onnx::{Decode, ModelEntry, Runtime};
-use crate::pipeline::pose2d::decode::{detections, yolox_grid};
-use crate::pipeline::pose2d::model_input::ModelInput;
 use crate::types::image::Image;
 use crate::types::pose2d::PersonBox;
 use anyhow::{Result, bail};
