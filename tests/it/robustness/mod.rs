@@ -1,7 +1,8 @@
-//! Kills, memory, bad input, lost output, privacy.
+//! Kills, memory, bad and hostile input, lost output, privacy.
 
 pub mod bad_input;
 pub mod earlier_versions;
+pub mod hostile_files;
 pub mod kill;
 pub mod memory;
 pub mod output;

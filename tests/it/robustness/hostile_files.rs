@@ -1,0 +1,172 @@
+//! Files that somebody made to do harm: names that lead out of a folder, playlists that name other files, counts that
+//! fill the memory. Each is an error that names the file, and nothing is written or read beside it.
+
+use crate::fixtures::clips::ffmpeg;
+use crate::fixtures::samples::constant_sample;
+use crate::fixtures::support::files_under;
+use crate::fixtures::write_dataset::write_dataset;
+use ndarray::Array3;
+use orator::dataset::{Dataset, Split};
+use orator::external::ffmpeg::{audio, probe};
+use orator::formats::{npy, wav};
+use orator::types::pose3d::Motion;
+use orator::types::sound::Sound;
+use orator::types::time::FrameRate;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+const FPS: FrameRate = FrameRate::new(15, 1);
+
+/// Exit code and words of the program in the folder `dir`.
+fn run(dir: &Path, args: &[&str]) -> (i32, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_orator")).current_dir(dir).args(args).output().unwrap();
+    let words = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
+    (output.status.code().unwrap_or(-1), words)
+}
+
+/// Replaces every `old` in a file.
+fn change(file: &Path, old: &str, new: &str) {
+    let text = fs::read_to_string(file).unwrap();
+    assert!(text.contains(old), "{} in {}", old, file.display());
+    fs::write(file, text.replace(old, new)).unwrap();
+}
+
+fn dataset(dir: &Path) {
+    let samples = [("one-000000", Split::Train), ("two-000000", Split::Test)];
+    let samples: Vec<_> = samples.iter().map(|(key, split)| (*split, constant_sample(key, 30, 1))).collect();
+    write_dataset(dir, "host", FPS, &samples).unwrap();
+}
+
+#[test]
+fn names_in_a_dataset_lead_out_of_no_folder() {
+    let dir = tempfile::tempdir().unwrap();
+    let outside = dir.path().join("outside").display().to_string();
+    for (file, old, new) in [
+        ("index.jsonl", "\"key\":\"one-000000\"", "\"key\":\"../../x\"".to_owned()),
+        ("index.jsonl", "\"key\":\"one-000000\"", format!("\"key\":\"{outside}\"")),
+        ("index.jsonl", "\"key\":\"one-000000\"", "\"key\":\"..\"".to_owned()),
+        ("index.jsonl", "\"key\":\"one-000000\"", "\"key\":\"a\\u0000b\"".to_owned()),
+        ("index.jsonl", "\"train-one-0000.tar\"", "\"../data/train-one-0000.tar\"".to_owned()),
+        ("info.json", "\"train-one-0000.tar\"", "\"../data/train-one-0000.tar\"".to_owned()),
+    ] {
+        let data = dir.path().join("in/data");
+        fs::create_dir_all(&data).unwrap();
+        dataset(&data);
+        change(&data.join(file), old, &new);
+        let before = files_under(dir.path());
+        let (code, errors) = run(dir.path(), &["animate", "in/data", "--format", "npy", "--out", "in/deep/out"]);
+        assert!(code == 1 && errors.contains(file) && errors.contains("is no name of a file"), "{new}: {errors}");
+        assert!(errors.contains("line 1") || file != "index.jsonl", "{errors}");
+        assert_eq!(files_under(dir.path()), before, "{new}");
+        fs::remove_dir_all(&data).unwrap();
+    }
+}
+
+#[test]
+fn shards_named_outside_a_dataset_are_not_taken_over() {
+    let dir = tempfile::tempdir().unwrap();
+    let data = dir.path().join("data");
+    fs::create_dir_all(&data).unwrap();
+    dataset(&data);
+    let entry = data.join("videos/one.json");
+    change(&entry, "\"train-one-0000.tar\"", "\"../train-one-0000.tar\"");
+    fs::copy(data.join("train-one-0000.tar"), dir.path().join("train-one-0000.tar")).unwrap();
+    let hash = |file: &Path| blake3::hash(&fs::read(file).unwrap()).to_hex().to_string();
+    let sums = data.join("checksums.b3");
+    change(&sums, "  train-one-0000.tar", "  ../train-one-0000.tar");
+    let text = fs::read_to_string(&sums).unwrap();
+    let line = text.lines().find(|line| line.ends_with("videos/one.json")).unwrap();
+    change(&sums, line, &format!("{}  videos/one.json", hash(&entry)));
+    let (code, errors) = run(dir.path(), &["import", "data", "--out", "deep/er/out", "--speaker", "host"]);
+    assert!(code == 2 && errors.contains("one.json") && errors.contains("is no name of a file"), "{code} {errors}");
+    assert!(!dir.path().join("deep/er/train-one-0000.tar").exists());
+    assert_eq!(Dataset::open(dir.path().join("deep/er/out")).unwrap().samples(Split::Train).len(), 0);
+}
+
+#[test]
+fn a_video_reads_no_other_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let sound = Sound { rate: 16_000, samples: vec![0.1; 16_000] };
+    wav::write(&at("secret.wav"), &sound).unwrap();
+    assert!(ffmpeg(dir.path(), "-f lavfi -i color=gray:size=64x64:duration=1:rate=10 secret.ts"));
+    assert!(ffmpeg(dir.path(), "-f lavfi -i color=gray:size=64x64:duration=1:rate=10 -f image2 picture%d.png"));
+    fs::copy(at("picture1.png"), at("a%d.png")).unwrap();
+    for n in 1..4 {
+        fs::copy(at("picture1.png"), at(&format!("a{n}.png"))).unwrap();
+    }
+    let secret = at("secret.ts").display().to_string();
+    for (name, text) in [
+        ("concat.mp4", "ffconcat version 1.0\nfile secret.ts\n".to_owned()),
+        ("absolute.wav", format!("ffconcat version 1.0\nfile 'file://{secret}'\n")),
+        ("hls.mp4", "#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nsecret.ts\n#EXT-X-ENDLIST\n".to_owned()),
+        ("list.m3u8", format!("#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nfile://{secret}\n#EXT-X-ENDLIST\n")),
+        (
+            "dash.mp4",
+            "<?xml version=\"1.0\"?>\n<MPD xmlns=\"urn:mpeg:dash:schema:mpd:2011\" type=\"static\"><Period/></MPD>\n"
+                .to_owned(),
+        ),
+        (
+            "session.mp4",
+            "v=0\no=- 0 0 IN IP4 127.0.0.1\ns=x\nc=IN IP4 127.0.0.1\nt=0 0\nm=audio 4 RTP/AVP 0\n".to_owned(),
+        ),
+    ] {
+        fs::write(at(name), text).unwrap();
+        let text = format!("{:#}", probe::probe(&at(name)).unwrap_err());
+        assert!(text.contains(name) && text.contains("expected a video or sound file"), "{name}: {text}");
+        assert!(audio::read_sound(&at(name)).is_err(), "{name}");
+    }
+    let text = format!("{:#}", probe::probe(&at("hls.mp4")).unwrap_err());
+    assert!(text.contains("names other files"), "{text}");
+    assert!(probe::probe(&at("a%d.png")).is_err());
+    assert!(probe::probe(&at("picture1.png")).is_ok() && probe::probe(&at("secret.ts")).is_ok());
+}
+
+#[test]
+fn sound_of_an_impossible_rate_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("slow.wav");
+    for rate in [1, 3_999, 768_001] {
+        wav::write(&path, &Sound { rate, samples: vec![0.1; 80_000] }).unwrap();
+        let text = format!("{:#}", audio::read_sound(&path).unwrap_err());
+        let expected = format!("slow.wav says that its sound has {rate} samples a second, expected 4000 to 768000");
+        assert!(text.contains(&expected), "{text}");
+    }
+    wav::write(&path, &Sound { rate: 4_000, samples: vec![0.1; 8_000] }).unwrap();
+    assert_eq!(audio::read_sound(&path).unwrap().samples.len(), 32_000);
+}
+
+#[test]
+fn joints_far_beyond_a_body_are_an_error() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("far.npy");
+    for far in [1e6f32, 2e38] {
+        let mut joints = constant_sample("a-000000", 30, 1).motion.joints;
+        joints[[7, 3, 1]] = far;
+        npy::write(&path, &Motion::from_joints(FPS, joints)).unwrap();
+        let (code, errors) = run(dir.path(), &["animate", "far.npy", "--out", "far.glb"]);
+        assert_eq!(code, 1, "{errors}");
+        assert!(errors.contains("far.npy") && errors.contains("frame 7, joint 3"), "{errors}");
+        assert!(!dir.path().join("far.glb").exists());
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn folders_that_lead_to_themselves_end() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("takes");
+    fs::create_dir(&folder).unwrap();
+    for name in ["one", "two"] {
+        std::os::unix::fs::symlink(".", folder.join(name)).unwrap();
+    }
+    let far = Array3::<f32>::zeros((4, 49, 3));
+    let text = orator::formats::authors_txt::format(&Motion::from_joints(FPS, far));
+    fs::write(folder.join("a.txt"), text).unwrap();
+    let (code, errors) = run(dir.path(), &["import", "takes", "--out", "out", "--speaker", "host"]);
+    assert!(code == 1 && errors.contains("a.txt"), "{code} {errors}");
+    let (code, errors) =
+        run(dir.path(), &["generate", "--checkpoint", "none", "--audio-folder", "takes", "--out-folder", "motions"]);
+    assert!(code == 1 && !errors.is_empty(), "{code} {errors}");
+}
