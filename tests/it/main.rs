@@ -14,6 +14,7 @@ mod dataset;
 mod evaluate;
 mod fixtures;
 mod foreign;
+mod fuzz;
 mod generate;
 mod house;
 mod keypoints;

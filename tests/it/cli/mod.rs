@@ -9,4 +9,3 @@ pub mod examples;
 pub mod guide;
 pub mod library;
 pub mod models_verb;
-mod own_video;

@@ -1,11 +1,10 @@
 //! `orator models` as a user meets it: list, fetch from a folder, check, add, and what goes wrong.
 
 use crate::fixtures::onnx_models::models;
-use crate::fixtures::skip::{real_data, skip};
+use crate::fixtures::skip::real_data;
 use orator::external::onnx::{Manifest, sha256_of};
-use std::io::Write as _;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Output};
 
 fn orator(dir: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
@@ -167,27 +166,4 @@ fn the_first_source_that_answers_is_taken() {
     command.args(["models", "fetch", "person-packed", "--models-dir"]).arg(&dir);
     let wrong = command.env("PATH", format!("{}:/usr/bin:/bin", bin.display())).output().unwrap();
     assert!(wrong.status.code() == Some(0), "the wheel is still right: {}", said(&wrong));
-}
-
-/// `script` of Debian's essential packages gives the program a terminal of its own.
-#[test]
-fn a_run_without_models_asks_on_a_terminal() {
-    let root = tempfile::tempdir().unwrap();
-    let video = root.path().join("talk.mp4");
-    std::fs::write(&video, b"no video").unwrap();
-    let config =
-        "[work]\ndir = \"work\"\n[models]\ndir = \"models\"\n[[speaker]]\nname = \"s\"\nvideos = [\"talk.mp4\"]\n";
-    std::fs::write(root.path().join("pipeline.toml"), config).unwrap();
-    let program = format!("{} run", env!("CARGO_BIN_EXE_orator"));
-    let mut command = Command::new("script");
-    command.args(["-qec", &program, "/dev/null"]).current_dir(root.path());
-    let Ok(mut running) = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn() else {
-        return skip("`script` is not there");
-    };
-    running.stdin.as_mut().unwrap().write_all(b"n\n").unwrap();
-    let ended = running.wait_with_output().unwrap();
-    let said = said(&ended);
-    assert!(said.contains("orator models fetch") && said.contains("get the models now? [y/N]"), "{said}");
-    assert_eq!(ended.status.code(), Some(1), "{said}");
-    assert!(!root.path().join("models").exists());
 }

@@ -1,0 +1,59 @@
+//! Arrays: `.npy` and `.npz` of every kind.
+
+use crate::fixtures::fuzzing::harness::{corpus, fuzz_bytes, fuzz_file};
+use orator::dataset::sample::N_KEYPOINTS;
+use orator::formats::npy_slice::{Element, Layout};
+use orator::formats::npz::Npz;
+use orator::formats::timeline_npz::Timeline;
+use orator::formats::{joints_npz, keypoints, keypoints_npz, npy};
+use orator::mocap::fingers::files as fingers;
+use orator::mocap::motion_file;
+use orator::mocap::upper_body;
+use orator::pipeline::segment::Measures;
+use orator::types::time::FrameRate;
+
+#[test]
+fn npy() {
+    let files = [corpus("arrays", "motion"), corpus("arrays", "keypoints.npy")].concat();
+    fuzz_file("npy", &files, "a.npy", |path| {
+        let _ = npy::read(path, FrameRate::new(15, 1));
+        let _ = keypoints::read(path);
+    });
+}
+
+#[test]
+fn npy_slice() {
+    let files = corpus("arrays", "slice");
+    fuzz_bytes("npy_slice", &files, |bytes| {
+        let _ = Layout::parse(bytes, bytes.len() as u64, Element::F32, &[N_KEYPOINTS, 3]);
+        let _ = Layout::parse(bytes, bytes.len() as u64, Element::Bool, &[49]);
+    });
+}
+
+#[test]
+fn npz() {
+    fuzz_file("npz", &corpus("arrays", ""), "a.npz", |path| {
+        let Ok(mut npz) = Npz::open(path) else { return };
+        for name in npz.names().to_vec() {
+            let _ = (npz.numbers(&name, &[]), npz.floats(&name, &[]), npz.bools(&name, &[]));
+            let _ = (npz.frame_rate(&name), npz.text(&name));
+        }
+    });
+}
+
+#[test]
+fn npz_of_the_pipeline() {
+    let files = ["joints", "keypoints.npz", "timeline", "measures"].map(|name| corpus("arrays", name)).concat();
+    fuzz_file("npz_of_the_pipeline", &files, "a.npz", |path| {
+        let _ = (joints_npz::read(path), keypoints_npz::read_noting(path), keypoints_npz::read_extras(path));
+        let _ = (Timeline::read(path), Measures::read(path), keypoints::read(path), motion_file::read(path, None));
+    });
+}
+
+#[test]
+fn npz_of_captures() {
+    let files = corpus("arrays", "capture");
+    fuzz_file("npz_of_captures", &files, "a.npz", |path| {
+        let _ = (orator::mocap::ted::read(path), upper_body::read(path), fingers::read(path));
+    });
+}

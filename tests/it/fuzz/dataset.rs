@@ -1,0 +1,49 @@
+//! A dataset's folder, loose shards, and the files beside them.
+
+use crate::fixtures::fuzzing::harness::{corpus, fixtures, fuzz_file, fuzz_folder};
+use orator::dataset::import::shards;
+use orator::dataset::split::SplitRecord;
+use orator::dataset::verify::verify::verify;
+use orator::dataset::write::part;
+use orator::dataset::write::part::VideoEntry;
+use orator::dataset::{Dataset, Split};
+use orator::stage::ledger::Ledger;
+use orator::stage::progress::Silent;
+
+#[test]
+fn folder() {
+    fuzz_folder("folder", &fixtures("dataset"), |dir| {
+        if let Ok(dataset) = Dataset::open(dir) {
+            for sample in Split::ALL.iter().flat_map(|split| dataset.samples(*split)) {
+                let _ = dataset.read(&sample);
+            }
+        }
+        for name in part::names(dir).unwrap_or_default() {
+            if let Ok(entry) = VideoEntry::read(&VideoEntry::path(dir, &name)) {
+                let _ = entry.codes(dir);
+            }
+        }
+    });
+}
+
+#[test]
+fn verification() {
+    fuzz_folder("verification", &fixtures("dataset"), |dir| drop(verify(dir, true, &Silent)));
+}
+
+#[test]
+fn loose_shards() {
+    fuzz_file("loose_shards", &corpus("dataset", "train"), "train-000.tar", |path| {
+        for video in shards::open(&[path.to_owned()]).videos {
+            video.samples.iter().for_each(|sample| drop(sample.read()));
+        }
+    });
+}
+
+#[test]
+fn ledgers_and_records() {
+    fuzz_file("ledgers_and_records", &corpus("texts", "stage"), "a.json", |path| {
+        let _ = (Ledger::read(path), SplitRecord::read(path));
+        let _ = orator::formats::media_json::MediaInfo::read(path);
+    });
+}

@@ -1,0 +1,24 @@
+//! Sound files: the header that the project writes, and any through ffmpeg.
+
+use crate::fixtures::fuzzing::harness::{corpus, fuzz_bytes, fuzz_file};
+use orator::external::ffmpeg::{audio, probe};
+use orator::formats::wav;
+use orator::types::sound::SAMPLE_RATE;
+
+#[test]
+fn wav_header() {
+    fuzz_bytes("wav_header", &corpus("media", "a.wav"), |bytes| {
+        if wav::n_samples(bytes, bytes.len() as u64, SAMPLE_RATE).is_ok() {
+            drop(wav::samples(&bytes[wav::HEADER_BYTES..]));
+        }
+    });
+}
+
+#[test]
+fn sound() {
+    fuzz_file("sound", &corpus("media", "a.wav"), "a.wav", |path| {
+        if probe::probe(path).is_ok() {
+            let _ = audio::read_sound(path);
+        }
+    });
+}

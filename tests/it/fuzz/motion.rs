@@ -1,0 +1,61 @@
+//! Captured motion: BVH, the authors' text, labels of hands, and a take as an import reads it.
+
+use crate::fixtures::fuzzing::harness::{corpus, fixtures, folder, fuzz_bytes, fuzz_file};
+use orator::dataset::import::find::TakeFiles;
+use orator::dataset::import::take::{ImportedTake, TakeLimits};
+use orator::formats::authors_txt;
+use orator::formats::bvh::read::{Bvh, Positions};
+use orator::mocap::captured::MotionKind;
+use orator::mocap::fingers::files as fingers;
+use orator::mocap::{motion_file, upper_body};
+use orator::types::time::FrameRate;
+
+const FPS: FrameRate = FrameRate::new(15, 1);
+
+#[test]
+fn bvh() {
+    fuzz_bytes("bvh", &corpus("motion", "a.bvh"), |bytes| {
+        if let Ok(bvh) = Bvh::parse(&String::from_utf8_lossy(bytes)) {
+            drop(bvh.positions(Positions::Auto));
+        }
+    });
+}
+
+#[test]
+fn motion_of_bvh() {
+    fuzz_file("motion_of_bvh", &corpus("motion", "a.bvh"), "a.bvh", |path| {
+        let _ = (motion_file::read(path, None), upper_body::read(path), fingers::read(path));
+    });
+}
+
+#[test]
+fn authors_text() {
+    fuzz_bytes("authors_text", &corpus("motion", "a.txt"), |bytes| {
+        if let Ok(motion) = authors_txt::parse(&String::from_utf8_lossy(bytes), FPS) {
+            let _ = motion.in_range();
+        }
+    });
+}
+
+#[test]
+fn labels_of_hands() {
+    fuzz_file("labels_of_hands", &corpus("motion", "labels"), "a.txt", |path| drop(fingers::read(path)));
+}
+
+#[test]
+fn take() {
+    let limits = TakeLimits { fps: FPS, min_frames: 1, max_apart_secs: 60.0, no_sound: true };
+    let kinds = [(MotionKind::Authors, "a.txt"), (MotionKind::Bvh, "a.bvh"), (MotionKind::Ted, "capture-ted.npz")];
+    let dir = folder();
+    let files = kinds.map(|(_, name)| {
+        let family = if name.ends_with("npz") { "arrays" } else { "motion" };
+        std::fs::read(fixtures(family).join(name)).unwrap()
+    });
+    fuzz_bytes("take", &files, |bytes| {
+        for (kind, name) in kinds {
+            let motion = dir.path().join(name);
+            std::fs::write(&motion, bytes).unwrap();
+            let _ = ImportedTake::read(&TakeFiles { kind, motion, sound: None, transcript: None }, &limits);
+        }
+    });
+}

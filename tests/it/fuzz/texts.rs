@@ -1,0 +1,78 @@
+//! Texts: transcripts, keypoints as JSON, configuration, manifest, tables, results, logs.
+
+use crate::fixtures::fuzzing::harness::{corpus, folder, fuzz_bytes, fuzz_file};
+use orator::dataset::import::transcript::Transcript;
+use orator::evaluate::table::result::StoredResult;
+use orator::external::onnx::Manifest;
+use orator::formats::keypoints;
+use orator::pipeline::batch::sounds;
+
+#[test]
+fn transcripts() {
+    let files = corpus("texts", "words");
+    let dir = folder();
+    fuzz_bytes("transcripts", &files, |bytes| {
+        for ending in ["srt", "vtt", "TextGrid", "tsv", "json", "txt"] {
+            let path = dir.path().join(format!("a.{ending}"));
+            std::fs::write(&path, bytes).unwrap();
+            if let Ok(transcript) = Transcript::read(&path) {
+                let words = &transcript.until(10.0).words;
+                assert!(words.iter().all(|word| word.start_secs.is_finite() && word.end_secs.is_finite()));
+            }
+        }
+    });
+}
+
+#[test]
+fn keypoints_of_others() {
+    let files = corpus("texts", "keypoints");
+    fuzz_file("keypoints_of_others", &files, "a.json", |path| drop(keypoints::read(path)));
+}
+
+#[test]
+fn configuration() {
+    fuzz_file("configuration", &corpus("texts", "pipeline"), "pipeline.toml", |path| {
+        let _ = orator::config::load(path, &[]);
+    });
+}
+
+#[test]
+fn settings_on_the_command_line() {
+    let files = [b"extract.fps=15".to_vec(), b"segment.shot_threshold=0.5".to_vec(), b"work.dir=\"a\"".to_vec()];
+    let dir = folder();
+    let file = dir.path().join("pipeline.toml");
+    std::fs::write(&file, "[[speaker]]\nname = \"host\"\nvideos = []\n").unwrap();
+    fuzz_bytes("settings_on_the_command_line", &files, |bytes| {
+        let _ = orator::config::load(&file, &[String::from_utf8_lossy(bytes).into_owned()]);
+    });
+}
+
+#[test]
+fn manifest() {
+    fuzz_bytes("manifest", &corpus("texts", "manifest"), |bytes| {
+        let _ = Manifest::parse(&String::from_utf8_lossy(bytes));
+    });
+}
+
+#[test]
+fn table_of_sounds() {
+    fuzz_file("table_of_sounds", &corpus("texts", "sounds"), "sounds.csv", |path| {
+        for row in sounds::of_table(path).unwrap_or_default() {
+            assert!(!row.name.starts_with('/') && !row.name.split('/').any(|part| part == ".."), "{}", row.name);
+        }
+    });
+}
+
+#[test]
+fn result_of_an_evaluation() {
+    fuzz_file("result_of_an_evaluation", &corpus("texts", "result"), "result.json", |path| {
+        let _ = StoredResult::read(path);
+    });
+}
+
+#[test]
+fn log_of_a_training() {
+    fuzz_file("log_of_a_training", &corpus("texts", "log"), "log.jsonl", |path| {
+        let _ = orator::train::log::read(path.parent().unwrap());
+    });
+}

@@ -1,0 +1,31 @@
+//! Weights: checkpoints of a speaker, lifters, spaces of movement.
+
+use crate::fixtures::fuzzing::harness::{corpus, fuzz_bytes, fuzz_file};
+use orator::formats::checkpoint::Contents;
+use orator::generate::model;
+use orator::metrics::space::{basis::Basis, embedding};
+use orator::pipeline::lift::weights;
+
+#[test]
+fn checkpoint() {
+    fuzz_bytes("checkpoint", &corpus("weights", ""), |bytes| drop(Contents::from_bytes(bytes)));
+}
+
+#[test]
+fn speaker() {
+    fuzz_file("speaker", &corpus("weights", "speaker"), "best.safetensors", |path| drop(model::load(path)));
+}
+
+#[test]
+fn lifters() {
+    fuzz_file("lifters", &corpus("weights", "lifter"), "a.safetensors", |path| {
+        let _ = (weights::hands(path), weights::body(path));
+    });
+}
+
+#[test]
+fn spaces() {
+    fuzz_bytes("spaces", &corpus("weights", ""), |bytes| {
+        let _ = (Basis::parse(bytes), embedding::parse(bytes));
+    });
+}
