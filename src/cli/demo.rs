@@ -15,7 +15,7 @@ use orator::demo::rule::dataset;
 use orator::external::opencv::png;
 use orator::generate::GestureGenerator;
 use orator::mocap::motion_file;
-use orator::stage::workdir;
+use orator::stage::workdir::{self, FolderLock};
 use orator::types::time::FrameRate;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -162,6 +162,7 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
 fn speak(dir: &Path, hours: f64, seed: u64, ui: &Ui) -> Result<Outcome> {
     let clips = dataset::clips(hours, seed)?;
     let out = std::path::absolute(dir)?;
+    let _lock = FolderLock::exclusive(&out)?;
     ensure!(!workdir::has_files(&out), "{} is not empty; choose another folder", dir.display());
     let info = workdir::build_folder(&out, |attempt| dataset::write(attempt, &clips, ui))?;
     let secs: Vec<String> = info.splits.iter().map(|(name, split)| format!("{name} {:.0} s", split.secs)).collect();

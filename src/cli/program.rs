@@ -7,7 +7,8 @@ use super::outcome::Outcome;
 use super::pipeline::{init, report, run, status};
 use super::setup::{completions, doctor, guide, models};
 use super::{animate, demo, evaluate, generate, train, ui};
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
+use orator::stage::workdir;
 use std::process::ExitCode;
 
 /// Videos of one speaker to a 3D speech-gesture dataset, and to a model that gestures like that speaker.
@@ -46,7 +47,11 @@ enum Verb {
 
 /// Parses the command line, runs the verb, reports an error, and gives the exit code.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let parsed = Cli::command().try_get_matches().and_then(|matches| {
+        workdir::announce(words(&matches));
+        Cli::from_arg_matches(&matches)
+    });
+    let cli = match parsed {
         Ok(cli) => cli,
         Err(error) => {
             let _ = error.print();
@@ -85,6 +90,16 @@ pub fn main() -> ExitCode {
             ExitCode::from(1)
         }
     }
+}
+
+/// The program and its verb, like `orator train gan`.
+fn words(matches: &ArgMatches) -> String {
+    let (mut words, mut next) = ("orator".to_owned(), matches.subcommand());
+    while let Some((word, matches)) = next {
+        words += &format!(" {word}");
+        next = matches.subcommand();
+    }
+    words
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ use super::{CHECKSUMS, INDEX, INFO, STATS};
 use crate::formats::npy_slice;
 use crate::formats::npy_slice::{Element, Layout};
 use crate::formats::wav;
+use crate::stage::workdir::FolderLock;
 use crate::types::file_name::FileName;
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
@@ -30,13 +31,19 @@ pub struct Dataset {
     stats: DatasetStats,
     samples: Vec<SampleRef>,
     shards: BTreeMap<FileName, File>,
+    /// Keeps the folder from being replaced, and its videos from being forgotten.
+    _lock: FolderLock,
 }
 
 impl Dataset {
     /// Opens the folder of one speaker (`work/dataset/<speaker>`): reads its JSON files and checks that every shard
-    /// exists with its size. Contents are checked by `read` and by `verify`.
+    /// exists with its size. Contents are checked by `read` and by `verify`. Nobody writes the folder until it is closed.
+    ///
+    /// # Errors
+    /// No dataset, a damaged one, one that is being written (`BusyFolder`).
     pub fn open(dir: impl AsRef<Path>) -> Result<Dataset> {
         let dir = dir.as_ref().to_owned();
+        let lock = FolderLock::shared(&dir)?;
         ensure!(
             dir.join(INFO).is_file(),
             "{} is no dataset: it has no {}; the dataset stage of `orator run` writes one to work/dataset/<speaker>",
@@ -86,7 +93,7 @@ impl Dataset {
             dir.join(INFO).display()
         );
         let shards = shards.into_iter().map(|(name, (file, _))| (name, file)).collect();
-        Ok(Dataset { dir, info, stats, samples, shards })
+        Ok(Dataset { dir, info, stats, samples, shards, _lock: lock })
     }
 
     /// Folder of the dataset.

@@ -8,6 +8,7 @@ use crate::stage::artifacts::StageName;
 use crate::stage::fingerprint::HashCache;
 use crate::stage::record::DirtyReason;
 use crate::stage::runner::State;
+use crate::stage::workdir::FolderLock;
 use crate::stage::{Stage, Unit, runner};
 use anyhow::Result;
 use serde::Serialize;
@@ -99,8 +100,9 @@ impl Pipeline {
     /// How the speakers of those names stand; all where none is named. Only the table of known hashes is written.
     ///
     /// # Errors
-    /// An unknown speaker.
+    /// An unknown speaker; a video that is being forgotten now (`BusyFolder`).
     pub fn status(&self, speakers: &[String]) -> Result<StatusReport> {
+        let _lock = FolderLock::shared(&self.config().settings.work.dir)?;
         let hashes = self.hashes();
         let mut report = StatusReport::default();
         for videos in self.videos(speakers)? {

@@ -5,6 +5,7 @@ use super::fingerprint::{Fingerprint, HashCache};
 use super::overall::OverallProgress;
 use super::progress::{Event, Progress};
 use super::record::{DirtyReason, Failure, Output, Record};
+use super::workdir::FolderLock;
 use super::{Report, Stage, Unit, workdir};
 use anyhow::{Context, Result, anyhow};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -169,6 +170,7 @@ fn attempt(
     fingerprint: &Fingerprint,
     progress: &dyn Progress,
 ) -> Result<Report> {
+    let _lock = stage.is_read_long().then(|| FolderLock::exclusive(folder)).transpose()?;
     let attempt = workdir::attempt_folder(folder)?;
     let finish = || -> Result<Report> {
         let report = stage.run(unit, &attempt, progress).map_err(workdir::full_disk)?;

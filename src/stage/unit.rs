@@ -65,6 +65,10 @@ pub trait Stage: Sync {
     fn common_folder(&self) -> Option<&Path> {
         None
     }
+    /// Whether others read the unit's folder for long: nobody may while the stage writes it anew.
+    fn is_read_long(&self) -> bool {
+        false
+    }
     /// Does the work: writes its files into the empty folder `out` and nowhere else.
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> anyhow::Result<Report>;
 }

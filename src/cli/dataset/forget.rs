@@ -7,12 +7,11 @@ use anyhow::{Context, Result, bail};
 use orator::config::{Config, videos};
 use orator::dataset::forget::known;
 use orator::dataset::forget::known::KnownVideo;
-use orator::dataset::forget::removal::Removal;
+use orator::dataset::forget::removal::{Removal, models_dir};
 use orator::dataset::forget::search::{Searched, search};
 use orator::stage::artifacts::{StageName, speaker_dir};
-use orator::stage::workdir;
+use orator::stage::workdir::{self, FolderLock};
 use serde_json::json;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// Forget a video, or a speaker: remove all that was derived from it, and prove by search that nothing is left.
@@ -52,9 +51,11 @@ struct ForgetTask {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    let (task, _lock) = match &args.dataset {
-        Some(dir) => (of_dataset(dir, args.video.as_deref().unwrap_or_default(), args.dry_run)?, None),
-        None => of_project(&args)?,
+    // Until the search is over, nobody brings anything back.
+    let mut locks = Vec::new();
+    let task = match &args.dataset {
+        Some(dir) => of_dataset(dir, args.video.as_deref().unwrap_or_default(), args.dry_run, &mut locks)?,
+        None => of_project(&args, &mut locks)?,
     };
     let lines: Vec<String> = task.removals.iter().flat_map(|removal| removal.lines(args.keep_models)).collect();
     let kept: Vec<&PathBuf> = task.removals.iter().filter(|_| args.keep_models).flat_map(|r| &r.models).collect();
@@ -99,10 +100,13 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     Ok(if places.is_empty() { Outcome::Done } else { Outcome::Wrong })
 }
 
-fn of_dataset(dir: &Path, wanted: &str, dry_run: bool) -> Result<ForgetTask> {
+/// What to say of a folder that others work with.
+const NOT_NOW: &str = "nothing was forgotten; what is at work would bring it back";
+
+fn of_dataset(dir: &Path, wanted: &str, dry_run: bool, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
     let dir = std::path::absolute(dir)?;
     if !dry_run {
-        workdir::restore_folder(&dir)?;
+        locks.push(FolderLock::exclusive(&dir).context(NOT_NOW)?);
     }
     let all = known::of_dataset(&dir)?;
     let video = known::one(&all, wanted, None)?;
@@ -119,15 +123,17 @@ fn of_dataset(dir: &Path, wanted: &str, dry_run: bool) -> Result<ForgetTask> {
     })
 }
 
-fn of_project(args: &Args) -> Result<(ForgetTask, Option<File>)> {
+fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
     let config = args.config.load()?;
     let work = &config.settings.work.dir;
-    let lock = if args.dry_run || !work.exists() { None } else { Some(workdir::lock(work)?) };
-    if !args.dry_run {
+    let is_locked = !args.dry_run && work.exists();
+    if is_locked {
+        locks.push(workdir::lock(work).context(NOT_NOW)?);
+        locks.push(FolderLock::exclusive(work).context(NOT_NOW)?);
         for entry in std::fs::read_dir(work.join(StageName::Dataset.as_str())).into_iter().flatten().flatten() {
             let name = entry.file_name().to_string_lossy().into_owned();
             if let Some(speaker) = name.strip_prefix('.').and_then(|name| name.strip_suffix(".old")) {
-                workdir::restore_folder(&speaker_dir(work, StageName::Dataset, speaker.trim_end_matches(".attempt")))?;
+                workdir::restore_folder(&speaker_dir(work, StageName::Dataset, speaker))?;
             }
         }
     }
@@ -138,6 +144,12 @@ fn of_project(args: &Args) -> Result<(ForgetTask, Option<File>)> {
         (None, None) => bail!("say --video or --speaker"),
     };
     let speaker = videos.first().map(|video| video.speaker.clone()).unwrap_or_default();
+    if is_locked {
+        let folders = [speaker_dir(work, StageName::Dataset, &speaker), models_dir(work, &speaker)];
+        for folder in folders.iter().filter(|folder| folder.parent().is_some_and(Path::exists)) {
+            locks.push(FolderLock::exclusive(folder).context(NOT_NOW)?);
+        }
+    }
     let others: Vec<&KnownVideo> = all.iter().filter(|k| !videos.contains(k)).collect();
     let removal = Removal::of_work(work, &speaker, &videos, &others, whole)?;
     let mut advice: Vec<String> = Vec::new();
@@ -149,7 +161,7 @@ fn of_project(args: &Args) -> Result<(ForgetTask, Option<File>)> {
     }
     advice.extend(how_to_keep_away(&config, &speaker, &videos, whole));
     let titles = if whole { vec![speaker] } else { videos.iter().map(|video| video.title()).collect() };
-    Ok((ForgetTask { titles, removals: vec![removal], folders: vec![work.to_path_buf()], advice }, lock))
+    Ok(ForgetTask { titles, removals: vec![removal], folders: vec![work.to_path_buf()], advice })
 }
 
 /// What keeps the next run from bringing the videos back; nothing, where it would not.

@@ -13,7 +13,7 @@ use orator::dataset::import::{Imported, import};
 use orator::dataset::info::About;
 use orator::dataset::{INFO, Split};
 use orator::mocap::captured::MotionKind as Found;
-use orator::stage::workdir;
+use orator::stage::workdir::{self, FolderLock};
 use orator::types::time::FrameRate;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -84,6 +84,7 @@ enum ImportKind {
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let plan = plan(&args)?;
     let out = std::path::absolute(&args.out)?;
+    let _lock = FolderLock::exclusive(&out)?;
     let taken = workdir::has_files(&out);
     ensure!(
         !taken || args.force,

@@ -12,8 +12,9 @@ use orator::evaluate::verdict::text;
 use orator::generate::GestureGenerator;
 use orator::metrics::settings::Convention;
 use orator::metrics::settings::MetricSettings;
+use orator::pipeline::batch::motion_files::model_lock;
 use orator::report::evaluation::page;
-use orator::stage::workdir;
+use orator::stage::workdir::{self, FolderLock};
 use orator::types::time::FrameRate;
 use serde::Deserialize as _;
 use serde::de::IntoDeserializer as _;
@@ -111,6 +112,9 @@ fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
         with_neck: args.with_neck,
         ..MetricSettings::default()
     };
+    // The page names what was read, so that nothing of it is forgotten before the page is written.
+    let _dataset = args.dataset.as_deref().map(FolderLock::shared).transpose()?;
+    let _model = args.checkpoint.as_deref().map(model_lock).transpose()?;
     let evaluation = evaluation(args, ui)?;
     let table = evaluation.measure(&settings, ui)?;
     let mut facts: Value = result::json(&table);

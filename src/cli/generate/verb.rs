@@ -6,7 +6,7 @@ use crate::cli::outputs::{is_same_file, names, next_output, outputs};
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail};
 use orator::generate::GestureGenerator;
-use orator::pipeline::batch::motion_files::{checkpoint_file, write_motion};
+use orator::pipeline::batch::motion_files::{checkpoint_file, model_lock, write_motion};
 use orator::pipeline::batch::{SpeechBatch, sounds};
 use orator::stage::progress::Progress as _;
 use serde_json::json;
@@ -59,6 +59,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     if checkpoint != *given {
         ui.say(&format!("checkpoint {}", checkpoint.display()));
     }
+    let _lock = model_lock(&checkpoint)?;
     let speaker = GestureGenerator::open(&checkpoint)?;
     let written = write_motion(&speaker, audio, &outputs, ui)?;
     let speed = written.secs / written.motion_secs.max(1e-6);

@@ -14,9 +14,10 @@ use orator::pipeline::lift::quality;
 use orator::pipeline::lift::quality::{ArmFigures, ClipFigures};
 use orator::pipeline::pictures;
 use orator::report::sheet::sheet::SheetClip;
+use orator::stage::Unit;
 use orator::stage::artifacts::Artifact;
 use orator::stage::progress::Progress as _;
-use orator::stage::{Unit, workdir};
+use orator::stage::workdir::{self, FolderLock};
 use orator::types::image::PictureOptions;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -66,6 +67,7 @@ struct SheetFiles {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let mut lock = None;
     let clips = match (&args.keypoints, &args.joints, &args.video) {
         (Some(keypoints), Some(joints), Some(video)) => {
             let out = args.out.clone().unwrap_or_else(|| PathBuf::from("sheet.png"));
@@ -75,7 +77,11 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             let (video, keypoints, joints) = (video.clone(), keypoints.clone(), joints.clone());
             vec![SheetFiles { title, video, pictures, keypoints, joints, out }]
         }
-        _ => of_run(&args)?,
+        _ => {
+            let pipeline = Pipeline::open(args.config.load()?)?;
+            lock = Some(FolderLock::shared(&pipeline.config().settings.work.dir)?);
+            of_run(&pipeline, &args)?
+        }
     };
     let (mut text, mut facts, mut n_failed, mut next) = (String::new(), Vec::new(), 0, None);
     for files in &clips {
@@ -94,6 +100,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             Err(error) => return Err(error.context(format!("no sheet of {}", files.title))),
         }
     }
+    drop(lock);
     if n_failed > 0 {
         text += &format!("{n_failed} of {} clips failed\n", clips.len());
     }
@@ -102,8 +109,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 }
 
 /// The lifted clips of a run that are asked for.
-fn of_run(args: &Args) -> Result<Vec<SheetFiles>> {
-    let pipeline = Pipeline::open(args.config.load()?)?;
+fn of_run(pipeline: &Pipeline, args: &Args) -> Result<Vec<SheetFiles>> {
     let config = pipeline.config();
     let work = &config.settings.work.dir;
     let folder = args.out.clone().unwrap_or_else(|| work.join("sheets"));

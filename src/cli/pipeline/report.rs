@@ -8,7 +8,7 @@ use orator::pipeline::Pipeline;
 use orator::report;
 use orator::report::ReportRequest;
 use orator::report::html::numbers::{length, percent};
-use orator::stage::workdir;
+use orator::stage::workdir::{self, FolderLock};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -34,6 +34,7 @@ pub struct Args {
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let pipeline = Pipeline::open(args.config.load()?)?;
     let (videos, settings) = (pipeline.videos(&args.speaker)?, &pipeline.config().settings);
+    let _lock = FolderLock::shared(&settings.work.dir)?;
     let out = args.out.unwrap_or_else(|| settings.work.dir.join("report.html"));
     let request = ReportRequest { settings, videos: &videos, n_pictures: args.pictures };
     let page = report::make(&request, ui);

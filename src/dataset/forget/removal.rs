@@ -18,6 +18,11 @@ use std::path::{Path, PathBuf};
 /// Marker file in a dataset while one of its videos is being forgotten.
 pub const PENDING: &str = "FORGETTING.txt";
 
+/// The folder that a speaker's model is trained into, if no other is named.
+pub fn models_dir(work: &Path, speaker: &str) -> PathBuf {
+    work.join("gan").join(speaker)
+}
+
 /// Data to remove for some videos of a speaker, or for all.
 #[derive(Clone, Debug, Default)]
 pub struct Removal {
@@ -68,7 +73,7 @@ impl Removal {
         let names_one = |path: &PathBuf| fs::read(path).is_ok_and(|bytes| super::search::is_in(&bytes, &removal.terms));
         let reports: Vec<PathBuf> = pages(work)?.into_iter().filter(names_one).collect();
         removal.paths.extend(reports);
-        let (models, dir) = (work.join("gan").join(speaker), speaker_dir(work, StageName::Dataset, speaker));
+        let (models, dir) = (models_dir(work, speaker), speaker_dir(work, StageName::Dataset, speaker));
         let names: BTreeSet<String> = videos.iter().flat_map(|video| video.parts.iter().cloned()).collect();
         let has_samples = names.iter().any(|name| dataset::has_samples(&dir, name));
         removal.models.extend(Some(models).filter(|models| models.exists() && (whole || has_samples)));
@@ -83,6 +88,7 @@ impl Removal {
         removal.paths.extend(left_over);
         let splits = artifacts::splits(work, speaker);
         removal.paths.extend(workdir::left_over(&splits));
+        removal.paths.extend(workdir::left_over(&artifacts::hashes(work)));
         match SplitRecord::read(&splits) {
             Ok(Some(mut record)) if !whole => {
                 let n = removal.clean_record(&mut record);

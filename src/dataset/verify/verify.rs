@@ -15,6 +15,7 @@ use crate::dataset::write::part::VideoEntry;
 use crate::dataset::{CHECKSUMS, INFO, LEAKAGE, README};
 use crate::stage::fingerprint::hash_file;
 use crate::stage::progress::Progress;
+use crate::stage::workdir::FolderLock;
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result, ensure};
 use std::cell::RefCell;
@@ -59,10 +60,11 @@ impl Verified {
 /// Checks the dataset in `dir`; the problems are sorted and unique.
 ///
 /// # Errors
-/// A folder that cannot be listed, or is no dataset.
+/// A folder that cannot be listed, is no dataset, or is being written (`BusyFolder`).
 pub fn verify(dir: &Path, deep: bool, progress: &dyn Progress) -> Result<Verified> {
     let is_dataset = [INFO, CHECKSUMS].iter().any(|name| dir.join(name).exists());
     ensure!(is_dataset, "{} is no dataset: it has neither {INFO} nor {CHECKSUMS}", dir.display());
+    let _lock = FolderLock::shared(dir)?;
     let mut found = Verified::default();
     let there = files_of(dir)?;
     found.n_files = there.len();

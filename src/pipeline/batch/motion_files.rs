@@ -13,6 +13,7 @@ use crate::generate::GestureGenerator;
 use crate::generate::generator::CHUNK;
 use crate::generate::model::BEST;
 use crate::stage::progress::Progress;
+use crate::stage::workdir::FolderLock;
 use crate::types::sound::SAMPLE_RATE;
 use anyhow::{Context as _, Result, ensure};
 use std::path::{Path, PathBuf};
@@ -48,6 +49,11 @@ pub fn checkpoint_file(path: &Path) -> Result<PathBuf> {
     newest
         .map(|(_, file)| file)
         .with_context(|| format!("{} holds no checkpoint (best.safetensors or step-*.safetensors)", path.display()))
+}
+
+/// Keeps the model of a checkpoint, a file or a training's folder, from being forgotten while it is in use.
+pub fn model_lock(checkpoint: &Path) -> Result<FolderLock> {
+    FolderLock::shared(if checkpoint.is_dir() { checkpoint } else { checkpoint.parent().unwrap_or(checkpoint) })
 }
 
 /// Writes the motion of `speaker` for the sound of `audio` to `outputs`. Errors name the sound.

@@ -1,11 +1,12 @@
 //! The stage: one unit a sound, whose motion goes into the common folder in each of the formats.
 
-use super::motion_files::{checkpoint_file, write_motion};
+use super::motion_files::{checkpoint_file, model_lock, write_motion};
 use super::sounds::BatchSound;
 use crate::animate::AnimationOptions;
 use crate::animate::export::file::ExportFormat;
 use crate::generate::GestureGenerator;
 use crate::stage::progress::Progress;
+use crate::stage::workdir::FolderLock;
 use crate::stage::{Input, Report, Stage, Unit};
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::json;
@@ -21,7 +22,8 @@ pub struct BatchStage {
     folder: PathBuf,
     /// Of the sounds that name none.
     checkpoint: Option<PathBuf>,
-    generators: Mutex<BTreeMap<PathBuf, Arc<GestureGenerator>>>,
+    /// The models in use, with the locks of their folders.
+    generators: Mutex<BTreeMap<PathBuf, (Arc<GestureGenerator>, FolderLock)>>,
 }
 
 impl BatchStage {
@@ -62,11 +64,12 @@ impl BatchStage {
 
     fn generator(&self, checkpoint: &Path) -> Result<Arc<GestureGenerator>> {
         let mut generators = self.generators.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        if let Some(generator) = generators.get(checkpoint) {
+        if let Some((generator, _)) = generators.get(checkpoint) {
             return Ok(generator.clone());
         }
+        let lock = model_lock(checkpoint)?;
         let generator = Arc::new(GestureGenerator::open(checkpoint)?);
-        generators.insert(checkpoint.to_owned(), generator.clone());
+        generators.insert(checkpoint.to_owned(), (generator.clone(), lock));
         Ok(generator)
     }
 }

@@ -181,6 +181,10 @@ impl Stage for DatasetStage {
         Ok(inputs)
     }
 
+    fn is_read_long(&self) -> bool {
+        true
+    }
+
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let ready = self.ready(unit);
         let failures = self.failures(unit, &ready);

@@ -21,7 +21,7 @@ use crate::nn::device;
 use crate::nn::gan::generator::Preset;
 use crate::nn::gan::generator::{Config, FRAMES_MULTIPLE};
 use crate::stage::progress::Progress;
-use crate::stage::workdir;
+use crate::stage::workdir::{self, FolderLock};
 use crate::train::log::MetricsLog;
 use crate::types::skeleton::N_BONES;
 use anyhow::{Context, Result, bail, ensure};
@@ -72,6 +72,8 @@ pub fn train(
         "{} was imported without sound, so that there is no speech to learn from; import it with its sound files",
         dataset.dir().display()
     );
+    // Others may listen to the model while it learns, and nobody may forget it.
+    let _model = FolderLock::shared(folder)?;
     let _lock = workdir::lock(folder)?;
     let resumed = resume(dataset, requested, folder, progress)?;
     let (settings, normal) = match &resumed {
