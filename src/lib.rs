@@ -43,7 +43,9 @@
 //! this table.
 //!
 //! Invariants: the same input, configuration and seed give the same bytes, whatever the number of workers. A write is
-//! an attempt, flushed, renamed (`stage::workdir`), and its record comes last. Memory does not grow with the length of
+//! an attempt, flushed, renamed (`stage::workdir`), and its record comes last. What reads a dataset or a model shares its
+//! lock, what replaces or forgets one has it alone; locks are taken in the order work folder, dataset, model, and none is
+//! waited for: who comes second is told who is at work. Memory does not grow with the length of
 //! a video, except for its keypoints. No user input panics.
 
 #![warn(missing_docs)]

@@ -2,7 +2,7 @@
 //! picture, sound. A folder of frames (OpenPose) is one video; other folders hold a file or a folder for each.
 
 use super::SpeakerConfig;
-use super::patterns::{self, OF_SOUNDS, OF_VIDEOS};
+use super::patterns::{self, OF_SOUNDS, OF_VIDEOS, SearchRoot};
 use crate::types::time::FrameRate;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
@@ -32,12 +32,12 @@ pub struct KeypointSource {
 /// The speaker's keypoints, each path once. Entries that lead to nothing are `missing`.
 pub fn of_speaker(
     speaker: &SpeakerConfig,
-    folder: &Path,
+    root: &SearchRoot,
     missing: &mut Vec<String>,
 ) -> BTreeMap<PathBuf, KeypointSource> {
     let mut paths = BTreeSet::new();
     for entry in &speaker.keypoints {
-        match of_entry(entry, folder, missing) {
+        match of_entry(entry, root, missing) {
             Ok(found) => paths.extend(found),
             Err(message) => missing.push(message),
         }
@@ -45,7 +45,7 @@ pub fn of_speaker(
     let endings = [&OF_SOUNDS[..], &OF_VIDEOS].concat();
     let mut sounds = BTreeSet::new();
     for entry in &speaker.audio {
-        match patterns::expand(entry, folder, ("sound", &endings), missing) {
+        match patterns::expand(entry, root, ("sound", &endings), missing) {
             Ok(found) => sounds.extend(found),
             Err(message) => missing.push(format!("audio: {message}")),
         }
@@ -68,16 +68,16 @@ pub fn of_speaker(
     paths.into_iter().map(source).collect()
 }
 
-fn of_entry(entry: &str, folder: &Path, missing: &mut Vec<String>) -> Result<Vec<PathBuf>, String> {
+fn of_entry(entry: &str, root: &SearchRoot, missing: &mut Vec<String>) -> Result<Vec<PathBuf>, String> {
     let mut found = Vec::new();
     let mut frames_in: BTreeMap<PathBuf, bool> = BTreeMap::new();
-    for path in patterns::matches(entry, folder, missing)? {
+    for path in patterns::matches(entry, root, missing)? {
         if path.is_dir() {
             found.extend(of_folder(&path).map_err(|error| format!("{entry}: cannot list the folder: {error}"))?);
             continue;
         }
         // A pattern may match every frame of a folder.
-        let parent = path.parent().unwrap_or(folder).to_owned();
+        let parent = path.parent().unwrap_or(&root.folder).to_owned();
         let has_frames = || is_json(&path) && entry.contains(['*', '?', '[']) && is_frame(&path);
         match *frames_in.entry(parent.clone()).or_insert_with(has_frames) {
             true => found.push(parent),
@@ -152,7 +152,7 @@ mod tests {
         write("sound/b.m4a", "");
         for entries in [&["op", "mm"][..], &["op/talk", "mm/*"], &["op/*/*.json", "mm/*.json"]] {
             let mut missing = Vec::new();
-            let found = of_speaker(&speaker(entries, &["sound"]), dir.path(), &mut missing);
+            let found = of_speaker(&speaker(entries, &["sound"]), &SearchRoot::new(dir.path(), &[]), &mut missing);
             let found: Vec<(String, Result<PathBuf, String>)> =
                 found.into_iter().map(|(path, source)| (name_of(&path), source.sound)).collect();
             assert_eq!(missing, Vec::<String>::new());
@@ -162,13 +162,15 @@ mod tests {
             assert_eq!(found, expected.map(|(name, sound)| (name.to_owned(), sound)), "{entries:?}");
         }
         let mut missing = Vec::new();
-        let found = of_speaker(&speaker(&["mm/c.json", "none/*.npz"], &[]), dir.path(), &mut missing);
+        let found =
+            of_speaker(&speaker(&["mm/c.json", "none/*.npz"], &[]), &SearchRoot::new(dir.path(), &[]), &mut missing);
         let source = &found[&dir.path().join("mm/c.json")];
         assert_eq!((source.fps, source.image_size), (Some(FrameRate::new(30_000, 1001)), None));
         assert!(source.sound.as_ref().unwrap_err().contains("write `audio = "));
         assert!(missing.len() == 1 && missing[0].contains("none/*.npz: no file matches"), "{missing:?}");
         // One of each belongs together, whatever they are called.
-        let found = of_speaker(&speaker(&["mm/c.json"], &["sound/b.m4a"]), dir.path(), &mut missing);
+        let found =
+            of_speaker(&speaker(&["mm/c.json"], &["sound/b.m4a"]), &SearchRoot::new(dir.path(), &[]), &mut missing);
         assert!(found.values().all(|source| source.sound.is_ok()));
     }
 }

@@ -3,6 +3,29 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+/// Where entries are looked for.
+#[derive(Clone, Debug)]
+pub struct SearchRoot {
+    /// The folder that they count from.
+    pub folder: PathBuf,
+    /// Folders that the program writes in: patterns pass them over.
+    own: Vec<PathBuf>,
+}
+
+impl SearchRoot {
+    /// Entries of `folder`; a folder in `own` that everything lies in is not passed over.
+    pub fn new(folder: &Path, own: &[&Path]) -> Self {
+        let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let own = own.iter().map(|path| real(path)).filter(|path| !real(folder).starts_with(path)).collect();
+        Self { folder: folder.to_owned(), own }
+    }
+
+    fn is_own(&self, path: &Path) -> bool {
+        let real = || path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        !self.own.is_empty() && { let path = real(); self.own.iter().any(|own| path.starts_with(own)) }
+    }
+}
+
 /// Endings taken for videos when a folder is named.
 pub const OF_VIDEOS: [&str; 10] = ["mp4", "mkv", "mov", "webm", "avi", "m4v", "mpg", "mpeg", "ts", "wmv"];
 /// Endings taken for sounds, beside those of videos.
@@ -15,13 +38,13 @@ const MAX_DEPTH: usize = 64;
 /// `what` is a word for such a file. A plain path is taken as it is, so that a missing file fails by itself.
 pub fn expand(
     entry: &str,
-    folder: &Path,
+    root: &SearchRoot,
     (what, endings): (&str, &[&str]),
     missing: &mut Vec<String>,
 ) -> Result<Vec<PathBuf>, String> {
-    let path = folder.join(entry);
+    let path = root.folder.join(entry);
     if !path.is_dir() {
-        return matches(entry, folder, missing);
+        return matches(entry, root, missing);
     }
     let paths: Vec<PathBuf> = list(&path)
         .map_err(|error| format!("{entry}: cannot list the folder: {error}"))?
@@ -33,8 +56,9 @@ pub fn expand(
 }
 
 /// The file or folder that an entry is, or what its pattern matches. A folder that a pattern could not look into is
-/// `missing`.
-pub fn matches(entry: &str, folder: &Path, missing: &mut Vec<String>) -> Result<Vec<PathBuf>, String> {
+/// `missing`, and so is a file whose name is no text. What the program itself wrote matches no pattern.
+pub fn matches(entry: &str, root: &SearchRoot, missing: &mut Vec<String>) -> Result<Vec<PathBuf>, String> {
+    let folder = &root.folder;
     let path = folder.join(entry);
     if path.exists() || !entry.contains(['*', '?', '[']) {
         return Ok(vec![path]);
@@ -62,7 +86,10 @@ pub fn matches(entry: &str, folder: &Path, missing: &mut Vec<String>) -> Result<
         tops.iter().for_each(|top| add_below(top, MAX_DEPTH, &mut seen, &mut folders));
         rest = after;
     }
-    let paths = found(&folders, rest)?;
+    let mut paths = found(&folders, rest)?;
+    paths.retain(|path| !root.is_own(path));
+    let nameless = folders.iter().flat_map(|folder| nameless(rest, folder));
+    missing.extend(nameless.filter(|path| !root.is_own(path)).map(|path| no_text(&path)));
     if paths.is_empty() && missing.len() == n_missing {
         Err(format!("{entry}: no file matches, looked in {}", folder.display()))
     } else {
@@ -78,6 +105,24 @@ fn add_below(folder: &Path, depth: usize, seen: &mut BTreeSet<PathBuf>, folders:
         // A folder that cannot be listed is reported where its files are looked for.
         list(folder).unwrap_or_default().iter().for_each(|path| add_below(path, depth - 1, seen, folders));
     }
+}
+
+/// Files whose names are no text, in the folder where the pattern begins; patterns do not match them.
+fn nameless(entry: &str, folder: &Path) -> Vec<PathBuf> {
+    let parts: Vec<&str> = entry.split('/').collect();
+    let n_plain = parts.iter().take_while(|part| !part.contains(['*', '?', '['])).count();
+    let begin = parts[..n_plain].iter().fold(folder.to_owned(), |folder, part| folder.join(part));
+    let last = parts.last().and_then(|last| glob::Pattern::new(last).ok());
+    let matches = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default();
+        name.to_str().is_none() && last.as_ref().is_some_and(|last| last.matches(&name.to_string_lossy()))
+    };
+    list(&begin).unwrap_or_default().into_iter().filter(matches).collect()
+}
+
+/// What is wrong with a path that is no text, and what to do.
+pub fn no_text(path: &Path) -> String {
+    format!("{}: its name is no text (UTF-8); rename it", path.display())
 }
 
 /// What lies in a folder, sorted.
@@ -109,7 +154,7 @@ mod tests {
         symlink(".", at("one")).unwrap();
         symlink(".", at("two")).unwrap();
         let found = |entry: &str| {
-            let mut paths = matches(entry, dir.path(), &mut Vec::new())?;
+            let mut paths = matches(entry, &SearchRoot::new(dir.path(), &[]), &mut Vec::new())?;
             paths.sort();
             Ok::<_, String>(paths)
         };

@@ -72,7 +72,8 @@ impl HashCache {
     /// BLAKE3 of the content of `path`, in hex; of a folder as `hash_file` says.
     pub fn hash(&self, path: &Path) -> Result<String> {
         let (bytes, changed_ns) = size_and_change(path)?;
-        let name = path.to_string_lossy().into_owned();
+        // Two names that are no text may look alike.
+        let Some(name) = path.to_str().map(str::to_owned) else { return hash_file(path) };
         if let Some(known) = self.known().get(&name)
             && known.bytes == bytes
             && known.changed_ns == changed_ns

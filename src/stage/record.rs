@@ -88,11 +88,12 @@ impl Record {
         Some(Self { fingerprint: record.fingerprint.renamed(), ..record })
     }
 
-    /// Writes the record of the unit in `folder`, and forgets an earlier failure.
+    /// Forgets an earlier failure, and writes the record of the unit in `folder`. On an error, also a late one of the disk,
+    /// no record is left to speak against the failure.
     pub fn write(&self, folder: &Path) -> Result<()> {
-        workdir::write_file(&record_path(folder), &serde_json::to_vec_pretty(self)?)?;
-        let _ = fs::remove_file(failure_path(folder));
-        Ok(())
+        Failure::forget(folder)?;
+        let path = record_path(folder);
+        workdir::write_file(&path, &serde_json::to_vec_pretty(self)?).inspect_err(|_| drop(fs::remove_file(&path)))
     }
 
     /// Takes the record of the unit in `folder` away, for good before anything else happens.
@@ -144,6 +145,11 @@ impl Failure {
     pub fn read(folder: &Path) -> Option<Self> {
         let failure: Self = serde_json::from_slice(&fs::read(failure_path(folder)).ok()?).ok()?;
         Some(Self { fingerprint: failure.fingerprint.map(Fingerprint::renamed), ..failure })
+    }
+
+    /// Takes the failure of the unit in `folder` away, if there is one.
+    pub fn forget(folder: &Path) -> Result<()> {
+        workdir::remove_file(&failure_path(folder))
     }
 
     /// Keeps the failure beside what is there.

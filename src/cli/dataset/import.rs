@@ -96,6 +96,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         let inside = out.exists() && out.starts_with(std::path::absolute(source)?);
         ensure!(!inside, "{} lies in {}, which is imported; choose another folder", out.display(), source.display());
     }
+    let datasets = args.sources.iter().filter(|source| source.join(INFO).is_file());
+    let _sources = datasets.map(|dataset| FolderLock::shared(dataset)).collect::<Result<Vec<_>>>()?;
     let imported = workdir::build_folder(&out, |attempt| import(&plan, attempt, ui))?;
     close(&imported, &args.out, ui)
 }

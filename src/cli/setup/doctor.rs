@@ -8,6 +8,7 @@ use orator::config::{Config, Settings};
 use orator::external::onnx::{ModelStore, Runtime};
 use orator::pipeline::pose2d::models;
 use orator::pipeline::segment::speech_rule::SpeechListener;
+use orator::stage::workdir;
 use serde_json::json;
 use std::path::Path;
 
@@ -111,17 +112,13 @@ fn model_checks(settings: &Settings) -> Vec<Check> {
     checks
 }
 
-/// The work folder: can it be written?
+/// The work folder: can it be written, and do locks hold there?
 fn work(dir: &Path) -> Check {
     let existing = dir.ancestors().find(|folder| folder.exists()).unwrap_or(dir);
-    let probe = existing.join(".orator-doctor");
-    match std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe)) {
-        Ok(()) => ok("work folder", dir.display().to_string()),
-        Err(error) => wrong(
-            "work folder",
-            format!("cannot write in {}: {error}", existing.display()),
-            "choose another with --set work.dir=FOLDER",
-        ),
+    match workdir::are_kept_apart(existing) {
+        Ok(true) => ok("work folder", dir.display().to_string()),
+        Ok(false) => ok("work folder", format!("{} (locks do not hold there: one command at a time)", dir.display())),
+        Err(error) => wrong("work folder", format!("{error:#}"), "choose another with --set work.dir=FOLDER"),
     }
 }
 

@@ -95,7 +95,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         "page": page,
     });
     ui.summary(&text, Some(&next), facts);
-    Ok(Outcome::Done)
+    Ok(if page.is_some() { Outcome::Done } else { Outcome::SomeFailed })
 }
 
 /// The last validation as a table, and the alarm where there is one.
@@ -120,7 +120,7 @@ fn metrics(validation: &Validation) -> String {
     text
 }
 
-/// Writes the page of the training; the training is done, so that what hinders the page is only printed.
+/// Writes the page of the training; the training is done, so that what hinders the page is said, and is no error.
 fn page(dataset: &Dataset, best: &Path, folder: &Path, ui: &Ui) -> Option<PathBuf> {
     let written = || -> Result<()> {
         let pairs = pairs(dataset, &GestureGenerator::open(best)?)?;

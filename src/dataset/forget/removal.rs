@@ -242,13 +242,13 @@ fn remove(path: &Path) -> Result<()> {
 fn terms(videos: &[&KnownVideo], others: &[&KnownVideo]) -> Vec<SearchTerm> {
     let mut terms: Vec<SearchTerm> = Vec::new();
     for video in videos {
-        terms.extend(video.work.iter().map(|name| SearchTerm::name("work name", name)));
-        terms.extend(video.parts.iter().map(|name| SearchTerm::name("dataset name", name)));
+        terms.extend(video.work.iter().flat_map(|name| SearchTerm::name("work name", name)));
+        terms.extend(video.parts.iter().flat_map(|name| SearchTerm::name("dataset name", name)));
         if !video.file.is_empty() && others.iter().all(|other| other.file != video.file) {
-            terms.push(SearchTerm::name("file name", &video.file));
+            terms.extend(SearchTerm::name("file name", &video.file));
         }
         let source = video.source.as_ref().map(|source| source.to_string_lossy().into_owned());
-        terms.extend(source.iter().map(|path| SearchTerm::name("path", path)));
+        terms.extend(source.iter().flat_map(|path| SearchTerm::name("path", path)));
         let hashed = || video.source.as_ref().and_then(|source| hash_file(source).ok());
         let content = video.content.clone().or_else(hashed);
         if let Some(content) = content.filter(|c| others.iter().all(|other| other.content.as_ref() != Some(c))) {

@@ -2,6 +2,7 @@
 //! (members of tar files are stored uncompressed). Names of files and folders are searched too.
 
 use anyhow::{Context, Result};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -17,9 +18,16 @@ pub struct SearchTerm {
 }
 
 impl SearchTerm {
-    /// Term for a name, with a boundary.
-    pub fn name(what: &str, name: &str) -> Self {
-        Self { what: format!("{what} {name}"), bytes: name.as_bytes().to_vec(), whole: true }
+    /// Terms for a name, with a boundary: as it is, and as JSON, a page and an error message write it, also one inside the
+    /// other.
+    pub fn name(what: &str, name: &str) -> Vec<Self> {
+        let mut forms = BTreeSet::from([name.to_owned()]);
+        for _ in 0..2 {
+            let more: Vec<String> = forms.iter().flat_map(|form| escaped(form)).collect();
+            forms.extend(more);
+        }
+        let term = |form: String| Self { what: format!("{what} {name}"), bytes: form.into_bytes(), whole: true };
+        forms.into_iter().map(term).collect()
     }
 
     /// Terms for hexadecimal digits: as text and as the bytes they encode.
@@ -33,6 +41,15 @@ impl SearchTerm {
         let raw = raw.map(|bytes| Self { what: format!("{what} {hex}, as bytes"), bytes, whole: false });
         [text].into_iter().chain(raw).collect()
     }
+}
+
+/// A text as it stands in JSON, in the JSON of a page, in a page, and in an error message.
+fn escaped(text: &str) -> [String; 4] {
+    let inside = |quoted: String| quoted[1..quoted.len() - 1].to_owned();
+    let json = inside(serde_json::Value::from(text).to_string());
+    let entities = [('&', "&amp;"), ('<', "&lt;"), ('>', "&gt;"), ('"', "&quot;"), ('\'', "&#39;")];
+    let page = entities.iter().fold(text.to_owned(), |text, (letter, entity)| text.replace(*letter, entity));
+    [json.replace('<', "\\u003c"), json, page, inside(format!("{text:?}"))]
 }
 
 /// Occurrence of a term.
@@ -196,7 +213,7 @@ mod tests {
 
     fn terms() -> Vec<SearchTerm> {
         let hash = blake3::hash(b"a").to_hex().to_string();
-        [vec![SearchTerm::name("file", "a.mp4")], SearchTerm::hash("content", &hash)].concat()
+        [SearchTerm::name("file", "a.mp4"), SearchTerm::hash("content", &hash)].concat()
     }
 
     #[test]
@@ -222,6 +239,19 @@ mod tests {
         assert_eq!([count("text.json"), count("binary.bin"), count("hex.txt"), count("clean.txt")], [1, 1, 1, 0]);
         assert_eq!(searched.places.iter().find(|p| p.file.ends_with("binary.bin")).unwrap().at, Some(100));
         assert_eq!(searched.n_files, 5);
+    }
+
+    #[test]
+    fn a_name_is_found_however_it_is_written() {
+        let name = "a \"b\" & <c>\n'd'.mp4";
+        let terms = SearchTerm::name("file", name);
+        let json = serde_json::json!({ "file": name, "error": format!("cannot read {name:?}") }).to_string();
+        let page = "<p>a &quot;b&quot; &amp; &lt;c&gt;\n&#39;d&#39;.mp4</p>";
+        for text in [name, &*json, page, &json.replace('<', "\\u003c"), &format!("{name:?}")] {
+            assert!(is_in(text.as_bytes(), &terms), "{text}");
+        }
+        assert!(!is_in(b"a b & c d.mp4", &terms));
+        assert_eq!(SearchTerm::name("file", "a.mp4").len(), 1);
     }
 
     #[test]

@@ -93,6 +93,10 @@ impl EntryWriter {
             !name.is_empty() && name.len() <= 64 && name.chars().all(plain),
             "{name:?} is no name of a video in a dataset: expected 1 to 64 of a-z, 0-9, - and _"
         );
+        ensure!(
+            !VideoEntry::path(dir, &name).exists(),
+            "two videos would be called {name} in the dataset; rename the file {file} or leave it out"
+        );
         let part = VideoEntry {
             schema: crate::dataset::SCHEMA,
             name: FileName::new(name)?,

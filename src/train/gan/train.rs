@@ -104,6 +104,8 @@ pub fn train(
     };
     if let Some((stored, contents)) = &resumed {
         trainer.load(stored, contents)?;
+        // One too many is left by a kill before the oldest was removed.
+        checkpoint::prune(folder, trainer.settings.keep_checkpoints)?;
     }
     with_spinning_workers(|| run(&mut trainer, &loader, &held_out, folder, progress))
 }

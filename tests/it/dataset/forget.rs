@@ -148,3 +148,18 @@ fn a_dataset_alone_forgets_too_and_a_hidden_copy_is_found() {
     assert_eq!(answer.code, 0, "{} {}", answer.json, answer.errors);
     assert!(!dataset.exists(), "it was the last video");
 }
+
+#[test]
+fn a_page_that_shows_a_name_with_quotes_and_a_line_break_goes_too() {
+    let project = Project::with_clips("forget-quote", 0, 1.0);
+    let name = "a \"talk\" & <more>\nof it.mp4";
+    fs::write(project.video(name), "no video").unwrap();
+    project.name_videos(&["videos/host"]);
+    assert_eq!(project.run(&["--to", "extract"]).code, 2, "it is no video");
+    assert_eq!(project.answer(&["report"]).code, 0);
+    let page = project.work().join("report.html");
+    assert!(fs::read_to_string(&page).unwrap().contains("&quot;talk&quot;"), "the page shows it");
+    let answer = project.answer(&["forget", "--video", name]);
+    assert_eq!(answer.code, 0, "{} {}", answer.json, answer.errors);
+    assert!(!page.exists(), "{}", answer.json);
+}

@@ -1,4 +1,4 @@
-//! Kills, memory, bad and hostile input, lost output, privacy.
+//! Kills, memory, bad and hostile input, lost output, privacy, programs side by side.
 
 pub mod bad_input;
 pub mod earlier_versions;
@@ -8,3 +8,4 @@ pub mod memory;
 pub mod output;
 pub mod privacy;
 pub mod runner;
+pub mod side_by_side;

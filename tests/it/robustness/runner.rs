@@ -1,7 +1,8 @@
 //! The runner with a toy stage: fresh is skipped, why it is not is said, a failed or panicking unit stops no other.
 
-use orator::stage::fingerprint::HashCache;
+use orator::stage::fingerprint::{Fingerprint, HashCache};
 use orator::stage::progress::{Progress, Silent};
+use orator::stage::record::{Failure, failure_path};
 use orator::stage::runner::{StageOutcome, State, run, state};
 use orator::stage::{Input, Report, Stage, Unit};
 use std::path::{Path, PathBuf};
@@ -92,4 +93,22 @@ fn a_failure_stops_no_other_and_keeps_what_was_made() {
     assert!(matches!(run(&stage, &made[..1], &work, &hashes, (1, false), &Silent)[0], StageOutcome::Failed(_)));
     assert!(matches!(state(&stage, &made[0], &work, &hashes), State::Failed(_)));
     assert_eq!(std::fs::read_to_string(work.join("shout/host/a/loud.txt")).unwrap(), "FINE!");
+}
+
+#[test]
+fn a_failure_that_is_over_does_not_stay_beside_a_record() {
+    let dir = tempfile::tempdir().unwrap();
+    let work = dir.path().join("work");
+    let hashes = HashCache::open(&work.join("hashes.json"));
+    let units = units(dir.path(), &[("a", "fine")]);
+    let stage = Shout { version: 1, mark: "!" };
+    let folder = units[0].dir(&work.join("shout"));
+    let fingerprint = Fingerprint::now(&stage, &units[0], &hashes).unwrap();
+    let fail = || Failure { fingerprint: Some(fingerprint.clone()), error: "late".into() }.write(&folder).unwrap();
+    for done in [true, false] {
+        fail();
+        let ended = run(&stage, &units, &work, &hashes, (1, false), &Silent);
+        assert!(matches!(ended[0], StageOutcome::Done(_)) == done, "{ended:?}");
+        assert!(!failure_path(&folder).exists());
+    }
 }

@@ -220,3 +220,16 @@ fn a_training_that_explodes_keeps_its_last_good_checkpoint() {
     assert!(format!("{:#}", train(&dataset, &none, &out, &Silent).unwrap_err()).contains("window"));
     assert!(train(&dataset, &GanConfig { window_frames: 50, ..settings() }, &out, &Silent).is_err());
 }
+
+#[test]
+fn a_checkpoint_that_a_kill_left_over_goes_when_the_training_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let dataset = dataset(&folder.path().join("dataset"));
+    let out = folder.path().join("out");
+    train(&dataset, &settings(), &out, &Silent).unwrap();
+    let path = |step| orator::formats::checkpoint::path(&out, step);
+    assert!(path(4).exists() && path(6).exists());
+    std::fs::copy(path(4), path(2)).unwrap();
+    train(&dataset, &settings(), &out, &Silent).unwrap();
+    assert!(!path(2).exists() && path(4).exists() && path(6).exists());
+}

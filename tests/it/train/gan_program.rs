@@ -106,3 +106,17 @@ fn each_speaker_has_a_model_that_needs_only_its_file() {
     assert!(orator(elsewhere.path(), generate).status().unwrap().success());
     assert!(elsewhere.path().join("motion.npy").is_file());
 }
+
+#[test]
+fn a_page_that_cannot_be_written_is_told_by_the_exit_code() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    project(dir);
+    std::fs::create_dir_all(dir.join("out/training.html/in the way")).unwrap();
+    let train = |steps| train(dir, "out", steps).wait().unwrap().code();
+    assert_eq!(train(2), Some(2), "the model is there, its page is not");
+    assert!(dir.join("out/best.safetensors").exists());
+    std::fs::remove_dir_all(dir.join("out/training.html")).unwrap();
+    assert_eq!(train(2), Some(0));
+    assert!(dir.join("out/training.html").is_file());
+}
