@@ -15,7 +15,7 @@ fn records(work: &Path) -> BTreeMap<String, SystemTime> {
 fn dataset(work: &Path) -> BTreeMap<String, Vec<u8>> {
     let files = files_under(&work.join("dataset")).into_iter();
     files
-        .filter(|(name, _)| !name.contains("attempt"))
+        .filter(|(name, _)| !name.contains("attempt") && !name.ends_with(".lock"))
         .map(|(name, path)| (name, std::fs::read(path).unwrap()))
         .collect()
 }

@@ -3,7 +3,7 @@
 use crate::fixtures::figures::swinging;
 use crate::fixtures::gesture_dataset::{FPS, sample};
 use crate::fixtures::skip::skip;
-use crate::fixtures::support::files_under;
+use crate::fixtures::support::{Project, files_under};
 use crate::fixtures::write_dataset::write_dataset;
 use orator::dataset::verify::verify::verify;
 use orator::dataset::{Dataset, Split};
@@ -97,18 +97,22 @@ fn readers_keep_writers_away_and_are_named() {
     assert!(!files_under(dir).iter().any(|(name, _)| name.ends_with("host.lock")), "locks go with their programs");
 }
 
-/// Runs an import over the dataset `out` under strace, which does `inject` to system calls.
-fn import_with(dir: &Path, inject: &[&str]) -> bool {
+fn has_strace() -> bool {
+    Command::new("strace").arg("-V").output().is_ok_and(|output| output.status.success())
+}
+
+/// Runs a verb under strace, which does `inject` to system calls; whether it ended well.
+fn injected(dir: &Path, inject: &[&str], verb: &str) -> bool {
     let mut command = Command::new("strace");
-    command.args(["-f", "-qq", "-o", "/dev/null", "-e", "trace=rename,renameat,renameat2"]);
+    command.args(["-f", "-qq", "-o", "/dev/null", "-e", "trace=rename,renameat,renameat2,fsync"]);
     command.args(inject.iter().flat_map(|inject| ["-e", inject])).arg(env!("CARGO_BIN_EXE_orator"));
-    command.args(["import", "new", "--speaker", "host", "--out", "out", "--force"]).current_dir(dir);
+    command.args(verb.split_whitespace()).current_dir(dir);
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status().unwrap().success()
 }
 
 #[test]
 fn a_dataset_survives_a_kill_and_a_failing_disk_at_every_rename() {
-    if !Command::new("strace").arg("-V").output().is_ok_and(|output| output.status.success()) {
+    if !has_strace() {
         return skip("no strace");
     }
     let folder = tempfile::tempdir().unwrap();
@@ -124,8 +128,9 @@ fn a_dataset_survives_a_kill_and_a_failing_disk_at_every_rename() {
         assert_eq!(code, 0, "{said}");
         bytes_under(&dir.join("out"))
     };
+    let import_with = |inject: &[&str]| injected(dir, inject, "import new --speaker host --out out --force");
     let (new, old) = (import("new"), import("first"));
-    assert!(new != old && import_with(dir, &[]) && bytes_under(&dir.join("out")) == new);
+    assert!(new != old && import_with(&[]) && bytes_under(&dir.join("out")) == new);
     let no_exchange = "inject=renameat2:error=EINVAL";
     for what in ["signal=KILL", "error=EIO"] {
         for (others, call) in [(&[][..], "renameat2"), (&[no_exchange][..], "rename,renameat")] {
@@ -133,13 +138,13 @@ fn a_dataset_survives_a_kill_and_a_failing_disk_at_every_rename() {
             for when in 1..10 {
                 import("first");
                 let stop = format!("inject={call}:{what}:when={when}");
-                let is_done = import_with(dir, &[others, &[stop.as_str()]].concat());
+                let is_done = import_with(&[others, &[stop.as_str()]].concat());
                 // What comes next finds one of them whole.
                 let (code, said) = ended(&mut orator(dir, "dataset verify --deep out"));
                 assert_eq!(code, 0, "{stop}: {said}");
                 let now = bytes_under(&dir.join("out"));
                 assert!(now == if is_done { new.clone() } else { old.clone() }, "{stop}: neither the old nor the new");
-                assert!(import_with(dir, others), "{stop}: the next import");
+                assert!(import_with(others), "{stop}: the next import");
                 assert!(bytes_under(&dir.join("out")) == new);
                 let left = files_under(dir).into_iter().filter(|(name, _)| name.starts_with(".out"));
                 assert_eq!(left.count(), 0, "{stop}: left over");
@@ -151,6 +156,28 @@ fn a_dataset_survives_a_kill_and_a_failing_disk_at_every_rename() {
             assert_eq!(n_stopped, 1 + others.len(), "{call}: renames of a replacement");
         }
     }
+}
+
+#[test]
+fn a_disk_that_fails_late_leaves_a_record_or_a_failure_and_never_both() {
+    if !has_strace() {
+        return skip("no strace");
+    }
+    let project = Project::with_clips("late", 1, 1.0);
+    for when in 1..40 {
+        let _ = std::fs::remove_dir_all(project.work());
+        // The failing call is counted in each thread; the first of them belong to the table of hashes too.
+        let fails = format!("inject=fsync:error=EIO:when={when}");
+        let is_done = injected(project.dir(), &[&fails], "run --to extract");
+        let files = files_under(&project.work().join("extract"));
+        let n = |ending: &str| files.iter().filter(|(name, _)| name.ends_with(ending)).count();
+        assert_eq!(n(".record.json") + n(".failed.json"), 1, "{fails}: {files:?}");
+        if is_done && when > 4 {
+            assert_eq!(n(".record.json"), 1);
+            return;
+        }
+    }
+    panic!("the disk fails for ever");
 }
 
 #[test]
