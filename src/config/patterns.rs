@@ -22,7 +22,10 @@ impl SearchRoot {
 
     fn is_own(&self, path: &Path) -> bool {
         let real = || path.canonicalize().unwrap_or_else(|_| path.to_owned());
-        !self.own.is_empty() && { let path = real(); self.own.iter().any(|own| path.starts_with(own)) }
+        !self.own.is_empty() && {
+            let path = real();
+            self.own.iter().any(|own| path.starts_with(own))
+        }
     }
 }
 
