@@ -94,7 +94,11 @@ impl GestureGenerator {
         let chunks = StreamingGenerator::new(&self.generator, preset, n_mel_frames, padded, chunk, mels)?;
         Ok(chunks.zip((0..n_frames).step_by(chunk)).map(move |(poses, first)| {
             let n = chunk.min(n_frames - first);
-            let poses = poses?.narrow(2, 0, n)?.flatten_all()?.to_vec1()?;
+            let poses: Vec<f32> = poses?.narrow(2, 0, n)?.flatten_all()?.to_vec1()?;
+            ensure!(
+                poses.iter().all(|number| number.is_finite()),
+                "the network makes numbers that are not finite from frame {first} on: its checkpoint was damaged, or its training failed"
+            );
             Ok(Array2::from_shape_vec((N_FEATURES, n), poses)?)
         }))
     }

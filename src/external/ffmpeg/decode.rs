@@ -5,6 +5,9 @@ use ffmpeg_next as ffmpeg;
 use ffmpeg_next::{Frame, Packet, Rational, codec, decoder, format, media};
 use std::path::{Path, PathBuf};
 
+/// Most pixels of a picture, twice those of 8K; a header of a few bytes may claim any number.
+const MOST_PIXELS: i64 = 1 << 26;
+
 /// Decoder with its position in the file.
 pub(crate) struct StreamDecoder {
     path: PathBuf,
@@ -38,6 +41,8 @@ impl StreamDecoder {
         let open = || -> Result<decoder::Opened, ffmpeg::Error> {
             let mut context = codec::Context::from_parameters(parameters)?;
             context.set_threading(codec::threading::Config { count: threads, ..Default::default() });
+            // SAFETY: the context is ours and not open yet.
+            unsafe { (*context.as_mut_ptr()).max_pixels = MOST_PIXELS };
             let mut decoder = context.decoder();
             decoder.set_packet_time_base(time_base);
             decoder.open_as(decoder::find(id).ok_or(ffmpeg::Error::DecoderNotFound)?)
