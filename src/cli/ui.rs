@@ -2,6 +2,7 @@
 
 use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressState, ProgressStyle};
 use orator::stage::progress::{PARTS, Progress, Task};
+use std::borrow::Cow;
 use std::fmt;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::Arc;
@@ -57,7 +58,7 @@ impl Ui {
     /// Writes a line on standard output. A reader who has gone away (`orator status | head`) is no failure.
     fn print(&self, line: &str) {
         let mut out = std::io::stdout();
-        if let Err(error) = writeln!(out, "{line}").and_then(|()| out.flush())
+        if let Err(error) = writeln!(out, "{}", shown(line)).and_then(|()| out.flush())
             && error.kind() != ErrorKind::BrokenPipe
         {
             self.has_lost_output.store(true, Ordering::Relaxed);
@@ -77,7 +78,13 @@ pub fn tell_when_stopped(kept: &'static str) {
 
 /// Writes a line on standard error, where that can still be written.
 pub fn note(line: &str) {
-    let _ = writeln!(std::io::stderr(), "{line}");
+    let _ = writeln!(std::io::stderr(), "{}", shown(line));
+}
+
+/// Text without control characters: words of a damaged file must not command the terminal.
+fn shown(text: &str) -> Cow<'_, str> {
+    let commands = |letter: char| letter.is_control() && !matches!(letter, '\n' | '\t');
+    if text.contains(commands) { text.replace(commands, "\u{fffd}").into() } else { text.into() }
 }
 
 impl Progress for Ui {
@@ -107,7 +114,7 @@ impl Progress for Ui {
         if self.bars.is_hidden() {
             note(line);
         } else {
-            let _ = self.bars.println(line);
+            let _ = self.bars.println(shown(line));
         }
     }
 }
@@ -134,7 +141,7 @@ impl Task for Bar {
         self.bar.inc(steps);
     }
     fn detail(&self, text: &str) {
-        self.bar.set_message(text.to_owned());
+        self.bar.set_message(shown(text).into_owned());
     }
 }
 

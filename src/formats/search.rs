@@ -43,7 +43,12 @@ fn walk(
         if path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.')) {
             continue;
         }
-        if path.is_dir() { walk(&path, depth - 1, seen, enter, files)? } else { files.push(path) }
+        match path.metadata() {
+            Ok(meta) if meta.is_dir() => walk(&path, depth - 1, seen, enter, files)?,
+            // A pipe or a device has no end.
+            Ok(meta) if !meta.is_file() => {}
+            _ => files.push(path),
+        }
     }
     Ok(())
 }

@@ -65,8 +65,10 @@ pub fn open(tars: &[PathBuf]) -> Loose {
     let mut samples: BTreeMap<String, LooseSample> = BTreeMap::new();
     for tar in tars {
         let mut unknown = BTreeMap::<String, usize>::new();
-        if let Err(error) = list(tar, &mut samples, &mut unknown) {
-            loose.failed.push((tar.clone(), format!("{error:#}")));
+        match list(tar, &mut samples, &mut unknown) {
+            Ok(0) => loose.failed.push((tar.clone(), "it holds no file".to_owned())),
+            Ok(_) => {}
+            Err(error) => loose.failed.push((tar.clone(), format!("{error:#}"))),
         }
         let name = tar.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let left_out =
@@ -83,7 +85,13 @@ pub fn open(tars: &[PathBuf]) -> Loose {
     loose
 }
 
-fn list(tar: &Path, samples: &mut BTreeMap<String, LooseSample>, unknown: &mut BTreeMap<String, usize>) -> Result<()> {
+/// Adds the members of a tar; returns the number of files in it.
+fn list(
+    tar: &Path,
+    samples: &mut BTreeMap<String, LooseSample>,
+    unknown: &mut BTreeMap<String, usize>,
+) -> Result<usize> {
+    let mut n_files = 0;
     let reading = || format!("cannot read {} as a tar file", tar.display());
     let file = File::open(tar).with_context(reading)?;
     let length = file.metadata().with_context(reading)?.len();
@@ -93,6 +101,7 @@ fn list(tar: &Path, samples: &mut BTreeMap<String, LooseSample>, unknown: &mut B
         if !entry.header().entry_type().is_file() {
             continue;
         }
+        n_files += 1;
         let path = entry.path().with_context(reading)?.into_owned();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let (key, ending) = name.split_once('.').unwrap_or((&name, ""));
@@ -110,7 +119,7 @@ fn list(tar: &Path, samples: &mut BTreeMap<String, LooseSample>, unknown: &mut B
         }
         sample.members[member].get_or_insert(place);
     }
-    Ok(())
+    Ok(n_files)
 }
 
 /// Split of a tar by its name, `train-...tar`.

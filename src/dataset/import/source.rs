@@ -117,7 +117,9 @@ impl ImportItem {
         let marks =
             if content.is_empty() { blake3::hash(stem.as_bytes()).to_hex().to_string() } else { content.clone() };
         let source = VideoSource {
-            name: name.unwrap_or_else(|| format!("{}-{}", slug(&stem), marks.get(..8).unwrap_or_default())),
+            name: name
+                .filter(|name| part::check_name(name).is_ok())
+                .unwrap_or_else(|| format!("{}-{}", slug(&stem), marks.get(..8).unwrap_or_default())),
             file: file_name(&path),
             content,
             failure: Some(format!("import: {error}")),
@@ -230,6 +232,7 @@ fn look_at_part(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedIt
         dir.display(),
         info.fps
     );
+    part::check_name(name)?;
     let part = VideoEntry::read(&VideoEntry::path(dir, name))?;
     ensure!(
         part.is_sound(dir, &part::stated_hashes(dir)),
@@ -251,6 +254,7 @@ fn look_at_part(dir: &Path, name: &str, plan: &ImportPlan) -> Result<InspectedIt
 }
 
 fn look_at_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem> {
+    part::check_name(&video.name)?;
     let fps = plan.limits.fps;
     let (mut stretches, mut measured, mut fingerprinter) =
         (Vec::<(f64, f64)>::new(), Vec::new(), Fingerprinter::default());
@@ -306,15 +310,19 @@ impl InspectedItem {
         !self.source.ledger.kept.is_empty() && self.source.failure.is_none()
     }
 
-    /// Refuses a repeated name, under a name of its own.
-    pub fn twice(mut self, nth: usize) -> Self {
-        let first = self.source.name.clone();
-        let message = format!("{first} is there already");
+    /// Refuses a repeated name.
+    pub fn twice(mut self) -> Self {
+        let message = format!("{} is there already", self.source.name);
         self.refuse(self.source.ledger.kept_secs(), 0.0, &message);
+        self
+    }
+
+    /// Replaces a name that is taken by one that depends on the number `nth`.
+    pub fn rename(&mut self, nth: usize) {
+        let first = &self.source.name;
         let mark = blake3::hash(format!("{first} {nth}").as_bytes()).to_hex();
         let stem = first.rsplit_once('-').map_or(first.as_str(), |(stem, _)| stem);
         self.source.name = format!("{stem}-{}", &mark[..8]);
-        self
     }
 
     /// Refuses an item that shares sound with videos of different splits.

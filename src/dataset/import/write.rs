@@ -16,6 +16,7 @@ use crate::dataset::write::part;
 use crate::dataset::write::writer::DatasetWriter;
 use crate::dataset::{INFO, shared_sound};
 use crate::mocap::captured::MotionKind;
+use crate::stage::counted;
 use crate::stage::ledger::Ledger;
 use crate::stage::progress::Progress;
 use anyhow::{Context, Result, ensure};
@@ -61,9 +62,8 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
     for item in &items {
         task.detail(&item.file());
         let mut one = item.inspect(plan);
-        if !names.insert(one.source.name.clone()) {
-            one = one.twice(names.len() + inspected.len());
-            names.insert(one.source.name.clone());
+        if one.is_kept() && !names.insert(one.source.name.clone()) {
+            one = one.twice();
         }
         if let (Some(codes), true) = (&one.codes, one.is_kept()) {
             one.sound = Some(part::write_sound(out, &one.source.name, codes)?);
@@ -73,6 +73,12 @@ pub fn import(plan: &ImportPlan, out: &Path, progress: &dyn Progress) -> Result<
         task.advance(1);
     }
     drop(task);
+    // What failed or is refused takes no name from what is kept. Numbers are even, as in earlier versions.
+    for (nth, one) in inspected.iter_mut().enumerate().filter(|(_, one)| !one.is_kept()) {
+        while !names.insert(one.source.name.clone()) {
+            one.rename(2 * nth);
+        }
+    }
     let kept: Vec<usize> = (0..inspected.len()).filter(|&at| inspected[at].is_kept()).collect();
     ensure!(!kept.is_empty(), "nothing can be imported: {}", first_reasons(&items, &inspected));
     let compared = compare(&inspected, &kept, out, plan.dataset.duplicate_secs)?;
@@ -197,7 +203,7 @@ fn notes(takes: &[TakeFiles]) -> Vec<String> {
     notes
 }
 
-/// First few reasons why nothing is kept.
+/// First few reasons why nothing is kept, and the number of the others.
 fn first_reasons(items: &[ImportItem], inspected: &[InspectedItem]) -> String {
     let mut reasons: BTreeMap<String, usize> = BTreeMap::new();
     let lines = items.iter().zip(inspected).map(|(item, inspected)| inspected.line(&item.file()));
@@ -209,5 +215,7 @@ fn first_reasons(items: &[ImportItem], inspected: &[InspectedItem]) -> String {
             said.push(format!("{}: {}", line.file, line.message));
         }
     }
-    said.join("; ")
+    let n_others = inspected.len() - said.len();
+    let others = if n_others > 0 { format!("; and {}", counted(n_others, "other")) } else { String::new() };
+    said.join("; ") + &others
 }

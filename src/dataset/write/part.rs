@@ -88,11 +88,7 @@ impl EntryWriter {
         max_shard_bytes: u64,
     ) -> Result<Self> {
         let VideoSource { name, file, content, made_from, ledger, bones, failure } = source;
-        let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
-        ensure!(
-            !name.is_empty() && name.len() <= 64 && name.chars().all(plain),
-            "{name:?} is no name of a video in a dataset: expected 1 to 64 of a-z, 0-9, - and _"
-        );
+        check_name(&name)?;
         ensure!(
             !VideoEntry::path(dir, &name).exists(),
             "two videos would be called {name} in the dataset; rename the file {file} or leave it out"
@@ -249,6 +245,16 @@ impl VideoEntry {
 pub fn stated_hashes(dir: &Path) -> BTreeMap<String, String> {
     let text = fs::read_to_string(dir.join(crate::dataset::CHECKSUMS)).unwrap_or_default();
     text.lines().filter_map(|line| line.split_once("  ")).map(|(hash, file)| (file.into(), hash.into())).collect()
+}
+
+/// Checks the name of a video.
+pub fn check_name(name: &str) -> Result<()> {
+    let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
+    ensure!(
+        !name.is_empty() && name.len() <= 64 && name.chars().all(plain),
+        "{name:?} is no name of a video in a dataset: expected 1 to 64 of a-z, 0-9, - and _"
+    );
+    Ok(())
 }
 
 /// Names of the videos of the dataset in `dir`, sorted.

@@ -7,6 +7,7 @@ use crate::fixtures::support::files_under;
 use crate::fixtures::write_dataset::write_dataset;
 use ndarray::Array3;
 use orator::dataset::{Dataset, Split};
+use orator::external::ffmpeg::frames::FrameReader;
 use orator::external::ffmpeg::{audio, probe};
 use orator::formats::{npy, wav};
 use orator::types::pose3d::Motion;
@@ -124,6 +125,38 @@ fn a_video_reads_no_other_file() {
 }
 
 #[test]
+fn a_picture_of_impossible_size_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    assert!(ffmpeg(dir.path(), "-f lavfi -i color=gray:size=64x64:duration=1:rate=10 -frames:v 1 picture.png"));
+    let path = dir.path().join("picture.png");
+    let mut bytes = fs::read(&path).unwrap();
+    bytes[16..20].copy_from_slice(&30_000u32.to_be_bytes());
+    bytes[20..24].copy_from_slice(&30_000u32.to_be_bytes());
+    fs::write(&path, bytes).unwrap();
+    let error = FrameReader::open(&path, FPS).err().expect("it was read");
+    assert!(format!("{error:#}").contains("picture.png"), "{error:#}");
+}
+
+#[test]
+fn an_odd_name_in_a_tar_stops_no_import() {
+    let dir = tempfile::tempdir().unwrap();
+    fs::create_dir_all(dir.path().join("in/a")).unwrap();
+    dataset(&dir.path().join("in/a"));
+    let mut tar = tar::Builder::new(fs::File::create(dir.path().join("in/odd.tar")).unwrap());
+    for name in ["Foo Bar-1.json", "..json", "x/..wav", "\u{1b}[2J-1.wav"] {
+        let mut header = tar::Header::new_ustar();
+        header.set_size(2);
+        header.as_ustar_mut().unwrap().name[..name.len()].copy_from_slice(name.as_bytes());
+        header.set_cksum();
+        tar.append(&header, &b"{}"[..]).unwrap();
+    }
+    tar.finish().unwrap();
+    let (code, words) = run(dir.path(), &["import", "in", "--out", "out", "--speaker", "host"]);
+    assert!(code == 2 && words.contains("Foo Bar") && words.contains("2 kept"), "{code} {words}");
+    assert!(!words.contains('\u{1b}'), "{words:?}");
+}
+
+#[test]
 fn sound_of_an_impossible_rate_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("slow.wav");
@@ -150,6 +183,30 @@ fn joints_far_beyond_a_body_are_an_error() {
         assert!(errors.contains("far.npy") && errors.contains("frame 7, joint 3"), "{errors}");
         assert!(!dir.path().join("far.glb").exists());
     }
+}
+
+#[test]
+fn a_failed_video_takes_no_name_from_a_good_one_and_commands_no_terminal() {
+    let dir = tempfile::tempdir().unwrap();
+    for folder in ["in/a", "in/b"] {
+        let folder = dir.path().join(folder);
+        fs::create_dir_all(&folder).unwrap();
+        dataset(&folder);
+    }
+    fs::write(dir.path().join("in/a/videos/one.json"), "no JSON").unwrap();
+    fs::write(dir.path().join("in/empty.tar"), "").unwrap();
+    fs::write(dir.path().join("in/c.bvh"), "\u{1b}[2J\u{7}").unwrap();
+    let (code, words) = run(dir.path(), &["import", "in", "--out", "out", "--speaker", "host"]);
+    assert_eq!(code, 2, "{words}");
+    assert!(words.contains("one.json is not as the dataset stage writes it"), "{words}");
+    assert!(words.contains("empty.tar: import: it holds no file"), "{words}");
+    assert!(words.contains("`\u{fffd}[2J\u{fffd}` where `HIERARCHY`"), "{words:?}");
+    let keys: Vec<String> = Split::ALL
+        .iter()
+        .flat_map(|split| Dataset::open(dir.path().join("out")).unwrap().samples(*split))
+        .map(|s| s.key.to_string())
+        .collect();
+    assert_eq!(keys, ["one-000000", "two-000000"]);
 }
 
 #[cfg(unix)]
