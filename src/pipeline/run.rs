@@ -110,7 +110,7 @@ impl Pipeline {
             .context("no run now; another folder is chosen with --set work.dir=FOLDER")?;
         for videos in &alive {
             // What is on record of a dataset counts before its turn comes.
-            workdir::restore_folder(&speaker_dir(&settings.work.dir, StageName::Dataset, &videos.speaker))?;
+            workdir::recover_folder(&speaker_dir(&settings.work.dir, StageName::Dataset, &videos.speaker))?;
         }
         let jobs = match selection.jobs.unwrap_or(settings.work.jobs) {
             0 => std::thread::available_parallelism().map_or(1, |n| n.get()),

@@ -2,8 +2,8 @@
 
 use crate::config::Settings;
 use crate::config::videos::Videos;
-use crate::dataset::Dataset;
-use crate::dataset::info::DatasetVideo;
+use crate::dataset::INFO;
+use crate::dataset::info::{DatasetInfo, DatasetVideo};
 use crate::stage::artifacts::{StageName, speaker_dir};
 use crate::types::split::Split;
 use std::collections::BTreeMap;
@@ -15,8 +15,10 @@ pub type VideoSplits = BTreeMap<String, String>;
 pub fn of_videos(settings: &Settings, videos: &[Videos]) -> VideoSplits {
     let mut splits = VideoSplits::new();
     for Videos { speaker, .. } in videos {
-        let Ok(dataset) = Dataset::open(speaker_dir(&settings.work.dir, StageName::Dataset, speaker)) else { continue };
-        let named = dataset.info().videos.iter().filter(|video| video.samples > 0);
+        // One file, which is whole also while a run replaces the dataset.
+        let info = std::fs::read(speaker_dir(&settings.work.dir, StageName::Dataset, speaker).join(INFO));
+        let info: Option<DatasetInfo> = info.ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
+        let named = info.iter().flat_map(|info| &info.videos).filter(|video| video.samples > 0);
         splits.extend(named.map(|video| (format!("{speaker}/{}", video.name), in_words(video))));
     }
     splits

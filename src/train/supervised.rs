@@ -8,6 +8,7 @@ use crate::formats::checkpoint::{Contents, expect_same};
 use crate::nn::Mode;
 use crate::nn::params::Params;
 use crate::stage::progress::Progress;
+use crate::stage::workdir::FolderLock;
 use anyhow::{Context, Result, ensure};
 use candle_core::{DType, Device, Tensor};
 use rand::SeedableRng;
@@ -110,7 +111,8 @@ pub fn start_from(training_task: &dyn TrainingTask, path: &Path) -> Result<Strin
 
 /// Trains and writes the weights to `out`. A checkpoint beside it (`<out>.checkpoint`) lets an interrupted training
 /// go on, to the same bytes, when called again with the same schedule and data; it is removed at the end. The log is
-/// `<out>.jsonl`. Gives the errors on held-out samples; with no steps that is all it does.
+/// `<out>.jsonl`. Gives the errors on held-out samples; with no steps that is all it does. One training at a time works
+/// on `out` (`BusyFolder`).
 pub fn train(
     training_task: &mut dyn TrainingTask,
     schedule: &Schedule,
@@ -120,6 +122,7 @@ pub fn train(
     if schedule.steps == 0 {
         return training_task.errors(false);
     }
+    let _lock = FolderLock::exclusive(out)?;
     // inside the pool: its own thread does not sleep and wake for every small piece of work
     rayon::scope(|_| train_until(training_task, schedule, out, schedule.steps, progress))?;
     let facts = facts(training_task, schedule);

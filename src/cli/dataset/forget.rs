@@ -132,8 +132,10 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
         locks.push(FolderLock::exclusive(work).context(NOT_NOW)?);
         for entry in std::fs::read_dir(work.join(StageName::Dataset.as_str())).into_iter().flatten().flatten() {
             let name = entry.file_name().to_string_lossy().into_owned();
-            if let Some(speaker) = name.strip_prefix('.').and_then(|name| name.strip_suffix(".old")) {
-                workdir::restore_folder(&speaker_dir(work, StageName::Dataset, speaker))?;
+            let hidden = name.strip_prefix('.').and_then(|name| name.strip_suffix(".old"));
+            if let Some(speaker) = hidden.or(Some(&*name).filter(|name| !name.starts_with('.'))) {
+                // A killed forget may have left a video there that nothing else knows any more.
+                workdir::recover_folder(&speaker_dir(work, StageName::Dataset, speaker))?;
             }
         }
     }

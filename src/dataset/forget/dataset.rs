@@ -57,7 +57,7 @@ pub fn without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
         false => Vec::new(),
     };
     if left.is_empty() {
-        return std::fs::remove_dir_all(dir).with_context(|| format!("cannot remove {}", dir.display()));
+        return remove_whole(dir).with_context(|| format!("cannot remove {}", dir.display()));
     }
     let attempt = workdir::attempt_folder(dir)?;
     let made = || -> Result<()> {
@@ -82,6 +82,23 @@ pub fn without(dir: &Path, names: &BTreeSet<String>) -> Result<()> {
         let _ = std::fs::remove_dir_all(&attempt);
     }
     made
+}
+
+/// Removes a dataset, the entries of its videos last: by them another forget after a kill knows what is to go.
+fn remove_whole(dir: &Path) -> std::io::Result<()> {
+    let entries = dir.join(part::FOLDER);
+    for folder in [dir, &entries].into_iter().filter(|folder| folder.is_dir()) {
+        for entry in std::fs::read_dir(folder)? {
+            let path = entry?.path();
+            let is_entry = folder == entries && path.extension().is_some_and(|ending| ending == "json");
+            match path.is_dir() && !path.is_symlink() {
+                _ if is_entry || path == entries => {}
+                true => std::fs::remove_dir_all(&path)?,
+                false => std::fs::remove_file(&path)?,
+            }
+        }
+    }
+    std::fs::remove_dir_all(dir)
 }
 
 /// Entry without the names of the forgotten videos.

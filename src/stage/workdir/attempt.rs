@@ -18,11 +18,7 @@ const RECENT: Duration = Duration::from_secs(60);
 /// Makes an attempt beside `target` by `create`, which must fail where something is, a link too.
 pub fn begin(target: &Path, create: impl Fn(&Path) -> Result<()>) -> Result<PathBuf> {
     static NEXT: AtomicU64 = AtomicU64::new(1);
-    for (path, process) in attempts(target) {
-        if is_stale(&path, process) {
-            remove(&path)?;
-        }
-    }
+    sweep(target)?;
     let [start, end] = name_parts(target);
     loop {
         let mut name = start.clone();
@@ -34,6 +30,12 @@ pub fn begin(target: &Path, create: impl Fn(&Path) -> Result<()>) -> Result<Path
             made => return made.map(|()| path),
         }
     }
+}
+
+/// Removes what killed programs left of their attempts at `target`.
+pub fn sweep(target: &Path) -> Result<()> {
+    let stale = attempts(target).into_iter().filter(|(path, process)| is_stale(path, *process));
+    stale.map(|(path, _)| remove(&path)).collect()
 }
 
 /// Where the folder `target` stands while two renames put another in its place.

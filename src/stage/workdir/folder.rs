@@ -50,10 +50,23 @@ pub fn attempt_folder(target: &Path) -> Result<PathBuf> {
         .with_context(|| format!("cannot write in the work folder {}", parent(target).display()))
 }
 
+/// Ends what killed programs began at `target`: the folder is put back where it stood aside, attempts are removed. For who
+/// has the folder, or the work folder, alone.
+pub fn recover_folder(target: &Path) -> Result<()> {
+    restore_folder(target)?;
+    let remove = || -> io::Result<()> {
+        if target.symlink_metadata().is_ok() {
+            attempt::remove(&attempt::moved_aside(target))?;
+        }
+        attempt::sweep(target)
+    };
+    remove().with_context(|| format!("cannot remove what a killed program left beside {}", target.display()))
+}
+
 /// Puts back what `replace_folder` had moved aside when it was killed between its two renames.
 pub fn restore_folder(target: &Path) -> Result<()> {
     let old = attempt::moved_aside(target);
-    if target.symlink_metadata().is_ok() || old.symlink_metadata().is_err() {
+    if target.symlink_metadata().is_ok() || !old.is_dir() {
         return Ok(());
     }
     match fs::rename(&old, target) {

@@ -4,7 +4,7 @@
 
 use super::attempt::is_alive;
 use super::disk::parent;
-use super::folder::restore_folder;
+use super::folder::{recover_folder, restore_folder};
 use anyhow::{Context, Result};
 use rustix::fs::OFlags;
 use rustix::io::Errno;
@@ -79,7 +79,11 @@ impl FolderLock {
         name.push(".lock");
         let path = parent(&place).join(name);
         let lock = Self { file: take(folder, &path, is_exclusive)?, path: Some(path) };
-        restore_folder(folder)?;
+        if is_exclusive {
+            recover_folder(folder)?
+        } else {
+            restore_folder(folder)?
+        }
         Ok(lock)
     }
 }

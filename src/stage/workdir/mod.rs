@@ -11,5 +11,5 @@ pub use attempt::left_over;
 pub use disk::NoSpace;
 pub(crate) use disk::full_disk;
 pub use file::{has_files, move_files, remove_file, replace, write_file};
-pub use folder::{attempt_folder, build_folder, replace_folder, restore_folder};
+pub use folder::{attempt_folder, build_folder, recover_folder, replace_folder, restore_folder};
 pub use lock::{BusyFolder, FolderLock, announce, are_kept_apart, lock};

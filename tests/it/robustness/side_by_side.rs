@@ -104,7 +104,7 @@ fn has_strace() -> bool {
 /// Runs a verb under strace, which does `inject` to system calls; whether it ended well.
 fn injected(dir: &Path, inject: &[&str], verb: &str) -> bool {
     let mut command = Command::new("strace");
-    command.args(["-f", "-qq", "-o", "/dev/null", "-e", "trace=rename,renameat,renameat2,fsync"]);
+    command.args(["-f", "-qq", "-o", "/dev/null", "-e", "trace=rename,renameat,renameat2,fsync,unlink,unlinkat,rmdir"]);
     command.args(inject.iter().flat_map(|inject| ["-e", inject])).arg(env!("CARGO_BIN_EXE_orator"));
     command.args(verb.split_whitespace()).current_dir(dir);
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status().unwrap().success()
@@ -154,6 +154,37 @@ fn a_dataset_survives_a_kill_and_a_failing_disk_at_every_rename() {
                 n_stopped += 1;
             }
             assert_eq!(n_stopped, 1 + others.len(), "{call}: renames of a replacement");
+        }
+    }
+}
+
+#[test]
+fn a_forget_that_is_killed_at_any_removal_is_finished_by_the_next() {
+    if !has_strace() {
+        return skip("no strace");
+    }
+    for is_last in [false, true] {
+        for when in 1.. {
+            let folder = tempfile::tempdir().unwrap();
+            let dir = folder.path();
+            project(dir);
+            if is_last {
+                std::fs::remove_dir_all(dir.join("work/dataset/host")).unwrap();
+                let samples = [(Split::Train, sample("a-00000000-000000", 99, 0.0))];
+                write_dataset(&dir.join("work/dataset/host"), "host", FPS, &samples).unwrap();
+            }
+            let kill = format!("inject=unlink,unlinkat,rmdir:signal=KILL:when={when}");
+            let is_done = injected(dir, &[&kill], FORGET);
+            // Where only removing the old dataset was left, the next one no longer knows the video, and removes it.
+            ended(&mut orator(dir, FORGET));
+            let told = |bytes: &[u8]| bytes.windows(10).any(|window| window == b"a-00000000");
+            for (name, bytes) in bytes_under(&dir.join("work")) {
+                assert!(!told(name.as_bytes()) && !told(&bytes), "{kill}: {name}");
+            }
+            if is_done {
+                assert!(when > 3, "killed at {when} places");
+                break;
+            }
         }
     }
 }
