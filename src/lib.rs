@@ -22,7 +22,7 @@
 //! | 1 | `math` | vectors, rotations, Procrustes, eigenvalues, filters, median and quantiles | nothing |
 //! | 1 | `stage` | how any step runs, is recorded and resumes; the ledger | nothing |
 //! | 2 | `config` | `pipeline.toml`, as written and resolved | `types stage` |
-//! | 2 | `external` | one door each for the foreign libraries: ffmpeg, OpenCV, ONNX Runtime | `types stage` |
+//! | 2 | `external` | one door each for the foreign libraries: ffmpeg, OpenCV, ONNX Runtime; the sandbox of processes | `types stage` |
 //! | 2 | `audio` | sound to features | `types` |
 //! | 2 | `motion` | the body as numbers: bones, forward kinematics, resampling, what the lifters look at | `types math` |
 //! | 3 | `formats` | every file format, read and written | `types math stage motion` |
@@ -32,7 +32,7 @@
 //! | 4 | `generate` | what a trained speaker is, and speech to motion with it | `types audio motion formats nn` |
 //! | 4 | `animate` | joints to rotations on a rig, avatar, export, drawing | `types math stage motion formats external` |
 //! | 5 | `dataset` | the dataset on disk: write, read, verify, import, forget | `types math stage config audio motion formats external mocap` |
-//! | 6 | `pipeline` | the five stages, their order, the files in which they meet; batches of speech to motion | `types math stage config external audio motion formats nn generate animate dataset` |
+//! | 6 | `pipeline` | the five stages, their order, the files in which they meet, their processes; batches of speech to motion | `types math stage config external audio motion formats nn generate animate dataset` |
 //! | 6 | `train` | optimiser, GAN, lifters, synthetic scenes, spaces of movement | `types math stage config audio motion formats nn mocap dataset metrics generate` |
 //! | 6 | `demo` | the synthetic speaker: drawn, with a known rule, and the checks against it | `types math stage audio motion formats external animate dataset metrics generate` |
 //! | 7 | `evaluate` | clips, baselines, table, verdict; the lifters' errors | `types math stage config external audio motion formats nn mocap metrics generate dataset pipeline train` |

@@ -3,6 +3,7 @@
 
 pub mod animate;
 pub mod config_args;
+pub mod confine;
 pub mod dataset;
 pub mod demo;
 pub mod evaluate;

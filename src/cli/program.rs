@@ -8,6 +8,7 @@ use super::pipeline::{init, report, run, status};
 use super::setup::{completions, doctor, guide, models};
 use super::{animate, demo, evaluate, generate, train, ui};
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
+use orator::pipeline::process::{VERB, serve};
 use orator::stage::workdir;
 use std::process::ExitCode;
 
@@ -47,6 +48,11 @@ enum Verb {
 
 /// Parses the command line, runs the verb, reports an error, and gives the exit code.
 pub fn main() -> ExitCode {
+    // Before anything else: the process of a unit restricts itself while it has one thread.
+    if std::env::args_os().nth(1).is_some_and(|verb| verb == VERB) {
+        let ended = serve().inspect_err(|error| ui::note(&format!("error: {error:#}")));
+        return if ended.is_ok() { ExitCode::SUCCESS } else { ExitCode::from(1) };
+    }
     let parsed = Cli::command().try_get_matches().and_then(|matches| {
         workdir::announce(words(&matches));
         Cli::from_arg_matches(&matches)

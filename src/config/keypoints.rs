@@ -4,6 +4,7 @@
 use super::SpeakerConfig;
 use super::patterns::{self, OF_SOUNDS, OF_VIDEOS, SearchRoot};
 use crate::types::time::FrameRate;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -19,7 +20,7 @@ const PREFIXES: [&str; 2] = ["results_", "alphapose-"];
 const SUFFIXES: [&str; 5] = ["_keypoints", "-keypoints", "_openpose", "_pose", "_landmarks"];
 
 /// What the configuration says of the keypoints of a video.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KeypointSource {
     /// Frames a second; `None`: the file must say.
     pub fps: Option<FrameRate>,

@@ -88,11 +88,13 @@ pub struct WorkConfig {
     pub dir: ConfigPath,
     /// Units worked on side by side; 0: one a core.
     pub jobs: usize,
+    /// Read videos in restricted processes of their own.
+    pub sandbox: bool,
 }
 
 impl Default for WorkConfig {
     fn default() -> Self {
-        Self { dir: "work".into(), jobs: 0 }
+        Self { dir: "work".into(), jobs: 0, sandbox: true }
     }
 }
 

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The videos of one speaker.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Videos {
     pub speaker: String,
     /// Sorted by their work names, each once.

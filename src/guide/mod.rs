@@ -20,6 +20,8 @@ pub mod evaluation {}
 pub mod models {}
 #[doc = include_str!("configuration.md")]
 pub mod configuration {}
+#[doc = include_str!("security.md")]
+pub mod security {}
 #[doc = include_str!("architecture.md")]
 pub mod architecture {}
 #[doc = include_str!("contributing.md")]

@@ -11,6 +11,7 @@ pub mod lift;
 pub mod pictures;
 pub mod pipeline;
 pub mod pose2d;
+pub mod process;
 pub mod run;
 pub mod segment;
 pub mod selection;

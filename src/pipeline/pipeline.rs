@@ -5,12 +5,14 @@ use crate::config::{Config, videos};
 use crate::stage::artifacts;
 use crate::stage::fingerprint::HashCache;
 use anyhow::{Result, ensure};
+use std::path::{Path, PathBuf};
 
 /// Videos to datasets, by one configuration. `run` does the work, `status` says how far it is.
 #[derive(Clone, Debug)]
 pub struct Pipeline {
     config: Config,
     videos: Vec<Videos>,
+    program: Option<PathBuf>,
 }
 
 impl Pipeline {
@@ -21,7 +23,13 @@ impl Pipeline {
     pub fn open(config: Config) -> Result<Self> {
         let videos = videos::of(&config);
         ensure!(!videos.is_empty(), "{} names no [[speaker]]", config.file.display());
-        Ok(Self { config, videos })
+        Ok(Self { config, videos, program: None })
+    }
+
+    /// Lets foreign files be read in restricted processes of their own, one a unit and stage, unless `work.sandbox` says
+    /// no: `program` is the program `orator`. Without it a run reads them in this process.
+    pub fn with_processes(self, program: PathBuf) -> Self {
+        Self { program: Some(program), ..self }
     }
 
     /// The configuration.
@@ -40,6 +48,16 @@ impl Pipeline {
         }
         let chosen = self.videos.iter().filter(|v| speakers.is_empty() || speakers.contains(&v.speaker));
         Ok(chosen.cloned().collect())
+    }
+
+    /// The videos of all speakers.
+    pub(super) fn all_videos(&self) -> &[Videos] {
+        &self.videos
+    }
+
+    /// The program of the processes in which foreign files are read, where they are.
+    pub(super) fn program(&self) -> Option<&Path> {
+        self.program.as_deref().filter(|_| self.config.settings.work.sandbox)
     }
 
     /// The hashes of files that are known from earlier runs.

@@ -1,10 +1,10 @@
 //! A run of the pipeline: the stages of videos, video by video, then the datasets of the speakers.
 
 use super::pipeline::Pipeline;
+use super::process::SeparateStage;
 use super::segment::speech_rule::SpeechListener;
 use super::selection::Selection;
 use super::stages;
-use crate::config::Config;
 use crate::config::videos::Videos;
 use crate::stage::artifacts::{StageName, speaker_dir};
 use crate::stage::fingerprint::HashCache;
@@ -104,7 +104,7 @@ impl Pipeline {
         }
         // What a stage needs (weights, the manifest) is looked at before hours of work, not after.
         for name in StageName::ALL.into_iter().filter(|name| selection.has(*name)) {
-            stages::build(name, self.config(), &[])?;
+            stages::build(name, self.config(), self.all_videos(), &[])?;
         }
         let _lock = workdir::lock(&settings.work.dir)
             .context("no run now; another folder is chosen with --set work.dir=FOLDER")?;
@@ -121,7 +121,7 @@ impl Pipeline {
         }
         let report = RunReport { n_speakers: alive.len(), ..RunReport::default() };
         let hashes = self.hashes();
-        let mut run = StageRun { config: self.config(), hashes: &hashes, limits: (jobs, force), progress, report };
+        let mut run = StageRun { pipeline: self, hashes: &hashes, limits: (jobs, force), progress, report };
         for videos in &alive {
             for error in &videos.missing {
                 progress.event(&Event::NoVideo { speaker: &videos.speaker, error });
@@ -148,7 +148,7 @@ impl Pipeline {
 }
 
 struct StageRun<'a> {
-    config: &'a Config,
+    pipeline: &'a Pipeline,
     hashes: &'a HashCache,
     /// Workers, and whether fresh units are worked on again.
     limits: (usize, bool),
@@ -156,15 +156,26 @@ struct StageRun<'a> {
     report: RunReport,
 }
 
-impl StageRun<'_> {
+impl<'a> StageRun<'a> {
+    /// The stage; one that works on videos in processes of their own where the pipeline has a program for them.
+    fn stage(&self, name: StageName, ready: &[Unit]) -> Result<Box<dyn Stage + 'a>> {
+        let (config, videos) = (self.pipeline.config(), self.pipeline.all_videos());
+        let stage = stages::build(name, config, videos, ready)?;
+        Ok(match self.pipeline.program() {
+            Some(program) if name != StageName::Dataset => Box::new(SeparateStage { stage, program, config, videos }),
+            _ => stage,
+        })
+    }
+
     /// Runs stages that have the same units, for everything alive; what fails is not alive for later ones. Gives the
     /// speakers of what failed.
     fn stages(&mut self, names: &[StageName], ready: &[Unit], alive: &mut [Videos]) -> Result<Vec<String>> {
         let Some(&first) = names.first() else { return Ok(Vec::new()) };
-        let units: Vec<Unit> = alive.iter().flat_map(|videos| stages::units(first, self.config, videos)).collect();
-        let stages = names.iter().map(|name| stages::build(*name, self.config, ready)).collect::<Result<Vec<_>>>()?;
+        let config = self.pipeline.config();
+        let units: Vec<Unit> = alive.iter().flat_map(|videos| stages::units(first, config, videos)).collect();
+        let stages = names.iter().map(|name| self.stage(*name, ready)).collect::<Result<Vec<_>>>()?;
         let stages: Vec<&dyn Stage> = stages.iter().map(|stage| &**stage).collect();
-        let work = &self.config.settings.work.dir;
+        let work = &config.settings.work.dir;
         let ended = runner::run_stages(&stages, &units, work, self.hashes, self.limits, self.progress);
         self.hashes.save()?;
         for name in names {
@@ -208,7 +219,7 @@ impl StageRun<'_> {
     fn ready(&self, alive: &[Videos]) -> Result<Vec<Unit>> {
         let mut all_ready = Vec::new();
         for videos in alive {
-            let ready = stages::ready(self.config, videos, self.hashes)?;
+            let ready = stages::ready(self.pipeline.config(), videos, self.hashes)?;
             for unit in videos.units.iter().filter(|unit| !ready.contains(unit)) {
                 self.progress.event(&Event::LeftOut { unit: &unit.to_string() });
             }

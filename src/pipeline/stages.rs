@@ -9,7 +9,7 @@ use super::pose2d::Pose2dStage;
 use super::segment::SegmentStage;
 use super::segment::speech_rule::SpeechListener;
 use crate::config::videos::Videos;
-use crate::config::{Config, Settings, videos};
+use crate::config::{Config, Settings};
 use crate::dataset::info::ModelUsed;
 use crate::external::onnx::{Model, ModelEntry, Runtime};
 use crate::stage::artifacts::StageName;
@@ -19,26 +19,22 @@ use crate::stage::runner::State;
 use crate::stage::{Stage, Unit};
 use anyhow::Result;
 
-/// The stage, ready to run. `ready` are the videos the dataset is made of.
+/// The stage, ready to run on `all` videos. `ready` are those the dataset is made of.
 ///
 /// # Errors
 /// A model the manifest does not have, weights that cannot be read.
-pub fn build(name: StageName, config: &Config, ready: &[Unit]) -> Result<Box<dyn Stage>> {
+pub fn build(name: StageName, config: &Config, all: &[Videos], ready: &[Unit]) -> Result<Box<dyn Stage>> {
     let settings = &config.settings;
     Ok(match name {
-        StageName::Extract => {
-            StageBySource::extract(Box::new(ExtractStage::of_config(config)), settings, &videos::of(config))
-        }
-        StageName::Pose2d => {
-            StageBySource::pose2d(Box::new(Pose2dStage::new(settings)?), settings, &videos::of(config))
-        }
+        StageName::Extract => StageBySource::extract(Box::new(ExtractStage::of_config(config)), settings, all),
+        StageName::Pose2d => StageBySource::pose2d(Box::new(Pose2dStage::new(settings)?), settings, all),
         StageName::Segment => Box::new(
             SegmentStage::new(&settings.segment, &settings.work.dir).with_speech(SpeechListener::find(settings)?),
         ),
         StageName::Lift => Box::new(LiftStage::new(&settings.lift, &settings.segment, &settings.work.dir)?),
         StageName::Dataset => Box::new(
             DatasetStage::new(settings, ready, reach_secs(&settings.lift))
-                .with_videos(videos::of(config))
+                .with_videos(all.to_vec())
                 .with_models(models_used(settings)?)
                 .with_note(SpeechListener::note(settings)?),
         ),
@@ -59,7 +55,9 @@ pub fn units(name: StageName, config: &Config, videos: &Videos) -> Vec<Unit> {
 /// # Errors
 /// Those of `build`.
 pub fn ready(config: &Config, videos: &Videos, hashes: &HashCache) -> Result<Vec<Unit>> {
-    let stages = StageName::OF_VIDEOS.into_iter().map(|name| build(name, config, &[])).collect::<Result<Vec<_>>>()?;
+    let all = std::slice::from_ref(videos);
+    let stages =
+        StageName::OF_VIDEOS.into_iter().map(|name| build(name, config, all, &[])).collect::<Result<Vec<_>>>()?;
     let state = |stage: &dyn Stage, unit: &Unit| runner::state(stage, unit, &config.settings.work.dir, hashes);
     let fresh = |unit: &&Unit| stages.iter().all(|stage| matches!(state(&**stage, unit), State::Fresh(_)));
     Ok(videos.units.iter().filter(fresh).cloned().collect())

@@ -3,7 +3,6 @@
 use super::account::{Standing, TimeAccount};
 use super::pipeline::Pipeline;
 use super::stages;
-use crate::config::Config;
 use crate::stage::artifacts::StageName;
 use crate::stage::fingerprint::HashCache;
 use crate::stage::record::DirtyReason;
@@ -113,7 +112,7 @@ impl Pipeline {
                 why: message.clone(),
             }));
             let ready = stages::ready(self.config(), &videos, &hashes).unwrap_or_default();
-            let check = StatusCheck { config: self.config(), hashes: &hashes, ready: &ready };
+            let check = StatusCheck { pipeline: self, hashes: &hashes, ready: &ready };
             let of_videos = StageName::OF_VIDEOS.map(|name| (name, check.stage(name)));
             let mut speaker_waits_for = None;
             let mut total = TimeAccount::of_speaker(&videos.speaker);
@@ -160,7 +159,7 @@ impl Pipeline {
 }
 
 struct StatusCheck<'a> {
-    config: &'a Config,
+    pipeline: &'a Pipeline,
     hashes: &'a HashCache,
     /// The videos the dataset is made of.
     ready: &'a [Unit],
@@ -168,7 +167,7 @@ struct StatusCheck<'a> {
 
 impl StatusCheck<'_> {
     fn stage(&self, name: StageName) -> Result<Box<dyn Stage>> {
-        stages::build(name, self.config, self.ready)
+        stages::build(name, self.pipeline.config(), self.pipeline.all_videos(), self.ready)
     }
 
     /// How `unit` stands at a stage, given the first stage before it that is not fresh.
@@ -186,7 +185,7 @@ impl StatusCheck<'_> {
         };
         let state = match waits_for {
             Some(earlier) => State::Stale(DirtyReason::WaitsFor { stage: earlier.to_string() }),
-            None => runner::state(&**stage, unit, &self.config.settings.work.dir, self.hashes),
+            None => runner::state(&**stage, unit, &self.pipeline.config().settings.work.dir, self.hashes),
         };
         if !matches!(state, State::Fresh(_)) {
             waits_for.get_or_insert(name);

@@ -1,8 +1,9 @@
 //! The bar of a whole run: it moves while a stage works on a video, by that stage's share of all the work.
 
-use super::progress::{PARTS, Progress, Task};
+use super::progress::{Event, PARTS, Progress, Task};
 use super::{Stage, Unit};
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The work on all units at all stages as one task of `PARTS` steps.
 pub struct OverallProgress<'a> {
@@ -11,6 +12,7 @@ pub struct OverallProgress<'a> {
     whole: f64,
     /// Work done so far, and the steps of the task it came to.
     done: Mutex<(f64, u64)>,
+    has_estimate: AtomicBool,
 }
 
 impl<'a> OverallProgress<'a> {
@@ -18,7 +20,13 @@ impl<'a> OverallProgress<'a> {
     pub fn begin(stages: &[&dyn Stage], units: &[Unit], progress: &'a dyn Progress) -> Self {
         let whole = units.iter().flat_map(|unit| stages.iter().map(|stage| work(*stage, unit))).sum();
         let label = format!("{} of {}", names(stages), super::counted(units.len(), "unit"));
-        Self { progress, task: progress.begin(&label, PARTS), whole, done: Mutex::new((0.0, 0)) }
+        Self {
+            progress,
+            task: progress.begin(&label, PARTS),
+            whole,
+            done: Mutex::new((0.0, 0)),
+            has_estimate: AtomicBool::new(false),
+        }
     }
 
     /// What the stage reports its work on the unit to.
@@ -79,6 +87,14 @@ impl Progress for UnitProgress<'_> {
     fn say(&self, line: &str) {
         self.overall.progress.say(line);
     }
+
+    fn event(&self, event: &Event<'_>) {
+        let is_told =
+            matches!(event, Event::Estimate { .. }) && self.overall.has_estimate.swap(true, Ordering::Relaxed);
+        if !is_told {
+            self.overall.progress.event(event);
+        }
+    }
 }
 
 impl Drop for UnitProgress<'_> {
@@ -110,7 +126,7 @@ mod tests {
     use crate::stage::{Input, Report};
     use anyhow::Result;
     use std::path::Path;
-    use std::sync::atomic::{AtomicU64, Ordering};
+    use std::sync::atomic::AtomicU64;
 
     struct Costly(u32);
 

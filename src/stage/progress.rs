@@ -31,6 +31,8 @@ pub enum Event<'a> {
     NoVideo { speaker: &'a str, error: &'a str },
     /// The dataset is made without this video, which is not fresh at every stage before.
     LeftOut { unit: &'a str },
+    /// How long the whole may take; said of the first unit alone.
+    Estimate { line: &'a str },
     /// What a run does without, and what would change that; said once.
     Advice { line: &'a str },
 }
@@ -43,6 +45,7 @@ impl Event<'_> {
             Self::Done { stage, unit, line } => Some(format!("done    {stage} {unit}: {line}")),
             Self::Failed { stage, unit, error } => Some(format!("failed  {stage} {unit}: {error}")),
             Self::NoVideo { speaker, error } => Some(format!("failed  {speaker}: {error}")),
+            Self::Estimate { line } => Some((*line).to_owned()),
             Self::Advice { line } => Some(format!("note    {line}")),
             Self::LeftOut { unit } => Some(format!("left out of the dataset: {unit} (`orator status --why` says why)")),
         }

@@ -160,7 +160,7 @@ fn run_unit(
 }
 
 /// Runs a stage's code. A panic is a defect, but one video must not take the night's run with it.
-fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
+pub fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
     let caught = catch_unwind(AssertUnwindSafe(work));
     caught.unwrap_or_else(|panic| Err(anyhow!("internal error: {}", panic_text(&*panic))))
 }

@@ -3,6 +3,7 @@
 use super::input::{InputMotion, MotionInput, inputs};
 use crate::cli::Outcome;
 use crate::cli::config_args::split;
+use crate::cli::confine::confine;
 use crate::cli::outputs::{OutputFiles, names, next_output, outputs};
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
@@ -124,6 +125,7 @@ enum Switch {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    confine(args.out.iter().map(PathBuf::as_path));
     let options = options(&args)?;
     let inputs = inputs(&args.input, args.sample.as_deref(), args.split)?;
     if !args.format.is_empty() {

@@ -1,6 +1,7 @@
 //! `orator import`.
 
 use crate::cli::Outcome;
+use crate::cli::confine::confine;
 use crate::cli::ui::Ui;
 use anyhow::{Result, ensure};
 use clap::ValueEnum;
@@ -82,6 +83,7 @@ enum ImportKind {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    confine([args.out.as_path()]);
     let plan = plan(&args)?;
     let out = std::path::absolute(&args.out)?;
     let _lock = FolderLock::exclusive(&out)?;

@@ -2,6 +2,7 @@
 
 use super::import::{train_gan, verify_deep};
 use crate::cli::Outcome;
+use crate::cli::confine::confine;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator::config::SplitUnit;
@@ -39,6 +40,7 @@ enum DatasetVerb {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    confine([]);
     match args.verb {
         DatasetVerb::Verify { dir, deep } => check(&dir, deep, ui),
         DatasetVerb::Info { dir } => info(&dir, ui),

@@ -3,6 +3,7 @@
 use super::{compare, lifter};
 use crate::cli::Outcome;
 use crate::cli::config_args::split;
+use crate::cli::confine::confine;
 use crate::cli::ui::Ui;
 use anyhow::{Result, bail, ensure};
 use orator::dataset::{Dataset, Split};
@@ -83,6 +84,7 @@ struct MotionArgs {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    confine(args.motion.report.as_deref());
     match args.what {
         Some(What::Lifter(args)) => lifter::run(args, ui),
         Some(What::Compare(args)) => compare::run(&args, ui),

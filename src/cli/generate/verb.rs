@@ -2,6 +2,7 @@
 
 use super::batch;
 use crate::cli::Outcome;
+use crate::cli::confine::confine;
 use crate::cli::outputs::{is_same_file, names, next_output, outputs};
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail};
@@ -52,6 +53,7 @@ pub struct Args {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    confine(args.out.iter().chain(&args.out_folder).map(PathBuf::as_path));
     let Some(audio) = &args.audio else { return batch::run(&batch(args)?, ui) };
     let Some(given) = &args.checkpoint else { bail!("give --checkpoint") };
     let outputs = outputs(&args.out, |path| is_same_file(path, audio), "the speech itself", "")?;

@@ -2,6 +2,7 @@
 
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
+use crate::cli::confine::confine;
 use crate::cli::ui::Ui;
 use anyhow::{Result, bail, ensure};
 use orator::animate::{AnimationOptions, perform};
@@ -83,6 +84,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             of_run(&pipeline, &args)?
         }
     };
+    confine(clips.iter().map(|files| files.out.as_path()));
     let (mut text, mut facts, mut n_failed, mut next) = (String::new(), Vec::new(), 0, None);
     for files in &clips {
         match draw(files, args.every, args.figure, ui) {

@@ -2,9 +2,11 @@
 
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
+use crate::cli::confine::confine;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator::pipeline::{Pipeline, StagePlan, StatusReport, TimeAccount, UnitState, UnitStatus};
+use orator::stage::artifacts;
 use orator::stage::artifacts::StageName;
 use orator::stage::ledger::longest_first;
 use serde_json::json;
@@ -27,7 +29,9 @@ pub struct Args {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    let report = Pipeline::open(args.config.load()?)?.status(&args.speaker)?;
+    let pipeline = Pipeline::open(args.config.load()?)?;
+    confine([artifacts::hashes(&pipeline.config().settings.work.dir).as_path()]);
+    let report = pipeline.status(&args.speaker)?;
     let verb = if report.datasets_are_fresh() { "train gan" } else { "run" };
     let next = format!("orator {verb}{}", args.config.flags());
     let mut facts = json!(report);

@@ -2,11 +2,13 @@
 
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
+use crate::cli::confine::this_program;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator::config::{Config, Settings};
 use orator::external::onnx::{ModelStore, Runtime};
 use orator::pipeline::pose2d::models;
+use orator::pipeline::process::probe;
 use orator::pipeline::segment::speech_rule::SpeechListener;
 use orator::stage::workdir;
 use serde_json::json;
@@ -26,6 +28,8 @@ pub struct Args {
 struct Check {
     name: String,
     found: Result<String, (String, String)>,
+    /// Whether what was found is all that could be there.
+    is_full: bool,
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
@@ -41,6 +45,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             checks.push(ok("configuration", config.file.display().to_string()));
             checks.extend(model_checks(&config.settings));
             checks.push(work(&config.settings.work.dir));
+            checks.push(sandbox(config.settings.work.sandbox));
         }
         Err(error) => {
             checks.push(wrong(
@@ -70,11 +75,21 @@ fn defaults() -> Result<Config> {
 }
 
 fn ok(name: &str, found: String) -> Check {
-    Check { name: name.to_owned(), found: Ok(found) }
+    Check { name: name.to_owned(), found: Ok(found), is_full: true }
 }
 
 fn wrong(name: &str, what: String, fix: &str) -> Check {
-    Check { name: name.to_owned(), found: Err((what, fix.to_owned())) }
+    Check { name: name.to_owned(), found: Err((what, fix.to_owned())), is_full: false }
+}
+
+/// How far a process that reads videos is restricted here. Where it is not, work goes on: nothing is missing.
+fn sandbox(is_wanted: bool) -> Check {
+    let (is_active, found) = match probe(&this_program()) {
+        _ if !is_wanted => (false, "not active: work.sandbox = false".to_owned()),
+        Ok(restriction) => (restriction.is_active(), restriction.to_string()),
+        Err(error) => (false, format!("not active: {error:#}")),
+    };
+    Check { is_full: is_active, ..ok("sandbox", found) }
 }
 
 /// ONNX Runtime, and the models the configuration chooses.
@@ -125,7 +140,7 @@ fn work(dir: &Path) -> Check {
 impl Check {
     fn line(&self) -> String {
         match &self.found {
-            Ok(found) => format!("ok       {:26} {found}", self.name),
+            Ok(found) => format!("{}     {:26} {found}", if self.is_full { "ok  " } else { "note" }, self.name),
             Err((what, fix)) => format!("missing  {:26} {what}\n         {:26} fix: {fix}", self.name, ""),
         }
     }

@@ -16,6 +16,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use ndarray::{Array3, s};
 use serde_json::json;
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// Version of what is read of other programs' files; goes up when the same file gives other keypoints.
@@ -156,7 +157,8 @@ impl Stage for KeypointPose2dStage {
 
     fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
         let (from, to) = (self.taken(unit), Artifact::Keypoints.within(out));
-        std::fs::copy(&from, &to).with_context(|| format!("cannot copy {} to {}", from.display(), to.display()))?;
+        let copy = || std::io::copy(&mut File::open(&from)?, &mut File::create(&to)?);
+        copy().with_context(|| format!("cannot copy {} to {}", from.display(), to.display()))?;
         let (keypoints, extras) = (keypoints_npz::read(&to)?, keypoints_npz::read_extras(&to)?);
         let share = |points: &Array3<f32>| {
             let seen =

@@ -15,7 +15,7 @@ use crate::formats::keypoints_npz;
 use crate::formats::media_json::MediaInfo;
 use crate::formats::timeline_npz::Timeline;
 use crate::stage::artifacts::{Artifact, StageName};
-use crate::stage::progress::Progress;
+use crate::stage::progress::{Event, Progress};
 use crate::stage::{Input, Report, Stage, Unit};
 use crate::types::pose2d::{Keypoint, Pose2d};
 use crate::types::time::FrameRate;
@@ -23,7 +23,6 @@ use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// Frames after which the time that a video takes is told.
@@ -38,7 +37,6 @@ pub struct Pose2dStage {
     store: ModelStore,
     /// The picture that shows a speaker, by the speaker's name.
     references: BTreeMap<String, PathBuf>,
-    has_told_speed: AtomicBool,
 }
 
 impl Pose2dStage {
@@ -57,7 +55,6 @@ impl Pose2dStage {
             work: settings.work.dir.to_path_buf(),
             store,
             references: references.collect(),
-            has_told_speed: AtomicBool::new(false),
         })
     }
 
@@ -163,12 +160,10 @@ impl Stage for Pose2dStage {
             if let Some(picture) = picture {
                 pose = chain.frame(&picture).with_context(|| format!("frame {idx}"))?.moved(corner);
             }
-            if idx + 1 == N_MEASURED
-                && restarts.len() >= 6 * N_MEASURED
-                && !self.has_told_speed.swap(true, Ordering::Relaxed)
-            {
+            if idx + 1 == N_MEASURED && restarts.len() >= 6 * N_MEASURED {
                 let hours = begun.elapsed().as_secs_f64() / (N_MEASURED as f64 / self.fps.per_sec());
-                progress.say(&format!("an hour of video takes about {hours:.1} h here, one at a time"));
+                let line = format!("an hour of video takes about {hours:.1} h here, one at a time");
+                progress.event(&Event::Estimate { line: &line });
             }
             seen.count(&pose);
             gathered.push(&pose, time.source_secs);

@@ -10,6 +10,13 @@ use std::path::{Path, PathBuf};
 #[error(transparent)]
 pub struct NoSpace(anyhow::Error);
 
+impl NoSpace {
+    /// The error that came of it.
+    pub fn new(error: anyhow::Error) -> Self {
+        Self(error)
+    }
+}
+
 /// An error that comes of a full disk becomes `NoSpace` with the same text; any other stays.
 pub fn full_disk(error: anyhow::Error) -> anyhow::Error {
     let is_full = |error: &std::io::Error| matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded);

@@ -16,15 +16,23 @@ use rand_chacha::ChaCha8Rng;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-/// Peak resident memory in MiB of a program until it ends, well.
+/// Peak resident memory in MiB of a process up to now.
+fn high_water_mib(id: &str) -> f64 {
+    let text = std::fs::read_to_string(format!("/proc/{id}/status")).unwrap_or_default();
+    let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let kib = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
+    kib.unwrap_or(0.0) / 1024.0
+}
+
+/// Peak resident memory in MiB of a program, with that of the processes it starts, until it ends, well.
 fn peak_mib(mut child: Child) -> f64 {
-    let status = format!("/proc/{}/status", child.id());
+    let id = child.id().to_string();
     let mut peak = 0.0_f64;
     while child.try_wait().unwrap().is_none() {
-        let text = std::fs::read_to_string(&status).unwrap_or_default();
-        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-        let kib = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
-        peak = peak.max(kib.unwrap_or(0.0) / 1024.0);
+        let tasks = std::fs::read_dir(format!("/proc/{id}/task")).into_iter().flatten().flatten();
+        let started = tasks.filter_map(|task| std::fs::read_to_string(task.path().join("children")).ok());
+        let of_started: f64 = started.map(|ids| ids.split_whitespace().map(high_water_mib).sum::<f64>()).sum();
+        peak = peak.max(high_water_mib(&id) + of_started);
         std::thread::sleep(Duration::from_millis(20));
     }
     assert!(child.wait().unwrap().success());

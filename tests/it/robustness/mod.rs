@@ -1,4 +1,5 @@
-//! Kills, memory, bad and hostile input, lost output, privacy, programs side by side.
+//! Kills, memory, bad and hostile input, lost output, privacy, programs side by side, the processes in which videos are
+//! read.
 
 pub mod bad_input;
 pub mod earlier_versions;
@@ -8,4 +9,5 @@ pub mod memory;
 pub mod output;
 pub mod privacy;
 pub mod runner;
+pub mod sandbox;
 pub mod side_by_side;

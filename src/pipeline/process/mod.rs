@@ -1,0 +1,11 @@
+//! Stages that read foreign files, each unit in a process of its own that is restricted before it reads: `stage` stands for
+//! the stage in the run and starts the process, `unit` is what happens in it, `message` goes between them as MessagePack,
+//! `failure` carries errors over with their types.
+
+pub mod failure;
+pub mod message;
+pub mod stage;
+pub mod unit;
+
+pub use stage::{SeparateStage, probe};
+pub use unit::{VERB, serve};

@@ -1,0 +1,135 @@
+//! The process of a unit: it restricts itself, builds the stage, works, and says how that goes on standard output. It dies
+//! with the run that started it.
+
+use super::failure::SentFailure;
+use super::message::{Message, Request, UnitRequest, receive, send};
+use crate::config::Config;
+use crate::config::videos::Videos;
+use crate::external::sandbox::{FileAccess, restrict};
+use crate::pipeline::stages;
+use crate::stage::progress::{Event, Progress, Task};
+use crate::stage::{Report, Unit, runner, workdir};
+use anyhow::{Context, Result};
+use std::io::{Read, Stdout, Write};
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+/// The argument by which the program becomes the process of a unit. It stands in no help text.
+pub const VERB: &str = "work-unit";
+
+/// Least time between two messages of a task's progress.
+const PACE: Duration = Duration::from_millis(50);
+
+/// Answers the request on standard input. It must come before the process starts threads.
+///
+/// # Errors
+/// No request, or nobody who reads the answer.
+pub fn serve() -> Result<()> {
+    #[cfg(target_os = "linux")]
+    rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
+    let out = Messages(Mutex::new(std::io::stdout()));
+    match receive(&mut std::io::stdin().lock()).context("this is started by `orator run` alone")? {
+        Request::Restrict => {
+            out.send(&Message::Restricted(restrict(&FileAccess { reads: Some(Vec::new()), writes: Vec::new() })))
+        }
+        Request::Unit(unit) => {
+            let paths = |paths: &[std::ffi::OsString]| paths.iter().map(PathBuf::from).collect();
+            restrict(&FileAccess { reads: Some(paths(&unit.reads)), writes: vec![(&unit.out).into()] });
+            std::thread::spawn(end_with_parent);
+            let message = match runner::guarded(|| work(*unit, &out)) {
+                Ok(Report { line, facts }) => Message::Done { line, facts },
+                Err(error) => Message::Failed(SentFailure::of(&workdir::full_disk(error))),
+            };
+            out.send(&message)
+        }
+    }
+}
+
+/// Ends the process when the other end of standard input is gone.
+fn end_with_parent() {
+    let mut byte = [0];
+    while matches!(std::io::stdin().lock().read(&mut byte), Ok(1..)) {}
+    std::process::abort();
+}
+
+fn work(request: UnitRequest, out: &Messages) -> Result<Report> {
+    let UnitRequest { stage, speaker, video, source, settings, config_file, keypoints, out: folder, .. } = request;
+    let unit = Unit { speaker: speaker.clone(), video: video.clone(), source: source.into() };
+    let keypoints = keypoints.map(|source| (video, source)).into_iter().collect();
+    let videos = Videos { speaker, units: vec![unit.clone()], keypoints, ..Videos::default() };
+    let config = Config { settings, file: config_file, notes: Vec::new() };
+    let stage = stages::build(stage.parse()?, &config, &[videos], &[])?;
+    let progress = SentProgress { out, next: AtomicU32::new(0) };
+    stage.run(&unit, &PathBuf::from(folder), &progress)
+}
+
+/// Standard output.
+struct Messages(Mutex<Stdout>);
+
+impl Messages {
+    fn send(&self, message: &Message) -> Result<()> {
+        let mut out = self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        send(&mut *out, message)?;
+        Ok(out.flush()?)
+    }
+
+    /// Sends what may be lost: a run that is gone ends this process anyway.
+    fn tell(&self, message: &Message) {
+        let _ = self.send(message);
+    }
+}
+
+/// Progress that goes to the run.
+struct SentProgress<'a> {
+    out: &'a Messages,
+    next: AtomicU32,
+}
+
+impl Progress for SentProgress<'_> {
+    fn begin(&self, _label: &str, total: u64) -> Box<dyn Task + '_> {
+        let task = self.next.fetch_add(1, Ordering::Relaxed);
+        self.out.tell(&Message::Begin { task, total });
+        Box::new(SentTask { out: self.out, task, waiting: Mutex::new((0, Instant::now())) })
+    }
+
+    fn say(&self, line: &str) {
+        self.out.tell(&Message::Say { line: line.to_owned() });
+    }
+
+    fn event(&self, event: &Event<'_>) {
+        match event {
+            Event::Estimate { line } => self.out.tell(&Message::Estimate { line: (*line).to_owned() }),
+            event => event.message().iter().for_each(|line| self.say(line)),
+        }
+    }
+}
+
+struct SentTask<'a> {
+    out: &'a Messages,
+    task: u32,
+    /// Steps not sent yet, and the time of the last message.
+    waiting: Mutex<(u64, Instant)>,
+}
+
+impl Task for SentTask<'_> {
+    fn advance(&self, steps: u64) {
+        let Ok(mut waiting) = self.waiting.lock() else { return };
+        waiting.0 += steps;
+        if waiting.1.elapsed() >= PACE {
+            self.out.tell(&Message::Advance { task: self.task, steps: waiting.0 });
+            *waiting = (0, Instant::now());
+        }
+    }
+
+    fn detail(&self, text: &str) {
+        self.out.tell(&Message::Detail { task: self.task, text: text.to_owned() });
+    }
+}
+
+impl Drop for SentTask<'_> {
+    fn drop(&mut self) {
+        self.out.tell(&Message::End { task: self.task });
+    }
+}

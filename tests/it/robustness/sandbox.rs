@@ -1,0 +1,230 @@
+//! Videos are read in processes of their own: what these may not do fails, what they make is the same to the byte, and when
+//! one dies, or the run that started it, nothing else is lost.
+
+use crate::fixtures::skip::skip;
+use crate::fixtures::support::{Project, files_under};
+use orator::external::sandbox::restrict::{FileAccess, restrict, restrict_thread};
+use orator::pipeline::process::{VERB, probe};
+use orator::{Pipeline, Selection, Silent, StageName, UnreadableMedia, load_config};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_orator");
+
+/// Whether the kernel restricts processes; a loud line where not.
+fn is_active() -> bool {
+    let restriction = probe(Path::new(PROGRAM)).unwrap();
+    if !restriction.is_active() {
+        skip(&format!("the sandbox is {restriction}"));
+    }
+    restriction.is_active()
+}
+
+#[test]
+fn who_is_restricted_writes_nowhere_else_and_reaches_no_network_or_program() {
+    if !is_active() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    for folder in ["out", "in"] {
+        fs::create_dir(dir.path().join(folder)).unwrap();
+        fs::write(dir.path().join(folder).join("a"), folder).unwrap();
+    }
+    fs::write(dir.path().join("secret"), "secret").unwrap();
+    let folder = dir.path().to_owned();
+    // The other tests of this process stay free.
+    std::thread::spawn(move || attempt_everything(&folder)).join().unwrap();
+    assert_eq!(fs::read_to_string(dir.path().join("secret")).unwrap(), "secret");
+    assert_eq!(fs::read_to_string(dir.path().join("out/new")).unwrap(), "new");
+}
+
+fn attempt_everything(dir: &Path) {
+    use std::net::{TcpListener, TcpStream, UdpSocket};
+    use std::os::unix::fs::{PermissionsExt as _, symlink};
+    use std::os::unix::net::{UnixDatagram, UnixListener, UnixStream};
+    let (out, input, secret) = (dir.join("out"), dir.join("in"), dir.join("secret"));
+    let restriction = restrict_thread(&FileAccess { reads: Some(vec![input.join("a")]), writes: vec![out.clone()] });
+    assert!(restriction.is_active(), "{restriction}");
+
+    fs::write(out.join("new"), "new").unwrap();
+    fs::create_dir(out.join("folder")).unwrap();
+    fs::rename(out.join("new"), out.join("newer")).unwrap();
+    fs::rename(out.join("newer"), out.join("new")).unwrap();
+    assert_eq!(fs::read_to_string(input.join("a")).unwrap(), "in");
+    assert_eq!(std::thread::spawn(|| 1).join().unwrap(), 1);
+
+    let mode = || fs::Permissions::from_mode(0o777);
+    let attempts: [(&str, std::io::Result<()>); 21] = [
+        ("a file outside", fs::write(dir.join("new"), "")),
+        ("a file outside changed", fs::write(&secret, "")),
+        ("a file outside removed", fs::remove_file(&secret)),
+        ("a file outside renamed", fs::rename(&secret, out.join("secret"))),
+        ("a file outside linked", fs::hard_link(&secret, out.join("secret"))),
+        ("a file outside read", fs::read(&secret).map(drop)),
+        ("an input changed", fs::write(input.join("a"), "")),
+        ("a folder listed", fs::read_dir(dir).map(drop)),
+        ("a folder outside", fs::create_dir(dir.join("folder"))),
+        ("a symbolic link", symlink("/etc/passwd", out.join("link"))),
+        ("another mode", fs::set_permissions(out.join("new"), mode())),
+        ("another mode outside", fs::set_permissions(&secret, mode())),
+        ("/etc/passwd read", fs::read("/etc/passwd").map(drop)),
+        ("UDP", UdpSocket::bind("127.0.0.1:0").map(drop)),
+        ("TCP in", TcpListener::bind("127.0.0.1:0").map(drop)),
+        ("TCP out", TcpStream::connect("127.0.0.1:9").map(drop)),
+        ("a local socket", UnixDatagram::unbound().map(drop)),
+        ("a pair of sockets", UnixStream::pair().map(drop)),
+        ("a socket with a name", UnixListener::bind(out.join("socket")).map(drop)),
+        ("a program", Command::new("/bin/true").status().map(drop)),
+        ("the program itself", Command::new(PROGRAM).status().map(drop)),
+    ];
+    for (what, attempted) in attempts {
+        let error = attempted.expect_err(what);
+        assert_eq!(error.kind(), std::io::ErrorKind::PermissionDenied, "{what}: {error}");
+    }
+}
+
+#[test]
+fn a_process_with_threads_is_not_called_restricted() {
+    let late = restrict(&FileAccess::default());
+    assert!(!late.is_active() && late.to_string().contains("threads already"), "{late}");
+    fs::write(tempfile::tempdir().unwrap().path().join("a"), "").unwrap();
+}
+
+#[test]
+fn doctor_says_whether_it_is_active() {
+    let project = Project::with_clips("doctor", 0, 1.0);
+    let found = |args: &[&str]| {
+        let answer = project.answer(&[&["doctor"], args].concat());
+        let checks = answer.json["checks"].as_array().unwrap().clone();
+        let sandbox = checks.into_iter().find(|check| check["name"] == "sandbox").unwrap();
+        sandbox["found"].as_str().unwrap().to_owned()
+    };
+    assert!(found(&["--set", "work.sandbox=false"]).starts_with("not active: work.sandbox"));
+    if is_active() {
+        let found = found(&[]);
+        assert!(found.starts_with("active: files by Landlock ABI") && found.ends_with("seccomp"), "{found}");
+    }
+}
+
+/// All that a run left, but for the table of hashes, which has paths and times.
+fn made(work: &Path) -> BTreeMap<String, Vec<u8>> {
+    let files = files_under(work).into_iter().filter(|(name, _)| name != "hashes.json");
+    files.map(|(name, path)| (name, fs::read(path).unwrap())).collect()
+}
+
+#[test]
+fn the_same_bytes_come_out_of_processes_as_out_of_one() {
+    let project = Project::with_clips("same", 2, 4.6);
+    fs::write(project.video("text.mp4"), "this is no video\n").unwrap();
+    let pipeline = || Pipeline::open(load_config(&project.dir().join("pipeline.toml"), &[]).unwrap()).unwrap();
+    let run = |pipeline: &Pipeline| {
+        let report = pipeline.run(&Selection::default(), &Silent).unwrap();
+        let [failure] = &report.failures[..] else { panic!("{:?}", report.failures) };
+        let cause = failure.cause.as_ref().unwrap();
+        assert!(cause.is::<UnreadableMedia>() && failure.error.contains("text.mp4"), "{cause:#}");
+        assert_eq!(report.stages[&StageName::Lift].done, 2);
+        let made = made(&project.work());
+        fs::remove_dir_all(project.work()).unwrap();
+        (serde_json::to_string(&report).unwrap(), made)
+    };
+    let (within, apart) = (run(&pipeline()), run(&pipeline().with_processes(PROGRAM.into())));
+    assert_eq!(within.0, apart.0);
+    assert_eq!(within.1.keys().collect::<Vec<_>>(), apart.1.keys().collect::<Vec<_>>());
+    for (name, bytes) in &within.1 {
+        assert!(apart.1[name] == *bytes, "{name} differs");
+    }
+    assert!(within.1.keys().any(|name| name.ends_with(".tar")));
+}
+
+/// The process of a unit that the run has started; waits for it.
+fn unit_of(run: &mut Child) -> Option<u32> {
+    while run.try_wait().unwrap().is_none() {
+        let tasks = fs::read_dir(format!("/proc/{}/task", run.id())).into_iter().flatten().flatten();
+        let children = tasks.filter_map(|task| fs::read_to_string(task.path().join("children")).ok());
+        let ids: Vec<u32> = children
+            .flat_map(|ids| ids.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<_>>())
+            .collect();
+        let is_unit =
+            |id: &u32| fs::read_to_string(format!("/proc/{id}/cmdline")).is_ok_and(|line| line.contains(VERB));
+        if let Some(id) = ids.into_iter().find(is_unit) {
+            return Some(id);
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    None
+}
+
+fn signal(name: &str, id: u32) {
+    assert!(Command::new("kill").args([format!("-{name}"), id.to_string()]).status().unwrap().success());
+}
+
+#[test]
+fn a_process_that_dies_fails_its_unit_alone() {
+    let project = Project::with_clips("crash", 2, 4.6);
+    for (name, number) in [("SEGV", "signal 11"), ("KILL", "signal 9")] {
+        let mut command = Command::new(PROGRAM);
+        command.current_dir(project.dir()).args(["--json", "run", "--jobs", "1"]).stdin(Stdio::null());
+        let mut run = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        signal(name, unit_of(&mut run).unwrap());
+        let output = run.wait_with_output().unwrap();
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let failures = json["failures"].as_array().unwrap();
+        assert_eq!((output.status.code(), failures.len()), (Some(2), 1), "{json}");
+        let error = failures[0]["error"].as_str().unwrap();
+        assert!(error.contains(number) && error.contains("clip-"), "{error}");
+        assert_eq!(
+            (&json["stages"]["lift"]["done"], &json["stages"]["extract"]["failed"]),
+            (&1.into(), &1.into()),
+            "{json}"
+        );
+        assert_eq!(project.run(&[]).code, 0);
+        fs::remove_dir_all(project.work()).unwrap();
+    }
+}
+
+#[test]
+fn every_thread_that_reads_a_video_is_restricted() {
+    if !is_active() {
+        return;
+    }
+    let project = Project::with_clips("threads", 1, 4.6);
+    let mut run = project.start(&["run", "--to", "lift"]);
+    let mut most = 0;
+    while let Some(unit) = unit_of(&mut run) {
+        let tasks = fs::read_dir(format!("/proc/{unit}/task")).into_iter().flatten().flatten();
+        let statuses: Vec<_> = tasks.filter_map(|task| fs::read_to_string(task.path().join("status")).ok()).collect();
+        most = most.max(statuses.len());
+        // A single thread is on its way there.
+        for status in statuses.iter().filter(|_| statuses.len() > 1) {
+            let has = |line: &str| status.lines().any(|other| other == line);
+            assert!(has("Seccomp:\t2") && has("NoNewPrivs:\t1"), "{status}");
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert!(run.wait().unwrap().success() && most > 1, "{most} threads");
+}
+
+#[test]
+fn no_process_outlives_its_run() {
+    let project = Project::with_clips("orphan", 1, 8.0);
+    for _ in 0..3 {
+        let mut run = project.start(&["run"]);
+        let unit = unit_of(&mut run).unwrap();
+        run.kill().unwrap();
+        run.wait().unwrap();
+        let is_alive = || {
+            let status = fs::read_to_string(format!("/proc/{unit}/status")).unwrap_or_default();
+            status.lines().any(|line| line.starts_with("State:") && !line.contains('Z') && !line.contains('X'))
+        };
+        let begun = Instant::now();
+        while is_alive() && begun.elapsed() < Duration::from_secs(2) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        assert!(!is_alive(), "process {unit} lives");
+        eprintln!("gone {} ms after its run", begun.elapsed().as_millis());
+    }
+    assert_eq!(project.run(&[]).code, 0);
+}
