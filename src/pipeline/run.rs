@@ -157,12 +157,13 @@ struct StageRun<'a> {
 }
 
 impl<'a> StageRun<'a> {
-    /// The stage; one that works on videos in processes of their own where the pipeline has a program for them.
+    /// The stage; one that hands foreign files to foreign libraries does so in processes of their own, where the pipeline
+    /// has a program for them. The last two stages read what the first three wrote, in Rust alone.
     fn stage(&self, name: StageName, ready: &[Unit]) -> Result<Box<dyn Stage + 'a>> {
         let (config, videos) = (self.pipeline.config(), self.pipeline.all_videos());
         let stage = stages::build(name, config, videos, ready)?;
         Ok(match self.pipeline.program() {
-            Some(program) if name != StageName::Dataset => Box::new(SeparateStage { stage, program, config, videos }),
+            Some(program) if name < StageName::Lift => Box::new(SeparateStage { stage, program, config, videos }),
             _ => stage,
         })
     }

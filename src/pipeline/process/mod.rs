@@ -1,4 +1,4 @@
-//! Stages that read foreign files, each unit in a process of its own that is restricted before it reads: `stage` stands for
+//! Stages that hand foreign files to foreign libraries, each unit in a process of its own that is restricted before it reads: `stage` stands for
 //! the stage in the run and starts the process, `unit` is what happens in it, `message` goes between them as MessagePack,
 //! `failure` carries errors over with their types.
 
