@@ -1,6 +1,6 @@
-//! Stages that hand foreign files to foreign libraries, each unit in a process of its own that is restricted before it reads: `stage` stands for
-//! the stage in the run and starts the process, `unit` is what happens in it, `message` goes between them as MessagePack,
-//! `failure` carries errors over with their types.
+//! Stages that hand foreign files to foreign libraries, each unit in a process of its own that is restricted before it
+//! reads: `stage` stands for the stage in the run and starts the process, `unit` is what happens in it, `message` goes
+//! between them as MessagePack, `failure` carries errors over with their types.
 
 pub mod failure;
 pub mod message;
