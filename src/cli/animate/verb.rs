@@ -125,7 +125,7 @@ enum Switch {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    confine(args.out.iter().map(PathBuf::as_path));
+    confine(args.out.iter().map(PathBuf::as_path), [args.input.as_path()]);
     let options = options(&args)?;
     let inputs = inputs(&args.input, args.sample.as_deref(), args.split)?;
     if !args.format.is_empty() {

@@ -83,7 +83,7 @@ enum ImportKind {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    confine([args.out.as_path()]);
+    confine([args.out.as_path()], args.sources.iter().chain([&args.out]).map(PathBuf::as_path));
     let plan = plan(&args)?;
     let out = std::path::absolute(&args.out)?;
     let _lock = FolderLock::exclusive(&out)?;

@@ -40,7 +40,8 @@ enum DatasetVerb {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    confine([]);
+    let (DatasetVerb::Verify { dir, .. } | DatasetVerb::Info { dir }) = &args.verb;
+    confine([], [dir.as_path()]);
     match args.verb {
         DatasetVerb::Verify { dir, deep } => check(&dir, deep, ui),
         DatasetVerb::Info { dir } => info(&dir, ui),

@@ -84,7 +84,8 @@ struct MotionArgs {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    confine(args.motion.report.as_deref());
+    let MotionArgs { report, dataset, checkpoint, .. } = &args.motion;
+    confine(report.as_deref(), [dataset, checkpoint].into_iter().flatten().map(PathBuf::as_path));
     match args.what {
         Some(What::Lifter(args)) => lifter::run(args, ui),
         Some(What::Compare(args)) => compare::run(&args, ui),

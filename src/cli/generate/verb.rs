@@ -53,8 +53,8 @@ pub struct Args {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    confine(args.out.iter().chain(&args.out_folder).map(PathBuf::as_path));
     let Some(audio) = &args.audio else { return batch::run(&batch(args)?, ui) };
+    confine(args.out.iter().map(PathBuf::as_path), args.checkpoint.as_deref());
     let Some(given) = &args.checkpoint else { bail!("give --checkpoint") };
     let outputs = outputs(&args.out, |path| is_same_file(path, audio), "the speech itself", "")?;
     let checkpoint = checkpoint_file(given)?;

@@ -96,7 +96,7 @@ fn taken(args: &Args) -> Result<(Keypoints, Vec<String>)> {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    confine([Some(&args.out), args.extra.as_ref()].into_iter().flatten().map(PathBuf::as_path));
+    confine([Some(&args.out), args.extra.as_ref()].into_iter().flatten().map(PathBuf::as_path), []);
     for path in [Some(&args.out), args.extra.as_ref()].into_iter().flatten() {
         ensure!(
             path.extension().is_some_and(|e| e == "npy"),

@@ -68,7 +68,7 @@ struct SheetFiles {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    let mut lock = None;
+    let (mut lock, mut locked) = (None, None);
     let clips = match (&args.keypoints, &args.joints, &args.video) {
         (Some(keypoints), Some(joints), Some(video)) => {
             let out = args.out.clone().unwrap_or_else(|| PathBuf::from("sheet.png"));
@@ -80,11 +80,13 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         }
         _ => {
             let pipeline = Pipeline::open(args.config.load()?)?;
-            lock = Some(FolderLock::shared(&pipeline.config().settings.work.dir)?);
+            let work = &pipeline.config().settings.work.dir;
+            lock = Some(FolderLock::shared(work)?);
+            locked = Some(work.to_path_buf());
             of_run(&pipeline, &args)?
         }
     };
-    confine(clips.iter().map(|files| files.out.as_path()));
+    confine(clips.iter().map(|files| files.out.as_path()), locked.as_deref());
     let (mut text, mut facts, mut n_failed, mut next) = (String::new(), Vec::new(), 0, None);
     for files in &clips {
         match draw(files, args.every, args.figure, ui) {

@@ -30,7 +30,8 @@ pub struct Args {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let pipeline = Pipeline::open(args.config.load()?)?;
-    confine([artifacts::hashes(&pipeline.config().settings.work.dir).as_path()]);
+    let work = &pipeline.config().settings.work.dir;
+    confine([artifacts::hashes(work).as_path()], [&**work]);
     let report = pipeline.status(&args.speaker)?;
     let verb = if report.datasets_are_fresh() { "train gan" } else { "run" };
     let next = format!("orator {verb}{}", args.config.flags());

@@ -19,7 +19,6 @@ const REFUSED: &[c_long] = &[
     libc::SYS_pidfd_open,
     libc::SYS_pidfd_getfd,
     libc::SYS_pidfd_send_signal,
-    libc::SYS_kill,
     libc::SYS_tkill,
     libc::SYS_rt_sigqueueinfo,
     libc::SYS_rt_tgsigqueueinfo,
@@ -119,7 +118,8 @@ fn apply() -> Result<(), Error> {
     };
     // A new process; threads go on.
     refuse(libc::SYS_clone, 0, SeccompCmpOp::MaskedEq(libc::CLONE_THREAD as u64), 0)?;
-    // Signals to and limits of other processes; `abort` signals its own.
+    // Signals to and limits of other processes; `abort` signals its own, and signal 0 asks whether one is alive.
+    refuse(libc::SYS_kill, 1, SeccompCmpOp::Ne, 0)?;
     refuse(libc::SYS_tgkill, 0, SeccompCmpOp::Ne, u64::from(std::process::id()))?;
     refuse(libc::SYS_prlimit64, 0, SeccompCmpOp::Ne, 0)?;
     // Letters typed into the terminal in the name of the user.

@@ -49,6 +49,10 @@ impl Stage for SeparateStage<'_> {
         self.stage.inputs(unit)
     }
 
+    fn is_read_long(&self) -> bool {
+        self.stage.is_read_long()
+    }
+
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let mut process = UnitProcess::start(self.program)?;
         process.ask(&Request::Unit(Box::new(self.request(unit, out)?)));
