@@ -34,8 +34,8 @@ pub fn begin(target: &Path, create: impl Fn(&Path) -> Result<()>) -> Result<Path
 
 /// Removes what killed programs left of their attempts at `target`.
 pub fn sweep(target: &Path) -> Result<()> {
-    let stale = attempts(target).into_iter().filter(|(path, process)| is_stale(path, *process));
-    stale.map(|(path, _)| remove(&path)).collect()
+    let mut stale = attempts(target).into_iter().filter(|(path, process)| is_stale(path, *process));
+    stale.try_for_each(|(path, _)| remove(&path))
 }
 
 /// Where the folder `target` stands while two renames put another in its place.

@@ -80,9 +80,9 @@ impl FolderLock {
         let path = parent(&place).join(name);
         let lock = Self { file: take(folder, &path, is_exclusive)?, path: Some(path) };
         if is_exclusive {
-            recover_folder(folder)?
+            recover_folder(folder)?;
         } else {
-            restore_folder(folder)?
+            restore_folder(folder)?;
         }
         Ok(lock)
     }
