@@ -12,7 +12,7 @@ use crate::stage::fingerprint::hash_file;
 use crate::stage::ledger::Ledger;
 use crate::types::file_name::FileName;
 use crate::types::split::{Split, TimeBlock};
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
@@ -181,6 +181,13 @@ impl VideoEntry {
         ensure!(part.schema == crate::dataset::SCHEMA, "{} has layout version {}", path.display(), part.schema);
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         ensure!(part.name == *stem, "{} speaks of the video {:?}", path.display(), part.name);
+        let is_own = |shard: &&ShardRef| {
+            let rest = Split::ALL.iter().find_map(|split| shard.file.strip_prefix(split.name())?.strip_prefix('-'));
+            rest.is_some_and(|rest| rest.starts_with(&*part.name) && rest.ends_with(".tar"))
+        };
+        if let Some(other) = part.shards.iter().find(|shard| !is_own(shard)) {
+            bail!("{} names the shard {}, which is none of its video's", path.display(), other.file);
+        }
         Ok(part)
     }
 

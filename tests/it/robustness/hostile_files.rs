@@ -65,22 +65,31 @@ fn names_in_a_dataset_lead_out_of_no_folder() {
 }
 
 #[test]
-fn shards_named_outside_a_dataset_are_not_taken_over() {
+fn shards_of_other_names_are_not_taken_over() {
+    // A hard link to the file that describes the dataset would be written through.
+    for (other, words) in [("../train-one-0000.tar", "is no name of a file"), ("info.json", "none of its video's")] {
+        shard_is_not_taken_over(other, words);
+    }
+}
+
+fn shard_is_not_taken_over(other: &str, expected: &str) {
     let dir = tempfile::tempdir().unwrap();
     let data = dir.path().join("data");
     fs::create_dir_all(&data).unwrap();
     dataset(&data);
     let entry = data.join("videos/one.json");
-    change(&entry, "\"train-one-0000.tar\"", "\"../train-one-0000.tar\"");
-    fs::copy(data.join("train-one-0000.tar"), dir.path().join("train-one-0000.tar")).unwrap();
+    change(&entry, "\"train-one-0000.tar\"", &format!("{other:?}"));
+    if other.starts_with("..") {
+        fs::copy(data.join("train-one-0000.tar"), dir.path().join("train-one-0000.tar")).unwrap();
+    }
     let hash = |file: &Path| blake3::hash(&fs::read(file).unwrap()).to_hex().to_string();
     let sums = data.join("checksums.b3");
-    change(&sums, "  train-one-0000.tar", "  ../train-one-0000.tar");
+    change(&sums, "  train-one-0000.tar", &format!("  {other}"));
     let text = fs::read_to_string(&sums).unwrap();
     let line = text.lines().find(|line| line.ends_with("videos/one.json")).unwrap();
     change(&sums, line, &format!("{}  videos/one.json", hash(&entry)));
     let (code, errors) = run(dir.path(), &["import", "data", "--out", "deep/er/out", "--speaker", "host"]);
-    assert!(code == 2 && errors.contains("one.json") && errors.contains("is no name of a file"), "{code} {errors}");
+    assert!(code == 2 && errors.contains("one.json") && errors.contains(expected), "{code} {errors}");
     assert!(!dir.path().join("deep/er/train-one-0000.tar").exists());
     assert_eq!(Dataset::open(dir.path().join("deep/er/out")).unwrap().samples(Split::Train).len(), 0);
 }
