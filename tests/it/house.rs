@@ -317,3 +317,13 @@ fn unsafe_code_stays_in_three_places() {
     let names = texts.filter(|(_, text)| tokens(&without_comments(text)).iter().any(|token| token == "unsafe"));
     none(&names.map(|(name, _)| name).collect::<Vec<_>>());
 }
+
+/// Which files ffmpeg may follow is decided where it opens one.
+#[test]
+fn media_are_opened_in_one_file() {
+    let opens =
+        |text: &str| ["format::input", "avformat_open_input"].iter().any(|call| without_comments(text).contains(call));
+    let sources = rust_texts().into_iter().filter(|(name, text)| name.starts_with("src/") && opens(text));
+    let names: Vec<String> = sources.map(|(name, _)| name).collect();
+    assert_eq!(names, ["src/external/ffmpeg/source.rs"]);
+}
