@@ -4,6 +4,7 @@
 pub mod bad_input;
 pub mod earlier_versions;
 pub mod hostile_files;
+pub mod faults;
 pub mod kill;
 pub mod memory;
 pub mod output;
