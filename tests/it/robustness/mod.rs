@@ -3,8 +3,8 @@
 
 pub mod bad_input;
 pub mod earlier_versions;
-pub mod hostile_files;
 pub mod faults;
+pub mod hostile_files;
 pub mod kill;
 pub mod memory;
 pub mod output;

@@ -1,7 +1,7 @@
 //! A tool for people's videos sends nothing and writes nothing but what it was asked for, as the kernel sees it.
 
 use crate::fixtures::skip::skip;
-use crate::fixtures::support::Project;
+use super::faults::scenes::{SCENES, copy, prepare, set_up};
 use std::path::{Component, Path};
 use std::process::{Command, Stdio};
 
@@ -9,19 +9,19 @@ use std::process::{Command, Stdio};
 const CALLS: &str = "trace=socket,connect,sendto,openat,openat2,creat,mkdir,mkdirat,rename,renameat,renameat2,link,\
     linkat,symlink,symlinkat,unlink,unlinkat";
 
-/// Runs a verb under strace and gives the calls that open a socket or write outside the project's folder.
-fn calls_outside(project: &Project, args: &[&str]) -> Vec<String> {
-    let home = project.dir().join("home");
+/// Runs a verb under strace in `dir` and gives the calls that open a socket or write outside of it.
+fn calls_outside(dir: &Path, args: &[&str]) -> Vec<String> {
+    let home = dir.join("home");
     std::fs::create_dir_all(&home).unwrap();
-    let trace = project.dir().join("trace.txt");
+    let trace = dir.join("trace.txt");
     let mut command = Command::new("strace");
-    command.args(["-f", "-qq", "-y", "-e", CALLS, "-o"]).arg(&trace).arg(env!("CARGO_BIN_EXE_orator")).args(args);
-    command.env("HOME", &home).env_remove("XDG_CACHE_HOME").current_dir(project.dir());
+    command.args(["-f", "--seccomp-bpf", "-qq", "-y", "-e", CALLS, "-o"]).arg(&trace).arg(env!("CARGO_BIN_EXE_orator")).args(args);
+    command.env("HOME", &home).env_remove("XDG_CACHE_HOME").current_dir(dir);
     let status = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status().unwrap();
     assert_eq!(status.code(), Some(0), "{args:?}");
     assert_eq!(std::fs::read_dir(&home).unwrap().count(), 0, "{args:?} wrote into the home folder");
     let trace = std::fs::read_to_string(trace).unwrap();
-    let outside = trace.lines().filter(|line| is_outside(line, project.dir()));
+    let outside = trace.lines().filter(|line| is_outside(line, dir));
     outside.map(str::to_owned).collect()
 }
 
@@ -45,19 +45,27 @@ fn no_verb_opens_a_socket_or_writes_outside_the_named_folders() {
     if Command::new("strace").arg("-V").output().is_err() {
         return skip("no strace");
     }
-    let project = Project::with_clips("privacy", 1, 4.6);
-    let verbs: [&[&str]; 8] = [
-        &["init", "other"],
+    let folder = tempfile::Builder::new().prefix("orator-privacy-").tempdir().unwrap();
+    let root = folder.path().canonicalize().unwrap();
+    prepare(&root);
+    let (ran, place) = (root.join("ran"), root.join("place"));
+    let of_scenes = SCENES.iter().map(|scene| {
+        set_up(&root, &place, scene);
+        (scene.args, calls_outside(&place, scene.args))
+    });
+    let others: [&[&str]; 6] = [
         &["models", "list"],
-        &["models", "check", "person-marker"],
+        &["models", "check", "body-marker"],
         &["doctor"],
-        &["run"],
-        &["status"],
-        &["report"],
-        &["dataset", "verify", "work/dataset/host"],
+        &["dataset", "info", "work/dataset/host"],
+        &["guide", "models"],
+        &["completions", "bash"],
     ];
-    for verb in verbs {
-        let outside = calls_outside(&project, verb);
-        assert!(outside.is_empty(), "{verb:?}:\n{}", outside.join("\n"));
+    let of_others = others.into_iter().map(|args| {
+        copy(&ran, &place);
+        (args, calls_outside(&place, args))
+    });
+    for (args, outside) in of_scenes.chain(of_others) {
+        assert!(outside.is_empty(), "{args:?}:\n{}", outside.join("\n"));
     }
 }
