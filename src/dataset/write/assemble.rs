@@ -55,8 +55,8 @@ pub fn assemble_into(
     open: &mut Open,
 ) -> Result<(DatasetInfo, DatasetStats)> {
     let mut checksums = BTreeMap::new();
-    let mut index = HashedFile::new(open(INDEX)?);
-    let mut ledger = HashedFile::new(open(LEDGER)?);
+    let mut index = HashedFile::new(INDEX, open)?;
+    let mut ledger = HashedFile::new(LEDGER, open)?;
     let mut splits: BTreeMap<Split, SplitInfo> = Split::ALL.map(|split| (split, SplitInfo::default())).into();
     let (mut videos, mut bones, mut gatherer) = (Vec::new(), Vec::<VideoBones>::new(), StatsCollector::default());
     let mut placed: BTreeMap<String, Vec<TimeBlock>> = BTreeMap::new();
@@ -107,11 +107,11 @@ pub fn assemble_into(
         (README, card::text(&info, &stats, &leakage).into_bytes()),
     ];
     for (name, bytes) in texts {
-        let mut file = HashedFile::new(open(name)?);
+        let mut file = HashedFile::new(name, open)?;
         file.write(&bytes)?;
         checksums.insert(name.to_owned(), file.finish()?);
     }
-    let mut file = HashedFile::new(open(CHECKSUMS)?);
+    let mut file = HashedFile::new(CHECKSUMS, open)?;
     for (name, hash) in &checksums {
         file.write(format!("{hash}  {name}\n").as_bytes())?;
     }
@@ -127,18 +127,19 @@ fn pretty(value: &impl Serialize) -> Result<Vec<u8>> {
 
 /// File with a running hash.
 struct HashedFile {
+    name: &'static str,
     to: Box<dyn Write>,
     hasher: blake3::Hasher,
 }
 
 impl HashedFile {
-    fn new(to: Box<dyn Write>) -> Self {
-        Self { to, hasher: blake3::Hasher::new() }
+    fn new(name: &'static str, open: &mut Open) -> Result<Self> {
+        Ok(Self { name, to: open(name)?, hasher: blake3::Hasher::new() })
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<()> {
         self.hasher.update(bytes);
-        self.to.write_all(bytes).context("writing a file of the dataset")
+        self.to.write_all(bytes).with_context(|| format!("cannot write {} of the dataset", self.name))
     }
 
     fn line(&mut self, value: &impl Serialize) -> Result<()> {
@@ -148,7 +149,7 @@ impl HashedFile {
     }
 
     fn finish(mut self) -> Result<String> {
-        self.to.flush().context("writing a file of the dataset")?;
+        self.to.flush().with_context(|| format!("cannot write {} of the dataset", self.name))?;
         Ok(self.hasher.finalize().to_hex().to_string())
     }
 }

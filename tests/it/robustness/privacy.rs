@@ -1,7 +1,7 @@
 //! A tool for people's videos sends nothing and writes nothing but what it was asked for, as the kernel sees it.
 
-use crate::fixtures::skip::skip;
 use super::faults::scenes::{SCENES, copy, prepare, set_up};
+use crate::fixtures::skip::skip;
 use std::path::{Component, Path};
 use std::process::{Command, Stdio};
 
@@ -15,7 +15,11 @@ fn calls_outside(dir: &Path, args: &[&str]) -> Vec<String> {
     std::fs::create_dir_all(&home).unwrap();
     let trace = dir.join("trace.txt");
     let mut command = Command::new("strace");
-    command.args(["-f", "--seccomp-bpf", "-qq", "-y", "-e", CALLS, "-o"]).arg(&trace).arg(env!("CARGO_BIN_EXE_orator")).args(args);
+    command
+        .args(["-f", "--seccomp-bpf", "-qq", "-y", "-e", CALLS, "-o"])
+        .arg(&trace)
+        .arg(env!("CARGO_BIN_EXE_orator"))
+        .args(args);
     command.env("HOME", &home).env_remove("XDG_CACHE_HOME").current_dir(dir);
     let status = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status().unwrap();
     assert_eq!(status.code(), Some(0), "{args:?}");

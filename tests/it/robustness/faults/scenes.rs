@@ -108,14 +108,16 @@ pub fn copy(from: &Path, to: &Path) {
     assert!(Command::new("cp").arg("-a").args([from, to]).status().unwrap().success());
 }
 
-/// What is in the folder, by content, but for locks and the lines of records that say how much there was to do.
+/// What is in the folder, by content, but for locks, attempts of killed programs (which go after a minute) and the
+/// lines of records that say how much there was to do.
 pub fn content(dir: &Path) -> BTreeMap<String, String> {
-    let files = files_under(dir).into_iter().filter(|(name, _)| !name.ends_with(".lock"));
+    let files =
+        files_under(dir).into_iter().filter(|(name, _)| !name.ends_with(".lock") && !name.contains(".attempt-"));
     let hash = |name: &str, path: &Path| {
         let mut bytes = fs::read(path).unwrap();
         if name.ends_with("record.json") {
             let mut record: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
-            ["line", "facts"].map(|key| record[key].take());
+            ["line", "facts"].into_iter().for_each(|key| drop(record[key].take()));
             bytes = record.to_string().into_bytes();
         }
         blake3::hash(&bytes).to_hex()[..16].to_owned()
