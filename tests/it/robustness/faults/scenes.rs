@@ -29,7 +29,7 @@ const IMPORT: &[&str] =
     &["import", "captured", "--no-sound", "--speaker", "other", "--out", "other", "--min-frames", "10"];
 const TRAIN: &[&str] = &["train", "gan", "--dataset", "tones", "--out", "gan", "--set", "gan.batch=2", "--steps", "2"];
 const BATCH: &[&str] =
-    &["generate", "--checkpoint", "host.safetensors", "--audio-folder", "speech", "--out-folder", "moved"];
+    &["generate", "--checkpoint", "model/host.safetensors", "--audio-folder", "speech", "--out-folder", "moved"];
 
 /// All of them; the first of a kind begins from nothing, the next over what is there.
 pub const SCENES: [Scene; 22] = [
@@ -49,7 +49,7 @@ pub const SCENES: [Scene; 22] = [
         &[
             "generate",
             "--checkpoint",
-            "host.safetensors",
+            "model/host.safetensors",
             "--audio",
             "speech/1.wav",
             "--out",
@@ -59,7 +59,7 @@ pub const SCENES: [Scene; 22] = [
         ],
         &[],
     ),
-    scene(&["generate", "--checkpoint", "host.safetensors", "--audio", "speech/1.wav", "--out", "m.mp4"], &[]),
+    scene(&["generate", "--checkpoint", "model/host.safetensors", "--audio", "speech/1.wav", "--out", "m.mp4"], &[]),
     scene(&["animate", "motion.npy", "--out", "a.bvh", "a.glb", "a.npy"], &[]),
     scene(&["lift", "keypoints.npz", "--out", "joints.npy"], &[RUN]),
     scene(&["sheet"], &[RUN]),
@@ -78,7 +78,8 @@ pub fn prepare(base: &Path) {
     let dir = &base.join("fresh");
     fs::create_dir_all(dir).unwrap();
     expect_success(dir, &["demo", "draw", ".", "--videos", "1", "--secs", "4.6"]);
-    write_untrained_speaker(&dir.join("host.safetensors"));
+    fs::create_dir_all(dir.join("model")).unwrap();
+    write_untrained_speaker(&dir.join("model/host.safetensors"));
     write_npy(&dir.join("motion.npy"), &swinging(3, 20).joints);
     dataset(&dir.join("tones"));
     fs::create_dir_all(dir.join("speech")).unwrap();
