@@ -47,7 +47,7 @@ pub fn attempt_folder(target: &Path) -> Result<PathBuf> {
     };
     made()
         .map_err(|error| full_disk(error.into()))
-        .with_context(|| format!("cannot write in the work folder {}", parent(target).display()))
+        .with_context(|| format!("cannot write {}: no folder can be made beside it", target.display()))
 }
 
 /// Ends what killed programs began at `target`: the folder is put back where it stood aside, attempts are removed. For who
