@@ -16,13 +16,16 @@ pub struct Motion {
     pub mask: Array2<bool>,
 }
 
-/// Farthest that a joint lies from the neck, metres: far more than any body, far less than what overflows.
+/// Farthest that a joint lies from the neck, metres, or medians of all coordinates where that is more: a whole figure in
+/// millimetres can be told from a joint gone astray.
 const FARTHEST: f32 = 100.0;
+/// Farthest in any unit: far less than what overflows.
+const FARTHEST_OF_ALL: f32 = 1e5;
 
 /// Joint beyond all sense.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "frame {frame}, joint {joint} ({}): {position:?} lies more than {FARTHEST} m from the neck; joints must be in metres",
+    "frame {frame}, joint {joint} ({}): {position:?} lies beyond all sense, {FARTHEST} m from the neck or more; joints must be in metres",
     skeleton::name(*joint)
 )]
 pub struct FarJoint {
@@ -41,12 +44,17 @@ impl Motion {
         Self { fps, joints, mask }
     }
 
-    /// Checks that every joint lies within 100 m of the neck or is missing; done once, where a file is read.
+    /// Checks that every joint lies within 100 m of the neck or is missing; done once, where a file is read. A figure
+    /// that is large as a whole passes, to be told later that it is not in metres.
     pub fn in_range(self) -> Result<Self, FarJoint> {
+        let mut sizes: Vec<f32> = self.joints.iter().map(|v| v.abs()).filter(|v| v.is_finite()).collect();
+        let middle = sizes.len() / 2;
+        let median = if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(middle, f32::total_cmp).1 };
+        let farthest = (FARTHEST * median.max(1.0)).min(FARTHEST_OF_ALL);
         for (frame, joints) in self.joints.outer_iter().enumerate() {
             for (joint, at) in joints.outer_iter().enumerate() {
                 let position = std::array::from_fn(|k| at[k]);
-                if position.iter().all(|v: &f32| v.is_finite()) && position.iter().any(|v| v.abs() > FARTHEST) {
+                if position.iter().all(|v: &f32| v.is_finite()) && position.iter().any(|v| v.abs() > farthest) {
                     return Err(FarJoint { frame, joint, position });
                 }
             }

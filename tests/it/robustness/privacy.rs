@@ -1,6 +1,6 @@
 //! A tool for people's videos sends nothing and writes nothing but what it was asked for, as the kernel sees it.
 
-use super::faults::scenes::{SCENES, copy, prepare, set_up};
+use crate::fixtures::faults::scenes::{SCENES, copy, prepare, set_up};
 use crate::fixtures::skip::skip;
 use std::path::{Component, Path};
 use std::process::{Command, Stdio};

@@ -1,7 +1,8 @@
-//! The trials: a scene, a call in it, a fault.
+//! Every call that writes fails once, or is where the program is killed: it says so, and the same command ends in the
+//! same bytes afterwards. `ORATOR_FAULTS=all` tries every call (`make prove`), else a few are drawn by lot.
 
-use super::scenes::{SCENES, Scene, content, copy, prepare, set_up};
-use super::shim::{Call, Fault, Shim, orator};
+use crate::fixtures::faults::scenes::{SCENES, Scene, content, copy, prepare, set_up};
+use crate::fixtures::faults::shim::{Call, Fault, Shim, orator};
 use crate::fixtures::skip::skip;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -31,10 +32,8 @@ fn calm(shim: &Shim, root: &Path, at: usize) -> Calm {
     let run = |name: &str| {
         let place = root.join(format!("{name}-{at}"));
         copy(&start, &place);
-        let begun = std::time::Instant::now();
         let (output, calls) = shim.calls(&place, scene.args);
         assert!(output.status.success(), "{:?}: {}", scene.args, said(&output));
-        eprintln!("{:?} {:.1} s, {} calls", scene.args, begun.elapsed().as_secs_f64(), calls.len());
         // A verb that is given twice: what the second one adds (a cache) is no difference.
         orator(&place, scene.args).output().unwrap();
         let content = content(&place);
