@@ -91,10 +91,8 @@ fn remove_whole(dir: &Path) -> std::io::Result<()> {
         for entry in std::fs::read_dir(folder)? {
             let path = entry?.path();
             let is_entry = folder == entries && path.extension().is_some_and(|ending| ending == "json");
-            match path.is_dir() && !path.is_symlink() {
-                _ if is_entry || path == entries => {}
-                true => std::fs::remove_dir_all(&path)?,
-                false => std::fs::remove_file(&path)?,
+            if !is_entry && path != entries {
+                workdir::remove(&path)?;
             }
         }
     }

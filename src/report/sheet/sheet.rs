@@ -167,7 +167,7 @@ impl SheetClip<'_> {
     }
 
     /// Text over a moment: `3.0 s   wrists shake L 2.1 R 0.9 mm   refused: left hand`:
-    /// keypoints were found there, the joints are left out.
+    /// keypoints were found there, the joints are left out. A wrist that has no joints has no shake.
     fn words(&self, frame_idx: usize) -> String {
         let mask = self.motion.mask.row(frame_idx);
         let half_seen = |root: usize| (1..N_HAND_JOINTS).filter(|j| mask[root + j]).count() * 2 >= N_HAND_JOINTS;
@@ -183,13 +183,14 @@ impl SheetClip<'_> {
             let names = parts.iter().filter(|part| !part.1 && part.2 == is_found).map(|part| part.0);
             names.collect::<Vec<_>>().join(", ")
         };
-        let shake = |joint: usize| jitter_around(self.motion, joint, frame_idx);
-        let mut words = format!(
-            "{:.1} s   wrists shake L {:.1} R {:.1} mm",
-            self.motion.fps.secs(frame_idx),
-            shake(L_WRIST),
-            shake(R_WRIST)
-        );
+        let mut words = format!("{:.1} s", self.motion.fps.secs(frame_idx));
+        let shakes =
+            [("L", L_WRIST), ("R", R_WRIST)].map(|(side, at)| (side, jitter_around(self.motion, at, frame_idx)));
+        let shakes = shakes.into_iter().filter(|(_, mm)| mm.is_finite()).map(|(side, mm)| format!(" {side} {mm:.1}"));
+        let shakes: String = shakes.collect();
+        if !shakes.is_empty() {
+            words += &format!("   wrists shake{shakes} mm");
+        }
         for (why, parts) in [("refused", without(true)), ("not seen", without(false))] {
             if !parts.is_empty() {
                 words += &format!("   {why}: {parts}");

@@ -7,7 +7,7 @@ mod file;
 mod folder;
 mod lock;
 
-pub use attempt::left_over;
+pub use attempt::{left_over, remove};
 pub use disk::NoSpace;
 pub(crate) use disk::full_disk;
 pub use file::{has_files, move_files, remove_file, replace, write_file};
