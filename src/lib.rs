@@ -27,14 +27,15 @@
 //! | 2 | `motion` | the body as numbers: bones, forward kinematics, resampling, what the lifters look at | `types math` |
 //! | 3 | `formats` | every file format, read and written | `types math stage motion` |
 //! | 3 | `nn` | operators, their kernels, the networks | `types motion` |
+//! | 3 | `render` | software renderer: posed meshes seen by a camera | `types math` |
 //! | 4 | `mocap` | motion that others captured, read into our skeleton | `types math motion formats` |
 //! | 4 | `metrics` | how good predicted motion is, as pure sums | `types math nn` |
 //! | 4 | `generate` | what a trained speaker is, and speech to motion with it | `types audio motion formats nn` |
-//! | 4 | `animate` | joints to rotations on a rig, avatar, export, drawing | `types math stage motion formats external` |
+//! | 4 | `animate` | joints to rotations on a rig, avatar, export, drawing | `types math stage motion formats external render` |
 //! | 5 | `dataset` | the dataset on disk: write, read, verify, import, forget | `types math stage config audio motion formats external mocap` |
 //! | 6 | `pipeline` | the five stages, their order, the files in which they meet, their processes; batches of speech to motion | `types math stage config external audio motion formats nn generate animate dataset` |
 //! | 6 | `train` | optimiser, GAN, lifters, synthetic scenes, spaces of movement | `types math stage config audio motion formats nn mocap dataset metrics generate` |
-//! | 6 | `demo` | the synthetic speaker: drawn, with a known rule, and the checks against it | `types math stage audio motion formats external animate dataset metrics generate` |
+//! | 6 | `demo` | synthetic speakers: drawn, rendered, with a known rule, and the checks against them | `types math stage audio motion formats external mocap render animate dataset metrics generate` |
 //! | 7 | `evaluate` | clips, baselines, table, verdict; the lifters' errors | `types math stage config external audio motion formats nn mocap metrics generate dataset pipeline train` |
 //! | 8 | `report` | pages for people | `types stage config external formats metrics animate dataset pipeline train evaluate` |
 //! | - | `guide` | the pages of the guide, in Markdown | nothing |
@@ -84,6 +85,8 @@ pub mod motion;
 pub mod nn;
 #[doc(hidden)]
 pub mod pipeline;
+#[doc(hidden)]
+pub mod render;
 #[doc(hidden)]
 pub mod report;
 #[doc(hidden)]

@@ -11,6 +11,7 @@ pub mod npy;
 pub mod npy_slice;
 pub mod npz;
 pub mod npz_output;
+pub mod rendered_truth;
 pub mod search;
 pub mod tfevents;
 pub mod timeline_npz;

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Floor, room, and the rooms it may import.
-const FLOORS: [(u8, &str, &str); 19] = [
+const FLOORS: [(u8, &str, &str); 20] = [
     (1, "types", ""),
     (1, "math", ""),
     (1, "stage", ""),
@@ -18,14 +18,15 @@ const FLOORS: [(u8, &str, &str); 19] = [
     (2, "motion", "types math"),
     (3, "formats", "types math stage motion"),
     (3, "nn", "types motion"),
+    (3, "render", "types math"),
     (4, "mocap", "types math motion formats"),
     (4, "metrics", "types math nn"),
     (4, "generate", "types audio motion formats nn"),
-    (4, "animate", "types math stage motion formats external"),
+    (4, "animate", "types math stage motion formats external render"),
     (5, "dataset", "types math stage config audio motion formats external mocap"),
     (6, "pipeline", "types math stage config external audio motion formats nn generate animate dataset"),
     (6, "train", "types math stage config audio motion formats nn mocap dataset metrics generate"),
-    (6, "demo", "types math stage audio motion formats external animate dataset metrics generate"),
+    (6, "demo", "types math stage audio motion formats external mocap render animate dataset metrics generate"),
     (
         7,
         "evaluate",
