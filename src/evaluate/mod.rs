@@ -1,4 +1,5 @@
-//! Evaluation of what is trained. `lifter`: errors of the lifters on motion with known truth seen by random cameras.
+//! Evaluation of what is trained. `lifter`: errors of the lifters on motion with known truth seen by random cameras;
+//! `people`: of the whole pipeline on rendered people.
 //! For gestures: `clips` (from pairs of files, or from a dataset and a checkpoint), `baseline` (predictors to compare
 //! with), `table` (metrics in blocks, bootstrap intervals, results, comparison) and `verdict` (conclusions in words).
 
@@ -6,6 +7,7 @@ pub mod baseline;
 pub mod clips;
 pub mod evaluation;
 pub mod lifter;
+pub mod people;
 pub mod table;
 pub mod verdict;
 

@@ -30,7 +30,7 @@ const FLOORS: [(u8, &str, &str); 20] = [
     (
         7,
         "evaluate",
-        "types math stage config external audio motion formats nn mocap metrics generate dataset pipeline train",
+        "types math stage config external audio motion formats nn mocap metrics generate animate dataset pipeline train",
     ),
     (8, "report", "types stage config external formats metrics animate dataset pipeline train evaluate"),
 ];

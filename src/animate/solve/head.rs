@@ -38,16 +38,16 @@ const LIMITS: Vec3 = [75.0, 40.0, 40.0];
 const RELAX_SECS: f64 = 0.5;
 const STEPS: usize = 8;
 
-/// Turns neck and head; returns the number of frames in which the face was seen.
-pub fn turn(face: &Face, rig: &Rig, filters: &SolveFilters, local: &mut [RotationTrack]) -> usize {
-    let n_frames = local[rig.head].len();
+/// Yaw (to the person's left), pitch (down, relative to the clip's median) and roll (towards the right shoulder) of the
+/// head in the camera's axes, radians, a value for each of `n_frames`; `None` where too little of the face is seen.
+pub fn angles(face: &Face, n_frames: usize) -> Vec<Option<Vec3>> {
     let frame = |t: usize| FacePoints::from_keypoints(face.body.index_axis(ndarray::Axis(0), t));
     let points: Vec<Option<FacePoints>> =
         (0..n_frames).map(|t| if t < face.body.shape()[0] { frame(t) } else { None }).collect();
     let Some(scale) = upper_median(points.iter().flatten().filter_map(|points| points.shoulder_scale))
         .or_else(|| upper_median(points.iter().flatten().map(|points| points.spread() / 0.1)))
     else {
-        return 0;
+        return vec![None; n_frames];
     };
     let fitted = |scale: f64, nod: f64, usual: f64| -> Vec<Option<[f64; 4]>> {
         points.iter().map(|points| Some(points.as_ref()?.fit([0.0, nod, 0.0, scale.ln()], usual))).collect()
@@ -57,9 +57,15 @@ pub fn turn(face: &Face, rig: &Rig, filters: &SolveFilters, local: &mut [Rotatio
     let (nod, log_scale) = (middle(&first, 1).unwrap_or(0.0), middle(&first, 3).unwrap_or(scale.ln()));
     let second = fitted(log_scale.exp(), nod, USUAL_SCALE[1]);
     let nod = middle(&second, 1).unwrap_or(0.0);
+    second.iter().map(|fit| fit.map(|[yaw, pitch, roll, _]| [yaw, pitch - nod, roll])).collect()
+}
 
-    let mut angles: Vec<Option<Vec3>> =
-        second.iter().map(|fit| fit.map(|[yaw, pitch, roll, _]| [yaw, pitch - nod, roll])).collect();
+/// Turns neck and head; returns the number of frames in which the face was seen.
+pub fn turn(face: &Face, rig: &Rig, filters: &SolveFilters, local: &mut [RotationTrack]) -> usize {
+    let mut angles = angles(face, local[rig.head].len());
+    if angles.iter().all(Option::is_none) {
+        return 0;
+    }
     filters.hands.runs(&mut angles);
     let halves: ObservedTrack = angles
         .into_iter()

@@ -1,6 +1,6 @@
 //! `orator evaluate`.
 
-use super::{compare, lifter};
+use super::{compare, lifter, people};
 use crate::cli::Outcome;
 use crate::cli::config_args::split;
 use crate::cli::confine::confine;
@@ -40,6 +40,7 @@ pub struct Args {
 enum What {
     Lifter(lifter::Args),
     Compare(compare::Args),
+    People(people::Args),
 }
 
 #[derive(clap::Args)]
@@ -89,6 +90,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.what {
         Some(What::Lifter(args)) => lifter::run(args, ui),
         Some(What::Compare(args)) => compare::run(&args, ui),
+        Some(What::People(args)) => people::run(&args, ui),
         None => motion(&args.motion, ui),
     }
 }

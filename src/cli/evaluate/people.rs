@@ -1,0 +1,33 @@
+//! `orator evaluate people`.
+
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
+use anyhow::Result;
+use orator::evaluate::people::table;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Print the errors of a run on rendered people, by condition, beside the truth.
+///
+/// 2D keypoints, hands (missed, stolen, swapped, invented), what was kept and refused wrongly, and lifted joints beside the
+/// clip's mean pose and beside the same lifter with exact keypoints.
+#[derive(clap::Args)]
+pub struct Args {
+    /// A folder of `orator demo draw --people`.
+    #[arg(value_name = "DIR")]
+    dir: PathBuf,
+    /// Configurations whose runs are measured, each a model set [default: DIR/pipeline.toml]
+    #[arg(short, long, value_name = "FILE", num_args = 1..)]
+    config: Vec<PathBuf>,
+    /// Only clips of this part: first, middle or last.
+    #[arg(long, value_name = "PART")]
+    part: Option<String>,
+}
+
+pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+    let default = [args.dir.join("pipeline.toml")];
+    let config: &[PathBuf] = if args.config.is_empty() { &default } else { &args.config };
+    let rows = table::table(&args.dir, config, args.part.as_deref())?;
+    ui.summary(&table::text(&rows), None, json!({ "people": rows }));
+    Ok(Outcome::Done)
+}

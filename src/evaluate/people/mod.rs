@@ -1,0 +1,11 @@
+//! Errors of the whole pipeline on rendered people, whose truth is known: `points` (2D keypoints), `hands` (missed,
+//! invented, stolen, swapped), `head` (its angles), `kept` (what the intervals keep and the mask says), `joints` (3D), and `table`: all of it
+//! by condition and by model set.
+
+pub mod clips;
+pub mod hands;
+pub mod head;
+pub mod joints;
+pub mod kept;
+pub mod points;
+pub mod table;
