@@ -1,8 +1,9 @@
-//! Pages and pictures for people: `videos` (a speaker's videos), `training`, `evaluation`, and contact sheets
-//! (`sheet`), all written with `html`.
+//! Pages and pictures for people: `videos` (a speaker's videos), `training`, `evaluation`, rendered `people`,
+//! and contact sheets (`sheet`), all written with `html`.
 
 pub mod evaluation;
 pub mod html;
+pub mod people;
 pub mod preview;
 pub mod sheet;
 pub mod splits;

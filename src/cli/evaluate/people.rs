@@ -3,7 +3,9 @@
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator::evaluate::people::table;
+use orator::evaluate::people::{grid, table};
+use orator::report::people::page;
+use orator::stage::workdir;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -22,12 +24,20 @@ pub struct Args {
     /// Only clips of this part: first, middle or last.
     #[arg(long, value_name = "PART")]
     part: Option<String>,
+    /// Also write one HTML page.
+    #[arg(long, value_name = "PAGE.html")]
+    report: Option<PathBuf>,
 }
 
 pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let default = [args.dir.join("pipeline.toml")];
     let config: &[PathBuf] = if args.config.is_empty() { &default } else { &args.config };
     let rows = table::table(&args.dir, config, args.part.as_deref())?;
-    ui.summary(&table::text(&rows), None, json!({ "people": rows }));
+    let mut text = grid::text(&rows);
+    if let Some(path) = &args.report {
+        workdir::write_file(path, page::html(&rows).as_bytes())?;
+        text += &format!("\nwrote {}", path.display());
+    }
+    ui.summary(&text, None, json!({ "people": rows, "report": args.report }));
     Ok(Outcome::Done)
 }

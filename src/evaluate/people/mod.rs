@@ -1,8 +1,9 @@
 //! Errors of the whole pipeline on rendered people, whose truth is known: `points` (2D keypoints), `hands` (missed,
-//! invented, stolen, swapped), `head` (its angles), `kept` (what the intervals keep and the mask says), `joints` (3D), and `table`: all of it
-//! by condition and by model set.
+//! invented, stolen, swapped), `head` (its angles), `kept` (what the intervals keep and the mask says), `joints` (3D), `table` (all of it by
+//! condition and by model set), and `grid` (the table as text).
 
 pub mod clips;
+pub mod grid;
 pub mod hands;
 pub mod head;
 pub mod joints;

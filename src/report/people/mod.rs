@@ -1,0 +1,3 @@
+//! Page of the errors on rendered people.
+
+pub mod page;
