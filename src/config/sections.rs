@@ -148,6 +148,8 @@ pub struct Pose2dConfig {
     pub hand: String,
     /// Palm detector, asked when a hand is lost; empty: none.
     pub palm: String,
+    /// Face model, which sees how far the mouth is open; empty, or `auto` where it is not there: none.
+    pub face: String,
     /// The person detector looks at every n-th frame of a shot.
     pub person_every: usize,
     /// The palm detector looks at every n-th frame while a hand is missing; more rarely while it finds none.
@@ -167,6 +169,7 @@ impl Default for Pose2dConfig {
             body: "auto".into(),
             hand: "auto".into(),
             palm: "auto".into(),
+            face: "auto".into(),
             person_every: 15,
             palm_every: 5,
             person_follow: 0.3,

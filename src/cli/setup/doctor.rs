@@ -119,6 +119,9 @@ fn model_checks(settings: &Settings) -> Vec<Check> {
             Err(error) => wrong(&format!("model {id}"), format!("{error:#}"), "orator models fetch"),
         });
     }
+    if let Some(advice) = models::advice(&settings.pose2d, &store) {
+        checks.push(wrong("face model", advice.to_owned(), "orator models fetch"));
+    }
     match SpeechListener::advice(settings) {
         Ok(None) => {}
         Ok(Some(advice)) => checks.push(wrong("speech model", advice.to_owned(), "orator models fetch")),

@@ -35,6 +35,7 @@ person = "person-marker"
 body = "body-marker"
 hand = "hand-marker"
 palm = ""
+face = ""                          # it has no face
 
 [segment]
 speech = "loudness"                # its speech is made of tones, which the speech model rightly takes for none

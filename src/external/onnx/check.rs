@@ -82,6 +82,7 @@ impl ModelEntry {
                 Decode::Heatmap { .. } | Decode::Simcc { .. } | Decode::Regression { .. },
             ) => height == width,
             (ModelRole::Palm, PictureFit::Letterbox { .. }, Decode::SsdAnchors { .. }) => height == width,
+            (ModelRole::Face, PictureFit::Region, Decode::Regression { .. }) => height == width,
             (ModelRole::Other, _, _) => true,
             _ => false,
         };
@@ -89,7 +90,7 @@ impl ModelEntry {
             fits,
             "role, fit and decode do not go together: person: letterbox + detections or yolox-grid; body: box (margin > 0) + \
              heatmap or simcc; hand: region (a square input) + heatmap, simcc or regression; palm: letterbox (a square \
-             input) + ssd-anchors"
+             input) + ssd-anchors; face: region (a square input) + regression"
         );
         let whole = |points: &[usize], n: usize| points.len() == n;
         let maps = match self.role {
@@ -126,7 +127,7 @@ impl Decode {
             Self::YoloxGrid { predictions, .. } => vec![predictions],
             Self::Heatmap { heatmap, .. } => vec![heatmap],
             Self::Simcc { x, y, .. } => vec![x, y],
-            Self::Regression { landmarks, score, right } => {
+            Self::Regression { landmarks, score, right, .. } => {
                 [Some(landmarks), Some(score), right.as_ref()].into_iter().flatten().map(String::as_str).collect()
             }
             Self::SsdAnchors { regressors, scores, .. } => vec![regressors, scores],

@@ -54,6 +54,7 @@ pub enum ModelRole {
     Body,
     Hand,
     Palm,
+    Face,
     Speech,
     Other,
 }
@@ -157,6 +158,9 @@ pub enum Decode {
     Regression {
         landmarks: String,
         score: String,
+        /// The score is a logit.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        logit: bool,
         right: Option<String>,
     },
     SsdAnchors {

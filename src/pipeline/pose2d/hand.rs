@@ -58,8 +58,8 @@ impl HandModel {
         let Some(src_from_dst) = region.src_from_dst(size[0]) else { return Ok(None) };
         let outputs = self.feed.part(image, &src_from_dst)?;
         let single = |name: &str| -> Result<f32> { Ok(outputs.floats(name)?.1.first().copied().unwrap_or(0.0)) };
-        let hand = if let Decode::Regression { landmarks, score, right } = &self.decode {
-            let score = single(score)?;
+        let hand = if let Decode::Regression { landmarks, score, logit, right } = &self.decode {
+            let score = regression::score(single(score)?, *logit);
             let n_points = self.map.iter().max().map_or(0, |largest| largest + 1);
             let points = regression::decode(outputs.floats(landmarks)?.1, score, n_points.max(21))?;
             let right = right.as_ref().map(|name| single(name)).transpose()?.map(f64::from);

@@ -5,16 +5,17 @@ use crate::external::onnx::{AUTO, ModelRole, ModelStore, Wanted};
 use anyhow::{Context, Result};
 
 /// The keys of `[pose2d]` that name a model, with the role of each and what the configuration says.
-pub fn keys(config: &Pose2dConfig) -> [(&'static str, ModelRole, &String); 4] {
+pub fn keys(config: &Pose2dConfig) -> [(&'static str, ModelRole, &String); 5] {
     [
         ("person", ModelRole::Person, &config.person),
         ("body", ModelRole::Body, &config.body),
         ("hand", ModelRole::Hand, &config.hand),
         ("palm", ModelRole::Palm, &config.palm),
+        ("face", ModelRole::Face, &config.face),
     ]
 }
 
-/// The configuration with a model's id in the place of every `auto`.
+/// The configuration with a model's id in the place of every `auto`; a face model that is not there is none.
 ///
 /// # Errors
 /// An id that the manifest does not have, or of another role.
@@ -25,8 +26,23 @@ pub fn choose(config: &Pose2dConfig, store: &ModelStore) -> Result<Pose2dConfig>
         }
         Ok(store.choose(id, role).with_context(|| format!("pose2d.{key}"))?.id.clone())
     };
-    let [person, body, hand, palm] = keys(config).map(id);
-    Ok(Pose2dConfig { person: person?, body: body?, hand: hand?, palm: palm?, ..config.clone() })
+    let [person, body, hand, palm, face] = keys(config).map(id);
+    let face = if lacks_face(config, store) { String::new() } else { face? };
+    Ok(Pose2dConfig { person: person?, body: body?, hand: hand?, palm: palm?, face, ..config.clone() })
+}
+
+/// What to say once of a run without the face model that might have it.
+pub fn advice(config: &Pose2dConfig, store: &ModelStore) -> Option<&'static str> {
+    lacks_face(config, store).then_some(
+        "no face model is there, so the voice of somebody who is not seen counts as the speaker's: `orator models fetch` \
+         gets the model that sees the mouth",
+    )
+}
+
+/// Whether the face model is left to what is there, and none is.
+fn lacks_face(config: &Pose2dConfig, store: &ModelStore) -> bool {
+    let is_there = |entry| store.path(entry).is_file();
+    config.face == AUTO && !store.choose(AUTO, ModelRole::Face).is_ok_and(is_there)
 }
 
 /// What `ModelStore::fetch` is asked for, so that every model of the configuration is there.

@@ -6,10 +6,11 @@ use orator::external::onnx::{Manifest, Model, ModelRole, TensorAxes};
 use std::path::Path;
 
 /// Models whose numbers were written down from files of other names, of the same weights.
-const WRITTEN_AS: [(&str, &str); 3] = [
+const WRITTEN_AS: [(&str, &str); 4] = [
     ("body-tinypose-256x192", "body_pp_tinypose_256x192.onnx"),
     ("hand-mediapipe-lite", "mp_hand_landmark_lite_224.onnx"),
     ("palm-mediapipe-full", "mp_palm_detection_full_192.onnx"),
+    ("face-mediapipe", "mp_face_landmark_192.onnx"),
 ];
 
 #[test]

@@ -1,5 +1,6 @@
 //! Numbers held to independent references: golden values from committed scripts, and real clips.
 
+pub mod face_parity;
 pub mod generator_parity;
 pub mod golden;
 pub mod heatmap_parity;

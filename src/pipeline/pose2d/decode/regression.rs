@@ -1,5 +1,5 @@
 //! Models that name the keypoints outright: a row of numbers a point, x and y first, in pixels of the input, and one
-//! score for them all (MediaPipe's hand).
+//! score for them all (MediaPipe's hand and face).
 
 use super::ScoredPoint;
 use anyhow::{Result, ensure};
@@ -13,6 +13,11 @@ pub fn decode(landmarks: &[f32], score: f32, n_points: usize) -> Result<Vec<Scor
     }
     let rows = landmarks.chunks_exact(landmarks.len() / n_points);
     Ok(rows.map(|row| [f64::from(row[0]), f64::from(row[1]), f64::from(score)]).collect())
+}
+
+/// The score 0..1 that a model gives outright or as a logit.
+pub fn score(number: f32, is_logit: bool) -> f32 {
+    if is_logit { 1.0 / (1.0 + (-number).exp()) } else { number }
 }
 
 #[cfg(test)]
