@@ -33,6 +33,9 @@ impl Visibility {
         [Self::Seen, Self::BehindBody, Self::BehindHand, Self::BehindThing, Self::BehindPerson, Self::Outside];
 }
 
+/// Array that no other file of motion has.
+pub const BODY_JOINTS: &str = "body_joints";
+
 /// Ground truth of the person in the middle of interest, at every frame of the video.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderedTruth {
@@ -48,10 +51,14 @@ pub struct RenderedTruth {
     pub right_hand_seen: Array2<Visibility>,
     /// Joints [T, 49, 3] in camera axes (x right, y down, z away), metres, the neck at the origin of every frame.
     pub joints: Array3<f32>,
+    /// COCO-17 in the same axes and from the same origin, [T, 17, 3], metres; face points lie on the skin.
+    pub body_joints: Array3<f32>,
     /// Neck [T, 3] in camera axes, metres.
     pub neck: Array2<f32>,
     /// Focal length, px.
     pub focal_px: f32,
+    /// Unit vector that points up in the world, in camera axes.
+    pub up: [f32; 3],
     /// Rotation of the head in camera axes [T, 3], degrees: yaw (positive: to the person's left), pitch (positive: up),
     /// roll (positive: towards the person's left shoulder); all 0 facing the camera.
     pub head: Array2<f32>,
@@ -81,8 +88,10 @@ impl RenderedTruth {
                 npz.add_array("right_hand", &self.right_hand)?;
                 npz.add_array("right_hand_seen", &codes(&self.right_hand_seen))?;
                 npz.add_array("joints", &self.joints)?;
+                npz.add_array(BODY_JOINTS, &self.body_joints)?;
                 npz.add_array("neck", &self.neck)?;
                 npz.add_array("focal_px", &aview1(&[self.focal_px]))?;
+                npz.add_array("up", &aview1(&self.up))?;
                 npz.add_array("head", &self.head)?;
                 npz.add_array("mouth", &self.mouth)?;
                 npz.add_array("speaks", &self.speaks)
@@ -121,8 +130,13 @@ impl RenderedTruth {
             right_hand: floats(&mut npz, "right_hand", &[n, Some(N_HAND), Some(2)])?,
             right_hand_seen,
             joints,
+            body_joints: floats(&mut npz, BODY_JOINTS, &[n, Some(N_BODY), Some(3)])?,
             neck: floats(&mut npz, "neck", &[n, Some(3)])?,
             focal_px: floats::<Ix1>(&mut npz, "focal_px", &[Some(1)])?[0],
+            up: {
+                let up = floats::<Ix1>(&mut npz, "up", &[Some(3)])?;
+                [up[0], up[1], up[2]]
+            },
             head: floats(&mut npz, "head", &[n, Some(3)])?,
             mouth: floats(&mut npz, "mouth", &[n])?,
             speaks,
@@ -152,8 +166,10 @@ mod tests {
             right_hand: Array3::zeros((n, N_HAND, 2)),
             right_hand_seen: Array2::from_elem((n, N_HAND), Visibility::BehindHand),
             joints: Array3::from_elem((n, N_JOINTS, 3), 0.25),
+            body_joints: Array3::from_elem((n, N_BODY, 3), -0.5),
             neck: Array2::from_elem((n, 3), 1.5),
             focal_px: 900.0,
+            up: [0.0, -1.0, 0.0],
             head: Array2::zeros((n, 3)),
             mouth: Array1::from_elem(n, 0.5),
             speaks: Array1::from_elem(n, true),

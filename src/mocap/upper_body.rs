@@ -1,17 +1,19 @@
 //! Captured motion as the body lifter needs it: nine points of the upper body in camera-like axes (a person at rest
 //! faces -z, y down), in metres. Read are BVH files of any skeleton whose names are understood (`joint_names`), y or z
-//! up, in any unit; `.npz` files of CMU joints ([T, 38, 3] a clip, millimetres, y up, `fps`); and those of TED Expressive
-//! (`human_joints`). A take is one continuous stretch: files are divided where the body jumps, as behind a T-pose at
+//! up, in any unit; `.npz` files of CMU joints ([T, 38, 3] a clip, millimetres, y up, `fps`), of TED Expressive
+//! (`human_joints`), and the truth of rendered people. A take is one continuous stretch: files are divided where the body jumps, as behind a T-pose at
 //! the beginning.
 
 use crate::formats::bvh::joint_names;
 use crate::formats::bvh::read::{Bvh, Positions};
 use crate::formats::npz::Npz;
+use crate::formats::rendered_truth::{BODY_JOINTS, RenderedTruth};
 use crate::formats::search;
 use crate::math::order::upper_median;
+use crate::math::rotation::Rotation;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
-use crate::motion::upper_body::{N_POINTS, Pose};
+use crate::motion::upper_body::{COCO, N_POINTS, Pose};
 use anyhow::{Context, Result, bail, ensure};
 use std::path::{Path, PathBuf};
 
@@ -127,7 +129,31 @@ fn in_metres(bodies: &mut [[Vec3; 10]]) -> Result<()> {
 
 fn read_npz(path: &Path) -> Result<Vec<BodyTake>> {
     let npz = Npz::open(path)?;
-    if npz.has("human_joints") { read_ted(path, npz) } else { read_cmu(npz) }
+    if npz.has(BODY_JOINTS) {
+        read_rendered(path)
+    } else if npz.has("human_joints") {
+        read_ted(path, npz)
+    } else {
+        read_cmu(npz)
+    }
+}
+
+/// Truth of a rendered person, turned upright: its camera may look up or down.
+fn read_rendered(path: &Path) -> Result<Vec<BodyTake>> {
+    let truth = RenderedTruth::read(path)?;
+    let up = vec3::unit(truth.up.map(f64::from), 1e-6).with_context(|| format!("{}: `up` is 0", path.display()))?;
+    let upright = Rotation::between(up, [0.0, -1.0, 0.0]);
+    let pose = |frame: ndarray::ArrayView2<f32>| -> Pose {
+        COCO.map(|point| upright.turn(std::array::from_fn(|k| f64::from(frame[[point, k]]))))
+    };
+    let poses: Vec<Pose> = truth.body_joints.outer_iter().map(pose).collect();
+    ensure!(
+        poses.iter().flatten().flatten().all(|v| v.is_finite()),
+        "{}: it holds numbers that are not finite",
+        path.display()
+    );
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    Ok(divided(&name, truth.fps.per_sec(), poses))
 }
 
 /// TED Expressive: `human_joints` [T, 43, 3] in metres, y down, and `fps`. 0 is the spine, 0.26 m below the neck (1);
