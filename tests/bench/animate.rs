@@ -2,7 +2,7 @@
 
 use super::report::{Report, median};
 use anyhow::{Result, ensure};
-use orator::animate::avatar::Avatar;
+use orator::animate::avatar::{Appearance, Avatar};
 use orator::animate::export::glb_scene;
 use orator::animate::rig::names::Names;
 use orator::animate::{AnimationOptions, perform};
@@ -56,7 +56,7 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         n_bytes[0] = performance.clip.to_bvh().len();
         secs[1].push(start.elapsed().as_secs_f64());
         let start = Instant::now();
-        let avatar = one_core.install(|| Avatar::new(&performance.rig));
+        let avatar = one_core.install(|| Avatar::new(&performance.rig, &Appearance::plain()));
         secs[2].push(start.elapsed().as_secs_f64());
         let start = Instant::now();
         n_bytes[1] = glb_scene::file(&performance.rig, &performance.clip, &avatar, Names::Own).len();

@@ -1,6 +1,7 @@
 //! Skinned avatar of a rig. Its shape is a signed distance field around the bones in a relaxed stance; the surface
 //! mesh, the skinning weights and the vertices in T-pose (by inverse linear skinning) follow from it.
 
+use super::appearance::{Appearance, Reflectance};
 use super::body::BodyForm;
 use super::field::Form;
 use super::hand::HandForm;
@@ -29,25 +30,44 @@ pub enum Material {
     Shoes,
 }
 
+impl Material {
+    /// Strength of the highlight, 0 .. 1.
+    pub fn gloss(self) -> f32 {
+        match self {
+            Self::Skin => 0.12,
+            Self::Shirt | Self::Trousers => 0.0,
+            Self::Shoes => 0.1,
+        }
+    }
+}
+
 /// Triangles of one material in the T-pose (cm, in the figure's axes, the soles at y = 0), with their joints.
 #[derive(Clone, Debug)]
 pub struct AvatarMesh {
     pub material: Material,
     pub points: Vec<Vec3>,
     pub normals: Vec<Vec3>,
+    pub colours: Vec<Reflectance>,
     pub triangles: Vec<[u32; 3]>,
-    /// Four joints a vertex with weights that sum to 1.
+    /// Four joints a vertex with weights that sum to 1, largest first.
     pub weights: Vec<Weights>,
+    /// Way of each vertex from the closed to the open mouth, cm; empty where nothing moves.
+    pub mouth: Vec<Vec3>,
 }
 
 /// Meshes that together cover a rig.
 #[derive(Clone, Debug)]
 pub struct Avatar {
     pub parts: Vec<AvatarMesh>,
+    /// Nose, left eye, right eye, left ear, right ear, cm from the head joint in its axes.
+    pub face: [Vec3; 5],
+    /// Middles of the upper and the lower lip's inner edges, cm from the head joint, and the way of the lower one to the
+    /// open mouth.
+    pub inner_lips: [Vec3; 3],
 }
 
 impl Avatar {
-    pub fn new(rig: &Rig) -> Self {
+    pub fn new(rig: &Rig, looks: &Appearance) -> Self {
         let stance = Stance::new(rig);
         let hands = [0, 1].map(|side| HandForm::new(rig, &stance, side));
         let body = BodyForm::new(rig, &stance, hands.each_ref().map(|hand| hand.scale));
@@ -56,27 +76,27 @@ impl Avatar {
         let surface_of = |form: &Form, cell: f64| Surface::from_field(&|at| form.distance(at), form.bounds(), cell);
 
         let surface = surface_of(&body.head(), HEAD_CELL * cm);
-        skin.add(body.head_weights(&surface), surface);
+        skin.add(body.head_weights(&surface), surface, looks.skin);
         let surface = Surface::from_field(&body.shirt(), body.shirt_bounds(), SHIRT_CELL * cm);
-        shirt.add(body.shirt_weights(&surface), surface);
+        shirt.add(body.shirt_weights(&surface), surface, looks.top_colour);
         let surface = surface_of(&body.trousers(), LEGS_CELL * cm);
-        trousers.add(body.leg_weights(&surface), surface);
+        trousers.add(body.leg_weights(&surface), surface, looks.legs_colour);
         for (side, hand) in hands.iter().enumerate() {
             let size = hand.scale;
             let light = |at: Vec3| hand.whole(at);
             let palm = PALM_CELL * size;
             let surface = Surface::from_field(&|at| hand.palm(at), hand.bounds(None), palm).lit(&light, palm);
-            skin.add(body.palm_weights(side, size, &surface), surface);
+            skin.add(body.palm_weights(side, size, &surface), surface, looks.skin);
             for n in 1..5 {
                 let finger = FINGER_CELL * size;
                 let surface =
                     Surface::from_field(&|at| hand.finger(n, at), hand.bounds(Some(n)), finger).lit(&light, finger);
-                skin.add(body.finger_weights(side, n, size, &surface), surface);
+                skin.add(body.finger_weights(side, n, size, &surface), surface, looks.skin);
             }
             let surface = surface_of(&body.cuff(side), CUFF_CELL * size);
-            shirt.add(body.cuff_weights(side, &surface), surface);
+            shirt.add(body.cuff_weights(side, &surface), surface, looks.top_colour);
             let surface = surface_of(&body.shoe(side), SHOE_CELL * cm);
-            shoes.add(body.leg_weights(&surface), surface);
+            shoes.add(body.leg_weights(&surface), surface, looks.shoes_colour);
         }
         let parts = [
             (Material::Skin, skin),
@@ -84,7 +104,12 @@ impl Avatar {
             (Material::Trousers, trousers),
             (Material::Shoes, shoes),
         ];
-        Self { parts: parts.into_iter().map(|(material, built)| built.rested(material, &stance)).collect() }
+        let place = |[x, y, z]: Vec3| [x * cm, y * cm, z * cm];
+        Self {
+            parts: parts.into_iter().map(|(material, built)| built.rested(material, &stance)).collect(),
+            face: [[0.0, 8.2, 9.8], [3.1, 10.8, 8.3], [-3.1, 10.8, 8.3], [7.6, 9.8, 0.0], [-7.6, 9.8, 0.0]].map(place),
+            inner_lips: [[0.0, 4.2, 8.8], [0.0, 4.2, 8.8], [0.0, -2.6, -0.4]].map(place),
+        }
     }
 }
 
@@ -93,11 +118,13 @@ impl Avatar {
 struct PosedMesh {
     surface: Surface,
     weights: Vec<Weights>,
+    colours: Vec<Reflectance>,
 }
 
 impl PosedMesh {
-    fn add(&mut self, weights: Vec<Weights>, surface: Surface) {
+    fn add(&mut self, weights: Vec<Weights>, surface: Surface, colour: Reflectance) {
         let first = self.surface.points.len() as u32;
+        self.colours.resize(self.colours.len() + surface.points.len(), colour);
         self.surface.points.extend(surface.points);
         self.surface.normals.extend(surface.normals);
         self.surface.triangles.extend(surface.triangles.into_iter().map(|triangle| triangle.map(|v| v + first)));
@@ -118,7 +145,8 @@ impl PosedMesh {
                 (rest, unit(turn.back(normal), 1e-9).unwrap_or(normal))
             })
             .unzip();
-        AvatarMesh { material, points, normals, triangles, weights: self.weights }
+        let (colours, weights) = (self.colours, self.weights);
+        AvatarMesh { material, points, normals, colours, triangles, weights, mouth: Vec::new() }
     }
 }
 
@@ -167,7 +195,7 @@ mod tests {
     #[test]
     fn skinning_brings_the_rest_into_the_stance_and_both_sides_are_alike() {
         let rig = rig();
-        let (avatar, stance) = (Avatar::new(&rig), Stance::new(&rig));
+        let (avatar, stance) = (Avatar::new(&rig, &Appearance::plain()), Stance::new(&rig));
         let shirt = &avatar.parts[1];
         let hands = [0, 1].map(|side| HandForm::new(&rig, &stance, side).scale);
         let body = BodyForm::new(&rig, &stance, hands);
@@ -192,7 +220,7 @@ mod tests {
     fn bent_joints_do_not_collapse() {
         // The thinnest place around a finger's middle joint and around an elbow, straight and bent by 90 degrees.
         let rig = rig();
-        let avatar = Avatar::new(&rig);
+        let avatar = Avatar::new(&rig, &Appearance::plain());
         let arm = &rig.arms[0];
         let finger = super::super::stance::finger_joints(&rig, 0, 2);
         for (part, joint, next, axis) in [

@@ -1,13 +1,17 @@
-//! Skinned avatar of a rig: distance fields (`field`, `body`, `hand`), their surfaces, the stance they are built in,
-//! and skinning weights.
+//! Skinned avatar of a rig: its looks, distance fields (`field`, `body`, `hand`), their surfaces, the stance they are
+//! built in, skinning weights, and poses.
 
+pub mod appearance;
 pub mod avatar;
 pub mod body;
 pub mod field;
 pub mod hand;
+pub mod posing;
 pub mod skin;
 pub mod stance;
 pub mod surface;
 
+pub use appearance::Appearance;
 pub use avatar::{Avatar, AvatarMesh, Material};
+pub use posing::hip_points;
 pub use skin::Weights;

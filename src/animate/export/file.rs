@@ -1,7 +1,7 @@
 //! Motion file of any kind, chosen by its name's extension, written atomically.
 
 use super::{film, glb_scene, json};
-use crate::animate::avatar::Avatar;
+use crate::animate::avatar::{Appearance, Avatar};
 use crate::animate::performance::Performance;
 use crate::animate::rig::names::Names;
 use crate::formats::{authors_txt, npy};
@@ -80,7 +80,7 @@ impl ExportFormat {
                 streamed(path, |text| performance.clip.write_bvh(&named, text))
             }
             Self::Glb => {
-                let avatar = Avatar::new(&performance.rig);
+                let avatar = Avatar::new(&performance.rig, &Appearance::plain());
                 let bytes = glb_scene::file(&performance.rig, &performance.clip, &avatar, sources.names);
                 workdir::write_file(path, &bytes)
             }

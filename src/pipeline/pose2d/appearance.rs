@@ -15,9 +15,9 @@ const BAND: [usize; 2] = [10, 6];
 
 /// Distributions of colour over the body, cumulated: how much of each channel lies at or below each bin.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Appearance(Vec<f32>);
+pub struct BodyColours(Vec<f32>);
 
-impl Appearance {
+impl BodyColours {
     /// Measures the body whose points are given; `None` if its shoulders are not surer than `least`.
     pub fn measure(image: &Image, body: &[ScoredPoint; 17], least: f64) -> Option<Self> {
         let [left, right] = [coco::L_SHOULDER, coco::R_SHOULDER].map(|at| body[at]);
@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn another_shirt_is_another_person_and_another_place_or_light_is_not() {
-        let of = |(image, body): (Image, [ScoredPoint; 17])| Appearance::measure(&image, &body, 0.3).unwrap();
+        let of = |(image, body): (Image, [ScoredPoint; 17])| BodyColours::measure(&image, &body, 0.3).unwrap();
         let red = of(person([180, 40, 40], 1.0, 100.0));
         let same = red.distance(&of(person([180, 40, 40], 0.9, 200.0)));
         let other = red.distance(&of(person([40, 60, 160], 1.0, 100.0)));
@@ -115,8 +115,8 @@ mod tests {
     fn without_shoulders_there_is_nothing_to_see() {
         let (image, mut body) = person([1, 2, 3], 1.0, 100.0);
         body[coco::L_SHOULDER][2] = 0.1;
-        assert_eq!(Appearance::measure(&image, &body, 0.3), None);
+        assert_eq!(BodyColours::measure(&image, &body, 0.3), None);
         body[coco::L_SHOULDER] = [f64::NAN, f64::NAN, 0.9];
-        assert_eq!(Appearance::measure(&image, &body, 0.3), None);
+        assert_eq!(BodyColours::measure(&image, &body, 0.3), None);
     }
 }

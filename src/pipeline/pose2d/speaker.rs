@@ -1,7 +1,7 @@
 //! The one speaker in frame after frame: when to look for people, whom of them to follow (`tracker`), and whether it
 //! still is the same person, which his or her colours tell (`appearance`) where two people cross.
 
-use super::appearance::Appearance;
+use super::appearance::BodyColours;
 use super::body::BodyModel;
 use super::decode::{ScoredPoint, boxes};
 use super::liveness::LivenessTracks;
@@ -36,15 +36,15 @@ pub struct SpeakerTracker {
     pub detector: Option<Detector>,
     pub track: PersonTrack,
     tracks: LivenessTracks,
-    reference: Option<Appearance>,
-    /// Appearance of the tracked person.
-    colours: Option<Appearance>,
+    reference: Option<BodyColours>,
+    /// Colours of the tracked person.
+    colours: Option<BodyColours>,
     /// Frames in a row that showed a stranger; below 0: frames for which that is not believed.
     n_strange: i32,
     /// More than one person was in view in this shot.
     several: bool,
     /// Whom the shot before showed, and where.
-    before: Option<(PersonBox, Appearance)>,
+    before: Option<(PersonBox, BodyColours)>,
 }
 
 impl SpeakerTracker {
@@ -119,7 +119,7 @@ impl SpeakerTracker {
         body: &mut BodyModel,
         settings: &config::Pose2dConfig,
     ) -> Result<bool> {
-        let Some(seen) = Appearance::measure(image, points, settings.joint_score) else { return Ok(false) };
+        let Some(seen) = BodyColours::measure(image, points, settings.joint_score) else { return Ok(false) };
         if let Some((place, colours)) = self.before.take()
             && boxes::overlap(&place, &self.track.person()) >= SAME_BOX
             && colours.distance(&seen) <= SAME_COLOURS
@@ -176,7 +176,7 @@ fn is_here(found: &[Candidate], followed: &PersonBox) -> bool {
 /// How far the colours of everybody found are from those given.
 fn measure(
     found: &mut [Candidate],
-    colours: &Appearance,
+    colours: &BodyColours,
     image: &Image,
     body: &mut BodyModel,
     least: f64,
@@ -189,7 +189,7 @@ fn measure(
     Ok(())
 }
 
-fn colours_of(image: &Image, one: &PersonBox, body: &mut BodyModel, least: f64) -> Result<Option<Appearance>> {
+fn colours_of(image: &Image, one: &PersonBox, body: &mut BodyModel, least: f64) -> Result<Option<BodyColours>> {
     let found = body.find(image, [one.x, one.y, one.width, one.height].map(f64::from))?;
-    Ok(found.and_then(|found| Appearance::measure(image, &found.points, least)))
+    Ok(found.and_then(|found| BodyColours::measure(image, &found.points, least)))
 }

@@ -1,0 +1,135 @@
+//! Avatar in a pose: linear blend skinning into the world, and the points of head and hips that picture datasets name.
+
+use super::avatar::{Avatar, AvatarMesh};
+use crate::animate::rig::rig::Rig;
+use crate::math::rotation::Rotation;
+use crate::math::vec3::{Vec3, add, sub};
+use crate::render::Mesh;
+
+/// Affine map of a joint from the T-pose into the world: the matrix's columns and the shift.
+type JointMap = [[f32; 3]; 4];
+
+impl Avatar {
+    /// Meshes in a pose, in world axes (cm, y up): the hips at `root`, a local rotation for every joint of the rig, the
+    /// mouth open by `mouth` (0 closed .. 1).
+    pub fn posed(&self, rig: &Rig, root: Vec3, local: &[Rotation], mouth: f64) -> Vec<Mesh> {
+        let mut meshes = Vec::new();
+        self.pose_into(rig, root, local, mouth, &mut meshes);
+        meshes
+    }
+
+    /// Writes the meshes of a pose into `meshes`, whose memory is used again.
+    pub fn pose_into(&self, rig: &Rig, root: Vec3, local: &[Rotation], mouth: f64, meshes: &mut Vec<Mesh>) {
+        let (turns, places) = (rig.skeleton.world(local), rig.skeleton.positions(root, local));
+        let rest = rig.skeleton.positions(rig.root, &vec![Rotation::IDENTITY; local.len()]);
+        let maps: Vec<JointMap> = (0..turns.len())
+            .map(|joint| {
+                let [x, y, z] = turns[joint].axes();
+                [x, y, z, sub(places[joint], turns[joint].turn(rest[joint]))].map(|column| column.map(|v| v as f32))
+            })
+            .collect();
+        meshes.resize_with(self.parts.len(), Mesh::default);
+        for (part, mesh) in self.parts.iter().zip(meshes) {
+            part.pose_into(&maps, mouth as f32, mesh);
+        }
+    }
+
+    /// Nose, left eye, right eye, left ear, right ear (the order of COCO) on the surface in a pose, world cm; they move
+    /// with the rig's head joint.
+    pub fn face_points(&self, rig: &Rig, root: Vec3, local: &[Rotation]) -> [Vec3; 5] {
+        self.on_head(rig, root, local, self.face)
+    }
+
+    /// Middles of the upper and the lower lip's inner edges in a pose, world cm.
+    pub fn lip_points(&self, rig: &Rig, root: Vec3, local: &[Rotation], mouth: f64) -> [Vec3; 2] {
+        let [upper, lower, open] = self.inner_lips;
+        self.on_head(rig, root, local, [upper, add(lower, open.map(|v| v * mouth))])
+    }
+
+    fn on_head<const N: usize>(&self, rig: &Rig, root: Vec3, local: &[Rotation], points: [Vec3; N]) -> [Vec3; N] {
+        let turn = rig.skeleton.world(local)[rig.head];
+        let place = rig.skeleton.positions(root, local)[rig.head];
+        points.map(|point| add(place, turn.turn(point)))
+    }
+}
+
+/// Hip joints, left and right, in a pose, world cm.
+pub fn hip_points(rig: &Rig, root: Vec3, local: &[Rotation]) -> [Vec3; 2] {
+    let places = rig.skeleton.positions(root, local);
+    ["LeftUpLeg", "RightUpLeg"].map(|name| places[rig.skeleton.find(name).unwrap_or_default()])
+}
+
+impl AvatarMesh {
+    fn pose_into(&self, maps: &[JointMap], mouth: f32, mesh: &mut Mesh) {
+        mesh.colours.clone_from(&self.colours);
+        mesh.triangles.clone_from(&self.triangles);
+        mesh.gloss = self.material.gloss();
+        mesh.labels.clear();
+        mesh.labels.extend(self.weights.iter().map(|weights| weights[0].0 as u16));
+        mesh.points.clear();
+        mesh.normals.clear();
+        for (n, weights) in self.weights.iter().enumerate() {
+            let mut at = self.points[n].map(|v| v as f32);
+            if let Some(open) = self.mouth.get(n) {
+                (0..3).for_each(|k| at[k] += mouth * open[k] as f32);
+            }
+            let normal = self.normals[n].map(|v| v as f32);
+            let (mut place, mut out) = ([0.0; 3], [0.0; 3]);
+            for &(joint, weight) in weights.iter().take_while(|(_, weight)| *weight > 0.0) {
+                let ([x, y, z, shift], weight) = (&maps[joint], weight as f32);
+                for k in 0..3 {
+                    place[k] += weight * (x[k] * at[0] + y[k] * at[1] + z[k] * at[2] + shift[k]);
+                    out[k] += weight * (x[k] * normal[0] + y[k] * normal[1] + z[k] * normal[2]);
+                }
+            }
+            let length = (out[0] * out[0] + out[1] * out[1] + out[2] * out[2]).sqrt().max(1e-12);
+            mesh.points.push(place);
+            mesh.normals.push(out.map(|v| v / length));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::animate::avatar::Appearance;
+    use crate::math::vec3::norm;
+    use crate::types::pose3d::Motion;
+    use crate::types::skeleton::N_JOINTS;
+    use crate::types::time::FrameRate;
+
+    fn rig() -> Rig {
+        let unseen = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
+        Rig::from_motion(&Motion::from_joints(FrameRate::new(15, 1), unseen))
+    }
+
+    #[test]
+    fn at_rest_the_pose_is_the_avatar_and_a_turned_head_turns_its_points() {
+        let rig = rig();
+        let avatar = Avatar::new(&rig, &Appearance::plain());
+        let mut local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
+        let mut meshes = avatar.posed(&rig, rig.root, &local, 0.0);
+        for (part, mesh) in avatar.parts.iter().zip(&meshes) {
+            assert_eq!((part.triangles.len(), part.points.len()), (mesh.triangles.len(), mesh.points.len()));
+            for (point, posed) in part.points.iter().zip(&mesh.points) {
+                assert!(norm(sub(*point, posed.map(f64::from))) < 1e-3);
+            }
+        }
+        let [nose, left, right, left_ear, right_ear] = avatar.face_points(&rig, rig.root, &local);
+        assert!(left[0] > 0.0 && left_ear[0] > left[0] && nose[2] > left[2] && left[2] > left_ear[2]);
+        assert!((left[0] + right[0]).abs() < 1e-9 && (left_ear[0] + right_ear[0]).abs() < 1e-9);
+        // Every point of the face lies on the skin or the eyes.
+        for point in [nose, left, right, left_ear, right_ear] {
+            let all = meshes.iter().flat_map(|mesh| &mesh.points);
+            let near = all.map(|at| norm(sub(at.map(f64::from), point))).fold(f64::INFINITY, f64::min);
+            assert!(near < 0.6, "{point:?} is {near} cm off the surface");
+        }
+        // The head turned to its left; the same memory holds the new pose.
+        local[rig.head] = Rotation::about([0.0, 1.0, 0.0], 0.5);
+        avatar.pose_into(&rig, rig.root, &local, 0.0, &mut meshes);
+        assert_eq!(meshes, avatar.posed(&rig, rig.root, &local, 0.0));
+        assert!(avatar.face_points(&rig, rig.root, &local)[0][0] > nose[0] + 2.0);
+        let [left, right] = hip_points(&rig, rig.root, &local);
+        assert!(left[0] > 5.0 && right[0] < -5.0 && (left[1] - right[1]).abs() < 1e-9);
+    }
+}
