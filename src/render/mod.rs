@@ -1,7 +1,18 @@
 //! Software renderer: posed triangle meshes seen by a pinhole camera, with the same bytes on every machine.
 
+pub mod background;
 pub mod camera;
+pub mod light;
 pub mod mesh;
+mod pixel;
+pub mod renderer;
+mod samples;
+mod shadow;
+mod srgb;
+mod surfaces;
 
+pub use background::Background;
 pub use camera::PinholeCamera;
+pub use light::Light;
 pub use mesh::Mesh;
+pub use renderer::Renderer;

@@ -1,0 +1,166 @@
+//! Shadow map of the key light, read with percentage-closer filtering.
+
+use super::light::{Light, dot};
+
+/// Least offset of a surface from its own shadow, cm; a texel's width is added.
+const BIAS_CM: f32 = 0.35;
+/// Texels around the casters that nothing casts on.
+const MARGIN: usize = 4;
+/// Width of the cells that tell where the map is empty, texels.
+const CELL: usize = 16;
+
+/// Distance of what the key light meets first, over a plane across it.
+#[derive(Clone, Debug)]
+pub struct ShadowMap {
+    n: usize,
+    /// Position of texel 0, 0 across the light, cm.
+    origin: [f32; 2],
+    texels_per_cm: f32,
+    bias: f32,
+    /// Distance along the light, cm; infinite where nothing is met. [n, n]
+    depths: Vec<f32>,
+    /// Whether a cell or its neighbours hold anything.
+    cells: Vec<bool>,
+    is_empty: bool,
+}
+
+impl ShadowMap {
+    /// An empty map of `n` x `n` texels.
+    pub fn new(n: usize) -> Self {
+        let n_cells = n.div_ceil(CELL);
+        let (depths, cells) = (vec![f32::INFINITY; n * n], vec![false; n_cells * n_cells]);
+        Self { n, origin: [0.0; 2], texels_per_cm: 1.0, bias: BIAS_CM, depths, cells, is_empty: true }
+    }
+
+    /// A point in the light's axes: cm across it (twice) and along it.
+    #[inline(always)]
+    pub fn seen(axes: &[[f32; 3]; 3], point: [f32; 3]) -> [f32; 3] {
+        axes.map(|axis| dot(axis, point))
+    }
+
+    /// Casts triangles, points in the light's axes.
+    pub fn cast<'a>(&mut self, parts: impl Iterator<Item = (&'a [[f32; 3]], &'a [[u32; 3]])> + Clone) {
+        self.depths.fill(f32::INFINITY);
+        self.cells.fill(false);
+        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+        for point in parts.clone().flat_map(|part| part.0) {
+            for k in 0..2 {
+                low[k] = low[k].min(point[k]);
+                high[k] = high[k].max(point[k]);
+            }
+        }
+        let extent = (high[0] - low[0]).max(high[1] - low[1]).max(1.0);
+        self.is_empty = !extent.is_finite();
+        if self.is_empty {
+            return;
+        }
+        self.texels_per_cm = (self.n - 2 * MARGIN - 1) as f32 / extent;
+        self.bias = BIAS_CM + 1.0 / self.texels_per_cm;
+        self.origin = low.map(|v| v - MARGIN as f32 / self.texels_per_cm);
+        let mut flat = Vec::new();
+        for (points, triangles) in parts {
+            flat.clear();
+            flat.extend(points.iter().map(|point| self.texel(*point)));
+            for triangle in triangles {
+                self.fill(triangle.map(|v| flat[v as usize]));
+            }
+        }
+        self.close_cells();
+    }
+
+    fn texel(&self, [x, y, depth]: [f32; 3]) -> [f32; 3] {
+        [(x - self.origin[0]) * self.texels_per_cm, (y - self.origin[1]) * self.texels_per_cm, depth]
+    }
+
+    fn fill(&mut self, [a, b, c]: [[f32; 3]; 3]) {
+        let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
+        let ends = |k: usize| {
+            let (low, high) = (a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k]));
+            // Texels whose middle (a whole number) lies between.
+            (low.max(0.0).ceil() as usize, (high.max(0.0) as usize + 1).min(self.n))
+        };
+        let (columns, rows) = (ends(0), ends(1));
+        // NaN and triangles seen edge-on are left out too.
+        if !(area.abs() > 1e-9) || columns.0 >= columns.1 || rows.0 >= rows.1 {
+            return;
+        }
+        let per_area = 1.0 / area;
+        let [to_b, to_c] = [b, c].map(|corner| [corner[0] - a[0], corner[1] - a[1], corner[2] - a[2]]);
+        for y in rows.0..rows.1 {
+            let dy = y as f32 - a[1];
+            for x in columns.0..columns.1 {
+                let dx = x as f32 - a[0];
+                let share_b = (dx * to_c[1] - dy * to_c[0]) * per_area;
+                let share_c = (dy * to_b[0] - dx * to_b[1]) * per_area;
+                if share_b >= -1e-4 && share_c >= -1e-4 && share_b + share_c <= 1.0002 {
+                    let depth = a[2] + share_b * to_b[2] + share_c * to_c[2];
+                    let texel = &mut self.depths[y * self.n + x];
+                    *texel = if depth < *texel { depth } else { *texel };
+                }
+            }
+        }
+    }
+
+    fn close_cells(&mut self) {
+        let n_cells = self.n.div_ceil(CELL);
+        for (y, row) in self.depths.chunks_exact(self.n).enumerate() {
+            for (cell, texels) in row.chunks(CELL).enumerate() {
+                if texels.iter().any(|depth| *depth < f32::INFINITY) {
+                    self.cells[y / CELL * n_cells + cell] = true;
+                }
+            }
+        }
+    }
+
+    /// Whether anything may cast on points between `low` and `high`, cm across the light.
+    pub fn reaches(&self, low: [f32; 2], high: [f32; 2]) -> bool {
+        if self.is_empty {
+            return false;
+        }
+        let ends = |k: usize| {
+            let [from, to] = [low[k], high[k]].map(|v| (v - self.origin[k]) * self.texels_per_cm);
+            let first = (from - MARGIN as f32).max(0.0) as usize / CELL;
+            // A negative end leaves nothing.
+            let last = if to < -(MARGIN as f32) { 0 } else { (to.max(0.0) as usize + MARGIN) / CELL + 1 };
+            (first, last.min(self.n.div_ceil(CELL)))
+        };
+        let (columns, rows) = (ends(0), ends(1));
+        (rows.0..rows.1).any(|y| (columns.0..columns.1).any(|x| self.cells[y * self.n.div_ceil(CELL) + x]))
+    }
+
+    /// Share of the key light that reaches a point in the light's axes, 0..1: a tent over four by four texels.
+    #[inline(always)]
+    pub fn lit(&self, point: [f32; 3]) -> f32 {
+        let [x, y, depth] = self.texel(point);
+        let furthest = (self.n - 3) as f32;
+        // Also false for NaN.
+        if self.is_empty || !(x >= 1.0 && y >= 1.0 && x < furthest && y < furthest) {
+            return 1.0;
+        }
+        let (column, row) = (x as usize, y as usize);
+        let (right, low) = (x - column as f32, y - row as f32);
+        let across = [1.0 - right, 1.0, 1.0, right];
+        let down = [1.0 - low, 1.0, 1.0, low];
+        let depth = depth - self.bias;
+        let mut lit = [0.0f32; 4];
+        for (k, share) in down.into_iter().enumerate() {
+            let start = (row - 1 + k) * self.n + column - 1;
+            let texels = &self.depths[start..start + 4];
+            for n in 0..4 {
+                lit[n] += if depth < texels[n] { share * across[n] } else { 0.0 };
+            }
+        }
+        (lit[0] + lit[1] + lit[2] + lit[3]) * (1.0 / 9.0)
+    }
+}
+
+/// Offset along the normal at which a surface asks for its shadow, cm: it keeps curved surfaces from shading themselves.
+pub const NORMAL_OFFSET_CM: f32 = 0.5;
+
+/// A point in the light's axes where a surface asks for its shadow.
+#[inline(always)]
+pub fn asking_point(light: &Light, axes: &[[f32; 3]; 3], point: [f32; 3], normal: [f32; 3]) -> [f32; 3] {
+    // Further out where the light grazes.
+    let by = NORMAL_OFFSET_CM * (1.5 - dot(normal, light.to_key).abs());
+    ShadowMap::seen(axes, std::array::from_fn(|k| point[k] + by * normal[k]))
+}

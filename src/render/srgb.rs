@@ -1,0 +1,97 @@
+//! sRGB bytes and linear light, by tables that are made with exactly specified arithmetic (no power function of the
+//! system), so that a picture has the same bytes on every machine.
+
+use std::sync::LazyLock;
+
+/// Steps of the encoding table; one is at most 0.4 of a byte apart from its neighbour.
+const N_STEPS: usize = 8192;
+/// Linear value from which on highlights are compressed.
+const SHOULDER: f32 = 0.6;
+
+static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|byte| decoded(byte as f64 / 255.0) as f32));
+
+static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    // The byte whose range, between the middles to its neighbours, holds the value.
+    let bound = |byte: u32| decoded((f64::from(byte) + 0.5) / 255.0);
+    let mut byte = 0;
+    let of_step = |step: usize| {
+        while byte < 255 && step as f64 / N_STEPS as f64 > bound(byte) {
+            byte += 1;
+        }
+        byte as u8
+    };
+    (0..=N_STEPS).map(of_step).collect()
+});
+
+/// Both tables at hand.
+#[derive(Clone, Copy)]
+pub struct Srgb {
+    linear: &'static [f32; 256],
+    bytes: &'static [u8],
+}
+
+impl Srgb {
+    pub fn tables() -> Self {
+        Self { linear: &LINEAR, bytes: &BYTES }
+    }
+
+    /// Linear light 0..1 of a byte.
+    pub fn linear(self, byte: u8) -> f32 {
+        self.linear[usize::from(byte)]
+    }
+
+    /// Byte of linear light; values outside 0..1 and no numbers have the byte of the nearest end.
+    #[inline(always)]
+    pub fn byte(self, linear: f32) -> u8 {
+        self.bytes[((linear * N_STEPS as f32 + 0.5) as usize).min(N_STEPS)]
+    }
+}
+
+/// Linear light 0..1 for a scene's linear light, which has no upper end: equal up to the shoulder, then less and less.
+#[inline(always)]
+pub fn compressed(scene: f32) -> f32 {
+    if scene <= SHOULDER {
+        return scene;
+    }
+    let over = scene - SHOULDER;
+    SHOULDER + over * (1.0 - SHOULDER) / (over + (1.0 - SHOULDER))
+}
+
+/// Linear light of an encoded value 0..1 (IEC 61966-2-1).
+fn decoded(encoded: f64) -> f64 {
+    if encoded <= 0.04045 {
+        return encoded / 12.92;
+    }
+    // x^2.4 = x^2 times the fifth root of x^2, which Newton's method finds from above.
+    let x = (encoded + 0.055) / 1.055;
+    let square = x * x;
+    let mut root = 1.0;
+    for _ in 0..40 {
+        let fourth = (root * root) * (root * root);
+        root -= (root - square / fourth) / 5.0;
+    }
+    square * root
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_come_back_and_the_curve_is_that_of_the_standard() {
+        let srgb = Srgb::tables();
+        for byte in 0..=255 {
+            assert_eq!(srgb.byte(srgb.linear(byte)), byte);
+            let x = f64::from(byte) / 255.0;
+            let known = if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) };
+            assert!((f64::from(srgb.linear(byte)) - known).abs() < 1e-6);
+        }
+        assert_eq!([srgb.byte(-1.0), srgb.byte(2.0), srgb.byte(f32::NAN)], [0, 255, 0]);
+    }
+
+    #[test]
+    fn the_shoulder_never_turns_back() {
+        let values: Vec<f32> = (0..400).map(|n| compressed(n as f32 / 100.0)).collect();
+        assert!(values.windows(2).all(|pair| pair[0] < pair[1]) && values.iter().all(|v| *v < 1.0));
+    }
+}
