@@ -1,5 +1,6 @@
 //! Vectors, rotations, Procrustes alignment, eigenvalues, filters, median and quantiles. Knows no body and no file.
 
+pub mod cholesky;
 pub mod eigen;
 pub mod gaussian;
 pub mod one_euro;

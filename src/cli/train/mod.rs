@@ -5,6 +5,7 @@ pub mod corpus;
 pub mod embedding;
 pub mod gan;
 pub mod lifter;
+pub mod noise;
 pub mod verb;
 
 pub use verb::{Args, run};

@@ -1,6 +1,6 @@
 //! `orator train`: one file a network.
 
-use super::{basis, embedding, gan, lifter};
+use super::{basis, embedding, gan, lifter, noise};
 use crate::cli::Outcome;
 use crate::cli::ui;
 use crate::cli::ui::Ui;
@@ -18,6 +18,7 @@ enum Network {
     Embedding(embedding::Args),
     Gan(gan::Args),
     Lifter(lifter::Args),
+    Noise(noise::Args),
 }
 
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
@@ -27,5 +28,6 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
         Network::Embedding(args) => embedding::run(args, ui),
         Network::Gan(args) => gan::run(args, ui),
         Network::Lifter(args) => lifter::run(args, ui),
+        Network::Noise(args) => noise::run(&args, ui),
     }
 }

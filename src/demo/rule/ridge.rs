@@ -1,7 +1,8 @@
 //! Ridge regression from the sound of a frame to the motion of the same frame. Without context, its error shows how
 //! much of a rule depends on the present moment alone.
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
+use crate::math::cholesky::solve;
+use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
 
 /// Sums over frames that determine a regression of any penalty.
 pub struct RidgeSums {
@@ -44,29 +45,6 @@ impl Ridge {
         let n = self.0.nrows() - 1;
         inputs.dot(&self.0.slice(ndarray::s![..n, ..])) + self.0.row(n)
     }
-}
-
-/// Solution X of A X = B for a symmetric positive definite A, by Cholesky decomposition.
-fn solve(mut a: Array2<f64>, mut b: Array2<f64>) -> Array2<f64> {
-    let n = a.nrows();
-    for j in 0..n {
-        for k in 0..j {
-            let factor = a[[j, k]];
-            for i in j..n {
-                a[[i, j]] -= a[[i, k]] * factor;
-            }
-        }
-        let root = a[[j, j]].max(1e-12).sqrt();
-        (j..n).for_each(|i| a[[i, j]] /= root);
-    }
-    let mut at = |i: usize, others: std::ops::Range<usize>, weight: &dyn Fn(usize) -> f64, root: f64| {
-        let mut row: Array1<f64> = b.row(i).to_owned();
-        others.for_each(|k| row.scaled_add(-weight(k), &b.row(k)));
-        b.row_mut(i).assign(&(row / root));
-    };
-    (0..n).for_each(|i| at(i, 0..i, &|k| a[[i, k]], a[[i, i]]));
-    (0..n).rev().for_each(|i| at(i, i + 1..n, &|k| a[[k, i]], a[[i, i]]));
-    b
 }
 
 /// Pearson correlation of two series; 0 where one of them is constant.

@@ -5,6 +5,7 @@
 use super::body_motion;
 use super::body_motion::{Proportions, turn};
 use super::hand_shape::normal;
+use super::noise;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use crate::mocap::upper_body::BodyTake;
@@ -17,6 +18,11 @@ use rand_chacha::ChaCha8Rng;
 
 /// Dataset frames a second, the rate the lifter sees.
 pub const FPS: f64 = 15.0;
+
+/// Share of the training's scenes with the noise that real models were measured to have, and the share of those with
+/// its bias; the others have one of its size.
+const MEASURED_NOISE: f64 = 0.7;
+const MEASURED_BIAS: f64 = 0.7;
 
 /// What was filmed: the truth in metres and camera axes, and the keypoints.
 #[derive(Clone, Debug)]
@@ -102,7 +108,11 @@ impl FilmedScene {
         let mut seen: Vec<SeenBody> = truth.iter().map(|pose| pose.map(|p| Some(picture(p)))).collect();
         let px_per_metre = focal_px / distance;
         if filming != Filming::Clean {
-            spoil(&mut seen, 0.35 * px_per_metre, training, rng);
+            let shoulders = vec3::norm(vec3::sub(truth[0][R_SHOULDER], truth[0][L_SHOULDER]));
+            if !(training && spoil_as_measured(&mut seen, shoulders * px_per_metre, rng)) {
+                spoil(&mut seen, 0.35 * px_per_metre, training, rng);
+            }
+            lose_hips(&mut seen, 0.35 * px_per_metre, training, rng);
         }
         Self { truth, seen, yaw, neck, focal_px, px_per_metre }
     }
@@ -155,6 +165,23 @@ fn spoil(seen: &mut [SeenBody], shoulders_px: f64, training: bool, rng: &mut Cha
             seen.iter_mut().for_each(|f| f[point] = None);
         }
     }
+}
+
+/// Spoils keypoints as real models were measured to do, in most scenes; says whether it did.
+fn spoil_as_measured(seen: &mut [SeenBody], shoulders_px: f64, rng: &mut ChaCha8Rng) -> bool {
+    let sets = &noise::measured().bodies;
+    if sets.is_empty() || !rng.random_bool(MEASURED_NOISE) {
+        return false;
+    }
+    let set = &sets[rng.random_range(0..sets.len())];
+    let much = rng.random_range(-0.7f64..0.4).exp();
+    let with_bias = rng.random_bool(MEASURED_BIAS);
+    set.apply(seen, shoulders_px, much, with_bias, rng);
+    true
+}
+
+/// Hips are often not seen: behind a desk, below the picture.
+fn lose_hips(seen: &mut [SeenBody], shoulders_px: f64, training: bool, rng: &mut ChaCha8Rng) {
     if rng.random_bool(0.6) {
         seen.iter_mut().for_each(|f| (f[R_HIP], f[L_HIP]) = (None, None));
     } else if training && rng.random_bool(0.5) {

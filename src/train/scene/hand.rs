@@ -1,6 +1,7 @@
 //! Hands made by rule before a camera, as the hand lifters learn them, and the errors on such hands.
 
 use super::hand_shape::{normal, random_rotation, sample_shape};
+use super::noise;
 use crate::math::order;
 use crate::math::procrustes;
 use crate::math::vec3;
@@ -11,38 +12,64 @@ use anyhow::Result;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+/// Share of the hands with the noise that real models were measured to have, and the share of those with its bias.
+const MEASURED_NOISE: f64 = 0.7;
+const MEASURED_BIAS: f64 = 0.8;
+
 /// A hand in px of the picture with the wrist at 0, and what a detector says of it.
 pub struct HandSample {
     pub truth: HandJoints,
     pub seen: SeenHand,
 }
 
-/// A hand from any side at 5 to 20 of its lengths, in px; noise 2 % of the palm more or less, a part of it common to
-/// a finger; sometimes a finger that the detector can only guess, sometimes points missing.
+/// A hand from any side at 5 to 20 of its lengths, in px, with the noise of real models or a plain one; sometimes points
+/// are missing.
 pub fn sample_hand(rng: &mut ChaCha8Rng) -> HandSample {
     let (shape, turn) = (sample_shape(rng), random_rotation(rng));
     let turned = shape.map(|p| turn.turn(p));
     let distance = 0.19 * rng.random_range(5.0..20.0);
     let px_per_metre: f64 = 1000.0;
     let palm_px = px_per_metre * vec3::norm(shape[9]);
+    let mut keypoints = turned.map(|p| {
+        let grow = px_per_metre * distance / (distance + p[2]);
+        [p[0] * grow, p[1] * grow]
+    });
+    if !spoil_as_measured(&mut keypoints, palm_px, rng) {
+        spoil(&mut keypoints, palm_px, rng);
+    }
+    let gone = missing(rng);
+    let seen = std::array::from_fn(|j| (!gone[j]).then_some(keypoints[j].map(|v| v as f32)));
+    // the view hangs on the wrist that is seen, the truth on the true one: the same within the noise
+    HandSample { truth: turned.map(|p| vec3::scale(p, px_per_metre)), seen }
+}
+
+/// Noise of about 2 % of the palm, a part of it common to a finger; sometimes a finger is only guessed.
+fn spoil(keypoints: &mut [[f64; 2]; N_HAND], palm_px: f64, rng: &mut ChaCha8Rng) {
     let much = 0.02 * palm_px * rng.random_range(-1.1f64..0.6).exp();
     let guessed = if rng.random_bool(0.2) { rng.random_range(0..5) } else { 5 };
     let fingers: [[f64; 2]; 5] = std::array::from_fn(|f| {
         let common = if f == guessed { 2.0 } else { 0.4 };
         [common * much * normal(rng), common * much * normal(rng)]
     });
-    let gone = missing(rng);
-    let mut seen = [None; N_HAND];
-    for (j, point) in seen.iter_mut().enumerate() {
+    for (j, point) in keypoints.iter_mut().enumerate() {
         let finger = j.checked_sub(1).map(|k| k / 4);
         let noise = if finger == Some(guessed) { 2.0 * much } else { 0.92 * much };
         let moved = finger.map_or([0.0; 2], |f| fingers[f]);
-        let grow = px_per_metre * distance / (distance + turned[j][2]);
-        let at = [0, 1].map(|k| turned[j][k] * grow + moved[k] + noise * normal(rng));
-        *point = (!gone[j]).then_some(at.map(|v| v as f32));
+        (0..2).for_each(|k| point[k] += moved[k] + noise * normal(rng));
     }
-    // the view hangs on the wrist that is seen, the truth on the true one: the same within the noise
-    HandSample { truth: turned.map(|p| vec3::scale(p, px_per_metre)), seen }
+}
+
+/// Spoils keypoints as real models were measured to do, in most hands; says whether it did.
+fn spoil_as_measured(keypoints: &mut [[f64; 2]; N_HAND], palm_px: f64, rng: &mut ChaCha8Rng) -> bool {
+    let sets = &noise::measured().hands;
+    if sets.is_empty() || !rng.random_bool(MEASURED_NOISE) {
+        return false;
+    }
+    let set = &sets[rng.random_range(0..sets.len())];
+    let much = rng.random_range(-0.7f64..0.4).exp();
+    let with_bias = rng.random_bool(MEASURED_BIAS);
+    set.apply(keypoints, palm_px, much, with_bias, rng);
+    true
 }
 
 /// Points that a detector does not give: mostly none, else some anywhere, a finger, all tips, or all knuckles but the

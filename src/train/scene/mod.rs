@@ -4,4 +4,6 @@ pub mod body;
 pub mod body_motion;
 pub mod hand;
 pub mod hand_motion;
+pub mod hand_noise;
 pub mod hand_shape;
+pub mod noise;
