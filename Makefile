@@ -8,7 +8,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: setup runtime models readers browser blender validator build check test prove prove-rule demo clean-demo
+.PHONY: setup runtime models readers browser blender validator build check test prove prove-rule prove-people demo clean-demo
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -48,7 +48,7 @@ test: build models readers browser blender validator
 	@if [ -s $(SKIPPED) ]; then echo 'skipped tests:'; sort -u $(SKIPPED); else echo 'no test was skipped'; fi
 	@echo 'make test: all passed'
 
-prove prove-rule: build models
+prove prove-rule prove-people: build models
 	.ci/$@
 
 # The synthetic speaker from its videos to its motion. DEMO: the folder; DRAW and STEPS: how much of it.

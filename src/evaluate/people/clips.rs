@@ -27,11 +27,6 @@ pub struct ListedClip {
     pub part: String,
 }
 
-#[derive(Deserialize)]
-struct List {
-    clips: Vec<ListedClip>,
-}
-
 /// Clip with the truth at the frames of its keypoints.
 #[derive(Clone, Debug)]
 pub struct RenderedClip {
@@ -99,10 +94,10 @@ pub fn read(dir: &Path, config_file: &Path, part: Option<&str>) -> Result<Vec<Re
     let path = dir.join(LIST);
     let text = std::fs::read_to_string(&path)
         .with_context(|| format!("cannot read {}; `orator demo draw --people` writes it", path.display()))?;
-    let list: List =
+    let list: Vec<ListedClip> =
         serde_json::from_str(&text).with_context(|| format!("{} is no list of rendered clips", path.display()))?;
     let units = units(&config);
-    let wanted = list.clips.iter().filter(|clip| part.is_none_or(|part| clip.part == part));
+    let wanted = list.iter().filter(|clip| part.is_none_or(|part| clip.part == part));
     let clips = wanted.map(|listed| read_clip(dir, listed, &units, &config)).collect::<Result<Vec<_>>>()?;
     ensure!(
         !clips.is_empty(),
