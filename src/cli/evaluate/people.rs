@@ -3,7 +3,7 @@
 use crate::cli::Outcome;
 use crate::cli::ui::Ui;
 use anyhow::Result;
-use orator::evaluate::people::{grid, table};
+use orator::evaluate::people::{gap, grid, table};
 use orator::report::people::page;
 use orator::stage::workdir;
 use serde_json::json;
@@ -24,6 +24,9 @@ pub struct Args {
     /// Only clips of this part: first, middle or last.
     #[arg(long, value_name = "PART")]
     part: Option<String>,
+    /// Configurations of runs on real clips, to lay the keypoints of rendered ones beside: scores, jitter, hands found.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    beside: Vec<PathBuf>,
     /// Also write one HTML page.
     #[arg(long, value_name = "PAGE.html")]
     report: Option<PathBuf>,
@@ -33,11 +36,15 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let default = [args.dir.join("pipeline.toml")];
     let config: &[PathBuf] = if args.config.is_empty() { &default } else { &args.config };
     let rows = table::table(&args.dir, config, args.part.as_deref())?;
-    let mut text = grid::text(&rows);
+    let looked_at: Vec<&PathBuf> =
+        if args.beside.is_empty() { Vec::new() } else { config.iter().chain(&args.beside).collect() };
+    let looks = looked_at.into_iter().map(|file| gap::look(file)).collect::<Result<Vec<_>>>()?;
+    let last = (!looks.is_empty()).then(|| gap::grid(&looks));
+    let mut text = grid::text(&rows, last.as_ref());
     if let Some(path) = &args.report {
-        workdir::write_file(path, page::html(&rows).as_bytes())?;
+        workdir::write_file(path, page::html(&rows, last.as_ref()).as_bytes())?;
         text += &format!("\nwrote {}", path.display());
     }
-    ui.summary(&text, None, json!({ "people": rows, "report": args.report }));
+    ui.summary(&text, None, json!({ "people": rows, "keypoints": looks, "report": args.report }));
     Ok(Outcome::Done)
 }

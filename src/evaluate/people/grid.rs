@@ -21,13 +21,14 @@ pub fn grids(rows: &[PeopleRow]) -> Vec<Grid> {
     vec![points(rows), hands(rows), seconds(rows), joints(rows)]
 }
 
-/// Grids of every model set as text.
-pub fn text(rows: &[PeopleRow]) -> String {
+/// Grids of every model set as text, and a last one where there is one.
+pub fn text(rows: &[PeopleRow], last: Option<&Grid>) -> String {
     let of_set = |rows: &[PeopleRow]| {
         let grids: Vec<String> = grids(rows).iter().map(Grid::text).collect();
         format!("model set {}\n\n{}", rows[0].set, grids.join("\n"))
     };
-    rows.chunk_by(|a, b| a.set == b.set).map(of_set).collect::<Vec<_>>().join("\n")
+    let sets = rows.chunk_by(|a, b| a.set == b.set).map(of_set);
+    sets.chain(last.map(Grid::text)).collect::<Vec<_>>().join("\n")
 }
 
 impl Grid {
@@ -50,11 +51,12 @@ fn heads(names: &[&str]) -> Vec<String> {
 }
 
 /// Number with `digits` after the point; a dash where there is none.
-fn number(value: f64, digits: usize) -> String {
+pub fn number(value: f64, digits: usize) -> String {
     if value.is_finite() { format!("{value:.digits$}") } else { "-".to_owned() }
 }
 
-fn percent(share: f64) -> String {
+/// Share as percent; a dash where there is none.
+pub fn percent(share: f64) -> String {
     number(100.0 * share, 1)
 }
 

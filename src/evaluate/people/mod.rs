@@ -1,9 +1,10 @@
 //! Errors of the whole pipeline on rendered people, whose truth is known: `points` (2D keypoints), `hands` (missed,
 //! invented, stolen, swapped), `head` (its angles), `kept` (what the intervals keep and the mask says), `joints` (3D), `table` (all of it by
-//! condition and by model set), `grid` (the table as text), and `noise`
-//! and `hand_noise` (the errors as the noise by which lifters are trained).
+//! condition and by model set), `grid` (the table as text), `gap` (beside real
+//! clips), `noise` and `hand_noise` (the errors as the noise by which lifters are trained).
 
 pub mod clips;
+pub mod gap;
 pub mod grid;
 pub mod hand_noise;
 pub mod hands;

@@ -5,8 +5,8 @@ use crate::evaluate::people::table::PeopleRow;
 use crate::report::html::{Node, Page, Section, node, table};
 use serde_json::Value;
 
-/// Text of the page.
-pub fn html(rows: &[PeopleRow]) -> String {
+/// Text of the page; `last`: a grid of its own section.
+pub fn html(rows: &[PeopleRow], last: Option<&Grid>) -> String {
     let sets: Vec<&[PeopleRow]> = rows.chunk_by(|a, b| a.set == b.set).collect();
     let n_clips: usize = sets.iter().map(|rows| rows.last().map_or(0, |all| all.n_clips)).max().unwrap_or(0);
     let names: Vec<&str> = sets.iter().map(|rows| rows[0].set.as_str()).collect();
@@ -17,7 +17,10 @@ pub fn html(rows: &[PeopleRow]) -> String {
     let page = Page {
         title: "Errors on rendered people".to_owned(),
         lead: format!("{n_clips} clips of rendered people whose truth is known; model sets: {}.", names.join(", ")),
-        sections: vec![Section { id: "sets", title: "By condition", body: body.collect() }],
+        sections: vec![
+            Section { id: "sets", title: "By condition", body: body.collect() },
+            Section { id: "gap", title: "Without truth", body: last.into_iter().flat_map(shown).collect() },
+        ],
         style: "",
         script: "",
         data: Value::Null,
