@@ -49,6 +49,8 @@ pub struct Appearance {
     pub hips: f64,
     /// Depth of the bust, 0 (none) .. 1.
     pub bust: f64,
+    /// Girth of the neck.
+    pub neck: f64,
     /// Width, height and depth of the head.
     pub head: [f64; 3],
     /// Width of the jaw, size of the nose, fullness of the lips and weight of the brows.
@@ -134,6 +136,7 @@ impl Appearance {
             waist: 1.0,
             hips: 1.0,
             bust: 0.0,
+            neck: 1.0,
             head: [1.0; 3],
             jaw: 1.0,
             nose: 1.0,
@@ -196,6 +199,7 @@ impl Appearance {
             waist: near(&mut rng, if woman { 0.93 } else { 1.0 }, 0.05) + 0.4 * heavy.max(0.0),
             hips: near(&mut rng, if woman { 1.06 } else { 0.99 }, 0.04),
             bust: if woman { rng.random_range(0.4..1.0) } else { 0.0 },
+            neck: near(&mut rng, if woman { 0.86 } else { 1.0 }, 0.06) + 0.3 * heavy,
             head: [
                 near(&mut rng, if woman { 0.97 } else { 1.0 }, 0.04),
                 near(&mut rng, if woman { 0.97 } else { 1.0 }, 0.035),

@@ -3,43 +3,27 @@
 
 use super::appearance::{Appearance, Reflectance};
 use super::body::BodyForm;
+use super::face::Feature;
 use super::field::Form;
 use super::hand::HandForm;
-use super::skin::Weights;
+use super::head::{EAR, EYE, EYE_RADIUS, HeadForm};
+use super::jaw::{MOUTH_Y, jaw_share, opening};
+use super::material::Material;
+use super::skin::{Weights, rigid};
 use super::stance::Stance;
 use super::surface::Surface;
 use crate::animate::rig::rig::Rig;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, add, cross, dot, sub, unit};
+use std::collections::BTreeMap;
 
 /// Cell sizes of the surface meshes, cm.
-const SHIRT_CELL: f64 = 1.6;
-const LEGS_CELL: f64 = 2.0;
-const SHOE_CELL: f64 = 1.4;
-const HEAD_CELL: f64 = 1.15;
-const PALM_CELL: f64 = 0.56;
-const CUFF_CELL: f64 = 0.7;
-const FINGER_CELL: f64 = 0.42;
-
-/// Material of a mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Material {
-    Skin,
-    Shirt,
-    Trousers,
-    Shoes,
-}
-
-impl Material {
-    /// Strength of the highlight, 0 .. 1.
-    pub fn gloss(self) -> f32 {
-        match self {
-            Self::Skin => 0.12,
-            Self::Shirt | Self::Trousers => 0.0,
-            Self::Shoes => 0.1,
-        }
-    }
-}
+const SHIRT_CELL: f64 = 1.9;
+const LEGS_CELL: f64 = 2.3;
+const SHOE_CELL: f64 = 1.7;
+const PALM_CELL: f64 = 0.62;
+const CUFF_CELL: f64 = 0.8;
+const FINGER_CELL: f64 = 0.45;
 
 /// Triangles of one material in the T-pose (cm, in the figure's axes, the soles at y = 0), with their joints.
 #[derive(Clone, Debug)]
@@ -72,45 +56,79 @@ impl Avatar {
         let hands = [0, 1].map(|side| HandForm::new(rig, &stance, side));
         let body = BodyForm::new(rig, &stance, hands.each_ref().map(|hand| hand.scale));
         let cm = stance.scale;
-        let [mut skin, mut shirt, mut trousers, mut shoes] = [(); 4].map(|()| PosedMesh::default());
+        let head = HeadForm::new(&stance, &body.trunk, looks);
+        let mut built: BTreeMap<Material, PosedMesh> = BTreeMap::new();
+        let mut add = |material: Material, weights: Vec<Weights>, surface: Surface, colour: Reflectance| {
+            let colours = vec![colour; surface.points.len()];
+            built.entry(material).or_default().add(weights, surface, colours, Vec::new());
+        };
         let surface_of = |form: &Form, cell: f64| Surface::from_field(&|at| form.distance(at), form.bounds(), cell);
-
-        let surface = surface_of(&body.head(), HEAD_CELL * cm);
-        skin.add(body.head_weights(&surface), surface, looks.skin);
         let surface = Surface::from_field(&body.shirt(), body.shirt_bounds(), SHIRT_CELL * cm);
-        shirt.add(body.shirt_weights(&surface), surface, looks.top_colour);
+        add(Material::Shirt, body.shirt_weights(&surface), surface, looks.top_colour);
         let surface = surface_of(&body.trousers(), LEGS_CELL * cm);
-        trousers.add(body.leg_weights(&surface), surface, looks.legs_colour);
+        add(Material::Trousers, body.leg_weights(&surface), surface, looks.legs_colour);
         for (side, hand) in hands.iter().enumerate() {
             let size = hand.scale;
             let light = |at: Vec3| hand.whole(at);
             let palm = PALM_CELL * size;
             let surface = Surface::from_field(&|at| hand.palm(at), hand.bounds(None), palm).lit(&light, palm);
-            skin.add(body.palm_weights(side, size, &surface), surface, looks.skin);
+            add(Material::Skin, body.palm_weights(side, size, &surface), surface, looks.skin);
             for n in 1..5 {
                 let finger = FINGER_CELL * size;
                 let surface =
                     Surface::from_field(&|at| hand.finger(n, at), hand.bounds(Some(n)), finger).lit(&light, finger);
-                skin.add(body.finger_weights(side, n, size, &surface), surface, looks.skin);
+                add(Material::Skin, body.finger_weights(side, n, size, &surface), surface, looks.skin);
             }
             let surface = surface_of(&body.cuff(side), CUFF_CELL * size);
-            shirt.add(body.cuff_weights(side, &surface), surface, looks.top_colour);
+            let weights = vec![rigid(rig.arms[side].fore); surface.points.len()];
+            add(Material::Shirt, weights, surface, looks.top_colour);
             let surface = surface_of(&body.shoe(side), SHOE_CELL * cm);
-            shoes.add(body.leg_weights(&surface), surface, looks.shoes_colour);
+            add(Material::Shoes, body.leg_weights(&surface), surface, looks.shoes_colour);
         }
-        let parts = [
-            (Material::Skin, skin),
-            (Material::Shirt, shirt),
-            (Material::Trousers, trousers),
-            (Material::Shoes, shoes),
-        ];
-        let place = |[x, y, z]: Vec3| [x * cm, y * cm, z * cm];
-        Self {
-            parts: parts.into_iter().map(|(material, built)| built.rested(material, &stance)).collect(),
-            face: [[0.0, 8.2, 9.8], [3.1, 10.8, 8.3], [-3.1, 10.8, 8.3], [7.6, 9.8, 0.0], [-7.6, 9.8, 0.0]].map(place),
-            inner_lips: [[0.0, 4.2, 8.8], [0.0, 4.2, 8.8], [0.0, -2.6, -0.4]].map(place),
-        }
+        add_head(&mut built, &body, &head, looks);
+        let parts = built.into_iter().map(|(material, built)| built.rested(material, &stance)).collect();
+        let at_front = |x: f64, y: f64| [x, y, head.front(x, y)];
+        let [ex, ey, ez] = EYE;
+        let [ax, ay, az] = EAR;
+        let sides = |x: f64, y: f64, z: f64| [[x, y, z], [-x, y, z]];
+        let ([left_eye, right_eye], [left_ear, right_ear]) = (sides(ex, ey, ez + EYE_RADIUS), sides(ax + 0.6, ay, az));
+        let face = [at_front(0.0, 7.5), left_eye, right_eye, left_ear, right_ear].map(|at| head.scaled(at));
+        let lips = at_front(0.0, MOUTH_Y);
+        let inner_lips = [lips, lips, opening(lips, 1.0)].map(|at| head.scaled(at));
+        Self { parts, face, inner_lips }
     }
+}
+
+/// Adds head, ears, hair and the features of the face.
+fn add_head(built: &mut BTreeMap<Material, PosedMesh>, body: &BodyForm, head: &HeadForm, looks: &Appearance) {
+    let skin = head.skin_surface();
+    let colours = skin.points.iter().map(|&at| head.complexion(at, looks)).collect();
+    let shares: Vec<f64> = skin.points.iter().map(|&at| jaw_share(at)).collect();
+    let mut features = vec![Feature { material: Material::Face, surface: skin, colours, shares }];
+    features.extend(head.features(looks));
+    let ear = head.ear_surface();
+    for surface in [ear.clone(), ear.mirrored()] {
+        let colours = vec![looks.skin; surface.points.len()];
+        features.push(Feature { material: Material::Face, surface, colours, shares: Vec::new() });
+    }
+    if let Some(surface) = head.hair_surface() {
+        let colours = surface.points.iter().map(|&at| strand(looks.hair_colour, at)).collect();
+        features.push(Feature { material: Material::Hair, surface, colours, shares: Vec::new() });
+    }
+    for (n, Feature { material, surface, colours, shares }) in features.into_iter().enumerate() {
+        let mouth = surface.points.iter().zip(shares).map(|(&at, share)| head.scaled(opening(at, share))).collect();
+        let hangs = n == 0 || material == Material::Hair;
+        let surface = head.placed(surface);
+        let weights =
+            if hangs { body.head_weights(&surface) } else { vec![rigid(body.trunk.head); surface.points.len()] };
+        built.entry(material).or_default().add(weights, surface, colours, mouth);
+    }
+}
+
+/// Colour of the hair at a point: lighter and darker strands.
+fn strand(colour: Reflectance, [x, y, z]: Vec3) -> Reflectance {
+    let light = 1.0 + 0.16 * (3.1 * x + 0.4 * y).sin() * (1.3 * z + 0.7 * y).cos();
+    colour.map(|v| v * light as f32)
 }
 
 /// Mesh of one material in the stance, before it is brought to the T-pose.
@@ -119,22 +137,24 @@ struct PosedMesh {
     surface: Surface,
     weights: Vec<Weights>,
     colours: Vec<Reflectance>,
+    mouth: Vec<Vec3>,
 }
 
 impl PosedMesh {
-    fn add(&mut self, weights: Vec<Weights>, surface: Surface, colour: Reflectance) {
-        let first = self.surface.points.len() as u32;
-        self.colours.resize(self.colours.len() + surface.points.len(), colour);
-        self.surface.points.extend(surface.points);
-        self.surface.normals.extend(surface.normals);
-        self.surface.triangles.extend(surface.triangles.into_iter().map(|triangle| triangle.map(|v| v + first)));
+    fn add(&mut self, weights: Vec<Weights>, surface: Surface, colours: Vec<Reflectance>, mouth: Vec<Vec3>) {
+        if !mouth.is_empty() {
+            self.mouth.resize(self.surface.points.len(), [0.0; 3]);
+            self.mouth.extend(mouth);
+        }
+        self.surface.extend(surface);
         self.weights.extend(weights);
+        self.colours.extend(colours);
     }
 
     /// Mesh in the T-pose; linear skinning of it with the stance gives the posed mesh exactly.
     fn rested(self, material: Material, stance: &Stance) -> AvatarMesh {
         let Surface { points, normals, triangles } = self.surface;
-        let (points, normals) = points
+        let (points, normals): (Vec<Vec3>, Vec<Vec3>) = points
             .into_iter()
             .zip(normals)
             .zip(&self.weights)
@@ -145,8 +165,11 @@ impl PosedMesh {
                 (rest, unit(turn.back(normal), 1e-9).unwrap_or(normal))
             })
             .unzip();
-        let (colours, weights) = (self.colours, self.weights);
-        AvatarMesh { material, points, normals, colours, triangles, weights, mouth: Vec::new() }
+        let (colours, weights, mut mouth) = (self.colours, self.weights, self.mouth);
+        if !mouth.is_empty() {
+            mouth.resize(points.len(), [0.0; 3]);
+        }
+        AvatarMesh { material, points, normals, colours, triangles, weights, mouth }
     }
 }
 

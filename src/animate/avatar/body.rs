@@ -40,17 +40,6 @@ impl<'a> BodyForm<'a> {
         cm * self.stance.scale
     }
 
-    /// Head and neck down into the collar.
-    pub fn head(&self) -> Form {
-        let (head, neck) = (self.trunk.head, self.trunk.neck);
-        Form::default()
-            .with(self.limb(head, [[0.0, 13.4, -1.7], [0.0, 13.6, 1.4]], [7.7, 7.6]), 0.0)
-            .with(self.limb(head, [[0.0, 10.5, 2.0], [0.0, 5.6, 3.2]], [7.3, 6.1]), self.cm(5.0))
-            .with(self.limb(head, [[0.0, 4.6, 4.0], [0.0, 2.9, 5.2]], [4.6, 3.0]), self.cm(4.0))
-            .with(self.limb(head, [[0.0, 11.6, 8.3], [0.0, 8.2, 9.0]], [0.4, 0.8]), self.cm(2.2))
-            .with(self.limb(neck, [[0.0, -1.0, -1.6], [0.0, 13.0, -0.6]], [5.6, 4.9]), self.cm(2.5))
-    }
-
     /// The trunk of the shirt without its sleeves.
     pub fn trunk(&self) -> Form {
         let (hips, neck) = (self.trunk.hips, self.trunk.neck);

@@ -36,7 +36,7 @@ impl RoundCone {
     }
 
     /// Corners of the axis-aligned bounding box.
-    fn bounds(&self) -> [Vec3; 2] {
+    pub fn bounds(&self) -> [Vec3; 2] {
         let reach = self.radii[0].max(self.radii[1]) * self.flat.map_or(1.0, |(_, factor)| factor.max(1.0));
         let [a, b] = self.ends;
         [[0, 1, 2].map(|k| a[k].min(b[k]) - reach), [0, 1, 2].map(|k| a[k].max(b[k]) + reach)]

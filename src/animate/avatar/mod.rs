@@ -4,14 +4,20 @@
 pub mod appearance;
 pub mod avatar;
 pub mod body;
+pub mod face;
 pub mod field;
 pub mod hand;
+pub mod head;
+pub mod jaw;
+pub mod material;
+pub mod patch;
 pub mod posing;
 pub mod skin;
 pub mod stance;
 pub mod surface;
 
 pub use appearance::Appearance;
-pub use avatar::{Avatar, AvatarMesh, Material};
+pub use avatar::{Avatar, AvatarMesh};
+pub use material::Material;
 pub use posing::hip_points;
 pub use skin::Weights;

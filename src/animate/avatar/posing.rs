@@ -129,6 +129,17 @@ mod tests {
         avatar.pose_into(&rig, rig.root, &local, 0.0, &mut meshes);
         assert_eq!(meshes, avatar.posed(&rig, rig.root, &local, 0.0));
         assert!(avatar.face_points(&rig, rig.root, &local)[0][0] > nose[0] + 2.0);
+        // The mouth opens about the jaw's hinge, by what the lips' points say.
+        let gap = |mouth: f64| {
+            let [upper, lower] = avatar.lip_points(&rig, rig.root, &local, mouth);
+            norm(sub(upper, lower))
+        };
+        let gaps: Vec<f64> = (0..=10).map(|n| gap(f64::from(n) / 10.0)).collect();
+        assert!(gaps[0] < 0.01 && gaps.windows(2).all(|pair| pair[1] > pair[0] + 0.1) && gaps[10] < 4.0, "{gaps:?}");
+        let open = avatar.posed(&rig, rig.root, &local, 1.0);
+        let lowered = meshes.iter().zip(&open).flat_map(|(a, b)| a.points.iter().zip(&b.points));
+        let most = lowered.map(|(a, b)| a[1] - b[1]).fold(0.0, f32::max);
+        assert!((f64::from(most) - gaps[10]).abs() < 0.5, "{most}");
         let [left, right] = hip_points(&rig, rig.root, &local);
         assert!(left[0] > 5.0 && right[0] < -5.0 && (left[1] - right[1]).abs() < 1e-9);
     }

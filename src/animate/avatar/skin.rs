@@ -2,12 +2,18 @@
 //! between chains it belongs to the nearer one; all weights are smoothed over the surface.
 
 use super::body::BodyForm;
+use super::jaw::rise;
 use super::stance::finger_joints;
 use super::surface::Surface;
 use crate::math::vec3::{Vec3, dot, norm, sub};
 
 /// Joints of a vertex with their weights, which sum to 1.
 pub type Weights = [(usize, f64); 4];
+
+/// Weights of a vertex that follows one joint.
+pub fn rigid(joint: usize) -> Weights {
+    [(joint, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)]
+}
 
 /// Sparse weights of one vertex by joint.
 type Shares = Vec<(usize, f64)>;
@@ -39,12 +45,6 @@ fn add_share(into: &mut Shares, joint: usize, share: f64) {
     }
 }
 
-/// Smooth step from 0 at -1 to 1 at 1.
-fn rise(at: f64) -> f64 {
-    let t = ((at + 1.0) / 2.0).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
-}
-
 impl BodyForm<'_> {
     /// Chain whose transition planes bisect the bones at each joint; `halves` in cm of the rig.
     fn chain(&self, before: usize, joints: &[usize], after: usize, halves: &[f64]) -> WeightChain {
@@ -67,9 +67,11 @@ impl BodyForm<'_> {
         let up = |joint: usize, higher: f64, half: f64| {
             (self.stance.at(joint, [0.0, higher, 0.0]), [0.0, 1.0, 0.0], half * cm)
         };
+        // The plane between head and neck rises from below the chin to the nape.
+        let jaw = (self.stance.at(t.head, [0.0, -1.0, 0.0]), [0.0, 0.876, 0.482], 3.2 * cm);
         WeightChain {
             joints: vec![t.hips, t.spine, t.chest, t.neck, t.head],
-            passes: vec![up(t.spine, 0.0, 7.0), up(t.chest, 0.0, 8.0), up(t.neck, 5.0, 3.5), up(t.head, 1.0, 4.0)],
+            passes: vec![up(t.spine, 0.0, 7.0), up(t.chest, 0.0, 8.0), up(t.neck, 5.0, 3.5), jaw],
         }
     }
 
@@ -108,12 +110,6 @@ impl BodyForm<'_> {
             }
             spine.shares(at, left, shares);
         })
-    }
-
-    /// Weights of a cuff, which follows the forearm.
-    pub fn cuff_weights(&self, side: usize, surface: &Surface) -> Vec<Weights> {
-        let fore = self.rig.arms[side].fore;
-        vec![[(fore, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)]; surface.points.len()]
     }
 
     /// Weights of trousers and shoes.

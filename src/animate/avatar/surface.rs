@@ -21,7 +21,7 @@ pub struct Surface {
 }
 
 /// Field values at the corners of the cells.
-struct Grid {
+struct FieldGrid {
     low: Vec3,
     cell: f64,
     /// Number of corners along x, y, z.
@@ -32,13 +32,42 @@ struct Grid {
 impl Surface {
     /// Surface of `field` inside the box `bounds`, with cells of `cell` cm.
     pub fn from_field(field: &(dyn Fn(Vec3) -> f64 + Sync), bounds: [Vec3; 2], cell: f64) -> Self {
-        let grid = Grid::sample(field, bounds, cell);
+        Self::on_grid(&FieldGrid::sample(field, bounds, cell), &|at| at, field, cell)
+    }
+
+    /// Surface of `field` inside the box `bounds`, with cells of `cell` cm at `focus` that grow with the distance from it
+    /// (twice as large at about 1.7 `even` cm).
+    pub fn focused(
+        field: &(dyn Fn(Vec3) -> f64 + Sync),
+        bounds: [Vec3; 2],
+        cell: f64,
+        (focus, even): (Vec3, f64),
+    ) -> Self {
+        // In the grid's space, where all cells are of one size, a point at `even` sinh(r / even) lies at r.
+        let space = |at: Vec3| {
+            let far = norm(at) / even;
+            add(focus, scale(at, if far > 1e-9 { far.sinh() / far } else { 1.0 }))
+        };
+        let [low, high] = bounds.map(|corner| sub(corner, focus).map(|v| even * (v / even).asinh() / cell));
+        // Whole cells, so that a box which is the same on both sides has a grid which is.
+        let bounds = [low.map(|v| v.floor() * cell), high.map(|v| v.ceil() * cell)];
+        let steepest = bounds.map(|corner| norm(corner) / even).into_iter().fold(0.0, f64::max).cosh();
+        let grid = FieldGrid::sample(&|at| field(space(at)) / steepest, bounds, cell);
+        Self::on_grid(&grid, &space, field, cell)
+    }
+
+    fn on_grid(
+        grid: &FieldGrid,
+        space: &dyn Fn(Vec3) -> Vec3,
+        field: &(dyn Fn(Vec3) -> f64 + Sync),
+        cell: f64,
+    ) -> Self {
         let mut surface = Self::default();
         let mut vertex_of = vec![u32::MAX; grid.values.len()];
         for (z, y, x) in ndarray::indices((grid.n[2] - 1, grid.n[1] - 1, grid.n[0] - 1)) {
             if let Some(point) = grid.vertex([x, y, z]) {
                 vertex_of[grid.index([x, y, z])] = surface.points.len() as u32;
-                surface.points.push(point);
+                surface.points.push(space(point));
             }
         }
         grid.quads(|corners, inwards| {
@@ -121,7 +150,7 @@ fn gradient(field: &(dyn Fn(Vec3) -> f64 + Sync), at: Vec3, cell: f64) -> Vec3 {
     })
 }
 
-impl Grid {
+impl FieldGrid {
     fn sample(field: &(dyn Fn(Vec3) -> f64 + Sync), [low, high]: [Vec3; 2], cell: f64) -> Self {
         let low = low.map(|v| v - 1.5 * cell);
         let n = [0, 1, 2].map(|k| (((high[k] + 1.5 * cell - low[k]) / cell).ceil().max(1.0) as usize) + 1);

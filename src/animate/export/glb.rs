@@ -39,7 +39,7 @@ impl GlbBuffer {
         self.add(values.iter().flatten().copied(), BufferUse::Vertices, accessor)
     }
 
-    /// Adds vectors of four 16-bit fixed-point fractions (weights); returns the accessor's index.
+    /// Adds vectors of four 16-bit fixed-point fractions (weights, colours); returns the accessor's index.
     pub fn shares4(&mut self, values: &[[u16; 4]]) -> usize {
         let accessor = json!({ "componentType": 5123, "normalized": true, "count": values.len(), "type": "VEC4" });
         self.add(values.iter().flatten().flat_map(|v| v.to_le_bytes()), BufferUse::Vertices, accessor)

@@ -1,8 +1,8 @@
-//! Performance as a glTF scene: the rig's joints as nodes in T-pose (metres, y up, facing +z), the avatar as one
-//! skinned mesh, the clip as one animation. Joints that do not turn have one key.
+//! Performance as a glTF scene: the rig's joints as nodes in T-pose (metres, y up, facing +z), the avatar as
+//! skinned meshes, the clip as one animation. Joints that do not turn have one key.
 
 use super::glb::{BufferUse, GlbBuffer};
-use crate::animate::avatar::{Avatar, AvatarMesh, Material};
+use crate::animate::avatar::{Avatar, AvatarMesh};
 use crate::animate::rig::names::Names;
 use crate::animate::rig::rig::Rig;
 use crate::formats::bvh::write::BvhClip;
@@ -36,17 +36,24 @@ pub fn file(rig: &Rig, clip: &BvhClip, avatar: &Avatar, names: Names) -> Vec<u8>
             node
         })
         .collect();
+    // The face is a mesh of its own, since all parts of a mesh have the same morph targets.
+    let (faces, body): (Vec<_>, Vec<_>) = avatar.parts.iter().enumerate().partition(|(_, part)| !part.mouth.is_empty());
     nodes.push(json!({ "name": "Avatar", "mesh": 0, "skin": 0 }));
+    nodes.push(json!({ "name": "Face", "mesh": 1, "skin": 0 }));
+    let mut primitives = |parts: &[(usize, &AvatarMesh)]| -> Vec<Value> {
+        parts.iter().map(|(material, part)| primitive(&mut buffer, part, *material)).collect()
+    };
+    let meshes = json!([
+        { "name": "Avatar", "primitives": primitives(&body) },
+        { "name": "Face", "primitives": primitives(&faces), "weights": [0.0], "extras": { "targetNames": ["mouthOpen"] } },
+    ]);
     let mut scene = json!({
         "asset": { "version": "2.0", "generator": concat!("orator ", env!("CARGO_PKG_VERSION")) },
         "scene": 0,
-        "scenes": [{ "name": "Figure", "nodes": [0, bones.len()] }],
+        "scenes": [{ "name": "Figure", "nodes": [0, bones.len(), bones.len() + 1] }],
         "nodes": nodes,
-        "materials": avatar.parts.iter().map(|part| material(part.material)).collect::<Vec<_>>(),
-        "meshes": [{
-            "name": "Avatar",
-            "primitives": avatar.parts.iter().enumerate().map(|(n, part)| primitive(&mut buffer, part, n)).collect::<Vec<_>>(),
-        }],
+        "materials": avatar.parts.iter().map(material).collect::<Vec<_>>(),
+        "meshes": meshes,
         "skins": [{
             "inverseBindMatrices": inverse_binds(&mut buffer, rig, clip.root),
             "skeleton": 0,
@@ -58,7 +65,7 @@ pub fn file(rig: &Rig, clip: &BvhClip, avatar: &Avatar, names: Names) -> Vec<u8>
     }
     if names == Names::Vrm {
         scene["extensionsUsed"] = json!(["VRMC_vrm"]);
-        scene["extensions"] = json!({ "VRMC_vrm": vrm(&own, &called) });
+        scene["extensions"] = json!({ "VRMC_vrm": vrm(&own, &called, bones.len() + 1) });
     }
     buffer.file(scene)
 }
@@ -67,17 +74,18 @@ fn metres(cm: Vec3) -> [f32; 3] {
     cm.map(|v| (v * METRES) as f32)
 }
 
-fn material(material: Material) -> Value {
-    let (name, rgb, roughness) = match material {
-        Material::Skin => ("Skin", [0.60, 0.42, 0.33], 0.65),
-        Material::Shirt => ("Shirt", [0.16, 0.30, 0.38], 0.9),
-        Material::Trousers => ("Trousers", [0.055, 0.065, 0.085], 0.9),
-        Material::Shoes => ("Shoes", [0.30, 0.28, 0.26], 0.8),
-    };
+/// Colour of all vertices; `None` where they differ.
+fn one_colour(part: &AvatarMesh) -> Option<[f32; 3]> {
+    let first = *part.colours.first()?;
+    part.colours.iter().all(|colour| *colour == first).then_some(first)
+}
+
+fn material(part: &AvatarMesh) -> Value {
+    let [r, g, b] = one_colour(part).unwrap_or([1.0; 3]);
     json!({
-        "name": name,
+        "name": format!("{:?}", part.material),
         "pbrMetallicRoughness": {
-            "baseColorFactor": [rgb[0], rgb[1], rgb[2], 1.0], "metallicFactor": 0.0, "roughnessFactor": roughness,
+            "baseColorFactor": [r, g, b, 1.0], "metallicFactor": 0.0, "roughnessFactor": part.material.roughness(),
         },
     })
 }
@@ -86,7 +94,7 @@ fn primitive(buffer: &mut GlbBuffer, part: &AvatarMesh, material: usize) -> Valu
     let points: Vec<[f32; 3]> = part.points.iter().map(|&point| metres(point)).collect();
     let normals: Vec<[f32; 3]> = part.normals.iter().map(|normal| normal.map(|v| v as f32)).collect();
     let (joints, weights): (Vec<[u8; 4]>, Vec<[u16; 4]>) = part.weights.iter().map(whole_shares).unzip();
-    json!({
+    let mut primitive = json!({
         "attributes": {
             "POSITION": buffer.floats(&points, "VEC3", BufferUse::Vertices),
             "NORMAL": buffer.floats(&normals, "VEC3", BufferUse::Vertices),
@@ -95,7 +103,18 @@ fn primitive(buffer: &mut GlbBuffer, part: &AvatarMesh, material: usize) -> Valu
         },
         "indices": buffer.indices(&part.triangles),
         "material": material,
-    })
+    });
+    if one_colour(part).is_none() {
+        let share = |v: f32| (v.clamp(0.0, 1.0) * 65_535.0).round() as u16;
+        let colours: Vec<[u16; 4]> =
+            part.colours.iter().map(|&[r, g, b]| [share(r), share(g), share(b), u16::MAX]).collect();
+        primitive["attributes"]["COLOR_0"] = json!(buffer.shares4(&colours));
+    }
+    if !part.mouth.is_empty() {
+        let open: Vec<[f32; 3]> = part.mouth.iter().map(|&way| metres(way)).collect();
+        primitive["targets"] = json!([{ "POSITION": buffer.floats(&open, "VEC3", BufferUse::Vertices) }]);
+    }
+    primitive
 }
 
 /// Weights as 16-bit fractions that sum to 65535, largest first; a joint with weight 0 is joint 0.
@@ -157,8 +176,8 @@ fn quaternions(clip: &BvhClip, joint: usize) -> Vec<[f32; 4]> {
     clip.local.iter().map(next).collect()
 }
 
-/// VRM 1.0 extension: nodes of the humanoid bones, and the avatar's author and licence.
-fn vrm(own: &[String], called: &[String]) -> Value {
+/// VRM 1.0 extension: nodes of the humanoid bones, the open mouth of the node `face`, the avatar's author and licence.
+fn vrm(own: &[String], called: &[String], face: usize) -> Value {
     let is_bone = |name: &str| !name.ends_with('4') && !name.ends_with("End");
     let bones: serde_json::Map<String, Value> = own
         .iter()
@@ -171,5 +190,8 @@ fn vrm(own: &[String], called: &[String]) -> Value {
         "specVersion": "1.0",
         "meta": { "name": "Avatar", "authors": ["orator"], "licenseUrl": VRM_LICENSE },
         "humanoid": { "humanBones": bones },
+        "expressions": {
+            "preset": { "aa": { "morphTargetBinds": [{ "node": face, "index": 0, "weight": 1.0 }] } },
+        },
     })
 }

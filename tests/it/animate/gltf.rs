@@ -48,10 +48,10 @@ fn the_skin_at_rest_is_the_mesh_and_every_vertex_hangs_on_its_joints() {
     let inverse_binds = glb.numbers(&glb.scene["skins"][0]["inverseBindMatrices"]);
     assert_eq!(inverse_binds.len(), n_joints);
     let root = vec3(&glb.node(0)["translation"]);
-    let rest = glb.world(&vec![Rotation::IDENTITY; n_joints + 1], root);
+    let rest = glb.world(&vec![Rotation::IDENTITY; n_joints + 2], root);
     let (mut n_triangles, mut low, mut high) = (0, [f64::MAX; 3], [f64::MIN; 3]);
     let mut carried = vec![0.0; n_joints];
-    for part in glb.scene["meshes"][0]["primitives"].as_array().unwrap() {
+    for part in glb.parts() {
         let of = |name: &str| glb.numbers(&part["attributes"][name]);
         let (points, normals, joints, weights) = (of("POSITION"), of("NORMAL"), of("JOINTS_0"), of("WEIGHTS_0"));
         for (n, point) in points.iter().enumerate() {
@@ -81,6 +81,32 @@ fn the_skin_at_rest_is_the_mesh_and_every_vertex_hangs_on_its_joints() {
     for (joint, bone) in performance.rig.skeleton.joints.iter().enumerate() {
         assert!(bone.end || carried[joint] > 5.0, "{} carries {} vertices", bone.name, carried[joint]);
     }
+}
+
+#[test]
+fn the_face_has_colours_and_a_mouth_that_opens() {
+    let folder = tempfile::tempdir().unwrap();
+    let (performance, path) = written(folder.path(), 3, Names::Vrm);
+    let glb = Glb::read(&path);
+    let face = &glb.scene["meshes"][1];
+    assert_eq!(face["extras"]["targetNames"][0], "mouthOpen");
+    let part = &face["primitives"][0];
+    let open = glb.numbers(&part["targets"][0]["POSITION"]);
+    let points = glb.numbers(&part["attributes"]["POSITION"]);
+    let colours = glb.numbers(&part["attributes"]["COLOR_0"]);
+    assert!(open.len() == points.len() && colours.len() == points.len());
+    // The chin drops by centimetres; eyes, nose and everything below the collar stay.
+    let lowest = open.iter().map(|way| way[1]).fold(f64::INFINITY, f64::min);
+    assert!((-0.04..-0.015).contains(&lowest), "{lowest} m");
+    let head = glb
+        .world(&vec![Rotation::IDENTITY; performance.rig.skeleton.joints.len() + 2], vec3(&glb.node(0)["translation"]))
+        [performance.rig.head]
+        .1;
+    let still = points.iter().zip(&open).filter(|(point, _)| point[1] > head[1] + 0.10 || point[1] < head[1] - 0.05);
+    assert!(still.clone().count() > 500);
+    assert!(still.map(|(_, way)| way[1].abs()).fold(0.0, f64::max) < 1e-3);
+    let vrm = &glb.scene["extensions"]["VRMC_vrm"]["expressions"]["preset"]["aa"]["morphTargetBinds"][0];
+    assert_eq!(glb.node(vrm["node"].as_u64().unwrap() as usize)["mesh"], 1);
 }
 
 #[test]
