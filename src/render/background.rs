@@ -3,11 +3,11 @@
 use super::camera::PinholeCamera;
 use super::light::Light;
 use super::mesh::Mesh;
-use super::pixel::{PixelLight, is_empty, pixel_light};
-use super::samples::Samples;
+use super::pixel::{PixelLight, Shading, is_empty, nearest};
 use super::shadow::ShadowMap;
 use super::srgb::{Srgb, compressed};
 use super::surfaces::Surfaces;
+use super::visibility::Visibility;
 use crate::types::image::Image;
 use std::sync::Arc;
 
@@ -57,40 +57,39 @@ impl Background {
     /// over them must have this camera and this light.
     pub fn of_scene(camera: &PinholeCamera, meshes: &[&Mesh], light: &Light, behind: Image) -> Self {
         let size = camera.size;
-        let (mut surfaces, mut samples) = (Surfaces::default(), Samples::new(size));
+        let (mut surfaces, mut shading) = (Surfaces::default(), Shading::default());
         surfaces.set(camera, meshes, light);
-        for (number, triangle) in surfaces.triangles.iter().enumerate() {
-            samples.fill(&surfaces.flat(triangle), number as u32);
-        }
+        shading.open(&surfaces);
         let mut shadows = ShadowMap::new(SHADOW_TEXELS);
         shadows.cast(surfaces.casters(meshes));
         let srgb = Srgb::tables();
         let mut image = behind;
-        let mut pixels = Vec::with_capacity(size[0] * size[1]);
-        let mut labels = Vec::with_capacity(pixels.capacity());
-        for at in 0..size[0] * size[1] {
-            let triangles = samples.triangles[at];
-            if is_empty(&triangles) {
-                pixels.push(PixelLight::default());
-                labels.push(None);
-                continue;
+        let n = size[0] * size[1];
+        let (mut pixels, mut labels) = (vec![PixelLight::default(); n], vec![None; n]);
+        let mut nearness = vec![[0.0; 4]; n];
+        Visibility::new(size).visit(&surfaces, None, |band, rows, columns| {
+            for (x, y) in (rows[0]..rows[1]).flat_map(|y| (columns[0]..columns[1]).map(move |x| (x, y))) {
+                let (at, there) = (y * size[0] + x, band.at(x, y));
+                let triangles = &band.triangles[there];
+                if is_empty(triangles) {
+                    continue;
+                }
+                nearness[at] = band.nearness[there];
+                let mut pixel = shading.light(&surfaces, (triangles, &nearness[at]), [x, y]);
+                let lit = shadows.lit(pixel.asking);
+                let there = srgb.linears(image.pixel(x, y));
+                for k in 0..4 {
+                    pixel.own[k] += (1.0 - pixel.cover) * there[k];
+                    pixel.key[k] *= lit;
+                }
+                image.data[3 * at..3 * at + 3].copy_from_slice(&srgb.bytes(compressed(pixel.sum(1.0))));
+                let front = surfaces.triangles.get(triangles[nearest(&nearness[at])] as usize);
+                labels[at] = front.map(|triangle| (triangle.mesh, triangle.label));
+                pixels[at] = pixel;
             }
-            let (x, y) = (at % size[0], at / size[0]);
-            let mut pixel = pixel_light(&surfaces, &triangles, &samples.nearness[at], x, y);
-            let lit = shadows.lit(pixel.asking);
-            let bytes = &mut image.data[3 * at..3 * at + 3];
-            for k in 0..3 {
-                pixel.own[k] += (1.0 - pixel.cover) * srgb.linear(bytes[k]);
-                pixel.key[k] *= lit;
-                bytes[k] = srgb.byte(compressed(pixel.own[k] + pixel.key[k]));
-            }
-            let nearest = (0..4).max_by(|&a, &b| samples.nearness[at][a].total_cmp(&samples.nearness[at][b]));
-            let front = nearest.and_then(|k| surfaces.triangles.get(triangles[k] as usize));
-            labels.push(front.map(|triangle| (triangle.mesh, triangle.label)));
-            pixels.push(pixel);
-        }
+        });
         let blocks = blocks(size, &pixels);
-        let scene = StaticScene { nearness: samples.nearness, labels, light: pixels, blocks };
+        let scene = StaticScene { nearness, labels, light: pixels, blocks };
         Self { image, scene: Some(Arc::new(scene)) }
     }
 }
@@ -118,9 +117,7 @@ impl StaticScene {
                     let pixel = &self.light[at];
                     let lit = if pixel.cover > 0.0 { shadows.lit(pixel.asking) } else { 1.0 };
                     if lit < 1.0 {
-                        for k in 0..3 {
-                            image.data[3 * at + k] = srgb.byte(compressed(pixel.own[k] + lit * pixel.key[k]));
-                        }
+                        image.data[3 * at..3 * at + 3].copy_from_slice(&srgb.bytes(compressed(pixel.sum(lit))));
                     }
                 }
             }

@@ -10,6 +10,7 @@ mod samples;
 mod shadow;
 mod srgb;
 mod surfaces;
+mod visibility;
 
 pub use background::Background;
 pub use camera::PinholeCamera;

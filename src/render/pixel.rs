@@ -1,22 +1,56 @@
 //! Light of one pixel from the triangles at its four samples.
 
-use super::samples::NO_TRIANGLE;
+use super::samples::{NO_TRIANGLE, PARTS, SPOTS};
 use super::shadow::ShadowMap;
-use super::surfaces::Surfaces;
+use super::srgb::compressed;
+use super::surfaces::{Radiance, RadiancePlane, Surfaces};
 
 /// Depths of one surface within a pixel differ by less than this share.
 const ONE_SURFACE: f32 = 0.012;
+/// No plane of a triangle is known yet, or none exists.
+const NO_PLANE: u32 = u32::MAX;
+const UNEVEN: u32 = u32::MAX - 1;
 
 /// What a pixel sends, weighted by the samples that are covered.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PixelLight {
     /// Linear RGB without the key light, and of the key light.
-    pub own: [f32; 3],
-    pub key: [f32; 3],
+    pub own: [f32; 4],
+    pub key: [f32; 4],
     /// Point in the light's axes of the first surface.
     pub asking: [f32; 3],
     /// Share of covered samples, 0..1.
     pub cover: f32,
+}
+
+impl PixelLight {
+    /// Linear RGB with a share of the key light.
+    #[inline(always)]
+    pub fn sum(&self, lit: f32) -> [f32; 4] {
+        let mut sum = self.own;
+        for k in 0..4 {
+            sum[k] += lit * self.key[k];
+        }
+        sum
+    }
+}
+
+/// Share of the key light that was found last, and where.
+#[derive(Clone, Copy, Debug, Default)]
+struct LastShadow {
+    pixel: [usize; 2],
+    mesh: u16,
+    nearness: f32,
+    lit: f32,
+}
+
+/// Light of the triangles of a picture, worked out where it is asked for.
+#[derive(Clone, Debug, Default)]
+pub struct Shading {
+    /// Plane of each triangle.
+    numbers: Vec<u32>,
+    planes: Vec<RadiancePlane>,
+    last: LastShadow,
 }
 
 /// Whether no sample is covered.
@@ -25,71 +59,167 @@ pub fn is_empty(triangles: &[u32; 4]) -> bool {
     triangles[0] & triangles[1] & triangles[2] & triangles[3] == NO_TRIANGLE
 }
 
-/// Calls `each` with a triangle and its share of the pixel for every surface in it.
+/// Sample that is nearest to the camera.
 #[inline(always)]
-fn for_surfaces(surfaces: &Surfaces, triangles: &[u32; 4], nearness: &[f32; 4], mut each: impl FnMut(u32, f32)) {
-    let first = triangles[0];
-    if triangles[1] == first && triangles[2] == first && triangles[3] == first {
-        return each(first, 1.0);
-    }
+pub fn nearest(nearness: &[f32; 4]) -> usize {
+    (1..4).fold(0, |best, k| if nearness[k] > nearness[best] { k } else { best })
+}
+
+/// One of the surfaces in a pixel.
+#[derive(Clone, Copy, Default)]
+struct Part {
+    triangle: u32,
+    nearness: f32,
+    /// Share of the pixel.
+    share: f32,
+    /// Point of the surface, parts of a pixel.
+    point: [i32; 2],
+}
+
+/// Calls `each` for every surface in a pixel.
+#[inline(always)]
+fn for_parts(
+    surfaces: &Surfaces,
+    (triangles, nearness): (&[u32; 4], &[f32; 4]),
+    [x, y]: [usize; 2],
+    mut each: impl FnMut(Part),
+) {
     let mut is_open = triangles.map(|triangle| triangle != NO_TRIANGLE);
     for k in 0..4 {
         if !is_open[k] {
             continue;
         }
-        let triangle = &surfaces.triangles[triangles[k] as usize];
+        let mesh = surfaces.triangles[triangles[k] as usize].mesh;
         let mut n = 1;
         for other in k + 1..4 {
-            if !is_open[other] {
-                continue;
-            }
-            let apart = (nearness[k] - nearness[other]).abs();
-            let is_same = triangles[other] == triangles[k]
-                || apart < ONE_SURFACE * nearness[k]
-                    && surfaces.triangles[triangles[other] as usize].mesh == triangle.mesh;
-            if is_same {
-                is_open[other] = false;
-                n += 1;
+            if is_open[other] {
+                let is_near = (nearness[k] - nearness[other]).abs() < ONE_SURFACE * nearness[k];
+                if is_near && surfaces.triangles[triangles[other] as usize].mesh == mesh {
+                    is_open[other] = false;
+                    n += 1;
+                }
             }
         }
-        each(triangles[k], n as f32 * 0.25);
+        let point = [x as i32 * PARTS + SPOTS[k][0], y as i32 * PARTS + SPOTS[k][1]];
+        each(Part { triangle: triangles[k], nearness: nearness[k], share: n as f32 * 0.25, point });
     }
 }
 
-/// Light of a pixel before shadows.
-pub fn pixel_light(surfaces: &Surfaces, triangles: &[u32; 4], nearness: &[f32; 4], x: usize, y: usize) -> PixelLight {
-    let mut light = PixelLight::default();
-    for_surfaces(surfaces, triangles, nearness, |number, share| {
-        let [own, key, asking] = surfaces.radiance_at(&surfaces.triangles[number as usize], x, y);
-        if light.cover == 0.0 {
-            light.asking = [asking[0], asking[1], asking[2]];
-        }
-        light.cover += share;
-        for k in 0..3 {
-            light.own[k] += share * own[k];
-            light.key[k] += share * key[k];
-        }
-    });
-    light
-}
+impl Shading {
+    /// Starts over with the triangles of another picture.
+    pub fn open(&mut self, surfaces: &Surfaces) {
+        self.numbers.clear();
+        self.numbers.resize(surfaces.triangles.len(), NO_PLANE);
+        self.planes.clear();
+        self.last = LastShadow::default();
+    }
 
-/// Linear RGB of a pixel with shadows, weighted by the share of covered samples, and that share.
-#[inline(always)]
-pub fn shaded(
-    surfaces: &Surfaces,
-    shadows: &ShadowMap,
-    (triangles, nearness): (&[u32; 4], &[f32; 4]),
-    [x, y]: [usize; 2],
-) -> ([f32; 3], f32) {
-    let (mut sum, mut cover) = ([0.0f32; 3], 0.0);
-    for_surfaces(surfaces, triangles, nearness, |number, share| {
-        let [own, key, asking] = surfaces.radiance_at(&surfaces.triangles[number as usize], x, y);
-        let is_turned_away = key[0] + key[1] + key[2] <= 1e-4;
-        let lit = if is_turned_away { 0.0 } else { shadows.lit([asking[0], asking[1], asking[2]]) };
-        cover += share;
-        for k in 0..3 {
-            sum[k] += share * super::srgb::compressed(own[k] + lit * key[k]);
+    #[inline(always)]
+    fn radiance(&mut self, surfaces: &Surfaces, number: u32, point: [i32; 2]) -> Radiance {
+        let plane = self.numbers[number as usize];
+        if let Some(plane) = self.planes.get(plane as usize) {
+            return plane.radiance_at(point);
         }
-    });
-    (sum, cover)
+        self.first_radiance(surfaces, number, point)
+    }
+
+    #[inline(never)]
+    fn first_radiance(&mut self, surfaces: &Surfaces, number: u32, point: [i32; 2]) -> Radiance {
+        let triangle = &surfaces.triangles[number as usize];
+        if self.numbers[number as usize] == NO_PLANE && surfaces.is_even(triangle) {
+            self.numbers[number as usize] = self.planes.len() as u32;
+            self.planes.push(surfaces.plane(triangle));
+        } else {
+            self.numbers[number as usize] = UNEVEN;
+        }
+        surfaces.radiance_at(triangle, point)
+    }
+
+    /// Light of a pixel before shadows.
+    pub fn light(&mut self, surfaces: &Surfaces, samples: (&[u32; 4], &[f32; 4]), pixel: [usize; 2]) -> PixelLight {
+        let mut light = PixelLight::default();
+        for_parts(surfaces, samples, pixel, |Part { triangle, share, point, .. }| {
+            let [own, key, asking] = self.radiance(surfaces, triangle, point);
+            if light.cover == 0.0 {
+                light.asking = [asking[0], asking[1], asking[2]];
+            }
+            light.cover += share;
+            for k in 0..4 {
+                light.own[k] += share * own[k];
+                light.key[k] += share * key[k];
+            }
+        });
+        light
+    }
+
+    /// Linear RGB of a pixel with shadows, weighted by the share of covered samples, and that share.
+    #[inline(always)]
+    pub fn shaded(
+        &mut self,
+        surfaces: &Surfaces,
+        shadows: &ShadowMap,
+        samples: (&[u32; 4], &[f32; 4]),
+        pixel: [usize; 2],
+    ) -> ([f32; 4], f32) {
+        let (triangles, nearness) = samples;
+        let first = triangles[0];
+        if triangles[1] == first && triangles[2] == first && triangles[3] == first {
+            // Most pixels.
+            let point = pixel.map(|v| v as i32 * PARTS);
+            let whole = Part { triangle: first, nearness: nearness[0], share: 1.0, point };
+            return (self.part(surfaces, shadows, whole, pixel), 1.0);
+        }
+        self.mixed(surfaces, shadows, samples, pixel)
+    }
+
+    #[inline(never)]
+    fn mixed(
+        &mut self,
+        surfaces: &Surfaces,
+        shadows: &ShadowMap,
+        samples: (&[u32; 4], &[f32; 4]),
+        pixel: [usize; 2],
+    ) -> ([f32; 4], f32) {
+        let (mut sum, mut cover) = ([0.0f32; 4], 0.0);
+        for_parts(surfaces, samples, pixel, |part| {
+            let light = self.part(surfaces, shadows, part, pixel);
+            cover += part.share;
+            for k in 0..4 {
+                sum[k] += part.share * light[k];
+            }
+        });
+        (sum, cover)
+    }
+
+    /// Linear RGB of one surface with its shadow.
+    #[inline(always)]
+    fn part(&mut self, surfaces: &Surfaces, shadows: &ShadowMap, part: Part, pixel: [usize; 2]) -> [f32; 4] {
+        let [own, key, asking] = self.radiance(surfaces, part.triangle, part.point);
+        let is_turned_away = key[0] + key[1] + key[2] <= 1e-4;
+        let lit = if is_turned_away {
+            0.0
+        } else {
+            let (mesh, nearness) = (surfaces.triangles[part.triangle as usize].mesh, part.nearness);
+            self.lit(shadows, [asking[0], asking[1], asking[2]], LastShadow { pixel, mesh, nearness, lit: 0.0 })
+        };
+        let mut light = own;
+        for k in 0..4 {
+            light[k] += lit * key[k];
+        }
+        compressed(light)
+    }
+
+    /// Share of the key light at a pixel; the second of two neighbours on a surface takes over that of the first, as
+    /// shadows are soft.
+    #[inline(always)]
+    fn lit(&mut self, shadows: &ShadowMap, asking: [f32; 3], here: LastShadow) -> f32 {
+        let last = self.last;
+        let is_second = here.pixel[0] & 1 == 1 && last.pixel == [here.pixel[0] - 1, here.pixel[1]];
+        if is_second && last.mesh == here.mesh && (last.nearness - here.nearness).abs() < ONE_SURFACE * here.nearness {
+            return last.lit;
+        }
+        let lit = shadows.lit(asking);
+        self.last = LastShadow { lit, ..here };
+        lit
+    }
 }

@@ -1,31 +1,34 @@
 //! Frames of posed meshes over a background: visibility first (four samples a pixel, nearest triangle), then the light of
-//! what is seen, once a surface and pixel. A figure's area alone is worked on.
+//! what is seen, once a surface and pixel. The figures' area alone is worked on.
 
 use super::background::{Background, StaticScene};
 use super::camera::PinholeCamera;
 use super::light::Light;
 use super::mesh::Mesh;
-use super::pixel::{is_empty, shaded};
-use super::samples::{PixelBounds, Samples};
+use super::pixel::{Shading, is_empty, nearest};
+use super::samples::NO_TRIANGLE;
 use super::shadow::ShadowMap;
 use super::srgb::Srgb;
 use super::surfaces::Surfaces;
+use super::visibility::Visibility;
 use crate::types::image::Image;
 use std::sync::Arc;
 
 /// Texels of the figures' shadow map, each way.
-const SHADOW_TEXELS: usize = 384;
+const SHADOW_TEXELS: usize = 320;
 
 /// Renderer with the memory that frames of one size need.
 #[derive(Clone, Debug)]
 pub struct Renderer {
-    samples: Samples,
+    size: [usize; 2],
+    visibility: Visibility,
     surfaces: Surfaces,
+    shading: Shading,
     shadows: ShadowMap,
-    /// Numbers of triangles whose inner side is seen.
-    inner: Vec<u32>,
-    /// Area that the last frame used.
-    area: PixelBounds,
+    /// Triangle and nearness (1/cm) in front at each pixel of the last frame.
+    front: Vec<(u32, f32)>,
+    /// Rows of pixels in `front` that the last frame filled, in columns from one to another.
+    spans: Vec<[usize; 2]>,
     n_meshes: usize,
     scene: Option<Arc<StaticScene>>,
 }
@@ -34,11 +37,13 @@ impl Renderer {
     /// Renderer of pictures with a width and a height, px.
     pub fn new(size: [usize; 2]) -> Self {
         Self {
-            samples: Samples::new(size),
+            size,
+            visibility: Visibility::new(size),
             surfaces: Surfaces::default(),
+            shading: Shading::default(),
             shadows: ShadowMap::new(SHADOW_TEXELS),
-            inner: Vec::new(),
-            area: PixelBounds::default(),
+            front: vec![(NO_TRIANGLE, 0.0); size[0] * size[1]],
+            spans: vec![[0; 2]; size[1]],
             n_meshes: 0,
             scene: None,
         }
@@ -48,83 +53,68 @@ impl Renderer {
     /// background is returned as it is.
     pub fn draw(&mut self, camera: &PinholeCamera, meshes: &[&Mesh], light: &Light, background: &Background) -> Image {
         let mut image = background.image.clone();
-        let size = self.samples.size;
-        self.samples.clear(self.area, None);
-        self.area = PixelBounds::default();
+        self.spans.fill([0; 2]);
         self.n_meshes = meshes.len();
         self.scene.clone_from(&background.scene);
-        if camera.size != size || [image.width, image.height] != size {
+        if camera.size != self.size || [image.width, image.height] != self.size {
             return image;
         }
         self.surfaces.set(camera, meshes, light);
-        self.area = self.surfaces.bounds(size);
-        self.samples.clear(self.area, self.scene.as_ref().map(|scene| &scene.nearness[..]));
-        self.fill();
+        self.shading.open(&self.surfaces);
         self.shadows.cast(self.surfaces.casters(meshes));
         if let Some(scene) = &self.scene {
             scene.shade(&mut image, &self.shadows);
         }
-        self.shade(&mut image);
+        self.fill(&mut image);
         image
     }
 
     /// Mesh, label and depth along the camera's axis (cm) of the frontmost surface at a pixel of the last frame. Meshes
     /// of the background's scene are counted on after those of the frame.
     pub fn label_at(&self, px: [f64; 2]) -> Option<(usize, u16, f64)> {
-        let [width, height] = self.samples.size;
         let [x, y] = px.map(|v| (v + 0.5).floor());
         // Also false for NaN.
-        if !(x >= 0.0 && y >= 0.0 && x < width as f64 && y < height as f64) {
+        if !(x >= 0.0 && y >= 0.0 && x < self.size[0] as f64 && y < self.size[1] as f64) {
             return None;
         }
-        let at = y as usize * width + x as usize;
-        let (nearness, triangles) = (self.samples.nearness[at], self.samples.triangles[at]);
-        let nearest = (0..4).max_by(|&a, &b| nearness[a].total_cmp(&nearness[b]))?;
-        if let Some(triangle) = self.surfaces.triangles.get(triangles[nearest] as usize) {
-            return Some((usize::from(triangle.mesh), triangle.label, 1.0 / f64::from(nearness[nearest])));
+        let (x, y) = (x as usize, y as usize);
+        let at = y * self.size[0] + x;
+        let (number, nearness) =
+            if (self.spans[y][0]..self.spans[y][1]).contains(&x) { self.front[at] } else { (NO_TRIANGLE, 0.0) };
+        if let Some(triangle) = self.surfaces.triangles.get(number as usize) {
+            return Some((usize::from(triangle.mesh), triangle.label, 1.0 / f64::from(nearness)));
         }
         let (mesh, label, depth) = self.scene.as_ref()?.label(at)?;
         Some((self.n_meshes + usize::from(mesh), label, depth))
     }
 
-    fn fill(&mut self) {
-        self.inner.clear();
-        for (number, triangle) in self.surfaces.triangles.iter().enumerate() {
-            if triangle.is_inner {
-                self.inner.push(number as u32);
-            } else {
-                self.samples.fill(&self.surfaces.flat(triangle), number as u32);
-            }
-        }
-        // Nearly all inner sides are hidden, which their cells tell at once.
-        self.samples.close_cells(self.area);
-        for &number in &self.inner {
-            let triangle = self.surfaces.flat(&self.surfaces.triangles[number as usize]);
-            if !self.samples.is_hidden(&triangle) {
-                self.samples.fill(&triangle, number);
-            }
-        }
-    }
-
-    fn shade(&self, image: &mut Image) {
+    fn fill(&mut self, image: &mut Image) {
         let srgb = Srgb::tables();
-        for y in self.area.from[1]..self.area.to[1] {
-            let row = y * image.width;
-            for x in self.area.from[0]..self.area.to[0] {
-                let at = row + x;
-                let triangles = &self.samples.triangles[at];
-                if is_empty(triangles) {
-                    continue;
-                }
-                let front = (triangles, &self.samples.nearness[at]);
-                let (linear, cover) = shaded(&self.surfaces, &self.shadows, front, [x, y]);
-                let bytes = &mut image.data[3 * at..3 * at + 3];
-                for k in 0..3 {
-                    let behind = if cover < 1.0 { (1.0 - cover) * srgb.linear(bytes[k]) } else { 0.0 };
-                    bytes[k] = srgb.byte(linear[k] + behind);
+        let Self { size: [width, _], visibility, surfaces, shading, shadows, front, spans, scene, .. } = self;
+        let behind = scene.as_ref().map(|scene| &scene.nearness[..]);
+        visibility.visit(surfaces, behind, |band, rows, columns| {
+            for y in rows[0]..rows[1] {
+                spans[y] = columns;
+                for x in columns[0]..columns[1] {
+                    let (at, there) = (y * *width + x, band.at(x, y));
+                    let (triangles, nearness) = (&band.triangles[there], &band.nearness[there]);
+                    if is_empty(triangles) {
+                        front[at].0 = NO_TRIANGLE;
+                        continue;
+                    }
+                    let nearest = nearest(nearness);
+                    front[at] = (triangles[nearest], nearness[nearest]);
+                    let (mut linear, cover) = shading.shaded(surfaces, shadows, (triangles, nearness), [x, y]);
+                    if cover < 1.0 {
+                        let behind = srgb.linears(image.pixel(x, y));
+                        for k in 0..4 {
+                            linear[k] += (1.0 - cover) * behind[k];
+                        }
+                    }
+                    image.data[3 * at..3 * at + 3].copy_from_slice(&srgb.bytes(linear));
                 }
             }
-        }
+        });
     }
 }
 
@@ -192,7 +182,7 @@ mod tests {
         let (ball, mut renderer) = (ball([0.0; 3], 12.0, 24), Renderer::new([200, 160]));
         let image = renderer.draw(&camera(), &[&ball], &WHITE, &black());
         let srgb = Srgb::tables();
-        let area: f32 = image.data.chunks_exact(3).map(|rgb| srgb.linear(rgb[0]) / 0.5).sum();
+        let area: f32 = image.data.chunks_exact(3).map(|rgb| srgb.linears([rgb[0]; 3])[0] / 0.5).sum();
         let radius = 400.0 * 12.0 / (100.0f32 * 100.0 - 144.0).sqrt();
         assert!((area / (std::f32::consts::PI * radius * radius) - 1.0).abs() < 0.01, "{area} px");
         let (mesh, label, depth) = renderer.label_at([99.5, 79.5]).unwrap();
@@ -223,7 +213,7 @@ mod tests {
             let mesh = square(left + 5.0, 0.0, 0.0, 5.0, 0);
             let image = Renderer::new([200, 160]).draw(&camera(), &[&mesh], &WHITE, &black());
             // The middle of the picture lies between two pixels.
-            let seen = Srgb::tables().linear(image.pixel(120, 80)[1]);
+            let seen = Srgb::tables().linears(image.pixel(120, 80))[1];
             assert!((seen - 0.5 * samples / 4.0).abs() < 0.004, "{seen} at {edge}");
             assert_eq!(image.pixel(119, 80)[1], 0);
         }
@@ -235,7 +225,7 @@ mod tests {
         let mut renderer = Renderer::new([200, 160]);
         let image = renderer.draw(&camera(), &[&floor], &WHITE, &black());
         // The floor's end, 500 cm away, is 16 px below the axis.
-        assert_eq!((image.pixel(100, 90)[0], image.pixel(100, 100)[0]), (0, Srgb::tables().byte(0.5)));
+        assert_eq!((image.pixel(100, 90)[0], image.pixel(100, 100)[0]), (0, Srgb::tables().bytes([0.5; 4])[0]));
         let (_, label, depth) = renderer.label_at([100.0, 119.0]).unwrap();
         assert!(label == 5 && (depth - 200.6).abs() < 0.5, "{depth} cm");
         let bad = square(f32::NAN, 0.0, 99.0, 1.0, 0);
@@ -293,6 +283,6 @@ mod tests {
         renderer.draw(&camera, &[&square(0.0, 0.0, 40.0, 50.0, 0)], &light, &black());
         assert_eq!(image, renderer.draw(&camera, &[&ball], &light, &scene));
         let hash = blake3::hash(&image.data).to_hex();
-        assert_eq!(&hash[..16], "0f4b7c461082b6ee");
+        assert_eq!(&hash[..16], "44b0aa2e29dc23a6");
     }
 }

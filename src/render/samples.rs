@@ -1,23 +1,21 @@
-//! Frontmost triangle of four samples in each pixel.
+//! Frontmost triangle of four samples in each pixel, for a band of rows at a time, which the processor's cache holds.
 
-/// Parts of a pixel that vertices are rounded to. Sums and products of them stay whole numbers that f32 (triangles of up
-/// to `SMALL` parts) and f64 hold exactly, so that triangles that share an edge leave no gap.
+/// Parts of a pixel that vertices are rounded to: with whole numbers, triangles that share an edge leave no gap.
 pub const PARTS: i32 = 16;
-const SMALL: i32 = 120 * PARTS;
+/// Extent of a triangle whose edge functions i32 holds, parts.
+const SMALL: i32 = 512 * PARTS;
 /// Samples of a pixel from its centre, parts: a rotated grid.
-const SPOTS: [[i32; 2]; 4] = [[-2, -6], [6, -2], [-6, 2], [2, 6]];
+pub const SPOTS: [[i32; 2]; 4] = [[-2, -6], [6, -2], [-6, 2], [2, 6]];
 const FURTHEST_SPOT: i32 = 6;
 /// Triangle of a sample that no triangle covers.
 pub const NO_TRIANGLE: u32 = u32::MAX;
 /// Width of the cells in which hidden triangles are told at once, px.
 const CELL: usize = 8;
+/// Rows of a band.
+pub const BAND_ROWS: usize = 16;
 
-/// Rectangle of pixels: first column and row, column and row after the last.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PixelBounds {
-    pub from: [usize; 2],
-    pub to: [usize; 2],
-}
+/// Pixels that may have a sample within a triangle: first column and the one after the last, the same of rows.
+pub type Extent = [[u16; 2]; 2];
 
 /// Triangle in the picture.
 #[derive(Clone, Copy, Debug)]
@@ -35,58 +33,69 @@ impl FlatTriangle {
         (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
     }
 
-    /// Pixels that may have a sample within the triangle, in a picture of `size`.
-    fn bounds(&self, size: [usize; 2]) -> PixelBounds {
-        let ends = [0, 1].map(|k| {
+    /// Pixels in a picture of `size` that may have a sample within the triangle.
+    #[inline(always)]
+    pub fn extent(&self, size: [usize; 2]) -> Extent {
+        [0, 1].map(|k| {
             let [a, b, c] = self.corners.map(|corner| corner[k]);
             let first = (a.min(b).min(c) - FURTHEST_SPOT + PARTS - 1).div_euclid(PARTS);
             let last = (a.max(b).max(c) + FURTHEST_SPOT).div_euclid(PARTS) + 1;
-            [first, last].map(|v| v.clamp(0, size[k] as i32) as usize)
-        });
-        PixelBounds { from: [ends[0][0], ends[1][0]], to: [ends[0][1], ends[1][1]] }
+            [first, last].map(|v| v.clamp(0, size[k] as i32) as u16)
+        })
     }
 }
 
-/// Depth and triangle of all samples of a picture.
+/// Depth and triangle of all samples of a band.
 #[derive(Clone, Debug, Default)]
-pub struct Samples {
-    pub size: [usize; 2],
-    /// One over the depth, 1/cm; 0 is infinitely far.
+pub struct Band {
+    width: usize,
+    rows: [usize; 2],
+    /// One over the depth, 1/cm; 0 is infinitely far. [BAND_ROWS, width]
     pub nearness: Vec<[f32; 4]>,
     pub triangles: Vec<[u32; 4]>,
     /// Least nearness in each cell, once `close_cells` has run.
     cells: Vec<f32>,
 }
 
-impl Samples {
-    pub fn new(size: [usize; 2]) -> Self {
-        let n = size[0] * size[1];
-        let cells = vec![0.0; size[0].div_ceil(CELL) * size[1].div_ceil(CELL)];
-        Self { size, nearness: vec![[0.0; 4]; n], triangles: vec![[NO_TRIANGLE; 4]; n], cells }
+impl Band {
+    pub fn new(width: usize) -> Self {
+        let n = width * BAND_ROWS;
+        let cells = vec![0.0; width.div_ceil(CELL) * BAND_ROWS / CELL];
+        Self { width, rows: [0; 2], nearness: vec![[0.0; 4]; n], triangles: vec![[NO_TRIANGLE; 4]; n], cells }
     }
 
-    /// Takes all triangles out of an area; `behind` is the nearness of what is there without them.
-    pub fn clear(&mut self, area: PixelBounds, behind: Option<&[[f32; 4]]>) {
-        for y in area.from[1]..area.to[1] {
-            let row = y * self.size[0] + area.from[0]..y * self.size[0] + area.to[0];
+    /// Starts over as other rows with no triangle in some columns; `behind` is the nearness of what a whole picture shows
+    /// without them.
+    pub fn open(&mut self, rows: [usize; 2], columns: [usize; 2], behind: Option<&[[f32; 4]]>) {
+        self.rows = rows;
+        for y in rows[0]..rows[1] {
+            let row = self.at(columns[0], y)..self.at(columns[1], y);
             match behind {
-                Some(behind) => self.nearness[row.clone()].copy_from_slice(&behind[row.clone()]),
+                Some(behind) => {
+                    let there = y * self.width;
+                    self.nearness[row.clone()].copy_from_slice(&behind[there + columns[0]..there + columns[1]]);
+                }
                 None => self.nearness[row.clone()].fill([0.0; 4]),
             }
             self.triangles[row].fill([NO_TRIANGLE; 4]);
         }
     }
 
-    /// Notes how far each cell of an area reaches, for `is_hidden`.
-    pub fn close_cells(&mut self, area: PixelBounds) {
-        let n_columns = self.size[0].div_ceil(CELL);
-        for cell_y in area.from[1] / CELL..area.to[1].div_ceil(CELL) {
-            for cell_x in area.from[0] / CELL..area.to[0].div_ceil(CELL) {
+    /// Index of a pixel of the picture.
+    #[inline(always)]
+    pub fn at(&self, x: usize, y: usize) -> usize {
+        (y - self.rows[0]) * self.width + x
+    }
+
+    /// Notes how far each cell of some columns reaches, for `is_hidden`.
+    pub fn close_cells(&mut self, columns: [usize; 2]) {
+        let n_columns = self.width.div_ceil(CELL);
+        for cell_y in 0..(self.rows[1] - self.rows[0]).div_ceil(CELL) {
+            for cell_x in columns[0] / CELL..columns[1].div_ceil(CELL) {
                 let mut least = [f32::INFINITY; 4];
-                for y in cell_y * CELL..((cell_y + 1) * CELL).min(self.size[1]) {
-                    let row = y * self.size[0];
-                    let columns = row + cell_x * CELL..row + ((cell_x + 1) * CELL).min(self.size[0]);
-                    for pixel in &self.nearness[columns] {
+                for y in cell_y * CELL..((cell_y + 1) * CELL).min(self.rows[1] - self.rows[0]) {
+                    let ends = [cell_x * CELL, (cell_x + 1) * CELL].map(|x| x.clamp(columns[0], columns[1]));
+                    for pixel in &self.nearness[y * self.width + ends[0]..y * self.width + ends[1]] {
                         (0..4).for_each(|k| least[k] = if pixel[k] < least[k] { pixel[k] } else { least[k] });
                     }
                 }
@@ -96,49 +105,47 @@ impl Samples {
     }
 
     /// Whether a triangle lies behind everything in the cells it may touch.
-    pub fn is_hidden(&self, triangle: &FlatTriangle) -> bool {
-        let bounds = triangle.bounds(self.size);
+    pub fn is_hidden(&self, triangle: &FlatTriangle, extent: Extent) -> bool {
+        let ([first, last], [top, bottom]) = (extent[0].map(usize::from), self.rows_of(extent));
         let nearest = triangle.nearness[0].max(triangle.nearness[1]).max(triangle.nearness[2]);
-        let n_columns = self.size[0].div_ceil(CELL);
-        let mut rows = bounds.from[1] / CELL..bounds.to[1].div_ceil(CELL);
-        rows.all(|y| {
-            let mut columns = bounds.from[0] / CELL..bounds.to[0].div_ceil(CELL);
-            columns.all(|x| nearest < self.cells[y * n_columns + x])
-        })
+        let n_columns = self.width.div_ceil(CELL);
+        ((top - self.rows[0]) / CELL..(bottom - self.rows[0]).div_ceil(CELL))
+            .all(|y| (first / CELL..last.div_ceil(CELL)).all(|x| nearest < self.cells[y * n_columns + x]))
+    }
+
+    /// Rows of the band within an extent that reaches into it.
+    #[inline(always)]
+    fn rows_of(&self, extent: Extent) -> [usize; 2] {
+        extent[1].map(|y| usize::from(y).clamp(self.rows[0], self.rows[1]))
     }
 
     /// Puts a triangle, seen from either side, wherever it is frontmost.
-    pub fn fill(&mut self, triangle: &FlatTriangle, number: u32) {
-        let area = triangle.area();
-        let bounds = triangle.bounds(self.size);
-        if area == 0 || bounds.from[0] >= bounds.to[0] || bounds.from[1] >= bounds.to[1] {
-            return;
-        }
+    pub fn fill(&mut self, triangle: &FlatTriangle, extent: Extent, number: u32) {
         let [a, b, c] = triangle.corners;
-        let extent = |k: usize| a[k].max(b[k]).max(c[k]) - a[k].min(b[k]).min(c[k]);
-        if extent(0) <= SMALL && extent(1) <= SMALL {
-            self.fill_with::<f32>(triangle, area, bounds, number);
+        let length = |k: usize| a[k].max(b[k]).max(c[k]) - a[k].min(b[k]).min(c[k]);
+        if length(0) <= SMALL && length(1) <= SMALL {
+            self.fill_with::<i32>(triangle, extent, number);
         } else {
-            self.fill_with::<f64>(triangle, area, bounds, number);
+            self.fill_with::<i64>(triangle, extent, number);
         }
     }
 
     #[inline(always)]
-    fn fill_with<T: Whole>(&mut self, triangle: &FlatTriangle, area: i64, bounds: PixelBounds, number: u32) {
+    fn fill_with<T: Whole>(&mut self, triangle: &FlatTriangle, extent: Extent, number: u32) {
         let FlatTriangle { corners, nearness } = triangle;
-        let sign = area.signum();
-        let start = [0, 1].map(|k| bounds.from[k] as i64 * i64::from(PARTS));
+        let area = triangle.area();
+        let sign = area.signum() as i32;
+        let ([left, right], [top, bottom]) = (extent[0].map(usize::from), self.rows_of(extent));
+        let start = [left as i32 * PARTS, top as i32 * PARTS];
         // Edge functions: at least 0 on the inner side, at the four samples of the first pixel; their steps.
         let mut edges = [[T::ZERO; 4]; 3];
         let mut steps = [[T::ZERO; 2]; 3];
         for side in 0..3 {
-            let [p, q] = [corners[(side + 1) % 3], corners[(side + 2) % 3]].map(|corner| corner.map(i64::from));
-            let slope = [(p[1] - q[1]) * sign, (q[0] - p[0]) * sign];
-            edges[side] = SPOTS.map(|spot| {
-                let from = [0, 1].map(|k| start[k] + i64::from(spot[k]) - p[k]);
-                T::of(slope[0] * from[0] + slope[1] * from[1])
-            });
-            steps[side] = slope.map(|v| T::of(v * i64::from(PARTS)));
+            let (p, q) = (corners[(side + 1) % 3], corners[(side + 2) % 3]);
+            let slope = [T::of((p[1] - q[1]) * sign), T::of((q[0] - p[0]) * sign)];
+            let middle = slope[0] * T::of(start[0] - p[0]) + slope[1] * T::of(start[1] - p[1]);
+            edges[side] = SPOTS.map(|spot| middle + slope[0] * T::of(spot[0]) + slope[1] * T::of(spot[1]));
+            steps[side] = slope.map(|v| v * T::of(PARTS));
         }
         // The plane of nearness over the picture.
         let [from_a, from_b] = [1, 2].map(|n| [0, 1].map(|k| (corners[n][k] - corners[0][k]) as f32));
@@ -149,30 +156,57 @@ impl Samples {
             (rise[1] * from_a[0] - rise[0] * from_b[0]) * per_area,
         ];
         let first = SPOTS.map(|spot| {
-            let from = [0, 1].map(|k| (start[k] + i64::from(spot[k]) - i64::from(corners[0][k])) as f32);
+            let from = [0, 1].map(|k| (start[k] + spot[k] - corners[0][k]) as f32);
             nearness[0] + slope[0] * from[0] + slope[1] * from[1]
         });
         let per_pixel = slope.map(|v| v * PARTS as f32);
-        for y in bounds.from[1]..bounds.to[1] {
-            let down = per_pixel[1] * (y - bounds.from[1]) as f32;
-            let row = y * self.size[0];
-            let columns = row + bounds.from[0]..row + bounds.to[0];
+        self.fill_rows(&Setup { edges, steps, first, per_pixel, number }, [left, right], [top, bottom]);
+    }
+
+    /// Walks over the pixels of an extent. Apart from its set-up, the compiler makes vectors of the four samples.
+    #[inline(never)]
+    fn fill_rows<T: Whole>(&mut self, setup: &Setup<T>, [left, right]: [usize; 2], [top, bottom]: [usize; 2]) {
+        let Setup { mut edges, steps, first, per_pixel, number } = *setup;
+        for y in top..bottom {
+            let down = per_pixel[1] * (y - top) as f32;
+            let columns = self.at(left, y)..self.at(right, y);
             let pixels = self.nearness[columns.clone()].iter_mut().zip(&mut self.triangles[columns]);
             let [mut e0, mut e1, mut e2] = edges;
+            let mut is_entered = false;
             for (column, (front, triangles)) in pixels.enumerate() {
-                let along = per_pixel[0] * column as f32 + down;
-                let inner: [T; 4] = std::array::from_fn(|k| least(least(e0[k], e1[k]), e2[k]));
-                let here: [f32; 4] = std::array::from_fn(|k| first[k] + along);
+                // Loops over four samples without branches become one instruction each.
+                let (mut outer, mut here, mut is_kept) = ([0; 4], [0.0; 4], [0; 4]);
                 for k in 0..4 {
-                    let is_front = (inner[k] >= T::ZERO) & (here[k] > front[k]);
-                    front[k] = if is_front { here[k] } else { front[k] };
-                    triangles[k] = if is_front { number } else { triangles[k] };
+                    outer[k] = T::outer(e0[k], e1[k], e2[k]);
                 }
                 for k in 0..4 {
                     e0[k] = e0[k] + steps[0][0];
                     e1[k] = e1[k] + steps[1][0];
                     e2[k] = e2[k] + steps[2][0];
                 }
+                if outer[0] & outer[1] & outer[2] & outer[3] < 0 {
+                    if is_entered {
+                        break;
+                    }
+                    continue;
+                }
+                is_entered = true;
+                let along = per_pixel[0] * column as f32 + down;
+                for k in 0..4 {
+                    here[k] = first[k] + along;
+                }
+                let (old, old_triangles) = (*front, *triangles);
+                for k in 0..4 {
+                    is_kept[k] = (outer[k] >> 31) as u32 | u32::from(here[k] > old[k]).wrapping_sub(1);
+                }
+                let (mut new, mut new_triangles) = ([0.0; 4], [0; 4]);
+                for k in 0..4 {
+                    new[k] = f32::from_bits(here[k].to_bits() & !is_kept[k] | old[k].to_bits() & is_kept[k]);
+                }
+                for k in 0..4 {
+                    new_triangles[k] = number & !is_kept[k] | old_triangles[k] & is_kept[k];
+                }
+                (*front, *triangles) = (new, new_triangles);
             }
             for (edge, step) in edges.iter_mut().zip(steps) {
                 edge.iter_mut().for_each(|v| *v = *v + step[1]);
@@ -181,27 +215,46 @@ impl Samples {
     }
 }
 
-/// Floating-point number that holds whole ones exactly.
-trait Whole: Copy + PartialOrd + std::ops::Add<Output = Self> {
+/// What is known of a triangle at the first pixel of its extent, and the steps to the next across and down.
+struct Setup<T> {
+    edges: [[T; 4]; 3],
+    steps: [[T; 2]; 3],
+    /// Nearness at the four samples, 1/cm.
+    first: [f32; 4],
+    per_pixel: [f32; 2],
+    number: u32,
+}
+
+/// Integer that holds the edge functions of a triangle.
+trait Whole: Copy + std::ops::Add<Output = Self> + std::ops::Mul<Output = Self> {
     const ZERO: Self;
-    fn of(whole: i64) -> Self;
+    fn of(whole: i32) -> Self;
+    /// A negative number where one of three is negative.
+    fn outer(a: Self, b: Self, c: Self) -> i32;
 }
 
-impl Whole for f32 {
-    const ZERO: Self = 0.0;
-    fn of(whole: i64) -> Self {
-        whole as Self
+impl Whole for i32 {
+    const ZERO: Self = 0;
+
+    fn of(whole: i32) -> Self {
+        whole
+    }
+
+    #[inline(always)]
+    fn outer(a: Self, b: Self, c: Self) -> i32 {
+        a | b | c
     }
 }
 
-impl Whole for f64 {
-    const ZERO: Self = 0.0;
-    fn of(whole: i64) -> Self {
-        whole as Self
-    }
-}
+impl Whole for i64 {
+    const ZERO: Self = 0;
 
-#[inline(always)]
-fn least<T: PartialOrd>(a: T, b: T) -> T {
-    if a < b { a } else { b }
+    fn of(whole: i32) -> Self {
+        i64::from(whole)
+    }
+
+    #[inline(always)]
+    fn outer(a: Self, b: Self, c: Self) -> i32 {
+        ((a | b | c) >> 32) as i32
+    }
 }

@@ -74,14 +74,17 @@ impl ShadowMap {
 
     fn fill(&mut self, [a, b, c]: [[f32; 3]; 3]) {
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
+        // The outer sides alone cast; NaN and triangles seen edge-on are left out too.
+        if !(area > 1e-9) {
+            return;
+        }
+        // Texels whose middle, a whole number, lies between.
         let ends = |k: usize| {
             let (low, high) = (a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k]));
-            // Texels whose middle (a whole number) lies between.
-            (low.max(0.0).ceil() as usize, (high.max(0.0) as usize + 1).min(self.n))
+            ((low.max(0.0) as i32 + 1) as usize, (high.max(0.0) as i32 as usize + 1).min(self.n))
         };
         let (columns, rows) = (ends(0), ends(1));
-        // NaN and triangles seen edge-on are left out too.
-        if !(area.abs() > 1e-9) || columns.0 >= columns.1 || rows.0 >= rows.1 {
+        if columns.0 >= columns.1 || rows.0 >= rows.1 {
             return;
         }
         let per_area = 1.0 / area;
@@ -137,7 +140,7 @@ impl ShadowMap {
         if self.is_empty || !(x >= 1.0 && y >= 1.0 && x < furthest && y < furthest) {
             return 1.0;
         }
-        let (column, row) = (x as usize, y as usize);
+        let (column, row) = (x as i32 as usize, y as i32 as usize);
         let (right, low) = (x - column as f32, y - row as f32);
         let across = [1.0 - right, 1.0, 1.0, right];
         let down = [1.0 - low, 1.0, 1.0, low];

@@ -10,24 +10,23 @@ const SHOULDER: f32 = 0.6;
 
 static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|byte| decoded(byte as f64 / 255.0) as f32));
 
-static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| {
+static BYTES: LazyLock<[u8; N_STEPS + 1]> = LazyLock::new(|| {
     // The byte whose range, between the middles to its neighbours, holds the value.
     let bound = |byte: u32| decoded((f64::from(byte) + 0.5) / 255.0);
     let mut byte = 0;
-    let of_step = |step: usize| {
+    std::array::from_fn(|step| {
         while byte < 255 && step as f64 / N_STEPS as f64 > bound(byte) {
             byte += 1;
         }
         byte as u8
-    };
-    (0..=N_STEPS).map(of_step).collect()
+    })
 });
 
 /// Both tables at hand.
 #[derive(Clone, Copy)]
 pub struct Srgb {
     linear: &'static [f32; 256],
-    bytes: &'static [u8],
+    bytes: &'static [u8; N_STEPS + 1],
 }
 
 impl Srgb {
@@ -35,26 +34,42 @@ impl Srgb {
         Self { linear: &LINEAR, bytes: &BYTES }
     }
 
-    /// Linear light 0..1 of a byte.
-    pub fn linear(self, byte: u8) -> f32 {
-        self.linear[usize::from(byte)]
+    /// Bytes of linear RGB (the fourth number is none); values outside 0..1 have the byte of the nearest end.
+    #[inline(always)]
+    pub fn bytes(self, linear: [f32; 4]) -> [u8; 3] {
+        let mut steps = [0.0; 4];
+        for k in 0..4 {
+            let step = if linear[k] > 0.0 { linear[k] * N_STEPS as f32 } else { 0.0 };
+            steps[k] = if step < N_STEPS as f32 { step } else { N_STEPS as f32 };
+        }
+        for step in &mut steps {
+            *step += WHOLE;
+        }
+        let byte = |k: usize| self.bytes[((steps[k].to_bits() & 0x3fff) as usize).min(N_STEPS)];
+        [byte(0), byte(1), byte(2)]
     }
 
-    /// Byte of linear light; values outside 0..1 and no numbers have the byte of the nearest end.
+    /// Linear light of the bytes of a pixel.
     #[inline(always)]
-    pub fn byte(self, linear: f32) -> u8 {
-        self.bytes[((linear * N_STEPS as f32 + 0.5) as usize).min(N_STEPS)]
+    pub fn linears(self, bytes: [u8; 3]) -> [f32; 4] {
+        let [r, g, b] = bytes.map(|byte| self.linear[usize::from(byte)]);
+        [r, g, b, 0.0]
     }
 }
 
+/// Sums with numbers up to a quarter of 2^16 are rounded to whole ones, which stand in the lowest bits.
+const WHOLE: f32 = (1 << 23) as f32;
+
 /// Linear light 0..1 for a scene's linear light, which has no upper end: equal up to the shoulder, then less and less.
 #[inline(always)]
-pub fn compressed(scene: f32) -> f32 {
-    if scene <= SHOULDER {
-        return scene;
+pub fn compressed(scene: [f32; 4]) -> [f32; 4] {
+    let mut all = scene;
+    for v in &mut all {
+        let over = if *v > SHOULDER { *v - SHOULDER } else { 0.0 };
+        let plain = if *v < SHOULDER { *v } else { SHOULDER };
+        *v = plain + over * (1.0 - SHOULDER) / (over + (1.0 - SHOULDER));
     }
-    let over = scene - SHOULDER;
-    SHOULDER + over * (1.0 - SHOULDER) / (over + (1.0 - SHOULDER))
+    all
 }
 
 /// Linear light of an encoded value 0..1 (IEC 61966-2-1).
@@ -81,17 +96,17 @@ mod tests {
     fn bytes_come_back_and_the_curve_is_that_of_the_standard() {
         let srgb = Srgb::tables();
         for byte in 0..=255 {
-            assert_eq!(srgb.byte(srgb.linear(byte)), byte);
+            assert_eq!(srgb.bytes(srgb.linears([byte, 0, byte])), [byte, 0, byte]);
             let x = f64::from(byte) / 255.0;
             let known = if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) };
-            assert!((f64::from(srgb.linear(byte)) - known).abs() < 1e-6);
+            assert!((f64::from(srgb.linears([byte; 3])[0]) - known).abs() < 1e-6);
         }
-        assert_eq!([srgb.byte(-1.0), srgb.byte(2.0), srgb.byte(f32::NAN)], [0, 255, 0]);
+        assert_eq!(srgb.bytes([-1.0, 2.0, f32::NAN, 0.0]), [0, 255, 0]);
     }
 
     #[test]
     fn the_shoulder_never_turns_back() {
-        let values: Vec<f32> = (0..400).map(|n| compressed(n as f32 / 100.0)).collect();
+        let values: Vec<f32> = (0..400).map(|n| compressed([n as f32 / 100.0; 4])[1]).collect();
         assert!(values.windows(2).all(|pair| pair[0] < pair[1]) && values.iter().all(|v| *v < 1.0));
     }
 }

@@ -3,7 +3,7 @@
 use super::camera::{NEAR_CM, PinholeCamera};
 use super::light::{Light, direction, dot};
 use super::mesh::Mesh;
-use super::samples::{FlatTriangle, PARTS, PixelBounds};
+use super::samples::{Extent, FlatTriangle, PARTS};
 use super::shadow::{self, ShadowMap};
 
 /// Furthest point that is drawn, cm.
@@ -12,6 +12,9 @@ const FAR_CM: f32 = 1e6;
 const FURTHEST: f32 = (1 << 23) as f32;
 /// Light that reaches the inner side of a surface, which is mostly the inside of clothes.
 const INNER_LIGHT: f32 = 0.45;
+
+/// Ratio of the depths within a triangle up to which it is even.
+const EVEN: f32 = 1.03;
 
 /// Light of its own, light of the key where that reaches it (linear RGB), and the point in the light's axes where to ask
 /// whether it does; the fourth numbers fill up registers.
@@ -25,11 +28,14 @@ pub struct SurfaceTriangle {
     pub label: u16,
     /// Whether its inner side is seen.
     pub is_inner: bool,
+    pub extent: Extent,
 }
 
 /// Vertices and triangles of all meshes of a picture.
 #[derive(Clone, Debug, Default)]
 pub struct Surfaces {
+    /// Width and height of the picture, px.
+    size: [usize; 2],
     /// In camera axes, cm.
     seen: Vec<[f32; 3]>,
     corners: Vec<[i32; 2]>,
@@ -46,6 +52,7 @@ impl Surfaces {
     /// Takes over the meshes of a picture in place of those before.
     pub fn set(&mut self, camera: &PinholeCamera, meshes: &[&Mesh], light: &Light) {
         self.clear();
+        self.size = camera.size;
         let rows = camera.axes.inverse().axes().map(|axis| axis.map(|v| v as f32));
         let eye = camera.position.map(|v| v as f32);
         let middle = camera.size.map(|n| (n as f32 - 1.0) / 2.0 * PARTS as f32);
@@ -72,7 +79,8 @@ impl Surfaces {
                 let label = mesh.labels.get(triangle[0] as usize).copied().unwrap_or(0);
                 let vertices = triangle.map(|v| v + start as u32);
                 let depths = vertices.map(|v| self.seen[v as usize][2]);
-                let triangle = SurfaceTriangle { vertices, mesh: number as u16, label, is_inner: false };
+                let triangle =
+                    SurfaceTriangle { vertices, mesh: number as u16, label, is_inner: false, extent: [[0; 2]; 2] };
                 if depths.iter().all(|z| (NEAR_CM as f32..FAR_CM).contains(z)) {
                     self.push(triangle);
                 } else if depths.iter().all(|z| z.abs() < FAR_CM) && depths.iter().any(|z| *z > NEAR_CM as f32) {
@@ -93,9 +101,10 @@ impl Surfaces {
     }
 
     fn push(&mut self, triangle: SurfaceTriangle) {
-        let area = self.flat(&triangle).area();
-        if area != 0 {
-            self.triangles.push(SurfaceTriangle { is_inner: area > 0, ..triangle });
+        let flat = self.flat(&triangle);
+        let (area, extent) = (flat.area(), flat.extent(self.size));
+        if area != 0 && extent.iter().all(|[first, last]| first < last) {
+            self.triangles.push(SurfaceTriangle { is_inner: area > 0, extent, ..triangle });
         }
     }
 
@@ -153,52 +162,75 @@ impl Surfaces {
         parts.map(|(mesh, &start)| (&self.light_points[start..start + mesh.points.len()], &mesh.triangles[..]))
     }
 
-    /// Pixels that may show a triangle.
-    pub fn bounds(&self, size: [usize; 2]) -> PixelBounds {
-        let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
-        for vertex in self.triangles.iter().flat_map(|triangle| triangle.vertices) {
-            let corner = self.corners[vertex as usize];
-            for k in 0..2 {
-                low[k] = low[k].min(corner[k]);
-                high[k] = high[k].max(corner[k]);
-            }
-        }
-        if low[0] > high[0] {
-            return PixelBounds::default();
-        }
-        let pixel = |v: i32, k: usize| v.div_euclid(PARTS).clamp(0, size[k] as i32) as usize;
-        PixelBounds {
-            from: [0, 1].map(|k| pixel(low[k] - PARTS, k)),
-            to: [0, 1].map(|k| pixel(high[k] + 2 * PARTS, k)),
-        }
+    /// Whether a triangle is so far away for its size that what it sends changes evenly over the picture.
+    pub fn is_even(&self, triangle: &SurfaceTriangle) -> bool {
+        let [a, b, c] = self.flat(triangle).nearness;
+        a.max(b).max(c) < EVEN * a.min(b).min(c)
     }
 
-    /// What a triangle sends from the middle of a pixel, or from its point next to that.
-    #[inline(always)]
-    pub fn radiance_at(&self, triangle: &SurfaceTriangle, x: usize, y: usize) -> Radiance {
-        let [a, b, c] = triangle.vertices.map(|v| v as usize);
-        let middle = [x as i32 * PARTS, y as i32 * PARTS];
-        let from = |v: usize| {
-            let corner = self.corners[v];
-            [(corner[0] - middle[0]) as f32, (corner[1] - middle[1]) as f32]
+    /// What a triangle sends over the picture, as a plane.
+    pub fn plane(&self, triangle: &SurfaceTriangle) -> RadiancePlane {
+        let flat = self.flat(triangle);
+        let from = flat.corners[0];
+        let [to_b, to_c] = [1, 2].map(|n| [0, 1].map(|k| (flat.corners[n][k] - from[k]) as f32));
+        let per_area = 1.0 / (to_b[0] * to_c[1] - to_b[1] * to_c[0]);
+        let [a, b, c] = self.lit(triangle);
+        let slope = |p: f32, q: f32| -> Radiance {
+            let (p, q) = (p * per_area, q * per_area);
+            std::array::from_fn(|n| std::array::from_fn(|k| (b[n][k] - a[n][k]) * p + (c[n][k] - a[n][k]) * q))
         };
-        let corners = [from(a), from(b), from(c)];
+        RadiancePlane { from, at: a, across: slope(to_c[1], -to_b[1]), down: slope(-to_c[0], to_b[0]) }
+    }
+
+    /// What a triangle sends from a point (parts of a pixel) within it.
+    pub fn radiance_at(&self, triangle: &SurfaceTriangle, point: [i32; 2]) -> Radiance {
+        let flat = self.flat(triangle);
+        let corners = flat.corners.map(|corner| [0, 1].map(|k| (corner[k] - point[k]) as f32));
         let sign = if triangle.is_inner { 1.0 } else { -1.0 };
-        let share = |p: [f32; 2], q: [f32; 2], v: usize| {
-            let area = (p[0] * q[1] - p[1] * q[0]) * sign;
-            if area > 0.0 { area * self.nearness[v] } else { 0.0 }
-        };
-        let shares =
-            [share(corners[1], corners[2], a), share(corners[2], corners[0], b), share(corners[0], corners[1], c)];
+        let shares: [f32; 3] = std::array::from_fn(|n| {
+            let [p, q] = [corners[(n + 1) % 3], corners[(n + 2) % 3]];
+            ((p[0] * q[1] - p[1] * q[0]) * sign).max(0.0) * flat.nearness[n]
+        });
         let sum = shares[0] + shares[1] + shares[2];
-        // A triangle seen edge-on may give no share at all.
-        let shares = if sum > 0.0 { shares.map(|v| v * (1.0 / sum)) } else { [1.0, 0.0, 0.0] };
-        let light = if triangle.is_inner { INNER_LIGHT } else { 1.0 };
-        let [ra, rb, rc] = [&self.radiance[a], &self.radiance[b], &self.radiance[c]];
+        let shares = if sum > 0.0 { shares.map(|v| v / sum) } else { [1.0, 0.0, 0.0] };
+        let [a, b, c] = self.lit(triangle);
         std::array::from_fn(|n| {
-            let by = if n < 2 { light } else { 1.0 };
-            std::array::from_fn(|k| (shares[0] * ra[n][k] + shares[1] * rb[n][k] + shares[2] * rc[n][k]) * by)
+            std::array::from_fn(|k| shares[0] * a[n][k] + shares[1] * b[n][k] + shares[2] * c[n][k])
         })
+    }
+
+    /// What the corners of a triangle send; less on its inner side.
+    #[inline(always)]
+    fn lit(&self, triangle: &SurfaceTriangle) -> [Radiance; 3] {
+        let mut lit = triangle.vertices.map(|v| self.radiance[v as usize]);
+        if triangle.is_inner {
+            lit.iter_mut().flat_map(|corner| &mut corner[..2]).flatten().for_each(|v| *v *= INNER_LIGHT);
+        }
+        lit
+    }
+}
+
+/// What a triangle sends as a plane over the picture: at a point (parts of a pixel), and its change a part.
+#[derive(Clone, Copy, Debug)]
+pub struct RadiancePlane {
+    from: [i32; 2],
+    at: Radiance,
+    across: Radiance,
+    down: Radiance,
+}
+
+impl RadiancePlane {
+    #[inline(always)]
+    pub fn radiance_at(&self, point: [i32; 2]) -> Radiance {
+        let [dx, dy] = [0, 1].map(|k| (point[k] - self.from[k]) as f32);
+        let along = |n: usize| {
+            let mut sum = self.at[n];
+            for k in 0..4 {
+                sum[k] += self.across[n][k] * dx + self.down[n][k] * dy;
+            }
+            sum
+        };
+        [along(0), along(1), along(2)]
     }
 }
 
