@@ -11,6 +11,9 @@ use orator::demo::check::pipeline::{LEAST_FOUND, LEAST_FRAMES, LEAST_JOINTS, MOS
 use orator::demo::check::{learned, sheet, traces};
 use orator::demo::drawn::folder;
 use orator::demo::drawn::folder::DemoPlan;
+use orator::demo::people;
+use orator::demo::people::condition::Condition;
+use orator::demo::people::folder::PeoplePlan;
 use orator::demo::rule::dataset;
 use orator::external::opencv::png;
 use orator::generate::GestureGenerator;
@@ -19,6 +22,9 @@ use orator::stage::workdir::{self, FolderLock};
 use orator::types::time::FrameRate;
 use serde_json::json;
 use std::path::{Path, PathBuf};
+
+/// Seconds of a clip of rendered people, if not given.
+const PEOPLE_SECS: f64 = 8.0;
 
 /// A synthetic speaker with known joints: draw its videos, measure what a run made of them.
 #[derive(clap::Args)]
@@ -29,16 +35,26 @@ pub struct Args {
 
 #[derive(clap::Subcommand)]
 enum DemoVerb {
-    /// Draw videos of the speaker with sound, their truth, the marker models and a pipeline.toml into DIR.
+    /// Draw videos of the speaker with sound, their truth, the marker models and a pipeline.toml into DIR; with --people,
+    /// render people in rooms for the models that know real people.
     Draw {
         /// The demo's folder; created if it is not there.
         dir: PathBuf,
         /// How many videos.
-        #[arg(long, default_value_t = DemoPlan::default().n_videos)]
+        #[arg(long, default_value_t = DemoPlan::default().n_videos, conflicts_with = "people")]
         videos: usize,
-        /// Seconds of each video.
-        #[arg(long, default_value_t = DemoPlan::default().secs)]
-        secs: f64,
+        /// Render people: N clips for each condition, a multiple of 3 (a third each for training, choosing and testing).
+        #[arg(long, value_name = "N")]
+        people: Option<usize>,
+        /// Conditions to render, by commas (front, standing, crossing ...); without it all.
+        #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "people")]
+        conditions: Vec<String>,
+        /// Captured motion for the rendered people, a file or a folder; the sound is the .wav beside it.
+        #[arg(long, value_name = "FILE|FOLDER", requires = "people")]
+        motion: Option<PathBuf>,
+        /// Seconds of each video; 30, of rendered people 8.
+        #[arg(long)]
+        secs: Option<f64>,
         /// Frames a second.
         #[arg(long, default_value_t = 30)]
         fps: u32,
@@ -90,9 +106,15 @@ enum DemoVerb {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.part {
-        DemoVerb::Draw { dir, videos, secs, fps, seed } => {
+        DemoVerb::Draw { dir, videos, people, conditions, motion, secs, fps, seed } => {
             let fps = FrameRate::new(fps.clamp(1, 120), 1);
-            let plan = DemoPlan { n_videos: videos, secs, fps, seed, ..DemoPlan::default() };
+            if let Some(n_clips) = people {
+                let conditions = Condition::of_names(&conditions)?;
+                let secs = secs.unwrap_or(PEOPLE_SECS);
+                return render(&dir, &PeoplePlan { conditions, n_clips, secs, fps, seed, motion }, ui);
+            }
+            let usual = DemoPlan::default();
+            let plan = DemoPlan { n_videos: videos, secs: secs.unwrap_or(usual.secs), fps, seed, ..usual };
             draw(&dir, &plan, ui)
         }
         DemoVerb::Measure { dir } => measure(&dir, ui),
@@ -109,6 +131,19 @@ fn draw(dir: &Path, plan: &DemoPlan, ui: &Ui) -> Result<Outcome> {
     let next = format!("orator run -c {}", dir.join("pipeline.toml").display());
     let text = format!("drew {} videos of {} s into {}", videos.len(), plan.secs, dir.join("videos/host").display());
     ui.summary(&text, Some(&next), json!({ "videos": videos, "next": next }));
+    Ok(Outcome::Done)
+}
+
+fn render(dir: &Path, plan: &PeoplePlan, ui: &Ui) -> Result<Outcome> {
+    let clips = people::folder::draw(dir, plan, ui)?;
+    let next = format!("orator run -c {} --to pose2d", dir.join("pipeline.toml").display());
+    let text = format!(
+        "rendered {} clips of people under {} conditions into {}",
+        clips.len(),
+        plan.conditions.len(),
+        dir.join("videos").display()
+    );
+    ui.summary(&text, Some(&next), json!({ "clips": clips, "next": next }));
     Ok(Outcome::Done)
 }
 

@@ -1,11 +1,12 @@
-//! Synthetic speaker: a drawn figure with known 3D joints, the embedded demo and the end-to-end test of the pipeline.
+//! Synthetic speakers with known joints, the embedded demo and the end-to-end test of the pipeline.
 //!
-//! `drawn`: `speech` -> `gesture` -> `figure` (joints) -> `camera` -> `paint` (one colour for each joint). `rule`:
-//! hours of speech and motion by a known rule, as a dataset. `check`: the results of the pipeline and of trained models
-//! against the truth.
+//! `drawn`: `speech` -> `gesture` -> `figure` (joints) -> `camera` -> `paint` (one colour for each joint). `people`:
+//! rendered people in rooms. `rule`: hours of speech and motion by a known rule, as a dataset. `check`: the results of
+//! the pipeline and of trained models against the truth.
 
 pub mod check;
 pub mod drawn;
+pub mod people;
 pub mod rule;
 
 pub use check::pipeline::GENERATOR;

@@ -15,9 +15,9 @@ use std::path::Path;
 #[repr(u8)]
 pub enum Visibility {
     Seen,
-    /// Behind another part of the same body, its hands excepted.
+    /// Behind another part of the same body; a finger: behind its own hand too.
     BehindBody,
-    /// Behind the other hand, or a hand that is not its own.
+    /// Behind a hand that is not its own: a finger behind the other hand, a shoulder behind either.
     BehindHand,
     /// Behind a thing: a desk, what a hand holds.
     BehindThing,

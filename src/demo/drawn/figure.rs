@@ -19,10 +19,10 @@ const SKULL_BASE: Vec3 = [0.0, -0.08, 0.02];
 const HIPS: [Vec3; 2] = [[0.11, 0.5, 0.02], [-0.11, 0.5, 0.02]];
 /// First joint of thumb to little finger relative to the wrist, in the hand's axes: along the fingers, towards the
 /// thumb, out of the palm.
-const FINGER_BASES: [Vec3; 5] =
+pub const FINGER_BASES: [Vec3; 5] =
     [[0.026, 0.028, 0.012], [0.09, 0.026, 0.0], [0.094, 0.003, 0.0], [0.087, -0.018, 0.0], [0.078, -0.037, 0.003]];
 /// The three bones of each finger beyond its base; the middle finger's first is 48 mm.
-const PHALANGES: [[f64; 3]; 5] =
+pub const PHALANGES: [[f64; 3]; 5] =
     [[0.044, 0.034, 0.028], [0.044, 0.027, 0.021], [0.048, 0.03, 0.022], [0.044, 0.028, 0.022], [0.036, 0.021, 0.019]];
 
 /// Direction of the elbows in torso axes: outwards, down, away. Elbows are then 0.27 m beside and below the neck and
@@ -34,7 +34,7 @@ const ELBOW_POLE: [f64; 3] = [0.3, 0.95, 0.0];
 pub struct ArmControls {
     /// Wrist from the neck in torso axes: outwards, down, away from the viewer; metres.
     pub wrist: [f64; 3],
-    /// Turn about the hand's length; 0: thumb up, positive: palm down. Radians.
+    /// Turn about the hand's length; 0: thumb up, positive: palm up. Radians.
     pub roll: f64,
     /// Tangent of the angle of the hand above the forearm's line.
     pub raise: f64,
@@ -95,7 +95,8 @@ impl DrawnFigure {
         {
             let to_world = |[out, down, away]: Vec3| torso.turn([side * out, down, away]);
             let start = at([side * SHOULDER_WIDTH / 2.0, 0.0, 0.0]);
-            let (elbow, wrist) = reach(start, add(controls.neck, to_world(arm.wrist)), to_world(ELBOW_POLE));
+            let (elbow, wrist) =
+                reach([UPPER_ARM, FOREARM], start, add(controls.neck, to_world(arm.wrist)), to_world(ELBOW_POLE));
             joints[shoulder] = start;
             joints[shoulder + 1] = elbow;
             joints[shoulder + 2] = wrist;
@@ -111,15 +112,16 @@ fn lean([turn, forward, sideways]: [f64; 3]) -> Rotation {
         * Rotation::about([0.0, 0.0, 1.0], sideways)
 }
 
-/// Elbow and wrist of an arm from `shoulder` that reaches for `target`, the elbow towards `pole`.
-fn reach(shoulder: Vec3, target: Vec3, pole: Vec3) -> (Vec3, Vec3) {
+/// Elbow and wrist of an arm (lengths of upper arm and forearm) from `shoulder` that reaches for `target`, the elbow
+/// towards `pole`.
+pub fn reach([upper, fore]: [f64; 2], shoulder: Vec3, target: Vec3, pole: Vec3) -> (Vec3, Vec3) {
     let way = sub(target, shoulder);
     let wanted = norm(way).max(1e-6);
     let axis = scale(way, 1.0 / wanted);
-    let distance = wanted.clamp(0.3 * (UPPER_ARM + FOREARM), 0.97 * (UPPER_ARM + FOREARM));
+    let distance = wanted.clamp(0.3 * (upper + fore), 0.97 * (upper + fore));
     // Along the axis to the foot of the elbow, and out from it (law of cosines).
-    let along = (distance * distance + UPPER_ARM * UPPER_ARM - FOREARM * FOREARM) / (2.0 * distance);
-    let out = (UPPER_ARM * UPPER_ARM - along * along).max(0.0).sqrt();
+    let along = (distance * distance + upper * upper - fore * fore) / (2.0 * distance);
+    let out = (upper * upper - along * along).max(0.0).sqrt();
     let side = direction(sub(pole, scale(axis, dot(pole, axis))));
     let elbow = add(shoulder, add(scale(axis, along), scale(side, out)));
     (elbow, add(shoulder, scale(axis, distance)))

@@ -108,10 +108,15 @@ impl Speech {
 
     /// Sound of `secs` seconds.
     pub fn sound(&self, secs: f64, rng: &mut ChaCha8Rng) -> Sound {
+        self.sound_of_tract(secs, 1.0, rng)
+    }
+
+    /// Sound of `secs` seconds by a vocal tract whose formants are `formants` times those of the table.
+    pub fn sound_of_tract(&self, secs: f64, formants: f64, rng: &mut ChaCha8Rng) -> Sound {
         let rate = f64::from(SAMPLE_RATE);
         let mut samples = vec![0.0f32; (secs * rate).round().max(0.0) as usize];
         for syllable in &self.syllables {
-            let mut voice = VoiceSource::new(syllable, rate);
+            let mut voice = VoiceSource::new(syllable, formants, rate);
             let (start, end) = ((syllable.start * rate) as usize, (syllable.end * rate) as usize);
             for n in start..end.min(samples.len()) {
                 let now = n as f64 / rate;
@@ -146,8 +151,8 @@ struct VoiceSource {
 }
 
 impl VoiceSource {
-    fn new(syllable: &Syllable, rate: f64) -> Self {
-        let formants = std::array::from_fn(|k| Resonator::new(VOWELS[syllable.vowel][k], BANDWIDTHS[k], rate));
+    fn new(syllable: &Syllable, factor: f64, rate: f64) -> Self {
+        let formants = std::array::from_fn(|k| Resonator::new(factor * VOWELS[syllable.vowel][k], BANDWIDTHS[k], rate));
         Self { phase: 0.0, pitch: syllable.pitch, formants }
     }
 

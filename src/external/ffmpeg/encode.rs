@@ -32,6 +32,9 @@ struct SoundTrack {
     n_sent: usize,
 }
 
+/// Constant rate factor of a good picture; 6 more halve the bit rate.
+pub const GOOD_CRF: u32 = 18;
+
 const VIDEO: usize = 0;
 const AUDIO: usize = 1;
 
@@ -39,6 +42,17 @@ impl VideoWriter {
     /// Begins the mp4 `path` of pictures of `width` x `height` px (an odd side gains a row or column that repeats the
     /// last), with the whole of `sound` from time 0 on.
     pub fn create(path: &Path, width: usize, height: usize, fps: FrameRate, sound: Option<&Sound>) -> Result<Self> {
+        Self::with_crf(path, [width, height], fps, sound, GOOD_CRF)
+    }
+
+    /// `create` with another constant rate factor of libx264, 0..=51.
+    pub fn with_crf(
+        path: &Path,
+        [width, height]: [usize; 2],
+        fps: FrameRate,
+        sound: Option<&Sound>,
+        crf: u32,
+    ) -> Result<Self> {
         super::library::init();
         ensure!(width > 0 && height > 0, "{}: a video of {width} x {height} px cannot be written", path.display());
         let even = [width, height].map(|n| n.next_multiple_of(2));
@@ -46,7 +60,7 @@ impl VideoWriter {
         let mut output = format::output_as(&source::url(path)?, "mp4").with_context(what)?;
         // SAFETY: the context is ours; the flag leaves out the library's version and the time of day.
         unsafe { (*output.as_mut_ptr()).flags |= ffmpeg::ffi::AVFMT_FLAG_BITEXACT };
-        let video = open_video(even, fps).with_context(what)?;
+        let video = open_video(even, fps, crf).with_context(what)?;
         output.add_stream_with(&video).with_context(what)?.set_time_base(video_tick(fps));
         let sound = match sound {
             Some(sound) if !sound.samples.is_empty() => Some(SoundTrack::open(sound).with_context(what)?),
@@ -189,7 +203,7 @@ impl SoundTrack {
 }
 
 /// An encoder of pictures of an even size, one thread so that the bytes do not depend on the machine's cores.
-fn open_video([width, height]: [usize; 2], fps: FrameRate) -> Result<encoder::video::Encoder> {
+fn open_video([width, height]: [usize; 2], fps: FrameRate, crf: u32) -> Result<encoder::video::Encoder> {
     let x264 = encoder::find_by_name("libx264");
     let codec = x264.or_else(|| encoder::find(Id::MPEG4)).context("this ffmpeg has no encoder for H.264 or MPEG-4")?;
     let mut context = codec::Context::new_with_codec(codec).encoder().video()?;
@@ -203,14 +217,16 @@ fn open_video([width, height]: [usize; 2], fps: FrameRate) -> Result<encoder::vi
     context.set_frame_rate(Some(Rational(i32::try_from(fps.num)?, i32::try_from(fps.den)?)));
     context.set_threading(codec::threading::Config::count(1));
     context.set_flags(codec::Flags::GLOBAL_HEADER | codec::Flags::BITEXACT);
+    let (factor, crf) = (f64::from(crf), crf.to_string());
     let options: &[(&str, &str)] = match x264 {
         // libx264's vector code reads beyond the edge of very narrow pictures: their bytes would change between runs.
-        Some(_) if width < 128 => &[("preset", "veryfast"), ("crf", "18"), ("x264-params", "no-asm=1")],
+        Some(_) if width < 128 => &[("preset", "veryfast"), ("crf", &crf), ("x264-params", "no-asm=1")],
         // Its macroblock tree reads memory it never wrote, at any width.
-        Some(_) => &[("preset", "veryfast"), ("crf", "18"), ("x264-params", "mbtree=0")],
+        Some(_) => &[("preset", "veryfast"), ("crf", &crf), ("x264-params", "mbtree=0")],
         None => {
-            // A quarter of a bit a pixel.
-            context.set_bit_rate((width as f64 * height as f64 * fps.per_sec() / 4.0) as usize);
+            // A quarter of a bit a pixel for a good picture.
+            let share = 2f64.powf((f64::from(GOOD_CRF) - factor) / 6.0);
+            context.set_bit_rate((share * width as f64 * height as f64 * fps.per_sec() / 4.0) as usize);
             &[]
         }
     };

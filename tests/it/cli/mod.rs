@@ -9,3 +9,4 @@ pub mod examples;
 pub mod guide;
 pub mod library;
 pub mod models_verb;
+pub mod people;

@@ -1,0 +1,22 @@
+//! Rendered people: videos with sound of a gesturing person in a room, and the exact truth of every frame.
+//!
+//! `condition` (what a clip is about) -> `body`, `voice`, `acts` with `vocabulary` (the motion), `contact`,
+//! `trunk` (the rig's rotations) -> `actor`, `held`, `solid`, `set`, `view` -> `scene` with `lens` and `truth` ->
+//! `folder`.
+
+pub mod actor;
+pub mod acts;
+pub mod body;
+pub mod condition;
+pub mod contact;
+pub mod folder;
+pub mod held;
+pub mod lens;
+pub mod scene;
+pub mod set;
+pub mod solid;
+pub mod trunk;
+pub mod truth;
+pub mod view;
+pub mod vocabulary;
+pub mod voice;

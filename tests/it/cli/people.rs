@@ -1,0 +1,83 @@
+//! Rendered people: what is written is what is read back, what hides a point is told, and the bytes depend on nothing
+//! but the seed.
+
+use crate::fixtures::support::Project;
+use ndarray::Array2;
+use orator::demo::people::condition::Condition;
+use orator::demo::people::folder::{self, ClipSeeds, PeoplePlan, SetPart};
+use orator::demo::people::scene::PeopleScene;
+use orator::external::ffmpeg::frames::FrameReader;
+use orator::formats::rendered_truth::{RenderedTruth, Visibility};
+use orator::stage::progress::Silent;
+use orator::types::pose2d::coco;
+use orator::types::time::FrameRate;
+use std::path::Path;
+
+const FPS: FrameRate = FrameRate::new(5, 1);
+
+fn plan(conditions: &[Condition]) -> PeoplePlan {
+    PeoplePlan { conditions: conditions.to_vec(), n_clips: 3, secs: 1.0, fps: FPS, seed: 4, motion: None }
+}
+
+fn bytes(dir: &Path, file: &Path) -> Vec<u8> {
+    std::fs::read(dir.join(file)).unwrap()
+}
+
+#[test]
+fn clips_have_their_truth_and_the_same_bytes_on_one_thread() {
+    let dirs = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+    let [first, second] = dirs.each_ref().map(tempfile::TempDir::path);
+    let plan = plan(&[Condition::Outside, Condition::Holding]);
+    let clips = folder::draw(first, &plan, &Silent).unwrap();
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert_eq!(alone.install(|| folder::draw(second, &plan, &Silent)).unwrap(), clips);
+    assert_eq!(folder::read(first).unwrap(), clips);
+    assert_eq!(clips.iter().map(|clip| clip.part).collect::<Vec<_>>(), [SetPart::ALL, SetPart::ALL].concat());
+    let mut outside = 0;
+    for clip in &clips {
+        for file in [&clip.video, &clip.truth] {
+            assert_eq!(bytes(first, file), bytes(second, file), "{}", file.display());
+        }
+        let truth = RenderedTruth::read(&first.join(&clip.truth)).unwrap();
+        let frames = FrameReader::open(&first.join(&clip.video), FPS).unwrap().map(Result::unwrap);
+        assert_eq!((frames.count(), truth.n_frames()), (5, 5));
+        let [width, height] = clip.size.map(|n| n as f32);
+        for ((t, point), &seen) in truth.body_seen.indexed_iter() {
+            let [x, y] = [0, 1].map(|k| truth.body[[t, point, k]]);
+            let inside = (-0.5..width - 0.5).contains(&x) && (-0.5..height - 0.5).contains(&y);
+            assert_eq!(seen != Visibility::Outside, inside, "{x} {y}");
+            // The pixel is that of the place in space.
+            let place = [0, 1, 2].map(|k| truth.body_joints[[t, point, k]] + truth.neck[[t, k]]);
+            let px = (width - 1.0) / 2.0 + truth.focal_px * place[0] / place[2];
+            assert!((px - x).abs() < 0.05, "{px} {x}");
+        }
+        assert!(truth.body_seen.row(0)[coco::NOSE] == Visibility::Seen);
+        outside += usize::from(clip.condition == "outside" && truth.body_seen[[0, 11]] == Visibility::Outside);
+    }
+    assert_eq!(outside, 3, "hips are below a picture of head and shoulders");
+}
+
+#[test]
+fn hands_under_a_desk_are_behind_a_thing() {
+    let share = |seen: &Array2<Visibility>, what: Visibility| {
+        seen.iter().filter(|&&seen| seen == what).count() as f64 / seen.len() as f64
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let hidden = (0..12).any(|seed| {
+        let seeds = ClipSeeds { body: seed, clothes: 1, camera: seed, motion: seed };
+        let scene = PeopleScene::new(Condition::SeatedDesk, seeds, 1.0, FrameRate::new(2, 1), None);
+        let truth = scene.film(&dir.path().join("a.mp4"), &Silent).unwrap();
+        let hands = [&truth.left_hand_seen, &truth.right_hand_seen];
+        hands.iter().all(|seen| share(seen, Visibility::BehindThing) > 0.7)
+    });
+    assert!(hidden, "in none of twelve clips both hands are under the desk");
+}
+
+#[test]
+fn an_unknown_condition_is_refused_with_the_list() {
+    let project = Project::with_clips("people", 0, 1.0);
+    let refused = project.answer(&["demo", "draw", "people", "--people", "3", "--conditions", "front,rear"]);
+    assert_ne!(refused.code, 0);
+    assert!(refused.errors.contains("`rear`") && refused.errors.contains("hands-folded"), "{}", refused.errors);
+    assert!(!project.dir().join("people").exists());
+}
