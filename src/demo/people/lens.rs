@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// Defects of a clip's pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Lens {
+pub struct CameraDefects {
     /// Standard deviation of the blur, px; 0: sharp.
     pub blur_px: f64,
     /// Share of the light that reaches the sensor; 0: all, without noise.
@@ -15,7 +15,7 @@ pub struct Lens {
     pub seed: u64,
 }
 
-impl Lens {
+impl CameraDefects {
     /// Picture of a frame as the sensor gives it.
     pub fn taken(&self, mut image: Image, frame_idx: usize) -> Image {
         if self.blur_px > 0.0 {
@@ -84,11 +84,11 @@ mod tests {
     fn blur_keeps_the_light_and_darkness_takes_it() {
         let mut image = Image::filled(40, 30, [0; 3]);
         image.data[3 * (15 * 40 + 20)..][..3].fill(255);
-        let blurred = Lens { blur_px: 1.5, ..Lens::default() }.taken(image.clone(), 0);
+        let blurred = CameraDefects { blur_px: 1.5, ..CameraDefects::default() }.taken(image.clone(), 0);
         let sum: u32 = blurred.data.iter().map(|&v| u32::from(v)).sum();
         assert!(blurred.data.iter().all(|&v| v < 30) && (600..930).contains(&sum), "{sum}");
         let grey = Image::filled(40, 30, [128; 3]);
-        let dark = Lens { darkness: 0.1, seed: 3, ..Lens::default() };
+        let dark = CameraDefects { darkness: 0.1, seed: 3, ..CameraDefects::default() };
         let taken = dark.taken(grey.clone(), 1);
         let mean = taken.data.iter().map(|&v| f64::from(v)).sum::<f64>() / taken.data.len() as f64;
         assert!((35.0..55.0).contains(&mean), "{mean}");

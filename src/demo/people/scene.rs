@@ -3,7 +3,7 @@
 use super::actor::{Actor, ActorPose, ActorRole, ActorSeeds};
 use super::condition::{Condition, Seat};
 use super::lens;
-use super::lens::Lens;
+use super::lens::CameraDefects;
 use super::set;
 use super::set::SeatPlace;
 use super::truth;
@@ -55,7 +55,7 @@ pub struct PeopleScene {
     voice: Voice,
     light: Light,
     background: Background,
-    lens: Lens,
+    defects: CameraDefects,
     /// Steps of time in a frame.
     n_steps: usize,
     crf: u32,
@@ -109,13 +109,13 @@ impl PeopleScene {
         let seats: Vec<SeatPlace> = actors.iter().map(seat_place).collect();
         let background = set::background(&camera, &light, &seats, &mut rng);
         let wide = camera.size[0] as f64 / 640.0;
-        let lens = Lens {
+        let defects = CameraDefects {
             blur_px: if condition == Condition::Blurred { wide * rng.random_range(1.2..2.4) } else { 0.0 },
             darkness: if condition == Condition::Dark { rng.random_range(0.07..0.16) } else { 0.0 },
             seed: seeds.camera,
         };
         let crf = if condition == Condition::Compressed { rng.random_range(35..41) } else { GOOD_CRF };
-        Self { fps, n_frames, camera, actors, voice, light, background, lens, n_steps, crf }
+        Self { fps, n_frames, camera, actors, voice, light, background, defects, n_steps, crf }
     }
 
     /// Sound of the clip.
@@ -162,7 +162,7 @@ impl PeopleScene {
         let counts = [first.n_body_meshes(), n_own, n_people];
         let truth = FrameTruth::of(first, owners, &first.poses[middle], &self.camera, (renderer, counts));
         let image = lens::mean(&images).unwrap_or_else(|| self.background.image.clone());
-        (self.lens.taken(image, frame_idx), truth)
+        (self.defects.taken(image, frame_idx), truth)
     }
 
     fn draw(&self, renderer: &mut Renderer, step: usize) -> Image {
