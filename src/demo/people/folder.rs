@@ -68,6 +68,8 @@ pub struct PeoplePlan {
 }
 
 const PIPELINE: &str = r#"# Rendered people of `orator demo draw --people`: one speaker for each condition, seen by the models for real people.
+[segment]
+speech = "loudness"                # its speech is made of tones, which the speech model rightly takes for none
 "#;
 
 const SPEAKER: &str = r#"
