@@ -72,6 +72,8 @@ pub struct Appearance {
     /// Stripes and checks, or the shirt below a jacket.
     pub second_colour: Reflectance,
     pub weave: Weave,
+    /// Whether the shirt has a collar.
+    pub collar: bool,
     /// Whether a skirt is worn instead of trousers.
     pub skirt: bool,
     pub legs_colour: Reflectance,
@@ -153,6 +155,7 @@ impl Appearance {
             top_colour: CLOTHS[0],
             second_colour: CLOTHS[1],
             weave: Weave::Plain,
+            collar: false,
             skirt: false,
             legs_colour: LEGS[0],
             shoes_colour: SHOES[0],
@@ -222,6 +225,7 @@ impl Appearance {
             top_colour,
             second_colour,
             weave: if top == Top::Jacket { Weave::Plain } else { weave },
+            collar: top == Top::Jacket || rng.random_bool(0.4),
             skirt: woman && rng.random_bool(0.35),
             legs_colour: jittered(&mut rng, &LEGS, 0.25),
             shoes_colour: jittered(&mut rng, &SHOES, 0.2),

@@ -2,28 +2,18 @@
 //! mesh, the skinning weights and the vertices in T-pose (by inverse linear skinning) follow from it.
 
 use super::appearance::{Appearance, Reflectance};
+use super::assembly::{Assembly, PosedMesh};
 use super::body::BodyForm;
-use super::face::Feature;
-use super::field::Form;
 use super::hand::HandForm;
 use super::head::{EAR, EYE, EYE_RADIUS, HeadForm};
-use super::jaw::{MOUTH_Y, jaw_share, opening};
+use super::jaw::{MOUTH_Y, opening};
 use super::material::Material;
-use super::skin::{Weights, rigid};
+use super::skin::Weights;
 use super::stance::Stance;
 use super::surface::Surface;
 use crate::animate::rig::rig::Rig;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, add, cross, dot, sub, unit};
-use std::collections::BTreeMap;
-
-/// Cell sizes of the surface meshes, cm.
-const SHIRT_CELL: f64 = 1.9;
-const LEGS_CELL: f64 = 2.3;
-const SHOE_CELL: f64 = 1.7;
-const PALM_CELL: f64 = 0.62;
-const CUFF_CELL: f64 = 0.8;
-const FINGER_CELL: f64 = 0.45;
 
 /// Triangles of one material in the T-pose (cm, in the figure's axes, the soles at y = 0), with their joints.
 #[derive(Clone, Debug)]
@@ -37,6 +27,9 @@ pub struct AvatarMesh {
     pub weights: Vec<Weights>,
     /// Way of each vertex from the closed to the open mouth, cm; empty where nothing moves.
     pub mouth: Vec<Vec3>,
+    /// Place of each vertex along a bare forearm, 0 (elbow) .. 1 (wrist), by which it turns with the hand; empty where
+    /// no forearm is bare.
+    pub twist: Vec<f32>,
 }
 
 /// Meshes that together cover a rig.
@@ -54,39 +47,10 @@ impl Avatar {
     pub fn new(rig: &Rig, looks: &Appearance) -> Self {
         let stance = Stance::new(rig);
         let hands = [0, 1].map(|side| HandForm::new(rig, &stance, side));
-        let body = BodyForm::new(rig, &stance, hands.each_ref().map(|hand| hand.scale));
-        let cm = stance.scale;
+        let body = BodyForm::new(rig, &stance, hands.each_ref().map(|hand| hand.scale), looks);
         let head = HeadForm::new(&stance, &body.trunk, looks);
-        let mut built: BTreeMap<Material, PosedMesh> = BTreeMap::new();
-        let mut add = |material: Material, weights: Vec<Weights>, surface: Surface, colour: Reflectance| {
-            let colours = vec![colour; surface.points.len()];
-            built.entry(material).or_default().add(weights, surface, colours, Vec::new());
-        };
-        let surface_of = |form: &Form, cell: f64| Surface::from_field(&|at| form.distance(at), form.bounds(), cell);
-        let surface = Surface::from_field(&body.shirt(), body.shirt_bounds(), SHIRT_CELL * cm);
-        add(Material::Shirt, body.shirt_weights(&surface), surface, looks.top_colour);
-        let surface = surface_of(&body.trousers(), LEGS_CELL * cm);
-        add(Material::Trousers, body.leg_weights(&surface), surface, looks.legs_colour);
-        for (side, hand) in hands.iter().enumerate() {
-            let size = hand.scale;
-            let light = |at: Vec3| hand.whole(at);
-            let palm = PALM_CELL * size;
-            let surface = Surface::from_field(&|at| hand.palm(at), hand.bounds(None), palm).lit(&light, palm);
-            add(Material::Skin, body.palm_weights(side, size, &surface), surface, looks.skin);
-            for n in 1..5 {
-                let finger = FINGER_CELL * size;
-                let surface =
-                    Surface::from_field(&|at| hand.finger(n, at), hand.bounds(Some(n)), finger).lit(&light, finger);
-                add(Material::Skin, body.finger_weights(side, n, size, &surface), surface, looks.skin);
-            }
-            let surface = surface_of(&body.cuff(side), CUFF_CELL * size);
-            let weights = vec![rigid(rig.arms[side].fore); surface.points.len()];
-            add(Material::Shirt, weights, surface, looks.top_colour);
-            let surface = surface_of(&body.shoe(side), SHOE_CELL * cm);
-            add(Material::Shoes, body.leg_weights(&surface), surface, looks.shoes_colour);
-        }
-        add_head(&mut built, &body, &head, looks);
-        let parts = built.into_iter().map(|(material, built)| built.rested(material, &stance)).collect();
+        let meshes = Assembly::new(&body, &head, &hands).meshes;
+        let parts = meshes.into_iter().map(|(material, mesh)| AvatarMesh::rested(material, mesh, &stance)).collect();
         let at_front = |x: f64, y: f64| [x, y, head.front(x, y)];
         let [ex, ey, ez] = EYE;
         let [ax, ay, az] = EAR;
@@ -99,65 +63,14 @@ impl Avatar {
     }
 }
 
-/// Adds head, ears, hair and the features of the face.
-fn add_head(built: &mut BTreeMap<Material, PosedMesh>, body: &BodyForm, head: &HeadForm, looks: &Appearance) {
-    let skin = head.skin_surface();
-    let colours = skin.points.iter().map(|&at| head.complexion(at, looks)).collect();
-    let shares: Vec<f64> = skin.points.iter().map(|&at| jaw_share(at)).collect();
-    let mut features = vec![Feature { material: Material::Face, surface: skin, colours, shares }];
-    features.extend(head.features(looks));
-    let ear = head.ear_surface();
-    for surface in [ear.clone(), ear.mirrored()] {
-        let colours = vec![looks.skin; surface.points.len()];
-        features.push(Feature { material: Material::Face, surface, colours, shares: Vec::new() });
-    }
-    if let Some(surface) = head.hair_surface() {
-        let colours = surface.points.iter().map(|&at| strand(looks.hair_colour, at)).collect();
-        features.push(Feature { material: Material::Hair, surface, colours, shares: Vec::new() });
-    }
-    for (n, Feature { material, surface, colours, shares }) in features.into_iter().enumerate() {
-        let mouth = surface.points.iter().zip(shares).map(|(&at, share)| head.scaled(opening(at, share))).collect();
-        let hangs = n == 0 || material == Material::Hair;
-        let surface = head.placed(surface);
-        let weights =
-            if hangs { body.head_weights(&surface) } else { vec![rigid(body.trunk.head); surface.points.len()] };
-        built.entry(material).or_default().add(weights, surface, colours, mouth);
-    }
-}
-
-/// Colour of the hair at a point: lighter and darker strands.
-fn strand(colour: Reflectance, [x, y, z]: Vec3) -> Reflectance {
-    let light = 1.0 + 0.16 * (3.1 * x + 0.4 * y).sin() * (1.3 * z + 0.7 * y).cos();
-    colour.map(|v| v * light as f32)
-}
-
-/// Mesh of one material in the stance, before it is brought to the T-pose.
-#[derive(Default)]
-struct PosedMesh {
-    surface: Surface,
-    weights: Vec<Weights>,
-    colours: Vec<Reflectance>,
-    mouth: Vec<Vec3>,
-}
-
-impl PosedMesh {
-    fn add(&mut self, weights: Vec<Weights>, surface: Surface, colours: Vec<Reflectance>, mouth: Vec<Vec3>) {
-        if !mouth.is_empty() {
-            self.mouth.resize(self.surface.points.len(), [0.0; 3]);
-            self.mouth.extend(mouth);
-        }
-        self.surface.extend(surface);
-        self.weights.extend(weights);
-        self.colours.extend(colours);
-    }
-
+impl AvatarMesh {
     /// Mesh in the T-pose; linear skinning of it with the stance gives the posed mesh exactly.
-    fn rested(self, material: Material, stance: &Stance) -> AvatarMesh {
-        let Surface { points, normals, triangles } = self.surface;
+    fn rested(material: Material, mesh: PosedMesh, stance: &Stance) -> Self {
+        let Surface { points, normals, triangles } = mesh.surface;
         let (points, normals): (Vec<Vec3>, Vec<Vec3>) = points
             .into_iter()
             .zip(normals)
-            .zip(&self.weights)
+            .zip(&mesh.weights)
             .map(|((point, normal), weights)| {
                 let turn = Blend::new(stance, weights);
                 // point = sum of w (R (rest - rest joint) + joint)
@@ -165,11 +78,14 @@ impl PosedMesh {
                 (rest, unit(turn.back(normal), 1e-9).unwrap_or(normal))
             })
             .unzip();
-        let (colours, weights, mut mouth) = (self.colours, self.weights, self.mouth);
+        let PosedMesh { colours, weights, mut mouth, mut twist, .. } = mesh;
         if !mouth.is_empty() {
             mouth.resize(points.len(), [0.0; 3]);
         }
-        AvatarMesh { material, points, normals, colours, triangles, weights, mouth }
+        if !twist.is_empty() {
+            twist.resize(points.len(), 0.0);
+        }
+        Self { material, points, normals, colours, triangles, weights, mouth, twist }
     }
 }
 
@@ -221,7 +137,8 @@ mod tests {
         let (avatar, stance) = (Avatar::new(&rig, &Appearance::plain()), Stance::new(&rig));
         let shirt = &avatar.parts[1];
         let hands = [0, 1].map(|side| HandForm::new(&rig, &stance, side).scale);
-        let body = BodyForm::new(&rig, &stance, hands);
+        let looks = Appearance::plain();
+        let body = BodyForm::new(&rig, &stance, hands, &looks);
         let form = body.shirt();
         let cuffs = [0, 1].map(|side| body.cuff(side));
         let mut far = 0;

@@ -16,6 +16,8 @@ pub const EAR: Vec3 = [7.75, 9.5, -0.4];
 /// Size of the cells at the middle of the face, and the radius within which they hardly grow.
 const CELL: f64 = 0.4;
 const FOCUS: (Vec3, f64) = ([0.0, 7.0, 8.8], 5.2);
+/// Size of the head of the plain figure relative to the shape, by its trunk.
+const LARGE: f64 = 1.05;
 const EAR_CELL: f64 = 0.42;
 const HAIR_CELL: f64 = 1.0;
 
@@ -44,7 +46,7 @@ fn carved(d: f64, hole: f64, blend: f64) -> f64 {
 impl<'a> HeadForm<'a> {
     pub fn new(stance: &'a Stance, trunk: &Trunk, looks: &'a Appearance) -> Self {
         let joint = trunk.head;
-        let size = looks.head;
+        let size = looks.head.map(|v| v * LARGE);
         let down = sub(stance.positions[trunk.neck], stance.positions[joint]);
         let neck_y = down[1] / stance.scale / size[1];
         let (jaw, nose) = (looks.jaw, looks.nose);
@@ -144,7 +146,7 @@ impl<'a> HeadForm<'a> {
         let shell = cone([x + 0.75, y + 1.1, z + 0.1], [x + 0.6, y - 0.6, z + 0.35], [0.8, 0.6]).flat(out, 0.55);
         let field = |at: Vec3| carved(form.distance(at), shell.distance(at), 0.35);
         let whole = |at: Vec3| joined(field(at), self.bare(at), 0.7);
-        Surface::from_field(&field, form.bounds(), EAR_CELL).lit(&whole, EAR_CELL)
+        Surface::from_field(&field, form.bounds(), EAR_CELL).lit(&whole, 0.3 * EAR_CELL)
     }
 
     /// Hair of the head, in the shape's axes; `None` on a bald one.
@@ -192,7 +194,7 @@ impl<'a> HeadForm<'a> {
         };
         let low = if style == Hairstyle::Long { -12.5 } else { 2.0 };
         let bounds = even([[-11.0, low, -15.0], [11.0, 24.0, 11.0]], HAIR_CELL);
-        Some(Surface::from_field(&field, bounds, HAIR_CELL))
+        Some(Surface::from_field(&field, bounds, HAIR_CELL).lit(&field, 0.5 * HAIR_CELL))
     }
 
     /// Whether a point of the skin lies in the hollow of the mouth.

@@ -2,10 +2,12 @@
 //! built in, skinning weights, and poses.
 
 pub mod appearance;
+pub mod assembly;
 pub mod avatar;
 pub mod body;
 pub mod face;
 pub mod field;
+pub mod garments;
 pub mod hand;
 pub mod head;
 pub mod jaw;

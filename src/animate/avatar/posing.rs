@@ -9,6 +9,41 @@ use crate::render::Mesh;
 /// Affine map of a joint from the T-pose into the world: the matrix's columns and the shift.
 type JointMap = [[f32; 3]; 4];
 
+/// Number of maps along a forearm.
+const TWISTS: usize = 9;
+
+/// Maps of a forearm that turns with the hand, from the elbow, where it does not, to the wrist.
+struct TwistedForearm {
+    joint: usize,
+    maps: [JointMap; TWISTS],
+}
+
+impl TwistedForearm {
+    fn new(rig: &Rig, local: &[Rotation], side: usize, maps: &[JointMap], rest: &[Vec3]) -> Self {
+        let arm = &rig.arms[side];
+        let (_, angle) = local[arm.hand].swing_twist([1.0, 0.0, 0.0]);
+        let [x, y, z, shift] = maps[arm.fore];
+        let elbow = rest[arm.fore].map(|v| v as f32);
+        let turned = |step: usize| {
+            // The bone lies along x: y and z turn about the line through the elbow.
+            let (sin, cos) = (angle as f32 * step as f32 / (TWISTS - 1) as f32).sin_cos();
+            let (u, v): ([f32; 3], [f32; 3]) =
+                (std::array::from_fn(|k| cos * y[k] + sin * z[k]), std::array::from_fn(|k| cos * z[k] - sin * y[k]));
+            let moved = |k: usize| (y[k] - u[k]) * elbow[1] + (z[k] - v[k]) * elbow[2];
+            [x, u, v, std::array::from_fn(|k| shift[k] + moved(k))]
+        };
+        Self { joint: arm.fore, maps: std::array::from_fn(turned) }
+    }
+
+    /// Map at a place along the forearm, 0 .. 1.
+    fn at(&self, place: f32) -> JointMap {
+        let at = place.clamp(0.0, 1.0) * (TWISTS - 1) as f32;
+        let (low, share) = ((at as usize).min(TWISTS - 2), at - (at as usize).min(TWISTS - 2) as f32);
+        let (a, b) = (&self.maps[low], &self.maps[low + 1]);
+        std::array::from_fn(|c| std::array::from_fn(|k| a[c][k] + share * (b[c][k] - a[c][k])))
+    }
+}
+
 impl Avatar {
     /// Meshes in a pose, in world axes (cm, y up): the hips at `root`, a local rotation for every joint of the rig, the
     /// mouth open by `mouth` (0 closed .. 1).
@@ -28,9 +63,10 @@ impl Avatar {
                 [x, y, z, sub(places[joint], turns[joint].turn(rest[joint]))].map(|column| column.map(|v| v as f32))
             })
             .collect();
+        let forearms = [0, 1].map(|side| TwistedForearm::new(rig, local, side, &maps, &rest));
         meshes.resize_with(self.parts.len(), Mesh::default);
         for (part, mesh) in self.parts.iter().zip(meshes) {
-            part.pose_into(&maps, mouth as f32, mesh);
+            part.pose_into(&maps, &forearms, mouth as f32, mesh);
         }
     }
 
@@ -60,7 +96,7 @@ pub fn hip_points(rig: &Rig, root: Vec3, local: &[Rotation]) -> [Vec3; 2] {
 }
 
 impl AvatarMesh {
-    fn pose_into(&self, maps: &[JointMap], mouth: f32, mesh: &mut Mesh) {
+    fn pose_into(&self, maps: &[JointMap], forearms: &[TwistedForearm; 2], mouth: f32, mesh: &mut Mesh) {
         mesh.colours.clone_from(&self.colours);
         mesh.triangles.clone_from(&self.triangles);
         mesh.gloss = self.material.gloss();
@@ -76,7 +112,16 @@ impl AvatarMesh {
             let normal = self.normals[n].map(|v| v as f32);
             let (mut place, mut out) = ([0.0; 3], [0.0; 3]);
             for &(joint, weight) in weights.iter().take_while(|(_, weight)| *weight > 0.0) {
-                let ([x, y, z, shift], weight) = (&maps[joint], weight as f32);
+                let twisted = self.twist.get(n).zip(forearms.iter().find(|forearm| forearm.joint == joint));
+                let turned;
+                let [x, y, z, shift] = match twisted {
+                    None => &maps[joint],
+                    Some((&place, forearm)) => {
+                        turned = forearm.at(place);
+                        &turned
+                    }
+                };
+                let weight = weight as f32;
                 for k in 0..3 {
                     place[k] += weight * (x[k] * at[0] + y[k] * at[1] + z[k] * at[2] + shift[k]);
                     out[k] += weight * (x[k] * normal[0] + y[k] * normal[1] + z[k] * normal[2]);

@@ -124,6 +124,18 @@ impl BodyForm<'_> {
         })
     }
 
+    /// Weights of a skirt: the hips', towards the hem the nearer thigh's.
+    pub fn skirt_weights(&self, surface: &Surface) -> Vec<Weights> {
+        let cm = self.stance.scale;
+        let top = self.stance.positions[self.trunk.hips];
+        settled(surface, 10, |at, shares| {
+            let thigh = self.trunk.legs[usize::from(at[0] < 0.0)][0];
+            let low = 0.75 * rise((top[1] - at[1] - 22.0 * cm) / (18.0 * cm));
+            add_share(shares, thigh, low);
+            add_share(shares, self.trunk.hips, 1.0 - low);
+        })
+    }
+
     /// Weights of one of the fingers beside the thumb; `scale` is the hand's size.
     pub fn finger_weights(&self, side: usize, finger: usize, scale: f64, surface: &Surface) -> Vec<Weights> {
         let chain = self.finger(side, finger, scale);
@@ -137,12 +149,13 @@ impl BodyForm<'_> {
         self.chain(arm.fore, &[arm.hand, a, b, c], tip, &halves.map(|half| half * scale))
     }
 
-    /// Weights of a palm with its thumb and wrist; `scale` is the hand's size.
+    /// Weights of a palm with its thumb, the wrist and a bare arm; `scale` is the hand's size.
     pub fn palm_weights(&self, side: usize, scale: f64, surface: &Surface) -> Vec<Weights> {
         let arm = &self.rig.arms[side];
         let thumb = self.finger(side, 0, scale);
         let knuckles: [usize; 5] = std::array::from_fn(|finger| finger_joints(self.rig, side, finger)[0]);
-        let wrist = self.chain(arm.upper, &[arm.fore, arm.hand], knuckles[2], &[2.6 * scale]);
+        let bends = [4.0 * self.stance.scale, 2.6 * scale];
+        let wrist = self.chain(arm.clavicle, &[arm.upper, arm.fore, arm.hand], knuckles[2], &bends);
         let positions = &self.stance.positions;
         let thumb_line = finger_joints(self.rig, side, 0).map(|joint| positions[joint]);
         settled(surface, 4, |at, shares| {

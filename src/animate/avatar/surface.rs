@@ -9,6 +9,8 @@ use rayon::prelude::*;
 const BLOCK: usize = 4;
 /// Largest step of a vertex towards the surface, as a share of a cell.
 const REACH: f64 = 0.9;
+/// Step of the gradient's differences, as a share of a cell.
+const FINE: f64 = 0.02;
 /// Rounds of moving vertices towards the middle of their neighbours.
 const ROUNDS: usize = 3;
 
@@ -97,14 +99,14 @@ impl Surface {
         }
     }
 
-    /// Replaces the normals by those of another field at the vertices.
+    /// Replaces the normals by those of another field at the vertices, seen over `width` cm.
     #[must_use]
-    pub fn lit(mut self, field: &(dyn Fn(Vec3) -> f64 + Sync), cell: f64) -> Self {
+    pub fn lit(mut self, field: &(dyn Fn(Vec3) -> f64 + Sync), width: f64) -> Self {
         let normals = self
             .points
             .iter()
             .zip(&self.normals)
-            .map(|(&at, &own)| unit(gradient(field, at, cell), 1e-9).unwrap_or(own));
+            .map(|(&at, &own)| unit(gradient(field, at, width / 2.0), 1e-9).unwrap_or(own));
         self.normals = normals.collect();
         self
     }
@@ -130,19 +132,18 @@ impl Surface {
 fn onto(field: &(dyn Fn(Vec3) -> f64 + Sync), point: Vec3, cell: f64, steps: usize) -> (Vec3, Vec3) {
     let mut at = point;
     for _ in 0..steps {
-        let slope = gradient(field, at, cell);
+        let slope = gradient(field, at, FINE * cell);
         let steep = dot(slope, slope);
         let next = sub(at, scale(slope, field(at) / steep.max(0.05)));
         if norm(sub(next, point)) < REACH * cell {
             at = next;
         }
     }
-    (at, unit(gradient(field, at, cell), 1e-9).unwrap_or([0.0, 1.0, 0.0]))
+    (at, unit(gradient(field, at, FINE * cell), 1e-9).unwrap_or([0.0, 1.0, 0.0]))
 }
 
-/// Gradient of the field by central differences over a fiftieth of a cell.
-fn gradient(field: &(dyn Fn(Vec3) -> f64 + Sync), at: Vec3, cell: f64) -> Vec3 {
-    let step = cell * 0.02;
+/// Gradient of the field by central differences, `step` to each side.
+fn gradient(field: &(dyn Fn(Vec3) -> f64 + Sync), at: Vec3, step: f64) -> Vec3 {
     std::array::from_fn(|k| {
         let mut shift = [0.0; 3];
         shift[k] = step;
