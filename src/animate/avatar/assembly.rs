@@ -105,7 +105,7 @@ impl<'a> Assembly<'a> {
         let size = hand.scale;
         let (palm, finger) = (PALM_CELL * size, FINGER_CELL * size);
         let arm = body.bare_arm(side);
-        let on_arm = |d: f64, at: Vec3| arm.as_ref().map_or(d, |arm| joined(d, arm.distance(at), 1.6 * size));
+        let on_arm = |d: f64, at: Vec3| arm.as_ref().map_or(d, |arm| joined(d, arm.distance(at), 1.0 * size));
         let light = |at: Vec3| on_arm(hand.whole(at), at);
         let field = |at: Vec3| on_arm(hand.palm(at), at);
         let bounds = hand.bounds(None);

@@ -109,7 +109,7 @@ impl<'a> BodyForm<'a> {
         let out = arm.sign;
         let (upper, fore) = (self.length(arm.upper, arm.fore), self.length(arm.fore, arm.hand));
         let wide = |radii: [f64; 2]| radii.map(|r| r * self.looks.limbs);
-        let wrist = 2.55 * self.hands[side] / self.stance.scale;
+        let wrist = 2.4 * self.hands[side] / self.stance.scale;
         let back = self.stance.world[arm.hand].turn([0.0, 1.0, 0.0]);
         let on_upper = |from: Vec3, to: Vec3, radii: [f64; 2]| self.limb(arm.upper, [from, to], wide(radii));
         let on_fore = |from: Vec3, to: Vec3, radii: [f64; 2]| self.limb(arm.fore, [from, to], radii);
