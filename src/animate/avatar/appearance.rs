@@ -63,6 +63,11 @@ pub struct Appearance {
     pub iris: Reflectance,
     pub hair: Hairstyle,
     pub hair_colour: Reflectance,
+    /// Thickness of the hair.
+    pub hair_volume: f64,
+    /// How far the hair hangs into the forehead, cm, and how much farther on the right than on the left, -1 .. 1.
+    pub fringe: f64,
+    pub parting: f64,
     /// Density of the beard, 0 (shaven) .. 1.
     pub beard: f64,
     /// Colour of the glasses' frames.
@@ -149,6 +154,9 @@ impl Appearance {
             iris: IRISES[1],
             hair: Hairstyle::Short,
             hair_colour: HAIRS[2],
+            hair_volume: 1.0,
+            fringe: 0.0,
+            parting: 0.0,
             beard: 0.0,
             glasses: None,
             top: Top::LongSleeves,
@@ -217,6 +225,9 @@ impl Appearance {
             iris: IRISES[if dark { 0 } else { rng.random_range(0..IRISES.len()) }],
             hair,
             hair_colour,
+            hair_volume: near(&mut rng, 1.05, 0.35),
+            fringe: near(&mut rng, 0.3, 1.3),
+            parting: near(&mut rng, 0.0, 1.0),
             beard: if !woman && rng.random_bool(0.35) { rng.random_range(0.35..1.0) } else { 0.0 },
             glasses: rng
                 .random_bool(0.25)

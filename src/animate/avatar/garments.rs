@@ -40,7 +40,7 @@ impl BodyForm<'_> {
             let mut rows: Vec<Vec<Vec3>> = Vec::new();
             for k in 0..=16 {
                 let t = f64::from(k) / 16.0;
-                let y = BUTTON - 1.0 + t * (THROAT - 4.0 - BUTTON);
+                let y = BUTTON - 1.0 + t * (THROAT - 2.5 - BUTTON);
                 // Widest below the notch, narrow as a collar above.
                 let width = if t < 0.74 { 0.6 + 7.6 * t } else { 3.6 };
                 let inner = opening(y) - 0.4;
@@ -102,7 +102,10 @@ impl BodyForm<'_> {
         let colour = |(&at, normal): (&Vec3, &Vec3)| {
             let local = sub(at, stance.positions[self.trunk.hips]).map(|v| v / stance.scale);
             if looks.top == Top::Jacket {
-                let shown = normal[2] > 0.15 && local[1] > BUTTON + 1.0 && local[0].abs() < opening(local[1]) + 1.4;
+                // Above the lapels the jacket lies on the shoulders, at the side of the neck.
+                let narrow = 0.8 * (local[1] - THROAT + 5.0).max(0.0);
+                let shown =
+                    normal[2] > 0.15 && local[1] > BUTTON + 1.0 && local[0].abs() < opening(local[1]) + 1.4 - narrow;
                 return if shown { looks.second_colour } else { looks.top_colour };
             }
             // Along the trunk, or along the arm whose sleeve is nearer; and around.

@@ -160,12 +160,12 @@ impl<'a> HeadForm<'a> {
             .with(cone([0.0, 14.6, -8.6], [0.0, 15.0, -9.4], [2.2, 2.4]), 0.0)
             .with(cone([0.0, 14.8, -11.0], [0.0, 15.2, -11.4], [2.7, 2.6]), 1.0);
         if style == Hairstyle::Long {
-            locks = locks.with(cone([-3.2, 8.0, -7.0], [3.2, 8.0, -7.0], [3.4, 3.4]), 0.0);
+            locks = locks.with(cone([0.0, 10.0, -6.6], [0.0, -9.0, -5.2], [3.6, 2.6]), 0.0);
             for side in [1.0, -1.0] {
                 locks = locks
                     .with(cone([side * 7.2, 13.0, -2.6], [side * 7.6, 3.0, -2.4], [1.7, 2.1]), 3.0)
                     .with(cone([side * 7.6, 3.0, -2.4], [side * 7.0, -8.5, -1.6], [2.2, 1.9]), 2.0)
-                    .with(cone([side * 4.4, 6.0, -6.6], [side * 4.2, -9.5, -5.6], [3.0, 2.4]), 3.0);
+                    .with(cone([side * 4.2, 7.0, -6.6], [side * 4.0, -9.0, -5.4], [3.0, 2.5]), 4.0);
             }
         }
         let thick = match style {
@@ -173,14 +173,16 @@ impl<'a> HeadForm<'a> {
             Hairstyle::Tied => 0.6,
             _ => 0.75,
         };
+        let (volume, fringe, parting) = (self.looks.hair_volume, self.looks.fringe, self.looks.parting);
         let field = |at: Vec3| {
             let [x, y, z] = at;
             // Fuller on the crown, thin at the temples and the nape.
-            let full = thick * (0.45 + 0.75 * rise((y - 13.0) / 6.0));
+            let full = thick * volume * (0.45 + 0.75 * rise((y - 13.0) / 6.0));
             let strand = 0.10 * (1.9 * x + 0.6 * y + (0.5 * z).sin()).sin() * rise((y - 9.0) / 6.0);
             let mut d = self.skull.distance([x.abs(), y, z]) - full - strand;
             // The face stays free, and below it the nape and the ears.
-            let face = norm([x / 13.5, (y - 8.2) / 9.6, (z - 12.2) / 11.2]) - 1.0;
+            let low = fringe - 0.9 * parting * (x / 2.5).tanh();
+            let face = norm([x / 13.5, (y - 8.2 + low) / 9.6, (z - 12.2) / 11.2]) - 1.0;
             d = carved(d, 8.0 * face, 0.5);
             let nape = dot(sub(at, [0.0, 5.0, -5.0]), [0.0, 0.97, -0.24]);
             d = -joined(-d, nape, 0.6);
