@@ -61,7 +61,7 @@ impl Background {
         surfaces.set(camera, meshes, light);
         shading.open(&surfaces);
         let mut shadows = ShadowMap::new(SHADOW_TEXELS);
-        shadows.cast(surfaces.casters(meshes));
+        shadows.cast(surfaces.casters(meshes), true);
         let srgb = Srgb::tables();
         let mut image = behind;
         let n = size[0] * size[1];

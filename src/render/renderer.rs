@@ -61,7 +61,7 @@ impl Renderer {
         }
         self.surfaces.set(camera, meshes, light);
         self.shading.open(&self.surfaces);
-        self.shadows.cast(self.surfaces.casters(meshes));
+        self.shadows.cast(self.surfaces.casters(meshes), false);
         if let Some(scene) = &self.scene {
             scene.shade(&mut image, &self.shadows);
         }

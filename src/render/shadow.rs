@@ -38,8 +38,13 @@ impl ShadowMap {
         axes.map(|axis| dot(axis, point))
     }
 
-    /// Casts triangles, points in the light's axes.
-    pub fn cast<'a>(&mut self, parts: impl Iterator<Item = (&'a [[f32; 3]], &'a [[u32; 3]])> + Clone) {
+    /// Casts triangles, points in the light's axes. With `only_far_sides` those that face the light cast nothing: what
+    /// is closed casts the same shadow and lies in none of its own, and walls, which have one side, cast none.
+    pub fn cast<'a>(
+        &mut self,
+        parts: impl Iterator<Item = (&'a [[f32; 3]], &'a [[u32; 3]])> + Clone,
+        only_far_sides: bool,
+    ) {
         self.depths.fill(f32::INFINITY);
         self.cells.fill(false);
         let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
@@ -62,7 +67,10 @@ impl ShadowMap {
             flat.clear();
             flat.extend(points.iter().map(|point| self.texel(*point)));
             for triangle in triangles {
-                self.fill(triangle.map(|v| flat[v as usize]));
+                let corners = triangle.map(|v| flat[v as usize]);
+                if !(only_far_sides && area(&corners) > 0.0) {
+                    self.fill(corners);
+                }
             }
         }
         self.close_cells();
@@ -72,8 +80,9 @@ impl ShadowMap {
         [(x - self.origin[0]) * self.texels_per_cm, (y - self.origin[1]) * self.texels_per_cm, depth]
     }
 
-    fn fill(&mut self, [a, b, c]: [[f32; 3]; 3]) {
-        let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
+    fn fill(&mut self, corners: [[f32; 3]; 3]) {
+        let area = area(&corners);
+        let [a, b, c] = corners;
         // The outer sides alone cast; NaN and triangles seen edge-on are left out too.
         if !(area > 1e-9) {
             return;
@@ -155,6 +164,11 @@ impl ShadowMap {
         }
         (lit[0] + lit[1] + lit[2] + lit[3]) * (1.0 / 9.0)
     }
+}
+
+/// Twice the area of a triangle across the light; positive where it faces the light.
+fn area([a, b, c]: &[[f32; 3]; 3]) -> f32 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
 }
 
 /// Offset along the normal at which a surface asks for its shadow, cm: it keeps curved surfaces from shading themselves.
