@@ -49,6 +49,9 @@ enum DemoVerb {
         /// Conditions to render, by commas (front, standing, crossing ...); without it all.
         #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "people")]
         conditions: Vec<String>,
+        /// Write the truth of the rendered people alone, no videos: motion for `orator train lifter --mocap DIR/truth`.
+        #[arg(long, requires = "people")]
+        truth_only: bool,
         /// Captured motion for the rendered people, a file or a folder; the sound is the .wav beside it.
         #[arg(long, value_name = "FILE|FOLDER", requires = "people")]
         motion: Option<PathBuf>,
@@ -106,12 +109,12 @@ enum DemoVerb {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.part {
-        DemoVerb::Draw { dir, videos, people, conditions, motion, secs, fps, seed } => {
+        DemoVerb::Draw { dir, videos, people, conditions, truth_only, motion, secs, fps, seed } => {
             let fps = FrameRate::new(fps.clamp(1, 120), 1);
             if let Some(n_clips) = people {
                 let conditions = Condition::of_names(&conditions)?;
                 let secs = secs.unwrap_or(PEOPLE_SECS);
-                return render(&dir, &PeoplePlan { conditions, n_clips, secs, fps, seed, motion }, ui);
+                return render(&dir, &PeoplePlan { conditions, n_clips, secs, fps, seed, motion, truth_only }, ui);
             }
             let usual = DemoPlan::default();
             let plan = DemoPlan { n_videos: videos, secs: secs.unwrap_or(usual.secs), fps, seed, ..usual };

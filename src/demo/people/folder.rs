@@ -65,6 +65,8 @@ pub struct PeoplePlan {
     pub seed: u64,
     /// File of a captured motion, or a folder of them.
     pub motion: Option<PathBuf>,
+    /// Write the truth alone, without pictures: motion for lifters to learn from.
+    pub truth_only: bool,
 }
 
 const PIPELINE: &str = r#"# Rendered people of `orator demo draw --people`: one speaker for each condition, seen by the models for real people.
@@ -102,11 +104,13 @@ pub fn draw(dir: &Path, plan: &PeoplePlan, progress: &dyn Progress) -> Result<Ve
             let stem = format!("{name}-{}", number + 1);
             let video = PathBuf::from(format!("videos/{name}/{stem}.mp4"));
             let truth = PathBuf::from(format!("truth/{name}/{stem}.npz"));
-            let mut known = None;
-            workdir::replace(&dir.join(&video), |attempt| {
-                known = Some(scene.film(attempt, progress)?);
-                Ok(())
-            })?;
+            let mut known = plan.truth_only.then(|| scene.truth_without_pictures());
+            if !plan.truth_only {
+                workdir::replace(&dir.join(&video), |attempt| {
+                    known = Some(scene.film(attempt, progress)?);
+                    Ok(())
+                })?;
+            }
             known.context("a rendered clip has no truth")?.write(&dir.join(&truth))?;
             files[3 * number / n].push(format!("\"{stem}.mp4\""));
             clips.push(PeopleClip {

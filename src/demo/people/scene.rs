@@ -148,6 +148,18 @@ impl PeopleScene {
         Ok(truth::collected(&truths, self.fps, &self.camera, speaks))
     }
 
+    /// Truth without pictures: every point inside the picture counts as seen.
+    pub fn truth_without_pictures(&self) -> RenderedTruth {
+        let owners = PointOwners::new(&self.actors[0]);
+        // A renderer that has drawn nothing has nothing in front of a point.
+        let renderer = Renderer::new(self.camera.size);
+        let first = &self.actors[0];
+        let truths: Vec<FrameTruth> = (0..self.n_frames)
+            .map(|t| FrameTruth::of(first, &owners, &first.poses[t * self.n_steps], &self.camera, (&renderer, [0; 3])))
+            .collect();
+        truth::collected(&truths, self.fps, &self.camera, first.role.speaks && !self.sound().samples.is_empty())
+    }
+
     /// Picture and truth of a frame. The truth is that of the middle of the time that the shutter is open.
     pub fn frame(&self, renderer: &mut Renderer, owners: &PointOwners, frame_idx: usize) -> (Image, FrameTruth) {
         let middle = frame_idx * self.n_steps;

@@ -16,7 +16,8 @@ use std::path::Path;
 const FPS: FrameRate = FrameRate::new(5, 1);
 
 fn plan(conditions: &[Condition]) -> PeoplePlan {
-    PeoplePlan { conditions: conditions.to_vec(), n_clips: 3, secs: 1.0, fps: FPS, seed: 4, motion: None }
+    let (conditions, motion) = (conditions.to_vec(), None);
+    PeoplePlan { conditions, n_clips: 3, secs: 1.0, fps: FPS, seed: 4, motion, truth_only: false }
 }
 
 fn bytes(dir: &Path, file: &Path) -> Vec<u8> {
@@ -80,4 +81,19 @@ fn an_unknown_condition_is_refused_with_the_list() {
     assert_ne!(refused.code, 0);
     assert!(refused.errors.contains("`rear`") && refused.errors.contains("hands-folded"), "{}", refused.errors);
     assert!(!project.dir().join("people").exists());
+}
+
+#[test]
+fn truth_alone_is_the_truth_but_for_what_hides_what() {
+    let dir = tempfile::tempdir().unwrap();
+    let [whole, alone] = ["whole", "alone"].map(|name| dir.path().join(name));
+    let conditions = [Condition::Front];
+    folder::draw(&whole, &plan(&conditions), &Silent).unwrap();
+    folder::draw(&alone, &PeoplePlan { truth_only: true, ..plan(&conditions) }, &Silent).unwrap();
+    let truth = |folder: &Path| RenderedTruth::read(&folder.join("truth/front/front-1.npz")).unwrap();
+    let (whole, truth) = (truth(&whole), truth(&alone));
+    assert!(!alone.join("videos").exists());
+    assert_eq!((&truth.joints, &truth.body, &truth.right_hand), (&whole.joints, &whole.body, &whole.right_hand));
+    let takes = orator::mocap::upper_body::read_all(&[alone.join("truth")]).unwrap();
+    assert_eq!(takes.len(), 3);
 }
