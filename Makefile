@@ -51,14 +51,20 @@ test: build models readers browser blender validator
 prove prove-rule prove-people: build models
 	.ci/$@
 
-# The synthetic speaker from its videos to its motion. DEMO: the folder; DRAW and STEPS: how much of it.
+# The synthetic speaker from its videos to its motion: a rendered person seen by the models for real people, or, where
+# they cannot be had, a figure in a suit of markers. DEMO: the folder; DRAW and STEPS: how much of it.
 DEMO := $(TARGET)/demo
 DRAW :=
 STEPS := 600
 
 demo: build
-	$(ORATOR) demo draw $(DEMO) $(DRAW)
-	$(ORATOR) run -c $(DEMO)/pipeline.toml
+	@if $(ORATOR) models fetch --models-dir $(ORATOR_MODELS); then \
+		$(ORATOR) demo draw $(DEMO) --rendered $(DRAW) && \
+		$(ORATOR) run -c $(DEMO)/pipeline.toml --set models.dir=$(ORATOR_MODELS); \
+	else \
+		echo 'The models for real people cannot be had (no network, or no npm): the speaker wears a suit of markers.'; \
+		$(ORATOR) demo draw $(DEMO) $(DRAW) && $(ORATOR) run -c $(DEMO)/pipeline.toml; \
+	fi
 	$(ORATOR) train gan -c $(DEMO)/pipeline.toml --steps $(STEPS)
 	$(ORATOR) generate --checkpoint $(DEMO)/work/gan/host --audio $(DEMO)/speech.wav \
 		--out $(addprefix $(DEMO)/motion.,npy bvh glb mp4)

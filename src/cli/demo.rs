@@ -7,10 +7,11 @@ use orator::config;
 use orator::dataset::Dataset;
 use orator::demo::GENERATOR;
 use orator::demo::check::pipeline;
-use orator::demo::check::pipeline::{LEAST_FOUND, LEAST_FRAMES, LEAST_JOINTS, MOST_MM, MOST_PX, Millimetres};
+use orator::demo::check::pipeline::{LEAST_FRAMES, LEAST_JOINTS, Millimetres};
 use orator::demo::check::{learned, sheet, traces};
 use orator::demo::drawn::folder;
 use orator::demo::drawn::folder::DemoPlan;
+use orator::demo::host;
 use orator::demo::people;
 use orator::demo::people::condition::Condition;
 use orator::demo::people::folder::PeoplePlan;
@@ -55,6 +56,10 @@ enum DemoVerb {
         /// Captured motion for the rendered people, a file or a folder; the sound is the .wav beside it.
         #[arg(long, value_name = "FILE|FOLDER", requires = "people")]
         motion: Option<PathBuf>,
+        /// Render the speaker as a person for the models that know real people (`orator models fetch`), in place of the
+        /// figure in a marker suit for the marker models.
+        #[arg(long, conflicts_with = "people")]
+        rendered: bool,
         /// Seconds of each video; 30, of rendered people 8.
         #[arg(long)]
         secs: Option<f64>,
@@ -109,7 +114,7 @@ enum DemoVerb {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.part {
-        DemoVerb::Draw { dir, videos, people, conditions, truth_only, motion, secs, fps, seed } => {
+        DemoVerb::Draw { dir, videos, people, conditions, truth_only, motion, rendered, secs, fps, seed } => {
             let fps = FrameRate::new(fps.clamp(1, 120), 1);
             if let Some(n_clips) = people {
                 let conditions = Condition::of_names(&conditions)?;
@@ -118,7 +123,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             }
             let usual = DemoPlan::default();
             let plan = DemoPlan { n_videos: videos, secs: secs.unwrap_or(usual.secs), fps, seed, ..usual };
-            draw(&dir, &plan, ui)
+            draw(&dir, &plan, rendered, ui)
         }
         DemoVerb::Measure { dir } => measure(&dir, ui),
         DemoVerb::Speaker { dir, hours, seed } => speak(&dir, hours, seed, ui),
@@ -129,8 +134,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     }
 }
 
-fn draw(dir: &Path, plan: &DemoPlan, ui: &Ui) -> Result<Outcome> {
-    let videos = folder::draw(dir, plan, ui)?;
+fn draw(dir: &Path, plan: &DemoPlan, rendered: bool, ui: &Ui) -> Result<Outcome> {
+    let videos = if rendered { host::draw(dir, plan, ui)? } else { folder::draw(dir, plan, ui)? };
     let next = format!("orator run -c {}", dir.join("pipeline.toml").display());
     let text = format!("drew {} videos of {} s into {}", videos.len(), plan.secs, dir.join("videos/host").display());
     ui.summary(&text, Some(&next), json!({ "videos": videos, "next": next }));
@@ -158,9 +163,14 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
     let px = |name: &str, px: &pipeline::Pixels| {
         format!("{name:34}{:>8.2}{:>8.2}{:>7.1} %\n", px.median, px.p90, 100.0 * px.found)
     };
+    let targets = m.targets();
     let mut text = format!("{:34}{:>8}{:>8}{:>9}\n", "2D, px from the truth", "median", "90 %", "found");
     text += &px("body (13 points)", &m.body);
     text += &px("hands (2 x 21 points)", &m.hands);
+    text += &m.shoulders_px.map_or(String::new(), |shoulders| {
+        let [body, hands] = [m.body.median, m.hands.median].map(|px| 100.0 * px / shoulders);
+        format!("of points that can be seen; the shoulders are {shoulders:.0} px wide: {body:.1} % and {hands:.1} % of them\n")
+    });
     text +=
         &format!("{:34}{:>8}{:>8}{:>8}{:>9}\n", "3D, mean mm from the truth", "joints", "body", "wrists", "fingers");
     text += &row("this run", &m.lifted);
@@ -178,10 +188,12 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
     let met = if good { "met" } else { "MISSED" };
     text += &format!("generator: {GENERATOR}\n");
     text += &format!(
-        "3D error against the known truth: {:.1} mm; targets: {MOST_PX} px, {MOST_MM} mm, {:.0} % of points found, {:.0} % \
+        "3D error against the known truth: {:.1} mm; targets: {:.1} px, {:.0} mm, {:.0} % of points found, {:.0} % \
          of frames, {:.0} % of joints: {met}",
         m.lifted.all,
-        100.0 * LEAST_FOUND,
+        targets.most_px,
+        targets.most_mm,
+        100.0 * targets.least_found,
         100.0 * LEAST_FRAMES,
         100.0 * LEAST_JOINTS
     );
@@ -190,7 +202,8 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
         "body_px": { "median": m.body.median, "p90": m.body.p90, "found": m.body.found },
         "hands_px": { "median": m.hands.median, "p90": m.hands.p90, "found": m.hands.found },
         "mm": mm(&m.lifted), "mean_pose_mm": mm(&m.mean_pose), "mean_depth_mm": mm(&m.mean_depth),
-        "bone_depth_mm": mm(&m.bone_depth), "joints": m.joints, "generator": GENERATOR,
+        "bone_depth_mm": mm(&m.bone_depth), "joints": m.joints, "shoulders_px": m.shoulders_px,
+        "generator": if m.shoulders_px.is_some() { "rendered person" } else { GENERATOR },
         "n_frames": m.n_frames, "n_drawn": m.n_drawn, "good": good,
     });
     ui.summary(&text, None, facts);

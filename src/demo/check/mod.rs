@@ -4,3 +4,4 @@ pub mod learned;
 pub mod pipeline;
 pub mod sheet;
 pub mod traces;
+pub mod truth;

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// Frame rate of the dataset and of the truth.
 pub const DATASET_FPS: FrameRate = FrameRate::new(15, 1);
 /// Seconds of speech without video for `orator generate`.
-const UNHEARD_SECS: f64 = 10.0;
+pub const UNHEARD_SECS: f64 = 10.0;
 
 const MODELS: [(&str, &[u8]); 3] = [
     ("marker_person.onnx", include_bytes!("../../../models/marker_person.onnx")),
@@ -64,11 +64,19 @@ impl Default for DemoPlan {
     }
 }
 
+impl DemoPlan {
+    /// Errors: no videos or too many, too short or too long ones.
+    pub fn check(&self) -> anyhow::Result<()> {
+        ensure!((1..=1000).contains(&self.n_videos), "between 1 and 1000 videos can be drawn, not {}", self.n_videos);
+        ensure!((1.0..=3600.0).contains(&self.secs), "a video lasts 1 to 3600 seconds, not {}", self.secs);
+        Ok(())
+    }
+}
+
 /// Writes `videos/host/clip-<n>.mp4`, `truth/clip-<n>.npz`, `speech.wav`, `models/` and `pipeline.toml` into `dir`;
 /// returns the videos.
 pub fn draw(dir: &Path, plan: &DemoPlan, progress: &dyn Progress) -> anyhow::Result<Vec<PathBuf>> {
-    ensure!((1..=1000).contains(&plan.n_videos), "between 1 and 1000 videos can be drawn, not {}", plan.n_videos);
-    ensure!((1.0..=3600.0).contains(&plan.secs), "a video lasts 1 to 3600 seconds, not {}", plan.secs);
+    plan.check()?;
     for (name, bytes) in MODELS {
         workdir::write_file(&dir.join("models").join(name), bytes)?;
     }
@@ -87,7 +95,7 @@ pub fn draw(dir: &Path, plan: &DemoPlan, progress: &dyn Progress) -> anyhow::Res
 }
 
 /// Configuration lines for the splits: the last two videos validate and test; fewer than three all train.
-fn splits(n_videos: usize) -> String {
+pub fn splits(n_videos: usize) -> String {
     if n_videos < 3 {
         return "train = [\"*.mp4\"]".to_owned();
     }

@@ -151,7 +151,7 @@ fn seeds(seed: u64, condition: Condition, number: usize, part: SetPart) -> ClipS
     rng.set_stream(1000 * condition as u64 + number as u64);
     let range = (part as u64) << 32;
     let mut next = || range + u64::from(rng.random::<u32>());
-    ClipSeeds { body: next(), clothes: next(), camera: next(), motion: next() }
+    ClipSeeds { body: next(), clothes: next(), camera: next(), motion: next(), voice: None }
 }
 
 /// Files of motion of a folder in the order of their names, or the file itself.
@@ -192,7 +192,7 @@ mod tests {
         for condition in Condition::ALL {
             for number in 0..30 {
                 let part = SetPart::ALL[number / 10];
-                let ClipSeeds { body, clothes, camera, motion } = seeds(7, condition, number, part);
+                let ClipSeeds { body, clothes, camera, motion, .. } = seeds(7, condition, number, part);
                 for (kind, seed) in [("body", body), ("clothes", clothes), ("camera", camera), ("motion", motion)] {
                     assert_eq!(parts.insert((kind, seed), part), None, "{kind} {seed}");
                     assert_eq!(seed >> 32, part as u64);

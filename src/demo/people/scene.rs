@@ -37,6 +37,9 @@ pub struct ClipSeeds {
     pub clothes: u64,
     pub camera: u64,
     pub motion: u64,
+    /// Pitch and formants; those of the speech where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub voice: Option<u64>,
 }
 
 /// Motion captured elsewhere, with its sound.
@@ -75,7 +78,7 @@ impl PeopleScene {
         let step_fps = FrameRate::new(fps.num * n_steps as u32, fps.den);
         let voice = match captured {
             Some(clip) => Voice::recorded(seeds.motion, secs, clip.sound.clone()),
-            None => Voice::new(seeds.motion, secs),
+            None => Voice::new(seeds.motion, secs, seeds.voice),
         };
         let mut rng = ChaCha8Rng::seed_from_u64(seeds.camera);
         let seat = condition.seat().unwrap_or([Seat::Standing, Seat::Chair, Seat::Desk][rng.random_range(0..3)]);
@@ -90,7 +93,7 @@ impl PeopleScene {
         let act = |seeds: ActorSeeds, role: ActorRole, voice: &Voice, motion: Option<&Motion>| {
             Actor::new(seeds, role, voice, motion, step_fps, n_frames * n_steps)
         };
-        let ClipSeeds { body, clothes, camera: _, motion } = seeds;
+        let ClipSeeds { body, clothes, motion, .. } = seeds;
         let mut actors =
             vec![act(ActorSeeds { body, clothes, motion }, role, &voice, captured.map(|clip| &clip.motion))];
         if condition == Condition::TwoPeople {
@@ -99,7 +102,7 @@ impl PeopleScene {
             let second = ActorRole { place, turn: -side * rng.random_range(0.0..0.35), speaks: false, ..role };
             // The second person has the first one's seeds from far along the same streams.
             let [body, clothes, motion] = [body, clothes, motion].map(|seed| seed ^ (1 << 40));
-            let silent = Voice::new(motion, secs);
+            let silent = Voice::new(motion, secs, None);
             actors.push(act(ActorSeeds { body, clothes, motion }, second, &silent, None));
         }
         let first = &actors[0];

@@ -27,13 +27,16 @@ pub struct Voice {
 }
 
 impl Voice {
-    /// Voice of a seed for `secs` seconds; pitch 90 to 240 Hz, formants in proportion to a usual tract of that pitch.
-    pub fn new(seed: u64, secs: f64) -> Self {
+    /// Voice of a seed for `secs` seconds; pitch 90 to 240 Hz, formants in proportion to a usual tract of that pitch. A
+    /// seed of its own makes pitch and formants those of one person whatever is said.
+    pub fn new(seed: u64, secs: f64, person: Option<u64>) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut speech = if rng.random_bool(0.5) { Speech::new(secs, &mut rng) } else { Speech::free(secs, &mut rng) };
-        let high = rng.random_range(0.0..1.0_f64);
+        let tract = |rng: &mut ChaCha8Rng| (rng.random_range(0.0..1.0_f64), rng.random_range(-0.03..0.03));
+        let of_speech = tract(&mut rng);
+        let (high, shade) = person.map_or(of_speech, |seed| tract(&mut ChaCha8Rng::seed_from_u64(seed)));
         let pitch = 90.0 * (240.0_f64 / 90.0).powf(high);
-        let formants = 0.94 + 0.24 * high + rng.random_range(-0.03..0.03);
+        let formants = 0.94 + 0.24 * high + shade;
         speech.syllables.iter_mut().for_each(|syllable| syllable.pitch *= pitch / SPEECH_PITCH);
         if secs > 5.0 && rng.random_bool(0.5) {
             let start = rng.random_range(1.5..secs - 2.5);
@@ -49,7 +52,7 @@ impl Voice {
     /// Voice with a recorded sound, or in silence; gestures are still tied to the speech of the seed.
     pub fn recorded(seed: u64, secs: f64, sound: Option<Sound>) -> Self {
         let silent = Sound { rate: crate::types::sound::SAMPLE_RATE, samples: Vec::new() };
-        Self { sound: sound.unwrap_or(silent), captured: true, ..Self::new(seed, secs) }
+        Self { sound: sound.unwrap_or(silent), captured: true, ..Self::new(seed, secs, None) }
     }
 
     /// Opening of the speaking mouth, 0..1.
@@ -89,12 +92,12 @@ mod tests {
 
     #[test]
     fn voices_differ_in_pitch_and_the_mouth_is_shut_in_pauses() {
-        let pitch = |seed: u64| Voice::new(seed, 6.0).speech.syllables[0].pitch;
+        let pitch = |seed: u64| Voice::new(seed, 6.0, None).speech.syllables[0].pitch;
         let pitches: Vec<f64> = (0..40).map(pitch).collect();
         let (low, high) =
             (pitches.iter().copied().fold(f64::MAX, f64::min), pitches.iter().copied().fold(0.0, f64::max));
         assert!(low < 110.0 && high > 200.0, "{low} {high}");
-        let voice = Voice::new(3, 8.0);
+        let voice = Voice::new(3, 8.0, None);
         let syllables = &voice.speech.syllables;
         let loud = syllables.iter().max_by(|a, b| a.stress.total_cmp(&b.stress)).unwrap();
         assert!(voice.mouth((loud.start + loud.end) / 2.0) > 0.15);

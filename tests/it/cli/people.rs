@@ -65,7 +65,7 @@ fn hands_under_a_desk_are_behind_a_thing() {
     };
     let dir = tempfile::tempdir().unwrap();
     let hidden = (0..12).any(|seed| {
-        let seeds = ClipSeeds { body: seed, clothes: 1, camera: seed, motion: seed };
+        let seeds = ClipSeeds { body: seed, clothes: 1, camera: seed, motion: seed, voice: None };
         let scene = PeopleScene::new(Condition::SeatedDesk, seeds, 1.0, FrameRate::new(2, 1), None);
         let truth = scene.film(&dir.path().join("a.mp4"), &Silent).unwrap();
         let hands = [&truth.left_hand_seen, &truth.right_hand_seen];
