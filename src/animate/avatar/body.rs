@@ -183,15 +183,18 @@ impl<'a> BodyForm<'a> {
         let seat = looks.trunk * looks.hips;
         let x = 5.4 * seat;
         let mut form = Form::default().with(self.limb(hips, [[-x, -3.5, -0.5], [x, -3.5, -0.5]], [8.6 * seat; 2]), 0.0);
-        let girth = looks.limbs * if looks.skirt { 0.84 } else { 1.0 };
+        // Thighs keep within narrow hips.
+        let girth = looks.limbs.min(seat + 0.05) * if looks.skirt { 0.84 } else { 1.0 };
+        let narrow = 9.0 * (1.0 - seat).max(0.0);
         for (side, [upper, lower, foot, _]) in [1.0, -1.0].into_iter().zip(self.trunk.legs) {
             let knee = self.length(upper, lower);
             let ankle = self.length(lower, foot);
             let wide = |radii: [f64; 2]| radii.map(|r| r * girth);
             let hem = if looks.skirt { 3.6 } else { 5.2 };
+            let (hip, seam) = (-side * narrow, -side * (narrow + 1.5));
             form = form
-                .with(self.limb(upper, [[0.0, -2.0, 0.0], [0.0, -knee, 0.0]], wide([7.1, 5.8])), self.cm(2.5))
-                .with(self.limb(upper, [[side * -1.5, -1.0, -2.0], [0.0, -12.0, -0.5]], wide([7.0, 6.7])), self.cm(3.0))
+                .with(self.limb(upper, [[hip, -2.0, 0.0], [0.0, -knee, 0.0]], wide([7.1, 5.8])), self.cm(2.5))
+                .with(self.limb(upper, [[seam, -1.0, -2.0], [0.5 * hip, -12.0, -0.5]], wide([7.0, 6.7])), self.cm(3.0))
                 .with(self.limb(lower, [[0.0, 0.0, 0.0], [0.0, -ankle, 0.0]], wide([5.9, hem])), self.cm(2.0))
                 .with(self.limb(lower, [[0.0, -7.0, -1.6], [0.0, -18.0, -1.2]], wide([5.2, 4.8])), self.cm(4.0));
         }

@@ -260,11 +260,11 @@ impl HeadForm<'_> {
         if looks.beard <= 0.0 {
             return 0.0;
         }
-        let cheek = 5.0 + 0.75 * (x - 2.6).max(0.0);
+        let cheek = 5.0 + 0.6 * (x - 2.6).max(0.0) + 0.5 * (4.0 - z).max(0.0);
         let jaw = rise((cheek - y) / 0.5) * rise((x - 2.2) / 0.5);
         let chin = rise((MOUTH_Y - 1.1 - y) / 0.3);
         let moustache = rise((y - MOUTH_Y - 0.55) / 0.2) * rise((6.0 - y) / 0.3) * rise((2.9 - x) / 0.4);
-        let front = rise((z - 0.6) / 0.8) * rise((y + 1.4) / 1.2);
+        let front = rise((z - 1.0) / 1.4) * rise((y + 1.4) / 1.2);
         looks.beard * (jaw.max(chin).max(moustache) * front)
     }
 }

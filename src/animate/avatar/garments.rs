@@ -104,8 +104,10 @@ impl BodyForm<'_> {
             if looks.top == Top::Jacket {
                 // Above the lapels the jacket lies on the shoulders, at the side of the neck.
                 let narrow = 0.8 * (local[1] - THROAT + 5.0).max(0.0);
+                // The edge lies below the lapel, which is narrow at its lower end.
+                let under = (0.12 * (local[1] - BUTTON)).min(1.4);
                 let shown =
-                    normal[2] > 0.15 && local[1] > BUTTON + 1.0 && local[0].abs() < opening(local[1]) + 1.4 - narrow;
+                    normal[2] > 0.15 && local[1] > BUTTON + 1.0 && local[0].abs() < opening(local[1]) + under - narrow;
                 return if shown { looks.second_colour } else { looks.top_colour };
             }
             // Along the trunk, or along the arm whose sleeve is nearer; and around.

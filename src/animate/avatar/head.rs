@@ -15,7 +15,7 @@ pub const EYE_RADIUS: f64 = 1.36;
 pub const EAR: Vec3 = [7.75, 9.5, -0.4];
 /// Size of the cells at the middle of the face, and the radius within which they hardly grow.
 const CELL: f64 = 0.4;
-const FOCUS: (Vec3, f64) = ([0.0, 7.0, 8.8], 5.2);
+const FOCUS: (Vec3, f64) = ([0.0, 7.0, 8.8], 4.8);
 /// Size of the head of the plain figure relative to the shape, by its trunk.
 const LARGE: f64 = 1.05;
 const EAR_CELL: f64 = 0.42;
@@ -194,9 +194,9 @@ impl<'a> HeadForm<'a> {
                 _ => d,
             }
         };
-        let low = if style == Hairstyle::Long { -12.5 } else { 2.0 };
-        let bounds = even([[-11.0, low, -15.0], [11.0, 24.0, 11.0]], HAIR_CELL);
-        Some(Surface::from_field(&field, bounds, HAIR_CELL).lit(&field, 0.5 * HAIR_CELL))
+        let (low, cell) = if style == Hairstyle::Long { (-12.5, 1.2 * HAIR_CELL) } else { (2.0, HAIR_CELL) };
+        let bounds = even([[-11.0, low, -15.0], [11.0, 24.0, 11.0]], cell);
+        Some(Surface::from_field(&field, bounds, cell).lit(&field, 0.5 * cell))
     }
 
     /// Whether a point of the skin lies in the hollow of the mouth.

@@ -137,7 +137,8 @@ impl AvatarMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::animate::avatar::Appearance;
+    use crate::animate::avatar::appearance::{Appearance, Top};
+    use crate::animate::avatar::material::Material;
     use crate::math::vec3::norm;
     use crate::types::pose3d::Motion;
     use crate::types::skeleton::N_JOINTS;
@@ -187,5 +188,59 @@ mod tests {
         assert!((f64::from(most) - gaps[10]).abs() < 0.5, "{most}");
         let [left, right] = hip_points(&rig, rig.root, &local);
         assert!(left[0] > 5.0 && right[0] < -5.0 && (left[1] - right[1]).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_seed_gives_the_same_bytes_and_the_plain_face_is_the_same_on_both_sides() {
+        let rig = rig();
+        let local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
+        let of = |seed: u64| Avatar::new(&rig, &Appearance::from_seed(seed)).posed(&rig, rig.root, &local, 0.3);
+        let first = of(4);
+        assert_eq!(first, of(4));
+        assert_ne!(first, of(5));
+        for mesh in &first {
+            let n = mesh.points.len();
+            assert!(mesh.triangles.iter().flatten().all(|&v| (v as usize) < n) && mesh.colours.len() == n);
+            assert!(mesh.points.iter().flatten().chain(mesh.normals.iter().flatten()).all(|v| v.is_finite()));
+        }
+        assert!((20_000..46_000).contains(&first.iter().map(|mesh| mesh.triangles.len()).sum::<usize>()));
+        let plain = Avatar::new(&rig, &Appearance::plain());
+        for material in [Material::Face, Material::Eyes] {
+            let part = plain.parts.iter().find(|part| part.material == material).unwrap();
+            for point in part.points.iter().step_by(37) {
+                let mirror = [-point[0], point[1], point[2]];
+                let near = part.points.iter().map(|at| norm(sub(*at, mirror))).fold(f64::INFINITY, f64::min);
+                assert!(near < 0.02, "{material:?}: {point:?} has no mirror image, by {near} cm");
+            }
+        }
+    }
+
+    #[test]
+    fn a_bare_forearm_keeps_its_girth_when_the_hand_turns_and_bends() {
+        let rig = rig();
+        let looks = Appearance { top: Top::ShortSleeves, ..Appearance::plain() };
+        let avatar = Avatar::new(&rig, &looks);
+        let arm = &rig.arms[0];
+        // Mean distance from the forearm's axis of the skin in slices from its middle to the wrist.
+        let girth = |turn: Rotation| {
+            let mut local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
+            local[arm.hand] = turn;
+            let places = rig.skeleton.positions(rig.root, &local);
+            let (elbow, wrist) = (places[arm.fore], places[arm.hand]);
+            let long = norm(sub(wrist, elbow));
+            let meshes = avatar.posed(&rig, rig.root, &local, 0.0);
+            [0.5, 0.6, 0.7, 0.8, 0.9].map(|share| {
+                let at = |point: &[f32; 3]| sub(point.map(f64::from), elbow);
+                let slice = meshes[0].points.iter().map(at).filter(|at| (at[0] / long - share).abs() < 0.04);
+                let radii: Vec<f64> = slice.map(|at| at[1].hypot(at[2])).filter(|r| *r < 6.0).collect();
+                radii.iter().sum::<f64>() / radii.len() as f64
+            })
+        };
+        let straight = girth(Rotation::IDENTITY);
+        for (axis, degrees) in [([1.0, 0.0, 0.0], 85.0), ([1.0, 0.0, 0.0], -85.0), ([0.0, 0.0, -1.0], 60.0)] {
+            let bent = girth(Rotation::about(axis, f64::to_radians(degrees)));
+            let worst = straight.iter().zip(bent).map(|(a, b)| b / a).fold(1.0, f64::min);
+            assert!(worst > 0.9, "{degrees} degrees about {axis:?}: {straight:?} cm become {bent:?}");
+        }
     }
 }
