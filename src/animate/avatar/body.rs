@@ -67,7 +67,7 @@ impl<'a> BodyForm<'a> {
             }
         }
         for side in [1.0, -1.0] {
-            let ends = [[side * 2.4, 3.4, -1.6], [side * wide(14.0), -1.2, -0.8]];
+            let ends = [[side * 2.8, 4.8, -1.7], [side * wide(14.0), -1.2, -0.8]];
             form = form.with(self.limb(neck, ends, [4.6 + cloth, 4.1 + cloth]), self.cm(6.0));
         }
         let [low, high] = [7.2, 6.2].map(|r| r * looks.neck.max(0.9) * looks.head[0].max(1.0) + 0.5 * cloth);
@@ -153,7 +153,7 @@ impl<'a> BodyForm<'a> {
     pub fn shirt(&self) -> impl Fn(Vec3) -> f64 + Sync + use<'_> {
         let trunk = self.trunk();
         let sleeves = [0, 1].map(|side| self.sleeve(side));
-        let collar = self.stance.at(self.trunk.neck, [0.0, 4.4, 0.0]);
+        let collar = self.stance.at(self.trunk.neck, [0.0, 5.4, 0.0]);
         // A shirt is worn over trousers and inside a skirt.
         let low = match (self.looks.skirt, self.looks.top) {
             (_, Top::Jacket) => -10.0,

@@ -75,7 +75,7 @@ impl BodyForm<'_> {
             let share = f64::from(k) / 18.0;
             let (sin, cos) = (share * 172.0_f64.to_radians()).sin_cos();
             let front = (0.5 - 0.5 * cos).powi(2);
-            let base = 3.6 - 2.6 * front;
+            let base = 4.7 - 2.9 * front;
             let point = (share.abs() - 0.72).max(0.0) / 0.28;
             let fold = [
                 (5.75, base + 0.5),

@@ -18,7 +18,7 @@ const CELL: f64 = 0.4;
 const FOCUS: (Vec3, f64) = ([0.0, 7.0, 8.8], 4.8);
 /// Size of the head of the plain figure relative to the shape, by its trunk.
 const LARGE: f64 = 1.05;
-const EAR_CELL: f64 = 0.42;
+const EAR_CELL: f64 = 0.38;
 const HAIR_CELL: f64 = 1.0;
 
 /// Head of one person.
@@ -141,7 +141,7 @@ impl<'a> HeadForm<'a> {
         let [x, y, z] = EAR;
         let out = unit([0.86, 0.0, -0.5], 0.0).unwrap_or([1.0, 0.0, 0.0]);
         let form = Form::default()
-            .with(cone([x + 0.25, y + 1.7, z - 0.5], [x, y - 0.8, z], [1.65, 1.15]).flat(out, 0.36), 0.0)
+            .with(cone([x + 0.25, y + 1.7, z - 0.5], [x, y - 0.8, z], [1.65, 1.15]).flat(out, 0.42), 0.0)
             .with(cone([x - 0.15, y - 1.6, z + 0.35], [x - 0.15, y - 2.1, z + 0.5], [0.8, 0.65]).flat(out, 0.5), 0.8);
         let shell = cone([x + 0.75, y + 1.1, z + 0.1], [x + 0.6, y - 0.6, z + 0.35], [0.8, 0.6]).flat(out, 0.55);
         let field = |at: Vec3| carved(form.distance(at), shell.distance(at), 0.35);

@@ -2,7 +2,7 @@
 //! crosses, a quad around every edge that crosses it; vertices are then projected onto the surface and relaxed over it.
 //! Normals are the field's gradient.
 
-use crate::math::vec3::{Vec3, add, dot, norm, scale, sub, unit};
+use crate::math::vec3::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use rayon::prelude::*;
 
 /// Cells of a block that is skipped as a whole where the surface is far away.
@@ -72,15 +72,31 @@ impl Surface {
                 surface.points.push(space(point));
             }
         }
+        let mut quads = Vec::new();
         grid.quads(|corners, inwards| {
             let [a, b, c, d] = corners.map(|corner| vertex_of[corner]);
-            let [a, b, c, d] = if inwards { [d, c, b, a] } else { [a, b, c, d] };
-            let apart = |i: u32, j: u32| norm(sub(surface.points[i as usize], surface.points[j as usize]));
-            let pair = if apart(a, c) <= apart(b, d) { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
-            surface.triangles.extend(pair);
+            quads.push(if inwards { [d, c, b, a] } else { [a, b, c, d] });
         });
+        let halves = |&[a, b, c, d]: &[u32; 4]| [[a, b, c], [a, c, d]];
+        surface.triangles = quads.iter().flat_map(halves).collect();
         surface.settle(field, cell);
+        // Of a quad's diagonals the one whose triangles face outwards more.
+        let split = |quad: &[u32; 4]| {
+            let [a, b, c, d] = *quad;
+            let [one, other] = [halves(quad), [[a, b, d], [b, c, d]]];
+            let outwards = |pair: &[[u32; 3]; 2]| surface.facing(pair[0]).min(surface.facing(pair[1]));
+            if outwards(&one) >= outwards(&other) { one } else { other }
+        };
+        surface.triangles = quads.iter().flat_map(split).collect();
         surface
+    }
+
+    /// Cosine of the angle between a triangle's normal and the mean of those of its vertices; 0 without an area.
+    fn facing(&self, triangle: [u32; 3]) -> f64 {
+        let [a, b, c] = triangle.map(|v| self.points[v as usize]);
+        let mean = triangle.iter().fold([0.0; 3], |sum, &v| add(sum, self.normals[v as usize]));
+        let [normal, mean] = [cross(sub(b, a), sub(c, a)), mean].map(|v| unit(v, 1e-12).unwrap_or([0.0; 3]));
+        dot(normal, mean)
     }
 
     /// Projects the vertices onto the surface and distributes them evenly.
@@ -229,7 +245,6 @@ impl FieldGrid {
 mod tests {
     use super::*;
     use crate::animate::avatar::field::RoundCone;
-    use crate::math::vec3::cross;
 
     #[test]
     fn a_ball_is_round_closed_and_faces_outwards() {
