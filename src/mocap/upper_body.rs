@@ -23,6 +23,8 @@ pub struct BodyTake {
     pub name: String,
     pub fps: f64,
     pub poses: Vec<Pose>,
+    /// Whether it is the truth of a rendered person, whose bones and head are as they should be.
+    pub rendered: bool,
 }
 
 impl BodyTake {
@@ -153,7 +155,9 @@ fn read_rendered(path: &Path) -> Result<Vec<BodyTake>> {
         path.display()
     );
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
-    Ok(divided(&name, truth.fps.per_sec(), poses))
+    let mut takes = divided(&name, truth.fps.per_sec(), poses);
+    takes.iter_mut().for_each(|take| take.rendered = true);
+    Ok(takes)
 }
 
 /// TED Expressive: `human_joints` [T, 43, 3] in metres, y down, and `fps`. 0 is the spine, 0.26 m below the neck (1);
@@ -216,7 +220,9 @@ fn divided(name: &str, fps: f64, poses: Vec<Pose>) -> Vec<BodyTake> {
         |a: &Pose, b: &Pose| (0..N_POINTS).map(|j| vec3::norm(vec3::sub(a[j], b[j]))).sum::<f64>() / N_POINTS as f64;
     let stretches = poses.chunk_by(|a, b| jump(a, b) <= limit);
     let long = stretches.filter(|s| s.len() as f64 >= SHORTEST_SECS * fps);
-    long.enumerate().map(|(i, s)| BodyTake { name: format!("{name}#{i}"), fps, poses: s.to_vec() }).collect()
+    long.enumerate()
+        .map(|(i, s)| BodyTake { name: format!("{name}#{i}"), fps, poses: s.to_vec(), rendered: false })
+        .collect()
 }
 
 #[cfg(test)]
@@ -315,7 +321,7 @@ mod tests {
 
     #[test]
     fn takes_are_divided_by_their_names() {
-        let take = |name: &str| BodyTake { name: name.into(), fps: 30.0, poses: Vec::new() };
+        let take = |name: &str| BodyTake { name: name.into(), fps: 30.0, poses: Vec::new(), rendered: false };
         let takes = || ["walk#0", "walk#1", "wave#0"].map(take).to_vec();
         let (sets, others) = divide(takes(), &["*#1".into(), "wave*".into()]).unwrap();
         let names: Vec<&str> = sets.iter().flat_map(|(_, set)| set).map(|t| t.name.as_str()).collect();

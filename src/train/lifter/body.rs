@@ -18,9 +18,10 @@ use serde_json::{Value, json};
 
 /// Weight of each point in the loss: nose, arms, hips.
 const WEIGHTS: [f32; N_POINTS] = [1.0, 1.0, 1.2, 1.5, 1.0, 1.2, 1.5, 0.4, 0.4];
-/// Share of scenes of captured motion, where there is any.
-const CAPTURED: f64 = 0.5;
-/// Share of those in which one arm comes from another take.
+/// Shares of scenes of captured motion and of rendered people, where there are any; the rest is made by rule.
+const CAPTURED: f64 = 0.4;
+const RENDERED: f64 = 0.3;
+/// Share of the captured ones in which one arm comes from another take.
 const MIXED: f64 = 0.35;
 /// Frames of a scene, from and to, and the windows that are cut from it.
 const SCENE_FRAMES: std::ops::RangeInclusive<usize> = 30..=84;
@@ -33,9 +34,8 @@ const MEASURED_BRIEFLY: usize = 40;
 pub struct BodyLifterTask {
     params: Params,
     lifter: BodyLifter,
-    takes: Vec<BodyTake>,
-    /// Sum of the seconds of `takes` up to and with each: longer takes are drawn more often.
-    ends: Vec<f64>,
+    captured: TakePool,
+    rendered: TakePool,
     /// Takes that are only measured on.
     held_out: Vec<Set>,
 }
@@ -46,23 +46,16 @@ impl BodyLifterTask {
         takes.sort_by(|a, b| a.name.cmp(&b.name));
         let mut params = Params::new(seed);
         let lifter = BodyLifter::new(&mut params, config)?;
-        let ends = takes.iter().scan(0.0, |end, take| {
-            *end += take.poses.len() as f64 / take.fps;
-            Some(*end)
-        });
-        let ends = ends.collect();
-        Ok(Self { params, lifter, takes, ends, held_out })
-    }
-
-    fn take(&self, rng: &mut ChaCha8Rng) -> Option<&BodyTake> {
-        let at = rng.random_range(0.0..*self.ends.last()?);
-        self.takes.get(self.ends.partition_point(|&end| end <= at))
+        let (rendered, captured) = takes.into_iter().partition(|take| take.rendered);
+        Ok(Self { params, lifter, captured: TakePool::new(captured), rendered: TakePool::new(rendered), held_out })
     }
 
     fn scene(&self, rng: &mut ChaCha8Rng) -> FilmedScene {
         let n_frames = rng.random_range(SCENE_FRAMES);
-        if let (true, Some(take)) = (rng.random_bool(CAPTURED), self.take(rng)) {
-            let other = if rng.random_bool(MIXED) { self.take(rng) } else { None };
+        let kind = rng.random_range(0.0..1.0);
+        let pool = if kind < CAPTURED { &self.captured } else { &self.rendered };
+        if let (true, Some(take)) = (kind < CAPTURED + RENDERED, pool.sample(rng)) {
+            let other = if !take.rendered && rng.random_bool(MIXED) { pool.sample(rng) } else { None };
             // a short take lasts for as long as it goes slowly
             for n_frames in [n_frames, *SCENE_FRAMES.start()] {
                 if let Some(scene) = FilmedScene::from_take(take, other, Filming::Training, n_frames, rng) {
@@ -74,6 +67,28 @@ impl BodyLifterTask {
     }
 }
 
+/// Takes to draw from.
+struct TakePool {
+    takes: Vec<BodyTake>,
+    /// Sum of the seconds of `takes` up to and with each: longer takes are drawn more often.
+    ends: Vec<f64>,
+}
+
+impl TakePool {
+    fn new(takes: Vec<BodyTake>) -> Self {
+        let ends = takes.iter().scan(0.0, |end, take| {
+            *end += take.poses.len() as f64 / take.fps;
+            Some(*end)
+        });
+        Self { ends: ends.collect(), takes }
+    }
+
+    fn sample(&self, rng: &mut ChaCha8Rng) -> Option<&BodyTake> {
+        let at = rng.random_range(0.0..*self.ends.last()?);
+        self.takes.get(self.ends.partition_point(|&end| end <= at))
+    }
+}
+
 impl TrainingTask for BodyLifterTask {
     fn kind(&self) -> &'static str {
         "body-lifter"
@@ -81,15 +96,17 @@ impl TrainingTask for BodyLifterTask {
 
     fn metadata(&self) -> Value {
         let mut hash = blake3::Hasher::new();
-        for take in &self.takes {
+        for take in self.captured.takes.iter().chain(&self.rendered.takes) {
             hash.update(take.name.as_bytes());
             for value in take.poses.iter().flatten().flatten() {
                 hash.update(&value.to_le_bytes());
             }
         }
+        let frames = |pool: &TakePool| pool.takes.iter().map(|take| take.poses.len()).sum::<usize>();
         json!({
             "config": self.lifter.net.config(),
-            "takes": self.takes.len(), "frames": self.takes.iter().map(|t| t.poses.len()).sum::<usize>(),
+            "takes": self.captured.takes.len(), "rendered": self.rendered.takes.len(),
+            "frames": frames(&self.captured) + frames(&self.rendered),
             "held_out": self.held_out.iter().map(|(set, _)| set).collect::<Vec<_>>(),
             "motion": hash.finalize().to_hex().as_str(),
         })

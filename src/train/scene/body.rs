@@ -64,9 +64,12 @@ impl FilmedScene {
         if let Some(other) = other.and_then(|other| stretch(other, training, n_frames, rng)) {
             poses.iter_mut().zip(&other).for_each(|(pose, other)| take_arm(pose, other));
         }
-        let bones = if training { Proportions::sample(rng) } else { Proportions::MEAN };
-        poses.iter_mut().for_each(|pose| *pose = with_bones(pose, &bones));
-        if training {
+        let as_it_is = training && take.rendered;
+        if !as_it_is {
+            let bones = if training { Proportions::sample(rng) } else { Proportions::MEAN };
+            poses.iter_mut().for_each(|pose| *pose = with_bones(pose, &bones));
+        }
+        if training && !as_it_is {
             let glance = turn(rng.random_range(-0.5..0.5), rng.random_range(-0.2..0.2), 0.0);
             poses.iter_mut().for_each(|pose| pose[NOSE] = glance.turn(pose[NOSE]));
         }
@@ -291,6 +294,7 @@ mod tests {
         BodyTake {
             name: "t".into(),
             fps: 60.0,
+            rendered: false,
             poses: poses.iter().map(|p| p.map(|q| turn(2.5, 0.0, 0.0).turn(q))).collect(),
         }
     }

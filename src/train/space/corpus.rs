@@ -205,7 +205,8 @@ mod tests {
             let (sin, cos) = (4.0 * PI * t as f64 / 300.0).sin_cos();
             still.map(|[x, y, z]| [cos * x - sin * z, y, cos * z + sin * x])
         };
-        let take = BodyTake { name: "turn#0".into(), fps: 30.0, poses: (0..300).map(turning).collect() };
+        let take =
+            BodyTake { name: "turn#0".into(), fps: 30.0, poses: (0..300).map(turning).collect(), rendered: false };
         let corpus = Corpus::new(&[take], &[], &[], &[], 7).unwrap();
         assert_eq!(corpus.pieces.len(), COPIES + RULES);
         for piece in &corpus.pieces {

@@ -14,7 +14,7 @@ use std::process::Command;
 fn by_rule() -> Set {
     let take = |seed: u64| {
         let poses = gesture(&mut ChaCha8Rng::seed_from_u64(seed), 240, 1.0 / 30.0);
-        BodyTake { name: format!("rule#{seed}"), fps: 30.0, poses }
+        BodyTake { name: format!("rule#{seed}"), fps: 30.0, poses, rendered: false }
     };
     ("by rule".to_owned(), (900..908).map(take).collect())
 }
