@@ -114,9 +114,13 @@ impl StaticScene {
             for y in from[1]..(from[1] + BLOCK).min(image.height) {
                 for x in from[0]..(from[0] + BLOCK).min(image.width) {
                     let at = y * image.width + x;
-                    let pixel = &self.light[at];
-                    let lit = if pixel.cover > 0.0 { shadows.lit(pixel.asking) } else { 1.0 };
-                    if lit < 1.0 {
+                    let mut pixel = self.light[at];
+                    if pixel.cover == 0.0 {
+                        continue;
+                    }
+                    let (open, lit) = (shadows.open_share(pixel.asking), shadows.lit(pixel.asking));
+                    if open < 1.0 || lit < 1.0 {
+                        pixel.own.iter_mut().for_each(|v| *v *= open);
                         image.data[3 * at..3 * at + 3].copy_from_slice(&srgb.bytes(compressed(pixel.sum(lit))));
                     }
                 }

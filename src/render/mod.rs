@@ -2,6 +2,7 @@
 
 pub mod background;
 pub mod camera;
+pub mod faults;
 pub mod light;
 pub mod mesh;
 mod pixel;

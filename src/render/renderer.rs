@@ -62,6 +62,7 @@ impl Renderer {
         self.surfaces.set(camera, meshes, light);
         self.shading.open(&self.surfaces);
         self.shadows.cast(self.surfaces.casters(meshes), false);
+        self.surfaces.occlude(&self.shadows);
         if let Some(scene) = &self.scene {
             scene.shade(&mut image, &self.shadows);
         }
@@ -283,6 +284,6 @@ mod tests {
         renderer.draw(&camera, &[&square(0.0, 0.0, 40.0, 50.0, 0)], &light, &black());
         assert_eq!(image, renderer.draw(&camera, &[&ball], &light, &scene));
         let hash = blake3::hash(&image.data).to_hex();
-        assert_eq!(&hash[..16], "44b0aa2e29dc23a6");
+        assert_eq!(&hash[..16], "87a530482266c943");
     }
 }

@@ -4,6 +4,26 @@ use super::light::{Light, dot};
 
 /// Least offset of a surface from its own shadow, cm; a texel's width is added.
 const BIAS_CM: f32 = 0.35;
+/// Surroundings of a point that take light from all round: places on two rings, and the rings' radii.
+const NEAR_SPOTS: [[f32; 2]; 12] = [
+    [1.0, 0.0],
+    [0.0, 1.0],
+    [-1.0, 0.0],
+    [0.0, -1.0],
+    [0.924, 0.383],
+    [0.383, 0.924],
+    [-0.383, 0.924],
+    [-0.924, 0.383],
+    [-0.924, -0.383],
+    [-0.383, -0.924],
+    [0.383, -0.924],
+    [0.924, -0.383],
+];
+const NEAR_RADII_CM: [f32; 2] = [2.0, 4.5];
+/// Nearest and furthest of what takes light, cm, and the share it takes where it is all round.
+const NEAR_BIAS_CM: f32 = 0.8;
+const NEAR_CM: f32 = 22.0;
+const NEAR_STRENGTH: f32 = 0.9;
 /// Texels around the casters that nothing casts on.
 const MARGIN: usize = 4;
 /// Width of the cells that tell where the map is empty, texels.
@@ -131,13 +151,36 @@ impl ShadowMap {
         }
         let ends = |k: usize| {
             let [from, to] = [low[k], high[k]].map(|v| (v - self.origin[k]) * self.texels_per_cm);
-            let first = (from - MARGIN as f32).max(0.0) as usize / CELL;
+            let around = MARGIN as f32 + NEAR_RADII_CM[1] * self.texels_per_cm;
+            let first = (from - around).max(0.0) as usize / CELL;
             // A negative end leaves nothing.
-            let last = if to < -(MARGIN as f32) { 0 } else { (to.max(0.0) as usize + MARGIN) / CELL + 1 };
+            let last = if to < -around { 0 } else { (to + around) as usize / CELL + 1 };
             (first, last.min(self.n.div_ceil(CELL)))
         };
         let (columns, rows) = (ends(0), ends(1));
         (rows.0..rows.1).any(|y| (columns.0..columns.1).any(|x| self.cells[y * self.n.div_ceil(CELL) + x]))
+    }
+
+    /// Share of the light from all round that reaches a point in the light's axes, 0..1: less close behind something, by
+    /// how much of it stands before the point within `NEAR_RADII_CM`. It sets a hand off from the chest and the desk.
+    pub fn open_share(&self, point: [f32; 3]) -> f32 {
+        if self.is_empty {
+            return 1.0;
+        }
+        let last = (self.n - 1) as f32;
+        let mut hidden = 0.0;
+        for (radius, spots) in NEAR_RADII_CM.into_iter().zip([&NEAR_SPOTS[..4], &NEAR_SPOTS[4..]]) {
+            for spot in spots {
+                let [x, y, depth] = self.texel([point[0] + radius * spot[0], point[1] + radius * spot[1], point[2]]);
+                if x >= 0.0 && y >= 0.0 && x <= last && y <= last {
+                    let behind = depth - self.depths[y as i32 as usize * self.n + x as i32 as usize];
+                    if behind > NEAR_BIAS_CM + 1.2 * radius && behind < NEAR_CM {
+                        hidden += 1.0 - behind * (1.0 / NEAR_CM);
+                    }
+                }
+            }
+        }
+        1.0 - hidden * (NEAR_STRENGTH / NEAR_SPOTS.len() as f32)
     }
 
     /// Share of the key light that reaches a point in the light's axes, 0..1: a tent over four by four texels.

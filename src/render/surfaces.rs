@@ -162,6 +162,14 @@ impl Surfaces {
         parts.map(|(mesh, &start)| (&self.light_points[start..start + mesh.points.len()], &mesh.triangles[..]))
     }
 
+    /// Takes light of their own from the vertices that are close behind something.
+    pub fn occlude(&mut self, shadows: &ShadowMap) {
+        for [own, _, asking] in &mut self.radiance {
+            let open = shadows.open_share([asking[0], asking[1], asking[2]]);
+            own.iter_mut().for_each(|v| *v *= open);
+        }
+    }
+
     /// Whether a triangle is so far away for its size that what it sends changes evenly over the picture.
     pub fn is_even(&self, triangle: &SurfaceTriangle) -> bool {
         let [a, b, c] = self.flat(triangle).nearness;
