@@ -181,9 +181,13 @@ mod tests {
     #[test]
     fn a_ball_has_the_outline_and_the_depth_of_a_ball() {
         let (ball, mut renderer) = (ball([0.0; 3], 12.0, 24), Renderer::new([200, 160]));
-        let image = renderer.draw(&camera(), &[&ball], &WHITE, &black());
-        let srgb = Srgb::tables();
-        let area: f32 = image.data.chunks_exact(3).map(|rgb| srgb.linears([rgb[0]; 3])[0] / 0.5).sum();
+        // The difference of what is drawn over white and over black shows the background's share.
+        let [white, black] = [[255; 3], [0; 3]].map(|rgb| {
+            let behind = Background::picture(Image::filled(200, 160, rgb));
+            let image = renderer.draw(&camera(), &[&ball], &WHITE, &behind);
+            image.data.iter().map(|byte| Srgb::tables().linears([*byte; 3])[0] / 3.0).sum::<f32>()
+        });
+        let area = 200.0 * 160.0 - (white - black);
         let radius = 400.0 * 12.0 / (100.0f32 * 100.0 - 144.0).sqrt();
         assert!((area / (std::f32::consts::PI * radius * radius) - 1.0).abs() < 0.01, "{area} px");
         let (mesh, label, depth) = renderer.label_at([99.5, 79.5]).unwrap();
