@@ -1,5 +1,6 @@
 //! Motion file of any kind, chosen by its name's extension, written atomically.
 
+use super::film_panel::{FilmBody, FilmStyle};
 use super::{film, glb_scene, json};
 use crate::animate::avatar::{Appearance, Avatar};
 use crate::animate::performance::Performance;
@@ -20,8 +21,10 @@ pub struct ExportContent<'a> {
     pub sound: Option<&'a Sound>,
     /// Bone names, in formats that have names.
     pub names: Names,
-    /// What a film shows beside the figure.
+    /// What a film shows beside the body.
     pub beside: film::SecondPanel<'a>,
+    /// How a film shows the body.
+    pub style: FilmStyle,
 }
 
 /// Format of a motion file.
@@ -37,7 +40,7 @@ pub enum ExportFormat {
     Glb,
     /// Joints and rotations as JSON (`export::json`).
     Json,
-    /// A film of the figure with the sound.
+    /// A film of the body with the sound.
     Mp4,
 }
 
@@ -86,8 +89,9 @@ impl ExportFormat {
             }
             Self::Json => streamed(path, |text| json::write(text, performance, sources.names)),
             Self::Mp4 => {
-                let motion = performance.motion();
-                workdir::replace(path, |attempt| film::write(attempt, &motion, sources.sound, sources.beside, progress))
+                let motion = (sources.style == FilmStyle::Figure).then(|| performance.motion());
+                let body = FilmBody::new(sources.style, performance, motion.as_ref());
+                workdir::replace(path, |attempt| film::write(attempt, body, sources.sound, sources.beside, progress))
             }
         }
     }

@@ -2,6 +2,8 @@
 
 pub mod file;
 pub mod film;
+pub mod film_avatar;
+pub mod film_panel;
 pub mod glb;
 pub mod glb_scene;
 pub mod json;

@@ -1,5 +1,6 @@
 //! `orator animate`.
 
+mod film_args;
 pub mod input;
 pub mod verb;
 

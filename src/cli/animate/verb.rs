@@ -1,5 +1,6 @@
 //! `orator animate`.
 
+use super::film_args::FilmArgs;
 use super::input::{InputMotion, MotionInput, inputs};
 use crate::cli::Outcome;
 use crate::cli::config_args::split;
@@ -9,6 +10,7 @@ use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
 use orator::animate::export::file::{ExportContent, ExportFormat};
 use orator::animate::export::film::SecondPanel;
+use orator::animate::export::film_panel::{FilmBody, FilmStyle};
 use orator::animate::performance::{AnimationReport, Jerk, SeenFrames};
 use orator::animate::rig::names::Names;
 use orator::animate::solve::smoothing::ONE_EURO;
@@ -79,6 +81,8 @@ pub struct Args {
     /// What the two motions of --beside are called, such as `prediction truth`; without: their files' names.
     #[arg(long, value_names = ["OURS", "OTHER"], num_args = 2, requires = "beside")]
     labels: Option<Vec<String>>,
+    #[command(flatten)]
+    film: FilmArgs,
     /// Frames a second of a .npy or .txt.
     #[arg(long, value_name = "RATE", default_value = "15")]
     in_fps: FrameRate,
@@ -198,7 +202,10 @@ fn whole_folder(args: &Args, inputs: &[MotionInput], options: &AnimationOptions,
 fn check_effect(args: &Args, outputs: &OutputFiles) -> Result<()> {
     let has = |formats: &[ExportFormat]| outputs.iter().any(|(_, format)| formats.contains(format));
     let is_film = has(&[ExportFormat::Mp4]);
-    for (option, is_given) in [("--beside", args.beside.is_some()), ("--audio", args.audio.is_some())] {
+    args.film.check()?;
+    let beside = [("--beside", args.beside.is_some()), ("--audio", args.audio.is_some())];
+    let given = beside.into_iter().chain(args.film.given());
+    for (option, is_given) in given {
         ensure!(is_film || !is_given, "{option} is for films: name an .mp4 at --out, or leave it away");
     }
     let has_names = has(&[ExportFormat::Bvh, ExportFormat::Glb, ExportFormat::Json]);
@@ -233,7 +240,7 @@ fn animate(
     let other = match &args.beside {
         Some(path) if motion_file::has_ending(path) => {
             let other = motion_file::read(path, Some(args.in_fps))?;
-            Some(perform(&other.motion, None, options).motion())
+            Some(perform(&other.motion, None, options))
         }
         _ => None,
     };
@@ -242,9 +249,12 @@ fn animate(
         Some([ours, other]) => [ours.clone(), other.clone()],
         _ => [input.name.clone(), args.beside.as_deref().map(stem).unwrap_or_default()],
     };
-    let beside = match (&args.beside, &other) {
+    let style = args.film.style();
+    let other_motion = other.as_ref().filter(|_| style == FilmStyle::Figure).map(Performance::motion);
+    let other = other.as_ref().map(|other| FilmBody::new(style, other, other_motion.as_ref()));
+    let beside = match (&args.beside, other) {
         (None, _) => SecondPanel::Itself,
-        (Some(_), Some(motion)) => SecondPanel::Motion { motion, labels: labels.each_ref().map(String::as_str) },
+        (Some(_), Some(body)) => SecondPanel::Motion { body, labels: labels.each_ref().map(String::as_str) },
         (Some(path), None) => SecondPanel::Video { path, from_secs: args.beside_from },
     };
     let is_film = outputs.iter().any(|&(_, format)| format == ExportFormat::Mp4);
@@ -265,7 +275,7 @@ fn animate(
         (true, true) => "the film is without sound: give --audio\n",
         (true, false) => "the film is without sound\n",
     };
-    let sources = ExportContent { sound: sound.as_ref(), names: args.names, beside };
+    let sources = ExportContent { sound: sound.as_ref(), names: args.names, beside, style };
     for (path, format) in outputs {
         format.write(path, &performance, &sources, ui).with_context(|| format!("cannot write {}", path.display()))?;
     }

@@ -6,6 +6,9 @@ use ndarray::s;
 use orator::animate::draw::figure::{LEFT, PAPER, RIGHT};
 use orator::animate::export::film;
 use orator::animate::export::film::{Film, SIZE, SecondPanel};
+use orator::animate::export::film_avatar::FilmCamera;
+use orator::animate::export::film_panel::FilmBody;
+use orator::animate::{AnimationOptions, perform};
 use orator::external::ffmpeg::frames::FrameReader;
 use orator::external::ffmpeg::{audio, probe};
 use orator::formats::npy;
@@ -34,7 +37,7 @@ fn middle(image: &Image, columns: std::ops::Range<usize>, hue: [u8; 3]) -> f64 {
 #[test]
 fn the_speakers_left_is_at_the_right_of_the_front_view_and_nothing_is_cut() {
     let motion = swinging(4, 20);
-    let film = Film::new(&motion, None, SecondPanel::Itself);
+    let mut film = Film::new(FilmBody::Figure(&motion), None, SecondPanel::Itself);
     for frame in [0, 7, 19] {
         let image = film.frame(frame).unwrap();
         assert_eq!([image.width, image.height], SIZE);
@@ -52,7 +55,8 @@ fn missing_joints_and_wild_ones_are_left_out() {
     motion.joints.slice_mut(s![1, .., ..]).fill(f32::NAN);
     motion.joints.slice_mut(s![2, 3, ..]).fill(1e30);
     motion.joints.slice_mut(s![3, .., ..]).fill(0.0);
-    let film = Film::new(&motion, Some(&Sound { rate: 16_000, samples: vec![] }), SecondPanel::Itself);
+    let mut film =
+        Film::new(FilmBody::Figure(&motion), Some(&Sound { rate: 16_000, samples: vec![] }), SecondPanel::Itself);
     let blank = film.frame(1).unwrap();
     for frame in 0..4 {
         assert!(frame == 1 || film.frame(frame).unwrap() != blank);
@@ -65,7 +69,8 @@ fn the_mp4_has_every_frame_and_the_sound() {
     let path = folder.path().join("talk.mp4");
     let motion = swinging(6, 15);
     let samples = (0..16_000).map(|n| (n as f32 * 0.17).sin() * (n as f32 / 16_000.0)).collect();
-    film::write(&path, &motion, Some(&Sound { rate: 16_000, samples }), SecondPanel::Itself, &Silent).unwrap();
+    film::write(&path, FilmBody::Figure(&motion), Some(&Sound { rate: 16_000, samples }), SecondPanel::Itself, &Silent)
+        .unwrap();
     let info = probe::probe(&path).unwrap();
     let secs = info.duration_secs.unwrap();
     assert!((secs - 15.0 / FPS.per_sec()).abs() < 0.1, "{secs} s");
@@ -106,7 +111,7 @@ fn a_click_at_a_second_stands_at_the_picture_of_that_second() {
     let rate = 16_000;
     let sample = |n: usize| (1..4).map(|k| chirp(n as f64 / f64::from(rate) - f64::from(k))).sum::<f64>() as f32;
     let sound = Sound { rate, samples: (0..4 * rate as usize).map(sample).collect() };
-    film::write(&path, &motion, Some(&sound), SecondPanel::Itself, &Silent).unwrap();
+    film::write(&path, FilmBody::Figure(&motion), Some(&sound), SecondPanel::Itself, &Silent).unwrap();
 
     let streams = streams(&path);
     let of = |kind: &str| streams.iter().find(|stream| stream.0 == kind).unwrap_or_else(|| panic!("no {kind}"));
@@ -146,7 +151,7 @@ fn the_video_beside_the_figure_is_in_step() {
     let path = folder.path().join("beside.mp4");
     let motion = swinging(6, 30);
     let beside = SecondPanel::Video { path: &clip.path, from_secs: 2.0 };
-    film::write(&path, &motion, None, beside, &Silent).unwrap();
+    film::write(&path, FilmBody::Figure(&motion), None, beside, &Silent).unwrap();
     // A picture of the clip fills the left half: 64 x 48 px become 600 x 450.
     let read = |image: &Image| {
         let bit = |block: usize| {
@@ -160,7 +165,7 @@ fn the_video_beside_the_figure_is_in_step() {
         assert_eq!(read(&frame.unwrap().image), 60 + 2 * n, "frame {n}");
     }
     let late = SecondPanel::Video { path: &clip.path, from_secs: 60.0 };
-    let error = format!("{:#}", film::write(&path, &motion, None, late, &Silent).unwrap_err());
+    let error = format!("{:#}", film::write(&path, FilmBody::Figure(&motion), None, late, &Silent).unwrap_err());
     assert!(error.contains("lasts 6.0 s"), "{error}");
 }
 
@@ -168,7 +173,11 @@ fn the_video_beside_the_figure_is_in_step() {
 fn another_motion_is_drawn_beside_in_the_same_size_until_it_ends() {
     let (motion, mut other) = (swinging(6, 30), swinging(7, 20));
     other.fps = orator::types::time::FrameRate::new(30, 1);
-    let film = Film::new(&motion, None, SecondPanel::Motion { motion: &other, labels: ["truth", "prediction"] });
+    let mut film = Film::new(
+        FilmBody::Figure(&motion),
+        None,
+        SecondPanel::Motion { body: FilmBody::Figure(&other), labels: ["truth", "prediction"] },
+    );
     let half = |image: &Image, from: usize| {
         let coloured = |x, y| {
             let [r, _, b] = image.pixel(x, y).map(i32::from);
@@ -190,7 +199,7 @@ fn a_film_beside_its_video_has_the_videos_sound_from_there_on() {
     npy::write(&motion, &swinging(6, 30)).unwrap();
     let mut orator = Command::new(env!("CARGO_BIN_EXE_orator"));
     orator.arg("animate").arg(&motion).arg("--out").arg(&film).arg("--beside").arg(&clip.path);
-    let output = orator.args(["--beside-from", "2"]).output().unwrap();
+    let output = orator.args(["--beside-from", "2", "--style", "figure"]).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let lengths: Vec<f64> = streams(&film).into_iter().map(|stream| stream.2).collect();
     assert!(lengths.len() == 2 && lengths.iter().all(|secs| (secs - 2.0).abs() < FPS.secs(1)), "{lengths:?}");
@@ -198,4 +207,51 @@ fn a_film_beside_its_video_has_the_videos_sound_from_there_on() {
     let flash = clip.flashes.iter().find(|flash| (2.1..3.8).contains(&flash.on_secs)).expect("a flash in the film");
     let heard = chirp_begins(&sound.samples, 16_000, flash.on_secs - 2.0);
     assert!((heard - (flash.on_secs - 2.0)).abs() < 0.002, "{heard}");
+}
+
+#[test]
+fn the_avatar_moves_as_the_figure_does_and_nothing_is_cut() {
+    let motion = swinging(4, 12);
+    let performance = perform(&motion, None, &AnimationOptions::default());
+    let sound = Sound { rate: 16_000, samples: (0..12_800).map(|n| (n as f32 * 0.1).sin()).collect() };
+    for camera in [FilmCamera::Front, FilmCamera::ThreeQuarter] {
+        let body = FilmBody::Avatar(&performance, camera);
+        let mut film = Film::new(body, Some(&sound), SecondPanel::Itself);
+        let (first, last) = (film.frame(0).unwrap(), film.frame(11).unwrap());
+        assert_eq!([first.width, first.height], SIZE);
+        assert_eq!(first, film.frame(0).unwrap(), "the same frame twice is the same picture");
+        // The backdrop has one colour a row; at the sides and above nothing of the body is cut.
+        for image in [&first, &last] {
+            assert!((0..600).all(|y| image.pixel(2, y) == image.pixel(0, y)));
+            assert!((0..600).all(|y| image.pixel(1277, y) == image.pixel(0, y)));
+            assert!((0..1280).all(|x| (0..12).all(|y| image.pixel(x, y) == image.pixel(0, y))));
+        }
+        let body_px = |image: &Image| {
+            (0..1280)
+                .flat_map(|x| (0..600).map(move |y| (x, y)))
+                .filter(|&(x, y)| image.pixel(x, y) != image.pixel(0, y))
+                .count()
+        };
+        assert!(body_px(&first) > 40_000, "{}", body_px(&first));
+        let moved = first.data.iter().zip(&last.data).filter(|(a, b)| a.abs_diff(**b) > 30).count();
+        assert!(moved > 3_000, "{moved}");
+    }
+}
+
+#[test]
+fn two_avatars_stand_beside_each_other_in_one_size() {
+    let [one, other] = [6, 7].map(|seed| perform(&swinging(seed, 10), None, &AnimationOptions::default()));
+    let body = |performance| FilmBody::Avatar(performance, FilmCamera::Front);
+    let beside = SecondPanel::Motion { body: body(&other), labels: ["truth", "prediction"] };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("two.mp4");
+    film::write(&path, body(&one), None, beside, &Silent).unwrap();
+    let frames: Vec<Image> = FrameReader::open(&path, FPS).unwrap().map(|frame| frame.unwrap().image).collect();
+    assert_eq!(frames.len(), 10);
+    let dark = |from: usize| {
+        let all = (from..from + 600).flat_map(|x| (66..600).map(move |y| (x, y)));
+        all.filter(|&(x, y)| frames[5].pixel(x, y)[0] < 120).count()
+    };
+    let (left, right) = (dark(30) as f64, dark(650) as f64);
+    assert!(left > 5_000.0 && (left / right - 1.0).abs() < 0.4, "{left} and {right} px");
 }
