@@ -15,7 +15,7 @@ use crate::types::image::Image;
 use std::sync::Arc;
 
 /// Texels of the figures' shadow map, each way.
-const SHADOW_TEXELS: usize = 320;
+const SHADOW_TEXELS: usize = 256;
 
 /// Renderer with the memory that frames of one size need.
 #[derive(Clone, Debug)]

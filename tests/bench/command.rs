@@ -1,7 +1,8 @@
 //! The command line of the benchmark: which part is measured, and how the result is shown.
 
+use super::bodies::{animate, render};
 use super::report::{Bars, Report};
-use super::{animate, dataset, evaluate, generate, lift, lifter, pose2d, run, scale, spaces, train};
+use super::{dataset, evaluate, generate, lift, lifter, pose2d, run, scale, spaces, train};
 use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser, Subcommand};
 use orator::stage::progress::Progress;
@@ -31,6 +32,7 @@ enum Part {
     Generate(generate::Args),
     Lift(lift::Args),
     Lifter(lifter::Args),
+    Render(render::Args),
     Run(run::Args),
     Scale(scale::Args),
     Spaces(spaces::Args),
@@ -47,6 +49,7 @@ impl Part {
             Part::Generate(args) => generate::run(args, progress),
             Part::Lift(args) => lift::run(args, progress),
             Part::Lifter(args) => lifter::run(args, progress),
+            Part::Render(args) => render::run(args, progress),
             Part::Run(args) => run::run(args, progress),
             Part::Scale(args) => scale::run(args, progress),
             Part::Spaces(args) => spaces::run(args, progress),

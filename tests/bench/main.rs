@@ -1,7 +1,7 @@
 //! The benchmark: `cargo bench -- PART`, one file a part. The variants of a part take turns, round after round, and the
 //! median round counts, so that a noisy machine favours none of them. Without a part it lists them and ends.
 
-pub mod animate;
+pub mod bodies;
 pub mod child;
 pub mod command;
 pub mod dataset;

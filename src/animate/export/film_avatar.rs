@@ -70,6 +70,11 @@ impl<'a> AvatarView<'a> {
         }
     }
 
+    /// Triangles of the avatar.
+    pub fn n_triangles(&self) -> usize {
+        self.avatar.parts.iter().map(|part| part.triangles.len()).sum()
+    }
+
     /// Picture of one frame with the mouth open by `mouth`, 0..1.
     pub fn frame(&mut self, frame_idx: usize, mouth: f64) -> Image {
         let Performance { rig, clip, .. } = self.performance;

@@ -59,3 +59,11 @@ fn the_step_of_the_trainer_is_measured() {
     fails("train --batch 1", "two windows");
     fails("train --preset large", "`light` or `paper`");
 }
+
+#[test]
+fn the_renderer_is_measured() {
+    let facts = facts("render --frames 2 --rounds 1");
+    assert!(facts["draw_ms"].as_f64().unwrap() > 0.0 && facts["encode_ms"].as_f64().unwrap() > 0.0, "{facts}");
+    assert!(facts["triangles"].as_u64().unwrap() > 10_000, "{facts}");
+    fails("render --rounds 0", "nothing to measure");
+}

@@ -1,6 +1,6 @@
 //! `cargo bench -- animate`.
 
-use super::report::{Report, median};
+use super::super::report::{Report, median};
 use anyhow::{Result, ensure};
 use orator::animate::avatar::{Appearance, Avatar};
 use orator::animate::export::glb_scene;

@@ -1,0 +1,117 @@
+//! `cargo bench -- render`.
+
+use super::super::report::{Report, median};
+use anyhow::{Context, Result, ensure};
+use orator::animate::export::film_avatar::{AvatarView, FilmCamera};
+use orator::animate::{AnimationOptions, perform};
+use orator::demo::drawn::speech::Speech;
+use orator::demo::rule::rule::RuleGestures;
+use orator::external::ffmpeg::encode::VideoWriter;
+use orator::render::{Background, Light, Mesh, PinholeCamera};
+use orator::stage::progress::Progress;
+use orator::types::image::Image;
+use orator::types::time::FrameRate;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::json;
+use std::time::Instant;
+
+/// Avatar to pictures of 1280 x 720 px, on one core: posing and drawing, with shadows; beside it the background of a desk
+/// and a wall, once, and the encoder on the same pictures.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Frames of a round.
+    #[arg(long, default_value_t = 150, value_name = "N")]
+    frames: usize,
+    /// Rounds; each measures every step once.
+    #[arg(long, default_value_t = 5, value_name = "N")]
+    rounds: usize,
+}
+
+const SIZE: [usize; 2] = [1280, 720];
+/// Real time: frames a second.
+const FPS: FrameRate = FrameRate::new(30, 1);
+
+pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
+    ensure!(args.rounds > 0 && args.frames > 0, "nothing to measure: there must be rounds and frames");
+    let mut dice = ChaCha8Rng::seed_from_u64(1337);
+    let secs = FPS.secs(args.frames);
+    let speech = Speech::new(secs, &mut dice);
+    let motion = RuleGestures::with_variation(&speech, secs, &mut dice).motion(args.frames, FPS);
+    let performance = perform(&motion, None, &AnimationOptions::default());
+    let mut view = AvatarView::new(&performance, &[&performance], SIZE, FilmCamera::Front);
+    let folder = tempfile::tempdir()?;
+    let task = progress.begin("render", args.rounds as u64);
+    let mut secs: [Vec<f64>; 3] = Default::default();
+    for _ in 0..args.rounds {
+        let start = Instant::now();
+        let pictures: Vec<Image> = (0..args.frames.min(30)).map(|frame| view.frame(frame, 0.3)).collect();
+        for frame in pictures.len()..args.frames {
+            std::hint::black_box(view.frame(frame, 0.3));
+        }
+        secs[0].push(start.elapsed().as_secs_f64());
+        let start = Instant::now();
+        std::hint::black_box(desk());
+        secs[1].push(start.elapsed().as_secs_f64());
+        let start = Instant::now();
+        let mut writer = VideoWriter::create(&folder.path().join("film.mp4"), SIZE[0], SIZE[1], FPS, None)?;
+        for frame in 0..args.frames {
+            writer.push(&pictures[frame % pictures.len()])?;
+        }
+        writer.finish().context("the film")?;
+        secs[2].push(start.elapsed().as_secs_f64());
+        task.advance(1);
+    }
+    drop(task);
+    let [drawing, scene, encoding] = secs.map(median);
+    let per_frame = |secs: f64| 1e3 * secs / args.frames as f64;
+    let speed = FPS.secs(args.frames) / drawing;
+    let text = format!(
+        "{} frames of {} x {} px, one avatar of {} triangles, median of {} round(s)\n\
+         posing and drawing    {:6.2} ms a frame, {speed:.1} x real time at {FPS}\n\
+         a scene, once         {:6.1} ms\n\
+         the encoder alone     {:6.2} ms a frame",
+        args.frames,
+        SIZE[0],
+        SIZE[1],
+        view.n_triangles(),
+        args.rounds,
+        per_frame(drawing),
+        1e3 * scene,
+        per_frame(encoding),
+    );
+    let facts = json!({
+        "frames": args.frames,
+        "triangles": view.n_triangles(),
+        "draw_ms": per_frame(drawing),
+        "times_real_time": speed,
+        "scene_ms": 1e3 * scene,
+        "encode_ms": per_frame(encoding),
+    });
+    Ok(Report { text, facts })
+}
+
+/// A desk before a wall.
+fn desk() -> Background {
+    let square = |corners: [[f32; 3]; 4], normal: [f32; 3]| Mesh {
+        points: corners.to_vec(),
+        normals: vec![normal; 4],
+        colours: vec![[0.4; 3]; 4],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        labels: vec![0; 4],
+        gloss: 0.0,
+    };
+    let wall = square(
+        [[-300.0, 0.0, -90.0], [300.0, 0.0, -90.0], [300.0, 300.0, -90.0], [-300.0, 300.0, -90.0]],
+        [0.0, 0.0, 1.0],
+    );
+    let desk =
+        square([[-80.0, 95.0, 70.0], [80.0, 95.0, 70.0], [80.0, 95.0, 15.0], [-80.0, 95.0, 15.0]], [0.0, 1.0, 0.0]);
+    let camera = PinholeCamera::looking_at(SIZE, 1500.0, [0.0, 150.0, 260.0], [0.0, 125.0, 0.0], 0.0);
+    Background::of_scene(
+        &camera,
+        &[&wall, &desk],
+        &Light::studio([-0.5, 0.8, 0.7]),
+        Image::filled(SIZE[0], SIZE[1], [0; 3]),
+    )
+}
