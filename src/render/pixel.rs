@@ -76,6 +76,14 @@ struct Part {
     point: [i32; 2],
 }
 
+/// Whether all samples show the first one's surface.
+#[inline(always)]
+fn is_one_surface(surfaces: &Surfaces, triangles: &[u32; 4], nearness: &[f32; 4]) -> bool {
+    let mesh = |k: usize| surfaces.triangles.get(triangles[k] as usize).map(|triangle| triangle.mesh);
+    let first = mesh(0);
+    first.is_some() && (1..4).all(|k| (nearness[0] - nearness[k]).abs() < ONE_SURFACE * nearness[0] && mesh(k) == first)
+}
+
 /// Calls `each` for every surface in a pixel.
 #[inline(always)]
 fn for_parts(
@@ -162,10 +170,14 @@ impl Shading {
         pixel: [usize; 2],
     ) -> ([f32; 4], f32) {
         let (triangles, nearness) = samples;
-        let first = triangles[0];
-        if triangles[1] == first && triangles[2] == first && triangles[3] == first {
+        let [first, others @ ..] = *triangles;
+        let mut point = pixel.map(|v| v as i32 * PARTS);
+        let is_whole = others == [first; 3];
+        if is_whole || is_one_surface(surfaces, triangles, nearness) {
             // Most pixels.
-            let point = pixel.map(|v| v as i32 * PARTS);
+            if !is_whole {
+                (0..2).for_each(|k| point[k] += SPOTS[0][k]);
+            }
             let whole = Part { triangle: first, nearness: nearness[0], share: 1.0, point };
             return (self.part(surfaces, shadows, whole, pixel), 1.0);
         }

@@ -288,6 +288,6 @@ mod tests {
         renderer.draw(&camera, &[&square(0.0, 0.0, 40.0, 50.0, 0)], &light, &black());
         assert_eq!(image, renderer.draw(&camera, &[&ball], &light, &scene));
         let hash = blake3::hash(&image.data).to_hex();
-        assert_eq!(&hash[..16], "87a530482266c943");
+        assert_eq!(&hash[..16], "b7f04df71f20dac3");
     }
 }

@@ -17,7 +17,7 @@ const INNER_LIGHT: f32 = 0.45;
 const EVEN: f32 = 1.03;
 
 /// Light of its own, light of the key where that reaches it (linear RGB), and the point in the light's axes where to ask
-/// whether it does; the fourth numbers fill up registers.
+/// whether it does. The fourth numbers fill up registers; the first of them is the cosine of the angle to the viewer.
 pub type Radiance = [[f32; 4]; 3];
 
 /// One triangle of `Surfaces`.
@@ -72,7 +72,9 @@ impl Surfaces {
                 self.seen.push(seen);
                 self.corners.push(corner);
                 self.nearness.push(nearness);
-                self.radiance.push([own, key, asking].map(|[a, b, c]| [a, b, c, 0.0]));
+                let mut radiance = [own, key, asking].map(|[a, b, c]| [a, b, c, 0.0]);
+                radiance[0][3] = dot(normal, to_viewer);
+                self.radiance.push(radiance);
                 self.light_points.push(ShadowMap::seen(&axes, *point));
             }
             for triangle in &mesh.triangles {
@@ -164,7 +166,8 @@ impl Surfaces {
 
     /// Takes light of their own from the vertices that are close behind something.
     pub fn occlude(&mut self, shadows: &ShadowMap) {
-        for [own, _, asking] in &mut self.radiance {
+        // Vertices on the far side are not seen.
+        for [own, _, asking] in self.radiance.iter_mut().filter(|[own, ..]| own[3] > -0.3) {
             let open = shadows.open_share([asking[0], asking[1], asking[2]]);
             own.iter_mut().for_each(|v| *v *= open);
         }
