@@ -2,7 +2,6 @@
 
 pub mod background;
 pub mod camera;
-pub mod faults;
 pub mod light;
 pub mod mesh;
 mod pixel;

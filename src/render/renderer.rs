@@ -248,7 +248,8 @@ mod tests {
         let scene = Background::of_scene(&camera, &[&floor], &light, Image::filled(200, 160, [0; 3]));
         let over = renderer.draw(&camera, &[&ball], &light, &scene);
         let on_floor = |x: f64| camera.pixel(camera.see([x, 0.0, 0.0])).map(|v| v.round());
-        for image in [&together, &over] {
+        let still = Background::of_scene(&camera, &[&floor, &ball], &light, Image::filled(200, 160, [0; 3]));
+        for image in [&together, &over, &still.image] {
             let at = |x: f64| image.pixel(on_floor(x)[0] as usize, on_floor(x)[1] as usize)[0];
             // The light comes from +x at 45 degrees: 20 cm up, the shadow falls 20 cm towards -x.
             assert!(

@@ -88,8 +88,11 @@ impl ShadowMap {
             flat.extend(points.iter().map(|point| self.texel(*point)));
             for triangle in triangles {
                 let corners = triangle.map(|v| flat[v as usize]);
-                if !(only_far_sides && area(&corners) > 0.0) {
-                    self.fill(corners);
+                let area = area(&corners);
+                let towards_light = if only_far_sides { -area } else { area };
+                // Triangles seen edge-on and those without numbers cast nothing either.
+                if towards_light > 1e-9 {
+                    self.fill(corners, area);
                 }
             }
         }
@@ -100,13 +103,7 @@ impl ShadowMap {
         [(x - self.origin[0]) * self.texels_per_cm, (y - self.origin[1]) * self.texels_per_cm, depth]
     }
 
-    fn fill(&mut self, corners: [[f32; 3]; 3]) {
-        let area = area(&corners);
-        let [a, b, c] = corners;
-        // The outer sides alone cast; NaN and triangles seen edge-on are left out too.
-        if !(area > 1e-9) {
-            return;
-        }
+    fn fill(&mut self, [a, b, c]: [[f32; 3]; 3], area: f32) {
         // Texels whose middle, a whole number, lies between.
         let ends = |k: usize| {
             let (low, high) = (a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k]));
