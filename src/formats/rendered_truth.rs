@@ -33,6 +33,9 @@ impl Visibility {
         [Self::Seen, Self::BehindBody, Self::BehindHand, Self::BehindThing, Self::BehindPerson, Self::Outside];
 }
 
+/// File of a folder of rendered people that lists its clips.
+pub const LIST: &str = "people.json";
+
 /// Array that no other file of motion has.
 pub const BODY_JOINTS: &str = "body_joints";
 

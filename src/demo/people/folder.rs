@@ -6,6 +6,7 @@ use super::scene::{CapturedClip, PeopleScene};
 
 pub use super::scene::ClipSeeds;
 use crate::external::ffmpeg::audio::read_sound;
+use crate::formats::rendered_truth::LIST;
 use crate::mocap::motion_file;
 use crate::stage::progress::Progress;
 use crate::stage::workdir;
@@ -16,9 +17,6 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-
-/// File with the list of clips.
-pub const LIST: &str = "people.json";
 
 /// Part of a set: each has bodies, clothes, cameras and motions of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]

@@ -2,7 +2,7 @@
 
 use crate::config::{self, Config};
 use crate::formats::keypoints_npz;
-use crate::formats::rendered_truth::{RenderedTruth, Visibility};
+use crate::formats::rendered_truth::{LIST, RenderedTruth, Visibility};
 use crate::stage::Unit;
 use crate::stage::artifacts::Artifact;
 use crate::types::interval::Intervals;
@@ -12,9 +12,6 @@ use anyhow::{Context, Result, ensure};
 use ndarray::{Axis, s};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-
-/// File in a folder of rendered people that lists their clips.
-pub const LIST: &str = "people.json";
 
 /// Entry of the list.
 #[derive(Clone, Debug, Deserialize)]
