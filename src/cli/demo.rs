@@ -12,6 +12,7 @@ use orator::demo::check::{learned, sheet, traces};
 use orator::demo::drawn::folder;
 use orator::demo::drawn::folder::DemoPlan;
 use orator::demo::host;
+use orator::demo::labels;
 use orator::demo::people;
 use orator::demo::people::condition::Condition;
 use orator::demo::people::folder::PeoplePlan;
@@ -60,6 +61,12 @@ enum DemoVerb {
         /// figure in a marker suit for the marker models.
         #[arg(long, conflicts_with = "people")]
         rendered: bool,
+        /// Draw pictures of rendered people with labels of this form instead of videos.
+        #[arg(long, value_enum, conflicts_with_all = ["videos", "people", "rendered", "secs", "fps"])]
+        labels: Option<LabelForm>,
+        /// How many labelled pictures.
+        #[arg(long, value_name = "N", default_value_t = 1000, requires = "labels")]
+        images: usize,
         /// Seconds of each video; 30, of rendered people 8.
         #[arg(long)]
         secs: Option<f64>,
@@ -112,9 +119,19 @@ enum DemoVerb {
     },
 }
 
+/// Forms of labels.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum LabelForm {
+    /// images, annotations/coco_wholebody_{train,val}.json: 17 points of the body and 21 of each hand.
+    CocoWholebody,
+}
+
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     match args.part {
-        DemoVerb::Draw { dir, videos, people, conditions, truth_only, motion, rendered, secs, fps, seed } => {
+        DemoVerb::Draw { dir, labels: Some(LabelForm::CocoWholebody), images, seed, .. } => {
+            label(&dir, images, seed, ui)
+        }
+        DemoVerb::Draw { dir, videos, people, conditions, truth_only, motion, rendered, secs, fps, seed, .. } => {
             let fps = FrameRate::new(fps.clamp(1, 120), 1);
             if let Some(n_clips) = people {
                 let conditions = Condition::of_names(&conditions)?;
@@ -152,6 +169,19 @@ fn render(dir: &Path, plan: &PeoplePlan, ui: &Ui) -> Result<Outcome> {
         dir.join("videos").display()
     );
     ui.summary(&text, Some(&next), json!({ "clips": clips, "next": next }));
+    Ok(Outcome::Done)
+}
+
+fn label(dir: &Path, n_images: usize, seed: u64, ui: &Ui) -> Result<Outcome> {
+    let drawn = labels::folder::draw(dir, n_images, seed, ui)?;
+    let [train, val] = drawn.images;
+    let next = format!("orator train pose --labels {} --out body.safetensors", dir.display());
+    let text = format!(
+        "drew {train} pictures to train and {val} to validate, {} people, into {}",
+        drawn.people,
+        dir.display()
+    );
+    ui.summary(&text, Some(&next), json!({ "train": train, "val": val, "people": drawn.people, "next": next }));
     Ok(Outcome::Done)
 }
 

@@ -2,4 +2,5 @@
 
 pub mod blender;
 pub mod dataset_readers;
+pub mod label_readers;
 pub mod training_readers;
