@@ -34,7 +34,7 @@
 //! | 4 | `animate` | joints to rotations on a rig, avatar, export, drawing | `types math stage motion formats external render` |
 //! | 5 | `dataset` | the dataset on disk: write, read, verify, import, forget | `types math stage config audio motion formats external mocap` |
 //! | 6 | `pipeline` | the five stages, their order, the files in which they meet, their processes; batches of speech to motion | `types math stage config external audio motion formats nn generate animate dataset` |
-//! | 6 | `train` | optimiser, GAN, lifters, synthetic scenes, spaces of movement | `types math stage config audio motion formats nn mocap dataset metrics generate` |
+//! | 6 | `train` | optimiser, GAN, lifters, body network, synthetic scenes, spaces of movement | `types math stage config external audio motion formats nn mocap dataset metrics generate` |
 //! | 6 | `demo` | synthetic speakers: drawn, rendered, with a known rule, and the checks against them | `types math stage audio motion formats external mocap render animate dataset metrics generate` |
 //! | 7 | `evaluate` | clips, baselines, table, verdict; the lifters' errors | `types math stage config external audio motion formats nn mocap metrics generate animate dataset pipeline train` |
 //! | 8 | `report` | pages for people | `types stage config external formats metrics animate dataset pipeline train evaluate` |

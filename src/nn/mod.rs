@@ -12,5 +12,6 @@ pub mod mode;
 pub mod motion_encoder;
 pub mod ops;
 pub mod params;
+pub mod pose;
 
 pub use mode::Mode;

@@ -7,6 +7,7 @@ pub mod gan;
 pub mod lifter;
 pub mod log;
 pub mod optim;
+pub mod pose;
 pub mod scene;
 pub mod space;
 pub mod supervised;

@@ -1,4 +1,4 @@
-//! Training of the lifters: one straight loop over freshly drawn samples. What is learnt (bodies or hands) is a
+//! Training of the lifters and of the body network: one straight loop over freshly drawn samples. What is learnt is a
 //! `TrainingTask`; the schedule, the optimiser and resuming are here.
 
 use super::log::MetricsLog;
@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What a lifter learns: where samples come from and the network they go through.
+/// What a network learns: where samples come from and the network they go through.
 pub trait TrainingTask: Send + Sync {
     /// Kind of the weights file.
     fn kind(&self) -> &'static str;
@@ -35,12 +35,12 @@ pub trait TrainingTask: Send + Sync {
     }
     /// Draws a group of samples: what goes in, and what should come out. At the end of a batch a group may be smaller.
     fn sample(&self, rng: &mut ChaCha8Rng, x: &mut [f32], y: &mut [f32]);
-    /// [B, shape in] to [B, 3 x points].
+    /// [B, shape in] to what the loss takes, [B, 3 x points] unless the task has its own.
     fn forward(&self, x: &Tensor, mode: &mut Mode) -> candle_core::Result<Tensor>;
-    /// The loss of what came out, [B, points, 3], against what should have; `weights` [1, points] of mean 1. The mean
+    /// The loss of what came out against what should have, [B, points, 3]; `weights` [1, points] of mean 1. The mean
     /// distance of the points unless the task knows better.
     fn loss(&self, out: &Tensor, wanted: &Tensor, weights: &Tensor) -> candle_core::Result<Tensor> {
-        let distance = ((out - wanted)?.sqr()?.sum(2)? + 1e-8)?.sqrt()?;
+        let distance = ((out.reshape(wanted.shape())? - wanted)?.sqr()?.sum(2)? + 1e-8)?.sqrt()?;
         distance.broadcast_mul(weights)?.mean_all()
     }
     /// How much a batch counts in running statistics, if the network has such.
@@ -174,8 +174,8 @@ fn train_until(
         // the running statistics settle as the training does: 0.1 falls to 0.001
         training_task.set_momentum(0.1 * (-(step as f64 / schedule.steps as f64) * 100f64.ln()).exp());
         let mut rng = stream(schedule.seed, step, schedule.batch, schedule.batch);
-        let lifted = training_task.forward(&x, &mut Mode::Train(&mut rng))?.reshape(y.shape())?;
-        let loss = training_task.loss(&lifted, &y, &weights)?;
+        let given = training_task.forward(&x, &mut Mode::Train(&mut rng))?;
+        let loss = training_task.loss(&given, &y, &weights)?;
         let norm = adam.step(&loss.backward()?, schedule.learning_rate(step))?;
         ensure!(norm.is_finite(), "step {step}: the gradient is not finite; try a smaller --learning-rate");
         let loss = f64::from(loss.to_scalar::<f32>()?);

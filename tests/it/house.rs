@@ -25,7 +25,7 @@ const FLOORS: [(u8, &str, &str); 20] = [
     (4, "animate", "types math stage motion formats external render"),
     (5, "dataset", "types math stage config audio motion formats external mocap"),
     (6, "pipeline", "types math stage config external audio motion formats nn generate animate dataset"),
-    (6, "train", "types math stage config audio motion formats nn mocap dataset metrics generate"),
+    (6, "train", "types math stage config external audio motion formats nn mocap dataset metrics generate"),
     (6, "demo", "types math stage audio motion formats external mocap render animate dataset metrics generate"),
     (
         7,

@@ -6,6 +6,7 @@ pub mod embedding;
 pub mod gan;
 pub mod lifter;
 pub mod noise;
+pub mod pose;
 pub mod verb;
 
 pub use verb::{Args, run};

@@ -1,11 +1,11 @@
 //! `orator train`: one file a network.
 
-use super::{basis, embedding, gan, lifter, noise};
+use super::{basis, embedding, gan, lifter, noise, pose};
 use crate::cli::Outcome;
 use crate::cli::ui;
 use crate::cli::ui::Ui;
 
-/// Train the lifters, a speaker's generator, or the spaces that `evaluate` compares motion in.
+/// Train the lifters, a model of bodies, a speaker's generator, or the spaces that `evaluate` compares motion in.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -19,6 +19,7 @@ enum Network {
     Gan(gan::Args),
     Lifter(lifter::Args),
     Noise(noise::Args),
+    Pose(pose::Args),
 }
 
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
@@ -29,5 +30,6 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
         Network::Gan(args) => gan::run(args, ui),
         Network::Lifter(args) => lifter::run(args, ui),
         Network::Noise(args) => noise::run(&args, ui),
+        Network::Pose(args) => pose::run(&args, ui),
     }
 }

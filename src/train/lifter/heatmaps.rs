@@ -85,7 +85,7 @@ impl TrainingTask for HeatmapLifterTask {
 
     /// Mean squared error of the points plus that of the turn.
     fn loss(&self, out: &Tensor, wanted: &Tensor, _weights: &Tensor) -> candle_core::Result<Tensor> {
-        let off = (out - wanted)?.sqr()?;
+        let off = (out.reshape(wanted.shape())? - wanted)?.sqr()?;
         off.narrow(1, 0, N_HAND)?.mean_all()? + off.narrow(1, N_HAND, 3)?.mean_all()?
     }
 

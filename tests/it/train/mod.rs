@@ -4,4 +4,5 @@ pub mod gan;
 pub mod gan_program;
 pub mod networks;
 pub mod operators;
+pub mod pose;
 pub mod rule;

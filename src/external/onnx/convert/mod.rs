@@ -16,5 +16,6 @@ mod tfjs;
 mod tfjs_file;
 mod tflite;
 
+pub use graph::{AttributeValue, OnnxGraph};
 pub use options::ConversionOptions;
 pub use source::{SourceFormat, convert};
