@@ -152,11 +152,16 @@ fn obstacles(seated: &SeatedRig, build: &Build, front: usize) -> Obstacles {
     if seated.seat != Seat::Standing {
         let hips = seated.root(&upright);
         let half = 22.0 * unit;
-        slabs.push(Slab { top: hips[1] + 4.0 * unit, x: [-half, half], z: [8.0 * unit, 46.0 * unit] });
+        slabs.push(Slab {
+            top: hips[1] + 4.0 * unit,
+            x: [-half, half],
+            z: [8.0 * unit, 46.0 * unit],
+            beneath: f64::INFINITY,
+        });
     }
     if seated.seat == Seat::Desk {
         let top = seated.torso(&upright).neck[1] - DESK_BELOW_NECK * CM * unit;
-        slabs.push(Slab { top, x: [-90.0, 90.0], z: [DESK_AHEAD * CM * unit, 120.0] });
+        slabs.push(Slab { top, x: [-90.0, 90.0], z: [DESK_AHEAD * CM * unit, 120.0], beneath: DESK_BELOW_NECK + 0.03 });
     }
     Obstacles { slabs, front }
 }

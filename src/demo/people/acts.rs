@@ -123,12 +123,13 @@ impl Acts {
         rng: &mut ChaCha8Rng,
     ) -> Self {
         let mut rests = vocabulary::rests(manner, seat, rng);
-        let hidden = (seat == Seat::Desk && manner == Manner::Free && rng.random_bool(0.5)).then(|| {
+        let hidden = (seat == Seat::Desk && manner == Manner::Free && rng.random_bool(0.6)).then(|| {
             rests.push(vocabulary::under_desk());
             rests.len() - 1
         });
         let sway = std::array::from_fn(|_| rng.random_range(0.0..TAU));
-        let first = rng.random_range(0..rests.len());
+        let begins_hidden = hidden.filter(|_| rng.random_bool(0.5));
+        let first = begins_hidden.unwrap_or_else(|| rng.random_range(0..rests.len()));
         let mut plan = ArmPlan { manner, rests, hidden, rest: first, moves: Vec::new(), rng };
         let mut beats = Vec::new();
         let rare = if manner == Manner::Folded || manner == Manner::Crossing { 0.3 } else { 0.75 };

@@ -144,10 +144,10 @@ impl Condition {
                 yaw_degrees: [0.0, 15.0],
                 below_neck: [0.5, 0.6],
                 above_head: [0.0, 0.06],
-                sizes: &[[480, 480], [480, 640], [540, 600]],
+                sizes: &[[540, 540], [640, 560], [600, 480], [640, 480]],
                 ..half
             },
-            Self::Outside => Framing { below_neck: [0.22, 0.36], ..half },
+            Self::Outside => Framing { below_neck: [0.25, 0.42], ..half },
             Self::Small => {
                 Framing { below_neck: [1.6, 2.2], above_head: [0.5, 1.1], sizes: &[[960, 540], [1280, 720]], ..half }
             }

@@ -9,8 +9,8 @@ use crate::types::skeleton::{L_HAND, N_HAND_JOINTS, N_JOINTS, R_HAND};
 /// Half width and depth of the trunk with clothes, metres of a body of unit 1, and its lower end below the neck.
 const TRUNK: [f64; 2] = [0.165, 0.14];
 const TRUNK_END: f64 = 0.56;
-/// How deep below a surface a point may be and still be lifted onto it, cm; deeper it is beneath.
-const BENEATH: f64 = 14.0;
+/// How deep below a surface a point may be and still be lifted onto it, cm.
+const DEEPEST: f64 = 25.0;
 /// Shortest distance of two hands' joints, metres.
 const APART: f64 = 0.024;
 const ROUNDS: usize = 4;
@@ -21,6 +21,8 @@ pub struct Slab {
     pub top: f64,
     pub x: [f64; 2],
     pub z: [f64; 2],
+    /// A hand whose wrist is meant to be this far below the neck is under the surface, metres of a body of unit 1.
+    pub beneath: f64,
 }
 
 /// What a person's hands may touch.
@@ -52,7 +54,7 @@ impl Obstacles {
                 let hand = &joints[root..root + N_HAND_JOINTS];
                 let way = self.out_of_trunk(hand, unit);
                 let forearm = scale(add(joints[shoulder + 1], joints[shoulder + 2]), 0.5);
-                add(way, self.onto_slabs(hand, forearm, torso))
+                add(way, self.onto_slabs(arms[side].wrist[1], (hand, forearm), torso))
             });
             let between = apart(&joints);
             ways[self.front][2] -= 0.5 * between;
@@ -81,15 +83,15 @@ impl Obstacles {
         [0.0, 0.0, -ahead.fold(0.0, f64::max)]
     }
 
-    /// Way up onto the surfaces, metres.
-    fn onto_slabs(&self, hand: &[Vec3], forearm: Vec3, torso: &TorsoPlace) -> Vec3 {
+    /// Way up onto the surfaces, metres, of a hand that is meant to be `below` the neck.
+    fn onto_slabs(&self, below: f64, (hand, forearm): (&[Vec3], Vec3), torso: &TorsoPlace) -> Vec3 {
         let joints = hand.iter().enumerate().map(|(joint, &at)| (torso.world(at), thickness(joint)));
         let points: Vec<(Vec3, f64)> = joints.chain([(torso.world(forearm), 3.5)]).collect();
-        let lift = self.slabs.iter().flat_map(|slab| {
+        let lift = self.slabs.iter().filter(|slab| below < slab.beneath).flat_map(|slab| {
             points.iter().map(move |([x, y, z], thick)| {
                 let over = (slab.x[0]..slab.x[1]).contains(x) && (slab.z[0]..slab.z[1]).contains(z);
                 let lift = slab.top + thick - y;
-                if over && lift < BENEATH { lift.max(0.0) } else { 0.0 }
+                if over && lift < DEEPEST { lift.max(0.0) } else { 0.0 }
             })
         });
         torso.way([0.0, lift.fold(0.0, f64::max), 0.0])
@@ -122,7 +124,7 @@ mod tests {
         let rig = build.rig();
         let seated = SeatedRig { rig: &rig, seat: Seat::Desk, knees: 0.1, shins: 0.1 };
         let torso = seated.torso(&TrunkPosture::default());
-        let slab = Slab { top: torso.neck[1] - 36.0, x: [-60.0, 60.0], z: [26.0, 90.0] };
+        let slab = Slab { top: torso.neck[1] - 36.0, x: [-60.0, 60.0], z: [26.0, 90.0], beneath: 0.5 };
         let low = ArmPosture {
             wrist: [0.12, 0.42, -0.36],
             elbow: 0.3,

@@ -14,7 +14,7 @@ use rand_chacha::ChaCha8Rng;
 const HALF: f64 = 600.0;
 const HEIGHT: f64 = 290.0;
 const FURNISHED: f64 = 480.0;
-const BEFORE: f64 = 300.0;
+const BEFORE: f64 = 1000.0;
 
 /// A body's seat in its place.
 #[derive(Clone, Copy, Debug)]
@@ -69,7 +69,7 @@ fn floor(solids: &mut Solids, behind: f64, colour: Colour, rng: &mut ChaCha8Rng)
     let shades: Vec<f32> = (0..24).map(|_| rng.random_range(0.88..1.1)).collect();
     let shade = |i: usize, k: usize| colour.map(|v| v * shades[(7 * i + 3 * k) % shades.len()]);
     let corner = [-HALF, 0.0, BEFORE];
-    solids.tiles(corner, [[2.0 * HALF, 0.0, 0.0], [0.0, 0.0, behind - BEFORE]], [30, 8], shade);
+    solids.tiles(corner, [[2.0 * HALF, 0.0, 0.0], [0.0, 0.0, behind - BEFORE]], [24, 16], shade);
 }
 
 fn back_wall(solids: &mut Solids, behind: f64, colour: Colour) {

@@ -69,7 +69,7 @@ impl PointOwners {
         let find = |name: &str| rig.skeleton.find(name).unwrap_or_default();
         let trunk = [0, rig.spine, rig.chest];
         let mut owners: Vec<PointOwner> =
-            [2.0, 2.0, 2.0, 3.0, 3.0].map(|depth| PointOwner { joints: head.clone(), depth, hand: None }).into();
+            [2.0, 2.0, 2.0, 4.5, 4.5].map(|depth| PointOwner { joints: head.clone(), depth, hand: None }).into();
         let body = |names: [&str; 2], depth: f64, more: &[usize]| {
             names.map(|name| {
                 let mut joints = near(find(name));

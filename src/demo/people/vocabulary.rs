@@ -41,7 +41,7 @@ pub fn rests(manner: Manner, seat: Seat, rng: &mut ChaCha8Rng) -> Vec<Arms> {
     let stacked = swapped(folded(place, true), front);
     match manner {
         Manner::Folded => vec![interlaced, stacked, swapped(fist_in_hand(place), front)],
-        Manner::Crossing => vec![swapped(arms_crossed(), front), swapped(wrists_crossed(), front), apart],
+        Manner::Crossing => vec![swapped(arms_crossed(), front), swapped(wrists_crossed(place), front), apart],
         Manner::Low => vec![apart, stacked],
         Manner::Holding => vec![apart],
         _ => {
@@ -70,9 +70,12 @@ pub fn stroke(manner: Manner, rng: &mut ChaCha8Rng) -> [Option<ArmPosture>; 2] {
             arms = if rng.random_bool(0.6) { [Some(first), Some(wide(rng))] } else { arms };
             arms[side] = Some(first);
         }
-        Manner::Low if rng.random_bool(0.55) => {
-            let low = ArmPosture { wrist: near([0.2, 0.44, -0.22], [0.08, 0.05, 0.06], rng), ..open(rng) };
-            arms = [Some(low), Some(ArmPosture { wrist: near(low.wrist, [0.04; 3], rng), ..low })];
+        Manner::Low if rng.random_bool(0.8) => {
+            let middle = if rng.random_bool(0.5) { [0.2, 0.42, -0.22] } else { [0.2, 0.1, -0.22] };
+            let first = ArmPosture { wrist: near(middle, [0.08, 0.07, 0.06], rng), ..open(rng) };
+            arms[side] = Some(first);
+            let second = ArmPosture { wrist: near(first.wrist, [0.04; 3], rng), ..first };
+            arms[1 - side] = rng.random_bool(0.6).then_some(second);
         }
         Manner::Fast if rng.random_bool(0.5) => {
             let far = ArmPosture { wrist: near([0.26, 0.14, -0.26], [0.16, 0.18, 0.08], rng), ..open(rng) };
@@ -177,15 +180,15 @@ fn steeple() -> ArmPosture {
 /// Arms crossed before the chest, the left one in front.
 fn arms_crossed() -> Arms {
     [
-        posture([-0.1, 0.2, -0.22], 0.45, 0.2, 0.0, 0.25, FingerShape::RELAXED),
-        posture([-0.08, 0.25, -0.155], 0.45, 0.1, 0.1, 0.1, FingerShape::RELAXED),
+        posture([-0.09, 0.2, -0.215], 0.45, 0.3, 0.1, 0.0, FingerShape::INTERLACED),
+        posture([-0.07, 0.25, -0.155], 0.45, 0.1, 0.1, 0.1, FingerShape::RELAXED),
     ]
 }
 
 /// Wrists crossed low before the body, the left one in front.
-fn wrists_crossed() -> Arms {
+fn wrists_crossed([_, down, away]: Vec3) -> Arms {
     [
-        posture([-0.03, 0.36, -0.26], 0.4, 0.7, 0.1, 0.2, FingerShape::RELAXED),
-        posture([-0.03, 0.385, -0.195], 0.4, 0.7, 0.0, 0.2, FingerShape::RELAXED),
+        posture([-0.03, down - 0.04, away - 0.055], 0.4, 0.5, 0.1, 0.2, FingerShape::RELAXED),
+        posture([-0.03, down - 0.015, away + 0.01], 0.4, 0.5, 0.0, 0.2, FingerShape::RELAXED),
     ]
 }
