@@ -22,7 +22,8 @@ pub fn camera(
     let size = sizes[rng.random_range(0..sizes.len())];
     let [width, height] = size.map(|n| n as f64);
     let fov = rng.random_range(fov_degrees[0]..fov_degrees[1]).to_radians();
-    let focal_px = width / 2.0 / (fov / 2.0).tan();
+    // Whole quarters of a pixel come back from text as they were.
+    let focal_px = (4.0 * width / 2.0 / (fov / 2.0).tan()).round() / 4.0;
     let top = neck[1] + cm * (CROWN + rng.random_range(above_head[0]..above_head[1]));
     let bottom = neck[1] - cm * rng.random_range(below_neck[0]..below_neck[1]);
     let distance = (top - bottom) * focal_px / height;
