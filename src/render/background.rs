@@ -7,7 +7,7 @@ use super::pixel::{PixelLight, Shading, is_empty, nearest};
 use super::shadow::ShadowMap;
 use super::srgb::{Srgb, compressed};
 use super::surfaces::Surfaces;
-use super::visibility::Visibility;
+use super::visibility::VisibleTriangles;
 use crate::types::image::Image;
 use std::sync::Arc;
 
@@ -67,7 +67,7 @@ impl Background {
         let n = size[0] * size[1];
         let (mut pixels, mut labels) = (vec![PixelLight::default(); n], vec![None; n]);
         let mut nearness = vec![[0.0; 4]; n];
-        Visibility::new(size).visit(&surfaces, None, |band, rows, columns| {
+        VisibleTriangles::new(size).visit(&surfaces, None, |band, rows, columns| {
             for (x, y) in (rows[0]..rows[1]).flat_map(|y| (columns[0]..columns[1]).map(move |x| (x, y))) {
                 let (at, there) = (y * size[0] + x, band.at(x, y));
                 let triangles = &band.triangles[there];

@@ -10,7 +10,7 @@ use super::samples::NO_TRIANGLE;
 use super::shadow::ShadowMap;
 use super::srgb::Srgb;
 use super::surfaces::Surfaces;
-use super::visibility::Visibility;
+use super::visibility::VisibleTriangles;
 use crate::types::image::Image;
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ const SHADOW_TEXELS: usize = 256;
 #[derive(Clone, Debug)]
 pub struct Renderer {
     size: [usize; 2],
-    visibility: Visibility,
+    visibility: VisibleTriangles,
     surfaces: Surfaces,
     shading: Shading,
     shadows: ShadowMap,
@@ -38,7 +38,7 @@ impl Renderer {
     pub fn new(size: [usize; 2]) -> Self {
         Self {
             size,
-            visibility: Visibility::new(size),
+            visibility: VisibleTriangles::new(size),
             surfaces: Surfaces::default(),
             shading: Shading::default(),
             shadows: ShadowMap::new(SHADOW_TEXELS),

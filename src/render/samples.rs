@@ -47,7 +47,7 @@ impl FlatTriangle {
 
 /// Depth and triangle of all samples of a band.
 #[derive(Clone, Debug, Default)]
-pub struct Band {
+pub struct RowBand {
     width: usize,
     rows: [usize; 2],
     /// One over the depth, 1/cm; 0 is infinitely far. [BAND_ROWS, width]
@@ -57,7 +57,7 @@ pub struct Band {
     cells: Vec<f32>,
 }
 
-impl Band {
+impl RowBand {
     pub fn new(width: usize) -> Self {
         let n = width * BAND_ROWS;
         let cells = vec![0.0; width.div_ceil(CELL) * BAND_ROWS / CELL];

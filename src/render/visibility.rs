@@ -1,21 +1,21 @@
 //! Which triangles a picture shows: its bands one after the other, outer sides before inner ones.
 
-use super::samples::{BAND_ROWS, Band};
+use super::samples::{BAND_ROWS, RowBand};
 use super::surfaces::Surfaces;
 
 /// Memory of the search for what is seen.
 #[derive(Clone, Debug)]
-pub struct Visibility {
+pub struct VisibleTriangles {
     size: [usize; 2],
-    band: Band,
+    band: RowBand,
     /// Numbers of the triangles of each band, one after the other, and where each band's end.
     numbers: Vec<u32>,
     ends: Vec<usize>,
 }
 
-impl Visibility {
+impl VisibleTriangles {
     pub fn new(size: [usize; 2]) -> Self {
-        Self { size, band: Band::new(size[0]), numbers: Vec::new(), ends: vec![0; size[1].div_ceil(BAND_ROWS)] }
+        Self { size, band: RowBand::new(size[0]), numbers: Vec::new(), ends: vec![0; size[1].div_ceil(BAND_ROWS)] }
     }
 
     /// Calls `each` with every band that has triangles, its rows and its columns; `behind` is the nearness of what the
@@ -24,7 +24,7 @@ impl Visibility {
         &mut self,
         surfaces: &Surfaces,
         behind: Option<&[[f32; 4]]>,
-        mut each: impl FnMut(&Band, [usize; 2], [usize; 2]),
+        mut each: impl FnMut(&RowBand, [usize; 2], [usize; 2]),
     ) {
         self.sort(surfaces);
         let mut start = 0;
