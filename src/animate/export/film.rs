@@ -22,6 +22,8 @@ const WHOLE: FilmArea = [0.0, 0.0, 1280.0, 620.0];
 const HALVES: [FilmArea; 2] = [[30.0, 66.0, 630.0, 610.0], [650.0, 66.0, 1250.0, 610.0]];
 const WAVE: FilmArea = [40.0, 636.0, 1240.0, 684.0];
 const WORDS_PX: f32 = 11.0;
+/// How far the mouth is open at the loudest, 0..1.
+const WIDEST_MOUTH: f64 = 0.7;
 /// Frames that are drawn ahead of the encoder.
 const N_AHEAD: usize = 3;
 
@@ -95,7 +97,7 @@ impl<'a> Film<'a> {
     pub fn frame(&mut self, frame_idx: usize) -> anyhow::Result<Image> {
         let mut image = Image::filled(SIZE[0], SIZE[1], PAPER);
         let secs = self.fps.secs(frame_idx);
-        let mouth = self.voice.get(frame_idx).map_or(0.0, |loudness| f64::from(*loudness).sqrt());
+        let mouth = self.voice.get(frame_idx).map_or(0.0, |loudness| WIDEST_MOUTH * f64::from(*loudness));
         for LabelledPanel { body, panel, label, label_px } in &mut self.panels {
             // The other body's frame nearest in time, none after its end.
             let shown = if body.fps() == self.fps { frame_idx } else { (secs * body.fps().per_sec()).round() as usize };
