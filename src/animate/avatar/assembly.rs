@@ -1,6 +1,6 @@
 //! Surfaces of one person by material, with weights and colours, in the stance.
 
-use super::appearance::{Appearance, Reflectance, Top};
+use super::appearance::{Appearance, Reflectance, Top, Weave};
 use super::body::BodyForm;
 use super::face::Feature;
 use super::field::{Form, around, joined};
@@ -15,6 +15,8 @@ use std::collections::BTreeMap;
 
 /// Cell sizes of the surface meshes, cm.
 const SHIRT_CELL: f64 = 1.9;
+/// Cells of a shirt with a pattern.
+const WOVEN_CELL: f64 = 1.65;
 const LEGS_CELL: f64 = 2.4;
 const SHOE_CELL: f64 = 1.8;
 const PALM_CELL: f64 = 0.62;
@@ -72,7 +74,8 @@ impl<'a> Assembly<'a> {
         let (body, looks) = (self.body, self.looks);
         let cm = body.stance.scale;
         let shirt = body.shirt();
-        let surface = Surface::from_field(&shirt, body.shirt_bounds(), SHIRT_CELL * cm).lit(&shirt, SHIRT_CELL * cm);
+        let cell = cm * if looks.weave == Weave::Plain { SHIRT_CELL } else { WOVEN_CELL };
+        let surface = Surface::from_field(&shirt, body.shirt_bounds(), cell).lit(&shirt, cell);
         let colours = body.cloth(&surface.points, &surface.normals);
         self.meshes.entry(Material::Shirt).or_default().add(body.shirt_weights(&surface), surface, colours);
         let jacket = looks.top == Top::Jacket;

@@ -20,6 +20,11 @@ fn opening(y: f64) -> f64 {
     OPEN * ((y - BUTTON) / (THROAT - BUTTON)).clamp(0.0, 1.0).powf(0.85)
 }
 
+/// Width of a lapel at a share of its length: widest below the notch, narrow as a collar above, cm.
+fn lapel(share: f64) -> f64 {
+    if share < 0.74 { 0.6 + 7.6 * share } else { 3.6 }
+}
+
 impl BodyForm<'_> {
     /// Point of the shirt in front of the hips' (x, y), `over` cm above the cloth, in the stance.
     fn on_chest(&self, shirt: &dyn Fn(Vec3) -> f64, [x, y]: [f64; 2], over: f64) -> Vec3 {
@@ -41,8 +46,7 @@ impl BodyForm<'_> {
             for k in 0..=16 {
                 let t = f64::from(k) / 16.0;
                 let y = BUTTON - 1.0 + t * (THROAT - 2.5 - BUTTON);
-                // Widest below the notch, narrow as a collar above.
-                let width = if t < 0.74 { 0.6 + 7.6 * t } else { 3.6 };
+                let width = lapel(t);
                 let inner = opening(y) - 0.4;
                 let place = |share: f64, over: f64| {
                     self.on_chest(shirt, [sign * (inner + share * width), y + 1.2 * share * t], over)
@@ -104,8 +108,8 @@ impl BodyForm<'_> {
             if looks.top == Top::Jacket {
                 // Above the lapels the jacket lies on the shoulders, at the side of the neck.
                 let narrow = 0.8 * (local[1] - THROAT + 5.0).max(0.0);
-                // The edge lies below the lapel, which is narrow at its lower end.
-                let under = (0.12 * (local[1] - BUTTON)).min(1.4);
+                // The colours meet below the lapel, a cell away from its outer edge.
+                let under = (lapel((local[1] - BUTTON) / (THROAT - BUTTON)) - 2.4).min(0.9);
                 let shown =
                     normal[2] > 0.15 && local[1] > BUTTON + 1.0 && local[0].abs() < opening(local[1]) + under - narrow;
                 return if shown { looks.second_colour } else { looks.top_colour };
