@@ -4,3 +4,4 @@ pub mod fingerprint;
 pub mod mel;
 pub mod mfcc;
 pub mod onset;
+pub mod openness;

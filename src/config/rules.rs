@@ -24,6 +24,7 @@ pub fn check(settings: &Settings, locations: &BTreeMap<String, SourceLocation>) 
     rules.within("segment.min_shoulder_px", s.segment.min_shoulder_px, 1.0, 1e5, "pixels");
     rules.within("segment.min_sound_db", s.segment.min_sound_db, -120.0, 0.0, "dB of full scale");
     rules.within("segment.min_speech", s.segment.min_speech, 0.0, 1.0, "");
+    rules.within("segment.min_lip_sync", s.segment.min_lip_sync, -1.0, 1.0, "");
     rules.within("segment.max_quiet_secs", s.segment.max_quiet_secs, 0.0, 60.0, "seconds");
     rules.within("segment.min_change", s.segment.min_change, 0.0, 255.0, "steps of 8-bit colour");
     rules.within("segment.max_still_secs", s.segment.max_still_secs, 0.0, 1.0, "seconds, all that lift fills");

@@ -121,6 +121,8 @@ pub struct ExtractConfig {
     pub fps: u32,
     /// Which of several sound tracks, from 1; 0: the first that the file marks as its default, else the first.
     pub audio_track: usize,
+    /// Shift the sound of a video by the offset that the lips show, where it is sure.
+    pub fix_offset: bool,
     /// Write every dataset frame as PNG as well.
     pub keep_frames: bool,
 }
@@ -134,7 +136,7 @@ impl ExtractConfig {
 
 impl Default for ExtractConfig {
     fn default() -> Self {
-        Self { fps: 15, audio_track: 0, keep_frames: false }
+        Self { fps: 15, audio_track: 0, fix_offset: false, keep_frames: false }
     }
 }
 
@@ -203,6 +205,8 @@ pub struct SegmentConfig {
     pub speech: SpeechRule,
     /// Least share of speech in the 4 s around a frame, 0..1, as the speech model tells it.
     pub min_speech: f64,
+    /// Least correlation of the mouth that is seen with the voice, in the 8 s around a frame, -1..1.
+    pub min_lip_sync: f64,
     /// Longest stretch, quiet or without speech, that is a pause of speech, seconds.
     pub max_quiet_secs: f64,
     /// Least change of a moving picture from frame to frame, steps of 8-bit colour.
@@ -234,6 +238,7 @@ impl Default for SegmentConfig {
             min_sound_db: -50.0,
             speech: SpeechRule::Auto,
             min_speech: 0.4,
+            min_lip_sync: 0.1,
             max_quiet_secs: 3.0,
             min_change: 0.03,
             max_still_secs: 0.5,

@@ -1,7 +1,8 @@
 //! The keypoints file `keypoints.npz`: the 2D keypoints of a video at the dataset rate. Arrays: `body` f32 [T,17,3]
 //! (COCO-17; x px, y px, score), `left_hand` and `right_hand` f32 [T,21,3], `image_size` i64 [2] (width, height),
 //! `fps` f64 [2] (numerator, denominator; one number is read too), `time_secs` f64 [T], `person` f32 [T,5]
-//! (x, y, width, height, score), `n_people` i64 [T], `identity` i64 [T].
+//! (x, y, width, height, score), `n_people` i64 [T], `identity` i64 [T]; where a face model looked, `mouth_opening` and
+//! `face_score` f32 [T].
 
 use super::npz;
 use super::npz::Npz;
@@ -22,6 +23,17 @@ pub struct Extras {
     pub n_people: Array1<i64>,
     /// Number of the person tracked in each frame, [T]: one higher where another person is taken, or tracking begins anew.
     pub identity: Array1<i64>,
+    /// What was seen of the face; none where no face model looked.
+    pub face: Option<FaceFrames>,
+}
+
+/// The face of the followed person in each frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FaceFrames {
+    /// Distance of the lips in distances between the outer corners of the eyes, [T]; NaN: not seen.
+    pub opening: Array1<f32>,
+    /// How sure it is that there is a face, 0..1, [T]; 0: not seen.
+    pub score: Array1<f32>,
 }
 
 /// Reads the keypoints. A point with a number that is not finite is a missing one (all zeros). Errors: unreadable,
@@ -78,7 +90,13 @@ pub fn read_extras(path: &Path) -> Result<Extras> {
     let person = npz.floats("person", &[n_frames, Some(5)])?.into_dimensionality::<Ix2>()?;
     let n_people = npz.numbers("n_people", &[n_frames])?.mapv(|v| v as i64).into_dimensionality::<Ix1>()?;
     let identity = npz.numbers("identity", &[n_frames])?.mapv(|v| v as i64).into_dimensionality::<Ix1>()?;
-    Ok(Extras { time_secs, person, n_people, identity })
+    let face = npz.has("mouth_opening").then(|| -> Result<FaceFrames> {
+        let mut of_face =
+            |name: &str| -> Result<Array1<f32>> { Ok(npz.floats(name, &[n_frames])?.into_dimensionality::<Ix1>()?) };
+        Ok(FaceFrames { opening: of_face("mouth_opening")?, score: of_face("face_score")? })
+    });
+    let face = face.transpose()?;
+    Ok(Extras { time_secs, person, n_people, identity, face })
 }
 
 /// Writes the file at `path`; the same keypoints give the same bytes.
@@ -92,7 +110,12 @@ pub fn write(path: &Path, keypoints: &Keypoints, extras: &Extras) -> Result<()> 
         npz.add_array("time_secs", &extras.time_secs)?;
         npz.add_array("person", &extras.person)?;
         npz.add_array("n_people", &extras.n_people)?;
-        npz.add_array("identity", &extras.identity)
+        npz.add_array("identity", &extras.identity)?;
+        if let Some(FaceFrames { opening, score }) = &extras.face {
+            npz.add_array("mouth_opening", opening)?;
+            npz.add_array("face_score", score)?;
+        }
+        Ok(())
     })
 }
 
@@ -144,6 +167,7 @@ mod tests {
         fn any_finite_keypoints_come_back_and_the_bytes_repeat(
             n_frames in 0usize..4,
             sides in [1u32..1_000_000, 1u32..1_000_000],
+            has_face in proptest::bool::ANY,
             numbers in proptest::collection::vec(-1e6f32..1e6, 200),
         ) {
             let points = |n: usize| {
@@ -161,6 +185,10 @@ mod tests {
                 person: Array2::from_shape_fn((n_frames, 5), |(t, k)| numbers[5 * t + k]),
                 n_people: Array1::from_shape_fn(n_frames, |t| t as i64),
                 identity: Array1::from_shape_fn(n_frames, |t| 3 * t as i64),
+                face: has_face.then(|| FaceFrames {
+                    opening: Array1::from_shape_fn(n_frames, |t| numbers[t + 9]),
+                    score: Array1::from_shape_fn(n_frames, |t| numbers[t + 5]),
+                }),
             };
             let folder = tempfile::tempdir().unwrap();
             let [path, again] = ["a.npz", "b.npz"].map(|name| folder.path().join(name));

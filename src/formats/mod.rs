@@ -14,6 +14,7 @@ pub mod npz;
 pub mod npz_output;
 pub mod rendered_truth;
 pub mod search;
+pub mod sound_offset_json;
 pub mod tfevents;
 pub mod timeline_npz;
 pub mod wav;

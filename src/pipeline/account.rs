@@ -6,6 +6,7 @@ use crate::formats::media_json::MediaInfo;
 use crate::stage::Unit;
 use crate::stage::artifacts::{Artifact, StageName};
 use crate::stage::ledger::Ledger;
+use crate::types::sync::SoundOffset;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -55,6 +56,9 @@ pub struct TimeAccount {
     /// Sentence about what is not judged of a video without pictures.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_judged: Option<String>,
+    /// How much later the sound of a video is than its picture, where that is sure and to be seen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sound_offset: Option<SoundOffset>,
     /// Whether it is of one video or of a speaker.
     pub kind: AccountKind,
 }
@@ -81,7 +85,8 @@ impl TimeAccount {
         let account = Self { of: unit.to_string(), kind: AccountKind::Video, ..Self::default() };
         let media = if is_extracted { MediaInfo::read(&Artifact::MediaInfo.path(work, unit)).ok() } else { None };
         let not_judged = media.as_ref().and_then(MediaInfo::not_judged);
-        let account = Self { not_judged, ..account };
+        let offset = SoundOffset::read(&Artifact::SoundOffset.path(work, unit)).ok().flatten();
+        let account = Self { not_judged, sound_offset: offset.filter(SoundOffset::is_told), ..account };
         let Some(duration) = media.as_ref().map(|media| media.duration_secs).or_else(|| probed(&unit.source)) else {
             return Self { n_unknown: 1, ..account };
         };

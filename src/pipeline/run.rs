@@ -1,11 +1,13 @@
 //! A run of the pipeline: the stages of videos, video by video, then the datasets of the speakers.
 
 use super::pipeline::Pipeline;
+use super::pose2d::models;
 use super::process::SeparateStage;
 use super::segment::speech_rule::SpeechListener;
 use super::selection::Selection;
 use super::stages;
 use crate::config::videos::Videos;
+use crate::external::onnx::ModelStore;
 use crate::stage::artifacts::{StageName, speaker_dir};
 use crate::stage::fingerprint::HashCache;
 use crate::stage::progress::{Event, Progress};
@@ -117,6 +119,10 @@ impl Pipeline {
             n => n,
         };
         if let Some(line) = SpeechListener::advice(settings)?.filter(|_| selection.has(StageName::Segment)) {
+            progress.event(&Event::Advice { line });
+        }
+        let advice = models::advice(&settings.pose2d, &ModelStore::open(&settings.models.dir)?);
+        if let Some(line) = advice.filter(|_| selection.has(StageName::Pose2d)) {
             progress.event(&Event::Advice { line });
         }
         let report = RunReport { n_speakers: alive.len(), ..RunReport::default() };

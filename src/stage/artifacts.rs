@@ -83,6 +83,8 @@ pub enum Artifact {
     Frames,
     Keypoints,
     Measures,
+    /// How much later the sound is than the picture; absent where nobody was seen to speak.
+    SoundOffset,
     SegmentIntervals,
     SegmentLedger,
     Joints,
@@ -99,7 +101,7 @@ impl Artifact {
         match self {
             Self::Sound | Self::Timeline | Self::MediaInfo | Self::Frames => StageName::Extract,
             Self::Keypoints => StageName::Pose2d,
-            Self::Measures | Self::SegmentIntervals | Self::SegmentLedger => StageName::Segment,
+            Self::Measures | Self::SoundOffset | Self::SegmentIntervals | Self::SegmentLedger => StageName::Segment,
             Self::Joints | Self::Bones | Self::Camera | Self::BoneChange | Self::LiftIntervals | Self::LiftLedger => {
                 StageName::Lift
             }
@@ -115,6 +117,7 @@ impl Artifact {
             Self::Frames => "frames",
             Self::Keypoints => "keypoints.npz",
             Self::Measures => "measures.npz",
+            Self::SoundOffset => "sound_offset.json",
             Self::SegmentIntervals | Self::LiftIntervals => "intervals.json",
             Self::SegmentLedger | Self::LiftLedger => "ledger.json",
             Self::Joints => "joints.npz",

@@ -11,6 +11,8 @@ pub enum Refusal {
     Quiet,
     /// Share of the sound that is speech.
     NoSpeech,
+    /// Correlation of the mouth that is seen with the voice that is heard.
+    OtherVoice,
     /// Seconds for which the picture stands still.
     Still,
     /// Best score of face and arms.
@@ -61,10 +63,11 @@ pub enum Refusal {
 
 impl Refusal {
     /// The reasons that `segment` and `lift` judge frames by.
-    pub const JUDGED: [Self; 19] = [
+    pub const JUDGED: [Self; 20] = [
         Self::NoSound,
         Self::Quiet,
         Self::NoSpeech,
+        Self::OtherVoice,
         Self::Still,
         Self::NoPerson,
         Self::Small,
@@ -94,6 +97,7 @@ impl Refusal {
             Self::NoSound | Self::NoSoundFile => "no sound",
             Self::Quiet => "quiet",
             Self::NoSpeech => "no speech",
+            Self::OtherVoice => "voice of another",
             Self::Still => "still",
             Self::NoPerson => "no person",
             Self::Small => "too small",
@@ -116,7 +120,7 @@ impl Refusal {
         }
     }
 
-    /// What `measured` and `threshold` are given in; empty: scores and shares, 0 to 1.
+    /// What `measured` and `threshold` are given in; empty: scores and shares, 0 to 1, and a correlation, -1 to 1.
     pub const fn unit(self) -> &'static str {
         match self {
             Self::Still
@@ -139,6 +143,7 @@ impl Refusal {
             Self::Jump => "shoulder widths",
             Self::NoSound
             | Self::NoSpeech
+            | Self::OtherVoice
             | Self::NoPerson
             | Self::Face
             | Self::Arms
@@ -154,6 +159,7 @@ impl Refusal {
             Self::NoSound => "no sound track, or it has ended",
             Self::Quiet => "the sound is too quiet for speech",
             Self::NoSpeech => "the sound is not speech",
+            Self::OtherVoice => "the voice is not that of the person seen",
             Self::Still => "the picture stands still",
             Self::NoPerson => "nobody is seen",
             Self::Small => "the speaker is too small in the picture",
@@ -186,6 +192,9 @@ impl Refusal {
             Self::Quiet => format!("too quiet: the sound is at {m:.0} dB, {t:.0} dB is needed"),
             Self::NoSpeech => {
                 format!("no speech: {:.0} % of the sound is speech, at least {:.0} % are needed", 100.0 * m, 100.0 * t)
+            }
+            Self::OtherVoice => {
+                format!("voice of another: the mouth follows the sound with {m:.2}, at least {t:.2} is needed")
             }
             Self::Still => format!("the picture stands still for {m:.1} s, {t:.1} s are allowed"),
             Self::NoPerson => format!("no person: face and arms score {m:.2} at best, {t:.2} is needed"),

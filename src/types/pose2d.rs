@@ -64,6 +64,17 @@ pub struct Pose2d {
     pub left_hand: [Keypoint; N_HAND],
     /// The speaker's right hand.
     pub right_hand: [Keypoint; N_HAND],
+    /// The speaker's face, where it is seen closely.
+    pub face: Option<FaceSeen>,
+}
+
+/// What is seen of a face.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FaceSeen {
+    /// How sure it is that there is a face, 0..1.
+    pub score: f32,
+    /// Distance of the lips in distances between the outer corners of the eyes.
+    pub opening: f32,
 }
 
 impl Pose2d {
@@ -91,6 +102,7 @@ impl Default for Pose2d {
             body: [Keypoint::default(); N_BODY],
             left_hand: [Keypoint::default(); N_HAND],
             right_hand: [Keypoint::default(); N_HAND],
+            face: None,
         }
     }
 }

@@ -197,10 +197,10 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let real_time = |frames: f64, secs: f64| frames / fps / secs;
     let one_real_time = real_time(n_frames, whole(&streamed));
     let two_real_time = real_time(2.0 * n_frames, whole(&two_streamed));
-    let [person, body, hand, palm] = asked;
+    let [person, body, hand, palm, face] = asked;
     let mut text = format!(
         "{n_frames} frames, median of {} rounds, {}\n\
-         models asked a frame           person {person:.2}, body {body:.2}, hand {hand:.2}, palm {palm:.2}\n\
+         models asked a frame           person {person:.2}, body {body:.2}, hand {hand:.2}, palm {palm:.2}, face {face:.2}\n\
          one worker, frames in memory   {:6.1} ms a frame, {:.1} of it inside ONNX Runtime: ratio {ratio:.3}\n\
          one worker, decoding           {:6.1} ms a frame: {one_real_time:.1} x real time at {fps} fps\n\
          two workers, frames in memory  {speed_up:.2} x one worker\n\
@@ -215,7 +215,7 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
         "n_frames": n_frames, "ms_a_frame": per_frame(whole(&one)), "ms_inside": per_frame(inside), "ratio": ratio,
         "ms_a_frame_decoding": per_frame(whole(&streamed)), "speed_up_of_two": speed_up,
         "real_time_one": one_real_time, "real_time_two": two_real_time,
-        "asked": { "person": person, "body": body, "hand": hand, "palm": palm },
+        "asked": { "person": person, "body": body, "hand": hand, "palm": palm, "face": face },
     });
     if !python.is_empty() {
         let theirs = median(python.clone());

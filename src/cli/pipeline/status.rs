@@ -60,6 +60,8 @@ fn text(report: &StatusReport, why: bool) -> String {
     lines.push(verdict(&report.total));
     let not_judged = |account: &TimeAccount| account.not_judged.as_ref().map(|said| format!("{}: {said}", account.of));
     lines.extend(report.account.iter().filter_map(not_judged));
+    let offset = |account: &TimeAccount| account.sound_offset.map(|said| format!("{}: {said}", account.of));
+    lines.extend(report.account.iter().filter_map(offset));
     if why {
         lines.push(String::new());
         lines.extend(report.units.iter().map(|UnitStatus { unit, stage, state, why }| match state {

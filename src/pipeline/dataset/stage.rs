@@ -26,6 +26,9 @@ use anyhow::{Result, ensure};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+/// What the readers of a dataset whose sound was shifted should know.
+const FIXED: &str = "Where the lips showed surely that the sound of a video was late or early, it was shifted.";
+
 /// A speaker's videos to shards. Its unit is the speaker.
 pub struct DatasetStage {
     settings: config::DatasetConfig,
@@ -36,6 +39,8 @@ pub struct DatasetStage {
     /// All videos of all speakers, with the splits that the configuration names.
     all: Vec<Videos>,
     models: Vec<ModelUsed>,
+    /// Whether sound that is surely late or early is shifted.
+    fixes_offset: bool,
     notes: Vec<String>,
     /// Frames between two splits of a video that is divided by time.
     guard_frames: usize,
@@ -55,7 +60,8 @@ impl DatasetStage {
             ready: ready.to_vec(),
             all: Vec::new(),
             models: Vec::new(),
-            notes: Vec::new(),
+            fixes_offset: settings.extract.fix_offset,
+            notes: settings.extract.fix_offset.then(|| FIXED.to_owned()).into_iter().collect(),
             guard_frames: division::guard_frames(settings, reach_secs),
             fps: settings.extract.rate(),
             window_frames: division::window_frames(settings),
@@ -159,19 +165,24 @@ impl Stage for DatasetStage {
         // A damaged record is an error of the run.
         let rule = self.division(unit).ok().map(|division| division.rule(self.fps));
         let guard_secs = rule.as_ref().map_or(0.0, |rule| rule.guard_secs);
-        serde_json::json!({
+        let mut settings = serde_json::json!({
             "unit": rule.map(|rule| rule.unit), "guard_secs": guard_secs,
             "dataset": self.settings, "models": self.models, "notes": self.notes, "tool": env!("CARGO_PKG_VERSION"),
             "speaker": { "licence": said.licence, "consent": said.consent, "source": said.source },
             "splits": videos.map(|videos| &videos.splits), "others": others,
-        })
+        });
+        if let (true, Some(settings)) = (self.fixes_offset, settings.as_object_mut()) {
+            settings.insert("fix_offset".to_owned(), true.into());
+        }
+        settings
     }
 
     fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
         let mut inputs = Vec::new();
         for video in self.ready(unit) {
             inputs.push(Input { role: format!("{} video", video.video), path: video.source.clone() });
-            for (file, optional) in FILES {
+            let offset = self.fixes_offset.then_some((Artifact::SoundOffset, true));
+            for (file, optional) in FILES.into_iter().chain(offset) {
                 let path = file.path(&self.work, video);
                 if !optional || path.exists() {
                     inputs.push(Input { role: format!("{} {}", video.video, file.file()), path });
@@ -188,8 +199,10 @@ impl Stage for DatasetStage {
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let ready = self.ready(unit);
         let failures = self.failures(unit, &ready);
-        let mut videos =
-            ready.into_iter().map(|video| LiftedVideo::open(&self.work, video)).collect::<Result<Vec<_>>>()?;
+        let mut videos = ready
+            .into_iter()
+            .map(|video| LiftedVideo::open(&self.work, video, self.fixes_offset))
+            .collect::<Result<Vec<_>>>()?;
         videos.sort_by(|a, b| (&a.name, &a.unit.video).cmp(&(&b.name, &b.unit.video)));
         check(unit, &self.work, &videos)?;
 

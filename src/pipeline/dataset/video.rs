@@ -16,6 +16,7 @@ use crate::types::pose3d::Motion;
 use crate::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
 use crate::types::sound::{SAMPLE_RATE, Sound};
 use crate::types::sync;
+use crate::types::sync::SoundOffset;
 use anyhow::{Context, Result, ensure};
 use ndarray::{Axis, concatenate, s};
 use std::fs::File;
@@ -37,6 +38,8 @@ pub struct LiftedVideo {
     pub bones: VideoBones,
     /// What the stages call it.
     pub unit: Unit,
+    /// Samples by which the sound is taken later than the frames.
+    shift: i64,
     sound: PathBuf,
     keypoints: PathBuf,
     joints: PathBuf,
@@ -69,8 +72,9 @@ fn hash_of(file: Artifact, work: &Path, unit: &Unit) -> Result<String> {
 }
 
 impl LiftedVideo {
-    /// Reads the small files. Hashes are taken from the records of the stages, where there are any.
-    pub fn open(work: &Path, unit: &Unit) -> Result<LiftedVideo> {
+    /// Reads the small files. Hashes are taken from the records of the stages, where there are any. `fixes_offset`: sound
+    /// that is surely late or early is shifted.
+    pub fn open(work: &Path, unit: &Unit, fixes_offset: bool) -> Result<LiftedVideo> {
         let path_of = |file: Artifact| file.path(work, unit);
         let extracted = Record::read(&dir(work, StageName::Extract, unit));
         let content = match extracted.and_then(|record| record.fingerprint.inputs.get("video").cloned()) {
@@ -83,6 +87,11 @@ impl LiftedVideo {
                 let line = format!("{} {} {}\n", file.stage(), file.file(), hash_of(file, work, unit)?);
                 hasher.update(line.as_bytes());
             }
+        }
+        let offset = if fixes_offset { SoundOffset::read(&path_of(Artifact::SoundOffset))? } else { None };
+        let shift = offset.filter(SoundOffset::is_sure).map_or(0, |o| (o.secs * f64::from(SAMPLE_RATE)).round() as i64);
+        if shift != 0 {
+            hasher.update(format!("sound shifted by {shift} samples\n").as_bytes());
         }
         let stem = unit.source.file_stem().unwrap_or_default().to_string_lossy();
         let path = path_of(Artifact::LiftIntervals);
@@ -101,6 +110,7 @@ impl LiftedVideo {
             ledger: Ledger::read(&path_of(Artifact::LiftLedger))?,
             unit: unit.clone(),
             bones: VideoBones::read(&path_of(Artifact::Bones))?,
+            shift,
             sound: path_of(Artifact::Sound),
             keypoints: path_of(Artifact::Keypoints),
             joints: path_of(Artifact::Joints),
@@ -182,7 +192,7 @@ impl LiftedSamples<'_> {
             let hand = motion.mask.slice(s![.., root..root + N_HAND_JOINTS]);
             hand.iter().filter(|&&seen| seen).count() as f64 / hand.len().max(1) as f64
         };
-        let meta = serde_json::json!({
+        let mut meta = serde_json::json!({
             "video": self.video.name,
             "first_frame": interval.start,
             "n_frames": interval.n_frames(),
@@ -194,24 +204,33 @@ impl LiftedSamples<'_> {
             "right_hand_seen": seen(R_HAND),
             "sound_samples_padded": n_padded,
         });
+        if self.video.shift != 0
+            && let Some(meta) = meta.as_object_mut()
+        {
+            meta.insert("sound_shift_samples".to_owned(), self.video.shift.into());
+        }
         let key = format!("{}-{:06}", self.video.name, interval.start);
         let padded_secs = n_padded as f64 / f64::from(SAMPLE_RATE);
         Ok(CutSample { sample: Sample { key, motion, pose2d, sound, meta }, padded_secs })
     }
 
-    /// The sound under an interval, and how many samples of silence had to be appended.
+    /// The sound under an interval, and how many samples of silence stand in for some that are not there.
     fn sound_of(&mut self, interval: Interval) -> Result<(Sound, usize)> {
         let reading = || format!("cannot read {}", self.video.sound.display());
         let range = sync::samples_of(self.video.intervals.fps, SAMPLE_RATE, interval.start..interval.end);
-        let n_held = (self.sound.duration() as usize).clamp(range.start, range.end) - range.start;
-        let mut samples = Vec::with_capacity(range.len());
-        if n_held > 0 {
-            self.sound.seek(range.start as u32).with_context(reading)?;
-            for sample in self.sound.samples::<i16>().take(n_held) {
+        let n_held = i64::from(self.sound.duration());
+        let [start, end] = [range.start, range.end].map(|at| (at as i64 + self.video.shift).clamp(0, n_held));
+        // Silence where the shifted sound begins after the interval does.
+        let n_before = (-(range.start as i64 + self.video.shift)).clamp(0, range.len() as i64) as usize;
+        let mut samples = vec![0.0; n_before];
+        samples.reserve(range.len());
+        if start < end {
+            self.sound.seek(start as u32).with_context(reading)?;
+            for sample in self.sound.samples::<i16>().take((end - start) as usize) {
                 samples.push(f32::from(sample.with_context(reading)?) / 32_768.0);
             }
         }
-        let n_padded = range.len() - samples.len();
+        let n_padded = range.len() - samples.len() + n_before;
         samples.resize(range.len(), 0.0);
         Ok((Sound { rate: SAMPLE_RATE, samples }, n_padded))
     }

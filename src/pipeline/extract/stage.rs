@@ -54,8 +54,11 @@ impl Stage for ExtractStage {
     }
 
     fn settings(&self, unit: &Unit) -> serde_json::Value {
+        // The offset of the sound is known later, and shifted by where sound and frames meet.
+        let mut settings = json!(self.settings);
+        settings.as_object_mut().map(|settings| settings.remove("fix_offset"));
         json!({
-            "extract": self.settings,
+            "extract": settings,
             "sample_rate": SAMPLE_RATE,
             "mirrored": self.is_mirrored(unit),
             "ffmpeg": ffmpeg::version(),

@@ -1,7 +1,9 @@
-//! The way of one frame: person box (every n-th frame, followed between), body, hands.
+//! The way of one frame: person box (every n-th frame, followed between), body, hands, face.
 
 use super::body::{BodyModel, DetectedBody};
 use super::decode::ScoredPoint;
+use super::face::FaceTracker;
+use super::face::model::FaceModel;
 use super::hand::{DetectedHand, HandModel};
 use super::hands;
 use super::hands::HandTracker;
@@ -21,6 +23,7 @@ pub struct Chain {
     speaker: SpeakerTracker,
     body: BodyModel,
     hands: Option<HandTracker>,
+    face: Option<FaceTracker>,
     body_seen: bool,
     /// Frames since the shot began.
     n_frames: usize,
@@ -44,6 +47,8 @@ impl Chain {
         let palm = (named(&settings.palm) && named(&settings.hand))
             .then(|| PalmDetector::open(runtime, entry("palm", &settings.palm, ModelRole::Palm)?, models_dir));
         let palm = palm.transpose()?;
+        let face = named(&settings.face)
+            .then(|| FaceModel::open(runtime, entry("face", &settings.face, ModelRole::Face)?, models_dir));
         ensure!(
             hand.is_some() || body.gives_hands(),
             "pose2d.hand is empty, but the model {:?} gives no hands: name a hand model",
@@ -54,6 +59,7 @@ impl Chain {
             speaker: SpeakerTracker::new(person.transpose()?),
             body,
             hands: hand.transpose()?.map(|hand| HandTracker::new(hand, palm)),
+            face: face.transpose()?.map(FaceTracker::new),
             body_seen: false,
             n_frames: 0,
         })
@@ -69,7 +75,7 @@ impl Chain {
     pub fn begin_shot(&mut self) {
         self.speaker.begin_anew();
         self.body_seen = false;
-        self.forget_hands();
+        self.forget_details();
         self.n_frames = 0;
     }
 
@@ -78,24 +84,27 @@ impl Chain {
         self.inputs().into_iter().flatten().map(ModelInput::secs_inside).sum()
     }
 
-    /// How often the models of person, body, hand and palm were asked so far.
-    pub fn n_runs(&self) -> [u64; 4] {
+    /// How often the models of person, body, hand, palm and face were asked so far.
+    pub fn n_runs(&self) -> [u64; 5] {
         self.inputs().map(|input| input.map_or(0, ModelInput::n_runs))
     }
 
-    /// Person, body, hand, palm.
-    fn inputs(&self) -> [Option<&ModelInput>; 4] {
+    /// Person, body, hand, palm, face.
+    fn inputs(&self) -> [Option<&ModelInput>; 5] {
         let hands = self.hands.as_ref();
         [
             self.speaker.detector.as_ref().map(|detector| &detector.feed),
             Some(&self.body.feed),
             hands.map(|hands| &hands.model.feed),
             hands.and_then(|hands| hands.palm.as_ref()).map(|palm| &palm.feed),
+            self.face.as_ref().map(|face| &face.model.feed),
         ]
     }
 
-    fn forget_hands(&mut self) {
+    /// Hands and face are looked for anew.
+    fn forget_details(&mut self) {
         self.hands.iter_mut().for_each(HandTracker::begin_anew);
+        self.face.iter_mut().for_each(FaceTracker::begin_anew);
     }
 
     /// What is seen of the speaker in the next frame of the shot.
@@ -107,7 +116,7 @@ impl Chain {
         if let Some(body) = &found
             && self.speaker.recognise(image, &body.points, &mut self.body, &self.settings)?
         {
-            self.forget_hands();
+            self.forget_details();
             found = self.look_for_body(image)?;
         }
         let followed = &self.speaker.track;
@@ -118,7 +127,7 @@ impl Chain {
             ..Pose2d::default()
         };
         let Some(body) = found else {
-            self.forget_hands();
+            self.forget_details();
             self.body_seen = false;
             return Ok(pose);
         };
@@ -133,6 +142,9 @@ impl Chain {
             }
             (None, None) => [None, None],
         };
+        if let Some(face) = &mut self.face {
+            pose.face = face.find(image, &body.points, self.settings.joint_score)?;
+        }
         pose.body = body.points.map(keypoint);
         pose.left_hand = left.map_or(pose.left_hand, |hand| hand.points.map(keypoint));
         pose.right_hand = right.map_or(pose.right_hand, |hand| hand.points.map(keypoint));

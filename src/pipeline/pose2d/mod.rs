@@ -1,12 +1,13 @@
 //! Stage 2: frames to 2D keypoints of the one speaker: person box, body, both hands, tracked through each shot.
 //! `decode` reads the models' outputs, one file a kind; `person`, `body`, `hand` and `palm` ask one model each; `speaker`
 //! says who is tracked, with `tracker` (the choice), `liveness` and `appearance` (on a `patch` of the picture); `region`
-//! and `hands` say where to look for a hand and when; `chain` is the way of one frame; `stage` the way of a video.
+//! and `hands` say where to look for a hand and when; `face` sees the mouth; `chain` is the way of one frame; `stage` the way of a video.
 
 pub mod appearance;
 pub mod body;
 pub mod chain;
 pub mod decode;
+pub mod face;
 pub mod hand;
 pub mod hands;
 pub mod liveness;

@@ -75,7 +75,7 @@ impl Stage for Pose2dStage {
     }
 
     fn version(&self) -> u32 {
-        4
+        5
     }
 
     fn cost(&self) -> u32 {
@@ -192,6 +192,7 @@ struct DetectionCounts {
     left_hand: usize,
     right_hand: usize,
     several: usize,
+    face: usize,
 }
 
 impl DetectionCounts {
@@ -202,6 +203,7 @@ impl DetectionCounts {
         self.left_hand += any(&pose.left_hand);
         self.right_hand += any(&pose.right_hand);
         self.several += usize::from(pose.n_people > 1);
+        self.face += usize::from(pose.face.is_some());
     }
 
     fn report(&self) -> Report {
@@ -217,6 +219,7 @@ impl DetectionCounts {
         let facts = json!({
             "n_frames": self.n_frames, "person": share(self.person), "left_hand": share(self.left_hand),
             "right_hand": share(self.right_hand), "several_people": share(self.several),
+            "mouth": share(self.face),
         });
         Report { line, facts: facts.as_object().cloned().unwrap_or_default() }
     }

@@ -1,7 +1,7 @@
 //! The keypoints of a video as they are gathered, frame by frame.
 
-use crate::formats::keypoints_npz::Extras;
-use crate::types::pose2d::{Keypoint, Keypoints, N_BODY, N_HAND, PersonBox, Pose2d};
+use crate::formats::keypoints_npz::{Extras, FaceFrames};
+use crate::types::pose2d::{FaceSeen, Keypoint, Keypoints, N_BODY, N_HAND, PersonBox, Pose2d};
 use crate::types::time::FrameRate;
 use anyhow::Result;
 use ndarray::{Array1, Array2, Array3};
@@ -15,6 +15,7 @@ pub struct KeypointFrames {
     person: Vec<f32>,
     n_people: Vec<i64>,
     identity: Vec<i64>,
+    face: Vec<Option<FaceSeen>>,
     time_secs: Vec<f64>,
 }
 
@@ -29,6 +30,7 @@ impl KeypointFrames {
         self.person.extend([x, y, width, height, score]);
         self.n_people.push(i64::from(pose.n_people));
         self.identity.push(pose.identity);
+        self.face.push(pose.face);
         self.time_secs.push(source_secs);
     }
 
@@ -48,11 +50,20 @@ impl KeypointFrames {
             left_hand: points(self.left_hand, N_HAND)?,
             right_hand: points(self.right_hand, N_HAND)?,
         };
+        let of_face = |part: fn(&FaceSeen) -> f32, unseen: f32| {
+            self.face.iter().map(|face| face.as_ref().map_or(unseen, part)).collect::<Array1<f32>>()
+        };
+        let is_seen = self.face.iter().any(Option::is_some);
+        let face = is_seen.then(|| FaceFrames {
+            opening: of_face(|face| face.opening, f32::NAN),
+            score: of_face(|face| face.score, 0.0),
+        });
         let extras = Extras {
             time_secs: Array1::from(self.time_secs),
             person: Array2::from_shape_vec((n_frames, 5), self.person)?,
             n_people: Array1::from(self.n_people),
             identity: Array1::from(self.identity),
+            face,
         };
         Ok((keypoints, extras))
     }
@@ -69,10 +80,13 @@ mod tests {
         gathered.push(&pose, 0.0);
         pose.right_hand[20] = Keypoint { x: 5.0, y: 6.0, score: 0.5 };
         pose.person.height = 9.0;
+        pose.face = Some(FaceSeen { score: 0.9, opening: 0.2 });
         gathered.push(&pose, 0.07);
         let (keypoints, extras) = gathered.finish(FrameRate::new(15, 1), [64, 48]).unwrap();
         assert_eq!((keypoints.n_frames(), keypoints.right_hand[[1, 20, 1]], keypoints.body[[1, 0, 0]]), (2, 6.0, 0.0));
         assert_eq!((extras.person[[1, 3]], extras.n_people[0], extras.time_secs[1]), (9.0, 2, 0.07));
         assert_eq!(extras.identity[1], 3);
+        let face = extras.face.unwrap();
+        assert_eq!((face.opening[0].is_nan(), face.opening[1], face.score[0]), (true, 0.2, 0.0));
     }
 }

@@ -19,6 +19,8 @@ pub struct Measures {
     pub sound_db: Vec<f32>,
     /// Share of speech in the seconds around the frame, 0..1; not known where loudness alone is the rule.
     pub speech: Vec<f32>,
+    /// Correlation of the mouth that is seen with the voice, in the seconds around the frame, -1..1.
+    pub lip_sync: Vec<f32>,
     /// Change of the picture since the frame before, in steps of 8-bit colour.
     pub frame_difference: Vec<f32>,
     /// Best score of a face or arm point: whether somebody is there.
@@ -74,6 +76,7 @@ impl Measures {
             sound: vec![1.0; n_frames],
             sound_db: vec![0.0; n_frames],
             speech: vec![1.0; n_frames],
+            lip_sync: vec![1.0; n_frames],
             frame_difference: vec![255.0; n_frames],
             left_hand: mean_scores(keypoints.left_hand.view()),
             right_hand: mean_scores(keypoints.right_hand.view()),

@@ -1,5 +1,6 @@
-//! How loud a video is at each frame, from its wav file read as a stream.
+//! How loud a video is at each frame, and how open its voice sounds, from its wav file read as a stream.
 
+use crate::audio::openness::{Openness, OpennessMeter};
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result};
 use std::path::Path;
@@ -8,6 +9,8 @@ use std::path::Path;
 const AROUND_SECS: f64 = 1.0;
 /// Digital silence, dB.
 const NOTHING_DB: f64 = -120.0;
+/// Samples read at a time.
+const PIECE: usize = 1 << 14;
 
 /// Whether each frame has sound (1 or 0), and its loudness: the root mean square of the second around it in dB
 /// of full scale, -120 where there is none. A file that is not there has no sound.
@@ -36,6 +39,25 @@ pub fn levels(path: &Path, fps: FrameRate, n_frames: usize) -> Result<(Vec<f32>,
     };
     let there = n_samples.iter().map(|&n| f32::from(u8::from(n > 0))).collect();
     Ok((there, (0..n_frames).map(loudness).collect()))
+}
+
+/// How open the voice in a file of 16 kHz sounds; a file that is not there has none.
+pub fn openness(path: &Path) -> Result<Openness> {
+    let mut meter = OpennessMeter::default();
+    if path.exists() {
+        let reading = || format!("cannot read {}", path.display());
+        let mut wav = hound::WavReader::open(path).with_context(reading)?;
+        let mut piece = Vec::with_capacity(PIECE);
+        for sample in wav.samples::<i16>() {
+            piece.push(f32::from(sample.with_context(reading)?) / 32_768.0);
+            if piece.len() == PIECE {
+                meter.push(&piece);
+                piece.clear();
+            }
+        }
+        meter.push(&piece);
+    }
+    Ok(meter.finish())
 }
 
 #[cfg(test)]

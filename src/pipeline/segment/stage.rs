@@ -1,7 +1,8 @@
-//! The stage: reads what `extract` and `pose2d` wrote of a video, judges it, writes `intervals.json`, `ledger.json`
-//! and `measures.npz`.
+//! The stage: reads what `extract` and `pose2d` wrote of a video, judges it, writes `intervals.json`, `ledger.json`,
+//! `measures.npz` and `sound_offset.json`.
 
 use super::judge::judge;
+use super::lips;
 use super::measure;
 use super::measure::Measures;
 use super::sound;
@@ -15,6 +16,7 @@ use crate::stage::ledger::{Ledger, longest_first};
 use crate::stage::progress::Progress;
 use crate::stage::{Input, Report, Stage, Unit, counted, write_json};
 use crate::types::interval::Intervals;
+use crate::types::sync::SoundOffset;
 use anyhow::{Result, ensure};
 use std::path::{Path, PathBuf};
 
@@ -48,7 +50,7 @@ impl Stage for SegmentStage {
     }
 
     fn version(&self) -> u32 {
-        6
+        7
     }
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
@@ -72,21 +74,26 @@ impl Stage for SegmentStage {
 
     fn run(&self, unit: &Unit, out: &Path, _progress: &dyn Progress) -> Result<Report> {
         let video = MediaInfo::read(&self.file(Artifact::MediaInfo, unit))?;
-        let measures = self.measures(unit, &video)?;
+        let (measures, offset) = self.measures(unit, &video)?;
         let (intervals, ledger) = judge(&measures, &video, &self.rules);
         write_json(&Artifact::SegmentIntervals.within(out), &intervals)?;
         write_json(&Artifact::SegmentLedger.within(out), &ledger)?;
         measures.write(&Artifact::Measures.within(out))?;
+        if let Some(offset) = &offset {
+            write_json(&Artifact::SoundOffset.within(out), offset)?;
+        }
         let mut report = report(&intervals, &ledger);
         let rule = if self.speech.is_some() { "vad" } else { "loudness" };
         report.facts.insert("speech".to_owned(), rule.into());
+        report.facts.insert("sound_offset".to_owned(), serde_json::to_value(offset)?);
+        report.line.extend(offset.filter(SoundOffset::is_told).map(|offset| format!("; {offset}")));
         report.line.extend(video.not_judged().map(|said| format!("; {said}")));
         Ok(report)
     }
 }
 
 impl SegmentStage {
-    fn measures(&self, unit: &Unit, video: &MediaInfo) -> Result<Measures> {
+    fn measures(&self, unit: &Unit, video: &MediaInfo) -> Result<(Measures, Option<SoundOffset>)> {
         let path = self.file(Artifact::Keypoints, unit);
         let (keypoints, extras) = (keypoints_npz::read(&path)?, keypoints_npz::read_extras(&path)?);
         let n_frames = video.n_frames;
@@ -109,16 +116,29 @@ impl SegmentStage {
             Some(listener) => listener.shares(&self.file(Artifact::Sound, unit), video.fps, n_frames)?,
             None => vec![f32::NAN; n_frames],
         };
-        Ok(Measures {
+        let (lip_sync, offset) = match &extras.face {
+            Some(face) => {
+                let is_speech: Vec<bool> =
+                    speech.iter().zip(&sound_db).map(|(share, db)| lips::is_speech(*share, *db)).collect();
+                let voice = sound::openness(&self.file(Artifact::Sound, unit))?;
+                let (opening, secs) = (face.opening.to_vec(), extras.time_secs.to_vec());
+                let found = lips::compare(&opening, &secs, &is_speech, &voice, video.fps);
+                (found.score, found.offset)
+            }
+            None => (vec![f32::NAN; n_frames], None),
+        };
+        let measures = Measures {
             sound,
             sound_db,
             speech,
+            lip_sync,
             frame_difference: timeline.frame_difference,
             n_people: extras.n_people.iter().map(|&n| n as f32).collect(),
             identity: measure::identity(&extras.identity.to_vec(), &timeline.restart, &of_body.jump),
             shot_score: timeline.shot_score.iter().map(|&score| score as f32).collect(),
             ..of_body
-        })
+        };
+        Ok((measures, offset))
     }
 }
 

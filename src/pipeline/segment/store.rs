@@ -9,11 +9,12 @@ use std::path::Path;
 
 impl Measures {
     /// Every array with its name, in the order of the rules.
-    pub fn arrays(&self) -> [(&'static str, &[f32]); 16] {
+    pub fn arrays(&self) -> [(&'static str, &[f32]); 17] {
         [
             ("sound", &self.sound),
             ("sound_db", &self.sound_db),
             ("speech", &self.speech),
+            ("lip_sync", &self.lip_sync),
             ("still", &self.frame_difference),
             ("person", &self.person),
             ("shoulder_px", &self.shoulder_px),
@@ -41,17 +42,21 @@ impl Measures {
     pub fn read(path: &Path) -> Result<Self> {
         let mut npz = Npz::open(path)?;
         let person = npz.floats("person", &[None])?.into_iter().collect::<Vec<f32>>();
-        // Earlier versions did not listen for speech.
-        let speech = match npz.has("speech") {
-            true => npz.floats("speech", &[Some(person.len())])?.into_iter().collect(),
-            false => vec![f32::NAN; person.len()],
+        // Earlier versions did not listen for speech, nor look at mouths.
+        let mut newer = |name: &str| -> Result<Vec<f32>> {
+            Ok(match npz.has(name) {
+                true => npz.floats(name, &[Some(person.len())])?.into_iter().collect(),
+                false => vec![f32::NAN; person.len()],
+            })
         };
+        let (speech, lip_sync) = (newer("speech")?, newer("lip_sync")?);
         let mut read =
             |name: &str| -> Result<Vec<f32>> { Ok(npz.floats(name, &[Some(person.len())])?.into_iter().collect()) };
         Ok(Self {
             sound: read("sound")?,
             sound_db: read("sound_db")?,
             speech,
+            lip_sync,
             frame_difference: read("still")?,
             shoulder_px: read("shoulder_px")?,
             face: read("face")?,

@@ -63,7 +63,7 @@ impl Bound {
 }
 
 /// The rules on frames.
-pub fn frame_rules(rules: &config::SegmentConfig) -> [FrameRule; 13] {
+pub fn frame_rules(rules: &config::SegmentConfig) -> [FrameRule; 14] {
     use Bound::{AtLeast, AtMost};
     let score = AtLeast(rules.joint_score);
     let row = |refusal, values: fn(&Measures) -> &[f32], bound, gap| FrameRule {
@@ -82,6 +82,7 @@ pub fn frame_rules(rules: &config::SegmentConfig) -> [FrameRule; 13] {
         row(Refusal::NoSound, |m| &m.sound, AtLeast(0.5), none),
         row(Refusal::Quiet, |m| &m.sound_db, AtLeast(rules.min_sound_db), quiet),
         row(Refusal::NoSpeech, |m| &m.speech, AtLeast(rules.min_speech), quiet),
+        row(Refusal::OtherVoice, |m| &m.lip_sync, AtLeast(rules.min_lip_sync), quiet),
         secs(row(Refusal::Still, |m| &m.frame_difference, AtLeast(rules.min_change), still)),
         row(Refusal::NoPerson, |m| &m.person, score, body),
         row(Refusal::Small, |m| &m.shoulder_px, AtLeast(rules.min_shoulder_px), body),

@@ -35,9 +35,10 @@ const ONE: [f64; 2] = [0.0, 1.0];
 const BONES: &str = "bone_change";
 const LENGTHS: &str = "interval_secs";
 
-const ROWS: [Measure; 16] = [
+const ROWS: [Measure; 17] = [
     row("sound_db", "Loudness of the second", "dB", [-100.0, 0.0], 50, "min_sound_db"),
     row("speech", "Share of speech in the 4 s around", "", ONE, 50, "min_speech"),
+    row("lip_sync", "Mouth and voice in the 8 s around", "correlation", [-1.0, 1.0], 50, "min_lip_sync"),
     row("still", "Change of the picture", "8-bit steps", [0.0, 4.0], 80, "min_change"),
     row("person", "Best score of face and arms", "", ONE, 40, "joint_score"),
     row("shoulder_px", "Between the shoulders", "px", [0.0, 600.0], 60, "min_shoulder_px"),

@@ -48,9 +48,10 @@ macro_rules! row {
 }
 
 /// Thresholds of `[segment]`.
-pub const THRESHOLDS: [ThresholdGrid; 17] = [
+pub const THRESHOLDS: [ThresholdGrid; 18] = [
     row!(min_sound_db, "least loudness of the second around a frame", "dB of full scale", -90.0, -10.0),
     row!(min_speech, "least share of speech in the 4 s around a frame", "", 0.0, 1.0),
+    row!(min_lip_sync, "least correlation of the mouth with the voice in the 8 s around a frame", "", -0.5, 0.5),
     row!(max_quiet_secs, "longest pause of speech that is kept", "s", 0.0, 10.0),
     row!(min_change, "a picture that changes less stands still", "steps of 8-bit colour", 0.0, 1.0),
     row!(max_still_secs, "longest time the picture may stand still", "s", 0.0, 1.0),

@@ -6,6 +6,7 @@ use crate::stage::Unit;
 use crate::stage::artifacts::{Artifact, StageName, dir};
 use crate::stage::ledger::Ledger;
 use crate::stage::record::Failure;
+use crate::types::sync::SoundOffset;
 use std::path::Path;
 
 /// Video of the report.
@@ -49,6 +50,11 @@ impl VideoSummary {
             if let Some(said) = media.not_judged() {
                 video.note(&format!("Made {said}."));
             }
+        }
+        if let Some(offset) = SoundOffset::read(&Artifact::SoundOffset.path(work, unit)).ok().flatten()
+            && offset.is_told()
+        {
+            video.note(&format!("By the lips, the {offset}."));
         }
         let failure = StageName::OF_VIDEOS
             .into_iter()

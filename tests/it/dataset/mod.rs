@@ -7,5 +7,6 @@ pub mod import;
 pub mod import_readers;
 pub mod shard;
 pub mod shared_sound;
+pub mod sound_offset;
 pub mod splits;
 pub mod splits_by_time;

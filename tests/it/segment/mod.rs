@@ -3,3 +3,4 @@
 pub mod redecide;
 pub mod segment;
 pub mod speech;
+pub mod voices;

@@ -1,0 +1,223 @@
+//! Own voice against the voices of others on real clips, and how well a shifted sound is found. `ORATOR_LONG=1` (`make
+//! prove`): all clips; otherwise two of them. Clips whose lips a model made are measured apart.
+
+use crate::fixtures::skip::{fetched_model, fetched_models, real_data};
+use crate::fixtures::support::{Project, files_under};
+use ndarray::Array1;
+use orator::audio::openness::{Openness, OpennessMeter};
+use orator::external::ffmpeg::audio::read_sound;
+use orator::formats::keypoints_npz;
+use orator::pipeline::segment::lips::{LipVoiceMatch, NEAR_SECS};
+use orator::types::sync::SoundOffset;
+use orator::types::time::FrameRate;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::path::Path;
+
+const FPS: FrameRate = FrameRate::new(15, 1);
+/// Clips of people who talk, with the frames a second of the file.
+const TALKING: [(&str, f64); 5] = [
+    ("talk_tyson_2cam_17s_720p", 30.0),
+    ("talk_kim_7s_1080p", 30.0),
+    ("talk_latentsync_demo1_1080x1920_hevc", 25.0),
+    ("talk_oliver_wan_3.5s_1080p", 30.0),
+    ("talk_phoneman_33s_1080p_UNSURE", 30.0),
+];
+/// Whose lips are certainly not a model's.
+const REAL: [&str; 2] = ["talk_tyson_2cam_17s_720p", "talk_kim_7s_1080p"];
+const GENERATED: [&str; 10] = [
+    "mdd_long_chemistry",
+    "mdd_long_seth",
+    "mdd_showcase_chemistry1",
+    "mdd_showcase_chemistry2",
+    "mdd_showcase_jon1",
+    "mdd_showcase_jon2",
+    "mdd_showcase_oliver1",
+    "mdd_showcase_oliver2",
+    "mdd_showcase_seth1",
+    "mdd_showcase_seth2",
+];
+/// Sounds of a speaker who is in no clip.
+const SOUNDS: [&str; 2] = ["beat2_2_scott_0_2_2_16k.wav", "beat2_2_scott_0_4_4_16k.wav"];
+const WINDOW_SECS: f64 = 4.0;
+
+struct Clip {
+    name: String,
+    source_fps: f64,
+    opening: Array1<f32>,
+    time_secs: Array1<f64>,
+    voice: Openness,
+    secs: f64,
+}
+
+impl Clip {
+    fn speaker(&self) -> &str {
+        let name = self.name.trim_start_matches("talk_").trim_start_matches("mdd_");
+        let name = name.trim_start_matches("long_").trim_start_matches("showcase_");
+        name.split('_').next().unwrap().trim_end_matches(|c: char| c.is_ascii_digit())
+    }
+
+    /// The lips of `frames`, the voice of `sound` taken `later_secs` later.
+    fn beside(&self, sound: &Openness, frames: std::ops::Range<usize>, later_secs: f64) -> LipVoiceMatch {
+        let opening = self.opening.slice(ndarray::s![frames.clone()]).to_vec();
+        let times: Vec<f64> = self.time_secs.slice(ndarray::s![frames]).iter().map(|secs| secs + later_secs).collect();
+        let is_speech = vec![true; times.len()];
+        LipVoiceMatch::new(&opening, &times, &is_speech, sound, FPS)
+    }
+
+    fn n_frames(&self) -> usize {
+        self.opening.len()
+    }
+
+    /// Of the whole clip; none of one that is too short to say.
+    fn offset(&self) -> SoundOffset {
+        let none = SoundOffset { secs: 0.0, correlation: 0.0, confidence: 0.0, compared_secs: 0.0 };
+        self.beside(&self.voice, 0..self.n_frames(), 0.0).offset().unwrap_or(none)
+    }
+
+    /// Scores of windows, one a second.
+    fn windows(&self, sound: &Openness, later_secs: f64, middle_secs: f64) -> Vec<f64> {
+        let scores = self.beside(sound, 0..self.n_frames(), later_secs).scores(WINDOW_SECS, middle_secs, NEAR_SECS);
+        let inside = scores.iter().skip(30).step_by(15).take((self.n_frames().saturating_sub(60)) / 15 + 1);
+        inside.filter(|score| score.is_finite()).map(|score| f64::from(*score)).collect()
+    }
+}
+
+fn openness(path: &Path) -> (Openness, f64) {
+    let sound = read_sound(path).unwrap();
+    let mut meter = OpennessMeter::default();
+    meter.push(&sound.samples);
+    (meter.finish(), sound.samples.len() as f64 / f64::from(sound.rate))
+}
+
+/// Share of pairs in which an own voice scores higher.
+fn area(own: &[f64], others: &[f64]) -> f64 {
+    let wins = |own: &f64| {
+        others.iter().map(|other| if own > other { 1.0 } else { 0.5 * f64::from(own == other) }).sum::<f64>()
+    };
+    own.iter().map(wins).sum::<f64>() / (own.len() * others.len()).max(1) as f64
+}
+
+/// The area over all clips, and the middle 95 % of it over clips drawn anew.
+fn with_interval(clips: &[(Vec<f64>, Vec<f64>)], rng: &mut ChaCha8Rng) -> [f64; 3] {
+    let of = |drawn: &[usize]| {
+        let both = |side: fn(&(Vec<f64>, Vec<f64>)) -> &Vec<f64>| {
+            drawn.iter().flat_map(|k| side(&clips[*k]).clone()).collect::<Vec<_>>()
+        };
+        area(&both(|clip| &clip.0), &both(|clip| &clip.1))
+    };
+    let mut drawn: Vec<f64> =
+        (0..400).map(|_| of(&(0..clips.len()).map(|_| rng.random_range(0..clips.len())).collect::<Vec<_>>())).collect();
+    drawn.sort_by(f64::total_cmp);
+    [of(&(0..clips.len()).collect::<Vec<_>>()), drawn[10], drawn[389]]
+}
+
+#[test]
+fn own_voices_are_told_from_others_and_shifts_are_found() {
+    let (Some(videos), Some(sounds), Some(models), Some(_)) =
+        (real_data("data/videos"), real_data("data/audio"), fetched_models(), fetched_model("face_landmark_192.onnx"))
+    else {
+        return;
+    };
+    let is_long = std::env::var("ORATOR_LONG").is_ok();
+    let talking = TALKING.iter().filter(|(name, _)| is_long || REAL.contains(name));
+    let mut named: Vec<(String, f64)> = talking.map(|(name, fps)| ((*name).to_owned(), *fps)).collect();
+    if is_long {
+        named.extend(GENERATED.iter().map(|name| (format!("generated/{name}"), 25.0)));
+    }
+    named.retain(|(name, _)| videos.join(format!("{name}.mp4")).is_file());
+
+    let project = Project::with_clips("voices", 0, 0.0);
+    let files: Vec<String> = named.iter().map(|(name, _)| format!("{}/{name}.mp4", videos.display())).collect();
+    let text = format!("[models]\ndir = {models:?}\n[[speaker]]\nname = \"host\"\nvideos = {files:?}\n");
+    std::fs::write(project.dir().join("pipeline.toml"), text).unwrap();
+    let answer = project.run(&["--to", "segment"]);
+    assert_eq!(answer.code, 0, "{}", answer.errors);
+    let work = files_under(&project.work());
+    let made = |name: &str, ending: &str| {
+        let slug = name.rsplit('/').next().unwrap().to_lowercase().replace(['_', '.'], "-");
+        let is_it = |file: &&(String, std::path::PathBuf)| file.0.contains(&slug) && file.0.ends_with(ending);
+        work.iter().find(is_it).unwrap_or_else(|| panic!("no {ending} of {name}")).1.clone()
+    };
+    let clips: Vec<Clip> = named
+        .iter()
+        .map(|(name, source_fps)| {
+            let extras = keypoints_npz::read_extras(&made(name, "keypoints.npz")).unwrap();
+            let ledger = std::fs::read_to_string(made(name, "ledger.json")).unwrap();
+            assert!(!ledger.contains("voice of another"), "{name}: an own voice is refused");
+            let (voice, secs) = openness(&made(name, "audio.wav"));
+            let opening = extras.face.unwrap().opening;
+            let name = name.trim_start_matches("generated/").to_owned();
+            Clip { name, source_fps: *source_fps, opening, time_secs: extras.time_secs, voice, secs }
+        })
+        .collect();
+    let strangers: Vec<(Openness, f64)> =
+        SOUNDS.iter().map(|name| sounds.join(name)).filter(|path| path.is_file()).map(|path| openness(&path)).collect();
+
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let (mut scored, mut n_found, mut n_shifts) = (Vec::new(), [0, 0], [0, 0]);
+    for clip in &clips {
+        let offset = clip.offset();
+        let own = clip.windows(&clip.voice, 0.0, offset.secs);
+        let of_clips = clips.iter().filter(|other| other.speaker() != clip.speaker());
+        let others = of_clips.map(|other| (&other.voice, other.secs)).chain(strangers.iter().map(|(v, s)| (v, *s)));
+        let mut other = Vec::new();
+        for (voice, secs) in others {
+            for _ in 0..4 {
+                let room = secs - clip.secs;
+                let later = if room > 0.0 { rng.random_range(0.0..room) } else { rng.random_range(room..0.0) };
+                other.extend(clip.windows(voice, later, 0.0));
+            }
+        }
+        let is_generated = clip.name.starts_with("mdd");
+        let ten = 150.min(clip.n_frames());
+        let mut worst: f64 = 0.0;
+        // Shorter clips than 10 s say nothing of clips of 10 s.
+        let starts = (0..=clip.n_frames() - ten).step_by(30).filter(|_| ten >= 110);
+        for (start, shift) in starts.flat_map(|start| [-0.4, -0.2, 0.0, 0.2, 0.4].map(|shift| (start, shift))) {
+            let found = clip.beside(&clip.voice, start..start + ten, -shift).offset().unwrap().secs;
+            let error = (found - offset.secs - shift).abs();
+            n_shifts[usize::from(is_generated)] += 1;
+            n_found[usize::from(is_generated)] += usize::from(error <= 1.0 / clip.source_fps + 1e-9);
+            worst = worst.max(error);
+        }
+        let area = area(&own, &other);
+        eprintln!(
+            "{:<38} {offset}, correlation {:.2}, confidence {:.4}; area {area:.3} ({} own, {} other windows); shifts of \
+             10 s within {:.0} ms",
+            clip.name,
+            offset.correlation,
+            offset.confidence,
+            own.len(),
+            other.len(),
+            1000.0 * worst
+        );
+        scored.push((clip.name.clone(), (own, other)));
+    }
+    let group = |is_in: &dyn Fn(&str) -> bool| -> Vec<(Vec<f64>, Vec<f64>)> {
+        scored.iter().filter(|(name, _)| is_in(name)).map(|(_, scores)| scores.clone()).collect()
+    };
+    let is_generated = |name: &str| name.starts_with("mdd");
+    let groups: [(&str, Vec<_>); 3] = [
+        ("surely real lips", group(&|name| REAL.contains(&name))),
+        ("talking clips", group(&|name| !is_generated(name))),
+        ("generated clips", group(&is_generated)),
+    ];
+    for (name, clips) in groups.iter().filter(|(_, clips)| !clips.is_empty()) {
+        let [area, low, high] = with_interval(clips, &mut rng);
+        eprintln!("{name}: area under the curve at {WINDOW_SECS} s {area:.3} (95 %: {low:.3} to {high:.3})");
+        // Two clips alone have few others to be told from.
+        let least = if *name == "generated clips" { 0.85 } else { 0.95 };
+        assert!(area >= if is_long { least } else { 0.9 }, "{name}: {area}");
+    }
+    for (name, k) in [("talking", 0), ("generated", 1)] {
+        let share = n_found[k] as f64 / n_shifts[k].max(1) as f64;
+        eprintln!(
+            "{name}: {} of {} shifts found within a frame of the source ({:.1} %)",
+            n_found[k],
+            n_shifts[k],
+            100.0 * share
+        );
+        assert!(n_shifts[k] == 0 || share >= 0.95, "{name}: {share}");
+    }
+}
