@@ -52,7 +52,7 @@ impl Obstacles {
             let mut ways = [0, 1].map(|side| {
                 let (shoulder, root, _) = SIDES[side];
                 let hand = &joints[root..root + N_HAND_JOINTS];
-                let way = self.out_of_trunk(hand, unit);
+                let way = out_of_trunk(hand, unit);
                 let forearm = scale(add(joints[shoulder + 1], joints[shoulder + 2]), 0.5);
                 add(way, self.onto_slabs(arms[side].wrist[1], (hand, forearm), torso))
             });
@@ -70,19 +70,6 @@ impl Obstacles {
         joints
     }
 
-    /// Way ahead out of the trunk's ellipse, metres.
-    fn out_of_trunk(&self, hand: &[Vec3], unit: f64) -> Vec3 {
-        let [half, depth] = TRUNK.map(|metres| metres * unit);
-        let ahead = hand.iter().enumerate().map(|(joint, &[x, down, away])| {
-            let room = 1.0 - (x / half).powi(2);
-            if room <= 0.0 || !(0.0..TRUNK_END * unit).contains(&down) {
-                return 0.0;
-            }
-            (depth * room.sqrt() + thickness(joint) / 100.0 + away).max(0.0)
-        });
-        [0.0, 0.0, -ahead.fold(0.0, f64::max)]
-    }
-
     /// Way up onto the surfaces, metres, of a hand that is meant to be `below` the neck.
     fn onto_slabs(&self, below: f64, (hand, forearm): (&[Vec3], Vec3), torso: &TorsoPlace) -> Vec3 {
         let joints = hand.iter().enumerate().map(|(joint, &at)| (torso.world(at), thickness(joint)));
@@ -96,6 +83,19 @@ impl Obstacles {
         });
         torso.way([0.0, lift.fold(0.0, f64::max), 0.0])
     }
+}
+
+/// Way ahead out of the trunk's ellipse, metres.
+fn out_of_trunk(hand: &[Vec3], unit: f64) -> Vec3 {
+    let [half, depth] = TRUNK.map(|metres| metres * unit);
+    let ahead = hand.iter().enumerate().map(|(joint, &[x, down, away])| {
+        let room = 1.0 - (x / half).powi(2);
+        if room <= 0.0 || !(0.0..TRUNK_END * unit).contains(&down) {
+            return 0.0;
+        }
+        (depth * room.sqrt() + thickness(joint) / 100.0 + away).max(0.0)
+    });
+    [0.0, 0.0, -ahead.fold(0.0, f64::max)]
 }
 
 /// How far two hands are into each other, metres.

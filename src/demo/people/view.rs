@@ -52,8 +52,8 @@ pub fn light(rng: &mut ChaCha8Rng) -> Light {
     let (key, fill, warm) =
         (rng.random_range(0.5..1.15_f32), rng.random_range(0.7..1.2_f32), rng.random_range(-0.12..0.12_f32));
     let tint = [1.0 + warm, 1.0, 1.0 - warm];
-    for k in 0..3 {
-        light.key[k] *= key * tint[k];
+    for (k, tint) in tint.into_iter().enumerate() {
+        light.key[k] *= key * tint;
         light.sky[k] *= fill;
         light.ground[k] *= fill;
     }
