@@ -77,15 +77,15 @@ impl Surface {
             let [a, b, c, d] = corners.map(|corner| vertex_of[corner]);
             quads.push(if inwards { [d, c, b, a] } else { [a, b, c, d] });
         });
-        let halves = |&[a, b, c, d]: &[u32; 4]| [[a, b, c], [a, c, d]];
-        surface.triangles = quads.iter().flat_map(halves).collect();
+        let halves = |&[a, b, c, d]: &[u32; 4]| [[[a, b, c], [a, c, d]], [[a, b, d], [b, c, d]]];
+        let apart = |i: u32, j: u32| norm(sub(surface.points[i as usize], surface.points[j as usize]));
+        let shorter = |quad: &[u32; 4]| halves(quad)[usize::from(apart(quad[0], quad[2]) > apart(quad[1], quad[3]))];
+        surface.triangles = quads.iter().flat_map(shorter).collect();
         surface.settle(field, cell);
         // Of a quad's diagonals the one whose triangles face outwards more.
         let split = |quad: &[u32; 4]| {
-            let [a, b, c, d] = *quad;
-            let [one, other] = [halves(quad), [[a, b, d], [b, c, d]]];
-            let outwards = |pair: &[[u32; 3]; 2]| surface.facing(pair[0]).min(surface.facing(pair[1]));
-            if outwards(&one) >= outwards(&other) { one } else { other }
+            let outwards = halves(quad).map(|pair| surface.facing(pair[0]).min(surface.facing(pair[1])));
+            halves(quad)[usize::from(outwards[0] < outwards[1])]
         };
         surface.triangles = quads.iter().flat_map(split).collect();
         surface
