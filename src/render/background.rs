@@ -78,10 +78,9 @@ impl Background {
                 let mut pixel = shading.light(&surfaces, (triangles, &nearness[at]), [x, y]);
                 let lit = shadows.lit(pixel.asking);
                 let there = srgb.linears(image.pixel(x, y));
-                for k in 0..4 {
-                    pixel.own[k] += (1.0 - pixel.cover) * there[k];
-                    pixel.key[k] *= lit;
-                }
+                let uncovered = 1.0 - pixel.cover;
+                pixel.own.iter_mut().zip(there).for_each(|(own, there)| *own += uncovered * there);
+                pixel.key.iter_mut().for_each(|v| *v *= lit);
                 image.data[3 * at..3 * at + 3].copy_from_slice(&srgb.bytes(compressed(pixel.sum(1.0))));
                 let front = surfaces.triangles.get(triangles[nearest(&nearness[at])] as usize);
                 labels[at] = front.map(|triangle| (triangle.mesh, triangle.label));

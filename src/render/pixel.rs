@@ -28,9 +28,7 @@ impl PixelLight {
     #[inline(always)]
     pub fn sum(&self, lit: f32) -> [f32; 4] {
         let mut sum = self.own;
-        for k in 0..4 {
-            sum[k] += lit * self.key[k];
-        }
+        sum.iter_mut().zip(self.key).for_each(|(sum, key)| *sum += lit * key);
         sum
     }
 }

@@ -94,8 +94,8 @@ impl Renderer {
         let Self { size: [width, _], visibility, surfaces, shading, shadows, front, spans, scene, .. } = self;
         let behind = scene.as_ref().map(|scene| &scene.nearness[..]);
         visibility.visit(surfaces, behind, |band, rows, columns| {
+            spans[rows[0]..rows[1]].fill(columns);
             for y in rows[0]..rows[1] {
-                spans[y] = columns;
                 for x in columns[0]..columns[1] {
                     let (at, there) = (y * *width + x, band.at(x, y));
                     let (triangles, nearness) = (&band.triangles[there], &band.nearness[there]);

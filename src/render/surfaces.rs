@@ -236,9 +236,8 @@ impl RadiancePlane {
         let [dx, dy] = [0, 1].map(|k| (point[k] - self.from[k]) as f32);
         let along = |n: usize| {
             let mut sum = self.at[n];
-            for k in 0..4 {
-                sum[k] += self.across[n][k] * dx + self.down[n][k] * dy;
-            }
+            let slopes = self.across[n].iter().zip(&self.down[n]);
+            sum.iter_mut().zip(slopes).for_each(|(sum, (across, down))| *sum += across * dx + down * dy);
             sum
         };
         [along(0), along(1), along(2)]
