@@ -216,7 +216,8 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
     );
     let good = m.good();
     let met = if good { "met" } else { "MISSED" };
-    text += &format!("generator: {GENERATOR}\n");
+    let generator = if m.shoulders_px.is_some() { "a rendered person, seen by the models for real people" } else { GENERATOR };
+    text += &format!("generator: {generator}\n");
     text += &format!(
         "3D error against the known truth: {:.1} mm; targets: {:.1} px, {:.0} mm, {:.0} % of points found, {:.0} % \
          of frames, {:.0} % of joints: {met}",
@@ -233,7 +234,7 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
         "hands_px": { "median": m.hands.median, "p90": m.hands.p90, "found": m.hands.found },
         "mm": mm(&m.lifted), "mean_pose_mm": mm(&m.mean_pose), "mean_depth_mm": mm(&m.mean_depth),
         "bone_depth_mm": mm(&m.bone_depth), "joints": m.joints, "shoulders_px": m.shoulders_px,
-        "generator": if m.shoulders_px.is_some() { "rendered person" } else { GENERATOR },
+        "generator": generator,
         "n_frames": m.n_frames, "n_drawn": m.n_drawn, "good": good,
     });
     ui.summary(&text, None, facts);
