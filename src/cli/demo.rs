@@ -216,7 +216,8 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
     );
     let good = m.good();
     let met = if good { "met" } else { "MISSED" };
-    let generator = if m.shoulders_px.is_some() { "a rendered person, seen by the models for real people" } else { GENERATOR };
+    let generator =
+        if m.shoulders_px.is_some() { "a rendered person, seen by the models for real people" } else { GENERATOR };
     text += &format!("generator: {generator}\n");
     text += &format!(
         "3D error against the known truth: {:.1} mm; targets: {:.1} px, {:.0} mm, {:.0} % of points found, {:.0} % \

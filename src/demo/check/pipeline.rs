@@ -24,8 +24,8 @@ pub const GENERATOR: &str = "synthetic speaker, version 2; the lifter's training
 /// Largest allowed medians and means.
 pub const MOST_PX: f64 = 2.0;
 pub const MOST_MM: f64 = 80.0;
-/// The same of a rendered person and real models, which define a shoulder or an elbow differently: keypoints in shares
-/// of the shoulder width.
+/// Targets of a rendered person and real models, which define a shoulder or an elbow differently: largest median of
+/// keypoints as a share of the shoulder width, largest mean, smallest share of points found.
 const MOST_OF_SHOULDERS: f64 = 0.1;
 const MOST_MM_OF_REAL_MODELS: f64 = 120.0;
 const LEAST_FOUND_BY_REAL_MODELS: f64 = 0.85;

@@ -24,7 +24,7 @@ const MM: f64 = 1000.0;
 pub struct JointErrors {
     /// Shoulders, elbows, wrists.
     pub mpjpe: f64,
-    /// The same after the best similarity of each frame.
+    /// Shoulders, elbows, wrists after the best similarity of each frame.
     pub p_mpjpe: f64,
     pub elbow: f64,
     /// Along the line of sight: |dz|.

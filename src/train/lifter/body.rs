@@ -19,8 +19,8 @@ use serde_json::{Value, json};
 /// Weight of each point in the loss: nose, arms, hips.
 const WEIGHTS: [f32; N_POINTS] = [1.0, 1.0, 1.2, 1.5, 1.0, 1.2, 1.5, 0.4, 0.4];
 /// Shares of scenes of captured motion and of rendered people, where there are any; the rest is made by rule.
-const CAPTURED: f64 = 0.4;
-const RENDERED: f64 = 0.3;
+const CAPTURED: f64 = 0.35;
+const RENDERED: f64 = 0.4;
 /// Share of the captured ones in which one arm comes from another take.
 const MIXED: f64 = 0.35;
 /// Frames of a scene, from and to, and the windows that are cut from it.
