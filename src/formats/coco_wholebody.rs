@@ -101,6 +101,7 @@ pub struct CocoImage {
 /// A person. Points are x, y in px (the centre of the top left pixel is 0, 0) and v: 0 without label (x and y are 0
 /// then), 1 hidden, 2 seen. Of a part that is not labelled (`..._valid` false) all numbers are 0.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(clippy::struct_excessive_bools)] // the form has them
 pub struct CocoPerson {
     pub id: u64,
     pub image_id: u64,

@@ -252,19 +252,19 @@ impl HeadForm<'_> {
         // Nostrils are dark.
         let nostril = rise(1.6 - ((x - 0.62 * looks.nose) / 0.24).hypot((y - 6.75) / 0.35).hypot((z - 10.0) / 0.6));
         colour = mix(colour, looks.skin.map(|v| 0.25 * v), 0.9 * nostril);
-        mix(colour, mix(looks.hair_colour, looks.skin, 0.15), self.beard([x, y, z], looks))
+        mix(colour, mix(looks.hair_colour, looks.skin, 0.15), beard([x, y, z], looks))
     }
+}
 
-    /// Density of the beard at a point with x >= 0.
-    fn beard(&self, [x, y, z]: Vec3, looks: &Appearance) -> f64 {
-        if looks.beard <= 0.0 {
-            return 0.0;
-        }
-        let cheek = 5.0 + 0.6 * (x - 2.6).max(0.0) + 0.5 * (4.0 - z).max(0.0);
-        let jaw = rise((cheek - y) / 0.5) * rise((x - 2.2) / 0.5);
-        let chin = rise((MOUTH_Y - 1.1 - y) / 0.3);
-        let moustache = rise((y - MOUTH_Y - 0.55) / 0.2) * rise((6.0 - y) / 0.3) * rise((2.9 - x) / 0.4);
-        let front = rise((z - 1.0) / 1.4) * rise((y + 1.4) / 1.2);
-        looks.beard * (jaw.max(chin).max(moustache) * front)
+/// Density of the beard at a point with x >= 0.
+fn beard([x, y, z]: Vec3, looks: &Appearance) -> f64 {
+    if looks.beard <= 0.0 {
+        return 0.0;
     }
+    let cheek = 5.0 + 0.6 * (x - 2.6).max(0.0) + 0.5 * (4.0 - z).max(0.0);
+    let jaw = rise((cheek - y) / 0.5) * rise((x - 2.2) / 0.5);
+    let chin = rise((MOUTH_Y - 1.1 - y) / 0.3);
+    let moustache = rise((y - MOUTH_Y - 0.55) / 0.2) * rise((6.0 - y) / 0.3) * rise((2.9 - x) / 0.4);
+    let front = rise((z - 1.0) / 1.4) * rise((y + 1.4) / 1.2);
+    looks.beard * (jaw.max(chin).max(moustache) * front)
 }

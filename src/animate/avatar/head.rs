@@ -107,13 +107,7 @@ impl<'a> HeadForm<'a> {
         let socket =
             cone([ex - 0.45, ey + 0.15, 9.6], [ex + 0.5, ey + 0.25, 9.4], [1.65, 1.65]).flat([0.0, 1.0, 0.0], 0.75);
         let d = carved(self.bare(at), socket.distance(at), 1.0);
-        carved(d, self.hollow(at), 0.2)
-    }
-
-    /// Distance to the hollow of the mouth, which the lips cover.
-    fn hollow(&self, at: Vec3) -> f64 {
-        let deep = cone([-1.1, MOUTH_Y, 8.6], [1.1, MOUTH_Y, 8.6], [1.3, 1.3]);
-        deep.flat([0.0, 1.0, 0.0], 0.42).distance(at)
+        carved(d, hollow(at), 0.2)
     }
 
     /// Height z of the face in front, above (x, y), before anything is carved.
@@ -201,7 +195,7 @@ impl<'a> HeadForm<'a> {
 
     /// Whether a point of the skin lies in the hollow of the mouth.
     pub fn in_mouth(&self, [x, y, z]: Vec3) -> bool {
-        self.bare([x, y, z]) < -0.12 && self.hollow([x, y, z]) < 0.25 && y < MOUTH_Y + 1.0
+        self.bare([x, y, z]) < -0.12 && hollow([x, y, z]) < 0.25 && y < MOUTH_Y + 1.0
     }
 }
 
@@ -210,4 +204,10 @@ fn even([mut low, mut high]: [Vec3; 2], cell: f64) -> [Vec3; 2] {
     high[0] = (high[0] / cell).ceil() * cell;
     low[0] = -high[0];
     [low, high]
+}
+
+/// Distance to the hollow of the mouth, which the lips cover.
+fn hollow(at: Vec3) -> f64 {
+    let deep = cone([-1.1, MOUTH_Y, 8.6], [1.1, MOUTH_Y, 8.6], [1.3, 1.3]);
+    deep.flat([0.0, 1.0, 0.0], 0.42).distance(at)
 }

@@ -73,20 +73,21 @@ impl Avatar {
     /// Nose, left eye, right eye, left ear, right ear (the order of COCO) on the surface in a pose, world cm; they move
     /// with the rig's head joint.
     pub fn face_points(&self, rig: &Rig, root: Vec3, local: &[Rotation]) -> [Vec3; 5] {
-        self.on_head(rig, root, local, self.face)
+        on_head(rig, root, local, self.face)
     }
 
     /// Middles of the upper and the lower lip's inner edges in a pose, world cm.
     pub fn lip_points(&self, rig: &Rig, root: Vec3, local: &[Rotation], mouth: f64) -> [Vec3; 2] {
         let [upper, lower, open] = self.inner_lips;
-        self.on_head(rig, root, local, [upper, add(lower, open.map(|v| v * mouth))])
+        on_head(rig, root, local, [upper, add(lower, open.map(|v| v * mouth))])
     }
+}
 
-    fn on_head<const N: usize>(&self, rig: &Rig, root: Vec3, local: &[Rotation], points: [Vec3; N]) -> [Vec3; N] {
-        let turn = rig.skeleton.world(local)[rig.head];
-        let place = rig.skeleton.positions(root, local)[rig.head];
-        points.map(|point| add(place, turn.turn(point)))
-    }
+/// Points of the head's axes in a pose, world cm.
+fn on_head<const N: usize>(rig: &Rig, root: Vec3, local: &[Rotation], points: [Vec3; N]) -> [Vec3; N] {
+    let turn = rig.skeleton.world(local)[rig.head];
+    let place = rig.skeleton.positions(root, local)[rig.head];
+    points.map(|point| add(place, turn.turn(point)))
 }
 
 /// Hip joints, left and right, in a pose, world cm.

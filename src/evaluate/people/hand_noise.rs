@@ -32,8 +32,8 @@ pub fn fit(set: &str, clips: &[RenderedClip]) -> HandNoise {
     let mut hands = Vec::new();
     for clip in clips {
         for (t, frame) in outcomes(clip).into_iter().enumerate() {
-            for side in 0..2 {
-                if matches!(frame[side], HandOutcome::Right | HandOutcome::Unjudged) {
+            for (side, outcome) in frame.into_iter().enumerate() {
+                if matches!(outcome, HandOutcome::Right | HandOutcome::Unjudged) {
                     hands.extend(HandResidual::new(clip, t, side));
                 }
             }
@@ -41,10 +41,9 @@ pub fn fit(set: &str, clips: &[RenderedClip]) -> HandNoise {
     }
     let bias: [[f64; N_BASIS]; N_POINTS] = std::array::from_fn(|point| bias(&hands, point));
     for hand in &mut hands {
-        for point in 0..N_POINTS {
+        for ((error, basis), bias) in hand.errors.iter_mut().zip(&hand.basis).zip(&bias) {
             for k in 0..2 {
-                let along: f64 = hand.basis[point].iter().zip(bias[point]).map(|(v, weight)| weight * v[k]).sum();
-                hand.errors[point][k] -= along;
+                error[k] -= basis.iter().zip(bias).map(|(v, weight)| weight * v[k]).sum::<f64>();
             }
         }
     }

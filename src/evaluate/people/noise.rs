@@ -17,10 +17,13 @@ const STRAY: f64 = 4.0;
 /// Penalty of the bias's weights, as a share of the data's, which keeps unused vectors at 0.
 const PENALTY: f64 = 1e-3;
 
+/// Error of a point in shoulder widths, and the vectors of its bias.
+type PointError = ([f64; 2], [[f64; 2]; N_BASIS]);
+
 /// Errors of one point over a clip.
 struct PointTrack {
-    /// Error in shoulder widths and the vectors of its bias; `None`: not found, or not in the picture.
-    errors: Vec<Option<([f64; 2], [[f64; 2]; N_BASIS])>>,
+    /// `None`: not found, or not in the picture.
+    errors: Vec<Option<PointError>>,
     /// Whether the point is in the picture, and hidden.
     inside: Vec<bool>,
     hidden: Vec<bool>,

@@ -62,13 +62,14 @@ impl HandNoise {
             let is_stray = rng.random_bool(noise.strays.clamp(0.0, 1.0));
             let much = if is_stray { noise.stray_finger } else { noise.finger };
             let of_finger = [0, 1].map(|_| much * normal(rng));
-            for j in 1 + N_OF_FINGER * finger..=N_OF_FINGER * (finger + 1) {
+            let first = 1 + N_OF_FINGER * finger;
+            for (j, point) in hand.iter_mut().enumerate().skip(first).take(N_OF_FINGER) {
                 let bias = basis(&exact, j);
                 for k in 0..2 {
                     let own = noise.point * normal(rng);
-                    hand[j][k] += size * (whole[k] + of_finger[k] + own);
+                    point[k] += size * (whole[k] + of_finger[k] + own);
                     if with_bias {
-                        hand[j][k] += bias.iter().zip(self.bias[j - 1]).map(|(v, weight)| weight * v[k]).sum::<f64>();
+                        point[k] += bias.iter().zip(self.bias[j - 1]).map(|(v, weight)| weight * v[k]).sum::<f64>();
                     }
                 }
             }

@@ -101,10 +101,9 @@ fn area(own: &[f64], others: &[f64]) -> f64 {
 /// The area over all clips, and the middle 95 % of it over clips drawn anew.
 fn with_interval(clips: &[(Vec<f64>, Vec<f64>)], rng: &mut ChaCha8Rng) -> [f64; 3] {
     let of = |drawn: &[usize]| {
-        let both = |side: fn(&(Vec<f64>, Vec<f64>)) -> &Vec<f64>| {
-            drawn.iter().flat_map(|k| side(&clips[*k]).clone()).collect::<Vec<_>>()
-        };
-        area(&both(|clip| &clip.0), &both(|clip| &clip.1))
+        let own: Vec<f64> = drawn.iter().flat_map(|k| clips[*k].0.clone()).collect();
+        let others: Vec<f64> = drawn.iter().flat_map(|k| clips[*k].1.clone()).collect();
+        area(&own, &others)
     };
     let mut drawn: Vec<f64> =
         (0..400).map(|_| of(&(0..clips.len()).map(|_| rng.random_range(0..clips.len())).collect::<Vec<_>>())).collect();
@@ -210,6 +209,11 @@ fn own_voices_are_told_from_others_and_shifts_are_found() {
         let least = if *name == "generated clips" { 0.85 } else { 0.95 };
         assert!(area >= if is_long { least } else { 0.9 }, "{name}: {area}");
     }
+    check_shifts(n_found, n_shifts);
+}
+
+/// Shifts of talking and of generated clips that are found within a frame of the source.
+fn check_shifts(n_found: [usize; 2], n_shifts: [usize; 2]) {
     for (name, k) in [("talking", 0), ("generated", 1)] {
         let share = n_found[k] as f64 / n_shifts[k].max(1) as f64;
         eprintln!(
