@@ -1,7 +1,7 @@
 //! Demo folder of a rendered person for the models that know real people: videos, their truth, speech without a video,
 //! and a configuration for `orator run`.
 
-use super::drawn::folder::{DemoPlan, UNHEARD_SECS, splits};
+use super::drawn::folder::{DemoPlan, UNHEARD_SECS, pipeline};
 use super::people::condition::Condition;
 use super::people::scene::{ClipSeeds, PeopleScene};
 use super::people::voice::Voice;
@@ -10,23 +10,6 @@ use crate::stage::progress::Progress;
 use crate::stage::workdir;
 use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
-
-const PIPELINE: &str = r#"# The rendered speaker of `orator demo`, seen by the models for real people (`orator models fetch`).
-[[speaker]]
-name = "host"
-videos = ["videos/host/*.mp4"]
-SPLITS
-licence = "cc0-1.0"
-consent = "none needed: nobody is shown"
-source = "rendered by orator demo"
-
-[segment]
-speech = "loudness"                # its speech is made of tones, which the speech model rightly takes for none
-
-[gan]
-learning_rate = 5e-4               # for hundreds of steps on a minute of speech; the defaults are for hours of it
-lambda_gan = 0.15                  # 1 moves nearly three times as much as the data after 600 steps
-"#;
 
 /// Writes `videos/host/clip-<n>.mp4`, `truth/clip-<n>.npz`, `speech.wav` and `pipeline.toml` into `dir`; returns the
 /// videos. Body, clothes, voice, room and camera are the same in all videos, speech and gestures are not.
@@ -49,6 +32,8 @@ pub fn draw(dir: &Path, plan: &DemoPlan, progress: &dyn Progress) -> Result<Vec<
     }
     let unheard = Voice::new(seed, UNHEARD_SECS, Some(seed)).sound;
     workdir::replace(&dir.join("speech.wav"), |attempt| wav::write(attempt, &unheard))?;
-    workdir::write_file(&dir.join("pipeline.toml"), PIPELINE.replace("SPLITS", &splits(plan.n_videos)).as_bytes())?;
+    let title = "The rendered speaker of `orator demo`, seen by the models for real people (`orator models fetch`).";
+    let pipeline = pipeline(title, "rendered by orator demo", "", plan.n_videos);
+    workdir::write_file(&dir.join("pipeline.toml"), pipeline.as_bytes())?;
     Ok(videos)
 }

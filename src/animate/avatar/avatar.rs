@@ -119,14 +119,15 @@ impl Blend {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::math::vec3::{norm, scale};
     use crate::types::pose3d::Motion;
     use crate::types::skeleton::N_JOINTS;
     use crate::types::time::FrameRate;
 
-    fn rig() -> Rig {
+    /// Rig of the default bones.
+    pub fn rig() -> Rig {
         let unseen = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
         Rig::from_motion(&Motion::from_joints(FrameRate::new(15, 1), unseen))
     }

@@ -139,16 +139,9 @@ impl AvatarMesh {
 mod tests {
     use super::*;
     use crate::animate::avatar::appearance::{Appearance, Top};
+    use crate::animate::avatar::avatar::tests::rig;
     use crate::animate::avatar::material::Material;
     use crate::math::vec3::norm;
-    use crate::types::pose3d::Motion;
-    use crate::types::skeleton::N_JOINTS;
-    use crate::types::time::FrameRate;
-
-    fn rig() -> Rig {
-        let unseen = ndarray::Array3::from_elem((1, N_JOINTS, 3), f32::NAN);
-        Rig::from_motion(&Motion::from_joints(FrameRate::new(15, 1), unseen))
-    }
 
     #[test]
     fn at_rest_the_pose_is_the_avatar_and_a_turned_head_turns_its_points() {

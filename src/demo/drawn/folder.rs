@@ -21,29 +21,38 @@ const MODELS: [(&str, &[u8]); 3] = [
     ("marker_hand.onnx", include_bytes!("../../../models/marker_hand.onnx")),
 ];
 
-const PIPELINE: &str = r#"# The synthetic speaker of `orator demo`: the marker models know its suit and no real person.
+/// Configuration of a demo: `TITLE`, `SPLITS`, `SOURCE` and `MODELS` stand for what differs.
+const PIPELINE: &str = r#"# TITLE
 [[speaker]]
 name = "host"
 videos = ["videos/host/*.mp4"]
 SPLITS
 licence = "cc0-1.0"
 consent = "none needed: nobody is shown"
-source = "drawn by orator demo"
+source = "SOURCE"
 
-[pose2d]
-person = "person-marker"
-body = "body-marker"
-hand = "hand-marker"
-palm = ""
-face = ""                          # it has no face
-
-[segment]
+MODELS[segment]
 speech = "loudness"                # its speech is made of tones, which the speech model rightly takes for none
 
 [gan]
 learning_rate = 5e-4               # for hundreds of steps on a minute of speech; the defaults are for hours of it
 lambda_gan = 0.15                  # 1 moves nearly three times as much as the data after 600 steps
 "#;
+
+const MARKER_MODELS: &str = r#"[pose2d]
+person = "person-marker"
+body = "body-marker"
+hand = "hand-marker"
+palm = ""
+face = ""                          # it has no face
+
+"#;
+
+/// Configuration of a demo of `n_videos` videos: a title, where the videos are from, and the section of its models.
+pub fn pipeline(title: &str, source: &str, models: &str, n_videos: usize) -> String {
+    let filled = PIPELINE.replace("TITLE", title).replace("SOURCE", source).replace("MODELS", models);
+    filled.replace("SPLITS", &splits(n_videos))
+}
 
 /// Contents of a demo folder.
 #[derive(Clone, Debug)]
@@ -90,12 +99,14 @@ pub fn draw(dir: &Path, plan: &DemoPlan, progress: &dyn Progress) -> anyhow::Res
     }
     let unheard = DrawnScene::new(plan.seed.wrapping_mul(1000), UNHEARD_SECS, plan.size).sound();
     workdir::replace(&dir.join("speech.wav"), |attempt| wav::write(attempt, &unheard))?;
-    workdir::write_file(&dir.join("pipeline.toml"), PIPELINE.replace("SPLITS", &splits(plan.n_videos)).as_bytes())?;
+    let title = "The synthetic speaker of `orator demo`: the marker models know its suit and no real person.";
+    let pipeline = pipeline(title, "drawn by orator demo", MARKER_MODELS, plan.n_videos);
+    workdir::write_file(&dir.join("pipeline.toml"), pipeline.as_bytes())?;
     Ok(videos)
 }
 
 /// Configuration lines for the splits: the last two videos validate and test; fewer than three all train.
-pub fn splits(n_videos: usize) -> String {
+fn splits(n_videos: usize) -> String {
     if n_videos < 3 {
         return "train = [\"*.mp4\"]".to_owned();
     }

@@ -1,24 +1,17 @@
 //! Errors of a hand model on rendered people, fitted as the noise by which the hand lifter is trained
 //! (`train::scene::hand_noise`).
 
+use super::bias_fit::{self, STRAY, deviation};
 use super::clips::RenderedClip;
 use super::hands::{HandOutcome, outcomes};
 use crate::formats::rendered_truth::Visibility;
-use crate::math::cholesky;
-use crate::math::order::{Ordered, median};
+use crate::math::order::Ordered;
 use crate::train::scene::hand_noise::{FingerNoise, HandNoise, N_BASIS, N_FINGERS, N_OF_FINGER, N_POINTS, basis};
 use crate::types::pose2d::N_HAND;
 use crate::types::skeleton::{L_HAND, R_HAND};
-use ndarray::Array2;
 
-/// Median absolute deviation to standard deviation of a normal distribution.
-const MAD: f64 = 1.4826;
-/// Standard deviations from which on an error is a stray.
-const STRAY: f64 = 4.0;
 /// Hidden points from which on a finger counts as hidden.
 const HIDDEN_POINTS: usize = 2;
-/// Penalty of the bias's weights, as a share of the data's.
-const PENALTY: f64 = 1e-3;
 
 /// Errors of a hand in a frame, relative to the wrist, in lengths of the palm.
 struct HandResidual {
@@ -42,9 +35,7 @@ pub fn fit(set: &str, clips: &[RenderedClip]) -> HandNoise {
     let bias: [[f64; N_BASIS]; N_POINTS] = std::array::from_fn(|point| bias(&hands, point));
     for hand in &mut hands {
         for ((error, basis), bias) in hand.errors.iter_mut().zip(&hand.basis).zip(&bias) {
-            for k in 0..2 {
-                error[k] -= basis.iter().zip(bias).map(|(v, weight)| weight * v[k]).sum::<f64>();
-            }
+            *error = bias_fit::rest(*error, basis, bias);
         }
     }
     let whole = |hand: &HandResidual, k: usize| hand.errors.iter().map(|e| e[k]).sum::<f64>() / N_POINTS as f64;
@@ -87,38 +78,10 @@ impl HandResidual {
     }
 }
 
-/// Weights of the bias of a point by least squares over the fingers that can be seen; those far off have no say in a
-/// second round.
+/// Weights of the bias of a point over the fingers that can be seen.
 fn bias(hands: &[HandResidual], point: usize) -> [f64; N_BASIS] {
-    let mut bias = [0.0; N_BASIS];
-    for most in [f64::INFINITY, 0.4] {
-        let (mut a, mut b) = (Array2::zeros((N_BASIS, N_BASIS)), Array2::zeros((N_BASIS, 1)));
-        let mut n = 0.0;
-        for hand in hands.iter().filter(|hand| !hand.hidden[point / N_OF_FINGER]) {
-            let (basis, error) = (&hand.basis[point], hand.errors[point]);
-            let off =
-                [0, 1].map(|k| error[k] - basis.iter().zip(bias).map(|(v, w): (&[f64; 2], f64)| w * v[k]).sum::<f64>());
-            if off[0].hypot(off[1]) > most {
-                continue;
-            }
-            n += 1.0;
-            for k in 0..2 {
-                for i in 0..N_BASIS {
-                    (0..N_BASIS).for_each(|j| a[[i, j]] += basis[i][k] * basis[j][k]);
-                    b[[i, 0]] += basis[i][k] * error[k];
-                }
-            }
-        }
-        (0..N_BASIS).for_each(|i| a[[i, i]] += PENALTY * n + 1e-9);
-        let solved = cholesky::solve(a, b);
-        bias = std::array::from_fn(|i| solved[[i, 0]]);
-    }
-    bias
-}
-
-/// Robust standard deviation about 0.
-fn deviation(values: &[f64]) -> f64 {
-    MAD * median(values.iter().map(|v| v.abs())).unwrap_or(0.0)
+    let seen = || hands.iter().filter(|hand| !hand.hidden[point / N_OF_FINGER]);
+    bias_fit::weights(&[f64::INFINITY, 0.4], || seen().map(|hand| (hand.errors[point], hand.basis[point])))
 }
 
 fn finger_noise(hands: &[HandResidual], hidden: bool, whole: impl Fn(&HandResidual, usize) -> f64) -> FingerNoise {

@@ -1,21 +1,13 @@
 //! Errors of a model set on rendered people, fitted as the noise by which lifters are trained (`train::scene::noise`):
 //! least squares for the bias, then robust deviations of what is left.
 
+use super::bias_fit::{self, STRAY, deviation};
 use super::clips::RenderedClip;
 use crate::formats::rendered_truth::Visibility;
-use crate::math::cholesky;
 use crate::math::order::{Ordered, median};
 use crate::motion::upper_body::{COCO, N_POINTS, SeenBody};
 use crate::train::scene::noise::{FrameNoise, KeypointNoise, N_BASIS, PointNoise, Runs, basis, kind};
 use crate::types::pose2d::SEEN_SCORE;
-use ndarray::Array2;
-
-/// Median absolute deviation to standard deviation of a normal distribution.
-const MAD: f64 = 1.4826;
-/// Standard deviations from which on an error is a stray.
-const STRAY: f64 = 4.0;
-/// Penalty of the bias's weights, as a share of the data's, which keeps unused vectors at 0.
-const PENALTY: f64 = 1e-3;
 
 /// Error of a point in shoulder widths, and the vectors of its bias.
 type PointError = ([f64; 2], [[f64; 2]; N_BASIS]);
@@ -65,11 +57,8 @@ fn fit_point(tracks: &[PointTrack]) -> PointNoise {
     let bias = bias(tracks);
     let (mut clip_means, mut seen, mut hidden) = (Vec::new(), Vec::new(), Vec::new());
     for track in tracks {
-        let rest: Vec<Option<[f64; 2]>> = track
-            .errors
-            .iter()
-            .map(|e| e.map(|(error, basis)| [0, 1].map(|k| error[k] - along(&basis, &bias, k))))
-            .collect();
+        let rest: Vec<Option<[f64; 2]>> =
+            track.errors.iter().map(|e| e.map(|(error, basis)| bias_fit::rest(error, &basis, &bias))).collect();
         let middle = [0, 1].map(|k| median(rest.iter().flatten().map(|e| e[k])).unwrap_or(0.0));
         if rest.iter().flatten().count() > 10 {
             clip_means.extend(middle);
@@ -93,42 +82,12 @@ fn fit_point(tracks: &[PointTrack]) -> PointNoise {
     }
 }
 
-fn along(basis: &[[f64; 2]; N_BASIS], bias: &[f64; N_BASIS], k: usize) -> f64 {
-    basis.iter().zip(bias).map(|(vector, weight)| weight * vector[k]).sum()
-}
-
-/// Weights of the bias by least squares over the frames in which the point can be seen; frames that are far off have no
-/// say in a second round.
+/// Weights of the bias over the frames in which the point can be seen.
 fn bias(tracks: &[PointTrack]) -> [f64; N_BASIS] {
-    let mut bias = [0.0; N_BASIS];
-    for most in [f64::INFINITY, 0.25, 0.25] {
-        let (mut a, mut b) = (Array2::zeros((N_BASIS, N_BASIS)), Array2::zeros((N_BASIS, 1)));
-        let mut n = 0.0;
-        for track in tracks {
-            for (error, basis) in track.errors.iter().zip(&track.hidden).filter_map(|(e, h)| e.filter(|_| !h)) {
-                let off = [0, 1].map(|k| error[k] - along(&basis, &bias, k));
-                if off[0].hypot(off[1]) > most {
-                    continue;
-                }
-                n += 1.0;
-                for k in 0..2 {
-                    for i in 0..N_BASIS {
-                        (0..N_BASIS).for_each(|j| a[[i, j]] += basis[i][k] * basis[j][k]);
-                        b[[i, 0]] += basis[i][k] * error[k];
-                    }
-                }
-            }
-        }
-        (0..N_BASIS).for_each(|i| a[[i, i]] += PENALTY * n + 1e-9);
-        let solved = cholesky::solve(a, b);
-        bias = std::array::from_fn(|i| solved[[i, 0]]);
-    }
-    bias
-}
-
-/// Robust standard deviation about 0.
-fn deviation(values: &[f64]) -> f64 {
-    MAD * median(values.iter().map(|v| v.abs())).unwrap_or(0.0)
+    let seen = |track: &PointTrack| -> Vec<PointError> {
+        track.errors.iter().zip(&track.hidden).filter_map(|(error, hidden)| error.filter(|_| !hidden)).collect()
+    };
+    bias_fit::weights(&[f64::INFINITY, 0.25, 0.25], || tracks.iter().flat_map(seen))
 }
 
 fn frame_noise(tracks: &[Vec<Option<[f64; 2]>>]) -> FrameNoise {
@@ -210,7 +169,8 @@ mod tests {
         // Of one pose the weights cannot be told apart, their sum can.
         let frame: SeenBody = COCO.map(|c| Some([0, 1].map(|k| exact().truth.body[[3, c, k]])));
         let vectors = basis(&frame, 3, f64::from(exact().shoulders_px(3))).unwrap();
-        (0..2).for_each(|k| near(along(&vectors, &found.bias, k), along(&vectors, &made.points[3].bias, k), 0.01));
+        let along = |bias| bias_fit::rest([0.0; 2], &vectors, bias);
+        (0..2).for_each(|k| near(along(&found.bias)[k], along(&made.points[3].bias)[k], 0.01));
         near(found.clip, 0.02, 0.005);
         near(found.seen.deviation, 0.01, 0.002);
         near(found.gaps.begin, 0.05, 0.01);
