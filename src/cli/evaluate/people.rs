@@ -29,7 +29,7 @@ pub struct Args {
     beside: Vec<PathBuf>,
     /// Also write one HTML page.
     #[arg(long, value_name = "PAGE.html")]
-    report: Option<PathBuf>,
+    pub report: Option<PathBuf>,
 }
 
 pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {

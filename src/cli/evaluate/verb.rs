@@ -86,7 +86,11 @@ struct MotionArgs {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let MotionArgs { report, dataset, checkpoint, .. } = &args.motion;
-    confine(report.as_deref(), [dataset, checkpoint].into_iter().flatten().map(PathBuf::as_path));
+    let report = match &args.what {
+        Some(What::People(people)) => people.report.as_deref(),
+        _ => report.as_deref(),
+    };
+    confine(report, [dataset, checkpoint].into_iter().flatten().map(PathBuf::as_path));
     match args.what {
         Some(What::Lifter(args)) => lifter::run(args, ui),
         Some(What::Compare(args)) => compare::run(&args, ui),
