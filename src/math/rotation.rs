@@ -1,5 +1,5 @@
-//! Rotations in space as unit quaternions: between directions, between frames, swing and twist, Euler angles in the
-//! order Z X Y (the channels of our BVH). Right-handed, angles in radians unless a name says degrees.
+//! Rotations in space as unit quaternions: between directions, between frames, swing and twist, Euler angles in any
+//! order, exponential maps. Right-handed, angles in radians unless a name says degrees.
 
 use super::vec3::{Vec3, add, any_across, cross, dot, norm, scale};
 use std::ops::Mul;
@@ -137,14 +137,52 @@ impl Rotation {
     /// Degrees about Z, X and Y such that `self = Rz * Rx * Ry` (BVH channels `Zrotation Xrotation Yrotation`);
     /// x lies in -90..=90.
     pub fn euler_zxy_degrees(self) -> Vec3 {
-        let [x, y, z] = self.axes();
-        // Rows of the matrix: r21 = sin x; r01, r11 = -cos x sin z, cos x cos z; r20, r22 = -cos x sin y, cos x cos y.
-        let (r01, r11, r21) = (y[0], y[1], y[2]);
-        let cos_x = r01.hypot(r11);
-        let angle_x = r21.atan2(cos_x);
-        let (angle_z, angle_y) =
-            if cos_x > 1e-9 { ((-r01).atan2(r11), (-x[2]).atan2(z[2])) } else { (x[1].atan2(x[0]), 0.0) };
-        [angle_z.to_degrees(), angle_x.to_degrees(), angle_y.to_degrees()]
+        self.euler([2, 0, 1]).map(f64::to_degrees)
+    }
+
+    /// Angles about three different axes (0 x, 1 y, 2 z) such that `self` is the product of the rotations about them in
+    /// this order; the middle one lies in -pi/2..=pi/2.
+    pub fn euler(self, order: [usize; 3]) -> Vec3 {
+        let [i, j, k] = order;
+        // +1 where the axes follow each other as x, y, z, x do
+        let sign = if (i + 1) % 3 == j { 1.0 } else { -1.0 };
+        let columns = self.axes();
+        let matrix = |row: usize, column: usize| columns[column][row];
+        let (along, across) = (matrix(j, k), matrix(k, k));
+        let cos = along.hypot(across);
+        let middle = (sign * matrix(i, k)).atan2(cos);
+        if cos > 1e-9 {
+            [(-sign * along).atan2(across), middle, (-sign * matrix(i, j)).atan2(matrix(i, i))]
+        } else {
+            [(sign * matrix(k, j)).atan2(matrix(j, j)), middle, 0.0]
+        }
+    }
+
+    /// The product of rotations by `angles` about three axes (0 x, 1 y, 2 z), as [`Self::euler`] takes it apart.
+    pub fn from_euler(order: [usize; 3], angles: Vec3) -> Self {
+        order.into_iter().zip(angles).fold(Self::IDENTITY, |product, (axis, angle)| {
+            let mut about = [0.0; 3];
+            about[axis] = 1.0;
+            product * Self::about(about, angle)
+        })
+    }
+
+    /// The exponential map: axis times angle, 0..=pi long.
+    pub fn rotation_vector(self) -> Vec3 {
+        let q = if self.w < 0.0 { self.opposite() } else { self };
+        let sin = norm(q.v);
+        // sin(a / 2) = a / 2 to the last digit where it is this small
+        scale(q.v, if sin < 1e-9 { 2.0 } else { 2.0 * sin.atan2(q.w) / sin })
+    }
+
+    /// The rotation whose axis times angle is `vector`, of any length.
+    pub fn from_rotation_vector(vector: Vec3) -> Self {
+        let angle = norm(vector);
+        if angle < 1e-12 {
+            Self { w: 1.0, v: scale(vector, 0.5) }
+        } else {
+            Self::about(scale(vector, 1.0 / angle), angle)
+        }
     }
 
     fn normalised(self) -> Self {
@@ -225,8 +263,31 @@ mod tests {
                 assert!(norm(sub(euler.turn(a), r.turn(a))) < 1e-8, "{r:?} {:?}", r.euler_zxy_degrees());
             }
         }
+        for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+            for r in rotations() {
+                let back = Rotation::from_euler(order, r.euler(order));
+                assert!(norm(sub(back.turn([0.3, -0.5, 0.8]), r.turn([0.3, -0.5, 0.8]))) < 1e-8, "{order:?} {r:?}");
+            }
+        }
         // Known: a quarter turn about y takes z to x.
         assert!(close(from_euler_zxy_degrees([0.0, 0.0, 90.0]).turn([0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]));
+    }
+
+    #[test]
+    fn the_exponential_map_gives_the_rotation_back() {
+        for r in rotations() {
+            let vector = r.rotation_vector();
+            assert!(norm(vector) <= std::f64::consts::PI + 1e-12);
+            // the other way round, beyond half a turn, is the same rotation
+            let other = match norm(vector) {
+                angle if angle > 0.1 => scale(vector, (angle - std::f64::consts::TAU) / angle),
+                _ => vector,
+            };
+            for back in [vector, other].map(Rotation::from_rotation_vector) {
+                assert!(close(back.turn([0.3, -0.5, 0.8]), r.turn([0.3, -0.5, 0.8])), "{r:?}");
+            }
+        }
+        assert!(close(Rotation::about([0.0, 0.0, 1.0], 0.7).rotation_vector(), [0.0, 0.0, 0.7]));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Motion as numbers: forward kinematics, rotations, Procrustes, smoothing, bone lengths; readers and writers of motion files. Pure but for those files.
 
 pub mod bones;
+pub mod exponential_map;
 pub mod fk;
 pub mod hand_bones;
 pub mod jerk;

@@ -5,6 +5,7 @@ use crate::math::rotation::Rotation;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
 use anyhow::{Context, Result, anyhow, bail, ensure};
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// A BVH file in memory, in its own units and axes.
@@ -15,8 +16,8 @@ pub struct Bvh {
     pub frame_secs: f64,
     pub n_frames: usize,
     /// Frame by frame all channels in the order of the joints.
-    values: Vec<f64>,
-    n_channels: usize,
+    pub(super) values: Vec<f64>,
+    pub(super) n_channels: usize,
 }
 
 /// A joint, or the end of a bone (an `End Site`, named after its parent with `_end`).
@@ -25,17 +26,18 @@ pub struct BvhJoint {
     pub name: String,
     pub parent: Option<usize>,
     pub offset: Vec3,
-    channels: Vec<Channel>,
-    first_channel: usize,
+    pub(super) channels: Vec<Channel>,
+    pub(super) first_channel: usize,
 }
 
 /// Axis 0 x, 1 y, 2 z.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Channel {
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Channel {
+    /// Along an axis, in the file's unit.
     Position(usize),
+    /// About an axis, degrees.
     Rotation(usize),
 }
-
 /// Meaning of a joint's position channels: the format does not define it, and both kinds occur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Positions {
@@ -151,7 +153,8 @@ impl Bvh {
         self.frames().map(|frame| self.pose(frame, positions)).collect()
     }
 
-    fn frames(&self) -> impl Iterator<Item = &[f64]> {
+    /// All channels of each frame, in the order of the joints.
+    pub fn frames(&self) -> impl Iterator<Item = &[f64]> {
         (0..self.n_frames).map(|t| &self.values[t * self.n_channels..(t + 1) * self.n_channels])
     }
 

@@ -136,6 +136,7 @@ impl TrainingTask for BodyLifterTask {
             let (t, view) = loop {
                 let t = rng.random_range(0..scene.seen.len());
                 match BodyView::around(&scene.seen, t, window, 1.0) {
+                    Some(_) if scene.disturbed[t] => {}
                     Some(view) => break (t, view),
                     None => scene = self.scene(rng),
                 }

@@ -5,6 +5,7 @@
 use super::body_motion;
 use super::body_motion::{Proportions, turn};
 use super::hand_shape::normal;
+use super::jumps;
 use super::noise;
 use crate::math::vec3;
 use crate::math::vec3::Vec3;
@@ -29,6 +30,8 @@ const MEASURED_BIAS: f64 = 0.7;
 pub struct FilmedScene {
     pub truth: Vec<Pose>,
     pub seen: Vec<SeenBody>,
+    /// [T]; whether a frame has a gross error (`jumps`), so that nothing is to be learnt from it.
+    pub disturbed: Vec<bool>,
     /// Which side the body is seen from on average, radians; 0: from ahead.
     pub yaw: f64,
     /// The neck in metres before the camera, and the camera's focal length in px; the axis meets the picture at 0, 0.
@@ -89,11 +92,12 @@ impl FilmedScene {
             poses.iter_mut().for_each(|pose| *pose = MIRROR.map(|j| [-pose[j][0], pose[j][1], pose[j][2]]));
         }
         // yaw within 60 degrees, in training more often less; the camera from 15 below to 15, in training 25, above;
-        // roll within 4
+        // roll within 4, in a third of the training within 15
         let yaw = if training && rng.random_bool(0.4) { 0.5 } else { 1.047 };
         let yaw = rng.random_range(-yaw..yaw);
         let above = if training { 0.44 } else { 0.262 };
-        let view = turn(0.0, rng.random_range(-0.262..above), rng.random_range(-0.07..0.07)) * turn(yaw, 0.0, 0.0);
+        let roll = if training && rng.random_bool(0.33) { 0.26 } else { 0.07 };
+        let view = turn(0.0, rng.random_range(-0.262..above), rng.random_range(-roll..roll)) * turn(yaw, 0.0, 0.0);
         let truth: Vec<Pose> = poses.iter().map(|pose| pose.map(|p| view.turn(p))).collect();
         // focal length in picture widths; a body of 0.75 m covers 50 to 150 % of the height of a 16:9 picture
         let focal: f64 = rng.random_range(1.0..2.2);
@@ -117,7 +121,9 @@ impl FilmedScene {
             }
             lose_hips(&mut seen, 0.35 * px_per_metre, training, rng);
         }
-        Self { truth, seen, yaw, neck, focal_px, px_per_metre }
+        let disturbed =
+            if training { jumps::disturb(&mut seen, 0.35 * px_per_metre, rng) } else { vec![false; seen.len()] };
+        Self { truth, seen, disturbed, yaw, neck, focal_px, px_per_metre }
     }
 }
 

@@ -6,4 +6,5 @@ pub mod hand;
 pub mod hand_motion;
 pub mod hand_noise;
 pub mod hand_shape;
+pub mod jumps;
 pub mod noise;

@@ -1,0 +1,372 @@
+//! Motion of a BVH file as the numbers FineMotion learns (Korzun et al. 2020): exponential maps of 15 joints of the upper
+//! body at 20 frames a second, the hips held still; and back to a BVH file of the same skeleton.
+
+use super::read::{Bvh, Channel};
+use super::skeleton::BvhSkeleton;
+use crate::math::rotation::Rotation;
+use crate::math::savitzky_golay::SavitzkyGolay;
+use crate::math::vec3::Vec3;
+use crate::motion::exponential_map::make_continuous;
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, bail, ensure};
+use ndarray::{Array2, ArrayView2};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Joints that are learnt, by their names in the captures of GENEA 2020.
+pub const JOINTS: [&str; 15] = [
+    "Spine",
+    "Spine1",
+    "Spine2",
+    "Spine3",
+    "Neck",
+    "Neck1",
+    "Head",
+    "RightShoulder",
+    "RightArm",
+    "RightForeArm",
+    "RightHand",
+    "LeftShoulder",
+    "LeftArm",
+    "LeftForeArm",
+    "LeftHand",
+];
+/// Frames a second of the numbers.
+pub const FPS: FrameRate = FrameRate::new(20, 1);
+/// A column that changes less is left out.
+const LEAST_STD: f64 = 1e-6;
+/// Added to the largest value that a column is divided by.
+const EPS: f64 = 1e-8;
+/// Half the frames of the smoothing window, and the order of its polynomial.
+const SMOOTHING: (usize, usize) = (4, 3);
+
+/// What the joints are called in a skeleton other than GENEA's: of those named, its own name, or nothing where it has no
+/// such joint.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct JointMapping(BTreeMap<String, String>);
+
+impl JointMapping {
+    /// From `Spine3=Chest` and, of a joint that is not there, `Spine3=`. Errors: another form, a joint that is not learnt.
+    pub fn parse(entries: &[String]) -> Result<Self> {
+        let entry = |entry: &String| {
+            let (joint, name) = entry.split_once('=').with_context(|| format!("`{entry}`: expected JOINT=NAME"))?;
+            ensure!(JOINTS.contains(&joint), "`{joint}` is none of the joints that are learnt: {}", JOINTS.join(", "));
+            Ok((joint.to_owned(), name.to_owned()))
+        };
+        Ok(Self(entries.iter().map(entry).collect::<Result<_>>()?))
+    }
+
+    /// Joints of the skeleton that are learnt, in the reverse of its order (the order of FineMotion's columns).
+    fn find(&self, skeleton: &BvhSkeleton) -> Result<Vec<usize>> {
+        let names = || skeleton.joints.iter().map(|joint| joint.name.as_str());
+        let mut found = Vec::new();
+        for joint in JOINTS {
+            let name = self.0.get(joint).map_or(joint, String::as_str);
+            if name.is_empty() {
+                continue;
+            }
+            let Some(at) = names().position(|other| other == name) else {
+                bail!(
+                    "there is no joint {name}; name another with `{joint}=NAME`, or `{joint}=` where the skeleton has none. \
+                     Its joints: {}",
+                    names().collect::<Vec<_>>().join(", ")
+                );
+            };
+            ensure!(!found.contains(&at), "joint {name} stands for two joints");
+            found.push(at);
+        }
+        ensure!(!found.is_empty(), "no joint is left to learn");
+        found.sort_unstable_by(|a, b| b.cmp(a));
+        Ok(found)
+    }
+}
+
+/// The way between the motion of one skeleton and the numbers that are learnt.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ExponentialMaps {
+    pub skeleton: BvhSkeleton,
+    /// Channels of all joints where nothing is learnt: the first frame of the first file, the root at 0.
+    rest: Vec<f64>,
+    /// Joints that are learnt.
+    joints: Vec<usize>,
+    /// Columns that are learnt, of three for each of `joints`; and of each the mean and the largest absolute value.
+    columns: Vec<usize>,
+    mean: Vec<f64>,
+    largest: Vec<f64>,
+}
+
+impl ExponentialMaps {
+    /// From the files to learn from. Errors: none, a file of another skeleton than the first, no frame, numbers that are not
+    /// finite, joints that are not there.
+    pub fn of(files: &[Bvh], mapping: &JointMapping) -> Result<Self> {
+        let first = files.first().context("there is no motion to learn from")?;
+        let skeleton = BvhSkeleton::of(first);
+        skeleton.check()?;
+        let joints = mapping.find(&skeleton)?;
+        let mut rest = first.frames().next().context("the first file has no frame")?.to_vec();
+        let n_root = skeleton.joints[0].channels.len();
+        rest[..n_root].fill(0.0);
+        let mut maps = Self { skeleton, rest, joints, columns: Vec::new(), mean: Vec::new(), largest: Vec::new() };
+        let all: Vec<Array2<f64>> = files.iter().map(|file| maps.exponential_maps(file)).collect::<Result<_>>()?;
+        maps.columns = (0..all[0].ncols()).filter(|&column| all[0].column(column).std(0.0) >= LEAST_STD).collect();
+        ensure!(!maps.columns.is_empty(), "no joint of the first file moves");
+        let n_frames: usize = all.iter().map(Array2::nrows).sum();
+        for &column in &maps.columns {
+            let values = || all.iter().flat_map(move |file| file.column(column).to_vec());
+            maps.mean.push(values().sum::<f64>() / n_frames as f64);
+            maps.largest.push(values().fold(0.0, |largest, v| f64::max(largest, v.abs())) + EPS);
+        }
+        Ok(maps)
+    }
+
+    /// Numbers of a frame.
+    pub fn n_columns(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Errors unless the tables fit each other, as those of a checkpoint may not.
+    pub fn check(&self) -> Result<()> {
+        self.skeleton.check()?;
+        let n = self.columns.len();
+        ensure!(self.mean.len() == n && self.largest.len() == n && n > 0, "its tables of columns differ in length");
+        ensure!(self.rest.len() == self.skeleton.n_channels(), "its rest pose has {} numbers", self.rest.len());
+        ensure!(self.columns.iter().all(|&column| column < 3 * self.joints.len()), "it has a column of no joint");
+        for &joint in &self.joints {
+            let order = self.skeleton.joints.get(joint).and_then(|joint| joint.rotation_order());
+            ensure!(order.is_some(), "joint {joint} has no three rotations");
+        }
+        let mut numbers = self.mean.iter().chain(&self.largest).chain(&self.rest);
+        ensure!(numbers.all(|v| v.is_finite()), "it holds a number that is not finite");
+        Ok(())
+    }
+
+    /// Numbers of a file [T, columns] at 20 frames a second: centred on the mean, divided by the largest value.
+    pub fn features(&self, bvh: &Bvh) -> Result<Array2<f32>> {
+        let all = self.exponential_maps(bvh)?;
+        Ok(Array2::from_shape_fn((all.nrows(), self.columns.len()), |(t, i)| {
+            ((all[[t, self.columns[i]]] - self.mean[i]) / self.largest[i]) as f32
+        }))
+    }
+
+    /// Channels of each frame for numbers [T, columns]; what is not learnt stays as in the first file's first frame.
+    pub fn channels(&self, features: ArrayView2<f32>) -> Vec<Vec<f64>> {
+        let first_channels = self.skeleton.first_channels();
+        let at_rest: Vec<Vec3> =
+            self.joints.iter().map(|&joint| self.rotation(joint, &self.rest).rotation_vector()).collect();
+        let frame = |row: ndarray::ArrayView1<f32>| {
+            let mut maps = at_rest.clone();
+            for (i, &column) in self.columns.iter().enumerate() {
+                maps[column / 3][column % 3] = f64::from(row[i]) * self.largest[i] + self.mean[i];
+            }
+            let mut channels = self.rest.clone();
+            for (&joint, map) in self.joints.iter().zip(maps) {
+                let parts = &self.skeleton.joints[joint];
+                let Some(order) = parts.rotation_order() else { continue };
+                let rotations =
+                    parts.channels.iter().enumerate().filter(|(_, channel)| matches!(channel, Channel::Rotation(_)));
+                for ((at, _), angle) in rotations.zip(Rotation::from_rotation_vector(map).euler(order)) {
+                    channels[first_channels[joint] + at] = angle.to_degrees();
+                }
+            }
+            channels
+        };
+        features.outer_iter().map(frame).collect()
+    }
+
+    /// A BVH file of the skeleton for numbers [T, columns].
+    pub fn to_bvh(&self, features: ArrayView2<f32>) -> String {
+        let channels = self.channels(features);
+        self.skeleton.to_bvh(FPS, channels.iter().map(Vec::as_slice))
+    }
+
+    /// Exponential maps of the learnt joints [T, 3 * joints], every frame that 20 a second keep but the last one.
+    fn exponential_maps(&self, bvh: &Bvh) -> Result<Array2<f64>> {
+        let skeleton = BvhSkeleton::of(bvh);
+        ensure!(
+            skeleton.joints.iter().map(|joint| (&joint.name, &joint.channels)).eq(self
+                .skeleton
+                .joints
+                .iter()
+                .map(|joint| (&joint.name, &joint.channels))),
+            "its skeleton has other joints or channels than the first file's ({} joints, expected {})",
+            skeleton.joints.len(),
+            self.skeleton.joints.len()
+        );
+        let per_frame = 1.0 / (bvh.frame_secs * FPS.per_sec());
+        ensure!(per_frame > 0.99, "it has {:.2} frames a second, fewer than {FPS}", 1.0 / bvh.frame_secs);
+        let frames: Vec<&[f64]> = bvh.frames().collect();
+        if let Some(t) = frames.iter().position(|frame| frame.iter().any(|value| !value.is_finite())) {
+            bail!("frame {t} has a number that is not finite");
+        }
+        // up to the frame before the last one
+        let n = (0..).take_while(|t| (f64::from(*t) * per_frame).round() < frames.len() as f64 - 1.0).count();
+        let whole = (per_frame - per_frame.round()).abs() < 0.01;
+        let mut maps = Array2::zeros((n, 3 * self.joints.len()));
+        for (i, &joint) in self.joints.iter().enumerate() {
+            let name = &self.skeleton.joints[joint].name;
+            ensure!(
+                self.skeleton.joints[joint].rotation_order().is_some(),
+                "joint {name} has no rotations about three axes"
+            );
+            let rotation = |t: usize| self.rotation(joint, frames[t.min(frames.len() - 1)]);
+            let at = |t: usize| {
+                let place = t as f64 * per_frame;
+                if whole {
+                    return rotation(t * per_frame.round() as usize);
+                }
+                rotation(place as usize).slerp(rotation(place as usize + 1), place.fract())
+            };
+            let mut track: Vec<Vec3> = (0..n).map(|t| at(t).rotation_vector()).collect();
+            make_continuous(&mut track);
+            for (t, vector) in track.iter().enumerate() {
+                (0..3).for_each(|k| maps[[t, 3 * i + k]] = vector[k]);
+            }
+        }
+        Ok(maps)
+    }
+
+    /// Rotation of a joint in a frame.
+    fn rotation(&self, joint: usize, frame: &[f64]) -> Rotation {
+        let parts = &self.skeleton.joints[joint];
+        let values = &frame[self.skeleton.first_channels()[joint]..];
+        let mut angles = parts.channels.iter().zip(values).filter_map(|(channel, value)| match channel {
+            Channel::Rotation(_) => Some(value.to_radians()),
+            Channel::Position(_) => None,
+        });
+        let angles = std::array::from_fn(|_| angles.next().unwrap_or(0.0));
+        Rotation::from_euler(parts.rotation_order().unwrap_or([0, 1, 2]), angles)
+    }
+}
+
+/// Smooths every column of numbers [T, columns] with the Savitzky-Golay filter over 9 frames, of order 3.
+pub fn smooth(features: &mut Array2<f32>) {
+    let filter = SavitzkyGolay::new(SMOOTHING.0, SMOOTHING.1);
+    for mut column in features.columns_mut() {
+        let values: Vec<Vec3> = column.iter().map(|v| [f64::from(*v), 0.0, 0.0]).collect();
+        column.iter_mut().zip(filter.run(&values)).for_each(|(v, smooth)| *v = smooth[0] as f32);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::vec3::{norm, sub};
+
+    /// A skeleton with the joints of GENEA and hips, legs and fingers beside them, whose angles swing; the captures' own order
+    /// of channels. `legs` moves what is not learnt.
+    fn captured(n_frames: usize, frame_secs: f64, legs: f64) -> Bvh {
+        let six = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation";
+        let three = "CHANNELS 3 Zrotation Xrotation Yrotation";
+        let mut text = format!("HIERARCHY\nROOT Hips\n{{\nOFFSET 0 90 0\n{six}\n");
+        let chain = |names: &[&str], step: &str| -> String {
+            let open: String = names.iter().map(|name| format!("JOINT {name}\n{{\nOFFSET {step}\n{three}\n")).collect();
+            format!("{open}End Site\n{{\nOFFSET {step}\n}}\n{}", "}\n".repeat(names.len()))
+        };
+        text += &chain(&["LeftUpLeg", "LeftLeg"], "0 -40 0");
+        for name in ["Spine", "Spine1", "Spine2", "Spine3"] {
+            text += &format!("JOINT {name}\n{{\nOFFSET 0 12 0\n{three}\n");
+        }
+        text += &chain(&["Neck", "Neck1", "Head"], "0 8 0");
+        text += &chain(&["RightShoulder", "RightArm", "RightForeArm", "RightHand", "RightHandIndex1"], "-20 0 0");
+        text += &chain(&["LeftShoulder", "LeftArm", "LeftForeArm", "LeftHand", "LeftHandIndex1"], "20 0 0");
+        text += &"}\n".repeat(5);
+        text += &format!("MOTION\nFrames: {n_frames}\nFrame Time: {frame_secs}\n");
+        let names = Bvh::parse(&format!("{text}").replace(&format!("Frames: {n_frames}"), "Frames: 0")).unwrap().joints;
+        for t in 0..n_frames {
+            let mut numbers = vec![0.0; 6];
+            for (i, joint) in names.iter().enumerate().skip(1).filter(|(_, joint)| !joint.channels.is_empty()) {
+                let learnt = JOINTS.contains(&joint.name.as_str());
+                let wide = if learnt { 1.0 } else { legs };
+                let far = if joint.name == "LeftArm" { 170.0 } else { 35.0 };
+                let secs = t as f64 * frame_secs;
+                for k in 0..3 {
+                    let at = (1.0 + 0.1 * i as f64) * secs + k as f64;
+                    numbers.push(wide * if k == 1 { 30.0 } else { far } * at.sin());
+                }
+            }
+            let numbers: Vec<String> = numbers.iter().map(f64::to_string).collect();
+            text += &(numbers.join(" ") + "\n");
+        }
+        Bvh::parse(&text).unwrap()
+    }
+
+    #[test]
+    fn a_round_trip_leaves_every_joint_where_it_is() {
+        let bvh = captured(301, 1.0 / 60.0, 0.0);
+        let maps = ExponentialMaps::of(std::slice::from_ref(&bvh), &JointMapping::default()).unwrap();
+        maps.check().unwrap();
+        assert_eq!(maps.n_columns(), 45);
+        let first: Vec<&str> =
+            maps.joints.iter().take(4).map(|&joint| maps.skeleton.joints[joint].name.as_str()).collect();
+        assert_eq!(first, ["LeftHand", "LeftForeArm", "LeftArm", "LeftShoulder"]);
+        let features = maps.features(&bvh).unwrap();
+        assert_eq!(features.dim(), (100, 45));
+        assert!(features.iter().all(|v| v.abs() <= 2.0));
+        let back = Bvh::parse(&maps.to_bvh(features.view())).unwrap();
+        assert_eq!((back.n_frames, back.joints.len()), (100, bvh.joints.len()));
+        let known: Vec<&[f64]> = bvh.frames().step_by(3).collect();
+        let mut worst: f64 = 0.0;
+        for (t, frame) in back.frames().enumerate() {
+            for (a, b) in maps.skeleton.positions(frame).into_iter().zip(maps.skeleton.positions(known[t])) {
+                worst = worst.max(10.0 * norm(sub(a, b)));
+            }
+        }
+        assert!(worst < 0.05, "{worst} mm");
+    }
+
+    #[test]
+    fn hips_stand_still_and_what_is_not_learnt_stays_as_it_began() {
+        let bvh = captured(61, 1.0 / 60.0, 1.0);
+        let maps = ExponentialMaps::of(std::slice::from_ref(&bvh), &JointMapping::default()).unwrap();
+        let channels = maps.channels(maps.features(&bvh).unwrap().view());
+        let first: Vec<f64> = bvh.frames().next().unwrap().to_vec();
+        let knee = maps.skeleton.first_channels()[2];
+        for frame in &channels {
+            assert_eq!(frame[..6], [0.0; 6]);
+            assert_eq!(frame[knee..knee + 3], first[knee..knee + 3]);
+        }
+        let at_24 = captured(49, 1.0 / 24.0, 0.0);
+        let (a, b) = (maps.features(&at_24).unwrap(), maps.features(&captured(121, 1.0 / 60.0, 0.0)).unwrap());
+        for (a, b) in a.iter().zip(&b) {
+            assert!((a - b).abs() < 0.02, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn joints_of_another_skeleton_are_named_or_refused() {
+        let bvh = captured(31, 1.0 / 60.0, 0.0);
+        let parse =
+            |entries: &[&str]| JointMapping::parse(&entries.iter().map(|e| (*e).to_owned()).collect::<Vec<_>>());
+        let fewer = parse(&["Spine3=", "Neck1="]).unwrap();
+        assert_eq!(ExponentialMaps::of(std::slice::from_ref(&bvh), &fewer).unwrap().n_columns(), 39);
+        let says = |mapping: &JointMapping| {
+            format!("{:#}", ExponentialMaps::of(std::slice::from_ref(&bvh), mapping).unwrap_err())
+        };
+        let text = says(&parse(&["Spine3=Chest"]).unwrap());
+        assert!(
+            text.contains("no joint Chest") && text.contains("Spine3=NAME") && text.contains("LeftUpLeg"),
+            "{text}"
+        );
+        assert!(says(&parse(&["Spine3=Spine2"]).unwrap()).contains("two joints"));
+        assert!(parse(&["Spine3"]).is_err() && parse(&["Tail=Tail"]).is_err());
+        let mut other = bvh.clone();
+        other.joints[2].name = "Knee".into();
+        let text = format!("{:#}", ExponentialMaps::of(&[bvh.clone(), other], &parse(&[]).unwrap()).unwrap_err());
+        assert!(text.contains("other joints"), "{text}");
+        let mut broken = bvh.clone();
+        broken.values[bvh.n_channels + 7] = f64::NAN;
+        let text = format!("{:#}", ExponentialMaps::of(&[bvh, broken], &parse(&[]).unwrap()).unwrap_err());
+        assert!(text.contains("frame 1 "), "{text}");
+    }
+
+    #[test]
+    fn smoothing_takes_the_shake_and_leaves_the_way() {
+        let mut features =
+            Array2::from_shape_fn((60, 3), |(t, _)| (t as f32 * 0.1).sin() + if t % 2 == 0 { 0.05 } else { -0.05 });
+        smooth(&mut features);
+        for ((t, _), v) in features.indexed_iter().filter(|((t, _), _)| (5..55).contains(t)) {
+            assert!((v - (t as f32 * 0.1).sin()).abs() < 0.02, "{t} {v}");
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! The skeleton of a BVH file, kept so that other motion can be written in it: joints, offsets and channels as they were.
+
+use super::read::{Bvh, Channel};
+use crate::math::rotation::Rotation;
+use crate::math::vec3::{self, Vec3};
+use crate::types::time::FrameRate;
+use anyhow::{Result, ensure};
+use serde::{Deserialize, Serialize};
+use std::fmt::Write;
+
+/// A joint, or the end of a bone, which has no channels.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SkeletonJoint {
+    pub name: String,
+    pub parent: Option<usize>,
+    /// From the parent, in the file's unit.
+    pub offset: Vec3,
+    pub channels: Vec<Channel>,
+}
+
+impl SkeletonJoint {
+    /// Axes of its rotation channels in their order; `None` unless there are three about different axes.
+    pub fn rotation_order(&self) -> Option<[usize; 3]> {
+        let axes: Vec<usize> = self
+            .channels
+            .iter()
+            .filter_map(|channel| match channel {
+                Channel::Rotation(axis) => Some(*axis),
+                Channel::Position(_) => None,
+            })
+            .collect();
+        let order: [usize; 3] = axes.try_into().ok()?;
+        (order[0] != order[1] && order[1] != order[2] && order[0] != order[2]).then_some(order)
+    }
+}
+
+/// Joints in the order of the file, parents before children.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct BvhSkeleton {
+    pub joints: Vec<SkeletonJoint>,
+}
+
+impl BvhSkeleton {
+    /// The skeleton of a file.
+    pub fn of(bvh: &Bvh) -> Self {
+        let joint = |joint: &super::read::BvhJoint| SkeletonJoint {
+            name: joint.name.clone(),
+            parent: joint.parent,
+            offset: joint.offset,
+            channels: joint.channels.clone(),
+        };
+        Self { joints: bvh.joints.iter().map(joint).collect() }
+    }
+
+    /// Numbers of a frame.
+    pub fn n_channels(&self) -> usize {
+        self.joints.iter().map(|joint| joint.channels.len()).sum()
+    }
+
+    /// Place of each joint's first channel in a frame.
+    pub fn first_channels(&self) -> Vec<usize> {
+        let mut next = 0;
+        self.joints
+            .iter()
+            .map(|joint| {
+                next += joint.channels.len();
+                next - joint.channels.len()
+            })
+            .collect()
+    }
+
+    /// Errors unless it is a tree whose parents come first, with finite offsets, as every file has one.
+    pub fn check(&self) -> Result<()> {
+        for (at, joint) in self.joints.iter().enumerate() {
+            ensure!(joint.parent.is_none() == (at == 0), "joint {} has no place in the skeleton", joint.name);
+            ensure!(joint.parent.is_none_or(|parent| parent < at), "the parent of joint {} comes after it", joint.name);
+            ensure!(joint.offset.iter().all(|v| v.is_finite()), "the offset of joint {} is not finite", joint.name);
+            let axis = |channel: &Channel| match channel {
+                Channel::Position(axis) | Channel::Rotation(axis) => *axis,
+            };
+            ensure!(joint.channels.iter().all(|channel| axis(channel) < 3), "joint {} has a fourth axis", joint.name);
+            ensure!(!joint.name.contains(char::is_whitespace), "joint {:?} has a space in its name", joint.name);
+        }
+        Ok(())
+    }
+
+    /// Positions of all joints for the channels of a frame, in the file's unit; position channels are added to the offset.
+    pub fn positions(&self, frame: &[f64]) -> Vec<Vec3> {
+        let mut turned = vec![Rotation::IDENTITY; self.joints.len()];
+        let mut placed = vec![[0.0; 3]; self.joints.len()];
+        let mut values = frame.iter();
+        for (at, joint) in self.joints.iter().enumerate() {
+            let (mut step, mut turn) = (joint.offset, Rotation::IDENTITY);
+            for (channel, value) in joint.channels.iter().zip(values.by_ref()) {
+                match *channel {
+                    Channel::Position(axis) => step[axis] += value,
+                    Channel::Rotation(axis) => {
+                        let mut about = [0.0; 3];
+                        about[axis] = 1.0;
+                        turn = turn * Rotation::about(about, value.to_radians());
+                    }
+                }
+            }
+            (turned[at], placed[at]) = match joint.parent {
+                Some(parent) => (turned[parent] * turn, vec3::add(placed[parent], turned[parent].turn(step))),
+                None => (turn, step),
+            };
+        }
+        placed
+    }
+
+    /// A BVH file of this skeleton; `frames`: all channels of each frame.
+    pub fn to_bvh<'a>(&self, fps: FrameRate, frames: impl ExactSizeIterator<Item = &'a [f64]>) -> String {
+        let mut text = String::from("HIERARCHY\n");
+        let mut open: Vec<usize> = Vec::new();
+        for (at, joint) in self.joints.iter().enumerate() {
+            while open.last().copied() != joint.parent && open.pop().is_some() {
+                let _ = writeln!(text, "{}}}", "\t".repeat(open.len()));
+            }
+            let indent = "\t".repeat(open.len());
+            let is_end = joint.channels.is_empty() && at > 0;
+            let title = match (at, is_end) {
+                (0, _) => format!("ROOT {}", joint.name),
+                (_, true) => "End Site".to_owned(),
+                (_, false) => format!("JOINT {}", joint.name),
+            };
+            let [x, y, z] = joint.offset;
+            let _ = writeln!(text, "{indent}{title}\n{indent}{{\n{indent}\tOFFSET {x:.6} {y:.6} {z:.6}");
+            if !is_end {
+                let names: Vec<String> = joint.channels.iter().map(channel_name).collect();
+                let _ = writeln!(text, "{indent}\tCHANNELS {} {}", names.len(), names.join(" "));
+            }
+            open.push(at);
+        }
+        while open.pop().is_some() {
+            let _ = writeln!(text, "{}}}", "\t".repeat(open.len()));
+        }
+        let _ = write!(text, "MOTION\nFrames: {}\nFrame Time: {:.8}\n", frames.len(), 1.0 / fps.per_sec());
+        for frame in frames {
+            let numbers: Vec<String> = frame.iter().map(|value| format!("{value:.6}")).collect();
+            text.push_str(&numbers.join(" "));
+            text.push('\n');
+        }
+        text
+    }
+}
+
+fn channel_name(channel: &Channel) -> String {
+    let (axis, kind) = match channel {
+        Channel::Position(axis) => (axis, "position"),
+        Channel::Rotation(axis) => (axis, "rotation"),
+    };
+    format!("{}{kind}", ["X", "Y", "Z"][*axis])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::bvh::read::Positions;
+
+    const TEXT: &str = include_str!("../../../fixtures/reference/bvh_take.bvh");
+
+    #[test]
+    fn a_file_written_in_its_own_skeleton_is_itself() {
+        let bvh = Bvh::parse(TEXT).unwrap();
+        let skeleton = BvhSkeleton::of(&bvh);
+        skeleton.check().unwrap();
+        let frames: Vec<&[f64]> = bvh.frames().collect();
+        let fps = FrameRate::new((1.0 / bvh.frame_secs).round() as u32, 1);
+        let back = Bvh::parse(&skeleton.to_bvh(fps, frames.iter().copied())).unwrap();
+        assert_eq!(BvhSkeleton::of(&back), skeleton);
+        for (t, frame) in bvh.positions(Positions::Add).into_iter().enumerate() {
+            for ((a, b), c) in frame.iter().zip(&back.positions(Positions::Add)[t]).zip(skeleton.positions(frames[t])) {
+                assert!((0..3).all(|k| (a[k] - b[k]).abs() < 1e-3 && (a[k] - c[k]).abs() < 1e-9), "{a:?} {b:?} {c:?}");
+            }
+        }
+        let stored: BvhSkeleton = serde_json::from_str(&serde_json::to_string(&skeleton).unwrap()).unwrap();
+        assert_eq!(stored, skeleton);
+    }
+}
