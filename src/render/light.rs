@@ -3,7 +3,7 @@
 use crate::math::vec3::{Vec3, any_across, cross, unit};
 
 /// A directional key light, light from all round, and a rim. Colours are linear RGB.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Light {
     /// Unit vector in world axes towards the key light.
     pub to_key: [f32; 3],
@@ -39,7 +39,8 @@ impl Light {
         let facing = dot(normal, to_viewer).max(0.0);
         let edge = (1.0 - facing) * (1.0 - facing);
         let rim = edge * edge * up * 0.5;
-        let half = direction(std::array::from_fn(|k| self.to_key[k] + to_viewer[k]));
+        let half =
+            direction([self.to_key[0] + to_viewer[0], self.to_key[1] + to_viewer[1], self.to_key[2] + to_viewer[2]]);
         let mut shine = dot(normal, half).max(0.0);
         let (n_squares, strength) = if gloss < 0.5 { (4, 0.35) } else { (7, 2.0) };
         for _ in 0..n_squares {

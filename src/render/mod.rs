@@ -8,7 +8,7 @@ mod pixel;
 pub mod renderer;
 mod samples;
 mod shadow;
-mod srgb;
+pub mod srgb;
 mod surfaces;
 mod visibility;
 
@@ -17,3 +17,4 @@ pub use camera::PinholeCamera;
 pub use light::Light;
 pub use mesh::Mesh;
 pub use renderer::Renderer;
+pub use srgb::Srgb;

@@ -3,7 +3,7 @@
 use super::samples::{NO_TRIANGLE, PARTS, SPOTS};
 use super::shadow::ShadowMap;
 use super::srgb::compressed;
-use super::surfaces::{Radiance, RadiancePlane, Surfaces};
+use super::surfaces::{INNER_LIGHT, Radiance, RadiancePlane, Surfaces};
 
 /// Depths of one surface within a pixel differ by less than this share.
 const ONE_SURFACE: f32 = 0.012;
@@ -33,22 +33,21 @@ impl PixelLight {
     }
 }
 
-/// Share of the key light that was found last, and where.
-#[derive(Clone, Copy, Debug, Default)]
-struct LastShadow {
-    pixel: [usize; 2],
-    mesh: u16,
-    nearness: f32,
-    lit: f32,
-}
-
 /// Light of the triangles of a picture, worked out where it is asked for.
 #[derive(Clone, Debug, Default)]
 pub struct Shading {
+    /// What the vertices send, and for which of them that is known.
+    vertices: Vec<Radiance>,
+    is_known: Vec<bool>,
     /// Plane of each triangle.
     numbers: Vec<u32>,
     planes: Vec<RadiancePlane>,
-    last: LastShadow,
+    /// Numbers of the last pixel's mesh: from one to another.
+    mesh: [u32; 2],
+    /// Pixels of a row that one surface fills: columns, and what they send.
+    columns: Vec<usize>,
+    row: Vec<Radiance>,
+    n_row: usize,
 }
 
 /// Whether no sample is covered.
@@ -67,19 +66,10 @@ pub fn nearest(nearness: &[f32; 4]) -> usize {
 #[derive(Clone, Copy, Default)]
 struct Part {
     triangle: u32,
-    nearness: f32,
     /// Share of the pixel.
     share: f32,
     /// Point of the surface, parts of a pixel.
     point: [i32; 2],
-}
-
-/// Whether all samples show the first one's surface.
-#[inline(always)]
-fn is_one_surface(surfaces: &Surfaces, triangles: &[u32; 4], nearness: &[f32; 4]) -> bool {
-    let mesh = |k: usize| surfaces.triangles.get(triangles[k] as usize).map(|triangle| triangle.mesh);
-    let first = mesh(0);
-    first.is_some() && (1..4).all(|k| (nearness[0] - nearness[k]).abs() < ONE_SURFACE * nearness[0] && mesh(k) == first)
 }
 
 /// Calls `each` for every surface in a pixel.
@@ -107,7 +97,7 @@ fn for_parts(
             }
         }
         let point = [x as i32 * PARTS + SPOTS[k][0], y as i32 * PARTS + SPOTS[k][1]];
-        each(Part { triangle: triangles[k], nearness: nearness[k], share: n as f32 * 0.25, point });
+        each(Part { triangle: triangles[k], share: n as f32 * 0.25, point });
     }
 }
 
@@ -117,35 +107,75 @@ impl Shading {
         self.numbers.clear();
         self.numbers.resize(surfaces.triangles.len(), NO_PLANE);
         self.planes.clear();
-        self.last = LastShadow::default();
+        self.vertices.resize(surfaces.n_vertices(), Radiance::default());
+        self.is_known.clear();
+        self.is_known.resize(surfaces.n_vertices(), false);
+        self.mesh = [0; 2];
+        self.columns.resize(surfaces.width(), 0);
+        self.row.resize(surfaces.width(), Radiance::default());
+        self.n_row = 0;
     }
 
     #[inline(always)]
-    fn radiance(&mut self, surfaces: &Surfaces, number: u32, point: [i32; 2]) -> Radiance {
+    fn radiance(&mut self, surfaces: &Surfaces, shadows: Option<&ShadowMap>, number: u32, point: [i32; 2]) -> Radiance {
         let plane = self.numbers[number as usize];
         if let Some(plane) = self.planes.get(plane as usize) {
             return plane.radiance_at(point);
         }
-        self.first_radiance(surfaces, number, point)
+        self.first_radiance(surfaces, shadows, number, point)
     }
 
     #[inline(never)]
-    fn first_radiance(&mut self, surfaces: &Surfaces, number: u32, point: [i32; 2]) -> Radiance {
+    fn first_radiance(
+        &mut self,
+        surfaces: &Surfaces,
+        shadows: Option<&ShadowMap>,
+        number: u32,
+        point: [i32; 2],
+    ) -> Radiance {
         let triangle = &surfaces.triangles[number as usize];
+        let mut corners = [Radiance::default(); 3];
+        for (corner, vertex) in corners.iter_mut().zip(triangle.vertices) {
+            let at = vertex as usize;
+            if !self.is_known[at] {
+                (self.vertices[at], self.is_known[at]) = (surfaces.radiance(vertex, shadows), true);
+            }
+            *corner = self.vertices[at];
+            if triangle.is_inner {
+                corner[..2].iter_mut().flatten().for_each(|v| *v *= INNER_LIGHT);
+            }
+        }
         if self.numbers[number as usize] == NO_PLANE && surfaces.is_even(triangle) {
             self.numbers[number as usize] = self.planes.len() as u32;
-            self.planes.push(surfaces.plane(triangle));
-        } else {
-            self.numbers[number as usize] = UNEVEN;
+            let plane = surfaces.plane(triangle, &corners);
+            self.planes.push(plane);
+            return plane.radiance_at(point);
         }
-        surfaces.radiance_at(triangle, point)
+        self.numbers[number as usize] = UNEVEN;
+        surfaces.radiance_at(triangle, &corners, point)
+    }
+
+    /// Whether all samples show the first one's surface.
+    #[inline(always)]
+    fn is_one_surface(&mut self, surfaces: &Surfaces, triangles: &[u32; 4], nearness: &[f32; 4]) -> bool {
+        let [a, b, c, d] = *nearness;
+        let reach = ONE_SURFACE * a;
+        if !((a - b).abs() < reach && (a - c).abs() < reach && (a - d).abs() < reach) {
+            return false;
+        }
+        let [a, b, c, d] = *triangles;
+        if !(self.mesh[0] <= a && a < self.mesh[1]) {
+            self.mesh = surfaces.numbers_of_mesh(a);
+        }
+        let [first, end] = self.mesh;
+        a.min(b).min(c).min(d) >= first && a.max(b).max(c).max(d) < end
     }
 
     /// Light of a pixel before shadows.
     pub fn light(&mut self, surfaces: &Surfaces, samples: (&[u32; 4], &[f32; 4]), pixel: [usize; 2]) -> PixelLight {
         let mut light = PixelLight::default();
-        for_parts(surfaces, samples, pixel, |Part { triangle, share, point, .. }| {
-            let [own, key, asking] = self.radiance(surfaces, triangle, point);
+        for_parts(surfaces, samples, pixel, |Part { triangle, share, point }| {
+            let [own, key, asking] = self.radiance(surfaces, None, triangle, point);
             if light.cover == 0.0 {
                 light.asking = [asking[0], asking[1], asking[2]];
             }
@@ -158,32 +188,44 @@ impl Shading {
         light
     }
 
-    /// Linear RGB of a pixel with shadows, weighted by the share of covered samples, and that share.
+    /// Takes a pixel into the row where one surface fills it.
     #[inline(always)]
-    pub fn shaded(
+    pub fn add(
         &mut self,
         surfaces: &Surfaces,
         shadows: &ShadowMap,
-        samples: (&[u32; 4], &[f32; 4]),
+        (triangles, nearness): (&[u32; 4], &[f32; 4]),
         pixel: [usize; 2],
-    ) -> ([f32; 4], f32) {
-        let (triangles, nearness) = samples;
+    ) -> bool {
         let [first, others @ ..] = *triangles;
-        let mut point = pixel.map(|v| v as i32 * PARTS);
         let is_whole = others == [first; 3];
-        if is_whole || is_one_surface(surfaces, triangles, nearness) {
-            // Most pixels.
-            if !is_whole {
-                (0..2).for_each(|k| point[k] += SPOTS[0][k]);
-            }
-            let whole = Part { triangle: first, nearness: nearness[0], share: 1.0, point };
-            return (self.part(surfaces, shadows, whole, pixel), 1.0);
+        if !is_whole && !self.is_one_surface(surfaces, triangles, nearness) {
+            return false;
         }
-        self.mixed(surfaces, shadows, samples, pixel)
+        let spot = if is_whole { [0; 2] } else { SPOTS[0] };
+        let point = [pixel[0] as i32 * PARTS + spot[0], pixel[1] as i32 * PARTS + spot[1]];
+        let radiance = self.radiance(surfaces, Some(shadows), first, point);
+        (self.columns[self.n_row], self.row[self.n_row]) = (pixel[0], radiance);
+        self.n_row += 1;
+        true
     }
 
+    /// Ends a row: calls `each` with the columns of its pixels and their linear RGB with shadows.
+    #[inline(always)]
+    pub fn close_row(&mut self, shadows: &ShadowMap, mut each: impl FnMut(usize, [f32; 4])) {
+        let row = &mut self.row[..self.n_row];
+        for radiance in &mut *row {
+            radiance[0] = with_shadow(shadows, radiance);
+        }
+        for (&column, radiance) in self.columns.iter().zip(row) {
+            each(column, radiance[0]);
+        }
+        self.n_row = 0;
+    }
+
+    /// Linear RGB of a pixel with several surfaces, weighted by the share of covered samples, and that share.
     #[inline(never)]
-    fn mixed(
+    pub fn mixed(
         &mut self,
         surfaces: &Surfaces,
         shadows: &ShadowMap,
@@ -191,45 +233,25 @@ impl Shading {
         pixel: [usize; 2],
     ) -> ([f32; 4], f32) {
         let (mut sum, mut cover) = ([0.0f32; 4], 0.0);
-        for_parts(surfaces, samples, pixel, |part| {
-            let light = self.part(surfaces, shadows, part, pixel);
-            cover += part.share;
+        for_parts(surfaces, samples, pixel, |Part { triangle, share, point }| {
+            let light = with_shadow(shadows, &self.radiance(surfaces, Some(shadows), triangle, point));
+            cover += share;
             for k in 0..4 {
-                sum[k] += part.share * light[k];
+                sum[k] += share * light[k];
             }
         });
         (sum, cover)
     }
+}
 
-    /// Linear RGB of one surface with its shadow.
-    #[inline(always)]
-    fn part(&mut self, surfaces: &Surfaces, shadows: &ShadowMap, part: Part, pixel: [usize; 2]) -> [f32; 4] {
-        let [own, key, asking] = self.radiance(surfaces, part.triangle, part.point);
-        let is_turned_away = key[0] + key[1] + key[2] <= 1e-4;
-        let lit = if is_turned_away {
-            0.0
-        } else {
-            let (mesh, nearness) = (surfaces.triangles[part.triangle as usize].mesh, part.nearness);
-            self.lit(shadows, [asking[0], asking[1], asking[2]], LastShadow { pixel, mesh, nearness, lit: 0.0 })
-        };
-        let mut light = own;
-        for k in 0..4 {
-            light[k] += lit * key[k];
-        }
-        compressed(light)
+/// Linear RGB of what a surface sends, with its shadow.
+#[inline(always)]
+fn with_shadow(shadows: &ShadowMap, [own, key, asking]: &Radiance) -> [f32; 4] {
+    let is_turned_away = key[0] + key[1] + key[2] <= 1e-4;
+    let lit = if is_turned_away { 0.0 } else { shadows.lit([asking[0], asking[1], asking[2]]) };
+    let mut light = *own;
+    for k in 0..4 {
+        light[k] += lit * key[k];
     }
-
-    /// Share of the key light at a pixel; the second of two neighbours on a surface takes over that of the first, as
-    /// shadows are soft.
-    #[inline(always)]
-    fn lit(&mut self, shadows: &ShadowMap, asking: [f32; 3], here: LastShadow) -> f32 {
-        let last = self.last;
-        let is_second = here.pixel[0] & 1 == 1 && last.pixel == [here.pixel[0] - 1, here.pixel[1]];
-        if is_second && last.mesh == here.mesh && (last.nearness - here.nearness).abs() < ONE_SURFACE * here.nearness {
-            return last.lit;
-        }
-        let lit = shadows.lit(asking);
-        self.last = LastShadow { lit, ..here };
-        lit
-    }
+    compressed(light)
 }

@@ -62,7 +62,6 @@ impl Renderer {
         self.surfaces.set(camera, meshes, light);
         self.shading.open(&self.surfaces);
         self.shadows.cast(self.surfaces.casters(meshes), false);
-        self.surfaces.occlude(&self.shadows);
         if let Some(scene) = &self.scene {
             scene.shade(&mut image, &self.shadows);
         }
@@ -105,15 +104,18 @@ impl Renderer {
                     }
                     let nearest = nearest(nearness);
                     front[at] = (triangles[nearest], nearness[nearest]);
-                    let (mut linear, cover) = shading.shaded(surfaces, shadows, (triangles, nearness), [x, y]);
-                    if cover < 1.0 {
-                        let behind = srgb.linears(image.pixel(x, y));
-                        for k in 0..4 {
-                            linear[k] += (1.0 - cover) * behind[k];
-                        }
+                    if shading.add(surfaces, shadows, (triangles, nearness), [x, y]) {
+                        continue;
+                    }
+                    let (mut linear, cover) = shading.mixed(surfaces, shadows, (triangles, nearness), [x, y]);
+                    let behind = srgb.linears(image.pixel(x, y));
+                    for k in 0..4 {
+                        linear[k] += (1.0 - cover) * behind[k];
                     }
                     image.data[3 * at..3 * at + 3].copy_from_slice(&srgb.bytes(linear));
                 }
+                let row = &mut image.data[3 * y * *width..3 * (y + 1) * *width];
+                shading.close_row(shadows, |x, linear| row[3 * x..3 * x + 3].copy_from_slice(&srgb.bytes(linear)));
             }
         });
     }
@@ -289,6 +291,6 @@ mod tests {
         renderer.draw(&camera, &[&square(0.0, 0.0, 40.0, 50.0, 0)], &light, &black());
         assert_eq!(image, renderer.draw(&camera, &[&ball], &light, &scene));
         let hash = blake3::hash(&image.data).to_hex();
-        assert_eq!(&hash[..16], "b7f04df71f20dac3");
+        assert_eq!(&hash[..16], "2a6c8e32c3b3b1a0");
     }
 }

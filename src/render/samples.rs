@@ -28,20 +28,24 @@ pub struct FlatTriangle {
 
 impl FlatTriangle {
     /// Twice the area; negative where the corners run counter-clockwise as one sees them.
+    #[inline(always)]
     pub fn area(&self) -> i64 {
-        let [a, b, c] = self.corners.map(|corner| corner.map(i64::from));
-        (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+        let [a, b, c] = self.corners;
+        let across = |p: [i32; 2], q: [i32; 2], k: usize| i64::from(q[k]) - i64::from(p[k]);
+        across(a, b, 0) * across(a, c, 1) - across(a, c, 0) * across(a, b, 1)
     }
 
     /// Pixels in a picture of `size` that may have a sample within the triangle.
     #[inline(always)]
     pub fn extent(&self, size: [usize; 2]) -> Extent {
-        [0, 1].map(|k| {
-            let [a, b, c] = self.corners.map(|corner| corner[k]);
+        let ends = |k: usize| {
+            let [a, b, c] = [self.corners[0][k], self.corners[1][k], self.corners[2][k]];
             let first = (a.min(b).min(c) - FURTHEST_SPOT + PARTS - 1).div_euclid(PARTS);
             let last = (a.max(b).max(c) + FURTHEST_SPOT).div_euclid(PARTS) + 1;
-            [first, last].map(|v| v.clamp(0, size[k] as i32) as u16)
-        })
+            let n = size[k] as i32;
+            [first.clamp(0, n) as u16, last.clamp(0, n) as u16]
+        };
+        [ends(0), ends(1)]
     }
 }
 
@@ -144,22 +148,27 @@ impl RowBand {
             let (p, q) = (corners[(side + 1) % 3], corners[(side + 2) % 3]);
             let slope = [T::of((p[1] - q[1]) * sign), T::of((q[0] - p[0]) * sign)];
             let middle = slope[0] * T::of(start[0] - p[0]) + slope[1] * T::of(start[1] - p[1]);
-            edges[side] = SPOTS.map(|spot| middle + slope[0] * T::of(spot[0]) + slope[1] * T::of(spot[1]));
-            steps[side] = slope.map(|v| v * T::of(PARTS));
+            for (edge, spot) in edges[side].iter_mut().zip(SPOTS) {
+                *edge = middle + slope[0] * T::of(spot[0]) + slope[1] * T::of(spot[1]);
+            }
+            steps[side] = [slope[0] * T::of(PARTS), slope[1] * T::of(PARTS)];
         }
         // The plane of nearness over the picture.
-        let [from_a, from_b] = [1, 2].map(|n| [0, 1].map(|k| (corners[n][k] - corners[0][k]) as f32));
+        let [a, b, c] = *corners;
+        let from_a = [(b[0] - a[0]) as f32, (b[1] - a[1]) as f32];
+        let from_b = [(c[0] - a[0]) as f32, (c[1] - a[1]) as f32];
         let rise = [nearness[1] - nearness[0], nearness[2] - nearness[0]];
         let per_area = 1.0 / area as f32;
         let slope = [
             (rise[0] * from_b[1] - rise[1] * from_a[1]) * per_area,
             (rise[1] * from_a[0] - rise[0] * from_b[0]) * per_area,
         ];
-        let first = SPOTS.map(|spot| {
-            let from = [0, 1].map(|k| (start[k] + spot[k] - corners[0][k]) as f32);
-            nearness[0] + slope[0] * from[0] + slope[1] * from[1]
-        });
-        let per_pixel = slope.map(|v| v * PARTS as f32);
+        let mut first = [0.0; 4];
+        for (first, spot) in first.iter_mut().zip(SPOTS) {
+            let (right, down) = ((start[0] + spot[0] - a[0]) as f32, (start[1] + spot[1] - a[1]) as f32);
+            *first = nearness[0] + slope[0] * right + slope[1] * down;
+        }
+        let per_pixel = [slope[0] * PARTS as f32, slope[1] * PARTS as f32];
         self.fill_rows(&Setup { edges, steps, first, per_pixel, number }, [left, right], [top, bottom]);
     }
 

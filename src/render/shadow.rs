@@ -39,6 +39,8 @@ pub struct ShadowMap {
     bias: f32,
     /// Distance along the light, cm; infinite where nothing is met. [n, n]
     depths: Vec<f32>,
+    /// Least and greatest distance in the four by four texels from each on.
+    ends: [Vec<f32>; 2],
     /// Whether a cell or its neighbours hold anything.
     cells: Vec<bool>,
     is_empty: bool,
@@ -49,13 +51,14 @@ impl ShadowMap {
     pub fn new(n: usize) -> Self {
         let n_cells = n.div_ceil(CELL);
         let (depths, cells) = (vec![f32::INFINITY; n * n], vec![false; n_cells * n_cells]);
-        Self { n, origin: [0.0; 2], texels_per_cm: 1.0, bias: BIAS_CM, depths, cells, is_empty: true }
+        let ends = [0, 1].map(|_| vec![f32::INFINITY; n * n]);
+        Self { n, origin: [0.0; 2], texels_per_cm: 1.0, bias: BIAS_CM, depths, ends, cells, is_empty: true }
     }
 
     /// A point in the light's axes: cm across it (twice) and along it.
     #[inline(always)]
     pub fn seen(axes: &[[f32; 3]; 3], point: [f32; 3]) -> [f32; 3] {
-        axes.map(|axis| dot(axis, point))
+        [dot(axes[0], point), dot(axes[1], point), dot(axes[2], point)]
     }
 
     /// Casts triangles, points in the light's axes. With `only_far_sides` those that face the light cast nothing: what
@@ -85,39 +88,44 @@ impl ShadowMap {
         let mut flat = Vec::new();
         for (points, triangles) in parts {
             flat.clear();
-            flat.extend(points.iter().map(|point| self.texel(*point)));
+            flat.extend(points.iter().map(|point| {
+                let at = self.texel(*point);
+                (at, [at[0].max(0.0) as i32, at[1].max(0.0) as i32])
+            }));
             for triangle in triangles {
-                let corners = triangle.map(|v| flat[v as usize]);
+                let [a, b, c] = [0, 1, 2].map(|n: usize| &flat[triangle[n] as usize]);
+                // Texels whose middle, a whole number, lies between.
+                let ends = |k: usize| {
+                    let (low, high) = (a.1[k].min(b.1[k]).min(c.1[k]), a.1[k].max(b.1[k]).max(c.1[k]));
+                    [low as usize + 1, (high as usize + 1).min(self.n)]
+                };
+                let (columns, rows) = (ends(0), ends(1));
+                if columns[0] >= columns[1] || rows[0] >= rows[1] {
+                    continue;
+                }
+                let corners = [a.0, b.0, c.0];
                 let area = area(&corners);
                 let towards_light = if only_far_sides { -area } else { area };
                 // Triangles seen edge-on and those without numbers cast nothing either.
                 if towards_light > 1e-9 {
-                    self.fill(corners, area);
+                    self.fill(corners, area, columns, rows);
                 }
             }
         }
         self.close_cells();
+        self.close_ends();
     }
 
     fn texel(&self, [x, y, depth]: [f32; 3]) -> [f32; 3] {
         [(x - self.origin[0]) * self.texels_per_cm, (y - self.origin[1]) * self.texels_per_cm, depth]
     }
 
-    fn fill(&mut self, [a, b, c]: [[f32; 3]; 3], area: f32) {
-        // Texels whose middle, a whole number, lies between.
-        let ends = |k: usize| {
-            let (low, high) = (a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k]));
-            ((low.max(0.0) as i32 + 1) as usize, (high.max(0.0) as i32 as usize + 1).min(self.n))
-        };
-        let (columns, rows) = (ends(0), ends(1));
-        if columns.0 >= columns.1 || rows.0 >= rows.1 {
-            return;
-        }
+    fn fill(&mut self, [a, b, c]: [[f32; 3]; 3], area: f32, columns: [usize; 2], rows: [usize; 2]) {
         let per_area = 1.0 / area;
         let [to_b, to_c] = [b, c].map(|corner| [corner[0] - a[0], corner[1] - a[1], corner[2] - a[2]]);
-        for y in rows.0..rows.1 {
+        for y in rows[0]..rows[1] {
             let dy = y as f32 - a[1];
-            for x in columns.0..columns.1 {
+            for x in columns[0]..columns[1] {
                 let dx = x as f32 - a[0];
                 let share_b = (dx * to_c[1] - dy * to_c[0]) * per_area;
                 let share_c = (dy * to_b[0] - dx * to_b[1]) * per_area;
@@ -139,6 +147,16 @@ impl ShadowMap {
                 }
             }
         }
+    }
+
+    fn close_ends(&mut self) {
+        let [nearest, furthest] = &mut self.ends;
+        let [rows, texels] = [self.n, 1];
+        let mut along = vec![f32::INFINITY; self.depths.len()];
+        over_four(&self.depths, texels, &mut along, |a, b| if a < b { a } else { b });
+        over_four(&along, rows, nearest, |a, b| if a < b { a } else { b });
+        over_four(&self.depths, texels, &mut along, |a, b| if a > b { a } else { b });
+        over_four(&along, rows, furthest, |a, b| if a > b { a } else { b });
     }
 
     /// Whether anything may cast on points between `low` and `high`, cm across the light.
@@ -186,24 +204,60 @@ impl ShadowMap {
         let [x, y, depth] = self.texel(point);
         let furthest = (self.n - 3) as f32;
         // Also false for NaN.
-        if self.is_empty || !(x >= 1.0 && y >= 1.0 && x < furthest && y < furthest) {
+        if self.is_empty || !(x > 1.0 && y > 1.0 && x < furthest && y < furthest) {
             return 1.0;
         }
-        let (column, row) = (x as i32 as usize, y as i32 as usize);
-        let (right, low) = (x - column as f32, y - row as f32);
+        let (column, row) = (whole(x), whole(y));
+        let depth = depth - self.bias;
+        let start = (row - 1) * self.n + column - 1;
+        if depth < self.ends[0][start] {
+            return 1.0;
+        }
+        if depth >= self.ends[1][start] {
+            return 0.0;
+        }
+        self.lit_in_part([x - column as f32, y - row as f32], [column, row], depth)
+    }
+
+    /// Share of the key light where only some of the texels are nearer to the light.
+    #[inline(never)]
+    fn lit_in_part(&self, [right, low]: [f32; 2], [column, row]: [usize; 2], depth: f32) -> f32 {
         let across = [1.0 - right, 1.0, 1.0, right];
         let down = [1.0 - low, 1.0, 1.0, low];
-        let depth = depth - self.bias;
         let mut lit = [0.0f32; 4];
         for (k, share) in down.into_iter().enumerate() {
             let start = (row - 1 + k) * self.n + column - 1;
-            let texels = &self.depths[start..start + 4];
+            let Some(texels) = self.depths[start..].first_chunk::<4>() else { continue };
+            let mut open = [0.0f32; 4];
             for n in 0..4 {
-                lit[n] += if depth < texels[n] { share * across[n] } else { 0.0 };
+                open[n] = if depth < texels[n] { share } else { 0.0 };
             }
+            for n in 0..4 {
+                lit[n] += open[n];
+            }
+        }
+        for n in 0..4 {
+            lit[n] *= across[n];
         }
         (lit[0] + lit[1] + lit[2] + lit[3]) * (1.0 / 9.0)
     }
+}
+
+/// Folds four values that stand `step` apart.
+#[inline(always)]
+fn over_four(from: &[f32], step: usize, to: &mut [f32], fold: impl Fn(f32, f32) -> f32) {
+    let n = from.len() - 3 * step;
+    let [a, b, c, d] = [0, 1, 2, 3].map(|k| &from[k * step..][..n]);
+    for (at, to) in to[..n].iter_mut().enumerate() {
+        *to = fold(fold(a[at], b[at]), fold(c[at], d[at]));
+    }
+}
+
+/// Whole part of a number from 1 to 2^22; a whole number itself may give the one below, next to which it lies as well.
+#[inline(always)]
+fn whole(v: f32) -> usize {
+    // In sums with 2^23 the lowest bits are the number, rounded.
+    ((v - 0.5 + (1 << 23) as f32).to_bits() & 0x7f_ffff) as usize
 }
 
 /// Twice the area of a triangle across the light; positive where it faces the light.
@@ -219,5 +273,5 @@ pub const NORMAL_OFFSET_CM: f32 = 0.5;
 pub fn asking_point(light: &Light, axes: &[[f32; 3]; 3], point: [f32; 3], normal: [f32; 3]) -> [f32; 3] {
     // Further out where the light grazes.
     let by = NORMAL_OFFSET_CM * (1.5 - dot(normal, light.to_key).abs());
-    ShadowMap::seen(axes, std::array::from_fn(|k| point[k] + by * normal[k]))
+    ShadowMap::seen(axes, [point[0] + by * normal[0], point[1] + by * normal[1], point[2] + by * normal[2]])
 }

@@ -5,12 +5,14 @@ use std::sync::LazyLock;
 
 /// Steps of the encoding table; one is at most 0.4 of a byte apart from its neighbour.
 const N_STEPS: usize = 8192;
+/// Entries of the table: as many as the bits that are looked at hold, so that none is outside it.
+const N_ENTRIES: usize = 1 << 14;
 /// Linear value from which on highlights are compressed.
 const SHOULDER: f32 = 0.6;
 
 static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|byte| decoded(byte as f64 / 255.0) as f32));
 
-static BYTES: LazyLock<[u8; N_STEPS + 1]> = LazyLock::new(|| {
+static BYTES: LazyLock<[u8; N_ENTRIES]> = LazyLock::new(|| {
     // The byte whose range, between the middles to its neighbours, holds the value.
     let bound = |byte: u32| decoded((f64::from(byte) + 0.5) / 255.0);
     let mut byte = 0;
@@ -26,7 +28,7 @@ static BYTES: LazyLock<[u8; N_STEPS + 1]> = LazyLock::new(|| {
 #[derive(Clone, Copy)]
 pub struct Srgb {
     linear: &'static [f32; 256],
-    bytes: &'static [u8; N_STEPS + 1],
+    bytes: &'static [u8; N_ENTRIES],
 }
 
 impl Srgb {
@@ -45,7 +47,7 @@ impl Srgb {
         for step in &mut steps {
             *step += WHOLE;
         }
-        let byte = |k: usize| self.bytes[((steps[k].to_bits() & 0x3fff) as usize).min(N_STEPS)];
+        let byte = |k: usize| self.bytes[steps[k].to_bits() as usize % N_ENTRIES];
         [byte(0), byte(1), byte(2)]
     }
 

@@ -11,13 +11,13 @@ const FAR_CM: f32 = 1e6;
 /// Furthest corner from the picture's, parts of a pixel: products of two are whole numbers in f64.
 const FURTHEST: f32 = (1 << 23) as f32;
 /// Light that reaches the inner side of a surface, which is mostly the inside of clothes.
-const INNER_LIGHT: f32 = 0.45;
+pub const INNER_LIGHT: f32 = 0.45;
 
 /// Ratio of the depths within a triangle up to which it is even.
 const EVEN: f32 = 1.03;
 
 /// Light of its own, light of the key where that reaches it (linear RGB), and the point in the light's axes where to ask
-/// whether it does. The fourth numbers fill up registers; the first of them is the cosine of the angle to the viewer.
+/// whether it does. The fourth numbers fill up registers.
 pub type Radiance = [[f32; 4]; 3];
 
 /// One triangle of `Surfaces`.
@@ -31,19 +31,33 @@ pub struct SurfaceTriangle {
     pub extent: Extent,
 }
 
+/// What the light of a vertex follows from, in world axes.
+#[derive(Clone, Copy, Debug)]
+struct Vertex {
+    point: [f32; 3],
+    /// Outward, of any length.
+    normal: [f32; 3],
+    colour: [f32; 3],
+    gloss: f32,
+}
+
 /// Vertices and triangles of all meshes of a picture.
 #[derive(Clone, Debug, Default)]
 pub struct Surfaces {
     /// Width and height of the picture, px.
     size: [usize; 2],
+    eye: [f32; 3],
+    light: Light,
+    /// The light's axes.
+    axes: [[f32; 3]; 3],
     /// In camera axes, cm.
     seen: Vec<[f32; 3]>,
     corners: Vec<[i32; 2]>,
     nearness: Vec<f32>,
-    radiance: Vec<Radiance>,
+    vertices: Vec<Vertex>,
     /// In the light's axes, cm.
     light_points: Vec<[f32; 3]>,
-    /// First vertex of each mesh, in `light_points`.
+    /// First vertex of each mesh.
     starts: Vec<usize>,
     pub triangles: Vec<SurfaceTriangle>,
 }
@@ -53,34 +67,31 @@ impl Surfaces {
     pub fn set(&mut self, camera: &PinholeCamera, meshes: &[&Mesh], light: &Light) {
         self.clear();
         self.size = camera.size;
+        self.eye = camera.position.map(|v| v as f32);
+        (self.light, self.axes) = (*light, light.axes());
         let rows = camera.axes.inverse().axes().map(|axis| axis.map(|v| v as f32));
-        let eye = camera.position.map(|v| v as f32);
         let middle = camera.size.map(|n| (n as f32 - 1.0) / 2.0 * PARTS as f32);
         let lens = Lens { middle, parts: camera.focal_px as f32 * PARTS as f32 };
-        let axes = light.axes();
         for (number, mesh) in meshes.iter().enumerate() {
             let start = self.seen.len();
             self.starts.push(start);
-            for ((point, normal), colour) in mesh.points.iter().zip(&mesh.normals).zip(&mesh.colours) {
-                let from_eye: [f32; 3] = std::array::from_fn(|k| point[k] - eye[k]);
-                let seen = rows.map(|row| dot(row, from_eye));
-                let normal = direction(*normal);
-                let to_viewer = direction(from_eye.map(|v| -v));
-                let [own, key] = light.on(normal, to_viewer, *colour, mesh.gloss);
-                let asking = shadow::asking_point(light, &axes, *point, normal);
+            let gloss = mesh.gloss;
+            for ((&point, &normal), &colour) in mesh.points.iter().zip(&mesh.normals).zip(&mesh.colours) {
+                let from_eye = less(point, self.eye);
+                let seen = [dot(rows[0], from_eye), dot(rows[1], from_eye), dot(rows[2], from_eye)];
                 let (corner, nearness) = lens.project(seen);
                 self.seen.push(seen);
                 self.corners.push(corner);
                 self.nearness.push(nearness);
-                let mut radiance = [own, key, asking].map(|[a, b, c]| [a, b, c, 0.0]);
-                radiance[0][3] = dot(normal, to_viewer);
-                self.radiance.push(radiance);
-                self.light_points.push(ShadowMap::seen(&axes, *point));
+                self.vertices.push(Vertex { point, normal, colour, gloss });
+                self.light_points.push(ShadowMap::seen(&self.axes, point));
             }
             for triangle in &mesh.triangles {
                 let label = mesh.labels.get(triangle[0] as usize).copied().unwrap_or(0);
-                let vertices = triangle.map(|v| v + start as u32);
-                let depths = vertices.map(|v| self.seen[v as usize][2]);
+                let [a, b, c] = *triangle;
+                let vertices = [a + start as u32, b + start as u32, c + start as u32];
+                let depth = |n: usize| self.seen[vertices[n] as usize][2];
+                let depths = [depth(0), depth(1), depth(2)];
                 let triangle =
                     SurfaceTriangle { vertices, mesh: number as u16, label, is_inner: false, extent: [[0; 2]; 2] };
                 if depths.iter().all(|z| (NEAR_CM as f32..FAR_CM).contains(z)) {
@@ -96,12 +107,13 @@ impl Surfaces {
         self.seen.clear();
         self.corners.clear();
         self.nearness.clear();
-        self.radiance.clear();
+        self.vertices.clear();
         self.light_points.clear();
         self.starts.clear();
         self.triangles.clear();
     }
 
+    /// Takes a triangle that may be seen.
     fn push(&mut self, triangle: SurfaceTriangle) {
         let flat = self.flat(&triangle);
         let (area, extent) = (flat.area(), flat.extent(self.size));
@@ -127,15 +139,21 @@ impl Surfaces {
                 let between = |a: f32, b: f32| a + share * (b - a);
                 let [a, b] = [self.seen[from], self.seen[to]];
                 let seen = [between(a[0], b[0]), between(a[1], b[1]), near];
-                let [a, b] = [self.radiance[from], self.radiance[to]];
-                let radiance = std::array::from_fn(|n| std::array::from_fn(|k| between(a[n][k], b[n][k])));
+                let [a, b] = [self.vertices[from], self.vertices[to]];
+                let mixed = |a: [f32; 3], b: [f32; 3]| std::array::from_fn(|k| between(a[k], b[k]));
+                let vertex = Vertex {
+                    point: mixed(a.point, b.point),
+                    normal: mixed(direction(a.normal), direction(b.normal)),
+                    colour: mixed(a.colour, b.colour),
+                    gloss: a.gloss,
+                };
                 let (corner, nearness) = lens.project(seen);
                 kept[n_kept] = self.seen.len() as u32;
                 n_kept += 1;
                 self.seen.push(seen);
                 self.corners.push(corner);
                 self.nearness.push(nearness);
-                self.radiance.push(radiance);
+                self.vertices.push(vertex);
                 // Shadows are cast by the whole triangle.
                 self.light_points.push(self.light_points[from]);
             }
@@ -148,7 +166,8 @@ impl Surfaces {
     /// A triangle in the picture.
     #[inline(always)]
     pub fn flat(&self, triangle: &SurfaceTriangle) -> FlatTriangle {
-        let [a, b, c] = triangle.vertices.map(|v| v as usize);
+        let [a, b, c] = triangle.vertices;
+        let [a, b, c] = [a as usize, b as usize, c as usize];
         FlatTriangle {
             corners: [self.corners[a], self.corners[b], self.corners[c]],
             nearness: [self.nearness[a], self.nearness[b], self.nearness[c]],
@@ -164,13 +183,36 @@ impl Surfaces {
         parts.map(|(mesh, &start)| (&self.light_points[start..start + mesh.points.len()], &mesh.triangles[..]))
     }
 
-    /// Takes light of their own from the vertices that are close behind something.
-    pub fn occlude(&mut self, shadows: &ShadowMap) {
-        // Vertices on the far side are not seen.
-        for [own, _, asking] in self.radiance.iter_mut().filter(|[own, ..]| own[3] > -0.3) {
-            let open = shadows.open_share([asking[0], asking[1], asking[2]]);
+    /// Numbers of the triangles of one triangle's mesh, from one to another: those of a mesh follow each other.
+    pub fn numbers_of_mesh(&self, number: u32) -> [u32; 2] {
+        let mesh = self.triangles.get(number as usize).map(|triangle| triangle.mesh);
+        let Some(mesh) = mesh else { return [0; 2] };
+        let first = self.triangles.partition_point(|triangle| triangle.mesh < mesh);
+        let end = self.triangles.partition_point(|triangle| triangle.mesh <= mesh);
+        [first as u32, end as u32]
+    }
+
+    /// Width of the picture, px.
+    pub fn width(&self) -> usize {
+        self.size[0]
+    }
+
+    /// Number of vertices.
+    pub fn n_vertices(&self) -> usize {
+        self.vertices.len()
+    }
+
+    /// What a vertex sends; close behind something that `shadows` hold, less of its own.
+    pub fn radiance(&self, vertex: u32, shadows: Option<&ShadowMap>) -> Radiance {
+        let Vertex { point, normal, colour, gloss } = self.vertices[vertex as usize];
+        let (normal, to_viewer) = (direction(normal), direction(less(self.eye, point)));
+        let [mut own, key] = self.light.on(normal, to_viewer, colour, gloss);
+        let asking = shadow::asking_point(&self.light, &self.axes, point, normal);
+        if let Some(shadows) = shadows {
+            let open = shadows.open_share(asking);
             own.iter_mut().for_each(|v| *v *= open);
         }
+        [own, key, asking].map(|[a, b, c]| [a, b, c, 0.0])
     }
 
     /// Whether a triangle is so far away for its size that what it sends changes evenly over the picture.
@@ -179,22 +221,29 @@ impl Surfaces {
         a.max(b).max(c) < EVEN * a.min(b).min(c)
     }
 
-    /// What a triangle sends over the picture, as a plane.
-    pub fn plane(&self, triangle: &SurfaceTriangle) -> RadiancePlane {
+    /// What a triangle whose corners send this sends over the picture, as a plane.
+    pub fn plane(&self, triangle: &SurfaceTriangle, [a, b, c]: &[Radiance; 3]) -> RadiancePlane {
         let flat = self.flat(triangle);
         let from = flat.corners[0];
-        let [to_b, to_c] = [1, 2].map(|n| [0, 1].map(|k| (flat.corners[n][k] - from[k]) as f32));
+        let [_, b_px, c_px] = flat.corners;
+        let to_b = [(b_px[0] - from[0]) as f32, (b_px[1] - from[1]) as f32];
+        let to_c = [(c_px[0] - from[0]) as f32, (c_px[1] - from[1]) as f32];
         let per_area = 1.0 / (to_b[0] * to_c[1] - to_b[1] * to_c[0]);
-        let [a, b, c] = self.lit(triangle);
-        let slope = |p: f32, q: f32| -> Radiance {
+        let slope = |p: f32, q: f32| {
             let (p, q) = (p * per_area, q * per_area);
-            std::array::from_fn(|n| std::array::from_fn(|k| (b[n][k] - a[n][k]) * p + (c[n][k] - a[n][k]) * q))
+            let mut slope = Radiance::default();
+            for (n, slope) in slope.iter_mut().enumerate() {
+                for k in 0..4 {
+                    slope[k] = (b[n][k] - a[n][k]) * p + (c[n][k] - a[n][k]) * q;
+                }
+            }
+            slope
         };
-        RadiancePlane { from, at: a, across: slope(to_c[1], -to_b[1]), down: slope(-to_c[0], to_b[0]) }
+        RadiancePlane { from, at: *a, across: slope(to_c[1], -to_b[1]), down: slope(-to_c[0], to_b[0]) }
     }
 
-    /// What a triangle sends from a point (parts of a pixel) within it.
-    pub fn radiance_at(&self, triangle: &SurfaceTriangle, point: [i32; 2]) -> Radiance {
+    /// What a triangle whose corners send this sends from a point (parts of a pixel) within it.
+    pub fn radiance_at(&self, triangle: &SurfaceTriangle, [a, b, c]: &[Radiance; 3], point: [i32; 2]) -> Radiance {
         let flat = self.flat(triangle);
         let corners = flat.corners.map(|corner| [0, 1].map(|k| (corner[k] - point[k]) as f32));
         let sign = if triangle.is_inner { 1.0 } else { -1.0 };
@@ -204,20 +253,9 @@ impl Surfaces {
         });
         let sum = shares[0] + shares[1] + shares[2];
         let shares = if sum > 0.0 { shares.map(|v| v / sum) } else { [1.0, 0.0, 0.0] };
-        let [a, b, c] = self.lit(triangle);
         std::array::from_fn(|n| {
             std::array::from_fn(|k| shares[0] * a[n][k] + shares[1] * b[n][k] + shares[2] * c[n][k])
         })
-    }
-
-    /// What the corners of a triangle send; less on its inner side.
-    #[inline(always)]
-    fn lit(&self, triangle: &SurfaceTriangle) -> [Radiance; 3] {
-        let mut lit = triangle.vertices.map(|v| self.radiance[v as usize]);
-        if triangle.is_inner {
-            lit.iter_mut().flat_map(|corner| &mut corner[..2]).flatten().for_each(|v| *v *= INNER_LIGHT);
-        }
-        lit
     }
 }
 
@@ -233,14 +271,14 @@ pub struct RadiancePlane {
 impl RadiancePlane {
     #[inline(always)]
     pub fn radiance_at(&self, point: [i32; 2]) -> Radiance {
-        let [dx, dy] = [0, 1].map(|k| (point[k] - self.from[k]) as f32);
-        let along = |n: usize| {
-            let mut sum = self.at[n];
-            let slopes = self.across[n].iter().zip(&self.down[n]);
-            sum.iter_mut().zip(slopes).for_each(|(sum, (across, down))| *sum += across * dx + down * dy);
-            sum
-        };
-        [along(0), along(1), along(2)]
+        let (dx, dy) = ((point[0] - self.from[0]) as f32, (point[1] - self.from[1]) as f32);
+        let mut sum = self.at;
+        for n in 0..3 {
+            for k in 0..4 {
+                sum[n][k] += self.across[n][k] * dx + self.down[n][k] * dy;
+            }
+        }
+        sum
     }
 }
 
@@ -262,4 +300,9 @@ impl Lens {
         };
         ([part(x, 0), part(y, 1)], nearness)
     }
+}
+
+#[inline(always)]
+fn less(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }

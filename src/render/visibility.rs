@@ -1,21 +1,25 @@
 //! Which triangles a picture shows: its bands one after the other, outer sides before inner ones.
 
 use super::samples::{BAND_ROWS, RowBand};
-use super::surfaces::Surfaces;
+use super::surfaces::{SurfaceTriangle, Surfaces};
 
 /// Memory of the search for what is seen.
 #[derive(Clone, Debug)]
 pub struct VisibleTriangles {
     size: [usize; 2],
     band: RowBand,
-    /// Numbers of the triangles of each band, one after the other, and where each band's end.
+    /// Numbers of the triangles of each band, outer sides before inner ones, and where those of each band and side end.
     numbers: Vec<u32>,
     ends: Vec<usize>,
+    /// First column of each band's triangles and the one after the last.
+    columns: Vec<[u16; 2]>,
 }
 
 impl VisibleTriangles {
     pub fn new(size: [usize; 2]) -> Self {
-        Self { size, band: RowBand::new(size[0]), numbers: Vec::new(), ends: vec![0; size[1].div_ceil(BAND_ROWS)] }
+        let n_bands = size[1].div_ceil(BAND_ROWS);
+        let (ends, columns) = (vec![0; 2 * n_bands], vec![[0; 2]; n_bands]);
+        Self { size, band: RowBand::new(size[0]), numbers: Vec::new(), ends, columns }
     }
 
     /// Calls `each` with every band that has triangles, its rows and its columns; `behind` is the nearness of what the
@@ -28,28 +32,25 @@ impl VisibleTriangles {
     ) {
         self.sort(surfaces);
         let mut start = 0;
-        for (number, &end) in self.ends.iter().enumerate() {
-            let shown = &self.numbers[start..end];
-            start = end;
-            let triangle = |number: u32| &surfaces.triangles[number as usize];
-            let columns = shown.iter().fold([u16::MAX, 0], |[low, high], &number| {
-                let [first, last] = triangle(number).extent[0];
-                [low.min(first), high.max(last)]
-            });
-            let columns = columns.map(usize::from);
+        for (number, (ends, columns)) in self.ends.chunks_exact(2).zip(&self.columns).enumerate() {
+            let (outer, inner) = (&self.numbers[start..ends[0]], &self.numbers[ends[0]..ends[1]]);
+            start = ends[1];
+            let columns = [usize::from(columns[0]), usize::from(columns[1])];
             if columns[0] >= columns[1] {
                 continue;
             }
             let rows = [number * BAND_ROWS, ((number + 1) * BAND_ROWS).min(self.size[1])];
             self.band.open(rows, columns, behind);
-            let of_side =
-                |is_inner| shown.iter().map(move |&n| (n, triangle(n))).filter(move |t| t.1.is_inner == is_inner);
-            for (number, outer) in of_side(false) {
+            for &number in outer {
+                let outer = &surfaces.triangles[number as usize];
                 self.band.fill(&surfaces.flat(outer), outer.extent, number);
             }
             // Nearly all inner sides are hidden, which their cells tell at once.
-            self.band.close_cells(columns);
-            for (number, inner) in of_side(true) {
+            if !inner.is_empty() {
+                self.band.close_cells(columns);
+            }
+            for &number in inner {
+                let inner = &surfaces.triangles[number as usize];
                 let flat = surfaces.flat(inner);
                 if !self.band.is_hidden(&flat, inner.extent) {
                     self.band.fill(&flat, inner.extent, number);
@@ -59,27 +60,30 @@ impl VisibleTriangles {
         }
     }
 
-    /// Sorts the triangles by band; one that reaches into several stands in each.
+    /// Sorts the triangles by band and side; one that reaches into several bands stands in each.
     fn sort(&mut self, surfaces: &Surfaces) {
-        let bands = |number: usize| {
-            let [first, last] = surfaces.triangles[number].extent[1].map(usize::from);
-            first / BAND_ROWS..last.div_ceil(BAND_ROWS)
-        };
+        let bands = |rows: [u16; 2]| usize::from(rows[0]) / BAND_ROWS..usize::from(rows[1]).div_ceil(BAND_ROWS);
         self.ends.fill(0);
-        for number in 0..surfaces.triangles.len() {
-            bands(number).for_each(|band| self.ends[band] += 1);
+        self.columns.fill([u16::MAX, 0]);
+        for SurfaceTriangle { is_inner, extent: [columns, rows], .. } in &surfaces.triangles {
+            for band in bands(*rows) {
+                self.ends[2 * band + usize::from(*is_inner)] += 1;
+                let [low, high] = self.columns[band];
+                self.columns[band] = [low.min(columns[0]), high.max(columns[1])];
+            }
         }
         let mut sum = 0;
         for end in &mut self.ends {
-            // For now where the band begins.
+            // For now where the side begins.
             (*end, sum) = (sum, sum + *end);
         }
         self.numbers.clear();
         self.numbers.resize(sum, 0);
-        for number in 0..surfaces.triangles.len() {
-            for band in bands(number) {
-                self.numbers[self.ends[band]] = number as u32;
-                self.ends[band] += 1;
+        for (number, SurfaceTriangle { is_inner, extent: [_, rows], .. }) in surfaces.triangles.iter().enumerate() {
+            for band in bands(*rows) {
+                let end = &mut self.ends[2 * band + usize::from(*is_inner)];
+                self.numbers[*end] = number as u32;
+                *end += 1;
             }
         }
     }

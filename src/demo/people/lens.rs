@@ -1,5 +1,6 @@
 //! What lens and sensor make of a rendered picture: motion blur, a lens out of focus, little light with noise.
 
+use crate::render::Srgb;
 use crate::types::image::Image;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -30,49 +31,71 @@ impl CameraDefects {
     }
 }
 
-/// Mean of pictures of one size, each rounded to the nearest byte.
+/// Mean light of pictures of one size.
 pub fn mean(images: &[Image]) -> Option<Image> {
-    let first = images.first()?;
-    let n = images.len();
-    let byte = |at: usize| ((images.iter().map(|image| usize::from(image.data[at])).sum::<usize>() + n / 2) / n) as u8;
-    Some(Image { data: (0..first.data.len()).map(byte).collect(), ..*first })
+    let (srgb, first) = (Srgb::tables(), images.first()?);
+    let share = 1.0 / images.len() as f32;
+    let mut sums = vec![[0.0; 4]; first.width * first.height];
+    for image in images {
+        for (sum, light) in sums.iter_mut().zip(linear(image)) {
+            (0..3).for_each(|k| sum[k] += share * light[k]);
+        }
+    }
+    Some(Image { data: sums.into_iter().flat_map(|light| srgb.bytes(light)).collect(), ..*first })
 }
 
-/// Gaussian blur as two passes over rows and columns.
+/// Linear light of the pixels.
+fn linear(image: &Image) -> impl Iterator<Item = [f32; 4]> {
+    let srgb = Srgb::tables();
+    image.data.chunks_exact(3).map(move |pixel| srgb.linears([pixel[0], pixel[1], pixel[2]]))
+}
+
+/// Gaussian blur of the light as two passes over rows and columns.
 fn blur(image: &mut Image, sigma: f64) {
     let reach = (3.0 * sigma).ceil() as usize;
-    let raw: Vec<f64> = (0..=reach).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
+    let raw: Vec<f64> = (0..=reach).map(|k| decay(0.5 * (k as f64 / sigma) * (k as f64 / sigma))).collect();
     let sum = raw[0] + 2.0 * raw[1..].iter().sum::<f64>();
     let weights: Vec<f32> = raw.iter().map(|w| (w / sum) as f32).collect();
     let (width, height) = (image.width, image.height);
-    let values: Vec<f32> = image.data.iter().map(|&v| f32::from(v)).collect();
-    let passed = |values: &[f32], n: usize, step: usize, along: &dyn Fn(usize) -> usize| -> Vec<f32> {
+    let passed = |values: &[[f32; 4]], n: usize, step: usize, along: &dyn Fn(usize) -> usize| -> Vec<[f32; 4]> {
         (0..values.len())
             .map(|at| {
                 let here = along(at);
-                (1..=reach).fold(weights[0] * values[at], |sum, k| {
-                    let back = at - step * k.min(here);
-                    let ahead = at + step * k.min(n - 1 - here);
-                    sum + weights[k] * (values[back] + values[ahead])
-                })
+                let mut sum = values[at].map(|v| weights[0] * v);
+                for k in 1..=reach {
+                    let back = values[at - step * k.min(here)];
+                    let ahead = values[at + step * k.min(n - 1 - here)];
+                    (0..3).for_each(|c| sum[c] += weights[k] * (back[c] + ahead[c]));
+                }
+                sum
             })
             .collect()
     };
-    let rows = passed(&values, width, 3, &|at| at / 3 % width);
-    let both = passed(&rows, height, 3 * width, &|at| at / (3 * width));
-    image.data = both.into_iter().map(|v| (v + 0.5).clamp(0.0, 255.0) as u8).collect();
+    let values: Vec<[f32; 4]> = linear(image).collect();
+    let rows = passed(&values, width, 1, &|at| at % width);
+    let both = passed(&rows, height, width, &|at| at / width);
+    image.data = both.into_iter().flat_map(|light| Srgb::tables().bytes(light)).collect();
+}
+
+/// e^-x for x from 0 to 10, by operations that are exactly specified.
+fn decay(x: f64) -> f64 {
+    let part = x / 1024.0;
+    let series = 1.0 + part * (1.0 + part * (0.5 + part * (1.0 / 6.0 + part / 24.0)));
+    (0..10).fold(1.0 / series, |power, _| power * power)
 }
 
 /// Lets a share of the light through and adds the noise of photons and of the sensor.
-fn darken(image: &mut Image, light: f64, rng: &mut ChaCha8Rng) {
-    let linear: Vec<f32> = (0..256).map(|v| ((v as f32) / 255.0).powf(2.2) * light as f32).collect();
-    for byte in &mut image.data {
-        let value = linear[usize::from(*byte)];
-        // The sum of four bytes is close to normal; its standard deviation is 147.8.
-        let noise: i32 = rng.random::<u32>().to_le_bytes().iter().map(|&v| i32::from(v)).sum();
-        let normal = (noise - 510) as f32 / 147.8;
-        let noisy = value + normal * (0.0006 * value + 1.5e-5).sqrt();
-        *byte = (255.0 * noisy.max(0.0).powf(1.0 / 2.2) + 0.5).min(255.0) as u8;
+fn darken(image: &mut Image, share: f64, rng: &mut ChaCha8Rng) {
+    let srgb = Srgb::tables();
+    for pixel in image.data.chunks_exact_mut(3) {
+        let mut light = srgb.linears([pixel[0], pixel[1], pixel[2]]);
+        for value in &mut light[..3] {
+            *value *= share as f32;
+            // The sum of four bytes is close to normal; its standard deviation is 147.8.
+            let noise: i32 = rng.random::<u32>().to_le_bytes().iter().map(|&v| i32::from(v)).sum();
+            *value += (noise - 510) as f32 / 147.8 * (0.0006 * *value + 1.5e-5).sqrt();
+        }
+        pixel.copy_from_slice(&srgb.bytes(light));
     }
 }
 
@@ -85,8 +108,12 @@ mod tests {
         let mut image = Image::filled(40, 30, [0; 3]);
         image.data[3 * (15 * 40 + 20)..][..3].fill(255);
         let blurred = CameraDefects { blur_px: 1.5, ..CameraDefects::default() }.taken(image.clone(), 0);
-        let sum: u32 = blurred.data.iter().map(|&v| u32::from(v)).sum();
-        assert!(blurred.data.iter().all(|&v| v < 30) && (600..930).contains(&sum), "{sum}");
+        let light: Vec<f32> = linear(&blurred).map(|light| light[1]).collect();
+        let (sum, most) = (light.iter().sum::<f32>(), light.iter().copied().fold(0.0, f32::max));
+        assert!((sum - 1.0).abs() < 0.03 && (most - 0.071).abs() < 0.002, "{sum} {most}");
+        for (x, known) in [(0.0, 1.0), (1.0, 0.367_879_441_171_442_3), (8.0, 3.354_626_279_025_118e-4)] {
+            assert!((decay(x) / known - 1.0).abs() < 1e-8);
+        }
         let grey = Image::filled(40, 30, [128; 3]);
         let dark = CameraDefects { darkness: 0.1, seed: 3, ..CameraDefects::default() };
         let taken = dark.taken(grey.clone(), 1);
@@ -94,5 +121,8 @@ mod tests {
         assert!((35.0..55.0).contains(&mean), "{mean}");
         assert!(taken != dark.taken(grey.clone(), 2) && taken == dark.taken(grey.clone(), 1));
         assert_eq!(super::mean(&[grey.clone(), grey.clone()]).unwrap(), grey);
+        // Half the light of white has the byte 188.
+        let [black, white] = [[0; 3], [255; 3]].map(|rgb| Image::filled(40, 30, rgb));
+        assert_eq!(super::mean(&[black, white]).unwrap(), Image::filled(40, 30, [188; 3]));
     }
 }
