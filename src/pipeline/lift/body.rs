@@ -12,7 +12,7 @@ use crate::types::interval::Interval;
 use crate::types::pose2d::Keypoints;
 use crate::types::skeleton::NECK;
 use anyhow::Result;
-use ndarray::s;
+use ndarray::{Array2, s};
 
 /// Frames a second that the lifter was trained on.
 pub const TRAINED_FPS: f64 = 15.0;
@@ -24,6 +24,10 @@ pub const STRAY_FRAMES: f64 = 2.0;
 const GO: f64 = 4096.0;
 /// Frames at that rate, before and after, that the lifter may look at beyond its window.
 const MARGIN: f64 = 128.0;
+
+/// Distance of a lifted point from its keypoint, in the picture and in metres at the reference size, from which the
+/// keypoint counts as not seen: the lifter has put the joint elsewhere. Noise and bias of detectors stay below 0.1.
+const DISBELIEVED: f64 = 0.2;
 
 /// Which of the nine points are lifted beside the joints.
 const EXTRA: [usize; 3] = [NOSE, R_HIP, L_HIP];
@@ -39,22 +43,32 @@ pub fn lift(
 ) -> Result<()> {
     let step = keypoints.fps.per_sec() / TRAINED_FPS;
     let frames = |at_trained: f64| (at_trained * step).round() as usize;
-    let sight = ObservedBody::from_keypoints(keypoints, interval, frames(STRAY_FRAMES).max(2), max_gap);
+    let mut sight = ObservedBody::from_keypoints(keypoints, interval, frames(STRAY_FRAMES).max(2), max_gap);
     let n_frames = interval.n_frames();
     let mut sizes = vec![f32::NAN; n_frames];
-    // a frame is placed by frames that lie within this many
-    let margin = frames(MARGIN.max(lifter.net.config().receptive_field() as f64)).max(1);
-    for first in (0..n_frames).step_by(frames(GO).max(1)) {
-        let end = n_frames.min(first + frames(GO).max(1));
-        let from = first.saturating_sub(margin);
-        let points: Vec<SeenBody> = (from..n_frames.min(end + margin)).map(|t| sight.frame(t)).collect();
-        let poses = lifter.poses(&points, step)?;
-        for (t, pose) in poses.iter().enumerate().take(end - from).skip(first - from) {
-            if let Some(pose) = pose {
-                sizes[from + t] = size(pose) as f32;
-                write_pose(pose, from + t, into);
+    let mut pass = |sight: &ObservedBody| -> Result<Array2<bool>> {
+        let mut believed = Array2::from_elem(sight.seen.dim(), true);
+        // a frame is placed by frames that lie within this many
+        let margin = frames(MARGIN.max(lifter.net.config().receptive_field() as f64)).max(1);
+        for first in (0..n_frames).step_by(frames(GO).max(1)) {
+            let end = n_frames.min(first + frames(GO).max(1));
+            let from = first.saturating_sub(margin);
+            let points: Vec<SeenBody> = (from..n_frames.min(end + margin)).map(|t| sight.frame(t)).collect();
+            let poses = lifter.poses(&points, step)?;
+            for (t, pose) in poses.iter().enumerate().take(end - from).skip(first - from) {
+                if let Some(pose) = pose {
+                    sizes[from + t] = size(pose) as f32;
+                    write_pose(pose, from + t, into);
+                    disbelieved(pose, &points[t]).for_each(|joint| believed[[from + t, joint]] = false);
+                }
             }
         }
+        Ok(believed)
+    };
+    // What is disbelieved for longer is told by the lengths of the bones.
+    let believed = pass(&sight)?;
+    if sight.forget(&believed, max_gap) {
+        pass(&sight)?;
     }
     to_reference(&sizes, frames(SIZE_FRAMES), into);
     for joint in ARMS {
@@ -65,6 +79,19 @@ pub fn lift(
     }
     forget_long_gaps(&sight, max_gap, into);
     Ok(())
+}
+
+/// Joints of the arms that were lifted to another place in the picture than their keypoint's.
+fn disbelieved(pose: &Pose, seen: &SeenBody) -> impl Iterator<Item = usize> {
+    let most = DISBELIEVED * size(pose) / REFERENCE_SIZE;
+    let is_far = move |joint: usize| {
+        let (Some(right), Some(left), Some(point)) = (seen[R_SHOULDER], seen[L_SHOULDER], seen[joint]) else {
+            return false;
+        };
+        let off = |k: usize| f64::from(point[k] - (right[k] + left[k]) / 2.0) - pose[joint][k];
+        off(0).hypot(off(1)) > most
+    };
+    ARMS.filter(move |joint| is_far(*joint))
 }
 
 fn write_pose(pose: &Pose, t: usize, into: &mut IntervalView) {

@@ -49,6 +49,22 @@ impl ObservedBody {
         Self { points, seen }
     }
 
+    /// Makes unseen, and bridges, the points that are not `believed` [T, 9] for up to `max_gap` frames in a row; whether there
+    /// are any.
+    pub fn forget(&mut self, believed: &Array2<bool>, max_gap: usize) -> bool {
+        let mut forgotten = false;
+        for j in 0..N_POINTS {
+            let long = gaps::long_gaps(&believed.column(j).to_vec(), max_gap);
+            for t in (0..long.len()).filter(|&t| !believed[[t, j]] && !long[t]) {
+                self.points.slice_mut(s![t, j, ..]).fill(f32::NAN);
+                self.seen[[t, j]] = false;
+                forgotten = true;
+            }
+            gaps::bridge(self.points.slice_mut(s![.., j..j + 1, ..]), max_gap);
+        }
+        forgotten
+    }
+
     /// A frame as the body lifter takes it.
     pub fn frame(&self, t: usize) -> SeenBody {
         std::array::from_fn(|j| at(&self.points, t, j))

@@ -17,7 +17,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
 /// Weight of each point in the loss: nose, arms, hips.
-const WEIGHTS: [f32; N_POINTS] = [1.0, 1.0, 1.2, 1.5, 1.0, 1.2, 1.5, 0.4, 0.4];
+const WEIGHTS: [f32; N_POINTS] = [1.0, 1.0, 1.2, 1.5, 1.0, 1.2, 1.5, 0.7, 0.7];
 /// Shares of scenes of captured motion and of rendered people, where there are any; the rest is made by rule.
 const CAPTURED: f64 = 0.35;
 const RENDERED: f64 = 0.4;
