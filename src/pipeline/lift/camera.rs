@@ -1,8 +1,8 @@
-//! How the camera was held over an interval: its roll, and how far it looked down. Keypoints do not show which way is up;
-//! the speaker's torso stands in for it, taken to be upright on average. So a posture held throughout (a lean over a
-//! desk) counts as the camera's. Of upright bodies filmed at known angles (roll within 14, pitch -14 to 23 degrees; the
-//! lifter was trained with rolls of up to 15) roll was 2.4 and pitch 7.8 degrees off (median, `tests/it/lift/lift_camera.rs`);
-//! torsos that leaned 15.2 degrees as seen leaned 1.8 after levelling. Guessed hips tell no more than no estimate at all.
+//! How the camera was held over an interval: its roll, and how far it looked down. Keypoints do not show which way is
+//! up; the speaker's torso stands in for it, taken to be upright on average. So a posture held throughout (a lean over a
+//! desk) counts as the camera's. Of upright bodies filmed at known angles (roll within 14, pitch -14 to 23 degrees) roll
+//! was 2.4 and pitch 7.8 degrees off (median, `tests/it/lift/lift_camera.rs`); torsos that leaned 15.2 degrees as seen
+//! leaned 1.8 after levelling. Guessed hips tell no more than no estimate at all.
 
 use super::interval_view::IntervalView;
 use crate::math::order::lower_median;
