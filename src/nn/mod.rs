@@ -13,5 +13,6 @@ pub mod motion_encoder;
 pub mod ops;
 pub mod params;
 pub mod pose;
+pub mod seq2seq;
 
 pub use mode::Mode;

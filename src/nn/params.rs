@@ -15,6 +15,8 @@ pub enum Init {
     Glorot,
     /// Uniform in +-sqrt(6 / fan in) (He 2015).
     He,
+    /// Uniform in plus or minus this.
+    Uniform(f64),
 }
 
 /// Named tensors of one or more networks.
@@ -84,6 +86,7 @@ impl Params {
             (_, Init::Constant(value)) => vec![value; n],
             (Some(seed), Init::Glorot) => uniform(seed, name, n, (6.0 / (fan_in + fan_out)).sqrt()),
             (Some(seed), Init::He) => uniform(seed, name, n, (6.0 / fan_in).sqrt()),
+            (Some(seed), Init::Uniform(bound)) => uniform(seed, name, n, bound),
         };
         let values = Tensor::from_vec(values, shape, &Device::Cpu)?.to_dtype(self.dtype)?;
         Var::from_tensor(&values.to_device(&self.device)?)

@@ -2,6 +2,7 @@
 //! and the one matrix product. Everything here gives the same bits for any number of threads: work is cut into
 //! pieces of a fixed size and each number is summed by one thread in one order.
 
+use super::exponential;
 use super::kernel;
 use super::kernel::TileKernel;
 use candle_core::{CpuStorage, DType, Layout, Result, Storage, Tensor, WithDType};
@@ -21,13 +22,20 @@ pub trait Scalar: WithDType {
     fn pool() -> &'static LocalKey<RefCell<Vec<Vec<Self>>>>;
     /// The loop of the processor at hand.
     fn kernel() -> TileKernel<Self>;
+    /// e^x; in f32 an approximation that loops can be vectorised with.
+    fn fast_exp(self) -> Self;
 }
 
 macro_rules! real {
-    ($type:ty, $kernel:path) => {
+    ($type:ty, $kernel:path, $exp:path) => {
         impl Scalar for $type {
             fn kernel() -> TileKernel<Self> {
                 $kernel()
+            }
+
+            #[inline(always)]
+            fn fast_exp(self) -> Self {
+                $exp(self)
             }
 
             fn pool() -> &'static LocalKey<RefCell<Vec<Vec<Self>>>> {
@@ -37,8 +45,8 @@ macro_rules! real {
         }
     };
 }
-real!(f32, kernel::of_f32);
-real!(f64, kernel::of_f64);
+real!(f32, kernel::of_f32, exponential::exp_f32);
+real!(f64, kernel::of_f64, f64::exp);
 
 /// The numbers of a contiguous tensor inside an operator. Errors when it is not contiguous (callers see to it).
 pub fn slice<'a, T: Scalar>(storage: &'a CpuStorage, layout: &Layout) -> Result<&'a [T]> {
@@ -142,6 +150,42 @@ pub fn matmul<T: Scalar>(product: &mut [T], left: Matrix<T>, right: Matrix<T>, m
             );
         }
     });
+}
+
+/// Adds `left x right`, [m, depth] x [depth, n], to `sum`, row-major, on this thread alone.
+pub fn add_product<T: Scalar>(sum: &mut [T], left: Matrix<T>, right: Matrix<T>, m: usize, n: usize, depth: usize) {
+    if m == 0 || n == 0 || depth == 0 {
+        return;
+    }
+    let last_index = |matrix: Matrix<T>, rows: usize, columns: usize| {
+        (rows - 1) * matrix.row_stride + (columns - 1) * matrix.column_stride
+    };
+    assert!(sum.len() == m * n, "product of {m} x {n} over {depth}");
+    assert!(last_index(left, m, depth) < left.data.len() && last_index(right, depth, n) < right.data.len());
+    // SAFETY: the asserts bound every address gemm reads and writes.
+    unsafe {
+        gemm::gemm(
+            m,
+            n,
+            depth,
+            sum.as_mut_ptr(),
+            1,
+            n as isize,
+            true,
+            left.data.as_ptr(),
+            left.column_stride as isize,
+            left.row_stride as isize,
+            right.data.as_ptr(),
+            right.column_stride as isize,
+            right.row_stride as isize,
+            T::one(),
+            T::one(),
+            false,
+            false,
+            false,
+            gemm::Parallelism::None,
+        );
+    }
 }
 
 /// New numbers, which `write` writes without zeros having been there before.

@@ -6,8 +6,8 @@
 use rayon::prelude::*;
 use std::cell::{Cell, UnsafeCell};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
+use std::sync::{Mutex, OnceLock};
 
 /// A piece's work by its number, as the team sees it: alive as long as `ThreadTeam::run` has not returned.
 type TeamTask = *const (dyn Fn(usize) + Sync);
@@ -77,6 +77,16 @@ pub fn parallel_map<R: Send + Sync>(n: usize, f: impl Fn(usize) -> R + Sync) -> 
         let _ = results[i].set(f(i));
     });
     results.into_iter().filter_map(OnceLock::into_inner).collect()
+}
+
+/// What `f` gives for each of `items` with its number, in their order, worked out on all threads at hand.
+pub fn parallel_each<I: Send, R: Send + Sync>(
+    items: impl Iterator<Item = I>,
+    f: impl Fn(usize, I) -> R + Sync,
+) -> Vec<R> {
+    let items: Vec<Mutex<Option<I>>> = items.map(|item| Mutex::new(Some(item))).collect();
+    let take = |i: usize| items[i].lock().ok().and_then(|mut item| item.take());
+    parallel_map(items.len(), |i| take(i).map(|item| f(i, item))).into_iter().flatten().collect()
 }
 
 impl ThreadTeam {

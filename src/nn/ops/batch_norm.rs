@@ -5,6 +5,7 @@
 use super::fallback;
 use super::operator::{CpuOperator, CustomOperator, Operand};
 use crate::nn::cpu::tensor::{GRAIN, LANES, Scalar, sum};
+use crate::nn::cpu::vectorised::{DropMask, drop_out};
 use crate::nn::params::{Init, Params};
 use candle_core::{Device, Result, Shape, Tensor, Var};
 use rayon::prelude::*;
@@ -51,11 +52,19 @@ impl BatchNorm {
 
     /// [B, C, ...] to the same shape. Training moves the running statistics.
     pub fn forward(&self, x: &Tensor, train: bool) -> Result<Tensor> {
+        self.forward_dropped(x, train, None)
+    }
+
+    /// [`Self::forward`] with a dropout behind a ReLU (slope 0): what is dropped looks like what the ReLU has cut.
+    pub fn forward_dropped(&self, x: &Tensor, train: bool, dropout: Option<DropMask>) -> Result<Tensor> {
+        if dropout.is_some() && self.slope != 0.0 {
+            candle_core::bail!("dropout goes with a ReLU, not with slope {}", self.slope);
+        }
         let statistics = Arc::new(OnceLock::new());
         if !train {
             let _ = statistics.set(self.running()?);
         }
-        let op = BatchNormOp { statistics: statistics.clone(), eps: self.eps, slope: self.slope, train };
+        let op = BatchNormOp { statistics: statistics.clone(), eps: self.eps, slope: self.slope, train, dropout };
         let y = x.contiguous()?.apply_op3(&self.weight, &self.bias, CustomOperator(op))?;
         if let (true, Some(batch)) = (train, statistics.get()) {
             self.follow(batch, x.elem_count() / batch.mean.len())?;
@@ -105,6 +114,15 @@ struct BatchNormOp {
     eps: f64,
     slope: f64,
     train: bool,
+    /// Behind a ReLU alone.
+    dropout: Option<DropMask>,
+}
+
+impl BatchNormOp {
+    /// What numbers that are not dropped are multiplied by.
+    fn kept_scale(&self) -> f64 {
+        self.dropout.map_or(1.0, |mask| mask.scale)
+    }
 }
 
 /// Batch, channels, and numbers of a channel in one sample.
@@ -186,6 +204,9 @@ impl CpuOperator for BatchNormOp {
                 let z = *x * scale + shift;
                 *y = if z > zero { z } else { z * slope };
             }
+            if let Some(mask) = self.dropout {
+                drop_out(y, row * s.2, mask);
+            }
         });
         Ok((y, Shape::from(x.dims)))
     }
@@ -204,7 +225,7 @@ impl CpuOperator for BatchNormOp {
                 of_product += product;
             }
             let inverse = 1.0 / (statistics.variance[c] + self.eps).sqrt();
-            (T::from_f64(of_product * inverse), T::from_f64(of_bias))
+            (T::from_f64(of_product * inverse * self.kept_scale()), T::from_f64(of_bias * self.kept_scale()))
         };
         let (grad_weight, grad_bias): (Vec<T>, Vec<T>) =
             (0..s.1).into_par_iter().with_min_len(GRAIN / (s.0 * s.2)).map(per_channel).unzip();
@@ -218,7 +239,8 @@ impl CpuOperator for BatchNormOp {
                 let scale = weight.values[c].to_f64() * inverse;
                 // The batch's own mean and variance move with x; fixed ones do not.
                 let moving = if self.train { scale / n } else { 0.0 };
-                let (scale, constant) = (T::from_f64(scale), T::from_f64(-moving * grad_bias[c].to_f64()));
+                let (scale, constant) =
+                    (T::from_f64(scale * self.kept_scale()), T::from_f64(-moving * grad_bias[c].to_f64()));
                 let linear = T::from_f64(-moving * grad_weight[c].to_f64() * inverse);
                 let centre = T::from_f64(statistics.mean[c]);
                 for (((out, x), y), grad) in out.iter_mut().zip(x).zip(y).zip(grad) {
@@ -253,7 +275,7 @@ mod tests {
                 if !train {
                     let _ = statistics.set(fixed.clone());
                 }
-                let op = BatchNormOp { statistics, eps: 1e-3, slope, train };
+                let op = BatchNormOp { statistics, eps: 1e-3, slope, train, dropout: None };
                 v[0].apply_op3(&v[1], &v[2], CustomOperator(op))
             };
             let by_fallback = |v: &[Tensor]| {
@@ -267,6 +289,19 @@ mod tests {
             let (off, error) = (apart(&inputs, own, by_fallback)?, worst(&inputs, own)?);
             assert!(off < 1e-11 && error < 1e-7, "{shape:?}, train {train}, slope {slope}: {off:e} {error:e}");
         }
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_dropped_behind_a_relu_has_no_gradient() -> Result<()> {
+        let inputs = [pattern(&[6, 3, 5], 0.0)?, (pattern(&[3], 5.0)? + 1.5)?, pattern(&[3], 9.0)?];
+        let dropped = |v: &[Tensor]| {
+            let dropout = Some(DropMask::new(4, 0.3));
+            let op = BatchNormOp { statistics: Arc::default(), eps: 1e-3, slope: 0.0, train: true, dropout };
+            v[0].apply_op3(&v[1], &v[2], CustomOperator(op))
+        };
+        let error = worst(&inputs, dropped)?;
+        assert!(error < 1e-7, "{error:e}");
         Ok(())
     }
 

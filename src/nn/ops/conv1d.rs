@@ -32,6 +32,20 @@ impl Conv1d {
         let bias = Tensor::zeros(n[1], weight.dtype(), weight.device())?;
         Ok(Self { weight, bias, stride: Some(stride) })
     }
+
+    /// [`Self::valid`] with a bias, both uniform in +-1 / sqrt(fan in) as PyTorch's begin.
+    pub fn valid_with_bias(
+        params: &mut Params,
+        name: &str,
+        n: [usize; 2],
+        kernel: usize,
+        stride: usize,
+    ) -> Result<Self> {
+        let init = Init::Uniform(1.0 / ((n[0] * kernel) as f64).sqrt());
+        let weight = params.trainable(&format!("{name}.weight"), &[n[1], n[0], kernel], init)?;
+        let bias = params.trainable(&format!("{name}.bias"), &[n[1]], init)?;
+        Ok(Self { weight, bias, stride: Some(stride) })
+    }
 }
 
 impl Module for Conv1d {

@@ -1,7 +1,8 @@
-//! Operators with forward and backward passes: convolutions, batch norm, linear, dropout, resize; `operator` is how the
+//! Operators with forward and backward passes: convolutions, batch norm, linear, dropout, resize, recurrent layers; `operator` is how the
 //! framework runs them, `fallback` what runs on a device without the kernels of `nn::cpu`, `gradcheck` the finite
 //! differences that prove the gradients.
 
+pub mod affine;
 pub mod batch_norm;
 pub mod conv1d;
 pub mod conv2d;
@@ -12,4 +13,5 @@ pub mod fallback;
 pub mod gradcheck;
 pub mod linear;
 pub mod operator;
+pub mod recurrent;
 pub mod resize;

@@ -83,6 +83,8 @@ const CASES: &[Case] = &[
     ("clamp", &[&[2, 9]], |v| v[0].clamp(-0.5, 0.5)),
     ("leaky ReLU", &[&[2, 9]], |v| candle_nn::ops::leaky_relu(&v[0], 0.2)),
     ("ReLU", &[&[2, 9]], |v| v[0].relu()),
+    ("hyperbolic tangent", &[&[2, 9]], |v| v[0].tanh()),
+    ("index select, rows, repeated", &[&[5, 3]], |v| v[0].index_select(&indices(&[4, 0, 0, 2, 0])?, 0)),
     ("sum and mean", &[&[2, 3, 4]], |v| v[0].sum_all()? * v[0].mean_all()?),
     ("sum over a middle axis", &[&[2, 3, 4, 5]], |v| v[0].sum(2)),
     ("sum over an axis, kept", &[&[2, 3, 4]], |v| v[0].sqr()?.sum_keepdim(2)),

@@ -1,0 +1,246 @@
+//! Row-wise work of recurrent networks, compiled for AVX-512, for AVX2 and for any processor: the gates of a GRU,
+//! attention of one state over some keys, dropout. Rows are multiples of [`COLUMNS`] long, filled up with zeros.
+
+use super::packed_matrix::COLUMNS;
+use super::tensor::Scalar;
+
+/// A function whose loops are compiled for each kind of processor.
+macro_rules! vectorised {
+    ($(#[$doc:meta])* $name:ident = $body:ident($($argument:ident: $type:ty),*)) => {
+        $(#[$doc])*
+        pub fn $name<T: Scalar>($($argument: $type),*) {
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx512f,avx512dq,avx512bw,avx512vl")]
+                fn wide<T: Scalar>($($argument: $type),*) {
+                    $body($($argument),*);
+                }
+                #[target_feature(enable = "avx2,fma")]
+                fn half<T: Scalar>($($argument: $type),*) {
+                    $body($($argument),*);
+                }
+                if std::arch::is_x86_feature_detected!("avx512dq") && std::arch::is_x86_feature_detected!("avx512bw")
+                    && std::arch::is_x86_feature_detected!("avx512vl")
+                {
+                    // SAFETY: the processor has what the function is compiled for.
+                    return unsafe { wide($($argument),*) };
+                }
+                if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+                    // SAFETY: the processor has what the function is compiled for.
+                    return unsafe { half($($argument),*) };
+                }
+            }
+            $body($($argument),*);
+        }
+    };
+}
+
+vectorised!(
+    /// Gates of a GRU. Rows of `sums` hold, each `width` long, what goes into the candidate from the input, into the reset
+    /// gate, into the update gate, and into the candidate from the state; they become candidate n, reset r, update z, and
+    /// stay. `next = (1 - z) n + z previous`, with n = tanh(input + r state).
+    gates_forward = forward_body(sums: &mut [T], previous: &[T], next: &mut [T], width: usize)
+);
+
+#[inline(always)]
+fn forward_body<T: Scalar>(sums: &mut [T], previous: &[T], next: &mut [T], width: usize) {
+    let rows = previous.chunks_exact(width).zip(next.chunks_exact_mut(width));
+    for (sums, (previous, next)) in sums.chunks_exact_mut(4 * width).zip(rows) {
+        let (candidate, sums) = sums.split_at_mut(width);
+        let (reset, sums) = sums.split_at_mut(width);
+        let (update, state) = sums.split_at_mut(width);
+        for i in 0..width {
+            let r = sigmoid(reset[i]);
+            let z = sigmoid(update[i]);
+            let n = tanh(candidate[i] + r * state[i]);
+            candidate[i] = n;
+            reset[i] = r;
+            update[i] = z;
+            next[i] = n + z * (previous[i] - n);
+        }
+    }
+}
+
+vectorised!(
+    /// Gradients of what went into the gates, in the order of `gates`, which [`gates_forward`] left; the gradient of the
+    /// next state in `grad` becomes that part of the previous state's that does not pass the gates.
+    gates_backward = backward_body(gates: &[T], previous: &[T], grad: &mut [T], of_sums: &mut [T], width: usize)
+);
+
+#[inline(always)]
+fn backward_body<T: Scalar>(gates: &[T], previous: &[T], grad: &mut [T], of_sums: &mut [T], width: usize) {
+    let one = T::one();
+    let rows = gates.chunks_exact(4 * width).zip(of_sums.chunks_exact_mut(4 * width));
+    for ((gates, of_sums), (previous, grad)) in rows.zip(previous.chunks_exact(width).zip(grad.chunks_exact_mut(width)))
+    {
+        let (candidate, gates) = gates.split_at(width);
+        let (reset, gates) = gates.split_at(width);
+        let (update, state) = gates.split_at(width);
+        let (of_candidate, of_sums) = of_sums.split_at_mut(width);
+        let (of_reset, of_sums) = of_sums.split_at_mut(width);
+        let (of_update, of_state) = of_sums.split_at_mut(width);
+        for i in 0..width {
+            let (n, r, z) = (candidate[i], reset[i], update[i]);
+            let of_n = grad[i] * (one - z) * (one - n * n);
+            of_candidate[i] = of_n;
+            of_reset[i] = of_n * state[i] * r * (one - r);
+            of_update[i] = grad[i] * (previous[i] - n) * z * (one - z);
+            of_state[i] = of_n * r;
+            grad[i] *= z;
+        }
+    }
+}
+
+#[inline(always)]
+fn sigmoid<T: Scalar>(x: T) -> T {
+    T::one() / (T::one() + (T::zero() - x).fast_exp())
+}
+
+#[inline(always)]
+fn tanh<T: Scalar>(x: T) -> T {
+    let two = T::one() + T::one();
+    two * sigmoid(two * x) - T::one()
+}
+
+vectorised!(
+    /// Attention of a state over keys, as many rows as there are `weights`: weights = softmax of the inner products, context =
+    /// sum of the weighted keys.
+    attend = attend_body(state: &[T], keys: &[T], weights: &mut [T], context: &mut [T])
+);
+
+#[inline(always)]
+fn attend_body<T: Scalar>(state: &[T], keys: &[T], weights: &mut [T], context: &mut [T]) {
+    let mut most = T::zero();
+    for (i, (weight, key)) in weights.iter_mut().zip(keys.chunks_exact(state.len())).enumerate() {
+        *weight = inner_product(state, key);
+        most = if i == 0 || *weight > most { *weight } else { most };
+    }
+    let mut total = T::zero();
+    for weight in weights.iter_mut() {
+        *weight = (*weight - most).fast_exp();
+        total += *weight;
+    }
+    context.fill(T::zero());
+    for (weight, key) in weights.iter_mut().zip(keys.chunks_exact(state.len())) {
+        *weight = *weight / total;
+        add_scaled(context, *weight, key);
+    }
+}
+
+/// What the backward pass of an attention reads.
+#[derive(Clone, Copy)]
+pub struct Attended<'a, T> {
+    pub state: &'a [T],
+    pub keys: &'a [T],
+    pub weights: &'a [T],
+    /// Gradient of the context.
+    pub grad: &'a [T],
+}
+
+vectorised!(
+    /// Adds the gradients of an attention to those of its state and keys.
+    attend_backward = attend_backward_body(of: Attended<'_, T>, of_state: &mut [T], of_keys: &mut [T])
+);
+
+#[inline(always)]
+fn attend_backward_body<T: Scalar>(of: Attended<'_, T>, of_state: &mut [T], of_keys: &mut [T]) {
+    let width = of.state.len();
+    let mut mean = T::zero();
+    for (weight, key) in of.weights.iter().zip(of.keys.chunks_exact(width)) {
+        mean += *weight * inner_product(of.grad, key);
+    }
+    for ((weight, key), of_key) in
+        of.weights.iter().zip(of.keys.chunks_exact(width)).zip(of_keys.chunks_exact_mut(width))
+    {
+        let of_score = *weight * (inner_product(of.grad, key) - mean);
+        add_scaled(of_state, of_score, key);
+        add_scaled(of_key, of_score, of.state);
+        add_scaled(of_key, *weight, of.grad);
+    }
+}
+
+#[inline(always)]
+fn inner_product<T: Scalar>(a: &[T], b: &[T]) -> T {
+    let mut lanes = [T::zero(); COLUMNS];
+    for (a, b) in a.as_chunks::<COLUMNS>().0.iter().zip(b.as_chunks::<COLUMNS>().0) {
+        for i in 0..COLUMNS {
+            lanes[i] += a[i] * b[i];
+        }
+    }
+    lanes.iter().fold(T::zero(), |sum, lane| sum + *lane)
+}
+
+#[inline(always)]
+fn add_scaled<T: Scalar>(to: &mut [T], scale: T, row: &[T]) {
+    to.iter_mut().zip(row).for_each(|(to, value)| *to += scale * *value);
+}
+
+/// Which numbers a dropout zeroes, as a function of a seed and the number's place, so that no mask is kept.
+#[derive(Clone, Copy, Debug)]
+pub struct DropMask {
+    seed: u32,
+    threshold: u32,
+    /// What kept numbers are multiplied by.
+    pub scale: f64,
+}
+
+impl DropMask {
+    /// Drops a share `p` of the numbers, 0 <= p < 1.
+    pub fn new(seed: u32, p: f64) -> Self {
+        Self { seed, threshold: (p * f64::from(u32::MAX)) as u32, scale: 1.0 / (1.0 - p) }
+    }
+}
+
+vectorised!(
+    /// Drops numbers of `values`, the first of which stands at this place of the whole.
+    drop_out = drop_body(values: &mut [T], first: usize, mask: DropMask)
+);
+
+#[inline(always)]
+fn drop_body<T: Scalar>(values: &mut [T], first: usize, mask: DropMask) {
+    let (scale, start) = (T::from_f64(mask.scale), first as u32);
+    for (i, value) in values.iter_mut().enumerate() {
+        // Finaliser of MurmurHash3.
+        let mut hash = start.wrapping_add(i as u32).wrapping_mul(0x9e37_79b9) ^ mask.seed;
+        hash = (hash ^ (hash >> 16)).wrapping_mul(0x85eb_ca6b);
+        hash = (hash ^ (hash >> 13)).wrapping_mul(0xc2b2_ae35);
+        hash ^= hash >> 16;
+        *value = if hash < mask.threshold { T::zero() } else { *value * scale };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gates_are_those_of_the_definition() {
+        let width = COLUMNS;
+        let value = |i: usize, k: f64| ((i as f64) * k).sin() * 3.0;
+        let mut sums: Vec<f32> = (0..8 * width).map(|i| value(i, 1.3) as f32).collect();
+        let previous: Vec<f32> = (0..2 * width).map(|i| value(i, 0.7) as f32).collect();
+        let (before, mut next) = (sums.clone(), vec![0.0; 2 * width]);
+        gates_forward(&mut sums, &previous, &mut next, width);
+        for (i, next) in next.iter().enumerate() {
+            let at = |gate: usize| f64::from(before[i / width * 4 * width + gate * width + i % width]);
+            let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
+            let (r, z) = (sigmoid(at(1)), sigmoid(at(2)));
+            let n = (at(0) + r * at(3)).tanh();
+            let expected = (1.0 - z) * n + z * f64::from(previous[i]);
+            assert!((f64::from(*next) - expected).abs() < 1e-6, "{next}, expected {expected}");
+        }
+    }
+
+    #[test]
+    fn a_share_is_dropped_whatever_the_pieces() {
+        let mask = DropMask::new(77, 0.3);
+        let mut whole = vec![1.0f32; 100_000];
+        drop_out(&mut whole, 5, mask);
+        let mut pieces = vec![1.0f32; 100_000];
+        pieces.chunks_mut(777).enumerate().for_each(|(i, piece)| drop_out(piece, 5 + 777 * i, mask));
+        assert_eq!(whole, pieces);
+        let dropped = whole.iter().filter(|v| **v == 0.0).count() as f64 / 1e5;
+        assert!((dropped - 0.3).abs() < 0.01, "{dropped}");
+        assert!((whole.iter().sum::<f32>() / 1e5 - 1.0).abs() < 0.02);
+    }
+}

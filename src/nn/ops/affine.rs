@@ -1,0 +1,204 @@
+//! A fully connected layer over the last axis, bias and ReLU included, as one operator: many rows by few columns, each
+//! piece of rows by one thread, results independent of the number of threads.
+
+use super::operator::{CpuOperator, CustomOperator, Operand};
+use crate::nn::cpu::packed_matrix::PackedMatrix;
+use crate::nn::cpu::tensor::{Matrix, Scalar, add_product};
+use crate::nn::cpu::thread_team::parallel_each;
+use crate::nn::params::{Init, Params};
+use candle_core::{D, Module, Result, Shape, Tensor};
+
+/// Rows that are multiplied before their sums are stored.
+const ROWS: usize = 48;
+/// Pieces of the rows at most, and rows of a piece at least.
+const PIECES: usize = 8;
+const SMALLEST_PIECE: usize = 128;
+
+/// `<name>.weight` [out, in] and `<name>.bias` [out], both uniform in +-1 / sqrt(in), as PyTorch's begin.
+pub struct Affine {
+    weight: Tensor,
+    bias: Tensor,
+    relu: bool,
+}
+
+impl Affine {
+    pub fn new(params: &mut Params, name: &str, n_in: usize, n_out: usize) -> Result<Self> {
+        let init = Init::Uniform(1.0 / (n_in as f64).sqrt());
+        Ok(Self {
+            weight: params.trainable(&format!("{name}.weight"), &[n_out, n_in], init)?,
+            bias: params.trainable(&format!("{name}.bias"), &[n_out], init)?,
+            relu: false,
+        })
+    }
+
+    /// Adds a ReLU to the result.
+    pub fn with_relu(self) -> Self {
+        Self { relu: true, ..self }
+    }
+
+    pub fn weight(&self) -> &Tensor {
+        &self.weight
+    }
+
+    pub fn bias(&self) -> &Tensor {
+        &self.bias
+    }
+}
+
+impl Module for Affine {
+    /// [..., in] to [..., out].
+    fn forward(&self, x: &Tensor) -> Result<Tensor> {
+        affine(x, &self.weight, &self.bias, self.relu)
+    }
+}
+
+/// `x` [..., in] times `weight` [out, in] plus `bias` [out], negative results made zero with `relu`.
+fn affine(x: &Tensor, weight: &Tensor, bias: &Tensor, relu: bool) -> Result<Tensor> {
+    let (mut shape, n_in) = (x.dims().to_vec(), x.dim(D::Minus1)?);
+    let y = x.contiguous()?.reshape(((), n_in))?.apply_op3(weight, bias, CustomOperator(AffineOp { relu }))?;
+    if let Some(last) = shape.last_mut() {
+        *last = bias.dim(0)?;
+    }
+    y.reshape(shape)
+}
+
+struct AffineOp {
+    relu: bool,
+}
+
+/// Rows, numbers of a row that goes in, and of one that comes out.
+type AffineSizes = (usize, usize, usize);
+
+fn sizes(x: &[usize], weight: &[usize], n_bias: usize) -> Result<AffineSizes> {
+    match (x, weight) {
+        (&[n, n_in], &[n_out, w_in]) if n_in == w_in && n_bias == n_out && n * n_in * n_out > 0 => Ok((n, n_in, n_out)),
+        _ => candle_core::bail!("linear: input {x:?} does not fit weight {weight:?} and bias {n_bias}"),
+    }
+}
+
+/// Rows of a piece.
+fn piece(n: usize) -> usize {
+    n.div_ceil(PIECES).max(SMALLEST_PIECE).next_multiple_of(ROWS)
+}
+
+/// Products of the rows of `x` with a matrix, some rows at a time, handed to `store` with the first row's number.
+fn products<T: Scalar>(x: &[T], n_in: usize, by: &PackedMatrix<T>, mut store: impl FnMut(usize, &[T])) {
+    let mut sums = vec![T::zero(); ROWS * by.width()];
+    for (i, x) in x.chunks(ROWS * n_in).enumerate() {
+        let sums = &mut sums[..x.len() / n_in * by.width()];
+        sums.fill(T::zero());
+        by.multiply_add(x.len() / n_in, x, n_in, sums, by.width());
+        store(i * ROWS, sums);
+    }
+}
+
+impl CpuOperator for AffineOp {
+    const NAME: &'static str = "linear layer";
+
+    fn forward<T: Scalar>(&self, [x, weight, bias]: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)> {
+        let (n, n_in, n_out) = sizes(x.dims, weight.dims, bias.values.len())?;
+        let packed = PackedMatrix::new(n_in, n_out, |k, c| weight.values[c * n_in + k]);
+        let (piece, zero) = (piece(n), T::zero());
+        let mut y = vec![zero; n * n_out];
+        let pieces = y.chunks_mut(piece * n_out).zip(x.values.chunks(piece * n_in));
+        parallel_each(pieces, |_, (y, x)| {
+            products(x, n_in, &packed, |first, sums| {
+                let rows = y[first * n_out..].chunks_exact_mut(n_out).zip(sums.chunks_exact(packed.width()));
+                for (y, sums) in rows {
+                    for ((y, sum), bias) in y.iter_mut().zip(sums).zip(bias.values) {
+                        let value = *sum + *bias;
+                        *y = if self.relu && value < zero { zero } else { value };
+                    }
+                }
+            });
+        });
+        Ok((y, Shape::from((n, n_out))))
+    }
+
+    fn backward<T: Scalar>(
+        &self,
+        [x, weight, bias]: [Operand<T>; 3],
+        y: &[T],
+        grad: &[T],
+    ) -> Result<[Option<Vec<T>>; 3]> {
+        let (n, n_in, n_out) = sizes(x.dims, weight.dims, bias.values.len())?;
+        let packed = PackedMatrix::new(n_out, n_in, |k, c| weight.values[k * n_in + c]);
+        let (piece, zero) = (piece(n), T::zero());
+        let mut of_x = vec![zero; if x.tracked { n * n_in } else { 0 }];
+        let mut none: Vec<&mut [T]> = (0..n.div_ceil(piece)).map(|_| Default::default()).collect();
+        if x.tracked {
+            none = of_x.chunks_mut(piece * n_in).collect();
+        }
+        let outputs = y.chunks(piece * n_out).zip(grad.chunks(piece * n_out));
+        let pieces = none.into_iter().zip(x.values.chunks(piece * n_in)).zip(outputs);
+        let parts = parallel_each(pieces, |_, ((of_x, x), (y, grad))| {
+            let cut: Vec<T>;
+            let grad = if self.relu {
+                cut = y.iter().zip(grad).map(|(y, grad)| if *y > zero { *grad } else { zero }).collect();
+                &cut[..]
+            } else {
+                grad
+            };
+            let mut part = vec![zero; n_out * n_in + n_out];
+            let (of_weight, of_bias) = part.split_at_mut(n_out * n_in);
+            let rows = Matrix::new(grad, n_out).transposed();
+            add_product(of_weight, rows, Matrix::new(x, n_in), n_out, n_in, grad.len() / n_out);
+            for row in grad.chunks_exact(n_out) {
+                of_bias.iter_mut().zip(row).for_each(|(sum, value)| *sum += *value);
+            }
+            if !of_x.is_empty() {
+                products(grad, n_out, &packed, |first, sums| {
+                    let rows = of_x[first * n_in..].chunks_exact_mut(n_in).zip(sums.chunks_exact(packed.width()));
+                    rows.for_each(|(to, sums)| to.copy_from_slice(&sums[..n_in]));
+                });
+            }
+            part
+        });
+        let mut of_weight = vec![zero; n_out * n_in + n_out];
+        for part in &parts {
+            of_weight.iter_mut().zip(part).for_each(|(sum, value)| *sum += *value);
+        }
+        let of_bias = of_weight.split_off(n_out * n_in);
+        Ok([x.tracked.then_some(of_x), Some(of_weight), Some(of_bias)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nn::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
+    use candle_core::{DType, Var};
+
+    #[test]
+    fn it_is_the_composed_layer_and_gradients_are_right() -> Result<()> {
+        for (shape, relu) in [(&[2, 5, 3][..], false), (&[7, 3], true), (&[1, 3], false)] {
+            let inputs = [pattern(shape, 0.0)?, pattern(&[4, 3], 5.0)?, pattern(&[4], 9.0)?];
+            let own = |v: &[Tensor]| affine(&v[0], &v[1], &v[2], relu);
+            let composed = |v: &[Tensor]| {
+                let y = v[0].reshape(((), 3))?.matmul(&v[1].t()?)?.broadcast_add(&v[2])?;
+                let y = if relu { y.relu()? } else { y };
+                y.reshape([&shape[..shape.len() - 1], &[4]].concat())
+            };
+            let (off, error) = (apart(&inputs, own, composed)?, worst(&inputs, own)?);
+            assert!(off < 1e-12 && error < 1e-7, "{shape:?}: {off:e} {error:e}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
+        let f32s = |shape: &[usize], phase| pattern(shape, phase)?.to_dtype(DType::F32);
+        let (x, bias) = (f32s(&[1500, 26], 0.0)?, f32s(&[50], 5.0)?);
+        let weight = Var::from_tensor(&f32s(&[50, 26], 1.0)?)?;
+        any_threads_give_the_same(&weight, || affine(&x, &weight, &bias, true))
+    }
+
+    #[test]
+    fn what_does_not_fit_is_an_error() -> Result<()> {
+        let (x, weight) = (pattern(&[2, 3], 0.0)?, pattern(&[4, 3], 0.0)?);
+        assert!(affine(&x, &weight, &pattern(&[4], 0.0)?, false).is_ok());
+        assert!(affine(&x, &weight, &pattern(&[3], 0.0)?, false).is_err());
+        assert!(affine(&x.narrow(1, 0, 2)?, &weight, &pattern(&[4], 0.0)?, false).is_err());
+        Ok(())
+    }
+}

@@ -1,0 +1,187 @@
+//! One step of a GRU (Cho 2014, in PyTorch's form) for some rows of a batch, forward and backward. Inside, a state is
+//! filled up with zeros to whole vectors, and gates stand in the order candidate from the input, reset, update,
+//! candidate from the state: the first three come from the input, the last three from the state.
+
+use crate::nn::cpu::packed_matrix::{COLUMNS, PackedMatrix};
+use crate::nn::cpu::tensor::{Matrix, Scalar, add_product};
+use crate::nn::cpu::vectorised::{gates_backward, gates_forward};
+
+/// Rows of the largest piece of a batch.
+const PIECE: usize = 64;
+/// Batches of fewer rows are one piece.
+const UNDIVIDED: usize = 8;
+
+/// Rows of each piece of a batch; the last piece may have fewer. They do not depend on the number of threads.
+pub fn rows_of_a_piece(batch: usize) -> usize {
+    if batch < UNDIVIDED { batch.max(1) } else { batch.div_ceil(batch.div_ceil(PIECE).next_multiple_of(2)) }
+}
+
+/// Numbers of the input and of the state.
+#[derive(Clone, Copy, Debug)]
+pub struct GruSizes {
+    pub input: usize,
+    pub hidden: usize,
+}
+
+impl GruSizes {
+    /// Length of a state with its zeros.
+    pub fn width(&self) -> usize {
+        self.hidden.next_multiple_of(COLUMNS)
+    }
+
+    /// Weights of the input [3 H, I] and of the state [3 H, H], both biases [3 H]; rows are reset, update, candidate.
+    pub fn n_weights(&self) -> usize {
+        3 * self.hidden * (self.input + self.hidden + 2)
+    }
+
+    /// Those four of as many numbers as [`Self::n_weights`].
+    fn parts<'a, T>(&self, weights: &'a [T]) -> [&'a [T]; 4] {
+        let (of_input, rest) = weights.split_at(3 * self.hidden * self.input);
+        let (of_state, rest) = rest.split_at(3 * self.hidden * self.hidden);
+        let (input_bias, state_bias) = rest.split_at(3 * self.hidden);
+        [of_input, of_state, input_bias, state_bias]
+    }
+
+    /// The row of a weight for a column of the three gates of the input; none in the filling.
+    fn row_of_input(&self, column: usize) -> Option<usize> {
+        let (gate, i) = (column / self.width(), column % self.width());
+        (i < self.hidden).then_some([2, 0, 1][gate] * self.hidden + i)
+    }
+
+    /// The row of a weight for a column of the three gates of the state.
+    fn row_of_state(&self, column: usize) -> Option<usize> {
+        let (gate, i) = (column / self.width(), column % self.width());
+        (i < self.hidden).then_some(gate * self.hidden + i)
+    }
+}
+
+/// Weights as the forward pass reads them.
+pub struct ForwardCell<T> {
+    sizes: GruSizes,
+    of_input: PackedMatrix<T>,
+    of_state: PackedMatrix<T>,
+    /// What the four sums begin with.
+    bias: Vec<T>,
+}
+
+impl<T: Scalar> ForwardCell<T> {
+    pub fn new(sizes: GruSizes, weights: &[T]) -> Self {
+        let ([of_input, of_state, input_bias, state_bias], width) = (sizes.parts(weights), sizes.width());
+        let GruSizes { input, hidden } = sizes;
+        let or_zero = |row: Option<usize>, value: &dyn Fn(usize) -> T| row.map_or(T::zero(), value);
+        let bias = (0..4 * width).map(|column| {
+            let from_input = |c: usize| or_zero(sizes.row_of_input(c), &|row| input_bias[row]);
+            let from_state = |c: usize| or_zero(sizes.row_of_state(c), &|row| state_bias[row]);
+            match column / width {
+                0 => from_input(column),
+                1 | 2 => from_input(column) + from_state(column - width),
+                _ => from_state(column - width),
+            }
+        });
+        Self {
+            sizes,
+            bias: bias.collect(),
+            of_input: PackedMatrix::new(input, 3 * width, |k, c| {
+                or_zero(sizes.row_of_input(c), &|row| of_input[row * input + k])
+            }),
+            of_state: PackedMatrix::new(hidden, 3 * width, |k, c| {
+                or_zero(sizes.row_of_state(c), &|row| of_state[row * hidden + k])
+            }),
+        }
+    }
+
+    /// A step of as many rows as `previous` has states: input rows every `stride` numbers; `gates` and `next` are
+    /// overwritten.
+    pub fn step(&self, x: &[T], stride: usize, previous: &[T], gates: &mut [T], next: &mut [T]) {
+        let width = self.sizes.width();
+        let n = previous.len() / width;
+        gates.chunks_exact_mut(4 * width).for_each(|row| row.copy_from_slice(&self.bias));
+        self.of_input.multiply_add(n, x, stride, gates, 4 * width);
+        self.of_state.multiply_add(n, previous, width, &mut gates[width..], 4 * width);
+        gates_forward(gates, previous, next, width);
+    }
+}
+
+/// Weights as the backward pass reads them, and the gradients of those of one piece.
+pub struct BackwardCell<T> {
+    sizes: GruSizes,
+    to_input: PackedMatrix<T>,
+    to_state: PackedMatrix<T>,
+}
+
+impl<T: Scalar> BackwardCell<T> {
+    pub fn new(sizes: GruSizes, weights: &[T]) -> Self {
+        let ([of_input, of_state, ..], GruSizes { input, hidden }) = (sizes.parts(weights), sizes);
+        let depth = 3 * sizes.width();
+        Self {
+            sizes,
+            to_input: PackedMatrix::new(depth, input, |k, c| {
+                sizes.row_of_input(k).map_or(T::zero(), |row| of_input[row * input + c])
+            }),
+            to_state: PackedMatrix::new(depth, hidden, |k, c| {
+                sizes.row_of_state(k).map_or(T::zero(), |row| of_state[row * hidden + c])
+            }),
+        }
+    }
+
+    /// A step back: `grad`, the gradient of the next state, becomes that of the previous; `of_gates` is overwritten.
+    pub fn step(&self, gates: &[T], previous: &[T], grad: &mut [T], of_gates: &mut [T]) {
+        let width = self.sizes.width();
+        gates_backward(gates, previous, grad, of_gates, width);
+        self.to_state.multiply_add(grad.len() / width, &of_gates[width..], 4 * width, grad, width);
+    }
+
+    /// Length of a row of the input's gradient with its zeros.
+    pub fn input_width(&self) -> usize {
+        self.to_input.width()
+    }
+
+    /// Adds the gradient of the input, rows of [`Self::input_width`], from that of the gates.
+    pub fn add_input_gradient(&self, of_gates: &[T], to: &mut [T]) {
+        let (width, input_width) = (self.sizes.width(), self.input_width());
+        self.to_input.multiply_add(to.len() / input_width, of_gates, 4 * width, to, input_width);
+    }
+
+    /// Adds the gradients of the weights to `to`, in their order, from all rows of a piece: gradients of the gates,
+    /// inputs (rows of `input` numbers) and previous states.
+    pub fn add_weight_gradients(&self, of_gates: &[T], inputs: &[T], previous: &[T], to: &mut [T]) {
+        let (s, width) = (self.sizes, self.sizes.width());
+        let GruSizes { input, hidden } = s;
+        let n = of_gates.len() / (4 * width);
+        let gates = |first: usize| Matrix::new(&of_gates[first..], 4 * width).transposed();
+        let (to_input, rest) = to.split_at_mut(3 * hidden * input);
+        let (to_state, rest) = rest.split_at_mut(3 * hidden * hidden);
+        let (input_bias, state_bias) = rest.split_at_mut(3 * hidden);
+        for gate in 0..3 {
+            let first = gate * width;
+            let of_input = [2, 0, 1][gate] * hidden * input;
+            let rows = &mut to_input[of_input..][..hidden * input];
+            add_product(rows, gates(first), Matrix::new(inputs, input), hidden, input, n);
+            let rows = &mut to_state[gate * hidden * hidden..][..hidden * hidden];
+            add_product(rows, gates(first + width), Matrix::new(previous, width), hidden, hidden, n);
+        }
+        for row in of_gates.chunks_exact(4 * width) {
+            for gate in 0..3 {
+                let add = |to: &mut [T], from: &[T]| to.iter_mut().zip(from).for_each(|(to, from)| *to += *from);
+                add(&mut input_bias[[2, 0, 1][gate] * hidden..][..hidden], &row[gate * width..]);
+                add(&mut state_bias[gate * hidden..][..hidden], &row[(gate + 1) * width..]);
+            }
+        }
+    }
+}
+
+/// Adds the weight gradients of the pieces of a batch, in their order.
+pub fn sum_of_pieces<T: Scalar>(pieces: &[Vec<T>]) -> Vec<T> {
+    let mut sum = pieces.first().cloned().unwrap_or_default();
+    for piece in pieces.iter().skip(1) {
+        sum.iter_mut().zip(piece).for_each(|(sum, value)| *sum += *value);
+    }
+    sum
+}
+
+/// Copies rows of `hidden` numbers into rows filled up with zeros.
+pub fn widen<T: Scalar>(rows: &[T], hidden: usize, to: &mut [T], width: usize) {
+    for (from, to) in rows.chunks_exact(hidden).zip(to.chunks_exact_mut(width)) {
+        to[..hidden].copy_from_slice(from);
+    }
+}

@@ -1,0 +1,190 @@
+//! A decoder that goes on from poses it is given: a GRU reads them, then takes its own last pose at every step, attends
+//! to encoded sequences by inner products (Luong 2015, "dot") and makes the next pose from state and contexts. The whole
+//! loop, with backpropagation through time, is one operator: twenty steps of small products would else be some hundred
+//! operators each way.
+
+use super::cell::{GruSizes, rows_of_a_piece, sum_of_pieces};
+use super::decoder_pass::{BackwardDecoder, DecoderSizes, ForwardDecoder};
+use super::saved::SavedPieces;
+use crate::nn::cpu::tensor::Scalar;
+use crate::nn::cpu::thread_team::parallel_each;
+use crate::nn::cpu::vectorised::DropMask;
+use crate::nn::ops::operator::{CpuOperator, CustomOperator, Operand};
+use candle_core::{Result, Shape, Tensor};
+
+/// What a decoder starts from.
+pub struct DecoderInputs<'a> {
+    /// Poses [B, P, X] that are read before the first step; the last is read once more at the first step.
+    pub previous: &'a Tensor,
+    /// State [B, H] before them.
+    pub state: &'a Tensor,
+    /// Sequences [B, K, H] to attend to, each by itself; what is attended to is also what is read.
+    pub keys: &'a [Tensor],
+}
+
+/// Weights of a decoder.
+pub struct DecoderWeights<'a> {
+    /// Those of the GRU as one row of numbers.
+    pub gru: &'a Tensor,
+    /// [X, (1 + sequences) H] over state and contexts side by side, and bias [X].
+    pub weight: &'a Tensor,
+    pub bias: &'a Tensor,
+}
+
+/// `n_steps` poses [B, N, X]. `mask`: dropout of state and contexts side by side, at every step.
+pub fn decode(
+    inputs: &DecoderInputs,
+    weights: &DecoderWeights,
+    n_steps: usize,
+    mask: Option<DropMask>,
+) -> Result<Tensor> {
+    let (batch, n_previous, pose) = inputs.previous.dims3()?;
+    let start = Tensor::cat(&[&inputs.previous.reshape((batch, n_previous * pose))?, inputs.state], 1)?;
+    let keys = match inputs.keys {
+        [one] => one.contiguous()?,
+        several => Tensor::cat(several, 1)?,
+    };
+    let all = Tensor::cat(&[weights.gru, &weights.weight.flatten_all()?, weights.bias], 0)?;
+    let n_keys = inputs.keys.iter().map(|keys| keys.dim(1)).collect::<Result<Vec<_>>>()?;
+    let cell = GruSizes { input: pose, hidden: inputs.state.dim(1)? };
+    let sizes = DecoderSizes { batch, n_previous, n_steps, cell, n_keys, piece: rows_of_a_piece(batch) };
+    if weights.weight.dims() != [pose, sizes.n_read() * cell.hidden] {
+        candle_core::bail!(
+            "decoder: output weights {:?} for poses {:?}",
+            weights.weight.dims(),
+            inputs.previous.dims()
+        );
+    }
+    let saves = start.track_op() || keys.track_op() || all.track_op();
+    start.apply_op3(&keys, &all, CustomOperator(DecoderOp { sizes, mask, saves, saved: SavedPieces::default() }))
+}
+
+struct DecoderOp {
+    sizes: DecoderSizes,
+    mask: Option<DropMask>,
+    saves: bool,
+    saved: SavedPieces,
+}
+
+impl CpuOperator for DecoderOp {
+    const NAME: &'static str = "decoder with attention";
+
+    fn forward<T: Scalar>(&self, [start, keys, weights]: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)> {
+        let s = &self.sizes;
+        s.check(start.dims, keys.dims, weights.values.len())?;
+        let (row, keys_row) = (s.n_steps * s.cell.input, s.all_keys() * s.cell.hidden);
+        let decoder = ForwardDecoder::new(s, self.mask, weights.values);
+        let mut y = vec![T::zero(); s.batch * row];
+        let pieces = start.values.chunks(s.piece * s.start_len()).zip(keys.values.chunks(s.piece * keys_row));
+        let saved = parallel_each(y.chunks_mut(s.piece * row).zip(pieces), |piece, (y, (start, keys))| {
+            let saved = decoder.run(piece * s.piece, start, keys, y);
+            if self.saves { saved } else { Vec::new() }
+        });
+        if self.saves {
+            self.saved.put(saved);
+        }
+        Ok((y, Shape::from((s.batch, s.n_steps, s.cell.input))))
+    }
+
+    fn backward<T: Scalar>(
+        &self,
+        [start, keys, weights]: [Operand<T>; 3],
+        y: &[T],
+        grad: &[T],
+    ) -> Result<[Option<Vec<T>>; 3]> {
+        let s = &self.sizes;
+        let saved = self.saved.get::<T>()?;
+        let (row, keys_row) = (s.n_steps * s.cell.input, s.all_keys() * s.cell.hidden);
+        let decoder = BackwardDecoder::new(s, self.mask, weights.values);
+        let mut of_start = vec![T::zero(); start.values.len()];
+        let mut of_keys = vec![T::zero(); keys.values.len()];
+        let inputs = start.values.chunks(s.piece * s.start_len()).zip(keys.values.chunks(s.piece * keys_row));
+        let outputs = y.chunks(s.piece * row).zip(grad.chunks(s.piece * row));
+        let results =
+            of_start.chunks_mut(s.piece * s.start_len()).zip(of_keys.chunks_mut(s.piece * keys_row)).zip(saved);
+        let of_weights = parallel_each(results.zip(inputs.zip(outputs)), |piece, (results, (inputs, outputs))| {
+            let ((of_start, of_keys), saved) = results;
+            decoder.run(piece * s.piece, inputs, outputs, saved, of_start, of_keys)
+        });
+        Ok([
+            start.tracked.then_some(of_start),
+            keys.tracked.then_some(of_keys),
+            weights.tracked.then(|| sum_of_pieces(&of_weights)),
+        ])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nn::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
+    use crate::nn::ops::recurrent::gru::{GruOptions, gru};
+    use candle_core::{DType, Var};
+
+    const CELL: GruSizes = GruSizes { input: 3, hidden: 4 };
+
+    /// Previous poses, state, two sequences of keys, weights of GRU and output.
+    fn inputs(batch: usize) -> Result<Vec<Tensor>> {
+        let shapes: [&[usize]; 7] =
+            [&[batch, 2, 3], &[batch, 4], &[batch, 5, 4], &[batch, 2, 4], &[CELL.n_weights()], &[3, 12], &[3]];
+        shapes.iter().enumerate().map(|(i, shape)| pattern(shape, 11.0 * i as f64)).collect()
+    }
+
+    fn own(v: &[Tensor], mask: Option<DropMask>) -> Result<Tensor> {
+        let inputs = DecoderInputs { previous: &v[0], state: &v[1], keys: &v[2..4] };
+        decode(&inputs, &DecoderWeights { gru: &v[4], weight: &v[5], bias: &v[6] }, 3, mask)
+    }
+
+    fn composed(v: &[Tensor]) -> Result<Tensor> {
+        let options = GruOptions { n_directions: 1, last: true, mask: None };
+        let mut state = gru(&v[0], &v[1].unsqueeze(0)?, &v[4], options)?;
+        let (mut pose, mut poses) = (v[0].narrow(1, 1, 1)?.contiguous()?, Vec::new());
+        for _ in 0..3 {
+            state = gru(&pose, &state.unsqueeze(0)?, &v[4], options)?;
+            let mut read = vec![state.clone()];
+            for keys in &v[2..4] {
+                let scores = keys.broadcast_mul(&state.unsqueeze(1)?)?.sum_keepdim(2)?.exp()?;
+                let weights = scores.broadcast_div(&scores.sum_keepdim(1)?)?;
+                read.push(keys.broadcast_mul(&weights)?.sum(1)?);
+            }
+            pose = Tensor::cat(&read, 1)?.matmul(&v[5].t()?)?.broadcast_add(&v[6])?.unsqueeze(1)?;
+            poses.push(pose.clone());
+        }
+        Tensor::cat(&poses, 1)
+    }
+
+    #[test]
+    fn it_is_the_composed_decoder_and_gradients_are_right() -> Result<()> {
+        for batch in [2, 9] {
+            let inputs = inputs(batch)?;
+            let off = apart(&inputs, |v| own(v, None), composed)?;
+            let error = worst(&inputs, |v| own(v, None))?;
+            let dropped = worst(&inputs, |v| own(v, Some(DropMask::new(9, 0.5))))?;
+            assert!(off < 1e-12 && error < 1e-7 && dropped < 1e-7, "{off:e} {error:e} {dropped:e}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
+        let v = inputs(150)?.iter().map(|v| v.to_dtype(DType::F32)).collect::<Result<Vec<_>>>()?;
+        let weights = Var::from_tensor(&v[4])?;
+        any_threads_give_the_same(&weights, || {
+            let mut v = v.clone();
+            v[4] = weights.as_tensor().clone();
+            own(&v, Some(DropMask::new(3, 0.5)))
+        })
+    }
+
+    #[test]
+    fn what_does_not_fit_is_an_error() -> Result<()> {
+        let good = inputs(2)?;
+        assert!(own(&good, None).is_ok());
+        for (which, dim) in [(1, 0), (2, 2), (4, 0), (5, 1), (6, 0)] {
+            let mut v = good.clone();
+            v[which] = v[which].narrow(dim, 0, 1)?;
+            assert!(own(&v, None).is_err(), "{which}");
+        }
+        Ok(())
+    }
+}

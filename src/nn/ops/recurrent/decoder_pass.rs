@@ -1,0 +1,289 @@
+//! The decoder's loop over one piece of a batch, forward and backward.
+
+use super::cell::{BackwardCell, ForwardCell, GruSizes, widen};
+use crate::nn::cpu::packed_matrix::PackedMatrix;
+use crate::nn::cpu::tensor::{Matrix, Scalar, add_product};
+use crate::nn::cpu::vectorised::{Attended, DropMask, attend, attend_backward, drop_out};
+use candle_core::Result;
+
+/// Sizes of a decoder and its batch.
+pub struct DecoderSizes {
+    pub batch: usize,
+    pub n_previous: usize,
+    pub n_steps: usize,
+    /// Pose and state.
+    pub cell: GruSizes,
+    /// Keys of each sequence.
+    pub n_keys: Vec<usize>,
+    /// Rows of a piece.
+    pub piece: usize,
+}
+
+impl DecoderSizes {
+    /// States the output is made from: the decoder's own and a context a sequence.
+    pub fn n_read(&self) -> usize {
+        1 + self.n_keys.len()
+    }
+
+    /// Keys of all sequences.
+    pub fn all_keys(&self) -> usize {
+        self.n_keys.iter().sum()
+    }
+
+    /// Numbers of a row of the starts: previous poses and state.
+    pub fn start_len(&self) -> usize {
+        self.n_previous * self.cell.input + self.cell.hidden
+    }
+
+    fn n_weights(&self) -> usize {
+        self.cell.n_weights() + self.cell.input * (self.n_read() * self.cell.hidden + 1)
+    }
+
+    /// Errors when starts, keys and weights are not of these sizes.
+    pub fn check(&self, start: &[usize], keys: &[usize], n_weights: usize) -> Result<()> {
+        let fits = start == [self.batch, self.start_len()]
+            && keys == [self.batch, self.all_keys(), self.cell.hidden]
+            && n_weights == self.n_weights()
+            && !self.n_keys.contains(&0)
+            && self.batch * self.n_previous * self.n_steps * self.cell.input * self.cell.hidden > 0;
+        if !fits {
+            candle_core::bail!("decoder: starts {start:?} and keys {keys:?} do not fit {n_weights} weights");
+        }
+        Ok(())
+    }
+}
+
+/// What the forward pass of a piece of `n` rows leaves, one after the other: gates and states of every step, the first
+/// state included; attention weights and what the output is made from, for every step that has an output.
+fn saved_len(s: &DecoderSizes, n: usize) -> [usize; 4] {
+    let (width, steps) = (s.cell.width(), s.n_previous + s.n_steps);
+    [steps * n * 4 * width, (steps + 1) * n * width, s.n_steps * n * s.all_keys(), s.n_steps * n * s.n_read() * width]
+}
+
+/// Column of the output weights for a place in what the output is made from; none in the filling.
+fn output_column(s: &DecoderSizes, place: usize) -> Option<usize> {
+    let (part, i) = (place / s.cell.width(), place % s.cell.width());
+    (i < s.cell.hidden).then_some(part * s.cell.hidden + i)
+}
+
+/// First number in the whole of the result that a dropout of what row `row` reads at step `step` stands at.
+fn drop_place(s: &DecoderSizes, row: usize, step: usize) -> usize {
+    (row * s.n_steps + step) * s.n_read() * s.cell.width()
+}
+
+/// The keys of each row in turn, cut into sequences: first key and number of keys.
+fn sequences(s: &DecoderSizes) -> impl Iterator<Item = (usize, usize)> {
+    let firsts = s.n_keys.iter().scan(0, |first, n| {
+        *first += n;
+        Some(*first - n)
+    });
+    firsts.zip(s.n_keys.iter().copied())
+}
+
+/// Keys of a piece, filled up to whole vectors.
+fn wide_keys<T: Scalar>(s: &DecoderSizes, keys: &[T]) -> Vec<T> {
+    let mut wide = vec![T::zero(); keys.len() / s.cell.hidden * s.cell.width()];
+    widen(keys, s.cell.hidden, &mut wide, s.cell.width());
+    wide
+}
+
+/// Weights as the forward pass reads them.
+pub struct ForwardDecoder<'a, T> {
+    sizes: &'a DecoderSizes,
+    mask: Option<DropMask>,
+    cell: ForwardCell<T>,
+    output: PackedMatrix<T>,
+    bias: Vec<T>,
+}
+
+impl<'a, T: Scalar> ForwardDecoder<'a, T> {
+    pub fn new(sizes: &'a DecoderSizes, mask: Option<DropMask>, weights: &[T]) -> Self {
+        let s = sizes;
+        let (of_cell, rest) = weights.split_at(s.cell.n_weights());
+        let n_read = s.n_read() * s.cell.hidden;
+        let (weight, bias) = rest.split_at(s.cell.input * n_read);
+        let element =
+            |k: usize, pose: usize| output_column(s, k).map_or(T::zero(), |column| weight[pose * n_read + column]);
+        let output = PackedMatrix::new(s.n_read() * s.cell.width(), s.cell.input, element);
+        let mut wide = bias.to_vec();
+        wide.resize(output.width(), T::zero());
+        Self { sizes, mask, cell: ForwardCell::new(s.cell, of_cell), output, bias: wide }
+    }
+
+    /// Poses `y` of the rows from `begin` on; returns what the backward pass needs.
+    pub fn run(&self, begin: usize, start: &[T], keys: &[T], y: &mut [T]) -> Vec<T> {
+        let s = self.sizes;
+        let (pose, hidden, width) = (s.cell.input, s.cell.hidden, s.cell.width());
+        let (start_len, y_len) = (s.start_len(), s.n_steps * pose);
+        let n = start.len() / start_len;
+        let keys = wide_keys(s, keys);
+        let lens = saved_len(s, n);
+        let mut saved = vec![T::zero(); lens.iter().sum()];
+        let (gates, rest) = saved.split_at_mut(lens[0]);
+        let (states, rest) = rest.split_at_mut(lens[1]);
+        let (weights, read) = rest.split_at_mut(lens[2]);
+        for (row, state) in start.chunks_exact(start_len).zip(states.chunks_exact_mut(width)) {
+            state[..hidden].copy_from_slice(&row[s.n_previous * pose..]);
+        }
+        let read_len = s.n_read() * width;
+        let mut out = vec![T::zero(); n * self.output.width()];
+        for (step, gates) in gates.chunks_exact_mut(n * 4 * width).enumerate() {
+            let (previous, next) = states[step * n * width..][..2 * n * width].split_at_mut(n * width);
+            if step <= s.n_previous {
+                self.cell.step(&start[step.min(s.n_previous - 1) * pose..], start_len, previous, gates, next);
+            } else {
+                self.cell.step(&y[(step - s.n_previous - 1) * pose..], y_len, previous, gates, next);
+            }
+            let Some(step) = step.checked_sub(s.n_previous) else { continue };
+            let weights = &mut weights[step * n * s.all_keys()..][..n * s.all_keys()];
+            let read = &mut read[step * n * read_len..][..n * read_len];
+            let rows = read.chunks_exact_mut(read_len).zip(weights.chunks_exact_mut(s.all_keys()));
+            let of_rows = next.chunks_exact(width).zip(keys.chunks_exact(s.all_keys() * width));
+            for (row, ((read, weights), (state, keys))) in rows.zip(of_rows).enumerate() {
+                let (own, contexts) = read.split_at_mut(width);
+                own.copy_from_slice(state);
+                for ((first, n), context) in sequences(s).zip(contexts.chunks_exact_mut(width)) {
+                    attend(state, &keys[first * width..][..n * width], &mut weights[first..][..n], context);
+                }
+                if let Some(mask) = self.mask {
+                    drop_out(read, drop_place(s, begin + row, step), mask);
+                }
+            }
+            out.chunks_exact_mut(self.bias.len()).for_each(|row| row.copy_from_slice(&self.bias));
+            self.output.multiply_add(n, read, read_len, &mut out, self.bias.len());
+            for (y, out) in y.chunks_exact_mut(y_len).zip(out.chunks_exact(self.bias.len())) {
+                y[step * pose..][..pose].copy_from_slice(&out[..pose]);
+            }
+        }
+        saved
+    }
+}
+
+/// Weights as the backward pass reads them.
+pub struct BackwardDecoder<'a, T> {
+    sizes: &'a DecoderSizes,
+    mask: Option<DropMask>,
+    cell: BackwardCell<T>,
+    /// From the gradient of a pose to that of what it is made from.
+    to_read: PackedMatrix<T>,
+}
+
+impl<'a, T: Scalar> BackwardDecoder<'a, T> {
+    pub fn new(sizes: &'a DecoderSizes, mask: Option<DropMask>, weights: &[T]) -> Self {
+        let s = sizes;
+        let (of_cell, rest) = weights.split_at(s.cell.n_weights());
+        let n_read = s.n_read() * s.cell.hidden;
+        let element = |pose: usize, c: usize| output_column(s, c).map_or(T::zero(), |c| rest[pose * n_read + c]);
+        let to_read = PackedMatrix::new(s.cell.input, s.n_read() * s.cell.width(), element);
+        Self { sizes, mask, cell: BackwardCell::new(s.cell, of_cell), to_read }
+    }
+
+    /// Adds the gradients of starts and keys of the rows from `begin` on to `of_start` and `of_keys`; returns those of the
+    /// weights. Inputs: starts and keys; outputs: poses and their gradients.
+    pub fn run(
+        &self,
+        begin: usize,
+        (start, keys): (&[T], &[T]),
+        (y, grad): (&[T], &[T]),
+        saved: &[T],
+        of_start: &mut [T],
+        of_keys: &mut [T],
+    ) -> Vec<T> {
+        let s = self.sizes;
+        let (pose, hidden, width) = (s.cell.input, s.cell.hidden, s.cell.width());
+        let (start_len, y_len, read_len) = (s.start_len(), s.n_steps * pose, s.n_read() * width);
+        let n = start.len() / start_len;
+        let keys = wide_keys(s, keys);
+        let mut of_wide_keys = vec![T::zero(); keys.len()];
+        let lens = saved_len(s, n);
+        let (gates, rest) = saved.split_at(lens[0]);
+        let (states, rest) = rest.split_at(lens[1]);
+        let (weights, read) = rest.split_at(lens[2]);
+
+        let n_all = s.n_previous + s.n_steps;
+        let mut of_gates = vec![T::zero(); lens[0]];
+        let mut inputs = vec![T::zero(); n_all * n * pose];
+        let mut of_poses = vec![T::zero(); s.n_steps * n * pose];
+        let mut of_y = grad.to_vec();
+        let mut of_state = vec![T::zero(); n * width];
+        let mut of_read = vec![T::zero(); n * read_len];
+        let input_width = self.cell.input_width();
+        let mut of_input = vec![T::zero(); n * input_width];
+        for step in (0..n_all).rev() {
+            let gates = &gates[step * n * 4 * width..][..n * 4 * width];
+            let (previous, next) = states[step * n * width..][..2 * n * width].split_at(n * width);
+            if let Some(step) = step.checked_sub(s.n_previous) {
+                of_read.fill(T::zero());
+                self.to_read.multiply_add(n, &of_y[step * pose..], y_len, &mut of_read, read_len);
+                let of_poses = &mut of_poses[step * n * pose..][..n * pose];
+                for (to, of_y) in of_poses.chunks_exact_mut(pose).zip(of_y.chunks_exact(y_len)) {
+                    to.copy_from_slice(&of_y[step * pose..][..pose]);
+                }
+                let weights = &weights[step * n * s.all_keys()..][..n * s.all_keys()];
+                for row in 0..n {
+                    let of_read = &mut of_read[row * read_len..][..read_len];
+                    if let Some(mask) = self.mask {
+                        drop_out(of_read, drop_place(s, begin + row, step), mask);
+                    }
+                    let (own, contexts) = of_read.split_at(width);
+                    let of_state = &mut of_state[row * width..][..width];
+                    of_state.iter_mut().zip(own).for_each(|(to, from)| *to += *from);
+                    for ((first, n), grad) in sequences(s).zip(contexts.chunks_exact(width)) {
+                        let first = row * s.all_keys() + first;
+                        let attended = Attended {
+                            state: &next[row * width..][..width],
+                            keys: &keys[first * width..][..n * width],
+                            weights: &weights[first..][..n],
+                            grad,
+                        };
+                        attend_backward(attended, of_state, &mut of_wide_keys[first * width..][..n * width]);
+                    }
+                }
+            }
+            let of_gates = &mut of_gates[step * n * 4 * width..][..n * 4 * width];
+            self.cell.step(gates, previous, &mut of_state, of_gates);
+            of_input.fill(T::zero());
+            self.cell.add_input_gradient(of_gates, &mut of_input);
+            // Where the step has read its pose.
+            let (x, of_x, row_len, at) = match step.checked_sub(s.n_previous + 1) {
+                None => (start, &mut *of_start, start_len, step.min(s.n_previous - 1) * pose),
+                Some(before) => (y, &mut of_y[..], y_len, before * pose),
+            };
+            let inputs = &mut inputs[step * n * pose..][..n * pose];
+            for (to, x) in inputs.chunks_exact_mut(pose).zip(x.chunks_exact(row_len)) {
+                to.copy_from_slice(&x[at..][..pose]);
+            }
+            for (to, from) in of_x.chunks_exact_mut(row_len).zip(of_input.chunks_exact(input_width)) {
+                to[at..][..pose].iter_mut().zip(from).for_each(|(to, from)| *to += *from);
+            }
+        }
+        for (to, from) in of_start.chunks_exact_mut(start_len).zip(of_state.chunks_exact(width)) {
+            to[s.n_previous * pose..].copy_from_slice(&from[..hidden]);
+        }
+        for (to, from) in of_keys.chunks_exact_mut(hidden).zip(of_wide_keys.chunks_exact(width)) {
+            to.copy_from_slice(&from[..hidden]);
+        }
+        self.weight_gradients(&of_gates, &inputs, &states[..gates.len() / 4], &of_poses, read)
+    }
+
+    fn weight_gradients(&self, of_gates: &[T], inputs: &[T], states: &[T], of_poses: &[T], read: &[T]) -> Vec<T> {
+        let s = self.sizes;
+        let (pose, hidden, width, read_len) =
+            (s.cell.input, s.cell.hidden, s.cell.width(), s.n_read() * s.cell.width());
+        let n_read = s.n_read() * hidden;
+        let mut gradients = vec![T::zero(); s.cell.n_weights() + pose * (n_read + 1)];
+        let (of_cell, rest) = gradients.split_at_mut(s.cell.n_weights());
+        self.cell.add_weight_gradients(of_gates, inputs, states, of_cell);
+        let (of_weight, of_bias) = rest.split_at_mut(pose * n_read);
+        let mut wide = vec![T::zero(); pose * read_len];
+        let of_rows = Matrix::new(of_poses, pose).transposed();
+        add_product(&mut wide, of_rows, Matrix::new(read, read_len), pose, read_len, of_poses.len() / pose);
+        for (to, from) in of_weight.chunks_exact_mut(hidden).zip(wide.chunks_exact(width)) {
+            to.copy_from_slice(&from[..hidden]);
+        }
+        for row in of_poses.chunks_exact(pose) {
+            of_bias.iter_mut().zip(row).for_each(|(to, from)| *to += *from);
+        }
+        gradients
+    }
+}

@@ -1,0 +1,366 @@
+//! A GRU layer over a whole sequence, in one direction or both, with backpropagation through time: one operator, so
+//! that a step costs its products and its gates and nothing else. Pieces of the batch go through the sequence side by
+//! side; results do not depend on the number of threads.
+
+use super::cell::{BackwardCell, ForwardCell, GruSizes, rows_of_a_piece, sum_of_pieces, widen};
+use super::saved::SavedPieces;
+use crate::nn::Mode;
+use crate::nn::cpu::tensor::Scalar;
+use crate::nn::cpu::thread_team::parallel_each;
+use crate::nn::cpu::vectorised::{DropMask, drop_out};
+use crate::nn::ops::operator::{CpuOperator, CustomOperator, Operand};
+use crate::nn::params::{Init, Params};
+use candle_core::{Result, Shape, Tensor};
+use rand::Rng;
+
+/// A layer with its weights, named as PyTorch names them: `<name>.weight_ih_l0` [3 H, I], `.weight_hh_l0` [3 H, H],
+/// `.bias_ih_l0` and `.bias_hh_l0` [3 H], for the reverse direction with `_reverse` behind; rows are reset, update,
+/// candidate.
+pub struct Gru {
+    /// Four tensors a direction.
+    weights: Vec<Tensor>,
+    hidden: usize,
+}
+
+impl Gru {
+    /// Layer `layer` of the names; `n`: numbers of the input and of the state. First values uniform in +-1 / sqrt(H), as PyTorch's.
+    pub fn new(params: &mut Params, name: &str, n: [usize; 2], layer: usize, both_ways: bool) -> Result<Self> {
+        let [input, hidden] = n;
+        let init = Init::Uniform(1.0 / (hidden as f64).sqrt());
+        let mut weights = Vec::new();
+        for suffix in if both_ways { &["", "_reverse"][..] } else { &[""] } {
+            let mut add = |kind: &str, shape: &[usize]| -> Result<()> {
+                weights.push(params.trainable(&format!("{name}.{kind}_l{layer}{suffix}"), shape, init)?);
+                Ok(())
+            };
+            add("weight_ih", &[3 * hidden, input])?;
+            add("weight_hh", &[3 * hidden, hidden])?;
+            add("bias_ih", &[3 * hidden])?;
+            add("bias_hh", &[3 * hidden])?;
+        }
+        Ok(Self { weights, hidden })
+    }
+
+    /// Every state of a sequence [B, T, I] from a first state of zeros: [B, T, directions * H], of which training drops a
+    /// share `p`.
+    pub fn forward(&self, x: &Tensor, p: f64, mode: &mut Mode) -> Result<Tensor> {
+        self.run(x, false, drop_mask(p, mode))
+    }
+
+    /// The output of the last step [B, directions * H]: the reverse direction has seen that step alone.
+    pub fn last(&self, x: &Tensor) -> Result<Tensor> {
+        self.run(x, true, None)
+    }
+
+    /// Weights as one row of numbers, for operators that contain this layer.
+    pub fn flat_weights(&self) -> Result<Tensor> {
+        Tensor::cat(&self.weights.iter().map(Tensor::flatten_all).collect::<Result<Vec<_>>>()?, 0)
+    }
+
+    fn run(&self, x: &Tensor, last: bool, mask: Option<DropMask>) -> Result<Tensor> {
+        let n_directions = self.weights.len() / 4;
+        let first = Tensor::zeros((n_directions, x.dim(0)?, self.hidden), x.dtype(), x.device())?;
+        gru(x, &first, &self.flat_weights()?, GruOptions { n_directions, last, mask })
+    }
+}
+
+/// The mask of a dropout while training; none where nothing is dropped.
+pub fn drop_mask(p: f64, mode: &mut Mode) -> Option<DropMask> {
+    match mode {
+        Mode::Train(rng) if p > 0.0 => Some(DropMask::new(rng.random(), p)),
+        _ => None,
+    }
+}
+
+/// What a GRU gives.
+#[derive(Clone, Copy, Debug)]
+pub struct GruOptions {
+    /// 1: forward; 2: forward and backward in time, side by side in the result.
+    pub n_directions: usize,
+    /// Only the result of the last step, for which the backward direction makes one step.
+    pub last: bool,
+    /// Dropout of the result.
+    pub mask: Option<DropMask>,
+}
+
+/// States of a GRU over `x` [B, T, I] from the `first` states [directions, B, H], with `weights` one direction after the
+/// other: [B, T, directions * H], or with `last` [B, directions * H].
+pub fn gru(x: &Tensor, first: &Tensor, weights: &Tensor, options: GruOptions) -> Result<Tensor> {
+    let saves = x.track_op() || first.track_op() || weights.track_op();
+    let op = GruOp { options, saves, saved: SavedPieces::default() };
+    x.contiguous()?.apply_op3(&first.contiguous()?, weights, CustomOperator(op))
+}
+
+struct GruOp {
+    options: GruOptions,
+    saves: bool,
+    saved: SavedPieces,
+}
+
+/// Sizes of one pass.
+struct PassSizes {
+    batch: usize,
+    n_steps: usize,
+    cell: GruSizes,
+    /// Rows of a piece.
+    piece: usize,
+    /// Numbers of a row of the result.
+    row: usize,
+}
+
+impl GruOp {
+    fn sizes(&self, x: &[usize], first: &[usize], n_weights: usize) -> Result<PassSizes> {
+        let GruOptions { n_directions, last, .. } = self.options;
+        if let (&[batch, n_steps, input], &[directions, b, hidden]) = (x, first) {
+            let cell = GruSizes { input, hidden };
+            let fits = (directions, b, n_weights) == (n_directions, batch, n_directions * cell.n_weights());
+            if fits && batch * n_steps * input * hidden > 0 {
+                let row = if last { 1 } else { n_steps } * directions * hidden;
+                return Ok(PassSizes { batch, n_steps, cell, piece: rows_of_a_piece(batch), row });
+            }
+        }
+        candle_core::bail!("gru: input {x:?} does not fit first states {first:?} and {n_weights} weights")
+    }
+
+    /// Steps of a direction.
+    fn steps(&self, direction: usize, s: &PassSizes) -> usize {
+        if self.options.last && direction == 1 { 1 } else { s.n_steps }
+    }
+
+    /// Where in time step `k` of a direction is.
+    fn time(direction: usize, k: usize, s: &PassSizes) -> usize {
+        if direction == 1 { s.n_steps - 1 - k } else { k }
+    }
+
+    /// Where the output of step `k` begins in a row of the result; none for steps that give no output.
+    fn place(&self, direction: usize, k: usize, s: &PassSizes) -> Option<usize> {
+        let GruOptions { n_directions, last, .. } = self.options;
+        let time = Self::time(direction, k, s);
+        let at = |time: usize| (time * n_directions + direction) * s.cell.hidden;
+        if last { (time == s.n_steps - 1).then(|| at(0)) } else { Some(at(time)) }
+    }
+
+    /// Numbers of a direction of a piece of `n` rows: gates of every step, and every state, the first included.
+    fn saved_len(&self, direction: usize, n: usize, s: &PassSizes) -> [usize; 2] {
+        let (steps, width) = (self.steps(direction, s), s.cell.width());
+        [steps * n * 4 * width, (steps + 1) * n * width]
+    }
+}
+
+impl CpuOperator for GruOp {
+    const NAME: &'static str = "gru";
+
+    fn forward<T: Scalar>(&self, [x, first, weights]: [Operand<T>; 3]) -> Result<(Vec<T>, Shape)> {
+        let s = &self.sizes(x.dims, first.dims, weights.values.len())?;
+        let (hidden, width, x_row) = (s.cell.hidden, s.cell.width(), s.n_steps * s.cell.input);
+        let cells: Vec<ForwardCell<T>> =
+            weights.values.chunks_exact(s.cell.n_weights()).map(|weights| ForwardCell::new(s.cell, weights)).collect();
+        let mut y = vec![T::zero(); s.batch * s.row];
+        let saved = parallel_each(y.chunks_mut(s.piece * s.row), |piece, y| {
+            let (n, begin) = (y.len() / s.row, piece * s.piece);
+            let x = &x.values[begin * x_row..][..n * x_row];
+            let mut saved = vec![T::zero(); (0..cells.len()).flat_map(|d| self.saved_len(d, n, s)).sum()];
+            let mut rest = &mut saved[..];
+            for (direction, cell) in cells.iter().enumerate() {
+                let [n_gates, n_states] = self.saved_len(direction, n, s);
+                let (gates, after) = std::mem::take(&mut rest).split_at_mut(n_gates);
+                let (states, after) = after.split_at_mut(n_states);
+                rest = after;
+                let of_piece = &first.values[(direction * s.batch + begin) * hidden..][..n * hidden];
+                widen(of_piece, hidden, &mut states[..n * width], width);
+                for (k, gates) in gates.chunks_exact_mut(n * 4 * width).enumerate() {
+                    let x = &x[Self::time(direction, k, s) * s.cell.input..];
+                    let (previous, next) = states[k * n * width..][..2 * n * width].split_at_mut(n * width);
+                    cell.step(x, x_row, previous, gates, next);
+                    let Some(place) = self.place(direction, k, s) else { continue };
+                    for (y, state) in y.chunks_exact_mut(s.row).zip(next.chunks_exact(width)) {
+                        y[place..][..hidden].copy_from_slice(&state[..hidden]);
+                    }
+                }
+            }
+            if let Some(mask) = self.options.mask {
+                drop_out(y, begin * s.row, mask);
+            }
+            if self.saves { saved } else { Vec::new() }
+        });
+        if self.saves {
+            self.saved.put(saved);
+        }
+        let n_out = self.options.n_directions * hidden;
+        let shape = match self.options.last {
+            true => Shape::from((s.batch, n_out)),
+            false => Shape::from((s.batch, s.n_steps, n_out)),
+        };
+        Ok((y, shape))
+    }
+
+    fn backward<T: Scalar>(
+        &self,
+        [x, first, weights]: [Operand<T>; 3],
+        _: &[T],
+        grad: &[T],
+    ) -> Result<[Option<Vec<T>>; 3]> {
+        let s = &self.sizes(x.dims, first.dims, weights.values.len())?;
+        let saved = self.saved.get::<T>()?;
+        let (hidden, width, input) = (s.cell.hidden, s.cell.width(), s.cell.input);
+        let (x_row, n_directions) = (s.n_steps * input, self.options.n_directions);
+        let cells: Vec<BackwardCell<T>> =
+            weights.values.chunks_exact(s.cell.n_weights()).map(|weights| BackwardCell::new(s.cell, weights)).collect();
+        let mut of_x = vec![T::zero(); if x.tracked { x.values.len() } else { 0 }];
+        let mut none = saved.iter().map(|_| Default::default());
+        let pieces: Vec<&mut [T]> =
+            if x.tracked { of_x.chunks_mut(s.piece * x_row).collect() } else { none.by_ref().collect() };
+        let gradients = parallel_each(pieces.into_iter().zip(saved), |piece, (of_x, saved)| {
+            let begin = piece * s.piece;
+            let n = s.piece.min(s.batch - begin);
+            let x = &x.values[begin * x_row..][..n * x_row];
+            let mut grad = grad[begin * s.row..][..n * s.row].to_vec();
+            if let Some(mask) = self.options.mask {
+                drop_out(&mut grad, begin * s.row, mask);
+            }
+            let mut of_weights = vec![T::zero(); weights.values.len()];
+            let mut of_first = Vec::with_capacity(n_directions * n * hidden);
+            let mut rest = &saved[..];
+            for (direction, cell) in cells.iter().enumerate() {
+                let [n_gates, n_states] = self.saved_len(direction, n, s);
+                let (gates, after) = rest.split_at(n_gates);
+                let (states, after) = after.split_at(n_states);
+                rest = after;
+                let mut of_gates = vec![T::zero(); n_gates];
+                let mut inputs = vec![T::zero(); self.steps(direction, s) * n * input];
+                let mut of_state = vec![T::zero(); n * width];
+                let mut of_input = vec![T::zero(); n * cell.input_width()];
+                let steps = gates.chunks_exact(n * 4 * width).zip(of_gates.chunks_exact_mut(n * 4 * width));
+                for (k, ((gates, of_gates), inputs)) in steps.zip(inputs.chunks_exact_mut(n * input)).enumerate().rev()
+                {
+                    if let Some(place) = self.place(direction, k, s) {
+                        for (to, grad) in of_state.chunks_exact_mut(width).zip(grad.chunks_exact(s.row)) {
+                            to.iter_mut().zip(&grad[place..][..hidden]).for_each(|(to, grad)| *to += *grad);
+                        }
+                    }
+                    cell.step(gates, &states[k * n * width..][..n * width], &mut of_state, of_gates);
+                    let at = Self::time(direction, k, s) * input;
+                    for (to, x) in inputs.chunks_exact_mut(input).zip(x.chunks_exact(x_row)) {
+                        to.copy_from_slice(&x[at..][..input]);
+                    }
+                    if of_x.is_empty() {
+                        continue;
+                    }
+                    of_input.fill(T::zero());
+                    cell.add_input_gradient(of_gates, &mut of_input);
+                    for (to, of_input) in of_x.chunks_exact_mut(x_row).zip(of_input.chunks_exact(cell.input_width())) {
+                        to[at..][..input].iter_mut().zip(of_input).for_each(|(to, from)| *to += *from);
+                    }
+                }
+                let of_cell = &mut of_weights[direction * s.cell.n_weights()..][..s.cell.n_weights()];
+                cell.add_weight_gradients(&of_gates, &inputs, &states[..gates.len() / 4], of_cell);
+                of_state.chunks_exact(width).for_each(|row| of_first.extend_from_slice(&row[..hidden]));
+            }
+            (of_weights, of_first)
+        });
+        let (of_weights, of_pieces): (Vec<_>, Vec<_>) = gradients.into_iter().unzip();
+        let of_first = first.tracked.then(|| {
+            let part = |direction: usize, piece: &Vec<T>| {
+                let n = piece.len() / n_directions;
+                piece[direction * n..][..n].to_vec()
+            };
+            let parts = (0..n_directions).flat_map(|d| of_pieces.iter().map(move |piece| part(d, piece)));
+            parts.flatten().collect()
+        });
+        Ok([x.tracked.then_some(of_x), of_first, weights.tracked.then(|| sum_of_pieces(&of_weights))])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nn::ops::gradcheck::{any_threads_give_the_same, apart, pattern, worst};
+    use candle_core::{DType, Var};
+
+    /// A GRU of the framework's operators, one way.
+    fn composed(x: &Tensor, first: &Tensor, weights: &Tensor, reverse: bool) -> Result<Tensor> {
+        let ((_, n_steps, input), hidden) = (x.dims3()?, first.dim(1)?);
+        let part = |start: usize, rows: usize, columns: usize| {
+            weights.narrow(0, start, rows * columns)?.reshape((rows, columns))?.t()?.contiguous()
+        };
+        let of_input = part(0, 3 * hidden, input)?;
+        let of_state = part(3 * hidden * input, 3 * hidden, hidden)?;
+        let start = 3 * hidden * (input + hidden);
+        let input_bias = weights.narrow(0, start, 3 * hidden)?;
+        let state_bias = weights.narrow(0, start + 3 * hidden, 3 * hidden)?;
+        let sigmoid = |x: Tensor| -> Result<Tensor> { (x.neg()?.exp()? + 1.0)?.recip() };
+        let (mut state, mut states) = (first.clone(), Vec::new());
+        for k in 0..n_steps {
+            let x = x.narrow(1, if reverse { n_steps - 1 - k } else { k }, 1)?.squeeze(1)?.contiguous()?;
+            let a = x.matmul(&of_input)?.broadcast_add(&input_bias)?;
+            let b = state.matmul(&of_state)?.broadcast_add(&state_bias)?;
+            let gate = |of: &Tensor, i: usize| of.narrow(1, i * hidden, hidden);
+            let r = sigmoid((gate(&a, 0)? + gate(&b, 0)?)?)?;
+            let z = sigmoid((gate(&a, 1)? + gate(&b, 1)?)?)?;
+            let n = ((sigmoid(((gate(&a, 2)? + (r * gate(&b, 2)?)?)? * 2.0)?)? * 2.0)? - 1.0)?;
+            state = (&n + (z * (&state - &n)?)?)?;
+            states.push(state.clone());
+        }
+        if reverse {
+            states.reverse();
+        }
+        Tensor::stack(&states, 1)
+    }
+
+    fn inputs(n_directions: usize, batch: usize) -> Result<[Tensor; 3]> {
+        let sizes = GruSizes { input: 3, hidden: 4 };
+        Ok([
+            pattern(&[batch, 5, 3], 0.0)?,
+            pattern(&[n_directions, batch, 4], 7.0)?,
+            (pattern(&[n_directions * sizes.n_weights()], 3.0)? * 0.7)?,
+        ])
+    }
+
+    #[test]
+    fn it_is_the_composed_layer_and_gradients_are_right() -> Result<()> {
+        for (n_directions, last, batch) in [(1, false, 2), (1, true, 3), (2, false, 10), (2, true, 2)] {
+            let inputs = inputs(n_directions, batch)?;
+            let own = |v: &[Tensor]| gru(&v[0], &v[1], &v[2], GruOptions { n_directions, last, mask: None });
+            let by_parts = |v: &[Tensor]| {
+                let n = v[2].dim(0)? / n_directions;
+                let way = |d: usize| composed(&v[0], &v[1].get(d)?, &v[2].narrow(0, d * n, n)?, d == 1);
+                let y = Tensor::cat(&(0..n_directions).map(way).collect::<Result<Vec<_>>>()?, 2)?;
+                if last { y.narrow(1, 4, 1)?.squeeze(1) } else { Ok(y) }
+            };
+            let (off, error) = (apart(&inputs, own, by_parts)?, worst(&inputs, own)?);
+            assert!(off < 1e-12 && error < 1e-7, "{n_directions} {last}: {off:e} {error:e}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_dropped_has_no_gradient() -> Result<()> {
+        let mask = Some(DropMask::new(5, 0.4));
+        let dropped = |v: &[Tensor]| gru(&v[0], &v[1], &v[2], GruOptions { n_directions: 2, last: false, mask });
+        let inputs = inputs(2, 3)?;
+        assert!(worst(&inputs, dropped)? < 1e-7);
+        let y = dropped(&inputs)?.flatten_all()?.to_vec1::<f64>()?;
+        assert!(y.contains(&0.0) && y.iter().any(|v| *v != 0.0));
+        Ok(())
+    }
+
+    #[test]
+    fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
+        let f32s = |shape: &[usize], phase| pattern(shape, phase)?.to_dtype(DType::F32);
+        let sizes = GruSizes { input: 26, hidden: 50 };
+        let weights = Var::from_tensor(&(f32s(&[2 * sizes.n_weights()], 1.0)? * 0.2)?)?;
+        let (x, first) = (f32s(&[150, 7, 26], 0.0)?, f32s(&[2, 150, 50], 5.0)?);
+        let options = GruOptions { n_directions: 2, last: false, mask: Some(DropMask::new(1, 0.2)) };
+        any_threads_give_the_same(&weights, || gru(&x, &first, &weights, options))
+    }
+
+    #[test]
+    fn what_does_not_fit_is_an_error() -> Result<()> {
+        let [x, first, weights] = inputs(1, 2)?;
+        let options = GruOptions { n_directions: 1, last: false, mask: None };
+        assert!(gru(&x, &first, &weights, options).is_ok());
+        assert!(gru(&x, &first, &weights.narrow(0, 1, 10)?, options).is_err());
+        assert!(gru(&x, &first, &weights, GruOptions { n_directions: 2, ..options }).is_err());
+        Ok(())
+    }
+}

@@ -1,0 +1,53 @@
+//! The discriminator of network C: whether a segment of poses is real, without sound or words.
+
+use super::config::Config;
+use crate::nn::ops::affine::Affine;
+use crate::nn::ops::batch_norm::BatchNorm;
+use crate::nn::ops::conv1d::Conv1d;
+use crate::nn::params::Params;
+use candle_core::{Module, Result, Tensor};
+
+const CHANNELS: [usize; 2] = [100, 200];
+/// Kernel of each convolution; both take every second frame.
+const KERNELS: [usize; 2] = [4, 3];
+const HIDDEN: usize = 100;
+/// Slope of the leaky ReLUs.
+const SLOPE: f64 = 0.2;
+
+/// `conv.0`, `norm.0`, `conv.1`, `norm.1`, then `linear.0` and `linear.1`.
+pub struct SegmentDiscriminator {
+    blocks: Vec<(Conv1d, BatchNorm)>,
+    hidden: Affine,
+    score: Affine,
+}
+
+impl SegmentDiscriminator {
+    /// For segments of `config.predicted` poses.
+    pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
+        let (mut blocks, mut n_in, mut n_frames) = (Vec::new(), config.pose, config.predicted);
+        for (i, (channels, kernel)) in CHANNELS.into_iter().zip(KERNELS).enumerate() {
+            if n_frames < kernel {
+                candle_core::bail!("{} poses are too few for the discriminator", config.predicted);
+            }
+            n_frames = (n_frames - kernel) / 2 + 1;
+            let conv = Conv1d::valid_with_bias(params, &format!("conv.{i}"), [n_in, channels], kernel, 2)?;
+            blocks.push((conv, BatchNorm::new(params, &format!("norm.{i}"), channels, 1e-5, 0.1, SLOPE)?));
+            n_in = channels;
+        }
+        Ok(Self {
+            blocks,
+            hidden: Affine::new(params, "linear.0", n_in * n_frames, HIDDEN)?,
+            score: Affine::new(params, "linear.1", HIDDEN, 1)?,
+        })
+    }
+
+    /// Poses [B, predicted, pose] to logits [B, 1] that they are real.
+    pub fn forward(&self, poses: &Tensor, train: bool) -> Result<Tensor> {
+        let mut x = poses.t()?.contiguous()?;
+        for (conv, norm) in &self.blocks {
+            x = norm.forward(&conv.forward(&x)?, train)?;
+        }
+        let x = self.hidden.forward(&x.flatten_from(1)?)?;
+        self.score.forward(&candle_nn::ops::leaky_relu(&x, SLOPE)?)
+    }
+}
