@@ -1,7 +1,7 @@
 //! Mel-frequency cepstra as FineMotion computes them (Korzun et al. 2020, with the library python_speech_features): 26
-//! cepstra of 26 bands every 10 ms, the first replaced by the log energy, and their means to 20 a second.
+//! cepstra of 26 bands every 10 ms, the first replaced by the log energy; their means over poses, and the context of these.
 
-use ndarray::{Array2, Axis, s};
+use ndarray::Array2;
 use realfft::RealFftPlanner;
 use std::f64::consts::PI;
 
@@ -15,8 +15,6 @@ const PRE_EMPHASIS: f64 = 0.97;
 const LIFTER: f64 = 22.0;
 /// The scale of 16-bit samples, which the log energy shows.
 const FULL: f64 = 32_768.0;
-/// Windows in a row that are averaged: 20 rows a second.
-pub const N_AVERAGED: usize = 5;
 
 /// Of mono sound at `rate` samples a second (at most 51.2 kHz: a window is one transform), samples in -1..1: [n, 26], row
 /// k the 20 ms from k * 10 ms on; the last window is filled up with zeros.
@@ -58,14 +56,45 @@ pub fn mfcc(samples: &[f32], rate: u32) -> Array2<f64> {
     cepstra
 }
 
-/// Cepstra at 20 rows a second [n, 26]: means of 5 rows of [`mfcc`], an incomplete last mean dropped.
-pub fn at_20_fps(samples: &[f32], rate: u32) -> Array2<f64> {
-    let all = mfcc(samples, rate);
-    let rows = all.nrows() / N_AVERAGED;
-    let mean = |k: usize| all.slice(s![k * N_AVERAGED..(k + 1) * N_AVERAGED, ..]).sum_axis(Axis(0)) / N_AVERAGED as f64;
-    let mut means = Array2::zeros((rows, N_CEPSTRA));
-    means.outer_iter_mut().enumerate().for_each(|(k, mut row)| row.assign(&mean(k)));
+/// Cepstra of `n` poses [n, 26], `fps` a second: the mean of the rows of [`mfcc`] over the time of each pose, those at its
+/// edges in part (at 20 a second five whole rows); past the sound its last row is held. Zeros of no sound.
+pub fn of_poses(samples: &[f32], rate: u32, fps: f64, n: usize) -> Array2<f64> {
+    let rows = mfcc(samples, rate);
+    let per_pose = 1.0 / (fps * STEP_SECS);
+    let mut means = Array2::zeros((n, N_CEPSTRA));
+    let Some(last) = rows.nrows().checked_sub(1) else { return means };
+    for (t, mut mean) in means.outer_iter_mut().enumerate() {
+        let (start, end) = (t as f64 * per_pose, (t + 1) as f64 * per_pose);
+        let mut at = start;
+        while end - at > 1e-9 {
+            // whole rows but for what rounding leaves of them
+            let row = (at + 1e-9).floor();
+            let next = (row + 1.0).min(end);
+            mean.scaled_add((next - at) / per_pose, &rows.row(last.min(row as usize)));
+            at = next;
+        }
+    }
     means
+}
+
+/// Poses that whole rows of a sound of so many samples are there for.
+pub fn n_poses(n_samples: usize, rate: u32, fps: f64) -> usize {
+    (n_samples as f64 / f64::from(rate) * fps + 1e-6) as usize
+}
+
+/// Rows [n, 26] with half a context (an odd number of rows) of `silence` before and behind: [n + context - 1, 26].
+pub fn with_context(rows: &Array2<f64>, context: usize, silence: &[f64; N_CEPSTRA]) -> Array2<f32> {
+    let half = context / 2;
+    Array2::from_shape_fn((rows.nrows() + 2 * half, N_CEPSTRA), |(t, c)| {
+        let inside = t.checked_sub(half).filter(|&t| t < rows.nrows());
+        inside.map_or(silence[c], |t| rows[[t, c]]) as f32
+    })
+}
+
+/// Cepstra of silence: FineMotion pads with the first row of a silent recording, this with that of zeros.
+pub fn silence(rate: u32) -> [f64; N_CEPSTRA] {
+    let rows = mfcc(&[0.0; 1], rate);
+    std::array::from_fn(|c| rows[[0, c]])
 }
 
 /// Weights of each band over the bins [26][513]: triangles between bins equally spaced in mel.
@@ -120,9 +149,26 @@ mod tests {
                 }
             };
             check(mfcc(&sound, rate), "cepstra");
-            check(at_20_fps(&sound, rate), "at_20_fps");
+            check(of_poses(&sound, rate, 20.0, case["at_20_fps"].as_array().unwrap().len()), "at_20_fps");
         }
         assert_eq!(mfcc(&[], 16_000).nrows(), 0);
+        assert!(of_poses(&[], 16_000, 20.0, 3).iter().all(|v| *v == 0.0));
         assert!(mfcc(&[0.0; 10], 16_000).iter().all(|v| v.is_finite()));
+    }
+
+    #[test]
+    fn poses_of_another_rate_share_the_rows_at_their_edges() {
+        let sound: Vec<f32> = (0..16_000).map(|i| 0.3 * (i as f32 * 0.2).sin() * (i as f32 * 0.0007).cos()).collect();
+        let (rows, poses) = (mfcc(&sound, 16_000), of_poses(&sound, 16_000, 15.0, n_poses(16_000, 16_000, 15.0)));
+        assert_eq!(poses.nrows(), 15);
+        // pose 1 lasts from row 6 2/3 to 13 1/3
+        let whole: f64 = (7..13).map(|row| rows[[row, 3]]).sum();
+        let known = (whole + rows[[6, 3]] / 3.0 + rows[[13, 3]] / 3.0) * 3.0 / 20.0;
+        assert!((poses[[1, 3]] - known).abs() < 1e-9, "{} {known}", poses[[1, 3]]);
+        let silence = silence(16_000);
+        let padded = with_context(&poses, 7, &silence);
+        assert_eq!(padded.dim(), (21, N_CEPSTRA));
+        assert!(padded[[2, 0]] == silence[0] as f32 && padded[[3, 0]] == poses[[0, 0]] as f32);
+        assert!(padded[[20, 5]] == silence[5] as f32 && silence.iter().all(|v| v.is_finite()));
     }
 }
