@@ -1,8 +1,11 @@
 //! Motion as a film: a body, alone or beside the source video or another motion; below, the sound's waveform with a
 //! running mark. A drawn figure alone is shown from its left too.
 
+use super::film_avatar::{AvatarView, FilmCamera};
 use super::film_panel::{FilmArea, FilmBody, FilmPanel};
+use super::film_source::SourceCamera;
 use crate::animate::draw::figure::{INK, LEFT, PAPER, RIGHT, mix};
+use crate::animate::performance::Performance;
 use crate::external::ffmpeg::encode::VideoWriter;
 use crate::external::ffmpeg::frames::FrameReader;
 use crate::external::opencv::draw;
@@ -35,6 +38,8 @@ pub enum SecondPanel<'a> {
     Itself,
     /// Frames of a video from this second of it on.
     Video { path: &'a Path, from_secs: f64 },
+    /// Frames of a video from this second of it on, behind the avatar, which stands where the person does.
+    Behind { path: &'a Path, from_secs: f64, camera: &'a SourceCamera },
     /// Another body, drawn in the same size; the labels of the two, the other last.
     Motion { body: FilmBody<'a>, labels: [&'a str; 2] },
 }
@@ -44,6 +49,7 @@ pub struct Film<'a> {
     fps: FrameRate,
     n_frames: usize,
     panels: Vec<LabelledPanel<'a>>,
+    over: Option<OverVideo<'a>>,
     /// Whether left and right have colours.
     has_colours: bool,
     /// Loudness of each column of the waveform, 0..1; empty without sound.
@@ -72,10 +78,11 @@ impl<'a> Film<'a> {
         };
         let has_colours = matches!(body, FilmBody::Figure(_));
         let panels = match beside {
-            SecondPanel::Itself if has_colours => {
+            SecondPanel::Behind { .. } if !has_colours => Vec::new(),
+            SecondPanel::Itself | SecondPanel::Behind { .. } if has_colours => {
                 vec![one(SIDE, 90.0, "from the left", SIDE[0] + 20.0), one(FRONT, 0.0, "", FRONT[0])]
             }
-            SecondPanel::Itself => vec![one(WHOLE, 0.0, "", 0.0)],
+            SecondPanel::Itself | SecondPanel::Behind { .. } => vec![one(WHOLE, 0.0, "", 0.0)],
             SecondPanel::Video { .. } => vec![one(HALVES[1], 0.0, "", HALVES[1][0])],
             SecondPanel::Motion { body: other, labels } => {
                 let bodies = [body, other];
@@ -86,11 +93,17 @@ impl<'a> Film<'a> {
                 bodies.into_iter().zip(labels).zip(HALVES).map(half).collect()
             }
         };
+        let over = match (beside, body) {
+            (SecondPanel::Behind { path, from_secs, camera }, FilmBody::Avatar(performance, _)) => {
+                Some(OverVideo { performance, path, from_secs, camera, open: None })
+            }
+            _ => None,
+        };
         let (fps, n_frames) = (body.fps(), body.n_frames());
         let secs = fps.secs(n_frames);
         let loudness = |n_parts: usize| sound.map(|sound| loudness(sound, secs, n_parts)).unwrap_or_default();
         let wave = loudness(((WAVE[2] - WAVE[0]) / COLUMN_PX) as usize);
-        Self { fps, n_frames, panels, has_colours, wave, voice: loudness(n_frames) }
+        Self { fps, n_frames, panels, over, has_colours, wave, voice: loudness(n_frames) }
     }
 
     /// Picture of one frame, `SIZE` px; an empty area in place of a video.
@@ -105,6 +118,9 @@ impl<'a> Film<'a> {
                 panel.draw(&mut image, shown, mouth)?;
             }
             draw::text(&mut image, label, [*label_px, 50.0], WORDS_PX, INK)?;
+        }
+        if let Some(over) = &mut self.over {
+            over.draw(&mut image, frame_idx, mouth)?;
         }
         self.draw_wave(&mut image, frame_idx)?;
         if self.has_colours {
@@ -145,7 +161,7 @@ pub fn write(
 ) -> anyhow::Result<()> {
     let (fps, n_frames) = (body.fps(), body.n_frames());
     let mut footage = match beside {
-        SecondPanel::Video { path, from_secs } => Some(FilmFootage::open(path, fps, from_secs)?),
+        SecondPanel::Video { path, from_secs } => Some(FilmFootage::open(path, fps, from_secs, HALVES[0])?),
         _ => None,
     };
     let task = progress.begin("drawing", n_frames as u64);
@@ -170,16 +186,44 @@ pub fn write(
     writer.finish()
 }
 
+/// Avatar before the video that its motion was lifted from; frames are drawn one after the other.
+struct OverVideo<'a> {
+    performance: &'a Performance,
+    path: &'a Path,
+    from_secs: f64,
+    camera: &'a SourceCamera,
+    open: Option<(FilmFootage, Box<AvatarView<'a>>)>,
+}
+
+impl OverVideo<'_> {
+    /// Draws the next frame of the video with the avatar; nothing after the video's last one.
+    fn draw(&mut self, image: &mut Image, frame_idx: usize, mouth: f64) -> anyhow::Result<()> {
+        let (footage, view) = match &mut self.open {
+            Some(open) => open,
+            closed => {
+                let footage = FilmFootage::open(self.path, self.performance.clip.fps, self.from_secs, WHOLE)?;
+                let view = AvatarView::new(self.performance, &[], footage.size, FilmCamera::Front);
+                closed.insert((footage, Box::new(view)))
+            }
+        };
+        if let Some(picture) = footage.picture()? {
+            footage.paste(image, &view.frame_over(picture, frame_idx, mouth, self.camera));
+        }
+        Ok(())
+    }
+}
+
 /// Frames of a video in step with a motion.
 struct FilmFootage {
     frames: FrameReader,
+    area: FilmArea,
     /// Width and height of its pictures in the film, px.
     size: [usize; 2],
     ended: bool,
 }
 
 impl FilmFootage {
-    fn open(path: &Path, fps: FrameRate, from_secs: f64) -> anyhow::Result<Self> {
+    fn open(path: &Path, fps: FrameRate, from_secs: f64, area: FilmArea) -> anyhow::Result<Self> {
         ensure!(from_secs.is_finite() && from_secs >= 0.0, "a video cannot be shown from second {from_secs} on");
         let mut frames = FrameReader::open(path, fps)?;
         for _ in 0..(from_secs * fps.per_sec()).round() as u64 {
@@ -188,24 +232,32 @@ impl FilmFootage {
                 format!("{} lasts {secs:.1} s: it cannot be shown from second {from_secs} on", path.display())
             })?;
         }
-        let [left, top, right, bottom] = HALVES[0];
+        let [left, top, right, bottom] = area;
         let [width, height] = frames.image_size().map(|px| px as f32);
         let scale = ((right - left) / width).min((bottom - top) / height);
         let size = [width, height].map(|px| ((px * scale) as usize).max(2));
-        Ok(Self { frames, size, ended: false })
+        Ok(Self { frames, area, size, ended: false })
     }
 
     /// Draws the next frame into its area; nothing after the last one.
     fn show(&mut self, image: &mut Image) -> anyhow::Result<()> {
-        self.ended = self.ended || self.frames.advance()?.is_none();
-        if self.ended {
-            return Ok(());
+        if let Some(picture) = self.picture()? {
+            self.paste(image, &picture);
         }
-        let picture = self.frames.picture(Some(self.size))?;
-        let [left, top, right, bottom] = HALVES[0].map(|px| px as usize);
-        let (x0, y0) = (left + (right - left - picture.width) / 2, top + (bottom - top - picture.height) / 2);
-        draw::paste(image, &picture, [x0, y0]);
         Ok(())
+    }
+
+    /// Next frame; none after the last one.
+    fn picture(&mut self) -> anyhow::Result<Option<Image>> {
+        self.ended = self.ended || self.frames.advance()?.is_none();
+        if self.ended { Ok(None) } else { Ok(Some(self.frames.picture(Some(self.size))?)) }
+    }
+
+    /// Puts a picture in the middle of the area.
+    fn paste(&self, image: &mut Image, picture: &Image) {
+        let [left, top, right, bottom] = self.area.map(|px| px as usize);
+        let (x0, y0) = (left + (right - left - picture.width) / 2, top + (bottom - top - picture.height) / 2);
+        draw::paste(image, picture, [x0, y0]);
     }
 }
 

@@ -1,5 +1,6 @@
 //! Avatar of a performance before a plain backdrop, framed so that head, hips and every gesture fit.
 
+use super::film_source::SourceCamera;
 use crate::animate::avatar::{Appearance, Avatar};
 use crate::animate::performance::Performance;
 use crate::math::rotation::Rotation;
@@ -81,6 +82,15 @@ impl<'a> AvatarView<'a> {
         self.avatar.pose_into(rig, clip.root, &clip.local[frame_idx], mouth, &mut self.meshes);
         let meshes: Vec<&Mesh> = self.meshes.iter().collect();
         self.renderer.draw(&self.camera, &meshes, &self.light, &self.backdrop)
+    }
+
+    /// Picture of one frame before the picture of a video, of the view's size, from the video's camera.
+    pub fn frame_over(&mut self, behind: Image, frame_idx: usize, mouth: f64, source: &SourceCamera) -> Image {
+        let Performance { rig, clip, .. } = self.performance;
+        let neck = clip.positions(frame_idx)[rig.neck];
+        self.camera = source.at(clip.fps.secs(frame_idx), neck, self.camera.size);
+        self.backdrop = Background::picture(behind);
+        self.frame(frame_idx, mouth)
     }
 }
 

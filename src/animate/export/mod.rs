@@ -4,6 +4,7 @@ pub mod file;
 pub mod film;
 pub mod film_avatar;
 pub mod film_panel;
+pub mod film_source;
 pub mod glb;
 pub mod glb_scene;
 pub mod json;

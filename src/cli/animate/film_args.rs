@@ -9,7 +9,8 @@ pub struct FilmArgs {
     /// Body of a film: a clothed avatar, or the bones as a drawn figure with its sides in two colours.
     #[arg(long, value_enum, default_value = "avatar")]
     style: StyleName,
-    /// Where a film sees the avatar from.
+    /// Where a film sees the avatar from; `source`: from the camera of the video --beside that the motion was lifted
+    /// from, before its picture.
     #[arg(long, value_enum, default_value = "front")]
     camera: CameraName,
 }
@@ -24,15 +25,21 @@ enum StyleName {
 enum CameraName {
     Front,
     ThreeQuarter,
+    Source,
 }
 
 impl FilmArgs {
     pub fn style(&self) -> FilmStyle {
         match (self.style, self.camera) {
             (StyleName::Figure, _) => FilmStyle::Figure,
-            (StyleName::Avatar, CameraName::Front) => FilmStyle::Avatar(FilmCamera::Front),
+            (StyleName::Avatar, CameraName::Front | CameraName::Source) => FilmStyle::Avatar(FilmCamera::Front),
             (StyleName::Avatar, CameraName::ThreeQuarter) => FilmStyle::Avatar(FilmCamera::ThreeQuarter),
         }
+    }
+
+    /// Whether the avatar stands before the video.
+    pub fn is_over_video(&self) -> bool {
+        self.camera == CameraName::Source
     }
 
     /// Options and whether they were given another value than the plain one.

@@ -8,7 +8,7 @@ use orator::formats::keypoints_npz;
 use orator::math::order;
 use orator::mocap::motion_file;
 use orator::stage::artifacts::{Artifact, StageName};
-use orator::types::pose2d::N_BODY;
+use orator::types::pose2d::{Keypoints, N_BODY};
 use orator::types::pose3d::Motion;
 use orator::types::skeleton::ARM_BONES;
 use orator::types::sound::Sound;
@@ -135,10 +135,16 @@ impl MotionInput {
             }
         };
         check(&take.motion).with_context(|| format!("no animation of {}", self.name))?;
-        match keypoints.map(Path::to_owned).or_else(|| self.of_run(Artifact::Keypoints)) {
-            Some(path) => Ok(InputMotion { face: Some(read_face(&path, &take.motion)?), ..take }),
+        match self.keypoints(keypoints, &take.motion)? {
+            Some(Keypoints { body, .. }) => Ok(InputMotion { face: Some(Face { body }), ..take }),
             None => Ok(take),
         }
+    }
+
+    /// The keypoints of a file, else of the run that a lifted video belongs to.
+    pub fn keypoints(&self, named: Option<&Path>, motion: &Motion) -> Result<Option<Keypoints>> {
+        let path = named.map(Path::to_owned).or_else(|| self.of_run(Artifact::Keypoints));
+        path.map(|path| read_keypoints(&path, motion)).transpose()
     }
 
     /// The sound of the run that a lifted video belongs to.
@@ -158,7 +164,7 @@ impl MotionInput {
     }
 }
 
-fn read_face(path: &Path, motion: &Motion) -> Result<Face> {
+fn read_keypoints(path: &Path, motion: &Motion) -> Result<Keypoints> {
     let keypoints = keypoints_npz::read(path)?;
     ensure!(
         keypoints.n_frames() == motion.n_frames(),
@@ -167,7 +173,7 @@ fn read_face(path: &Path, motion: &Motion) -> Result<Face> {
         keypoints.n_frames(),
         motion.n_frames()
     );
-    Ok(Face { body: keypoints.body })
+    Ok(keypoints)
 }
 
 /// That there is something to animate, in metres.

@@ -11,6 +11,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 use orator::animate::export::file::{ExportContent, ExportFormat};
 use orator::animate::export::film::SecondPanel;
 use orator::animate::export::film_panel::{FilmBody, FilmStyle};
+use orator::animate::export::film_source::SourceCamera;
 use orator::animate::performance::{AnimationReport, Jerk, SeenFrames};
 use orator::animate::rig::names::Names;
 use orator::animate::solve::smoothing::ONE_EURO;
@@ -20,6 +21,7 @@ use orator::external::ffmpeg::audio;
 use orator::math::one_euro::OneEuro;
 use orator::mocap::motion_file;
 use orator::stage::progress::Progress as _;
+use orator::types::pose3d::Motion;
 use orator::types::sound::{SAMPLE_RATE, Sound};
 use orator::types::time::FrameRate;
 use serde_json::{Value, json};
@@ -237,6 +239,7 @@ fn animate(
     let started = Instant::now();
     let performance = perform(&motion, face.as_ref(), options);
     let secs = started.elapsed().as_secs_f64();
+    let source = source(args, input, &motion)?;
     let other = match &args.beside {
         Some(path) if motion_file::has_ending(path) => {
             let other = motion_file::read(path, Some(args.in_fps))?;
@@ -255,7 +258,10 @@ fn animate(
     let beside = match (&args.beside, other) {
         (None, _) => SecondPanel::Itself,
         (Some(_), Some(body)) => SecondPanel::Motion { body, labels: labels.each_ref().map(String::as_str) },
-        (Some(path), None) => SecondPanel::Video { path, from_secs: args.beside_from },
+        (Some(path), None) => match &source {
+            Some(camera) => SecondPanel::Behind { path, from_secs: args.beside_from, camera },
+            None => SecondPanel::Video { path, from_secs: args.beside_from },
+        },
     };
     let is_film = outputs.iter().any(|&(_, format)| format == ExportFormat::Mp4);
     let motion_secs = motion.fps.secs(motion.n_frames());
@@ -263,7 +269,9 @@ fn animate(
         Ok(audio::read_mono(path, SAMPLE_RATE)?.map(|whole| part(&whole, from_secs, motion_secs)))
     };
     let sound = match (sound, beside) {
-        (None, SecondPanel::Video { path, from_secs }) if is_film => of_file(path, from_secs)?,
+        (None, SecondPanel::Video { path, from_secs } | SecondPanel::Behind { path, from_secs, .. }) if is_film => {
+            of_file(path, from_secs)?
+        }
         (sound, _) => sound,
     };
     let sound = match (sound, input.sound_of_run()) {
@@ -300,6 +308,19 @@ fn animate(
         "outputs": names(outputs),
     });
     Ok(Done { text, facts })
+}
+
+/// Camera of the video that the motion was lifted from, where a film is to be seen from there.
+fn source(args: &Args, input: &MotionInput, motion: &Motion) -> Result<Option<SourceCamera>> {
+    if !args.film.is_over_video() {
+        return Ok(None);
+    }
+    let is_video = args.beside.as_ref().is_some_and(|path| !motion_file::has_ending(path));
+    ensure!(is_video, "--camera source needs the video that the motion was lifted from: give --beside VIDEO");
+    let keypoints = input.keypoints(args.keypoints.as_deref(), motion)?.with_context(|| {
+        format!("{} has no keypoints, which --camera source needs: give --keypoints FILE.npz", input.name)
+    })?;
+    SourceCamera::fit(motion, &keypoints).map(Some).with_context(|| format!("no camera of {}", input.name))
 }
 
 fn words(report: &AnimationReport) -> String {

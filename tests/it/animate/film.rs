@@ -2,18 +2,21 @@
 
 use crate::fixtures::figures::{FPS, swinging};
 use crate::fixtures::media::sync_clips::{Kind, PLAIN, chirp, chirp_begins, make};
-use ndarray::s;
+use ndarray::{Array3, s};
 use orator::animate::draw::figure::{LEFT, PAPER, RIGHT};
 use orator::animate::export::film;
 use orator::animate::export::film::{Film, SIZE, SecondPanel};
 use orator::animate::export::film_avatar::FilmCamera;
 use orator::animate::export::film_panel::FilmBody;
-use orator::animate::{AnimationOptions, perform};
+use orator::animate::export::film_source::SourceCamera;
+use orator::animate::{AnimationOptions, Constraints, Smoothing, perform};
 use orator::external::ffmpeg::frames::FrameReader;
 use orator::external::ffmpeg::{audio, probe};
 use orator::formats::npy;
 use orator::stage::progress::Silent;
 use orator::types::image::Image;
+use orator::types::pose2d::Keypoints;
+use orator::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
 use orator::types::sound::Sound;
 use std::path::Path;
 use std::process::Command;
@@ -235,6 +238,47 @@ fn the_avatar_moves_as_the_figure_does_and_nothing_is_cut() {
         assert!(body_px(&first) > 40_000, "{}", body_px(&first));
         let moved = first.data.iter().zip(&last.data).filter(|(a, b)| a.abs_diff(**b) > 30).count();
         assert!(moved > 3_000, "{moved}");
+    }
+}
+
+#[test]
+fn before_its_video_the_avatar_stands_where_the_person_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(clip) = make(folder.path(), &Kind { secs: 2.0, ..PLAIN }) else { return };
+    let motion = swinging(6, 4);
+    let neck = [0.05, -0.1, 2.6];
+    // The pixel of a joint in a picture of some size, as a plain lens shows it.
+    let pixel = |t: usize, joint: usize, [width, height]: [f64; 2]| {
+        let [x, y, z] = [0, 1, 2].map(|k| f64::from(motion.joints[[t, joint, k]]) + neck[k]);
+        [(width - 1.0) / 2.0 + 1.2 * width * x / z, (height - 1.0) / 2.0 + 1.2 * width * y / z]
+    };
+    let mut body = Array3::zeros((4, 17, 3));
+    let limbs = [[R_SHOULDER, 6], [R_ELBOW, 8], [R_WRIST, 10], [L_SHOULDER, 5], [L_ELBOW, 7], [L_WRIST, 9]];
+    for (t, [joint, point]) in (0..4).flat_map(|t| limbs.map(|limb| (t, limb))) {
+        let [x, y] = pixel(t, joint, [64.0, 48.0]);
+        body.slice_mut(s![t, point, ..]).assign(&ndarray::arr1(&[x as f32, y as f32, 0.9]));
+    }
+    let hand = Array3::zeros((4, 21, 3));
+    let keypoints = Keypoints { fps: FPS, image_size: [64, 48], body, left_hand: hand.clone(), right_hand: hand };
+    let camera = SourceCamera::fit(&motion, &keypoints).unwrap();
+    let (smoothing, constraints) = (Smoothing::None, Constraints::NONE);
+    let options = AnimationOptions { smoothing, constraints, ..AnimationOptions::default() };
+    let performance = perform(&motion, None, &options);
+    let behind = SecondPanel::Behind { path: &clip.path, from_secs: 0.0, camera: &camera };
+    let mut film = Film::new(FilmBody::Avatar(&performance, FilmCamera::Front), None, behind);
+    let mut video = FrameReader::open(&clip.path, FPS).unwrap();
+    for t in 0..4 {
+        let image = film.frame(t).unwrap();
+        video.advance().unwrap();
+        // 64 x 48 px become 826 x 620 in the middle.
+        let plain = video.picture(Some([826, 620])).unwrap();
+        let is_body = |x: usize, y: usize| image.pixel(227 + x, y) != plain.pixel(x, y);
+        assert!((0..620).all(|y| !is_body(0, y) && !is_body(825, y)));
+        for [joint, _] in limbs {
+            let [x, y] = pixel(t, joint, [826.0, 620.0]).map(|v| v.round() as usize);
+            let near = (0..17).flat_map(|dx| (0..17).map(move |dy| (x + dx - 8, y + dy - 8)));
+            assert!(near.filter(|&(x, y)| is_body(x, y)).count() > 40, "frame {t}: joint {joint} at {x}, {y}");
+        }
     }
 }
 
