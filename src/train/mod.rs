@@ -9,5 +9,6 @@ pub mod log;
 pub mod optim;
 pub mod pose;
 pub mod scene;
+pub mod seq2seq;
 pub mod space;
 pub mod supervised;

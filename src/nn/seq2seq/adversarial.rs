@@ -7,10 +7,8 @@ use crate::nn::ops::conv1d::Conv1d;
 use crate::nn::params::Params;
 use candle_core::{Module, Result, Tensor};
 
-const CHANNELS: [usize; 2] = [100, 200];
 /// Kernel of each convolution; both take every second frame.
 const KERNELS: [usize; 2] = [4, 3];
-const HIDDEN: usize = 100;
 /// Slope of the leaky ReLUs.
 const SLOPE: f64 = 0.2;
 
@@ -25,7 +23,7 @@ impl SegmentDiscriminator {
     /// For segments of `config.predicted` poses.
     pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
         let (mut blocks, mut n_in, mut n_frames) = (Vec::new(), config.pose, config.predicted);
-        for (i, (channels, kernel)) in CHANNELS.into_iter().zip(KERNELS).enumerate() {
+        for (i, (channels, kernel)) in config.score_channels.into_iter().zip(KERNELS).enumerate() {
             if n_frames < kernel {
                 candle_core::bail!("{} poses are too few for the discriminator", config.predicted);
             }
@@ -36,8 +34,8 @@ impl SegmentDiscriminator {
         }
         Ok(Self {
             blocks,
-            hidden: Affine::new(params, "linear.0", n_in * n_frames, HIDDEN)?,
-            score: Affine::new(params, "linear.1", HIDDEN, 1)?,
+            hidden: Affine::new(params, "linear.0", n_in * n_frames, config.score_hidden)?,
+            score: Affine::new(params, "linear.1", config.score_hidden, 1)?,
         })
     }
 

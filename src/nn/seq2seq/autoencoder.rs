@@ -9,10 +9,6 @@ use crate::nn::ops::dropout::dropout;
 use crate::nn::params::Params;
 use candle_core::{Module, Result, Tensor};
 
-const HIDDEN: usize = 312;
-/// Numbers of the code of a pose.
-pub const CODE: usize = 40;
-
 /// `encoder.0`, `encoder.2`, `decoder.0`, `decoder.2`: a pose to its code and back, ReLU within, tanh behind.
 pub struct PoseAutoencoder {
     layers: [Affine; 4],
@@ -20,18 +16,19 @@ pub struct PoseAutoencoder {
 
 impl PoseAutoencoder {
     pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
+        let Config { pose, pose_hidden, code, .. } = *config;
         let mut layer = |name: &str, n: [usize; 2]| Affine::new(params, name, n[0], n[1]);
         Ok(Self {
             layers: [
-                layer("encoder.0", [config.pose, HIDDEN])?.with_relu(),
-                layer("encoder.2", [HIDDEN, CODE])?,
-                layer("decoder.0", [CODE, HIDDEN])?.with_relu(),
-                layer("decoder.2", [HIDDEN, config.pose])?,
+                layer("encoder.0", [pose, pose_hidden])?.with_relu(),
+                layer("encoder.2", [pose_hidden, code])?,
+                layer("decoder.0", [code, pose_hidden])?.with_relu(),
+                layer("decoder.2", [pose_hidden, pose])?,
             ],
         })
     }
 
-    /// Codes [B, CODE] of poses [B, pose].
+    /// Codes [B, code] of poses [B, pose].
     pub fn encode(&self, poses: &Tensor) -> Result<Tensor> {
         self.layers[1].forward(&self.layers[0].forward(poses)?)?.tanh()
     }
@@ -58,14 +55,14 @@ impl SpeechEncoder {
     pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
         Ok(Self {
             audio: ContextEncoder::new(params, "audio_encoder", config)?,
-            linear: Affine::new(params, "linear", config.hidden, CODE)?,
+            linear: Affine::new(params, "linear", config.hidden, config.code)?,
             config: config.clone(),
         })
     }
 
-    /// Audio [B, T + context - 1, audio] to codes [B, T, CODE].
+    /// Audio [B, T + context - 1, audio] to codes [B, T, code].
     pub fn forward(&self, audio: &Tensor, mode: &mut Mode) -> Result<Tensor> {
         let heard = dropout(&self.audio.forward(audio, mode)?, self.config.dropout, mode)?;
-        self.linear.forward(&heard)?.reshape((audio.dim(0)?, (), CODE))
+        self.linear.forward(&heard)?.reshape((audio.dim(0)?, (), self.config.code))
     }
 }

@@ -31,6 +31,12 @@ pub struct Config {
     pub dropout: f64,
     /// Share of state and contexts that `words` drops before the output.
     pub dropout_read: f64,
+    /// Channels of the discriminator's convolutions, and numbers of the layer behind them.
+    pub score_channels: [usize; 2],
+    pub score_hidden: usize,
+    /// Numbers of the autoencoder's inner layers, and of the code of a pose.
+    pub pose_hidden: usize,
+    pub code: usize,
 }
 
 impl Default for Config {
@@ -50,6 +56,10 @@ impl Default for Config {
             dropout_between: 0.2,
             dropout: 0.1,
             dropout_read: 0.5,
+            score_channels: [100, 200],
+            score_hidden: 100,
+            pose_hidden: 312,
+            code: 40,
         }
     }
 }

@@ -8,3 +8,4 @@ pub mod lifter_parity;
 pub mod packages;
 pub mod pose_parity;
 pub mod real;
+pub mod seq2seq_parity;

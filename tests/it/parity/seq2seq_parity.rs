@@ -1,0 +1,201 @@
+//! The sequence-to-sequence networks and their losses give what PyTorch's own modules give, outputs and every gradient
+//! (`fixtures/reference/seq2seq_reference.py`); weights and inputs are filled by one formula on both sides.
+
+use crate::fixtures::networks::{phase, value};
+use candle_core::{DType, Device, Result, Tensor, Var};
+use orator::nn::Mode;
+use orator::nn::ops::gradcheck::pattern;
+use orator::nn::params::Params;
+use orator::nn::seq2seq::adversarial::SegmentDiscriminator;
+use orator::nn::seq2seq::autoencoder::{PoseAutoencoder, SpeechEncoder};
+use orator::nn::seq2seq::config::{Config, Segment};
+use orator::nn::seq2seq::contextual::ContextSeq2Seq;
+use orator::nn::seq2seq::predict::GesturePredictor;
+use orator::nn::seq2seq::words::WordsSeq2Seq;
+use orator::train::seq2seq::losses;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::collections::BTreeMap;
+
+const BATCH: usize = 10;
+
+#[derive(serde::Deserialize)]
+struct Golden {
+    #[serde(default)]
+    eval: Vec<f64>,
+    train: Vec<f64>,
+    gradients: BTreeMap<String, Vec<f64>>,
+    #[serde(default)]
+    running: BTreeMap<String, Vec<f64>>,
+}
+
+fn golden(name: &str) -> Golden {
+    let text = include_str!("../../../fixtures/reference/seq2seq_golden.json");
+    let mut all: BTreeMap<String, Golden> = serde_json::from_str(text).unwrap();
+    all.remove(name).unwrap()
+}
+
+/// Sizes of the reference; nothing is dropped.
+fn small() -> Config {
+    Config {
+        pose: 5,
+        audio: 4,
+        context: 7,
+        previous: 3,
+        predicted: 8,
+        hidden: 6,
+        vocabulary: 9,
+        word: 5,
+        word_hidden: 4,
+        dropout_between: 0.0,
+        dropout: 0.0,
+        dropout_read: 0.0,
+        score_channels: [6, 7],
+        score_hidden: 5,
+        pose_hidden: 8,
+        code: 4,
+        ..Config::default()
+    }
+}
+
+fn inputs(words: Option<Tensor>, dtype: DType) -> Result<Segment> {
+    let c = small();
+    Ok(Segment {
+        audio: pattern(&[BATCH, c.audio_frames(), c.audio], 1.0)?.to_dtype(dtype)?,
+        previous: pattern(&[BATCH, c.previous, c.pose], 2.0)?.to_dtype(dtype)?,
+        words,
+    })
+}
+
+/// Words of a segment, most rows padded with word 0.
+fn words_of_segments() -> Result<Tensor> {
+    let word = |b: usize, w: usize| if w < 1 + b % 4 { (7 * b + 3 * w) % 9 } else { 0 };
+    let all = (0..BATCH).flat_map(|b| (0..4).map(move |w| word(b, w) as u32));
+    Tensor::from_vec(all.collect::<Vec<u32>>(), (BATCH, 4), &Device::Cpu)
+}
+
+fn words_of_poses() -> Result<Tensor> {
+    let n = small().predicted;
+    let word = |b: usize, t: usize, w: usize| if w < 1 + (b + t) % 3 { (5 * b + 3 * t + w) % 9 } else { 0 };
+    let of_row = move |b: usize| (0..n).flat_map(move |t| (0..3).map(move |w| word(b, t, w) as u32));
+    Tensor::from_vec((0..BATCH).flat_map(of_row).collect::<Vec<u32>>(), (BATCH, n, 3), &Device::Cpu)
+}
+
+/// Every tensor by the formula, weights of norms around 1 as trained ones are.
+fn filled(params: &Params) -> Result<BTreeMap<String, Tensor>> {
+    let of_norm = |name: &str| name.contains("norm.") && name.ends_with(".weight");
+    let tensors = params.all().map(|(name, var)| {
+        let tensor = match of_norm(name) {
+            true => pattern(var.dims(), phase(name))?.affine(0.2, 1.0)?,
+            false => value(name, var.dims())?,
+        };
+        Ok((name.to_owned(), tensor))
+    });
+    tensors.collect()
+}
+
+/// Largest difference over the largest number expected, 1e-3 at least.
+fn off(own: &Tensor, expected: &[f64]) -> Result<f64> {
+    let own = own.to_dtype(DType::F64)?.flatten_all()?.to_vec1::<f64>()?;
+    assert_eq!(own.len(), expected.len());
+    let most = expected.iter().fold(1e-3f64, |most, v| most.max(v.abs()));
+    Ok(own.iter().zip(expected).map(|(own, expected)| (own - expected).abs() / most).fold(0.0, f64::max))
+}
+
+/// Compares a network, `build` and `run` by their parts: outputs to 1e-5, gradients and running statistics to 1e-3 in f32,
+/// all to 1e-7 in f64.
+fn compare<N>(
+    name: &str,
+    build: impl Fn(&mut Params) -> Result<N>,
+    run: impl Fn(&N, DType, &mut Mode) -> Result<Tensor>,
+) -> anyhow::Result<()> {
+    let golden = golden(name);
+    for (dtype, most_output, most_gradient) in [(DType::F32, 1e-5, 1e-3), (DType::F64, 1e-7, 1e-7)] {
+        let mut params = Params::with_dtype(0, dtype);
+        let net = build(&mut params)?;
+        params.load(&filled(&params)?)?;
+        let evaluated = off(&run(&net, dtype, &mut Mode::Eval)?, &golden.eval)?;
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        let y = run(&net, dtype, &mut Mode::Train(&mut rng))?;
+        let trained = off(&y, &golden.train)?;
+        assert!(evaluated.max(trained) < most_output, "{name} {dtype:?}: outputs {evaluated:e} {trained:e}");
+        let gradients = (&y * pattern(y.dims(), 0.5)?.to_dtype(dtype)?)?.sum_all()?.backward()?;
+        let names: Vec<&str> = params.trainables().map(|(own, _)| own).collect();
+        assert_eq!(names, golden.gradients.keys().map(String::as_str).collect::<Vec<_>>(), "{name}");
+        let mut worst = 0.0f64;
+        for (own, var) in params.trainables() {
+            let gradient = gradients.get(var).unwrap();
+            assert_eq!(gradient.dims(), var.dims());
+            let off = off(gradient, &golden.gradients[own])?;
+            assert!(off < most_gradient, "{name} {dtype:?}: gradient of {own} {off:e}");
+            worst = worst.max(off);
+        }
+        for (own, var) in params.all().filter(|(own, _)| own.contains("running_")) {
+            let off = off(var.as_tensor(), &golden.running[own])?;
+            assert!(off < most_output, "{name} {dtype:?}: {own} {off:e}");
+        }
+        eprintln!("{name} {dtype:?}: outputs {:.1e}, gradients {worst:.1e}", evaluated.max(trained));
+    }
+    Ok(())
+}
+
+#[test]
+fn the_network_of_words_is_that_of_pytorch() -> anyhow::Result<()> {
+    let run =
+        |net: &WordsSeq2Seq, dtype, mode: &mut Mode| net.forward(&inputs(Some(words_of_segments()?), dtype)?, mode);
+    compare("words", |params| WordsSeq2Seq::new(params, &small()), run)?;
+    let config = Config { hears_context: true, ..small() };
+    compare("words_context", |params| WordsSeq2Seq::new(params, &config), run)
+}
+
+#[test]
+fn the_contextual_network_is_that_of_pytorch() -> anyhow::Result<()> {
+    let run =
+        |net: &ContextSeq2Seq, dtype, mode: &mut Mode| net.forward(&inputs(Some(words_of_poses()?), dtype)?, mode);
+    compare("contextual", |params| ContextSeq2Seq::new(params, &small()), run)
+}
+
+#[test]
+fn the_adversarial_networks_are_those_of_pytorch() -> anyhow::Result<()> {
+    let run = |net: &WordsSeq2Seq, dtype, mode: &mut Mode| net.forward(&inputs(None, dtype)?, mode);
+    compare("adversarial", |params| WordsSeq2Seq::without_words(params, &small()), run)?;
+    let score = |net: &SegmentDiscriminator, dtype, mode: &mut Mode| {
+        net.forward(&pattern(&[BATCH, 8, 5], 3.0)?.to_dtype(dtype)?, mode.trains())
+    };
+    compare("discriminator", |params| SegmentDiscriminator::new(params, &small()), score)
+}
+
+#[test]
+fn the_audio_baseline_is_that_of_pytorch() -> anyhow::Result<()> {
+    let back = |net: &PoseAutoencoder, dtype, _: &mut Mode| {
+        net.forward(&pattern(&[BATCH, 8, 5], 3.0)?.reshape((BATCH * 8, 5))?.to_dtype(dtype)?)
+    };
+    compare("autoencoder", |params| PoseAutoencoder::new(params, &small()), back)?;
+    let code = |net: &SpeechEncoder, dtype, mode: &mut Mode| net.forward(&inputs(None, dtype)?.audio, mode);
+    compare("speech", |params| SpeechEncoder::new(params, &small()), code)
+}
+
+#[test]
+fn the_losses_are_those_of_pytorch() -> anyhow::Result<()> {
+    let real = &pattern(&[3, 6, 4], 5.0)?;
+    type Loss<'a> = &'a dyn Fn(&Tensor) -> Result<Tensor>;
+    let all: [(&str, Loss); 8] = [
+        ("l1", &|made| losses::l1(made, real)),
+        ("mse", &|made| losses::mse(made, real)),
+        ("continuity_of_numbers", &losses::continuity_of_numbers),
+        ("continuity_of_poses", &losses::continuity_of_poses),
+        ("excursion", &losses::excursion),
+        ("variance", &losses::variance),
+        ("discriminator", &|made| losses::discriminator(made, real)),
+        ("adversarial", &losses::adversarial),
+    ];
+    for (name, loss) in all {
+        let golden = golden(&format!("loss {name}"));
+        let made = Var::from_tensor(&pattern(&[3, 6, 4], 4.0)?)?;
+        let value = loss(&made)?;
+        assert!(off(&value, &golden.train)? < 1e-7, "{name}");
+        let gradients = value.backward()?;
+        assert!(off(gradients.get(&made).unwrap(), &golden.gradients["made"])? < 1e-7, "gradient of {name}");
+    }
+    Ok(())
+}
