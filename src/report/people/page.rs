@@ -14,13 +14,12 @@ pub fn html(rows: &[PeopleRow], last: Option<&Grid>) -> String {
         let title = node("h3").text(format!("Model set {}", rows[0].set));
         std::iter::once(title).chain(grids(rows).iter().flat_map(shown).collect::<Vec<_>>())
     });
+    let mut sections = vec![Section { id: "sets", title: "By condition", body: body.collect() }];
+    sections.extend(last.map(|grid| Section { id: "gap", title: "Without truth", body: shown(grid).into() }));
     let page = Page {
         title: "Errors on rendered people".to_owned(),
         lead: format!("{n_clips} clips of rendered people whose truth is known; model sets: {}.", names.join(", ")),
-        sections: vec![
-            Section { id: "sets", title: "By condition", body: body.collect() },
-            Section { id: "gap", title: "Without truth", body: last.into_iter().flat_map(shown).collect() },
-        ],
+        sections,
         style: "",
         script: "",
         data: Value::Null,

@@ -1,6 +1,7 @@
 //! Rendered people: what is written is what is read back, what hides a point is told, and the bytes depend on nothing
 //! but the seed.
 
+use crate::fixtures::skip::fetched_models;
 use crate::fixtures::support::Project;
 use ndarray::Array2;
 use orator::demo::people::condition::Condition;
@@ -83,6 +84,26 @@ fn an_unknown_condition_is_refused_with_the_list() {
     assert_ne!(refused.code, 0);
     assert!(refused.errors.contains("`rear`") && refused.errors.contains("hands-folded"), "{}", refused.errors);
     assert!(!project.dir().join("people").exists());
+}
+
+#[test]
+fn the_page_of_errors_is_written_where_it_is_asked_for() {
+    let Some(models) = fetched_models() else { return };
+    let project = Project::with_clips("people-page", 0, 1.0);
+    let page = tempfile::tempdir().unwrap();
+    folder::draw(&project.dir().join("people"), &plan(&[Condition::Front]), &Silent).unwrap();
+    let models = format!("models.dir={}", models.display());
+    let ran = project.run(&["-c", "people/pipeline.toml", "--to", "lift", "--set", &models]);
+    assert_eq!(ran.code, 0, "{}", ran.errors);
+    let (file, text) = (page.path().join("people.html"), page.path().join("people.html").display().to_string());
+    let report = project.answer(&["evaluate", "people", "people", "--report", &text]);
+    assert_eq!(report.code, 0, "{}", report.errors);
+    let html = std::fs::read_to_string(&file).unwrap();
+    assert!(html.contains("Errors on rendered people") && !html.contains("Without truth"), "{html}");
+    let both = ["evaluate", "people", "people", "--beside", "people/pipeline.toml", "--report", &text];
+    let report = project.answer(&both);
+    assert_eq!(report.code, 0, "{}", report.errors);
+    assert!(std::fs::read_to_string(&file).unwrap().contains("Without truth"));
 }
 
 #[test]
