@@ -37,6 +37,17 @@ pub enum AdversarialLoss {
     Log,
 }
 
+/// Whom of several people in view the stage pose2d follows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FollowRule {
+    /// The largest, surest and most central.
+    #[default]
+    Largest,
+    /// The one whose mouth follows the voice, where that is clear, else the largest; needs the face model.
+    Speaking,
+}
+
 /// What tells speech from other sound.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

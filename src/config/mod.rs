@@ -12,7 +12,9 @@ pub mod rules;
 pub mod sections;
 pub mod videos;
 
-pub use choices::{AdversarialLoss, ComputeDevice, MotionRepresentation, NetworkPreset, SpeechRule, SplitUnit};
+pub use choices::{
+    AdversarialLoss, ComputeDevice, FollowRule, MotionRepresentation, NetworkPreset, SpeechRule, SplitUnit,
+};
 pub use config_path::ConfigPath;
 pub use file::Problem;
 pub use file::SourceLocation;

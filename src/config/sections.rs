@@ -1,7 +1,9 @@
 //! The sections of `pipeline.toml` with their defaults. What each key means, its unit and its reason stand in the
 //! top level `pipeline.toml`; here are the types.
 
-use super::choices::{AdversarialLoss, ComputeDevice, MotionRepresentation, NetworkPreset, SpeechRule, SplitUnit};
+use super::choices::{
+    AdversarialLoss, ComputeDevice, FollowRule, MotionRepresentation, NetworkPreset, SpeechRule, SplitUnit,
+};
 use super::config_path::ConfigPath;
 use crate::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
@@ -152,6 +154,8 @@ pub struct Pose2dConfig {
     pub palm: String,
     /// Face model, which sees how far the mouth is open; empty, or `auto` where it is not there: none.
     pub face: String,
+    /// Whom of several people to follow.
+    pub follow: FollowRule,
     /// The person detector looks at every n-th frame of a shot.
     pub person_every: usize,
     /// The palm detector looks at every n-th frame while a hand is missing; more rarely while it finds none.
@@ -172,6 +176,7 @@ impl Default for Pose2dConfig {
             hand: "auto".into(),
             palm: "auto".into(),
             face: "auto".into(),
+            follow: FollowRule::Largest,
             person_every: 15,
             palm_every: 5,
             person_follow: 0.3,

@@ -166,20 +166,20 @@ impl PairSums {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
     use crate::audio::openness::OpennessMeter;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use std::f64::consts::TAU;
 
-    const FPS: FrameRate = FrameRate::new(15, 1);
+    pub const FPS: FrameRate = FrameRate::new(15, 1);
 
     /// How open a mouth is that says four syllables a second of its own lengths and widths: 0..1.
-    struct Mouth(Vec<[f64; 3]>);
+    pub struct Mouth(Vec<[f64; 3]>);
 
     impl Mouth {
-        fn new(secs: f64, seed: u64) -> Self {
+        pub fn new(secs: f64, seed: u64) -> Self {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let (mut syllables, mut now) = (Vec::new(), 0.0);
             while now < secs {
@@ -199,7 +199,7 @@ mod tests {
         }
 
         /// Its voice, `late` seconds later: a murmur, and harmonics up to 4 kHz as far as the mouth is open.
-        fn voice(&self, secs: f64, late: f64) -> Openness {
+        pub fn voice(&self, secs: f64, late: f64) -> Openness {
             let mut meter = OpennessMeter::default();
             let sample = |n: usize| {
                 let now = n as f64 / 16_000.0;
@@ -213,7 +213,7 @@ mod tests {
         }
 
         /// The opening that is seen, with noise, every `unseen`-th frame missing.
-        fn seen(&self, secs: f64, unseen: usize, seed: u64) -> (Vec<f32>, Vec<f64>) {
+        pub fn seen(&self, secs: f64, unseen: usize, seed: u64) -> (Vec<f32>, Vec<f64>) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let times: Vec<f64> = (0..FPS.frames_in(secs)).map(|t| FPS.secs(t)).collect();
             let opening = |(t, secs): (usize, &f64)| {

@@ -1,5 +1,5 @@
 //! The pipeline as a value (`pipeline`, run by `run`, looked at by `status`), its five stages, how the `pictures` of its
-//! videos are read, and speech to motion files in batches. The stages never import each other: they meet in the files that
+//! videos are read, what their `sound` tells of loudness and `lips` of whose voice it is, and speech to motion files in batches. The stages never import each other: they meet in the files that
 //! they write. `keypoints` stands in for the first two where other programs looked at the pictures.
 
 pub mod account;
@@ -8,6 +8,7 @@ pub mod dataset;
 pub mod extract;
 pub mod keypoints;
 pub mod lift;
+pub mod lips;
 pub mod pictures;
 pub mod pipeline;
 pub mod pose2d;
@@ -15,6 +16,7 @@ pub mod process;
 pub mod run;
 pub mod segment;
 pub mod selection;
+pub mod sound;
 pub mod stages;
 pub mod status;
 

@@ -11,6 +11,7 @@ use super::model_input::ModelInput;
 use super::palm::PalmDetector;
 use super::person::Detector;
 use super::speaker::SpeakerTracker;
+use super::talker::TalkerPath;
 use crate::config;
 use crate::external::onnx::{ModelRole, ModelStore, Runtime};
 use crate::types::image::Image;
@@ -73,7 +74,12 @@ impl Chain {
 
     /// A new shot begins: nothing of the one before is followed.
     pub fn begin_shot(&mut self) {
-        self.speaker.begin_anew();
+        self.begin_shot_of(None);
+    }
+
+    /// A new shot begins, in which the one who goes this way is followed, if it is known.
+    pub fn begin_shot_of(&mut self, talker: Option<TalkerPath>) {
+        self.speaker.begin_anew(talker);
         self.body_seen = false;
         self.forget_details();
         self.n_frames = 0;

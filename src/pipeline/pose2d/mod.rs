@@ -1,7 +1,8 @@
 //! Stage 2: frames to 2D keypoints of the one speaker: person box, body, both hands, tracked through each shot.
 //! `decode` reads the models' outputs, one file a kind; `person`, `body`, `hand` and `palm` ask one model each; `speaker`
 //! says who is tracked, with `tracker` (the choice), `liveness` and `appearance` (on a `patch` of the picture); `region`
-//! and `hands` say where to look for a hand and when; `face` sees the mouth; `chain` is the way of one frame; `stage` the way of a video.
+//! and `hands` say where to look for a hand and when; `face` sees the mouth, `talker` finds whose mouth the voice is of;
+//! `chain` is the way of one frame; `stage` the way of a video.
 
 pub mod appearance;
 pub mod body;
@@ -20,6 +21,7 @@ pub mod region;
 pub mod speaker;
 pub mod stage;
 pub mod store;
+pub mod talker;
 pub mod tracker;
 
 pub use chain::Chain;

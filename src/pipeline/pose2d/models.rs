@@ -1,8 +1,8 @@
 //! Which models look at a frame: the ids of the configuration, with `auto` answered by the folder of models.
 
-use crate::config::Pose2dConfig;
+use crate::config::{FollowRule, Pose2dConfig};
 use crate::external::onnx::{AUTO, ModelRole, ModelStore, Wanted};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
 /// The keys of `[pose2d]` that name a model, with the role of each and what the configuration says.
 pub fn keys(config: &Pose2dConfig) -> [(&'static str, ModelRole, &String); 5] {
@@ -39,6 +39,25 @@ pub fn advice(config: &Pose2dConfig, store: &ModelStore) -> Option<&'static str>
     )
 }
 
+/// Whether the models are named that find who speaks, where that is to be found.
+///
+/// # Errors
+/// The key that is empty, and what to do.
+pub fn check_follow(chosen: &Pose2dConfig) -> Result<()> {
+    if chosen.follow == FollowRule::Speaking {
+        let needs = |key: &str, id: &str, remedy: &str| {
+            ensure!(
+                !id.is_empty(),
+                "pose2d.follow = \"speaking\" needs a model in pose2d.{key}, and there is none: {remedy}"
+            );
+            Ok(())
+        };
+        needs("face", &chosen.face, "`orator models fetch` gets one; or write follow = \"largest\"")?;
+        needs("person", &chosen.person, "write person = \"auto\", or follow = \"largest\"")?;
+    }
+    Ok(())
+}
+
 /// Whether the face model is left to what is there, and none is.
 fn lacks_face(config: &Pose2dConfig, store: &ModelStore) -> bool {
     let is_there = |entry| store.path(entry).is_file();
@@ -49,4 +68,26 @@ fn lacks_face(config: &Pose2dConfig, store: &ModelStore) -> bool {
 pub fn wanted(config: &Pose2dConfig) -> Vec<Wanted> {
     let named = keys(config).into_iter().filter(|(_, _, id)| !id.is_empty());
     named.map(|(_, role, id)| if id == AUTO { Wanted::Role(role) } else { Wanted::Id(id.clone()) }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_speaks_is_found_with_a_face_and_a_person_model_or_not_at_all() {
+        let speaking = Pose2dConfig { follow: FollowRule::Speaking, ..Pose2dConfig::default() };
+        let said = |config: Pose2dConfig| check_follow(&config).err().map(|error| error.to_string());
+        assert_eq!(
+            (said(speaking.clone()), said(Pose2dConfig { face: String::new(), ..Pose2dConfig::default() })),
+            (None, None)
+        );
+        let face = said(Pose2dConfig { face: String::new(), ..speaking.clone() }).unwrap();
+        assert!(face.contains("pose2d.face") && face.contains("orator models fetch"), "{face}");
+        assert!(said(Pose2dConfig { person: String::new(), ..speaking.clone() }).unwrap().contains("pose2d.person"));
+        // `auto` without the model's file is none.
+        let empty = tempfile::tempdir().unwrap();
+        let chosen = choose(&speaking, &ModelStore::open(empty.path()).unwrap()).unwrap();
+        assert!(said(chosen).is_some());
+    }
 }

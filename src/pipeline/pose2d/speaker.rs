@@ -6,6 +6,7 @@ use super::body::BodyModel;
 use super::decode::{ScoredPoint, boxes};
 use super::liveness::LivenessTracks;
 use super::person::Detector;
+use super::talker::TalkerPath;
 use super::tracker::{Candidate, PersonTrack, TrackerStep};
 use crate::config;
 use crate::types::image::Image;
@@ -45,6 +46,9 @@ pub struct SpeakerTracker {
     several: bool,
     /// Whom the shot before showed, and where.
     before: Option<(PersonBox, BodyColours)>,
+    /// The way of the one who speaks in this shot, where that is known, and the frame of the shot.
+    talker: Option<TalkerPath>,
+    idx: usize,
 }
 
 impl SpeakerTracker {
@@ -59,6 +63,8 @@ impl SpeakerTracker {
             n_strange: 0,
             several: false,
             before: None,
+            talker: None,
+            idx: 0,
         }
     }
 
@@ -72,8 +78,9 @@ impl SpeakerTracker {
         Ok(())
     }
 
-    /// Ends the track.
-    pub fn begin_anew(&mut self) {
+    /// Ends the track; `talker`: the way of the one to follow next, where it is known.
+    pub fn begin_anew(&mut self, talker: Option<TalkerPath>) {
+        self.talker = talker;
         let place = self.track.place.map(|_| self.track.person());
         self.before = place.zip(self.colours.take());
         self.track.begin_anew();
@@ -90,6 +97,7 @@ impl SpeakerTracker {
         body_seen: bool,
         settings: &config::Pose2dConfig,
     ) -> Result<()> {
+        self.idx = idx;
         let every = settings.person_every.max(1);
         let crowd = self.track.n_people > 1 && idx.is_multiple_of((every / CROWD_LOOKS).max(1));
         let regular = idx.is_multiple_of(every);
@@ -160,17 +168,23 @@ impl SpeakerTracker {
         };
         let found = detector.find(image)?;
         let movements = self.tracks.look(image, &found);
-        let candidate = |(person, movement)| Candidate { person, movement, appearance_distance: None };
-        Ok(Some(found.into_iter().zip(movements).map(candidate).collect()))
+        let talker = self.talker.as_ref().and_then(|path| path.goer(self.idx, found.iter().copied()));
+        let candidate = |(at, (person, movement))| {
+            let speaks = talker == Some(at);
+            Candidate { person, movement, appearance_distance: None, speaks }
+        };
+        Ok(Some(found.into_iter().zip(movements).enumerate().map(candidate).collect()))
     }
 }
 
-/// Whether the one in the followed box still is the speaker: nobody else found is much more like the speaker.
+/// Whether the one in the followed box still is the speaker: known to speak, or nobody else found is much more like the
+/// speaker.
 fn is_here(found: &[Candidate], followed: &PersonBox) -> bool {
     let overlap = |one: &Candidate| boxes::overlap(&one.person, followed);
     let Some(here) = found.iter().max_by(|a, b| overlap(a).total_cmp(&overlap(b))) else { return false };
     let appearance_distance = |one: &Candidate| one.appearance_distance.unwrap_or(f32::INFINITY);
-    overlap(here) >= HERE && found.iter().all(|one| appearance_distance(one) >= MUCH_NEARER * appearance_distance(here))
+    let is_likeliest = || found.iter().all(|one| appearance_distance(one) >= MUCH_NEARER * appearance_distance(here));
+    overlap(here) >= HERE && (here.speaks || is_likeliest())
 }
 
 /// How far the colours of everybody found are from those given.

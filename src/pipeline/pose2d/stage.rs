@@ -1,11 +1,15 @@
 //! The way of a video: its frames at the dataset rate, one after the other, through a `Chain` that begins anew at each
-//! shot, into `keypoints.npz`. A frame that repeats the one before is not looked at again.
+//! shot, into `keypoints.npz`. A frame that repeats the one before is not looked at again. To follow who speaks, a
+//! `TalkerSearch` sees the whole video first.
 
 use super::chain::Chain;
 use super::models;
 use super::store::KeypointFrames;
+use super::talker::TalkerSearch;
+use super::talker::choice::ShotVoice;
+use super::talker::search::ShotTalker;
 use crate::config;
-use crate::config::Settings;
+use crate::config::{FollowRule, Settings};
 use crate::external::ffmpeg;
 use crate::external::ffmpeg::ahead;
 use crate::external::ffmpeg::frames::{FrameReader, FrameTime};
@@ -14,9 +18,11 @@ use crate::external::opencv;
 use crate::formats::keypoints_npz;
 use crate::formats::media_json::MediaInfo;
 use crate::formats::timeline_npz::Timeline;
+use crate::pipeline::{lips, sound};
 use crate::stage::artifacts::{Artifact, StageName};
-use crate::stage::progress::{Event, Progress};
-use crate::stage::{Input, Report, Stage, Unit};
+use crate::stage::progress::{Event, Progress, Task};
+use crate::stage::{Input, Report, Stage, Unit, counted};
+use crate::types::image::Image;
 use crate::types::pose2d::{Keypoint, Pose2d};
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result, ensure};
@@ -43,13 +49,16 @@ impl Pose2dStage {
     /// Reads the manifest and looks which models are there; opens none.
     ///
     /// # Errors
-    /// A manifest that is not sound; a model that is not in it.
+    /// A manifest that is not sound; a model that is not in it; `follow = "speaking"` without the models that find who
+    /// speaks.
     pub fn new(settings: &Settings) -> Result<Self> {
         let named = settings.speaker.iter().filter(|speaker| !speaker.reference.as_os_str().is_empty());
         let references = named.map(|speaker| (speaker.name.clone(), speaker.reference.to_path_buf()));
         let store = ModelStore::open(&settings.models.dir)?;
+        let chosen = models::choose(&settings.pose2d, &store)?;
+        models::check_follow(&chosen)?;
         Ok(Self {
-            settings: models::choose(&settings.pose2d, &store)?,
+            settings: chosen,
             models: settings.models.clone(),
             fps: settings.extract.rate(),
             work: settings.work.dir.to_path_buf(),
@@ -91,8 +100,13 @@ impl Stage for Pose2dStage {
         };
         let models: serde_json::Map<String, Value> =
             self.used().unwrap_or_default().into_iter().map(|(key, entry)| (key.to_owned(), read(entry))).collect();
+        let mut pose2d = json!(self.settings);
+        // The largest was followed before there was a choice: what was made then is what would be made now.
+        if let Some(keys) = pose2d.as_object_mut().filter(|_| !self.follows_talker()) {
+            keys.remove("follow");
+        }
         json!({
-            "pose2d": self.settings,
+            "pose2d": pose2d,
             "fps": [self.fps.num, self.fps.den],
             "models": models,
             "onnxruntime": self.runtime().map_or_else(|_| "missing".to_owned(), |runtime| runtime.version()),
@@ -111,6 +125,10 @@ impl Stage for Pose2dStage {
         if let Some(path) = self.references.get(&unit.speaker) {
             inputs.push(input("reference".into(), path.clone()));
         }
+        let sound = Artifact::Sound.path(&self.work, unit);
+        if self.follows_talker() && sound.exists() {
+            inputs.push(input("sound".into(), sound));
+        }
         for (key, entry) in self.used()? {
             let path = self.models.dir.join(&entry.file);
             if !path.exists() {
@@ -123,6 +141,12 @@ impl Stage for Pose2dStage {
 
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let restarts = Timeline::read(&Artifact::Timeline.path(&self.work, unit))?.restart;
+        let media = MediaInfo::read(&Artifact::MediaInfo.path(&self.work, unit))?;
+        let n_passes = 1 + u64::from(self.follows_talker());
+        let task = progress.begin(&unit.to_string(), n_passes * restarts.len() as u64);
+        let video = VideoFrames { unit, restarts: &restarts, media: &media, fps: self.fps };
+        let talkers = if self.follows_talker() { self.talkers(&video, &*task)? } else { Vec::new() };
+        let mut ways = talkers.iter().map(|shot| shot.path.clone());
         let mut chain = Chain::new(&self.runtime()?, &self.store, &self.settings)?;
         if let Some(path) = self.references.get(&unit.speaker) {
             let mut reference = FrameReader::open(path, FrameRate::new(1, 1))?;
@@ -131,31 +155,15 @@ impl Stage for Pose2dStage {
                 .set_reference(&picture.image)
                 .with_context(|| format!("the speaker's reference {}", path.display()))?;
         }
-        let media = MediaInfo::read(&Artifact::MediaInfo.path(&self.work, unit))?;
-        let reader = FrameReader::open(&unit.source, self.fps)?.with_options(media.pictures);
         let corner = media.active_area.map_or([0; 2], |area| [area.x, area.y]);
-        let [width, height] = reader.image_size();
-        let image_size = [u32::try_from(width)?, u32::try_from(height)?];
-        let task = progress.begin(&unit.to_string(), restarts.len() as u64);
         let begun = Instant::now();
         let mut gathered = KeypointFrames::default();
         let mut seen = DetectionCounts::default();
         let mut pose = Pose2d::default();
-        let restart_at = |idx: usize| {
-            restarts.get(idx).copied().with_context(|| frame_count_mismatch(&unit.source, idx + 1, restarts.len()))
-        };
-        let pick = |reader: &mut FrameReader, time: FrameTime| {
-            let is_new = time.frame_idx == 0 || restart_at(time.frame_idx)? || !time.repeated;
-            let whole = is_new.then(|| reader.picture(None)).transpose()?;
-            Ok(match (whole, media.active_area) {
-                (Some(whole), Some(area)) => Some(whole.cropped(area)),
-                (whole, _) => whole,
-            })
-        };
-        ahead::for_each(reader, pick, |time, picture| {
+        let image_size = video.each(|time, begins_shot, picture| {
             let idx = time.frame_idx;
-            if restart_at(idx)? {
-                chain.begin_shot();
+            if begins_shot || idx == 0 {
+                chain.begin_shot_of(ways.next().flatten());
             }
             if let Some(picture) = picture {
                 pose = chain.frame(&picture).with_context(|| format!("frame {idx}"))?.moved(corner);
@@ -170,13 +178,100 @@ impl Stage for Pose2dStage {
             task.advance(1);
             Ok(())
         })?;
-        ensure!(
-            gathered.n_frames() == restarts.len(),
-            frame_count_mismatch(&unit.source, gathered.n_frames(), restarts.len())
-        );
         let (keypoints, extras) = gathered.finish(self.fps, image_size)?;
         keypoints_npz::write(&Artifact::Keypoints.within(out), &keypoints, &extras)?;
-        Ok(seen.report())
+        let mut report = seen.report();
+        if self.follows_talker() {
+            tell_followed(&talkers, &mut report);
+        }
+        Ok(report)
+    }
+}
+
+impl Pose2dStage {
+    fn follows_talker(&self) -> bool {
+        self.settings.follow == FollowRule::Speaking
+    }
+
+    /// Who speaks in each shot.
+    fn talkers(&self, video: &VideoFrames, task: &dyn Task) -> Result<Vec<ShotTalker>> {
+        let sound = Artifact::Sound.path(&self.work, video.unit);
+        let (_, sound_db) = sound::levels(&sound, self.fps, video.restarts.len())?;
+        let is_speech: Vec<bool> = sound_db.iter().map(|&db| lips::is_speech(f32::NAN, db)).collect();
+        let voice = sound::openness(&sound)?;
+        let mut search = TalkerSearch::new(&self.runtime()?, &self.store, &self.settings)?;
+        let (mut talkers, mut time_secs) = (Vec::new(), Vec::new());
+        let mut end_shot = |search: &mut TalkerSearch, time_secs: &mut Vec<f64>, end: usize| {
+            let is_speech = &is_speech[end - time_secs.len()..end];
+            talkers.push(search.end_shot(&ShotVoice { voice: &voice, fps: self.fps, time_secs, is_speech }));
+            time_secs.clear();
+        };
+        video.each(|time, begins_shot, picture| {
+            let idx = time.frame_idx;
+            if begins_shot && idx > 0 {
+                end_shot(&mut search, &mut time_secs, idx);
+            }
+            search.frame(picture.as_ref()).with_context(|| format!("frame {idx}"))?;
+            time_secs.push(time.source_secs);
+            task.advance(1);
+            Ok(())
+        })?;
+        end_shot(&mut search, &mut time_secs, video.restarts.len());
+        Ok(talkers)
+    }
+}
+
+/// The frames of a video in the order of its timeline.
+struct VideoFrames<'a> {
+    unit: &'a Unit,
+    /// Where a shot begins.
+    restarts: &'a [bool],
+    media: &'a MediaInfo,
+    fps: FrameRate,
+}
+
+impl VideoFrames<'_> {
+    /// Calls `work` with each frame's time, whether it begins a shot, and its picture if that is not the one before
+    /// again. Returns the width and height of the whole picture in px.
+    ///
+    /// # Errors
+    /// A video that cannot be read or has not as many frames as the timeline.
+    fn each(&self, mut work: impl FnMut(FrameTime, bool, Option<Image>) -> Result<()>) -> Result<[u32; 2]> {
+        let (source, restarts) = (&self.unit.source, self.restarts);
+        let reader = FrameReader::open(source, self.fps)?.with_options(self.media.pictures);
+        let [width, height] = reader.image_size();
+        let restart_at = |idx: usize| {
+            restarts.get(idx).copied().with_context(|| frame_count_mismatch(source, idx + 1, restarts.len()))
+        };
+        let pick = |reader: &mut FrameReader, time: FrameTime| {
+            let is_new = time.frame_idx == 0 || restart_at(time.frame_idx)? || !time.repeated;
+            let whole = is_new.then(|| reader.picture(None)).transpose()?;
+            Ok(match (whole, self.media.active_area) {
+                (Some(whole), Some(area)) => Some(whole.cropped(area)),
+                (whole, _) => whole,
+            })
+        };
+        let mut n_frames = 0;
+        ahead::for_each(reader, pick, |time, picture| {
+            n_frames = time.frame_idx + 1;
+            work(time, restart_at(time.frame_idx)?, picture)
+        })?;
+        ensure!(n_frames == restarts.len(), frame_count_mismatch(source, n_frames, restarts.len()));
+        Ok([u32::try_from(width)?, u32::try_from(height)?])
+    }
+}
+
+/// Adds in how many shots the one who speaks is followed, and in how many the largest for want of a clear one.
+fn tell_followed(talkers: &[ShotTalker], report: &mut Report) {
+    let n_several = talkers.iter().filter(|shot| shot.several).count();
+    let n_clear = talkers.iter().filter(|shot| shot.path.is_some()).count();
+    report.facts.insert("followed".to_owned(), json!({ "several": n_several, "speaking": n_clear }));
+    if n_several > n_clear {
+        let shots = counted(n_several, "shot");
+        let rest = n_several - n_clear;
+        report.line += &format!(
+            "; several people in {shots}: in {rest} nobody's mouth clearly follows the voice, so the largest is followed"
+        );
     }
 }
 

@@ -1,6 +1,7 @@
 //! Which of the people found is the speaker: in a new shot the largest, most central and surest, who looks most like
 //! the reference if there is one; from then on the one who overlaps the box followed. One who proves to be a picture
-//! gives way to one who is alive, and one far from the reference to one who is near it.
+//! gives way to one who is alive, one far from the reference to one who is near it, and anybody to the one who is known
+//! to speak.
 
 use super::decode::boxes;
 use super::liveness::Movement;
@@ -18,6 +19,8 @@ const ALIVE: f32 = 6.0;
 const TIMES_ALIVE: f32 = 2.0;
 /// Distance of appearances, in 8-bit steps, at which a person's weight is half.
 const DISTANCE_OF_HALF_WEIGHT: f32 = 5.0;
+/// Weight of the one who speaks among those who do not.
+const SPEAKS: f32 = 1e6;
 /// People smaller than this share of the speaker's box are not counted.
 const RELEVANT: f32 = 0.2;
 
@@ -28,6 +31,8 @@ pub struct Candidate {
     pub movement: Movement,
     /// Distance to the reference, where there is one.
     pub appearance_distance: Option<f32>,
+    /// This one is known to speak in the shot.
+    pub speaks: bool,
 }
 
 impl Candidate {
@@ -48,12 +53,14 @@ impl Candidate {
         let likeness = self
             .appearance_distance
             .map_or(1.0, |appearance_distance| 1.0 / (1.0 + (appearance_distance / DISTANCE_OF_HALF_WEIGHT).powi(2)));
-        score * width * height * (1.0 - 0.5 * off) * alive * likeness
+        let speaks = if self.speaks { SPEAKS } else { 1.0 };
+        score * width * height * (1.0 - 0.5 * off) * alive * likeness * speaks
     }
 
-    /// Whether this one is so much more like the reference that it was the wrong choice.
+    /// Whether this one was the wrong choice: the other speaks, is alive, or is so much more like the reference.
     fn gives_way_to(&self, other: &Self) -> bool {
-        matches!((self.appearance_distance, other.appearance_distance), (Some(mine), Some(other)) if other < DISTANCE_OF_HALF_WEIGHT && mine > 2.0 * other.max(2.5))
+        let is_likelier = || matches!((self.appearance_distance, other.appearance_distance), (Some(mine), Some(other)) if other < DISTANCE_OF_HALF_WEIGHT && mine > 2.0 * other.max(2.5));
+        !self.speaks && (other.speaks || (self.is_picture() && other.outlives(self)) || is_likelier())
     }
 }
 
@@ -99,9 +106,7 @@ impl PersonTrack {
         let nearest = found.iter().map(|one| (boxes::overlap(&one.person, &followed), one));
         match nearest.max_by(|a, b| a.0.total_cmp(&b.0)) {
             Some((overlap, same)) if overlap >= SAME_PERSON => {
-                let is_better =
-                    |other: &&Candidate| (same.is_picture() && other.outlives(same)) || same.gives_way_to(other);
-                let better: Vec<Candidate> = found.iter().filter(is_better).copied().collect();
+                let better: Vec<Candidate> = found.iter().filter(|other| same.gives_way_to(other)).copied().collect();
                 if !better.is_empty() {
                     return self.choose(&better, look.image_width);
                 }
@@ -230,6 +235,20 @@ mod tests {
         assert_eq!((followed.person().x, followed.identity()), (80.0, 0));
         followed.look(&[moving(large, 1.0), moving(small, 30.0)], look(300, true));
         assert_eq!((followed.person().x, followed.identity(), followed.n_people), (0.0, 1, 1));
+    }
+
+    #[test]
+    fn the_one_who_speaks_is_followed_whoever_is_larger_or_likelier() {
+        let speaking = |candidate: Candidate| Candidate { speaks: true, appearance_distance: Some(90.0), ..candidate };
+        let (large, small) = (Candidate { appearance_distance: Some(1.0), ..at(80.0, 200.0, 0.9) }, at(0.0, 30.0, 0.5));
+        let mut followed = PersonTrack::default();
+        followed.look(&[large, speaking(small)], look(300, false));
+        followed.look(&[large, speaking(moving(small, 1.0))], look(300, true));
+        assert_eq!((followed.person().x, followed.identity(), followed.n_people), (0.0, 0, 1));
+        let mut late = PersonTrack::default();
+        late.look(&[large, small], look(300, false));
+        late.look(&[large, speaking(small)], look(300, true));
+        assert_eq!((late.person().x, late.identity()), (0.0, 1));
     }
 
     #[test]

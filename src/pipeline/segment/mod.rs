@@ -1,11 +1,9 @@
-//! Stage 3: keypoints to intervals worth keeping. `measure`, `sound`, `lips` (whose voice it is) and, by `speech_rule`,
+//! Stage 3: keypoints to intervals worth keeping. `measure` and, by `speech_rule`,
 //! `speech_activity` turn what the stages before wrote into a few numbers a frame (`store` keeps them), `table` has the
 //! rules, a row each, `judge` applies them, `stage` reads and writes the files.
 
 pub mod judge;
-pub mod lips;
 pub mod measure;
-pub mod sound;
 pub mod speech_activity;
 pub mod speech_rule;
 pub mod stage;

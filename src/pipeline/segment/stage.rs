@@ -2,15 +2,14 @@
 //! `measures.npz` and `sound_offset.json`.
 
 use super::judge::judge;
-use super::lips;
 use super::measure;
 use super::measure::Measures;
-use super::sound;
 use super::speech_rule::SpeechListener;
 use crate::config;
 use crate::formats::keypoints_npz;
 use crate::formats::media_json::MediaInfo;
 use crate::formats::timeline_npz::Timeline;
+use crate::pipeline::{lips, sound};
 use crate::stage::artifacts::{Artifact, StageName};
 use crate::stage::ledger::{Ledger, longest_first};
 use crate::stage::progress::Progress;

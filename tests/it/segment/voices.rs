@@ -7,7 +7,7 @@ use ndarray::Array1;
 use orator::audio::openness::{Openness, OpennessMeter};
 use orator::external::ffmpeg::audio::read_sound;
 use orator::formats::keypoints_npz;
-use orator::pipeline::segment::lips::{LipVoiceMatch, NEAR_SECS};
+use orator::pipeline::lips::{LipVoiceMatch, NEAR_SECS};
 use orator::types::sync::SoundOffset;
 use orator::types::time::FrameRate;
 use rand::{Rng, SeedableRng};

@@ -13,55 +13,73 @@ const LEAST_SCORE: f64 = 0.5;
 /// A face whose nose is further from the body's, in sides of its square, is somebody else's.
 const SAME_NOSE: f64 = 0.15;
 
-/// Follows one face.
+/// Follows one face with a model of its own.
 pub struct FaceTracker {
     pub model: FaceModel,
-    /// Where it was in the frame before.
-    region: Option<Region>,
+    track: FaceTrack,
 }
 
 impl FaceTracker {
     pub fn new(model: FaceModel) -> Self {
-        Self { model, region: None }
+        Self { model, track: FaceTrack::default() }
     }
 
     /// Ends the track.
     pub fn begin_anew(&mut self) {
-        self.region = None;
+        self.track = FaceTrack::default();
     }
 
-    /// The face of the body whose points are given, of which those that score `least` are seen.
+    /// As `FaceTrack::find`.
     pub fn find(&mut self, image: &Image, body: &[ScoredPoint; 17], least: f64) -> Result<Option<FaceSeen>> {
-        let mut found = match self.region.take() {
-            Some(region) => self.face_of(image, &region, body, least)?,
+        self.track.find(&mut self.model, image, body, least)
+    }
+}
+
+/// Where a face was in the frame before.
+#[derive(Default)]
+pub struct FaceTrack(Option<Region>);
+
+impl FaceTrack {
+    /// The face of the body whose points are given, of which those that score `least` are seen.
+    pub fn find(
+        &mut self,
+        model: &mut FaceModel,
+        image: &Image,
+        body: &[ScoredPoint; 17],
+        least: f64,
+    ) -> Result<Option<FaceSeen>> {
+        let mut face_of = |region: &Region| face_of(model, image, region, body, least);
+        let mut found = match self.0.take() {
+            Some(region) => face_of(&region)?,
             None => None,
         };
         if found.is_none()
             && let Some(region) = around_eyes(body, least)
-            && let Some(first) = self.face_of(image, &region, body, least)?
+            && let Some(first) = face_of(&region)?
         {
             // The first square is a guess, one around the face found is not.
-            found = self.face_of(image, &landmarks::region(&first.points), body, least)?;
+            found = face_of(&landmarks::region(&first.points))?;
         }
         let Some(face) = found else { return Ok(None) };
-        self.region = Some(landmarks::region(&face.points));
+        self.0 = Some(landmarks::region(&face.points));
         let seen = |opening: f64| FaceSeen { score: face.score as f32, opening: opening as f32 };
         Ok(landmarks::opening(&face.points).map(seen))
     }
+}
 
-    fn face_of(
-        &mut self,
-        image: &Image,
-        region: &Region,
-        body: &[ScoredPoint; 17],
-        least: f64,
-    ) -> Result<Option<DetectedFace>> {
-        let Some(face) = self.model.find(image, region)? else { return Ok(None) };
-        let [x, y, _] = face.points[landmarks::NOSE_TIP];
-        let nose = body[coco::NOSE];
-        let is_here = nose[2] < least || (x - nose[0]).hypot(y - nose[1]) <= SAME_NOSE * region.side;
-        Ok(Some(face).filter(|face| face.score >= LEAST_SCORE && is_here))
-    }
+/// The face in a square, if there is one and it is the body's.
+fn face_of(
+    model: &mut FaceModel,
+    image: &Image,
+    region: &Region,
+    body: &[ScoredPoint; 17],
+    least: f64,
+) -> Result<Option<DetectedFace>> {
+    let Some(face) = model.find(image, region)? else { return Ok(None) };
+    let [x, y, _] = face.points[landmarks::NOSE_TIP];
+    let nose = body[coco::NOSE];
+    let is_here = nose[2] < least || (x - nose[0]).hypot(y - nose[1]) <= SAME_NOSE * region.side;
+    Ok(Some(face).filter(|face| face.score >= LEAST_SCORE && is_here))
 }
 
 /// Where the face of a body should be: the square below the line of its eyes, as large as eyes, nose and ears say.

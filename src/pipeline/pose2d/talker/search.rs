@@ -1,0 +1,156 @@
+//! The mouths of everybody in a shot: people are looked for every few frames and tied by overlap, and while two or more
+//! are in view the face model sees each one's mouth in every frame. Kept are one number a frame and person and the boxes
+//! of the looks.
+
+use super::choice::{self, MouthOpening, ShotVoice};
+use super::path::{SAME_WAY, TalkerPath};
+use crate::config::Pose2dConfig;
+use crate::external::onnx::{ModelRole, ModelStore, Runtime};
+use crate::pipeline::pose2d::body::BodyModel;
+use crate::pipeline::pose2d::decode::boxes;
+use crate::pipeline::pose2d::face::model::FaceModel;
+use crate::pipeline::pose2d::face::tracker::FaceTrack;
+use crate::pipeline::pose2d::person::Detector;
+use crate::types::image::Image;
+use crate::types::pose2d::PersonBox;
+use anyhow::Result;
+
+/// Frames of a shot at which people are looked for beside the regular ones.
+const EARLY: [usize; 3] = [2, 5, 10];
+/// With several people in view, looks come so many times as often.
+const CROWD_LOOKS: usize = 3;
+/// People smaller than this share of the largest are in the background.
+const RELEVANT: f32 = 0.2;
+/// A point of a body is seen from this score on, whatever the configuration says: between looks no point is known.
+const LEAST_SCORE: f64 = 1e-6;
+
+/// Looks at one shot after the other.
+pub struct TalkerSearch {
+    detector: Detector,
+    body: BodyModel,
+    face: FaceModel,
+    settings: Pose2dConfig,
+    people: Vec<Talker>,
+    /// Frames of the shot so far.
+    n_frames: usize,
+    several: bool,
+}
+
+/// What a shot told.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ShotTalker {
+    /// More than one person was in view.
+    pub several: bool,
+    /// The way of the one who speaks; `None`: nobody's mouth clearly follows the voice.
+    pub path: Option<TalkerPath>,
+}
+
+#[derive(Default)]
+struct Talker {
+    path: TalkerPath,
+    mouth: MouthOpening,
+    face: FaceTrack,
+    /// Found at the last look.
+    is_here: bool,
+}
+
+impl TalkerSearch {
+    /// Opens the models for persons, bodies and faces that the settings name.
+    ///
+    /// # Errors
+    /// An id that is not in the manifest or has another role; a model that cannot be opened.
+    pub fn new(runtime: &Runtime, store: &ModelStore, settings: &Pose2dConfig) -> Result<Self> {
+        let (dir, entry) = (store.dir(), |id: &str, role| store.choose(id, role));
+        Ok(Self {
+            detector: Detector::open(runtime, entry(&settings.person, ModelRole::Person)?, dir)?,
+            body: BodyModel::open(runtime, entry(&settings.body, ModelRole::Body)?, dir)?,
+            face: FaceModel::open(runtime, entry(&settings.face, ModelRole::Face)?, dir)?,
+            settings: settings.clone(),
+            people: Vec::new(),
+            n_frames: 0,
+            several: false,
+        })
+    }
+
+    /// Takes in the next frame of the shot; `None`: it repeats the one before.
+    pub fn frame(&mut self, image: Option<&Image>) -> Result<()> {
+        let idx = self.n_frames;
+        self.n_frames += 1;
+        let Some(image) = image else {
+            let here = self.people.iter_mut().filter(|one| one.is_here);
+            here.for_each(|one| one.mouth.repeat(idx));
+            return Ok(());
+        };
+        let every = self.settings.person_every.max(1);
+        let every = if self.is_crowd() { (every / CROWD_LOOKS).max(1) } else { every };
+        let is_look = idx.is_multiple_of(every) || EARLY.contains(&idx);
+        if is_look {
+            let found = self.detector.find(image)?;
+            tie(&mut self.people, idx, &found);
+            self.several |= self.is_crowd();
+        }
+        if !self.is_crowd() {
+            self.people.iter_mut().for_each(|one| one.face = FaceTrack::default());
+            return Ok(());
+        }
+        let least = self.settings.joint_score.max(LEAST_SCORE);
+        for one in self.people.iter_mut().filter(|one| one.is_here) {
+            let place = one.path.last().filter(|_| is_look);
+            let place = place.map(|at| [at.x, at.y, at.width, at.height].map(f64::from));
+            let body = place.map(|place| self.body.find(image, place)).transpose()?.flatten();
+            let points = body.map_or([[0.0; 3]; 17], |body| body.points);
+            if let Some(seen) = one.face.find(&mut self.face, image, &points, least)? {
+                one.mouth.set(idx, seen.opening);
+            }
+        }
+        Ok(())
+    }
+
+    /// Ends the shot: who spoke in it. The next frame begins another.
+    pub fn end_shot(&mut self, heard: &ShotVoice) -> ShotTalker {
+        let mut people = std::mem::take(&mut self.people);
+        let speaking = choice::speaking(people.iter().map(|one| &one.mouth), heard);
+        self.n_frames = 0;
+        let several = std::mem::take(&mut self.several);
+        ShotTalker { several, path: speaking.map(|at| people.swap_remove(at).path) }
+    }
+
+    fn is_crowd(&self) -> bool {
+        self.people.iter().filter(|one| one.is_here).count() > 1
+    }
+}
+
+/// Ties the people found at a look to those known; who overlaps with nobody is new.
+fn tie(people: &mut Vec<Talker>, idx: usize, found: &[PersonBox]) {
+    let area = |one: &PersonBox| one.width * one.height;
+    let largest = found.iter().map(area).fold(0.0, f32::max);
+    people.iter_mut().for_each(|one| one.is_here = false);
+    for one in found.iter().filter(|one| area(one) >= RELEVANT * largest) {
+        let overlap = |known: &Talker| known.path.last().map_or(0.0, |last| boxes::overlap(last, one));
+        let free = (0..people.len()).filter(|&at| !people[at].is_here);
+        let nearest = free.max_by(|&a, &b| overlap(&people[a]).total_cmp(&overlap(&people[b])));
+        let at = nearest.filter(|&at| overlap(&people[at]) >= SAME_WAY).unwrap_or_else(|| {
+            people.push(Talker::default());
+            people.len() - 1
+        });
+        people[at].path.push(idx, *one);
+        people[at].is_here = true;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn people_are_tied_by_overlap_and_the_background_is_left_out() {
+        let at = |x: f32, width: f32| PersonBox { x, y: 0.0, width, height: 200.0, score: 0.9 };
+        let mut people = Vec::new();
+        tie(&mut people, 0, &[at(0.0, 100.0), at(300.0, 80.0), at(600.0, 10.0)]);
+        tie(&mut people, 5, &[at(310.0, 80.0), at(20.0, 100.0)]);
+        tie(&mut people, 10, &[at(330.0, 80.0), at(150.0, 90.0)]);
+        let last: Vec<f32> = people.iter().map(|one| one.path.last().unwrap().x).collect();
+        let here: Vec<bool> = people.iter().map(|one| one.is_here).collect();
+        assert_eq!((last, here), (vec![20.0, 330.0, 150.0], vec![false, true, true]));
+    }
+}
