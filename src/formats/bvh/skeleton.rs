@@ -10,7 +10,7 @@ use std::fmt::Write;
 
 /// A joint, or the end of a bone, which has no channels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SkeletonJoint {
+pub struct JointChannels {
     pub name: String,
     pub parent: Option<usize>,
     /// From the parent, in the file's unit.
@@ -18,7 +18,7 @@ pub struct SkeletonJoint {
     pub channels: Vec<Channel>,
 }
 
-impl SkeletonJoint {
+impl JointChannels {
     /// Axes of its rotation channels in their order; `None` unless there are three about different axes.
     pub fn rotation_order(&self) -> Option<[usize; 3]> {
         let axes: Vec<usize> = self
@@ -38,13 +38,13 @@ impl SkeletonJoint {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct BvhSkeleton {
-    pub joints: Vec<SkeletonJoint>,
+    pub joints: Vec<JointChannels>,
 }
 
 impl BvhSkeleton {
     /// The skeleton of a file.
     pub fn of(bvh: &Bvh) -> Self {
-        let joint = |joint: &super::read::BvhJoint| SkeletonJoint {
+        let joint = |joint: &super::read::BvhJoint| JointChannels {
             name: joint.name.clone(),
             parent: joint.parent,
             offset: joint.offset,
