@@ -1,20 +1,13 @@
 //! Own voice against the voices of others on real clips, and how well a shifted sound is found. `ORATOR_LONG=1` (`make
 //! prove`): all clips; otherwise two of them. Clips whose lips a model made are measured apart.
 
+use crate::fixtures::media::voices::{TalkingClip, WINDOW_SECS, area, openness};
 use crate::fixtures::skip::{fetched_model, fetched_models, real_data};
 use crate::fixtures::support::{Project, files_under};
-use ndarray::Array1;
-use orator::audio::openness::{Openness, OpennessMeter};
-use orator::external::ffmpeg::audio::read_sound;
-use orator::formats::keypoints_npz;
-use orator::pipeline::lips::{LipVoiceMatch, NEAR_SECS};
-use orator::types::sync::SoundOffset;
-use orator::types::time::FrameRate;
+use orator::audio::openness::Openness;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::path::Path;
 
-const FPS: FrameRate = FrameRate::new(15, 1);
 /// Clips of people who talk, with the frames a second of the file.
 const TALKING: [(&str, f64); 5] = [
     ("talk_tyson_2cam_17s_720p", 30.0),
@@ -39,63 +32,12 @@ const GENERATED: [&str; 10] = [
 ];
 /// Sounds of a speaker who is in no clip.
 const SOUNDS: [&str; 2] = ["beat2_2_scott_0_2_2_16k.wav", "beat2_2_scott_0_4_4_16k.wav"];
-const WINDOW_SECS: f64 = 4.0;
 
-struct Clip {
-    name: String,
-    source_fps: f64,
-    opening: Array1<f32>,
-    time_secs: Array1<f64>,
-    voice: Openness,
-    secs: f64,
-}
-
-impl Clip {
-    fn speaker(&self) -> &str {
-        let name = self.name.trim_start_matches("talk_").trim_start_matches("mdd_");
-        let name = name.trim_start_matches("long_").trim_start_matches("showcase_");
-        name.split('_').next().unwrap().trim_end_matches(|c: char| c.is_ascii_digit())
-    }
-
-    /// The lips of `frames`, the voice of `sound` taken `later_secs` later.
-    fn beside(&self, sound: &Openness, frames: std::ops::Range<usize>, later_secs: f64) -> LipVoiceMatch {
-        let opening = self.opening.slice(ndarray::s![frames.clone()]).to_vec();
-        let times: Vec<f64> = self.time_secs.slice(ndarray::s![frames]).iter().map(|secs| secs + later_secs).collect();
-        let is_speech = vec![true; times.len()];
-        LipVoiceMatch::new(&opening, &times, &is_speech, sound, FPS)
-    }
-
-    fn n_frames(&self) -> usize {
-        self.opening.len()
-    }
-
-    /// Of the whole clip; none of one that is too short to say.
-    fn offset(&self) -> SoundOffset {
-        let none = SoundOffset { secs: 0.0, correlation: 0.0, confidence: 0.0, compared_secs: 0.0 };
-        self.beside(&self.voice, 0..self.n_frames(), 0.0).offset().unwrap_or(none)
-    }
-
-    /// Scores of windows, one a second.
-    fn windows(&self, sound: &Openness, later_secs: f64, middle_secs: f64) -> Vec<f64> {
-        let scores = self.beside(sound, 0..self.n_frames(), later_secs).scores(WINDOW_SECS, middle_secs, NEAR_SECS);
-        let inside = scores.iter().skip(30).step_by(15).take((self.n_frames().saturating_sub(60)) / 15 + 1);
-        inside.filter(|score| score.is_finite()).map(|score| f64::from(*score)).collect()
-    }
-}
-
-fn openness(path: &Path) -> (Openness, f64) {
-    let sound = read_sound(path).unwrap();
-    let mut meter = OpennessMeter::default();
-    meter.push(&sound.samples);
-    (meter.finish(), sound.samples.len() as f64 / f64::from(sound.rate))
-}
-
-/// Share of pairs in which an own voice scores higher.
-fn area(own: &[f64], others: &[f64]) -> f64 {
-    let wins = |own: &f64| {
-        others.iter().map(|other| if own > other { 1.0 } else { 0.5 * f64::from(own == other) }).sum::<f64>()
-    };
-    own.iter().map(wins).sum::<f64>() / (own.len() * others.len()).max(1) as f64
+/// Who talks in a clip of that name.
+fn speaker(name: &str) -> &str {
+    let name = name.trim_start_matches("talk_").trim_start_matches("mdd_");
+    let name = name.trim_start_matches("long_").trim_start_matches("showcase_");
+    name.split('_').next().unwrap().trim_end_matches(|c: char| c.is_ascii_digit())
 }
 
 /// The area over all clips, and the middle 95 % of it over clips drawn anew.
@@ -138,16 +80,15 @@ fn own_voices_are_told_from_others_and_shifts_are_found() {
         let is_it = |file: &&(String, std::path::PathBuf)| file.0.contains(&slug) && file.0.ends_with(ending);
         work.iter().find(is_it).unwrap_or_else(|| panic!("no {ending} of {name}")).1.clone()
     };
-    let clips: Vec<Clip> = named
+    let clips: Vec<TalkingClip> = named
         .iter()
         .map(|(name, source_fps)| {
-            let extras = keypoints_npz::read_extras(&made(name, "keypoints.npz")).unwrap();
             let ledger = std::fs::read_to_string(made(name, "ledger.json")).unwrap();
             assert!(!ledger.contains("voice of another"), "{name}: an own voice is refused");
-            let (voice, secs) = openness(&made(name, "audio.wav"));
-            let opening = extras.face.unwrap().opening;
-            let name = name.trim_start_matches("generated/").to_owned();
-            Clip { name, source_fps: *source_fps, opening, time_secs: extras.time_secs, voice, secs }
+            let mut clip =
+                TalkingClip::read(&made(name, "keypoints.npz"), &made(name, "audio.wav"), *source_fps).unwrap();
+            clip.name = name.trim_start_matches("generated/").to_owned();
+            clip
         })
         .collect();
     let strangers: Vec<(Openness, f64)> =
@@ -158,7 +99,7 @@ fn own_voices_are_told_from_others_and_shifts_are_found() {
     for clip in &clips {
         let offset = clip.offset();
         let own = clip.windows(&clip.voice, 0.0, offset.secs);
-        let of_clips = clips.iter().filter(|other| other.speaker() != clip.speaker());
+        let of_clips = clips.iter().filter(|other| speaker(&other.name) != speaker(&clip.name));
         let others = of_clips.map(|other| (&other.voice, other.secs)).chain(strangers.iter().map(|(v, s)| (v, *s)));
         let mut other = Vec::new();
         for (voice, secs) in others {
@@ -169,13 +110,8 @@ fn own_voices_are_told_from_others_and_shifts_are_found() {
             }
         }
         let is_generated = clip.name.starts_with("mdd");
-        let ten = 150.min(clip.n_frames());
         let mut worst: f64 = 0.0;
-        // Shorter clips than 10 s say nothing of clips of 10 s.
-        let starts = (0..=clip.n_frames() - ten).step_by(30).filter(|_| ten >= 110);
-        for (start, shift) in starts.flat_map(|start| [-0.4, -0.2, 0.0, 0.2, 0.4].map(|shift| (start, shift))) {
-            let found = clip.beside(&clip.voice, start..start + ten, -shift).offset().unwrap().secs;
-            let error = (found - offset.secs - shift).abs();
+        for error in clip.shift_errors(10.0, 7.3) {
             n_shifts[usize::from(is_generated)] += 1;
             n_found[usize::from(is_generated)] += usize::from(error <= 1.0 / clip.source_fps + 1e-9);
             worst = worst.max(error);

@@ -1,0 +1,96 @@
+//! Rendered people, whose lips and voices are exact, seen by the models for real people: who of two speaks is followed,
+//! own voices are told from others, shifts are found. `ORATOR_PEOPLE` (`make prove-people`): a folder of rendered people
+//! and the work folder of a run on it with the face model, all of whose clips are measured.
+
+use crate::fixtures::clips::ffmpeg;
+use crate::fixtures::media::voices::{TalkingClip, WINDOW_SECS, area};
+use crate::fixtures::skip::{fetched_model, fetched_models};
+use crate::fixtures::support::{Project, files_under};
+use orator::demo::people::condition::Condition;
+use orator::demo::people::scene::{ClipSeeds, PeopleScene};
+use orator::formats::keypoints_npz;
+use orator::stage::progress::Silent;
+use orator::types::time::FrameRate;
+use std::path::Path;
+
+const FPS: FrameRate = FrameRate::new(15, 1);
+const SECS: f64 = 7.0;
+
+/// Prints and returns the area under the curve of own voices against those of others, and the share of shifts that are
+/// found within a frame.
+fn measured(clips: &[TalkingClip]) -> [f64; 2] {
+    let (mut own, mut other, mut errors) = (Vec::new(), Vec::new(), Vec::new());
+    for (at, clip) in clips.iter().enumerate() {
+        own.extend(clip.windows(&clip.voice, 0.0, clip.offset().secs));
+        let others = (1..clips.len().min(5)).map(|away| &clips[(at + away * 7) % clips.len()]);
+        let strangers = others.filter(|stranger| stranger.name != clip.name);
+        strangers.for_each(|stranger| other.extend(clip.windows(&stranger.voice, 0.0, 0.0)));
+        errors.extend(clip.shift_errors(8.0, 6.0).into_iter().map(|error| error * clip.source_fps));
+    }
+    let n_found = errors.iter().filter(|frames| **frames <= 1.0 + 1e-9).count();
+    let found = n_found as f64 / errors.len().max(1) as f64;
+    let area = area(&own, &other);
+    eprintln!(
+        "{} clips: area under the curve at {WINDOW_SECS} s {area:.3} ({} own, {} other windows); {n_found} of {} shifts \
+         of -400 to 400 ms found within a frame",
+        clips.len(),
+        own.len(),
+        other.len(),
+        errors.len()
+    );
+    [area, found]
+}
+
+#[test]
+fn of_two_the_one_who_speaks_is_followed_and_the_voices_are_told_apart() {
+    let (Some(models), Some(_)) = (fetched_models(), fetched_model("face_landmark_192.onnx")) else { return };
+    let project = Project::with_clips("two", 0, 0.0);
+    for seed in [3, 8] {
+        let seeds = ClipSeeds { body: seed, clothes: seed, camera: seed, motion: seed, voice: None };
+        let scene = PeopleScene::new(Condition::Front, seeds, SECS, FPS, None);
+        scene.film(&project.dir().join(format!("{seed}.mp4")), &Silent).unwrap();
+    }
+    // Side by side, one two thirds as large; the voice is of one or of the other.
+    let sizes = "[0:v]scale=-2:480[a];[1:v]scale=-2:320,pad=iw:480:0:160[b];[a][b]hstack[v]";
+    for (who, name) in [(0, "large"), (1, "small")] {
+        let how = format!("-i 3.mp4 -i 8.mp4 -filter_complex {sizes} -map [v] -map {who}:a videos/host/{name}.mp4");
+        if !ffmpeg(project.dir(), &how) {
+            return;
+        }
+    }
+    let text = format!(
+        "[models]\ndir = {models:?}\n[pose2d]\nfollow = \"speaking\"\n[[speaker]]\nname = \"host\"\nvideos = \
+         [\"videos/host/*.mp4\"]\n"
+    );
+    std::fs::write(project.dir().join("pipeline.toml"), text).unwrap();
+    let answer = project.run(&["--to", "pose2d"]);
+    assert_eq!(answer.code, 0, "{}", answer.errors);
+    let clips = ["large", "small"].map(|name| {
+        let file = project.written("pose2d", name, "keypoints.npz");
+        let extras = keypoints_npz::read_extras(&file).unwrap();
+        assert!(extras.n_people.iter().filter(|n| **n == 2).count() > 60, "{name}: {:?}", extras.n_people);
+        assert!(extras.identity.iter().all(|who| *who == 0), "{name}: {:?}", extras.identity);
+        let middle = extras.person.column(0).mean().unwrap() + extras.person.column(2).mean().unwrap() / 2.0;
+        let clip = TalkingClip::read(&file, &project.written("extract", name, "audio.wav"), FPS.per_sec()).unwrap();
+        (middle, clip)
+    });
+    assert!(clips[0].0 + 150.0 < clips[1].0, "followed at {} and {} px", clips[0].0, clips[1].0);
+    let [area, found] = measured(&clips.map(|(_, clip)| clip));
+    assert!(area > 0.9 && found == 1.0, "{area} {found}");
+}
+
+#[test]
+fn voices_of_a_rendered_set_are_told_apart() {
+    let Some(work) = std::env::var_os("ORATOR_PEOPLE") else { return };
+    let is_keypoints = |(name, _): &(String, _)| name.starts_with("pose2d/") && name.ends_with("keypoints.npz");
+    let files = files_under(Path::new(&work)).into_iter().filter(is_keypoints);
+    let clips: Vec<TalkingClip> = files
+        .filter_map(|(name, path)| {
+            let clip = Path::new(&name).parent()?.strip_prefix("pose2d").ok()?;
+            let sound = Path::new(&work).join("extract").join(clip).join("audio.wav");
+            TalkingClip::read(&path, &sound, FPS.per_sec())
+        })
+        .collect();
+    let [area, found] = measured(&clips);
+    assert!(area > 0.95 && found > 0.97, "{area} {found}");
+}
