@@ -84,7 +84,7 @@ impl Stage for Pose2dStage {
     }
 
     fn version(&self) -> u32 {
-        5
+        6
     }
 
     fn cost(&self) -> u32 {
