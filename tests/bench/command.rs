@@ -2,7 +2,7 @@
 
 use super::bodies::{animate, render};
 use super::report::{Bars, Report};
-use super::{dataset, evaluate, generate, lift, lifter, pose2d, run, scale, spaces, train};
+use super::{dataset, evaluate, generate, lift, lifter, pose2d, run, scale, seq2seq, spaces, train};
 use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser, Subcommand};
 use orator::stage::progress::Progress;
@@ -35,6 +35,7 @@ enum Part {
     Render(render::Args),
     Run(run::Args),
     Scale(scale::Args),
+    Seq2seq(seq2seq::Args),
     Spaces(spaces::Args),
     Train(train::Args),
 }
@@ -52,6 +53,7 @@ impl Part {
             Part::Render(args) => render::run(args, progress),
             Part::Run(args) => run::run(args, progress),
             Part::Scale(args) => scale::run(args, progress),
+            Part::Seq2seq(args) => seq2seq::run(args, progress),
             Part::Spaces(args) => spaces::run(args, progress),
             Part::Train(args) => train::run(args, progress),
         }

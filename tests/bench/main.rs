@@ -16,6 +16,7 @@ pub mod reference;
 pub mod report;
 pub mod run;
 pub mod scale;
+pub mod seq2seq;
 pub mod spaces;
 pub mod train;
 
