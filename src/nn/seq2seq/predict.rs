@@ -5,7 +5,7 @@ use crate::nn::Mode;
 use candle_core::{Result, Tensor};
 
 /// A network that goes on from poses with the speech that belongs to what follows.
-pub trait GesturePredictor {
+pub trait GesturePredictor: Send + Sync {
     fn config(&self) -> &Config;
 
     /// Poses [B, predicted, pose] of a batch of segments.
