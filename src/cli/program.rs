@@ -5,7 +5,7 @@ use super::dataset::{forget, import, verify as dataset};
 use super::motion::{lift, sheet};
 use super::outcome::Outcome;
 use super::pipeline::{init, report, run, status};
-use super::setup::{completions, doctor, guide, models};
+use super::setup::{completions, doctor, guide, models, words};
 use super::{animate, demo, evaluate, generate, train, ui};
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use orator::pipeline::process::{VERB, serve};
@@ -29,6 +29,7 @@ enum Verb {
     Run(run::Args),
     Status(status::Args),
     Models(models::Args),
+    Words(words::Args),
     Doctor(doctor::Args),
     Lift(lift::Args),
     Sheet(sheet::Args),
@@ -70,6 +71,7 @@ pub fn main() -> ExitCode {
         Verb::Run(args) => run::run(args, &ui),
         Verb::Status(args) => status::run(args, &ui),
         Verb::Models(args) => models::run(args, &ui),
+        Verb::Words(args) => words::run(args, &ui),
         Verb::Doctor(args) => doctor::run(args, &ui),
         Verb::Lift(args) => lift::run(args, &ui),
         Verb::Sheet(args) => sheet::run(args, &ui),

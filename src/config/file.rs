@@ -100,7 +100,7 @@ fn defaults() -> Table {
 fn speaker_schema() -> Table {
     let text = || Value::String(String::new());
     let words = ["name", "reference", "size", "licence", "consent", "source"].map(|key| (key.to_owned(), text()));
-    let lists = ["videos", "keypoints", "audio", "exclude", "mirrored", "train", "validation", "test"];
+    let lists = ["videos", "keypoints", "audio", "transcripts", "exclude", "mirrored", "train", "validation", "test"];
     let lists = lists.map(|key| (key.to_owned(), Value::Array(vec![text()])));
     let rate = [("fps".to_owned(), Value::Float(0.0))];
     words.into_iter().chain(lists).chain(rate).collect()

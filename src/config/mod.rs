@@ -10,6 +10,7 @@ pub mod load;
 pub mod patterns;
 pub mod rules;
 pub mod sections;
+pub mod transcripts;
 pub mod videos;
 
 pub use choices::{

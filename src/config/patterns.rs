@@ -34,6 +34,9 @@ pub const OF_VIDEOS: [&str; 10] = ["mp4", "mkv", "mov", "webm", "avi", "m4v", "m
 /// Endings taken for sounds, beside those of videos.
 pub const OF_SOUNDS: [&str; 8] = ["wav", "mp3", "flac", "ogg", "opus", "m4a", "aac", "wma"];
 
+/// Endings taken for transcripts.
+pub const OF_TRANSCRIPTS: [&str; 7] = ["json", "srt", "vtt", "textgrid", "ctm", "tsv", "txt"];
+
 /// Most folders within each other that `**` looks into.
 const MAX_DEPTH: usize = 64;
 

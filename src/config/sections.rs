@@ -38,6 +38,9 @@ pub struct SpeakerConfig {
     /// Sounds of the keypoints, found by their names.
     #[serde(default)]
     pub audio: Vec<String>,
+    /// Transcripts of the videos, found by their names.
+    #[serde(default)]
+    pub transcripts: Vec<String>,
     /// Frames a second of the keypoints; 0: their files say.
     #[serde(default)]
     pub fps: f64,

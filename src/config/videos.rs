@@ -3,6 +3,7 @@
 
 use super::keypoints::{self, KeypointSource};
 use super::patterns::{self, SearchRoot};
+use super::transcripts;
 use super::{Config, SpeakerConfig};
 use crate::stage::Unit;
 use crate::types::split::Split;
@@ -17,6 +18,8 @@ pub struct Videos {
     pub units: Vec<Unit>,
     /// The videos that are keypoints of other programs, by their work names.
     pub keypoints: BTreeMap<String, KeypointSource>,
+    /// The transcript of each video that has one, by its work name.
+    pub transcripts: BTreeMap<String, PathBuf>,
     /// The split of each video that the configuration puts into one, by its work name.
     pub splits: BTreeMap<String, Split>,
     /// Entries of the configuration that lead to no video, each with what to do.
@@ -85,8 +88,9 @@ fn of_speaker(speaker: &SpeakerConfig, root: &SearchRoot) -> Videos {
         }
     }
     given.retain(|video, _| found.contains_key(video));
-    let units = found.into_values().collect();
-    Videos { speaker: speaker.name.clone(), units, keypoints: given, splits, missing }
+    let units: Vec<Unit> = found.into_values().collect();
+    let transcripts = transcripts::of_speaker(speaker, &units, root, &mut missing);
+    Videos { speaker: speaker.name.clone(), units, keypoints: given, transcripts, splits, missing }
 }
 
 /// Adds a video under its work name, which is returned. Errors where its path is no text, or another has the name.

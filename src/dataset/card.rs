@@ -5,6 +5,7 @@ use super::leakage::Leakage;
 use super::split::{Split, SplitRule};
 use super::stats::DatasetStats;
 use crate::config::choices::SplitUnit;
+use crate::stage::ledger::WordCount;
 use std::fmt::Write;
 
 /// Text of the card.
@@ -56,6 +57,9 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
         let _ = writeln!(text, "| refused: {reason} | {} |", length(*secs));
     }
     let _ = writeln!(text, "| failed | {} |", length(stats.footage.failed_secs));
+    if let Some(WordCount { n_words, n_kept, .. }) = stats.footage.words {
+        let _ = writeln!(text, "\nOf {n_words} words in the transcripts {n_kept} lie in samples.");
+    }
     let _ = write!(
         text,
         "\n`ledger.jsonl` says of every second of every video which it was, with what was measured.\n\n## Splits\n\n\

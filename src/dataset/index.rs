@@ -45,6 +45,9 @@ pub struct SampleRef {
     pub pose3d: ByteRange,
     /// Sound.
     pub wav: ByteRange,
+    /// Words; `None`: no transcript was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub words: Option<ByteRange>,
 }
 
 /// Range of bytes in a shard.
@@ -63,6 +66,9 @@ impl SampleRef {
         let Some(sample_end) = end(self.offset, self.size) else { return false };
         let members = [self.json, self.mask, self.pose2d, self.pose3d, self.wav];
         sample_end <= shard_bytes
-            && members.iter().all(|m| m.offset >= self.offset && end(m.offset, m.size).is_some_and(|e| e <= sample_end))
+            && members
+                .iter()
+                .chain(&self.words)
+                .all(|m| m.offset >= self.offset && end(m.offset, m.size).is_some_and(|e| e <= sample_end))
     }
 }

@@ -1,7 +1,7 @@
 //! Description file `info.json`: the meaning of all numbers, for readers without this program.
 
 use super::index::ShardRef;
-use super::sample::N_KEYPOINTS;
+use super::sample::{N_KEYPOINTS, WORDS_EXTENSION};
 use super::split::{Split, SplitBy, SplitRule, TimeBlock};
 use crate::types::skeleton;
 use crate::types::skeleton::{N_JOINTS, Side};
@@ -184,6 +184,15 @@ impl DatasetInfo {
         let DatasetInfo { speaker, tool, fps, models, licence, consent, source, notes, no_sound, split_rule, .. } =
             self.clone();
         About { speaker, tool, fps, models, licence, consent, source, notes, no_sound, split_rule }
+    }
+
+    /// Describes the words of samples.
+    pub fn with_words(mut self) -> Self {
+        let meaning = "the words said, each with start_secs and end_secs from the first frame's beginning, the source of \
+                       these times (given, shared, aligned, interpolated) and confidence 0..1 or null";
+        let member = Member { shape: "N words".into(), element: String::new(), meaning: meaning.into() };
+        self.members.insert(WORDS_EXTENSION.to_owned(), member);
+        self
     }
 
     /// Shards of all splits.

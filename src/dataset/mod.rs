@@ -19,6 +19,7 @@ pub mod shared_sound;
 pub mod split;
 pub mod stats;
 pub mod verify;
+pub mod words;
 pub mod write;
 
 pub use layout::{CHECKSUMS, INDEX, INFO, LEAKAGE, LEDGER, README, SCHEMA, STATS, STRIDE_FRAMES, WINDOW_FRAMES};

@@ -3,12 +3,13 @@
 
 use super::index::{ByteRange, SampleRef};
 use super::info::DatasetInfo;
-use super::sample::{N_KEYPOINTS, Sample};
+use super::sample::{N_KEYPOINTS, Sample, WORDS_EXTENSION};
 use super::split::Split;
 use super::stats::DatasetStats;
 use super::{CHECKSUMS, INDEX, INFO, STATS};
 use crate::formats::npy_slice;
 use crate::formats::npy_slice::{Element, Layout};
+use crate::formats::transcript::Word;
 use crate::formats::wav;
 use crate::stage::workdir::FolderLock;
 use crate::types::file_name::FileName;
@@ -140,7 +141,15 @@ impl Dataset {
         let pose2d = Array3::from_shape_vec((frames.len(), N_KEYPOINTS, 3), pose2d).context("shaping keypoints")?;
         let n_samples = (sample.wav.size.saturating_sub(wav::HEADER_BYTES as u64) / 2) as usize;
         let sound = self.sound(sample, 0..n_samples)?;
-        Ok(Sample { key: sample.key.to_string(), motion: self.motion(sample, frames)?, pose2d, sound, meta })
+        let (key, motion, words) = (sample.key.to_string(), self.motion(sample, frames)?, self.words(sample)?);
+        Ok(Sample { key, motion, pose2d, sound, words, meta })
+    }
+
+    /// Words of a sample; `None`: no transcript was asked for.
+    pub fn words(&self, sample: &SampleRef) -> Result<Option<Vec<Word>>> {
+        let Some(range) = sample.words else { return Ok(None) };
+        let words = serde_json::from_slice(&self.bytes(sample, range)?);
+        words.with_context(|| format!("reading {}.{WORDS_EXTENSION} in {}", sample.key, sample.shard))
     }
 
     /// Motion of the frames `frames` of a sample; only these are read, no hash is checked.

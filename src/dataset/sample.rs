@@ -1,5 +1,7 @@
 //! Sample of the dataset: motion, keypoints, sound and metadata of an interval, and its members as bytes.
 
+use super::words;
+use crate::formats::transcript::Word;
 use crate::formats::{npy_slice, wav};
 use crate::types::pose2d::{N_BODY, N_HAND};
 use crate::types::pose3d::Motion;
@@ -23,12 +25,16 @@ pub struct Sample {
     pub pose2d: Array3<f32>,
     /// Sound at 16 kHz mono, from the beginning of the first frame to the end of the last.
     pub sound: Sound,
+    /// Words said in it, their times from its beginning; `None`: no transcript was asked for.
+    pub words: Option<Vec<Word>>,
     /// Metadata: source and properties of the interval.
     pub meta: serde_json::Value,
 }
 
 /// Extensions of the members, in the order of a shard.
 pub const EXTENSIONS: [&str; 5] = ["json", "mask.npy", "pose2d.npy", "pose3d.npy", "wav"];
+/// Extension of the words, behind the others where a sample has them.
+pub const WORDS_EXTENSION: &str = "words.json";
 
 impl Sample {
     /// Number of frames T.
@@ -61,5 +67,15 @@ impl Sample {
             npy_slice::write_f32(self.motion.joints.shape(), self.motion.joints.iter()),
             wav::to_bytes(&self.sound)?,
         ])
+    }
+
+    /// Bytes of its words, if it has any. Errors where they contradict the sample.
+    pub fn words_member(&self) -> Result<Option<Vec<u8>>> {
+        let Some(said) = &self.words else { return Ok(None) };
+        let secs = self.motion.fps.secs(self.n_frames());
+        words::check(said, secs).with_context(|| self.key.clone())?;
+        let mut json = serde_json::to_vec(said).context("writing a sample's words as JSON")?;
+        json.push(b'\n');
+        Ok(Some(json))
     }
 }

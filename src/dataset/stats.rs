@@ -4,6 +4,7 @@
 use super::joint_stats::JointMoments;
 use super::write::part::VideoEntry;
 use super::{STRIDE_FRAMES, WINDOW_FRAMES};
+use crate::stage::ledger::WordCount;
 use crate::types::interval::Interval;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::split::Split;
@@ -48,6 +49,9 @@ pub struct FootageCount {
     pub n_of_unknown_length: usize,
     /// Seconds of silence appended where the sound ended before the motion.
     pub padded_sound_secs: f64,
+    /// Words of the transcripts; `None`: none was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub words: Option<WordCount>,
 }
 
 impl DatasetStats {
@@ -111,6 +115,9 @@ impl StatsCollector {
         footage.failed_secs += part.ledger.failed_secs();
         footage.n_of_unknown_length += usize::from(part.ledger.duration_secs == 0.0 && part.failure.is_some());
         footage.padded_sound_secs += part.padded_sound_secs;
+        if let Some(words) = &part.ledger.words {
+            *footage.words.get_or_insert_default() += words.count;
+        }
         for (reason, secs) in part.ledger.refused_secs() {
             *footage.refused_secs.entry(reason).or_default() += secs;
         }

@@ -17,4 +17,6 @@ pub mod search;
 pub mod sound_offset_json;
 pub mod tfevents;
 pub mod timeline_npz;
+pub mod transcript;
 pub mod wav;
+pub mod word_vectors;

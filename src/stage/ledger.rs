@@ -15,6 +15,48 @@ pub struct Ledger {
     pub refused: Vec<Refused>,
     #[serde(default)]
     pub failed: Vec<Failed>,
+    /// Its words; `None`: no transcript was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub words: Option<TranscriptAccount>,
+}
+
+/// The account of a video's words.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TranscriptAccount {
+    /// File name of the transcript; `None`: the video has none.
+    pub file: Option<String>,
+    #[serde(flatten)]
+    pub count: WordCount,
+    /// What is doubtful or wrong about it, a sentence each.
+    pub notes: Vec<String>,
+}
+
+/// What became of words: `n_kept`, `n_refused` and `n_outside` add up to `n_words`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct WordCount {
+    pub n_words: usize,
+    /// Words in samples.
+    pub n_kept: usize,
+    /// Words in stretches that were not kept.
+    pub n_refused: usize,
+    /// Words after the end of the sound.
+    pub n_outside: usize,
+}
+
+impl WordCount {
+    /// Whether every word is accounted for.
+    pub fn is_whole(&self) -> bool {
+        self.n_kept + self.n_refused + self.n_outside == self.n_words
+    }
+}
+
+impl std::ops::AddAssign for WordCount {
+    fn add_assign(&mut self, other: Self) {
+        self.n_words += other.n_words;
+        self.n_kept += other.n_kept;
+        self.n_refused += other.n_refused;
+        self.n_outside += other.n_outside;
+    }
 }
 
 /// A stretch worth keeping.

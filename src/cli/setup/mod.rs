@@ -1,6 +1,7 @@
-//! The verbs of an installation: `models`, `doctor`, `guide`, `completions`, `man`.
+//! The verbs of an installation: `models`, `words`, `doctor`, `guide`, `completions`, `man`.
 
 pub mod completions;
 pub mod doctor;
 pub mod guide;
 pub mod models;
+pub mod words;

@@ -4,7 +4,7 @@
 use crate::dataset::INFO;
 use crate::dataset::write::part;
 use crate::formats::npz::Npz;
-use crate::formats::search;
+use crate::formats::{search, transcript};
 use crate::mocap::captured::MotionKind;
 use anyhow::{Context, Result, ensure};
 use std::fs::File;
@@ -33,10 +33,10 @@ pub struct ImportSources {
 }
 
 const SOUND: [&str; 7] = ["wav", "flac", "mp3", "m4a", "ogg", "opus", "aac"];
-const TRANSCRIPT: [&str; 6] = ["tsv", "json", "TextGrid", "srt", "vtt", "txt"];
 /// Names of neighbouring folders, in lower case.
 const SOUND_FOLDERS: [&str; 6] = ["wav", "wavs", "audio", "audios", "sound", "speech"];
-const TRANSCRIPT_FOLDERS: [&str; 12] = [
+const TRANSCRIPT_FOLDERS: [&str; 13] = [
+    "ctm",
     "tsv",
     "transcript",
     "transcripts",
@@ -137,7 +137,7 @@ fn with_company(kind: MotionKind, motion: PathBuf) -> TakeFiles {
     // The sound of gt_interval_3821.txt is 3821.wav.
     stems.extend(["gt_interval_", "prediction_interval_"].iter().filter_map(|prefix| stem.strip_prefix(prefix)));
     let sound = beside(&motion, &stems, &SOUND, &SOUND_FOLDERS);
-    let transcript = beside(&motion, &stems, &TRANSCRIPT, &TRANSCRIPT_FOLDERS);
+    let transcript = beside(&motion, &stems, &transcript::ENDINGS, &TRANSCRIPT_FOLDERS);
     TakeFiles { kind, motion, sound, transcript }
 }
 

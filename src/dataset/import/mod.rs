@@ -9,11 +9,7 @@ pub mod find;
 pub mod plan;
 pub mod shards;
 pub mod source;
-pub mod subtitles;
 pub mod take;
-pub mod textgrid;
-pub mod transcript;
-pub mod word;
 pub mod write;
 
 pub use plan::ImportPlan;

@@ -2,7 +2,7 @@
 //! and noted. Bytes of members stay unchanged wherever a dataset can hold them.
 
 use crate::dataset::Split;
-use crate::dataset::sample::{EXTENSIONS, N_KEYPOINTS, Sample};
+use crate::dataset::sample::{EXTENSIONS, N_KEYPOINTS, Sample, WORDS_EXTENSION};
 use crate::formats::npy_slice;
 use crate::formats::npy_slice::{Element, Layout};
 use crate::formats::wav;
@@ -32,6 +32,7 @@ struct MemberLocation {
 pub struct LooseSample {
     pub key: String,
     members: [Option<MemberLocation>; 5],
+    words: Option<MemberLocation>,
 }
 
 /// Samples whose keys differ only behind the last dash.
@@ -55,7 +56,8 @@ pub struct Loose {
 impl LooseVideo {
     /// Tars that hold its samples.
     pub fn tars(&self) -> Vec<&PathBuf> {
-        self.samples.iter().flat_map(|sample| sample.members.iter().flatten().map(|place| &place.tar)).collect()
+        let members = self.samples.iter().flat_map(|sample| sample.members.iter().chain([&sample.words]));
+        members.flatten().map(|place| &place.tar).collect()
     }
 }
 
@@ -105,19 +107,21 @@ fn list(
         let path = entry.path().with_context(reading)?.into_owned();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let (key, ending) = name.split_once('.').unwrap_or((&name, ""));
-        let Some(member) = EXTENSIONS.iter().position(|extension| *extension == ending) else {
+        let member = EXTENSIONS.iter().position(|extension| *extension == ending);
+        if member.is_none() && ending != WORDS_EXTENSION {
             *unknown.entry(ending.to_owned()).or_default() += 1;
             continue;
-        };
+        }
         let place = MemberLocation { tar: tar.to_owned(), offset: entry.raw_file_position(), bytes: entry.size() };
         ensure!(place.offset.saturating_add(place.bytes) <= length, "{}: {name} is cut off", reading());
-        let fresh = || LooseSample { key: key.to_owned(), members: Default::default() };
+        let fresh = || LooseSample { key: key.to_owned(), members: Default::default(), words: None };
         let sample = samples.entry(key.to_owned()).or_insert_with(fresh);
-        if let Some(first) = &sample.members[member] {
+        let known = member.map_or(&mut sample.words, |member| &mut sample.members[member]);
+        if let Some(first) = known {
             let same = read_place(first)? == read_place(&place)?;
             ensure!(same, "{name} lies in {} and in {} with other bytes", first.tar.display(), tar.display());
         }
-        sample.members[member].get_or_insert(place);
+        known.get_or_insert(place);
     }
     Ok(n_files)
 }
@@ -158,7 +162,10 @@ impl LooseSample {
             *bytes = read_place(place)?;
         }
         let [json, mask, pose2d, pose3d, sound] = &members;
-        let sample = self.parse(json, mask, pose2d, pose3d, sound);
+        let words = self.words.as_ref().map(read_place).transpose()?;
+        let words = words.map(|bytes| serde_json::from_slice(&bytes).context(WORDS_EXTENSION)).transpose();
+        let sample = words.and_then(|words| Ok(Sample { words, ..self.parse(json, mask, pose2d, pose3d, sound)? }));
+        let sample = sample.and_then(|sample| sample.words_member().map(|_| sample));
         let sample = sample.with_context(|| format!("the sample {} in {tar} is damaged", self.key))?;
         Ok((sample, members.into_iter().next().unwrap_or_default()))
     }
@@ -181,7 +188,7 @@ impl LooseSample {
         let sound = read_wav(sound).context("wav")?;
         fps.checked().context("json: fps")?;
         let motion = Motion { fps, joints, mask }.in_range().context("pose3d.npy")?;
-        let sample = Sample { key: self.key.clone(), motion, pose2d, sound, meta };
+        let sample = Sample { key: self.key.clone(), motion, pose2d, sound, words: None, meta };
         sample.members()?;
         Ok(sample)
     }

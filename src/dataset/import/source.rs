@@ -18,7 +18,7 @@ use crate::dataset::write::writer::DatasetWriter;
 use crate::dataset::{INFO, Split};
 use crate::motion::bones;
 use crate::stage::fingerprint::hash_file;
-use crate::stage::ledger::{Kept, Ledger, Refused};
+use crate::stage::ledger::{Kept, Ledger, Refused, TranscriptAccount, WordCount};
 use crate::stage::refusal::{FrameRefusal, Refusal};
 use crate::types::sound::Sound;
 use anyhow::{Context, Result, ensure};
@@ -195,12 +195,15 @@ fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
                 source.ledger.refused.push(Refused::new(end_secs, duration_secs, why));
             }
             source.bones = VideoBones { lengths_metres: kept.lengths.map(f64::from).to_vec(), n_frames };
-            let remark = match kept.moved_mm {
+            let bones = match kept.moved_mm {
                 moved if moved > MUCH_MOVED_MM => {
-                    format!("its bones vary: one length each moved its joints by {moved} mm (median)")
+                    Some(format!("its bones vary: one length each moved its joints by {moved} mm (median)"))
                 }
-                _ => String::new(),
+                _ => None,
             };
+            source.ledger.words = kept.words;
+            let notes = source.ledger.words.iter().flat_map(|words| words.notes.iter().cloned());
+            let remark = bones.into_iter().chain(notes).collect::<Vec<_>>().join("; ");
             let codes = (!plan.limits.no_sound).then(|| codes([&kept.sample.sound]));
             Ok(InspectedItem { source, codes, remark, ..InspectedItem::default() })
         }
@@ -260,6 +263,7 @@ fn look_at_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem>
         (Vec::<(f64, f64)>::new(), Vec::new(), Fingerprinter::default());
     let mut blocks: Vec<TimeBlock> = Vec::new();
     let mut content = String::new();
+    let mut words: Option<TranscriptAccount> = None;
     for waiting in &video.samples {
         let (sample, _) = waiting.read()?;
         let (key, own) = (&sample.key, sample.motion.fps);
@@ -272,6 +276,10 @@ fn look_at_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem>
         stretches.push((start, fps.secs(n_frames)));
         measured.push(VideoBones { lengths_metres: bones::measure(&sample.motion).map(f64::from).to_vec(), n_frames });
         fingerprinter.push(&sample.sound.samples);
+        if let Some(said) = &sample.words {
+            let count = WordCount { n_words: said.len(), n_kept: said.len(), ..WordCount::default() };
+            words.get_or_insert_default().count += count;
+        }
         if let Some(said) = sample.meta["content"].as_str() {
             content = said.to_owned();
         }
@@ -280,7 +288,7 @@ fn look_at_loose(video: &LooseVideo, plan: &ImportPlan) -> Result<InspectedItem>
         name: video.name.clone(),
         file: video.name.clone(),
         content,
-        ledger: shards::ledger(&stretches),
+        ledger: Ledger { words, ..shards::ledger(&stretches) },
         bones: VideoBones {
             lengths_metres: of_speaker(&measured).map(f64::from).to_vec(),
             n_frames: measured.iter().map(|bones| bones.n_frames).sum(),

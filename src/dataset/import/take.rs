@@ -2,10 +2,11 @@
 //! common length; or the reason of a refusal. A take is one continuous interval.
 
 use super::find::TakeFiles;
-use super::transcript::Transcript;
 use crate::config::videos::slug;
 use crate::dataset::sample::{N_KEYPOINTS, Sample};
+use crate::dataset::words::VideoWords;
 use crate::external::ffmpeg::audio;
+use crate::formats::transcript::{Transcript, Word};
 use crate::math::order::Ordered;
 use crate::mocap::captured;
 use crate::mocap::captured::MotionKind;
@@ -13,6 +14,7 @@ use crate::mocap::take::CapturedMotion;
 use crate::motion::bones;
 use crate::motion::resample;
 use crate::stage::fingerprint::hash_file;
+use crate::stage::ledger::TranscriptAccount;
 use crate::stage::refusal::{FrameRefusal, Refusal};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::{L_HAND, N_BONES, N_HAND_JOINTS, N_JOINTS, R_HAND};
@@ -62,6 +64,8 @@ pub struct KeptTake {
     /// Median movement of the joints by making bones constant, mm.
     pub moved_mm: f64,
     pub sample: Sample,
+    /// Account of the words of its transcript, if it has one with times.
+    pub words: Option<TranscriptAccount>,
     pub lengths: [f32; N_BONES],
 }
 
@@ -164,7 +168,12 @@ fn keep(
         Some(path) => Transcript::read(path)?,
         None => captured.text.as_deref().map(Transcript::of_text).unwrap_or_default(),
     };
-    let transcript = transcript.until(fps.secs(n_frames));
+    let end_secs = fps.secs(n_frames);
+    let timed = found.transcript.as_ref().filter(|_| !transcript.words.is_empty());
+    let said = timed.map(|path| VideoWords::new(transcript.clone(), path, sound_secs, 0.0)).transpose()?;
+    let words = said.as_ref().map(|said| said.account([(0.0, end_secs)]));
+    let transcript = transcript.until(end_secs);
+    let in_meta = |word: &Word| json!({ "start_secs": word.start_secs, "end_secs": word.end_secs, "word": word.word });
     let seen = |root: usize| {
         let hand = motion.mask.slice(s![.., root..root + N_HAND_JOINTS]);
         hand.iter().filter(|&&seen| seen).count() as f64 / hand.len().max(1) as f64
@@ -191,16 +200,17 @@ fn keep(
             "bones_moved_mm": { "median": moved[0], "largest": moved[1] },
         },
         "text": transcript.text,
-        "words": transcript.words,
+        "words": transcript.words.iter().map(in_meta).collect::<Vec<_>>(),
     });
     if let Some(imported) = meta.get_mut("imported").and_then(Value::as_object_mut) {
         imported.extend(captured.facts.clone());
     }
     let pose2d = Array3::zeros((n_frames, N_KEYPOINTS, 3));
     let key = format!("{name}-{:06}", 0);
-    let sample = Sample { key, motion, pose2d, sound, meta };
+    let in_sample = said.map(|said| said.within(0.0, end_secs));
+    let sample = Sample { key, motion, pose2d, sound, words: in_sample, meta };
     sample.members().with_context(|| format!("{} makes no sample", found.motion.display()))?;
-    Ok(KeptTake { moved_mm: moved[0], sample, lengths })
+    Ok(KeptTake { moved_mm: moved[0], sample, words, lengths })
 }
 
 /// Movement of the joints by making bones constant: median and maximum, mm to a hundredth.

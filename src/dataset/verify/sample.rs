@@ -11,6 +11,7 @@ const BONE_TOLERANCE: f64 = 1e-5;
 pub fn check_sample(sample: &Sample, lengths: &[f64]) -> Result<()> {
     // A sample that cannot be written is damaged.
     sample.members()?;
+    sample.words_member()?;
     let (joints, mask) = (&sample.motion.joints, &sample.motion.mask);
     for t in 0..sample.n_frames() {
         let at = |joint: usize| -> [f64; 3] { std::array::from_fn(|k| f64::from(joints[[t, joint, k]])) };

@@ -194,6 +194,7 @@ fn videos(dir: &Path, found: &mut Verified) -> Result<()> {
         }
         found.note(&file, account(&part, fps));
         found.note(&file, blocks::check_blocks(&part, &info));
+        found.note(&file, words_accounted(&part));
     }
     Ok(())
 }
@@ -214,6 +215,15 @@ fn account(part: &VideoEntry, fps: FrameRate) -> Result<()> {
         fps.secs(frames),
         part.samples.len()
     );
+    Ok(())
+}
+
+/// Checks that the ledger of a video accounts for every word.
+fn words_accounted(part: &VideoEntry) -> Result<()> {
+    let has_words = part.samples.iter().any(|sample| sample.words.is_some());
+    ensure!(part.ledger.words.is_some() || !has_words, "its samples have words, its ledger none");
+    let is_whole = part.ledger.words.as_ref().is_none_or(|words| words.count.is_whole());
+    ensure!(is_whole, "its ledger does not account for every word of the transcript");
     Ok(())
 }
 
@@ -245,10 +255,17 @@ fn samples(dir: &Path, found: &mut Verified, progress: &dyn Progress) {
     let task = progress.begin("samples", found.n_samples as u64);
     for name in part::names(dir).unwrap_or_default() {
         let Ok(part) = VideoEntry::read(&VideoEntry::path(dir, &name)) else { continue };
+        let mut n_words = 0;
         for sample in &part.samples {
-            let checked = dataset.read(sample).and_then(|read| check_sample(&read, &part.bones.lengths_metres));
+            let read = dataset.read(sample).inspect(|read| n_words += read.words.as_ref().map_or(0, Vec::len));
+            let checked = read.and_then(|read| check_sample(&read, &part.bones.lengths_metres));
             found.note(&sample.shard, checked.with_context(|| sample.key.clone()));
             task.advance(1);
+        }
+        let n_kept = part.ledger.words.as_ref().map_or(0, |words| words.count.n_kept);
+        if n_words != n_kept {
+            let file = format!("{}/{name}.json", part::FOLDER);
+            found.wrong(&file, format!("its ledger keeps {n_kept} words, its samples hold {n_words}"));
         }
     }
 }

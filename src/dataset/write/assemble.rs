@@ -98,8 +98,9 @@ pub fn assemble_into(
     checksums.insert(INDEX.to_owned(), index.finish()?);
     checksums.insert(LEDGER.to_owned(), ledger.finish()?);
     let leakage = Leakage::new(compared, &placed);
-    let info = DatasetInfo::new(about, &of_speaker(&bones), splits, videos);
     let stats = gatherer.finish();
+    let info = DatasetInfo::new(about, &of_speaker(&bones), splits, videos);
+    let info = if stats.footage.words.is_some() { info.with_words() } else { info };
     let texts = [
         (INFO, pretty(&info)?),
         (STATS, pretty(&stats)?),

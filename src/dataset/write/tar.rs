@@ -2,7 +2,7 @@
 //! are recorded while writing.
 
 use crate::dataset::index::{ByteRange, SampleRef, ShardRef};
-use crate::dataset::sample::{EXTENSIONS, Sample};
+use crate::dataset::sample::{EXTENSIONS, Sample, WORDS_EXTENSION};
 use crate::dataset::split::Split;
 use crate::types::file_name::FileName;
 use anyhow::{Context, Result};
@@ -46,9 +46,10 @@ impl ShardWriter {
         self.push_members(sample, &sample.members()?)
     }
 
-    /// Appends a sample with these bytes as members.
+    /// Appends a sample with these bytes as members, and its words.
     pub fn push_members(&mut self, sample: &Sample, members: &[Vec<u8>; 5]) -> Result<()> {
-        let bytes: usize = members.iter().map(|m| BLOCK + m.len().next_multiple_of(BLOCK)).sum();
+        let words = sample.words_member()?;
+        let bytes: usize = members.iter().chain(&words).map(|m| BLOCK + m.len().next_multiple_of(BLOCK)).sum();
         if self.open.as_ref().is_some_and(|open| open.bytes + (bytes + 2 * BLOCK) as u64 > self.max_bytes) {
             self.close()?;
         }
@@ -65,7 +66,7 @@ impl ShardWriter {
         let offset = open.bytes;
         let mut hasher = blake3::Hasher::new();
         let mut spans = Vec::with_capacity(EXTENSIONS.len());
-        for (extension, member) in EXTENSIONS.iter().zip(members) {
+        for (extension, member) in EXTENSIONS.iter().chain([&WORDS_EXTENSION]).zip(members.iter().chain(&words)) {
             let header = header(&format!("{}.{extension}", sample.key), member.len())?;
             let padding = [0; BLOCK];
             let padding = &padding[..member.len().next_multiple_of(BLOCK) - member.len()];
@@ -76,6 +77,7 @@ impl ShardWriter {
             }
         }
         open.n_samples += 1;
+        let words = if words.is_some() { spans.pop() } else { None };
         let [json, mask, pose2d, pose3d, wav] = spans.try_into().unwrap_or([ByteRange::default(); 5]);
         self.samples.push(SampleRef {
             key: FileName::new(&*sample.key)?,
@@ -90,6 +92,7 @@ impl ShardWriter {
             pose2d,
             pose3d,
             wav,
+            words,
         });
         Ok(())
     }

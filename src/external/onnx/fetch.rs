@@ -2,7 +2,7 @@
 //! Every file is pinned by its SHA-256 before it is converted, and the result after it.
 
 use super::convert::{ConversionOptions, convert};
-use super::{ModelEntry, ModelSource, RuntimeEntry, SourceKind, package, sha256_of};
+use super::{ModelEntry, ModelSource, PinnedFile, SourceKind, package, sha256_of};
 use crate::stage::workdir;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use sha2::{Digest, Sha256};
@@ -104,18 +104,18 @@ impl<'a> Fetcher<'a> {
         bail!("it could not be had:{refused}\n      a folder that has the file (sha256 {}): --mirror DIR", entry.sha256)
     }
 
-    /// Writes the library of ONNX Runtime to `path`.
+    /// Writes a file that is no model to `path`.
     ///
     /// # Errors
     /// No source that has it; the message says why of each.
-    pub fn get_library(&mut self, runtime: &RuntimeEntry, path: &Path) -> Result<FetchSource> {
-        let library = |files: &[Vec<u8>]| {
+    pub fn get_file(&mut self, file: &PinnedFile, path: &Path) -> Result<FetchSource> {
+        let whole = |files: &[Vec<u8>]| {
             let bytes = files.concat();
-            pinned(&bytes, &runtime.sha256, &runtime.file).map(|()| bytes)
+            pinned(&bytes, &file.sha256, &file.file).map(|()| bytes)
         };
-        let obtained = self.first_of(&runtime.sources, library);
+        let obtained = self.first_of(&file.sources, whole);
         let Obtained { bytes, source, .. } =
-            obtained.map_err(|refused| anyhow!("{} could not be had:{refused}", runtime.file))?;
+            obtained.map_err(|refused| anyhow!("{} could not be had:{refused}", file.file))?;
         workdir::write_file(path, &bytes)?;
         Ok(source)
     }

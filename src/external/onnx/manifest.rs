@@ -1,7 +1,7 @@
 //! `manifest.toml`: the models known, built in and beside the model files. One model's description is in `entry`, what
 //! makes it sound in `check`; `model` opens what is described here.
 
-use super::{ModelEntry, ModelRole, ModelSource, RuntimeEntry};
+use super::{ModelEntry, ModelRole, ModelSource, PinnedFile};
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -19,7 +19,10 @@ pub struct Manifest {
     pub models: Vec<ModelEntry>,
     /// The ONNX Runtime library, for machines that have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub runtime: Option<RuntimeEntry>,
+    pub runtime: Option<PinnedFile>,
+    /// Word vectors, as they are published.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub words: Option<PinnedFile>,
     /// Descriptions without a file: forms to register other models by.
     #[serde(default, rename = "layout", skip_serializing_if = "Vec::is_empty")]
     pub layouts: Vec<ModelEntry>,
@@ -39,6 +42,7 @@ impl Manifest {
             Ok(text) => {
                 let own = Self::parse(&text).with_context(|| format!("in {}", path.display()))?;
                 manifest.runtime = own.runtime.or(manifest.runtime);
+                manifest.words = own.words.or(manifest.words);
                 own.models.into_iter().for_each(|entry| put(&mut manifest.models, entry));
                 own.layouts.into_iter().for_each(|entry| put(&mut manifest.layouts, entry));
             }
@@ -56,7 +60,8 @@ impl Manifest {
             let known = manifest.models[..idx].iter().any(|other| other.id == entry.id);
             ensure!(!known, "model {:?} stands in it twice", entry.id);
         }
-        manifest.runtime.iter().flat_map(|runtime| &runtime.sources).try_for_each(ModelSource::check)?;
+        let files = manifest.runtime.iter().chain(&manifest.words);
+        files.flat_map(|file| &file.sources).try_for_each(ModelSource::check)?;
         for entry in &manifest.layouts {
             entry.check().with_context(|| format!("layout {:?}", entry.id))?;
         }

@@ -28,5 +28,5 @@ pub use runtime::LIBRARY;
 pub use runtime::Runtime;
 pub use runtime::TELEMETRY_OFF;
 pub use runtime::find_library;
-pub use source::{Conversion, ModelSource, RuntimeEntry, SourceFile, SourceKind};
+pub use source::{Conversion, ModelSource, PinnedFile, SourceFile, SourceKind};
 pub use store::{AUTO, Fetched, ModelState, ModelStore, Wanted};

@@ -27,11 +27,11 @@ pub struct ModelSource {
     pub licence: Option<String>,
 }
 
-/// The shared library of ONNX Runtime, and the places that have it.
+/// A file that is no model (the library of ONNX Runtime, word vectors), and the places that have it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct RuntimeEntry {
-    /// Its name in the folder `lib` of the models.
+pub struct PinnedFile {
+    /// Its name.
     pub file: String,
     /// SHA-256 of its content, 64 hex digits.
     pub sha256: String,

@@ -182,7 +182,30 @@ impl ModelStore {
         let _task = progress.begin("ONNX Runtime", 0);
         let downloads = self.dir.join(DOWNLOADS);
         let _ = std::fs::remove_dir_all(&downloads);
-        let had = Fetcher::new(mirror, &downloads)?.get_library(runtime, &self.dir.join("lib").join(&runtime.file));
+        let had = Fetcher::new(mirror, &downloads)?.get_file(runtime, &self.dir.join("lib").join(&runtime.file));
+        let _ = std::fs::remove_dir_all(&downloads);
+        had
+    }
+
+    /// Gets the word vectors of the manifest, and gives what `convert` makes of the file as it is published.
+    ///
+    /// # Errors
+    /// No place that has it; an error of `convert`.
+    pub fn fetch_words<T>(
+        &self,
+        mirror: Option<&Path>,
+        progress: &dyn Progress,
+        convert: impl FnOnce(&Path, &FetchSource) -> Result<T>,
+    ) -> Result<T> {
+        let words = self.manifest.words.as_ref().context("the manifest names no word vectors")?;
+        let _lock = workdir::lock(&self.dir)?;
+        let _task = progress.begin("word vectors", 0);
+        let downloads = self.dir.join(DOWNLOADS);
+        let _ = std::fs::remove_dir_all(&downloads);
+        let file = downloads.join(&words.file);
+        let had = Fetcher::new(mirror, &downloads)
+            .and_then(|mut fetcher| fetcher.get_file(words, &file))
+            .and_then(|source| convert(&file, &source));
         let _ = std::fs::remove_dir_all(&downloads);
         had
     }

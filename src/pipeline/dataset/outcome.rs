@@ -8,10 +8,14 @@ use crate::dataset::leakage::Leakage;
 use crate::dataset::split::{Split, SplitRule};
 use crate::dataset::stats::DatasetStats;
 use crate::dataset::{INFO, LEAKAGE};
+use crate::stage::ledger::WordCount;
 use crate::stage::{Report, counted};
 use anyhow::{Context, Result};
 use std::collections::BTreeMap;
 use std::path::Path;
+
+/// Videos whose notes on words are told.
+const MAX_NOTED: usize = 5;
 
 /// How the writing came out.
 pub struct DatasetOutcome<'a> {
@@ -43,6 +47,9 @@ impl DatasetOutcome<'_> {
         };
         if self.n_taken_over > 0 {
             line += &format!("; {} taken over as they were", counted(self.n_taken_over, "video"));
+        }
+        if let Some(WordCount { n_words, n_kept, .. }) = self.stats.footage.words {
+            line += &format!("; {n_kept} of {n_words} words");
         }
         warnings.iter().for_each(|warning| line += &format!("; warning: {warning}"));
         let secs: BTreeMap<_, _> = info.splits.iter().map(|(name, split)| (name, split.secs)).collect();
@@ -94,6 +101,16 @@ impl DatasetOutcome<'_> {
         if n_left_out > 0 {
             let videos = counted(n_left_out, "video");
             warnings.push(format!("{videos} left out, the same content is there already (ledger.jsonl says where)"));
+        }
+        let noted = self.videos.iter().filter_map(|video| {
+            let notes = video.account_of_words(std::iter::empty())?.notes;
+            (!notes.is_empty()).then(|| format!("{}: {}", video.file, notes.join("; ")))
+        });
+        let noted: Vec<String> = noted.collect();
+        let n_others = noted.len().saturating_sub(MAX_NOTED);
+        warnings.extend(noted.into_iter().take(MAX_NOTED));
+        if n_others > 0 {
+            warnings.push(format!("notes on the words of {} more (ledger.jsonl)", counted(n_others, "video")));
         }
         warnings
     }

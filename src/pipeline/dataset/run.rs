@@ -87,7 +87,9 @@ impl<'a> DatasetRun<'a> {
         if self.is_taken_over(video, &made_from)? {
             return Ok(());
         }
-        let mut part = writer.video(source(video, made_from, video.ledger.clone()), split, by)?;
+        let words = video.account_of_words(video.intervals.intervals.iter().copied());
+        let ledger = Ledger { words, ..video.ledger.clone() };
+        let mut part = writer.video(source(video, made_from, ledger), split, by)?;
         if let Some(mut samples) = video.samples(&video.intervals.intervals)? {
             while let Some(cut) = samples.next_sample()? {
                 part.push(&cut.sample, cut.padded_secs)?;
@@ -118,8 +120,10 @@ impl<'a> DatasetRun<'a> {
             return Ok(());
         }
         let divided = division.divide(&video.intervals, &video.ledger, &blocks)?;
-        let mut part = writer.video_in_blocks(source(video, made_from, divided.ledger), blocks)?;
         let intervals: Vec<Interval> = divided.pieces.iter().map(|(_, interval)| *interval).collect();
+        let words = video.account_of_words(intervals.iter().copied());
+        let ledger = Ledger { words, ..divided.ledger };
+        let mut part = writer.video_in_blocks(source(video, made_from, ledger), blocks)?;
         if let Some(mut samples) = video.samples(&intervals)? {
             for (split, _) in divided.pieces {
                 let Some(cut) = samples.next_sample()? else { break };
@@ -143,7 +147,8 @@ impl<'a> DatasetRun<'a> {
     /// A video that is left out, since what it shows is there already: what was kept of it is refused.
     pub fn duplicate(&self, video: &LiftedVideo, of: &str, secs: f64) -> VideoSource {
         let threshold = self.settings.duplicate_secs;
-        let mut ledger = video.ledger.clone();
+        let words = video.account_of_words(std::iter::empty());
+        let mut ledger = Ledger { words, ..video.ledger.clone() };
         let why = FrameRefusal::new(Refusal::Duplicate, secs, threshold);
         let refused = ledger.kept.drain(..).map(|kept| {
             Refused::with_message(kept.start_secs, kept.end_secs, why, format!("the same {secs:.1} s are in {of}"))

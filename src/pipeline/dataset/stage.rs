@@ -113,6 +113,17 @@ impl DatasetStage {
         Ok(Division { record, guard_frames: self.guard_frames, least_frames: self.window_frames })
     }
 
+    /// Opens a video, with its words where the speaker has transcripts.
+    fn open(&self, video: &Unit) -> Result<LiftedVideo> {
+        let opened = LiftedVideo::open(&self.work, video, self.fixes_offset)?;
+        let has_words = self.speakers.iter().any(|said| said.name == video.speaker && !said.transcripts.is_empty());
+        Ok(if has_words { opened.with_words(self.transcript(video)) } else { opened })
+    }
+
+    fn transcript(&self, video: &Unit) -> Option<&Path> {
+        Some(self.all.iter().find(|videos| videos.speaker == video.speaker)?.transcripts.get(&video.video)?)
+    }
+
     fn about(&self, speaker: &Unit, first: &LiftedVideo) -> About {
         let said = self.speakers.iter().find(|said| said.name == speaker.speaker).cloned().unwrap_or_default();
         let config::SpeakerConfig { licence, consent, source, .. } = said;
@@ -174,6 +185,9 @@ impl Stage for DatasetStage {
         if let (true, Some(settings)) = (self.fixes_offset, settings.as_object_mut()) {
             settings.insert("fix_offset".to_owned(), true.into());
         }
+        if let (false, Some(settings)) = (said.transcripts.is_empty(), settings.as_object_mut()) {
+            settings.insert("words".to_owned(), true.into());
+        }
         settings
     }
 
@@ -181,6 +195,9 @@ impl Stage for DatasetStage {
         let mut inputs = Vec::new();
         for video in self.ready(unit) {
             inputs.push(Input { role: format!("{} video", video.video), path: video.source.clone() });
+            if let Some(path) = self.transcript(video).filter(|path| path.is_file()) {
+                inputs.push(Input { role: format!("{} transcript", video.video), path: path.to_owned() });
+            }
             let offset = self.fixes_offset.then_some((Artifact::SoundOffset, true));
             for (file, optional) in FILES.into_iter().chain(offset) {
                 let path = file.path(&self.work, video);
@@ -199,10 +216,7 @@ impl Stage for DatasetStage {
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
         let ready = self.ready(unit);
         let failures = self.failures(unit, &ready);
-        let mut videos = ready
-            .into_iter()
-            .map(|video| LiftedVideo::open(&self.work, video, self.fixes_offset))
-            .collect::<Result<Vec<_>>>()?;
+        let mut videos = ready.into_iter().map(|video| self.open(video)).collect::<Result<Vec<_>>>()?;
         videos.sort_by(|a, b| (&a.name, &a.unit.video).cmp(&(&b.name, &b.unit.video)));
         check(unit, &self.work, &videos)?;
 

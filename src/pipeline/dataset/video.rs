@@ -4,11 +4,12 @@ use crate::audio::fingerprint::Fingerprinter;
 use crate::config::videos::slug;
 use crate::dataset::bones::VideoBones;
 use crate::dataset::sample::Sample;
+use crate::dataset::words::VideoWords;
 use crate::formats::{joints_npz, keypoints_npz};
 use crate::stage::Unit;
 use crate::stage::artifacts::{Artifact, StageName, dir};
 use crate::stage::fingerprint::hash_file;
-use crate::stage::ledger::Ledger;
+use crate::stage::ledger::{Ledger, TranscriptAccount};
 use crate::stage::record::Record;
 use crate::types::interval::{Interval, Intervals};
 use crate::types::pose2d::Keypoints;
@@ -43,6 +44,8 @@ pub struct LiftedVideo {
     sound: PathBuf,
     keypoints: PathBuf,
     joints: PathBuf,
+    /// Its words; `None`: no transcripts were asked for.
+    pub words: Option<VideoWords>,
 }
 
 /// The files read of each video, and whether it may be missing.
@@ -116,7 +119,26 @@ impl LiftedVideo {
             joints: path_of(Artifact::Joints),
             content,
             intervals,
+            words: None,
         })
+    }
+
+    /// Gives the video the words of a transcript, or of none that has its name.
+    pub fn with_words(mut self, transcript: Option<&Path>) -> Self {
+        let sound_secs = hound::WavReader::open(&self.sound).map_or(0.0, |wav| f64::from(wav.duration()));
+        let rate = f64::from(SAMPLE_RATE);
+        let hash = transcript.and_then(|path| hash_file(path).ok()).unwrap_or_default();
+        let name = transcript.and_then(Path::file_name).unwrap_or_default().to_string_lossy().into_owned();
+        self.files_hash =
+            blake3::hash(format!("{} words {name} {hash}\n", self.files_hash).as_bytes()).to_hex().to_string();
+        self.words = Some(VideoWords::read(transcript, sound_secs / rate, self.shift as f64 / rate));
+        self
+    }
+
+    /// Account of the words in samples of these intervals.
+    pub fn account_of_words(&self, intervals: impl Iterator<Item = Interval>) -> Option<TranscriptAccount> {
+        let fps = self.intervals.fps;
+        self.words.as_ref().map(|words| words.account(intervals.map(|i| (fps.secs(i.start), fps.secs(i.end)))))
     }
 
     /// The codes of its sound (`audio::fingerprint`); `None` without sound. Memory: the codes, 0.45 MB an hour.
@@ -211,7 +233,9 @@ impl LiftedSamples<'_> {
         }
         let key = format!("{}-{:06}", self.video.name, interval.start);
         let padded_secs = n_padded as f64 / f64::from(SAMPLE_RATE);
-        Ok(CutSample { sample: Sample { key, motion, pose2d, sound, meta }, padded_secs })
+        let words =
+            self.video.words.as_ref().map(|words| words.within(fps.secs(interval.start), fps.secs(interval.end)));
+        Ok(CutSample { sample: Sample { key, motion, pose2d, sound, words, meta }, padded_secs })
     }
 
     /// The sound under an interval, and how many samples of silence stand in for some that are not there.

@@ -153,6 +153,7 @@ fn a_dataset_has_the_face_and_the_sound_of_its_samples() {
         motion: swinging(n as u64, n_frames),
         pose2d: pose2d.clone(),
         sound: sound.clone(),
+        words: None,
         meta: serde_json::json!({ "first_frame": 0, "n_frames": n_frames }),
     };
     let samples: Vec<(Split, Sample)> = vec![(Split::Train, sample(0)), (Split::Test, sample(1))];

@@ -10,3 +10,4 @@ pub mod shared_sound;
 pub mod sound_offset;
 pub mod splits;
 pub mod splits_by_time;
+pub mod words;

@@ -1,10 +1,10 @@
 //! Texts: transcripts, keypoints as JSON, configuration, manifest, tables, results, logs.
 
 use crate::fixtures::fuzzing::harness::{corpus, folder, fuzz_bytes, fuzz_file};
-use orator::dataset::import::transcript::Transcript;
 use orator::evaluate::table::result::StoredResult;
 use orator::external::onnx::Manifest;
 use orator::formats::keypoints;
+use orator::formats::transcript::Transcript;
 use orator::pipeline::batch::sounds;
 
 #[test]
@@ -12,7 +12,7 @@ fn transcripts() {
     let files = corpus("texts", "words");
     let dir = folder();
     fuzz_bytes("transcripts", &files, |bytes| {
-        for ending in ["srt", "vtt", "TextGrid", "tsv", "json", "txt"] {
+        for ending in ["srt", "vtt", "TextGrid", "tsv", "ctm", "json", "txt"] {
             let path = dir.path().join(format!("a.{ending}"));
             std::fs::write(&path, bytes).unwrap();
             if let Ok(transcript) = Transcript::read(&path) {

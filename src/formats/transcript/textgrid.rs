@@ -1,6 +1,6 @@
 //! Praat's TextGrid, long and short text format: the words of its tier of words.
 
-use super::word::Word;
+use super::word::{self, Word};
 use anyhow::{Context, Result, ensure};
 
 /// The intervals with text of the tier whose name has `word` in it, else of the first tier of intervals.
@@ -68,13 +68,8 @@ fn tier(values: &[TextGridValue], at: &mut usize) -> Result<(String, Vec<Word>)>
         let (Some(start_secs), Some(end_secs), TextGridValue::Text(word)) = (start_secs, end_secs, next()?) else {
             anyhow::bail!("tier {name}: interval {n} needs two times and a text");
         };
-        ensure!(
-            start_secs.is_finite() && end_secs.is_finite() && end_secs >= start_secs,
-            "tier {name}: interval {n} goes from {start_secs} to {end_secs} s"
-        );
-        if !word.trim().is_empty() {
-            words.push(Word { start_secs, end_secs, word: word.trim().to_owned() });
-        }
+        word::push(&mut words, word, (start_secs, end_secs), None)
+            .with_context(|| format!("tier {name}: interval {n}"))?;
     }
     Ok((name, words))
 }
@@ -96,7 +91,8 @@ mod tests {
     fn both_formats_give_the_words() {
         for text in [LONG, SHORT] {
             let words = read(text).unwrap();
-            assert_eq!(words, [Word { start_secs: 0.5, end_secs: 2.0, word: "so".into() }]);
+            let said: Vec<_> = words.iter().map(|word| (word.word.as_str(), word.start_secs, word.end_secs)).collect();
+            assert_eq!(said, [("so", 0.5, 2.0)]);
         }
         assert!(read("File type = \"ooTextFile\"\n").is_err());
         for end in 0..SHORT.len() {

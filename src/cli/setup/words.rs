@@ -1,0 +1,149 @@
+//! `orator words`: word vectors, got or made from a file, and how many words of transcripts they know.
+
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
+use anyhow::{Context, Result, ensure};
+use orator::config::{self, Settings};
+use orator::external::onnx::{ModelStore, sha256_of};
+use orator::formats::transcript::Transcript;
+use orator::formats::word_vectors::{WordVectors, glove, wink};
+use orator::stage::workdir;
+use serde_json::{Value, json};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+/// Folder of the tables within that of the models.
+const FOLDER: &str = "words";
+/// Name of the fetched table.
+const GLOVE: &str = "glove-6b-100d";
+
+/// Get word vectors, make them from a file, and see how many words of transcripts they know.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    verb: WordsVerb,
+    /// The folder of the models, instead of the configuration's; the vectors are in its folder `words`.
+    #[arg(long, global = true, value_name = "DIR")]
+    models_dir: Option<PathBuf>,
+    /// The configuration file; without one the defaults count.
+    #[arg(short, long, global = true, default_value = "pipeline.toml", value_name = "FILE")]
+    config: PathBuf,
+}
+
+#[derive(clap::Subcommand)]
+enum WordsVerb {
+    /// Get GloVe's vectors of 341479 English words (100 numbers each, 137 MB, licence PDDL) by your own npm.
+    Fetch {
+        /// A folder with the package or its JSON, under any name; it is looked at first.
+        #[arg(long, value_name = "DIR")]
+        mirror: Option<PathBuf>,
+    },
+    /// Make a table of a text of GloVe or word2vec: a word and its numbers a line.
+    Add {
+        /// The text, or the JSON of a package wink-embeddings.
+        file: PathBuf,
+        /// Name of the table; none: the file's.
+        #[arg(long, value_name = "NAME")]
+        name: Option<String>,
+    },
+    /// Show the tables, and how many words of transcripts each knows. Exit code 1 says that of some transcript none is known.
+    Check {
+        /// Transcripts, as `orator guide dataset` names them.
+        transcripts: Vec<PathBuf>,
+    },
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let models = match &args.models_dir {
+        Some(dir) => dir.clone(),
+        None if args.config.exists() => config::load(&args.config, &[])?.settings.models.dir.to_path_buf(),
+        None => Settings::default().models.dir.to_path_buf(),
+    };
+    let folder = models.join(FOLDER);
+    match &args.verb {
+        WordsVerb::Fetch { mirror } => {
+            let table = path_of(&folder, GLOVE);
+            if let Ok(there) = WordVectors::open(&table) {
+                return Ok(made(&table, &there, "there already", ui));
+            }
+            let store = ModelStore::open(&models)?;
+            std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+            let had = store.fetch_words(mirror.as_deref(), ui, |json, source| {
+                make(json, &table)?;
+                Ok(source.to_string())
+            })?;
+            let terms = store.manifest().words.as_ref().map(|words| words.licence.clone()).unwrap_or_default();
+            workdir::write_file(&table.with_extension("licence.txt"), format!("{terms}\n").as_bytes())?;
+            Ok(made(&table, &WordVectors::open(&table)?, &had, ui))
+        }
+        WordsVerb::Add { file, name } => {
+            let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let name = name.clone().unwrap_or(stem);
+            let is_plain = |c: char| c.is_ascii_alphanumeric() || ".-_".contains(c);
+            let is_name = !name.is_empty() && !name.starts_with('.') && name.chars().all(is_plain);
+            ensure!(is_name, "{name:?} is no name of a table: letters, digits, `.`, `-` and `_`; say one by --name");
+            std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+            let table = path_of(&folder, &name);
+            make(file, &table)?;
+            Ok(made(&table, &WordVectors::open(&table)?, &format!("made from {}", file.display()), ui))
+        }
+        WordsVerb::Check { transcripts } => check(&folder, transcripts, ui),
+    }
+}
+
+fn path_of(folder: &Path, name: &str) -> PathBuf {
+    folder.join(format!("{name}.safetensors"))
+}
+
+/// Makes the table of a file of vectors.
+fn make(file: &Path, table: &Path) -> Result<()> {
+    let reader = File::open(file).with_context(|| format!("cannot read {}", file.display()))?;
+    let reader = BufReader::with_capacity(1 << 20, reader);
+    let is_json = file.extension().is_some_and(|ending| ending == "json");
+    let converted = workdir::replace(table, |attempt| {
+        let n_words = if is_json { wink::convert(reader, attempt) } else { glove::convert(reader, attempt) };
+        n_words.map(drop)
+    });
+    converted.with_context(|| format!("{} holds no word vectors", file.display()))
+}
+
+fn made(path: &Path, table: &WordVectors, how: &str, ui: &Ui) -> Outcome {
+    let text = format!("{}: {} words of {} numbers, {how}", path.display(), table.n_words(), table.dim());
+    let hash = sha256_of(path).unwrap_or_default();
+    let facts = json!({ "file": path, "words": table.n_words(), "dim": table.dim(), "sha256": hash });
+    ui.summary(&text, None, facts);
+    Outcome::Done
+}
+
+fn check(folder: &Path, transcripts: &[PathBuf], ui: &Ui) -> Result<Outcome> {
+    let mut tables: Vec<PathBuf> =
+        std::fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path()).collect();
+    tables.retain(|path| path.extension().is_some_and(|ending| ending == "safetensors"));
+    tables.sort();
+    ensure!(!tables.is_empty(), "no word vectors are in {}: `orator words fetch` gets some", folder.display());
+    let texts = transcripts.iter().map(|path| Ok((path, Transcript::read(path)?))).collect::<Result<Vec<_>>>()?;
+    let (mut lines, mut facts, mut is_wrong) = (Vec::new(), Vec::<Value>::new(), false);
+    for path in &tables {
+        let table = WordVectors::open(path)?;
+        lines.push(format!("{}: {} words of {} numbers", path.display(), table.n_words(), table.dim()));
+        let mut known = Vec::new();
+        for (file, transcript) in &texts {
+            let words: Vec<&str> = transcript.text.split_whitespace().collect();
+            let (n_words, n_known) = (words.len(), table.n_known(words));
+            let said = match (n_words, n_known) {
+                (0, _) => "it holds no word".to_owned(),
+                (_, 0) => format!("none of its {n_words} words is known: is it in the language of the vectors?"),
+                _ => {
+                    format!("{n_known} of {n_words} words are known ({:.1} %)", 100.0 * n_known as f64 / n_words as f64)
+                }
+            };
+            is_wrong |= n_known == 0;
+            lines.push(format!("  {}: {said}", file.display()));
+            known.push(json!({ "file": file, "words": n_words, "known": n_known, "said": said }));
+        }
+        facts.push(json!({ "file": path, "words": table.n_words(), "dim": table.dim(), "transcripts": known }));
+    }
+    ui.summary(&lines.join("\n"), None, json!({ "tables": facts }));
+    Ok(if is_wrong { Outcome::Wrong } else { Outcome::Done })
+}

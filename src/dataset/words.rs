@@ -1,0 +1,163 @@
+//! Words of a video in its samples: a word belongs to the sample that holds its middle, so that each stands in one at
+//! most, and its times count from that sample's beginning.
+
+use crate::formats::transcript::{Transcript, Word};
+use crate::stage::ledger::{TranscriptAccount, WordCount};
+use anyhow::{Result, ensure};
+use std::path::Path;
+
+/// Words that may lie after the end of the sound, and their share; more of both, and it is the transcript of another.
+const MAX_OUTSIDE: (usize, f64) = (3, 0.1);
+/// Seconds by which a sample may end before a word of it does: the rounding of both.
+const ROUNDING_SECS: f64 = 1e-5;
+
+/// Words of a video, those within its sound, on the clock of its frames.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct VideoWords {
+    /// In the order of their middles.
+    words: Vec<Word>,
+    account: TranscriptAccount,
+}
+
+impl VideoWords {
+    /// Words of the transcript in `path` of a sound of `sound_secs`, which the frames lag behind by `shift_secs`. One that
+    /// cannot be read gives no words and a note.
+    pub fn read(path: Option<&Path>, sound_secs: f64, shift_secs: f64) -> Self {
+        let none = |note: String| {
+            let file = path.map(file_name);
+            Self {
+                words: Vec::new(),
+                account: TranscriptAccount { file, notes: vec![note], ..TranscriptAccount::default() },
+            }
+        };
+        let Some(path) = path else { return none("no transcript has the name of the video".to_owned()) };
+        let words = Transcript::read(path).and_then(|transcript| Self::new(transcript, path, sound_secs, shift_secs));
+        // Local folders must not influence the dataset.
+        let folder = path.parent().map(|folder| format!("{}/", folder.display())).filter(|folder| folder != "/");
+        let said =
+            |error: anyhow::Error| folder.iter().fold(format!("{error:#}"), |said, folder| said.replace(folder, ""));
+        words.unwrap_or_else(|error| none(said(error)))
+    }
+
+    /// Words of a transcript, as `read`.
+    ///
+    /// # Errors
+    /// Too many words after the end of the sound.
+    pub fn new(transcript: Transcript, path: &Path, sound_secs: f64, shift_secs: f64) -> Result<Self> {
+        let Transcript { mut words, mut notes, .. } = transcript;
+        let n_words = words.len();
+        let last_secs = words.iter().map(|word| word.end_secs).fold(0.0, f64::max);
+        let outside = words.iter().find(|word| middle(word) >= sound_secs).cloned();
+        words.retain(|word| middle(word) < sound_secs);
+        let n_outside = n_words - words.len();
+        ensure!(
+            n_outside <= MAX_OUTSIDE.0 || n_outside as f64 <= MAX_OUTSIDE.1 * n_words as f64,
+            "{n_outside} of {n_words} words lie after the end of the sound ({sound_secs:.2} s; the last ends at \
+             {last_secs:.2} s): is {} the transcript of another sound?",
+            file_name(path)
+        );
+        if let Some(first) = outside {
+            let (word, secs) = (first.word, first.start_secs);
+            notes.push(format!(
+                "{n_outside} of {n_words} words lie after the end of the sound and were left out, the first `{word}` at \
+                 {secs:.2} s"
+            ));
+        }
+        for word in &mut words {
+            word.start_secs -= shift_secs;
+            word.end_secs -= shift_secs;
+        }
+        words.sort_by(|a, b| middle(a).total_cmp(&middle(b)));
+        let count = WordCount { n_words, n_outside, ..WordCount::default() };
+        Ok(Self { words, account: TranscriptAccount { file: Some(file_name(path)), count, notes } })
+    }
+
+    /// Words of the sample from `start_secs` to `end_secs`, in the order of their beginnings.
+    pub fn within(&self, start_secs: f64, end_secs: f64) -> Vec<Word> {
+        let from = self.words.partition_point(|word| middle(word) < start_secs);
+        let words = self.words[from..].iter().take_while(|word| middle(word) < end_secs);
+        let micro = |secs: f64| (secs.clamp(0.0, end_secs - start_secs) * 1e6).round() / 1e6;
+        let in_sample = |word: &Word| Word {
+            start_secs: micro(word.start_secs - start_secs),
+            end_secs: micro(word.end_secs - start_secs),
+            ..word.clone()
+        };
+        let mut words: Vec<Word> = words.map(in_sample).collect();
+        words.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+        words
+    }
+
+    /// Account of the words in samples over these seconds.
+    pub fn account(&self, samples: impl IntoIterator<Item = (f64, f64)>) -> TranscriptAccount {
+        let n_kept = samples.into_iter().map(|(start, end)| self.within(start, end).len()).sum();
+        let mut account = self.account.clone();
+        account.count.n_kept = n_kept;
+        account.count.n_refused = self.words.len() - n_kept.min(self.words.len());
+        account
+    }
+}
+
+/// Checks the words of a sample of `secs` seconds.
+///
+/// # Errors
+/// The number and text of a word outside the sample, out of order or empty.
+pub fn check(words: &[Word], secs: f64) -> Result<()> {
+    let mut before = 0.0;
+    for (n, word) in words.iter().enumerate() {
+        let (start, end) = (word.start_secs, word.end_secs);
+        let named = || format!("word {} `{}`, {start} to {end} s", n + 1, word.word);
+        ensure!(!word.word.is_empty() && !word.word.contains(char::is_whitespace), "{}: it is not one word", named());
+        ensure!(start >= 0.0 && end >= start && end <= secs + ROUNDING_SECS, "{}: outside its {secs:.3} s", named());
+        ensure!(start >= before, "{}: it begins before the word before", named());
+        ensure!(word.confidence.is_none_or(|c| (0.0..=1.0).contains(&c)), "{}: its confidence is not in 0..1", named());
+        before = start;
+    }
+    Ok(())
+}
+
+fn middle(word: &Word) -> f64 {
+    f64::midpoint(word.start_secs, word.end_secs)
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn transcript(rows: &str) -> Transcript {
+        Transcript::parse(&rows.replace(' ', "\t"), "tsv", "").unwrap()
+    }
+
+    #[test]
+    fn every_word_is_in_one_sample_or_counted() {
+        let words = transcript("0.1 0.3 a\n0.9 1.3 b\n1.5 1.6 c\n2.9 3.0 d\n9 10 e\n");
+        let path = Path::new("talk.tsv");
+        assert!(VideoWords::new(words.clone(), path, 0.5, 0.0).unwrap_err().to_string().contains("4 of 5 words"));
+        let said = VideoWords::new(words.clone(), path, 10.0, 0.0).unwrap();
+        let samples = [(0.0, 1.0), (1.0, 2.0)];
+        let at = |n: usize| {
+            let words = said.within(samples[n].0, samples[n].1);
+            words.iter().map(|w| format!("{} {} {}", w.word, w.start_secs, w.end_secs)).collect::<Vec<_>>()
+        };
+        assert_eq!((at(0), at(1)), (vec!["a 0.1 0.3".to_owned()], vec!["b 0 0.3".to_owned(), "c 0.5 0.6".to_owned()]));
+        let WordCount { n_words, n_kept, n_refused, n_outside } = said.account(samples).count;
+        assert_eq!((n_words, n_kept, n_refused, n_outside), (5, 3, 2, 0));
+        let shifted = VideoWords::new(words, path, 10.0, 0.5).unwrap();
+        assert_eq!(shifted.within(1.0, 2.0).len(), 1);
+        assert!(check(&said.within(1.0, 2.0), 1.0).is_ok() && check(&said.within(1.0, 2.0), 0.5).is_err());
+    }
+
+    #[test]
+    fn a_few_words_after_the_end_are_left_out_with_a_note() {
+        let rows: String = (0..20).map(|n| format!("{n} {} w\n", n + 1)).collect();
+        let said = VideoWords::new(transcript(&rows), Path::new("a.tsv"), 19.0, 0.0).unwrap().account([(0.0, 19.0)]);
+        assert_eq!((said.count.n_kept, said.count.n_outside), (19, 1));
+        assert!(said.notes[0].contains("`w` at 19.00 s"));
+        let missing = VideoWords::read(Some(Path::new("/none/a.tsv")), 1.0, 0.0).account([]);
+        assert!(missing.notes[0].starts_with("cannot read a.tsv"), "{:?}", missing.notes);
+        assert!(VideoWords::read(None, 1.0, 0.0).account([]).notes[0].contains("no transcript"));
+    }
+}

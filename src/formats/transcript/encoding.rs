@@ -1,0 +1,66 @@
+//! Bytes of a text file to text: UTF-8, or UTF-16 with its mark, as Praat and Windows programs write it.
+
+use anyhow::{Result, bail, ensure};
+
+/// The text without its byte order mark.
+///
+/// # Errors
+/// Another encoding; the message names the line of the first byte that is no text.
+pub fn text_of(bytes: &[u8]) -> Result<String> {
+    match bytes {
+        [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes),
+        [0xfe, 0xff, rest @ ..] => utf16(rest, u16::from_be_bytes),
+        [0xef, 0xbb, 0xbf, rest @ ..] => utf8(rest),
+        _ => utf8(bytes),
+    }
+}
+
+fn utf8(bytes: &[u8]) -> Result<String> {
+    let text = match std::str::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(error) => {
+            let at = error.valid_up_to();
+            let line = 1 + bytes[..at].iter().filter(|byte| **byte == b'\n').count();
+            bail!("line {line}: the byte {:#04x} is no UTF-8; save the file as UTF-8", bytes[at]);
+        }
+    };
+    if let Some(at) = text.find('\0') {
+        let line = 1 + text[..at].matches('\n').count();
+        bail!("line {line}: a zero byte; it is no text, or UTF-16 without its mark: save the file as UTF-8");
+    }
+    Ok(text.to_owned())
+}
+
+fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<String> {
+    let (pairs, rest) = bytes.as_chunks::<2>();
+    ensure!(rest.is_empty(), "it is UTF-16, and ends in the middle of a letter");
+    let mut text = String::new();
+    for letter in char::decode_utf16(pairs.iter().map(|pair| unit(*pair))) {
+        let Ok(letter) = letter else {
+            bail!("line {}: half a letter of UTF-16; save the file as UTF-8", 1 + text.matches('\n').count())
+        };
+        text.push(letter);
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn encodings_are_told_by_their_marks_and_others_refused_with_their_line() {
+        let utf16 = |swap: bool| {
+            let units = "\u{feff}sö\n".encode_utf16();
+            let bytes = units.map(|unit| if swap { unit.to_be_bytes() } else { unit.to_le_bytes() });
+            bytes.collect::<Vec<_>>().concat()
+        };
+        for bytes in [utf16(false), utf16(true), "sö\n".into(), "\u{feff}sö\n".into()] {
+            assert_eq!(text_of(&bytes).unwrap(), "sö\n");
+        }
+        assert!(text_of(b"so\nsch\xf6n").unwrap_err().to_string().starts_with("line 2: the byte 0xf6"));
+        assert!(text_of(b"s\0o\0\n\0").unwrap_err().to_string().contains("UTF-16"));
+        assert!(text_of(b"\xff\xfes").is_err());
+        assert!(text_of(b"\xff\xfe\x00\xd8\x00\x00").unwrap_err().to_string().starts_with("line 1"));
+    }
+}

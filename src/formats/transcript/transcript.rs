@@ -1,0 +1,216 @@
+//! Transcripts by their endings: `.json` (recognisers), `.tsv`, `.ctm`, `.srt`, `.vtt`, `.TextGrid`, or words without
+//! times from `.txt`. Times that cannot be are errors with their place, doubtful ones are notes.
+
+use super::json::JsonTranscript;
+use super::word::{Word, WordSource};
+use super::{ctm, encoding, json, subtitles, textgrid, tsv};
+use anyhow::{Context, Result, ensure};
+use std::path::Path;
+
+/// Endings of transcripts, in the order in which one of several is chosen.
+pub const ENDINGS: [&str; 7] = ["tsv", "json", "TextGrid", "ctm", "srt", "vtt", "txt"];
+
+/// Most bytes of a transcript, 256 MiB: a hundred days of speech.
+const MAX_BYTES: u64 = 256 << 20;
+/// Seconds by which a word may begin before the end of the one before without a note: the rounding of recognisers.
+const OVERLAP_SECS: f64 = 0.02;
+
+/// Transcript; `words` is empty without times.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Transcript {
+    pub text: String,
+    /// Words in the order of their beginnings.
+    pub words: Vec<Word>,
+    /// What is doubtful about it, a sentence each.
+    pub notes: Vec<String>,
+}
+
+impl Transcript {
+    /// Transcript without times.
+    pub fn of_text(text: &str) -> Self {
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        let note = match text.is_empty() {
+            true => "the transcript holds no word",
+            false => "the transcript has no times",
+        };
+        Self { text, words: Vec::new(), notes: vec![note.to_owned()] }
+    }
+
+    /// Transcript of words with times.
+    pub fn of_words(mut words: Vec<Word>) -> Self {
+        let disorder = words.windows(2).find(|pair| pair[1].start_secs < pair[0].start_secs);
+        let disorder = disorder.map(|pair| {
+            format!(
+                "`{}` at {:.2} s is said behind `{}` at {:.2} s: the words were sorted",
+                pair[1].word, pair[1].start_secs, pair[0].word, pair[0].start_secs
+            )
+        });
+        words.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+        let mut notes: Vec<String> = disorder.into_iter().chain(overlaps(&words)).chain(untimed(&words)).collect();
+        if words.is_empty() {
+            notes.push("the transcript holds no word".to_owned());
+        }
+        let text = words.iter().map(|word| word.word.as_str()).collect::<Vec<_>>().join(" ");
+        Self { text, words, notes }
+    }
+
+    /// Reads a transcript by its ending.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is larger than 256 MiB, in another encoding or no transcript; the message names the
+    /// line or the word.
+    pub fn read(path: &Path) -> Result<Self> {
+        let reading = || format!("cannot read {}", path.display());
+        let bytes = std::fs::metadata(path).with_context(reading)?.len();
+        ensure!(bytes <= MAX_BYTES, "{} has {bytes} bytes: that is no transcript", path.display());
+        let bytes = std::fs::read(path).with_context(reading)?;
+        let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let read = encoding::text_of(&bytes).and_then(|text| Self::parse(&text, &ending, &stem));
+        read.with_context(|| format!("{} is no transcript", path.display()))
+    }
+
+    /// Reads text in the format of an ending, in small letters; `stem` names the recording in a file of several.
+    ///
+    /// # Errors
+    /// The line or the word that is not as the format says.
+    pub fn parse(text: &str, ending: &str, stem: &str) -> Result<Self> {
+        let words = match ending {
+            "tsv" => tsv::read(text)?,
+            "ctm" => ctm::read(text, stem)?,
+            "srt" | "vtt" => subtitles::read(text)?,
+            "textgrid" => textgrid::read(text)?,
+            "json" => match json::read(text)? {
+                JsonTranscript::Words(words) => words,
+                JsonTranscript::Text(text) => return Ok(Self::of_text(&text)),
+            },
+            _ => return Ok(Self::of_text(text)),
+        };
+        Ok(Self::of_words(words))
+    }
+
+    /// Transcript of the words that begin before second `end`; text without times is kept whole.
+    pub fn until(&self, end: f64) -> Self {
+        if self.words.is_empty() {
+            return self.clone();
+        }
+        Self::of_words(self.words.iter().filter(|word| word.start_secs < end).cloned().collect())
+    }
+}
+
+/// Note on words that begin before the end of the one before.
+fn overlaps(words: &[Word]) -> Option<String> {
+    let over = |pair: &[Word]| pair[0].end_secs - pair[1].start_secs;
+    let pairs = words.windows(2).filter(|pair| over(pair) > OVERLAP_SECS);
+    let first = pairs.clone().next()?;
+    Some(format!(
+        "{} of {} words begin before the one before ends, the first `{}` at {:.2} s, {:.2} s too early",
+        pairs.count(),
+        words.len(),
+        first[1].word,
+        first[1].start_secs,
+        over(first)
+    ))
+}
+
+/// Note on words whose times are not their own.
+fn untimed(words: &[Word]) -> Option<String> {
+    let shared = words.iter().filter(|word| word.source == WordSource::Shared).count();
+    let between = words.iter().filter(|word| word.source == WordSource::Interpolated).count();
+    let n = words.len();
+    match (shared, between) {
+        (0, 0) => None,
+        (0, _) => {
+            Some(format!("{between} of {n} words have no times of their own, but those between their neighbours"))
+        }
+        _ => Some(format!("{shared} of {n} words share the time of their sentence")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str, ending: &str) -> Result<Transcript> {
+        Transcript::parse(text, ending, "a")
+    }
+
+    fn said(text: &str, ending: &str) -> String {
+        let words = parse(text, ending).unwrap().words;
+        let words = words.iter().map(|w| format!("{}@{}-{}", w.word, w.start_secs, w.end_secs));
+        words.collect::<Vec<_>>().join(" ")
+    }
+
+    fn refusal(text: &str, ending: &str) -> String {
+        format!("{:#}", parse(text, ending).unwrap_err())
+    }
+
+    #[test]
+    fn every_layout_gives_the_same_words() {
+        let expected = "so@0.5-0.7 well@1-1.25";
+        assert_eq!(said("0.5\t0.7\tso\n1.0\t1.25\twell\n", "tsv"), expected);
+        assert_eq!(said("start\tend\tword\n1.0\t1.25\twell\n\n0.5\t0.7\tso\n", "tsv"), expected);
+        assert_eq!(said("start\tend\ttext\n500\t700\tso\n1000\t1250\twell\n", "tsv"), expected);
+        assert_eq!(said("a 1 0.5 0.2 so 0.9\na 1 1 0.25 well\n", "ctm"), expected);
+        assert_eq!(said(";; b\nb 1 9 1 no\na 1 0.5 0.2 so\na 1 1.0 0.25 well\n", "ctm"), expected);
+        let google = r#"[{"alternatives": [{"transcript": "so well", "words": [
+            {"start_time": "0.500s", "end_time": "0.700s", "word": "so"}]}, {"words": [{"start_time": "9s"}]}]},
+            {"alternatives": [{"words": [{"start_time": "1s", "end_time": "1.250s", "word": "well"}]}]}]"#;
+        assert_eq!(said(google, "json"), expected);
+        let plain = r#"[{"start": 0.5, "end": 0.7, "word": "so"}, {"start": 1, "end": 1.25, "word": "well"}]"#;
+        assert_eq!(said(plain, "json"), expected);
+        let whisper = r#"{"text": " so well", "language": "en", "segments": [{"id": 0, "start": 0.5, "end": 1.25,
+            "text": " so well", "words": [{"word": " so", "start": 0.5, "end": 0.7, "probability": 0.8},
+            {"word": " well", "start": 1.0, "end": 1.25, "probability": 0.9}]}]}"#;
+        assert_eq!(said(whisper, "json"), expected);
+        assert_eq!(parse(whisper, "json").unwrap().words[0].confidence, Some(0.8));
+        let without_words = r#"{"text": " so well", "segments": [{"start": 0.5, "end": 1.1, "text": " so well"}]}"#;
+        assert_eq!(said(without_words, "json"), "so@0.5-0.7 well@0.7-1.1");
+        assert!(parse(without_words, "json").unwrap().notes[0].contains("2 of 2 words share"));
+        assert_eq!(parse(r#"{"text": "so  well"}"#, "json").unwrap(), Transcript::of_text("so well"));
+    }
+
+    #[test]
+    fn a_number_that_whisperx_does_not_time_lies_between_its_neighbours() {
+        let words = r#"{"segments": [{"start": 0, "end": 2, "text": "in 2020 we", "words": [
+            {"word": "in", "start": 0, "end": 0.5, "score": 0.9}, {"word": "2020"},
+            {"word": "we", "start": 1.5, "end": 2, "score": 0.9}]}], "word_segments": [{"word": "in", "start": 0, "end": 0.5}]}"#;
+        assert_eq!(said(words, "json"), "in@0-0.5 2020@0.5-1.5 we@1.5-2");
+        let transcript = parse(words, "json").unwrap();
+        assert_eq!((transcript.words[1].source, transcript.words[1].confidence), (WordSource::Interpolated, Some(0.0)));
+        assert!(transcript.notes[0].starts_with("1 of 3 words"));
+    }
+
+    #[test]
+    fn errors_say_where_and_an_end_cuts_words() {
+        assert!(refusal("0 1 so\n", "tsv").contains("line 1"));
+        assert!(refusal("0\t1\tso\n2\tx\twell", "tsv").contains("line 2"));
+        assert!(refusal("2\t1\tso\n", "tsv").contains("from 2 to 1"));
+        assert!(refusal("-1\t1\tso\n", "tsv").contains("line 1: `so` is said from -1"));
+        assert!(refusal("a 1 0.5 0.2\n", "ctm").contains("line 1"));
+        assert!(refusal("b 1 0 1 so\nc 1 0 1 so\n", "ctm").contains("called a"));
+        assert!(parse("{", "json").is_err() && parse("{}", "json").is_err());
+        assert!(refusal(r#"{"words": [{"word": "so"}]}"#, "json").contains("word 1"));
+        let transcript = parse("0.5\t0.7\tso\n1.0\t1.25\twell\n", "tsv").unwrap();
+        assert_eq!((transcript.notes.len(), transcript.until(1.0).text.as_str()), (0, "so"));
+        assert_eq!(transcript.until(1.1).text, "so well");
+        assert_eq!(Transcript::of_text(" a\nb ").until(0.1).text, "a b");
+    }
+
+    #[test]
+    fn what_is_doubtful_is_noted() {
+        let notes = |text: &str, ending: &str| parse(text, ending).unwrap().notes.join("; ");
+        assert!(notes("0\t1\tso\n0.5\t2\twell\n", "tsv").contains("1 of 2 words begin before"));
+        assert!(notes("1\t2\tso\n0.5\t0.9\twell\n", "tsv").contains("`well` at 0.50 s is said behind `so`"));
+        for (empty, ending) in [("", "txt"), ("", "tsv"), ("", "srt"), ("[]", "json"), ("", "ctm")] {
+            assert_eq!(notes(empty, ending), "the transcript holds no word", "{ending}");
+        }
+        assert!(notes("so well", "txt").contains("no times"));
+    }
+
+    #[test]
+    fn a_hundred_thousand_words_are_read() {
+        let rows: String = (0..100_000).map(|n| format!("{}\t{}\tso\n", n, n + 1)).collect();
+        assert_eq!(parse(&rows, "tsv").unwrap().words.len(), 100_000);
+    }
+}

@@ -1,0 +1,75 @@
+//! Writer of a table of word vectors. Memory: the words.
+
+use anyhow::{Context, Result, ensure};
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::{BufWriter, Seek, SeekFrom, Write};
+use std::path::Path;
+
+/// Tensors of the file.
+pub const VECTORS: &str = "vectors";
+pub const WORDS: &str = "words";
+/// Bytes of the length and the JSON before the tensors; the JSON is padded with spaces.
+const HEADER_BYTES: usize = 512;
+
+/// Writer of vectors of `dim` numbers in the order in which they come.
+pub struct TableWriter {
+    file: BufWriter<File>,
+    dim: usize,
+    words: String,
+    known: BTreeSet<String>,
+}
+
+impl TableWriter {
+    /// Begins the file `path`.
+    pub fn new(path: &Path, dim: usize) -> Result<Self> {
+        ensure!((1..=10_000).contains(&dim), "vectors of {dim} numbers: expected 1 to 10000");
+        let file = File::create(path).with_context(|| format!("cannot write {}", path.display()))?;
+        let mut file = BufWriter::with_capacity(1 << 20, file);
+        file.write_all(&[b' '; HEADER_BYTES])?;
+        Ok(Self { file, dim, words: String::new(), known: BTreeSet::new() })
+    }
+
+    /// Numbers of a vector.
+    pub fn dim(&self) -> usize {
+        self.dim
+    }
+
+    /// Adds a word; the first vector of a word counts.
+    ///
+    /// # Errors
+    /// A vector of another length or with a number that is not finite, a word with a line break.
+    pub fn push(&mut self, word: &str, vector: &[f32]) -> Result<()> {
+        ensure!(vector.len() == self.dim, "`{word}` has {} numbers, the vectors have {}", vector.len(), self.dim);
+        ensure!(vector.iter().all(|number| number.is_finite()), "`{word}` has a number that is not finite");
+        ensure!(!word.is_empty() && !word.contains('\n'), "`{}` is no word", word.escape_debug());
+        if self.known.insert(word.to_owned()) {
+            self.words += word;
+            self.words.push('\n');
+            vector.iter().try_for_each(|number| self.file.write_all(&number.to_le_bytes()))?;
+        }
+        Ok(())
+    }
+
+    /// Writes the words and the header; the number of words.
+    ///
+    /// # Errors
+    /// No word.
+    pub fn finish(mut self) -> Result<usize> {
+        let (n_words, dim) = (self.known.len(), self.dim);
+        ensure!(n_words > 0, "it holds no word");
+        self.file.write_all(self.words.as_bytes())?;
+        let end = 4 * n_words * dim;
+        let header = serde_json::json!({
+            VECTORS: { "dtype": "F32", "shape": [n_words, dim], "data_offsets": [0, end] },
+            WORDS: { "dtype": "U8", "shape": [self.words.len()], "data_offsets": [end, end + self.words.len()] },
+        });
+        let json = format!("{:<1$}", header.to_string(), HEADER_BYTES - 8);
+        ensure!(json.len() == HEADER_BYTES - 8, "its header does not fit");
+        self.file.seek(SeekFrom::Start(0))?;
+        self.file.write_all(&(json.len() as u64).to_le_bytes())?;
+        self.file.write_all(json.as_bytes())?;
+        self.file.flush()?;
+        Ok(n_words)
+    }
+}

@@ -1,0 +1,166 @@
+//! Words of transcripts in datasets: each in one sample or counted, checked, imported, forgotten; what is wrong with a
+//! transcript is said and costs no video.
+
+use crate::fixtures::media::lifted_videos::{settings, shard_with_words, video};
+use crate::fixtures::support::files_under;
+use orator::config::DatasetConfig;
+use orator::dataset::forget::dataset::without;
+use orator::dataset::import::import;
+use orator::dataset::import::plan::ImportPlan;
+use orator::dataset::import::take::TakeLimits;
+use orator::dataset::info::About;
+use orator::dataset::verify::verify::{accounts, verify};
+use orator::dataset::{Dataset, Split};
+use orator::formats::transcript::Word;
+use orator::stage::Unit;
+use orator::stage::ledger::{TranscriptAccount, WordCount};
+use orator::stage::progress::Silent;
+use orator::types::time::FrameRate;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Subtitles of a cue a second, each of one word.
+fn srt(n_words: usize, word: &str) -> String {
+    let time = |secs: usize| format!("{:02}:{:02}:{:02},000", secs / 3600, secs / 60 % 60, secs % 60);
+    (0..n_words).map(|n| format!("{}\n{} --> {}\n{word}{n}\n\n", n + 1, time(n), time(n + 1))).collect()
+}
+
+/// Two videos of 20 s, and their datasets with these transcripts.
+struct TwoTalks {
+    dir: tempfile::TempDir,
+    videos: [Unit; 2],
+}
+
+impl TwoTalks {
+    fn new() -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        let videos = [("first", 1), ("second", 2)].map(|(name, seed)| video(dir.path(), name, 300, seed));
+        Self { dir, videos }
+    }
+
+    /// Dataset, with the report's line.
+    fn dataset(&self, transcripts: [Option<(&str, &[u8])>; 2], out: &str) -> (String, PathBuf) {
+        let written = self.videos.iter().zip(transcripts).filter_map(|(unit, transcript)| {
+            let (name, bytes) = transcript?;
+            let path = self.dir.path().join(name);
+            fs::write(&path, bytes).unwrap();
+            Some((unit, path))
+        });
+        let written: Vec<_> = written.collect();
+        let named: Vec<_> = self.videos.iter().map(|unit| (unit, Split::Train)).collect();
+        let settings = settings(self.dir.path());
+        let (report, out) = shard_with_words(&settings, &self.videos, &named, &written, out);
+        assert_eq!(verify(&out, true, &Silent).unwrap().problems, []);
+        (report.unwrap().line, out)
+    }
+}
+
+/// The words of all samples, by key.
+fn words(dir: &Path) -> BTreeMap<String, Option<Vec<Word>>> {
+    let dataset = Dataset::open(dir).unwrap();
+    let samples = Split::ALL.iter().flat_map(|split| dataset.samples(*split)).collect::<Vec<_>>();
+    samples.into_iter().map(|sample| (sample.key.to_string(), dataset.read(&sample).unwrap().words)).collect()
+}
+
+fn account(dir: &Path, name: &str) -> TranscriptAccount {
+    let lines = accounts(dir).unwrap().into_iter();
+    lines.filter(|line| line.file.starts_with(name)).find_map(|line| line.ledger.words).unwrap()
+}
+
+#[test]
+fn every_word_lies_in_one_sample_or_is_counted() {
+    let talks = TwoTalks::new();
+    let (first, second) = (srt(20, "alpha"), srt(18, "omega"));
+    let (line, out) = talks.dataset([Some(("a.srt", first.as_bytes())), Some(("b.vtt", second.as_bytes()))], "out");
+    assert!(line.contains("38 of 38 words"), "{line}");
+    let said = words(&out);
+    assert_eq!(said.len(), 4, "two intervals of each video");
+    let all: Vec<&Word> = said.values().flatten().flatten().collect();
+    let names: BTreeSet<&str> = all.iter().map(|word| word.word.as_str()).collect();
+    assert_eq!((all.len(), names.len()), (38, 38));
+    assert!(all.iter().all(|word| word.start_secs >= 0.0 && word.end_secs <= 10.0 + 1e-6));
+    let expected = WordCount { n_words: 20, n_kept: 20, n_refused: 0, n_outside: 0 };
+    assert_eq!(account(&out, "first").count, expected);
+    let info = Dataset::open(&out).unwrap();
+    assert!(info.info().members.contains_key("words.json"));
+    assert_eq!(info.stats().footage.words.unwrap().n_kept, 38);
+    drop(info);
+
+    // The shards by themselves give the same words.
+    let tars: Vec<PathBuf> = files_under(&out).into_iter().map(|(_, path)| path).collect();
+    let tars = tars.into_iter().filter(|path| path.extension().is_some_and(|ending| ending == "tar")).collect();
+    let fps = FrameRate::new(15, 1);
+    let plan = ImportPlan {
+        sources: tars,
+        kind: None,
+        about: About::new("host", fps),
+        limits: TakeLimits { fps, min_frames: 64, max_apart_secs: 0.5, no_sound: false },
+        dataset: DatasetConfig { validation: 0.0, test: 0.0, ..DatasetConfig::default() },
+    };
+    let imported = talks.dir.path().join("imported");
+    fs::create_dir(&imported).unwrap();
+    import(&plan, &imported, &Silent).unwrap();
+    assert_eq!(verify(&imported, true, &Silent).unwrap().problems, []);
+    assert_eq!(words(&imported), said);
+
+    // A forgotten video leaves none of its words.
+    let gone = said.keys().find(|key| key.starts_with("first")).unwrap().rsplit_once('-').unwrap().0.to_owned();
+    without(&out, &BTreeSet::from([gone])).unwrap();
+    assert_eq!(verify(&out, true, &Silent).unwrap().problems, []);
+    let holds = |word: &str| {
+        files_under(&out).into_iter().any(|(_, path)| String::from_utf8_lossy(&fs::read(path).unwrap()).contains(word))
+    };
+    assert!(!holds("alpha") && !holds("a.srt") && holds("omega"));
+}
+
+#[test]
+fn a_dataset_without_transcripts_has_no_trace_of_words() {
+    let (_, out) = TwoTalks::new().dataset([None, None], "out");
+    assert!(words(&out).values().all(Option::is_none));
+    for file in ["info.json", "stats.json", "index.jsonl", "ledger.jsonl", "README.md"] {
+        assert!(!fs::read_to_string(out.join(file)).unwrap().contains("words"), "{file}");
+    }
+}
+
+#[test]
+fn what_is_wrong_with_a_transcript_is_said_and_costs_no_video() {
+    let talks = TwoTalks::new();
+    let good = srt(20, "so");
+    let many: String = (0..100_000).map(|n| format!("{}\t{}\tso\n", n as f64 / 5000.0, n as f64 / 5000.0)).collect();
+    for (name, bytes, said) in [
+        ("other.srt", srt(40, "so").into_bytes(), "20 of 40 words lie after the end of the sound (20.00 s"),
+        ("late.srt", srt(21, "so").into_bytes(), "1 of 21 words lie after the end of the sound and were left out"),
+        ("empty.srt", Vec::new(), "the transcript holds no word"),
+        ("plain.txt", b"so well".to_vec(), "the transcript has no times"),
+        ("latin.srt", b"1\n00:00:01,000 --> 00:00:02,000\nsch\xf6n\n".to_vec(), "line 3: the byte 0xf6 is no UTF-8"),
+        ("times.tsv", b"0\t1\tso\n2\t1\twell\n".to_vec(), "line 2: `well` is said from 2 to 1 s"),
+        ("over.tsv", b"0\t5\tso\n1\t2\twell\n".to_vec(), "1 of 2 words begin before the one before ends"),
+        ("cut.json", b"{\"segments\": [".to_vec(), "not valid JSON"),
+        ("many.tsv", many.into_bytes(), "100020 of 100020 words"),
+    ] {
+        let (line, out) = talks.dataset([Some(("good.srt", good.as_bytes())), Some((name, &bytes))], name);
+        assert!(line.contains(said), "{name}: {line}");
+        let of_second = account(&out, "second");
+        assert_eq!((of_second.file.as_deref(), of_second.count.is_whole()), (Some(name), true));
+        assert_eq!(account(&out, "first").count.n_kept, 20);
+        assert!(words(&out).values().all(Option::is_some), "{name}: readers find one form");
+        assert!(!of_second.notes.iter().any(|note| note.contains(talks.dir.path().to_str().unwrap())));
+    }
+    let (line, _) = talks.dataset([Some(("good.srt", good.as_bytes())), None], "one");
+    assert!(line.contains("second.mp4: no transcript has the name of the video"), "{line}");
+}
+
+#[test]
+fn a_wrong_count_of_words_is_found() {
+    let talks = TwoTalks::new();
+    let (_, out) = talks.dataset([Some(("a.srt", srt(20, "so").as_bytes())), None], "out");
+    let entry =
+        files_under(&out).into_iter().find(|(name, _)| name.starts_with("videos/first") && name.ends_with(".json"));
+    let (name, path) = entry.unwrap();
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replace("\"n_kept\": 20", "\"n_kept\": 19")).unwrap();
+    let found = verify(&out, true, &Silent).unwrap().problems;
+    let said = |what: &str| found.iter().any(|problem| problem.file == name && problem.what.contains(what));
+    assert!(said("account for every word") && said("keeps 19 words, its samples hold 20"), "{found:?}");
+}
