@@ -116,7 +116,8 @@ fn every_word_lies_in_one_sample_or_is_counted() {
 
 #[test]
 fn a_dataset_without_transcripts_has_no_trace_of_words() {
-    let (_, out) = TwoTalks::new().dataset([None, None], "out");
+    let talks = TwoTalks::new();
+    let (_, out) = talks.dataset([None, None], "out");
     assert!(words(&out).values().all(Option::is_none));
     for file in ["info.json", "stats.json", "index.jsonl", "ledger.jsonl", "README.md"] {
         assert!(!fs::read_to_string(out.join(file)).unwrap().contains("words"), "{file}");
@@ -139,7 +140,8 @@ fn what_is_wrong_with_a_transcript_is_said_and_costs_no_video() {
         ("cut.json", b"{\"segments\": [".to_vec(), "not valid JSON"),
         ("many.tsv", many.into_bytes(), "100020 of 100020 words"),
     ] {
-        let (line, out) = talks.dataset([Some(("good.srt", good.as_bytes())), Some((name, &bytes))], name);
+        let (line, out) =
+            talks.dataset([Some(("good.srt", good.as_bytes())), Some((name, &bytes))], &format!("out-{name}"));
         assert!(line.contains(said), "{name}: {line}");
         let of_second = account(&out, "second");
         assert_eq!((of_second.file.as_deref(), of_second.count.is_whole()), (Some(name), true));
