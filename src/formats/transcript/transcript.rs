@@ -164,8 +164,8 @@ mod tests {
             {"word": " well", "start": 1.0, "end": 1.25, "probability": 0.9}]}]}"#;
         assert_eq!(said(whisper, "json"), expected);
         assert_eq!(parse(whisper, "json").unwrap().words[0].confidence, Some(0.8));
-        let without_words = r#"{"text": " so well", "segments": [{"start": 0.5, "end": 1.1, "text": " so well"}]}"#;
-        assert_eq!(said(without_words, "json"), "so@0.5-0.7 well@0.7-1.1");
+        let without_words = r#"{"text": " so well", "segments": [{"start": 0.5, "end": 2.0, "text": " so well"}]}"#;
+        assert_eq!(said(without_words, "json"), "so@0.5-1 well@1-2");
         assert!(parse(without_words, "json").unwrap().notes[0].contains("2 of 2 words share"));
         assert_eq!(parse(r#"{"text": "so  well"}"#, "json").unwrap(), Transcript::of_text("so well"));
     }
