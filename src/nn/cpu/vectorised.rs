@@ -49,16 +49,30 @@ fn forward_body<T: Scalar>(sums: &mut [T], previous: &[T], next: &mut [T], width
         let (candidate, sums) = sums.split_at_mut(width);
         let (reset, sums) = sums.split_at_mut(width);
         let (update, state) = sums.split_at_mut(width);
-        for i in 0..width {
-            let r = sigmoid(reset[i]);
-            let z = sigmoid(update[i]);
-            let n = tanh(candidate[i] + r * state[i]);
-            candidate[i] = n;
-            reset[i] = r;
-            update[i] = z;
-            next[i] = n + z * (previous[i] - n);
+        // Lanes on the stack: slices that might overlap would not be vectorised.
+        for at in (0..width).step_by(COLUMNS) {
+            let (mut n, mut r, mut z) = (lanes(candidate, at), lanes(reset, at), lanes(update, at));
+            let (state, mut next_state) = (lanes(state, at), lanes(previous, at));
+            for i in 0..COLUMNS {
+                r[i] = sigmoid(r[i]);
+                z[i] = sigmoid(z[i]);
+                n[i] = tanh(n[i] + r[i] * state[i]);
+                next_state[i] = n[i] + z[i] * (next_state[i] - n[i]);
+            }
+            candidate[at..][..COLUMNS].copy_from_slice(&n);
+            reset[at..][..COLUMNS].copy_from_slice(&r);
+            update[at..][..COLUMNS].copy_from_slice(&z);
+            next[at..][..COLUMNS].copy_from_slice(&next_state);
         }
     }
+}
+
+/// Numbers from this place on.
+#[inline(always)]
+fn lanes<T: Scalar>(row: &[T], at: usize) -> [T; COLUMNS] {
+    let mut lanes = [T::zero(); COLUMNS];
+    lanes.copy_from_slice(&row[at..at + COLUMNS]);
+    lanes
 }
 
 vectorised!(
