@@ -180,7 +180,7 @@ impl Default for Pose2dConfig {
             palm: "auto".into(),
             face: "auto".into(),
             follow: FollowRule::Largest,
-            person_every: 15,
+            person_every: 5,
             palm_every: 5,
             person_follow: 0.3,
             hand_score: 0.5,
