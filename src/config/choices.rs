@@ -48,6 +48,19 @@ pub enum FollowRule {
     Speaking,
 }
 
+/// Sequence-to-sequence network.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SequenceNetwork {
+    /// Sound and words around each pose.
+    #[default]
+    Contextual,
+    /// Sound of each pose, words of the segment.
+    Words,
+    /// Sound alone, against a discriminator.
+    Adversarial,
+}
+
 /// What tells speech from other sound.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

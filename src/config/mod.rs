@@ -10,11 +10,13 @@ pub mod load;
 pub mod patterns;
 pub mod rules;
 pub mod sections;
+pub mod seq2seq;
 pub mod transcripts;
 pub mod videos;
 
 pub use choices::{
-    AdversarialLoss, ComputeDevice, FollowRule, MotionRepresentation, NetworkPreset, SpeechRule, SplitUnit,
+    AdversarialLoss, ComputeDevice, FollowRule, MotionRepresentation, NetworkPreset, SequenceNetwork, SpeechRule,
+    SplitUnit,
 };
 pub use config_path::ConfigPath;
 pub use file::Problem;
@@ -25,3 +27,4 @@ pub use load::ConfigError;
 pub use load::DEFAULT_FILE;
 pub use load::{load, load_default};
 pub use sections::*;
+pub use seq2seq::Seq2seqConfig;

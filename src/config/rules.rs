@@ -58,6 +58,17 @@ pub fn check(settings: &Settings, locations: &BTreeMap<String, SourceLocation>) 
     rules.within("gan.lambda_bone", s.gan.lambda_bone, 0.0, 1e4, "");
     rules.within("gan.checkpoint_every", s.gan.checkpoint_every as f64, 1.0, 1e9, "steps");
     rules.within("gan.keep_checkpoints", s.gan.keep_checkpoints as f64, 1.0, 1e6, "checkpoints");
+    rules.within("seq2seq.stride_frames", s.seq2seq.stride_frames as f64, 0.0, 4096.0, "frames");
+    rules.within("seq2seq.batch", s.seq2seq.batch as f64, 2.0, 4096.0, "segments");
+    rules.within("seq2seq.steps", s.seq2seq.steps as f64, 1.0, 1e9, "steps");
+    rules.within("seq2seq.learning_rate", s.seq2seq.learning_rate, 1e-9, 1.0, "");
+    rules.within("seq2seq.lambda_continuity", s.seq2seq.lambda_continuity, 0.0, 1e4, "");
+    rules.within("seq2seq.lambda_reach", s.seq2seq.lambda_reach, 0.0, 1e4, "");
+    rules.within("seq2seq.lambda_adversarial", s.seq2seq.lambda_adversarial, 0.0, 1e4, "");
+    rules.within("seq2seq.hidden", s.seq2seq.hidden as f64, 1.0, 4096.0, "numbers");
+    rules.within("seq2seq.epoch_steps", s.seq2seq.epoch_steps as f64, 1.0, 1e9, "steps");
+    rules.within("seq2seq.checkpoint_every", s.seq2seq.checkpoint_every as f64, 1.0, 1e9, "steps");
+    rules.within("seq2seq.keep_checkpoints", s.seq2seq.keep_checkpoints as f64, 1.0, 1e6, "checkpoints");
     rules.speakers(settings);
     rules.problems
 }

@@ -5,6 +5,7 @@ use super::choices::{
     AdversarialLoss, ComputeDevice, FollowRule, MotionRepresentation, NetworkPreset, SpeechRule, SplitUnit,
 };
 use super::config_path::ConfigPath;
+use super::seq2seq::Seq2seqConfig;
 use crate::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +22,7 @@ pub struct Settings {
     pub lift: LiftConfig,
     pub dataset: DatasetConfig,
     pub gan: GanConfig,
+    pub seq2seq: Seq2seqConfig,
     pub speaker: Vec<SpeakerConfig>,
 }
 

@@ -75,6 +75,17 @@ impl Contents {
     }
 }
 
+/// Facts of a file alone. Errors name it.
+pub fn facts(path: &Path) -> anyhow::Result<Value> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read the weights {}", path.display()))?;
+    let read = || -> anyhow::Result<Value> {
+        let (_, header) = safetensors::SafeTensors::read_metadata(&bytes)?;
+        let facts = header.metadata().as_ref().and_then(|m| m.get(METADATA)).context("it was not written by orator")?;
+        Ok(serde_json::from_str(facts)?)
+    };
+    read().with_context(|| format!("{} is not a checkpoint or weights file", path.display()))
+}
+
 fn is_finite(tensor: &Tensor) -> anyhow::Result<bool> {
     if !tensor.dtype().is_float() {
         return Ok(true);

@@ -5,5 +5,6 @@ pub mod mel_stream;
 pub mod model;
 pub mod normalisation;
 pub mod representation;
+pub mod seq2seq;
 
 pub use generator::GestureGenerator;

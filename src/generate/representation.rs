@@ -3,10 +3,11 @@
 //! exists twice: on tensors, to train through, and on arrays, to generate with.
 
 use super::normalisation::{N_FEATURES, Normalisation};
+use crate::types::pose3d::Motion;
 use crate::types::skeleton::{N_BONES, N_JOINTS, NECK, is_duplicate, parent};
 use anyhow::{bail, ensure};
 use candle_core::{DType, Device, Result, Tensor};
-use ndarray::{Array3, ArrayView2};
+use ndarray::{Array2, Array3, ArrayView2};
 use serde::{Deserialize, Serialize};
 
 /// Least deviation of a direction's coordinate: what hardly turns is not blown up.
@@ -107,6 +108,28 @@ impl Representation {
         joints
     }
 
+    /// Directions of the bones of motion as raw numbers [T, 144], and which of them are known: both ends of the bone are
+    /// seen. The others are 0, and so are those of the hand roots, which are known. All unknown for `positions`.
+    pub fn directions(&self, motion: &Motion) -> (Array2<f32>, Array2<bool>) {
+        let shape = (motion.n_frames(), N_FEATURES);
+        let (mut numbers, mut known) = (Array2::zeros(shape), Array2::from_elem(shape, false));
+        let Self::Bones { mean, std } = self else { return (numbers, known) };
+        for (t, joint) in (0..motion.n_frames()).flat_map(|t| (1..N_JOINTS).map(move |joint| (t, joint))) {
+            let columns = 3 * (joint - 1)..3 * joint;
+            let from = real_parent(joint);
+            let bone: [f32; 3] = std::array::from_fn(|k| motion.joints[[t, joint, k]] - motion.joints[[t, from, k]]);
+            let length = bone.iter().map(|v| v * v).sum::<f32>().sqrt();
+            let is_known = motion.mask[[t, joint]] && motion.mask[[t, from]] && length.is_finite() && length > 1e-6;
+            for (k, i) in columns.enumerate() {
+                known[[t, i]] = is_known || is_duplicate(joint);
+                if is_known && !is_duplicate(joint) {
+                    numbers[[t, i]] = (bone[k] / length - mean[i]) / std[i];
+                }
+            }
+        }
+        (numbers, known)
+    }
+
     /// The way from raw features to normalised positions on tensors.
     pub fn decoder(&self, normal: &Normalisation, dtype: DType, device: &Device) -> Result<PoseDecoder> {
         let Self::Bones { mean, std } = self else { return Ok(PoseDecoder { kinematics: None }) };
@@ -181,10 +204,8 @@ mod tests {
     use super::*;
     use crate::motion::bones;
     use crate::nn::ops::gradcheck::{pattern, worst};
-    use crate::types::pose3d::Motion;
     use crate::types::skeleton::{L_HAND, R_HAND};
     use crate::types::time::FrameRate;
-    use ndarray::Array2;
 
     fn normal() -> Normalisation {
         let table = |value: f32| Array2::from_shape_fn((N_JOINTS, 3), |(j, k)| value + 0.003 * (j + 2 * k) as f32);
@@ -254,6 +275,11 @@ mod tests {
         });
         for (a, b) in bones.joints(raw.view(), &normal).iter().zip(&joints) {
             assert!((a - b).abs() < 1e-5);
+        }
+        let (numbers, known) = bones.directions(&Motion::from_joints(FrameRate::new(15, 1), joints.clone()));
+        assert!(known.iter().all(|known| *known));
+        for ((t, i), number) in numbers.indexed_iter().filter(|((_, i), _)| !is_duplicate(i / 3 + 1)) {
+            assert!((number - raw[[i, t]]).abs() < 1e-4, "{number} {}", raw[[i, t]]);
         }
         // Number 0 is seen in all 40 frames: mean 0, deviation 1.
         let row = raw.row(0);

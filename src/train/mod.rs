@@ -1,13 +1,14 @@
 //! Losses, optimiser, checkpoints, logs, and the training loops.
 //!
 //! A window: `gan::windows` (dataset to normalised poses and log-mels) -> `gan::step` (networks, `losses`, `optim`) ->
-//! a checkpoint; `gan::train` is the loop, `gan::validate` and `gan::score` choose the best.
+//! a checkpoint; `gan::train` is the loop, `gan::validate` and `gan::score` choose the best. `seq2seq` likewise.
 
 pub mod gan;
 pub mod lifter;
 pub mod log;
 pub mod optim;
 pub mod pose;
+pub mod resume;
 pub mod scene;
 pub mod seq2seq;
 pub mod space;

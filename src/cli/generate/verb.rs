@@ -5,9 +5,12 @@ use crate::cli::Outcome;
 use crate::cli::confine::confine;
 use crate::cli::outputs::{is_same_file, names, next_output, outputs};
 use crate::cli::ui::Ui;
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, bail, ensure};
 use orator::generate::GestureGenerator;
+use orator::generate::seq2seq::SequenceGenerator;
+use orator::generate::seq2seq::metadata::is_sequence;
 use orator::pipeline::batch::motion_files::{checkpoint_file, model_lock, write_motion};
+use orator::pipeline::batch::sequence_files::write_sequence;
 use orator::pipeline::batch::{SpeechBatch, sounds};
 use orator::stage::progress::Progress as _;
 use serde_json::json;
@@ -26,12 +29,15 @@ use std::path::PathBuf;
 /// (exit code 2).
 #[derive(clap::Args)]
 pub struct Args {
-    /// A checkpoint of `orator train gan`, or its folder (the best checkpoint, else the newest, is taken).
+    /// A checkpoint of `orator train gan` or `orator train seq2seq`, or its folder (the best checkpoint, else the newest, is taken).
     #[arg(long, value_name = "FILE|FOLDER", required_unless_present = "batch")]
     checkpoint: Option<PathBuf>,
     /// The speech.
     #[arg(long, value_name = "FILE", required_unless_present_any = ["audio_folder", "batch"], requires = "out")]
     audio: Option<PathBuf>,
+    /// What is said in it, with times, for a network that reads words (.tsv, .json, .TextGrid, .ctm, .srt, .vtt).
+    #[arg(long, value_name = "FILE", requires = "audio")]
+    transcript: Option<PathBuf>,
     /// What to write; may be given several times.
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "audio")]
     out: Vec<PathBuf>,
@@ -62,17 +68,26 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         ui.say(&format!("checkpoint {}", checkpoint.display()));
     }
     let _lock = model_lock(&checkpoint)?;
-    let speaker = GestureGenerator::open(&checkpoint)?;
-    let written = write_motion(&speaker, audio, &outputs, ui)?;
+    let (speaker, fps, written, seam_jump) = if is_sequence(&checkpoint)? {
+        let speaker = SequenceGenerator::open(&checkpoint)?;
+        let (written, jump) = write_sequence(&speaker, audio, args.transcript.as_deref(), &outputs, ui)?;
+        (speaker.metadata.name.clone(), speaker.fps(), written, Some(jump))
+    } else {
+        ensure!(args.transcript.is_none(), "{} reads no words: leave out --transcript", checkpoint.display());
+        let speaker = GestureGenerator::open(&checkpoint)?;
+        let written = write_motion(&speaker, audio, &outputs, ui)?;
+        (speaker.name().to_owned(), speaker.fps(), written, None)
+    };
     let speed = written.secs / written.motion_secs.max(1e-6);
     let names = names(&outputs);
     let note = written.note.as_ref().map_or(String::new(), |note| format!("note: {note}\n"));
+    let seams = seam_jump.map_or(String::new(), |[raw, smoothed]| {
+        format!("mean step over a seam of segments / elsewhere: {raw:.2} generated, {smoothed:.2} smoothed\n")
+    });
     let text = format!(
-        "{:.1} s of speech, {} frames of {} at {}, {speed:.0} x real time\n{note}wrote {}",
+        "{:.1} s of speech, {} frames of {speaker} at {fps}, {speed:.0} x real time\n{note}{seams}wrote {}",
         written.secs,
         written.n_frames,
-        speaker.name(),
-        speaker.fps(),
         names.join(", ")
     );
     let next = next_output(&outputs).map(|out| {
@@ -82,10 +97,11 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let facts = json!({
         "audio_secs": written.secs,
         "n_frames": written.n_frames,
-        "fps": speaker.fps(),
+        "fps": fps,
         "times_real_time": speed,
         "checkpoint": checkpoint,
-        "speaker": speaker.name(),
+        "speaker": speaker,
+        "seam_jump": seam_jump,
         "outputs": names,
         "note": written.note,
         "next": next,

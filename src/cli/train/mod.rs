@@ -7,6 +7,7 @@ pub mod gan;
 pub mod lifter;
 pub mod noise;
 pub mod pose;
+pub mod seq2seq;
 pub mod verb;
 
 pub use verb::{Args, run};

@@ -1,6 +1,6 @@
 //! `orator train`: one file a network.
 
-use super::{basis, embedding, gan, lifter, noise, pose};
+use super::{basis, embedding, gan, lifter, noise, pose, seq2seq};
 use crate::cli::Outcome;
 use crate::cli::ui;
 use crate::cli::ui::Ui;
@@ -20,6 +20,7 @@ enum Network {
     Lifter(lifter::Args),
     Noise(noise::Args),
     Pose(pose::Args),
+    Seq2seq(seq2seq::Args),
 }
 
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
@@ -31,5 +32,6 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
         Network::Lifter(args) => lifter::run(args, ui),
         Network::Noise(args) => noise::run(&args, ui),
         Network::Pose(args) => pose::run(&args, ui),
+        Network::Seq2seq(args) => seq2seq::run(args, ui),
     }
 }

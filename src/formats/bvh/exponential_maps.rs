@@ -97,18 +97,17 @@ pub struct ExponentialMaps {
 }
 
 impl ExponentialMaps {
-    /// From the files to learn from. Errors: none, a file of another skeleton than the first, no frame, numbers that are not
-    /// finite, joints that are not there.
-    pub fn of(files: &[Bvh], mapping: &JointMapping) -> Result<Self> {
-        let first = files.first().context("there is no motion to learn from")?;
-        let skeleton = BvhSkeleton::of(first);
-        skeleton.check()?;
-        let joints = mapping.find(&skeleton)?;
-        let mut rest = first.frames().next().context("the first file has no frame")?.to_vec();
-        let n_root = skeleton.joints[0].channels.len();
-        rest[..n_root].fill(0.0);
-        let mut maps = Self { skeleton, rest, joints, columns: Vec::new(), mean: Vec::new(), largest: Vec::new() };
-        let all: Vec<Array2<f64>> = files.iter().map(|file| maps.exponential_maps(file)).collect::<Result<_>>()?;
+    /// From the files to learn from with their names, of which one is held at a time. Errors, naming the file: none, a file
+    /// of another skeleton than the first, no frame, numbers that are not finite, joints that are not there.
+    pub fn of(files: impl IntoIterator<Item = Result<(String, Bvh)>>, mapping: &JointMapping) -> Result<Self> {
+        let mut files = files.into_iter();
+        let (name, first) = files.next().context("there is no motion to learn from")??;
+        let mut maps = Self::of_skeleton(&first, mapping).with_context(|| name.clone())?;
+        let mut all = vec![maps.exponential_maps(&first).context(name)?];
+        for file in files {
+            let (name, bvh) = file?;
+            all.push(maps.exponential_maps(&bvh).context(name)?);
+        }
         maps.columns = (0..all[0].ncols()).filter(|&column| all[0].column(column).std(0.0) >= LEAST_STD).collect();
         ensure!(!maps.columns.is_empty(), "no joint of the first file moves");
         let n_frames: usize = all.iter().map(Array2::nrows).sum();
@@ -118,6 +117,17 @@ impl ExponentialMaps {
             maps.largest.push(values().fold(0.0, |largest, v| f64::max(largest, v.abs())) + EPS);
         }
         Ok(maps)
+    }
+
+    /// Of the skeleton of the first file, without columns.
+    fn of_skeleton(first: &Bvh, mapping: &JointMapping) -> Result<Self> {
+        let skeleton = BvhSkeleton::of(first);
+        skeleton.check()?;
+        let joints = mapping.find(&skeleton)?;
+        let mut rest = first.frames().next().context("it has no frame")?.to_vec();
+        let n_root = skeleton.joints[0].channels.len();
+        rest[..n_root].fill(0.0);
+        Ok(Self { skeleton, rest, joints, columns: Vec::new(), mean: Vec::new(), largest: Vec::new() })
     }
 
     /// Numbers of a frame.
@@ -291,10 +301,15 @@ mod tests {
         Bvh::parse(&text).unwrap()
     }
 
+    fn fitted(files: &[Bvh], mapping: &JointMapping) -> Result<ExponentialMaps> {
+        let file = |(i, file): (usize, &Bvh)| Ok((format!("{i}.bvh"), file.clone()));
+        ExponentialMaps::of(files.iter().enumerate().map(file), mapping)
+    }
+
     #[test]
     fn a_round_trip_leaves_every_joint_where_it_is() {
         let bvh = captured(301, 1.0 / 60.0, 0.0);
-        let maps = ExponentialMaps::of(std::slice::from_ref(&bvh), &JointMapping::default()).unwrap();
+        let maps = fitted(std::slice::from_ref(&bvh), &JointMapping::default()).unwrap();
         maps.check().unwrap();
         assert_eq!(maps.n_columns(), 45);
         let first: Vec<&str> =
@@ -318,7 +333,7 @@ mod tests {
     #[test]
     fn hips_stand_still_and_what_is_not_learnt_stays_as_it_began() {
         let bvh = captured(61, 1.0 / 60.0, 1.0);
-        let maps = ExponentialMaps::of(std::slice::from_ref(&bvh), &JointMapping::default()).unwrap();
+        let maps = fitted(std::slice::from_ref(&bvh), &JointMapping::default()).unwrap();
         let channels = maps.channels(maps.features(&bvh).unwrap().view());
         let first: Vec<f64> = bvh.frames().next().unwrap().to_vec();
         let knee = maps.skeleton.first_channels()[2];
@@ -339,10 +354,8 @@ mod tests {
         let parse =
             |entries: &[&str]| JointMapping::parse(&entries.iter().map(|e| (*e).to_owned()).collect::<Vec<_>>());
         let fewer = parse(&["Spine3=", "Neck1="]).unwrap();
-        assert_eq!(ExponentialMaps::of(std::slice::from_ref(&bvh), &fewer).unwrap().n_columns(), 39);
-        let says = |mapping: &JointMapping| {
-            format!("{:#}", ExponentialMaps::of(std::slice::from_ref(&bvh), mapping).unwrap_err())
-        };
+        assert_eq!(fitted(std::slice::from_ref(&bvh), &fewer).unwrap().n_columns(), 39);
+        let says = |mapping: &JointMapping| format!("{:#}", fitted(std::slice::from_ref(&bvh), mapping).unwrap_err());
         let text = says(&parse(&["Spine3=Chest"]).unwrap());
         assert!(
             text.contains("no joint Chest") && text.contains("Spine3=NAME") && text.contains("LeftUpLeg"),
@@ -352,12 +365,12 @@ mod tests {
         assert!(parse(&["Spine3"]).is_err() && parse(&["Tail=Tail"]).is_err());
         let mut other = bvh.clone();
         other.joints[2].name = "Knee".into();
-        let text = format!("{:#}", ExponentialMaps::of(&[bvh.clone(), other], &parse(&[]).unwrap()).unwrap_err());
+        let text = format!("{:#}", fitted(&[bvh.clone(), other], &parse(&[]).unwrap()).unwrap_err());
         assert!(text.contains("other joints"), "{text}");
         let mut broken = bvh.clone();
         broken.values[bvh.n_channels + 7] = f64::NAN;
-        let text = format!("{:#}", ExponentialMaps::of(&[bvh, broken], &parse(&[]).unwrap()).unwrap_err());
-        assert!(text.contains("frame 1 "), "{text}");
+        let text = format!("{:#}", fitted(&[bvh, broken], &parse(&[]).unwrap()).unwrap_err());
+        assert!(text.contains("frame 1 ") && text.contains("1.bvh"), "{text}");
     }
 
     #[test]

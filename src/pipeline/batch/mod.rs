@@ -3,6 +3,7 @@
 
 pub mod job;
 pub mod motion_files;
+pub mod sequence_files;
 pub mod sounds;
 pub mod stage;
 

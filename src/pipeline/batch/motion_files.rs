@@ -14,6 +14,7 @@ use crate::generate::generator::CHUNK;
 use crate::generate::model::BEST;
 use crate::stage::progress::Progress;
 use crate::stage::workdir::FolderLock;
+use crate::types::pose3d::Motion;
 use crate::types::sound::SAMPLE_RATE;
 use anyhow::{Context as _, Result, ensure};
 use std::path::{Path, PathBuf};
@@ -78,6 +79,17 @@ pub fn write_motion(
         speaker.motion_of_pieces(pieces, n_samples, CHUNK, &mut |n| task.advance(n as u64)).with_context(no_motion)?;
     drop(task);
     let motion_secs = started.elapsed().as_secs_f64();
+    write_outputs(motion, audio, outputs, progress)?;
+    Ok(SpokenMotion { secs, n_frames, motion_secs, note })
+}
+
+/// Writes motion for the sound `audio` to files of all formats.
+pub(super) fn write_outputs(
+    motion: Motion,
+    audio: &Path,
+    outputs: &[(PathBuf, ExportFormat)],
+    progress: &dyn Progress,
+) -> Result<()> {
     // Files of joints hold what the network gave, before it is put on a figure.
     let (joints, figures): (Vec<_>, Vec<_>) = outputs.iter().partition(|(_, format)| format.holds_joints());
     for (path, format) in joints {
@@ -93,11 +105,11 @@ pub fn write_motion(
             format.write(path, &performance, &sources, progress)?;
         }
     }
-    Ok(SpokenMotion { secs, n_frames, motion_secs, note })
+    Ok(())
 }
 
 /// Number of samples of the sound at 16 kHz, and what a user should know of it.
-fn measure(path: &Path) -> Result<(usize, Option<String>)> {
+pub(super) fn measure(path: &Path) -> Result<(usize, Option<String>)> {
     ensure!(path.exists(), "{} is not there", path.display());
     ensure!(path.is_file(), "{} is no file", path.display());
     let info = probe::probe(path)?;

@@ -17,6 +17,7 @@ use crate::nn::gan::generator::Generator;
 use crate::nn::params::Params;
 use crate::train::optim::adam;
 use crate::train::optim::adam::Adam;
+use crate::train::resume;
 use anyhow::{Context, Result, ensure};
 use candle_core::{DType, Device, Tensor};
 use serde_json::{Value, json};
@@ -211,16 +212,7 @@ impl TrainerState {
 
     /// The settings to go on with: the checkpoint's, but for those that may change; and a line for each difference.
     pub fn settings(&self, requested: &GanConfig) -> Result<(GanConfig, Vec<String>)> {
-        let (mut kept, requested) = (serde_json::to_value(&self.settings)?, serde_json::to_value(requested)?);
-        let mut differences = Vec::new();
-        for (key, value) in requested.as_object().into_iter().flatten() {
-            if FREE.contains(&key.as_str()) {
-                kept[key] = value.clone();
-            } else if kept[key] != *value {
-                differences.push(format!("gan.{key} is {value} now, {} in the checkpoint, which counts", kept[key]));
-            }
-        }
-        Ok((serde_json::from_value(kept)?, differences))
+        resume::settings(&self.settings, requested, "gan", &FREE)
     }
 }
 

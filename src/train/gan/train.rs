@@ -23,10 +23,9 @@ use crate::nn::gan::generator::{Config, FRAMES_MULTIPLE};
 use crate::stage::progress::Progress;
 use crate::stage::workdir::{self, FolderLock};
 use crate::train::log::MetricsLog;
+use crate::train::resume::{kept, sample_windows};
 use crate::types::skeleton::N_BONES;
 use anyhow::{Context, Result, bail, ensure};
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -132,7 +131,7 @@ fn run(
         let losses = trainer.step(&batch)?;
         stepping += before.elapsed();
         let step = trainer.step;
-        losses.check(step).with_context(|| kept(folder))?;
+        losses.check(step).with_context(|| kept(folder, "gan"))?;
         task.advance(1);
         if step.is_multiple_of(LOG_EVERY) {
             let Losses { l1, adversarial, discriminator, .. } = losses;
@@ -228,14 +227,6 @@ fn is_over(trainer: &GanTrainer) -> bool {
     patience > 0 && since >= patience * epoch_steps
 }
 
-fn kept(folder: &Path) -> String {
-    let advice = "a smaller gan.learning_rate may help";
-    match checkpoint::list(folder).ok().and_then(|mut all| all.pop()) {
-        Some((step, path)) => format!("the checkpoint of step {step} is kept: {}; {advice}", path.display()),
-        None => format!("there is no checkpoint yet; {advice}"),
-    }
-}
-
 /// The network of a preset of the configuration.
 pub const fn preset(preset: NetworkPreset) -> Preset {
     match preset {
@@ -269,11 +260,4 @@ pub fn normalisation(dataset: &Dataset) -> Result<Normalisation> {
         lengths = bones::measure(&dataset.read(&longest)?.motion).to_vec();
     }
     Ok(Normalisation::new(&dataset.stats().mean(), &dataset.stats().std(), lengths))
-}
-
-/// The windows of a step, drawn with replacement.
-fn sample_windows(seed: u64, step: usize, n: usize, n_windows: usize) -> Vec<usize> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    rng.set_stream(step as u64 + 1);
-    (0..n).map(|_| rng.random_range(0..n_windows as u64) as usize).collect()
 }

@@ -1,6 +1,7 @@
 //! The generator's training end to end on a small made-up speaker whose arms follow the pitch of a tone: it learns,
 //! resumes exactly, stops when it breaks, and its checkpoint generates.
 
+use crate::fixtures::faults::stop::{Shared, Stop, bytes};
 use crate::fixtures::gesture_dataset::{FPS, dataset, sample};
 use crate::fixtures::write_dataset::write_dataset;
 use orator::config::GanConfig;
@@ -8,59 +9,16 @@ use orator::config::{AdversarialLoss, MotionRepresentation, NetworkPreset};
 use orator::dataset::{Dataset, Split};
 use orator::generate::GestureGenerator;
 use orator::generate::model::BEST;
-use orator::stage::progress::{Progress, Silent, Task};
+use orator::stage::progress::Silent;
 use orator::train::gan::train::train;
 use orator::types::skeleton::{R_HAND, R_WRIST};
 use orator::types::sound::Sound;
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
 
 fn settings() -> GanConfig {
     let gan = GanConfig { batch: 2, window_frames: 32, ..GanConfig::default() };
     GanConfig { steps: 6, epoch_steps: 3, checkpoint_every: 2, keep_checkpoints: 2, ..gan }
-}
-
-/// Every file of a training but its lock.
-fn bytes(folder: &Path) -> Vec<(String, Vec<u8>)> {
-    let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    files.sort();
-    let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
-    files.retain(|path| name(path) != ".lock");
-    files.iter().map(|path| (name(path), std::fs::read(path).unwrap())).collect()
-}
-
-/// Ends the training by a panic once so many steps are done: as a kill does, between any two writes.
-struct Stop {
-    at: u64,
-    done: AtomicU64,
-    said: Mutex<Vec<String>>,
-}
-
-impl Stop {
-    fn at(step: u64) -> Arc<Self> {
-        Arc::new(Self { at: step, done: AtomicU64::new(0), said: Mutex::new(Vec::new()) })
-    }
-}
-
-struct Shared(Arc<Stop>);
-
-impl Progress for Shared {
-    fn begin(&self, _label: &str, _total: u64) -> Box<dyn Task> {
-        Box::new(Shared(self.0.clone()))
-    }
-    fn say(&self, line: &str) {
-        self.0.said.lock().unwrap().push(line.to_owned());
-    }
-}
-
-impl Task for Shared {
-    fn advance(&self, steps: u64) {
-        let done = self.0.done.fetch_add(steps, Ordering::Relaxed) + steps;
-        assert!(done != self.0.at, "stopped by the test");
-    }
-    fn detail(&self, _text: &str) {}
 }
 
 #[test]

@@ -6,3 +6,4 @@ pub mod networks;
 pub mod operators;
 pub mod pose;
 pub mod rule;
+pub mod seq2seq;

@@ -1,0 +1,52 @@
+//! `[seq2seq]`: training of the sequence-to-sequence networks.
+
+use super::choices::SequenceNetwork;
+use serde::{Deserialize, Serialize};
+
+/// `[seq2seq]`: the network, its losses and its training.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Seq2seqConfig {
+    pub network: SequenceNetwork,
+    /// Frames between the starts of two segments; 0: as long as a segment.
+    pub stride_frames: usize,
+    pub batch: usize,
+    pub steps: usize,
+    pub learning_rate: f64,
+    /// Weights of the losses beside the distance.
+    pub lambda_continuity: f64,
+    pub lambda_reach: f64,
+    pub lambda_adversarial: f64,
+    /// Numbers of a state.
+    pub hidden: usize,
+    pub seed: u64,
+    /// Steps of an epoch: at its end comes a validation.
+    pub epoch_steps: usize,
+    /// Epochs without a better score after which the training ends; 0: never.
+    pub patience: usize,
+    /// Steps between checkpoints; one comes with each validation too.
+    pub checkpoint_every: usize,
+    /// Checkpoints kept.
+    pub keep_checkpoints: usize,
+}
+
+impl Default for Seq2seqConfig {
+    fn default() -> Self {
+        Self {
+            network: SequenceNetwork::Contextual,
+            stride_frames: 0,
+            batch: 50,
+            steps: 20_000,
+            learning_rate: 1e-3,
+            lambda_continuity: 0.01,
+            lambda_reach: 1.0,
+            lambda_adversarial: 0.01,
+            hidden: 150,
+            seed: 1337,
+            epoch_steps: 250,
+            patience: 0,
+            checkpoint_every: 250,
+            keep_checkpoints: 3,
+        }
+    }
+}

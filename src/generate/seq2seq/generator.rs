@@ -1,0 +1,121 @@
+//! Poses for a sound of any length, segment after segment, each begun with the last poses of the one before.
+
+use super::metadata::{self, SequenceMetadata};
+use super::sound;
+use crate::formats::bvh::exponential_maps::smooth;
+use crate::formats::transcript::Word;
+use crate::generate::model::BEST;
+use crate::nn::seq2seq::config::Config;
+use crate::nn::seq2seq::predict::{GesturePredictor, generate};
+use crate::types::pose3d::Motion;
+use crate::types::sound::Sound;
+use crate::types::time::FrameRate;
+use anyhow::{Result, ensure};
+use candle_core::{DType, Device, Tensor};
+use ndarray::{Array2, ArrayView2, s};
+use std::path::Path;
+
+/// A trained sequence-to-sequence network.
+pub struct SequenceGenerator {
+    /// What the checkpoint says of it.
+    pub metadata: SequenceMetadata,
+    network: Box<dyn GesturePredictor>,
+}
+
+/// Poses for a sound.
+#[derive(Clone, Debug)]
+pub struct GeneratedPoses {
+    /// Numbers of the poses [T, C], smoothed.
+    pub numbers: Array2<f32>,
+    /// Mean step of the poses over the seam of two segments, as a share of the mean step within segments: as the network
+    /// made them, and smoothed. 1 of a single segment.
+    pub seam_jump: [f64; 2],
+}
+
+impl SequenceGenerator {
+    /// Opens a checkpoint of `orator train seq2seq`: a file, or the folder of a training (its best checkpoint).
+    pub fn open(path: &Path) -> Result<Self> {
+        let file = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
+        ensure!(file.is_file(), "there is no checkpoint {}; `orator train seq2seq` writes one", file.display());
+        let (metadata, network) = metadata::load(&file)?;
+        Ok(Self { metadata, network })
+    }
+
+    /// Rate of the motion it makes.
+    pub fn fps(&self) -> FrameRate {
+        self.metadata.fps
+    }
+
+    /// Whole frames that fit into a sound of so many samples. Errors when there is none.
+    pub fn n_frames(&self, n_samples: usize) -> Result<usize> {
+        let secs = n_samples as f64 / f64::from(self.metadata.rate);
+        let n_frames = (secs * self.fps().per_sec() + 1e-6) as usize;
+        ensure!(n_frames > 0, "the sound is {secs:.3} s long: too short for one frame of motion");
+        Ok(n_frames)
+    }
+
+    /// Poses for a sound at `metadata.rate` and what is said in it, which may be nothing. The first segment goes on from the
+    /// mean pose; the sound is filled up with silence to whole segments.
+    ///
+    /// # Errors
+    /// Sound of another rate or shorter than a frame; a network that makes numbers that are not finite.
+    pub fn poses(&self, sound: &Sound, words: &[Word]) -> Result<GeneratedPoses> {
+        let SequenceMetadata { rate, architecture, .. } = self.metadata;
+        ensure!(sound.rate == rate, "the sound has {} Hz, expected {rate}", sound.rate);
+        let n_frames = self.n_frames(sound.samples.len())?;
+        let Config { pose, previous, predicted, context, .. } = *self.network.config();
+        let n_padded = n_frames.div_ceil(predicted) * predicted;
+        let heard = sound::features(sound, self.fps(), n_frames, n_padded, context);
+        let shape = (1, heard.nrows(), heard.ncols());
+        let heard = Tensor::from_iter(heard.iter().copied(), &Device::Cpu)?.reshape(shape)?;
+        let start = Tensor::zeros((1, previous, pose), DType::F32, &Device::Cpu)?;
+        let said = self.metadata.vocabulary.numbered(words);
+        let words = |i| architecture.words_tensor(&[architecture.words(&said, i * predicted, predicted, self.fps())]);
+        let made = generate(&*self.network, &heard, &start, words)?.flatten_all()?.to_vec1::<f32>()?;
+        ensure!(
+            made.iter().all(|number| number.is_finite()),
+            "the network makes numbers that are not finite: its checkpoint was damaged, or its training failed"
+        );
+        let made = Array2::from_shape_vec((n_padded, pose), made)?;
+        let mut numbers = made.slice(s![..n_frames, ..]).to_owned();
+        let raw = seam_jump(numbers.view(), predicted);
+        smooth(&mut numbers);
+        let smoothed = seam_jump(numbers.view(), predicted);
+        Ok(GeneratedPoses { numbers, seam_jump: [raw, smoothed] })
+    }
+
+    /// Motion of the 49 joints. Errors where it learnt a captured skeleton.
+    pub fn motion(&self, poses: &GeneratedPoses) -> Result<Motion> {
+        self.metadata.poses.motion(poses.numbers.view(), self.fps())
+    }
+
+    /// BVH text in the captured skeleton. Errors where it learnt the 49 joints.
+    pub fn bvh(&self, poses: &GeneratedPoses) -> Result<String> {
+        self.metadata.poses.bvh(poses.numbers.view())
+    }
+}
+
+/// Mean step over seams as a share of the mean step elsewhere; 1 where there is none of either.
+fn seam_jump(numbers: ArrayView2<f32>, predicted: usize) -> f64 {
+    let (mut seams, mut others) = ((0.0, 0usize), (0.0, 0usize));
+    for t in 1..numbers.nrows() {
+        let (before, now) = (numbers.row(t - 1), numbers.row(t));
+        let squares = now.iter().zip(&before).map(|(a, b)| f64::from(a - b).powi(2));
+        let sum = if t.is_multiple_of(predicted) { &mut seams } else { &mut others };
+        *sum = (sum.0 + squares.sum::<f64>().sqrt(), sum.1 + 1);
+    }
+    let mean = |(sum, n): (f64, usize)| sum / n.max(1) as f64;
+    if seams.1 > 0 && mean(others) > 0.0 { mean(seams) / mean(others) } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_at_each_seam_is_measured() {
+        let ramp = Array2::from_shape_fn((12, 2), |(t, _)| t as f32 + 2.0 * (t / 4) as f32);
+        assert!((seam_jump(ramp.view(), 4) - 3.0).abs() < 1e-6);
+        assert_eq!(seam_jump(ramp.slice(s![..3, ..]), 4), 1.0);
+    }
+}

@@ -1,0 +1,219 @@
+//! A sequence-to-sequence network in training: one step, and all of it to a checkpoint and back.
+
+use super::losses::{self, SequenceLoss};
+use super::segments::SegmentBatch;
+use super::validate::SequenceValidation;
+use crate::config::Seq2seqConfig;
+use crate::formats::checkpoint;
+use crate::formats::checkpoint::Contents;
+use crate::generate::model::BEST;
+use crate::generate::seq2seq::architecture::Architecture;
+use crate::generate::seq2seq::metadata::{NETWORK, SequenceMetadata};
+use crate::nn::Mode;
+use crate::nn::params::Params;
+use crate::nn::seq2seq::adversarial::SegmentDiscriminator;
+use crate::nn::seq2seq::predict::GesturePredictor;
+use crate::train::optim::adam;
+use crate::train::optim::adam::Adam;
+use crate::train::resume;
+use anyhow::{Context, Result, ensure};
+use candle_core::Tensor;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+const DISCRIMINATOR: &str = "discriminator.";
+const ADAM: &str = "adam.network.";
+const ADAM_D: &str = "adam.discriminator.";
+/// Loss beyond which a training has exploded.
+const LOSS_LIMIT: f64 = 1e4;
+/// Settings that may change between two runs of one training; of the others the checkpoint's count.
+const FREE: [&str; 4] = ["steps", "patience", "checkpoint_every", "keep_checkpoints"];
+
+/// Losses of one step: the weighted sum, parts of it unweighted, and the norm of the network's gradient.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct SequenceLosses {
+    pub total: f64,
+    pub l1: f64,
+    pub discriminator: f64,
+    pub gradient_norm: f64,
+}
+
+/// What a checkpoint says beside its tensors.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SequenceState {
+    pub speaker: SequenceMetadata,
+    pub settings: Seq2seqConfig,
+    /// Steps done.
+    pub step: usize,
+    /// Step and score of the best validation so far.
+    pub best: Option<(usize, f32)>,
+}
+
+/// The discriminator of the adversarial network.
+struct Adversary {
+    network: SegmentDiscriminator,
+    params: Params,
+    adam: Adam,
+}
+
+/// Networks, optimisers and where they are.
+pub struct SequenceTrainer {
+    pub metadata: SequenceMetadata,
+    pub settings: Seq2seqConfig,
+    pub network: Box<dyn GesturePredictor>,
+    params: Params,
+    adam: Adam,
+    adversary: Option<Adversary>,
+    loss: SequenceLoss,
+    /// Steps done.
+    pub step: usize,
+    /// Step and score of the best validation so far.
+    pub best: Option<(usize, f32)>,
+}
+
+impl SequenceTrainer {
+    /// Networks as the seed makes them.
+    pub fn new(metadata: SequenceMetadata, settings: Seq2seqConfig) -> Result<Self> {
+        let mut params = Params::new(settings.seed);
+        let network = metadata.architecture.network(&mut params, &metadata.network)?;
+        let is_adversarial = metadata.architecture == Architecture::Adversarial;
+        let beta1 = if is_adversarial { 0.5 } else { 0.9 };
+        let of_adam =
+            adam::Config { beta1, beta2: if is_adversarial { 0.9 } else { 0.999 }, ..adam::Config::default() };
+        let adversary = |seed: u64| -> Result<Adversary> {
+            let mut params = Params::new(seed);
+            let network = SegmentDiscriminator::new(&mut params, &metadata.network)?;
+            Ok(Adversary { network, adam: Adam::new(&params, of_adam)?, params })
+        };
+        let continuity_weight = settings.lambda_continuity;
+        let loss = match is_adversarial {
+            true => SequenceLoss {
+                continuity_weight,
+                adversarial_weight: settings.lambda_adversarial,
+                ..SequenceLoss::of_adversarial()
+            },
+            false => SequenceLoss { continuity_weight, reach_weight: settings.lambda_reach, ..SequenceLoss::default() },
+        };
+        Ok(Self {
+            adam: Adam::new(&params, of_adam)?,
+            // Another seed, or tensors of the same name would begin alike.
+            adversary: is_adversarial.then(|| adversary(!settings.seed)).transpose()?,
+            params,
+            network,
+            loss,
+            metadata,
+            settings,
+            step: 0,
+            best: None,
+        })
+    }
+
+    /// Tensors of the network.
+    pub fn params(&self) -> &Params {
+        &self.params
+    }
+
+    /// One step, the discriminator's first where there is one.
+    pub fn step(&mut self, batch: &SegmentBatch) -> Result<SequenceLosses> {
+        let rate = self.settings.learning_rate;
+        // Another seed than that of the windows.
+        let mut rng = resume::stream(!self.settings.seed, self.step);
+        let made = batch.completed(&self.network.forward(&batch.segment, &mut Mode::Train(&mut rng))?)?;
+        let (mut discriminator, mut logits) = (0.0, None);
+        if let Some(Adversary { network, adam, .. }) = &mut self.adversary {
+            let of_made = network.forward(&made.detach(), true)?;
+            let loss = losses::discriminator(&of_made, &network.forward(&batch.real, true)?)?;
+            discriminator = number(&loss)?;
+            adam.step(&loss.backward()?, rate)?;
+            logits = Some(network.forward(&made, true)?);
+        }
+        let total = self.loss.total(&made, &batch.real, logits.as_ref())?;
+        let gradient_norm = self.adam.step(&total.backward()?, rate)?;
+        self.step += 1;
+        let l1 = number(&losses::l1(&made, &batch.real)?)?;
+        Ok(SequenceLosses { total: number(&total)?, l1, discriminator, gradient_norm })
+    }
+
+    /// Writes the checkpoint of this step; old ones go.
+    pub fn save(&self, folder: &Path) -> Result<()> {
+        let mut contents = Contents { facts: self.stored()?, tensors: BTreeMap::new() };
+        contents.add(NETWORK, self.params.tensors()?);
+        contents.add("", self.adam.tensors(ADAM)?);
+        if let Some(Adversary { params, adam, .. }) = &self.adversary {
+            contents.add(DISCRIMINATOR, params.tensors()?);
+            contents.add("", adam.tensors(ADAM_D)?);
+        }
+        contents.write(&checkpoint::path(folder, self.step))?;
+        checkpoint::prune(folder, self.settings.keep_checkpoints)
+    }
+
+    /// Writes the network of this step as the best.
+    pub fn save_best(&self, folder: &Path, validation: &SequenceValidation) -> Result<()> {
+        let mut facts = self.stored()?;
+        facts["validation"] = serde_json::to_value(validation)?;
+        let mut contents = Contents { facts, tensors: BTreeMap::new() };
+        contents.add(NETWORK, self.params.tensors()?);
+        contents.write(&folder.join(BEST))
+    }
+
+    fn stored(&self) -> Result<Value> {
+        let (speaker, settings) = (self.metadata.clone(), self.settings.clone());
+        Ok(serde_json::to_value(SequenceState { speaker, settings, step: self.step, best: self.best })?)
+    }
+
+    /// Takes up the tensors and the place of a checkpoint.
+    pub fn load(&mut self, stored: &SequenceState, contents: &Contents) -> Result<()> {
+        self.params.load(&contents.part(NETWORK))?;
+        self.adam.load(ADAM, &contents.tensors)?;
+        if let Some(Adversary { params, adam, .. }) = &mut self.adversary {
+            params.load(&contents.part(DISCRIMINATOR))?;
+            adam.load(ADAM_D, &contents.tensors)?;
+        }
+        (self.step, self.best) = (stored.step, stored.best);
+        Ok(())
+    }
+}
+
+impl SequenceState {
+    /// What a checkpoint of a training says. Errors when it is none, or of another program's version.
+    pub fn from_checkpoint(contents: &Contents) -> Result<Self> {
+        let kind = SequenceMetadata::kind();
+        ensure!(
+            contents.facts["settings"].is_object() && contents.facts["speaker"]["kind"] == kind,
+            "it is no checkpoint of `orator train seq2seq` that this version can go on from; choose another --out, or move \
+             that folder away"
+        );
+        serde_json::from_value(contents.facts.clone()).context("its facts are not those of this program's version")
+    }
+
+    /// The settings to go on with, and a line for each difference.
+    pub fn settings(&self, requested: &Seq2seqConfig) -> Result<(Seq2seqConfig, Vec<String>)> {
+        resume::settings(&self.settings, requested, "seq2seq", &FREE)
+    }
+}
+
+impl SequenceLosses {
+    /// Errors, saying all of them, when one is not finite or has exploded.
+    pub fn check(&self, step: usize) -> Result<()> {
+        let Self { total, l1, discriminator, gradient_norm } = *self;
+        ensure!(
+            [total, l1, discriminator].iter().all(|loss| loss.is_finite() && loss.abs() < LOSS_LIMIT)
+                && gradient_norm.is_finite(),
+            "the training broke at step {step}: loss {total}, L1 {l1}, discriminator {discriminator}, norm of the gradient \
+             {gradient_norm}"
+        );
+        Ok(())
+    }
+
+    /// A line of the log.
+    pub fn line(&self, step: usize) -> Value {
+        let Self { total, l1, discriminator, gradient_norm } = *self;
+        json!({ "step": step, "total": total, "l1": l1, "discriminator": discriminator, "gradient_norm": gradient_norm })
+    }
+}
+
+fn number(scalar: &Tensor) -> Result<f64> {
+    Ok(f64::from(scalar.to_scalar::<f32>()?))
+}

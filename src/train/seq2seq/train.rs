@@ -1,0 +1,281 @@
+//! Training of a sequence-to-sequence network: one straight loop. The same data, settings and seed give the same
+//! checkpoints, also when the training was interrupted: segments and dropout of a step depend on the seed and the step
+//! alone, everything else is in the checkpoint.
+
+use super::segments::SegmentLoader;
+use super::sequence::{PoseSequence, SequenceSplits};
+use super::source::TrainingSource;
+use super::step::{SequenceLosses, SequenceState, SequenceTrainer};
+use super::validate::{SequenceValidation, ValidationSegments};
+use crate::config::{Seq2seqConfig, SequenceNetwork};
+use crate::formats::checkpoint;
+use crate::formats::checkpoint::Contents;
+use crate::formats::word_vectors::WordVectors;
+use crate::generate::model::BEST;
+use crate::generate::seq2seq::architecture::{Architecture, network_config};
+use crate::generate::seq2seq::metadata::SequenceMetadata;
+use crate::generate::seq2seq::vocabulary::{PADDING, UNKNOWN, Vocabulary};
+use crate::nn::cpu::thread_team::with_spinning_workers;
+use crate::nn::seq2seq::embedding::set_word_vectors;
+use crate::stage::progress::Progress;
+use crate::stage::workdir::{self, FolderLock};
+use crate::train::log::MetricsLog;
+use crate::train::resume::{kept, sample_windows};
+use anyhow::{Context, Result, bail, ensure};
+use candle_core::Tensor;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Steps between two lines of the log.
+const LOG_EVERY: usize = 10;
+/// Numbers of a word where no table of vectors is given.
+const WORD: usize = 100;
+
+/// How a training ended.
+#[derive(Clone, Debug)]
+pub struct SequenceOutcome {
+    /// Steps of this training altogether, and the step this run began at.
+    pub steps: usize,
+    pub began_at: usize,
+    /// Whether it ended before its last step since the score had not become better for `seq2seq.patience` epochs.
+    pub stopped_early: bool,
+    pub n_segments: usize,
+    pub n_parameters: usize,
+    /// Words that were trained with.
+    pub n_words: usize,
+    /// Of the newest checkpoint.
+    pub validation: SequenceValidation,
+    pub newest: PathBuf,
+    /// Best by the validation's score.
+    pub best: PathBuf,
+    pub best_step: usize,
+}
+
+/// Trains until `requested.steps`, going on from the newest checkpoint in `folder`; what the settings of that checkpoint say
+/// counts, and differences are told. `vectors`: what words begin with; else the seed.
+///
+/// # Errors
+/// Data that cannot be read, by the name of its file; no segment to train on; a checkpoint of other data; another training
+/// at work in `folder`; a loss that is not finite or explodes (the last good checkpoint stays).
+pub fn train(
+    source: TrainingSource,
+    vectors: Option<&WordVectors>,
+    requested: &Seq2seqConfig,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<SequenceOutcome> {
+    check(requested)?;
+    // Others may listen to the model while it learns, and nobody may forget it.
+    let _model = FolderLock::shared(folder)?;
+    let _lock = workdir::lock(folder)?;
+    let resumed = resume(source, requested, folder, progress)?;
+    let (mut trainer, splits) = match &resumed {
+        Some((stored, contents)) => {
+            let SequenceMetadata { poses, network, .. } = &stored.speaker;
+            let splits = source.sequences(poses, network.context)?;
+            let mut trainer = SequenceTrainer::new(stored.speaker.clone(), stored.settings.clone())?;
+            trainer.load(stored, contents)?;
+            // One too many is left by a kill before the oldest was removed.
+            checkpoint::prune(folder, trainer.settings.keep_checkpoints)?;
+            (trainer, splits)
+        }
+        None => begin(source, vectors, requested)?,
+    };
+    let train = SegmentLoader::new(splits.train, &trainer.metadata, trainer.settings.stride_frames);
+    ensure!(
+        !train.is_empty(),
+        "{}: no motion to train on is as long as a segment of {} frames",
+        source.place(),
+        trainer.metadata.network.previous + trainer.metadata.network.predicted
+    );
+    let held_out = SegmentLoader::new(splits.held_out, &trainer.metadata, 0);
+    if held_out.is_empty() {
+        progress.say("no segment is held out: the figures below are on those to train on");
+    }
+    let held_out = ValidationSegments::new(&held_out, &train, trainer.settings.batch)?;
+    with_spinning_workers(|| run(&mut trainer, &train, &held_out, folder, progress))
+}
+
+/// A trainer as the seed and the word vectors make it, and the data.
+fn begin(
+    source: TrainingSource,
+    vectors: Option<&WordVectors>,
+    settings: &Seq2seqConfig,
+) -> Result<(SequenceTrainer, SequenceSplits)> {
+    let (fps, poses) = (source.fps(), source.pose_numbers()?);
+    let word = vectors.map_or(WORD, WordVectors::dim);
+    let sizes = |n_words| network_config(fps, poses.n_numbers(), n_words, [settings.hidden, word]);
+    let splits = source.sequences(&poses, sizes(0).context)?;
+    let architecture = architecture(settings.network);
+    let vocabulary = match architecture.word_encoder() {
+        Some(_) => Vocabulary::of(splits.train.iter().flat_map(|sequence: &PoseSequence| &sequence.words)),
+        None => Vocabulary::default(),
+    };
+    let metadata = SequenceMetadata {
+        kind: SequenceMetadata::kind(),
+        name: source.name(),
+        fps,
+        rate: source.rate(),
+        architecture,
+        network: sizes(vocabulary.n_numbers()),
+        poses,
+        vocabulary,
+        dataset: source.hash()?,
+    };
+    let trainer = SequenceTrainer::new(metadata, settings.clone())?;
+    begin_words(&trainer, vectors)?;
+    Ok((trainer, splits))
+}
+
+/// Padding begins with zeros, the unknown word with ones, the others with their vectors where there are some.
+fn begin_words(trainer: &SequenceTrainer, vectors: Option<&WordVectors>) -> Result<()> {
+    let SequenceMetadata { architecture, vocabulary, network, .. } = &trainer.metadata;
+    let Some(encoder) = architecture.word_encoder() else { return Ok(()) };
+    let found = trainer.params().trainables().find(|(name, _)| *name == format!("{encoder}.embedding.weight"));
+    let (_, table) = found.context("this network has no table of words")?;
+    let mut rows = table.to_vec2::<f32>()?;
+    rows[PADDING as usize] = vec![0.0; network.word];
+    rows[UNKNOWN as usize] = vec![1.0; network.word];
+    if let Some(vectors) = vectors {
+        for word in vocabulary.words() {
+            rows[vocabulary.number(word) as usize] = vectors.vector(vectors.index(word))?;
+        }
+    }
+    let numbers: Vec<f32> = rows.concat();
+    let table = Tensor::from_vec(numbers, (vocabulary.n_numbers(), network.word), table.device())?;
+    Ok(set_word_vectors(trainer.params(), encoder, &table)?)
+}
+
+/// The loop: steps, and at the end of each epoch a validation.
+fn run(
+    trainer: &mut SequenceTrainer,
+    loader: &SegmentLoader,
+    held_out: &ValidationSegments,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<SequenceOutcome> {
+    let settings = trainer.settings.clone();
+    let began_at = trainer.step;
+    let mut log = MetricsLog::open(folder, began_at)?;
+    let task = progress.begin(&format!("train {}", trainer.metadata.name), settings.steps as u64);
+    task.advance(began_at.min(settings.steps) as u64);
+    let start = Instant::now();
+    let mut last = None;
+    while trainer.step < settings.steps && !is_over(trainer) {
+        let losses = trainer.step(&loader.batch(&sample_windows(
+            settings.seed,
+            trainer.step,
+            settings.batch,
+            loader.len(),
+        ))?)?;
+        let step = trainer.step;
+        losses.check(step).with_context(|| kept(folder, "seq2seq"))?;
+        task.advance(1);
+        if step.is_multiple_of(LOG_EVERY) {
+            let SequenceLosses { total, l1, .. } = losses;
+            let speed = (step - began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
+            task.detail(&format!("loss {total:.3} L1 {l1:.3}  {speed:.2} steps/s"));
+            log.write(&losses.line(step))?;
+        }
+        let is_last = step == settings.steps;
+        let ends_epoch = step.is_multiple_of(settings.epoch_steps);
+        if ends_epoch || is_last {
+            let validation = held_out.validate(&*trainer.network)?;
+            let epoch = step.div_ceil(settings.epoch_steps);
+            log.write(&json!({ "step": step, "epoch": epoch, "validation": validation }))?;
+            if let (Some(alarm), true) = (&validation.alarm, step > settings.epoch_steps) {
+                progress.say(&format!("step {step}: {alarm}"));
+            }
+            // In f32, whose decimals come back exactly from JSON.
+            let score = validation.score as f32;
+            if trainer.best.is_none_or(|(_, best)| score < best) {
+                trainer.best = Some((step, score));
+                trainer.save_best(folder, &validation)?;
+            }
+            last = Some(validation);
+        }
+        if ends_epoch || is_last || step.is_multiple_of(settings.checkpoint_every) {
+            trainer.save(folder)?;
+        }
+    }
+    let Some((_, newest)) = checkpoint::list(folder)?.pop() else {
+        bail!("seq2seq.steps is 0: nothing to train");
+    };
+    let validation = match last {
+        Some(validation) => validation,
+        None => held_out.validate(&*trainer.network)?,
+    };
+    Ok(SequenceOutcome {
+        steps: trainer.step,
+        began_at,
+        stopped_early: trainer.step < settings.steps,
+        n_segments: loader.len(),
+        n_parameters: trainer.params().n_parameters(),
+        n_words: trainer.metadata.vocabulary.words().len(),
+        validation,
+        newest,
+        best: folder.join(BEST),
+        best_step: trainer.best.map_or(trainer.step, |(step, _)| step),
+    })
+}
+
+/// The newest checkpoint, and what it says with the settings that count now. Tells where these differ from `requested`.
+fn resume(
+    source: TrainingSource,
+    requested: &Seq2seqConfig,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<Option<(SequenceState, Contents)>> {
+    let Some((step, newest)) = checkpoint::list(folder)?.pop() else { return Ok(None) };
+    let contents = Contents::read(&newest)?;
+    let read = || -> Result<(SequenceState, Vec<String>)> {
+        let mut stored = SequenceState::from_checkpoint(&contents)?;
+        let (settings, mut differences) = stored.settings(requested)?;
+        stored.settings = settings;
+        let (name, fps, rate) = (source.name(), source.fps(), source.rate());
+        let metadata = &mut stored.speaker;
+        ensure!(
+            metadata.name == name && metadata.fps == fps && metadata.rate == rate,
+            "it is of {} at {}, sound at {} Hz, the data of {name} at {fps}, {rate} Hz; choose another --out",
+            metadata.name,
+            metadata.fps,
+            metadata.rate
+        );
+        let hash = source.hash()?;
+        if metadata.dataset != hash {
+            differences.push("the data are others now: trained on with the checkpoint's means and words".to_owned());
+            metadata.dataset = hash;
+        }
+        Ok((stored, differences))
+    };
+    let (stored, differences) = read().with_context(|| format!("cannot go on from {}", newest.display()))?;
+    progress.say(&format!("going on from {} (step {step})", newest.display()));
+    differences.iter().for_each(|line| progress.say(line));
+    Ok(Some((stored, contents)))
+}
+
+/// Whether the score has not become better for as many epochs as `seq2seq.patience` allows.
+fn is_over(trainer: &SequenceTrainer) -> bool {
+    let Seq2seqConfig { patience, epoch_steps, .. } = trainer.settings;
+    let since = trainer.step - trainer.best.map_or(trainer.step, |(step, _)| step.min(trainer.step));
+    patience > 0 && since >= patience * epoch_steps
+}
+
+/// The network of a name of the configuration.
+fn architecture(network: SequenceNetwork) -> Architecture {
+    match network {
+        SequenceNetwork::Contextual => Architecture::Contextual,
+        SequenceNetwork::Words => Architecture::Words,
+        SequenceNetwork::Adversarial => Architecture::Adversarial,
+    }
+}
+
+fn check(settings: &Seq2seqConfig) -> Result<()> {
+    ensure!(settings.batch > 1, "seq2seq.batch is {}: batch norm needs at least 2 segments", settings.batch);
+    ensure!(
+        settings.checkpoint_every > 0 && settings.epoch_steps > 0 && settings.hidden > 0,
+        "seq2seq.checkpoint_every, seq2seq.epoch_steps and seq2seq.hidden must be at least 1"
+    );
+    Ok(())
+}

@@ -1,0 +1,172 @@
+//! Training of the sequence-to-sequence networks end to end on made-up motion that follows the pitch of a tone: it learns,
+//! resumes exactly, and its checkpoints generate for sounds of any length.
+
+use crate::fixtures::animation::captures::{bvh, tone, write_capture};
+use crate::fixtures::faults::stop::{Shared, Stop, bytes};
+use crate::fixtures::gesture_dataset::{dataset, sample};
+use orator::config::{Seq2seqConfig, SequenceNetwork};
+use orator::formats::bvh::exponential_maps::JointMapping;
+use orator::formats::bvh::read::Bvh;
+use orator::formats::transcript::Transcript;
+use orator::generate::model::BEST;
+use orator::generate::seq2seq::SequenceGenerator;
+use orator::stage::progress::Silent;
+use orator::train::seq2seq::captures::CaptureFolder;
+use orator::train::seq2seq::source::TrainingSource;
+use orator::train::seq2seq::train::train;
+use std::panic::AssertUnwindSafe;
+use std::path::Path;
+
+fn settings(network: SequenceNetwork) -> Seq2seqConfig {
+    let schedule =
+        Seq2seqConfig { steps: 6, epoch_steps: 3, checkpoint_every: 2, keep_checkpoints: 2, ..Default::default() };
+    Seq2seqConfig { network, batch: 3, hidden: 8, stride_frames: 5, ..schedule }
+}
+
+fn open(dir: &Path, hold_out: &[&str]) -> anyhow::Result<CaptureFolder> {
+    let hold_out: Vec<String> = hold_out.iter().map(|name| (*name).to_owned()).collect();
+    CaptureFolder::open(dir, &hold_out, JointMapping::default())
+}
+
+#[test]
+fn a_training_stopped_at_a_step_ends_with_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let dataset = dataset(&folder.path().join("dataset"));
+    let source = TrainingSource::Dataset(&dataset);
+    for (network, stops) in [
+        (SequenceNetwork::Contextual, vec![3, 4]),
+        (SequenceNetwork::Words, vec![5]),
+        (SequenceNetwork::Adversarial, vec![3]),
+    ] {
+        let settings = settings(network);
+        let place = |part: &str| folder.path().join(format!("{network:?}-{part}"));
+        let outcome = train(source, None, &settings, &place("whole"), &Silent).unwrap();
+        // 99 and 64 frames: a segment of 8 + 15 frames every five of them
+        assert_eq!((outcome.steps, outcome.n_segments, outcome.n_words), (6, 16 + 9, 0));
+        assert_eq!((outcome.validation.split.as_str(), outcome.validation.n_segments), ("validation", 8));
+        let whole = bytes(&place("whole"));
+        let names: Vec<&str> = whole.iter().map(|(name, _)| name.as_str()).collect();
+        assert!(
+            ["metrics.jsonl", BEST, "step-0000004.safetensors", "step-0000006.safetensors"]
+                .iter()
+                .all(|name| names.contains(name))
+        );
+        for stop in stops {
+            let parts = place(&stop.to_string());
+            let progress = Shared(Stop::at(stop));
+            let run = || train(source, None, &settings, &parts, &progress);
+            assert!(std::panic::catch_unwind(AssertUnwindSafe(run)).is_err());
+            let resumed = train(source, None, &settings, &parts, &Silent).unwrap();
+            assert_eq!((resumed.began_at, resumed.steps), ([0, 0, 2, 3, 4, 4][stop as usize - 1], 6));
+            for ((name, whole), (_, parts)) in whole.iter().zip(bytes(&parts)) {
+                assert!(*whole == parts, "{name} of {network:?} differs after a stop at step {stop}");
+            }
+        }
+    }
+    // A checkpoint is not gone on from with other data; other settings than its own are told.
+    let captures = folder.path().join("captures");
+    write_capture(&captures, "a", 4.0, 0.0, false);
+    let captures = open(&captures, &[]).unwrap();
+    let out = folder.path().join("Contextual-whole");
+    let text = train(TrainingSource::Captures(&captures), None, &settings(SequenceNetwork::Contextual), &out, &Silent);
+    assert!(format!("{:#}", text.unwrap_err()).contains("choose another --out"));
+    let stop = Stop::at(u64::MAX);
+    train(source, None, &settings(SequenceNetwork::Words), &out, &Shared(stop.clone())).unwrap();
+    assert!(stop.said.lock().unwrap().join("\n").contains("seq2seq.network"));
+}
+
+#[test]
+fn the_loss_falls_and_the_dataset_is_spoken() {
+    let folder = tempfile::tempdir().unwrap();
+    let dataset = dataset(&folder.path().join("dataset"));
+    let settings = Seq2seqConfig {
+        steps: 120,
+        batch: 8,
+        hidden: 24,
+        learning_rate: 4e-3,
+        lambda_reach: 0.0,
+        epoch_steps: 120,
+        checkpoint_every: 120,
+        ..settings(SequenceNetwork::Contextual)
+    };
+    let out = folder.path().join("out");
+    train(TrainingSource::Dataset(&dataset), None, &settings, &out, &Silent).unwrap();
+    let log = std::fs::read_to_string(out.join("metrics.jsonl")).unwrap();
+    let line = |line: &str| serde_json::from_str::<serde_json::Value>(line).unwrap()["l1"].as_f64();
+    let l1: Vec<f64> = log.lines().filter_map(line).collect();
+    assert!(l1.len() == 12 && l1[11] < 0.6 * l1[0], "{l1:?}");
+
+    let speaker = SequenceGenerator::open(&out).unwrap();
+    let poses = speaker.poses(&sample("a-00000000-000000", 99, 0.0).sound, &[]).unwrap();
+    let motion = speaker.motion(&poses).unwrap();
+    assert_eq!((motion.n_frames(), poses.numbers.dim()), (99, (99, 144)));
+    assert!(motion.joints.iter().all(|v| v.is_finite()) && poses.seam_jump.iter().all(|jump| jump.is_finite()));
+    assert!(speaker.bvh(&poses).is_err());
+    assert!(speaker.poses(&orator::types::sound::Sound { rate: 8_000, samples: vec![0.0; 8_000] }, &[]).is_err());
+}
+
+#[test]
+fn captures_with_and_without_words_speak_for_sounds_of_any_length() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("captures");
+    write_capture(&dir, "a", 6.0, 0.0, true);
+    write_capture(&dir, "b", 4.0, 2.0, false);
+    write_capture(&dir, "c", 4.0, 4.0, true);
+    let captures = open(&dir, &["c"]).unwrap();
+    for network in [SequenceNetwork::Contextual, SequenceNetwork::Words] {
+        let out = folder.path().join(format!("{network:?}"));
+        let outcome = train(TrainingSource::Captures(&captures), None, &settings(network), &out, &Silent).unwrap();
+        assert_eq!((outcome.validation.split.as_str(), outcome.n_words), ("validation", 2));
+        let speaker = SequenceGenerator::open(&out).unwrap();
+        let words = Transcript::read(&dir.join("a.tsv")).unwrap().words;
+        assert_eq!((words.len(), speaker.metadata.vocabulary.number("World")), (6, 3));
+        for (secs, n_frames) in [(0.9, 18), (7.33, 146), (70.0, 1400)] {
+            let sound = tone(secs, 1.0);
+            let (silent, said) = (speaker.poses(&sound, &[]).unwrap(), speaker.poses(&sound, &words).unwrap());
+            assert_eq!((silent.numbers.nrows(), said.numbers.nrows()), (n_frames, n_frames));
+            assert!(said.numbers != silent.numbers, "{network:?} does not hear words");
+            for poses in [silent, said] {
+                assert!(poses.numbers.iter().all(|v| v.is_finite()));
+                let back = Bvh::parse(&speaker.bvh(&poses).unwrap()).unwrap();
+                assert_eq!((back.n_frames, back.joints[0].name.as_str()), (n_frames, "Hips"));
+                assert!(speaker.motion(&poses).is_err());
+            }
+        }
+        assert!(speaker.poses(&tone(0.01, 0.0), &[]).is_err());
+    }
+}
+
+#[test]
+fn what_is_wrong_with_captures_names_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let says = |case: &str, hold_out: &[&str], spoil: &dyn Fn(&Path)| {
+        let dir = dir.join(case);
+        write_capture(&dir, "a", 3.0, 0.0, false);
+        write_capture(&dir, "b", 3.0, 1.0, false);
+        spoil(&dir);
+        let settings = settings(SequenceNetwork::Contextual);
+        let out = dir.join("out");
+        let trained = open(&dir, hold_out)
+            .and_then(|captures| train(TrainingSource::Captures(&captures), None, &settings, &out, &Silent));
+        format!("{:#}", trained.unwrap_err())
+    };
+    let write = |dir: &Path, text: String| std::fs::write(dir.join("b.bvh"), text).unwrap();
+    let whole = bvh(3.0, 1.0);
+    let text = says("skeleton", &[], &|dir| write(dir, whole.replace("LeftHand", "LeftPaw")));
+    assert!(text.contains("b.bvh") && text.contains("other joints"), "{text}");
+    let text = says("held-out", &["b"], &|dir| write(dir, whole.replace("LeftHand", "LeftPaw")));
+    assert!(text.contains("b.bvh") && text.contains("other joints"), "{text}");
+    let line = whole.lines().nth_back(9).unwrap().to_owned();
+    let text = says("nan", &[], &|dir| write(dir, whole.replace(&line, &line.replacen("0 ", "NaN ", 1))));
+    assert!(text.contains("b.bvh"), "{text}");
+    let text = says("no-motion", &[], &|dir| std::fs::remove_file(dir.join("b.bvh")).unwrap());
+    assert!(text.contains("b.wav has no motion"), "{text}");
+    let text = says("no-sound", &[], &|dir| std::fs::remove_file(dir.join("b.wav")).unwrap());
+    assert!(text.contains("b.bvh has no sound"), "{text}");
+    let text = says("damaged-sound", &[], &|dir| std::fs::write(dir.join("b.wav"), "no sound").unwrap());
+    assert!(text.contains("b.wav"), "{text}");
+    let text = says("unknown", &["z"], &|_| ());
+    assert!(text.contains("no z.bvh"), "{text}");
+    assert!(says("all", &["a", "b"], &|_| ()).contains("none is left"));
+}
