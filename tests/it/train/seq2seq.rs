@@ -80,21 +80,23 @@ fn the_loss_falls_and_the_dataset_is_spoken() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     let settings = Seq2seqConfig {
-        steps: 120,
+        steps: 80,
         batch: 8,
         hidden: 24,
-        learning_rate: 4e-3,
+        learning_rate: 2e-3,
         lambda_reach: 0.0,
-        epoch_steps: 120,
-        checkpoint_every: 120,
+        epoch_steps: 80,
+        checkpoint_every: 80,
         ..settings(SequenceNetwork::Contextual)
     };
     let out = folder.path().join("out");
-    train(TrainingSource::Dataset(&dataset), None, &settings, &out, &Silent).unwrap();
+    let validation = train(TrainingSource::Dataset(&dataset), None, &settings, &out, &Silent).unwrap().validation;
+    assert!(validation.l1 < validation.mean_pose_l1 && validation.energy > 0.3, "{validation:?}");
     let log = std::fs::read_to_string(out.join("metrics.jsonl")).unwrap();
     let line = |line: &str| serde_json::from_str::<serde_json::Value>(line).unwrap()["l1"].as_f64();
     let l1: Vec<f64> = log.lines().filter_map(line).collect();
-    assert!(l1.len() == 12 && l1[11] < 0.6 * l1[0], "{l1:?}");
+    let end = l1.iter().rev().take(4).sum::<f64>() / 4.0;
+    assert!(l1.len() == 8 && end < 0.7 * l1[0], "{l1:?}");
 
     let speaker = SequenceGenerator::open(&out).unwrap();
     let poses = speaker.poses(&sample("a-00000000-000000", 99, 0.0).sound, &[]).unwrap();
