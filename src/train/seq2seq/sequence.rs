@@ -57,10 +57,10 @@ mod tests {
 
     #[test]
     fn what_is_not_known_is_filled_in_time() {
-        let mut values = array![9.0, 1.0, 9.0, 9.0, 4.0, f32::NAN];
+        let mut values = array![9.0f32, 1.0, 9.0, 9.0, 4.0, f32::NAN];
         fill(values.view_mut(), aview1(&[false, true, false, false, true, false]));
         assert_eq!(values, array![1.0, 1.0, 2.0, 3.0, 4.0, 4.0]);
         fill(values.view_mut(), aview1(&[false; 6]));
-        assert_eq!(values, Array2::zeros((1, 6)).row(0));
+        assert_eq!(values, ndarray::Array1::<f32>::zeros(6));
     }
 }
