@@ -2,6 +2,7 @@
 
 use super::normalisation::{N_FEATURES, Normalisation};
 use super::representation::Representation;
+use super::seq2seq::metadata::is_sequence_kind;
 use crate::audio::mel;
 use crate::formats::checkpoint::Contents;
 use crate::motion::bones;
@@ -106,6 +107,10 @@ pub fn load(path: &Path) -> Result<(SpeakerMetadata, Generator)> {
 
 fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {
     let kind = &contents.facts["speaker"]["kind"];
+    ensure!(
+        !is_sequence_kind(kind),
+        "it is one of `orator train seq2seq`, with which `orator generate --audio` alone speaks, one sound at a time"
+    );
     ensure!(kind == KIND, "its kind is {kind}, this program reads {KIND:?}");
     let metadata: SpeakerMetadata =
         serde_json::from_value(contents.facts["speaker"].clone()).context("its facts are incomplete")?;

@@ -68,15 +68,15 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         ui.say(&format!("checkpoint {}", checkpoint.display()));
     }
     let _lock = model_lock(&checkpoint)?;
-    let (speaker, fps, written, seam_jump) = if is_sequence(&checkpoint)? {
+    let (speaker, fps, written, seam_jump, is_captured) = if is_sequence(&checkpoint)? {
         let speaker = SequenceGenerator::open(&checkpoint)?;
         let (written, jump) = write_sequence(&speaker, audio, args.transcript.as_deref(), &outputs, ui)?;
-        (speaker.metadata.name.clone(), speaker.fps(), written, Some(jump))
+        (speaker.metadata.name.clone(), speaker.fps(), written, Some(jump), speaker.is_captured())
     } else {
         ensure!(args.transcript.is_none(), "{} reads no words: leave out --transcript", checkpoint.display());
         let speaker = GestureGenerator::open(&checkpoint)?;
         let written = write_motion(&speaker, audio, &outputs, ui)?;
-        (speaker.name().to_owned(), speaker.fps(), written, None)
+        (speaker.name().to_owned(), speaker.fps(), written, None, false)
     };
     let speed = written.secs / written.motion_secs.max(1e-6);
     let names = names(&outputs);
@@ -90,9 +90,11 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         written.n_frames,
         names.join(", ")
     );
-    let next = next_output(&outputs).map(|out| {
+    let said = args.transcript.as_ref().map_or(String::new(), |path| format!(" --transcript {}", path.display()));
+    // A captured skeleton is written as .bvh alone.
+    let next = next_output(&outputs).filter(|_| !is_captured).map(|out| {
         let (checkpoint, audio, out) = (given.display(), audio.display(), out.display());
-        format!("orator generate --checkpoint {checkpoint} --audio {audio} --out {out}")
+        format!("orator generate --checkpoint {checkpoint} --audio {audio}{said} --out {out}")
     });
     let facts = json!({
         "audio_secs": written.secs,

@@ -1,6 +1,7 @@
 //! Poses for a sound of any length, segment after segment, each begun with the last poses of the one before.
 
 use super::metadata::{self, SequenceMetadata};
+use super::poses::PoseNumbers;
 use super::sound;
 use crate::formats::bvh::exponential_maps::smooth;
 use crate::formats::transcript::Word;
@@ -44,6 +45,11 @@ impl SequenceGenerator {
     /// Rate of the motion it makes.
     pub fn fps(&self) -> FrameRate {
         self.metadata.fps
+    }
+
+    /// Whether it moves the skeleton of the BVH files it learnt from, not the 49 joints.
+    pub fn is_captured(&self) -> bool {
+        matches!(self.metadata.poses, PoseNumbers::Captured(_))
     }
 
     /// Whole frames that fit into a sound of so many samples. Errors when there is none.

@@ -66,7 +66,12 @@ impl SequenceMetadata {
 /// Whether a file is a checkpoint of a sequence-to-sequence network. Errors: it cannot be read, or is no checkpoint.
 pub fn is_sequence(path: &Path) -> Result<bool> {
     let facts = crate::formats::checkpoint::facts(path)?;
-    Ok(facts["speaker"]["kind"].as_str().is_some_and(|kind| kind.starts_with("orator sequence")))
+    Ok(is_sequence_kind(&facts["speaker"]["kind"]))
+}
+
+/// Whether a kind is that of these checkpoints, of whatever version.
+pub fn is_sequence_kind(kind: &serde_json::Value) -> bool {
+    kind.as_str().is_some_and(|kind| kind.starts_with("orator sequence"))
 }
 
 /// Reads a checkpoint of `orator train seq2seq`. Errors name the file and what is wrong with it.

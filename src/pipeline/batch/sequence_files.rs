@@ -5,7 +5,6 @@ use crate::animate::export::file::ExportFormat;
 use crate::external::ffmpeg::audio;
 use crate::formats::transcript::Transcript;
 use crate::generate::seq2seq::SequenceGenerator;
-use crate::generate::seq2seq::poses::PoseNumbers;
 use crate::stage::progress::Progress;
 use crate::stage::workdir;
 use anyhow::{Context as _, Result, bail};
@@ -25,7 +24,7 @@ pub fn write_sequence(
     progress: &dyn Progress,
 ) -> Result<(SpokenMotion, [f64; 2])> {
     let started = Instant::now();
-    let is_captured = matches!(speaker.metadata.poses, PoseNumbers::Captured(_));
+    let is_captured = speaker.is_captured();
     if let Some((path, _)) = outputs.iter().find(|(_, format)| is_captured && *format != ExportFormat::Bvh) {
         bail!(
             "{}: this network moves the skeleton of the BVH files it was trained on, which is written as .bvh alone",
