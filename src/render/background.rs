@@ -76,7 +76,7 @@ impl Background {
                 }
                 nearness[at] = band.nearness[there];
                 let mut pixel = shading.light(&surfaces, (triangles, &nearness[at]), [x, y]);
-                let lit = shadows.lit(pixel.asking);
+                let lit = shadows.lit(shadows.asking(pixel.asking));
                 let there = srgb.linears(image.pixel(x, y));
                 let uncovered = 1.0 - pixel.cover;
                 pixel.own.iter_mut().zip(there).for_each(|(own, there)| *own += uncovered * there);
@@ -117,7 +117,7 @@ impl StaticScene {
                     if pixel.cover == 0.0 {
                         continue;
                     }
-                    let (open, lit) = (shadows.open_share(pixel.asking), shadows.lit(pixel.asking));
+                    let (open, lit) = (shadows.open_share(pixel.asking), shadows.lit(shadows.asking(pixel.asking)));
                     if open < 1.0 || lit < 1.0 {
                         pixel.own.iter_mut().for_each(|v| *v *= open);
                         image.data[3 * at..3 * at + 3].copy_from_slice(&srgb.bytes(compressed(pixel.sum(lit))));

@@ -9,6 +9,8 @@ pub struct Mesh {
     /// Linear RGB reflectance, 0..1.
     pub colours: Vec<[f32; 3]>,
     pub triangles: Vec<[u32; 3]>,
+    /// Number of the first triangles that enclose volumes, whose inner sides nobody sees.
+    pub n_closed: usize,
     /// Label of each vertex, for instance the joint that moves it; a triangle has that of its first vertex.
     pub labels: Vec<u16>,
     /// Strength of the highlight, 0 (cloth) .. 1 (glass).

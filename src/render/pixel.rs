@@ -2,7 +2,7 @@
 
 use super::samples::{NO_TRIANGLE, PARTS, SPOTS};
 use super::shadow::ShadowMap;
-use super::srgb::compressed;
+use super::srgb::{Srgb, Steps, compressed, steps};
 use super::surfaces::{INNER_LIGHT, Radiance, RadiancePlane, Surfaces};
 
 /// Depths of one surface within a pixel differ by less than this share.
@@ -44,10 +44,9 @@ pub struct Shading {
     planes: Vec<RadiancePlane>,
     /// Numbers of the last pixel's mesh: from one to another.
     mesh: [u32; 2],
-    /// Pixels of a row that one surface fills: columns, and what they send.
-    columns: Vec<usize>,
-    row: Vec<Radiance>,
-    n_row: usize,
+    /// Pixels of a row, and which of them are drawn: from one to another.
+    row: Vec<Steps>,
+    runs: Vec<[usize; 2]>,
 }
 
 /// Whether no sample is covered.
@@ -111,28 +110,44 @@ impl Shading {
         self.is_known.clear();
         self.is_known.resize(surfaces.n_vertices(), false);
         self.mesh = [0; 2];
-        self.columns.resize(surfaces.width(), 0);
-        self.row.resize(surfaces.width(), Radiance::default());
-        self.n_row = 0;
+        self.row.resize(surfaces.width(), Steps::default());
+        self.runs.resize(surfaces.width(), [0; 2]);
     }
 
     #[inline(always)]
     fn radiance(&mut self, surfaces: &Surfaces, shadows: Option<&ShadowMap>, number: u32, point: [i32; 2]) -> Radiance {
-        let plane = self.numbers[number as usize];
-        if let Some(plane) = self.planes.get(plane as usize) {
-            return plane.radiance_at(point);
+        match self.plane(surfaces, shadows, number) {
+            Some(plane) => plane.radiance_at(point),
+            None => {
+                let triangle = &surfaces.triangles[number as usize];
+                surfaces.radiance_at(triangle, &self.corners(surfaces, shadows, number), point)
+            }
         }
-        self.first_radiance(surfaces, shadows, number, point)
+    }
+
+    /// Plane of a triangle; none where it is uneven.
+    #[inline(always)]
+    fn plane(&mut self, surfaces: &Surfaces, shadows: Option<&ShadowMap>, number: u32) -> Option<&RadiancePlane> {
+        if self.numbers[number as usize] == NO_PLANE {
+            self.make_plane(surfaces, shadows, number);
+        }
+        self.planes.get(self.numbers[number as usize] as usize)
     }
 
     #[inline(never)]
-    fn first_radiance(
-        &mut self,
-        surfaces: &Surfaces,
-        shadows: Option<&ShadowMap>,
-        number: u32,
-        point: [i32; 2],
-    ) -> Radiance {
+    fn make_plane(&mut self, surfaces: &Surfaces, shadows: Option<&ShadowMap>, number: u32) {
+        let triangle = &surfaces.triangles[number as usize];
+        self.numbers[number as usize] = UNEVEN;
+        if surfaces.is_even(triangle) {
+            let corners = self.corners(surfaces, shadows, number);
+            self.numbers[number as usize] = self.planes.len() as u32;
+            self.planes.push(surfaces.plane(triangle, &corners));
+        }
+    }
+
+    /// What the corners of a triangle send.
+    #[inline(never)]
+    fn corners(&mut self, surfaces: &Surfaces, shadows: Option<&ShadowMap>, number: u32) -> [Radiance; 3] {
         let triangle = &surfaces.triangles[number as usize];
         let mut corners = [Radiance::default(); 3];
         for (corner, vertex) in corners.iter_mut().zip(triangle.vertices) {
@@ -145,14 +160,7 @@ impl Shading {
                 corner[..2].iter_mut().flatten().for_each(|v| *v *= INNER_LIGHT);
             }
         }
-        if self.numbers[number as usize] == NO_PLANE && surfaces.is_even(triangle) {
-            self.numbers[number as usize] = self.planes.len() as u32;
-            let plane = surfaces.plane(triangle, &corners);
-            self.planes.push(plane);
-            return plane.radiance_at(point);
-        }
-        self.numbers[number as usize] = UNEVEN;
-        surfaces.radiance_at(triangle, &corners, point)
+        corners
     }
 
     /// Whether all samples show the first one's surface.
@@ -188,39 +196,98 @@ impl Shading {
         light
     }
 
-    /// Takes a pixel into the row where one surface fills it.
-    #[inline(always)]
-    pub fn add(
+    /// Writes a row of pixels over its background, `image`, and what is in front there; the first has a place in the
+    /// picture.
+    pub fn draw_row(
         &mut self,
         surfaces: &Surfaces,
         shadows: &ShadowMap,
-        (triangles, nearness): (&[u32; 4], &[f32; 4]),
-        pixel: [usize; 2],
-    ) -> bool {
-        let [first, others @ ..] = *triangles;
-        let is_whole = others == [first; 3];
-        if !is_whole && !self.is_one_surface(surfaces, triangles, nearness) {
-            return false;
+        (triangles, nearness): (&[[u32; 4]], &[[f32; 4]]),
+        [left, y]: [usize; 2],
+        front: &mut [(u32, f32)],
+        image: &mut [u8],
+    ) {
+        let srgb = Srgb::tables();
+        let mut row = std::mem::take(&mut self.row);
+        let n = triangles.len().min(nearness.len()).min(front.len()).min(row.len());
+        let (mut at, mut n_runs) = (0, 0);
+        while at < n {
+            let first = triangles[at][0];
+            let mut end = at + 1;
+            if triangles[at] == [first; 4] {
+                while end < n && triangles[end] == [first; 4] {
+                    end += 1;
+                }
+                if first == NO_TRIANGLE {
+                    front[at..end].fill((NO_TRIANGLE, 0.0));
+                    at = end;
+                    continue;
+                }
+                for (front, nearness) in front[at..end].iter_mut().zip(&nearness[at..end]) {
+                    let [a, b, c, d] = *nearness;
+                    *front = (first, a.max(b).max(c.max(d)));
+                }
+                self.draw_run(surfaces, shadows, first, [left + at, y], &mut row[at..end]);
+            } else {
+                let (samples, pixel) = ((&triangles[at], &nearness[at]), [left + at, y]);
+                let nearest = nearest(samples.1);
+                front[at] = (samples.0[nearest], samples.1[nearest]);
+                row[at] = steps(if self.is_one_surface(surfaces, samples.0, samples.1) {
+                    let point = [0, 1].map(|k| pixel[k] as i32 * PARTS + SPOTS[0][k]);
+                    with_shadow(shadows, &self.radiance(surfaces, Some(shadows), first, point))
+                } else {
+                    let (mut linear, cover) = self.mixed(surfaces, shadows, samples, pixel);
+                    let behind = srgb.linears([image[3 * at], image[3 * at + 1], image[3 * at + 2]]);
+                    for k in 0..4 {
+                        linear[k] += (1.0 - cover) * behind[k];
+                    }
+                    linear
+                });
+            }
+            match self.runs[..n_runs].last_mut() {
+                Some(run) if run[1] == at => run[1] = end,
+                _ => {
+                    self.runs[n_runs] = [at, end];
+                    n_runs += 1;
+                }
+            }
+            at = end;
         }
-        let spot = if is_whole { [0; 2] } else { SPOTS[0] };
-        let point = [pixel[0] as i32 * PARTS + spot[0], pixel[1] as i32 * PARTS + spot[1]];
-        let radiance = self.radiance(surfaces, Some(shadows), first, point);
-        (self.columns[self.n_row], self.row[self.n_row]) = (pixel[0], radiance);
-        self.n_row += 1;
-        true
+        for &[from, to] in &self.runs[..n_runs] {
+            for (pixel, steps) in image[3 * from..3 * to].as_chunks_mut::<3>().0.iter_mut().zip(&row[from..to]) {
+                *pixel = srgb.bytes_of(*steps);
+            }
+        }
+        self.row = row;
     }
 
-    /// Ends a row: calls `each` with the columns of its pixels and their linear RGB with shadows.
+    /// Pixels of one triangle beside each other, from a first one on.
     #[inline(always)]
-    pub fn close_row(&mut self, shadows: &ShadowMap, mut each: impl FnMut(usize, [f32; 4])) {
-        let row = &mut self.row[..self.n_row];
-        for radiance in &mut *row {
-            radiance[0] = with_shadow(shadows, radiance);
+    fn draw_run(
+        &mut self,
+        surfaces: &Surfaces,
+        shadows: &ShadowMap,
+        number: u32,
+        [left, y]: [usize; 2],
+        row: &mut [Steps],
+    ) {
+        let point = |x: usize| [(left + x) as i32 * PARTS, y as i32 * PARTS];
+        let Some(plane) = self.plane(surfaces, Some(shadows), number) else {
+            for (x, steps_of) in row.iter_mut().enumerate() {
+                let radiance = self.radiance(surfaces, Some(shadows), number, point(x));
+                *steps_of = steps(with_shadow(shadows, &radiance));
+            }
+            return;
+        };
+        let (mut radiance, across) = (plane.radiance_at(point(0)), &plane.across);
+        for steps_of in row {
+            *steps_of = steps(with_shadow(shadows, &radiance));
+            for n in 0..3 {
+                for k in 0..4 {
+                    radiance[n][k] += across[n][k];
+                }
+            }
         }
-        for (&column, radiance) in self.columns.iter().zip(row) {
-            each(column, radiance[0]);
-        }
-        self.n_row = 0;
     }
 
     /// Linear RGB of a pixel with several surfaces, weighted by the share of covered samples, and that share.

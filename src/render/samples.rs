@@ -175,16 +175,15 @@ impl RowBand {
     /// Walks over the pixels of an extent. Apart from its set-up, the compiler makes vectors of the four samples.
     #[inline(never)]
     fn fill_rows<T: Whole>(&mut self, setup: &Setup<T>, [left, right]: [usize; 2], [top, bottom]: [usize; 2]) {
-        let Setup { mut edges, steps, first, per_pixel, number } = *setup;
+        let Setup { mut edges, steps, mut first, per_pixel, number } = *setup;
         for y in top..bottom {
-            let down = per_pixel[1] * (y - top) as f32;
             let columns = self.at(left, y)..self.at(right, y);
             let pixels = self.nearness[columns.clone()].iter_mut().zip(&mut self.triangles[columns]);
-            let [mut e0, mut e1, mut e2] = edges;
+            let ([mut e0, mut e1, mut e2], mut here) = (edges, first);
             let mut is_entered = false;
-            for (column, (front, triangles)) in pixels.enumerate() {
+            for (front, triangles) in pixels {
                 // Loops over four samples without branches become one instruction each.
-                let (mut outer, mut here, mut is_kept) = ([0; 4], [0.0; 4], [0; 4]);
+                let mut outer = [0; 4];
                 for k in 0..4 {
                     outer[k] = T::outer(e0[k], e1[k], e2[k]);
                 }
@@ -193,35 +192,50 @@ impl RowBand {
                     e1[k] = e1[k] + steps[1][0];
                     e2[k] = e2[k] + steps[2][0];
                 }
+                let mut new = here;
+                for k in 0..4 {
+                    here[k] += per_pixel[0];
+                }
                 if outer[0] & outer[1] & outer[2] & outer[3] < 0 {
-                    if is_entered {
+                    // Thin triangles pass between samples: the row ends where all of them are beyond one edge.
+                    if is_entered
+                        && (is_left(&e0, steps[0][0]) || is_left(&e1, steps[1][0]) || is_left(&e2, steps[2][0]))
+                    {
                         break;
                     }
                     continue;
                 }
                 is_entered = true;
-                let along = per_pixel[0] * column as f32 + down;
+                // Outside, as if infinitely far.
                 for k in 0..4 {
-                    here[k] = first[k] + along;
+                    new[k] = f32::from_bits(new[k].to_bits() & !((outer[k] >> 31) as u32));
                 }
                 let (old, old_triangles) = (*front, *triangles);
+                let (mut is_new, mut new_triangles) = ([0; 4], [0; 4]);
                 for k in 0..4 {
-                    is_kept[k] = (outer[k] >> 31) as u32 | u32::from(here[k] > old[k]).wrapping_sub(1);
-                }
-                let (mut new, mut new_triangles) = ([0.0; 4], [0; 4]);
-                for k in 0..4 {
-                    new[k] = f32::from_bits(here[k].to_bits() & !is_kept[k] | old[k].to_bits() & is_kept[k]);
+                    is_new[k] = if new[k] > old[k] { u32::MAX } else { 0 };
                 }
                 for k in 0..4 {
-                    new_triangles[k] = number & !is_kept[k] | old_triangles[k] & is_kept[k];
+                    new[k] = if new[k] > old[k] { new[k] } else { old[k] };
+                }
+                for k in 0..4 {
+                    new_triangles[k] = number & is_new[k] | old_triangles[k] & !is_new[k];
                 }
                 (*front, *triangles) = (new, new_triangles);
             }
             for (edge, step) in edges.iter_mut().zip(steps) {
                 edge.iter_mut().for_each(|v| *v = *v + step[1]);
             }
+            first.iter_mut().for_each(|v| *v += per_pixel[1]);
         }
     }
+}
+
+/// Whether all samples of a pixel and of those right of it are beyond an edge.
+#[inline(always)]
+fn is_left<T: Whole>(edge: &[T; 4], step: T) -> bool {
+    let [a, b, c, d] = edge.map(|v| T::outer(v, v, v));
+    a & b & c & d & T::outer(step, step, step) < 0
 }
 
 /// What is known of a triangle at the first pixel of its extent, and the steps to the next across and down.

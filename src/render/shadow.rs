@@ -94,20 +94,20 @@ impl ShadowMap {
             }));
             for triangle in triangles {
                 let [a, b, c] = [0, 1, 2].map(|n: usize| &flat[triangle[n] as usize]);
+                let corners = [a.0, b.0, c.0];
+                let area = area(&corners);
+                let towards_light = if only_far_sides { -area } else { area };
+                // Triangles seen edge-on and those without numbers cast nothing either.
+                if !(towards_light > 1e-9) {
+                    continue;
+                }
                 // Texels whose middle, a whole number, lies between.
                 let ends = |k: usize| {
                     let (low, high) = (a.1[k].min(b.1[k]).min(c.1[k]), a.1[k].max(b.1[k]).max(c.1[k]));
                     [low as usize + 1, (high as usize + 1).min(self.n)]
                 };
                 let (columns, rows) = (ends(0), ends(1));
-                if columns[0] >= columns[1] || rows[0] >= rows[1] {
-                    continue;
-                }
-                let corners = [a.0, b.0, c.0];
-                let area = area(&corners);
-                let towards_light = if only_far_sides { -area } else { area };
-                // Triangles seen edge-on and those without numbers cast nothing either.
-                if towards_light > 1e-9 {
+                if columns[0] < columns[1] && rows[0] < rows[1] {
                     self.fill(corners, area, columns, rows);
                 }
             }
@@ -198,17 +198,23 @@ impl ShadowMap {
         1.0 - hidden * (NEAR_STRENGTH / NEAR_SPOTS.len() as f32)
     }
 
-    /// Share of the key light that reaches a point in the light's axes, 0..1: a tent over four by four texels.
+    /// Where in the map a point in the light's axes asks for the key light: texels across, and the distance that must be
+    /// free, cm.
     #[inline(always)]
-    pub fn lit(&self, point: [f32; 3]) -> f32 {
+    pub fn asking(&self, point: [f32; 3]) -> [f32; 3] {
         let [x, y, depth] = self.texel(point);
+        [x, y, depth - self.bias]
+    }
+
+    /// Share of the key light that reaches a point, 0..1, by where it asks: a tent over four by four texels.
+    #[inline(always)]
+    pub fn lit(&self, [x, y, depth]: [f32; 3]) -> f32 {
         let furthest = (self.n - 3) as f32;
         // Also false for NaN.
         if self.is_empty || !(x > 1.0 && y > 1.0 && x < furthest && y < furthest) {
             return 1.0;
         }
         let (column, row) = (whole(x), whole(y));
-        let depth = depth - self.bias;
         let start = (row - 1) * self.n + column - 1;
         if depth < self.ends[0][start] {
             return 1.0;

@@ -39,16 +39,13 @@ impl Srgb {
     /// Bytes of linear RGB (the fourth number is none); values outside 0..1 have the byte of the nearest end.
     #[inline(always)]
     pub fn bytes(self, linear: [f32; 4]) -> [u8; 3] {
-        let mut steps = [0.0; 4];
-        for k in 0..4 {
-            let step = if linear[k] > 0.0 { linear[k] * N_STEPS as f32 } else { 0.0 };
-            steps[k] = if step < N_STEPS as f32 { step } else { N_STEPS as f32 };
-        }
-        for step in &mut steps {
-            *step += WHOLE;
-        }
-        let byte = |k: usize| self.bytes[steps[k].to_bits() as usize % N_ENTRIES];
-        [byte(0), byte(1), byte(2)]
+        self.bytes_of(steps(linear))
+    }
+
+    /// Bytes of linear RGB as steps of the table.
+    #[inline(always)]
+    pub fn bytes_of(self, [r, g, b, _]: Steps) -> [u8; 3] {
+        [r, g, b].map(|step| self.bytes[step.to_bits() as usize % N_ENTRIES])
     }
 
     /// Linear light of the bytes of a pixel.
@@ -61,6 +58,29 @@ impl Srgb {
 
 /// Sums with numbers up to a quarter of 2^16 are rounded to whole ones, which stand in the lowest bits.
 const WHOLE: f32 = (1 << 23) as f32;
+
+/// Linear RGB in steps of the table of bytes, which the lowest bits of the numbers hold.
+pub type Steps = [f32; 4];
+
+/// Steps of linear RGB; values outside 0..1 have those of the nearest end.
+#[inline(always)]
+pub fn steps(linear: [f32; 4]) -> Steps {
+    let mut steps = linear;
+    for step in &mut steps {
+        *step *= N_STEPS as f32;
+    }
+    // Also 0 for NaN.
+    for step in &mut steps {
+        *step = if *step > 0.0 { *step } else { 0.0 };
+    }
+    for step in &mut steps {
+        *step = if *step < N_STEPS as f32 { *step } else { N_STEPS as f32 };
+    }
+    for step in &mut steps {
+        *step += WHOLE;
+    }
+    steps
+}
 
 /// Linear light 0..1 for a scene's linear light, which has no upper end: equal up to the shoulder, then less and less.
 #[inline(always)]

@@ -76,26 +76,34 @@ impl Surfaces {
             let start = self.seen.len();
             self.starts.push(start);
             let gloss = mesh.gloss;
+            let mut is_beyond = true;
             for ((&point, &normal), &colour) in mesh.points.iter().zip(&mesh.normals).zip(&mesh.colours) {
                 let from_eye = less(point, self.eye);
                 let seen = [dot(rows[0], from_eye), dot(rows[1], from_eye), dot(rows[2], from_eye)];
                 let (corner, nearness) = lens.project(seen);
+                is_beyond &= (NEAR_CM as f32..FAR_CM).contains(&seen[2]);
                 self.seen.push(seen);
                 self.corners.push(corner);
                 self.nearness.push(nearness);
                 self.vertices.push(Vertex { point, normal, colour, gloss });
                 self.light_points.push(ShadowMap::seen(&self.axes, point));
             }
-            for triangle in &mesh.triangles {
+            // From within a closed surface, inner sides are seen.
+            let n_closed = if is_beyond { mesh.n_closed } else { 0 };
+            for (at, triangle) in mesh.triangles.iter().enumerate() {
                 let label = mesh.labels.get(triangle[0] as usize).copied().unwrap_or(0);
                 let [a, b, c] = *triangle;
                 let vertices = [a + start as u32, b + start as u32, c + start as u32];
-                let depth = |n: usize| self.seen[vertices[n] as usize][2];
-                let depths = [depth(0), depth(1), depth(2)];
                 let triangle =
                     SurfaceTriangle { vertices, mesh: number as u16, label, is_inner: false, extent: [[0; 2]; 2] };
+                if is_beyond {
+                    self.push(triangle, at < n_closed);
+                    continue;
+                }
+                let depth = |n: usize| self.seen[vertices[n] as usize][2];
+                let depths = [depth(0), depth(1), depth(2)];
                 if depths.iter().all(|z| (NEAR_CM as f32..FAR_CM).contains(z)) {
-                    self.push(triangle);
+                    self.push(triangle, false);
                 } else if depths.iter().all(|z| z.abs() < FAR_CM) && depths.iter().any(|z| *z > NEAR_CM as f32) {
                     self.push_cut(triangle, &lens);
                 }
@@ -113,11 +121,16 @@ impl Surfaces {
         self.triangles.clear();
     }
 
-    /// Takes a triangle that may be seen.
-    fn push(&mut self, triangle: SurfaceTriangle) {
+    /// Takes a triangle that may be seen, of a closed surface only from outside.
+    #[inline(always)]
+    fn push(&mut self, triangle: SurfaceTriangle, is_closed: bool) {
         let flat = self.flat(&triangle);
-        let (area, extent) = (flat.area(), flat.extent(self.size));
-        if area != 0 && extent.iter().all(|[first, last]| first < last) {
+        let area = flat.area();
+        if area == 0 || is_closed && area > 0 {
+            return;
+        }
+        let extent = flat.extent(self.size);
+        if extent.iter().all(|[first, last]| first < last) {
             self.triangles.push(SurfaceTriangle { is_inner: area > 0, extent, ..triangle });
         }
     }
@@ -159,7 +172,7 @@ impl Surfaces {
             }
         }
         for n in 2..n_kept {
-            self.push(SurfaceTriangle { vertices: [kept[0], kept[n - 1], kept[n]], ..triangle });
+            self.push(SurfaceTriangle { vertices: [kept[0], kept[n - 1], kept[n]], ..triangle }, false);
         }
     }
 
@@ -202,15 +215,17 @@ impl Surfaces {
         self.vertices.len()
     }
 
-    /// What a vertex sends; close behind something that `shadows` hold, less of its own.
+    /// What a vertex sends; with `shadows`, less of its own close behind something that they hold, and the place in
+    /// their map instead of the point in the light's axes.
     pub fn radiance(&self, vertex: u32, shadows: Option<&ShadowMap>) -> Radiance {
         let Vertex { point, normal, colour, gloss } = self.vertices[vertex as usize];
         let (normal, to_viewer) = (direction(normal), direction(less(self.eye, point)));
         let [mut own, key] = self.light.on(normal, to_viewer, colour, gloss);
-        let asking = shadow::asking_point(&self.light, &self.axes, point, normal);
+        let mut asking = shadow::asking_point(&self.light, &self.axes, point, normal);
         if let Some(shadows) = shadows {
             let open = shadows.open_share(asking);
             own.iter_mut().for_each(|v| *v *= open);
+            asking = shadows.asking(asking);
         }
         [own, key, asking].map(|[a, b, c]| [a, b, c, 0.0])
     }
@@ -228,7 +243,7 @@ impl Surfaces {
         let [_, b_px, c_px] = flat.corners;
         let to_b = [(b_px[0] - from[0]) as f32, (b_px[1] - from[1]) as f32];
         let to_c = [(c_px[0] - from[0]) as f32, (c_px[1] - from[1]) as f32];
-        let per_area = 1.0 / (to_b[0] * to_c[1] - to_b[1] * to_c[0]);
+        let per_area = PARTS as f32 / (to_b[0] * to_c[1] - to_b[1] * to_c[0]);
         let slope = |p: f32, q: f32| {
             let (p, q) = (p * per_area, q * per_area);
             let mut slope = Radiance::default();
@@ -259,19 +274,19 @@ impl Surfaces {
     }
 }
 
-/// What a triangle sends as a plane over the picture: at a point (parts of a pixel), and its change a part.
+/// What a triangle sends as a plane over the picture: at a point (parts of a pixel), and its change a pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct RadiancePlane {
     from: [i32; 2],
     at: Radiance,
-    across: Radiance,
+    pub across: Radiance,
     down: Radiance,
 }
 
 impl RadiancePlane {
     #[inline(always)]
     pub fn radiance_at(&self, point: [i32; 2]) -> Radiance {
-        let (dx, dy) = ((point[0] - self.from[0]) as f32, (point[1] - self.from[1]) as f32);
+        let [dx, dy] = [0, 1].map(|k| (point[k] - self.from[k]) as f32 * (1.0 / PARTS as f32));
         let mut sum = self.at;
         for n in 0..3 {
             for k in 0..4 {

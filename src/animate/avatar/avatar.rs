@@ -23,6 +23,8 @@ pub struct AvatarMesh {
     pub normals: Vec<Vec3>,
     pub colours: Vec<Reflectance>,
     pub triangles: Vec<[u32; 3]>,
+    /// Number of the first triangles that enclose volumes.
+    pub n_closed: usize,
     /// Four joints a vertex with weights that sum to 1, largest first.
     pub weights: Vec<Weights>,
     /// Way of each vertex from the closed to the open mouth, cm; empty where nothing moves.
@@ -66,6 +68,7 @@ impl Avatar {
 impl AvatarMesh {
     /// Mesh in the T-pose; linear skinning of it with the stance gives the posed mesh exactly.
     fn rested(material: Material, mesh: PosedMesh, stance: &Stance) -> Self {
+        let n_closed = mesh.surface.n_closed();
         let Surface { points, normals, triangles } = mesh.surface;
         let (points, normals): (Vec<Vec3>, Vec<Vec3>) = points
             .into_iter()
@@ -85,7 +88,7 @@ impl AvatarMesh {
         if !twist.is_empty() {
             twist.resize(points.len(), 0.0);
         }
-        Self { material, points, normals, colours, triangles, weights, mouth, twist }
+        Self { material, points, normals, colours, triangles, n_closed, weights, mouth, twist }
     }
 }
 

@@ -100,7 +100,7 @@ impl AvatarMesh {
     fn pose_into(&self, maps: &[JointMap], forearms: &[TwistedForearm; 2], mouth: f32, mesh: &mut Mesh) {
         mesh.colours.clone_from(&self.colours);
         mesh.triangles.clone_from(&self.triangles);
-        mesh.gloss = self.material.gloss();
+        (mesh.gloss, mesh.n_closed) = (self.material.gloss(), self.n_closed);
         mesh.labels.clear();
         mesh.labels.extend(self.weights.iter().map(|weights| weights[0].0 as u16));
         mesh.points.clear();

@@ -4,6 +4,7 @@
 
 use crate::math::vec3::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use rayon::prelude::*;
+use std::collections::HashSet;
 
 /// Cells of a block that is skipped as a whole where the surface is far away.
 const BLOCK: usize = 4;
@@ -125,6 +126,22 @@ impl Surface {
             .map(|(&at, &own)| unit(gradient(field, at, width / 2.0), 1e-9).unwrap_or(own));
         self.normals = normals.collect();
         self
+    }
+
+    /// Number of the first triangles that enclose volumes: they have no open edge and no vertex of those after them.
+    pub fn n_closed(&self) -> usize {
+        let edges = |[a, b, c]: [u32; 3]| [[a, b], [b, c], [c, a]];
+        let all: HashSet<[u32; 2]> = self.triangles.iter().flat_map(|triangle| edges(*triangle)).collect();
+        let is_open = |triangle: &[u32; 3]| edges(*triangle).iter().any(|[a, b]| !all.contains(&[*b, *a]));
+        let mut n = self.triangles.iter().position(is_open).unwrap_or(self.triangles.len());
+        loop {
+            let lowest = self.triangles[n..].iter().flatten().min().copied().unwrap_or(u32::MAX);
+            let has_later = |triangle: &[u32; 3]| triangle.iter().any(|vertex| *vertex >= lowest);
+            match self.triangles[..n].iter().position(has_later) {
+                Some(fewer) => n = fewer,
+                None => return n,
+            }
+        }
     }
 
     /// Vertices that share an edge with each vertex, in order.

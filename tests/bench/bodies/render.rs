@@ -115,6 +115,7 @@ fn desk() -> Background {
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         labels: vec![0; 4],
         gloss: 0.0,
+        n_closed: 0,
     };
     let wall = square(
         [[-300.0, 0.0, -90.0], [300.0, 0.0, -90.0], [300.0, 300.0, -90.0], [-300.0, 300.0, -90.0]],
