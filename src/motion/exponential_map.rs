@@ -44,7 +44,7 @@ mod tests {
 
     #[test]
     fn a_track_without_jumps_stays() {
-        let mut track: Vec<Vec3> = (0..50).map(|t| [0.02 * t as f64, 0.3, -0.1]).collect();
+        let mut track: Vec<Vec3> = (0..50).map(|t| [0.02 * f64::from(t), 0.3, -0.1]).collect();
         let before = track.clone();
         make_continuous(&mut track);
         make_continuous(&mut []);

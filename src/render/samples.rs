@@ -193,9 +193,7 @@ impl RowBand {
                     e2[k] = e2[k] + steps[2][0];
                 }
                 let mut new = here;
-                for k in 0..4 {
-                    here[k] += per_pixel[0];
-                }
+                here.iter_mut().for_each(|nearness| *nearness += per_pixel[0]);
                 if outer[0] & outer[1] & outer[2] & outer[3] < 0 {
                     // Thin triangles pass between samples: the row ends where all of them are beyond one edge.
                     if is_entered

@@ -98,7 +98,7 @@ impl ShadowMap {
                 let area = area(&corners);
                 let towards_light = if only_far_sides { -area } else { area };
                 // Triangles seen edge-on and those without numbers cast nothing either.
-                if !(towards_light > 1e-9) {
+                if towards_light.is_nan() || towards_light <= 1e-9 {
                     continue;
                 }
                 // Texels whose middle, a whole number, lies between.

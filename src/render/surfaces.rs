@@ -287,13 +287,9 @@ impl RadiancePlane {
     #[inline(always)]
     pub fn radiance_at(&self, point: [i32; 2]) -> Radiance {
         let [dx, dy] = [0, 1].map(|k| (point[k] - self.from[k]) as f32 * (1.0 / PARTS as f32));
-        let mut sum = self.at;
-        for n in 0..3 {
-            for k in 0..4 {
-                sum[n][k] += self.across[n][k] * dx + self.down[n][k] * dy;
-            }
-        }
-        sum
+        std::array::from_fn(|n| {
+            std::array::from_fn(|k| self.at[n][k] + (self.across[n][k] * dx + self.down[n][k] * dy))
+        })
     }
 }
 

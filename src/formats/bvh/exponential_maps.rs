@@ -282,7 +282,7 @@ mod tests {
         text += &chain(&["LeftShoulder", "LeftArm", "LeftForeArm", "LeftHand", "LeftHandIndex1"], "20 0 0");
         text += &"}\n".repeat(5);
         text += &format!("MOTION\nFrames: {n_frames}\nFrame Time: {frame_secs}\n");
-        let names = Bvh::parse(&format!("{text}").replace(&format!("Frames: {n_frames}"), "Frames: 0")).unwrap().joints;
+        let names = Bvh::parse(&text.replace(&format!("Frames: {n_frames}"), "Frames: 0")).unwrap().joints;
         for t in 0..n_frames {
             let mut numbers = vec![0.0; 6];
             for (i, joint) in names.iter().enumerate().skip(1).filter(|(_, joint)| !joint.channels.is_empty()) {
@@ -291,7 +291,7 @@ mod tests {
                 let far = if joint.name == "LeftArm" { 170.0 } else { 35.0 };
                 let secs = t as f64 * frame_secs;
                 for k in 0..3 {
-                    let at = (1.0 + 0.1 * i as f64) * secs + k as f64;
+                    let at = (1.0 + 0.1 * i as f64) * secs + f64::from(k);
                     numbers.push(wide * if k == 1 { 30.0 } else { far } * at.sin());
                 }
             }

@@ -20,7 +20,7 @@ fn utf8(bytes: &[u8]) -> Result<String> {
         Ok(text) => text,
         Err(error) => {
             let at = error.valid_up_to();
-            let line = 1 + bytes[..at].iter().filter(|byte| **byte == b'\n').count();
+            let line = bytes[..at].split(|byte| *byte == b'\n').count();
             bail!("line {line}: the byte {:#04x} is no UTF-8; save the file as UTF-8", bytes[at]);
         }
     };

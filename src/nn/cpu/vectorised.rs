@@ -136,7 +136,7 @@ fn attend_body<T: Scalar>(state: &[T], keys: &[T], weights: &mut [T], context: &
     }
     context.fill(T::zero());
     for (weight, key) in weights.iter_mut().zip(keys.chunks_exact(state.len())) {
-        *weight = *weight / total;
+        *weight /= total;
         add_scaled(context, *weight, key);
     }
 }

@@ -75,7 +75,7 @@ impl Config {
         let batch = segment.audio.dim(0)?;
         let expected = [batch, self.audio_frames(), self.audio];
         let previous = [batch, self.previous, self.pose];
-        if self.context % 2 == 0 || segment.audio.dims() != expected || segment.previous.dims() != previous {
+        if self.context.is_multiple_of(2) || segment.audio.dims() != expected || segment.previous.dims() != previous {
             candle_core::bail!(
                 "a segment of audio {:?} and previous poses {:?}, expected {expected:?} and {previous:?} (an odd context)",
                 segment.audio.dims(),

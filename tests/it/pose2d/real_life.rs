@@ -52,7 +52,7 @@ fn quantile(errors: &[f32], share: f64) -> f32 {
 
 #[test]
 fn keypoints_of_interlaced_footage_are_nearer_to_the_truth_deinterlaced() {
-    let project = Project::drawn("interlaced", &plan(4.0, 60, [640, 480]));
+    let project = Project::drawn("interlaced", &plan(4.0, 60, [960, 720]));
     let to = "-vf tinterlace=interleave_top -c:v libx264 -crf 12 -c:a copy";
     let videos = project.video("");
     let made = ["flagged.mp4 -flags +ildct+ilme", "silent.mp4 -bsf:v null"].map(|name| {
