@@ -128,7 +128,8 @@ fn a_dataset_without_transcripts_has_no_trace_of_words() {
 fn what_is_wrong_with_a_transcript_is_said_and_costs_no_video() {
     let talks = TwoTalks::new();
     let good = srt(20, "so");
-    let many: String = (0..100_000).map(|n| format!("{}\t{}\tso\n", f64::from(n) / 5000.0, f64::from(n) / 5000.0)).collect();
+    let many: String =
+        (0..100_000).map(|n| format!("{}\t{}\tso\n", f64::from(n) / 5000.0, f64::from(n) / 5000.0)).collect();
     for (name, bytes, said) in [
         ("other.srt", srt(40, "so").into_bytes(), "20 of 40 words lie after the end of the sound (20.00 s"),
         ("late.srt", srt(21, "so").into_bytes(), "1 of 21 words lie after the end of the sound and were left out"),

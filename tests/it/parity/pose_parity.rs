@@ -54,7 +54,12 @@ fn compare(name: &str, secs: u32) {
     let reference = keypoints_npz::read(&written).unwrap();
     let times = Npz::open(&written).unwrap().numbers("time_secs", &[None]).unwrap();
 
-    let settings = config::Pose2dConfig { person: "person-yolox-nano".into(), ..config::Pose2dConfig::default() };
+    // The reference looks for the person in every 15th frame.
+    let settings = config::Pose2dConfig {
+        person: "person-yolox-nano".into(),
+        person_every: 15,
+        ..config::Pose2dConfig::default()
+    };
     let mut chain = Chain::new(&runtime, &store, &settings).unwrap();
     let rate = FrameReader::open(&clip, orator::types::time::FrameRate::new(1, 1)).unwrap();
     let rate = rate.info().video.as_ref().and_then(|video| video.fps).unwrap();
