@@ -1,4 +1,4 @@
-//! Training a speaker's generator against the motion discriminator: one straight loop. The same dataset, settings and
+//! Training a speaker's generator against the motion discriminator. The same dataset, settings and
 //! seed give the same checkpoints, also when the training was interrupted: the windows of a step depend on the seed
 //! and the step alone (the place of the loader is the step), everything else is in the checkpoint.
 
@@ -22,16 +22,12 @@ use crate::nn::gan::generator::Preset;
 use crate::nn::gan::generator::{Config, FRAMES_MULTIPLE};
 use crate::stage::progress::Progress;
 use crate::stage::workdir::{self, FolderLock};
-use crate::train::log::MetricsLog;
-use crate::train::resume::{kept, sample_windows};
+use crate::train::epochs::{self, EpochSchedule, StepReport, ValidatedTraining};
+use crate::train::resume::sample_windows;
 use crate::types::skeleton::N_BONES;
-use anyhow::{Context, Result, bail, ensure};
-use serde_json::json;
+use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-
-/// Steps between two lines of the log.
-const LOG_EVERY: usize = 10;
 
 /// How a training ended.
 #[derive(Clone, Debug)]
@@ -106,80 +102,87 @@ pub fn train(
         // One too many is left by a kill before the oldest was removed.
         checkpoint::prune(folder, trainer.settings.keep_checkpoints)?;
     }
-    with_spinning_workers(|| run(&mut trainer, &loader, &held_out, folder, progress))
-}
-
-/// The loop: steps, and at the end of each epoch a validation.
-fn run(
-    trainer: &mut GanTrainer,
-    loader: &WindowLoader,
-    held_out: &ValidationWindows,
-    folder: &Path,
-    progress: &dyn Progress,
-) -> Result<TrainingOutcome> {
-    let settings = trainer.settings.clone();
-    let began_at = trainer.step;
-    let mut log = MetricsLog::open(folder, began_at)?;
-    let task = progress.begin(&format!("train {}", trainer.metadata.name), settings.steps as u64);
-    task.advance(began_at.min(settings.steps) as u64);
-    let (start, mut waiting, mut stepping) = (Instant::now(), Duration::ZERO, Duration::ZERO);
-    let mut last = None;
-    while trainer.step < settings.steps && !is_over(trainer) {
-        let before = Instant::now();
-        let batch = loader.batch(&sample_windows(settings.seed, trainer.step, settings.batch, loader.len()))?;
-        waiting += before.elapsed();
-        let losses = trainer.step(&batch)?;
-        stepping += before.elapsed();
-        let step = trainer.step;
-        losses.check(step).with_context(|| kept(folder, "gan"))?;
-        task.advance(1);
-        if step.is_multiple_of(LOG_EVERY) {
-            let Losses { l1, adversarial, discriminator, .. } = losses;
-            let speed = (step - began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
-            task.detail(&format!("L1 {l1:.3} adv {adversarial:.3} D {discriminator:.3}  {speed:.2} steps/s"));
-            log.write(&losses.line(step))?;
-        }
-        let is_last = step == settings.steps;
-        let ends_epoch = step.is_multiple_of(settings.epoch_steps);
-        if ends_epoch || is_last {
-            let validation = held_out.validate(trainer)?;
-            log.write(
-                &json!({ "step": step, "epoch": step.div_ceil(settings.epoch_steps), "validation": validation }),
-            )?;
-            if let (Some(alarm), true) = (&validation.alarm, step > settings.epoch_steps) {
-                progress.say(&format!("step {step}: {alarm}"));
-            }
-            // In f32, whose decimals come back exactly from JSON.
-            let score = validation.score as f32;
-            if trainer.best.is_none_or(|(_, best)| score < best) {
-                trainer.best = Some((step, score));
-                trainer.save_best(folder, &validation)?;
-            }
-            last = Some(validation);
-        }
-        if ends_epoch || is_last || step.is_multiple_of(settings.checkpoint_every) {
-            trainer.save(folder)?;
-        }
-    }
-    let Some((_, newest)) = checkpoint::list(folder)?.pop() else {
-        bail!("gan.steps is 0: nothing to train");
+    let mut training = GanTraining {
+        trainer: &mut trainer,
+        loader: &loader,
+        held_out: &held_out,
+        stepping: Duration::ZERO,
+        waiting: Duration::ZERO,
     };
-    let validation = match last {
-        Some(validation) => validation,
-        None => held_out.validate(trainer)?,
-    };
+    let end = with_spinning_workers(|| epochs::run(&mut training, folder, progress))?;
+    let waiting = training.waiting.as_secs_f64() / training.stepping.as_secs_f64().max(1e-9);
     Ok(TrainingOutcome {
         steps: trainer.step,
-        began_at,
-        stopped_early: trainer.step < settings.steps,
+        began_at: end.began_at,
+        stopped_early: end.stopped_early,
         n_windows: loader.len(),
         n_parameters: trainer.n_parameters(),
-        validation,
-        newest,
+        validation: end.validation,
+        newest: end.newest,
         best: folder.join(BEST),
-        best_step: trainer.best.map_or(trainer.step, |(step, _)| step),
-        waiting: waiting.as_secs_f64() / stepping.as_secs_f64().max(1e-9),
+        best_step: end.best_step,
+        waiting,
     })
+}
+
+/// A trainer with its windows.
+struct GanTraining<'a> {
+    trainer: &'a mut GanTrainer,
+    loader: &'a WindowLoader,
+    held_out: &'a ValidationWindows,
+    /// Time of the steps, and of it until their batches were there.
+    stepping: Duration,
+    waiting: Duration,
+}
+
+impl ValidatedTraining for GanTraining<'_> {
+    type Validation = Validation;
+
+    fn names(&self) -> (&str, &'static str) {
+        (&self.trainer.metadata.name, "gan")
+    }
+
+    fn schedule(&self) -> EpochSchedule {
+        let GanConfig { steps, epoch_steps, checkpoint_every, patience, .. } = self.trainer.settings;
+        EpochSchedule { steps, epoch_steps, checkpoint_every, patience }
+    }
+
+    fn n_done(&self) -> usize {
+        self.trainer.step
+    }
+
+    fn best(&mut self) -> &mut Option<(usize, f32)> {
+        &mut self.trainer.best
+    }
+
+    fn step(&mut self) -> Result<StepReport> {
+        let GanConfig { seed, batch, .. } = self.trainer.settings;
+        let before = Instant::now();
+        let batch = self.loader.batch(&sample_windows(seed, self.trainer.step, batch, self.loader.len()))?;
+        self.waiting += before.elapsed();
+        let losses = self.trainer.step(&batch)?;
+        self.stepping += before.elapsed();
+        losses.check(self.trainer.step)?;
+        let Losses { l1, adversarial, discriminator, .. } = losses;
+        let words = format!("L1 {l1:.3} adv {adversarial:.3} D {discriminator:.3}");
+        Ok(StepReport { line: losses.line(self.trainer.step), words })
+    }
+
+    fn validate(&self) -> Result<Validation> {
+        self.held_out.validate(self.trainer)
+    }
+
+    fn judged(validation: &Validation) -> (f64, Option<&str>) {
+        (validation.score, validation.alarm.as_deref())
+    }
+
+    fn save(&self, folder: &Path) -> Result<()> {
+        self.trainer.save(folder)
+    }
+
+    fn save_best(&self, folder: &Path, validation: &Validation) -> Result<()> {
+        self.trainer.save_best(folder, validation)
+    }
 }
 
 /// The newest checkpoint, and what it says with the settings that count now. Tells where these differ from `wanted`.
@@ -218,13 +221,6 @@ fn resume(
     progress.say(&format!("going on from {} (step {step})", newest.display()));
     differences.iter().for_each(|line| progress.say(line));
     Ok(Some((stored, contents)))
-}
-
-/// Whether the score has not become better for as many epochs as `gan.patience` allows.
-fn is_over(trainer: &GanTrainer) -> bool {
-    let GanConfig { patience, epoch_steps, .. } = trainer.settings;
-    let since = trainer.step - trainer.best.map_or(trainer.step, |(step, _)| step.min(trainer.step));
-    patience > 0 && since >= patience * epoch_steps
 }
 
 /// The network of a preset of the configuration.

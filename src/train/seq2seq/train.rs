@@ -1,4 +1,4 @@
-//! Training of a sequence-to-sequence network: one straight loop. The same data, settings and seed give the same
+//! Training of a sequence-to-sequence network. The same data, settings and seed give the same
 //! checkpoints, also when the training was interrupted: segments and dropout of a step depend on the seed and the step
 //! alone, everything else is in the checkpoint.
 
@@ -19,16 +19,12 @@ use crate::nn::cpu::thread_team::with_spinning_workers;
 use crate::nn::seq2seq::embedding::set_word_vectors;
 use crate::stage::progress::Progress;
 use crate::stage::workdir::{self, FolderLock};
-use crate::train::log::MetricsLog;
-use crate::train::resume::{kept, sample_windows};
-use anyhow::{Context, Result, bail, ensure};
+use crate::train::epochs::{self, EpochSchedule, StepReport, ValidatedTraining};
+use crate::train::resume::sample_windows;
+use anyhow::{Context, Result, ensure};
 use candle_core::Tensor;
-use serde_json::json;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
-/// Steps between two lines of the log.
-const LOG_EVERY: usize = 10;
 /// Numbers of a word where no table of vectors is given.
 const WORD: usize = 100;
 
@@ -94,7 +90,20 @@ pub fn train(
         progress.say("no segment is held out: the figures below are on those to train on");
     }
     let held_out = ValidationSegments::new(&held_out, &train, trainer.settings.batch)?;
-    with_spinning_workers(|| run(&mut trainer, &train, &held_out, folder, progress))
+    let mut training = SequenceTraining { trainer: &mut trainer, loader: &train, held_out: &held_out };
+    let end = with_spinning_workers(|| epochs::run(&mut training, folder, progress))?;
+    Ok(SequenceOutcome {
+        steps: trainer.step,
+        began_at: end.began_at,
+        stopped_early: end.stopped_early,
+        n_segments: train.len(),
+        n_parameters: trainer.params().n_parameters(),
+        n_words: trainer.metadata.vocabulary.words().len(),
+        validation: end.validation,
+        newest: end.newest,
+        best: folder.join(BEST),
+        best_step: end.best_step,
+    })
 }
 
 /// A trainer as the seed and the word vectors make it, and the data.
@@ -147,77 +156,57 @@ fn begin_words(trainer: &SequenceTrainer, vectors: Option<&WordVectors>) -> Resu
     Ok(set_word_vectors(trainer.params(), encoder, &table)?)
 }
 
-/// The loop: steps, and at the end of each epoch a validation.
-fn run(
-    trainer: &mut SequenceTrainer,
-    loader: &SegmentLoader,
-    held_out: &ValidationSegments,
-    folder: &Path,
-    progress: &dyn Progress,
-) -> Result<SequenceOutcome> {
-    let settings = trainer.settings.clone();
-    let began_at = trainer.step;
-    let mut log = MetricsLog::open(folder, began_at)?;
-    let task = progress.begin(&format!("train {}", trainer.metadata.name), settings.steps as u64);
-    task.advance(began_at.min(settings.steps) as u64);
-    let start = Instant::now();
-    let mut last = None;
-    while trainer.step < settings.steps && !is_over(trainer) {
-        let losses = trainer.step(&loader.batch(&sample_windows(
-            settings.seed,
-            trainer.step,
-            settings.batch,
-            loader.len(),
-        ))?)?;
-        let step = trainer.step;
-        losses.check(step).with_context(|| kept(folder, "seq2seq"))?;
-        task.advance(1);
-        if step.is_multiple_of(LOG_EVERY) {
-            let SequenceLosses { total, l1, .. } = losses;
-            let speed = (step - began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
-            task.detail(&format!("loss {total:.3} L1 {l1:.3}  {speed:.2} steps/s"));
-            log.write(&losses.line(step))?;
-        }
-        let is_last = step == settings.steps;
-        let ends_epoch = step.is_multiple_of(settings.epoch_steps);
-        if ends_epoch || is_last {
-            let validation = held_out.validate(&*trainer.network)?;
-            let epoch = step.div_ceil(settings.epoch_steps);
-            log.write(&json!({ "step": step, "epoch": epoch, "validation": validation }))?;
-            if let (Some(alarm), true) = (&validation.alarm, step > settings.epoch_steps) {
-                progress.say(&format!("step {step}: {alarm}"));
-            }
-            // In f32, whose decimals come back exactly from JSON.
-            let score = validation.score as f32;
-            if trainer.best.is_none_or(|(_, best)| score < best) {
-                trainer.best = Some((step, score));
-                trainer.save_best(folder, &validation)?;
-            }
-            last = Some(validation);
-        }
-        if ends_epoch || is_last || step.is_multiple_of(settings.checkpoint_every) {
-            trainer.save(folder)?;
-        }
+/// A trainer with its segments.
+struct SequenceTraining<'a> {
+    trainer: &'a mut SequenceTrainer,
+    loader: &'a SegmentLoader,
+    held_out: &'a ValidationSegments,
+}
+
+impl ValidatedTraining for SequenceTraining<'_> {
+    type Validation = SequenceValidation;
+
+    fn names(&self) -> (&str, &'static str) {
+        (&self.trainer.metadata.name, "seq2seq")
     }
-    let Some((_, newest)) = checkpoint::list(folder)?.pop() else {
-        bail!("seq2seq.steps is 0: nothing to train");
-    };
-    let validation = match last {
-        Some(validation) => validation,
-        None => held_out.validate(&*trainer.network)?,
-    };
-    Ok(SequenceOutcome {
-        steps: trainer.step,
-        began_at,
-        stopped_early: trainer.step < settings.steps,
-        n_segments: loader.len(),
-        n_parameters: trainer.params().n_parameters(),
-        n_words: trainer.metadata.vocabulary.words().len(),
-        validation,
-        newest,
-        best: folder.join(BEST),
-        best_step: trainer.best.map_or(trainer.step, |(step, _)| step),
-    })
+
+    fn schedule(&self) -> EpochSchedule {
+        let Seq2seqConfig { steps, epoch_steps, checkpoint_every, patience, .. } = self.trainer.settings;
+        EpochSchedule { steps, epoch_steps, checkpoint_every, patience }
+    }
+
+    fn n_done(&self) -> usize {
+        self.trainer.step
+    }
+
+    fn best(&mut self) -> &mut Option<(usize, f32)> {
+        &mut self.trainer.best
+    }
+
+    fn step(&mut self) -> Result<StepReport> {
+        let Seq2seqConfig { seed, batch, .. } = self.trainer.settings;
+        let batch = self.loader.batch(&sample_windows(seed, self.trainer.step, batch, self.loader.len()))?;
+        let losses = self.trainer.step(&batch)?;
+        losses.check(self.trainer.step)?;
+        let SequenceLosses { total, l1, .. } = losses;
+        Ok(StepReport { line: losses.line(self.trainer.step), words: format!("loss {total:.3} L1 {l1:.3}") })
+    }
+
+    fn validate(&self) -> Result<SequenceValidation> {
+        self.held_out.validate(&*self.trainer.network)
+    }
+
+    fn judged(validation: &SequenceValidation) -> (f64, Option<&str>) {
+        (validation.score, validation.alarm.as_deref())
+    }
+
+    fn save(&self, folder: &Path) -> Result<()> {
+        self.trainer.save(folder)
+    }
+
+    fn save_best(&self, folder: &Path, validation: &SequenceValidation) -> Result<()> {
+        self.trainer.save_best(folder, validation)
+    }
 }
 
 /// The newest checkpoint, and what it says with the settings that count now. Tells where these differ from `requested`.
@@ -253,13 +242,6 @@ fn resume(
     progress.say(&format!("going on from {} (step {step})", newest.display()));
     differences.iter().for_each(|line| progress.say(line));
     Ok(Some((stored, contents)))
-}
-
-/// Whether the score has not become better for as many epochs as `seq2seq.patience` allows.
-fn is_over(trainer: &SequenceTrainer) -> bool {
-    let Seq2seqConfig { patience, epoch_steps, .. } = trainer.settings;
-    let since = trainer.step - trainer.best.map_or(trainer.step, |(step, _)| step.min(trainer.step));
-    patience > 0 && since >= patience * epoch_steps
 }
 
 /// The network of a name of the configuration.
