@@ -17,6 +17,7 @@ use orator::demo::people;
 use orator::demo::people::condition::Condition;
 use orator::demo::people::folder::PeoplePlan;
 use orator::demo::rule::dataset;
+use orator::demo::rule::dataset::SpokenClip;
 use orator::external::opencv::png;
 use orator::generate::GestureGenerator;
 use orator::mocap::motion_file;
@@ -86,9 +87,12 @@ enum DemoVerb {
     Speaker {
         /// The dataset's folder; must not be there, or be empty.
         dir: PathBuf,
-        /// Hours of the training split; validation and test have ten minutes each.
+        /// Hours of the training split; validation and test have ten minutes each, with --words the test thirty.
         #[arg(long, default_value_t = 2.0)]
         hours: f64,
+        /// Words that the sound does not tell apart: some send a hand to a place of their own (version 2 of the rule).
+        #[arg(long)]
+        words: bool,
         /// Seed of the speech and of the speaker's variation.
         #[arg(long, default_value_t = 1)]
         seed: u64,
@@ -143,7 +147,10 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             draw(&dir, &plan, rendered, ui)
         }
         DemoVerb::Measure { dir } => measure(&dir, ui),
-        DemoVerb::Speaker { dir, hours, seed } => speak(&dir, hours, seed, ui),
+        DemoVerb::Speaker { dir, hours, words, seed } => {
+            let rule = if words { dataset::RULE_OF_WORDS } else { dataset::RULE };
+            speak(&dir, &dataset::clips(hours, seed, rule)?, rule, ui)
+        }
         DemoVerb::Learned { dataset, checkpoint, picture } => {
             learned(&dataset, checkpoint.as_deref(), picture.as_deref(), ui)
         }
@@ -242,14 +249,13 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
     Ok(if good { Outcome::Done } else { Outcome::SomeFailed })
 }
 
-fn speak(dir: &Path, hours: f64, seed: u64, ui: &Ui) -> Result<Outcome> {
-    let clips = dataset::clips(hours, seed)?;
+fn speak(dir: &Path, clips: &[SpokenClip], rule: u32, ui: &Ui) -> Result<Outcome> {
     let out = std::path::absolute(dir)?;
     let _lock = FolderLock::exclusive(&out)?;
     ensure!(!workdir::has_files(&out), "{} is not empty; choose another folder", dir.display());
-    let info = workdir::build_folder(&out, |attempt| dataset::write(attempt, &clips, ui))?;
+    let info = workdir::build_folder(&out, |attempt| dataset::write(attempt, clips, ui))?;
     let secs: Vec<String> = info.splits.iter().map(|(name, split)| format!("{name} {:.0} s", split.secs)).collect();
-    let text = format!("{} clips by version {} of the rule: {}", clips.len(), dataset::RULE, secs.join(", "));
+    let text = format!("{} clips by version {rule} of the rule: {}", clips.len(), secs.join(", "));
     let next = format!("orator demo learned --dataset {}", dir.display());
     ui.summary(&text, Some(&next), json!({ "dataset": dir, "clips": clips.len(), "next": next }));
     Ok(Outcome::Done)

@@ -47,7 +47,10 @@ pub fn gather(args: &CorpusArgs, ui: &Ui) -> Result<Corpus> {
     let mut speakers = Vec::new();
     for seed in 0..CLIPS + HELD_OUT {
         let number = args.seed.wrapping_add(seed as u64);
-        let clip = dataset::clips(CLIP_SECS / 3600.0, number)?.into_iter().next().context("no clip of the rule")?;
+        let clip = dataset::clips(CLIP_SECS / 3600.0, number, dataset::RULE)?
+            .into_iter()
+            .next()
+            .context("no clip of the rule")?;
         speakers.push((format!("speaker {number}"), clip.motion()));
         speakers.push((format!("gestures {number}"), gestures(number)));
     }

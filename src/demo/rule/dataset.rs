@@ -3,6 +3,7 @@
 //! predictable part can be computed again.
 
 use super::rule::RuleGestures;
+use super::words;
 use crate::dataset::bones::VideoBones;
 use crate::dataset::info::{About, DatasetInfo};
 use crate::dataset::sample::{N_KEYPOINTS, Sample};
@@ -10,8 +11,9 @@ use crate::dataset::split::SplitBy;
 use crate::dataset::write::part::VideoSource;
 use crate::dataset::write::writer::DatasetWriter;
 use crate::demo::drawn::speech::Speech;
+use crate::formats::transcript::Word;
 use crate::motion::bones;
-use crate::stage::ledger::{Kept, Ledger};
+use crate::stage::ledger::{Kept, Ledger, TranscriptAccount, WordCount};
 use crate::stage::progress::Progress;
 use crate::types::pose3d::Motion;
 use crate::types::sound::{SAMPLE_RATE, Sound};
@@ -27,14 +29,17 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::path::Path;
 
-/// Version of the rule and of its speech; another one is refused where the predictable part is needed.
+/// Versions of the rule and of its speech: by the sound alone, and with words. Others are refused where the predictable
+/// part is needed.
 pub const RULE: u32 = 1;
+pub const RULE_OF_WORDS: u32 = 2;
 pub const NAME: &str = "synthetic";
 const FPS: FrameRate = FrameRate::new(15, 1);
 /// Frames of a clip (a minute).
 const CLIP_FRAMES: usize = 900;
-/// Clips of the validation and the test split (ten minutes each).
+/// Clips of the validation and the test split (minutes), and of the test split where the rule has words.
 const HELD_OUT_CLIPS: usize = 10;
+const TEST_CLIPS_OF_WORDS: usize = 30;
 /// Amplitude of the room noise.
 const ROOM: f32 = 0.001;
 const SHARD_BYTES: u64 = 256 << 20;
@@ -70,6 +75,14 @@ impl SpokenClip {
         Speech::free(self.secs(), &mut self.rng("speech"))
     }
 
+    /// Words of the clip; none where the rule has none.
+    pub fn words(&self) -> Vec<Word> {
+        match self.rule {
+            RULE_OF_WORDS => words::words(&self.speech(), self.split, &mut self.rng("words")),
+            _ => Vec::new(),
+        }
+    }
+
     /// Sound of the clip with room noise.
     pub fn sound(&self) -> Sound {
         let mut rng = self.rng("sound");
@@ -81,12 +94,13 @@ impl SpokenClip {
 
     /// Motion of the clip: rule and variation.
     pub fn motion(&self) -> Motion {
-        RuleGestures::with_variation(&self.speech(), self.secs(), &mut self.rng("whims")).motion(self.n_frames, FPS)
+        let rng = &mut self.rng("whims");
+        RuleGestures::with_variation(&self.speech(), &self.words(), self.secs(), rng).motion(self.n_frames, FPS)
     }
 
     /// Predictable part of the motion: the rule alone.
     pub fn predictable(&self) -> Motion {
-        RuleGestures::new(&self.speech()).motion(self.n_frames, FPS)
+        RuleGestures::new(&self.speech(), &self.words()).motion(self.n_frames, FPS)
     }
 
     /// BLAKE3 of the clip's parameters; the text is fixed by existing datasets.
@@ -103,7 +117,12 @@ impl SpokenClip {
             serde_json::from_value(sample.meta.get("rule").cloned().unwrap_or_default()).with_context(|| {
                 format!("{} is not of the synthetic speaker; `orator demo speaker` writes one", sample.key)
             })?;
-        ensure!(clip.rule == RULE, "{} follows version {} of the rule, this program {RULE}", sample.key, clip.rule);
+        ensure!(
+            [RULE, RULE_OF_WORDS].contains(&clip.rule),
+            "{} follows version {} of the rule, this program knows {RULE} and {RULE_OF_WORDS}",
+            sample.key,
+            clip.rule
+        );
         ensure!(clip.n_frames == sample.n_frames(), "{} has {} frames", sample.key, sample.n_frames());
         Ok(clip)
     }
@@ -115,7 +134,7 @@ impl SpokenClip {
             motion: self.motion(),
             pose2d: Array3::zeros((self.n_frames, N_KEYPOINTS, 3)),
             sound: self.sound(),
-            words: None,
+            words: (self.rule == RULE_OF_WORDS).then(|| self.words()),
             meta: json!({
                 "video": self.name(), "first_frame": 0, "n_frames": self.n_frames, "fps": FPS, "start_secs": 0.0,
                 "end_secs": secs, "image_size": null, "left_hand_seen": 1.0, "right_hand_seen": 1.0,
@@ -126,6 +145,10 @@ impl SpokenClip {
 
     fn source(&self, sample: &Sample) -> VideoSource {
         let secs = self.secs();
+        let words = sample.words.as_ref().map(|words| TranscriptAccount {
+            count: WordCount { n_words: words.len(), n_kept: words.len(), ..WordCount::default() },
+            ..TranscriptAccount::default()
+        });
         let lengths = bones::measure(&sample.motion).map(f64::from).to_vec();
         VideoSource {
             name: self.name(),
@@ -134,6 +157,7 @@ impl SpokenClip {
             ledger: Ledger {
                 duration_secs: secs,
                 kept: vec![Kept { start_secs: 0.0, end_secs: secs }],
+                words,
                 ..Ledger::default()
             },
             bones: VideoBones { lengths_metres: lengths, n_frames: self.n_frames },
@@ -142,22 +166,24 @@ impl SpokenClip {
     }
 }
 
-/// Clips of `hours` of training, and ten minutes each of validation and test.
-pub fn clips(hours: f64, seed: u64) -> Result<Vec<SpokenClip>> {
+/// Clips of `hours` of training, ten minutes of validation, and ten of test, thirty where the rule has words.
+pub fn clips(hours: f64, seed: u64, rule: u32) -> Result<Vec<SpokenClip>> {
     ensure!((0.01..=100.0).contains(&hours), "--hours {hours}: expected 0.01 to 100");
     let n_train = (hours * 3600.0 / FPS.secs(CLIP_FRAMES)).ceil() as usize;
-    let of = |split, n| (0..n).map(move |number| SpokenClip { rule: RULE, seed, split, number, n_frames: CLIP_FRAMES });
-    let held_out = [Split::Validation, Split::Test].into_iter().flat_map(|split| of(split, HELD_OUT_CLIPS));
-    Ok(of(Split::Train, n_train).chain(held_out).collect())
+    let of = |split, n| (0..n).map(move |number| SpokenClip { rule, seed, split, number, n_frames: CLIP_FRAMES });
+    let n_test = if rule == RULE_OF_WORDS { TEST_CLIPS_OF_WORDS } else { HELD_OUT_CLIPS };
+    let parts = [(Split::Train, n_train), (Split::Validation, HELD_OUT_CLIPS), (Split::Test, n_test)];
+    Ok(parts.into_iter().flat_map(|(split, n)| of(split, n)).collect())
 }
 
 /// Writes `clips` as a dataset into the existing, empty folder `dir`.
 pub fn write(dir: &Path, clips: &[SpokenClip], progress: &dyn Progress) -> Result<DatasetInfo> {
+    let rule = clips.first().map_or(RULE, |clip| clip.rule);
     let about = About {
         licence: "cc0-1.0".to_owned(),
         consent: "none needed: nobody is shown".to_owned(),
         source: "made by orator demo speaker".to_owned(),
-        notes: vec![format!("Gestures follow version {RULE} of a known rule; pose2d is 0 everywhere.")],
+        notes: vec![format!("Gestures follow version {rule} of a known rule; pose2d is 0 everywhere.")],
         ..About::new(NAME, FPS)
     };
     let writer = DatasetWriter::new(dir, about, SHARD_BYTES);
@@ -181,13 +207,15 @@ mod tests {
     use crate::dataset::verify::verify::verify;
     use crate::stage::progress::Silent;
 
-    fn two(split: Split) -> Vec<SpokenClip> {
-        (0..2).map(|number| SpokenClip { rule: RULE, seed: 7, split, number, n_frames: 90 }).collect()
-    }
-
     #[test]
     fn a_dataset_is_sound_and_its_predictable_part_is_made_again() {
+        verify_rule(RULE);
+        verify_rule(RULE_OF_WORDS);
+    }
+
+    fn verify_rule(rule: u32) {
         let dir = tempfile::tempdir().unwrap();
+        let two = |split| (0..2).map(move |number| SpokenClip { rule, seed: 7, split, number, n_frames: 90 });
         let clips: Vec<SpokenClip> = Split::ALL.into_iter().flat_map(two).collect();
         let info = write(dir.path(), &clips, &Silent).unwrap();
         assert_eq!(info.splits.values().map(|split| split.samples).collect::<Vec<_>>(), [2, 2, 2]);
@@ -199,6 +227,7 @@ mod tests {
             let clip = SpokenClip::from_sample(&sample).unwrap();
             assert_eq!(clip.motion(), sample.motion);
             assert_ne!(clip.predictable(), sample.motion);
+            assert_eq!(sample.words.is_some_and(|words| !words.is_empty()), rule == RULE_OF_WORDS);
         }
         let again = tempfile::tempdir().unwrap();
         write(again.path(), &clips, &Silent).unwrap();
@@ -208,11 +237,11 @@ mod tests {
 
     #[test]
     fn no_two_clips_share_speech() {
-        let clips = clips(0.1, 3).unwrap();
+        let clips = clips(0.1, 3, RULE).unwrap();
         assert_eq!(clips.len(), 6 + 2 * HELD_OUT_CLIPS);
         let said: Vec<_> = clips.iter().map(|clip| format!("{:?}", clip.speech().syllables)).collect();
         let different: std::collections::BTreeSet<&String> = said.iter().collect();
         assert_eq!(different.len(), said.len());
-        assert!(super::clips(f64::NAN, 1).is_err() && super::clips(0.0, 1).is_err());
+        assert!(super::clips(f64::NAN, 1, RULE).is_err() && super::clips(0.0, 1, RULE).is_err());
     }
 }

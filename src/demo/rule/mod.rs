@@ -1,6 +1,7 @@
-//! Hours of a speaker whose motion follows from its sound by a known rule, and baselines for it.
+//! Hours of a speaker whose motion follows from its sound, and if asked its words, by a known rule; baselines for it.
 
 pub mod baselines;
 pub mod dataset;
 pub mod ridge;
 pub mod rule;
+pub mod words;

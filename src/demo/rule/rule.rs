@@ -1,12 +1,14 @@
 //! Gesture rule of the synthetic speaker: a deterministic function of its speech (the predictable part), and random
 //! variation on top.
 
+use super::words::{self, N_PLACES, WordGesture};
 use crate::demo::drawn::figure::{ArmControls, Controls, DrawnFigure, N_ARM};
 use crate::demo::drawn::gesture::minimum_jerk;
 use crate::demo::drawn::speech::{Speech, Syllable};
-use crate::math::vec3::sub;
+use crate::formats::transcript::Word;
+use crate::math::vec3::{Vec3, sub};
 use crate::types::pose3d::Motion;
-use crate::types::skeleton::{N_JOINTS, NECK};
+use crate::types::skeleton::{L_WRIST, N_JOINTS, NECK, R_WRIST};
 use crate::types::time::FrameRate;
 use ndarray::Array3;
 use rand::Rng;
@@ -43,6 +45,16 @@ const PLACES: [[Option<ArmTarget>; 2]; 5] = [
     [Some(CENTRE), Some(CENTRE)],
 ];
 
+/// Seconds from the beginning of a word to the stroke it causes.
+pub const WORD_DELAY: f64 = 0.3;
+/// Where words send the left or the right hand.
+const WORD_PLACES: [ArmTarget; N_PLACES] = [
+    [0.34, -0.2, -0.16, 0.3, 0.9, 0.1, 0.0, 0.1],
+    [0.52, 0.1, -0.1, -0.5, 0.4, 0.1, 0.0, 0.16],
+    [0.44, 0.4, -0.05, 0.7, 0.1, 0.6, -0.2, 0.04],
+    [0.02, 0.1, -0.16, 0.9, 0.9, 0.4, 0.0, 0.02],
+];
+
 /// Variation: share of skipped accents, rate of strokes without an accent (1/s), deviations of a stroke's time
 /// (seconds), target (metres) and hand shape, and the sway of wrists (metres) and torso (radians) with its frequencies.
 const PASSED_OVER: f64 = 0.12;
@@ -76,7 +88,13 @@ struct WristMove {
 ///   r = 0.2 .. 0.8 s.
 ///
 /// The right hand leads with d = 0.2 s (peak speed 0.4 s after an onset), the left follows with d = 0.4 s (0.6 s);
-/// nothing depends on the sound of the present moment. Variation, with a seed of its own: skipped accents, strokes
+/// nothing depends on the sound of the present moment.
+///
+/// A word with a gesture (`words`) that begins at t sends its hand to WORD_PLACES by a stroke from t + 0.3 s on, with hold
+/// and return as above; strokes of that hand that accents would begin from 0.4 s before it until the hold's end are left
+/// out.
+///
+/// Variation, with a seed of its own: skipped accents, strokes
 /// without an accent, errors of stroke times and targets, and sway of arms and torso.
 pub struct RuleGestures<'a> {
     speech: &'a Speech,
@@ -89,9 +107,9 @@ pub struct RuleGestures<'a> {
 struct Variation([[[f64; 2]; 2]; 9]);
 
 impl<'a> RuleGestures<'a> {
-    /// Predictable part: gestures of the rule for `speech`.
-    pub fn new(speech: &'a Speech) -> Self {
-        let strokes = std::array::from_fn(|hand| {
+    /// Predictable part: gestures of the rule for `speech` and the words said in it.
+    pub fn new(speech: &'a Speech, said: &[Word]) -> Self {
+        let mut strokes: [Vec<(f64, ArmTarget)>; 2] = std::array::from_fn(|hand| {
             let accents = speech.syllables.iter().filter(|syllable| syllable.stress > ACCENT);
             let stroke = accents.filter_map(|accent| {
                 let place = PLACES.get(accent.vowel)?[hand]?;
@@ -99,11 +117,12 @@ impl<'a> RuleGestures<'a> {
             });
             stroke.collect()
         });
+        put_words(&mut strokes, said, |goal| (0.0, *goal));
         Self { speech, moves: strokes.map(with_returns), sway: None }
     }
 
     /// Gestures of `secs` seconds with random variation.
-    pub fn with_variation(speech: &'a Speech, secs: f64, rng: &mut ChaCha8Rng) -> Self {
+    pub fn with_variation(speech: &'a Speech, said: &[Word], secs: f64, rng: &mut ChaCha8Rng) -> Self {
         let mut strokes: [Vec<(f64, ArmTarget)>; 2] = Default::default();
         for accent in speech.syllables.iter().filter(|syllable| syllable.stress > ACCENT) {
             let passed_over = rng.random_bool(PASSED_OVER);
@@ -128,6 +147,7 @@ impl<'a> RuleGestures<'a> {
             strokes[rng.random_range(0..2)].push((now, goal));
         }
         strokes.iter_mut().for_each(|strokes| strokes.sort_by(|a, b| a.0.total_cmp(&b.0)));
+        put_words(&mut strokes, said, |goal| (LATE * normal(rng), missed(goal, rng)));
         let mut wave = || [rng.random_range(SWAY_HZ), rng.random_range(0.0..TAU)];
         let sway = Variation(std::array::from_fn(|_| [wave(), wave()]));
         Self { speech, moves: strokes.map(with_returns), sway: Some(sway) }
@@ -164,6 +184,17 @@ impl<'a> RuleGestures<'a> {
         Motion::from_joints(fps, joints)
     }
 
+    /// Wrist from the neck, metres, at the place that a gesture means: the rule's pose at `secs` but for this arm.
+    pub fn wrist_at(&self, gesture: WordGesture, secs: f64) -> Vec3 {
+        let WordGesture { hand, place } = gesture;
+        let mut controls = self.controls(secs);
+        let mut target = WORD_PLACES[place.min(N_PLACES - 1)];
+        target[1] -= LIFT * self.slow_envelope(secs);
+        controls.arms[hand.min(1)] = ArmControls::from(target);
+        let figure = DrawnFigure::new(&controls);
+        sub(figure.joints[[L_WRIST, R_WRIST][hand.min(1)]], figure.joints[NECK])
+    }
+
     /// Lift L(t): the delayed, averaged envelope.
     fn slow_envelope(&self, secs: f64) -> f64 {
         const N: usize = 24;
@@ -179,6 +210,22 @@ impl<'a> RuleGestures<'a> {
 impl Variation {
     fn at(&self, number: usize, secs: f64) -> f64 {
         self.0[number].iter().map(|[hz, phase]| (TAU * hz * secs + phase).sin()).sum()
+    }
+}
+
+/// Puts the strokes of words among those of accents, in order of time. `varied`: how late a stroke is, and its goal.
+fn put_words(
+    strokes: &mut [Vec<(f64, ArmTarget)>; 2],
+    said: &[Word],
+    mut varied: impl FnMut(&ArmTarget) -> (f64, ArmTarget),
+) {
+    for word in said {
+        let Some(WordGesture { hand, place }) = words::gesture(&word.word) else { continue };
+        let (late, goal) = varied(&WORD_PLACES[place]);
+        let start = word.start_secs + WORD_DELAY + late;
+        strokes[hand].retain(|(other, _)| !(start - STROKE..start + STROKE + HOLD).contains(other));
+        let at = strokes[hand].partition_point(|(other, _)| *other < start);
+        strokes[hand].insert(at, (start, goal));
     }
 }
 
@@ -233,7 +280,7 @@ mod tests {
     fn delay(hand: usize) -> f64 {
         let speech = speech(1);
         let n_frames = FPS.frames_in(SECS);
-        let speeds = wrist_speeds(RuleGestures::new(&speech).motion(n_frames, FPS).joints.view(), FPS);
+        let speeds = wrist_speeds(RuleGestures::new(&speech, &[]).motion(n_frames, FPS).joints.view(), FPS);
         let accents = speech.syllables.iter().filter(|s| s.stress > ACCENT && PLACES[s.vowel][hand].is_some());
         let onsets: Vec<f64> = accents.map(|accent| accent.start).collect();
         let at = |delay: f64| {
@@ -258,21 +305,21 @@ mod tests {
     fn a_seed_gives_its_variation_and_another_seed_another() {
         let speech = speech(2);
         let with = |seed| {
-            RuleGestures::with_variation(&speech, SECS, &mut ChaCha8Rng::seed_from_u64(seed))
+            RuleGestures::with_variation(&speech, &[], SECS, &mut ChaCha8Rng::seed_from_u64(seed))
                 .motion(300, FrameRate::new(15, 1))
         };
         assert_eq!(with(1), with(1));
         assert_ne!(with(1), with(2));
-        let rule = RuleGestures::new(&speech).motion(300, FrameRate::new(15, 1));
+        let rule = RuleGestures::new(&speech, &[]).motion(300, FrameRate::new(15, 1));
         assert_ne!(with(1), rule);
-        assert_eq!(rule, RuleGestures::new(&speech).motion(300, FrameRate::new(15, 1)));
+        assert_eq!(rule, RuleGestures::new(&speech, &[]).motion(300, FrameRate::new(15, 1)));
     }
 
     #[test]
     fn bones_are_constant_and_silence_is_rest() {
         let speech = speech(3);
         let rng = &mut ChaCha8Rng::seed_from_u64(3);
-        let motion = RuleGestures::with_variation(&speech, SECS, rng).motion(900, FrameRate::new(15, 1));
+        let motion = RuleGestures::with_variation(&speech, &[], SECS, rng).motion(900, FrameRate::new(15, 1));
         let lengths = crate::motion::bones::measure(&motion);
         for (t, frame) in motion.joints.outer_iter().enumerate() {
             for joint in 1..N_JOINTS {
@@ -282,7 +329,31 @@ mod tests {
             }
         }
         let silent = Speech::default();
-        let still = RuleGestures::new(&silent).motion(30, FrameRate::new(15, 1));
+        let still = RuleGestures::new(&silent, &[]).motion(30, FrameRate::new(15, 1));
         assert!(wrist_speeds(still.joints.view(), still.fps).iter().all(|speed| *speed == 0.0));
+    }
+
+    #[test]
+    fn a_word_sends_its_hand_to_its_place() {
+        let rng = &mut ChaCha8Rng::seed_from_u64(4);
+        let speech = Speech::free(SECS, rng);
+        let said = words::words(&speech, crate::types::split::Split::Train, rng);
+        let rule = RuleGestures::new(&speech, &said);
+        let motion = rule.motion(FPS.frames_in(SECS), FPS);
+        let mut n = 0;
+        for word in said.iter().filter(|word| word.end_secs < SECS - 2.0) {
+            let Some(gesture) = words::gesture(&word.word) else { continue };
+            let t = FPS.frames_in(word.start_secs + WORD_DELAY + STROKE) + 1;
+            let wrist = [L_WRIST, R_WRIST][gesture.hand];
+            let distance = |place: usize| -> f64 {
+                let at = rule.wrist_at(WordGesture { place, ..gesture }, FPS.secs(t));
+                (0..3).map(|k| (f64::from(motion.joints[[t, wrist, k]]) - at[k]).powi(2)).sum::<f64>().sqrt()
+            };
+            let own = distance(gesture.place);
+            let others = (0..N_PLACES).filter(|place| *place != gesture.place).map(distance);
+            assert!(own < 0.001 && others.fold(f64::MAX, f64::min) > 0.25, "{word:?}: {own} m");
+            n += 1;
+        }
+        assert!(n > 10, "{n} words");
     }
 }
