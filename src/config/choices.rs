@@ -59,6 +59,35 @@ pub enum SequenceNetwork {
     Words,
     /// Sound alone, against a discriminator.
     Adversarial,
+    /// Sound alone, to the codes of an autoencoder of poses.
+    Autoencoder,
+}
+
+/// How far poses are from the real ones.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DistanceLoss {
+    #[default]
+    L1,
+    Mse,
+}
+
+/// How much poses change from one to the next.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ContinuityLoss {
+    #[default]
+    Numbers,
+    Poses,
+}
+
+/// How far poses reach, rewarded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ReachLoss {
+    #[default]
+    Excursion,
+    Variance,
 }
 
 /// What tells speech from other sound.

@@ -15,8 +15,8 @@ pub mod transcripts;
 pub mod videos;
 
 pub use choices::{
-    AdversarialLoss, ComputeDevice, FollowRule, MotionRepresentation, NetworkPreset, SequenceNetwork, SpeechRule,
-    SplitUnit,
+    AdversarialLoss, ComputeDevice, ContinuityLoss, DistanceLoss, FollowRule, MotionRepresentation, NetworkPreset,
+    ReachLoss, SequenceNetwork, SpeechRule, SplitUnit,
 };
 pub use config_path::ConfigPath;
 pub use file::Problem;

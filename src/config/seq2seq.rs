@@ -1,6 +1,6 @@
 //! `[seq2seq]`: training of the sequence-to-sequence networks.
 
-use super::choices::SequenceNetwork;
+use super::choices::{ContinuityLoss, DistanceLoss, ReachLoss, SequenceNetwork};
 use serde::{Deserialize, Serialize};
 
 /// `[seq2seq]`: the network, its losses and its training.
@@ -13,12 +13,18 @@ pub struct Seq2seqConfig {
     pub batch: usize,
     pub steps: usize,
     pub learning_rate: f64,
+    /// Readings of the losses: the authors' code, or the paper. `autoencoder` has squared differences of codes alone.
+    pub distance: DistanceLoss,
+    pub continuity: ContinuityLoss,
+    pub reach: ReachLoss,
     /// Weights of the losses beside the distance.
     pub lambda_continuity: f64,
     pub lambda_reach: f64,
     pub lambda_adversarial: f64,
     /// Numbers of a state.
     pub hidden: usize,
+    /// Steps in which `autoencoder` learns codes of poses, before it learns to hear them.
+    pub autoencoder_steps: usize,
     pub seed: u64,
     /// Steps of an epoch: at its end comes a validation.
     pub epoch_steps: usize,
@@ -38,10 +44,14 @@ impl Default for Seq2seqConfig {
             batch: 50,
             steps: 20_000,
             learning_rate: 1e-3,
+            distance: DistanceLoss::L1,
+            continuity: ContinuityLoss::Numbers,
+            reach: ReachLoss::Excursion,
             lambda_continuity: 0.01,
             lambda_reach: 1.0,
             lambda_adversarial: 0.01,
             hidden: 150,
+            autoencoder_steps: 2_000,
             seed: 1337,
             epoch_steps: 250,
             patience: 0,

@@ -6,5 +6,6 @@ pub mod model;
 pub mod normalisation;
 pub mod representation;
 pub mod seq2seq;
+pub mod trained;
 
 pub use generator::GestureGenerator;

@@ -1,19 +1,23 @@
 //! Check of a speaker trained on the rule: its motion for the sound of the test split against the synthetic speaker's
 //! motion and the rule's predictable part, beside simpler predictors.
 
+use super::places::{self, PlaceShare, WordPlaces};
 use super::traces;
 use crate::dataset::{Dataset, Sample, Split};
 use crate::demo::rule::baselines::{RuleBaselines, sound_of_frames, wrist_speeds};
-use crate::demo::rule::dataset::SpokenClip;
+use crate::demo::rule::dataset::{RULE_OF_WORDS, SpokenClip};
 use crate::demo::rule::ridge::correlation;
-use crate::generate::GestureGenerator;
+use crate::demo::rule::rule::RuleGestures;
+use crate::formats::transcript::Word;
+use crate::generate::seq2seq::architecture::Architecture;
+use crate::generate::trained::TrainedSpeaker;
 use crate::metrics::movement::energy::MotionEnergy;
 use crate::metrics::position::pck::{CorrectKeypoints, PckAxes};
 use crate::stage::progress::Progress;
 use crate::types::skeleton::{NECK, is_duplicate};
 use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
-use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis, concatenate};
+use ndarray::{Array1, Array2, Array3, ArrayView3};
 use serde::Serialize;
 
 /// Metrics of a predictor on the whole test split.
@@ -21,10 +25,12 @@ use serde::Serialize;
 pub struct LearnedRow {
     pub predictor: &'static str,
     /// Pearson correlation of the left and of the right wrist's speed with the predictable part's, over all frames of
-    /// all clips, without smoothing.
+    /// all clips in which no word moves the hand, without smoothing.
     pub speed_correlation: [f64; 2],
     /// Pose metrics; `None`: no poses are predicted.
     pub poses: Option<PoseQuality>,
+    /// Places to which words send the hands; `None`: the rule has no words, or no poses are predicted.
+    pub places: Option<WordPlaces>,
 }
 
 /// Agreement of the poses with the speaker's.
@@ -62,18 +68,30 @@ pub const LEAST_CORRELATION: f64 = 0.7;
 pub const LEAST_PCK: f64 = 1.5;
 pub const ENERGY: std::ops::RangeInclusive<f64> = 0.7..=1.3;
 
+/// Targets where words send hands to places: share of right places of all words, of lone words for the network that reads
+/// the words of a segment; most that one which is not told the words may differ from chance; correlation on beats.
+pub const LEAST_PLACES: f64 = 0.8;
+pub const LEAST_LONE_PLACES: f64 = 0.7;
+pub const MOST_FROM_CHANCE: f64 = 0.1;
+pub const LEAST_BEATS: f64 = 0.6;
+
+/// Row of the generator with the words of another clip.
+const OTHER_WORDS: &str = "generator, another text";
 /// Speed below which a wrist of the rule is held, m/s.
 const HELD: f64 = 0.05;
 
 /// Clip of the test split.
 struct TestClip {
     sample: Sample,
+    clip: SpokenClip,
     predictable: Array3<f32>,
     sound: Array2<f64>,
+    /// Steps [T - 1, 2] in which no word moves the left and the right hand.
+    of_beats: Array2<bool>,
 }
 
 /// Measures `speaker` on the test split of the synthetic speaker's `dataset`; without one, the baselines alone.
-pub fn measure(dataset: &Dataset, speaker: Option<&GestureGenerator>, progress: &dyn Progress) -> Result<Learned> {
+pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &dyn Progress) -> Result<Learned> {
     let tests: Vec<TestClip> =
         dataset.samples(Split::Test).iter().map(|s| TestClip::new(dataset.read(s)?)).collect::<Result<_>>()?;
     ensure!(tests.len() > 1, "{}: the test split needs two clips at least", dataset.dir().display());
@@ -86,8 +104,14 @@ pub fn measure(dataset: &Dataset, speaker: Option<&GestureGenerator>, progress: 
     let (mut rows, mut first) = (Vec::new(), None);
     if let Some(speaker) = speaker {
         task.detail("generating");
-        let predicted: Vec<Array3<f32>> =
-            tests.iter().map(|test| Ok(speaker.motion(&test.sample.sound)?.joints)).collect::<Result<_>>()?;
+        let with_words = |shift: Option<usize>| -> Result<Vec<Array3<f32>>> {
+            let one = |n: usize| {
+                let said = shift.map(|shift| tests[(n + shift) % tests.len()].said());
+                Ok(speaker.motion(&tests[n].sample.sound, said.unwrap_or_default())?.joints)
+            };
+            (0..tests.len()).map(one).collect()
+        };
+        let predicted = with_words(Some(0))?;
         for (predicted, test) in predicted.iter().zip(&tests) {
             ensure!(
                 predicted.shape() == test.predictable.shape(),
@@ -103,6 +127,10 @@ pub fn measure(dataset: &Dataset, speaker: Option<&GestureGenerator>, progress: 
         let mut other = predicted;
         other.rotate_left(1);
         rows.push(row("generator, another test sound", other));
+        if speaker.reads_words() {
+            rows.push(row(OTHER_WORDS, with_words(Some(1))?));
+            rows.push(row("generator, no words", with_words(None)?));
+        }
     }
     rows.push(row("mean pose", each(&|test| baselines.still(test.sample.n_frames()))));
     rows.push(row("ridge of the frame, to poses", each(&|test| baselines.ridge_poses(&test.sound))));
@@ -111,15 +139,19 @@ pub fn measure(dataset: &Dataset, speaker: Option<&GestureGenerator>, progress: 
         predictor: "ridge of the frame, to speeds",
         speed_correlation: judge.correlation(&speeds),
         poses: None,
+        places: None,
     });
     rows.push(row("nearest training window by sound", each(&|test| baselines.nearest(&test.sound))));
     rows.push(row("the data itself", each(&|test| test.sample.motion.joints.clone())));
     rows.push(row("the rule without variation", each(&|test| test.predictable.clone())));
+    if judge.has_words() {
+        rows.push(row("the rule without its words", each(&|test| test.without_words(fps))));
+    }
     let n_frames: usize = tests.iter().map(|test| test.sample.n_frames()).sum();
     Ok(Learned {
         n_clips: tests.len(),
         secs: fps.secs(n_frames),
-        good: speaker.map(|_| good(&rows)),
+        good: speaker.map(|speaker| if judge.has_words() { good_words(&rows, speaker) } else { good(&rows) }),
         rows,
         ridge_strengths: baselines.strengths,
         first,
@@ -136,11 +168,37 @@ fn good(rows: &[LearnedRow]) -> bool {
         && ENERGY.contains(&poses.energy)
 }
 
+/// Whether the generator's row reaches the targets for words.
+fn good_words(rows: &[LearnedRow], speaker: &TrainedSpeaker) -> bool {
+    let Some((row, places)) = rows.first().and_then(|row| Some((row, row.places?))) else { return false };
+    let is_chance = |share: PlaceShare| (share.share() - PlaceShare::CHANCE).abs() <= MOST_FROM_CHANCE;
+    let others = rows.iter().find(|row| row.predictor == OTHER_WORDS).and_then(|row| row.places);
+    let is_told = match speaker.architecture() {
+        Some(Architecture::Contextual) => places.all.share() >= LEAST_PLACES,
+        Some(Architecture::Words) => places.alone.share() >= LEAST_LONE_PLACES,
+        _ => return is_chance(places.all),
+    };
+    is_told
+        && others.is_some_and(|others| is_chance(others.all))
+        && row.speed_correlation.iter().all(|correlation| *correlation >= LEAST_BEATS)
+}
+
 impl TestClip {
     fn new(sample: Sample) -> Result<Self> {
-        let predictable = SpokenClip::from_sample(&sample)?.predictable().joints;
+        let clip = SpokenClip::from_sample(&sample)?;
+        let predictable = clip.predictable().joints;
         let sound = sound_of_frames(&sample.sound, sample.n_frames(), sample.motion.fps);
-        Ok(Self { sample, predictable, sound })
+        let of_beats = places::of_beats(&clip, sample.motion.fps);
+        Ok(Self { sample, clip, predictable, sound, of_beats })
+    }
+
+    fn said(&self) -> &[Word] {
+        self.sample.words.as_deref().unwrap_or_default()
+    }
+
+    /// The rule as if nothing were said with these sounds.
+    fn without_words(&self, fps: FrameRate) -> Array3<f32> {
+        RuleGestures::new(&self.clip.speech(), &[]).motion(self.clip.n_frames, fps).joints
     }
 }
 
@@ -152,6 +210,16 @@ struct Judge<'a> {
 }
 
 impl Judge<'_> {
+    fn has_words(&self) -> bool {
+        self.tests.iter().any(|test| test.clip.rule == RULE_OF_WORDS)
+    }
+
+    fn places(&self, predicted: &[Array3<f32>]) -> WordPlaces {
+        let mut places = WordPlaces::default();
+        predicted.iter().zip(self.tests).for_each(|(joints, test)| places.count(&test.clip, joints.view(), self.fps));
+        places
+    }
+
     fn row(&self, predictor: &'static str, predicted: &[Array3<f32>]) -> LearnedRow {
         let mut correct = CorrectKeypoints::default();
         let (mut energy, mut reference_energy) = (MotionEnergy::default(), MotionEnergy::default());
@@ -179,18 +247,22 @@ impl Judge<'_> {
                 pauses: pauses.relative_to(&reference_pauses),
                 l1: errors.0 / f64::max(errors.1, 1.0),
             }),
+            places: self.has_words().then(|| self.places(predicted)),
         }
     }
 
     fn correlation(&self, speeds: &[Array2<f64>]) -> [f64; 2] {
         let truth: Vec<Array2<f64>> =
             self.tests.iter().map(|test| wrist_speeds(test.predictable.view(), self.fps)).collect();
-        let joined = |parts: &[Array2<f64>]| {
-            let views: Vec<ArrayView2<f64>> = parts.iter().map(|part| part.view()).collect();
-            concatenate(Axis(0), &views).unwrap_or_default()
-        };
-        let (predicted, truth) = (joined(speeds), joined(&truth));
-        std::array::from_fn(|hand| correlation(predicted.column(hand), truth.column(hand)))
+        std::array::from_fn(|hand| {
+            let of_beats = |parts: &[Array2<f64>]| -> Array1<f64> {
+                let steps = parts.iter().zip(self.tests).flat_map(|(part, test)| {
+                    part.column(hand).into_iter().zip(test.of_beats.column(hand)).filter(|(_, is_beat)| **is_beat)
+                });
+                steps.map(|(speed, _)| *speed).collect()
+            };
+            correlation(of_beats(speeds).view(), of_beats(&truth).view())
+        })
     }
 
     /// Sum and number of normalised errors.

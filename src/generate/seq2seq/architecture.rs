@@ -3,6 +3,7 @@
 use super::vocabulary::{NumberedWord, PADDING};
 use crate::audio::mfcc::N_CEPSTRA;
 use crate::nn::params::Params;
+use crate::nn::seq2seq::autoencoder::AudioBaseline;
 use crate::nn::seq2seq::config::Config;
 use crate::nn::seq2seq::contextual::ContextSeq2Seq;
 use crate::nn::seq2seq::predict::GesturePredictor;
@@ -31,6 +32,8 @@ pub enum Architecture {
     Words,
     /// Sound alone, trained against a discriminator.
     Adversarial,
+    /// Sound alone, to the codes of an autoencoder of poses: the audio baseline.
+    Autoencoder,
 }
 
 /// Sizes at a rate, all others as published: `pose` numbers of a pose, `vocabulary` words of `word` numbers, states of
@@ -57,12 +60,13 @@ impl Architecture {
             Self::Contextual => Box::new(ContextSeq2Seq::new(params, config)?),
             Self::Words => Box::new(WordsSeq2Seq::new(params, config)?),
             Self::Adversarial => Box::new(WordsSeq2Seq::without_words(params, config)?),
+            Self::Autoencoder => Box::new(AudioBaseline::new(params, config)?),
         })
     }
 
     /// Name of the encoder that holds the table of word vectors; `None`: no words are read.
     pub fn word_encoder(self) -> Option<&'static str> {
-        (self != Self::Adversarial).then_some("word_encoder")
+        matches!(self, Self::Contextual | Self::Words).then_some("word_encoder")
     }
 
     /// Words of a segment whose first predicted pose is `first`: one row a pose, one row, or no row.
@@ -80,7 +84,7 @@ impl Architecture {
                 let (start, end) = (fps.secs(first), fps.secs(first + predicted));
                 vec![within(start - AROUND_SEGMENT_SECS, end + AROUND_SEGMENT_SECS)]
             }
-            Self::Adversarial => Vec::new(),
+            Self::Adversarial | Self::Autoencoder => Vec::new(),
         }
     }
 
@@ -95,7 +99,7 @@ impl Architecture {
         match self {
             Self::Contextual => Tensor::from_vec(numbers, (segments.len(), n_rows, n_words), &Device::Cpu).map(Some),
             Self::Words => Tensor::from_vec(numbers, (segments.len(), n_words), &Device::Cpu).map(Some),
-            Self::Adversarial => Ok(None),
+            Self::Adversarial | Self::Autoencoder => Ok(None),
         }
     }
 }

@@ -1,23 +1,24 @@
 //! Network D, the audio baseline: a denoising autoencoder of single poses, and an encoder from speech to its code
 //! (Kucherenko et al. 2019, with the context encoder of network B).
 
-use super::config::Config;
+use super::config::{Config, Segment};
 use super::context::ContextEncoder;
+use super::predict::GesturePredictor;
 use crate::nn::Mode;
 use crate::nn::ops::affine::Affine;
 use crate::nn::ops::dropout::dropout;
 use crate::nn::params::Params;
-use candle_core::{Module, Result, Tensor};
+use candle_core::{Module, Result, Tensor, Var};
 
-/// `encoder.0`, `encoder.2`, `decoder.0`, `decoder.2`: a pose to its code and back, ReLU within, tanh behind.
+/// Under `<name>`: `encoder.0`, `encoder.2`, `decoder.0`, `decoder.2`, a pose to its code and back, ReLU within, tanh behind.
 pub struct PoseAutoencoder {
     layers: [Affine; 4],
 }
 
 impl PoseAutoencoder {
-    pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
+    pub fn new(params: &mut Params, name: &str, config: &Config) -> Result<Self> {
         let Config { pose, pose_hidden, code, .. } = *config;
-        let mut layer = |name: &str, n: [usize; 2]| Affine::new(params, name, n[0], n[1]);
+        let mut layer = |own: &str, n: [usize; 2]| Affine::new(params, &format!("{name}{own}"), n[0], n[1]);
         Ok(Self {
             layers: [
                 layer("encoder.0", [pose, pose_hidden])?.with_relu(),
@@ -44,7 +45,7 @@ impl PoseAutoencoder {
     }
 }
 
-/// `audio_encoder` as in network B, dropout, and `linear` to the code.
+/// Under `<name>`: `audio_encoder` as in network B, dropout, and `linear` to the code.
 pub struct SpeechEncoder {
     audio: ContextEncoder,
     linear: Affine,
@@ -52,10 +53,10 @@ pub struct SpeechEncoder {
 }
 
 impl SpeechEncoder {
-    pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
+    pub fn new(params: &mut Params, name: &str, config: &Config) -> Result<Self> {
         Ok(Self {
-            audio: ContextEncoder::new(params, "audio_encoder", config)?,
-            linear: Affine::new(params, "linear", config.hidden, config.code)?,
+            audio: ContextEncoder::new(params, &format!("{name}audio_encoder"), config)?,
+            linear: Affine::new(params, &format!("{name}linear"), config.hidden, config.code)?,
             config: config.clone(),
         })
     }
@@ -64,5 +65,69 @@ impl SpeechEncoder {
     pub fn forward(&self, audio: &Tensor, mode: &mut Mode) -> Result<Tensor> {
         let heard = dropout(&self.audio.forward(audio, mode)?, self.config.dropout, mode)?;
         self.linear.forward(&heard)?.reshape((audio.dim(0)?, (), self.config.code))
+    }
+}
+
+/// Network D as a whole: speech to codes to poses. `autoencoder.`, `speech.`, and two tensors set before the training:
+/// `scale` [pose], by which poses are divided so that tanh reaches them, and `noise` [pose], the deviation of what is added
+/// to the divided poses.
+pub struct AudioBaseline {
+    autoencoder: PoseAutoencoder,
+    speech: SpeechEncoder,
+    scale: Var,
+    noise: Var,
+    config: Config,
+}
+
+impl AudioBaseline {
+    /// Scales of 1, no noise.
+    pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
+        Ok(Self {
+            autoencoder: PoseAutoencoder::new(params, "autoencoder.", config)?,
+            speech: SpeechEncoder::new(params, "speech.", config)?,
+            scale: params.buffer("scale", &[config.pose], 1.0)?,
+            noise: params.buffer("noise", &[config.pose], 0.0)?,
+            config: config.clone(),
+        })
+    }
+
+    /// Sets the scales (above 0) and the deviations of the noise.
+    pub fn set_scale(&self, scale: &Tensor, noise: &Tensor) -> Result<()> {
+        self.scale.set(scale)?;
+        self.noise.set(noise)
+    }
+
+    /// Mean squared error of poses [B, T, pose] that come back from their codes, with `normal` [B, T, pose] of deviation 1
+    /// times the noise added before.
+    pub fn loss_of_poses(&self, poses: &Tensor, normal: &Tensor) -> Result<Tensor> {
+        let poses = poses.broadcast_div(self.scale.as_tensor())?.flatten_to(1)?;
+        let noise = normal.broadcast_mul(self.noise.as_tensor())?.flatten_to(1)?;
+        (self.autoencoder.forward(&(&poses + noise)?)? - poses)?.sqr()?.mean_all()
+    }
+
+    /// Mean squared error of the codes that are heard, against those of the real poses [B, predicted, pose], through which
+    /// nothing is learnt.
+    pub fn loss_of_speech(&self, audio: &Tensor, poses: &Tensor, mode: &mut Mode) -> Result<Tensor> {
+        let poses = poses.broadcast_div(self.scale.as_tensor())?;
+        let codes = self.autoencoder.encode(&poses.flatten_to(1)?)?.detach();
+        let heard = self.speech.forward(audio, mode)?;
+        (heard.flatten_to(1)? - codes)?.sqr()?.mean_all()
+    }
+}
+
+impl GesturePredictor for AudioBaseline {
+    fn config(&self) -> &Config {
+        &self.config
+    }
+
+    fn forward(&self, segment: &Segment, mode: &mut Mode) -> Result<Tensor> {
+        self.config.check(segment)?;
+        let codes = self.speech.forward(&segment.audio, mode)?;
+        let poses = self.autoencoder.decode(&codes.flatten_to(1)?)?.broadcast_mul(self.scale.as_tensor())?;
+        poses.reshape((codes.dim(0)?, self.config.predicted, self.config.pose))
+    }
+
+    fn audio_baseline(&self) -> Option<&AudioBaseline> {
+        Some(self)
     }
 }

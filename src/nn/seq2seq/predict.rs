@@ -1,5 +1,6 @@
 //! What all sequence-to-sequence networks can do: predict a segment of poses, and a whole sound segment after segment.
 
+use super::autoencoder::AudioBaseline;
 use super::config::{Config, Segment};
 use crate::nn::Mode;
 use candle_core::{Result, Tensor};
@@ -10,6 +11,11 @@ pub trait GesturePredictor: Send + Sync {
 
     /// Poses [B, predicted, pose] of a batch of segments.
     fn forward(&self, segment: &Segment, mode: &mut Mode) -> Result<Tensor>;
+
+    /// Itself where it predicts codes of poses, which are learnt before the speech.
+    fn audio_baseline(&self) -> Option<&AudioBaseline> {
+        None
+    }
 }
 
 /// Poses [1, n predicted, pose] of a sound of n segments, each begun with the last poses of the one before; no state but

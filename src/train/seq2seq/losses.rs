@@ -1,6 +1,7 @@
 //! What FineMotion's networks are trained to make small (GENEA 2020 entry, section on training; where paper and code
 //! differ both are here, and the code's reading is the default). Pure functions of poses [B, T, X] and of logits.
 
+use crate::config::{ContinuityLoss, DistanceLoss, ReachLoss};
 use candle_core::{Result, Tensor};
 use serde::{Deserialize, Serialize};
 
@@ -59,33 +60,6 @@ fn softplus(x: &Tensor) -> Result<Tensor> {
     x.relu()? + (x.abs()?.neg()?.exp()? + 1.0)?.log()?
 }
 
-/// How far poses are from the real ones.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum DistanceLoss {
-    #[default]
-    L1,
-    Mse,
-}
-
-/// How much poses change from one to the next.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ContinuityLoss {
-    #[default]
-    Numbers,
-    Poses,
-}
-
-/// How far poses reach, rewarded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ReachLoss {
-    #[default]
-    Excursion,
-    Variance,
-}
-
 /// The loss of a generator, by parts and weights.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SequenceLoss {
@@ -113,8 +87,8 @@ impl Default for SequenceLoss {
 
 impl SequenceLoss {
     /// That of the adversarial network: squared differences, no reward of reach.
-    pub fn of_adversarial() -> Self {
-        Self { distance: DistanceLoss::Mse, reach_weight: 0.0, ..Self::default() }
+    pub fn of_adversarial(self) -> Self {
+        Self { distance: DistanceLoss::Mse, reach_weight: 0.0, ..self }
     }
 
     /// The weighted sum for poses and, where there is a discriminator, its logits of them.
@@ -172,7 +146,7 @@ mod tests {
         assert!(near(adversarial(&logits(0.5, -90.0)?), (entropy(0.5) + 90.0) / 2.0)?);
         let of_code = SequenceLoss::default().total(&made, &real, None);
         assert!(near(of_code, 0.75 + 0.01 * 1.75 - 1.75)?);
-        let of_gan = SequenceLoss::of_adversarial().total(&made, &real, Some(&logits(0.0, 0.0)?));
+        let of_gan = SequenceLoss::default().of_adversarial().total(&made, &real, Some(&logits(0.0, 0.0)?));
         assert!(near(of_gan, 1.25 + 0.0175 + 0.01 * 2f64.ln())?);
         Ok(())
     }

@@ -18,6 +18,8 @@ use crate::train::optim::adam::Adam;
 use crate::train::resume;
 use anyhow::{Context, Result, ensure};
 use candle_core::Tensor;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -35,7 +37,8 @@ const FREE: [&str; 4] = ["steps", "patience", "checkpoint_every", "keep_checkpoi
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct SequenceLosses {
     pub total: f64,
-    pub l1: f64,
+    /// `None`: no pose was made, as the audio baseline learns codes.
+    pub l1: Option<f64>,
     pub discriminator: f64,
     pub gradient_norm: f64,
 }
@@ -87,15 +90,15 @@ impl SequenceTrainer {
             let network = SegmentDiscriminator::new(&mut params, &metadata.network)?;
             Ok(Adversary { network, adam: Adam::new(&params, of_adam)?, params })
         };
-        let continuity_weight = settings.lambda_continuity;
-        let loss = match is_adversarial {
-            true => SequenceLoss {
-                continuity_weight,
-                adversarial_weight: settings.lambda_adversarial,
-                ..SequenceLoss::of_adversarial()
-            },
-            false => SequenceLoss { continuity_weight, reach_weight: settings.lambda_reach, ..SequenceLoss::default() },
+        let readings = SequenceLoss {
+            distance: settings.distance,
+            continuity: settings.continuity,
+            reach: settings.reach,
+            continuity_weight: settings.lambda_continuity,
+            reach_weight: settings.lambda_reach,
+            adversarial_weight: settings.lambda_adversarial,
         };
+        let loss = if is_adversarial { readings.of_adversarial() } else { readings };
         Ok(Self {
             adam: Adam::new(&params, of_adam)?,
             // Another seed, or tensors of the same name would begin alike.
@@ -120,6 +123,16 @@ impl SequenceTrainer {
         let rate = self.settings.learning_rate;
         // Another seed than that of the windows.
         let mut rng = resume::stream(!self.settings.seed, self.step);
+        if let Some(baseline) = self.network.audio_baseline() {
+            let total = match self.step < self.settings.autoencoder_steps {
+                true => baseline.loss_of_poses(&batch.real, &normal_like(&batch.real, &mut rng)?)?,
+                false => baseline.loss_of_speech(&batch.segment.audio, &batch.real, &mut Mode::Train(&mut rng))?,
+            };
+            let gradient_norm = self.adam.step(&total.backward()?, rate)?;
+            self.step += 1;
+            let total = number(&total)?;
+            return Ok(SequenceLosses { total, l1: None, discriminator: 0.0, gradient_norm });
+        }
         let made = batch.completed(&self.network.forward(&batch.segment, &mut Mode::Train(&mut rng))?)?;
         let (mut discriminator, mut logits) = (0.0, None);
         if let Some(Adversary { network, adam, .. }) = &mut self.adversary {
@@ -132,7 +145,7 @@ impl SequenceTrainer {
         let total = self.loss.total(&made, &batch.real, logits.as_ref())?;
         let gradient_norm = self.adam.step(&total.backward()?, rate)?;
         self.step += 1;
-        let l1 = number(&losses::l1(&made, &batch.real)?)?;
+        let l1 = Some(number(&losses::l1(&made, &batch.real)?)?);
         Ok(SequenceLosses { total: number(&total)?, l1, discriminator, gradient_norm })
     }
 
@@ -199,9 +212,9 @@ impl SequenceLosses {
     pub fn check(&self, step: usize) -> Result<()> {
         let Self { total, l1, discriminator, gradient_norm } = *self;
         ensure!(
-            [total, l1, discriminator].iter().all(|loss| loss.is_finite() && loss.abs() < LOSS_LIMIT)
+            [total, l1.unwrap_or(0.0), discriminator].iter().all(|loss| loss.is_finite() && loss.abs() < LOSS_LIMIT)
                 && gradient_norm.is_finite(),
-            "the training broke at step {step}: loss {total}, L1 {l1}, discriminator {discriminator}, norm of the gradient \
+            "the training broke at step {step}: loss {total}, L1 {l1:?}, discriminator {discriminator}, norm of the gradient \
              {gradient_norm}"
         );
         Ok(())
@@ -212,6 +225,12 @@ impl SequenceLosses {
         let Self { total, l1, discriminator, gradient_norm } = *self;
         json!({ "step": step, "total": total, "l1": l1, "discriminator": discriminator, "gradient_norm": gradient_norm })
     }
+}
+
+/// Normal random numbers in the shape of a tensor.
+fn normal_like(tensor: &Tensor, rng: &mut ChaCha8Rng) -> Result<Tensor> {
+    let numbers: Vec<f32> = (0..tensor.elem_count()).map(|_| StandardNormal.sample(rng)).collect();
+    Ok(Tensor::from_vec(numbers, tensor.shape(), tensor.device())?)
 }
 
 fn number(scalar: &Tensor) -> Result<f64> {

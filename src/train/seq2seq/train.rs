@@ -22,7 +22,7 @@ use crate::stage::workdir::{self, FolderLock};
 use crate::train::epochs::{self, EpochSchedule, StepReport, ValidatedTraining};
 use crate::train::resume::sample_windows;
 use anyhow::{Context, Result, ensure};
-use candle_core::Tensor;
+use candle_core::{Device, Tensor};
 use std::path::{Path, PathBuf};
 
 /// Numbers of a word where no table of vectors is given.
@@ -134,6 +134,7 @@ fn begin(
     };
     let trainer = SequenceTrainer::new(metadata, settings.clone())?;
     begin_words(&trainer, vectors)?;
+    begin_codes(&trainer, &splits.train)?;
     Ok((trainer, splits))
 }
 
@@ -154,6 +155,29 @@ fn begin_words(trainer: &SequenceTrainer, vectors: Option<&WordVectors>) -> Resu
     let numbers: Vec<f32> = rows.concat();
     let table = Tensor::from_vec(numbers, (vocabulary.n_numbers(), network.word), table.device())?;
     Ok(set_word_vectors(trainer.params(), encoder, &table)?)
+}
+
+/// Deviation of the noise that is added to a pose, as a share of the data's (published).
+const NOISE: f32 = 0.01;
+
+/// The audio baseline is told how far the numbers to train on reach from 0, where that is farther than tanh does, and how
+/// much of them is noise.
+fn begin_codes(trainer: &SequenceTrainer, train: &[PoseSequence]) -> Result<()> {
+    let Some(baseline) = trainer.network.audio_baseline() else { return Ok(()) };
+    let column = |c: usize| train.iter().flat_map(move |sequence| sequence.poses.column(c).to_vec());
+    let scale = |c: usize| column(c).fold(1.0f32, |most, number| most.max(number.abs()));
+    let deviation = |c: usize| {
+        let (n, sum, squares) = column(c).fold((0.0f64, 0.0, 0.0), |(n, sum, squares), number| {
+            (n + 1.0, sum + f64::from(number), squares + f64::from(number).powi(2))
+        });
+        let mean = sum / n.max(1.0);
+        (squares / n.max(1.0) - mean * mean).max(0.0).sqrt() as f32
+    };
+    let n = trainer.metadata.network.pose;
+    let scales: Vec<f32> = (0..n).map(scale).collect();
+    let noise: Vec<f32> = (0..n).map(|c| NOISE * deviation(c) / scales[c]).collect();
+    let tensor = |numbers: Vec<f32>| Tensor::from_vec(numbers, n, &Device::Cpu);
+    Ok(baseline.set_scale(&tensor(scales)?, &tensor(noise)?)?)
 }
 
 /// A trainer with its segments.
@@ -189,7 +213,8 @@ impl ValidatedTraining for SequenceTraining<'_> {
         let losses = self.trainer.step(&batch)?;
         losses.check(self.trainer.step)?;
         let SequenceLosses { total, l1, .. } = losses;
-        Ok(StepReport { line: losses.line(self.trainer.step), words: format!("loss {total:.3} L1 {l1:.3}") })
+        let words = format!("loss {total:.3}{}", l1.map_or(String::new(), |l1| format!(" L1 {l1:.3}")));
+        Ok(StepReport { line: losses.line(self.trainer.step), words })
     }
 
     fn validate(&self) -> Result<SequenceValidation> {
@@ -250,6 +275,7 @@ fn architecture(network: SequenceNetwork) -> Architecture {
         SequenceNetwork::Contextual => Architecture::Contextual,
         SequenceNetwork::Words => Architecture::Words,
         SequenceNetwork::Adversarial => Architecture::Adversarial,
+        SequenceNetwork::Autoencoder => Architecture::Autoencoder,
     }
 }
 

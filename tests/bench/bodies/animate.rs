@@ -37,7 +37,8 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     ensure!(args.rounds > 0 && args.fps > 0, "nothing to measure: there must be rounds and frames a second");
     let mut dice = ChaCha8Rng::seed_from_u64(1337);
     let speech = Speech::new(args.secs, &mut dice);
-    let mut motion = RuleGestures::with_variation(&speech, args.secs, &mut dice).motion(FPS.frames_in(args.secs), FPS);
+    let mut motion =
+        RuleGestures::with_variation(&speech, &[], args.secs, &mut dice).motion(FPS.frames_in(args.secs), FPS);
     for (t, mut frame) in motion.joints.outer_iter_mut().enumerate() {
         if t % 100 < 10 {
             frame.slice_mut(ndarray::s![8..28, ..]).fill(f32::NAN);

@@ -41,7 +41,7 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
     let mut dice = ChaCha8Rng::seed_from_u64(1337);
     let secs = FPS.secs(args.frames);
     let speech = Speech::new(secs, &mut dice);
-    let motion = RuleGestures::with_variation(&speech, secs, &mut dice).motion(args.frames, FPS);
+    let motion = RuleGestures::with_variation(&speech, &[], secs, &mut dice).motion(args.frames, FPS);
     let performance = perform(&motion, None, &AnimationOptions::default());
     let mut view = AvatarView::new(&performance, &[&performance], SIZE, FilmCamera::Front);
     let folder = tempfile::tempdir()?;

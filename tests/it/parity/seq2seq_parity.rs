@@ -170,9 +170,9 @@ fn the_audio_baseline_is_that_of_pytorch() -> anyhow::Result<()> {
     let back = |net: &PoseAutoencoder, dtype, _: &mut Mode| {
         net.forward(&pattern(&[BATCH, 8, 5], 3.0)?.reshape((BATCH * 8, 5))?.to_dtype(dtype)?)
     };
-    compare("autoencoder", |params| PoseAutoencoder::new(params, &small()), back)?;
+    compare("autoencoder", |params| PoseAutoencoder::new(params, "", &small()), back)?;
     let code = |net: &SpeechEncoder, dtype, mode: &mut Mode| net.forward(&inputs(None, dtype)?.audio, mode);
-    compare("speech", |params| SpeechEncoder::new(params, &small()), code)
+    compare("speech", |params| SpeechEncoder::new(params, "", &small()), code)
 }
 
 #[test]

@@ -20,7 +20,7 @@ use std::path::Path;
 fn settings(network: SequenceNetwork) -> Seq2seqConfig {
     let schedule =
         Seq2seqConfig { steps: 6, epoch_steps: 3, checkpoint_every: 2, keep_checkpoints: 2, ..Default::default() };
-    Seq2seqConfig { network, batch: 3, hidden: 8, stride_frames: 5, ..schedule }
+    Seq2seqConfig { network, batch: 3, hidden: 8, stride_frames: 5, autoencoder_steps: 3, ..schedule }
 }
 
 fn open(dir: &Path, hold_out: &[&str]) -> anyhow::Result<CaptureFolder> {
@@ -37,6 +37,7 @@ fn a_training_stopped_at_a_step_ends_with_the_same_bytes() {
         (SequenceNetwork::Contextual, vec![3, 4]),
         (SequenceNetwork::Words, vec![5]),
         (SequenceNetwork::Adversarial, vec![3]),
+        (SequenceNetwork::Autoencoder, vec![2, 5]),
     ] {
         let settings = settings(network);
         let place = |part: &str| folder.path().join(format!("{network:?}-{part}"));

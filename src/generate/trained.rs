@@ -1,0 +1,60 @@
+//! A trained speaker of either kind: sound, and where it reads them words, to motion of the 49 joints.
+
+use super::GestureGenerator;
+use super::model::BEST;
+use super::seq2seq::SequenceGenerator;
+use super::seq2seq::architecture::Architecture;
+use super::seq2seq::metadata::is_sequence;
+use crate::formats::transcript::Word;
+use crate::types::pose3d::Motion;
+use crate::types::sound::Sound;
+use crate::types::time::FrameRate;
+use anyhow::Result;
+use std::path::Path;
+
+/// Checkpoint of `orator train gan` or of `orator train seq2seq`.
+pub enum TrainedSpeaker {
+    Gan(Box<GestureGenerator>),
+    Sequence(Box<SequenceGenerator>),
+}
+
+impl TrainedSpeaker {
+    /// Opens a checkpoint, or the best one of a folder. Errors name the file.
+    pub fn open(path: &Path) -> Result<Self> {
+        let file = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
+        if file.is_file() && is_sequence(&file)? {
+            return Ok(Self::Sequence(Box::new(SequenceGenerator::open(path)?)));
+        }
+        Ok(Self::Gan(Box::new(GestureGenerator::open(path)?)))
+    }
+
+    /// Rate of the motion it makes.
+    pub fn fps(&self) -> FrameRate {
+        match self {
+            Self::Gan(speaker) => speaker.fps(),
+            Self::Sequence(speaker) => speaker.fps(),
+        }
+    }
+
+    /// Network of a sequence-to-sequence checkpoint.
+    pub fn architecture(&self) -> Option<Architecture> {
+        match self {
+            Self::Gan(_) => None,
+            Self::Sequence(speaker) => Some(speaker.metadata.architecture),
+        }
+    }
+
+    /// Whether it reads words.
+    pub fn reads_words(&self) -> bool {
+        self.architecture().is_some_and(|architecture| architecture.word_encoder().is_some())
+    }
+
+    /// Motion for a sound and what is said in it. Errors: sound too short or of another rate, or a speaker that moves a
+    /// captured skeleton.
+    pub fn motion(&self, sound: &Sound, words: &[Word]) -> Result<Motion> {
+        match self {
+            Self::Gan(speaker) => speaker.motion(sound),
+            Self::Sequence(speaker) => speaker.motion(&speaker.poses(sound, words)?),
+        }
+    }
+}
