@@ -102,8 +102,27 @@ fn off(own: &Tensor, expected: &[f64]) -> Result<f64> {
     Ok(own.iter().zip(expected).map(|(own, expected)| (own - expected).abs() / most).fold(0.0, f64::max))
 }
 
+/// Largest difference of a gradient (f64) and central differences, relative to 1 + |gradient|, of three numbers of a tensor.
+fn by_differences(var: &Var, gradient: &Tensor, objective: impl Fn() -> Result<f64>) -> Result<f64> {
+    const STEP: f64 = 1e-6;
+    let (values, gradient) = (var.flatten_all()?.to_vec1::<f64>()?, gradient.flatten_all()?.to_vec1::<f64>()?);
+    let mut worst = 0.0f64;
+    for i in [0, values.len() / 2, values.len() - 1] {
+        let at = |step: f64| -> Result<f64> {
+            let mut moved = values.clone();
+            moved[i] += step;
+            var.set(&Tensor::from_vec(moved, var.shape(), &Device::Cpu)?)?;
+            objective()
+        };
+        let difference = (at(STEP)? - at(-STEP)?) / (2.0 * STEP);
+        at(0.0)?;
+        worst = worst.max((gradient[i] - difference).abs() / (1.0 + difference.abs()));
+    }
+    Ok(worst)
+}
+
 /// Compares a network, `build` and `run` by their parts: outputs to 1e-5, gradients and running statistics to 1e-3 in f32,
-/// all to 1e-7 in f64.
+/// all to 1e-7 in f64; there gradients to 1e-5 with central differences too.
 fn compare<N>(
     name: &str,
     build: impl Fn(&mut Params) -> Result<N>,
@@ -133,6 +152,16 @@ fn compare<N>(
         for (own, var) in params.all().filter(|(own, _)| own.contains("running_")) {
             let off = off(var.as_tensor(), &golden.running[own])?;
             assert!(off < most_output, "{name} {dtype:?}: {own} {off:e}");
+        }
+        if dtype == DType::F64 {
+            let objective = || -> Result<f64> {
+                let y = run(&net, dtype, &mut Mode::Train(&mut ChaCha8Rng::seed_from_u64(0)))?;
+                (&y * pattern(y.dims(), 0.5)?)?.sum_all()?.to_scalar()
+            };
+            for (own, var) in params.trainables() {
+                let off = by_differences(var, gradients.get(var).unwrap(), objective)?;
+                assert!(off < 1e-5, "{name}: gradient of {own} is {off:e} off central differences");
+            }
         }
         eprintln!("{name} {dtype:?}: outputs {:.1e}, gradients {worst:.1e}", evaluated.max(trained));
     }
