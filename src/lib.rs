@@ -120,6 +120,7 @@ pub use dataset::{Dataset, Sample, Split};
 // Speech to motion.
 pub use external::ffmpeg::audio::read_sound;
 pub use generate::GestureGenerator;
+pub use nn::seq2seq::predict::StateAtSeams;
 pub use pipeline::batch::{BatchReport, SpeechBatch};
 
 // Motion to files for animation programs.

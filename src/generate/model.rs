@@ -107,10 +107,7 @@ pub fn load(path: &Path) -> Result<(SpeakerMetadata, Generator)> {
 
 fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {
     let kind = &contents.facts["speaker"]["kind"];
-    ensure!(
-        !is_sequence_kind(kind),
-        "it is one of `orator train seq2seq`, with which `orator generate --audio` alone speaks, one sound at a time"
-    );
+    ensure!(!is_sequence_kind(kind), "it is one of `orator train seq2seq`, with which `orator generate` speaks");
     ensure!(kind == KIND, "its kind is {kind}, this program reads {KIND:?}");
     let metadata: SpeakerMetadata =
         serde_json::from_value(contents.facts["speaker"].clone()).context("its facts are incomplete")?;

@@ -28,6 +28,19 @@ impl TrainedSpeaker {
         Ok(Self::Gan(Box::new(GestureGenerator::open(path)?)))
     }
 
+    /// The speaker's name.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Gan(speaker) => speaker.name(),
+            Self::Sequence(speaker) => &speaker.metadata.name,
+        }
+    }
+
+    /// Whether it moves a captured skeleton, which is written as .bvh alone.
+    pub fn is_captured(&self) -> bool {
+        matches!(self, Self::Sequence(speaker) if speaker.is_captured())
+    }
+
     /// Rate of the motion it makes.
     pub fn fps(&self) -> FrameRate {
         match self {

@@ -12,7 +12,7 @@ use orator::nn::ops::gradcheck::pattern;
 use orator::nn::params::Params;
 use orator::nn::seq2seq::config::{Config, Segment};
 use orator::nn::seq2seq::contextual::ContextSeq2Seq;
-use orator::nn::seq2seq::predict::{GesturePredictor, generate};
+use orator::nn::seq2seq::predict::{GesturePredictor, StateAtSeams, generate};
 use orator::nn::seq2seq::words::WordsSeq2Seq;
 use orator::stage::progress::Progress;
 use orator::train::optim::adam::{self, Adam};
@@ -146,7 +146,9 @@ impl Fixed {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
         let secs = (0..3).map(|_| {
             let start = Instant::now();
-            pool.install(|| generate(&*network, &audio, &one.previous, |_| Ok(one.words.clone())))?;
+            pool.install(|| {
+                generate(&*network, &audio, &one.previous, StateAtSeams::Renewed, |_| Ok(one.words.clone()))
+            })?;
             Ok(start.elapsed().as_secs_f64())
         });
         Ok(n_frames as f64 / FPS / median(secs.collect::<Result<_>>()?))

@@ -6,12 +6,12 @@ use crate::cli::confine::confine;
 use crate::cli::outputs::{is_same_file, names, next_output, outputs};
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
-use orator::generate::GestureGenerator;
-use orator::generate::seq2seq::SequenceGenerator;
 use orator::generate::seq2seq::metadata::is_sequence;
-use orator::pipeline::batch::motion_files::{checkpoint_file, model_lock, write_motion};
-use orator::pipeline::batch::sequence_files::write_sequence;
-use orator::pipeline::batch::{SpeechBatch, sounds};
+use orator::generate::trained::TrainedSpeaker;
+use orator::nn::seq2seq::predict::StateAtSeams;
+use orator::pipeline::batch::motion_files::{checkpoint_file, model_lock};
+use orator::pipeline::batch::spoken::{SegmentFacts, SpeechSource};
+use orator::pipeline::batch::{SpeechBatch, sounds, speaker, transcripts};
 use orator::stage::progress::Progress as _;
 use serde_json::json;
 use std::path::PathBuf;
@@ -23,10 +23,10 @@ use std::path::PathBuf;
 /// rotations, cm, y up, facing +z), .glb (a skinned avatar with the motion), .json (joints and rotations), .mp4 (a film
 /// of the figure with the sound).
 ///
-/// Many sounds at once: --audio-folder (everything that sounds below it) or --batch (a table, columns `audio`, `out` and
-/// `checkpoint`, of which the first is needed and paths count from the table's folder), with --out-folder and --format. What
-/// is there already from the same sound and checkpoint is not made again; a sound that fails does not stop the others
-/// (exit code 2).
+/// Many sounds at once: --audio-folder (everything that sounds below it) or --batch (a table, columns `audio`, `out`,
+/// `checkpoint` and `transcript`, of which the first is needed and paths count from the table's folder), with --out-folder
+/// and --format. What is there already from the same sound, transcript and checkpoint is not made again; a sound that fails
+/// does not stop the others (exit code 2).
 #[derive(clap::Args)]
 pub struct Args {
     /// A checkpoint of `orator train gan` or `orator train seq2seq`, or its folder (the best checkpoint, else the newest, is taken).
@@ -35,9 +35,13 @@ pub struct Args {
     /// The speech.
     #[arg(long, value_name = "FILE", required_unless_present_any = ["audio_folder", "batch"], requires = "out")]
     audio: Option<PathBuf>,
-    /// What is said in it, with times, for a network that reads words (.tsv, .json, .TextGrid, .ctm, .srt, .vtt).
-    #[arg(long, value_name = "FILE", requires = "audio")]
+    /// What is said in it, with times, for a network that reads words (.tsv, .json, .TextGrid, .ctm, .srt, .vtt). For many
+    /// sounds a folder of files with their names; left out, those beside the sounds are taken.
+    #[arg(long, value_name = "FILE|FOLDER")]
     transcript: Option<PathBuf>,
+    /// Let a sequence-to-sequence network keep its decoder's state from one segment to the next.
+    #[arg(long)]
+    carry_state: bool,
     /// What to write; may be given several times.
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "audio")]
     out: Vec<PathBuf>,
@@ -68,42 +72,36 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         ui.say(&format!("checkpoint {}", checkpoint.display()));
     }
     let _lock = model_lock(&checkpoint)?;
-    let (speaker, fps, written, seam_jump, is_captured) = if is_sequence(&checkpoint)? {
-        let speaker = SequenceGenerator::open(&checkpoint)?;
-        let (written, jump) = write_sequence(&speaker, audio, args.transcript.as_deref(), &outputs, ui)?;
-        (speaker.metadata.name.clone(), speaker.fps(), written, Some(jump), speaker.is_captured())
-    } else {
-        ensure!(args.transcript.is_none(), "{} reads no words: leave out --transcript", checkpoint.display());
-        let speaker = GestureGenerator::open(&checkpoint)?;
-        let written = write_motion(&speaker, audio, &outputs, ui)?;
-        (speaker.name().to_owned(), speaker.fps(), written, None, false)
-    };
+    let trained = TrainedSpeaker::open(&checkpoint)?;
+    let source = SpeechSource { audio, transcript: args.transcript.as_deref(), seams: seams(args.carry_state) };
+    let written = speaker::write(&trained, &source, &outputs, ui)?;
     let speed = written.secs / written.motion_secs.max(1e-6);
     let names = names(&outputs);
     let note = written.note.as_ref().map_or(String::new(), |note| format!("note: {note}\n"));
-    let seams = seam_jump.map_or(String::new(), |[raw, smoothed]| {
-        format!("mean step over a seam of segments / elsewhere: {raw:.2} generated, {smoothed:.2} smoothed\n")
-    });
     let text = format!(
-        "{:.1} s of speech, {} frames of {speaker} at {fps}, {speed:.0} x real time\n{note}{seams}wrote {}",
+        "{:.1} s of speech, {} frames of {} at {}, {speed:.0} x real time\n{note}{}wrote {}",
         written.secs,
         written.n_frames,
+        trained.name(),
+        trained.fps(),
+        written.segments.as_ref().map(segments).unwrap_or_default(),
         names.join(", ")
     );
     let said = args.transcript.as_ref().map_or(String::new(), |path| format!(" --transcript {}", path.display()));
+    let carried = if args.carry_state { " --carry-state" } else { "" };
     // A captured skeleton is written as .bvh alone.
-    let next = next_output(&outputs).filter(|_| !is_captured).map(|out| {
+    let next = next_output(&outputs).filter(|_| !trained.is_captured()).map(|out| {
         let (checkpoint, audio, out) = (given.display(), audio.display(), out.display());
-        format!("orator generate --checkpoint {checkpoint} --audio {audio}{said} --out {out}")
+        format!("orator generate --checkpoint {checkpoint} --audio {audio}{said}{carried} --out {out}")
     });
     let facts = json!({
         "audio_secs": written.secs,
         "n_frames": written.n_frames,
-        "fps": fps,
+        "fps": trained.fps(),
         "times_real_time": speed,
         "checkpoint": checkpoint,
-        "speaker": speaker,
-        "seam_jump": seam_jump,
+        "speaker": trained.name(),
+        "segments": written.segments,
         "outputs": names,
         "note": written.note,
         "next": next,
@@ -112,13 +110,38 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
+/// Lines on seams, and on the words that were read.
+fn segments(facts: &SegmentFacts) -> String {
+    let SegmentFacts { state, seam_jump: [raw, smoothed], other_seam_jump: [other_raw, other_smoothed], words } = facts;
+    let other = match state {
+        StateAtSeams::Renewed => "with --carry-state",
+        StateAtSeams::Carried => "without --carry-state",
+    };
+    let known = words
+        .map_or(String::new(), |[n, n_known]| format!("{n_known} of {n} words of the transcript were trained with\n"));
+    format!(
+        "{known}mean step over a seam of segments / elsewhere: {raw:.2} generated, {smoothed:.2} smoothed \
+         ({other} {other_raw:.2}, {other_smoothed:.2})\n"
+    )
+}
+
+fn seams(carry_state: bool) -> StateAtSeams {
+    if carry_state { StateAtSeams::Carried } else { StateAtSeams::Renewed }
+}
+
 /// The batch that the arguments describe.
 fn batch(args: Args) -> Result<SpeechBatch> {
     let folder = args.out_folder.context("give --out-folder, where the motions go")?;
-    let sounds = match (&args.batch, &args.audio_folder) {
+    let mut sounds = match (&args.batch, &args.audio_folder) {
         (Some(table), _) => sounds::of_table(table)?,
         (None, Some(sounds)) => sounds::of_folder(sounds, &folder)?,
         (None, None) => bail!("give --audio, --audio-folder or --batch"),
     };
-    Ok(SpeechBatch { sounds, folder, formats: args.format, checkpoint: args.checkpoint, again: args.again })
+    if let (Some(_), Some(checkpoint)) = (&args.transcript, &args.checkpoint) {
+        let is_sequence = is_sequence(&checkpoint_file(checkpoint)?)?;
+        ensure!(is_sequence, "{} reads no words: leave out --transcript", checkpoint.display());
+    }
+    transcripts::find(&mut sounds, args.transcript.as_deref())?;
+    let (formats, checkpoint, again) = (args.format, args.checkpoint, args.again);
+    Ok(SpeechBatch { sounds, folder, formats, checkpoint, seams: seams(args.carry_state), again })
 }

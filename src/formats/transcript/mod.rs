@@ -10,5 +10,5 @@ pub mod transcript;
 pub mod tsv;
 pub mod word;
 
-pub use transcript::{ENDINGS, Transcript};
+pub use transcript::{ENDINGS, Transcript, after_end};
 pub use word::{Word, WordSource};

@@ -98,6 +98,20 @@ impl Transcript {
     }
 }
 
+/// Note on words that begin after the end of a sound of `sound_secs`.
+pub fn after_end(words: &[Word], sound_secs: f64) -> Option<String> {
+    let mut outside = words.iter().filter(|word| word.start_secs >= sound_secs);
+    let first = outside.next()?;
+    Some(format!(
+        "{} of {} words are said after the end of the sound ({sound_secs:.2} s), the first `{}` at {:.2} s: is it the \
+         transcript of another sound?",
+        1 + outside.count(),
+        words.len(),
+        first.word,
+        first.start_secs
+    ))
+}
+
 /// Note on words that begin before the end of the one before.
 fn overlaps(words: &[Word]) -> Option<String> {
     let over = |pair: &[Word]| pair[0].end_secs - pair[1].start_secs;

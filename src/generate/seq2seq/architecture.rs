@@ -69,12 +69,14 @@ impl Architecture {
         matches!(self, Self::Contextual | Self::Words).then_some("word_encoder")
     }
 
-    /// Words of a segment whose first predicted pose is `first`: one row a pose, one row, or no row.
+    /// Words of a segment whose first predicted pose is `first`: one row a pose, one row, or no row. `said` in the order of
+    /// beginnings.
     pub fn words(self, said: &[NumberedWord], first: usize, predicted: usize, fps: FrameRate) -> Vec<Vec<u32>> {
         let within = |start: f64, end: f64| {
-            let is_inside =
-                |word: &&NumberedWord| word.start_secs >= start - ROUNDING_SECS && word.end_secs <= end + ROUNDING_SECS;
-            said.iter().filter(is_inside).map(|word| word.number).collect::<Vec<u32>>()
+            let (start, end) = (start - ROUNDING_SECS, end + ROUNDING_SECS);
+            let first = said.partition_point(|word| word.start_secs < start);
+            let begun = said[first..].iter().take_while(|word| word.start_secs <= end);
+            begun.filter(|word| word.end_secs <= end).map(|word| word.number).collect::<Vec<u32>>()
         };
         match self {
             Self::Contextual => (first..first + predicted)

@@ -3,11 +3,12 @@
 use super::metadata::{self, SequenceMetadata};
 use super::poses::PoseNumbers;
 use super::sound;
+use super::vocabulary::NumberedWord;
 use crate::formats::bvh::exponential_maps::smooth;
 use crate::formats::transcript::Word;
 use crate::generate::model::BEST;
 use crate::nn::seq2seq::config::Config;
-use crate::nn::seq2seq::predict::{GesturePredictor, generate};
+use crate::nn::seq2seq::predict::{GesturePredictor, StateAtSeams, generate};
 use crate::types::pose3d::Motion;
 use crate::types::sound::Sound;
 use crate::types::time::FrameRate;
@@ -21,6 +22,14 @@ pub struct SequenceGenerator {
     /// What the checkpoint says of it.
     pub metadata: SequenceMetadata,
     network: Box<dyn GesturePredictor>,
+}
+
+/// A sound and what is said in it, as a network hears and reads them.
+pub struct HeardSpeech {
+    n_frames: usize,
+    /// Cepstra [1, n predicted + context - 1, 26].
+    audio: Tensor,
+    said: Vec<NumberedWord>,
 }
 
 /// Poses for a sound.
@@ -52,6 +61,11 @@ impl SequenceGenerator {
         matches!(self.metadata.poses, PoseNumbers::Captured(_))
     }
 
+    /// Whether it reads words, not sound alone.
+    pub fn reads_words(&self) -> bool {
+        self.metadata.architecture.word_encoder().is_some()
+    }
+
     /// Whole frames that fit into a sound of so many samples. Errors when there is none.
     pub fn n_frames(&self, n_samples: usize) -> Result<usize> {
         let secs = n_samples as f64 / f64::from(self.metadata.rate);
@@ -60,34 +74,48 @@ impl SequenceGenerator {
         Ok(n_frames)
     }
 
-    /// Poses for a sound at `metadata.rate` and what is said in it, which may be nothing. The first segment goes on from the
-    /// mean pose; the sound is filled up with silence to whole segments.
+    /// What the network hears of a sound at `metadata.rate` and reads of what is said in it, which may be nothing. The sound
+    /// is filled up with silence to whole segments.
     ///
     /// # Errors
-    /// Sound of another rate or shorter than a frame; a network that makes numbers that are not finite.
-    pub fn poses(&self, sound: &Sound, words: &[Word]) -> Result<GeneratedPoses> {
-        let SequenceMetadata { rate, architecture, .. } = self.metadata;
+    /// Sound of another rate or shorter than a frame.
+    pub fn hear(&self, sound: &Sound, words: &[Word]) -> Result<HeardSpeech> {
+        let rate = self.metadata.rate;
         ensure!(sound.rate == rate, "the sound has {} Hz, expected {rate}", sound.rate);
         let n_frames = self.n_frames(sound.samples.len())?;
-        let Config { pose, previous, predicted, context, .. } = *self.network.config();
-        let n_padded = n_frames.div_ceil(predicted) * predicted;
-        let heard = sound::features(sound, self.fps(), n_frames, n_padded, context);
+        let Config { predicted, context, .. } = *self.network.config();
+        let heard = sound::features(sound, self.fps(), n_frames, n_frames.next_multiple_of(predicted), context);
         let shape = (1, heard.nrows(), heard.ncols());
-        let heard = Tensor::from_iter(heard.iter().copied(), &Device::Cpu)?.reshape(shape)?;
+        let audio = Tensor::from_iter(heard.iter().copied(), &Device::Cpu)?.reshape(shape)?;
+        Ok(HeardSpeech { n_frames, audio, said: self.metadata.vocabulary.numbered(words) })
+    }
+
+    /// Poses for what was heard. The first segment goes on from the mean pose.
+    ///
+    /// # Errors
+    /// A network that makes numbers that are not finite.
+    pub fn speak(&self, speech: &HeardSpeech, seams: StateAtSeams) -> Result<GeneratedPoses> {
+        let architecture = self.metadata.architecture;
+        let HeardSpeech { n_frames, audio, said } = speech;
+        let Config { pose, previous, predicted, .. } = *self.network.config();
         let start = Tensor::zeros((1, previous, pose), DType::F32, &Device::Cpu)?;
-        let said = self.metadata.vocabulary.numbered(words);
-        let words = |i| architecture.words_tensor(&[architecture.words(&said, i * predicted, predicted, self.fps())]);
-        let made = generate(&*self.network, &heard, &start, words)?.flatten_all()?.to_vec1::<f32>()?;
+        let words = |i| architecture.words_tensor(&[architecture.words(said, i * predicted, predicted, self.fps())]);
+        let made = generate(&*self.network, audio, &start, seams, words)?.flatten_all()?.to_vec1::<f32>()?;
         ensure!(
             made.iter().all(|number| number.is_finite()),
             "the network makes numbers that are not finite: its checkpoint was damaged, or its training failed"
         );
-        let made = Array2::from_shape_vec((n_padded, pose), made)?;
-        let mut numbers = made.slice(s![..n_frames, ..]).to_owned();
+        let made = Array2::from_shape_vec((made.len() / pose, pose), made)?;
+        let mut numbers = made.slice(s![..*n_frames, ..]).to_owned();
         let raw = seam_jump(numbers.view(), predicted);
         smooth(&mut numbers);
         let smoothed = seam_jump(numbers.view(), predicted);
         Ok(GeneratedPoses { numbers, seam_jump: [raw, smoothed] })
+    }
+
+    /// Poses for a sound, `hear` and then `speak` with the state renewed at seams.
+    pub fn poses(&self, sound: &Sound, words: &[Word]) -> Result<GeneratedPoses> {
+        self.speak(&self.hear(sound, words)?, StateAtSeams::Renewed)
     }
 
     /// Motion of the 49 joints. Errors where it learnt a captured skeleton.

@@ -54,14 +54,21 @@ impl Vocabulary {
         self.words.binary_search(&plain(word)).map_or(UNKNOWN, |at| (N_SPECIAL + at) as u32)
     }
 
-    /// Numbers of words with their times.
+    /// Numbers of words with their times, in the order of beginnings.
     pub fn numbered(&self, words: &[Word]) -> Vec<NumberedWord> {
         let number = |word: &Word| NumberedWord {
             number: self.number(&word.word),
             start_secs: word.start_secs,
             end_secs: word.end_secs,
         };
-        words.iter().map(number).collect()
+        let mut said: Vec<NumberedWord> = words.iter().map(number).collect();
+        said.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+        said
+    }
+
+    /// Count of the words that were trained with.
+    pub fn n_known(&self, words: &[Word]) -> usize {
+        words.iter().filter(|word| self.number(&word.word) != UNKNOWN).count()
     }
 }
 

@@ -33,14 +33,9 @@ impl ContextSeq2Seq {
             config: config.clone(),
         })
     }
-}
 
-impl GesturePredictor for ContextSeq2Seq {
-    fn config(&self) -> &Config {
-        &self.config
-    }
-
-    fn forward(&self, segment: &Segment, mode: &mut Mode) -> Result<Tensor> {
+    /// States over the frames of the segment.
+    fn encoded(&self, segment: &Segment, mode: &mut Mode) -> Result<Tensor> {
         self.config.check(segment)?;
         let Some(words) = &segment.words else { candle_core::bail!("this network reads the words around each pose") };
         let (batch, n_frames, n_words) = words.dims3()?;
@@ -51,7 +46,23 @@ impl GesturePredictor for ContextSeq2Seq {
         let said = self.words.last(&words.reshape((batch * n_frames, n_words))?)?.relu()?;
         let frames = self.linear.forward(&Tensor::cat(&[heard, said], 1)?)?;
         let frames = frames.reshape((batch, n_frames, self.config.hidden))?;
-        let encoded = self.gru.forward(&frames, self.config.dropout, mode)?;
+        self.gru.forward(&frames, self.config.dropout, mode)
+    }
+}
+
+impl GesturePredictor for ContextSeq2Seq {
+    fn config(&self) -> &Config {
+        &self.config
+    }
+
+    fn forward(&self, segment: &Segment, mode: &mut Mode) -> Result<Tensor> {
+        let encoded = self.encoded(segment, mode)?;
         self.decoder.forward(segment, &[encoded], mode)
+    }
+
+    fn go_on(&self, segment: &Segment, state: Option<&Tensor>) -> Result<(Tensor, Option<Tensor>)> {
+        let encoded = self.encoded(segment, &mut Mode::Eval)?;
+        let (poses, state) = self.decoder.go_on(segment, &[encoded], state)?;
+        Ok((poses, Some(state)))
     }
 }

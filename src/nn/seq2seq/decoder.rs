@@ -41,16 +41,64 @@ impl Decoder {
     /// Poses [B, predicted, pose] after those of the segment. `encoded`: sequences [B, K, n]; the first is the sound, whose
     /// forward state at its end and backward state at its beginning make the first state.
     pub fn forward(&self, segment: &Segment, encoded: &[Tensor], mode: &mut Mode) -> Result<Tensor> {
+        self.decode(&segment.previous, &self.first_state(encoded)?, encoded, mode)
+    }
+
+    /// Poses as those of `forward`, nothing dropped, and the state [B, hidden] that has read all of them but the last.
+    /// `state`: that of the segment before, which takes the place of the first state and of all previous poses but the last.
+    pub fn go_on(&self, segment: &Segment, encoded: &[Tensor], state: Option<&Tensor>) -> Result<(Tensor, Tensor)> {
+        let n_previous = segment.previous.dim(1)?;
+        let last = segment.previous.narrow(1, n_previous - 1, 1)?.contiguous()?;
+        let (previous, state) = match state {
+            Some(state) => (last.clone(), state.clone()),
+            None => (segment.previous.clone(), self.first_state(encoded)?),
+        };
+        let poses = self.decode(&previous, &state, encoded, &mut Mode::Eval)?;
+        let read = Tensor::cat(&[&previous, &last, &poses.narrow(1, 0, self.n_steps - 1)?], 1)?;
+        let state = self.gru.state_after(&read, &state)?;
+        Ok((poses, state))
+    }
+
+    fn first_state(&self, encoded: &[Tensor]) -> Result<Tensor> {
         let Some(sound) = encoded.first() else { candle_core::bail!("a decoder without encoder") };
         let (_, n, both) = sound.dims3()?;
         let end = sound.narrow(1, n - 1, 1)?.narrow(2, 0, both / 2)?;
         let beginning = sound.narrow(1, 0, 1)?.narrow(2, both / 2, both / 2)?;
-        let state = self.init.forward(&Tensor::cat(&[end, beginning], 2)?.squeeze(1)?)?;
+        self.init.forward(&Tensor::cat(&[end, beginning], 2)?.squeeze(1)?)
+    }
+
+    fn decode(&self, previous: &Tensor, state: &Tensor, encoded: &[Tensor], mode: &mut Mode) -> Result<Tensor> {
         let keys = self.attentions.iter().zip(encoded).map(|(attention, states)| attention.forward(states));
         let keys = keys.collect::<Result<Vec<_>>>()?;
-        let inputs = DecoderInputs { previous: &segment.previous, state: &state, keys: &keys };
+        let inputs = DecoderInputs { previous, state, keys: &keys };
         let gru = self.gru.flat_weights()?;
         let weights = DecoderWeights { gru: &gru, weight: self.output.weight(), bias: self.output.bias() };
         decode(&inputs, &weights, self.n_steps, drop_mask(self.dropout, mode))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nn::ops::gradcheck::pattern;
+
+    #[test]
+    fn a_carried_state_is_that_of_all_poses_since_the_first_state() -> Result<()> {
+        let config = Config { pose: 3, hidden: 4, previous: 5, predicted: 6, ..Config::default() };
+        let decoder = Decoder::new(&mut Params::with_dtype(1, candle_core::DType::F64), "decoder", &config, &[8], 0.0)?;
+        let encoded = [pattern(&[2, 6, 8], 0.0)?];
+        let segment = |previous: Tensor| Segment { audio: encoded[0].clone(), previous, words: None };
+        let first = segment(pattern(&[2, 5, 3], 1.0)?);
+        let (made, state) = decoder.go_on(&first, &encoded, None)?;
+        let apart = |a: &Tensor, b: &Tensor| (a - b)?.abs()?.max_all()?.to_scalar::<f64>();
+        assert!(apart(&made, &decoder.forward(&first, &encoded, &mut Mode::Eval)?)? < 1e-12);
+        let (carried, _) = decoder.go_on(&segment(made.narrow(1, 1, 5)?), &encoded, Some(&state))?;
+        // The first pose is read twice, as the last pose before any segment is.
+        let read = Tensor::cat(&[&first.previous, &first.previous.narrow(1, 4, 1)?, &made], 1)?;
+        let whole = decoder.decode(&read, &decoder.first_state(&encoded)?, &encoded, &mut Mode::Eval)?;
+        assert!(apart(&carried, &whole)? < 1e-12);
+        let renewed = decoder.forward(&segment(made.narrow(1, 1, 5)?), &encoded, &mut Mode::Eval)?;
+        assert!(apart(&carried, &renewed)? > 1e-6);
+        Ok(())
     }
 }

@@ -49,3 +49,30 @@ pub fn set_word_vectors(params: &Params, name: &str, vectors: &Tensor) -> Result
         None => candle_core::bail!("this network has no tensor {table}"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use candle_core::Device;
+
+    #[test]
+    fn vectors_are_set_for_the_encoder_that_is_named_and_for_its_words_alone() -> Result<()> {
+        let mut params = Params::new(1);
+        let encoder = WordEncoder::new(&mut params, "said", [3, 2, 4])?;
+        let states = |word: u32| encoder.last(&Tensor::new(&[[word]], &Device::Cpu)?)?.flatten_all()?.to_vec1::<f32>();
+        let before = states(1)?;
+        let vectors = Tensor::new(&[[0f64, 0.0], [1.0, 1.0], [0.5, -2.0]], &Device::Cpu)?;
+        set_word_vectors(&params, "said", &vectors)?;
+        let table = params.trainables().find(|(name, _)| *name == "said.embedding.weight").map(|(_, var)| var);
+        assert_eq!(
+            table.map(|var| var.to_vec2::<f32>()).transpose()?,
+            Some(vec![vec![0.0; 2], vec![1.0; 2], vec![0.5, -2.0]])
+        );
+        assert!(states(1)? != before && states(1)? != states(2)?);
+        for (name, shape) in [("heard", (3, 2)), ("said", (2, 2)), ("said", (3, 3)), ("said", (2, 3))] {
+            assert!(set_word_vectors(&params, name, &Tensor::zeros(shape, vectors.dtype(), &Device::Cpu)?).is_err());
+        }
+        assert!(encoder.last(&Tensor::new(&[[3u32]], &Device::Cpu)?).is_err());
+        Ok(())
+    }
+}

@@ -40,14 +40,9 @@ impl WordsSeq2Seq {
             config: config.clone(),
         })
     }
-}
 
-impl GesturePredictor for WordsSeq2Seq {
-    fn config(&self) -> &Config {
-        &self.config
-    }
-
-    fn forward(&self, segment: &Segment, mode: &mut Mode) -> Result<Tensor> {
+    /// States of the sound, and of the words where they are read.
+    fn encoded(&self, segment: &Segment, mode: &mut Mode) -> Result<Vec<Tensor>> {
         self.config.check(segment)?;
         let mut encoded = vec![self.encoder.forward(&segment.audio, mode)?];
         match (&self.words, &segment.words) {
@@ -57,6 +52,23 @@ impl GesturePredictor for WordsSeq2Seq {
                 candle_core::bail!("this network reads {} words", if reads.is_some() { "a segment's" } else { "no" })
             }
         }
+        Ok(encoded)
+    }
+}
+
+impl GesturePredictor for WordsSeq2Seq {
+    fn config(&self) -> &Config {
+        &self.config
+    }
+
+    fn forward(&self, segment: &Segment, mode: &mut Mode) -> Result<Tensor> {
+        let encoded = self.encoded(segment, mode)?;
         self.decoder.forward(segment, &encoded, mode)
+    }
+
+    fn go_on(&self, segment: &Segment, state: Option<&Tensor>) -> Result<(Tensor, Option<Tensor>)> {
+        let encoded = self.encoded(segment, &mut Mode::Eval)?;
+        let (poses, state) = self.decoder.go_on(segment, &encoded, state)?;
+        Ok((poses, Some(state)))
     }
 }

@@ -2,6 +2,7 @@
 
 use super::sounds::BatchSound;
 use super::stage::BatchStage;
+use crate::nn::seq2seq::predict::StateAtSeams;
 use crate::stage::fingerprint::HashCache;
 use crate::stage::progress::Progress;
 use crate::stage::runner::StageOutcome;
@@ -25,6 +26,8 @@ pub struct SpeechBatch {
     pub formats: Vec<String>,
     /// A checkpoint or a training's folder, for sounds that name none.
     pub checkpoint: Option<PathBuf>,
+    /// What sequence-to-sequence networks begin a segment with.
+    pub seams: StateAtSeams,
     /// Whether motions are made again where nothing changed.
     pub again: bool,
 }
@@ -56,7 +59,7 @@ pub struct BatchOutcome {
     /// Of a failure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// `secs` of sound, `n_frames` of motion, `speaker`, `note`; empty of a failure.
+    /// `secs` of sound, `n_frames` of motion, `speaker`, `note`, of segments `segments`; empty of a failure.
     #[serde(flatten)]
     pub facts: Map<String, Value>,
 }
@@ -80,7 +83,7 @@ impl SpeechBatch {
     /// What stops all: a format that is unknown, a common checkpoint that cannot be read, another batch in the same
     /// folder.
     pub fn run(&self, progress: &dyn Progress) -> Result<BatchReport> {
-        let stage = BatchStage::new(&self.sounds, &self.formats, &self.folder, self.checkpoint.as_deref())?;
+        let stage = BatchStage::new(&self.sounds, &self.formats, &self.folder, self.checkpoint.as_deref(), self.seams)?;
         let records = self.folder.join(RECORDS);
         let _lock = workdir::lock(&records)?;
         let hashes = HashCache::open(&artifacts::hashes(&records));

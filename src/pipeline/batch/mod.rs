@@ -5,6 +5,9 @@ pub mod job;
 pub mod motion_files;
 pub mod sequence_files;
 pub mod sounds;
+pub mod speaker;
+pub mod spoken;
 pub mod stage;
+pub mod transcripts;
 
 pub use job::{BatchOutcome, BatchReport, BatchState, SpeechBatch};

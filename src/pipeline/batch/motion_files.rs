@@ -1,6 +1,7 @@
 //! One sound to motion to files. The sound is streamed, so that its length takes no memory but for its motion; only a film,
 //! which holds the sound, reads it whole.
 
+use super::spoken::SpokenMotion;
 use crate::animate::export::file::{ExportContent, ExportFormat};
 use crate::animate::{AnimationOptions, perform};
 use crate::audio::mel;
@@ -19,19 +20,6 @@ use crate::types::sound::SAMPLE_RATE;
 use anyhow::{Context as _, Result, ensure};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-
-/// A sound whose motion was written.
-#[derive(Clone, Debug)]
-pub struct SpokenMotion {
-    /// Seconds of sound.
-    pub secs: f64,
-    /// Frames of motion.
-    pub n_frames: usize,
-    /// Seconds it took to make the motion, files not counted.
-    pub motion_secs: f64,
-    /// What a user should know of the sound.
-    pub note: Option<String>,
-}
 
 /// The checkpoint file meant by a file or a training's folder: its best, else its newest.
 ///
@@ -80,7 +68,7 @@ pub fn write_motion(
     drop(task);
     let motion_secs = started.elapsed().as_secs_f64();
     write_outputs(motion, audio, outputs, progress)?;
-    Ok(SpokenMotion { secs, n_frames, motion_secs, note })
+    Ok(SpokenMotion { secs, n_frames, motion_secs, note, segments: None })
 }
 
 /// Writes motion for the sound `audio` to files of all formats.

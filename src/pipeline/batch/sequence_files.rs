@@ -1,28 +1,30 @@
 //! One sound, and where there is one its transcript, to motion by a sequence-to-sequence network, to files.
 
-use super::motion_files::{SpokenMotion, measure, write_outputs};
+use super::motion_files::{measure, write_outputs};
+use super::spoken::{SegmentFacts, SpeechSource, SpokenMotion};
 use crate::animate::export::file::ExportFormat;
 use crate::external::ffmpeg::audio;
-use crate::formats::transcript::Transcript;
+use crate::formats::transcript::{Transcript, after_end};
 use crate::generate::seq2seq::SequenceGenerator;
+use crate::nn::seq2seq::predict::StateAtSeams;
 use crate::stage::progress::Progress;
 use crate::stage::workdir;
 use anyhow::{Context as _, Result, bail};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Motion of a speaker for one sound, written to `outputs`; and the jump at the seams of its segments, as generated and
-/// smoothed. A network that learnt captures writes its own skeleton, as .bvh alone.
+/// Motion of a speaker for one sound, written to `outputs`. A network that learnt captures writes its own skeleton, as .bvh
+/// alone.
 ///
 /// # Errors
 /// A sound or transcript that cannot be read, a sound shorter than a frame, another format for a captured skeleton.
 pub fn write_sequence(
     speaker: &SequenceGenerator,
-    audio: &Path,
-    transcript: Option<&Path>,
+    speech: &SpeechSource,
     outputs: &[(PathBuf, ExportFormat)],
     progress: &dyn Progress,
-) -> Result<(SpokenMotion, [f64; 2])> {
+) -> Result<SpokenMotion> {
+    let &SpeechSource { audio, transcript, seams } = speech;
     let started = Instant::now();
     let is_captured = speaker.is_captured();
     if let Some((path, _)) = outputs.iter().find(|(_, format)| is_captured && *format != ExportFormat::Bvh) {
@@ -31,20 +33,55 @@ pub fn write_sequence(
             path.display()
         );
     }
-    let words = transcript.map(Transcript::read).transpose()?.unwrap_or_default().words;
+    let said = transcript.map(Transcript::read).transpose()?;
     let task = progress.begin("speech to motion", 0);
     measure(audio)?;
     let sound = audio::read_mono(audio, speaker.metadata.rate)?;
     let sound = sound.with_context(|| format!("{} has no sound", audio.display()))?;
-    let poses = speaker.poses(&sound, &words).with_context(|| format!("no motion for {}", audio.display()))?;
-    drop(task);
+    let words = said.as_ref().map_or(&[][..], |said| &said.words);
+    let no_motion = || format!("no motion for {}", audio.display());
+    let heard = speaker.hear(&sound, words).with_context(no_motion)?;
+    let poses = speaker.speak(&heard, seams).with_context(no_motion)?;
     let motion_secs = started.elapsed().as_secs_f64();
+    let other = match seams {
+        StateAtSeams::Renewed => StateAtSeams::Carried,
+        StateAtSeams::Carried => StateAtSeams::Renewed,
+    };
+    let other_seam_jump = speaker.speak(&heard, other).with_context(no_motion)?.seam_jump;
+    drop((task, heard));
     if is_captured {
         let text = speaker.bvh(&poses)?;
         outputs.iter().try_for_each(|(path, _)| workdir::write_file(path, text.as_bytes()))?;
     } else {
         write_outputs(speaker.motion(&poses)?, audio, outputs, progress)?;
     }
-    let n_frames = poses.numbers.nrows();
-    Ok((SpokenMotion { secs: sound.secs(), n_frames, motion_secs, note: None }, poses.seam_jump))
+    let known = said.as_ref().map(|said| [said.words.len(), speaker.metadata.vocabulary.n_known(&said.words)]);
+    let notes = transcript.zip(said).map(|(path, said)| notes(speaker, path, &said, sound.secs()));
+    Ok(SpokenMotion {
+        secs: sound.secs(),
+        n_frames: poses.numbers.nrows(),
+        motion_secs,
+        note: notes.filter(|notes| !notes.is_empty()).map(|notes| notes.join("; ")),
+        segments: Some(SegmentFacts {
+            state: seams,
+            seam_jump: poses.seam_jump,
+            other_seam_jump,
+            words: known.filter(|_| speaker.reads_words()),
+        }),
+    })
+}
+
+/// What a user should know of a transcript.
+fn notes(speaker: &SequenceGenerator, path: &Path, said: &Transcript, sound_secs: f64) -> Vec<String> {
+    if !speaker.reads_words() {
+        return vec![format!("the network reads no words: {} was not used", path.display())];
+    }
+    let is_unknown = !said.words.is_empty() && speaker.metadata.vocabulary.n_known(&said.words) == 0;
+    let unknown = is_unknown.then(|| {
+        format!(
+            "none of the {} words was trained with: is the transcript in the language of the training?",
+            said.words.len()
+        )
+    });
+    said.notes.iter().cloned().chain(after_end(&said.words, sound_secs)).chain(unknown).collect()
 }

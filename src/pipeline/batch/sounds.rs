@@ -22,6 +22,8 @@ pub struct BatchSound {
     pub name: String,
     /// The checkpoint, if it is not that of the command.
     pub checkpoint: Option<PathBuf>,
+    /// What is said in it, for a network that reads words.
+    pub transcript: Option<PathBuf>,
 }
 
 /// All that sounds below `folder`, each called as its file; where two would be called the same, with their endings. What is
@@ -53,12 +55,13 @@ pub fn of_folder(folder: &Path, out: &Path) -> Result<Vec<BatchSound>> {
             audio,
             name: if alone { stem(&file) } else { file.replacen('.', "_", usize::MAX) },
             checkpoint: None,
+            transcript: None,
         }
     });
     distinct(rows.collect())
 }
 
-/// The rows of the table `path`: columns `audio`, and if they are there `out` and `checkpoint` (or `speaker`). Paths count
+/// The rows of the table `path`: columns `audio`, and if they are there `out`, `checkpoint` (or `speaker`) and `transcript`. Paths count
 /// from the table's folder. Errors name the line.
 pub fn of_table(path: &Path) -> Result<Vec<BatchSound>> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
@@ -72,15 +75,16 @@ fn parse(text: &str, folder: &Path) -> Result<Vec<BatchSound>> {
     let heads = text.lines().next().unwrap_or_default();
     let comma = [',', ';', '\t'].into_iter().max_by_key(|c| heads.matches(*c).count()).filter(|c| heads.contains(*c));
     let mut lines = fields(text, comma.unwrap_or(','))?.into_iter();
-    let (_, heads) = lines.next().context("it is empty; its first line names the columns: audio,out,checkpoint")?;
+    let (_, heads) =
+        lines.next().context("it is empty; its first line names the columns: audio,out,checkpoint,transcript")?;
     let heads: Vec<String> = heads.iter().map(|head| head.trim().to_lowercase()).collect();
     for head in &heads {
-        let known = ["audio", "out", "checkpoint", "speaker"].contains(&head.as_str());
-        ensure!(known, "line 1: column `{head}` is unknown; expected audio, out, checkpoint");
+        let known = ["audio", "out", "checkpoint", "speaker", "transcript"].contains(&head.as_str());
+        ensure!(known, "line 1: column `{head}` is unknown; expected audio, out, checkpoint, transcript");
     }
     let column = |names: &[&str]| heads.iter().position(|head| names.contains(&head.as_str()));
     let audio = column(&["audio"]).context("line 1: there is no column `audio`")?;
-    let (out, checkpoint) = (column(&["out"]), column(&["checkpoint", "speaker"]));
+    let (out, checkpoint, transcript) = (column(&["out"]), column(&["checkpoint", "speaker"]), column(&["transcript"]));
     let mut rows = Vec::new();
     for (line, fields) in lines {
         let field = |at: Option<usize>| at.and_then(|at| fields.get(at)).map(|f| f.trim()).filter(|f| !f.is_empty());
@@ -96,6 +100,7 @@ fn parse(text: &str, folder: &Path) -> Result<Vec<BatchSound>> {
             audio: folder.join(file),
             name,
             checkpoint: field(checkpoint).map(|path| folder.join(path)),
+            transcript: field(transcript).map(|path| folder.join(path)),
         });
     }
     ensure!(!rows.is_empty(), "it names no sound");
@@ -157,11 +162,14 @@ mod tests {
             audio: PathBuf::from(audio),
             name: name.into(),
             checkpoint: checkpoint.map(PathBuf::from),
+            transcript: None,
         };
         let read = |text: &str| parse(text, Path::new("t")).unwrap();
         assert_eq!(read("audio\na.wav\n\nsub/b.mp3"), [row("t/a.wav", "a", None), row("t/sub/b.mp3", "b", None)]);
         let text = "\u{feff}Out;Audio;speaker\r\n\"take \"\"1\"\".bvh\";\"a;b.wav\";host\r\nx/y;/c.wav;\r\n";
         assert_eq!(read(text), [row("t/a;b.wav", "take \"1\"", Some("t/host")), row("/c.wav", "x/y", None)]);
+        let said = read("audio,transcript\na.wav,said.srt\nb.wav,\n").into_iter().map(|row| row.transcript);
+        assert_eq!(said.collect::<Vec<_>>(), [Some(PathBuf::from("t/said.srt")), None]);
     }
 
     #[test]

@@ -1,10 +1,14 @@
 //! The stage: one unit a sound, whose motion goes into the common folder in each of the formats.
 
-use super::motion_files::{checkpoint_file, model_lock, write_motion};
+use super::motion_files::{checkpoint_file, model_lock};
 use super::sounds::BatchSound;
+use super::speaker;
+use super::spoken::SpeechSource;
 use crate::animate::AnimationOptions;
 use crate::animate::export::file::ExportFormat;
-use crate::generate::GestureGenerator;
+use crate::generate::seq2seq::metadata::is_sequence;
+use crate::generate::trained::TrainedSpeaker;
+use crate::nn::seq2seq::predict::StateAtSeams;
 use crate::stage::progress::Progress;
 use crate::stage::workdir::FolderLock;
 use crate::stage::{Input, Report, Stage, Unit};
@@ -22,8 +26,10 @@ pub struct BatchStage {
     folder: PathBuf,
     /// Of the sounds that name none.
     checkpoint: Option<PathBuf>,
+    /// What sequence-to-sequence networks begin a segment with.
+    seams: StateAtSeams,
     /// The models in use, with the locks of their folders.
-    generators: Mutex<BTreeMap<PathBuf, (Arc<GestureGenerator>, FolderLock)>>,
+    speakers: Mutex<BTreeMap<PathBuf, (Arc<TrainedSpeaker>, FolderLock)>>,
 }
 
 impl BatchStage {
@@ -32,7 +38,13 @@ impl BatchStage {
     ///
     /// # Errors
     /// An ending that is unknown or named twice, a sound without a checkpoint, a `checkpoint` that cannot be read.
-    pub fn new(sounds: &[BatchSound], endings: &[String], folder: &Path, checkpoint: Option<&Path>) -> Result<Self> {
+    pub fn new(
+        sounds: &[BatchSound],
+        endings: &[String],
+        folder: &Path,
+        checkpoint: Option<&Path>,
+        seams: StateAtSeams,
+    ) -> Result<Self> {
         let checkpoint = checkpoint.map(checkpoint_file).transpose()?;
         if checkpoint.is_none()
             && let Some(sound) = sounds.iter().find(|sound| sound.checkpoint.is_none())
@@ -44,10 +56,11 @@ impl BatchStage {
             formats: formats(endings)?,
             folder: folder.to_owned(),
             checkpoint,
-            generators: Mutex::default(),
+            seams,
+            speakers: Mutex::default(),
         };
         // A common checkpoint that cannot be read fails all sounds, and does so before any.
-        stage.checkpoint.as_deref().map(|path| stage.generator(path)).transpose()?;
+        stage.checkpoint.as_deref().map(|path| stage.speaker(path)).transpose()?;
         Ok(stage)
     }
 
@@ -56,21 +69,31 @@ impl BatchStage {
         Unit { speaker: String::new(), video: sound.name.clone(), source: sound.audio.clone() }
     }
 
+    fn sound(&self, unit: &Unit) -> Result<&BatchSound> {
+        self.sounds.get(&unit.video).with_context(|| format!("{unit} is no sound of this batch"))
+    }
+
+    /// The transcript of a sound, which a sequence-to-sequence network alone reads.
+    fn transcript_of(&self, unit: &Unit) -> Result<Option<&Path>> {
+        let transcript = self.sound(unit)?.transcript.as_deref();
+        Ok(transcript.filter(|_| self.checkpoint_of(unit).and_then(|path| is_sequence(&path)).unwrap_or(false)))
+    }
+
     fn checkpoint_of(&self, unit: &Unit) -> Result<PathBuf> {
-        let sound = self.sounds.get(&unit.video).with_context(|| format!("{unit} is no sound of this batch"))?;
+        let sound = self.sound(unit)?;
         let own = sound.checkpoint.as_deref().map(checkpoint_file).transpose()?;
         own.or_else(|| self.checkpoint.clone()).context("no checkpoint is named")
     }
 
-    fn generator(&self, checkpoint: &Path) -> Result<Arc<GestureGenerator>> {
-        let mut generators = self.generators.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        if let Some((generator, _)) = generators.get(checkpoint) {
-            return Ok(generator.clone());
+    fn speaker(&self, checkpoint: &Path) -> Result<Arc<TrainedSpeaker>> {
+        let mut speakers = self.speakers.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        if let Some((speaker, _)) = speakers.get(checkpoint) {
+            return Ok(speaker.clone());
         }
         let lock = model_lock(checkpoint)?;
-        let generator = Arc::new(GestureGenerator::open(checkpoint)?);
-        generators.insert(checkpoint.to_owned(), (generator.clone(), lock));
-        Ok(generator)
+        let speaker = Arc::new(TrainedSpeaker::open(checkpoint)?);
+        speakers.insert(checkpoint.to_owned(), (speaker.clone(), lock));
+        Ok(speaker)
     }
 }
 
@@ -85,12 +108,18 @@ impl Stage for BatchStage {
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
         let endings: Vec<&str> = self.formats.iter().map(|(ending, _)| ending.as_str()).collect();
-        json!({ "formats": endings, "animation": format!("{:?}", AnimationOptions::default()) })
+        let mut settings = json!({ "formats": endings, "animation": format!("{:?}", AnimationOptions::default()) });
+        if self.seams != StateAtSeams::default() {
+            settings["state"] = json!(self.seams);
+        }
+        settings
     }
 
     fn inputs(&self, unit: &Unit) -> Result<Vec<Input>> {
         let input = |role: &str, path| Input { role: role.to_owned(), path };
-        Ok(vec![input("sound", unit.source.clone()), input("checkpoint", self.checkpoint_of(unit)?)])
+        let transcript = self.transcript_of(unit)?.map(|path| input("transcript", path.to_owned()));
+        let needed = [input("sound", unit.source.clone()), input("checkpoint", self.checkpoint_of(unit)?)];
+        Ok(needed.into_iter().chain(transcript).collect())
     }
 
     fn common_folder(&self) -> Option<&Path> {
@@ -98,7 +127,7 @@ impl Stage for BatchStage {
     }
 
     fn run(&self, unit: &Unit, out: &Path, progress: &dyn Progress) -> Result<Report> {
-        let generator = self.generator(&self.checkpoint_of(unit)?)?;
+        let speaker = self.speaker(&self.checkpoint_of(unit)?)?;
         let file = |ending: &str| format!("{}.{ending}", unit.video);
         for (ending, _) in &self.formats {
             let path = self.folder.join(file(ending));
@@ -107,10 +136,14 @@ impl Stage for BatchStage {
         }
         let outputs: Vec<(PathBuf, ExportFormat)> =
             self.formats.iter().map(|(ending, format)| (out.join(file(ending)), *format)).collect();
-        let written = write_motion(&generator, &unit.source, &outputs, progress)?;
-        let facts = json!({
-            "secs": written.secs, "n_frames": written.n_frames, "speaker": generator.name(), "note": written.note,
+        let source = SpeechSource { audio: &unit.source, transcript: self.transcript_of(unit)?, seams: self.seams };
+        let written = speaker::write(&speaker, &source, &outputs, progress)?;
+        let mut facts = json!({
+            "secs": written.secs, "n_frames": written.n_frames, "speaker": speaker.name(), "note": written.note,
         });
+        if let Some(segments) = &written.segments {
+            facts["segments"] = json!(segments);
+        }
         Ok(Report { line: String::new(), facts: facts.as_object().cloned().unwrap_or_default() })
     }
 }

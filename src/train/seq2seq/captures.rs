@@ -5,8 +5,9 @@ use crate::audio::mfcc;
 use crate::external::ffmpeg::{audio, probe};
 use crate::formats::bvh::exponential_maps::{ExponentialMaps, FPS, JointMapping};
 use crate::formats::bvh::read::Bvh;
-use crate::formats::transcript::{ENDINGS, Transcript};
+use crate::formats::transcript::{ENDINGS, Transcript, after_end};
 use crate::generate::seq2seq::sound;
+use crate::stage::fingerprint::hash_file;
 use crate::types::sound::Sound;
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Array2, s};
@@ -77,17 +78,18 @@ impl CaptureFolder {
         &self.dir
     }
 
-    /// Hash of the names, lengths and parts of the files.
+    /// Hash of the names, contents and parts of the files.
     pub fn hash(&self) -> Result<String> {
-        let mut hasher = blake3::Hasher::new();
-        for capture in &self.captures {
-            for path in [Some(&capture.bvh), Some(&capture.wav), capture.transcript.as_ref()].into_iter().flatten() {
-                let bytes = std::fs::metadata(path).with_context(|| format!("cannot read {}", path.display()))?.len();
+        let line = |capture: &Capture| -> Result<String> {
+            let files = [Some(&capture.bvh), Some(&capture.wav), capture.transcript.as_ref()].into_iter().flatten();
+            let line = |path: &PathBuf| {
                 let name = path.file_name().unwrap_or_default().to_string_lossy();
-                hasher.update(format!("{name} {bytes} {}\n", capture.is_held_out).as_bytes());
-            }
-        }
-        Ok(hasher.finalize().to_hex().to_string())
+                Ok(format!("{name} {} {}\n", hash_file(path)?, capture.is_held_out))
+            };
+            files.map(line).collect()
+        };
+        let lines = self.captures.par_iter().map(line).collect::<Result<String>>()?;
+        Ok(blake3::hash(lines.as_bytes()).to_hex().to_string())
     }
 
     /// The way from the motion of these captures to numbers, from those to train on.
@@ -102,21 +104,37 @@ impl CaptureFolder {
         let read = |capture: &Capture| Ok((capture.is_held_out, self.sequence(capture, maps, context)?));
         let all = self.captures.par_iter().map(read).collect::<Result<Vec<_>>>()?;
         let (held_out, train): (Vec<_>, Vec<_>) = all.into_iter().partition(|(is_held_out, _)| *is_held_out);
-        let plain = |part: Vec<(bool, PoseSequence)>| part.into_iter().map(|(_, sequence)| sequence).collect();
-        Ok(SequenceSplits { train: plain(train), held_out: plain(held_out) })
+        let mut notes = Vec::new();
+        let mut plain = |part: Vec<(bool, (PoseSequence, Vec<String>))>| {
+            let (part, of_files): (Vec<_>, Vec<_>) = part.into_iter().map(|(_, sequence)| sequence).unzip();
+            notes.extend(of_files.concat());
+            part
+        };
+        let (train, held_out) = (plain(train), plain(held_out));
+        Ok(SequenceSplits { train, held_out, notes })
     }
 
-    fn sequence(&self, capture: &Capture, maps: &ExponentialMaps, context: usize) -> Result<PoseSequence> {
+    /// A capture, and what is doubtful about its transcript.
+    fn sequence(
+        &self,
+        capture: &Capture,
+        maps: &ExponentialMaps,
+        context: usize,
+    ) -> Result<(PoseSequence, Vec<String>)> {
         let poses = maps.features(&Bvh::read(&capture.bvh)?).with_context(|| capture.bvh.display().to_string())?;
         let sound = read_sound(&capture.wav, self.rate)?;
         let n = poses.nrows().min(mfcc::n_poses(sound.samples.len(), sound.rate, FPS.per_sec()));
         let audio = sound::features(&sound, FPS, n, n, context);
-        let words = match &capture.transcript {
-            Some(path) => Transcript::read(path)?.words,
-            None => Vec::new(),
+        let Transcript { words, mut notes, .. } =
+            capture.transcript.as_deref().map(Transcript::read).transpose()?.unwrap_or_default();
+        notes.extend(after_end(&words, sound.secs()));
+        let named = |note: String| match &capture.transcript {
+            Some(path) => format!("{}: {note}", path.display()),
+            None => note,
         };
+        let notes = notes.into_iter().map(named).collect();
         let poses = poses.slice(s![..n, ..]).to_owned();
-        Ok(PoseSequence::new(poses, Array2::from_elem((n, maps.n_columns()), true), audio, words))
+        Ok((PoseSequence::new(poses, Array2::from_elem((n, maps.n_columns()), true), audio, words), notes))
     }
 }
 

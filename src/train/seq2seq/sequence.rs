@@ -20,6 +20,8 @@ pub struct PoseSequence {
 pub struct SequenceSplits {
     pub train: Vec<PoseSequence>,
     pub held_out: Vec<PoseSequence>,
+    /// What is doubtful about the data, a sentence each.
+    pub notes: Vec<String>,
 }
 
 impl PoseSequence {

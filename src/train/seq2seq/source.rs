@@ -88,7 +88,11 @@ impl TrainingSource<'_> {
         match (self, numbers) {
             (Self::Dataset(dataset), PoseNumbers::Joints { representation, .. }) => {
                 let of_split = |split| of_split(dataset, split, representation, context);
-                Ok(SequenceSplits { train: of_split(Split::Train)?, held_out: of_split(Split::Validation)? })
+                Ok(SequenceSplits {
+                    train: of_split(Split::Train)?,
+                    held_out: of_split(Split::Validation)?,
+                    notes: Vec::new(),
+                })
             }
             (Self::Captures(captures), PoseNumbers::Captured(maps)) => captures.sequences(maps, context),
             _ => bail!("the checkpoint is of the other kind of data; choose another --out"),

@@ -69,6 +69,15 @@ pub fn train(
     let (mut trainer, splits) = match &resumed {
         Some((stored, contents)) => {
             let SequenceMetadata { poses, network, .. } = &stored.speaker;
+            let other = vectors.filter(|vectors| vectors.dim() != network.word);
+            ensure!(
+                other.is_none(),
+                "the word vectors have {} numbers, the words of the checkpoint in {} {}: leave them out, or choose another \
+                 --out",
+                other.map_or(0, WordVectors::dim),
+                folder.display(),
+                network.word
+            );
             let splits = source.sequences(poses, network.context)?;
             let mut trainer = SequenceTrainer::new(stored.speaker.clone(), stored.settings.clone())?;
             trainer.load(stored, contents)?;
@@ -76,8 +85,17 @@ pub fn train(
             checkpoint::prune(folder, trainer.settings.keep_checkpoints)?;
             (trainer, splits)
         }
-        None => begin(source, vectors, requested)?,
+        None => {
+            let begun = begin(source, vectors, requested)?;
+            if let Some(vectors) = vectors {
+                let words = begun.0.metadata.vocabulary.words();
+                let n_known = vectors.n_known(words.iter().map(String::as_str));
+                progress.say(&format!("{n_known} of {} words begin with their vectors", words.len()));
+            }
+            begun
+        }
     };
+    splits.notes.iter().for_each(|note| progress.say(note));
     let train = SegmentLoader::new(splits.train, &trainer.metadata, trainer.settings.stride_frames);
     ensure!(
         !train.is_empty(),

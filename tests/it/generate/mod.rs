@@ -2,4 +2,5 @@
 
 pub mod generate;
 pub mod generate_batch;
+pub mod generate_sequence;
 pub mod generate_sounds;

@@ -1,13 +1,14 @@
 //! Training of the sequence-to-sequence networks end to end on made-up motion that follows the pitch of a tone: it learns,
 //! resumes exactly, and its checkpoints generate for sounds of any length.
 
-use crate::fixtures::animation::captures::{bvh, tone, write_capture};
+use crate::fixtures::animation::captures::{bvh, tone, write_capture, write_stereo};
 use crate::fixtures::faults::stop::{Shared, Stop, bytes};
 use crate::fixtures::gesture_dataset::{dataset, sample};
 use orator::config::{Seq2seqConfig, SequenceNetwork};
 use orator::formats::bvh::exponential_maps::JointMapping;
 use orator::formats::bvh::read::Bvh;
 use orator::formats::transcript::Transcript;
+use orator::formats::word_vectors::{WordVectors, glove};
 use orator::generate::model::BEST;
 use orator::generate::seq2seq::SequenceGenerator;
 use orator::stage::progress::Silent;
@@ -169,7 +170,78 @@ fn what_is_wrong_with_captures_names_the_file() {
     assert!(text.contains("b.bvh has no sound"), "{text}");
     let text = says("damaged-sound", &[], &|dir| std::fs::write(dir.join("b.wav"), "no sound").unwrap());
     assert!(text.contains("b.wav"), "{text}");
+    let other = |dir: &Path| {
+        ["a", "b"].map(|name| {
+            let file = dir.join(name).with_extension("bvh");
+            std::fs::write(&file, std::fs::read_to_string(&file).unwrap().replace("LeftHand", "LeftPaw")).unwrap();
+        })
+    };
+    let text = says("joint", &[], &|dir| drop(other(dir)));
+    assert!(text.contains("a.bvh") && text.contains("no joint LeftHand") && text.contains("LeftPaw"), "{text}");
+    let text = says("transcript", &[], &|dir| std::fs::write(dir.join("b.json"), "{").unwrap());
+    assert!(text.contains("b.json is no transcript"), "{text}");
+    let text = says("short", &[], &|dir| ["a", "b"].iter().for_each(|name| write_capture(dir, name, 1.0, 0.0, false)));
+    assert!(text.contains("no motion to train on is as long as a segment of 30 frames"), "{text}");
     let text = says("unknown", &["z"], &|_| ());
     assert!(text.contains("no z.bvh"), "{text}");
     assert!(says("all", &["a", "b"], &|_| ()).contains("none is left"));
+}
+
+/// What a training says.
+fn told(captures: &CaptureFolder, vectors: Option<&WordVectors>, out: &Path) -> anyhow::Result<String> {
+    let stop = Stop::at(u64::MAX);
+    let settings = settings(SequenceNetwork::Words);
+    train(TrainingSource::Captures(captures), vectors, &settings, out, &Shared(stop.clone()))?;
+    let said = stop.said.lock().unwrap().join("\n");
+    Ok(said)
+}
+
+#[test]
+fn doubtful_transcripts_and_vectors_are_said_and_changed_captures_noticed() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("captures");
+    write_capture(&dir, "a", 4.0, 0.0, true);
+    write_capture(&dir, "b", 3.0, 1.0, false);
+    // Stereo of 44.1 kHz beside mono of 16 kHz.
+    write_stereo(&dir.join("b.wav"), 3.0, 1.0);
+    let words = |n: usize, word: &str| -> String { (0..n).map(|t| format!("{t}.2\t{t}.7\t{word}\n")).collect() };
+    std::fs::write(dir.join("b.tsv"), words(9, "hello")).unwrap();
+    let table = |text: &str| {
+        let path = folder.path().join("vectors.safetensors");
+        glove::convert(text.as_bytes(), &path).unwrap();
+        WordVectors::open(&path)
+    };
+    let (open, out) = (|| open(&dir, &[]).unwrap(), |name: &str| folder.path().join(name));
+    let english = table("hello 1 2 3\nso 4 5 6\n").unwrap();
+    let said = told(&open(), Some(&english), &out("a")).unwrap();
+    let late = "b.tsv: 6 of 9 words are said after the end of the sound (3.00 s), the first `hello` at 3.20 s";
+    assert!(said.contains(late) && said.contains("1 of 2 words begin with their vectors"), "{said}");
+    assert_eq!(open().rate, 16_000);
+    assert!(SequenceGenerator::open(&out("a")).unwrap().metadata.vocabulary.words() == ["hello", "world"]);
+    let german = table("hallo 1 2\n").unwrap();
+    assert!(told(&open(), Some(&german), &out("b")).unwrap().contains("0 of 2 words begin with their vectors"));
+    let error = format!("{:#}", told(&open(), Some(&german), &out("a")).unwrap_err());
+    assert!(error.contains("have 2 numbers") && error.contains("the words of the checkpoint"), "{error}");
+    std::fs::write(folder.path().join("vectors.safetensors"), "cut").unwrap();
+    assert!(WordVectors::open(&folder.path().join("vectors.safetensors")).is_err());
+
+    // Empty, and a hundred thousand words.
+    for (text, note) in
+        [(String::new(), "b.tsv: the transcript holds no word"), (words(100_000, "hello"), "99997 of 100000")]
+    {
+        std::fs::write(dir.join("b.tsv"), text).unwrap();
+        let said = told(&open(), None, &out(&note.len().to_string())).unwrap();
+        assert!(said.contains(note), "{said}");
+    }
+
+    // Of the same length, other content.
+    std::fs::write(dir.join("b.tsv"), words(3, "hello")).unwrap();
+    told(&open(), None, &out("c")).unwrap();
+    assert!(!told(&open(), None, &out("c")).unwrap().contains("others now"));
+    std::fs::write(dir.join("b.tsv"), words(3, "hullo")).unwrap();
+    assert!(told(&open(), None, &out("c")).unwrap().contains("the data are others now"));
+    let file = dir.join("b.bvh");
+    std::fs::write(&file, std::fs::read_to_string(&file).unwrap().replace("LeftHand", "LeftPaw")).unwrap();
+    let error = format!("{:#}", told(&open(), None, &out("c")).unwrap_err());
+    assert!(error.contains("b.bvh") && error.contains("other joints"), "{error}");
 }

@@ -57,6 +57,12 @@ impl Gru {
         Tensor::cat(&self.weights.iter().map(Tensor::flatten_all).collect::<Result<Vec<_>>>()?, 0)
     }
 
+    /// The state [B, H] of a layer of one direction that goes on from `state` [B, H] over a sequence [B, T, I].
+    pub fn state_after(&self, x: &Tensor, state: &Tensor) -> Result<Tensor> {
+        let options = GruOptions { n_directions: 1, last: true, mask: None };
+        gru(x, &state.unsqueeze(0)?, &self.flat_weights()?, options)
+    }
+
     fn run(&self, x: &Tensor, last: bool, mask: Option<DropMask>) -> Result<Tensor> {
         let n_directions = self.weights.len() / 4;
         let first = Tensor::zeros((n_directions, x.dim(0)?, self.hidden), x.dtype(), x.device())?;
