@@ -37,7 +37,7 @@ pub struct SegmentFacts {
     pub state: StateAtSeams,
     /// Mean step over a seam as a share of the mean step elsewhere, as generated and smoothed, of the motion written.
     pub seam_jump: [f64; 2],
-    /// The same of the other way to begin segments.
+    /// As `seam_jump`, of segments begun in the other way.
     pub other_seam_jump: [f64; 2],
     /// Words of the transcript, and those of them that were trained with; `None`: no transcript was read.
     pub words: Option<[usize; 2]>,

@@ -22,6 +22,7 @@ fn folder() -> tempfile::TempDir {
         ("contextual", Architecture::Contextual),
         ("words", Architecture::Words),
         ("adversarial", Architecture::Adversarial),
+        ("autoencoder", Architecture::Autoencoder),
     ] {
         write_untrained_sequence(&dir.join(format!("{name}.safetensors")), architecture, true, &WORDS);
     }
@@ -88,7 +89,7 @@ fn words_are_heard_and_none_is_as_no_transcript() {
         };
         (0..n).map(word).collect()
     };
-    for network in ["contextual", "words", "adversarial"] {
+    for network in ["contextual", "words", "adversarial", "autoencoder"] {
         let speaker = SequenceGenerator::open(&folder.path().join(format!("{network}.safetensors"))).unwrap();
         let (sound, silence) = (tone(4.37, 0.0), Sound { rate: 16_000, samples: vec![0.0; 16_000 * 437 / 100] });
         let none = speaker.poses(&sound, &[]).unwrap().numbers;

@@ -171,12 +171,11 @@ fn what_is_wrong_with_captures_names_the_file() {
     let text = says("damaged-sound", &[], &|dir| std::fs::write(dir.join("b.wav"), "no sound").unwrap());
     assert!(text.contains("b.wav"), "{text}");
     let other = |dir: &Path| {
-        ["a", "b"].map(|name| {
-            let file = dir.join(name).with_extension("bvh");
+        for file in ["a.bvh", "b.bvh"].map(|name| dir.join(name)) {
             std::fs::write(&file, std::fs::read_to_string(&file).unwrap().replace("LeftHand", "LeftPaw")).unwrap();
-        })
+        }
     };
-    let text = says("joint", &[], &|dir| drop(other(dir)));
+    let text = says("joint", &[], &other);
     assert!(text.contains("a.bvh") && text.contains("no joint LeftHand") && text.contains("LeftPaw"), "{text}");
     let text = says("transcript", &[], &|dir| std::fs::write(dir.join("b.json"), "{").unwrap());
     assert!(text.contains("b.json is no transcript"), "{text}");
