@@ -23,6 +23,8 @@ pub struct Seq2seqConfig {
     pub lambda_adversarial: f64,
     /// Numbers of a state.
     pub hidden: usize,
+    /// Whether `words` and `adversarial` hear a GRU over the sound around a pose instead of that of the pose alone.
+    pub hears_context: bool,
     /// Steps in which `autoencoder` learns codes of poses, before it learns to hear them.
     pub autoencoder_steps: usize,
     pub seed: u64,
@@ -51,6 +53,7 @@ impl Default for Seq2seqConfig {
             lambda_reach: 1.0,
             lambda_adversarial: 0.01,
             hidden: 150,
+            hears_context: false,
             autoencoder_steps: 2_000,
             seed: 1337,
             epoch_steps: 250,

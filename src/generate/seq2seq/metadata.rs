@@ -57,7 +57,8 @@ impl SequenceMetadata {
         self.poses.check(fps)?;
         ensure!(self.vocabulary.is_sorted(), "its vocabulary is not sorted");
         let (pose, words) = (self.poses.n_numbers(), self.vocabulary.n_numbers());
-        let expected = network_config(fps, pose, words, [network.hidden, network.word]);
+        let sizes = network_config(fps, pose, words, [network.hidden, network.word]);
+        let expected = Config { hears_context: network.hears_context, ..sizes };
         ensure!(*network == expected, "its network has other sizes than this program's: {network:?}");
         Ok(())
     }

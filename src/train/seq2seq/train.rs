@@ -16,6 +16,7 @@ use crate::generate::seq2seq::architecture::{Architecture, network_config};
 use crate::generate::seq2seq::metadata::SequenceMetadata;
 use crate::generate::seq2seq::vocabulary::{PADDING, UNKNOWN, Vocabulary};
 use crate::nn::cpu::thread_team::with_spinning_workers;
+use crate::nn::seq2seq::config::Config;
 use crate::nn::seq2seq::embedding::set_word_vectors;
 use crate::stage::progress::Progress;
 use crate::stage::workdir::{self, FolderLock};
@@ -132,7 +133,10 @@ fn begin(
 ) -> Result<(SequenceTrainer, SequenceSplits)> {
     let (fps, poses) = (source.fps(), source.pose_numbers()?);
     let word = vectors.map_or(WORD, WordVectors::dim);
-    let sizes = |n_words| network_config(fps, poses.n_numbers(), n_words, [settings.hidden, word]);
+    let sizes = |n_words| Config {
+        hears_context: settings.hears_context,
+        ..network_config(fps, poses.n_numbers(), n_words, [settings.hidden, word])
+    };
     let splits = source.sequences(&poses, sizes(0).context)?;
     let architecture = architecture(settings.network);
     let vocabulary = match architecture.word_encoder() {

@@ -117,9 +117,12 @@ fn captures_with_and_without_words_speak_for_sounds_of_any_length() {
     write_capture(&dir, "b", 4.0, 2.0, false);
     write_capture(&dir, "c", 4.0, 4.0, true);
     let captures = open(&dir, &["c"]).unwrap();
-    for network in [SequenceNetwork::Contextual, SequenceNetwork::Words] {
-        let out = folder.path().join(format!("{network:?}"));
-        let outcome = train(TrainingSource::Captures(&captures), None, &settings(network), &out, &Silent).unwrap();
+    for (network, hears_context) in
+        [(SequenceNetwork::Contextual, false), (SequenceNetwork::Words, false), (SequenceNetwork::Words, true)]
+    {
+        let out = folder.path().join(format!("{network:?} {hears_context}"));
+        let settings = Seq2seqConfig { hears_context, ..settings(network) };
+        let outcome = train(TrainingSource::Captures(&captures), None, &settings, &out, &Silent).unwrap();
         assert_eq!((outcome.validation.split.as_str(), outcome.n_words), ("validation", 2));
         let speaker = SequenceGenerator::open(&out).unwrap();
         let words = Transcript::read(&dir.join("a.tsv")).unwrap().words;
