@@ -21,6 +21,8 @@ pub struct Seq2seqConfig {
     pub lambda_continuity: f64,
     pub lambda_reach: f64,
     pub lambda_adversarial: f64,
+    /// Share of the words of a segment that a step reads as unknown ones (word dropout, Iyyer et al. 2015).
+    pub word_dropout: f64,
     /// Numbers of a state.
     pub hidden: usize,
     /// Whether `words` and `adversarial` hear a GRU over the sound around a pose instead of that of the pose alone.
@@ -52,6 +54,7 @@ impl Default for Seq2seqConfig {
             lambda_continuity: 0.01,
             lambda_reach: 1.0,
             lambda_adversarial: 0.01,
+            word_dropout: 0.0,
             hidden: 150,
             hears_context: false,
             autoencoder_steps: 2_000,

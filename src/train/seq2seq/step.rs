@@ -9,15 +9,18 @@ use crate::formats::checkpoint::Contents;
 use crate::generate::model::BEST;
 use crate::generate::seq2seq::architecture::Architecture;
 use crate::generate::seq2seq::metadata::{NETWORK, SequenceMetadata};
+use crate::generate::seq2seq::vocabulary::{PADDING, UNKNOWN};
 use crate::nn::Mode;
 use crate::nn::params::Params;
 use crate::nn::seq2seq::adversarial::SegmentDiscriminator;
+use crate::nn::seq2seq::config::Segment;
 use crate::nn::seq2seq::predict::GesturePredictor;
 use crate::train::optim::adam;
 use crate::train::optim::adam::Adam;
 use crate::train::resume;
 use anyhow::{Context, Result, ensure};
 use candle_core::Tensor;
+use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
@@ -133,7 +136,10 @@ impl SequenceTrainer {
             let total = number(&total)?;
             return Ok(SequenceLosses { total, l1: None, discriminator: 0.0, gradient_norm });
         }
-        let made = batch.completed(&self.network.forward(&batch.segment, &mut Mode::Train(&mut rng))?)?;
+        let words = batch.segment.words.as_ref();
+        let words = words.map(|words| drop_words(words, self.settings.word_dropout, &mut rng)).transpose()?;
+        let segment = Segment { words, ..batch.segment.clone() };
+        let made = batch.completed(&self.network.forward(&segment, &mut Mode::Train(&mut rng))?)?;
         let (mut discriminator, mut logits) = (0.0, None);
         if let Some(Adversary { network, adam, .. }) = &mut self.adversary {
             let of_made = network.forward(&made.detach(), true)?;
@@ -227,6 +233,25 @@ impl SequenceLosses {
     }
 }
 
+/// Words [B, ...] with a share of those of each segment replaced by the unknown one, a word wherever it stands in the
+/// segment.
+fn drop_words(words: &Tensor, share: f64, rng: &mut ChaCha8Rng) -> Result<Tensor> {
+    if share == 0.0 {
+        return Ok(words.clone());
+    }
+    let mut numbers = words.flatten_all()?.to_vec1::<u32>()?;
+    let n_words = numbers.len() / words.dim(0)?.max(1);
+    for segment in numbers.chunks_mut(n_words.max(1)) {
+        let mut is_dropped = BTreeMap::new();
+        for number in segment.iter_mut().filter(|number| **number != PADDING) {
+            if *is_dropped.entry(*number).or_insert_with(|| rng.random_bool(share)) {
+                *number = UNKNOWN;
+            }
+        }
+    }
+    Ok(Tensor::from_vec(numbers, words.shape(), words.device())?)
+}
+
 /// Normal random numbers in the shape of a tensor.
 fn normal_like(tensor: &Tensor, rng: &mut ChaCha8Rng) -> Result<Tensor> {
     let numbers: Vec<f32> = (0..tensor.elem_count()).map(|_| StandardNormal.sample(rng)).collect();
@@ -235,4 +260,27 @@ fn normal_like(tensor: &Tensor, rng: &mut ChaCha8Rng) -> Result<Tensor> {
 
 fn number(scalar: &Tensor) -> Result<f64> {
     Ok(f64::from(scalar.to_scalar::<f32>()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use candle_core::Device;
+    use rand::SeedableRng;
+
+    #[test]
+    fn a_share_of_the_words_becomes_unknown_wherever_it_stands() {
+        let numbers: Vec<u32> = (0..64 * 10 * 4).map(|i| [0, 2, 3, 4 + (i / 40) % 5][i as usize % 4]).collect();
+        let words = Tensor::from_vec(numbers, (64, 10, 4), &Device::Cpu).unwrap();
+        let rng = &mut ChaCha8Rng::seed_from_u64(1);
+        let same = drop_words(&words, 0.0, rng).unwrap();
+        assert_eq!(same.to_vec3::<u32>().unwrap(), words.to_vec3::<u32>().unwrap());
+        let dropped = drop_words(&words, 0.3, rng).unwrap().to_vec3::<u32>().unwrap();
+        let mut n_unknown = 0;
+        for segment in &dropped {
+            assert!(segment.iter().all(|row| row[0] == PADDING && *row == segment[0]));
+            n_unknown += segment[0].iter().filter(|number| **number == UNKNOWN).count();
+        }
+        assert!((35..80).contains(&n_unknown), "{n_unknown} of 192");
+    }
 }
