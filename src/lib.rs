@@ -120,6 +120,7 @@ pub use dataset::{Dataset, Sample, Split};
 // Speech to motion.
 pub use external::ffmpeg::audio::read_sound;
 pub use generate::GestureGenerator;
+pub use generate::seq2seq::SequenceGenerator;
 pub use nn::seq2seq::predict::StateAtSeams;
 pub use pipeline::batch::{BatchReport, SpeechBatch};
 
@@ -129,6 +130,7 @@ pub use animate::{AnimationOptions, Performance, perform};
 
 // Predicted motion against ground truth.
 pub use evaluate::Evaluation;
+pub use evaluate::clips::network::{EvaluatedCheckpoint, TrainedNetwork};
 pub use metrics::settings::MetricSettings;
 
 // Models that look at pictures.

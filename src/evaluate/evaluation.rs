@@ -4,11 +4,11 @@ use super::baseline::baselines;
 use super::baseline::baselines::Predictor;
 use super::clips::clips;
 use super::clips::clips::EvalClips;
+use super::clips::network::EvaluatedCheckpoint;
 use super::clips::{of_speaker, pairs};
 use super::table::table;
 use super::table::table::Table;
 use crate::dataset::{Dataset, Split};
-use crate::generate::GestureGenerator;
 use crate::metrics::settings::MetricSettings;
 use crate::stage::progress::Progress;
 use crate::types::time::FrameRate;
@@ -19,7 +19,7 @@ use std::path::Path;
 pub struct Evaluation {
     /// The ground truth, cut into clips, with its sound.
     pub clips: EvalClips,
-    /// The motion under test first, then the simple predictors.
+    /// The motions under test first, then the simple predictors.
     pub predictors: Vec<Predictor>,
 }
 
@@ -51,18 +51,21 @@ impl Evaluation {
         Ok(Self { clips, predictors })
     }
 
-    /// Generates motion for the sounds of a split of the dataset, whose own motion is the ground truth.
+    /// Generates motion with each checkpoint for the sounds and words of a split of the dataset, whose own motion is the
+    /// ground truth: joints [T, 49, 3] in metres at the dataset's rate. Where a checkpoint moves a captured skeleton, all
+    /// predictors are measured on the joints that it has, and a note says which.
     ///
     /// # Errors
-    /// A split without samples, a dataset of another rate than the generator's.
-    pub fn of_generator(
+    /// No checkpoint, a split without samples, a dataset of another rate than a checkpoint's (that of a captured skeleton
+    /// is resampled).
+    pub fn of_generators(
         dataset: &Dataset,
-        generator: &GestureGenerator,
+        checkpoints: &[EvaluatedCheckpoint],
         split: Split,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let task = progress.begin("evaluating", 0);
-        let (clips, predictors) = of_speaker::prepare(dataset, generator, split, &*task)?;
+        let (clips, predictors) = of_speaker::prepare(dataset, checkpoints, split, &*task)?;
         Ok(Self { clips, predictors })
     }
 

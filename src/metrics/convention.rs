@@ -22,8 +22,8 @@ pub(crate) fn metrics(settings: &MetricSettings) -> Vec<MetricFamily> {
         Convention::Genea => vec![
             derivatives::by_interval(derivatives::DerivativeOrder::Acceleration),
             derivatives::by_interval(derivatives::DerivativeOrder::Jerk),
-            hellinger::genea(),
-            cca::metric(BodyPart::WithNeck),
+            hellinger::genea(settings.has_fingers),
+            cca::metric(if settings.has_fingers { BodyPart::WithNeck } else { BodyPart::Body }),
         ],
         Convention::Emage => vec![diversity::l1div(BodyPart::All), consistency::emage(fps)],
         Convention::Trimodal => {

@@ -15,11 +15,19 @@ pub struct MetricSettings {
     pub fps: FrameRate,
     /// Whether errors and speeds are also given over 49 joints, the neck included.
     pub with_neck: bool,
+    /// Whether any finger is seen; where none is, numbers of whole poses are of the arms.
+    pub has_fingers: bool,
 }
 
 impl Default for MetricSettings {
     fn default() -> Self {
-        Self { convention: Convention::default(), alphas: vec![0.2, 0.1], fps: FrameRate::new(15, 1), with_neck: false }
+        Self {
+            convention: Convention::default(),
+            alphas: vec![0.2, 0.1],
+            fps: FrameRate::new(15, 1),
+            with_neck: false,
+            has_fingers: true,
+        }
     }
 }
 

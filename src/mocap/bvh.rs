@@ -36,6 +36,11 @@ pub fn read_as_it_stands(path: &Path) -> Result<CapturedMotion> {
     take(path, |house| house.as_it_stands().unwrap_or(house))
 }
 
+/// Reads a take from the text of a BVH file, turned as [`read`] does.
+pub fn of_text(text: &str) -> Result<CapturedMotion> {
+    of_bvh(&Bvh::parse(text)?, |house| house)
+}
+
 fn take(path: &Path, placed: impl Fn(House) -> House) -> Result<CapturedMotion> {
     let bvh = Bvh::read(path)?;
     of_bvh(&bvh, placed).with_context(|| format!("{} is no speaker's motion", path.display()))

@@ -8,9 +8,9 @@ use crate::cli::ui::Ui;
 use anyhow::{Result, bail, ensure};
 use orator::dataset::{Dataset, Split};
 use orator::evaluate::Evaluation;
+use orator::evaluate::clips::network::EvaluatedCheckpoint;
 use orator::evaluate::table::result;
 use orator::evaluate::verdict::text;
-use orator::generate::GestureGenerator;
 use orator::metrics::settings::Convention;
 use orator::metrics::settings::MetricSettings;
 use orator::pipeline::batch::motion_files::model_lock;
@@ -24,7 +24,7 @@ use std::path::PathBuf;
 
 /// Measure predicted motion beside the ground truth, and say what the metrics are worth.
 ///
-/// Files or folders of motion (.npy, .npz, the authors' .txt, .bvh), or a checkpoint on a split of a dataset. Beside each
+/// Files or folders of motion (.npy, .npz, the authors' .txt, .bvh), or checkpoints on a split of a dataset. Beside each
 /// figure stands the same for poses that never move, the nearest neighbour, mismatched motion and the truth itself; with its
 /// 95 % interval, and a plain sentence: is it better than doing nothing, and does it hear?
 #[derive(clap::Args)]
@@ -61,9 +61,10 @@ struct MotionArgs {
     /// Instead of files: a dataset, a folder of `orator run` or `orator import`.
     #[arg(long, value_name = "DIR", conflicts_with = "truth", requires = "checkpoint")]
     dataset: Option<PathBuf>,
-    /// A checkpoint of `orator train gan`, or its folder (the best checkpoint is taken).
-    #[arg(long, value_name = "FILE|FOLDER", requires = "dataset")]
-    checkpoint: Option<PathBuf>,
+    /// Checkpoints of `orator train gan` and `orator train seq2seq`, or their folders (the best checkpoint, else the newest,
+    /// is taken): all in one table.
+    #[arg(long, value_name = "FILE|FOLDER", requires = "dataset", num_args = 1..)]
+    checkpoint: Vec<PathBuf>,
     /// Which intervals of the dataset: validation, test or train.
     #[arg(long, value_name = "SPLIT", default_value = "validation", value_parser = split)]
     split: Split,
@@ -90,7 +91,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         Some(What::People(people)) => people.report.as_deref(),
         _ => report.as_deref(),
     };
-    confine(report, [dataset, checkpoint].into_iter().flatten().map(PathBuf::as_path));
+    confine(report, dataset.iter().chain(checkpoint).map(PathBuf::as_path));
     match args.what {
         Some(What::Lifter(args)) => lifter::run(args, ui),
         Some(What::Compare(args)) => compare::run(&args, ui),
@@ -123,7 +124,7 @@ fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
     };
     // The page names what was read, so that nothing of it is forgotten before the page is written.
     let _dataset = args.dataset.as_deref().map(FolderLock::shared).transpose()?;
-    let _model = args.checkpoint.as_deref().map(model_lock).transpose()?;
+    let _models: Vec<FolderLock> = args.checkpoint.iter().map(|path| model_lock(path)).collect::<Result<_>>()?;
     let evaluation = evaluation(args, ui)?;
     let table = evaluation.measure(&settings, ui)?;
     let mut facts: Value = result::json(&table);
@@ -141,25 +142,21 @@ fn motion(args: &MotionArgs, ui: &Ui) -> Result<Outcome> {
 
 /// What is measured, in a few words: names, no folders of this machine.
 fn title(args: &MotionArgs) -> String {
-    let name = |path: &Option<PathBuf>| {
-        let name = path.as_deref().and_then(|path| path.file_name());
-        name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
-    };
-    match &args.checkpoint {
-        Some(_) => format!("{} on the {} split of {}", name(&args.checkpoint), args.split.name(), name(&args.dataset)),
-        None => name(&args.prediction),
+    let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    match (&args.dataset, &args.prediction) {
+        (Some(dataset), _) => {
+            let names: Vec<String> = args.checkpoint.iter().map(name).collect();
+            format!("{} on the {} split of {}", names.join(" and "), args.split.name(), name(dataset))
+        }
+        (None, prediction) => prediction.as_ref().map(name).unwrap_or_default(),
     }
 }
 
 /// What is measured, from files or from a dataset.
 fn evaluation(args: &MotionArgs, ui: &Ui) -> Result<Evaluation> {
-    if let (Some(dataset), Some(checkpoint)) = (&args.dataset, &args.checkpoint) {
-        return Evaluation::of_generator(
-            &Dataset::open(dataset)?,
-            &GestureGenerator::open(checkpoint)?,
-            args.split,
-            ui,
-        );
+    if let Some(dataset) = &args.dataset {
+        let checkpoints = EvaluatedCheckpoint::open_all(&args.checkpoint)?;
+        return Evaluation::of_generators(&Dataset::open(dataset)?, &checkpoints, args.split, ui);
     }
     let (Some(truth), Some(prediction)) = (&args.truth, &args.prediction) else {
         bail!("nothing to measure: give --truth and --prediction, or --dataset and --checkpoint")

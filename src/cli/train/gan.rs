@@ -146,7 +146,7 @@ fn pairs(dataset: &Dataset, speaker: &GestureGenerator) -> Result<Vec<HeldOutPai
         let n_frames = interval.ground_truth.n_frames();
         let span = ((PAIR_SECS * speaker.fps().per_sec()) as usize).min(n_frames);
         let first = (n_frames - span) / 2;
-        let HeldOutInterval { key, ground_truth, sound } = interval.cut(first..first + span);
+        let HeldOutInterval { key, ground_truth, sound, .. } = interval.cut(first..first + span);
         let predicted = predictor::motion(speaker, &sound, span)?;
         Ok(HeldOutPair { name: key, start_secs: speaker.fps().secs(first), ground_truth, predicted })
     };

@@ -52,6 +52,33 @@ impl PredictorKind {
     }
 }
 
+/// One of several checkpoints that are measured together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NumberedCheckpoint {
+    /// From 1 on.
+    pub number: usize,
+    pub name: String,
+}
+
+impl NumberedCheckpoint {
+    /// Name for people of a predictor that is, or may be, of one of several checkpoints.
+    pub fn name_of(kind: PredictorKind, checkpoint: Option<&Self>) -> String {
+        match (kind, checkpoint) {
+            (PredictorKind::Prediction, Some(of)) => of.name.clone(),
+            (PredictorKind::MismatchedPrediction, Some(of)) => format!("mismatched {}", of.name),
+            _ => kind.name().to_owned(),
+        }
+    }
+
+    /// Its key in a result file: the first checkpoint's is that of a single one.
+    pub fn key_of(kind: PredictorKind, checkpoint: Option<&Self>) -> String {
+        match checkpoint {
+            Some(of) if of.number > 1 => format!("{}_{}", kind.key(), of.number),
+            _ => kind.key(),
+        }
+    }
+}
+
 /// Motion of one clip by a predictor.
 #[derive(Clone, Debug)]
 pub enum ClipMotion {
@@ -69,6 +96,8 @@ pub enum ClipMotion {
 #[derive(Clone, Debug)]
 pub struct Predictor {
     pub kind: PredictorKind,
+    /// Whose motion it is, where several checkpoints are measured.
+    pub checkpoint: Option<NumberedCheckpoint>,
     /// Description in a sentence.
     pub description: String,
     /// One motion a clip.
@@ -76,6 +105,11 @@ pub struct Predictor {
 }
 
 impl Predictor {
+    /// Predictor that is of no one of several checkpoints.
+    pub fn new(kind: PredictorKind, description: String, motions: Vec<ClipMotion>) -> Self {
+        Self { kind, checkpoint: None, description, motions }
+    }
+
     /// Motion for a clip, cut or repeated to its length.
     pub fn motion<'a>(&'a self, clips: &'a EvalClips, clip: usize) -> Option<ArrayView3<'a, f32>> {
         let of = clips.clips.get(clip)?;
@@ -101,17 +135,14 @@ impl Predictor {
     }
 
     pub fn prediction(clips: &EvalClips, description: &str) -> Self {
-        Self {
-            kind: PredictorKind::Prediction,
-            description: description.to_owned(),
-            motions: vec![ClipMotion::Prediction; clips.clips.len()],
-        }
+        let motions = vec![ClipMotion::Prediction; clips.clips.len()];
+        Self::new(PredictorKind::Prediction, description.to_owned(), motions)
     }
 
     pub fn truth(clips: &EvalClips) -> Self {
         let description =
             "the real motion beside itself: what its own figures are, and where the others end".to_owned();
-        Self { kind: PredictorKind::Truth, description, motions: vec![ClipMotion::GroundTruth; clips.clips.len()] }
+        Self::new(PredictorKind::Truth, description, vec![ClipMotion::GroundTruth; clips.clips.len()])
     }
 }
 
@@ -152,7 +183,7 @@ fn late(clips: &EvalClips, still: &Predictor) -> Predictor {
     };
     let description = "the clip's own prediction half of the clip later, and from the beginning again".to_owned();
     let motions = clips.clips.iter().map(of).collect();
-    Predictor { kind: PredictorKind::LatePrediction, description, motions }.filled(still)
+    Predictor::new(PredictorKind::LatePrediction, description, motions).filled(still)
 }
 
 /// Reason why a mismatched motion is left out.
@@ -187,8 +218,8 @@ fn constant_poses(clips: &EvalClips) -> Vec<Predictor> {
         false => format!("the {what} of the other clips' truths in every frame, which never moves"),
     };
     vec![
-        Predictor { kind: PredictorKind::MeanPose, description: description("mean pose"), motions: means },
-        Predictor { kind: PredictorKind::MedianPose, description: description("median pose"), motions: medians },
+        Predictor::new(PredictorKind::MeanPose, description("mean pose"), means),
+        Predictor::new(PredictorKind::MedianPose, description("median pose"), medians),
     ]
 }
 
@@ -217,7 +248,7 @@ fn neighbours(clips: &EvalClips, still: &Predictor) -> Result<Option<Predictor>>
     let Some(predicted) = neighbour::motions(&query, &library, clips.fps)? else { return Ok(None) };
     let description = "for each 4 s of sound the motion of the part of another clip that sounds most alike".to_owned();
     let motions = predicted.into_iter().map(ClipMotion::Motion).collect();
-    Ok(Some(Predictor { kind: PredictorKind::NearestNeighbour, description, motions }.filled(still)))
+    Ok(Some(Predictor::new(PredictorKind::NearestNeighbour, description, motions).filled(still)))
 }
 
 /// For each clip the motion (`Prediction` or `Truth`) of another, played back and forth where it is shorter; for a
@@ -244,7 +275,7 @@ pub fn mismatched(clips: &EvalClips, kind: PredictorKind, still: &Predictor) -> 
         let description = format!("the same {:.1} s later, and from the beginning again", clips.fps.secs(shift));
         (vec![ClipMotion::Motion(taken(of(0), (0..n_frames).map(|t| (t + shift) % n_frames)))], description)
     };
-    Some(Predictor { kind, description, motions }.filled(still))
+    Some(Predictor::new(kind, description, motions).filled(still))
 }
 
 fn taken(from: &Array3<f32>, frames: impl Iterator<Item = usize>) -> Array3<f32> {

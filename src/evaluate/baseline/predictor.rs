@@ -1,11 +1,13 @@
 //! Motion that a trained speaker generates for a sound of a given length.
 
+use crate::formats::transcript::Word;
 use crate::generate::GestureGenerator;
 use crate::types::pose3d::Motion;
 use crate::types::sound::{SAMPLE_RATE, Sound};
 use crate::types::sync;
 use anyhow::{Result, ensure};
 use ndarray::s;
+use std::ops::Range;
 
 /// Generated motion for one sound, exactly `n_frames` long.
 pub fn motion(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> Result<Motion> {
@@ -20,25 +22,60 @@ pub fn motion(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> Res
 /// Mismatched sound for sound `which`, as long as it: what follows half of all sounds later, with wrap-around, and so
 /// most often another video.
 pub fn turned(sounds: &[&Sound], which: usize) -> Sound {
+    let parts = turned_parts(sounds, which).into_iter();
+    let samples = parts.flat_map(|(sound, range)| sounds[sound].samples.get(range).unwrap_or_default());
+    Sound { rate: sounds[which].rate, samples: samples.copied().collect() }
+}
+
+/// Words said in the mismatched sound for sound `which`, each at its time there; `words` of each sound count from its
+/// beginning. A word that a seam cuts is left out.
+pub fn turned_words(sounds: &[&Sound], words: &[&[Word]], which: usize) -> Vec<Word> {
+    let secs = |n_samples: usize, of: usize| n_samples as f64 / f64::from(sounds[of].rate);
+    let (mut said, mut n_before) = (Vec::new(), 0);
+    for (of, range) in turned_parts(sounds, which) {
+        let (start, end, later) = (secs(range.start, of), secs(range.end, of), secs(n_before, of));
+        let inside = words[of].iter().filter(|word| word.start_secs >= start && word.end_secs <= end);
+        let moved = |secs: f64| secs - start + later;
+        said.extend(inside.map(|word| Word {
+            start_secs: moved(word.start_secs),
+            end_secs: moved(word.end_secs),
+            ..word.clone()
+        }));
+        n_before += range.len();
+    }
+    said
+}
+
+/// Sounds and their samples that make up the mismatched sound for sound `which`.
+fn turned_parts(sounds: &[&Sound], which: usize) -> Vec<(usize, Range<usize>)> {
     let length = |sounds: &[&Sound]| sounds.iter().map(|sound| sound.samples.len()).sum::<usize>();
     let (all, before) = (length(sounds), length(&sounds[..which]));
-    let (own, n) = (sounds[which], sounds[which].samples.len());
+    let mut wanted = sounds[which].samples.len();
     let mut skipped = (before + all / 2) % all.max(1);
-    let mut samples = Vec::with_capacity(n);
-    for sound in sounds.iter().cycle().take_while(|_| n > 0) {
-        let rest = sound.samples.get(skipped..).unwrap_or_default();
-        skipped -= sound.samples.len() - rest.len();
-        samples.extend(rest.iter().take(n - samples.len()));
-        if samples.len() == n {
+    let mut parts = Vec::new();
+    if wanted == 0 {
+        return parts;
+    }
+    for (at, sound) in sounds.iter().enumerate().cycle() {
+        let n = sound.samples.len();
+        let start = skipped.min(n);
+        let end = n.min(start + wanted);
+        skipped -= start;
+        wanted -= end - start;
+        if end > start {
+            parts.push((at, start..end));
+        }
+        if wanted == 0 {
             break;
         }
     }
-    Sound { rate: own.rate, samples }
+    parts
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::formats::transcript::WordSource;
 
     #[test]
     fn every_sound_becomes_another_one_of_its_length() {
@@ -48,5 +85,26 @@ mod tests {
         let turned: Vec<Sound> = (0..3).map(|i| turned(&all, i)).collect();
         assert_eq!(turned, [sound(&[4.0, 5.0, 6.0]), sound(&[]), sound(&[7.0, 1.0, 2.0, 3.0])]);
         assert_eq!(super::turned(&[&sound(&[])], 0), sound(&[]));
+    }
+
+    #[test]
+    fn words_go_with_their_sound() {
+        let sound = |secs: usize| Sound { rate: SAMPLE_RATE, samples: vec![0.0; secs * SAMPLE_RATE as usize] };
+        let word = |text: &str, start_secs: f64| Word {
+            word: text.into(),
+            start_secs,
+            end_secs: start_secs + 0.5,
+            source: WordSource::Given,
+            confidence: None,
+        };
+        let sounds = [sound(4), sound(2)];
+        let words = [vec![word("a", 0.2), word("cut", 0.8), word("b", 3.2)], vec![word("c", 1.0)]];
+        let (sounds, words): (Vec<_>, Vec<&[Word]>) =
+            (sounds.iter().collect(), words.iter().map(Vec::as_slice).collect());
+        // 3 s later: the last second of the first, the second, the first second of the first
+        let said = turned_words(&sounds, &words, 0);
+        let said: Vec<(&str, f64)> =
+            said.iter().map(|word| (word.word.as_str(), (100.0 * word.start_secs).round() / 100.0)).collect();
+        assert_eq!(said, [("b", 0.2), ("c", 2.0), ("a", 3.2)]);
     }
 }

@@ -9,7 +9,7 @@ use crate::mocap::motion_file;
 use crate::motion::bones;
 use crate::motion::resample;
 use crate::types::pose3d::Motion;
-use crate::types::skeleton::{N_JOINTS, NECK};
+use crate::types::skeleton::{L_HAND, N_JOINTS, NECK, is_duplicate};
 use crate::types::sound::SAMPLE_RATE;
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result, ensure};
@@ -117,6 +117,13 @@ impl EvalClips {
             hasher.update(&clip.n_frames().to_le_bytes());
         }
         hasher.finalize().to_hex().as_str()[..16].to_owned()
+    }
+
+    /// Whether any finger joint is compared in any frame.
+    pub fn have_fingers(&self) -> bool {
+        let is_finger = |joint: usize| joint > L_HAND && !is_duplicate(joint);
+        let seen = |clip: &EvalClip| clip.mask.indexed_iter().any(|((_, joint), seen)| *seen && is_finger(joint));
+        self.clips.iter().any(seen)
     }
 
     pub fn have_sound(&self) -> bool {

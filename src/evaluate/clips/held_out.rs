@@ -2,9 +2,11 @@
 
 use crate::dataset::index::SampleRef;
 use crate::dataset::{Dataset, Split};
+use crate::formats::transcript::Word;
 use crate::generate::normalisation::Normalisation;
 use crate::motion::bones;
 use crate::types::pose3d::Motion;
+use crate::types::skeleton::N_BONES;
 use crate::types::sound::Sound;
 use crate::types::sync;
 use anyhow::{Result, bail};
@@ -18,6 +20,8 @@ pub struct HeldOutInterval {
     /// Motion with the speaker's bone lengths, as in training; each video has its own.
     pub ground_truth: Motion,
     pub sound: Sound,
+    /// Words said in it, their times from its beginning.
+    pub words: Vec<Word>,
 }
 
 /// Samples of `split` in the dataset's order. Errors where there are none, naming the splits that have some.
@@ -38,19 +42,29 @@ pub fn samples(dataset: &Dataset, split: Split) -> Result<Vec<SampleRef>> {
 
 /// Reads the samples.
 pub fn read(dataset: &Dataset, samples: &[SampleRef], normal: &Normalisation) -> Result<Vec<HeldOutInterval>> {
-    let lengths = std::array::from_fn(|bone| normal.bone_lengths.get(bone).copied().unwrap_or(0.0));
+    let lengths = lengths(normal);
     let interval = |sample| -> Result<HeldOutInterval> {
         let mut sample = dataset.read(sample)?;
         bones::with_lengths(&mut sample.motion, &lengths);
-        Ok(HeldOutInterval { key: sample.key, ground_truth: sample.motion, sound: sample.sound })
+        let words = sample.words.unwrap_or_default();
+        Ok(HeldOutInterval { key: sample.key, ground_truth: sample.motion, sound: sample.sound, words })
     };
     samples.par_iter().map(interval).collect()
+}
+
+/// Bone of joint `n + 1` to its parent, metres; 0: not known.
+pub fn lengths(normal: &Normalisation) -> [f32; N_BONES] {
+    std::array::from_fn(|bone| normal.bone_lengths.get(bone).copied().unwrap_or(0.0))
 }
 
 impl HeldOutInterval {
     /// Part of the interval: these frames and their sound.
     pub fn cut(&self, frames: Range<usize>) -> Self {
         let ground_truth = &self.ground_truth;
+        let (start, end) = (ground_truth.fps.secs(frames.start), ground_truth.fps.secs(frames.end));
+        let inside = self.words.iter().filter(|word| word.start_secs >= start && word.end_secs <= end);
+        let moved =
+            |word: &Word| Word { start_secs: word.start_secs - start, end_secs: word.end_secs - start, ..word.clone() };
         let sound = sync::samples_of(ground_truth.fps, self.sound.rate, frames.clone());
         let sound = self.sound.samples.get(sound.start..sound.end.min(self.sound.samples.len())).unwrap_or_default();
         Self {
@@ -61,6 +75,7 @@ impl HeldOutInterval {
                 mask: ground_truth.mask.slice(s![frames, ..]).to_owned(),
             },
             sound: Sound { rate: self.sound.rate, samples: sound.to_vec() },
+            words: inside.map(moved).collect(),
         }
     }
 }

@@ -2,6 +2,8 @@
 
 pub mod clips;
 pub mod held_out;
+pub mod network;
+pub mod notes;
 pub mod of_speaker;
 pub mod pairs;
 pub mod sound_features;

@@ -1,21 +1,25 @@
-//! Clips and baselines of a trained speaker on a split of a dataset. Ground truth comes from the dataset, predictions
-//! from the sound alone, and baselines know the training split only.
+//! Clips and baselines of trained speakers on a split of a dataset. Ground truth comes from the dataset, predictions
+//! from sound and words alone, and baselines know the training split only.
 
 use super::clips::{ClipAudio, EvalClip, EvalClips, compared, pcm};
 use super::held_out;
 use super::held_out::HeldOutInterval;
+use super::network::{EvaluatedCheckpoint, TrainedNetwork};
+use super::notes;
 use super::sound_features;
 use super::sound_features::SoundFeatureExtractor;
 use crate::dataset::{Dataset, Split};
 use crate::evaluate::baseline::baselines;
-use crate::evaluate::baseline::baselines::{ClipMotion, Predictor, PredictorKind};
+use crate::evaluate::baseline::baselines::{ClipMotion, NumberedCheckpoint, Predictor, PredictorKind};
 use crate::evaluate::baseline::constant_pose::ConstantPoses;
 use crate::evaluate::baseline::neighbour;
 use crate::evaluate::baseline::neighbour::{Library, Query};
 use crate::evaluate::baseline::predictor;
-use crate::generate::GestureGenerator;
+use crate::formats::transcript::Word;
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
+use crate::motion::bones;
 use crate::stage::progress::Task;
+use crate::train::gan::train::normalisation;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::Sound;
 use crate::types::time::FrameRate;
@@ -23,89 +27,143 @@ use anyhow::{Context, Result, ensure};
 use ndarray::{Array2, Array3, s};
 use rayon::prelude::*;
 
-/// Clips and predictors of the speaker of a checkpoint on a split of `dataset`, the speaker's own motion first.
+/// Clips and predictors of checkpoints on a split of `dataset`, the motion of the checkpoints first. Bones have the
+/// lengths of the first checkpoint that learnt from a dataset, else those of this one.
 ///
 /// # Errors
-/// A dataset of another frame rate; a split without intervals.
+/// No checkpoint; a dataset of another frame rate, captured skeletons aside; a split without intervals.
 pub fn prepare(
     dataset: &Dataset,
-    speaker: &GestureGenerator,
+    checkpoints: &[EvaluatedCheckpoint],
     split: Split,
     task: &dyn Task,
 ) -> Result<(EvalClips, Vec<Predictor>)> {
-    let (of_dataset, of_speaker) = (dataset.info().fps, speaker.fps());
-    ensure!(
-        of_dataset == of_speaker,
-        "{} moves at {of_dataset}, the checkpoint's speaker at {of_speaker}: it was trained on another dataset",
-        dataset.dir().display()
-    );
-    let normal = &speaker.metadata.normalisation;
+    let fps = dataset.info().fps;
+    for EvaluatedCheckpoint { network, .. } in checkpoints {
+        let of_network = network.fps();
+        ensure!(
+            network.normalisation().is_none() || fps == of_network,
+            "{} moves at {fps}, the checkpoint's speaker at {of_network}: it was trained on another dataset",
+            dataset.dir().display()
+        );
+    }
+    let learnt_with = checkpoints.iter().find_map(|of| of.network.normalisation());
+    let own_normal = if learnt_with.is_none() { Some(normalisation(dataset)?) } else { None };
+    let normal = learnt_with.or(own_normal.as_ref()).context("there is no checkpoint to measure")?;
     task.detail("reading the intervals");
     let held_out = held_out::read(dataset, &held_out::samples(dataset, split)?, normal)?;
     task.detail("generating motion");
-    let predicted = generated(speaker, &held_out, |sounds, i| sounds[i].clone())?;
-    let other = generated(speaker, &held_out, predictor::turned)?;
+    let mut generated = checkpoints
+        .iter()
+        .map(|of| speak(&of.network, &held_out, normal, fps).with_context(|| of.name.clone()))
+        .collect::<Result<Vec<SpokenIntervals>>>()?;
     task.detail("listening");
-    let clips: Vec<EvalClip> = held_out
-        .into_par_iter()
-        .zip(predicted)
-        .map(|(held_out, predicted)| clip(held_out, predicted, of_dataset))
-        .collect();
-    let mut clips = EvalClips { fps: of_dataset, clips, notes: Vec::new(), learnt: split == Split::Train };
-    if clips.learnt {
-        clips
-            .notes
-            .push("THE CHECKPOINT WAS TRAINED ON THIS SPLIT: its figures say what it learnt by heart".to_owned());
-    }
-    if dataset.info().speaker != speaker.name() {
-        clips.notes.push(format!(
-            "the dataset is of {}, the checkpoint of {}: its bones were put on the checkpoint's lengths",
-            dataset.info().speaker,
-            speaker.name()
-        ));
+    let notes = notes::of_checkpoints(dataset, checkpoints, &held_out, split);
+    let first = std::mem::take(&mut generated.first_mut().context("there is no checkpoint to measure")?.matched);
+    let clips: Vec<EvalClip> =
+        held_out.into_par_iter().zip(first).map(|(held_out, predicted)| clip(held_out, predicted, fps)).collect();
+    let mut clips = EvalClips { fps, clips, notes, learnt: split == Split::Train };
+    if checkpoints.iter().any(|of| of.network.normalisation().is_none()) {
+        let is_known = |joint: usize| generated.iter().all(|spoken| spoken.joints[joint]);
+        let common: Vec<usize> = (0..N_JOINTS).filter(|joint| is_known(*joint)).collect();
+        restrict(&mut clips, &common);
+        clips.notes.push(notes::of_joints(&clips, &common));
     }
     task.detail("what the training split knows");
-    let prediction = format!("the speaker {} of the checkpoint, hearing the sound of each interval", speaker.name());
-    let mut all = vec![Predictor::prediction(&clips, &prediction)];
+    let several = |at: usize| {
+        let name = checkpoints[at].name.clone();
+        (checkpoints.len() > 1).then_some(NumberedCheckpoint { number: at + 1, name })
+    };
+    let mut all = Vec::new();
+    for (at, (of, spoken)) in checkpoints.iter().zip(&mut generated).enumerate() {
+        let heard = if of.network.n_words() > 0 { "sound and the words" } else { "sound" };
+        let description =
+            format!("the speaker {} of the checkpoint, hearing the {heard} of each interval", of.network.speaker());
+        let mut predictor = Predictor::prediction(&clips, &description);
+        if at > 0 {
+            predictor.motions = std::mem::take(&mut spoken.matched).into_iter().map(ClipMotion::Motion).collect();
+        }
+        all.push(Predictor { checkpoint: several(at), ..predictor });
+    }
+    let still = all.len();
     all.extend(constant_poses(dataset, normal, clips.clips.len())?);
     match copied(dataset, normal, &clips, split)? {
         Some(motions) => {
             let description =
                 "for each 4 s of sound the motion of the part of the training split that sounds most alike";
-            let copied =
-                Predictor { kind: PredictorKind::NearestNeighbour, description: description.to_owned(), motions };
-            all.push(copied.filled(&all[1]));
+            let copied = Predictor::new(PredictorKind::NearestNeighbour, description.to_owned(), motions);
+            all.push(copied.filled(&all[still]));
         }
         None => clips.notes.push(format!(
             "{}: left out, since no interval of the training split is long enough to copy from",
             PredictorKind::NearestNeighbour.name()
         )),
     }
-    let description = "the same speaker hearing another sound: what is said half of the split later".to_owned();
-    let motions = other.into_iter().map(ClipMotion::Motion).collect();
-    all.push(Predictor { kind: PredictorKind::MismatchedPrediction, description, motions });
-    match baselines::mismatched(&clips, PredictorKind::MismatchedTruth, &all[1]) {
+    for (at, (of, spoken)) in checkpoints.iter().zip(generated).enumerate() {
+        let said = if of.network.n_words() > 0 { " with its words" } else { "" };
+        let description = format!("the same speaker hearing another sound{said}: what is said half of the split later");
+        let motions = spoken.mismatched.into_iter().map(ClipMotion::Motion).collect();
+        let predictor = Predictor::new(PredictorKind::MismatchedPrediction, description, motions);
+        all.push(Predictor { checkpoint: several(at), ..predictor });
+    }
+    match baselines::mismatched(&clips, PredictorKind::MismatchedTruth, &all[still]) {
         Some(predictor) => all.push(predictor),
         None => clips.notes.push(baselines::too_short(PredictorKind::MismatchedTruth)),
     }
     Ok((clips, all))
 }
 
-fn generated(
-    speaker: &GestureGenerator,
+/// Motion of a network for every interval.
+struct SpokenIntervals {
+    /// For the interval's own sound and words: joints [T, 49, 3], metres.
+    matched: Vec<Array3<f32>>,
+    /// For those of half of the split later.
+    mismatched: Vec<Array3<f32>>,
+    /// Whether each of the 49 joints has a number in every frame.
+    joints: Vec<bool>,
+}
+
+fn speak(
+    network: &TrainedNetwork,
     held_out: &[HeldOutInterval],
-    features: impl Fn(&[&Sound], usize) -> Sound,
-) -> Result<Vec<Array3<f32>>> {
+    normal: &Normalisation,
+    fps: FrameRate,
+) -> Result<SpokenIntervals> {
     let sounds: Vec<&Sound> = held_out.iter().map(|interval| &interval.sound).collect();
-    let predicted = held_out.iter().enumerate().map(|(i, interval)| {
-        let predicted = predictor::motion(speaker, &features(&sounds, i), interval.ground_truth.n_frames());
-        Ok(predicted.with_context(|| format!("no motion for {}", interval.key))?.joints)
-    });
-    predicted.collect()
+    let words: Vec<&[Word]> = held_out.iter().map(|interval| interval.words.as_slice()).collect();
+    let other_bones = network.normalisation().is_none_or(|own| own.bone_lengths != normal.bone_lengths);
+    let motion = |at: usize, sound: &Sound, words: &[Word]| -> Result<Array3<f32>> {
+        let HeldOutInterval { key, ground_truth, .. } = &held_out[at];
+        let made = network.motion(sound, words, ground_truth.n_frames(), fps);
+        let mut made = made.with_context(|| format!("no motion for {key}"))?;
+        if other_bones {
+            bones::with_lengths(&mut made, &held_out::lengths(normal));
+        }
+        Ok(made.joints)
+    };
+    let all = 0..held_out.len();
+    let matched = all.clone().map(|at| motion(at, sounds[at], words[at])).collect::<Result<Vec<_>>>()?;
+    let mismatched = all
+        .map(|at| motion(at, &predictor::turned(&sounds, at), &predictor::turned_words(&sounds, &words, at)))
+        .collect::<Result<Vec<_>>>()?;
+    let is_known =
+        |joint: usize| matched.iter().all(|made| made.slice(s![.., joint, ..]).iter().all(|v| v.is_finite()));
+    let joints = (0..N_JOINTS).map(is_known).collect();
+    Ok(SpokenIntervals { matched, mismatched, joints })
+}
+
+/// Leaves the joints `common` to be compared; the others of the prediction are missing.
+fn restrict(clips: &mut EvalClips, common: &[usize]) {
+    for clip in &mut clips.clips {
+        for joint in (0..N_JOINTS).filter(|joint| !common.contains(joint)) {
+            clip.mask.column_mut(joint).fill(false);
+            clip.predicted.slice_mut(s![.., joint, ..]).fill(f32::NAN);
+        }
+    }
 }
 
 fn clip(held_out: HeldOutInterval, predicted: Array3<f32>, fps: FrameRate) -> EvalClip {
-    let HeldOutInterval { key, ground_truth, sound } = held_out;
+    let HeldOutInterval { key, ground_truth, sound, .. } = held_out;
     let features = Some(sound_features::from_samples(&sound.samples, fps, ground_truth.n_frames()));
     let mut predicted = predicted;
     let (mask, _) = compared(&ground_truth.joints, &ground_truth.mask, &mut predicted);
@@ -123,10 +181,9 @@ fn constant_poses(dataset: &Dataset, normal: &Normalisation, n_clips: usize) -> 
     let mean: Array2<f32> = normal.joints(Array2::zeros((N_FEATURES, 1)).view()).slice(s![0, .., ..]).to_owned();
     let mut median = constant_poses.median();
     median.zip_mut_with(&mean, |v, mean| *v = if v.is_finite() { *v } else { *mean });
-    let predictor = |kind: PredictorKind, pose: Array2<f32>| Predictor {
-        kind,
-        description: format!("the {} of the training split in every frame, which never moves", kind.name()),
-        motions: vec![ClipMotion::Constant(pose); n_clips],
+    let predictor = |kind: PredictorKind, pose: Array2<f32>| {
+        let description = format!("the {} of the training split in every frame, which never moves", kind.name());
+        Predictor::new(kind, description, vec![ClipMotion::Constant(pose); n_clips])
     };
     Ok(vec![predictor(PredictorKind::MeanPose, mean), predictor(PredictorKind::MedianPose, median)])
 }

@@ -2,7 +2,7 @@
 //! comparable.
 
 use super::bootstrap::Estimate;
-use super::table::Table;
+use super::table::{PredictorRow, Table};
 use crate::evaluate::baseline::baselines::PredictorKind;
 use crate::evaluate::verdict::labels;
 use crate::evaluate::verdict::verdict::{better_than_nothing, hears};
@@ -14,11 +14,25 @@ use std::path::Path;
 /// Version of the JSON's layout.
 pub const VERSION: u64 = 1;
 
-/// Result as JSON.
+/// Result as JSON. Of several checkpoints the first has the keys of a single one, the others end in their number.
 pub fn json(table: &Table) -> Value {
     let metrics = (0..table.definitions.len()).map(|index| metric(table, index));
-    let predictors = table.rows.iter().map(|row| json!({ "name": row.kind, "says": row.description }));
-    json!({
+    let predictors = table.rows.iter().map(|row| {
+        let mut predictor = json!({ "name": row.key(), "says": row.description });
+        if let Some(of) = &row.checkpoint {
+            predictor["checkpoint"] = json!(of.name);
+        }
+        predictor
+    });
+    let verdicts = |own: &PredictorRow| {
+        json!({
+            "predictor": own.key(),
+            "better_than_nothing": better_than_nothing(table, own),
+            "hears": hears(table, own),
+        })
+    };
+    let own = table.predictions().next().map(verdicts).unwrap_or_default();
+    let mut result = json!({
         "evaluation": VERSION,
         "convention": table.settings.convention,
         "fps": table.settings.fps,
@@ -33,9 +47,13 @@ pub fn json(table: &Table) -> Value {
         "notes": table.notes,
         "predictors": predictors.collect::<Vec<_>>(),
         "metrics": metrics.collect::<Vec<_>>(),
-        "better_than_nothing": better_than_nothing(table),
-        "hears": hears(table),
-    })
+        "better_than_nothing": own["better_than_nothing"],
+        "hears": own["hears"],
+    });
+    if table.predictions().count() > 1 {
+        result["verdicts"] = table.predictions().map(verdicts).collect();
+    }
+    result
 }
 
 fn metric(table: &Table, index: usize) -> Value {
@@ -48,7 +66,7 @@ fn metric(table: &Table, index: usize) -> Value {
             (false, "") => json!({ "value": null }),
             (false, reason) => json!({ "value": null, "undefined": reason }),
         };
-        values.insert(row.kind.key(), value);
+        values.insert(row.key(), value);
     }
     json!({
         "name": definition.name,

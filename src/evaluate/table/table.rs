@@ -2,7 +2,7 @@
 
 use super::blocks;
 use super::bootstrap::{Estimate, draws};
-use crate::evaluate::baseline::baselines::{Predictor, PredictorKind};
+use crate::evaluate::baseline::baselines::{NumberedCheckpoint, Predictor, PredictorKind};
 use crate::evaluate::clips::clips::EvalClips;
 use crate::metrics::catalogue::{Better, Catalogue, Definition, IntervalSums};
 use crate::metrics::settings::MetricSettings;
@@ -20,6 +20,8 @@ pub const FEW_BLOCKS: usize = 10;
 #[derive(Clone, Debug)]
 pub struct PredictorRow {
     pub kind: PredictorKind,
+    /// Whose motion it is, where several checkpoints are measured.
+    pub checkpoint: Option<NumberedCheckpoint>,
     /// Description in a sentence.
     pub description: String,
     /// One estimate a definition.
@@ -48,7 +50,7 @@ pub struct Table {
     pub learnt: bool,
     /// Hash of the ground truth and of its compared joints.
     pub truth: String,
-    /// Rows, the prediction first, the ground truth last.
+    /// Rows, the predictions first, the ground truth last.
     pub rows: Vec<PredictorRow>,
     pub notes: Vec<String>,
 }
@@ -64,15 +66,16 @@ pub fn measure(
     predictors: &[Predictor],
     task: &dyn Task,
 ) -> Result<Table> {
-    let settings = MetricSettings { fps: clips.fps, ..settings.clone() };
+    let settings = MetricSettings { fps: clips.fps, has_fingers: clips.have_fingers(), ..settings.clone() };
     let catalogue = Catalogue::new(&settings)?;
     ensure!(clips.n_frames() > 0, "there is no frame to measure");
     let (mut rows, mut n_blocks) = (Vec::new(), 0);
     for predictor in predictors {
-        task.detail(predictor.kind.name());
+        task.detail(&NumberedCheckpoint::name_of(predictor.kind, predictor.checkpoint.as_ref()));
         let measured = blocks::measure(&catalogue, clips, predictor);
         n_blocks = measured.blocks.len();
-        rows.push(row(&catalogue, predictor.kind, &predictor.description, &measured));
+        let row = row(&catalogue, predictor.kind, &predictor.description, &measured);
+        rows.push(PredictorRow { checkpoint: predictor.checkpoint.clone(), ..row });
         task.advance(1);
     }
     task.detail("truth");
@@ -149,6 +152,7 @@ fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: 
     };
     PredictorRow {
         kind,
+        checkpoint: None,
         description: description.to_owned(),
         reasons: values.iter().enumerate().map(reason).collect(),
         values: values.iter().enumerate().map(estimate).collect(),
@@ -156,8 +160,25 @@ fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: 
     }
 }
 
+impl PredictorRow {
+    /// Name for people.
+    pub fn name(&self) -> String {
+        NumberedCheckpoint::name_of(self.kind, self.checkpoint.as_ref())
+    }
+
+    /// Key in a result file.
+    pub fn key(&self) -> String {
+        NumberedCheckpoint::key_of(self.kind, self.checkpoint.as_ref())
+    }
+}
+
 impl Table {
-    /// Row of a predictor, if it was measured.
+    /// Rows of the motions under test, one of each checkpoint.
+    pub fn predictions(&self) -> impl Iterator<Item = &PredictorRow> {
+        self.rows.iter().filter(|row| row.kind == PredictorKind::Prediction)
+    }
+
+    /// Row of a predictor, if it was measured; of several checkpoints the first one's.
     pub fn row(&self, kind: PredictorKind) -> Option<&PredictorRow> {
         self.rows.iter().find(|row| row.kind == kind)
     }

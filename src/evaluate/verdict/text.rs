@@ -42,7 +42,7 @@ pub fn text(table: &Table, all: bool) -> String {
         text += "--all shows the other figures of arms, fingers and wrists too\n";
     }
     for row in &table.rows {
-        let _ = writeln!(text, "{}: {}", row.kind.name(), row.description);
+        let _ = writeln!(text, "{}: {}", row.name(), row.description);
     }
     for note in &table.notes {
         let _ = writeln!(text, "note: {note}");
@@ -50,7 +50,13 @@ pub fn text(table: &Table, all: bool) -> String {
     for note in undefined(table) {
         let _ = writeln!(text, "no value: {note}");
     }
-    let _ = write!(text, "\n{}\n{}\n", better_than_nothing(table).text(), hears(table).text());
+    for own in table.predictions() {
+        let _ = writeln!(text);
+        for verdict in [better_than_nothing(table, own), hears(table, own)] {
+            let of = own.checkpoint.as_ref().map(|of| format!("{}: ", of.name)).unwrap_or_default();
+            let _ = writeln!(text, "{of}{}", verdict.text());
+        }
+    }
     text
 }
 
@@ -69,11 +75,13 @@ pub fn undefined(table: &Table) -> Vec<String> {
     by_reason.into_iter().map(|(reason, names)| format!("{}: {reason}", names.join(", "))).collect()
 }
 
-/// Whether a metric is shown without `all`: the whole body, its only part, or a part of the first position metrics.
+/// Whether a metric is shown without `all`: the whole body, else the first part that has a value, or a part of the first
+/// position metrics.
 fn is_main(table: &Table, index: usize) -> bool {
     let definition = &table.definitions[index];
     let name = labels::whole_name(definition);
-    let first = table.definitions.iter().position(|other| labels::whole_name(other) == name);
+    let has_name = |i: &usize| labels::whole_name(&table.definitions[*i]) == name && table.is_shown(*i);
+    let first = (0..table.definitions.len()).find(has_name);
     let is_place = ["pck_3d", "mpjpe"].iter().any(|start| definition.name.starts_with(start));
     first == Some(index) || (is_place && ["body", "hands"].contains(&definition.part))
 }
@@ -100,6 +108,7 @@ fn column(table: &Table, row: &PredictorRow, shown: &[usize]) -> Vec<String> {
             _ => labels::number(definition, estimate.value),
         }
     };
-    let (first, second) = row.kind.name().split_once(' ').unwrap_or(("", row.kind.name()));
+    let name = row.name();
+    let (first, second) = name.split_once(' ').unwrap_or(("", &name));
     [first, second].map(str::to_owned).into_iter().chain(shown.iter().map(cell)).collect()
 }

@@ -58,9 +58,8 @@ pub struct Verdict {
 }
 
 /// Compares the prediction with the better of the constant poses.
-pub fn better_than_nothing(table: &Table) -> Verdict {
+pub fn better_than_nothing(table: &Table, own: &PredictorRow) -> Verdict {
     let question = "Is it better than doing nothing?";
-    let Some(own) = table.row(PredictorKind::Prediction) else { return undecided(question, NOTHING) };
     let asked = [Aspect::Position, Aspect::Poses, Aspect::Movement];
     let votes = votes(table, own, &asked, |index| better_constant_pose(table, index));
     if let Some(why) = hindrance(table, &votes) {
@@ -139,8 +138,8 @@ fn better_constant_pose(table: &Table, index: usize) -> Option<&PredictorRow> {
 }
 
 /// Comparison of the prediction with the better of the constant poses in one metric, whatever its aspect.
-pub fn against_nothing(table: &Table, index: usize) -> Option<Answer> {
-    let gain = table.gain(table.row(PredictorKind::Prediction)?, better_constant_pose(table, index)?, index);
+pub fn against_nothing(table: &Table, own: &PredictorRow, index: usize) -> Option<Answer> {
+    let gain = table.gain(own, better_constant_pose(table, index)?, index);
     (gain.value.is_finite() && table.n_blocks >= FEW_BLOCKS).then(|| answer(&gain))
 }
 
@@ -154,11 +153,12 @@ fn answer(gain: &Estimate) -> Answer {
 
 /// Compares the prediction with a mismatched one. Its own shifted prediction is preferred where there is one, since
 /// another clip's motion also has another posture.
-pub fn hears(table: &Table) -> Verdict {
+pub fn hears(table: &Table, own: &PredictorRow) -> Verdict {
     let question = "Does it hear?";
-    let other = table.row(PredictorKind::LatePrediction).or_else(|| table.row(PredictorKind::MismatchedPrediction));
-    let own = table.row(PredictorKind::Prediction).zip(other);
-    let Some((own, other)) = own else { return undecided(question, NOTHING) };
+    let of_own =
+        |kind: PredictorKind| table.rows.iter().find(|row| row.kind == kind && row.checkpoint == own.checkpoint);
+    let other = of_own(PredictorKind::LatePrediction).or_else(|| of_own(PredictorKind::MismatchedPrediction));
+    let Some(other) = other else { return undecided(question, "there is nothing to hold it against") };
     let votes = votes(table, own, &[Aspect::Position, Aspect::Beat], |_| Some(other));
     if let Some(why) = hindrance(table, &votes) {
         return undecided(question, &why);
@@ -176,8 +176,6 @@ pub fn hears(table: &Table) -> Verdict {
     };
     Verdict { word, sentence: format!("{question} {}: {description}.", capital(word)), votes }
 }
-
-const NOTHING: &str = "there is nothing to hold it against";
 
 fn undecided(question: &str, why: &str) -> Verdict {
     Verdict { word: "undecided", sentence: format!("{question} Undecided: {why}."), votes: Vec::new() }
@@ -219,8 +217,9 @@ fn aspect(table: &Table, index: usize) -> Option<Aspect> {
     let definition = &table.definitions[index];
     let is_first = |start: &str| table.definitions.iter().position(|d| d.name.starts_with(start)) == Some(index);
     let starts = |start: &str| definition.name.starts_with(start);
-    // Whole body, or the first part present.
-    let is_whole = table.definitions.iter().position(|d| d.name == definition.name) == Some(index);
+    // Whole body, or the first part that has a value.
+    let has_name = |i: &usize| table.definitions[*i].name == definition.name && table.is_shown(*i);
+    let is_whole = (0..table.definitions.len()).find(has_name) == Some(index);
     match definition.better {
         Better::Neither => None,
         // First of several shares, planes and parts.

@@ -10,7 +10,8 @@ use super::source;
 use super::source::{LONGEST_GAP_SECS, LONGEST_SECS, UnreadableMedia};
 use crate::types::sound::{AudioTracks, SAMPLE_RATE, Sound};
 use anyhow::{Context, Result, bail};
-use ffmpeg_next::frame;
+use ffmpeg_next::format::{Sample, sample};
+use ffmpeg_next::{ChannelLayout, frame};
 use std::path::Path;
 
 /// Difference between timestamp and sample count that is a gap, seconds: less than a lost frame of any codec, more than
@@ -21,6 +22,8 @@ const GAP_SECS: f64 = 0.015;
 const MEAN_SECS: f64 = 1.0;
 const ROUNDING_SECS: f64 = 0.0005;
 const STRETCH_SECS: f64 = 1.0;
+/// Samples that are brought to another rate at once.
+const PIECE: usize = 65_536;
 
 /// The whole sound of `path` (wav, flac, mp3, a video, ...) as mono at `rate` samples a second; `None` when it has no
 /// sound.
@@ -31,6 +34,24 @@ pub fn read_mono(path: &Path, rate: u32) -> Result<Option<Sound>> {
         Ok(())
     })?;
     Ok(streamed.map(|_| Sound { rate, samples }))
+}
+
+/// A sound at another rate, as long as before. What lies above half the lower rate is not in it.
+pub fn at_rate(sound: &Sound, rate: u32) -> Result<Sound> {
+    if sound.rate == rate {
+        return Ok(sound.clone());
+    }
+    let format = Sample::F32(sample::Type::Packed);
+    let mut resampler = Resampler::new((format, ChannelLayout::MONO, sound.rate), rate)?;
+    let mut samples = Vec::new();
+    for piece in sound.samples.chunks(PIECE) {
+        let mut frame = frame::Audio::new(format, piece.len(), ChannelLayout::MONO);
+        frame.set_rate(sound.rate);
+        frame.plane_mut::<f32>(0).copy_from_slice(piece);
+        resampler.push(&frame, &mut samples)?;
+    }
+    resampler.finish(&mut samples)?;
+    Ok(Sound { rate, samples })
 }
 
 /// The whole sound of `path` as mono at 16 kHz.

@@ -33,6 +33,14 @@ impl PoseNumbers {
         }
     }
 
+    /// Normalisation of the 49 joints; `None`: poses of a captured skeleton.
+    pub fn normalisation(&self) -> Option<&Normalisation> {
+        match self {
+            Self::Captured(_) => None,
+            Self::Joints { normalisation, .. } => Some(normalisation),
+        }
+    }
+
     /// Errors unless the tables fit each other and the rate, as those of a checkpoint may not.
     pub fn check(&self, fps: FrameRate) -> Result<()> {
         match self {

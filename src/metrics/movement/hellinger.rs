@@ -11,6 +11,9 @@ use serde_json::{Value, json};
 
 /// The first of the joints that `[:, 8:]` leaves of 49.
 const GENEA_FIRST: usize = 8;
+/// Width of a bin, m/s, and their number.
+const GENEA_BIN: f64 = 0.0005;
+const GENEA_BINS: usize = 980;
 
 /// Bins of 0.05 m/s up to 6 m/s.
 pub(crate) fn metric(part: BodyPart) -> MetricFamily {
@@ -20,13 +23,21 @@ pub(crate) fn metric(part: BodyPart) -> MetricFamily {
     family((part.name(), part.joints()), bin, n_bins, formula, json!({"bin_m_per_s": bin, "n_bins": n_bins}))
 }
 
-/// Histograms of the GENEA evaluation, at the bins of its script for the distance (0.05 cm/s).
-pub(crate) fn genea() -> MetricFamily {
+/// Histograms of the GENEA evaluation, at the bins of its script for the distance (0.05 cm/s). Its cut leaves no arm, so
+/// that without fingers the arms are counted in its place.
+pub(crate) fn genea(has_fingers: bool) -> MetricFamily {
+    if !has_fingers {
+        let formula = "sqrt(1 - sum over bins of sqrt(h_p h_g)), h the shares of speeds |x(t+1) - x(t)| * fps of the \
+                       joints of the arms in bins of arange(0, 49 + width, width) cm/s; speeds of 49 cm/s and more are \
+                       dropped; the published [:, 8:] would leave fingers alone, of which none is seen";
+        let part = (BodyPart::Body.name(), BodyPart::Body.joints());
+        return family(part, GENEA_BIN, GENEA_BINS, formula, json!({"bin_cm_per_s": 0.05}));
+    }
     let formula = "sqrt(1 - sum over bins of sqrt(h_p h_g)), h the shares of speeds |x(t+1) - x(t)| * fps of all \
                    joints in bins of arange(0, 49 + width, width) cm/s; speeds of 49 cm/s and more are dropped, the \
                    first 8 joints too ([:, 8:])";
     let parameters = json!({"bin_cm_per_s": 0.05, "first_joint": GENEA_FIRST});
-    family(("from_joint_8", (GENEA_FIRST..N_JOINTS).collect()), 0.0005, 980, formula, parameters)
+    family(("from_joint_8", (GENEA_FIRST..N_JOINTS).collect()), GENEA_BIN, GENEA_BINS, formula, parameters)
 }
 
 /// Of the joints of a named part; `bin` in m/s.

@@ -6,7 +6,7 @@ use super::player;
 use super::player::Excerpt;
 use super::table;
 use crate::evaluate::clips::clips::EvalClips;
-use crate::evaluate::table::table::Table;
+use crate::evaluate::table::table::{PredictorRow, Table};
 use crate::evaluate::verdict::text;
 use crate::evaluate::verdict::verdict::{Answer, Verdict, better_than_nothing, hears};
 use crate::report::html::numbers::length;
@@ -19,16 +19,15 @@ use serde_json::json;
 pub fn html(table: &Table, clips: &EvalClips, title: &str) -> Result<String> {
     let excerpts = player::choose(clips)?;
     let section = |id, title, body| Section { id, title, body };
-    let verdicts = [better_than_nothing(table), hears(table)];
     let page = Page {
         title: title.to_owned(),
         lead: lead(table),
         sections: vec![
-            section("meaning", "What it means", meaning(table, &verdicts)),
-            section("watch", "Truth and prediction", player::body(&excerpts, table)),
+            section("meaning", "What it means", meaning(table)),
+            section("watch", "Truth and prediction", of_first(table, player::body(&excerpts, table))),
             section("figures", "All figures", table::body(table)),
-            section("joints", "Which joints are right", joints(table, clips)),
-            section("speeds", "How fast it moves", speeds(clips)),
+            section("joints", "Which joints are right", of_first(table, joints(table, clips))),
+            section("speeds", "How fast it moves", of_first(table, speeds(clips))),
             section("definitions", "Exact definitions", table::definitions(table)),
         ],
         style: include_str!("page.css"),
@@ -52,9 +51,16 @@ fn lead(table: &Table) -> String {
     )
 }
 
+/// What a section shows of the first of several checkpoints, which is said above it.
+fn of_first(table: &Table, body: Vec<Node>) -> Vec<Node> {
+    let first = table.predictions().find_map(|own| own.checkpoint.as_ref());
+    let said = first.map(|of| node("p").text(format!("The prediction here is that of {}, given first.", of.name)));
+    said.into_iter().chain(body).collect()
+}
+
 /// Conclusions with the votes behind them, and assumptions.
-fn meaning(table: &Table, verdicts: &[Verdict; 2]) -> Vec<Node> {
-    let card = |verdict: &Verdict| {
+fn meaning(table: &Table) -> Vec<Node> {
+    let card = |(own, verdict): (&PredictorRow, Verdict)| {
         let class = format!("card verdict {}", verdict.word.replace(' ', "-"));
         let votes = verdict.votes.iter().map(|vote| {
             let (class, words) = match vote.answer {
@@ -65,12 +71,14 @@ fn meaning(table: &Table, verdicts: &[Verdict; 2]) -> Vec<Node> {
             let description = format!("{}: {words} {}", vote.metric, vote.against.name());
             node("li").class(format!("vote {class}")).text(description)
         });
-        let card = node("div").class(class).child(node("p").text(&verdict.sentence));
+        let of = own.checkpoint.as_ref().map(|of| format!("{}: ", of.name)).unwrap_or_default();
+        let card = node("div").class(class).child(node("p").text(format!("{of}{}", verdict.sentence)));
         card.child(node("ul").class("votes").children(votes))
     };
-    let mut body = vec![node("div").class("verdicts").children(verdicts.iter().map(card))];
+    let verdicts = |own| [(own, better_than_nothing(table, own)), (own, hears(table, own))];
+    let mut body = vec![node("div").class("verdicts").children(table.predictions().flat_map(verdicts).map(card))];
     let rows = table.rows.iter().map(|row| {
-        let name = node("th").attr("scope", "row").text(row.kind.name());
+        let name = node("th").attr("scope", "row").text(row.name());
         node("tr").child(name).child(node("td").text(&row.description))
     });
     body.push(node("h3").text("What is measured beside each other"));

@@ -19,10 +19,13 @@ const GROUPS: [(&str, &[&str]); 4] = [
 /// Table by group.
 pub fn body(table: &Table) -> Vec<Node> {
     let head = |text: &str| node("th").attr("scope", "col").class("num").text(text);
-    let heads = table.rows.iter().map(|row| head(row.kind.name()));
+    let heads = table.rows.iter().map(|row| head(&row.name()));
     let first = node("th").attr("scope", "col").text("");
-    let against = node("th").attr("scope", "col").class("against").text("against doing nothing");
-    let width = table.rows.len() + 2;
+    let against = table.predictions().map(|own| {
+        let of = own.checkpoint.as_ref().map(|of| format!("{} ", of.name)).unwrap_or_default();
+        node("th").attr("scope", "col").class("against").text(format!("{of}against doing nothing"))
+    });
+    let width = table.rows.len() + 1 + table.predictions().count();
     let mut rows: Vec<Node> = Vec::new();
     for (group, (title, _)) in GROUPS.iter().enumerate() {
         let of_group = (0..table.definitions.len()).filter(|i| group_of(&table.definitions[*i]) == group);
@@ -39,7 +42,7 @@ pub fn body(table: &Table) -> Vec<Node> {
          Against doing nothing: the prediction beside the better of the poses that never move, on the same draws: better, \
          worse, or not told apart."
     );
-    let table = html::table("figures", [first, against].into_iter().chain(heads), rows);
+    let table = html::table("figures", std::iter::once(first).chain(against).chain(heads), rows);
     vec![node("p").class("small").text(drawn), node("div").class("scroll").attr("tabindex", "0").child(table)]
 }
 
@@ -70,12 +73,15 @@ fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
         name.text(labels::name(definition)).child(node("small").text(small))
     };
     *last = whole;
-    let against = match against_nothing(table, index) {
-        Some(Answer::Yes) => ("yes", "better"),
-        Some(Answer::No) => ("no", "worse"),
-        Some(Answer::Undecided) => ("undecided", "not told apart"),
-        None => ("", ""),
-    };
+    let against = table.predictions().map(|own| {
+        let (class, words) = match against_nothing(table, own, index) {
+            Some(Answer::Yes) => ("yes", "better"),
+            Some(Answer::No) => ("no", "worse"),
+            Some(Answer::Undecided) => ("undecided", "not told apart"),
+            None => ("", ""),
+        };
+        node("td").class(format!("against {class}")).text(words)
+    });
     let cells = table.rows.iter().map(|row| {
         let estimate = &row.values[index];
         let cell = node("td").class(if row.kind == PredictorKind::Prediction { "num own" } else { "num" });
@@ -91,8 +97,7 @@ fn row(table: &Table, index: usize, last: &mut String) -> Option<Node> {
             cell.attr("title", interval)
         }
     });
-    let against = node("td").class(format!("against {}", against.0)).text(against.1);
-    Some(node("tr").child(name).child(against).children(cells))
+    Some(node("tr").child(name).children(against).children(cells))
 }
 
 /// Every definition with its parameters and hash, those of the ground truth alone included.

@@ -102,7 +102,7 @@ fn the_neighbour_by_sound_is_found_where_it_was_taken_from() {
     let normal = normalisation(&dataset).unwrap();
     let ground_truth =
         held_out::read(&dataset, &held_out::samples(&dataset, Split::Validation).unwrap(), &normal).unwrap();
-    let held_out::HeldOutInterval { key, ground_truth, sound } = ground_truth.into_iter().next().unwrap();
+    let held_out::HeldOutInterval { key, ground_truth, sound, .. } = ground_truth.into_iter().next().unwrap();
     let features = Some(from_samples(&sound.samples, fps, ground_truth.n_frames()));
     let clip = EvalClip {
         name: key,

@@ -1,0 +1,263 @@
+//! Checkpoints of both trainings in one table, on a dataset of the 49 joints and on imported captures, and what is refused.
+
+use crate::fixtures::animation::captures::write_capture;
+use crate::fixtures::browser::Browser;
+use crate::fixtures::gesture_dataset::{FPS, dataset};
+use crate::fixtures::support::{Answer, Project};
+use crate::fixtures::write_dataset::write_dataset;
+use orator::config::{Seq2seqConfig, SequenceNetwork};
+use orator::dataset::import::find::TakeFiles;
+use orator::dataset::import::take::{ImportedTake, TakeLimits, TakeOutcome};
+use orator::dataset::{Dataset, Sample, Split};
+use orator::external::ffmpeg::audio;
+use orator::formats::bvh::exponential_maps::{ExponentialMaps, JointMapping};
+use orator::formats::bvh::read::Bvh;
+use orator::formats::wav;
+use orator::mocap::bvh;
+use orator::mocap::captured::MotionKind;
+use orator::motion::{bones, resample};
+use orator::stage::progress::Silent;
+use orator::train::seq2seq::captures::CaptureFolder;
+use orator::train::seq2seq::source::TrainingSource;
+use orator::train::seq2seq::train::train;
+use orator::types::skeleton::L_HAND;
+use orator::types::sound::Sound;
+use orator::types::time::FrameRate;
+use serde_json::Value;
+use std::f64::consts::TAU;
+use std::path::Path;
+
+/// A training of a few steps.
+fn train_sequence(source: TrainingSource, network: SequenceNetwork, out: &Path) {
+    let schedule =
+        Seq2seqConfig { steps: 4, epoch_steps: 2, checkpoint_every: 2, keep_checkpoints: 2, ..Default::default() };
+    let settings = Seq2seqConfig { network, batch: 3, hidden: 8, stride_frames: 5, ..schedule };
+    train(source, None, &settings, out, &Silent).unwrap();
+}
+
+fn train_gan(project: &Project, data: &str, out: &str) {
+    let sets = ["gan.batch=2", "gan.epoch_steps=2", "gan.checkpoint_every=2"].map(|set| ["--set", set]).concat();
+    let answer =
+        project.answer(&[&["train", "gan", "--dataset", data, "--out", out, "--steps", "2"], &sets[..]].concat());
+    assert_eq!(answer.code, 0, "{}", answer.errors);
+}
+
+/// Keys of the rows, and the checkpoints that they are of.
+fn rows(answer: &Answer) -> Vec<(String, String)> {
+    let text = |row: &Value, key: &str| row[key].as_str().unwrap_or_default().to_owned();
+    let rows = answer.json["predictors"].as_array().unwrap();
+    rows.iter().map(|row| (text(row, "name"), text(row, "checkpoint"))).collect()
+}
+
+fn value(answer: &Answer, name: &str, part: &str, who: &str) -> Option<f64> {
+    let metrics = answer.json["metrics"].as_array().unwrap();
+    let metric = metrics.iter().find(|metric| metric["name"] == name && metric["part"] == part);
+    metric.unwrap()["values"][who]["value"].as_f64()
+}
+
+fn notes(answer: &Answer) -> String {
+    let notes = answer.json["notes"].as_array().unwrap();
+    notes.iter().map(|note| note.as_str().unwrap().to_owned() + "\n").collect()
+}
+
+#[test]
+fn networks_of_both_trainings_stand_in_one_table() {
+    let project = Project::with_clips("several", 0, 1.0);
+    let data = dataset(&project.dir().join("data"));
+    train_gan(&project, "data", "gan");
+    for (network, out) in [(SequenceNetwork::Contextual, "contextual"), (SequenceNetwork::Words, "words")] {
+        train_sequence(TrainingSource::Dataset(&data), network, &project.dir().join(out));
+    }
+    let several = ["evaluate", "--dataset", "data", "--checkpoint", "gan", "contextual", "words"];
+    let answer = project.answer(&[&several[..], &["--report", "page.html"]].concat());
+    assert_eq!(answer.code, 0, "{}", answer.errors);
+    let of = |key: &str, name: &str| (key.to_owned(), name.to_owned());
+    let expected = [
+        of("prediction", "gan"),
+        of("prediction_2", "seq2seq contextual"),
+        of("prediction_3", "seq2seq words"),
+        of("mean_pose", ""),
+        of("median_pose", ""),
+        of("nearest_neighbour", ""),
+        of("mismatched_prediction", "gan"),
+        of("mismatched_prediction_2", "seq2seq contextual"),
+        of("mismatched_prediction_3", "seq2seq words"),
+        of("mismatched_truth", ""),
+        of("truth_halves", ""),
+        of("truth", ""),
+    ];
+    assert_eq!(rows(&answer), expected);
+    let error = |who: &str| value(&answer, "mpjpe", "all", who).unwrap();
+    assert!(error("prediction_2") > 0.0 && error("prediction_2") != error("mismatched_prediction_2"));
+    assert!(value(&answer, "mpjpe", "hands", "prediction_3").is_some());
+    let verdicts = answer.json["verdicts"].as_array().unwrap();
+    let of: Vec<&str> = verdicts.iter().map(|verdict| verdict["predictor"].as_str().unwrap()).collect();
+    assert_eq!(of, ["prediction", "prediction_2", "prediction_3"]);
+    assert_eq!(verdicts[0]["hears"], answer.json["hears"]);
+    // the GAN's figures are those of the GAN alone
+    let alone = project.answer(&["evaluate", "--dataset", "data", "--checkpoint", "gan"]);
+    assert_eq!(alone.json["truth"], answer.json["truth"]);
+    assert!(alone.json["verdicts"].is_null() && alone.json["predictors"][0]["checkpoint"].is_null());
+    let metrics = |answer: &Answer| answer.json["metrics"].as_array().unwrap().clone();
+    for (one, several) in metrics(&alone).iter().zip(metrics(&answer)) {
+        for who in ["prediction", "mismatched_prediction", "nearest_neighbour"] {
+            assert_eq!(one["values"][who], several["values"][who], "{} {who}", one["plain_name"]);
+        }
+    }
+    let genea = project.answer(&[&several[..], &["--convention", "genea"]].concat());
+    assert_eq!(genea.code, 0, "{}", genea.errors);
+    assert!(value(&genea, "jerk", "all_and_neck", "mismatched_prediction_3").is_some());
+    if let Some(mut browser) = Browser::open(&project.dir().join("page.html"), [1200, 900]) {
+        let count =
+            |browser: &mut Browser, of: &str| browser.value(&format!("document.querySelectorAll('{of}').length"));
+        assert_eq!(count(&mut browser, ".verdict"), 6);
+        assert_eq!(count(&mut browser, "#figures thead .against"), 3);
+        assert!(browser.problems.is_empty(), "{:?}", browser.problems);
+    }
+
+    let fails = |args: &[&str]| {
+        let answer = project.answer(&[&["evaluate", "--dataset", "data", "--checkpoint"], args].concat());
+        assert_eq!(answer.code, 1, "{}", answer.errors);
+        answer.errors
+    };
+    assert!(fails(&["gan", "gan/best.safetensors"]).contains("given twice"));
+    assert!(fails(&["gan", "nowhere"]).contains("nowhere is not there"));
+    assert!(fails(&["data"]).contains("holds no checkpoint"));
+    let lifter = concat!(env!("CARGO_MANIFEST_DIR"), "/models/body_lifter.safetensors");
+    assert!(fails(&["gan", lifter]).contains("body_lifter.safetensors is a checkpoint of neither"));
+    std::fs::write(project.dir().join("other.safetensors"), "x").unwrap();
+    assert!(fails(&["gan", "other.safetensors"]).contains("other.safetensors"));
+}
+
+/// Take of a capture as a sample of a dataset at `FPS`.
+fn imported(dir: &Path, name: &str) -> Sample {
+    let file = |ending: &str| Some(dir.join(format!("{name}.{ending}"))).filter(|path| path.exists());
+    let [motion, sound, transcript] = ["bvh", "wav", "tsv"].map(file);
+    let files = TakeFiles { kind: MotionKind::Bvh, motion: motion.unwrap(), sound, transcript };
+    let limits = TakeLimits { fps: FPS, min_frames: 30, max_apart_secs: 0.5, no_sound: false };
+    match ImportedTake::read(&files, &limits).unwrap().ended {
+        TakeOutcome::Kept(kept) => kept.sample,
+        TakeOutcome::Refused(refusal) => panic!("{refusal:?}"),
+    }
+}
+
+#[test]
+fn captured_skeletons_are_measured_beside_the_gan_on_the_joints_of_both() {
+    let project = Project::with_clips("captured", 0, 1.0);
+    let (captures, loud) = (project.dir().join("captures"), project.dir().join("loud"));
+    for (name, secs, phase) in [("a", 9.0, 0.0), ("b", 9.0, 2.0), ("c", 14.0, 4.0)] {
+        write_capture(&captures, name, secs, phase, true);
+        write_capture(&loud, name, secs, phase, false);
+        let sound = audio::read_mono(&captures.join(format!("{name}.wav")), 48_000).unwrap().unwrap();
+        wav::write(&loud.join(format!("{name}.wav")), &sound).unwrap();
+    }
+    let take = |split, name: &str| (split, imported(&captures, name));
+    let samples = [take(Split::Train, "a"), take(Split::Train, "b"), take(Split::Validation, "c")];
+    assert!(samples.iter().all(|(_, sample)| sample.words.as_ref().is_some_and(|words| !words.is_empty())));
+    let data = project.dir().join("data");
+    write_dataset(&data, "host", FPS, &samples).unwrap();
+    for (dir, network, out) in
+        [(&captures, SequenceNetwork::Words, "spoken"), (&loud, SequenceNetwork::Contextual, "heard")]
+    {
+        let captures = CaptureFolder::open(dir, &["c".to_owned()], JointMapping::default()).unwrap();
+        train_sequence(TrainingSource::Captures(&captures), network, &project.dir().join(out));
+    }
+    train_gan(&project, "data", "gan");
+    let measure = |args: &[&str]| {
+        let answer = project.answer(&[&["evaluate", "--dataset", "data", "--checkpoint"], args].concat());
+        assert_eq!(answer.code, 0, "{}", answer.errors);
+        answer
+    };
+    let answer = measure(&["gan", "spoken", "heard"]);
+    let said = notes(&answer);
+    assert!(
+        said.contains("8 joints of 48; left out: 40 finger joints") && said.contains("100.0 % of the frames"),
+        "{said}"
+    );
+    assert!(said.contains("seq2seq words learnt the captures captures"), "{said}");
+    assert!(said.contains("seq2seq words moves at 20") && said.contains("resampled to 15"), "{said}");
+    assert!(said.contains("seq2seq contextual learnt from sound at 48000 Hz"), "{said}");
+    assert!(!said.contains("has none"), "{said}");
+    let body = |name: &str, who: &str| value(&answer, name, "body", who);
+    for who in
+        ["prediction", "prediction_2", "prediction_3", "mean_pose", "nearest_neighbour", "mismatched_prediction_2"]
+    {
+        assert!(body("mpjpe", who).unwrap() > 0.0, "{who}");
+        assert_eq!(value(&answer, "mpjpe", "hands", who), None, "{who}");
+        assert!(body("frechet_pose", who).is_some());
+    }
+    // hardly trained networks stay near the mean of their captures, in the axes of the import
+    for who in ["prediction_2", "prediction_3"] {
+        let [own, mean] = [who, "mean_pose"].map(|who| body("mpjpe", who).unwrap());
+        assert!(own < 1.5 * mean, "{who}: {own}, mean pose {mean}");
+    }
+    assert_ne!(body("mpjpe", "prediction_2"), body("mpjpe", "mismatched_prediction_2"));
+    // numbers of whole poses are of the arms
+    let genea = measure(&["spoken", "--convention", "genea", "--report", "page.html"]);
+    for name in ["hellinger_speed", "cca"] {
+        assert!(value(&genea, name, "body", "mismatched_prediction").is_some(), "{name}");
+    }
+    assert!(rows(&genea).iter().all(|(_, checkpoint)| checkpoint.is_empty()));
+
+    // a dataset without words, at another rate than the GAN's
+    let silent: Vec<(Split, Sample)> =
+        samples.into_iter().map(|(split, sample)| (split, Sample { words: None, ..sample })).collect();
+    write_dataset(&project.dir().join("silent"), "host", FPS, &silent).unwrap();
+    let answer = project.answer(&["evaluate", "--dataset", "silent", "--checkpoint", "spoken"]);
+    assert!(notes(&answer).contains("seq2seq reads words, and this split has none"), "{}", notes(&answer));
+}
+
+#[test]
+fn a_captured_motion_comes_back_as_it_is_imported() {
+    let folder = tempfile::tempdir().unwrap();
+    write_capture(folder.path(), "a", 9.0, 1.0, false);
+    let expected = imported(folder.path(), "a").motion;
+    let read = || Bvh::read(&folder.path().join("a.bvh")).unwrap();
+    let maps = ExponentialMaps::of([Ok(("a".to_owned(), read()))], &JointMapping::default()).unwrap();
+    let text = maps.to_bvh(maps.features(&read()).unwrap().view());
+    let mut made = resample::at_rate(&bvh::of_text(&text).unwrap().motion, FPS);
+    bones::with_lengths(&mut made, &bones::measure(&expected));
+    // metres; the ends aside, where the two resamplings have other neighbours
+    let mut worst = 0.0f32;
+    for t in 10..made.n_frames() - 10 {
+        for joint in 0..=L_HAND {
+            let apart = |k: usize| (made.joints[[t, joint, k]] - expected.joints[[t, joint, k]]).powi(2);
+            worst = worst.max((0..3).map(apart).sum::<f32>().sqrt());
+        }
+    }
+    assert!(made.n_frames() + 2 >= expected.n_frames() && worst < 0.01, "{worst} m");
+}
+
+#[test]
+fn a_dataset_of_another_rate_than_the_speakers_is_refused() {
+    let project = Project::with_clips("rates", 0, 1.0);
+    let data = dataset(&project.dir().join("data"));
+    train_sequence(TrainingSource::Dataset(&data), SequenceNetwork::Words, &project.dir().join("words"));
+    let fps = FrameRate::new(30, 1);
+    let again = |split: Split| {
+        let mut sample = data.read(&data.samples(split)[0]).unwrap();
+        sample.motion.fps = fps;
+        sample.sound.samples.truncate(sample.sound.samples.len() / 2);
+        (split, sample)
+    };
+    write_dataset(&project.dir().join("fast"), "host", fps, &[again(Split::Train), again(Split::Validation)]).unwrap();
+    assert_eq!(Dataset::open(&project.dir().join("fast")).unwrap().info().fps, fps);
+    let answer = project.answer(&["evaluate", "--dataset", "fast", "--checkpoint", "words"]);
+    assert!(answer.code == 1 && answer.errors.contains("moves at 30"), "{}", answer.errors);
+}
+
+#[test]
+fn a_sound_at_another_rate_is_the_same_sound() {
+    let tone = |rate: u32| {
+        let sample = |i: u32| (0.4 * (TAU * 440.0 * f64::from(i) / f64::from(rate)).sin()) as f32;
+        Sound { rate, samples: (0..rate).map(sample).collect() }
+    };
+    for (from, to) in [(16_000, 48_000), (48_000, 16_000), (16_000, 44_100), (16_000, 16_000)] {
+        let made = audio::at_rate(&tone(from), to).unwrap();
+        let expected = tone(to);
+        assert_eq!((made.rate, made.samples.len()), (to, expected.samples.len()));
+        let middle = to as usize / 10..to as usize * 9 / 10;
+        let apart = middle.map(|i| (made.samples[i] - expected.samples[i]).abs()).fold(0.0, f32::max);
+        assert!(apart < 1e-3, "{from} to {to}: {apart}");
+    }
+}
