@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use orator::config::{Config, videos};
 use orator::dataset::forget::known;
 use orator::dataset::forget::known::KnownVideo;
-use orator::dataset::forget::removal::{Removal, models_dir};
+use orator::dataset::forget::removal::{Removal, models_dirs};
 use orator::dataset::forget::search::{Searched, search};
 use orator::stage::artifacts::{StageName, speaker_dir};
 use orator::stage::workdir::{self, FolderLock};
@@ -147,8 +147,12 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
     };
     let speaker = videos.first().map(|video| video.speaker.clone()).unwrap_or_default();
     if is_locked {
-        let folders = [speaker_dir(work, StageName::Dataset, &speaker), models_dir(work, &speaker)];
-        for folder in folders.iter().filter(|folder| folder.parent().is_some_and(Path::exists)) {
+        let dataset = speaker_dir(work, StageName::Dataset, &speaker);
+        for folder in [dataset]
+            .iter()
+            .chain(&models_dirs(work, &speaker))
+            .filter(|folder| folder.parent().is_some_and(Path::exists))
+        {
             locks.push(FolderLock::exclusive(folder).context(NOT_NOW)?);
         }
     }

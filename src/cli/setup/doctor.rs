@@ -1,5 +1,6 @@
 //! `orator doctor`.
 
+use super::words;
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::confine::this_program;
@@ -7,12 +8,13 @@ use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator::config::{Config, Settings};
 use orator::external::onnx::{ModelStore, Runtime};
+use orator::formats::word_vectors::WordVectors;
 use orator::pipeline::pose2d::models;
 use orator::pipeline::process::probe;
 use orator::pipeline::segment::speech_rule::SpeechListener;
 use orator::stage::workdir;
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Say what is installed, what is missing, and the command that fixes it.
 ///
@@ -44,6 +46,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         Ok(config) => {
             checks.push(ok("configuration", config.file.display().to_string()));
             checks.extend(model_checks(&config.settings));
+            checks.extend(word_checks(&config.settings.models.dir));
             checks.push(work(&config.settings.work.dir));
             checks.push(sandbox(config.settings.work.sandbox));
         }
@@ -128,6 +131,25 @@ fn model_checks(settings: &Settings) -> Vec<Check> {
         Err(error) => checks.push(wrong("speech model", format!("{error:#}"), "orator models fetch")),
     }
     checks
+}
+
+/// Tables of word vectors. Without any, words begin as the seed makes them: nothing is missing.
+fn word_checks(models: &Path) -> Vec<Check> {
+    let tables = words::opened(models);
+    if tables.is_empty() {
+        let none = "none; `orator words fetch` gets some, for networks that read words".to_owned();
+        return vec![Check { is_full: false, ..ok("word vectors", none) }];
+    }
+    let check = |(path, table): (PathBuf, Result<WordVectors>)| match table {
+        Ok(table) => {
+            let (n_words, dim) = (table.n_words(), table.dim());
+            ok("word vectors", format!("{n_words} words of {dim} numbers ({})", path.display()))
+        }
+        Err(error) => {
+            wrong("word vectors", format!("{error:#}"), "remove it, and make it anew: `orator words fetch` or `add`")
+        }
+    };
+    tables.into_iter().map(check).collect()
 }
 
 /// The work folder: can it be written, and do locks hold there?

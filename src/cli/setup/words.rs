@@ -116,11 +116,23 @@ fn made(path: &Path, table: &WordVectors, how: &str, ui: &Ui) -> Outcome {
     Outcome::Done
 }
 
-fn check(folder: &Path, transcripts: &[PathBuf], ui: &Ui) -> Result<Outcome> {
+/// Tables in a folder, by name.
+fn tables(folder: &Path) -> Vec<PathBuf> {
     let mut tables: Vec<PathBuf> =
         std::fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path()).collect();
     tables.retain(|path| path.extension().is_some_and(|ending| ending == "safetensors"));
     tables.sort();
+    tables
+}
+
+/// Tables in the folder of the models, each opened.
+pub(super) fn opened(models: &Path) -> Vec<(PathBuf, Result<WordVectors>)> {
+    let tables = tables(&models.join(FOLDER)).into_iter();
+    tables.map(|path| (path.clone(), WordVectors::open(&path))).collect()
+}
+
+fn check(folder: &Path, transcripts: &[PathBuf], ui: &Ui) -> Result<Outcome> {
+    let tables = tables(folder);
     ensure!(!tables.is_empty(), "no word vectors are in {}: `orator words fetch` gets some", folder.display());
     let texts = transcripts.iter().map(|path| Ok((path, Transcript::read(path)?))).collect::<Result<Vec<_>>>()?;
     let (mut lines, mut facts, mut is_wrong) = (Vec::new(), Vec::<Value>::new(), false);

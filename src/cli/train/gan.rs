@@ -5,6 +5,7 @@ use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail};
 use orator::config::Config;
+use orator::dataset::index::SampleRef;
 use orator::dataset::{Dataset, Split};
 use orator::evaluate::baseline::predictor;
 use orator::evaluate::clips::held_out;
@@ -15,7 +16,9 @@ use orator::report::training::strip::HeldOutPair;
 use orator::stage::progress::Progress as _;
 use orator::train::gan::score::{Validation, ValidationMetrics};
 use orator::train::gan::train;
+use orator::types::time::FrameRate;
 use serde_json::json;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -63,7 +66,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let start = Instant::now();
     let outcome = train::train(&dataset, &settings, &out, ui)?;
     let steps_per_sec = (outcome.steps - outcome.began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
-    let page = page(&dataset, &outcome.best, &out, ui);
+    let of_best = || pairs(&dataset, &GestureGenerator::open(&outcome.best)?);
+    let page = page(&out, &dataset.info().speaker, of_best, ui);
     let text = format!(
         "{}: {} steps{} ({steps_per_sec:.2} a second, {:.1} % of it waiting for data) on {} windows, {} parameters\n\
          {}\nnewest checkpoint  {}\nbest (step {})  {}{}",
@@ -121,12 +125,13 @@ fn metrics(validation: &Validation) -> String {
 }
 
 /// Writes the page of the training; the training is done, so that what hinders the page is said, and is no error.
-fn page(dataset: &Dataset, best: &Path, folder: &Path, ui: &Ui) -> Option<PathBuf> {
-    let written = || -> Result<()> {
-        let pairs = pairs(dataset, &GestureGenerator::open(best)?)?;
-        page::write(folder, &dataset.info().speaker, &pairs)
-    };
-    match written() {
+pub(super) fn page(
+    folder: &Path,
+    speaker: &str,
+    pairs: impl FnOnce() -> Result<Vec<HeldOutPair>>,
+    ui: &Ui,
+) -> Option<PathBuf> {
+    match pairs().and_then(|pairs| page::write(folder, speaker, &pairs)) {
         Ok(()) => Some(folder.join(page::PAGE)),
         Err(error) => {
             ui.say(&format!("no page of this training: {error:#}"));
@@ -135,26 +140,35 @@ fn page(dataset: &Dataset, best: &Path, folder: &Path, ui: &Ui) -> Option<PathBu
     }
 }
 
-/// True and generated poses of a few intervals that were not trained on; of the training split where there are no others.
-fn pairs(dataset: &Dataset, speaker: &GestureGenerator) -> Result<Vec<HeldOutPair>> {
+/// A few intervals that were not trained on; of the training split where there are no others.
+pub(super) fn shown(dataset: &Dataset) -> Vec<SampleRef> {
     let splits = [Split::Validation, Split::Train].map(|split| dataset.samples(split));
     let samples = splits.into_iter().find(|samples| !samples.is_empty()).unwrap_or_default();
     let n = samples.len().min(N_PAIRS);
-    let chosen: Vec<_> = (0..n).map(|i| samples[i * samples.len() / n].clone()).collect();
-    let intervals = held_out::read(dataset, &chosen, &speaker.metadata.normalisation)?;
+    (0..n).map(|i| samples[i * samples.len() / n].clone()).collect()
+}
+
+/// Frames in the middle of so many.
+pub(super) fn middle(n_frames: usize, fps: FrameRate) -> Range<usize> {
+    let span = ((PAIR_SECS * fps.per_sec()) as usize).min(n_frames);
+    let first = (n_frames - span) / 2;
+    first..first + span
+}
+
+/// True and generated poses of these intervals.
+fn pairs(dataset: &Dataset, speaker: &GestureGenerator) -> Result<Vec<HeldOutPair>> {
+    let intervals = held_out::read(dataset, &shown(dataset), &speaker.metadata.normalisation)?;
     let pair = |interval: HeldOutInterval| {
-        let n_frames = interval.ground_truth.n_frames();
-        let span = ((PAIR_SECS * speaker.fps().per_sec()) as usize).min(n_frames);
-        let first = (n_frames - span) / 2;
-        let HeldOutInterval { key, ground_truth, sound, .. } = interval.cut(first..first + span);
-        let predicted = predictor::motion(speaker, &sound, span)?;
-        Ok(HeldOutPair { name: key, start_secs: speaker.fps().secs(first), ground_truth, predicted })
+        let frames = middle(interval.ground_truth.n_frames(), speaker.fps());
+        let HeldOutInterval { key, ground_truth, sound, .. } = interval.cut(frames.clone());
+        let predicted = predictor::motion(speaker, &sound, frames.len())?;
+        Ok(HeldOutPair { name: key, start_secs: speaker.fps().secs(frames.start), ground_truth, predicted })
     };
     intervals.into_iter().map(pair).collect()
 }
 
 /// The speaker's name: given, or the only one configured.
-fn speaker(given: Option<&String>, config: &Config) -> Result<String> {
+pub(super) fn speaker(given: Option<&String>, config: &Config) -> Result<String> {
     let names: Vec<&str> = config.settings.speaker.iter().map(|speaker| speaker.name.as_str()).collect();
     match (given, names.as_slice()) {
         (Some(name), _) if names.contains(&name.as_str()) => Ok(name.clone()),

@@ -1,15 +1,23 @@
 //! `orator train seq2seq`.
 
+use super::gan::{middle, page, shown, speaker};
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
+use ndarray::s;
 use orator::dataset::Dataset;
+use orator::evaluate::clips::held_out;
+use orator::evaluate::clips::held_out::HeldOutInterval;
 use orator::formats::bvh::exponential_maps::JointMapping;
 use orator::formats::word_vectors::WordVectors;
+use orator::generate::seq2seq::SequenceGenerator;
+use orator::generate::seq2seq::poses::PoseNumbers;
+use orator::report::training::strip::HeldOutPair;
 use orator::train::seq2seq::captures::CaptureFolder;
 use orator::train::seq2seq::source::TrainingSource;
 use orator::train::seq2seq::train;
+use orator::types::pose3d::Motion;
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -18,17 +26,20 @@ use std::time::Instant;
 ///
 /// Reads a dataset of `orator run` or `orator dataset import`, or a folder of captures (`NAME.bvh` with `NAME.wav` and,
 /// where there is one, a transcript of that name), and trains with the settings of `[seq2seq]`. Checkpoints,
-/// `metrics.jsonl` and TensorBoard events go to the output folder; started again, it goes on from the newest checkpoint
-/// there and ends with the same bytes as a training that was never interrupted.
+/// `metrics.jsonl`, TensorBoard events and a page of curves go to the output folder; started again, it goes on from the
+/// newest checkpoint there and ends with the same bytes as a training that was never interrupted.
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
-    /// The dataset.
-    #[arg(long, value_name = "DIR", required_unless_present = "captures", conflicts_with = "captures")]
+    /// The speaker; may be left out when the configuration names one only.
+    #[arg(long, value_name = "NAME", conflicts_with = "captures")]
+    speaker: Option<String>,
+    /// The dataset; `work/dataset/<speaker>` when left out.
+    #[arg(long, value_name = "DIR", conflicts_with = "captures")]
     dataset: Option<PathBuf>,
-    /// Folder of captures.
-    #[arg(long, value_name = "DIR")]
+    /// Folder of captures, instead of a dataset.
+    #[arg(long, value_name = "DIR", requires = "out")]
     captures: Option<PathBuf>,
     /// Capture to validate on, without ending; may be given several times.
     #[arg(long, value_name = "NAME", requires = "captures")]
@@ -42,34 +53,48 @@ pub struct Args {
     /// Steps to train altogether, instead of `seq2seq.steps`.
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
-    /// Folder of the checkpoints.
+    /// Folder of the checkpoints; `work/seq2seq/<speaker>` when left out.
     #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    out: Option<PathBuf>,
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    let mut settings = args.config.load_or_default()?.settings.seq2seq;
+    let is_named = args.dataset.is_some() || args.captures.is_some();
+    let config = if is_named { args.config.load_or_default()? } else { args.config.load()? };
+    let in_work = |given: Option<PathBuf>, room: &str| -> Result<PathBuf> {
+        match given {
+            Some(path) => Ok(path),
+            None => Ok(config.settings.work.dir.join(room).join(speaker(args.speaker.as_ref(), &config)?)),
+        }
+    };
+    let out = in_work(args.out, "seq2seq")?;
+    let mut settings = config.settings.seq2seq.clone();
     settings.steps = args.steps.unwrap_or(settings.steps);
     let vectors = args.words.as_deref().map(WordVectors::open).transpose()?;
     let start = Instant::now();
-    let train = |source| train::train(source, vectors.as_ref(), &settings, &args.out, ui);
-    let outcome = match (&args.dataset, &args.captures) {
-        (Some(folder), _) => {
-            let dataset = Dataset::open(folder).context("`orator run` makes the dataset to train on")?;
-            train(TrainingSource::Dataset(&dataset))?
+    let train = |source| train::train(source, vectors.as_ref(), &settings, &out, ui);
+    let (outcome, page) = match &args.captures {
+        None => {
+            let folder = in_work(args.dataset, "dataset")?;
+            let dataset = Dataset::open(&folder).context("`orator run` makes the dataset to train on")?;
+            let outcome = train(TrainingSource::Dataset(&dataset))?;
+            let of_best = || pairs(&dataset, &SequenceGenerator::open(&outcome.best)?);
+            let page = page(&out, &dataset.info().speaker, of_best, ui);
+            (outcome, page)
         }
-        (None, Some(folder)) => {
+        Some(folder) => {
             let captures = CaptureFolder::open(folder, &args.hold_out, JointMapping::parse(&args.joint)?)?;
-            train(TrainingSource::Captures(&captures))?
+            let outcome = train(TrainingSource::Captures(&captures))?;
+            let page = page(&out, &captures.name(), || Ok(Vec::new()), ui);
+            (outcome, page)
         }
-        (None, None) => bail!("give --dataset or --captures"),
     };
     let steps_per_sec = (outcome.steps - outcome.began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
     let validation = &outcome.validation;
     let mut text = format!(
         "{} steps{} ({steps_per_sec:.2} a second) on {} segments, {} words, {} parameters\n\
          on {} {} segments: L1 {:.3} (mean pose {:.3}), motion energy / data's {:.2}\n\
-         newest checkpoint  {}\nbest (step {})  {}",
+         newest checkpoint  {}\nbest (step {})  {}{}",
         outcome.steps,
         if outcome.stopped_early { ", ended early: the score had stopped falling" } else { "" },
         outcome.n_segments,
@@ -83,6 +108,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         outcome.newest.display(),
         outcome.best_step,
         outcome.best.display(),
+        page.as_ref().map(|page| format!("\ncurves and poses  {}", page.display())).unwrap_or_default(),
     );
     if let Some(alarm) = &validation.alarm {
         text += &format!("\nALARM: {alarm}");
@@ -99,7 +125,23 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         "newest": outcome.newest,
         "best": outcome.best,
         "best_step": outcome.best_step,
+        "page": page,
     });
     ui.summary(&text, Some(&next), facts);
-    Ok(Outcome::Done)
+    Ok(if page.is_some() { Outcome::Done } else { Outcome::SomeFailed })
+}
+
+/// True and generated poses of a few intervals, from the middle of each.
+fn pairs(dataset: &Dataset, speaker: &SequenceGenerator) -> Result<Vec<HeldOutPair>> {
+    let PoseNumbers::Joints { normalisation, .. } = &speaker.metadata.poses else { return Ok(Vec::new()) };
+    let fps = speaker.fps();
+    let pair = |interval: HeldOutInterval| {
+        let predicted = speaker.motion(&speaker.poses(&interval.sound, &interval.words)?)?;
+        let frames = middle(interval.ground_truth.n_frames().min(predicted.n_frames()), fps);
+        let predicted = Motion::from_joints(fps, predicted.joints.slice(s![frames.clone(), .., ..]).to_owned());
+        let start_secs = fps.secs(frames.start);
+        let HeldOutInterval { key, ground_truth, .. } = interval.cut(frames);
+        Ok(HeldOutPair { name: key, start_secs, ground_truth, predicted })
+    };
+    held_out::read(dataset, &shown(dataset), normalisation)?.into_iter().map(pair).collect()
 }

@@ -18,9 +18,9 @@ use std::path::{Path, PathBuf};
 /// Marker file in a dataset while one of its videos is being forgotten.
 pub const PENDING: &str = "FORGETTING.txt";
 
-/// The folder that a speaker's model is trained into, if no other is named.
-pub fn models_dir(work: &Path, speaker: &str) -> PathBuf {
-    work.join("gan").join(speaker)
+/// The folders that a speaker's models are trained into, if no others are named.
+pub fn models_dirs(work: &Path, speaker: &str) -> [PathBuf; 2] {
+    ["gan", "seq2seq"].map(|kind| work.join(kind).join(speaker))
 }
 
 /// Data to remove for some videos of a speaker, or for all.
@@ -73,10 +73,11 @@ impl Removal {
         let names_one = |path: &PathBuf| fs::read(path).is_ok_and(|bytes| super::search::is_in(&bytes, &removal.terms));
         let reports: Vec<PathBuf> = pages(work)?.into_iter().filter(names_one).collect();
         removal.paths.extend(reports);
-        let (models, dir) = (models_dir(work, speaker), speaker_dir(work, StageName::Dataset, speaker));
+        let dir = speaker_dir(work, StageName::Dataset, speaker);
         let names: BTreeSet<String> = videos.iter().flat_map(|video| video.parts.iter().cloned()).collect();
         let has_samples = names.iter().any(|name| dataset::has_samples(&dir, name));
-        removal.models.extend(Some(models).filter(|models| models.exists() && (whole || has_samples)));
+        let models = models_dirs(work, speaker).into_iter();
+        removal.models.extend(models.filter(|models| models.exists() && (whole || has_samples)));
         let left_over = workdir::left_over(&dir);
         if !names.is_empty() || (whole && dir.exists()) || dir.join(PENDING).exists() {
             removal.dataset = Some((dir.clone(), names));

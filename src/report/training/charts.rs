@@ -26,13 +26,14 @@ impl<'a> TrainingLog<'a> {
 
     /// Curves that are not 0 throughout.
     pub fn charts(&self) -> Vec<LineChart> {
-        let trained = |name: &str, colour, of: &str| curve(&self.steps, name, colour, &format!("/{of}"));
-        let made =
-            |name: &str, colour, of: &str| curve(&self.epochs, name, colour, &format!("/validation/generator/{of}"));
+        let trained = |name: &str, colour, of: &str| curve(&self.steps, name, colour, |line| line[of].as_f64());
+        let made = |name: &str, colour, of: &str| {
+            curve(&self.epochs, name, colour, |line| metrics(&line["validation"], of)[0].as_f64())
+        };
         let level = |name: &str, colour, value| ChartLevel { name: name.to_owned(), colour, value };
         // the mean pose's value, which all validations share
         let still = |name: &str, colour, of: &str| {
-            let last = self.epochs.last().and_then(|line| line["validation"]["mean_pose"][of].as_f64());
+            let last = self.epochs.last().and_then(|line| metrics(&line["validation"], of)[1].as_f64());
             level(name, colour, last.unwrap_or(f64::NAN))
         };
         let chart = |title: &str, description: &str, lines: Vec<ChartLine>, levels: Vec<ChartLevel>| LineChart {
@@ -70,7 +71,7 @@ impl<'a> TrainingLog<'a> {
             chart(
                 "Score",
                 "What chooses the best checkpoint, which the dashed line marks; lower is better.",
-                vec![curve(&self.epochs, "held out", 0, "/validation/score")],
+                vec![curve(&self.epochs, "held out", 0, |line| line["validation"]["score"].as_f64())],
                 vec![],
             ),
             chart(
@@ -89,13 +90,26 @@ impl<'a> TrainingLog<'a> {
         ];
         let says_something =
             |chart: &LineChart| chart.lines.iter().flat_map(|line| &line.places).any(|[_, value]| *value != 0.0);
-        charts.into_iter().filter(says_something).collect()
+        let mut charts: Vec<LineChart> = charts.into_iter().filter(says_something).collect();
+        for chart in &mut charts {
+            chart.lines.retain(|line| !line.places.is_empty());
+            chart.levels.retain(|level| level.value.is_finite());
+        }
+        charts
     }
 }
 
-/// Curve of the values at a JSON pointer.
-fn curve(lines: &[&Value], name: &str, colour: usize, at: &str) -> ChartLine {
-    let places = lines.iter().filter_map(|line| Some([line["step"].as_f64()?, line.pointer(at)?.as_f64()?]));
+/// A metric of the network and of the mean pose in a validation; those of sequences are in no group of their own.
+pub fn metrics<'v>(validation: &'v Value, of: &str) -> [&'v Value; 2] {
+    match validation["generator"].is_object() {
+        true => [&validation["generator"][of], &validation["mean_pose"][of]],
+        false => [&validation[of], &validation[format!("mean_pose_{of}")]],
+    }
+}
+
+/// Curve of a value of lines.
+fn curve(lines: &[&Value], name: &str, colour: usize, value: impl Fn(&Value) -> Option<f64>) -> ChartLine {
+    let places = lines.iter().filter_map(|line| Some([line["step"].as_f64()?, value(line)?]));
     ChartLine { name: name.to_owned(), colour, places: thinned(&places.collect::<Vec<_>>()) }
 }
 
@@ -126,5 +140,18 @@ mod tests {
         assert!(charts[0].lines[0].places.len() <= MOST_POINTS && charts[0].lines[1].places.len() == 3);
         assert_eq!((charts[0].levels[0].value, charts[0].marked), (0.8, Some(7000.0)));
         assert!(TrainingLog::parse(&[]).charts().is_empty());
+    }
+
+    #[test]
+    fn the_log_of_a_sequence_network_has_its_curves() {
+        let mut lines: Vec<Value> = (1..=9)
+            .map(|i| json!({"step": 10 * i, "total": 0.6, "l1": 0.5, "discriminator": 0.0, "gradient_norm": 2.0}))
+            .collect();
+        let validation = json!({"score": 1.1, "l1": 0.4, "mean_pose_l1": 0.5, "energy": 0.7, "n_segments": 8});
+        lines.push(json!({"step": 90, "epoch": 1, "validation": validation}));
+        let charts = TrainingLog::parse(&lines).charts();
+        let titles: Vec<&str> = charts.iter().map(|chart| chart.title.as_str()).collect();
+        assert_eq!(titles, ["L1 error", "Motion energy", "Score", "Gradient norm"]);
+        assert_eq!((charts[0].levels[0].value, charts[0].lines[1].places[0]), (0.5, [90.0, 0.4]));
     }
 }

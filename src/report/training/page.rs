@@ -1,7 +1,7 @@
 //! Page of a training beside its checkpoints: the curves of its log with the best epoch marked, the best epoch's
 //! metrics beside the mean pose's, and generated against true poses.
 
-use super::charts::TrainingLog;
+use super::charts::{TrainingLog, metrics};
 use super::picture::picture;
 use super::strip::{HeldOutPair, strip};
 use crate::external::ffmpeg::jpeg;
@@ -20,7 +20,7 @@ use std::path::Path;
 pub const PAGE: &str = "training.html";
 pub const PICTURE: &str = "training.png";
 
-/// Metric of a validation: name, JSON pointer, whether in percent.
+/// Metric of a validation: name, key, whether in percent.
 const FIGURES: [(&str, &str, bool); 6] = [
     ("L1 error (normalised)", "l1", false),
     ("PCK 0.2", "pck", true),
@@ -46,7 +46,7 @@ pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> 
          sound alone. The lines are the height of the wrists: grey the speaker's, in colour the generated one.",
     )];
     if pairs.is_empty() {
-        poses = vec![node("p").class("empty").text("The dataset has no interval to show.")];
+        poses = vec![node("p").class("empty").text("There is no interval of the 49 joints to show.")];
     } else {
         let names: Vec<&str> = pairs.iter().map(|pair| pair.name.as_str()).collect();
         let description = format!("True and generated poses of {}", names.join(", "));
@@ -73,12 +73,14 @@ fn lead(training_log: &TrainingLog) -> String {
     let Some(best) = training_log.best else { return "No validation yet.".to_owned() };
     let step = |line: &Value| line["step"].as_u64().unwrap_or(0);
     let last = training_log.epochs.last().map_or(0, |line| step(line));
-    let windows = best["validation"]["n_windows"].as_u64().unwrap_or(0) as usize;
+    let (key, of) =
+        if best["validation"]["n_segments"].is_u64() { ("n_segments", "sequence") } else { ("n_windows", "window") };
+    let windows = best["validation"][key].as_u64().unwrap_or(0) as usize;
     format!(
         "{last} steps. Of {} validations the one at step {} has the best score, measured on {} of the {} split.",
         training_log.epochs.len(),
         step(best),
-        counted(windows, "window"),
+        counted(windows, of),
         best["validation"]["split"].as_str().unwrap_or("validation"),
     )
 }
@@ -88,25 +90,30 @@ fn best(training_log: &TrainingLog) -> Vec<Node> {
     let Some(best) = training_log.best.map(|line| &line["validation"]) else {
         return vec![node("p").class("empty").text("The log has no validation.")];
     };
+    let is_sequence = best["n_segments"].is_u64();
     let shown = |value: &Value, in_percent: bool| match value.as_f64() {
         Some(value) if in_percent => format!("{:.1} %", 100.0 * value),
         Some(value) => number(value),
+        None if is_sequence => "0".to_owned(),
         None => "too few poses".to_owned(),
     };
+    let is_measured = |(_, of, _): &(&str, &str, bool)| !is_sequence || best[*of].is_number();
     let row = |(name, of, in_percent): (&str, &str, bool)| {
-        let cells = ["generator", "mean_pose"].map(|who| shown(&best[who][of], in_percent));
+        let cells = metrics(best, of).map(|value| shown(value, in_percent));
         let cells = cells.into_iter().map(|text| node("td").class("num").text(text));
         node("tr").child(node("th").attr("scope", "row").text(name)).children(cells)
     };
     let head = ["", "generator", "mean pose"].map(|name| node("th").attr("scope", "col").class("num").text(name));
     let table = node("table")
         .child(node("thead").child(node("tr").children(head)))
-        .child(node("tbody").children(FIGURES.into_iter().map(row)));
-    let poses = best["n_poses"].as_u64().unwrap_or(0) as usize;
-    let about = format!(
-        "The mean pose never moves. Behind each Frechet distance are {}; the smaller that count, the larger it is.",
-        counted(poses, "pose")
-    );
+        .child(node("tbody").children(FIGURES.into_iter().filter(is_measured).map(row)));
+    let about = match best["n_poses"].as_u64() {
+        Some(poses) => format!(
+            "The mean pose never moves. Behind each Frechet distance are {}; the smaller that count, the larger it is.",
+            counted(poses as usize, "pose")
+        ),
+        None => "The mean pose never moves.".to_owned(),
+    };
     let alarm = best["alarm"].as_str().map(|alarm| node("p").class("note").text(format!("Alarm: {alarm}.")));
     let table = node("div").class("scroll figures").child(table);
     [table, node("p").class("small").text(about)].into_iter().chain(alarm).collect()

@@ -27,8 +27,10 @@ fn a_forgotten_video_leaves_nothing_and_the_others_are_untouched() {
     let name = gone.file_name().unwrap().to_str().unwrap();
     let stem = stays.file_stem().unwrap().to_str().unwrap().replace('_', "-");
     let before = bytes_under(&project.work());
-    fs::create_dir_all(project.work().join("gan/host")).unwrap();
-    fs::write(project.work().join("gan/host/step-0000001.safetensors"), "weights").unwrap();
+    for kind in ["gan/host", "seq2seq/host", "seq2seq/other"] {
+        fs::create_dir_all(project.work().join(kind)).unwrap();
+        fs::write(project.work().join(kind).join("step-0000001.safetensors"), "weights").unwrap();
+    }
 
     let report = project.work().join("report.html");
     fs::write(&report, format!("<p>{name}</p>")).unwrap();
@@ -47,7 +49,10 @@ fn a_forgotten_video_leaves_nothing_and_the_others_are_untouched() {
     assert!(answer.json["searched"]["files"].as_u64().unwrap() > 20, "{}", answer.json);
     let advice = answer.json["advice"].to_string();
     assert!(advice.contains("exclude = ["), "{advice}");
-    assert!(!project.work().join("gan/host").exists(), "a model cannot unlearn");
+    for kind in ["gan/host", "seq2seq/host"] {
+        assert!(!project.work().join(kind).exists(), "a model cannot unlearn");
+    }
+    fs::remove_dir_all(project.work().join("seq2seq/other")).unwrap();
     assert!(!report.exists(), "a report that shows it");
     assert_eq!(problems(&project), 0);
     // no name of it is left, and what was made of the other is what it was

@@ -7,3 +7,4 @@ pub mod operators;
 pub mod pose;
 pub mod rule;
 pub mod seq2seq;
+pub mod seq2seq_program;

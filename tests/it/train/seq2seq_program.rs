@@ -1,0 +1,74 @@
+//! `orator train seq2seq` by the program itself: where things lie when nothing is named, and the page of the training.
+
+use crate::fixtures::animation::captures::write_capture;
+use crate::fixtures::gesture_dataset::{FPS, sample};
+use crate::fixtures::write_dataset::write_dataset;
+use orator::dataset::Split;
+use std::path::Path;
+use std::process::{Command, Output};
+
+const CONFIG: &str = r#"
+[[speaker]]
+name = "anna"
+videos = ["videos/anna/*.mp4"]
+[seq2seq]
+batch = 3
+hidden = 8
+steps = 20
+epoch_steps = 10
+"#;
+
+fn orator(dir: &Path, args: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+    command.args(args.split_whitespace()).current_dir(dir).output().unwrap()
+}
+
+/// The answer of a command that succeeds.
+fn answer(dir: &Path, args: &str) -> serde_json::Value {
+    let output = orator(dir, &format!("{args} --json"));
+    assert!(output.status.success(), "{args}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn a_training_lies_in_the_work_folder_with_a_page_of_its_curves() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    std::fs::write(dir.join("pipeline.toml"), CONFIG).unwrap();
+    let samples = [
+        (Split::Train, sample("a-00000000-000000", 99, 0.0)),
+        (Split::Validation, sample("c-00000000-000000", 128, 4.0)),
+    ];
+    write_dataset(&dir.join("work/dataset/anna"), "anna", FPS, &samples).unwrap();
+    let trained = answer(dir, "train seq2seq");
+    let out = dir.join("work/seq2seq/anna");
+    let place = std::path::Path::new(trained["page"].as_str().unwrap());
+    assert_eq!(place.canonicalize().unwrap(), out.join("training.html").canonicalize().unwrap());
+    let files = || ["training.html", "training.png"].map(|file| std::fs::read(out.join(file)).unwrap());
+    let written = files();
+    let page = String::from_utf8(written[0].clone()).unwrap();
+    for words in ["Training of anna", "L1 error", "Motion energy", "Score", "Gradient norm", "strip", "20 steps"] {
+        assert!(page.contains(words), "{words}");
+    }
+    assert!(!page.contains("PCK") && !page.contains("NaN") && page.contains("on 8 sequences of the validation split"));
+    answer(dir, "train seq2seq");
+    assert!(files() == written, "the same training has the same page");
+    assert!(std::fs::read_dir(&out).unwrap().flatten().any(|e| e.file_name().to_string_lossy().contains("tfevents")));
+}
+
+#[test]
+fn captures_need_a_place_and_have_a_page_without_poses() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    write_capture(&dir.join("takes"), "a", 4.0, 0.0, true);
+    let refused = orator(dir, "train seq2seq --captures takes");
+    assert!(!refused.status.success() && String::from_utf8_lossy(&refused.stderr).contains("--out"));
+    let refused = orator(dir, "train seq2seq --out model");
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("pipeline.toml"), "{refused:?}");
+    let set = "--set seq2seq.batch=3 --set seq2seq.hidden=8 --set seq2seq.epoch_steps=4";
+    answer(dir, &format!("train seq2seq --captures takes --steps 8 --out model {set}"));
+    let page = std::fs::read_to_string(dir.join("model/training.html")).unwrap();
+    assert!(page.contains("Training of takes") && page.contains("There is no interval of the 49 joints to show"));
+    let output = orator(dir, "generate --checkpoint model --audio takes/a.wav --transcript takes/a.tsv --out a.bvh");
+    assert!(output.status.success() && dir.join("a.bvh").is_file());
+}
