@@ -3,7 +3,6 @@
 
 use super::config::{Config, Segment};
 use super::context::ContextEncoder;
-use super::predict::GesturePredictor;
 use crate::nn::Mode;
 use crate::nn::ops::affine::Affine;
 use crate::nn::ops::dropout::dropout;
@@ -113,21 +112,17 @@ impl AudioBaseline {
         let heard = self.speech.forward(audio, mode)?;
         (heard.flatten_to(1)? - codes)?.sqr()?.mean_all()
     }
-}
 
-impl GesturePredictor for AudioBaseline {
-    fn config(&self) -> &Config {
+    /// Its sizes.
+    pub fn config(&self) -> &Config {
         &self.config
     }
 
-    fn forward(&self, segment: &Segment, mode: &mut Mode) -> Result<Tensor> {
+    /// Poses [B, predicted, pose] of segments.
+    pub fn poses(&self, segment: &Segment, mode: &mut Mode) -> Result<Tensor> {
         self.config.check(segment)?;
         let codes = self.speech.forward(&segment.audio, mode)?;
         let poses = self.autoencoder.decode(&codes.flatten_to(1)?)?.broadcast_mul(self.scale.as_tensor())?;
         poses.reshape((codes.dim(0)?, self.config.predicted, self.config.pose))
-    }
-
-    fn audio_baseline(&self) -> Option<&AudioBaseline> {
-        Some(self)
     }
 }
