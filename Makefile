@@ -8,12 +8,13 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: setup runtime models readers browser blender validator build check test prove prove-rule prove-people demo clean-demo
+.PHONY: setup runtime models readers aligner browser blender validator build check test prove prove-rule prove-people demo clean-demo
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
 SKIPPED := $(abspath $(TARGET))/skipped-tests.txt
 export ORATOR_READERS ?= $(abspath $(TARGET)/readers)
+export ORATOR_ALIGNER ?= $(abspath $(TARGET)/aligner)
 export ORATOR_MODELS ?= $(abspath $(TARGET)/models)
 export ORATOR_BLENDER ?= $(abspath $(TARGET)/blender)
 # A text that differs from its snapshot is an error.
@@ -22,7 +23,7 @@ export ORATOR_GLTF_VALIDATOR ?= $(abspath $(TARGET)/validator)
 
 setup: ; @.ci/setup/system.sh
 runtime: ; @.ci/setup/onnxruntime.sh
-readers browser blender validator: ; @.ci/setup/$@.sh
+readers aligner browser blender validator: ; @.ci/setup/$@.sh
 models: build ; @.ci/setup/models.sh
 
 build: setup runtime
@@ -39,7 +40,7 @@ check:
 	cargo test --locked --lib --bins
 	cargo test --locked --test it -- $(QUICK)
 
-test: build models readers browser blender validator
+test: build models readers aligner browser blender validator
 	@rm -f $(SKIPPED)
 	cargo fmt --check
 	cargo clippy --locked --all-targets -- -D warnings
@@ -48,7 +49,7 @@ test: build models readers browser blender validator
 	@if [ -s $(SKIPPED) ]; then echo 'skipped tests:'; sort -u $(SKIPPED); else echo 'no test was skipped'; fi
 	@echo 'make test: all passed'
 
-prove prove-rule prove-people: build models
+prove prove-rule prove-people: build models aligner
 	.ci/$@
 
 # The synthetic speaker from its videos to its motion: a rendered person seen by the models for real people, or, where

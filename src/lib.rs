@@ -22,7 +22,7 @@
 //! | 1 | `math` | vectors, rotations, Procrustes, eigenvalues, filters, median and quantiles | nothing |
 //! | 1 | `stage` | how any step runs, is recorded and resumes; the ledger | nothing |
 //! | 2 | `config` | `pipeline.toml`, as written and resolved | `types stage` |
-//! | 2 | `external` | one door each for the foreign libraries: ffmpeg, OpenCV, ONNX Runtime; the sandbox of processes | `types stage` |
+//! | 2 | `external` | one door each for the foreign libraries: ffmpeg, OpenCV, ONNX Runtime; the aligner of words; the sandbox of processes | `types stage` |
 //! | 2 | `audio` | sound to features | `types` |
 //! | 2 | `motion` | the body as numbers: bones, forward kinematics, resampling, what the lifters look at | `types math` |
 //! | 3 | `formats` | every file format, read and written | `types math stage motion` |

@@ -1,7 +1,7 @@
 //! The command line: the one place with clap, indicatif and println. One file a verb; a verb's doc comment is its
 //! `--help`. Exit codes: 0 all done; 1 usage, configuration, or a check that did not pass; 2 some units failed, the others are done.
 
-use super::dataset::{forget, import, verify as dataset};
+use super::dataset::{align, forget, import, verify as dataset};
 use super::motion::{lift, sheet};
 use super::outcome::Outcome;
 use super::pipeline::{init, report, run, status};
@@ -35,6 +35,7 @@ enum Verb {
     Sheet(sheet::Args),
     Report(report::Args),
     Import(import::Args),
+    Align(align::Args),
     Forget(forget::Args),
     Dataset(dataset::Args),
     Train(train::Args),
@@ -78,6 +79,7 @@ pub fn main() -> ExitCode {
         Verb::Report(args) => report::run(args, &ui),
         Verb::Dataset(args) => dataset::run(args, &ui),
         Verb::Import(args) => import::run(args, &ui),
+        Verb::Align(args) => align::run(args, &ui),
         Verb::Forget(args) => forget::run(args, &ui),
         Verb::Train(args) => train::run(args, &ui),
         Verb::Evaluate(args) => evaluate::run(args, &ui),

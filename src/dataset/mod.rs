@@ -4,6 +4,7 @@
 //! motion with its sound; training draws windows from it. Writing: `sample` -> `write::tar` -> `write::part` ->
 //! `write::assemble`; reading: `read`; splits: `split`, `shared_sound`; checks: `verify`.
 
+pub mod align;
 pub mod bones;
 pub mod card;
 pub mod forget;

@@ -38,7 +38,7 @@ const FLOORS: [(u8, &str, &str); 20] = [
 /// Folders that import nothing of each other: pairwise siblings under a room.
 const APART: [(&str, &[&str]); 2] = [
     ("pipeline", &["extract", "pose2d", "segment", "lift", "shard", "dataset"]),
-    ("external", &["ffmpeg", "opencv", "onnx"]),
+    ("external", &["ffmpeg", "opencv", "onnx", "aligner"]),
 ];
 
 /// Names that several types may carry.

@@ -1,5 +1,6 @@
-//! The verbs of a dataset: `dataset`, `import`, `forget`.
+//! The verbs of a dataset: `dataset`, `import`, `forget`, `align`.
 
+pub mod align;
 pub mod forget;
 pub mod import;
 pub mod verify;

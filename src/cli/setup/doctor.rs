@@ -4,9 +4,11 @@ use super::words;
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::confine::this_program;
+use crate::cli::dataset::align::default_python;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator::config::{Config, Settings};
+use orator::external::aligner::Aligner;
 use orator::external::onnx::{ModelStore, Runtime};
 use orator::formats::word_vectors::WordVectors;
 use orator::pipeline::pose2d::models;
@@ -49,6 +51,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             checks.extend(word_checks(&config.settings.models.dir));
             checks.push(work(&config.settings.work.dir));
             checks.push(sandbox(config.settings.work.sandbox));
+            checks.push(aligner());
         }
         Err(error) => {
             checks.push(wrong(
@@ -93,6 +96,18 @@ fn sandbox(is_wanted: bool) -> Check {
         Err(error) => (false, format!("not active: {error:#}")),
     };
     Check { is_full: is_active, ..ok("sandbox", found) }
+}
+
+/// The aligner of words, which `orator align` alone needs: nothing is missing without it.
+fn aligner() -> Check {
+    let python = default_python();
+    match Aligner::version(&python) {
+        Ok(version) => ok("word aligner (English)", format!("pocketsphinx {version} of {}", python.display())),
+        Err(error) => {
+            let found = format!("only `orator align` needs it: {error:#}");
+            Check { is_full: false, ..ok("word aligner (English)", found) }
+        }
+    }
 }
 
 /// ONNX Runtime, and the models the configuration chooses.

@@ -1,0 +1,99 @@
+//! `orator align`.
+
+use crate::cli::Outcome;
+use crate::cli::confine::confine;
+use crate::cli::ui::Ui;
+use anyhow::{Context, Result, ensure};
+use orator::dataset::align::{Alignment, align};
+use orator::external::aligner::Aligner;
+use orator::formats::transcript::Transcript;
+use orator::stage::progress::Progress;
+use orator::stage::workdir;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Words that do not fit and are named in the summary.
+const SHOWN: usize = 8;
+
+/// Give the words of an English transcript their times, by forced alignment with its sound.
+///
+/// For transcripts with times of sentences only (.srt, .vtt, ...), or plain text (.txt). Times that are there say where
+/// a word is looked for, 5 s around. English alone: the acoustic model and the dictionary are those of US English in the
+/// Python package pocketsphinx, which `orator doctor` tells how to get. A word that does not fit the sound (not said,
+/// said otherwise, of another language) keeps its place in the text and is marked: `source` is `interpolated`,
+/// `confidence` 0. A text of which less than a quarter fits is refused.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The sound: wav, flac, mp3, a video.
+    #[arg(value_name = "SOUND")]
+    sound: PathBuf,
+    /// The transcript, as `orator guide dataset` names them.
+    #[arg(value_name = "TRANSCRIPT")]
+    transcript: PathBuf,
+    /// The words with their times to write; called like the video, `orator run` finds it.
+    #[arg(long, value_name = "FILE.words.json")]
+    out: PathBuf,
+    /// The Python that has pocketsphinx, instead of the one that ORATOR_PYTHON names, else python3.
+    #[arg(long, value_name = "PROGRAM")]
+    python: Option<PathBuf>,
+}
+
+/// The Python that aligns, where the command line names none.
+pub fn default_python() -> PathBuf {
+    let named = std::env::var_os("ORATOR_PYTHON").filter(|name| !name.is_empty());
+    named.map_or_else(|| "python3".into(), PathBuf::from)
+}
+
+pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
+    let is_json = args.out.extension().is_some_and(|ending| ending == "json");
+    ensure!(is_json, "{}: words are written as .words.json; name such a file", args.out.display());
+    let is_same =
+        |path: &Path| path.canonicalize().is_ok_and(|path| args.out.canonicalize().is_ok_and(|out| out == path));
+    ensure!(!is_same(&args.transcript) && !is_same(&args.sound), "--out names what is read, {}", args.out.display());
+    let aligner = Aligner::start(&args.python.unwrap_or_else(default_python))?;
+    confine([args.out.as_path()], []);
+    let transcript = Transcript::read(&args.transcript)?;
+    if !transcript.words.is_empty() {
+        transcript.notes.iter().for_each(|note| ui.say(&format!("{}: {note}", args.transcript.display())));
+    }
+    let pair = || format!("cannot align {} with {}", args.transcript.display(), args.sound.display());
+    let task = ui.begin("seconds of sound", 0);
+    let mut secs = 0.0;
+    let aligned = align(aligner, &args.sound, &transcript, |heard| {
+        let before = secs as u64;
+        secs += heard;
+        task.advance(secs as u64 - before);
+    });
+    drop(task);
+    let aligned = aligned.with_context(pair)?;
+    let mut text = serde_json::to_string_pretty(&aligned.words)?;
+    text.push('\n');
+    workdir::write_file(&args.out, text.as_bytes())?;
+    let Alignment { words, unfit, sound_secs } = &aligned;
+    let n_aligned = words.len() - words.iter().filter(|word| word.confidence == Some(0.0)).count();
+    let mut lines = vec![format!("{n_aligned} of {} words aligned in {sound_secs:.1} s of sound", words.len())];
+    if !unfit.is_empty() {
+        let shown = unfit
+            .iter()
+            .take(SHOWN)
+            .map(|&n| format!("word {} `{}` near {:.1} s", n + 1, words[n].word, words[n].start_secs));
+        let more = if unfit.len() > SHOWN { ", ..." } else { "" };
+        let shown = shown.collect::<Vec<_>>().join(", ");
+        lines.push(format!("{} do not fit and are marked by confidence 0: {shown}{more}", unfit.len()));
+    }
+    lines.push(format!("wrote {}", args.out.display()));
+    let next = format!("orator words check {}", args.out.display());
+    let marked = unfit.iter().map(|&n| {
+        json!({ "number": n + 1, "word": words[n].word, "start_secs": words[n].start_secs, "end_secs": words[n].end_secs })
+    });
+    let facts = json!({
+        "out": args.out,
+        "words": words.len(),
+        "aligned": n_aligned,
+        "unfit": marked.collect::<Vec<_>>(),
+        "sound_secs": sound_secs,
+        "next": next,
+    });
+    ui.summary(&lines.join("\n"), Some(&next), facts);
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,107 @@
+//! Word times of a transcript that has none, by forced alignment with its sound.
+
+use crate::external::aligner::{AlignedWord, Aligner, SpokenWord};
+use crate::external::ffmpeg::UnreadableMedia;
+use crate::external::ffmpeg::sound_stream::SoundStream;
+use crate::formats::transcript::{Transcript, Word, WordSource};
+use crate::types::sound::SAMPLE_RATE;
+use anyhow::{Result, ensure};
+use std::path::Path;
+
+/// Fewest words that fit, as a share of all: with fewer it is the text of another sound.
+const MIN_FITTING: f64 = 0.25;
+
+/// Words with times, and what did not fit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Alignment {
+    /// Every word of the text, in its order: aligned, or interpolated with confidence 0 where it does not fit.
+    pub words: Vec<Word>,
+    /// Indices of the words that do not fit; signs without letters are none.
+    pub unfit: Vec<usize>,
+    /// Length of the sound.
+    pub sound_secs: f64,
+}
+
+/// Aligns the words of a transcript with the sound of `sound`; `heard` is told the seconds of every piece that was taken.
+///
+/// # Errors
+/// A text without words, a file without sound, a text that does not fit.
+pub fn align(aligner: Aligner, sound: &Path, transcript: &Transcript, mut heard: impl FnMut(f64)) -> Result<Alignment> {
+    let texts: Vec<&str> = transcript.text.split_whitespace().collect();
+    let n_words = texts.iter().filter(|text| has_letters(text)).count();
+    ensure!(n_words > 0, "the transcript holds no word");
+    let within = |nth: usize| transcript.words.get(nth).map(|word| (word.start_secs, word.end_secs));
+    // Texts of words with times are those words.
+    let is_timed = transcript.words.len() == texts.len();
+    let spoken = texts
+        .iter()
+        .enumerate()
+        .map(|(nth, text)| SpokenWord { word: (*text).to_owned(), within: within(nth).filter(|_| is_timed) });
+    let spoken: Vec<SpokenWord> = spoken.collect();
+    let mut n_samples = 0;
+    let found = aligner.align(&spoken, |take| {
+        for piece in SoundStream::open(sound, SAMPLE_RATE) {
+            let piece = piece?;
+            n_samples += piece.len();
+            heard(piece.len() as f64 / f64::from(SAMPLE_RATE));
+            take(&piece)?;
+        }
+        match n_samples {
+            0 => Err(UnreadableMedia(format!("{} has no sound", sound.display())).into()),
+            _ => Ok(()),
+        }
+    })?;
+    let unfit: Vec<usize> = (0..texts.len()).filter(|&n| found[n].is_none() && has_letters(texts[n])).collect();
+    let n_fitting = n_words - unfit.len();
+    let sound_secs = n_samples as f64 / f64::from(SAMPLE_RATE);
+    ensure!(
+        n_fitting as f64 >= MIN_FITTING * n_words as f64,
+        "only {n_fitting} of {n_words} words fit the {sound_secs:.1} s of sound: it is silent, or the text is that of \
+         another sound, or not in English"
+    );
+    Ok(Alignment { words: placed(&texts, &found, sound_secs), unfit, sound_secs })
+}
+
+fn has_letters(text: &str) -> bool {
+    text.chars().any(char::is_alphanumeric)
+}
+
+/// The words with their times; those without share the time between their neighbours.
+fn placed(texts: &[&str], found: &[Option<AlignedWord>], sound_secs: f64) -> Vec<Word> {
+    let mut words: Vec<Word> = Vec::with_capacity(texts.len());
+    while words.len() < texts.len() {
+        let first = words.len();
+        let start = words.last().map_or(0.0, |word| word.end_secs);
+        let n_untimed = found[first..].iter().take_while(|found| found.is_none()).count();
+        let until = found.get(first + n_untimed).copied().flatten().map_or(sound_secs, |next| next.start_secs);
+        let secs = (until - start).max(0.0) / n_untimed.max(1) as f64;
+        for nth in 0..n_untimed {
+            let [start_secs, end_secs] = [nth, nth + 1].map(|n| start + secs * n as f64);
+            let (word, source) = (texts[first + nth].to_owned(), WordSource::Interpolated);
+            words.push(Word { word, start_secs, end_secs, source, confidence: Some(0.0) });
+        }
+        if let Some(Some(AlignedWord { start_secs, end_secs, confidence })) = found.get(first + n_untimed).copied() {
+            let (word, source) = (texts[first + n_untimed].to_owned(), WordSource::Aligned);
+            let end_secs = end_secs.min(sound_secs).max(start_secs);
+            words.push(Word { word, start_secs, end_secs, source, confidence: Some(confidence) });
+        }
+    }
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_that_do_not_fit_lie_between_their_neighbours() {
+        let at = |start_secs, end_secs| Some(AlignedWord { start_secs, end_secs, confidence: 0.9 });
+        let found = [None, at(1.0, 1.5), None, None, at(2.5, 3.1), None];
+        let words = placed(&["a", "b", "c", "d", "e", "f"], &found, 3.0);
+        let times: Vec<_> = words.iter().map(|word| (word.start_secs, word.end_secs)).collect();
+        assert_eq!(times, [(0.0, 1.0), (1.0, 1.5), (1.5, 2.0), (2.0, 2.5), (2.5, 3.0), (3.0, 3.0)]);
+        let unfit: Vec<usize> = (0..6).filter(|&n| words[n].confidence == Some(0.0)).collect();
+        assert_eq!(unfit, [0, 2, 3, 5]);
+        assert!(unfit.iter().all(|&n| words[n].source == WordSource::Interpolated));
+    }
+}

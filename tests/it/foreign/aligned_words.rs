@@ -1,0 +1,192 @@
+//! `orator align` on speech of espeak-ng, whose word times are known, with the Python package pocketsphinx (`make
+//! aligner`). `ORATOR_LONG=1` (`make prove`): more than eight minutes; otherwise half a minute.
+
+use crate::fixtures::skip::{aligner, skip};
+use orator::formats::transcript::{Transcript, WordSource};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const SENTENCES: [&str; 14] = [
+    "Good evening, everybody.",
+    "Today I want to talk about the way that people move their hands while they speak.",
+    "When we explain something difficult, our fingers draw shapes in the air, and the listener understands us better.",
+    "She paid 350 dollars for a ticket in 1998.",
+    "Some researchers believe that gestures help the speaker to find the right words.",
+    "Others think that they are a second language, older than the one we write.",
+    "In my first year at the university, I watched hundreds of hours of video, and I counted every movement.",
+    "Nobody paid me for that work.",
+    "Please put the blue box next to the window.",
+    "It's a matter of trust, and of patience.",
+    "We went through the forest, across the river, and up the hill.",
+    "The weather in Chicago was terrible last winter.",
+    "Kubernetes and TypeScript are words no dictionary from that time contains.",
+    "Can you hear me now, or should I speak a little louder?",
+];
+const OTHER: &str = "the committee met on tuesday to consider a proposal from the ministry of agriculture concerning the \
+    price of wheat and barley members asked whether farmers in the northern provinces would receive any support during \
+    winter the chairman replied that money was short and that every department had been told to save a tenth of its budget";
+
+/// Words said, with the beginning and the end of each, where the voice tells them.
+struct Speech {
+    dir: tempfile::TempDir,
+    packages: PathBuf,
+    words: Vec<(String, Option<f64>, Option<f64>)>,
+}
+
+impl Speech {
+    /// Speech of `n_sentences`, in an order that repeats none within a minute.
+    #[track_caller]
+    fn of(n_sentences: usize) -> Option<Self> {
+        let packages = aligner()?;
+        let dir = tempfile::tempdir().unwrap();
+        let text: Vec<&str> = (0..n_sentences).map(|n| SENTENCES[(n * 5 + n / 14) % 14]).collect();
+        let path = |name: &str| dir.path().join(name);
+        std::fs::write(path("said.txt"), text.join(" ")).unwrap();
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/reference/spoken_words.py");
+        let files = ["said.txt", "said.wav", "said.json"].map(path);
+        let spoken = Command::new("python3").arg(script).args(files).arg("en-us+f2").output().unwrap();
+        if !spoken.status.success() {
+            skip(&format!("no voice of espeak-ng (`make aligner`): {}", String::from_utf8_lossy(&spoken.stderr)));
+            return None;
+        }
+        let known: Value = serde_json::from_slice(&std::fs::read(path("said.json")).unwrap()).unwrap();
+        let words = known.as_array().unwrap().iter().map(|word| {
+            (word["word"].as_str().unwrap().to_owned(), word["start_secs"].as_f64(), word["end_secs"].as_f64())
+        });
+        let words = words.collect();
+        Some(Self { dir, packages, words })
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+
+    /// What `orator align` makes of a text of this speech.
+    fn aligned(&self, file: &str, text: impl AsRef<[u8]>) -> Result<Transcript, String> {
+        std::fs::write(self.path(file), text).unwrap();
+        let output = align(&self.packages, &self.path("said.wav"), &self.path(file), &self.path("out.words.json"));
+        if !output.status.success() {
+            return Err(String::from_utf8_lossy(&output.stderr).into_owned());
+        }
+        Ok(Transcript::read(&self.path("out.words.json")).unwrap())
+    }
+}
+
+fn align(packages: &Path, sound: &Path, text: &Path, out: &Path) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+    command.arg("align").args([sound, text]).arg("--out").arg(out);
+    command.env("PYTHONPATH", packages).env("ORATOR_PYTHON", "python3").output().unwrap()
+}
+
+/// Errors of the boundaries of aligned words in seconds, in order of size; `known` of each word, `None` for a wrong one.
+fn errors(found: &Transcript, known: &[Option<(Option<f64>, Option<f64>)>]) -> Vec<f64> {
+    assert_eq!(found.words.len(), known.len());
+    let aligned = found.words.iter().zip(known).filter(|(word, _)| word.source == WordSource::Aligned);
+    let mut errors: Vec<f64> = aligned
+        .filter_map(|(word, known)| Some((word, (*known)?)))
+        .flat_map(|(word, (start, end))| [start.map(|s| s - word.start_secs), end.map(|s| s - word.end_secs)])
+        .flatten()
+        .map(f64::abs)
+        .collect();
+    errors.sort_by(f64::total_cmp);
+    errors
+}
+
+/// Share of the words of which `is_meant` that are marked as not fitting.
+fn marked(found: &Transcript, is_meant: impl Fn(usize) -> bool) -> f64 {
+    let meant: Vec<_> = (0..found.words.len()).filter(|&n| is_meant(n)).collect();
+    let marked = meant.iter().filter(|&&n| found.words[n].source == WordSource::Interpolated);
+    assert!(marked.clone().all(|&n| found.words[n].confidence == Some(0.0)));
+    marked.count() as f64 / meant.len() as f64
+}
+
+#[test]
+fn words_of_a_plain_text_get_their_times() {
+    let n_sentences = if std::env::var("ORATOR_LONG").is_ok() { 140 } else { 8 };
+    let Some(speech) = Speech::of(n_sentences) else { return };
+    let text: Vec<&str> = speech.words.iter().map(|word| word.0.as_str()).collect();
+    let found = speech.aligned("text.txt", text.join("\n")).unwrap();
+    let known: Vec<_> = speech.words.iter().map(|(_, start, end)| Some((*start, *end))).collect();
+    let errors = errors(&found, &known);
+    let (median, most) = (errors[errors.len() / 2], errors[errors.len() * 95 / 100]);
+    let unfit = marked(&found, |_| true);
+    let secs = found.words.last().unwrap().end_secs;
+    println!(
+        "{} words in {secs:.0} s: boundaries off by {:.0} ms (median), {:.0} ms (95 %); {:.1} % marked",
+        text.len(),
+        1000.0 * median,
+        1000.0 * most,
+        100.0 * unfit
+    );
+    assert!(median <= 0.05 && most <= 0.2 && unfit <= 0.03, "{median} {most} {unfit}");
+    assert!(n_sentences < 100 || secs > 480.0, "{secs}");
+}
+
+#[test]
+fn wrong_words_are_marked_and_the_others_keep_their_times() {
+    let Some(speech) = Speech::of(8) else { return };
+    let other: Vec<&str> = OTHER.split_whitespace().collect();
+    let words = &speech.words;
+    let is_wrong = |n: usize| n % 25 >= 20 && n / 25 < 3;
+    // A sentence of the sound is not in the text.
+    let kept: Vec<usize> = (0..words.len()).filter(|n| !(32..42).contains(n)).collect();
+    let text = kept.iter().map(|&n| if is_wrong(n) { other[(7 * n) % other.len()] } else { words[n].0.as_str() });
+    let found = speech.aligned("text.txt", text.collect::<Vec<_>>().join(" ")).unwrap();
+    let known: Vec<_> = kept.iter().map(|&n| (!is_wrong(n)).then_some((words[n].1, words[n].2))).collect();
+    let errors = errors(&found, &known);
+    let far = errors.iter().filter(|error| **error > 0.2).count() as f64 / errors.len() as f64;
+    let (wrong, right) = (marked(&found, |n| is_wrong(kept[n])), marked(&found, |n| !is_wrong(kept[n])));
+    println!("wrong words marked {wrong:.2}, right words marked {right:.2}, boundaries off by over 0.2 s {far:.3}");
+    assert!(wrong >= 0.7 && right <= 0.15 && far <= 0.05, "{wrong} {right} {far}");
+
+    let refused = speech.aligned("other.txt", OTHER).unwrap_err();
+    assert!(refused.contains("fit the") && refused.contains("another sound"), "{refused}");
+}
+
+#[test]
+fn sentences_of_subtitles_say_where_words_are_looked_for() {
+    let Some(speech) = Speech::of(8) else { return };
+    let cue = |n: usize, words: &[(String, Option<f64>, Option<f64>)]| {
+        let start = words.iter().find_map(|word| word.1).unwrap();
+        let end = words.iter().rev().find_map(|word| word.2).unwrap();
+        let time = |secs: f64| format!("00:00:{:02},{:03}", secs as u32, (secs * 1000.0) as u32 % 1000);
+        let said: Vec<&str> = words.iter().map(|word| word.0.as_str()).collect();
+        format!("{}\n{} --> {}\n{}\n\n", n + 1, time(start), time(end), said.join(" "))
+    };
+    let srt: String = speech.words.chunks(12).enumerate().map(|(n, words)| cue(n, words)).collect();
+    let found = speech.aligned("text.srt", srt).unwrap();
+    let known: Vec<_> = speech.words.iter().map(|(_, start, end)| Some((*start, *end))).collect();
+    let errors = errors(&found, &known);
+    assert!(errors[errors.len() / 2] <= 0.05 && errors[errors.len() * 95 / 100] <= 0.2);
+    assert!(marked(&found, |_| true) <= 0.05);
+}
+
+#[test]
+fn what_cannot_be_aligned_is_refused_with_its_place() {
+    let Some(speech) = Speech::of(1) else { return };
+    let refused = |file: &str, text: &[u8]| speech.aligned(file, text).unwrap_err();
+    assert!(refused("text.txt", b"so\nsch\xf6n").contains("line 2: the byte 0xf6"));
+    assert!(refused("text.txt", b" \n").contains("holds no word"));
+    assert!(refused("text.txt", "\u{434}\u{430} \u{43d}\u{435}\u{442}".as_bytes()).contains("not in English"));
+    let out = speech.path("silent.words.json");
+    std::fs::write(speech.path("text.txt"), "Good evening").unwrap();
+    // Header of the spoken file, and silence behind it.
+    let mut silent = std::fs::read(speech.path("said.wav")).unwrap();
+    silent[44..].fill(0);
+    std::fs::write(speech.path("silent.wav"), silent).unwrap();
+    let output = align(&speech.packages, &speech.path("silent.wav"), &speech.path("text.txt"), &out);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("it is silent") && !out.exists());
+    let output = align(&speech.packages, &speech.path("text.txt"), &speech.path("text.txt"), &out);
+    assert!(!output.status.success() && !out.exists());
+}
+
+#[test]
+fn a_python_without_the_package_is_told_what_to_install() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+    command.args(["align", "a.wav", "a.txt", "--out", "a.words.json", "--python", "/nowhere/python"]);
+    let output = command.current_dir(dir.path()).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("/nowhere/python") && said.contains("pip install pocketsphinx==5.1.1"), "{said}");
+}
