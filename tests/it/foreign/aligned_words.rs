@@ -131,7 +131,7 @@ fn wrong_words_are_marked_and_the_others_keep_their_times() {
     let is_wrong = |n: usize| n % 25 >= 20 && n / 25 < 3;
     // A sentence of the sound is not in the text.
     let kept: Vec<usize> = (0..words.len()).filter(|n| !(32..42).contains(n)).collect();
-    let text = kept.iter().map(|&n| if is_wrong(n) { other[(7 * n) % other.len()] } else { words[n].0.as_str() });
+    let text = kept.iter().map(|&n| if is_wrong(n) { other[(5 * n) % other.len()] } else { words[n].0.as_str() });
     let found = speech.aligned("text.txt", text.collect::<Vec<_>>().join(" ")).unwrap();
     let known: Vec<_> = kept.iter().map(|&n| (!is_wrong(n)).then_some((words[n].1, words[n].2))).collect();
     let errors = errors(&found, &known);
