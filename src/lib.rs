@@ -130,7 +130,8 @@ pub use animate::{AnimationOptions, Performance, perform};
 
 // Predicted motion against ground truth.
 pub use evaluate::Evaluation;
-pub use evaluate::clips::network::{EvaluatedCheckpoint, TrainedNetwork};
+pub use evaluate::clips::checkpoint::EvaluatedCheckpoint;
+pub use generate::trained::TrainedSpeaker;
 pub use metrics::settings::MetricSettings;
 
 // Models that look at pictures.

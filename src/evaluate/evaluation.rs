@@ -2,9 +2,9 @@
 
 use super::baseline::baselines;
 use super::baseline::baselines::Predictor;
+use super::clips::checkpoint::EvaluatedCheckpoint;
 use super::clips::clips;
 use super::clips::clips::EvalClips;
-use super::clips::network::EvaluatedCheckpoint;
 use super::clips::{of_speaker, pairs};
 use super::table::table;
 use super::table::table::Table;

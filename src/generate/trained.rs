@@ -2,14 +2,16 @@
 
 use super::GestureGenerator;
 use super::model::BEST;
+use super::normalisation::Normalisation;
 use super::seq2seq::SequenceGenerator;
 use super::seq2seq::architecture::Architecture;
-use super::seq2seq::metadata::is_sequence;
+use super::seq2seq::metadata::is_sequence_kind;
+use crate::formats::checkpoint;
 use crate::formats::transcript::Word;
 use crate::types::pose3d::Motion;
-use crate::types::sound::Sound;
+use crate::types::sound::{SAMPLE_RATE, Sound};
 use crate::types::time::FrameRate;
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use std::path::Path;
 
 /// Checkpoint of `orator train gan` or of `orator train seq2seq`.
@@ -22,10 +24,19 @@ impl TrainedSpeaker {
     /// Opens a checkpoint, or the best one of a folder. Errors name the file.
     pub fn open(path: &Path) -> Result<Self> {
         let file = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
-        if file.is_file() && is_sequence(&file)? {
-            return Ok(Self::Sequence(Box::new(SequenceGenerator::open(path)?)));
+        if !file.is_file() {
+            return Ok(Self::Gan(Box::new(GestureGenerator::open(path)?)));
         }
-        Ok(Self::Gan(Box::new(GestureGenerator::open(path)?)))
+        let kind = &checkpoint::facts(&file)?["speaker"]["kind"];
+        ensure!(
+            kind.is_string(),
+            "{} is a checkpoint of neither `orator train gan` nor `orator train seq2seq`",
+            file.display()
+        );
+        Ok(match is_sequence_kind(kind) {
+            true => Self::Sequence(Box::new(SequenceGenerator::open(path)?)),
+            false => Self::Gan(Box::new(GestureGenerator::open(path)?)),
+        })
     }
 
     /// The speaker's name.
@@ -46,6 +57,30 @@ impl TrainedSpeaker {
         match self {
             Self::Gan(speaker) => speaker.fps(),
             Self::Sequence(speaker) => speaker.fps(),
+        }
+    }
+
+    /// Samples a second of the sound that it hears.
+    pub fn rate(&self) -> u32 {
+        match self {
+            Self::Gan(_) => SAMPLE_RATE,
+            Self::Sequence(speaker) => speaker.metadata.rate,
+        }
+    }
+
+    /// Number of the words that it knows; 0: it reads none.
+    pub fn n_words(&self) -> usize {
+        match self {
+            Self::Gan(_) => 0,
+            Self::Sequence(speaker) => speaker.metadata.vocabulary.words().len(),
+        }
+    }
+
+    /// Normalisation of the dataset that it learnt from; `None`: it learnt a captured skeleton.
+    pub fn normalisation(&self) -> Option<&Normalisation> {
+        match self {
+            Self::Gan(speaker) => Some(&speaker.metadata.normalisation),
+            Self::Sequence(speaker) => speaker.metadata.poses.normalisation(),
         }
     }
 

@@ -8,7 +8,7 @@ use crate::cli::ui::Ui;
 use anyhow::{Result, bail, ensure};
 use orator::dataset::{Dataset, Split};
 use orator::evaluate::Evaluation;
-use orator::evaluate::clips::network::EvaluatedCheckpoint;
+use orator::evaluate::clips::checkpoint::EvaluatedCheckpoint;
 use orator::evaluate::table::result;
 use orator::evaluate::verdict::text;
 use orator::metrics::settings::Convention;

@@ -1,8 +1,8 @@
 //! Clips to evaluate: from pairs of files or from held-out intervals with generated motion, and their sound features.
 
+pub mod checkpoint;
 pub mod clips;
 pub mod held_out;
-pub mod network;
 pub mod notes;
 pub mod of_speaker;
 pub mod pairs;

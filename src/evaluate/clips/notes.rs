@@ -1,8 +1,8 @@
 //! What a reader of the table has to know of checkpoints and joints, in sentences.
 
+use super::checkpoint::EvaluatedCheckpoint;
 use super::clips::EvalClips;
 use super::held_out::HeldOutInterval;
-use super::network::EvaluatedCheckpoint;
 use crate::dataset::{Dataset, Split};
 use crate::stage::counted;
 use crate::types::skeleton;
@@ -21,35 +21,34 @@ pub fn of_checkpoints(
         notes.push("THE CHECKPOINT WAS TRAINED ON THIS SPLIT: its figures say what it learnt by heart".to_owned());
     }
     let (host, fps) = (&dataset.info().speaker, dataset.info().fps);
-    let first_of_dataset = checkpoints.iter().position(|of| of.network.normalisation().is_some());
-    for (at, EvaluatedCheckpoint { name, network }) in checkpoints.iter().enumerate() {
-        let (speaker, is_first) = (network.speaker(), first_of_dataset == Some(at));
-        if network.normalisation().is_none() {
+    let first_of_dataset = checkpoints.iter().position(|of| of.speaker.normalisation().is_some());
+    for (at, EvaluatedCheckpoint { name, speaker }) in checkpoints.iter().enumerate() {
+        let (learnt, is_first) = (speaker.name(), first_of_dataset == Some(at));
+        if speaker.normalisation().is_none() {
             notes.push(format!(
-                "{name} learnt the captures {speaker}, not this dataset: hold out there the takes of this split, else it knows \
+                "{name} learnt the captures {learnt}, not this dataset: hold out there the takes of this split, else it knows \
                  them; its motion was read as the captures' import reads them, its bones put on the lengths of the others"
             ));
-            if network.fps() != fps {
-                notes.push(format!("{name} moves at {}: resampled to {fps}", network.fps()));
+            if speaker.fps() != fps {
+                notes.push(format!("{name} moves at {}: resampled to {fps}", speaker.fps()));
             }
-        } else if host != speaker && is_first {
+        } else if host != learnt && is_first {
             notes.push(format!(
-                "the dataset is of {host}, the checkpoint of {speaker}: its bones were put on the checkpoint's lengths"
+                "the dataset is of {host}, the checkpoint of {learnt}: its bones were put on the checkpoint's lengths"
             ));
-        } else if host != speaker {
-            notes.push(format!(
-                "{name} is of {speaker}, not of {host}: its bones were put on the lengths of the others"
-            ));
+        } else if host != learnt {
+            notes
+                .push(format!("{name} is of {learnt}, not of {host}: its bones were put on the lengths of the others"));
         }
-        if network.rate() != SAMPLE_RATE {
+        if speaker.rate() != SAMPLE_RATE {
             notes.push(format!(
                 "{name} learnt from sound at {} Hz and hears the dataset's at {SAMPLE_RATE} Hz, which has nothing above {} Hz: \
                  it hears worse here than it could",
-                network.rate(),
+                speaker.rate(),
                 SAMPLE_RATE / 2
             ));
         }
-        if network.n_words() > 0 && held_out.iter().all(|interval| interval.words.is_empty()) {
+        if speaker.n_words() > 0 && held_out.iter().all(|interval| interval.words.is_empty()) {
             notes.push(format!("{name} reads words, and this split has none: it hears the sound alone"));
         }
     }

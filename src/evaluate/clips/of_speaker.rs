@@ -1,10 +1,10 @@
 //! Clips and baselines of trained speakers on a split of a dataset. Ground truth comes from the dataset, predictions
 //! from sound and words alone, and baselines know the training split only.
 
+use super::checkpoint::EvaluatedCheckpoint;
 use super::clips::{ClipAudio, EvalClip, EvalClips, compared, pcm};
 use super::held_out;
 use super::held_out::HeldOutInterval;
-use super::network::{EvaluatedCheckpoint, TrainedNetwork};
 use super::notes;
 use super::sound_features;
 use super::sound_features::SoundFeatureExtractor;
@@ -39,15 +39,15 @@ pub fn prepare(
     task: &dyn Task,
 ) -> Result<(EvalClips, Vec<Predictor>)> {
     let fps = dataset.info().fps;
-    for EvaluatedCheckpoint { network, .. } in checkpoints {
-        let of_network = network.fps();
+    for EvaluatedCheckpoint { speaker, .. } in checkpoints {
+        let of_network = speaker.fps();
         ensure!(
-            network.normalisation().is_none() || fps == of_network,
+            speaker.normalisation().is_none() || fps == of_network,
             "{} moves at {fps}, the checkpoint's speaker at {of_network}: it was trained on another dataset",
             dataset.dir().display()
         );
     }
-    let learnt_with = checkpoints.iter().find_map(|of| of.network.normalisation());
+    let learnt_with = checkpoints.iter().find_map(|of| of.speaker.normalisation());
     let own_normal = if learnt_with.is_none() { Some(normalisation(dataset)?) } else { None };
     let normal = learnt_with.or(own_normal.as_ref()).context("there is no checkpoint to measure")?;
     task.detail("reading the intervals");
@@ -55,7 +55,7 @@ pub fn prepare(
     task.detail("generating motion");
     let mut generated = checkpoints
         .iter()
-        .map(|of| speak(&of.network, &held_out, normal, fps).with_context(|| of.name.clone()))
+        .map(|of| speak(of, &held_out, normal, fps).with_context(|| of.name.clone()))
         .collect::<Result<Vec<SpokenIntervals>>>()?;
     task.detail("listening");
     let notes = notes::of_checkpoints(dataset, checkpoints, &held_out, split);
@@ -63,7 +63,7 @@ pub fn prepare(
     let clips: Vec<EvalClip> =
         held_out.into_par_iter().zip(first).map(|(held_out, predicted)| clip(held_out, predicted, fps)).collect();
     let mut clips = EvalClips { fps, clips, notes, learnt: split == Split::Train };
-    if checkpoints.iter().any(|of| of.network.normalisation().is_none()) {
+    if checkpoints.iter().any(|of| of.speaker.normalisation().is_none()) {
         let is_known = |joint: usize| generated.iter().all(|spoken| spoken.joints[joint]);
         let common: Vec<usize> = (0..N_JOINTS).filter(|joint| is_known(*joint)).collect();
         restrict(&mut clips, &common);
@@ -76,9 +76,9 @@ pub fn prepare(
     };
     let mut all = Vec::new();
     for (at, (of, spoken)) in checkpoints.iter().zip(&mut generated).enumerate() {
-        let heard = if of.network.n_words() > 0 { "sound and the words" } else { "sound" };
+        let heard = if of.speaker.n_words() > 0 { "sound and the words" } else { "sound" };
         let description =
-            format!("the speaker {} of the checkpoint, hearing the {heard} of each interval", of.network.speaker());
+            format!("the speaker {} of the checkpoint, hearing the {heard} of each interval", of.speaker.name());
         let mut predictor = Predictor::prediction(&clips, &description);
         if at > 0 {
             predictor.motions = std::mem::take(&mut spoken.matched).into_iter().map(ClipMotion::Motion).collect();
@@ -100,7 +100,7 @@ pub fn prepare(
         )),
     }
     for (at, (of, spoken)) in checkpoints.iter().zip(generated).enumerate() {
-        let said = if of.network.n_words() > 0 { " with its words" } else { "" };
+        let said = if of.speaker.n_words() > 0 { " with its words" } else { "" };
         let description = format!("the same speaker hearing another sound{said}: what is said half of the split later");
         let motions = spoken.mismatched.into_iter().map(ClipMotion::Motion).collect();
         let predictor = Predictor::new(PredictorKind::MismatchedPrediction, description, motions);
@@ -124,17 +124,17 @@ struct SpokenIntervals {
 }
 
 fn speak(
-    network: &TrainedNetwork,
+    checkpoint: &EvaluatedCheckpoint,
     held_out: &[HeldOutInterval],
     normal: &Normalisation,
     fps: FrameRate,
 ) -> Result<SpokenIntervals> {
     let sounds: Vec<&Sound> = held_out.iter().map(|interval| &interval.sound).collect();
     let words: Vec<&[Word]> = held_out.iter().map(|interval| interval.words.as_slice()).collect();
-    let other_bones = network.normalisation().is_none_or(|own| own.bone_lengths != normal.bone_lengths);
+    let other_bones = checkpoint.speaker.normalisation().is_none_or(|own| own.bone_lengths != normal.bone_lengths);
     let motion = |at: usize, sound: &Sound, words: &[Word]| -> Result<Array3<f32>> {
         let HeldOutInterval { key, ground_truth, .. } = &held_out[at];
-        let made = network.motion(sound, words, ground_truth.n_frames(), fps);
+        let made = checkpoint.motion(sound, words, ground_truth.n_frames(), fps);
         let mut made = made.with_context(|| format!("no motion for {key}"))?;
         if other_bones {
             bones::with_lengths(&mut made, &held_out::lengths(normal));
