@@ -13,6 +13,8 @@ pub struct Seq2seqConfig {
     pub batch: usize,
     pub steps: usize,
     pub learning_rate: f64,
+    /// Step from which the learning rate falls in a line, to 0 behind the last of `steps`; 0: it does not.
+    pub fade_from: usize,
     /// Readings of the losses: the authors' code, or the paper. `autoencoder` has squared differences of codes alone.
     pub distance: DistanceLoss,
     pub continuity: ContinuityLoss,
@@ -21,6 +23,8 @@ pub struct Seq2seqConfig {
     pub lambda_continuity: f64,
     pub lambda_reach: f64,
     pub lambda_adversarial: f64,
+    /// Seconds on either side of a segment whose words `words` reads.
+    pub words_around_secs: f64,
     /// Share of the words of a segment that a step reads as unknown ones (word dropout, Iyyer et al. 2015).
     pub word_dropout: f64,
     /// Numbers of a state.
@@ -48,12 +52,14 @@ impl Default for Seq2seqConfig {
             batch: 50,
             steps: 20_000,
             learning_rate: 1e-3,
+            fade_from: 0,
             distance: DistanceLoss::L1,
             continuity: ContinuityLoss::Numbers,
             reach: ReachLoss::Excursion,
             lambda_continuity: 0.01,
             lambda_reach: 1.0,
             lambda_adversarial: 0.01,
+            words_around_secs: 2.0,
             word_dropout: 0.0,
             hidden: 150,
             hears_context: false,
@@ -64,5 +70,28 @@ impl Default for Seq2seqConfig {
             checkpoint_every: 250,
             keep_checkpoints: 3,
         }
+    }
+}
+
+impl Seq2seqConfig {
+    /// Learning rate of a step, counted from 0.
+    pub fn rate(&self, step: usize) -> f64 {
+        let Self { learning_rate, fade_from, steps, .. } = *self;
+        if fade_from == 0 || step < fade_from || fade_from >= steps {
+            return learning_rate;
+        }
+        learning_rate * (steps.saturating_sub(step).max(1) as f64 / (steps - fade_from) as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_learning_rate_falls_to_nothing_from_a_step_on() {
+        let settings = Seq2seqConfig { learning_rate: 1.0, fade_from: 6, steps: 10, ..Seq2seqConfig::default() };
+        assert_eq!([0, 5, 6, 8, 9, 12].map(|step| settings.rate(step)), [1.0, 1.0, 1.0, 0.5, 0.25, 0.25]);
+        assert_eq!(Seq2seqConfig::default().rate(19_999), 1e-3);
     }
 }

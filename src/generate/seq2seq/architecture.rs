@@ -16,9 +16,10 @@ use serde::{Deserialize, Serialize};
 const PREDICTED_SECS: f64 = 1.0;
 const PREVIOUS_SECS: f64 = 0.5;
 const HEARD_SECS: f64 = 1.5;
-/// Seconds on either side of a pose whose words `contextual` reads, and of a segment whose words `words` reads.
+/// Seconds on either side of a pose whose words `contextual` reads.
 const AROUND_POSE_SECS: f64 = 1.5;
-const AROUND_SEGMENT_SECS: f64 = 2.0;
+/// Seconds on either side of a segment whose words `words` reads in the authors' code.
+pub const AROUND_SEGMENT_SECS: f64 = 2.0;
 /// Rounding of times, seconds.
 const ROUNDING_SECS: f64 = 1e-6;
 
@@ -69,9 +70,15 @@ impl Architecture {
         matches!(self, Self::Contextual | Self::Words).then_some("word_encoder")
     }
 
-    /// Words of a segment whose first predicted pose is `first`: one row a pose, one row, or no row. `said` in the order of
-    /// beginnings.
-    pub fn words(self, said: &[NumberedWord], first: usize, predicted: usize, fps: FrameRate) -> Vec<Vec<u32>> {
+    /// Words of a segment whose first predicted pose is `first`: one row a pose, one row of those so many seconds `around`
+    /// the segment, or no row. `said` in the order of beginnings.
+    pub fn words(
+        self,
+        said: &[NumberedWord],
+        [first, predicted]: [usize; 2],
+        fps: FrameRate,
+        around: f64,
+    ) -> Vec<Vec<u32>> {
         let within = |start: f64, end: f64| {
             let (start, end) = (start - ROUNDING_SECS, end + ROUNDING_SECS);
             let first = said.partition_point(|word| word.start_secs < start);
@@ -84,7 +91,7 @@ impl Architecture {
                 .collect(),
             Self::Words => {
                 let (start, end) = (fps.secs(first), fps.secs(first + predicted));
-                vec![within(start - AROUND_SEGMENT_SECS, end + AROUND_SEGMENT_SECS)]
+                vec![within(start - around, end + around)]
             }
             Self::Adversarial | Self::Autoencoder => Vec::new(),
         }
@@ -124,10 +131,13 @@ mod tests {
         let said = [word(2, 0.0), word(3, 2.0), word(4, 4.0), word(5, 7.0)];
         let fps = FrameRate::new(20, 1);
         // the segment from 3 s to 4 s; the words from 1 s to 6 s
-        let of_words = Architecture::Words.words(&said, 60, 20, fps);
+        let of_words = Architecture::Words.words(&said, [60, 20], fps, AROUND_SEGMENT_SECS);
         assert_eq!(of_words, [[3, 4]]);
+        // from 2.6 s to 4.4 s no word is whole, from 1.9 s to 5.1 s two are
+        assert_eq!(Architecture::Words.words(&said, [60, 20], fps, 0.4), [Vec::<u32>::new()]);
+        assert_eq!(Architecture::Words.words(&said, [60, 20], fps, 1.1), [[3, 4]]);
         // the pose at 3 s reads from 1.5 s to 4.5 s, the one at 3.55 s from 2.05 s
-        let around = Architecture::Contextual.words(&said, 60, 20, fps);
+        let around = Architecture::Contextual.words(&said, [60, 20], fps, AROUND_SEGMENT_SECS);
         assert_eq!((around.len(), &around[0][..], &around[11][..]), (20, &[3, 4][..], &[4][..]));
         let tensor = Architecture::Words.words_tensor(&[of_words, vec![Vec::new()]])?;
         assert_eq!(tensor.map(|t| t.to_vec2::<u32>()).transpose()?, Some(vec![vec![3, 4], vec![0, 0]]));

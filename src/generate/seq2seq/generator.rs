@@ -99,7 +99,7 @@ impl SequenceGenerator {
         let HeardSpeech { n_frames, audio, said } = speech;
         let Config { pose, previous, predicted, .. } = *self.network.config();
         let start = Tensor::zeros((1, previous, pose), DType::F32, &Device::Cpu)?;
-        let words = |i| architecture.words_tensor(&[architecture.words(said, i * predicted, predicted, self.fps())]);
+        let words = |i| architecture.words_tensor(&[self.metadata.words_of_segment(said, i * predicted)]);
         let made = generate(&*self.network, audio, &start, seams, words)?.flatten_all()?.to_vec1::<f32>()?;
         ensure!(
             made.iter().all(|number| number.is_finite()),

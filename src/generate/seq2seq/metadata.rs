@@ -1,9 +1,9 @@
 //! What a checkpoint of a sequence-to-sequence network says beside its tensors, and the network it describes.
 
-use super::architecture::{Architecture, network_config};
+use super::architecture::{AROUND_SEGMENT_SECS, Architecture, network_config};
 use super::poses::PoseNumbers;
 use super::sound::RATES;
-use super::vocabulary::Vocabulary;
+use super::vocabulary::{NumberedWord, Vocabulary};
 use crate::formats::checkpoint::Contents;
 use crate::nn::params::Params;
 use crate::nn::seq2seq::config::Config;
@@ -33,6 +33,9 @@ pub struct SequenceMetadata {
     pub network: Config,
     pub poses: PoseNumbers,
     pub vocabulary: Vocabulary,
+    /// Seconds on either side of a segment whose words `words` reads.
+    #[serde(default = "around_segment_secs")]
+    pub words_around_secs: f64,
     /// Hash of the data it learnt from.
     pub dataset: String,
 }
@@ -41,6 +44,11 @@ impl SequenceMetadata {
     /// Name of the current layout.
     pub fn kind() -> String {
         KIND.to_owned()
+    }
+
+    /// Words that the network reads of a segment whose first predicted pose is `first`, of those in order of beginnings.
+    pub fn words_of_segment(&self, said: &[NumberedWord], first: usize) -> Vec<Vec<u32>> {
+        self.architecture.words(said, [first, self.network.predicted], self.fps, self.words_around_secs)
     }
 
     /// Errors unless the facts fit each other and this program.
@@ -54,6 +62,8 @@ impl SequenceMetadata {
             network.hidden,
             network.word
         );
+        let around = self.words_around_secs;
+        ensure!((0.0..=60.0).contains(&around), "it reads words {around} s around a segment, expected 0 to 60");
         self.poses.check(fps)?;
         ensure!(self.vocabulary.is_sorted(), "its vocabulary is not sorted");
         let (pose, words) = (self.poses.n_numbers(), self.vocabulary.n_numbers());
@@ -62,6 +72,10 @@ impl SequenceMetadata {
         ensure!(*network == expected, "its network has other sizes than this program's: {network:?}");
         Ok(())
     }
+}
+
+const fn around_segment_secs() -> f64 {
+    AROUND_SEGMENT_SECS
 }
 
 /// Whether a file is a checkpoint of a sequence-to-sequence network. Errors: it cannot be read, or is no checkpoint.

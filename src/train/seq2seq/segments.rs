@@ -63,7 +63,7 @@ impl SegmentLoader {
     /// The segments of these numbers (each below `len`) as one batch.
     pub fn batch(&self, which: &[usize]) -> Result<SegmentBatch> {
         ensure!(!which.is_empty() && which.iter().all(|i| *i < self.len()), "segments {which:?} of {}", self.len());
-        let SequenceMetadata { architecture, network, fps, .. } = &self.metadata;
+        let SequenceMetadata { architecture, network, .. } = &self.metadata;
         let Config { previous, predicted, pose, audio, .. } = *network;
         let (mut heard, mut before, mut real, mut known) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut words = Vec::new();
@@ -74,7 +74,7 @@ impl SegmentLoader {
             real.extend(sequence.poses.slice(s![first..first + predicted, ..]).iter());
             let is_known = sequence.known.slice(s![first..first + predicted, ..]);
             known.extend(is_known.iter().map(|known| f32::from(u8::from(*known))));
-            words.push(architecture.words(&self.said[i], first, predicted, *fps));
+            words.push(self.metadata.words_of_segment(&self.said[i], first));
         }
         let filled = real.iter().zip(&known).map(|(real, known)| real * (1.0 - known)).collect();
         let tensor =

@@ -123,7 +123,7 @@ impl SequenceTrainer {
 
     /// One step, the discriminator's first where there is one.
     pub fn step(&mut self, batch: &SegmentBatch) -> Result<SequenceLosses> {
-        let rate = self.settings.learning_rate;
+        let rate = self.settings.rate(self.step);
         // Another seed than that of the windows.
         let mut rng = resume::stream(!self.settings.seed, self.step);
         if let Some(baseline) = self.network.audio_baseline() {

@@ -152,6 +152,7 @@ fn begin(
         network: sizes(vocabulary.n_numbers()),
         poses,
         vocabulary,
+        words_around_secs: settings.words_around_secs,
         dataset: source.hash()?,
     };
     let trainer = SequenceTrainer::new(metadata, settings.clone())?;
