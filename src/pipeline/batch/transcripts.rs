@@ -37,7 +37,7 @@ pub fn find(sounds: &mut [BatchSound], folder: Option<&Path>) -> Result<()> {
 /// The first file with the ending of a transcript behind `path`.
 fn with_ending(path: &Path) -> Option<PathBuf> {
     let named = |ending: &&str| PathBuf::from(format!("{}.{ending}", path.display()));
-    ENDINGS.iter().map(|ending| named(&ending)).find(|path| path.is_file())
+    ENDINGS.iter().map(named).find(|path| path.is_file())
 }
 
 #[cfg(test)]

@@ -241,7 +241,7 @@ fn a_dataset_of_another_rate_than_the_speakers_is_refused() {
         (split, sample)
     };
     write_dataset(&project.dir().join("fast"), "host", fps, &[again(Split::Train), again(Split::Validation)]).unwrap();
-    assert_eq!(Dataset::open(&project.dir().join("fast")).unwrap().info().fps, fps);
+    assert_eq!(Dataset::open(project.dir().join("fast")).unwrap().info().fps, fps);
     let answer = project.answer(&["evaluate", "--dataset", "fast", "--checkpoint", "words"]);
     assert!(answer.code == 1 && answer.errors.contains("moves at 30"), "{}", answer.errors);
 }

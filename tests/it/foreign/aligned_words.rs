@@ -112,7 +112,7 @@ fn words_of_a_plain_text_get_their_times() {
     let (median, most) = (errors[errors.len() / 2], errors[errors.len() * 95 / 100]);
     let unfit = marked(&found, |_| true);
     let secs = found.words.last().unwrap().end_secs;
-    println!(
+    eprintln!(
         "{} words in {secs:.0} s: boundaries off by {:.0} ms (median), {:.0} ms (95 %); {:.1} % marked",
         text.len(),
         1000.0 * median,
@@ -137,7 +137,7 @@ fn wrong_words_are_marked_and_the_others_keep_their_times() {
     let errors = errors(&found, &known);
     let far = errors.iter().filter(|error| **error > 0.2).count() as f64 / errors.len() as f64;
     let (wrong, right) = (marked(&found, |n| is_wrong(kept[n])), marked(&found, |n| !is_wrong(kept[n])));
-    println!("wrong words marked {wrong:.2}, right words marked {right:.2}, boundaries off by over 0.2 s {far:.3}");
+    eprintln!("wrong words marked {wrong:.2}, right words marked {right:.2}, boundaries off by over 0.2 s {far:.3}");
     assert!(wrong >= 0.7 && right <= 0.15 && far <= 0.05, "{wrong} {right} {far}");
 
     let refused = speech.aligned("other.txt", OTHER).unwrap_err();

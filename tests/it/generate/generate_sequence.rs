@@ -127,7 +127,8 @@ fn what_is_doubtful_about_a_transcript_is_said() {
     let write = |file: &str, text: &str| std::fs::write(dir.join(file), text).unwrap();
     let args =
         |file: &str| format!("--checkpoint words.safetensors --audio talks/a.wav --transcript {file} --out out.bvh");
-    let many: String = (0..100_000).map(|n| format!("{}\t{}\thello\n", n as f64 * 0.4, n as f64 * 0.4 + 0.3)).collect();
+    let line = |n: u32| format!("{}\t{}\thello\n", f64::from(n) * 0.4, f64::from(n) * 0.4 + 0.3);
+    let many: String = (0..100_000).map(line).collect();
     write("good.tsv", &tsv(3, &["Hello", "world.", "so"]));
     write("other.tsv", &tsv(40, &WORDS));
     write("foreign.tsv", &tsv(3, &["hallo", "welt"]));
