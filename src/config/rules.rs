@@ -67,6 +67,7 @@ pub fn check(settings: &Settings, locations: &BTreeMap<String, SourceLocation>) 
     rules.within("seq2seq.lambda_reach", s.seq2seq.lambda_reach, 0.0, 1e4, "");
     rules.within("seq2seq.lambda_adversarial", s.seq2seq.lambda_adversarial, 0.0, 1e4, "");
     rules.within("seq2seq.words_around_secs", s.seq2seq.words_around_secs, 0.0, 60.0, "s");
+    rules.within("seq2seq.own_previous", s.seq2seq.own_previous, 0.0, 1.0, "");
     rules.within("seq2seq.word_dropout", s.seq2seq.word_dropout, 0.0, 0.95, "");
     rules.within("seq2seq.hidden", s.seq2seq.hidden as f64, 1.0, 4096.0, "numbers");
     rules.within("seq2seq.autoencoder_steps", s.seq2seq.autoencoder_steps as f64, 0.0, 1e9, "steps");

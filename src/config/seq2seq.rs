@@ -25,6 +25,8 @@ pub struct Seq2seqConfig {
     pub lambda_adversarial: f64,
     /// Seconds on either side of a segment whose words `words` reads.
     pub words_around_secs: f64,
+    /// Share of the segments that begin with poses the network made itself (scheduled sampling, Bengio et al. 2015).
+    pub own_previous: f64,
     /// Share of the words of a segment that a step reads as unknown ones (word dropout, Iyyer et al. 2015).
     pub word_dropout: f64,
     /// Numbers of a state.
@@ -60,6 +62,7 @@ impl Default for Seq2seqConfig {
             lambda_reach: 1.0,
             lambda_adversarial: 0.01,
             words_around_secs: 2.0,
+            own_previous: 0.0,
             word_dropout: 0.0,
             hidden: 150,
             hears_context: false,

@@ -3,6 +3,7 @@
 
 pub mod captures;
 pub mod losses;
+pub mod own_previous;
 pub mod segments;
 pub mod sequence;
 pub mod source;

@@ -62,12 +62,31 @@ impl SegmentLoader {
 
     /// The segments of these numbers (each below `len`) as one batch.
     pub fn batch(&self, which: &[usize]) -> Result<SegmentBatch> {
-        ensure!(!which.is_empty() && which.iter().all(|i| *i < self.len()), "segments {which:?} of {}", self.len());
+        ensure!(which.iter().all(|i| *i < self.len()), "segments {which:?} of {}", self.len());
+        self.batch_of_starts(&which.iter().map(|i| self.starts[*i]).collect::<Vec<_>>())
+    }
+
+    /// Whether a whole segment ends where the poses of this one (below `len`) begin to be predicted.
+    pub fn has_segment_before(&self, which: usize) -> bool {
+        self.starts.get(which).is_some_and(|(_, start)| *start >= self.metadata.network.predicted)
+    }
+
+    /// The segments that end where these, which all have one before them, begin to be predicted.
+    pub fn batch_before(&self, which: &[usize]) -> Result<SegmentBatch> {
+        ensure!(which.iter().all(|i| self.has_segment_before(*i)), "no segment before one of {which:?}");
+        let predicted = self.metadata.network.predicted;
+        let start = |(i, start): (usize, usize)| (i, start - predicted);
+        self.batch_of_starts(&which.iter().map(|i| start(self.starts[*i])).collect::<Vec<_>>())
+    }
+
+    /// Segments by sequence and first frame of the poses before.
+    fn batch_of_starts(&self, starts: &[(usize, usize)]) -> Result<SegmentBatch> {
+        ensure!(!starts.is_empty(), "a batch of no segments");
         let SequenceMetadata { architecture, network, .. } = &self.metadata;
         let Config { previous, predicted, pose, audio, .. } = *network;
         let (mut heard, mut before, mut real, mut known) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut words = Vec::new();
-        for (i, start) in which.iter().map(|i| self.starts[*i]) {
+        for &(i, start) in starts {
             let (sequence, first) = (&self.sequences[i], start + previous);
             heard.extend(sequence.audio.slice(s![first..first + network.audio_frames(), ..]).iter());
             before.extend(sequence.poses.slice(s![start..first, ..]).iter());
@@ -78,7 +97,7 @@ impl SegmentLoader {
         }
         let filled = real.iter().zip(&known).map(|(real, known)| real * (1.0 - known)).collect();
         let tensor =
-            |values: Vec<f32>, rows, columns| Tensor::from_vec(values, (which.len(), rows, columns), &Device::Cpu);
+            |values: Vec<f32>, rows, columns| Tensor::from_vec(values, (starts.len(), rows, columns), &Device::Cpu);
         let segment = Segment {
             audio: tensor(heard, network.audio_frames(), audio)?,
             previous: tensor(before, previous, pose)?,

@@ -2,6 +2,7 @@
 //! checkpoints, also when the training was interrupted: segments and dropout of a step depend on the seed and the step
 //! alone, everything else is in the checkpoint.
 
+use super::own_previous::begin_with_own;
 use super::segments::SegmentLoader;
 use super::sequence::{PoseSequence, SequenceSplits};
 use super::source::TrainingSource;
@@ -21,7 +22,7 @@ use crate::nn::seq2seq::embedding::set_word_vectors;
 use crate::stage::progress::Progress;
 use crate::stage::workdir::{self, FolderLock};
 use crate::train::epochs::{self, EpochSchedule, StepReport, ValidatedTraining};
-use crate::train::resume::sample_windows;
+use crate::train::resume::{sample_windows, stream};
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
 use std::path::{Path, PathBuf};
@@ -231,8 +232,14 @@ impl ValidatedTraining for SequenceTraining<'_> {
     }
 
     fn step(&mut self) -> Result<StepReport> {
-        let Seq2seqConfig { seed, batch, .. } = self.trainer.settings;
-        let batch = self.loader.batch(&sample_windows(seed, self.trainer.step, batch, self.loader.len()))?;
+        let Seq2seqConfig { seed, batch, own_previous, .. } = self.trainer.settings;
+        let which = sample_windows(seed, self.trainer.step, batch, self.loader.len());
+        let mut batch = self.loader.batch(&which)?;
+        if own_previous > 0.0 {
+            // Another seed than those of the segments and of dropout.
+            let rng = &mut stream(seed.rotate_left(32), self.trainer.step);
+            begin_with_own(&mut batch, &which, self.loader, &*self.trainer.network, own_previous, rng)?;
+        }
         let losses = self.trainer.step(&batch)?;
         losses.check(self.trainer.step)?;
         let SequenceLosses { total, l1, .. } = losses;
