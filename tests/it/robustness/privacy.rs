@@ -37,7 +37,9 @@ fn is_outside(line: &str, dir: &Path) -> bool {
     let reads = call.starts_with("open") && !["O_WRONLY", "O_RDWR", "O_CREAT"].iter().any(|flag| call.contains(flag));
     // The program's own working folder is the project's: a relative path without ".." stays in it.
     let mut paths = call.split('"').skip(1).step_by(2).map(Path::new);
-    !reads && paths.any(|path| path != Path::new("/dev/null") && !is_beneath(path, dir))
+    // A Python whose name is a shell script asks for the terminal.
+    let is_device = |path: &Path| [Path::new("/dev/null"), Path::new("/dev/tty")].contains(&path);
+    !reads && paths.any(|path| !is_device(path) && !is_beneath(path, dir))
 }
 
 fn is_beneath(path: &Path, dir: &Path) -> bool {
