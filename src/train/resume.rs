@@ -1,7 +1,9 @@
 //! What trainings that go on from a checkpoint share: windows of a step, settings that count, advice when one breaks.
 
 use crate::formats::checkpoint;
-use anyhow::Result;
+use crate::formats::checkpoint::Contents;
+use crate::stage::progress::Progress;
+use anyhow::{Context, Result};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
@@ -39,6 +41,21 @@ pub fn settings<T: Serialize + DeserializeOwned>(
         }
     }
     Ok((serde_json::from_value(kept)?, differences))
+}
+
+/// The newest checkpoint of a folder, and what `read` makes of it; said, with a line for each difference that `read` finds.
+/// `None`: there is none. Errors name the checkpoint.
+pub fn newest<T>(
+    folder: &Path,
+    progress: &dyn Progress,
+    read: impl FnOnce(&Contents) -> Result<(T, Vec<String>)>,
+) -> Result<Option<(T, Contents)>> {
+    let Some((step, newest)) = checkpoint::list(folder)?.pop() else { return Ok(None) };
+    let contents = Contents::read(&newest)?;
+    let (stored, differences) = read(&contents).with_context(|| format!("cannot go on from {}", newest.display()))?;
+    progress.say(&format!("going on from {} (step {step})", newest.display()));
+    differences.iter().for_each(|line| progress.say(line));
+    Ok(Some((stored, contents)))
 }
 
 /// Which checkpoint is kept when a training breaks, and what may help.

@@ -188,11 +188,11 @@ impl<'a> RuleGestures<'a> {
     pub fn wrist_at(&self, gesture: WordGesture, secs: f64) -> Vec3 {
         let WordGesture { hand, place } = gesture;
         let mut controls = self.controls(secs);
-        let mut target = WORD_PLACES[place.min(N_PLACES - 1)];
+        let mut target = WORD_PLACES[place];
         target[1] -= LIFT * self.slow_envelope(secs);
-        controls.arms[hand.min(1)] = ArmControls::from(target);
+        controls.arms[hand] = ArmControls::from(target);
         let figure = DrawnFigure::new(&controls);
-        sub(figure.joints[[L_WRIST, R_WRIST][hand.min(1)]], figure.joints[NECK])
+        sub(figure.joints[[L_WRIST, R_WRIST][hand]], figure.joints[NECK])
     }
 
     /// Lift L(t): the delayed, averaged envelope.

@@ -43,7 +43,7 @@ pub fn write(folder: &Path, speaker: &str, pairs: &[HeldOutPair]) -> Result<()> 
 
     let mut poses = vec![node("p").text(
         "Intervals that were not trained on: what the speaker did, and under it what the best checkpoint makes of the \
-         sound alone. The lines are the height of the wrists: grey the speaker's, in colour the generated one.",
+         speech alone. The lines are the height of the wrists: grey the speaker's, in colour the generated one.",
     )];
     if pairs.is_empty() {
         poses = vec![node("p").class("empty").text("There is no interval of the 49 joints to show.")];

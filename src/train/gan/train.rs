@@ -23,7 +23,7 @@ use crate::nn::gan::generator::{Config, FRAMES_MULTIPLE};
 use crate::stage::progress::Progress;
 use crate::stage::workdir::{self, FolderLock};
 use crate::train::epochs::{self, EpochSchedule, StepReport, ValidatedTraining};
-use crate::train::resume::sample_windows;
+use crate::train::resume::{self, sample_windows};
 use crate::types::skeleton::N_BONES;
 use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
@@ -185,17 +185,15 @@ impl ValidatedTraining for GanTraining<'_> {
     }
 }
 
-/// The newest checkpoint, and what it says with the settings that count now. Tells where these differ from `wanted`.
+/// The newest checkpoint, and what it says with the settings that count now. Tells where these differ from `requested`.
 fn resume(
     dataset: &Dataset,
     requested: &GanConfig,
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<Option<(TrainerState, Contents)>> {
-    let Some((step, newest)) = checkpoint::list(folder)?.pop() else { return Ok(None) };
-    let contents = Contents::read(&newest)?;
-    let read = || -> Result<(TrainerState, Vec<String>)> {
-        let mut stored = TrainerState::from_checkpoint(&contents)?;
+    resume::newest(folder, progress, |contents| {
+        let mut stored = TrainerState::from_checkpoint(contents)?;
         let (settings, mut differences) = stored.settings(requested)?;
         stored.settings = settings;
         let (info, metadata) = (dataset.info(), &mut stored.speaker);
@@ -216,11 +214,7 @@ fn resume(
             metadata.dataset = hash;
         }
         Ok((stored, differences))
-    };
-    let (stored, differences) = read().with_context(|| format!("cannot go on from {}", newest.display()))?;
-    progress.say(&format!("going on from {} (step {step})", newest.display()));
-    differences.iter().for_each(|line| progress.say(line));
-    Ok(Some((stored, contents)))
+    })
 }
 
 /// The network of a preset of the configuration.

@@ -22,7 +22,7 @@ use crate::nn::seq2seq::embedding::set_word_vectors;
 use crate::stage::progress::Progress;
 use crate::stage::workdir::{self, FolderLock};
 use crate::train::epochs::{self, EpochSchedule, StepReport, ValidatedTraining};
-use crate::train::resume::{sample_windows, stream};
+use crate::train::resume::{self, sample_windows, stream};
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
 use std::path::{Path, PathBuf};
@@ -271,10 +271,8 @@ fn resume(
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<Option<(SequenceState, Contents)>> {
-    let Some((step, newest)) = checkpoint::list(folder)?.pop() else { return Ok(None) };
-    let contents = Contents::read(&newest)?;
-    let read = || -> Result<(SequenceState, Vec<String>)> {
-        let mut stored = SequenceState::from_checkpoint(&contents)?;
+    resume::newest(folder, progress, |contents| {
+        let mut stored = SequenceState::from_checkpoint(contents)?;
         let (settings, mut differences) = stored.settings(requested)?;
         stored.settings = settings;
         let (name, fps, rate) = (source.name(), source.fps(), source.rate());
@@ -292,11 +290,7 @@ fn resume(
             metadata.dataset = hash;
         }
         Ok((stored, differences))
-    };
-    let (stored, differences) = read().with_context(|| format!("cannot go on from {}", newest.display()))?;
-    progress.say(&format!("going on from {} (step {step})", newest.display()));
-    differences.iter().for_each(|line| progress.say(line));
-    Ok(Some((stored, contents)))
+    })
 }
 
 /// The network of a name of the configuration.
