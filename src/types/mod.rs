@@ -6,6 +6,7 @@ pub mod image;
 pub mod interval;
 pub mod pose2d;
 pub mod pose3d;
+pub mod posture;
 pub mod skeleton;
 pub mod sound;
 pub mod split;
