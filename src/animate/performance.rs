@@ -133,7 +133,9 @@ pub fn perform(motion: &Motion, face: Option<&Face>, options: &AnimationOptions)
     let mut positions = JointPositions::from_motion(motion);
     if options.constraints != Constraints::NONE {
         let as_it_is = rotations(&positions, &rig, &SolveFilters::new(Smoothing::None, motion.fps));
-        positions = moved(&positions, &rig, &constrained(clip_of(&as_it_is), &mut tally));
+        let within = constrained(clip_of(&as_it_is), &mut tally);
+        let frames: Vec<Vec<Vec3>> = (0..within.n_frames()).map(|t| within.positions(t)).collect();
+        positions = positions.moved(|t, joint| scale(frames[t][rig.positions[joint]], 1.0 / CM));
     }
     let filters = SolveFilters::new(options.smoothing, motion.fps);
     let mut tracks = rotations(&positions, &rig, &filters);
@@ -191,13 +193,4 @@ fn joints(rig: &Rig, clip: &BvhClip) -> Array3<f32> {
 /// Mask [T, 49] of the joints with finite coordinates, seen or filled.
 fn seen(motion: &Motion) -> Array2<bool> {
     motion.joints.map_axis(ndarray::Axis(2), |place| place.iter().all(|v| v.is_finite()))
-}
-
-/// Positions of these joints in a clip of the rig; missing joints stay missing.
-fn moved(positions: &JointPositions, rig: &Rig, clip: &BvhClip) -> JointPositions {
-    let moved = |(t, frame): (usize, &[Option<Vec3>; N_JOINTS])| {
-        let positions = clip.positions(t);
-        std::array::from_fn(|joint| frame[joint].map(|_| scale(positions[rig.positions[joint]], 1.0 / CM)))
-    };
-    JointPositions(positions.0.iter().enumerate().map(moved).collect())
 }

@@ -16,13 +16,14 @@ use serde::Serialize;
 pub struct Constraints {
     /// Limits of every joint.
     pub limits: bool,
-    /// Fingers within 10 degrees of the mean curl of the four; a pointing finger is bent with the others.
+    /// Fingers within 10 degrees of the mean curl of the four; a pointing finger is bent with the others, so
+    /// that it is not the default.
     pub curl_coherence: bool,
 }
 
 impl Default for Constraints {
     fn default() -> Self {
-        Self { limits: true, curl_coherence: true }
+        Self { limits: true, curl_coherence: false }
     }
 }
 

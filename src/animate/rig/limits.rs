@@ -1,7 +1,7 @@
-//! Joint limits of an adult in degrees, for the left side. Fingers follow Rebol et al. (2021): knuckle -20..90, middle
-//! joint 0..110, end joint 0..80. Elbow, forearm, wrist and thumb follow the normal ranges of the American Academy of
-//! Orthopaedic Surgeons (Joint Motion, 1965; Norkin and White, Measurement of Joint Motion), with 10 degrees of
-//! carrying angle on each side of the elbow, since a nearly straight arm does not show its plane of flexion.
+//! Joint limits in degrees, for the left side, wide enough for what captured people do: the normal ranges of an adult
+//! (American Academy of Orthopaedic Surgeons, Joint Motion, 1965; Norkin and White, Measurement of Joint Motion; fingers
+//! of Rebol et al. 2021), widened where 0.1 % of the frames of a capture lie beyond. The captures, and what they reach:
+//! `orator guide animation`.
 
 /// Ranges of a hinge joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,27 +15,31 @@ const fn limit(flexion: [f64; 2], side: [f64; 2]) -> Limit {
     Limit { flexion, side }
 }
 
-/// Forearm against upper arm.
-pub const ELBOW: Limit = limit([0.0, 150.0], [-10.0, 10.0]);
-/// Rotation of the hand about the forearm from pronation to supination, 0 with the palm along the elbow's axis. AAOS:
-/// 80 both ways; 10 more for the uncertainty of the elbow's plane.
-pub const SUPINATION: [f64; 2] = [-90.0, 90.0];
+/// Forearm against upper arm; to the side 10 degrees of carrying angle, since a nearly straight arm does not show its
+/// plane of flexion.
+pub const ELBOW: Limit = limit([0.0, 160.0], [-10.0, 10.0]);
+/// Rotation of the hand about the forearm from pronation to supination, 0 with the palm along the elbow's axis: 80 both
+/// ways by AAOS. The axis is seen only in a bent arm, and other skeletons turn theirs against ours, so that people who
+/// were captured are found up to 60 degrees further.
+pub const SUPINATION: [f64; 2] = [-140.0, 140.0];
 /// Extension to flexion; ulnar to radial deviation.
-pub const WRIST: Limit = limit([-70.0, 80.0], [-30.0, 20.0]);
+pub const WRIST: Limit = limit([-80.0, 90.0], [-45.0, 35.0]);
 /// Thumb to little finger, each from the knuckle to the end joint. Angles of the thumb are relative to its resting line
 /// (`rig::finger_hinge`).
 pub const FINGERS: [[Limit; 3]; 5] = [
-    [limit([-35.0, 40.0], [-35.0, 35.0]), limit([-20.0, 60.0], [-10.0, 10.0]), limit([-20.0, 80.0], [0.0, 0.0])],
-    finger([-10.0, 20.0]),
-    finger([-15.0, 15.0]),
-    finger([-20.0, 10.0]),
-    finger([-30.0, 10.0]),
+    [limit([-35.0, 45.0], [-45.0, 35.0]), limit([-25.0, 60.0], SIDE), limit([-20.0, 80.0], SIDE)],
+    finger([-45.0, 20.0], SIDE, SIDE),
+    finger([-25.0, 15.0], SIDE, SIDE),
+    finger([-20.0, 25.0], SIDE, SIDE),
+    finger([-30.0, 60.0], [-60.0, 25.0], [-25.0, 32.0]),
 ];
+/// Sideways range of a joint that does not bend sideways: what the axes of fingers differ by from person to person.
+const SIDE: [f64; 2] = [-25.0, 25.0];
 /// Largest difference of a finger's flexion from the mean of the four fingers at the same level (Rebol et al. 2021).
 pub const CURL_COHERENCE: f64 = 10.0;
 
-const fn finger(spread: [f64; 2]) -> [Limit; 3] {
-    [limit([-20.0, 90.0], spread), limit([0.0, 110.0], [0.0, 0.0]), limit([0.0, 80.0], [0.0, 0.0])]
+const fn finger(spread: [f64; 2], middle_side: [f64; 2], end_side: [f64; 2]) -> [Limit; 3] {
+    [limit([-20.0, 122.0], spread), limit([-5.0, 110.0], middle_side), limit([-10.0, 80.0], end_side)]
 }
 
 /// Angle in `range` for an angle on the circle: itself within, the nearer end beyond. Near the point opposite the range

@@ -30,11 +30,13 @@ pub struct SolveFilters {
     pub fps: f64,
     pub arms: Filter,
     pub hands: Filter,
+    pub fingers: Filter,
 }
 
 impl SolveFilters {
     pub fn new(smoothing: Smoothing, fps: FrameRate) -> Self {
-        Self { fps: fps.per_sec(), arms: smoothing.arms(fps), hands: smoothing.hands(fps) }
+        let (arms, hands, fingers) = (smoothing.arms(fps), smoothing.hands(fps), smoothing.fingers(fps));
+        Self { fps: fps.per_sec(), arms, hands, fingers }
     }
 }
 
@@ -53,7 +55,7 @@ pub fn solve(
     let smooth = |parent: &RotationTrack, from: usize, to: usize| -> Directions {
         let seen = |t: usize| Some(parent[t].inverse().turn(positions.direction(t, from, to)?));
         let mut track: Directions = (0..n_frames).map(seen).collect();
-        filters.arms.directions(&mut track);
+        filters.arms.directions(&mut track, &[]);
         track
     };
     let clavicle = smooth(chest, NECK, L_SHOULDER).into_iter().map(|to| Some(Rotation::between(X, to?)));
@@ -73,7 +75,11 @@ pub fn solve(
     let forearm = world(&world(&clavicle, &local[arm.upper]), &fore);
 
     let frames: ObservedTrack = (0..n_frames).map(|t| positions.hand_frame(t)).collect();
-    let hand = filled(smooth_hand(&forearm, &frames, &filters.hands), Rotation::IDENTITY, relax_frames);
+    let hand = filled(
+        smooth_hand(&forearm, &frames, &filters.hands, positions.hand_error()),
+        Rotation::IDENTITY,
+        relax_frames,
+    );
     let mut followed = 0.0;
     for t in 0..n_frames {
         let (supination, wrist) = ArmPose::hand_angles(hand[t], followed, FOLLOWED);
@@ -81,7 +87,7 @@ pub fn solve(
         (local[arm.fore][t], local[arm.hand][t]) = ArmPose::shared(fore[t], supination, wrist);
     }
     for (finger, joints) in arm.fingers.iter().enumerate() {
-        let bones = solve_finger(positions, &frames, finger, &filters.hands);
+        let bones = solve_finger(positions, &frames, finger, &filters.fingers);
         for ((&joint, bone), relaxed) in joints.iter().zip(bones).zip(RELAXED[finger]) {
             let rest = finger_hinge(finger).rotation(Bend { flexion: relaxed, side: 0.0 });
             local[joint] = filled(bone, rest, relax_frames);
@@ -91,16 +97,19 @@ pub fn solve(
 
 /// Hand rotations relative to the untwisted forearm, smoothed by their three angles: within the limits these are
 /// unique, while directions would cancel out between palm up and palm down.
-fn smooth_hand(forearm: &RotationTrack, frames: &ObservedTrack, filter: &Filter) -> ObservedTrack {
+fn smooth_hand(forearm: &RotationTrack, frames: &ObservedTrack, filter: &Filter, error: &[f64]) -> ObservedTrack {
     let mut followed = 0.0;
     let mut angle = |(hand, fore): (&Option<Rotation>, &Rotation)| {
         let (supination, wrist) = ArmPose::hand_angles(fore.inverse() * (*hand)?, followed, FOLLOWED);
         followed = supination;
-        Some([supination, wrist.flexion, wrist.side])
+        Some([supination, wrist.flexion, wrist.side].map(f64::to_radians))
     };
     let mut angles: Vec<Option<Vec3>> = frames.iter().zip(forearm).map(&mut angle).collect();
-    filter.runs(&mut angles);
-    let rotation = |[supination, flexion, side]: Vec3| ArmPose::hand(supination, Bend { flexion, side });
+    filter.runs(&mut angles, error);
+    let rotation = |angles: Vec3| {
+        let [supination, flexion, side] = angles.map(f64::to_degrees);
+        ArmPose::hand(supination, Bend { flexion, side })
+    };
     angles.into_iter().map(|angles| angles.map(rotation)).collect()
 }
 
@@ -117,7 +126,7 @@ fn solve_finger(
     [0, 1, 2].map(|k| {
         let seen = |t: usize| Some(frames[t]?.inverse().turn(positions.direction(t, base + k, base + k + 1)?));
         let mut track: Directions = (0..frames.len()).map(seen).collect();
-        filter.directions(&mut track);
+        filter.directions(&mut track, positions.hand_error());
         let bone = |(parent, to): (&Option<Rotation>, Option<Vec3>)| {
             Some(hinge.rotation(hinge.bend((*parent)?.inverse().turn(to?))))
         };

@@ -66,7 +66,7 @@ pub fn turn(face: &Face, rig: &Rig, filters: &SolveFilters, local: &mut [Rotatio
     if angles.iter().all(Option::is_none) {
         return 0;
     }
-    filters.hands.runs(&mut angles);
+    filters.hands.runs(&mut angles, &[]);
     let halves: ObservedTrack = angles
         .into_iter()
         .enumerate()

@@ -2,16 +2,22 @@
 //! Right arms and hands are handled by mirroring, so that one code for the left side serves both.
 
 use crate::math::rotation::Rotation;
-use crate::math::vec3::{Vec3, across, add, scale, sub, unit};
+use crate::math::vec3::{Vec3, across, add, norm, scale, sub, unit};
 use crate::types::pose3d::Motion;
 use crate::types::skeleton;
-use crate::types::skeleton::{L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, R_SHOULDER};
+use crate::types::skeleton::{L_HAND, L_SHOULDER, L_WRIST, N_JOINTS, R_HAND, R_SHOULDER, R_WRIST};
 
 /// Shortest bone with a direction, metres.
 const LEAST_METRES: f64 = 1e-5;
+/// Distance over which a moved finger tip tells an angle, metres.
+const HAND_METRES: f64 = 0.1;
 
 /// Joint positions by frame.
-pub struct JointPositions(pub(crate) Vec<[Option<Vec3>; N_JOINTS]>);
+pub struct JointPositions {
+    places: Vec<[Option<Vec3>; N_JOINTS]>,
+    /// Error of the left and the right hand's directions that the joint limits showed, radians.
+    hand_errors: [Vec<f64>; 2],
+}
 
 impl JointPositions {
     pub fn from_motion(motion: &Motion) -> Self {
@@ -19,7 +25,33 @@ impl JointPositions {
             let place = [0, 1, 2].map(|k| f64::from(frame[[joint, k]]) * if k == 0 { 1.0 } else { -1.0 });
             place.iter().all(|v| v.is_finite()).then_some(place)
         };
-        Self(motion.joints.outer_iter().map(|frame| std::array::from_fn(|joint| place(&frame, joint))).collect())
+        let frame = |frame: ndarray::ArrayView2<f32>| std::array::from_fn(|joint| place(&frame, joint));
+        let places: Vec<_> = motion.joints.outer_iter().map(frame).collect();
+        let hand_errors = [vec![0.0; places.len()], vec![0.0; places.len()]];
+        Self { places, hand_errors }
+    }
+
+    /// Joints moved to where `place` (frame, joint) has them, missing ones still missing. How far that is for the tips of
+    /// a hand tells how wrong its directions were.
+    pub fn moved(&self, place: impl Fn(usize, usize) -> Vec3) -> Self {
+        let frame = |(t, frame): (usize, &[Option<Vec3>; N_JOINTS])| {
+            std::array::from_fn(|joint| frame[joint].map(|_| place(t, joint)))
+        };
+        let places: Vec<[Option<Vec3>; N_JOINTS]> = self.places.iter().enumerate().map(frame).collect();
+        let error = |t: usize, root: usize, wrist: usize| {
+            let from_wrist = |places: &[Option<Vec3>; N_JOINTS], tip: usize| Some(sub(places[tip]?, places[wrist]?));
+            let moved = |tip| Some(norm(sub(from_wrist(&places[t], tip)?, from_wrist(&self.places[t], tip)?)));
+            let moved: Vec<f64> = (1..=5).filter_map(|finger| moved(root + 4 * finger)).collect();
+            moved.iter().sum::<f64>() / moved.len().max(1) as f64 / HAND_METRES
+        };
+        let hand_errors = [(L_HAND, L_WRIST), (R_HAND, R_WRIST)]
+            .map(|(root, wrist)| (0..places.len()).map(|t| error(t, root, wrist)).collect());
+        Self { places, hand_errors }
+    }
+
+    /// Error of the left hand's directions, radians, by frame; 0 where the limits showed none.
+    pub fn hand_error(&self) -> &[f64] {
+        &self.hand_errors[0]
     }
 
     /// Mirror image with left and right exchanged.
@@ -27,11 +59,12 @@ impl JointPositions {
         let image = |frame: &[Option<Vec3>; N_JOINTS]| {
             std::array::from_fn(|joint| frame[skeleton::mirror(joint)].map(|[x, y, z]| [-x, y, z]))
         };
-        Self(self.0.iter().map(image).collect())
+        let [left, right] = &self.hand_errors;
+        Self { places: self.places.iter().map(image).collect(), hand_errors: [right.clone(), left.clone()] }
     }
 
     pub fn n_frames(&self) -> usize {
-        self.0.len()
+        self.places.len()
     }
 
     /// Unit vector from one joint to another.
@@ -61,7 +94,8 @@ impl JointPositions {
 
     fn place(&self, t: usize, joint: usize) -> Option<Vec3> {
         // A hand's root is its wrist.
-        if joint == L_HAND { self.0[t][L_HAND].or(self.0[t][L_WRIST]) } else { self.0[t][joint] }
+        let frame = &self.places[t];
+        if joint == L_HAND { frame[L_HAND].or(frame[L_WRIST]) } else { frame[joint] }
     }
 }
 

@@ -16,7 +16,7 @@ pub fn rotations(positions: &JointPositions, rig: &Rig, filters: &SolveFilters) 
     let mut local: Vec<RotationTrack> = vec![vec![Rotation::IDENTITY; n_frames]; rig.skeleton.joints.len()];
 
     let mut line: Vec<Option<Vec3>> = (0..n_frames).map(|t| positions.shoulder_line(t)).collect();
-    filters.arms.directions(&mut line);
+    filters.arms.directions(&mut line, &[]);
     let half_yaw = |[x, _, z]: Vec3| Rotation::about([0.0, 1.0, 0.0], (-z).atan2(x) / 2.0);
     let half_yaw = filled(line.into_iter().map(|line| line.map(half_yaw)).collect(), Rotation::IDENTITY, None);
     let chest: RotationTrack = half_yaw.iter().map(|&half| half * half).collect();

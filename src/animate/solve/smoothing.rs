@@ -3,22 +3,33 @@
 //! keep their length, no angle jumps through half a turn, and the elbow's plane, which follows from smooth directions,
 //! is less noisy than if it were smoothed itself. Gaps separate runs.
 
+use crate::math::local_fit::LocalFit;
 use crate::math::one_euro::OneEuro;
 use crate::math::savitzky_golay::SavitzkyGolay;
 use crate::math::vec3::{Vec3, unit};
 use crate::types::time::FrameRate;
 
 /// Smoothing method.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Smoothing {
     None,
+    /// Local fits as wide as the noise of each bone in the clip allows. `strength` 1 changes a motion without noise by no
+    /// more than a few millimetres; it is a factor of the noise and of that tolerance, 0 removes nothing.
+    Adaptive {
+        strength: f64,
+    },
     /// Cubic Savitzky-Golay filter over 0.6 s for arms (9 frames at 15 fps) and 1 s (15 frames) for hands, without
     /// delay.
-    #[default]
     SavitzkyGolay,
     /// One-Euro filter (causal); hands with half of the cut-off at rest. Speeds are those of directions, radians a
     /// second.
     OneEuro(OneEuro),
+}
+
+impl Default for Smoothing {
+    fn default() -> Self {
+        Self::Adaptive { strength: 1.0 }
+    }
 }
 
 /// Default parameters of the one-Euro filter.
@@ -28,12 +39,18 @@ const ORDER: usize = 3;
 /// Half a window minus half a frame, seconds.
 const ARMS_HALF_SECS: f64 = 4.0 / 15.0;
 const HANDS_HALF_SECS: f64 = 7.0 / 15.0;
+/// Tolerances of the adaptive filter, radians: 1.5 mm at the end of an upper arm or forearm, 1 mm at the end of a
+/// hand, 0.6 mm at the end of a phalanx.
+const ARMS_RADIANS: f64 = 0.006;
+const HANDS_RADIANS: f64 = 0.006;
+const FINGERS_RADIANS: f64 = 0.015;
 /// One-Euro cut-off of hands relative to that of arms.
 const HANDS_SHARE: f64 = 0.5;
 
 /// Filter for tracks of one rate.
 pub enum Filter {
     None,
+    Adaptive(LocalFit),
     Polynomial(SavitzkyGolay),
     OneEuro(OneEuro, f64),
 }
@@ -41,17 +58,25 @@ pub enum Filter {
 impl Smoothing {
     /// Filter for trunk, head and arms at this rate.
     pub fn arms(self, fps: FrameRate) -> Filter {
-        self.filter(fps, ARMS_HALF_SECS, 1.0)
+        self.filter(fps, ARMS_HALF_SECS, 1.0, ARMS_RADIANS)
     }
 
-    /// Filter for hands and fingers at this rate.
+    /// Filter for the turns of hands against their forearms at this rate, radians.
     pub fn hands(self, fps: FrameRate) -> Filter {
-        self.filter(fps, HANDS_HALF_SECS, HANDS_SHARE)
+        self.filter(fps, HANDS_HALF_SECS, HANDS_SHARE, HANDS_RADIANS)
     }
 
-    fn filter(self, fps: FrameRate, half_secs: f64, share: f64) -> Filter {
+    /// Filter for fingers at this rate.
+    pub fn fingers(self, fps: FrameRate) -> Filter {
+        self.filter(fps, HANDS_HALF_SECS, HANDS_SHARE, FINGERS_RADIANS)
+    }
+
+    fn filter(self, fps: FrameRate, half_secs: f64, share: f64, tolerance: f64) -> Filter {
         match self {
             Self::None => Filter::None,
+            Self::Adaptive { strength } => {
+                Filter::Adaptive(LocalFit::new(fps.per_sec(), strength, strength * tolerance))
+            }
             Self::SavitzkyGolay => {
                 let half = (half_secs * fps.per_sec()).round().clamp(1.0, 1000.0) as usize;
                 Filter::Polynomial(SavitzkyGolay::new(half, ORDER))
@@ -65,18 +90,20 @@ impl Smoothing {
 
 impl Filter {
     /// Smooths the directions of each run of seen frames; a frame whose neighbours cancel out gets no direction.
-    pub fn directions(&self, track: &mut [Option<Vec3>]) {
-        self.runs(track);
+    pub fn directions(&self, track: &mut [Option<Vec3>], known: &[f64]) {
+        self.runs(track, known);
         track.iter_mut().for_each(|seen| *seen = seen.and_then(|v| unit(v, 1e-3)));
     }
 
-    /// Smooths vectors of any length in each run of seen frames.
-    pub fn runs(&self, track: &mut [Option<Vec3>]) {
+    /// Smooths vectors of any length in each run of seen frames. `known`: deviation of the noise that is known
+    /// beforehand, by frame, or empty.
+    pub fn runs(&self, track: &mut [Option<Vec3>], known: &[f64]) {
         let mut start = 0;
         while start < track.len() {
             let run: Vec<Vec3> = track[start..].iter().map_while(|seen| *seen).collect();
             let smooth = match self {
                 Self::None => return,
+                Self::Adaptive(filter) => filter.run(&run, known.get(start..).unwrap_or_default()),
                 Self::Polynomial(filter) => filter.run(&run),
                 Self::OneEuro(filter, fps) => filter.run(*fps, &run),
             };
@@ -96,7 +123,7 @@ mod tests {
         track[20] = None;
         track[21..].iter_mut().flatten().for_each(|v| v[2] = 100.0);
         let fps = FrameRate::new(15, 1);
-        Smoothing::default().arms(fps).runs(&mut track);
+        Smoothing::default().arms(fps).runs(&mut track, &[]);
         assert!(track[20].is_none());
         assert!(track[..20].iter().flatten().all(|v| v[2].abs() < 1e-9));
         assert!(track[21..].iter().flatten().all(|v| (v[2] - 100.0).abs() < 1e-9));

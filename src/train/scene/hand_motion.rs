@@ -1,4 +1,4 @@
-//! Hands that move, made by rule, for captured bodies that have none: what a hand does goes smoothly from one posture to the
+//! Hands that move, made by rule, for captured bodies that have none: what a hand does goes smoothly from one pose to the
 //! next (bends within what joints allow, the fingers mostly together), and it hangs on the forearm as a wrist lets it.
 
 use super::hand_shape::normal;
@@ -11,16 +11,16 @@ use crate::types::pose2d::N_HAND;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Numbers of a posture.
+/// Numbers of a pose.
 const N: usize = 15;
 
-/// A posture: curl (0 straight, 1 a fist), how much more each finger is curled than the one before, each finger's own
+/// A pose: curl (0 straight, 1 a fist), how much more each finger is curled than the one before, each finger's own
 /// share, spread, more bend of first and second joints (degrees), the thumb aside, before the palm, and bent (radians), the
 /// wrist bent to the palm, to the thumb, and turned palm down (radians).
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Posture([f64; N]);
+struct HandPose([f64; N]);
 
-impl Posture {
+impl HandPose {
     fn sample(rng: &mut ChaCha8Rng) -> Self {
         let curl = rng.random_range(-0.1f64..0.9).max(0.0).powf(1.5);
         let own = if rng.random_bool(0.3) { 0.4 } else { 0.06 };
@@ -75,20 +75,20 @@ impl Posture {
 #[derive(Clone, Debug)]
 pub struct HandMotion {
     size: f64,
-    start: Posture,
-    /// Start and end of the move to each posture, seconds, and the posture.
-    moves: Vec<(f64, f64, Posture)>,
+    start: HandPose,
+    /// Start and end of the move to each pose, seconds, and the pose.
+    moves: Vec<(f64, f64, HandPose)>,
 }
 
 impl HandMotion {
     pub fn sample(rng: &mut ChaCha8Rng, secs: f64) -> Self {
         let lively = rng.random_range(0.3..1.0);
-        let start = Posture::sample(rng);
+        let start = HandPose::sample(rng);
         let (mut last, mut t, mut moves) = (start, -rng.random_range(0.0..1.0), Vec::new());
         while t < secs {
             let takes = rng.random_range(0.25..0.9) / (0.5 + 0.5 * lively);
             let wholly = rng.random_bool(0.5);
-            let next = last.towards(&Posture::sample(rng), if wholly { lively } else { 0.3 * lively });
+            let next = last.towards(&HandPose::sample(rng), if wholly { lively } else { 0.3 * lively });
             moves.push((t, t + takes, next));
             last = next;
             t += takes + if rng.random_bool(0.4) { 0.0 } else { rng.random_range(0.0..1.6) };
@@ -99,13 +99,13 @@ impl HandMotion {
     /// Nearly the same, for the other hand.
     pub fn copied(&self, rng: &mut ChaCha8Rng) -> Self {
         let late = rng.random_range(-0.1..0.1);
-        let other = Posture::sample(rng);
-        let near = |posture: &Posture| posture.towards(&other, 0.15);
-        let moves = self.moves.iter().map(|(a, b, posture)| (a + late, b + late, near(posture))).collect();
+        let other = HandPose::sample(rng);
+        let near = |pose: &HandPose| pose.towards(&other, 0.15);
+        let moves = self.moves.iter().map(|(a, b, pose)| (a + late, b + late, near(pose))).collect();
         Self { size: self.size, start: near(&self.start), moves }
     }
 
-    fn at(&self, secs: f64) -> Posture {
+    fn at(&self, secs: f64) -> HandPose {
         self.moves.iter().take_while(|m| m.0 < secs).fold(self.start, |now, (leaves, has, next)| {
             let s = ((secs - leaves) / (has - leaves)).min(1.0);
             now.towards(next, s * s * s * (10.0 - 15.0 * s + 6.0 * s * s))
@@ -129,14 +129,14 @@ impl HandMotion {
             last = Some(fore);
             let x = vec3::scale(thumb, side);
             let y = vec3::scale(fore, -1.0);
-            let posture = self.at(frame as f64 * frame_secs);
-            let [.., to_palm, to_thumb, palm_down] = posture.0;
+            let pose = self.at(frame as f64 * frame_secs);
+            let [.., to_palm, to_thumb, palm_down] = pose.0;
             let about = Rotation::about;
             let held = about([0.0, 1.0, 0.0], side * palm_down)
                 * about([1.0, 0.0, 0.0], to_palm)
                 * about([0.0, 0.0, 1.0], side * to_thumb);
             let turn = Rotation::from_axes(x, y, vec3::cross(x, y)) * held;
-            posture.hand(self.size).map(|[x, y, z]| vec3::add(*wrist, turn.turn([side * x, y, z])))
+            pose.hand(self.size).map(|[x, y, z]| vec3::add(*wrist, turn.turn([side * x, y, z])))
         };
         arm.iter().enumerate().map(hand).collect()
     }
@@ -155,11 +155,11 @@ mod tests {
 
     #[test]
     fn hands_are_where_anatomy_has_them() {
-        let mut posture = Posture([0.0; N]);
-        posture.0[9] = 0.6;
+        let mut pose = HandPose([0.0; N]);
+        pose.0[9] = 0.6;
         for palm_down in [0.0, std::f64::consts::FRAC_PI_2] {
-            posture.0[14] = palm_down;
-            let motion = HandMotion { size: 1.0, start: posture, moves: Vec::new() };
+            pose.0[14] = palm_down;
+            let motion = HandMotion { size: 1.0, start: pose, moves: Vec::new() };
             for is_left in [false, true] {
                 let hand = motion.along(&[arm(is_left); 40], is_left, 0.1)[39].map(|p| vec3::sub(p, arm(is_left)[2]));
                 assert!(hand[9][2] < -0.08, "fingers ahead: {:?}", hand[9]);
@@ -172,8 +172,8 @@ mod tests {
                 }
             }
         }
-        posture.0[0] = 1.0;
-        let fist = HandMotion { size: 1.0, start: posture, moves: Vec::new() };
+        pose.0[0] = 1.0;
+        let fist = HandMotion { size: 1.0, start: pose, moves: Vec::new() };
         let hand = fist.along(&[arm(false); 40], false, 0.1)[39].map(|p| vec3::sub(p, arm(false)[2]));
         assert!(hand[11][1] > hand[9][1] + 0.03, "palm down, fingers close downwards: {hand:?}");
     }

@@ -47,13 +47,14 @@ fn random_rotations_come_out_within_the_limits_and_what_is_within_stays() {
     let mut tally = ClampTally::default();
     for n in 0..2_000 {
         let mut frame: Vec<Rotation> = rig.skeleton.joints.iter().map(|_| random_rotation(&mut random)).collect();
-        Constraints::default().apply(&rig, &mut frame, &mut tally);
+        let constraints = Constraints { limits: true, curl_coherence: true };
+        constraints.apply(&rig, &mut frame, &mut tally);
         for arm in &rig.arms {
             let pose = ArmPose::from_rotations(arm, &frame);
             assert!(is_within(&pose), "{n}: {pose:?}");
         }
         let mut again = frame.clone();
-        Constraints::default().apply(&rig, &mut again, &mut ClampTally::default());
+        constraints.apply(&rig, &mut again, &mut ClampTally::default());
         for (joint, (a, b)) in frame.iter().zip(&again).enumerate() {
             assert!((a.inverse() * *b).angle() < 1e-6, "{n}: {} moves again", rig.skeleton.joints[joint].name);
         }

@@ -3,6 +3,7 @@
 pub mod animate;
 pub mod animate_verb;
 pub mod bvh;
+pub mod captured;
 pub mod film;
 pub mod gltf;
 pub mod motion_files;

@@ -1,0 +1,113 @@
+//! Captured motion through the default animation: fingers and arms stay where they were, with noise and without.
+
+use crate::fixtures::figures::swinging;
+use crate::fixtures::skip::real_data;
+use ndarray::{Array2, Array3};
+use orator::animate::rig::rig::Rig;
+use orator::animate::{AnimationOptions, Constraints, Performance, Smoothing, perform};
+use orator::formats::bvh::write::BvhClip;
+use orator::formats::npz::Npz;
+use orator::math::rotation::Rotation;
+use orator::math::vec3::{norm, scale};
+use orator::types::pose3d::Motion;
+use orator::types::skeleton::{L_HAND, L_WRIST, R_HAND, R_WRIST};
+use orator::types::time::FrameRate;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::path::Path;
+
+/// Of an arm in the order of SMPL-X: clavicle, upper arm, forearm, hand, and the first joint of the hand's fifteen.
+const ARMS: [[usize; 5]; 2] = [[13, 16, 18, 20, 25], [14, 17, 19, 21, 40]];
+/// Where the thumb, index, middle, ring and little finger begin among those fifteen.
+const FINGERS: [usize; 5] = [12, 0, 3, 9, 6];
+
+/// The captured rotations on bones of ours: both rest in the same T-pose with axes of the world.
+fn on_our_bones(path: &Path, fps: FrameRate) -> Motion {
+    let poses = Npz::open(path).unwrap().numbers("poses", &[None, Some(165)]).unwrap();
+    let turned = |t: usize, joint: usize| {
+        let v: [f64; 3] = std::array::from_fn(|k| poses[[t, 3 * joint + k]]);
+        let angle = norm(v);
+        if angle < 1e-12 { Rotation::IDENTITY } else { Rotation::about(scale(v, 1.0 / angle), angle) }
+    };
+    let rig = Rig::from_motion(&swinging(0, 4));
+    let frame = |t: usize| {
+        let mut local = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
+        local[rig.spine] = turned(t, 0) * turned(t, 3);
+        local[rig.chest] = turned(t, 6) * turned(t, 9);
+        for (arm, [clavicle, upper, fore, hand, fingers]) in rig.arms.iter().zip(ARMS) {
+            for (joint, captured) in [(arm.clavicle, clavicle), (arm.upper, upper), (arm.fore, fore), (arm.hand, hand)]
+            {
+                local[joint] = turned(t, captured);
+            }
+            for (joints, first) in arm.fingers.iter().zip(FINGERS) {
+                joints.iter().enumerate().for_each(|(k, &joint)| local[joint] = turned(t, fingers + first + k));
+            }
+        }
+        local
+    };
+    let local = (0..poses.shape()[0]).map(frame).collect();
+    let clip = BvhClip { root: rig.root, skeleton: rig.skeleton.clone(), fps, local };
+    Performance { rig, clip, report: Default::default() }.motion()
+}
+
+/// Distances of these joints from the truth, mm, ascending.
+fn errors(motion: &Motion, truth: &Motion, joints: &[usize]) -> Vec<f64> {
+    let mut errors: Vec<f64> = (0..truth.n_frames())
+        .flat_map(|t| joints.iter().map(move |&joint| (t, joint)))
+        .map(|(t, joint)| {
+            let square = |k: usize| f64::from(motion.joints[[t, joint, k]] - truth.joints[[t, joint, k]]).powi(2);
+            1000.0 * (0..3).map(square).sum::<f64>().sqrt()
+        })
+        .collect();
+    errors.sort_by(f64::total_cmp);
+    errors
+}
+
+fn mean(errors: &[f64]) -> f64 {
+    errors.iter().sum::<f64>() / errors.len() as f64
+}
+
+/// Speeds of the wrists, m/s, ascending.
+fn wrist_speeds(motion: &Motion) -> Vec<f64> {
+    let later = Motion { joints: motion.joints.slice(ndarray::s![1.., .., ..]).to_owned(), ..motion.clone() };
+    let later = Motion { mask: Array2::from_elem((later.joints.shape()[0], 49), true), ..later };
+    let steps = errors(motion, &later, &[L_WRIST, R_WRIST]);
+    steps.into_iter().map(|mm| mm / 1000.0 * motion.fps.per_sec()).collect()
+}
+
+#[test]
+fn captured_arms_and_fingers_are_unharmed_and_noise_upon_them_goes() {
+    let Some(path) = real_data("data/speech_motion/beat2_2_scott_0_1_1_smplx30fps.npz") else { return };
+    let truth = on_our_bones(&path, FrameRate::new(30, 1));
+    let tips: Vec<usize> =
+        [L_HAND, R_HAND].iter().flat_map(|root| (1..=5).map(move |finger| root + 4 * finger)).collect();
+    let Performance { report, .. } = perform(&truth, None, &AnimationOptions::default());
+    let made = perform(&truth, None, &AnimationOptions::default()).motion();
+    let off = errors(&made, &truth, &tips);
+    let (mean_off, high) = (mean(&off), off[off.len() * 95 / 100]);
+    eprintln!("finger tips {mean_off:.1} mm, 95 % {high:.1} mm");
+    assert!(mean_off < 3.0 && high < 8.0, "{mean_off} {high}");
+    for clamps in &report.clamps {
+        assert!(clamps.share < 0.005, "{clamps:?}");
+    }
+    let [before, after] = [&truth, &made].map(|motion| {
+        let speeds = wrist_speeds(motion);
+        speeds[speeds.len() * 99 / 100]
+    });
+    assert!((after / before - 1.0).abs() < 0.03, "{before} -> {after} m/s");
+
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    let mut gauss = || (0..12).map(|_| random.random_range(-0.5..0.5)).sum::<f32>();
+    let noise = Array3::from_shape_simple_fn(truth.joints.raw_dim(), || 0.005 * gauss());
+    let mut noisy = truth.clone();
+    noisy.joints += &noise;
+    noisy.joints.slice_mut(ndarray::s![.., 0, ..]).fill(0.0);
+    let wrists = [L_WRIST, R_WRIST];
+    let error = |smoothing: Smoothing| {
+        let options = AnimationOptions { smoothing, constraints: Constraints::NONE, ..AnimationOptions::default() };
+        mean(&errors(&perform(&noisy, None, &options).motion(), &truth, &wrists))
+    };
+    let [kept, fixed, adaptive] = [Smoothing::None, Smoothing::SavitzkyGolay, Smoothing::default()].map(error);
+    eprintln!("wrists with 5 mm of noise: {kept:.1} mm as they are, {fixed:.1} fixed windows, {adaptive:.1} adaptive");
+    assert!(adaptive < 0.9 * fixed && adaptive < 0.75 * kept, "{kept} {fixed} {adaptive}");
+}
