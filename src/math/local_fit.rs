@@ -184,7 +184,8 @@ mod tests {
         let smooth = LocalFit::new(FPS, 1.0, 0.006).run(&beat, &[]);
         let fall = |track: &[Vec3]| track.iter().map(|v| v[1]).fold(0.0, f64::min);
         let energy = |track: &[Vec3]| track.windows(2).map(|pair| norm(sub(pair[1], pair[0])).powi(2)).sum::<f64>();
-        assert!((fall(&smooth) - fall(&beat)).abs() < 0.006, "{} of {}", fall(&smooth), fall(&beat));
+        // 5 mm at the end of an arm of 0.6 m.
+        assert!((fall(&smooth) - fall(&beat)).abs() < 0.005 / 0.6, "{} of {}", fall(&smooth), fall(&beat));
         assert!(energy(&smooth) > 0.95 * energy(&beat), "{}", energy(&smooth) / energy(&beat));
     }
 

@@ -123,11 +123,14 @@ mod tests {
         track[20] = None;
         track[21..].iter_mut().flatten().for_each(|v| v[2] = 100.0);
         let fps = FrameRate::new(15, 1);
-        Smoothing::default().arms(fps).runs(&mut track, &[]);
-        assert!(track[20].is_none());
-        assert!(track[..20].iter().flatten().all(|v| v[2].abs() < 1e-9));
-        assert!(track[21..].iter().flatten().all(|v| (v[2] - 100.0).abs() < 1e-9));
-        let window = |rate: u32| match Smoothing::default().arms(FrameRate::new(rate, 1)) {
+        for smoothing in [Smoothing::default(), Smoothing::SavitzkyGolay] {
+            let mut track = track.clone();
+            smoothing.arms(fps).runs(&mut track, &[]);
+            assert!(track[20].is_none());
+            assert!(track[..20].iter().flatten().all(|v| v[2].abs() < 1e-9));
+            assert!(track[21..].iter().flatten().all(|v| (v[2] - 100.0).abs() < 1e-9));
+        }
+        let window = |rate: u32| match Smoothing::SavitzkyGolay.arms(FrameRate::new(rate, 1)) {
             Filter::Polynomial(filter) => filter.window(),
             _ => 0,
         };
