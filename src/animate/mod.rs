@@ -10,5 +10,4 @@ pub mod solve;
 pub use draw::figure::{FigureView, draw_pose};
 pub use performance::{AnimationOptions, Performance, Yaw, perform};
 pub use rig::constraints::Constraints;
-pub use solve::head::Face;
 pub use solve::smoothing::Smoothing;

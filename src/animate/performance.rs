@@ -5,7 +5,6 @@ use super::rig::constraints::{ClampTally, Clamps, Constraints};
 use super::rig::rig::{CM, Rig};
 use super::solve::arm::SolveFilters;
 use super::solve::head;
-use super::solve::head::Face;
 use super::solve::positions::JointPositions;
 use super::solve::rotations::rotations;
 use super::solve::smoothing::Smoothing;
@@ -15,6 +14,7 @@ use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, scale};
 use crate::motion::jerk;
 use crate::types::pose3d::Motion;
+use crate::types::posture::Posture;
 use crate::types::skeleton::{L_HAND, L_SHOULDER, N_HAND_JOINTS, N_JOINTS, NECK, R_HAND, R_SHOULDER};
 use crate::types::time::FrameRate;
 use ndarray::{Array2, Array3};
@@ -55,7 +55,7 @@ pub struct AnimationReport {
     pub hands: Jerk,
     /// Clamps by kind of the unsmoothed joints, at the motion's own rate.
     pub clamps: Vec<Clamps>,
-    /// Number of frames with a visible face; `None` without face keypoints.
+    /// Number of frames in which the head was seen; `None` without a posture.
     pub face_frames: Option<usize>,
     /// Frames in which each limb was seen.
     pub seen: SeenFrames,
@@ -115,11 +115,11 @@ pub struct Performance {
     pub report: AnimationReport,
 }
 
-/// Animates a motion on a rig of its own bone lengths; a `face` turns the head.
+/// Animates a motion on a rig of its own bone lengths; a `posture` turns the head.
 ///
 /// Joint limits are applied before smoothing, so that a joint found on the wrong side does not pull its neighbours in
 /// time, and again after smoothing and at the output rate, so that they hold in every written frame.
-pub fn perform(motion: &Motion, face: Option<&Face>, options: &AnimationOptions) -> Performance {
+pub fn perform(motion: &Motion, posture: Option<&Posture>, options: &AnimationOptions) -> Performance {
     let rig = Rig::from_motion(motion);
     let clip_of = |tracks: &[RotationTrack]| {
         let local = (0..motion.n_frames()).map(|t| tracks.iter().map(|track| track[t]).collect()).collect();
@@ -139,7 +139,7 @@ pub fn perform(motion: &Motion, face: Option<&Face>, options: &AnimationOptions)
     }
     let filters = SolveFilters::new(options.smoothing, motion.fps);
     let mut tracks = rotations(&positions, &rig, &filters);
-    let face_frames = face.map(|face| head::turn(face, &rig, &filters, &mut tracks));
+    let face_frames = posture.map(|posture| head::turn(posture, &rig, &filters, &mut tracks));
     if options.yaw == Yaw::Removed {
         for joint in [rig.spine, rig.chest] {
             tracks[joint].fill(Rotation::IDENTITY);

@@ -2,9 +2,11 @@
 
 pub mod bones;
 pub mod exponential_map;
+pub mod face;
 pub mod fk;
 pub mod hand_bones;
 pub mod jerk;
+pub mod posture;
 pub mod resample;
 pub mod upper_body;
 pub mod view;

@@ -1,15 +1,18 @@
 //! Which motions `orator animate` is given, and what is beside them: face keypoints, sound.
 
 use anyhow::{Context as _, Result, bail, ensure};
-use orator::animate::Face;
+use ndarray::ArrayView3;
 use orator::dataset::index::SampleRef;
 use orator::dataset::{Dataset, Split};
 use orator::formats::keypoints_npz;
 use orator::math::order;
 use orator::mocap::motion_file;
+use orator::motion::posture;
+use orator::motion::posture::LiftedBody;
 use orator::stage::artifacts::{Artifact, StageName};
 use orator::types::pose2d::{Keypoints, N_BODY};
 use orator::types::pose3d::Motion;
+use orator::types::posture::Posture;
 use orator::types::skeleton::ARM_BONES;
 use orator::types::sound::Sound;
 use orator::types::time::FrameRate;
@@ -30,7 +33,7 @@ enum InputLocation {
 /// A motion with what is beside it.
 pub struct InputMotion {
     pub motion: Motion,
-    pub face: Option<Face>,
+    pub posture: Option<Posture>,
     pub sound: Option<Sound>,
 }
 
@@ -128,15 +131,18 @@ impl MotionInput {
             InputLocation::Sample(dataset, sample) => {
                 let sample = dataset.read(sample)?;
                 let body = sample.pose2d.slice(ndarray::s![.., ..N_BODY, ..]).to_owned();
-                InputMotion { motion: sample.motion, face: Some(Face { body }), sound: Some(sample.sound) }
+                let posture = Some(posture_of(body.view(), &sample.motion));
+                InputMotion { motion: sample.motion, posture, sound: Some(sample.sound) }
             }
             InputLocation::File(path) => {
-                InputMotion { motion: motion_file::read(path, Some(fps))?.motion, face: None, sound: None }
+                InputMotion { motion: motion_file::read(path, Some(fps))?.motion, posture: None, sound: None }
             }
         };
         check(&take.motion).with_context(|| format!("no animation of {}", self.name))?;
         match self.keypoints(keypoints, &take.motion)? {
-            Some(Keypoints { body, .. }) => Ok(InputMotion { face: Some(Face { body }), ..take }),
+            Some(Keypoints { body, .. }) => {
+                Ok(InputMotion { posture: Some(posture_of(body.view(), &take.motion)), ..take })
+            }
             None => Ok(take),
         }
     }
@@ -162,6 +168,10 @@ impl MotionInput {
         let found = file.within(&folder);
         (lift.file_name()? == StageName::Lift.as_str() && found.is_file()).then_some(found)
     }
+}
+
+fn posture_of(body: ArrayView3<f32>, motion: &Motion) -> Posture {
+    posture::estimate(body, LiftedBody { joints: Some(motion.joints.view()), extra: None })
 }
 
 fn read_keypoints(path: &Path, motion: &Motion) -> Result<Keypoints> {

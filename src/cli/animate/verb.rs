@@ -215,10 +215,10 @@ fn animate(
     options: &AnimationOptions,
     ui: &Ui,
 ) -> Result<Done> {
-    let InputMotion { motion, face, sound: own } = input.read(args.in_fps, args.keypoints.as_deref())?;
-    let (sound, face) = (sound.or(own), face.filter(|_| !args.neutral_head));
+    let InputMotion { motion, posture, sound: own } = input.read(args.in_fps, args.keypoints.as_deref())?;
+    let (sound, posture) = (sound.or(own), posture.filter(|_| !args.neutral_head));
     let started = Instant::now();
-    let performance = perform(&motion, face.as_ref(), options);
+    let performance = perform(&motion, posture.as_ref(), options);
     let secs = started.elapsed().as_secs_f64();
     let source = source(args, input, &motion)?;
     let other = match &args.beside {

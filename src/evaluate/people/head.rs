@@ -2,9 +2,8 @@
 
 use super::clips::RenderedClip;
 use super::points::share;
-use crate::animate::Face;
-use crate::animate::solve::head;
 use crate::math::order::median;
+use crate::motion::face;
 use serde::Serialize;
 
 /// Mean absolute errors in degrees. A clip's median pitch counts as looking ahead, in the truth as well.
@@ -23,9 +22,9 @@ impl HeadErrors {
         let (mut sums, mut n_found, mut n_frames) = ([0.0; 3], 0, 0);
         for clip in clips {
             let n = clip.n_frames();
-            let found = head::angles(&Face { body: clip.keypoints.body.clone() }, n);
+            let found = face::angles(clip.keypoints.body.view());
             let truth = |t: usize| [0, 1, 2].map(|k| f64::from(clip.truth.head[[t, k]]));
-            let seen = || (0..n).filter(|&t| found[t].is_some());
+            let seen = || (0..n).filter(|&t| found.get(t).is_some_and(Option::is_some));
             let level = median(seen().map(|t| truth(t)[1])).unwrap_or(0.0);
             n_frames += n;
             for t in seen() {

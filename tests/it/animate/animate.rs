@@ -6,10 +6,12 @@ use ndarray::{Array3, s};
 use orator::animate::rig::constraints::ClampTally;
 use orator::animate::rig::limits::{CURL_COHERENCE, ELBOW, FINGERS, Limit, SUPINATION, WRIST};
 use orator::animate::solve::arm_pose::ArmPose;
-use orator::animate::{AnimationOptions, Constraints, Face, Performance, Smoothing, Yaw, perform};
+use orator::animate::{AnimationOptions, Constraints, Performance, Smoothing, Yaw, perform};
 use orator::formats::bvh::write::BvhClip;
 use orator::math::one_euro::OneEuro;
 use orator::math::rotation::Rotation;
+use orator::motion::posture;
+use orator::motion::posture::LiftedBody;
 use orator::types::pose3d::Motion;
 use orator::types::skeleton;
 use orator::types::skeleton::{L_HAND, L_SHOULDER, N_JOINTS, R_SHOULDER};
@@ -260,7 +262,8 @@ fn the_head_turns_with_the_face_and_rests_without() {
             body.slice_mut(s![t, k, ..]).assign(&ndarray::arr1(&place));
         }
     }
-    let performance = perform(&motion, Some(&Face { body }), &AnimationOptions::default());
+    let performance =
+        perform(&motion, Some(&posture::estimate(body.view(), LiftedBody::default())), &AnimationOptions::default());
     assert_eq!(performance.report.face_frames, Some(45));
     let (rig, clip) = (&performance.rig, &performance.clip);
     let ahead = |t: usize| rig.skeleton.world(&clip.local[t])[rig.head].turn([0.0, 0.0, 1.0]);
