@@ -8,7 +8,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: setup runtime models readers aligner browser blender validator build check test prove prove-rule prove-people demo clean-demo
+.PHONY: setup runtime models readers aligner browser blender validator vrm build check test prove prove-rule prove-people demo clean-demo
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -20,10 +20,11 @@ export ORATOR_BLENDER ?= $(abspath $(TARGET)/blender)
 # A text that differs from its snapshot is an error.
 export INSTA_UPDATE := no
 export ORATOR_GLTF_VALIDATOR ?= $(abspath $(TARGET)/validator)
+export ORATOR_VRM ?= $(abspath $(TARGET)/vrm)
 
 setup: ; @.ci/setup/system.sh
 runtime: ; @.ci/setup/onnxruntime.sh
-readers aligner browser blender validator: ; @.ci/setup/$@.sh
+readers aligner browser blender validator vrm: ; @.ci/setup/$@.sh
 models: build ; @.ci/setup/models.sh
 
 build: setup runtime
@@ -40,7 +41,7 @@ check:
 	cargo test --locked --lib --bins
 	cargo test --locked --test it -- $(QUICK)
 
-test: build models readers aligner browser blender validator
+test: build models readers aligner browser blender validator vrm
 	@rm -f $(SKIPPED)
 	cargo fmt --check
 	cargo clippy --locked --all-targets -- -D warnings

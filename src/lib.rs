@@ -125,7 +125,7 @@ pub use nn::seq2seq::predict::StateAtSeams;
 pub use pipeline::batch::{BatchReport, SpeechBatch};
 
 // Motion to files for animation programs.
-pub use animate::export::file::{ExportContent, ExportFormat};
+pub use animate::export::file::{ExportContent, ExportFormat, FigureOptions};
 pub use animate::{AnimationOptions, Performance, perform};
 
 // Predicted motion against ground truth.

@@ -34,6 +34,25 @@ need_packages() {
     [ ${#missing[@]} -eq 0 ] || install_packages "${missing[@]}"
 }
 
+# Installs node and npm where they are missing.
+need_npm() {
+    local missing=()
+    command -v node >/dev/null || missing+=(nodejs)
+    command -v npm >/dev/null || missing+=(npm)
+    [ ${#missing[@]} -eq 0 ] || install_packages "${missing[@]}"
+}
+
+# Unpacks a package of npm at a version, whose hash is checked, into a folder.
+npm_package() {
+    local name=$1 version=$2 sha256=$3 folder=$4 packed
+    mkdir -p "$folder"
+    npm pack --silent --pack-destination "$folder" "$name@$version" >/dev/null
+    packed=$(ls "$folder"/*.tgz)
+    echo "$sha256  $packed" | sha256sum --check --quiet
+    tar -xzf "$packed" -C "$folder" --strip-components=1
+    rm "$packed"
+}
+
 # Sets `python` to the first of the named Pythons that has pip and, where a version is given first ("3.11", or "3" for
 # any), that version; installs Debian's where there is none. Fails where that does not help.
 find_python() {

@@ -4,6 +4,7 @@ pub mod avatar;
 pub mod draw;
 pub mod export;
 pub mod performance;
+pub mod retarget;
 pub mod rig;
 pub mod solve;
 

@@ -7,6 +7,7 @@ pub mod confine;
 pub mod dataset;
 pub mod demo;
 pub mod evaluate;
+mod figure_args;
 pub mod generate;
 pub mod motion;
 pub mod outcome;

@@ -1,15 +1,17 @@
 //! Motion file of any kind, chosen by its name's extension, written atomically.
 
 use super::film_panel::{FilmBody, FilmStyle};
-use super::{film, glb_scene, json};
+use super::{fbx, film, glb_scene, json, vrm};
 use crate::animate::avatar::{Appearance, Avatar};
 use crate::animate::performance::Performance;
+use crate::animate::rig::file_skeleton::{FileSkeleton, RestAxes};
 use crate::animate::rig::names::Names;
 use crate::formats::{authors_txt, npy};
 use crate::stage::progress::Progress;
 use crate::stage::workdir;
 use crate::types::pose3d::Motion;
 use crate::types::sound::Sound;
+use crate::types::time::FrameRate;
 use std::fs::File;
 use std::io::{self, BufWriter, Write as _};
 use std::path::Path;
@@ -27,6 +29,15 @@ pub struct ExportContent<'a> {
     pub style: FilmStyle,
 }
 
+/// What a user chooses of the figure in a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FigureOptions {
+    /// Bone names, in formats that have names.
+    pub names: Names,
+    /// Frame rate; `None`: that of the motion.
+    pub fps: Option<FrameRate>,
+}
+
 /// Format of a motion file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExportFormat {
@@ -38,6 +49,12 @@ pub enum ExportFormat {
     Bvh,
     /// The skinned avatar with its motion.
     Glb,
+    /// The skinned avatar with its motion, binary FBX 7.4.
+    Fbx,
+    /// The skinned avatar as a humanoid of VRM 1.0, without motion.
+    Vrm,
+    /// The motion for humanoids of VRM 1.0.
+    Vrma,
     /// Joints and rotations as JSON (`export::json`).
     Json,
     /// A film of the body with the sound.
@@ -53,14 +70,22 @@ impl ExportFormat {
             "txt" => Ok(Self::AuthorsTxt),
             "bvh" => Ok(Self::Bvh),
             "glb" => Ok(Self::Glb),
+            "fbx" => Ok(Self::Fbx),
+            "vrm" => Ok(Self::Vrm),
+            "vrma" => Ok(Self::Vrma),
             "json" => Ok(Self::Json),
             "mp4" => Ok(Self::Mp4),
             _ => anyhow::bail!(
-                "{}: motion is written as .npy (joints), .txt (the authors' layout), .json, .bvh, .glb or .mp4; \
+                "{}: motion is written as .npy (joints), .txt (the authors' layout), .json, .bvh, .fbx, .glb, .vrm, .vrma or .mp4; \
                  give the file one of these endings",
                 path.display()
             ),
         }
+    }
+
+    /// Whether the format has bones that other programs call by other names.
+    pub fn has_names(self) -> bool {
+        matches!(self, Self::Bvh | Self::Glb | Self::Fbx | Self::Json)
     }
 
     /// Whether the format holds joints and no rig.
@@ -79,14 +104,21 @@ impl ExportFormat {
         match self {
             Self::Npy | Self::AuthorsTxt => self.write_joints(path, &performance.motion()),
             Self::Bvh => {
-                let named = sources.names.applied(&performance.clip.skeleton);
-                streamed(path, |text| performance.clip.write_bvh(&named, text))
+                let skeleton = FileSkeleton::new(&performance.rig.skeleton, sources.names, RestAxes::World);
+                let clip = skeleton.clip(&performance.clip);
+                streamed(path, |text| clip.write_bvh(text))
             }
-            Self::Glb => {
-                let avatar = Avatar::new(&performance.rig, &Appearance::plain());
-                let bytes = glb_scene::file(&performance.rig, &performance.clip, &avatar, sources.names);
+            Self::Glb | Self::Fbx | Self::Vrm => {
+                let (rig, clip) = (&performance.rig, &performance.clip);
+                let avatar = Avatar::new(rig, &Appearance::plain());
+                let bytes = match self {
+                    Self::Fbx => fbx::scene::file(rig, clip, &avatar, sources.names),
+                    Self::Vrm => vrm::avatar(rig, &avatar),
+                    _ => glb_scene::file(rig, clip, &avatar, sources.names),
+                };
                 workdir::write_file(path, &bytes)
             }
+            Self::Vrma => workdir::write_file(path, &vrm::motion(&performance.rig, &performance.clip)),
             Self::Json => streamed(path, |text| json::write(text, performance, sources.names)),
             Self::Mp4 => {
                 let motion = (sources.style == FilmStyle::Figure).then(|| performance.motion());
@@ -125,7 +157,7 @@ mod tests {
         assert_eq!(ExportFormat::from_path(Path::new("a.Glb")).unwrap(), ExportFormat::Glb);
         assert_eq!(ExportFormat::from_path(Path::new("a.b/c.npy")).unwrap(), ExportFormat::Npy);
         for wrong in ["a.mov", "mp4", "a", ""] {
-            assert!(ExportFormat::from_path(Path::new(wrong)).unwrap_err().to_string().contains(".glb or .mp4"));
+            assert!(ExportFormat::from_path(Path::new(wrong)).unwrap_err().to_string().contains(".vrma or .mp4"));
         }
     }
 }

@@ -20,6 +20,12 @@ pub struct GlbBuffer {
 }
 
 impl GlbBuffer {
+    /// The buffer of a scene that was read, with its data, so that more can be added.
+    pub fn reopened(scene: &Value, bytes: Vec<u8>) -> Self {
+        let list = |key: &str| scene[key].as_array().cloned().unwrap_or_default();
+        Self { bytes, views: list("bufferViews"), accessors: list("accessors") }
+    }
+
     /// Adds vectors of `N` floats with their minimum and maximum; returns the accessor's index. `kind` is one of
     /// `SCALAR`, `VEC3`, `VEC4`, `MAT4`.
     pub fn floats<const N: usize>(&mut self, values: &[[f32; N]], kind: &str, purpose: BufferUse) -> usize {

@@ -2,7 +2,9 @@
 //! skinned meshes, the clip as one animation. Joints that do not turn have one key.
 
 use super::glb::{BufferUse, GlbBuffer};
-use crate::animate::avatar::{Avatar, AvatarMesh};
+use super::vrm_humanoid;
+use crate::animate::avatar::{Avatar, AvatarMesh, Weights};
+use crate::animate::rig::file_skeleton::{FileSkeleton, RestAxes};
 use crate::animate::rig::names::Names;
 use crate::animate::rig::rig::Rig;
 use crate::formats::bvh::write::BvhClip;
@@ -13,61 +15,72 @@ use serde_json::{Value, json};
 const METRES: f64 = 0.01;
 /// Largest difference of the quaternions of a joint that does not turn.
 const STILL: f64 = 1e-7;
-/// Licence address that the VRM format requires.
-const VRM_LICENSE: &str = "https://vrm.dev/licenses/1.0/";
-
-/// Bytes of the GLB file of a clip on its rig with `avatar` as its skin.
+/// Bytes of the GLB file of a clip on its rig with `avatar` as its skin; under the names of VRM it is a humanoid of VRM.
 pub fn file(rig: &Rig, clip: &BvhClip, avatar: &Avatar, names: Names) -> Vec<u8> {
+    let skeleton = FileSkeleton::new(&rig.skeleton, names, RestAxes::Convention);
     let mut buffer = GlbBuffer::default();
-    let bones = &rig.skeleton.joints;
-    let own = Names::Own.of(&rig.skeleton);
-    let called = names.of(&rig.skeleton);
-    let mut nodes: Vec<Value> = bones
-        .iter()
-        .zip(&called)
-        .enumerate()
-        .map(|(joint, (bone, name))| {
-            let at = bone.parent.map_or(clip.root, |_| bone.offset);
-            let mut node = json!({ "name": name, "translation": metres(at) });
-            let children: Vec<usize> = rig.skeleton.children(joint).collect();
-            if !children.is_empty() {
-                node["children"] = json!(children);
-            }
-            node
-        })
-        .collect();
+    let mut scene = scene(&mut buffer, &skeleton, clip.root, avatar);
+    if clip.n_frames() > 0 {
+        scene["animations"] = json!([animation(&mut buffer, &skeleton.clip(clip))]);
+    }
+    if names == Names::Vrm {
+        vrm_humanoid::make(&mut scene, &skeleton.skeleton);
+    }
+    buffer.file(scene)
+}
+
+/// Scene of the figure at rest, the hips at `root`: a node a joint, then those of the body's and the face's mesh.
+pub fn scene(buffer: &mut GlbBuffer, skeleton: &FileSkeleton, root: Vec3, avatar: &Avatar) -> Value {
+    let n_joints = skeleton.rest.len();
+    let mut nodes = joint_nodes(skeleton, root);
     // The face is a mesh of its own, since all parts of a mesh have the same morph targets.
     let (faces, body): (Vec<_>, Vec<_>) = avatar.parts.iter().enumerate().partition(|(_, part)| !part.mouth.is_empty());
     nodes.push(json!({ "name": "Avatar", "mesh": 0, "skin": 0 }));
     nodes.push(json!({ "name": "Face", "mesh": 1, "skin": 0 }));
     let mut primitives = |parts: &[(usize, &AvatarMesh)]| -> Vec<Value> {
-        parts.iter().map(|(material, part)| primitive(&mut buffer, part, *material)).collect()
+        parts.iter().map(|(material, part)| primitive(buffer, part, *material, &skeleton.of_rig)).collect()
     };
     let meshes = json!([
         { "name": "Avatar", "primitives": primitives(&body) },
         { "name": "Face", "primitives": primitives(&faces), "weights": [0.0], "extras": { "targetNames": ["mouthOpen"] } },
     ]);
-    let mut scene = json!({
-        "asset": { "version": "2.0", "generator": concat!("orator ", env!("CARGO_PKG_VERSION")) },
+    json!({
+        "asset": asset(),
         "scene": 0,
-        "scenes": [{ "name": "Figure", "nodes": [0, bones.len(), bones.len() + 1] }],
+        "scenes": [{ "name": "Figure", "nodes": [0, n_joints, n_joints + 1] }],
         "nodes": nodes,
         "materials": avatar.parts.iter().map(material).collect::<Vec<_>>(),
         "meshes": meshes,
         "skins": [{
-            "inverseBindMatrices": inverse_binds(&mut buffer, rig, clip.root),
+            "inverseBindMatrices": inverse_binds(buffer, skeleton, root),
             "skeleton": 0,
-            "joints": (0..bones.len()).collect::<Vec<_>>(),
+            "joints": (0..n_joints).collect::<Vec<_>>(),
         }],
-    });
-    if clip.n_frames() > 0 {
-        scene["animations"] = json!([animation(&mut buffer, clip)]);
-    }
-    if names == Names::Vrm {
-        scene["extensionsUsed"] = json!(["VRMC_vrm"]);
-        scene["extensions"] = json!({ "VRMC_vrm": vrm(&own, &called, bones.len() + 1) });
-    }
-    buffer.file(scene)
+    })
+}
+
+/// Version of the format and name of the program.
+pub fn asset() -> Value {
+    json!({ "version": "2.0", "generator": concat!("orator ", env!("CARGO_PKG_VERSION")) })
+}
+
+/// Nodes of the joints at rest.
+pub fn joint_nodes(skeleton: &FileSkeleton, root: Vec3) -> Vec<Value> {
+    let node = |(joint, rest): (usize, Rotation)| {
+        let bone = &skeleton.skeleton.joints[joint];
+        let at = bone.parent.map_or(root, |_| bone.offset);
+        let mut node = json!({ "name": bone.name, "translation": metres(at) });
+        if rest != Rotation::IDENTITY {
+            let Rotation { w, v: [x, y, z] } = rest;
+            node["rotation"] = json!([x, y, z, w].map(|v| v as f32));
+        }
+        let children: Vec<usize> = skeleton.skeleton.children(joint).collect();
+        if !children.is_empty() {
+            node["children"] = json!(children);
+        }
+        node
+    };
+    skeleton.rest_local().into_iter().enumerate().map(node).collect()
 }
 
 fn metres(cm: Vec3) -> [f32; 3] {
@@ -90,10 +103,11 @@ fn material(part: &AvatarMesh) -> Value {
     })
 }
 
-fn primitive(buffer: &mut GlbBuffer, part: &AvatarMesh, material: usize) -> Value {
+fn primitive(buffer: &mut GlbBuffer, part: &AvatarMesh, material: usize, of_rig: &[usize]) -> Value {
     let points: Vec<[f32; 3]> = part.points.iter().map(|&point| metres(point)).collect();
     let normals: Vec<[f32; 3]> = part.normals.iter().map(|normal| normal.map(|v| v as f32)).collect();
-    let (joints, weights): (Vec<[u8; 4]>, Vec<[u16; 4]>) = part.weights.iter().map(whole_shares).unzip();
+    let (joints, weights): (Vec<[u8; 4]>, Vec<[u16; 4]>) =
+        part.weights.iter().map(|weights| whole_shares(weights, of_rig)).unzip();
     let mut primitive = json!({
         "attributes": {
             "POSITION": buffer.floats(&points, "VEC3", BufferUse::Vertices),
@@ -118,28 +132,27 @@ fn primitive(buffer: &mut GlbBuffer, part: &AvatarMesh, material: usize) -> Valu
 }
 
 /// Weights as 16-bit fractions that sum to 65535, largest first; a joint with weight 0 is joint 0.
-fn whole_shares(weights: &crate::animate::avatar::Weights) -> ([u8; 4], [u16; 4]) {
+fn whole_shares(weights: &Weights, of_rig: &[usize]) -> ([u8; 4], [u16; 4]) {
     let mut shares = weights.map(|(_, weight)| (weight * 65_535.0).round() as u16);
     let others: u16 = shares[1..].iter().sum();
     shares[0] = u16::MAX - others;
-    let joints = std::array::from_fn(|k| if shares[k] == 0 { 0 } else { weights[k].0 as u8 });
+    let joints = std::array::from_fn(|k| if shares[k] == 0 { 0 } else { of_rig[weights[k].0] as u8 });
     (joints, shares)
 }
 
-fn inverse_binds(buffer: &mut GlbBuffer, rig: &Rig, root: Vec3) -> usize {
-    let still = vec![Rotation::IDENTITY; rig.skeleton.joints.len()];
-    let rest = rig.skeleton.positions(root, &still);
-    let matrices: Vec<[f32; 16]> = rest
-        .into_iter()
-        .map(|place| {
-            let [x, y, z] = metres(place).map(|v| 0.0 - v);
-            [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, x, y, z, 1.0]
-        })
-        .collect();
+fn inverse_binds(buffer: &mut GlbBuffer, skeleton: &FileSkeleton, root: Vec3) -> usize {
+    let back = |(turn, place): (&Rotation, Vec3)| {
+        let back = turn.inverse();
+        let [a, b, c] = back.axes().map(|axis| axis.map(|v| v as f32));
+        let [x, y, z] = metres(back.turn(place)).map(|v| 0.0 - v);
+        [a[0], a[1], a[2], 0.0, b[0], b[1], b[2], 0.0, c[0], c[1], c[2], 0.0, x, y, z, 1.0]
+    };
+    let matrices: Vec<[f32; 16]> = skeleton.rest.iter().zip(skeleton.rest_positions(root)).map(back).collect();
     buffer.floats(&matrices, "MAT4", BufferUse::Other)
 }
 
-fn animation(buffer: &mut GlbBuffer, clip: &BvhClip) -> Value {
+/// The clip as an animation of the nodes of its joints.
+pub fn animation(buffer: &mut GlbBuffer, clip: &BvhClip) -> Value {
     let times: Vec<[f32; 1]> = (0..clip.n_frames()).map(|frame| [clip.fps.secs(frame) as f32]).collect();
     let once = buffer.floats(&times[..1], "SCALAR", BufferUse::Other);
     let mut every = None;
@@ -147,7 +160,7 @@ fn animation(buffer: &mut GlbBuffer, clip: &BvhClip) -> Value {
         vec![json!({ "input": once, "output": buffer.floats(&[metres(clip.root)], "VEC3", BufferUse::Other) })];
     let mut channels = vec![json!({ "sampler": 0, "target": { "node": 0, "path": "translation" } })];
     for joint in (0..clip.skeleton.joints.len()).filter(|&joint| !clip.skeleton.joints[joint].end) {
-        let track = quaternions(clip, joint);
+        let track = signed(clip.local.iter().map(|local| local[joint]));
         let moves = track.iter().any(|q| (0..4).any(|k| (f64::from(q[k]) - f64::from(track[0][k])).abs() > STILL));
         let (input, output) = if moves {
             (*every.get_or_insert_with(|| buffer.floats(&times, "SCALAR", BufferUse::Other)), &track[..])
@@ -162,10 +175,10 @@ fn animation(buffer: &mut GlbBuffer, clip: &BvhClip) -> Value {
 }
 
 /// Quaternions (x, y, z, w) of a joint over time, each with the sign nearest to the one before.
-fn quaternions(clip: &BvhClip, joint: usize) -> Vec<[f32; 4]> {
+pub fn signed(rotations: impl Iterator<Item = Rotation>) -> Vec<[f32; 4]> {
     let mut before = [0.0, 0.0, 0.0, 1.0];
-    let next = |local: &Vec<Rotation>| {
-        let Rotation { w, v: [x, y, z] } = local[joint];
+    let next = |rotation: Rotation| {
+        let Rotation { w, v: [x, y, z] } = rotation;
         let mut q = [x, y, z, w];
         if (0..4).map(|k| q[k] * before[k]).sum::<f64>() < 0.0 {
             q = q.map(|v| -v);
@@ -173,25 +186,5 @@ fn quaternions(clip: &BvhClip, joint: usize) -> Vec<[f32; 4]> {
         before = q;
         q.map(|v| v as f32)
     };
-    clip.local.iter().map(next).collect()
-}
-
-/// VRM 1.0 extension: nodes of the humanoid bones, the open mouth of the node `face`, the avatar's author and licence.
-fn vrm(own: &[String], called: &[String], face: usize) -> Value {
-    let is_bone = |name: &str| !name.ends_with('4') && !name.ends_with("End");
-    let bones: serde_json::Map<String, Value> = own
-        .iter()
-        .zip(called)
-        .enumerate()
-        .filter(|(_, (own, _))| is_bone(own))
-        .map(|(node, (_, name))| (name.clone(), json!({ "node": node })))
-        .collect();
-    json!({
-        "specVersion": "1.0",
-        "meta": { "name": "Avatar", "authors": ["orator"], "licenseUrl": VRM_LICENSE },
-        "humanoid": { "humanBones": bones },
-        "expressions": {
-            "preset": { "aa": { "morphTargetBinds": [{ "node": face, "index": 0, "weight": 1.0 }] } },
-        },
-    })
+    rotations.map(next).collect()
 }

@@ -1,5 +1,6 @@
-//! Files that other programs open: GLB, JSON, MP4, and the choice of format by file name.
+//! Files that other programs open: FBX, GLB, JSON, MP4, and the choice of format by file name.
 
+pub mod fbx;
 pub mod file;
 pub mod film;
 pub mod film_avatar;
@@ -8,3 +9,5 @@ pub mod film_source;
 pub mod glb;
 pub mod glb_scene;
 pub mod json;
+pub mod vrm;
+pub mod vrm_humanoid;

@@ -1,4 +1,4 @@
-//! Bone names in files: our own, Mixamo's, Unity's humanoid, VRM 1.0. Only names differ, not the skeleton.
+//! Bone names in files: our own, Mixamo's, Unity's humanoid, VRM 1.0. What else a convention has is in `file_skeleton`.
 
 use crate::motion::fk::Skeleton;
 
@@ -8,7 +8,7 @@ pub enum Names {
     /// `Hips`, `LeftForeArm`, `LeftHandIndex1`: Mixamo's names without prefix, and `Chest`.
     #[default]
     Own,
-    /// `mixamorig:Hips` and so on; our chest is `Spine1`, and `Spine2` does not occur.
+    /// `mixamorig:Hips` and so on; our chest is `Spine1`.
     Mixamo,
     /// Unity's `HumanBodyBones`.
     UnityHumanoid,
@@ -44,17 +44,6 @@ impl Names {
         (0..skeleton.joints.len()).map(|joint| self.translated(&own(joint))).collect()
     }
 
-    /// Skeleton with these names; bone ends stay without one.
-    pub fn applied(self, skeleton: &Skeleton) -> Skeleton {
-        let mut renamed = skeleton.clone();
-        for (joint, name) in renamed.joints.iter_mut().zip(self.of(skeleton)) {
-            if !joint.end {
-                joint.name = name;
-            }
-        }
-        renamed
-    }
-
     fn translated(self, own: &str) -> String {
         match self {
             Self::Own => own.to_owned(),
@@ -62,7 +51,7 @@ impl Names {
                 let name = match own {
                     "Chest" => "Spine1".to_owned(),
                     "HeadEnd" => "HeadTop_End".to_owned(),
-                    _ => own.replace("FootEnd", "ToeBase"),
+                    _ => own.replace("ToeBaseEnd", "Toe_End").replace("FootEnd", "ToeBase"),
                 };
                 format!("mixamorig:{name}")
             }
@@ -102,6 +91,7 @@ fn humanoid(own: &str, thumb: [&str; 3]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::animate::rig::file_skeleton::{FileSkeleton, RestAxes};
     use crate::animate::rig::rig::Rig;
     use std::collections::BTreeSet;
 
@@ -121,7 +111,7 @@ mod tests {
         let bones = ["Proximal", "Intermediate", "Distal"];
         let thumb = ["ThumbMetacarpal", "ThumbProximal", "ThumbDistal"].map(String::from);
         let fingers = |names: &[&str]| names.iter().flat_map(|f| bones.map(|b| format!("{f}{b}"))).collect::<Vec<_>>();
-        let mixamo = ["UpLeg", "Leg", "Foot", "ToeBase", "Shoulder", "Arm", "ForeArm", "Hand"];
+        let mixamo = ["UpLeg", "Leg", "Foot", "ToeBase", "Toe_End", "Shoulder", "Arm", "ForeArm", "Hand"];
         let mixamos_fingers = ["Thumb", "Index", "Middle", "Ring", "Pinky"];
         let mixamos_fingers = mixamos_fingers.iter().flat_map(|f| (1..=4).map(move |k| format!("Hand{f}{k}")));
         for (names, n, start, trunk, sides, limbs, fingers) in [
@@ -145,19 +135,19 @@ mod tests {
                 &limbs[..],
                 [&thumb[..], &fingers(&FINGERS[1..])].concat(),
             ),
-            // Its 65 bones without Spine2 and the ends of the toes.
+            // X Bot and Y Bot.
             (
                 Names::Mixamo,
-                62,
+                65,
                 "mixamorig:",
-                "Hips Spine Spine1 Neck Head HeadTop_End",
+                "Hips Spine Spine1 Spine2 Neck Head HeadTop_End",
                 ["Left", "Right"],
                 &mixamo[..],
                 mixamos_fingers.collect(),
             ),
         ] {
-            let all = names.of(&skeleton());
-            let called: BTreeSet<&String> = all.iter().collect();
+            let all = FileSkeleton::new(&skeleton(), names, RestAxes::World).skeleton.joints;
+            let called: BTreeSet<&String> = all.iter().map(|joint| &joint.name).collect();
             assert_eq!(called.len(), all.len(), "a name is given twice");
             let parts: Vec<String> = limbs.iter().map(ToString::to_string).chain(fingers).collect();
             let both = sides.iter().flat_map(|side| parts.iter().map(move |part| format!("{side}{part}")));
@@ -166,12 +156,5 @@ mod tests {
             let missing: Vec<String> = expected.clone().filter(|name| !called.contains(name)).collect();
             assert_eq!((expected.len(), missing), (n, vec![]), "{names:?}");
         }
-    }
-
-    #[test]
-    fn ends_keep_no_name_in_a_bvh() {
-        let renamed = Names::Mixamo.applied(&skeleton());
-        assert!(renamed.find("mixamorig:LeftHandPinky3").is_some() && renamed.find("Hips").is_none());
-        assert!(renamed.joints.iter().all(|joint| joint.end == joint.name.is_empty()));
     }
 }

@@ -2,7 +2,9 @@
 
 mod film_args;
 pub mod input;
+mod retarget_args;
 mod smoothing_args;
+mod told;
 pub mod verb;
 
 pub use verb::{Args, run};

@@ -2,10 +2,13 @@
 
 use super::film_args::FilmArgs;
 use super::input::{InputMotion, MotionInput, inputs};
+use super::retarget_args::{OpenedRig, RetargetArgs};
 use super::smoothing_args::SmoothingArgs;
+use super::told;
 use crate::cli::Outcome;
 use crate::cli::config_args::split;
 use crate::cli::confine::confine;
+use crate::cli::figure_args::FigureArgs;
 use crate::cli::outputs::{OutputFiles, names, next_output, outputs};
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
@@ -13,8 +16,6 @@ use orator::animate::export::file::{ExportContent, ExportFormat};
 use orator::animate::export::film::SecondPanel;
 use orator::animate::export::film_panel::{FilmBody, FilmStyle};
 use orator::animate::export::film_source::SourceCamera;
-use orator::animate::performance::{AnimationReport, Jerk, SeenFrames};
-use orator::animate::rig::names::Names;
 use orator::animate::{AnimationOptions, Constraints, Performance, Yaw, perform};
 use orator::dataset::Split;
 use orator::external::ffmpeg::audio;
@@ -32,8 +33,9 @@ use std::time::Instant;
 ///
 /// IN is a motion: .npy (joints [frames, 49, 3], metres), .txt (the layout of Rebol et al. 2021), joints.npz or the
 /// folder of a lifted video (work/lift/SPEAKER/VIDEO), or a dataset (work/dataset/SPEAKER) with --sample. The ending of
-/// each output chooses what is written: .bvh (cm, y up, facing +z, T-pose at rest), .glb (a skinned avatar), .json,
-/// .npy and .txt (the joints of the figure), .mp4 (a film).
+/// each output chooses what is written: .bvh (cm, y up, facing +z, T-pose at rest), .fbx (binary 7.4) and .glb (a skinned
+/// avatar with its motion), .vrm (the avatar alone, VRM 1.0) and .vrma (the motion for avatars of VRM), .json, .npy and
+/// .txt (the joints of the figure), .mp4 (a film).
 /// With --format, IN may be a folder of motions, a speaker's folder of lifted videos or a whole dataset, and --out is a
 /// folder.
 ///
@@ -51,7 +53,7 @@ pub struct Args {
     /// What to write; may be given several times. With --format: one folder.
     #[arg(long, value_name = "FILE|FOLDER", required = true, num_args = 1..)]
     out: Vec<PathBuf>,
-    /// Write every motion of IN into the folder --out, in these formats: bvh,glb,json,mp4,npy,txt
+    /// Write every motion of IN into the folder --out, in these formats: bvh,fbx,glb,json,mp4,npy,txt,vrm,vrma
     #[arg(long, value_name = "ENDING", value_delimiter = ',')]
     format: Vec<String>,
     /// Of a dataset: the sample of this key.
@@ -60,9 +62,10 @@ pub struct Args {
     /// Of a dataset: only this part.
     #[arg(long, value_name = "train|validation|test", value_parser = split, conflicts_with = "sample")]
     split: Option<Split>,
-    /// What the bones are called in .bvh, .glb and .json.
-    #[arg(long, value_name = "own|mixamo|unity-humanoid|vrm", default_value = "own", value_parser = names_called)]
-    names: Names,
+    #[command(flatten)]
+    figure: FigureArgs,
+    #[command(flatten)]
+    retarget: RetargetArgs,
     /// Keypoints of the same frames (`body` [T, 17, 3], COCO), from which the head is turned.
     #[arg(long, value_name = "FILE.npz", conflicts_with = "format")]
     keypoints: Option<PathBuf>,
@@ -87,9 +90,6 @@ pub struct Args {
     /// Frames a second of a .npy or .txt.
     #[arg(long, value_name = "RATE", default_value = "15")]
     in_fps: FrameRate,
-    /// Frames a second of what is written; without: those of the motion. A fraction is 30000/1001.
-    #[arg(long, value_name = "RATE")]
-    fps: Option<FrameRate>,
     /// The turn of the shoulders about the vertical: of spine and chest, or removed, so that the figure faces ahead.
     #[arg(long, value_enum, default_value = "spine")]
     shoulder_yaw: ShoulderYaw,
@@ -117,11 +117,13 @@ enum Switch {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    confine(args.out.iter().map(PathBuf::as_path), [args.input.as_path()]);
+    let written = args.out.iter().map(PathBuf::as_path).chain(args.retarget.writes());
+    confine(written, [args.input.as_path()].into_iter().chain(args.retarget.reads()));
     let options = options(&args)?;
+    let rig = args.retarget.open()?;
     let inputs = inputs(&args.input, args.sample.as_deref(), args.split)?;
     if !args.format.is_empty() {
-        return whole_folder(&args, &inputs, &options, ui);
+        return whole_folder(&args, &inputs, rig.as_ref(), &options, ui);
     }
     let [input] = inputs.as_slice() else {
         bail!(
@@ -130,12 +132,19 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             inputs.len()
         );
     };
-    let is_read =
-        |path: &Path| input.is_at(path) || [&args.audio, &args.beside].into_iter().flatten().any(|read| read == path);
+    let is_read = |path: &Path| {
+        input.is_at(path)
+            || [&args.audio, &args.beside]
+                .into_iter()
+                .flatten()
+                .map(PathBuf::as_path)
+                .chain(args.retarget.reads())
+                .any(|read| read == path)
+    };
     let outputs = outputs(&args.out, is_read, "what is read", ", or give --format bvh")?;
     check_effect(&args, &outputs)?;
     let sound = args.audio.as_deref().map(audio::read_sound).transpose()?;
-    let done = animate(&args, input, sound, &outputs, &options, ui)?;
+    let done = animate(&args, input, (sound, rig.as_ref()), &outputs, &options, ui)?;
     let next = next_output(&outputs).map(|out| {
         let sample = args.sample.as_ref().map(|key| format!(" --sample {key}")).unwrap_or_default();
         format!("orator animate {}{sample} --out {}", args.input.display(), out.display())
@@ -148,7 +157,13 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
 }
 
 /// Every motion of a folder or dataset; one that fails does not stop the others.
-fn whole_folder(args: &Args, inputs: &[MotionInput], options: &AnimationOptions, ui: &Ui) -> Result<Outcome> {
+fn whole_folder(
+    args: &Args,
+    inputs: &[MotionInput],
+    rig: Option<&OpenedRig>,
+    options: &AnimationOptions,
+    ui: &Ui,
+) -> Result<Outcome> {
     let [folder] = args.out.as_slice() else { bail!("--format writes into one folder; give one --out") };
     ensure!(!folder.is_file(), "{} is a file; with --format --out is a folder", folder.display());
     let endings: Vec<&str> = args.format.iter().map(|ending| ending.trim_start_matches('.')).collect();
@@ -163,7 +178,7 @@ fn whole_folder(args: &Args, inputs: &[MotionInput], options: &AnimationOptions,
             Ok((path.clone(), ExportFormat::from_path(&path)?))
         };
         let outputs: Result<Vec<_>> = endings.iter().map(named).collect();
-        match outputs.and_then(|outputs| animate(args, input, None, &outputs, options, ui)) {
+        match outputs.and_then(|outputs| animate(args, input, (None, rig), &outputs, options, ui)) {
             Ok(done) => {
                 n_files += endings.len();
                 text += &format!("{}\n{}", input.name, done.text);
@@ -188,16 +203,14 @@ fn whole_folder(args: &Args, inputs: &[MotionInput], options: &AnimationOptions,
 
 /// Errors on an option that changes nothing in these outputs.
 fn check_effect(args: &Args, outputs: &OutputFiles) -> Result<()> {
-    let has = |formats: &[ExportFormat]| outputs.iter().any(|(_, format)| formats.contains(format));
-    let is_film = has(&[ExportFormat::Mp4]);
+    let is_film = outputs.iter().any(|&(_, format)| format == ExportFormat::Mp4);
     args.film.check()?;
     let beside = [("--beside", args.beside.is_some()), ("--audio", args.audio.is_some())];
     let given = beside.into_iter().chain(args.film.given());
     for (option, is_given) in given {
         ensure!(is_film || !is_given, "{option} is for films: name an .mp4 at --out, or leave it away");
     }
-    let has_names = has(&[ExportFormat::Bvh, ExportFormat::Glb, ExportFormat::Json]);
-    ensure!(has_names || args.names == Names::Own, "--names is for .bvh, .glb and .json: name one at --out");
+    args.figure.check(outputs)?;
     args.smoothing.check()
 }
 
@@ -210,7 +223,7 @@ struct Done {
 fn animate(
     args: &Args,
     input: &MotionInput,
-    sound: Option<Sound>,
+    (sound, rig): (Option<Sound>, Option<&OpenedRig>),
     outputs: &OutputFiles,
     options: &AnimationOptions,
     ui: &Ui,
@@ -264,8 +277,11 @@ fn animate(
         (true, true) => "the film is without sound: give --audio\n",
         (true, false) => "the film is without sound\n",
     };
-    let sources = ExportContent { sound: sound.as_ref(), names: args.names, beside, style };
-    for (path, format) in outputs {
+    let sources = ExportContent { sound: sound.as_ref(), names: args.figure.options().names, beside, style };
+    if let Some(rig) = rig {
+        rig.write(&performance, outputs, ui)?;
+    }
+    for (path, format) in outputs.iter().filter(|_| rig.is_none()) {
         format.write(path, &performance, &sources, ui).with_context(|| format!("cannot write {}", path.display()))?;
     }
     let Performance { report, clip, .. } = &performance;
@@ -275,7 +291,7 @@ fn animate(
         motion.fps,
         clip.n_frames(),
         clip.fps,
-        words(report)
+        told::words(report)
     );
     let facts = json!({
         "name": input.name,
@@ -304,49 +320,6 @@ fn source(args: &Args, input: &MotionInput, motion: &Motion) -> Result<Option<So
     SourceCamera::fit(motion, &keypoints).map(Some).with_context(|| format!("no camera of {}", input.name))
 }
 
-fn words(report: &AnimationReport) -> String {
-    let number = |jerk: Option<f64>| jerk.map_or("-".to_owned(), |jerk| format!("{jerk:.0}"));
-    let jerk = |jerk: Jerk| format!("{} -> {}", number(jerk.before), number(jerk.after));
-    let mut text = format!("jerk, m/s3: arms {}, hands {}\n", jerk(report.arms), jerk(report.hands));
-    text += &match report.face_frames {
-        Some(n) => format!("head: seen in {n} of {} frames\n", report.n_frames),
-        None => "head: at rest\n".to_owned(),
-    };
-    text += &seen(report);
-    let clamped: Vec<_> = report.clamps.iter().filter(|clamps| clamps.joint_frames > 0).collect();
-    match (report.clamps.is_empty(), clamped.is_empty()) {
-        (true, _) => text += "no constraints\n",
-        (_, true) => text += "nothing had to be clamped\n",
-        _ => text += "clamped                      angles   share    by, mean and most, degrees\n",
-    }
-    for clamps in clamped {
-        text += &format!(
-            "  {:26}{:>7}  {:>5.1} %  {:>6.1}  {:>6.1}\n",
-            clamps.kind,
-            clamps.joint_frames,
-            100.0 * clamps.share,
-            clamps.mean_excess_degrees,
-            clamps.largest_excess_degrees
-        );
-    }
-    text
-}
-
-/// What was not seen in all frames; nothing when all was.
-fn seen(report: &AnimationReport) -> String {
-    let SeenFrames { left_arm, right_arm, left_hand, right_hand } = report.seen;
-    let arms = match left_arm == right_arm {
-        true => vec![("arms", left_arm)],
-        false => vec![("left arm", left_arm), ("right arm", right_arm)],
-    };
-    let parts = || arms.iter().copied().chain([("left hand", left_hand), ("right hand", right_hand)]);
-    if parts().all(|(_, n)| n == report.n_frames) {
-        return String::new();
-    }
-    let parts: Vec<_> = parts().map(|(part, n)| format!("{part} in {n}")).collect();
-    format!("seen, of {} frames: {}; the rest is bridged or held\n", report.n_frames, parts.join(", "))
-}
-
 fn options(args: &Args) -> Result<AnimationOptions> {
     let smoothing = args.smoothing.smoothing()?;
     let constraints = match args.no_constraints {
@@ -354,16 +327,11 @@ fn options(args: &Args) -> Result<AnimationOptions> {
         false => Constraints { limits: true, curl_coherence: args.curl_coherence == Switch::On },
     };
     let yaw = if args.shoulder_yaw == ShoulderYaw::Removed { Yaw::Removed } else { Yaw::Spine };
-    Ok(AnimationOptions { smoothing, constraints, yaw, fps: args.fps })
+    Ok(AnimationOptions { smoothing, constraints, yaw, fps: args.figure.options().fps })
 }
 
 /// The part of a sound from a second on, as much as there is of `secs`.
 fn part(whole: &Sound, from_secs: f64, secs: f64) -> Sound {
     let at = |secs: f64| ((secs * f64::from(whole.rate)).round() as usize).min(whole.samples.len());
     Sound { rate: whole.rate, samples: whole.samples[at(from_secs)..at(from_secs + secs)].to_vec() }
-}
-
-fn names_called(label: &str) -> Result<Names, String> {
-    let known = || Names::ALL.map(Names::label).join(", ");
-    Names::ALL.into_iter().find(|names| names.label() == label).ok_or_else(|| format!("expected one of {}", known()))
 }

@@ -3,6 +3,7 @@
 use super::batch;
 use crate::cli::Outcome;
 use crate::cli::confine::confine;
+use crate::cli::figure_args::FigureArgs;
 use crate::cli::outputs::{is_same_file, names, next_output, outputs};
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
@@ -20,8 +21,8 @@ use std::path::PathBuf;
 ///
 /// The sound may be a wav, flac or mp3 file or the sound of a video, of any length. The ending of each output file
 /// chooses what is written: .npy (joints [frames, 49, 3], metres), .txt (the layout of Rebol et al. 2021), .bvh (bone
-/// rotations, cm, y up, facing +z), .glb (a skinned avatar with the motion), .json (joints and rotations), .mp4 (a film
-/// of the figure with the sound).
+/// rotations, cm, y up, facing +z), .fbx and .glb (a skinned avatar with the motion), .vrm (the avatar alone) and .vrma (the
+/// motion for avatars of VRM), .json (joints and rotations), .mp4 (a film of the figure with the sound).
 ///
 /// Many sounds at once: --audio-folder (everything that sounds below it) or --batch (a table, columns `audio`, `out`,
 /// `checkpoint` and `transcript`, of which the first is needed and paths count from the table's folder), with --out-folder
@@ -45,6 +46,8 @@ pub struct Args {
     /// What to write; may be given several times.
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "audio")]
     out: Vec<PathBuf>,
+    #[command(flatten)]
+    figure: FigureArgs,
     /// Speech in every file below this folder.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["audio", "batch"], requires = "out_folder")]
     audio_folder: Option<PathBuf>,
@@ -67,13 +70,15 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     confine(args.out.iter().map(PathBuf::as_path), args.checkpoint.as_deref());
     let Some(given) = &args.checkpoint else { bail!("give --checkpoint") };
     let outputs = outputs(&args.out, |path| is_same_file(path, audio), "the speech itself", "")?;
+    args.figure.check(&outputs)?;
     let checkpoint = checkpoint_file(given)?;
     if checkpoint != *given {
         ui.say(&format!("checkpoint {}", checkpoint.display()));
     }
     let _lock = model_lock(&checkpoint)?;
     let trained = TrainedSpeaker::open(&checkpoint)?;
-    let source = SpeechSource { audio, transcript: args.transcript.as_deref(), seams: seams(args.carry_state) };
+    let (seams, figure) = (seams(args.carry_state), args.figure.options());
+    let source = SpeechSource { audio, transcript: args.transcript.as_deref(), seams, figure };
     let written = speaker::write(&trained, &source, &outputs, ui)?;
     let speed = written.secs / written.motion_secs.max(1e-6);
     let names = names(&outputs);
@@ -142,6 +147,7 @@ fn batch(args: Args) -> Result<SpeechBatch> {
         ensure!(is_sequence, "{} reads no words: leave out --transcript", checkpoint.display());
     }
     transcripts::find(&mut sounds, args.transcript.as_deref())?;
+    let (figure, seams) = (args.figure.options(), seams(args.carry_state));
     let (formats, checkpoint, again) = (args.format, args.checkpoint, args.again);
-    Ok(SpeechBatch { sounds, folder, formats, checkpoint, seams: seams(args.carry_state), again })
+    Ok(SpeechBatch { sounds, folder, formats, checkpoint, seams, figure, again })
 }

@@ -52,13 +52,12 @@ impl BvhClip {
     pub fn to_bvh(&self) -> String {
         let mut text = Vec::new();
         // memory takes whatever is written, and all of it is text
-        let _ = self.write_bvh(&self.skeleton, &mut text);
+        let _ = self.write_bvh(&mut text);
         String::from_utf8(text).unwrap_or_default()
     }
 
-    /// Writes the text of `to_bvh` frame by frame, so that memory does not grow with the clip. `named` is the clip's skeleton,
-    /// maybe under other names.
-    pub fn write_bvh(&self, named: &Skeleton, out: &mut dyn io::Write) -> io::Result<()> {
+    /// Writes the text of `to_bvh` frame by frame.
+    pub fn write_bvh(&self, out: &mut dyn io::Write) -> io::Result<()> {
         let mut text = String::from("HIERARCHY\n");
         let order = self.written_order();
         let mut open: Vec<usize> = Vec::new();
@@ -67,7 +66,7 @@ impl BvhClip {
                 open.pop();
                 let _ = writeln!(text, "{}}}", "\t".repeat(open.len()));
             }
-            head(&mut text, &named.joints[joint], open.len());
+            head(&mut text, &self.skeleton.joints[joint], open.len());
             open.push(joint);
         }
         while open.pop().is_some() {

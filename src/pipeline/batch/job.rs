@@ -2,6 +2,7 @@
 
 use super::sounds::BatchSound;
 use super::stage::BatchStage;
+use crate::animate::export::file::FigureOptions;
 use crate::nn::seq2seq::predict::StateAtSeams;
 use crate::stage::fingerprint::HashCache;
 use crate::stage::progress::Progress;
@@ -22,12 +23,14 @@ pub struct SpeechBatch {
     pub sounds: Vec<BatchSound>,
     /// Where the motions go.
     pub folder: PathBuf,
-    /// Endings of the files of each motion: npy, txt, json, bvh, glb, mp4.
+    /// Endings of the files of each motion: npy, txt, json, bvh, fbx, glb, vrm, vrma, mp4.
     pub formats: Vec<String>,
     /// A checkpoint or a training's folder, for sounds that name none.
     pub checkpoint: Option<PathBuf>,
     /// What sequence-to-sequence networks begin a segment with.
     pub seams: StateAtSeams,
+    /// Bone names and rate of the figures.
+    pub figure: FigureOptions,
     /// Whether motions are made again where nothing changed.
     pub again: bool,
 }
@@ -83,7 +86,8 @@ impl SpeechBatch {
     /// What stops all: a format that is unknown, a common checkpoint that cannot be read, another batch in the same
     /// folder.
     pub fn run(&self, progress: &dyn Progress) -> Result<BatchReport> {
-        let stage = BatchStage::new(&self.sounds, &self.formats, &self.folder, self.checkpoint.as_deref(), self.seams)?;
+        let (checkpoint, seams) = (self.checkpoint.as_deref(), self.seams);
+        let stage = BatchStage::new(&self.sounds, &self.formats, &self.folder, checkpoint, seams, self.figure)?;
         let records = self.folder.join(RECORDS);
         let _lock = workdir::lock(&records)?;
         let hashes = HashCache::open(&artifacts::hashes(&records));

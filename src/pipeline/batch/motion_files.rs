@@ -1,7 +1,7 @@
 //! One sound to motion to files. The sound is streamed, so that its length takes no memory but for its motion; only a film,
 //! which holds the sound, reads it whole.
 
-use super::spoken::SpokenMotion;
+use super::spoken::{SpeechSource, SpokenMotion};
 use crate::animate::export::file::{ExportContent, ExportFormat};
 use crate::animate::{AnimationOptions, perform};
 use crate::audio::mel;
@@ -45,13 +45,14 @@ pub fn model_lock(checkpoint: &Path) -> Result<FolderLock> {
     FolderLock::shared(if checkpoint.is_dir() { checkpoint } else { checkpoint.parent().unwrap_or(checkpoint) })
 }
 
-/// Writes the motion of `speaker` for the sound of `audio` to `outputs`. Errors name the sound.
+/// Writes the motion of `speaker` for a sound to `outputs`. Errors name the sound.
 pub fn write_motion(
     speaker: &GestureGenerator,
-    audio: &Path,
+    speech: &SpeechSource,
     outputs: &[(PathBuf, ExportFormat)],
     progress: &dyn Progress,
 ) -> Result<SpokenMotion> {
+    let audio = speech.audio;
     let started = Instant::now();
     let task = progress.begin("speech to motion", 0);
     task.detail("listening");
@@ -67,14 +68,14 @@ pub fn write_motion(
         speaker.motion_of_pieces(pieces, n_samples, CHUNK, &mut |n| task.advance(n as u64)).with_context(no_motion)?;
     drop(task);
     let motion_secs = started.elapsed().as_secs_f64();
-    write_outputs(motion, audio, outputs, progress)?;
+    write_outputs(motion, speech, outputs, progress)?;
     Ok(SpokenMotion { secs, n_frames, motion_secs, note, segments: None })
 }
 
-/// Writes motion for the sound `audio` to files of all formats.
+/// Writes motion for a sound to files of all formats.
 pub(super) fn write_outputs(
     motion: Motion,
-    audio: &Path,
+    &SpeechSource { audio, figure, .. }: &SpeechSource,
     outputs: &[(PathBuf, ExportFormat)],
     progress: &dyn Progress,
 ) -> Result<()> {
@@ -84,11 +85,11 @@ pub(super) fn write_outputs(
         format.write_joints(path, &motion)?;
     }
     if !figures.is_empty() {
-        let performance = perform(&motion, None, &AnimationOptions::default());
+        let performance = perform(&motion, None, &AnimationOptions { fps: figure.fps, ..AnimationOptions::default() });
         drop(motion);
         let is_film = figures.iter().any(|(_, format)| *format == ExportFormat::Mp4);
         let sound = if is_film { audio::read_mono(audio, SAMPLE_RATE)? } else { None };
-        let sources = ExportContent { sound: sound.as_ref(), ..ExportContent::default() };
+        let sources = ExportContent { sound: sound.as_ref(), names: figure.names, ..ExportContent::default() };
         for (path, format) in figures {
             format.write(path, &performance, &sources, progress)?;
         }

@@ -2,14 +2,14 @@
 
 use super::motion_files::{measure, write_outputs};
 use super::spoken::{SegmentFacts, SpeechSource, SpokenMotion};
-use crate::animate::export::file::ExportFormat;
+use crate::animate::export::file::{ExportFormat, FigureOptions};
 use crate::external::ffmpeg::audio;
 use crate::formats::transcript::{Transcript, after_end};
 use crate::generate::seq2seq::SequenceGenerator;
 use crate::nn::seq2seq::predict::StateAtSeams;
 use crate::stage::progress::Progress;
 use crate::stage::workdir;
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, bail, ensure};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -24,7 +24,7 @@ pub fn write_sequence(
     outputs: &[(PathBuf, ExportFormat)],
     progress: &dyn Progress,
 ) -> Result<SpokenMotion> {
-    let &SpeechSource { audio, transcript, seams } = speech;
+    let &SpeechSource { audio, transcript, seams, figure } = speech;
     let started = Instant::now();
     let is_captured = speaker.is_captured();
     if let Some((path, _)) = outputs.iter().find(|(_, format)| is_captured && *format != ExportFormat::Bvh) {
@@ -33,6 +33,11 @@ pub fn write_sequence(
             path.display()
         );
     }
+    ensure!(
+        !is_captured || figure == FigureOptions::default(),
+        "this network moves the skeleton of the BVH files it was trained on, whose names and rate are kept: leave out \
+         --names and --fps"
+    );
     let said = transcript.map(Transcript::read).transpose()?;
     let task = progress.begin("speech to motion", 0);
     measure(audio)?;
@@ -53,7 +58,7 @@ pub fn write_sequence(
         let text = speaker.bvh(&poses)?;
         outputs.iter().try_for_each(|(path, _)| workdir::write_file(path, text.as_bytes()))?;
     } else {
-        write_outputs(speaker.motion(&poses)?, audio, outputs, progress)?;
+        write_outputs(speaker.motion(&poses)?, speech, outputs, progress)?;
     }
     let known = said.as_ref().map(|said| [said.words.len(), speaker.metadata.vocabulary.n_known(&said.words)]);
     let notes = transcript.zip(said).map(|(path, said)| notes(speaker, path, &said, sound.secs()));

@@ -25,7 +25,7 @@ pub fn write(
                 speech.seams == StateAtSeams::Renewed,
                 "the speaker {name} makes no segments, and has no state: leave out --carry-state"
             );
-            write_motion(speaker, speech.audio, outputs, progress)
+            write_motion(speaker, speech, outputs, progress)
         }
         TrainedSpeaker::Sequence(speaker) => write_sequence(speaker, speech, outputs, progress),
     }

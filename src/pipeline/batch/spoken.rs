@@ -1,5 +1,6 @@
 //! What is to be spoken, and what is told of motion that was written.
 
+use crate::animate::export::file::FigureOptions;
 use crate::nn::seq2seq::predict::StateAtSeams;
 use serde::Serialize;
 use std::path::Path;
@@ -13,6 +14,8 @@ pub struct SpeechSource<'a> {
     pub transcript: Option<&'a Path>,
     /// What a decoder begins a segment with.
     pub seams: StateAtSeams,
+    /// The figure in the files.
+    pub figure: FigureOptions,
 }
 
 /// A sound whose motion was written.

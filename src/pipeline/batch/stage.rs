@@ -5,7 +5,7 @@ use super::sounds::BatchSound;
 use super::speaker;
 use super::spoken::SpeechSource;
 use crate::animate::AnimationOptions;
-use crate::animate::export::file::ExportFormat;
+use crate::animate::export::file::{ExportFormat, FigureOptions};
 use crate::generate::seq2seq::metadata::is_sequence;
 use crate::generate::trained::TrainedSpeaker;
 use crate::nn::seq2seq::predict::StateAtSeams;
@@ -28,6 +28,7 @@ pub struct BatchStage {
     checkpoint: Option<PathBuf>,
     /// What sequence-to-sequence networks begin a segment with.
     seams: StateAtSeams,
+    figure: FigureOptions,
     /// The models in use, with the locks of their folders.
     speakers: Mutex<BTreeMap<PathBuf, (Arc<TrainedSpeaker>, FolderLock)>>,
 }
@@ -44,6 +45,7 @@ impl BatchStage {
         folder: &Path,
         checkpoint: Option<&Path>,
         seams: StateAtSeams,
+        figure: FigureOptions,
     ) -> Result<Self> {
         let checkpoint = checkpoint.map(checkpoint_file).transpose()?;
         if checkpoint.is_none()
@@ -57,6 +59,7 @@ impl BatchStage {
             folder: folder.to_owned(),
             checkpoint,
             seams,
+            figure,
             speakers: Mutex::default(),
         };
         // A common checkpoint that cannot be read fails all sounds, and does so before any.
@@ -112,6 +115,9 @@ impl Stage for BatchStage {
         if self.seams != StateAtSeams::default() {
             settings["state"] = json!(self.seams);
         }
+        if self.figure != FigureOptions::default() {
+            settings["figure"] = json!({ "names": self.figure.names.label(), "fps": self.figure.fps });
+        }
         settings
     }
 
@@ -136,7 +142,8 @@ impl Stage for BatchStage {
         }
         let outputs: Vec<(PathBuf, ExportFormat)> =
             self.formats.iter().map(|(ending, format)| (out.join(file(ending)), *format)).collect();
-        let source = SpeechSource { audio: &unit.source, transcript: self.transcript_of(unit)?, seams: self.seams };
+        let (transcript, seams, figure) = (self.transcript_of(unit)?, self.seams, self.figure);
+        let source = SpeechSource { audio: &unit.source, transcript, seams, figure };
         let written = speaker::write(&speaker, &source, &outputs, progress)?;
         let mut facts = json!({
             "secs": written.secs, "n_frames": written.n_frames, "speaker": speaker.name(), "note": written.note,

@@ -1,12 +1,15 @@
-//! BVH and GLB opened by Blender show the joints of the motion, the GLB also its skin. Blender is a Python module for
+//! BVH, GLB and FBX opened by Blender show the joints of the motion, the latter two also their skin. Blender is a Python module for
 //! Python 3.11 (`make blender`; ORATOR_BLENDER names its folder, else `target/blender`).
 
 use crate::fixtures::animation::bvh::{Bvh, worst_mm};
 use crate::fixtures::animation::gltf::{Glb, written};
+use crate::fixtures::animation::truth::worst_joint_mm;
 use crate::fixtures::figures::{FPS, swinging};
 use crate::fixtures::skip::blender;
+use orator::animate::export::file::{ExportContent, ExportFormat};
 use orator::animate::rig::names::Names;
 use orator::animate::{AnimationOptions, perform};
+use orator::stage::progress::Silent;
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
@@ -79,5 +82,33 @@ fn blender_sees_the_joints_of_the_glb_and_its_skin_around_them() {
         let bound = |n: usize| seen["mesh"][n][k].as_f64().unwrap();
         let (low, high) = skinned.iter().fold((f64::MAX, f64::MIN), |(low, high), p| (low.min(p[k]), high.max(p[k])));
         assert!((bound(0) - low).abs() < 1e-4 && (bound(1) - high).abs() < 1e-4, "{k}: {} {low}", bound(0));
+    }
+}
+
+#[test]
+fn blender_sees_the_joints_of_the_fbx_and_its_skin() {
+    let Some(python) = blender() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("swinging.fbx");
+    let performance = perform(&swinging(3, 12), None, &AnimationOptions::default());
+    let content = ExportContent { names: Names::Mixamo, ..ExportContent::default() };
+    ExportFormat::Fbx.write(&path, &performance, &content, &Silent).unwrap();
+    let seen = seen(python, &path);
+    assert_eq!(seen["frames"].as_array().unwrap().len(), performance.clip.n_frames());
+    assert_eq!(seen["frames"][0].as_object().unwrap().len(), 65);
+    // Blender's metres from the file's centimetres.
+    let worst = worst_joint_mm(&performance, Names::Mixamo, |frame, name| {
+        std::array::from_fn(|k| 100.0 * seen["frames"][frame][name][0][k].as_f64().unwrap_or(f64::NAN))
+    });
+    eprintln!("FBX: Blender's joints lie within {worst:.4} mm of the motion's");
+    assert!(worst < 0.1, "{worst} mm");
+    // The same mesh as in the GLB, posed by the same joints.
+    let (_, glb) = written(folder.path(), 12, Names::Mixamo);
+    let skinned = Glb::read(&glb).skinned(11);
+    assert_eq!(seen["n_vertices"].as_u64(), Some(skinned.len() as u64));
+    for k in 0..3 {
+        let (low, high) = skinned.iter().fold((f64::MAX, f64::MIN), |(low, high), p| (low.min(p[k]), high.max(p[k])));
+        let bound = |n: usize| seen["mesh"][n][k].as_f64().unwrap();
+        assert!((bound(0) - low).abs() < 1e-3 && (bound(1) - high).abs() < 1e-3, "{k}: {} {low}", bound(0));
     }
 }

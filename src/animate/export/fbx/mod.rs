@@ -1,0 +1,7 @@
+//! FBX, binary, version 7.4: its container, and a performance in it.
+
+pub mod binary;
+pub mod curves;
+pub mod document;
+pub mod mesh;
+pub mod scene;

@@ -1,0 +1,81 @@
+//! Options of `orator animate` that put the motion on a skeleton of the user's own.
+
+use crate::cli::outputs::OutputFiles;
+use crate::cli::ui::Ui;
+use anyhow::{Context as _, Result, ensure};
+use orator::animate::Performance;
+use orator::animate::retarget::bone_map::BoneMap;
+use orator::animate::retarget::retargeted::RetargetRig;
+use orator::stage::progress::Progress as _;
+use orator::stage::workdir;
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Args)]
+pub struct RetargetArgs {
+    /// Put the motion on the skeleton of this file: a .bvh is written as .bvh, a .glb as that file with an animation
+    /// added. Its bones are found by their names and listed.
+    #[arg(long, value_name = "RIG.glb|RIG.bvh", conflicts_with = "names")]
+    retarget: Option<PathBuf>,
+    /// Which joint of the skeleton is which bone, in place of what the names tell; lines LeftArm = \"upperarm_l\".
+    #[arg(long, value_name = "FILE", requires = "retarget")]
+    bone_map: Option<PathBuf>,
+    /// Write the bones that were found to this file, to be changed and given to --bone-map.
+    #[arg(long, value_name = "FILE", requires = "retarget", conflicts_with = "bone_map")]
+    write_bone_map: Option<PathBuf>,
+}
+
+/// A user's skeleton, opened.
+pub struct OpenedRig {
+    rig: RetargetRig,
+    /// Text of the map and where it is from; `None`: by names.
+    map: Option<(String, PathBuf)>,
+    write_map: Option<PathBuf>,
+}
+
+impl RetargetArgs {
+    /// Files that are read.
+    pub fn reads(&self) -> impl Iterator<Item = &Path> {
+        [&self.retarget, &self.bone_map].into_iter().flatten().map(PathBuf::as_path)
+    }
+
+    /// Files that are written beside the outputs.
+    pub fn writes(&self) -> Option<&Path> {
+        self.write_bone_map.as_deref()
+    }
+
+    /// Opens the skeleton, if one is given.
+    pub fn open(&self) -> Result<Option<OpenedRig>> {
+        let Some(path) = &self.retarget else { return Ok(None) };
+        let rig = RetargetRig::open(path)?;
+        let read = |path: &PathBuf| {
+            let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+            Ok::<_, anyhow::Error>((text, path.clone()))
+        };
+        let map = self.bone_map.as_ref().map(read).transpose()?;
+        Ok(Some(OpenedRig { rig, map, write_map: self.write_bone_map.clone() }))
+    }
+}
+
+impl OpenedRig {
+    /// Writes the performance on the skeleton; says which bones were found.
+    pub fn write(&self, performance: &Performance, outputs: &OutputFiles, ui: &Ui) -> Result<()> {
+        outputs.iter().try_for_each(|(path, _)| self.rig.check_output(path))?;
+        let ours = &performance.rig.skeleton;
+        let map = match &self.map {
+            Some((text, path)) => BoneMap::parse(text, self.rig.rig(), ours)
+                .with_context(|| format!("{} maps no bones", path.display()))?,
+            None => BoneMap::found(self.rig.rig())?,
+        };
+        let text = map.text(self.rig.rig(), ours);
+        if let Some(path) = &self.write_map {
+            workdir::write_file(path, text.as_bytes())?;
+            ui.say(&format!("wrote {}", path.display()));
+        }
+        ui.say(text.trim_end());
+        ensure!(map.n_bones() > 0, "no bone is mapped");
+        for (path, _) in outputs {
+            self.rig.write(path, performance, &map).with_context(|| format!("cannot write {}", path.display()))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,47 @@
+//! Report of an animation in words.
+
+use orator::animate::performance::{AnimationReport, Jerk, SeenFrames};
+
+/// Lines on jerk, head, what was seen and what was clamped.
+pub fn words(report: &AnimationReport) -> String {
+    let number = |jerk: Option<f64>| jerk.map_or("-".to_owned(), |jerk| format!("{jerk:.0}"));
+    let jerk = |jerk: Jerk| format!("{} -> {}", number(jerk.before), number(jerk.after));
+    let mut text = format!("jerk, m/s3: arms {}, hands {}\n", jerk(report.arms), jerk(report.hands));
+    text += &match report.face_frames {
+        Some(n) => format!("head: seen in {n} of {} frames\n", report.n_frames),
+        None => "head: at rest\n".to_owned(),
+    };
+    text += &seen(report);
+    let clamped: Vec<_> = report.clamps.iter().filter(|clamps| clamps.joint_frames > 0).collect();
+    match (report.clamps.is_empty(), clamped.is_empty()) {
+        (true, _) => text += "no constraints\n",
+        (_, true) => text += "nothing had to be clamped\n",
+        _ => text += "clamped                      angles   share    by, mean and most, degrees\n",
+    }
+    for clamps in clamped {
+        text += &format!(
+            "  {:26}{:>7}  {:>5.1} %  {:>6.1}  {:>6.1}\n",
+            clamps.kind,
+            clamps.joint_frames,
+            100.0 * clamps.share,
+            clamps.mean_excess_degrees,
+            clamps.largest_excess_degrees
+        );
+    }
+    text
+}
+
+/// What was not seen in all frames; nothing when all was.
+fn seen(report: &AnimationReport) -> String {
+    let SeenFrames { left_arm, right_arm, left_hand, right_hand } = report.seen;
+    let arms = match left_arm == right_arm {
+        true => vec![("arms", left_arm)],
+        false => vec![("left arm", left_arm), ("right arm", right_arm)],
+    };
+    let parts = || arms.iter().copied().chain([("left hand", left_hand), ("right hand", right_hand)]);
+    if parts().all(|(_, n)| n == report.n_frames) {
+        return String::new();
+    }
+    let parts: Vec<_> = parts().map(|(part, n)| format!("{part} in {n}")).collect();
+    format!("seen, of {} frames: {}; the rest is bridged or held\n", report.n_frames, parts.join(", "))
+}

@@ -1,0 +1,44 @@
+//! Options on the figure in the files of `orator animate` and `orator generate`.
+
+use super::outputs::OutputFiles;
+use anyhow::{Result, ensure};
+use orator::animate::export::file::{ExportFormat, FigureOptions};
+use orator::animate::rig::names::Names;
+use orator::types::time::FrameRate;
+
+#[derive(clap::Args)]
+pub struct FigureArgs {
+    /// What the bones are called in .bvh, .fbx, .glb and .json.
+    #[arg(long, value_name = "own|mixamo|unity-humanoid|vrm", default_value = "own", value_parser = names_called)]
+    names: Names,
+    /// Frames a second of the figures that are written; without: those of the motion. A fraction is 30000/1001.
+    #[arg(long, value_name = "RATE")]
+    fps: Option<FrameRate>,
+}
+
+impl FigureArgs {
+    /// The options as a value.
+    pub fn options(&self) -> FigureOptions {
+        FigureOptions { names: self.names, fps: self.fps }
+    }
+
+    /// Errors on names that are in none of these files.
+    pub fn check(&self, outputs: &OutputFiles) -> Result<()> {
+        self.check_formats(outputs.iter().map(|(_, format)| *format))
+    }
+
+    /// As `check`, of formats.
+    pub fn check_formats(&self, mut formats: impl Iterator<Item = ExportFormat>) -> Result<()> {
+        let is_named = formats.any(ExportFormat::has_names);
+        ensure!(
+            is_named || self.names == Names::Own,
+            "--names is for .bvh, .fbx, .glb and .json, .vrm and .vrma have their own: name one of the first, or leave it away"
+        );
+        Ok(())
+    }
+}
+
+fn names_called(label: &str) -> Result<Names, String> {
+    let known = || Names::ALL.map(Names::label).join(", ");
+    Names::ALL.into_iter().find(|names| names.label() == label).ok_or_else(|| format!("expected one of {}", known()))
+}
