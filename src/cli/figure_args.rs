@@ -9,7 +9,7 @@ use orator::types::time::FrameRate;
 #[derive(clap::Args)]
 pub struct FigureArgs {
     /// What the bones are called in .bvh, .fbx, .glb and .json.
-    #[arg(long, value_name = "own|mixamo|unity-humanoid|vrm", default_value = "own", value_parser = names_called)]
+    #[arg(long, value_name = "own|mixamo|unity-humanoid|vrm|unreal", default_value = "own", value_parser = names_called)]
     names: Names,
     /// Frames a second of the figures that are written; without: those of the motion. A fraction is 30000/1001.
     #[arg(long, value_name = "RATE")]

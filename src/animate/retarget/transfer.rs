@@ -9,11 +9,13 @@ use crate::animate::rig::rig::Rig;
 use crate::formats::bvh::write::BvhClip;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, across, add, cross, dot, norm, scale, sub, unit};
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, ensure};
 
 /// Cosine of the angle to an axis of the file below which a skeleton faces along the axis.
 const ALONG_AXIS: f64 = 0.9;
 
+/// Length of a bone beyond which a file holds no skeleton, in its unit.
+const LONGEST: f64 = 1e9;
 /// Cosine of the angle between the upward ways of two poses that stand alike.
 const UPRIGHT: f64 = 0.7;
 
@@ -68,11 +70,12 @@ impl<'a> Transfer<'a> {
         let t_pose = ours.positions(rig.root, &vec![Rotation::IDENTITY; ours.joints.len()]);
         let lost = "no left and right, or no up and down, at rest";
         let (rest, standing) = (user.at_rest(), user.standing());
-        let at_rest = facing(&rest, map).context(lost)?;
-        let stands = facing(&standing, map).context(lost)?;
+        let at_rest = facing(&rest, map);
+        let stands = facing(&standing, map).or(at_rest).context(lost)?;
         // A zero pose that does not stand as the figure does is no pose of a body: then the standing pose is the reference.
-        let is_pose = dot(at_rest.axes()[1], stands.axes()[1]) > UPRIGHT;
-        let (rest, axes) = if is_pose { (rest, at_rest) } else { (standing, upright(stands)) };
+        let at_rest = at_rest.filter(|axes| dot(axes.axes()[1], stands.axes()[1]) > UPRIGHT);
+        let is_pose = at_rest.is_some();
+        let (rest, axes) = at_rest.map_or_else(|| (standing, upright(stands)), |axes| (rest, axes));
         let reference = ComparedPoses { t_pose: &t_pose, rest: &rest, axes, is_pose };
         let mut moved = vec![None; user.joints.len()];
         for (n, bone) in ours.joints.iter().enumerate() {
@@ -92,7 +95,10 @@ impl<'a> Transfer<'a> {
             let (a, b, c) = a.zip(b).zip(c).map(|((a, b), c)| (a, b, c)).context("an arm is not whole")?;
             let length = |from: usize, to: usize| norm(sub(rest[to].place, rest[from].place));
             let lengths = [length(a.0, b.0), length(b.0, c.0)];
-            anyhow::ensure!(lengths.iter().all(|&length| length > 1e-9), "the {side} arm has no length at rest");
+            ensure!(
+                lengths.iter().all(|&length| length > 1e-9 && length < LONGEST),
+                "the {side} arm has no length at rest"
+            );
             Ok(ArmPair { theirs: [a.0, b.0, c.0], ours: [a.1, b.1, c.1], lengths })
         };
         let arms = [pair("Left")?, pair("Right")?];

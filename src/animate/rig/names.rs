@@ -1,4 +1,4 @@
-//! Bone names in files: our own, Mixamo's, Unity's humanoid, VRM 1.0. What else a convention has is in `file_skeleton`.
+//! Bone names in files: our own, Mixamo's, Unity's humanoid, VRM 1.0, Unreal's. What else a convention has is in `file_skeleton`.
 
 use crate::motion::fk::Skeleton;
 
@@ -14,10 +14,12 @@ pub enum Names {
     UnityHumanoid,
     /// Humanoid bones of VRM 1.0 (`VRMC_vrm`).
     Vrm,
+    /// Body of Unreal's Manny and of MetaHumans; our chest is `spine_05`, the spines between and `neck_02` do not occur.
+    Unreal,
 }
 
 impl Names {
-    pub const ALL: [Self; 4] = [Self::Own, Self::Mixamo, Self::UnityHumanoid, Self::Vrm];
+    pub const ALL: [Self; 5] = [Self::Own, Self::Mixamo, Self::UnityHumanoid, Self::Vrm, Self::Unreal];
 
     /// Name on the command line.
     pub fn label(self) -> &'static str {
@@ -26,6 +28,7 @@ impl Names {
             Self::Mixamo => "mixamo",
             Self::UnityHumanoid => "unity-humanoid",
             Self::Vrm => "vrm",
+            Self::Unreal => "unreal",
         }
     }
 
@@ -55,6 +58,7 @@ impl Names {
                 };
                 format!("mixamorig:{name}")
             }
+            Self::Unreal => unreal(own),
             Self::UnityHumanoid => humanoid(own, ["Proximal", "Intermediate", "Distal"]),
             Self::Vrm => {
                 let name = humanoid(own, ["Metacarpal", "Proximal", "Distal"]);
@@ -62,6 +66,38 @@ impl Names {
                 letters.next().map(|first| first.to_lowercase().chain(letters).collect()).unwrap_or_default()
             }
         }
+    }
+}
+
+/// Name in Unreal's convention.
+fn unreal(own: &str) -> String {
+    let (part, side) = match (own.strip_prefix("Left"), own.strip_prefix("Right")) {
+        (Some(part), _) => (part, "_l"),
+        (_, Some(part)) => (part, "_r"),
+        _ => (own, ""),
+    };
+    let name = match part {
+        "Hips" => "pelvis",
+        "Spine" => "spine_01",
+        "Chest" => "spine_05",
+        "Neck" => "neck_01",
+        "Head" => "head",
+        "HeadEnd" => "head_end",
+        "Shoulder" => "clavicle",
+        "Arm" => "upperarm",
+        "ForeArm" => "lowerarm",
+        "Hand" => "hand",
+        "UpLeg" => "thigh",
+        "Leg" => "calf",
+        "Foot" => "foot",
+        "FootEnd" => "ball",
+        _ => "",
+    };
+    let finger = part.strip_prefix("Hand").and_then(|finger| finger.split_at_checked(finger.len().saturating_sub(1)));
+    match (name, finger) {
+        ("", Some((finger, digit))) => format!("{}_0{digit}{side}", finger.to_lowercase()),
+        ("", None) => own.to_owned(),
+        _ => format!("{name}{side}"),
     }
 }
 
@@ -103,6 +139,21 @@ mod tests {
             ndarray::Array3::from_elem((1, crate::types::skeleton::N_JOINTS, 3), f32::NAN),
         );
         Rig::from_motion(&motion).skeleton
+    }
+
+    #[test]
+    fn unreals_names_have_their_side_at_the_end() {
+        let called = Names::Unreal.of(&skeleton());
+        let trunk = "pelvis spine_01 spine_05 neck_01 head".split(' ').map(String::from);
+        let limbs = ["clavicle", "upperarm", "lowerarm", "hand", "thigh", "calf", "foot", "ball"].map(String::from);
+        let fingers = ["thumb", "index", "middle", "ring", "pinky"];
+        let fingers = fingers.iter().flat_map(|finger| (1..=3).map(move |k| format!("{finger}_0{k}")));
+        let parts: Vec<String> = limbs.into_iter().chain(fingers).collect();
+        let both = ["l", "r"].into_iter().flat_map(|side| parts.iter().map(move |part| format!("{part}_{side}")));
+        for name in trunk.chain(both) {
+            assert_eq!(called.iter().filter(|known| **known == name).count(), 1, "{name}");
+        }
+        assert_eq!(called.iter().collect::<BTreeSet<_>>().len(), called.len());
     }
 
     #[test]

@@ -22,7 +22,7 @@ fn opened(bytes: &[u8]) -> ufbx::SceneRoot {
 
 #[test]
 fn ufbx_sees_the_joints_of_the_motion() {
-    for (names, fps) in Names::ALL.into_iter().zip([(15, 1), (24, 1), (60, 1), (30000, 1001)]) {
+    for (names, fps) in Names::ALL.into_iter().zip([(15, 1), (24, 1), (60, 1), (30000, 1001), (7, 1)]) {
         let fps = FrameRate::new(fps.0, fps.1);
         let performance = perform(&swinging(3, 20), None, &AnimationOptions { fps: Some(fps), ..Default::default() });
         let bytes = written(&performance, names);
