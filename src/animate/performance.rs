@@ -170,6 +170,11 @@ pub fn perform(motion: &Motion, posture: Option<&Posture>, options: &AnimationOp
 }
 
 impl Performance {
+    /// Performance at another rate: rotations between the frames are interpolated on the sphere, the frames themselves stay.
+    pub fn resampled(&self, fps: FrameRate) -> Self {
+        Self { rig: self.rig.clone(), clip: self.clip.resampled(fps), report: self.report.clone() }
+    }
+
     /// Joints [T, 49, 3] of the rig (metres, axes of `types::skeleton`, the neck at the origin) at the clip's rate.
     pub fn motion(&self) -> Motion {
         Motion::from_joints(self.clip.fps, joints(&self.rig, &self.clip))

@@ -11,7 +11,8 @@ pub struct FigureArgs {
     /// What the bones are called in .bvh, .fbx, .glb and .json.
     #[arg(long, value_name = "own|mixamo|unity-humanoid|vrm|unreal", default_value = "own", value_parser = names_called)]
     names: Names,
-    /// Frames a second of the figures that are written; without: those of the motion. A fraction is 30000/1001.
+    /// Frames a second of the figures that are written; without: those of the motion, in a film as many times them as give
+    /// 30 or more. A fraction is 30000/1001.
     #[arg(long, value_name = "RATE")]
     fps: Option<FrameRate>,
 }

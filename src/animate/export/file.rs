@@ -27,6 +27,8 @@ pub struct ExportContent<'a> {
     pub beside: film::SecondPanel<'a>,
     /// How a film shows the body.
     pub style: FilmStyle,
+    /// Frames a second of a film; `None`: interpolated to 30 or more (`film::smooth_rate`).
+    pub film_fps: Option<FrameRate>,
 }
 
 /// What a user chooses of the figure in a file.
@@ -121,6 +123,9 @@ impl ExportFormat {
             Self::Vrma => workdir::write_file(path, &vrm::motion(&performance.rig, &performance.clip)),
             Self::Json => streamed(path, |text| json::write(text, performance, sources.names)),
             Self::Mp4 => {
+                let fps = sources.film_fps.unwrap_or_else(|| film::smooth_rate(performance.clip.fps));
+                let resampled = (fps != performance.clip.fps).then(|| performance.resampled(fps));
+                let performance = resampled.as_ref().unwrap_or(performance);
                 let motion = (sources.style == FilmStyle::Figure).then(|| performance.motion());
                 let body = FilmBody::new(sources.style, performance, motion.as_ref());
                 workdir::replace(path, |attempt| film::write(attempt, body, sources.sound, sources.beside, progress))

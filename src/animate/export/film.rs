@@ -30,6 +30,16 @@ const WIDEST_MOUTH: f64 = 0.7;
 /// Frames that are drawn ahead of the encoder.
 const N_AHEAD: usize = 3;
 
+/// Least rate of a film that is given none, frames a second; NTSC's 29.97 passes.
+const LEAST_FPS: f64 = 29.9;
+
+/// Rate of a film of a motion: the motion's own, or its smallest multiple from 30 frames a second on, so that every
+/// frame of the motion is one of the film's.
+pub fn smooth_rate(fps: FrameRate) -> FrameRate {
+    let times = (LEAST_FPS / fps.per_sec()).ceil().clamp(1.0, 1000.0);
+    FrameRate::new(fps.num.saturating_mul(times as u32), fps.den)
+}
+
 /// Content of the picture's second half.
 #[derive(Clone, Copy, Debug, Default)]
 pub enum SecondPanel<'a> {
@@ -283,4 +293,19 @@ fn loudness(sound: &Sound, secs: f64, n_parts: usize) -> Vec<f32> {
 fn clock(secs: f64) -> String {
     let tenths = (secs * 10.0).round() as u64;
     format!("{}:{:02}.{}", tenths / 600, tenths / 10 % 60, tenths % 10)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_film_has_thirty_frames_and_every_one_of_its_motion() {
+        let rates = [(15, 1, 30, 1), (25, 1, 50, 1), (24, 1, 48, 1), (30_000, 1001, 30_000, 1001), (10, 1, 30, 1)];
+        for (num, den, film_num, film_den) in rates {
+            assert_eq!(smooth_rate(FrameRate::new(num, den)), FrameRate::new(film_num, film_den));
+        }
+        assert_eq!(smooth_rate(FrameRate::new(120, 1)), FrameRate::new(120, 1));
+        assert!(smooth_rate(FrameRate::new(u32::MAX, u32::MAX - 1)).per_sec() >= 30.0);
+    }
 }

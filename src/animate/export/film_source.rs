@@ -79,8 +79,10 @@ impl SourceCamera {
 
     /// Camera for pictures of `size` px at a time of the motion, for a body whose neck is at `neck` (cm) in the world.
     pub fn at(&self, secs: f64, neck: Vec3, size: [usize; 2]) -> PinholeCamera {
-        let frame = (secs * self.fps.per_sec()).round().max(0.0) as usize;
-        let [x, y, z] = self.necks.get(frame).or(self.necks.last()).copied().unwrap_or([0.0, 0.0, 1.0]);
+        let frame = (secs * self.fps.per_sec()).max(0.0);
+        let at = |frame: usize| self.necks.get(frame).or(self.necks.last()).copied().unwrap_or([0.0, 0.0, 1.0]);
+        let (before, after) = (at(frame as usize), at(frame as usize + 1));
+        let [x, y, z] = [0, 1, 2].map(|k| before[k] + frame.fract() * (after[k] - before[k]));
         let longer = usize::from(self.image_size[1] > self.image_size[0]);
         let focal_px = FOCAL * size[longer] as f64;
         let position = add(neck, [-100.0 * x, 100.0 * y, 100.0 * z]);

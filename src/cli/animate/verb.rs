@@ -13,7 +13,7 @@ use crate::cli::outputs::{OutputFiles, names, next_output, outputs};
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
 use orator::animate::export::file::{ExportContent, ExportFormat};
-use orator::animate::export::film::SecondPanel;
+use orator::animate::export::film::{SecondPanel, smooth_rate};
 use orator::animate::export::film_panel::{FilmBody, FilmStyle};
 use orator::animate::export::film_source::SourceCamera;
 use orator::animate::{AnimationOptions, Constraints, Performance, Yaw, perform};
@@ -234,10 +234,11 @@ fn animate(
     let performance = perform(&motion, posture.as_ref(), options);
     let secs = started.elapsed().as_secs_f64();
     let source = source(args, input, &motion)?;
+    let film_fps = options.fps.unwrap_or_else(|| smooth_rate(motion.fps));
     let other = match &args.beside {
         Some(path) if motion_file::has_ending(path) => {
             let other = motion_file::read(path, Some(args.in_fps))?;
-            Some(perform(&other.motion, None, options))
+            Some(perform(&other.motion, None, &AnimationOptions { fps: Some(film_fps), ..*options }))
         }
         _ => None,
     };
@@ -277,7 +278,13 @@ fn animate(
         (true, true) => "the film is without sound: give --audio\n",
         (true, false) => "the film is without sound\n",
     };
-    let sources = ExportContent { sound: sound.as_ref(), names: args.figure.options().names, beside, style };
+    let sources = ExportContent {
+        sound: sound.as_ref(),
+        names: args.figure.options().names,
+        beside,
+        style,
+        film_fps: Some(film_fps),
+    };
     if let Some(rig) = rig {
         rig.write(&performance, outputs, ui)?;
     }

@@ -89,7 +89,12 @@ pub(super) fn write_outputs(
         drop(motion);
         let is_film = figures.iter().any(|(_, format)| *format == ExportFormat::Mp4);
         let sound = if is_film { audio::read_mono(audio, SAMPLE_RATE)? } else { None };
-        let sources = ExportContent { sound: sound.as_ref(), names: figure.names, ..ExportContent::default() };
+        let sources = ExportContent {
+            sound: sound.as_ref(),
+            names: figure.names,
+            film_fps: figure.fps,
+            ..ExportContent::default()
+        };
         for (path, format) in figures {
             format.write(path, &performance, &sources, progress)?;
         }
