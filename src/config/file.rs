@@ -102,8 +102,8 @@ fn speaker_schema() -> Table {
     let words = ["name", "reference", "size", "licence", "consent", "source"].map(|key| (key.to_owned(), text()));
     let lists = ["videos", "keypoints", "audio", "transcripts", "exclude", "mirrored", "train", "validation", "test"];
     let lists = lists.map(|key| (key.to_owned(), Value::Array(vec![text()])));
-    let rate = [("fps".to_owned(), Value::Float(0.0))];
-    words.into_iter().chain(lists).chain(rate).collect()
+    let others = [("fps", Value::Float(0.0)), ("same_person", Value::Boolean(false))];
+    words.into_iter().chain(lists).chain(others.map(|(key, value)| (key.to_owned(), value))).collect()
 }
 
 struct Reader {

@@ -65,6 +65,9 @@ pub struct SpeakerConfig {
     pub validation: Vec<String>,
     #[serde(default)]
     pub test: Vec<String>,
+    /// Said by the user: all videos show one person, so that they are not compared.
+    #[serde(default)]
+    pub same_person: bool,
     /// For the dataset's card: the licence's identifier, how the speaker agreed, where the videos come from.
     #[serde(default)]
     pub licence: String,

@@ -1,6 +1,7 @@
 //! The pipeline as a value (`pipeline`, run by `run`, looked at by `status`), its five stages, how the `pictures` of its
-//! videos are read, what their `sound` tells of loudness and `lips` of whose voice it is, and speech to motion files in batches. The stages never import each other: they meet in the files that
-//! they write. `keypoints` stands in for the first two where other programs looked at the pictures.
+//! videos are read, what their `sound` tells of loudness, `lips` of whose voice it is and a `portrait` of who is seen, and
+//! speech to motion files in batches. The stages never import each other: they meet in the files that they write.
+//! `keypoints` stands in for the first two where other programs looked at the pictures.
 
 pub mod account;
 pub mod batch;
@@ -11,6 +12,7 @@ pub mod lift;
 pub mod lips;
 pub mod pictures;
 pub mod pipeline;
+pub mod portrait;
 pub mod pose2d;
 pub mod process;
 pub mod run;

@@ -82,6 +82,10 @@ pub enum Artifact {
     /// The folder of the frames as PNG, if asked for.
     Frames,
     Keypoints,
+    /// Shape of the face and colours of the person; absent where no face was seen. So is the next.
+    Portrait,
+    /// The face, seen from the front.
+    FacePicture,
     Measures,
     /// How much later the sound is than the picture; absent where nobody was seen to speak.
     SoundOffset,
@@ -100,7 +104,7 @@ impl Artifact {
     pub const fn stage(self) -> StageName {
         match self {
             Self::Sound | Self::Timeline | Self::MediaInfo | Self::Frames => StageName::Extract,
-            Self::Keypoints => StageName::Pose2d,
+            Self::Keypoints | Self::Portrait | Self::FacePicture => StageName::Pose2d,
             Self::Measures | Self::SoundOffset | Self::SegmentIntervals | Self::SegmentLedger => StageName::Segment,
             Self::Joints | Self::Bones | Self::Camera | Self::BoneChange | Self::LiftIntervals | Self::LiftLedger => {
                 StageName::Lift
@@ -116,6 +120,8 @@ impl Artifact {
             Self::MediaInfo => "media.json",
             Self::Frames => "frames",
             Self::Keypoints => "keypoints.npz",
+            Self::Portrait => "portrait.json",
+            Self::FacePicture => "face.png",
             Self::Measures => "measures.npz",
             Self::SoundOffset => "sound_offset.json",
             Self::SegmentIntervals | Self::LiftIntervals => "intervals.json",
@@ -151,6 +157,11 @@ pub fn speaker_dir(work: &Path, stage: StageName, speaker: &str) -> PathBuf {
 /// The record of the splits of a speaker's videos, which outlives the dataset.
 pub fn splits(work: &Path, speaker: &str) -> PathBuf {
     work.join("splits").join(format!("{speaker}.json"))
+}
+
+/// The picture of one face a video, where a speaker's videos seem to show several people.
+pub fn faces(work: &Path, speaker: &str) -> PathBuf {
+    work.join("faces").join(format!("{speaker}.png"))
 }
 
 /// The table of known hashes of a work folder.

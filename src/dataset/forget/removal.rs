@@ -87,6 +87,8 @@ impl Removal {
                 .extend([record::record_path(&dir), record::failure_path(&dir)].into_iter().filter(|p| p.exists()));
         }
         removal.paths.extend(left_over);
+        // One picture of all videos' faces, which the dataset stage draws again.
+        removal.paths.extend(Some(artifacts::faces(work, speaker)).filter(|picture| picture.exists()));
         let splits = artifacts::splits(work, speaker);
         removal.paths.extend(workdir::left_over(&splits));
         removal.paths.extend(workdir::left_over(&artifacts::hashes(work)));

@@ -11,11 +11,42 @@ use crate::dataset::{INFO, LEAKAGE};
 use crate::stage::ledger::WordCount;
 use crate::stage::{Report, counted};
 use anyhow::{Context, Result};
+use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Videos whose notes on words are told.
 const MAX_NOTED: usize = 5;
+/// People, and videos of each, that are named.
+const MAX_PEOPLE: usize = 6;
+const MAX_FILES: usize = 3;
+
+/// Several people whom the videos of one speaker seem to show.
+#[derive(Debug, Serialize)]
+pub struct SeveralPeople {
+    /// Picture of one face a video.
+    pub picture: PathBuf,
+    /// File names of each person's videos.
+    pub videos: Vec<Vec<String>>,
+}
+
+impl SeveralPeople {
+    /// What the user should know, and do.
+    fn warning(&self) -> String {
+        let named = |files: &Vec<String>| {
+            let more = files.len().saturating_sub(MAX_FILES);
+            let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
+            format!("{}{rest}", files[..files.len().min(MAX_FILES)].join(", "))
+        };
+        let people: Vec<String> = self.videos.iter().take(MAX_PEOPLE).map(named).collect();
+        format!(
+            "the videos seem to show {} people ({}): look at {}; a video of another person is left out by `exclude`, and              where all are one person, `same_person = true` under [[speaker]] says so",
+            self.videos.len(),
+            people.join(" | "),
+            self.picture.display()
+        )
+    }
+}
 
 /// How the writing came out.
 pub struct DatasetOutcome<'a> {
@@ -26,6 +57,7 @@ pub struct DatasetOutcome<'a> {
     pub n_failed: usize,
     pub n_left_out: usize,
     pub n_taken_over: usize,
+    pub several_people: Option<SeveralPeople>,
 }
 
 impl DatasetOutcome<'_> {
@@ -55,14 +87,14 @@ impl DatasetOutcome<'_> {
         let secs: BTreeMap<_, _> = info.splits.iter().map(|(name, split)| (name, split.secs)).collect();
         let DatasetStats { windows, footage, .. } = self.stats;
         let facts = serde_json::json!({ "secs": secs, "windows": windows, "footage": footage, "warnings": warnings,
-            "split_rule": self.rule });
+            "split_rule": self.rule, "several_people": self.several_people });
         Ok(Report { line, facts: facts.as_object().cloned().unwrap_or_default() })
     }
 
     /// What the user should know, each with what to do.
     fn warnings(&self, leakage: &Leakage) -> Vec<String> {
         let Self { videos, stats, n_failed, n_left_out, .. } = *self;
-        let mut warnings = Vec::new();
+        let mut warnings: Vec<String> = self.several_people.iter().map(SeveralPeople::warning).collect();
         // The longest is the one to train on; each of the others is proposed once.
         let mut by_length: Vec<&LiftedVideo> = videos.iter().filter(|video| video.ledger.kept_secs() > 0.0).collect();
         by_length.sort_by(|a, b| b.ledger.kept_secs().total_cmp(&a.ledger.kept_secs()));

@@ -3,7 +3,10 @@
 
 use super::division;
 use super::division::Division;
-use super::outcome::DatasetOutcome;
+use super::faces;
+use super::outcome::{DatasetOutcome, SeveralPeople};
+use super::people;
+use super::people::PersonSeen;
 use super::run::DatasetRun;
 use super::video::{FILES, LiftedVideo};
 use crate::config;
@@ -20,7 +23,7 @@ use crate::stage::artifacts::{Artifact, StageName, dir, speaker_dir};
 use crate::stage::ledger::{Ledger, longest_first};
 use crate::stage::progress::Progress;
 use crate::stage::record::Failure;
-use crate::stage::{Input, Report, Stage, Unit, counted};
+use crate::stage::{Input, Report, Stage, Unit, counted, workdir};
 use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
 use std::collections::{BTreeMap, BTreeSet};
@@ -101,6 +104,22 @@ impl DatasetStage {
         failed.sort_by(|a, b| a.video.cmp(&b.video));
         failed.dedup();
         failed.into_iter().map(|unit| failure(&self.work, unit)).collect()
+    }
+
+    /// The people whom the speaker's videos seem to show, drawn beside the stages' folders; `None`: one.
+    fn several_people(&self, speaker: &Unit) -> Result<Option<SeveralPeople>> {
+        let is_known = self.speakers.iter().any(|said| said.name == speaker.speaker && said.same_person);
+        let videos: Vec<&Unit> = if is_known { Vec::new() } else { self.ready(speaker) };
+        let seen: Vec<PersonSeen> = videos.into_iter().map(|video| PersonSeen::read(&self.work, video)).collect();
+        let groups = people::groups(&seen);
+        let picture = artifacts::faces(&self.work, &speaker.speaker);
+        if groups.len() < 2 {
+            workdir::remove(&picture)?;
+            return Ok(None);
+        }
+        faces::write(&picture, &self.work, &groups)?;
+        let files = |group: &Vec<&PersonSeen>| group.iter().map(|video| video.file.clone()).collect();
+        Ok(Some(SeveralPeople { picture, videos: groups.iter().map(files).collect() }))
     }
 
     /// How the speaker's videos are divided: as they are on record, else as the configuration asks.
@@ -188,6 +207,9 @@ impl Stage for DatasetStage {
         if let (false, Some(settings)) = (said.transcripts.is_empty(), settings.as_object_mut()) {
             settings.insert("words".to_owned(), true.into());
         }
+        if let (true, Some(settings)) = (said.same_person, settings.as_object_mut()) {
+            settings.insert("same_person".to_owned(), true.into());
+        }
         settings
     }
 
@@ -199,7 +221,8 @@ impl Stage for DatasetStage {
                 inputs.push(Input { role: format!("{} transcript", video.video), path: path.to_owned() });
             }
             let offset = self.fixes_offset.then_some((Artifact::SoundOffset, true));
-            for (file, optional) in FILES.into_iter().chain(offset) {
+            let portrait = Some((Artifact::Portrait, true));
+            for (file, optional) in FILES.into_iter().chain(offset).chain(portrait) {
                 let path = file.path(&self.work, video);
                 if !optional || path.exists() {
                     inputs.push(Input { role: format!("{} {}", video.video, file.file()), path });
@@ -263,7 +286,9 @@ impl Stage for DatasetStage {
         }
         let n_taken_over = run.n_taken_over;
         let (_, stats) = writer.finish()?;
+        let several_people = self.several_people(unit)?;
         let outcome = DatasetOutcome {
+            several_people,
             settings: &self.settings,
             rule: &rule,
             videos: &videos,

@@ -1,5 +1,5 @@
 //! What a person looks like: the colours of head, chest and belly, where the body's points say they are. Two people are
-//! told apart by them, one person at two times is not; faces are not looked at.
+//! told apart by them, one person at two times is not; the shape of faces is for `face::views`.
 
 use super::decode::ScoredPoint;
 use super::patch;
@@ -38,9 +38,7 @@ impl BodyColours {
         let mut numbers = Vec::with_capacity(CHANNELS * BINS);
         for band in bands {
             let colours = patch::colours(image, band, BAND);
-            for channel in 0..3 {
-                numbers.extend(cumulated(colours.iter().map(|colour| opponent(*colour)[channel])));
-            }
+            numbers.extend(distribution(&colours));
         }
         Some(Self(numbers))
     }
@@ -55,6 +53,11 @@ impl BodyColours {
     pub fn follow(&mut self, other: &Self, weight: f32) {
         self.0.iter_mut().zip(&other.0).for_each(|(mine, new)| *mine += weight * (new - *mine));
     }
+}
+
+/// Cumulated distributions of colours: light and two differences of colour, each of `BINS` numbers.
+pub fn distribution(colours: &[[f32; 3]]) -> impl Iterator<Item = f32> {
+    (0..3).flat_map(|channel| cumulated(colours.iter().map(move |colour| opponent(*colour)[channel])))
 }
 
 /// Light, red against green, and yellow against blue, each 0..255.

@@ -3,6 +3,7 @@
 use super::body::{BodyModel, DetectedBody};
 use super::decode::ScoredPoint;
 use super::face::FaceTracker;
+use super::face::landmarks::FacePoint;
 use super::face::model::FaceModel;
 use super::hand::{DetectedHand, HandModel};
 use super::hands;
@@ -83,6 +84,11 @@ impl Chain {
         self.body_seen = false;
         self.forget_details();
         self.n_frames = 0;
+    }
+
+    /// Points of the face that was seen in the last frame.
+    pub fn face_points(&self) -> Option<&[FacePoint]> {
+        self.face.as_ref()?.points()
     }
 
     /// Seconds inside ONNX Runtime so far, over all models.

@@ -3,6 +3,7 @@
 //! `TalkerSearch` sees the whole video first.
 
 use super::chain::Chain;
+use super::face::views::PortraitViews;
 use super::models;
 use super::store::KeypointFrames;
 use super::talker::TalkerSearch;
@@ -15,13 +16,14 @@ use crate::external::ffmpeg::ahead;
 use crate::external::ffmpeg::frames::{FrameReader, FrameTime};
 use crate::external::onnx::{ModelEntry, ModelError, ModelStore, Runtime};
 use crate::external::opencv;
+use crate::external::opencv::png;
 use crate::formats::keypoints_npz;
 use crate::formats::media_json::MediaInfo;
 use crate::formats::timeline_npz::Timeline;
 use crate::pipeline::{lips, sound};
 use crate::stage::artifacts::{Artifact, StageName};
 use crate::stage::progress::{Event, Progress, Task};
-use crate::stage::{Input, Report, Stage, Unit, counted};
+use crate::stage::{Input, Report, Stage, Unit, counted, workdir};
 use crate::types::image::Image;
 use crate::types::pose2d::{Keypoint, Pose2d};
 use crate::types::time::FrameRate;
@@ -84,7 +86,7 @@ impl Stage for Pose2dStage {
     }
 
     fn version(&self) -> u32 {
-        6
+        7
     }
 
     fn cost(&self) -> u32 {
@@ -160,13 +162,18 @@ impl Stage for Pose2dStage {
         let mut gathered = KeypointFrames::default();
         let mut seen = DetectionCounts::default();
         let mut pose = Pose2d::default();
+        let mut portrait = PortraitViews::default();
         let image_size = video.each(|time, begins_shot, picture| {
             let idx = time.frame_idx;
             if begins_shot || idx == 0 {
                 chain.begin_shot_of(ways.next().flatten());
             }
             if let Some(picture) = picture {
-                pose = chain.frame(&picture).with_context(|| format!("frame {idx}"))?.moved(corner);
+                let seen = chain.frame(&picture).with_context(|| format!("frame {idx}"))?;
+                if let Some(points) = chain.face_points() {
+                    portrait.look(&picture, points, time.source_secs)?;
+                }
+                pose = seen.moved(corner);
             }
             if idx + 1 == N_MEASURED && restarts.len() >= 6 * N_MEASURED {
                 let hours = begun.elapsed().as_secs_f64() / (N_MEASURED as f64 / self.fps.per_sec());
@@ -180,6 +187,10 @@ impl Stage for Pose2dStage {
         })?;
         let (keypoints, extras) = gathered.finish(self.fps, image_size)?;
         keypoints_npz::write(&Artifact::Keypoints.within(out), &keypoints, &extras)?;
+        if let Some((portrait, picture)) = portrait.finish() {
+            workdir::write_file(&Artifact::Portrait.within(out), &serde_json::to_vec(&portrait)?)?;
+            png::write(&Artifact::FacePicture.within(out), &picture)?;
+        }
         let mut report = seen.report();
         if self.follows_talker() {
             tell_followed(&talkers, &mut report);

@@ -8,6 +8,7 @@ use super::{distributions, motion, pictures, sliders, timelines};
 use crate::config::Settings;
 use crate::config::videos::Videos;
 use crate::report::html::{Page, Section};
+use crate::report::people::faces;
 use crate::report::preview;
 use crate::report::splits;
 use crate::stage::counted;
@@ -80,7 +81,9 @@ fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sum
     if n_heard.1 > 0 {
         reasons.push(summary::speech(*n_heard));
     }
-    Page {
+    let people = faces::section(request.settings, request.videos);
+    let people = (!people.is_empty()).then(|| section("people", "People", people));
+    let mut page = Page {
         title: format!("Report on {}", names.join(", ")),
         lead: format!(
             "What became of every second of {}: kept for the dataset, refused for a reason, or lost to a failure.",
@@ -100,5 +103,9 @@ fn page(request: &ReportRequest, gathered: &ReportData, pictures: &Pictures, sum
         style: include_str!("page.css"),
         script: include_str!("page.js"),
         data,
+    };
+    if let Some(people) = people {
+        page.sections.insert(3, people);
     }
+    page
 }

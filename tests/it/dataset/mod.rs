@@ -5,6 +5,7 @@ pub mod dataset_verify;
 pub mod forget;
 pub mod import;
 pub mod import_readers;
+pub mod people;
 pub mod shard;
 pub mod shared_sound;
 pub mod sound_offset;

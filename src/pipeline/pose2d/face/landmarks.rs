@@ -30,6 +30,16 @@ pub fn opening(points: &[FacePoint]) -> Option<f64> {
     Some(lips / eyes).filter(|opening| opening.is_finite())
 }
 
+/// How far a face is seen from the side: the tip of the nose from the middle of the eyes along their line, in their
+/// distance in the picture; 0: from the front. None: no size to measure by.
+pub fn turn(points: &[FacePoint]) -> Option<f64> {
+    let flat = |at: usize| points.get(at).map(|[x, y, _]| [*x, *y, 0.0]);
+    let ([right, left], nose) = ([flat(EYES[0])?, flat(EYES[1])?], flat(NOSE_TIP)?);
+    let (line, middle) = (vec3::sub(left, right), vec3::scale(vec3::add(left, right), 0.5));
+    let turn = vec3::dot(vec3::sub(nose, middle), line).abs() / vec3::dot(line, line);
+    Some(turn).filter(|turn| turn.is_finite())
+}
+
 /// The square around a face whose points are known, turned as its eyes are.
 pub fn region(points: &[FacePoint]) -> Region {
     let eye = |at: usize| points.get(at).copied().unwrap_or([f64::NAN; 3]);

@@ -1,6 +1,7 @@
 //! The face of the person followed from frame to frame: looked for where the body's eyes and nose are, then where it was.
 
 use super::landmarks;
+use super::landmarks::FacePoint;
 use super::model::{DetectedFace, FaceModel};
 use crate::external::opencv::warp::Region;
 use crate::pipeline::pose2d::decode::ScoredPoint;
@@ -29,6 +30,11 @@ impl FaceTracker {
         self.track = FaceTrack::default();
     }
 
+    /// Points of the face in the last frame, where it was seen.
+    pub fn points(&self) -> Option<&[FacePoint]> {
+        self.track.points.as_deref()
+    }
+
     /// As `FaceTrack::find`.
     pub fn find(&mut self, image: &Image, body: &[ScoredPoint; 17], least: f64) -> Result<Option<FaceSeen>> {
         self.track.find(&mut self.model, image, body, least)
@@ -37,7 +43,10 @@ impl FaceTracker {
 
 /// Where a face was in the frame before.
 #[derive(Default)]
-pub struct FaceTrack(Option<Region>);
+pub struct FaceTrack {
+    region: Option<Region>,
+    points: Option<Vec<FacePoint>>,
+}
 
 impl FaceTrack {
     /// The face of the body whose points are given, of which those that score `least` are seen.
@@ -49,7 +58,8 @@ impl FaceTrack {
         least: f64,
     ) -> Result<Option<FaceSeen>> {
         let mut face_of = |region: &Region| face_of(model, image, region, body, least);
-        let mut found = match self.0.take() {
+        self.points = None;
+        let mut found = match self.region.take() {
             Some(region) => face_of(&region)?,
             None => None,
         };
@@ -61,9 +71,11 @@ impl FaceTrack {
             found = face_of(&landmarks::region(&first.points))?;
         }
         let Some(face) = found else { return Ok(None) };
-        self.0 = Some(landmarks::region(&face.points));
+        self.region = Some(landmarks::region(&face.points));
         let seen = |opening: f64| FaceSeen { score: face.score as f32, opening: opening as f32 };
-        Ok(landmarks::opening(&face.points).map(seen))
+        let seen = landmarks::opening(&face.points).map(seen);
+        self.points = Some(face.points);
+        Ok(seen)
     }
 }
 

@@ -1,0 +1,135 @@
+//! Whether the videos of a speaker show one person: the shape of the face and the colours of skin and hair are compared
+//! pair by pair, the bones where a face is not seen from the front. Videos that are near to each other on the whole are
+//! one person's. It is a guess for the user to look at: clothes change, light changes colours, and relatives are alike.
+
+use crate::dataset::bones::VideoBones;
+use crate::pipeline::portrait::Portrait;
+use crate::stage::Unit;
+use crate::stage::artifacts::Artifact;
+use crate::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST, R_ELBOW, R_SHOULDER, R_WRIST};
+use std::path::Path;
+
+/// Videos that are compared; of more, so many evenly spread.
+const MOST_VIDEOS: usize = 200;
+/// Frames of a face below which its shape is not known.
+const LEAST_FRAMES: usize = 3;
+/// Difference of two faces, thousandths of their size, from which on they are two people's, and how much of it a step of
+/// 8-bit colour is worth.
+const OTHER_FACE: f64 = 40.0;
+const COLOUR_STEP: f64 = 0.5;
+/// Difference of two people's bones, in the logarithm of the shoulders' width over the arms' length; one person's differ
+/// by up to 0.02 between videos.
+const OTHER_BONES: f64 = 0.04;
+
+/// What is known of the person in a video.
+#[derive(Clone, Debug)]
+pub struct PersonSeen {
+    pub unit: Unit,
+    /// File name of the video.
+    pub file: String,
+    portrait: Option<Portrait>,
+    /// Logarithm of the shoulders' width over the arms' length; `None`: not measured.
+    shoulders: Option<f64>,
+}
+
+impl PersonSeen {
+    /// Reads what the stages left of a video; what is not there is not compared.
+    pub fn read(work: &Path, unit: &Unit) -> Self {
+        let bones = VideoBones::read(&Artifact::Bones.path(work, unit)).unwrap_or_default();
+        let length = |joint: usize| bones.lengths_metres.get(joint - 1).copied().unwrap_or(0.0);
+        let sum = |joints: &[usize]| joints.iter().map(|joint| length(*joint)).sum::<f64>();
+        let ratio = sum(&[L_SHOULDER, R_SHOULDER]) / sum(&[L_ELBOW, L_WRIST, R_ELBOW, R_WRIST]);
+        let portrait = Portrait::read(&Artifact::Portrait.path(work, unit)).ok();
+        Self {
+            unit: unit.clone(),
+            file: unit.source.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            portrait: portrait.filter(|portrait| portrait.n_frames >= LEAST_FRAMES),
+            shoulders: Some(ratio.ln()).filter(|ratio| bones.n_frames > 0 && ratio.is_finite()),
+        }
+    }
+
+    /// How far two videos are from showing one person, 1: as likely two. `None`: there is too little to compare.
+    fn difference(&self, other: &Self) -> Option<f64> {
+        let of_faces = || {
+            let (a, b) = (self.portrait.as_ref()?, other.portrait.as_ref()?);
+            Some((a.face_distance(b)? + COLOUR_STEP * a.colour_distance(b)) / OTHER_FACE)
+        };
+        let of_bones = || Some((self.shoulders? - other.shoulders?).abs() / OTHER_BONES);
+        of_faces().or_else(of_bones)
+    }
+}
+
+/// Groups of videos, each of one person as far as can be seen, the largest first. A video that can be compared with no
+/// other is in the first.
+pub fn groups(videos: &[PersonSeen]) -> Vec<Vec<&PersonSeen>> {
+    let step = videos.len().div_ceil(MOST_VIDEOS).max(1);
+    let compared: Vec<&PersonSeen> = videos.iter().step_by(step).collect();
+    let difference = |a: &PersonSeen, b: &PersonSeen| a.difference(b).filter(|_| a.unit != b.unit);
+    let is_known = |one: &&PersonSeen| compared.iter().any(|other| difference(one, other).is_some());
+    let (known, unknown): (Vec<&PersonSeen>, Vec<&PersonSeen>) = compared.iter().copied().partition(is_known);
+    let mut groups = by_average_linkage(&known, difference);
+    groups.sort_by_key(|group| std::cmp::Reverse(group.len()));
+    match groups.first_mut() {
+        Some(first) => first.extend(unknown),
+        None => groups.extend(Some(unknown).filter(|unknown| !unknown.is_empty())),
+    }
+    groups
+}
+
+/// Joins the two nearest groups for as long as the mean of the differences between their members is below 1.
+fn by_average_linkage<'a, T>(items: &[&'a T], difference: impl Fn(&T, &T) -> Option<f64>) -> Vec<Vec<&'a T>> {
+    let mut groups: Vec<Vec<&T>> = items.iter().map(|item| vec![*item]).collect();
+    // Sum and number of the known differences between the members of two groups.
+    let known = |a: &T, b: &T| difference(a, b).map_or([0.0; 2], |difference| [difference, 1.0]);
+    let mut sums: Vec<Vec<[f64; 2]>> = items.iter().map(|a| items.iter().map(|b| known(a, b)).collect()).collect();
+    loop {
+        let mean = |i: usize, j: usize| sums[i][j][0] / sums[i][j][1];
+        let pairs = (0..groups.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
+        let near = pairs.filter(|(i, j)| mean(*i, *j) < 1.0);
+        let nearest = near.min_by(|a, b| mean(a.0, a.1).total_cmp(&mean(b.0, b.1)));
+        let Some((i, j)) = nearest else { return groups };
+        let members = groups.swap_remove(j);
+        groups[i].extend(members);
+        let row = sums.swap_remove(j);
+        sums[i].iter_mut().zip(row).for_each(|(to, from)| *to = [to[0] + from[0], to[1] + from[1]]);
+        for row in &mut sums {
+            let from = row.swap_remove(j);
+            row[i] = [row[i][0] + from[0], row[i][1] + from[1]];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn person(file: &str, face: Option<f64>, shoulders: Option<f64>) -> PersonSeen {
+        let place = |k: u32, long: f64| [f64::from(k % 5), long * f64::from(k / 5), f64::from(k % 3)];
+        let face = face.map(|long| (0..40).map(|k| place(k, long)).collect());
+        let unit = Unit { speaker: "s".into(), video: file.into(), source: file.into() };
+        let portrait = face.map(|face| Portrait { face, n_frames: 9, ..Portrait::default() });
+        PersonSeen { unit, file: file.into(), portrait, shoulders }
+    }
+
+    fn files(seen: &[PersonSeen]) -> Vec<String> {
+        let name = |group: &Vec<&PersonSeen>| {
+            let mut files: Vec<&str> = group.iter().map(|one| one.file.as_str()).collect();
+            files.sort_unstable();
+            files.concat()
+        };
+        groups(seen).iter().map(name).collect()
+    }
+
+    #[test]
+    fn videos_are_put_to_the_person_they_are_most_like() {
+        let same = [person("a", Some(1.0), None), person("b", Some(1.001), Some(-0.4)), person("d", Some(1.002), None)];
+        assert_eq!(files(&same), ["abd"]);
+        let other = person("c", Some(2.0), None);
+        assert_eq!(files(&[same.to_vec(), vec![other]].concat()), ["abd", "c"]);
+        // Without a face the bones are compared where both are known.
+        let seated = [person("e", None, Some(-0.39)), person("f", None, Some(-0.5)), person("g", None, None)];
+        assert_eq!(files(&[same.to_vec(), seated.to_vec()].concat()), ["abdeg", "f"]);
+        assert_eq!(files(&seated[2..]), ["g"]);
+        assert!(groups(&[]).is_empty());
+    }
+}

@@ -1,0 +1,203 @@
+//! Gathers the portrait of a video's person from frames all over the video that show the face from the front, in a
+//! memory that does not grow with the video.
+
+use super::landmarks::{self, FacePoint};
+use crate::external::opencv::warp::{self, Region};
+use crate::math::order::median;
+use crate::math::procrustes::similarity;
+use crate::math::vec3;
+use crate::pipeline::portrait::Portrait;
+use crate::pipeline::pose2d::appearance;
+use crate::pipeline::pose2d::patch;
+use crate::types::image::Image;
+use anyhow::Result;
+
+/// A face turned no further than this (`landmarks::turn`) is seen from the front, than the second nearly so; the shape
+/// of one turned further is not known well enough.
+const FRONTAL: f64 = 0.1;
+const NEARLY_FRONTAL: f64 = 0.15;
+/// Views that are kept, and the fewest that a portrait is made of, the most frontal ones, where there are so many.
+const N_VIEWS: usize = 48;
+const LEAST_VIEWS: usize = 12;
+/// Cells of a region that are looked at.
+const CELLS: [usize; 2] = [10, 6];
+/// Width and height of the picture, px, and its side in sides of the square around the face.
+const PICTURE_PX: usize = 128;
+const PICTURE_ROOM: f64 = 1.15;
+
+/// One frame of a face.
+struct FaceView {
+    /// `FRONTAL`: seen from the front; more: from the side.
+    turn: f64,
+    secs: f64,
+    face: Vec<FacePoint>,
+    skin: Vec<f32>,
+    hair: Vec<f32>,
+}
+
+/// Views of a video so far.
+#[derive(Default)]
+pub struct PortraitViews {
+    views: Vec<FaceView>,
+    /// Time between two views, s: it doubles when there are too many frontal ones.
+    apart_secs: f64,
+    /// Picture of the view that is most from the front, and its turn.
+    picture: Option<(f64, Image)>,
+}
+
+impl PortraitViews {
+    /// Takes in the face found in a picture at a time of the video.
+    pub fn look(&mut self, image: &Image, points: &[FacePoint], secs: f64) -> Result<()> {
+        let Some((turn, face)) = landmarks::turn(points).zip(of_unit_size(points)) else { return Ok(()) };
+        if self.picture.as_ref().is_none_or(|(best, _)| turn < *best) {
+            let around = landmarks::region(points);
+            let square = Region { side: PICTURE_ROOM * around.side, rotation: 0.0, ..around };
+            if let Some(transform) = square.src_from_dst(PICTURE_PX) {
+                let mut picture = Image::filled(PICTURE_PX, PICTURE_PX, [0; 3]);
+                warp::warp(image, &transform, &mut picture)?;
+                self.picture = Some((turn, picture));
+            }
+        }
+        let turn = turn.max(FRONTAL);
+        if let Some(last) = self.views.last().filter(|last| secs - last.secs < self.apart_secs) {
+            if last.turn <= turn {
+                return Ok(());
+            }
+            self.views.pop();
+        }
+        let most = self.views.iter().enumerate().max_by(|a, b| a.1.turn.total_cmp(&b.1.turn));
+        if let Some((at, most)) = most.filter(|_| self.views.len() >= N_VIEWS) {
+            if most.turn > turn {
+                self.views.remove(at);
+            } else if turn > FRONTAL {
+                return Ok(());
+            } else {
+                self.thin_out();
+            }
+        }
+        let [skin, hair] = regions(points).map(|region| colours(image, region));
+        self.views.push(FaceView { turn, secs, face, skin, hair });
+        Ok(())
+    }
+
+    /// Drops every other view; those to come stand as far apart.
+    fn thin_out(&mut self) {
+        let (first, last) = (self.views.first(), self.views.last());
+        let secs = first.zip(last).map_or(0.0, |(first, last)| last.secs - first.secs);
+        self.apart_secs = 2.0 * secs / N_VIEWS as f64;
+        let mut at = 0;
+        self.views.retain(|_| {
+            at += 1;
+            at % 2 == 1
+        });
+    }
+
+    /// Portrait and a picture of the face; none where no face was seen.
+    pub fn finish(mut self) -> Option<(Portrait, Image)> {
+        self.views.sort_by(|a, b| a.turn.total_cmp(&b.turn));
+        let n_frontal = self.views.iter().filter(|view| view.turn <= FRONTAL).count();
+        self.views.truncate(n_frontal.max(LEAST_VIEWS));
+        self.views.retain(|view| view.turn <= NEARLY_FRONTAL);
+        let face = median_shape(&self.views).unwrap_or_default();
+        let mean = |colours: Vec<&Vec<f32>>| {
+            let n = colours.len().max(1) as f32;
+            let n_numbers = colours.first().map_or(0, |first| first.len());
+            (0..n_numbers).map(|at| colours.iter().map(|one| one[at]).sum::<f32>() / n).collect()
+        };
+        let portrait = Portrait {
+            face,
+            skin: mean(self.views.iter().map(|view| &view.skin).collect()),
+            hair: mean(self.views.iter().map(|view| &view.hair).collect()),
+            n_frames: self.views.len(),
+        };
+        Some((portrait, self.picture?.1))
+    }
+}
+
+/// Points with their mean at the origin and a root mean square distance of 1 from it.
+fn of_unit_size(points: &[FacePoint]) -> Option<Vec<FacePoint>> {
+    let n = points.len() as f64;
+    let middle = vec3::scale(points.iter().fold([0.0; 3], |sum, point| vec3::add(sum, *point)), 1.0 / n);
+    let centred: Vec<FacePoint> = points.iter().map(|point| vec3::sub(*point, middle)).collect();
+    let size = (centred.iter().map(|point| vec3::norm(*point).powi(2)).sum::<f64>() / n).sqrt();
+    (size > 1e-6 && size.is_finite()).then(|| centred.into_iter().map(|point| vec3::scale(point, 1.0 / size)).collect())
+}
+
+/// Median of each coordinate over all views, each laid onto the first, then onto their median.
+fn median_shape(views: &[FaceView]) -> Option<Vec<FacePoint>> {
+    let mut shape = views.first()?.face.clone();
+    for _ in 0..2 {
+        let laid = views.iter().filter_map(|view| {
+            let fit = similarity(&view.face, &shape)?;
+            Some(view.face.iter().map(|point| fit.apply(*point)).collect())
+        });
+        let laid: Vec<Vec<FacePoint>> = laid.collect();
+        let middle = |at: usize, axis: usize| median(laid.iter().map(|face| face[at][axis]));
+        let medians = (0..shape.len()).map(|at| Some([middle(at, 0)?, middle(at, 1)?, middle(at, 2)?]));
+        shape = of_unit_size(&medians.collect::<Option<Vec<_>>>()?)?;
+    }
+    // Six digits hold all that is measured.
+    Some(shape.into_iter().map(|point| point.map(|v| (v * 1e6).round() / 1e6)).collect())
+}
+
+/// Boxes (x, y, width, height in px) of the cheeks with the nose, and of the hair above the forehead.
+fn regions(points: &[FacePoint]) -> [[f64; 4]; 2] {
+    let end = |axis: usize, of: fn(f64, f64) -> f64, from: f64| points.iter().map(|p| p[axis]).fold(from, of);
+    let [left, top] = [0, 1].map(|axis| end(axis, f64::min, f64::INFINITY));
+    let [width, height] = [end(0, f64::max, f64::NEG_INFINITY) - left, end(1, f64::max, f64::NEG_INFINITY) - top];
+    [
+        [left + 0.25 * width, top + 0.35 * height, 0.5 * width, 0.3 * height],
+        [left + 0.2 * width, top - 0.22 * height, 0.6 * width, 0.15 * height],
+    ]
+}
+
+fn colours(image: &Image, region: [f64; 4]) -> Vec<f32> {
+    appearance::distribution(&patch::colours(image, region, CELLS)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Face with a chin that hangs `chin` lower, turned about the vertical and moved.
+    fn face(chin: f64, turn: f64) -> Vec<FacePoint> {
+        let (sin, cos) = turn.sin_cos();
+        let place = |k: usize| {
+            let (u, v) = ((k % 18) as f64 / 17.0 - 0.5, (k / 18) as f64 / 25.0 - 0.5);
+            let [x, y, z] = [80.0 * u, 120.0 * v + if v > 0.3 { chin } else { 0.0 }, 90.0 * u * u];
+            [300.0 + x * cos + z * sin, 200.0 + y, z * cos - x * sin]
+        };
+        (0..landmarks::N_LANDMARKS).map(place).collect()
+    }
+
+    fn portrait(chin: f64, skin: u8) -> (Portrait, Image) {
+        let image = Image::filled(640, 480, [skin, 100, 90]);
+        let mut views = PortraitViews::default();
+        for t in 0..200 {
+            let turn = 0.005 * (t % 40) as f64;
+            views.look(&image, &face(chin, turn), t as f64 / 15.0).unwrap();
+        }
+        assert!(views.views.len() <= N_VIEWS);
+        views.finish().unwrap()
+    }
+
+    #[test]
+    fn a_face_is_itself_from_every_side_and_another_chin_is_another_face() {
+        let ((one, picture), (other, _)) = (portrait(0.0, 150), portrait(12.0, 60));
+        assert!((LEAST_VIEWS..=N_VIEWS).contains(&one.n_frames) && picture.width == PICTURE_PX);
+        assert!(one.face_distance(&portrait(0.0, 90).0).unwrap() < 1.0);
+        assert!(one.face_distance(&other).unwrap() > 20.0);
+        assert!(one.face_distance(&portrait(0.0, 90).0).is_some() && one.colour_distance(&other) > 15.0);
+        assert!(PortraitViews::default().finish().is_none());
+    }
+
+    #[test]
+    fn points_that_are_none_make_no_portrait() {
+        let image = Image::filled(64, 48, [1; 3]);
+        let mut views = PortraitViews::default();
+        views.look(&image, &[], 0.0).unwrap();
+        views.look(&image, &vec![[f64::NAN; 3]; landmarks::N_LANDMARKS], 0.1).unwrap();
+        views.look(&image, &vec![[7.0; 3]; landmarks::N_LANDMARKS], 0.2).unwrap();
+        assert!(views.finish().is_none());
+    }
+}

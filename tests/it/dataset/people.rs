@@ -1,0 +1,52 @@
+//! Several people in the videos of one speaker: a warning with a picture, until the user says that they are one.
+
+use crate::fixtures::media::lifted_videos::{settings, shard_as, video};
+use orator::config::SpeakerConfig;
+use orator::dataset::Split;
+use orator::external::opencv::png;
+use orator::stage::Unit;
+use orator::stage::artifacts::{self, Artifact};
+use orator::types::image::Image;
+use serde_json::json;
+use std::path::Path;
+
+/// Portrait of a face that is as much longer than wide as `long` says.
+fn paint(work: &Path, unit: &Unit, long: f64) {
+    let place = |k: u32| [f64::from(k % 5), long * f64::from(k / 5), f64::from(k % 3)];
+    let face: Vec<[f64; 3]> = (0..40).map(place).collect();
+    let colours = vec![0.5; 48];
+    let portrait = json!({ "face": face, "skin": colours, "hair": colours, "n_frames": 20 });
+    std::fs::write(Artifact::Portrait.path(work, unit), portrait.to_string()).unwrap();
+    png::write(&Artifact::FacePicture.path(work, unit), &Image::filled(128, 128, [200, 150, 120])).unwrap();
+}
+
+#[test]
+fn a_second_person_is_told_until_the_user_knows_better() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path();
+    let units = [("one", 4), ("two", 5), ("other", 6)].map(|(name, seed)| video(root, name, 300, seed));
+    let mut settings = settings(root);
+    let work = settings.work.dir.to_path_buf();
+    let splits = [(&units[0], Split::Train), (&units[1], Split::Validation), (&units[2], Split::Test)];
+    let picture = artifacts::faces(&work, &units[0].speaker);
+    let facts = |settings: &orator::config::Settings, name: &str| {
+        let report = shard_as(settings, &units, &splits, name).0.unwrap();
+        assert_eq!(report.line.contains("seem to show 2 people"), picture.is_file(), "{}", report.line);
+        report.facts["several_people"].clone()
+    };
+    std::fs::create_dir_all(artifacts::dir(&work, Artifact::Portrait.stage(), &units[0])).unwrap();
+    assert!(facts(&settings, "nothing is known").is_null());
+    for (unit, long) in units.iter().zip([1.0, 1.001, 1.002]) {
+        paint(&work, unit, long);
+    }
+    assert!(facts(&settings, "one person").is_null());
+    paint(&work, &units[2], 2.0);
+    let told = facts(&settings, "two people");
+    assert_eq!(told["videos"][1], json!(["other.mp4"]), "{told}");
+    let sheet = png::read(&picture).unwrap();
+    assert_eq!((sheet.width, sheet.height), (8 * 144, 2 * 160));
+    assert_eq!(sheet.pixel(8, 8), [200, 150, 120]);
+    let speaker = SpeakerConfig { name: units[0].speaker.clone(), same_person: true, ..SpeakerConfig::default() };
+    settings.speaker = vec![speaker];
+    assert!(facts(&settings, "said to be one").is_null());
+}
