@@ -40,7 +40,8 @@ impl SeveralPeople {
         };
         let people: Vec<String> = self.videos.iter().take(MAX_PEOPLE).map(named).collect();
         format!(
-            "the videos seem to show {} people ({}): look at {}; a video of another person is left out by `exclude`, and              where all are one person, `same_person = true` under [[speaker]] says so",
+            "the videos seem to show {} people ({}): look at {}; a video of another person is left out by `exclude`, and \
+             where all are one person, `same_person = true` under [[speaker]] says so",
             self.videos.len(),
             people.join(" | "),
             self.picture.display()
