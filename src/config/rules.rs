@@ -21,6 +21,7 @@ pub fn check(settings: &Settings, locations: &BTreeMap<String, SourceLocation>) 
     rules.within("segment.max_body_gap_secs", s.segment.max_body_gap_secs, 0.0, 1.0, "seconds, all that lift fills");
     rules.within("segment.max_hand_gap_secs", s.segment.max_hand_gap_secs, 0.0, 1.0, "seconds, all that lift fills");
     rules.within("segment.min_hand_share", s.segment.min_hand_share, 0.0, 1.0, "");
+    rules.within("segment.max_rest_move", s.segment.max_rest_move, 0.0, 1.0, "shoulder widths");
     rules.within("segment.min_shoulder_px", s.segment.min_shoulder_px, 1.0, 1e5, "pixels");
     rules.within("segment.min_sound_db", s.segment.min_sound_db, -120.0, 0.0, "dB of full scale");
     rules.within("segment.min_speech", s.segment.min_speech, 0.0, 1.0, "");

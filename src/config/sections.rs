@@ -210,6 +210,9 @@ pub struct SegmentConfig {
     pub max_hand_gap_secs: f64,
     /// Least share of an interval's frames in which each hand is seen, 0..1.
     pub min_hand_share: f64,
+    /// Farthest that the wrists of hands that rest on each other move within a second, in shoulder widths; 0: a hand at
+    /// rest that is not seen is a missing one.
+    pub max_rest_move: f64,
     /// Least distance between the shoulders, pixels.
     pub min_shoulder_px: f64,
     /// Least loudness of the second around a frame, dB of full scale.
@@ -247,6 +250,7 @@ impl Default for SegmentConfig {
             max_body_gap_secs: 0.34,
             max_hand_gap_secs: 1.0,
             min_hand_share: 0.5,
+            max_rest_move: 0.1,
             min_shoulder_px: 40.0,
             min_sound_db: -50.0,
             speech: SpeechRule::Auto,

@@ -1,8 +1,9 @@
 //! The keypoints file `keypoints.npz`: the 2D keypoints of a video at the dataset rate. Arrays: `body` f32 [T,17,3]
 //! (COCO-17; x px, y px, score), `left_hand` and `right_hand` f32 [T,21,3], `image_size` i64 [2] (width, height),
 //! `fps` f64 [2] (numerator, denominator; one number is read too), `time_secs` f64 [T], `person` f32 [T,5]
-//! (x, y, width, height, score), `n_people` i64 [T], `identity` i64 [T]; where a face model looked, `mouth_opening` and
-//! `face_score` f32 [T].
+//! (x, y, width, height, score), `n_people` i64 [T], `identity` i64 [T], `other_hand` i64 [T,2]
+//! (1 where a hand is missing because the other one was found in its place); where a face model looked, `mouth_opening`
+//! and `face_score` f32 [T].
 
 use super::npz;
 use super::npz::Npz;
@@ -23,6 +24,8 @@ pub struct Extras {
     pub n_people: Array1<i64>,
     /// Number of the person tracked in each frame, [T]: one higher where another person is taken, or tracking begins anew.
     pub identity: Array1<i64>,
+    /// Whether the left and the right hand are missing because the other one was found in their place, [T, 2].
+    pub other_hand: Array2<bool>,
     /// What was seen of the face; none where no face model looked.
     pub face: Option<FaceFrames>,
 }
@@ -90,13 +93,18 @@ pub fn read_extras(path: &Path) -> Result<Extras> {
     let person = npz.floats("person", &[n_frames, Some(5)])?.into_dimensionality::<Ix2>()?;
     let n_people = npz.numbers("n_people", &[n_frames])?.mapv(|v| v as i64).into_dimensionality::<Ix1>()?;
     let identity = npz.numbers("identity", &[n_frames])?.mapv(|v| v as i64).into_dimensionality::<Ix1>()?;
+    // Earlier versions did not tell.
+    let other_hand = match npz.has("other_hand") {
+        true => npz.numbers("other_hand", &[n_frames, Some(2)])?.mapv(|v| v != 0.0).into_dimensionality::<Ix2>()?,
+        false => Array2::from_elem((time_secs.len(), 2), false),
+    };
     let face = npz.has("mouth_opening").then(|| -> Result<FaceFrames> {
         let mut of_face =
             |name: &str| -> Result<Array1<f32>> { Ok(npz.floats(name, &[n_frames])?.into_dimensionality::<Ix1>()?) };
         Ok(FaceFrames { opening: of_face("mouth_opening")?, score: of_face("face_score")? })
     });
     let face = face.transpose()?;
-    Ok(Extras { time_secs, person, n_people, identity, face })
+    Ok(Extras { time_secs, person, n_people, identity, other_hand, face })
 }
 
 /// Writes the file at `path`; the same keypoints give the same bytes.
@@ -111,6 +119,9 @@ pub fn write(path: &Path, keypoints: &Keypoints, extras: &Extras) -> Result<()> 
         npz.add_array("person", &extras.person)?;
         npz.add_array("n_people", &extras.n_people)?;
         npz.add_array("identity", &extras.identity)?;
+        if extras.other_hand.iter().any(|other| *other) {
+            npz.add_array("other_hand", &extras.other_hand.mapv(i64::from))?;
+        }
         if let Some(FaceFrames { opening, score }) = &extras.face {
             npz.add_array("mouth_opening", opening)?;
             npz.add_array("face_score", score)?;
@@ -185,6 +196,7 @@ mod tests {
                 person: Array2::from_shape_fn((n_frames, 5), |(t, k)| numbers[5 * t + k]),
                 n_people: Array1::from_shape_fn(n_frames, |t| t as i64),
                 identity: Array1::from_shape_fn(n_frames, |t| 3 * t as i64),
+                other_hand: Array2::from_shape_fn((n_frames, 2), |(t, side)| numbers[2 * t + side] > 0.0),
                 face: has_face.then(|| FaceFrames {
                     opening: Array1::from_shape_fn(n_frames, |t| numbers[t + 9]),
                     score: Array1::from_shape_fn(n_frames, |t| numbers[t + 5]),

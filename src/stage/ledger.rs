@@ -2,6 +2,7 @@
 //! stage that failed. `segment` writes it, `lift` moves seconds from kept to refused; later stages only add up.
 
 use super::refusal::FrameRefusal;
+use crate::types::interval::{Interval, Intervals};
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -12,6 +13,9 @@ use std::path::Path;
 pub struct Ledger {
     pub duration_secs: f64,
     pub kept: Vec<Kept>,
+    /// Parts of the kept stretches in which the hands rest on each other.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub resting: Vec<Kept>,
     pub refused: Vec<Refused>,
     #[serde(default)]
     pub failed: Vec<Failed>,
@@ -131,6 +135,20 @@ impl Ledger {
     /// Seconds kept.
     pub fn kept_secs(&self) -> f64 {
         self.kept.iter().map(|kept| kept.end_secs - kept.start_secs).sum()
+    }
+
+    /// Seconds kept in which the hands rest.
+    pub fn resting_secs(&self) -> f64 {
+        self.resting.iter().map(|rest| rest.end_secs - rest.start_secs).sum()
+    }
+
+    /// With the stretches of `intervals` in which the hands rest; the video's last frame may be cut off by its end.
+    #[must_use]
+    pub fn with_resting(mut self, intervals: &Intervals) -> Self {
+        let secs = |frame: usize| intervals.fps.secs(frame).min(self.duration_secs);
+        let kept = |rest: &Interval| Kept { start_secs: secs(rest.start), end_secs: secs(rest.end) };
+        self.resting = intervals.resting.iter().map(kept).filter(|rest| rest.start_secs < rest.end_secs).collect();
+        self
     }
 
     /// Seconds refused, by reason.

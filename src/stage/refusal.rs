@@ -27,6 +27,8 @@ pub enum Refusal {
     NoseOff,
     /// Lowest score of shoulders and elbows.
     Arms,
+    /// Seconds for which a hand is missing, the other one having been found in its place.
+    OtherHand,
     /// Seconds for which a hand is missing.
     HandGap,
     /// Shoulder widths the neck moves within a frame.
@@ -63,7 +65,7 @@ pub enum Refusal {
 
 impl Refusal {
     /// The reasons that `segment` and `lift` judge frames by.
-    pub const JUDGED: [Self; 20] = [
+    pub const JUDGED: [Self; 21] = [
         Self::NoSound,
         Self::Quiet,
         Self::NoSpeech,
@@ -75,6 +77,7 @@ impl Refusal {
         Self::Turned,
         Self::NoseOff,
         Self::Arms,
+        Self::OtherHand,
         Self::HandGap,
         Self::Jump,
         Self::Cut,
@@ -104,6 +107,7 @@ impl Refusal {
             Self::Face => "face",
             Self::Turned | Self::NoseOff => "turned",
             Self::Arms => "arms",
+            Self::OtherHand => "other hand",
             Self::HandGap | Self::HandShare => "hands",
             Self::Jump => "jump",
             Self::Cut => "cut",
@@ -124,6 +128,7 @@ impl Refusal {
     pub const fn unit(self) -> &'static str {
         match self {
             Self::Still
+            | Self::OtherHand
             | Self::HandGap
             | Self::Cut
             | Self::Identity
@@ -166,6 +171,7 @@ impl Refusal {
             Self::Face => "the face is not visible",
             Self::Turned | Self::NoseOff => "the speaker is turned sideways or away",
             Self::Arms => "shoulders or elbows are not visible",
+            Self::OtherHand => "one hand is found in the place of the other",
             Self::HandGap | Self::HandShare => "a hand is not visible for too long",
             Self::Jump => "the speaker jumps from frame to frame",
             Self::Cut => "a cut leaves too short an interval",
@@ -207,11 +213,16 @@ impl Refusal {
                 format!("turned sideways: the nose is {m:.2} half shoulder widths beside the neck, {t:.2} are allowed")
             }
             Self::Arms => format!("the arms are not visible: shoulders and elbows score {m:.2}, {t:.2} is needed"),
+            Self::OtherHand => {
+                format!(
+                    "a hand is not visible for {m:.1} s, where the other one is found in its place, {t:.1} s are allowed"
+                )
+            }
             Self::HandGap => format!("a hand is not visible for {m:.1} s, {t:.1} s are allowed"),
             Self::Jump => format!("the neck jumps by {m:.2} shoulder widths in a frame, {t:.2} are allowed"),
-            Self::Cut => format!("a cut of the film leaves {m:.1} s, an interval needs {t:.1} s"),
-            Self::Identity => format!("a change of person leaves {m:.1} s, an interval needs {t:.1} s"),
-            Self::TooShort => format!("too short: {m:.1} s between refused parts, an interval needs {t:.1} s"),
+            Self::Cut => format!("a cut of the film leaves {m:.2} s of the {t:.2} s that an interval needs"),
+            Self::Identity => format!("a change of person leaves {m:.2} s of the {t:.2} s that an interval needs"),
+            Self::TooShort => format!("too short: {m:.2} s of the {t:.2} s that an interval needs"),
             Self::HandShare => format!("a hand is seen in only {m:.2} of the frames, {t:.2} is needed"),
             Self::Crowd => format!("too many people in {m:.2} of the frames, {t:.2} is allowed"),
             Self::Bones => format!("a bone was lifted {m:.2} off its length in the video, {t:.2} is allowed"),

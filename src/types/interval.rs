@@ -31,6 +31,9 @@ pub struct Intervals {
     pub n_frames: usize,
     pub intervals: Vec<Interval>,
     pub windows_64: Windows64,
+    /// Stretches of the intervals in which the hands rest on each other: what is not seen of them is filled and masked.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub resting: Vec<Interval>,
 }
 
 /// Windows of 64 frames in all intervals together: one every 5 frames, and side by side.
@@ -45,6 +48,23 @@ impl Intervals {
     pub fn new(fps: FrameRate, n_frames: usize, intervals: Vec<Interval>) -> Self {
         let count = |stride| intervals.iter().map(|interval| interval.n_windows(64, stride)).sum();
         let windows_64 = Windows64 { stride_5: count(5), apart: count(64) };
-        Self { fps, n_frames, intervals, windows_64 }
+        Self { fps, n_frames, intervals, windows_64, resting: Vec::new() }
+    }
+
+    /// With the parts of the stretches `resting` that lie in the intervals.
+    #[must_use]
+    pub fn with_resting(mut self, resting: &[Interval]) -> Self {
+        let part = |interval: &Interval, rest: &Interval| Interval {
+            start: interval.start.max(rest.start),
+            end: interval.end.min(rest.end),
+        };
+        let parts = self.intervals.iter().flat_map(|interval| resting.iter().map(move |rest| part(interval, rest)));
+        self.resting = parts.filter(|part| part.n_frames() > 0).collect();
+        self
+    }
+
+    /// Seconds in which the hands rest.
+    pub fn resting_secs(&self) -> f64 {
+        self.resting.iter().map(|rest| self.fps.secs(rest.n_frames())).sum()
     }
 }

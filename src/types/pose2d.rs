@@ -64,6 +64,8 @@ pub struct Pose2d {
     pub left_hand: [Keypoint; N_HAND],
     /// The speaker's right hand.
     pub right_hand: [Keypoint; N_HAND],
+    /// Whether the other hand was found where the left and the right hand were looked for, which then count as missing.
+    pub other_hand: [bool; 2],
     /// The speaker's face, where it is seen closely.
     pub face: Option<FaceSeen>,
 }
@@ -102,6 +104,7 @@ impl Default for Pose2d {
             body: [Keypoint::default(); N_BODY],
             left_hand: [Keypoint::default(); N_HAND],
             right_hand: [Keypoint::default(); N_HAND],
+            other_hand: [false; 2],
             face: None,
         }
     }

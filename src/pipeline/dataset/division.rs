@@ -176,6 +176,9 @@ impl Division {
             }
             divided.ledger.refused.extend(self.left_out(at, kept.end_secs, blocks, fps));
         }
+        let pieces = divided.pieces.iter().map(|(_, piece)| *piece).collect();
+        let resting = Intervals::new(fps, intervals.n_frames, pieces).with_resting(&intervals.resting);
+        divided.ledger = divided.ledger.with_resting(&resting);
         divided.ledger.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
         Ok(divided)
     }

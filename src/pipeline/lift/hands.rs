@@ -1,7 +1,6 @@
-//! Hands in 3D: one hand over an interval through the hand lifter, then freed of wrong sides and single wrong frames,
-//! with gaps filled.
+//! Hands in 3D: one hand over an interval through the hand lifter, then freed of wrong sides and single wrong
+//! frames.
 
-use super::gaps;
 use super::hand_depth;
 use super::observed::FARTHEST_PX;
 use crate::math::vec3;
@@ -18,12 +17,12 @@ const LEAST_POINTS: usize = 12;
 const BATCH: usize = 1024;
 
 /// Lifts one hand from `points` [T, 21, 3] into `joints` [T, 21, 3]: the wrist at 0, all bones together 1 long; NaN
-/// where the hand is missing for more than `max_gap` frames. `mask` [T, 21] says what was seen.
+/// where the hand is missing. `mask` [T, 21] says what was seen.
 pub fn lift(
     lifter: &HandLifter,
     points: ArrayView3<f32>,
     side: Side,
-    (frame_secs, max_gap): (f32, usize),
+    frame_secs: f32,
     mut joints: ArrayViewMut3<f32>,
     mut mask: ArrayViewMut2<bool>,
 ) -> Result<()> {
@@ -40,8 +39,6 @@ pub fn lift(
     }
     hand_depth::settle(joints.view_mut(), frame_secs);
     steady(joints.view_mut());
-    gaps::bridge(joints.view_mut(), max_gap);
-    gaps::hold_ends(joints, max_gap);
     Ok(())
 }
 

@@ -3,7 +3,7 @@
 use super::body::{SIZE_FRAMES, STRAY_FRAMES, TRAINED_FPS};
 use super::camera::CameraTilt;
 use super::interval_view::IntervalView;
-use super::{body, hands, lengths, weights};
+use super::{body, gaps, hands, lengths, rest, weights};
 use crate::config;
 use crate::math::gaussian;
 use crate::motion::bones;
@@ -77,12 +77,13 @@ impl Lifter {
     /// The motion inside each interval, each lifted and smoothed by itself, all with the same bone lengths.
     /// Errors: an interval outside the video, keypoints of unequal lengths.
     pub fn lift_intervals(&self, keypoints: &Keypoints, intervals: &[Interval]) -> Result<Lifted> {
-        let raw = self.raw(keypoints, intervals)?;
+        let raw = self.raw(keypoints, intervals, &[])?;
         Ok(self.finish(raw, intervals))
     }
 
-    /// Each interval lifted and smoothed by itself; bones as long as they came out, hands each in its own frame.
-    pub(crate) fn raw(&self, keypoints: &Keypoints, intervals: &[Interval]) -> Result<Lifted> {
+    /// Each interval lifted and smoothed by itself; bones as long as they came out, hands each in its own frame. Hands are
+    /// filled however long they are not seen in the stretches `resting`.
+    pub(crate) fn raw(&self, keypoints: &Keypoints, intervals: &[Interval], resting: &[Interval]) -> Result<Lifted> {
         let n_frames = keypoints.n_frames();
         for hand in [&keypoints.left_hand, &keypoints.right_hand] {
             ensure!(hand.shape()[0] == n_frames, "{n_frames} frames of body keypoints, {} of a hand", hand.shape()[0]);
@@ -91,7 +92,7 @@ impl Lifter {
         for &interval in intervals {
             let Interval { start, end } = interval;
             ensure!(start <= end && end <= n_frames, "interval {start}..{end} of a video of {n_frames} frames");
-            self.lift_stretch(keypoints, interval, lifted.stretch(interval))?;
+            self.lift_stretch(keypoints, interval, resting, lifted.stretch(interval))?;
         }
         Ok(lifted)
     }
@@ -121,7 +122,13 @@ impl Lifter {
     }
 
     /// One interval, smoothed, of about the reference size; each hand in its own frame, the root at 0.
-    fn lift_stretch(&self, keypoints: &Keypoints, interval: Interval, mut into: IntervalView) -> Result<()> {
+    fn lift_stretch(
+        &self,
+        keypoints: &Keypoints,
+        interval: Interval,
+        resting: &[Interval],
+        mut into: IntervalView,
+    ) -> Result<()> {
         let fps = keypoints.fps.per_sec();
         let max_gap = (MAX_GAP_SECS * fps).round() as usize;
         let frames = |sigma: f64| sigma * fps / TRAINED_FPS;
@@ -134,7 +141,13 @@ impl Lifter {
             let points = points.slice(s![interval.start..interval.end, .., ..]);
             let mut joints = into.joints.slice_mut(s![.., root..root + N_HAND, ..]);
             let mask = into.mask.slice_mut(s![.., root..root + N_HAND]);
-            hands::lift(&self.hands, points, side, ((1.0 / fps) as f32, max_gap), joints.view_mut(), mask)?;
+            hands::lift(&self.hands, points, side, (1.0 / fps) as f32, joints.view_mut(), mask)?;
+        }
+        rest::fill(&mut into.joints, interval, resting);
+        for root in [L_HAND, R_HAND] {
+            let mut joints = into.joints.slice_mut(s![.., root..root + N_HAND, ..]);
+            gaps::bridge(joints.view_mut(), max_gap);
+            gaps::hold_ends(joints.view_mut(), max_gap);
             gaussian::gaussian(joints, frames(self.smooth_hands));
         }
         Ok(())
@@ -223,7 +236,7 @@ mod tests {
         let settings = config::LiftConfig::default();
         let lifter = Lifter::new(&settings).unwrap();
         let whole = [Interval { start: 0, end: n_frames }];
-        let raw = |change| lifter.raw(&keypoints(n_frames, change), &whole).unwrap().motion;
+        let raw = |change| lifter.raw(&keypoints(n_frames, change), &whole, &[]).unwrap().motion;
         let (plain, changed) = (raw(n_frames), raw(change));
         let last = change - (reach_secs(&settings) * 15.0).ceil() as usize;
         assert!(last > 80, "a reach of {} s", reach_secs(&settings));

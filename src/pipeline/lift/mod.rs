@@ -17,6 +17,7 @@ pub mod observed;
 pub mod outliers;
 pub mod quality;
 pub mod refuse;
+pub mod rest;
 pub mod stage;
 pub mod weights;
 

@@ -63,7 +63,9 @@ pub fn exclude_frames(
         }
     }
     reduced.refused.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
-    Ok((Intervals::new(fps, intervals.n_frames, left), reduced))
+    let left = Intervals::new(fps, intervals.n_frames, left).with_resting(&intervals.resting);
+    let reduced = reduced.with_resting(&left);
+    Ok((left, reduced))
 }
 
 /// An interval as pieces end to end, each kept (`None`), or refused for one reason with the mean of what was measured.

@@ -47,7 +47,7 @@ impl Stage for LiftStage {
     }
 
     fn version(&self) -> u32 {
-        8
+        9
     }
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
@@ -145,12 +145,12 @@ impl LiftStage {
         out: &Path,
     ) -> Result<(Lifted, Intervals, Ledger)> {
         let (most, min_frames) = (self.settings.max_bone_change, self.rules.min_frames);
-        let mut raw = self.lifter.raw(keypoints, &intervals.intervals)?;
+        let mut raw = self.lifter.raw(keypoints, &intervals.intervals, &intervals.resting)?;
         let change = BoneChange::measure(&raw.motion);
         if change.exceeds(most) {
             let refusals = change.judge(most, max_gap_frames(&self.rules, keypoints.fps), keypoints);
             (intervals, ledger) = exclude_frames(&intervals, &ledger, &refusals, min_frames)?;
-            raw = self.lifter.raw(keypoints, &intervals.intervals)?;
+            raw = self.lifter.raw(keypoints, &intervals.intervals, &intervals.resting)?;
         }
         let open = outliers::open_refusals(&raw.motion, &intervals.intervals);
         (intervals, ledger) = exclude_frames(&intervals, &ledger, &open, min_frames)?;

@@ -6,8 +6,7 @@ use super::face::FaceTracker;
 use super::face::landmarks::FacePoint;
 use super::face::model::FaceModel;
 use super::hand::{DetectedHand, HandModel};
-use super::hands;
-use super::hands::HandTracker;
+use super::hands::{self, HandTracker, Sight};
 use super::model_input::ModelInput;
 use super::palm::PalmDetector;
 use super::person::Detector;
@@ -138,14 +137,14 @@ impl Chain {
             identity: followed.identity(),
             ..Pose2d::default()
         };
-        let Some(body) = found else {
+        let Some(mut body) = found else {
             self.forget_details();
             self.body_seen = false;
             return Ok(pose);
         };
         let mean = body.points.iter().map(|point| point[2]).sum::<f64>() / body.points.len() as f64;
         self.body_seen = mean >= self.settings.joint_score / 2.0;
-        let [left, right] = match (&mut self.hands, body.hands) {
+        let hands = match (&mut self.hands, body.hands) {
             (Some(hands), _) => hands.find(image, &body.points, &self.settings)?,
             (None, Some(given)) => {
                 let mut given = given.map(|points| Some(DetectedHand::from_points(points)));
@@ -154,6 +153,9 @@ impl Chain {
             }
             (None, None) => [None, None],
         };
+        // Sight comes last: what is followed from frame to frame is what was found.
+        let Sight { hands: [left, right], others } = Sight::judge(hands, &mut body.points, image);
+        pose.other_hand = others;
         if let Some(face) = &mut self.face {
             pose.face = face.find(image, &body.points, self.settings.joint_score)?;
         }

@@ -15,6 +15,7 @@ pub struct KeypointFrames {
     person: Vec<f32>,
     n_people: Vec<i64>,
     identity: Vec<i64>,
+    other_hand: Vec<bool>,
     face: Vec<Option<FaceSeen>>,
     time_secs: Vec<f64>,
 }
@@ -30,6 +31,7 @@ impl KeypointFrames {
         self.person.extend([x, y, width, height, score]);
         self.n_people.push(i64::from(pose.n_people));
         self.identity.push(pose.identity);
+        self.other_hand.extend(pose.other_hand);
         self.face.push(pose.face);
         self.time_secs.push(source_secs);
     }
@@ -63,6 +65,7 @@ impl KeypointFrames {
             person: Array2::from_shape_vec((n_frames, 5), self.person)?,
             n_people: Array1::from(self.n_people),
             identity: Array1::from(self.identity),
+            other_hand: Array2::from_shape_vec((n_frames, 2), self.other_hand)?,
             face,
         };
         Ok((keypoints, extras))

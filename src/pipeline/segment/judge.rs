@@ -19,26 +19,35 @@ pub fn judge(measures: &Measures, video: &MediaInfo, rules: &config::SegmentConf
         t > 0 && score > 0.0 && score >= rules.shot_threshold
     };
     let begins_shot: Vec<bool> = (0..n_frames).map(begins_shot).collect();
+    let rests: Vec<bool> = measures.rest.iter().map(|&rest| f64::from(rest) < rules.max_rest_move).collect();
     let mut refusals = vec![None; n_frames];
     for rule in frame_rules(rules) {
-        apply(&rule, &mut refusals, measures, &begins_shot, video.fps);
+        let holds = |t: usize| {
+            rule.bound.holds(f64::from((rule.values)(measures)[t]))
+                || (rule.compares && begins_shot[t])
+                || (rule.spares_rest && rests[t])
+        };
+        apply(&rule, holds, &mut refusals, measures, &begins_shot, video.fps);
     }
     let pieces = pieces(&refusals, measures, &begins_shot, video.fps, rules);
     let intervals = pieces.iter().filter(|(_, refused)| refused.is_none()).map(|(interval, _)| *interval).collect();
-    (Intervals::new(video.fps, n_frames, intervals), ledger(&pieces, n_frames, video))
+    let resting = runs(n_frames, |t| rests[t], |_| false);
+    let intervals = Intervals::new(video.fps, n_frames, intervals).with_resting(&resting);
+    let ledger = ledger(&pieces, n_frames, video).with_resting(&intervals);
+    (intervals, ledger)
 }
 
-/// Refuses the frames that break `rule` for too long, where no earlier rule has.
+/// Refuses the frames in which `rule` does not hold for too long, where no earlier rule has refused them.
 fn apply(
     rule: &FrameRule,
+    holds: impl Fn(usize) -> bool,
     refusals: &mut [Option<FrameRefusal>],
     measures: &Measures,
     begins_shot: &[bool],
     fps: FrameRate,
 ) {
     let (values, n_frames) = ((rule.values)(measures), refusals.len());
-    let passes = |t: usize| rule.bound.holds(f64::from(values[t])) || (rule.compares && begins_shot[t]);
-    for run in runs(n_frames, |t| !passes(t), |t| begins_shot[t]) {
+    for run in runs(n_frames, |t| !holds(t), |t| begins_shot[t]) {
         let inside = run.start > 0 && run.end < n_frames && !begins_shot[run.start] && !begins_shot[run.end];
         let (longest, threshold) = match rule.gap {
             Gap::Anywhere(secs) => (frames_within(secs, fps), secs),
@@ -111,8 +120,10 @@ fn too_short(
 /// The first rule on pieces that a piece of good frames breaks.
 fn broken_by_piece(piece: Interval, measures: &Measures, rules: &config::SegmentConfig) -> Option<FrameRefusal> {
     piece_rules(rules).into_iter().find_map(|rule| {
-        let values = &(rule.values)(measures)[piece.start..piece.end];
-        let n = values.iter().filter(|&&value| rule.counted.holds(f64::from(value))).count();
+        let values = (rule.values)(measures);
+        let rests = |t: usize| rule.spares_rest && f64::from(measures.rest[t]) < rules.max_rest_move;
+        let counts = |&t: &usize| rule.counted.holds(f64::from(values[t])) || rests(t);
+        let n = (piece.start..piece.end).filter(counts).count();
         let share = n as f64 / piece.n_frames().max(1) as f64;
         (!rule.share.holds(share)).then(|| FrameRefusal::new(rule.refusal, share, rule.share.threshold()))
     })

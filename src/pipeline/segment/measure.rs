@@ -1,6 +1,7 @@
 //! What the rules look at: a few numbers a frame. They are written beside the verdict (`measures.npz`), so that
 //! thresholds can be judged anew without looking at the video or the keypoints again.
 
+use super::rest;
 use crate::types::pose2d::{Keypoints, SEEN_SCORE, coco};
 use ndarray::{ArrayView2, ArrayView3};
 
@@ -39,6 +40,11 @@ pub struct Measures {
     /// Mean score of a hand's points.
     pub left_hand: Vec<f32>,
     pub right_hand: Vec<f32>,
+    /// Share of the frames of a gap of the hand in which the other hand was found in its place; 0 outside of gaps.
+    pub left_other: Vec<f32>,
+    pub right_other: Vec<f32>,
+    /// How far the wrists move in the second around the frame, in shoulder widths, where they lie together; 10 elsewhere.
+    pub rest: Vec<f32>,
     /// People in view.
     pub n_people: Vec<f32>,
     /// Way of the neck since the frame before, in shoulder widths (the wider of the two frames); 0 in frame 0.
@@ -80,6 +86,9 @@ impl Measures {
             frame_difference: vec![255.0; n_frames],
             left_hand: mean_scores(keypoints.left_hand.view()),
             right_hand: mean_scores(keypoints.right_hand.view()),
+            left_other: vec![0.0; n_frames],
+            right_other: vec![0.0; n_frames],
+            rest: rest::movement(keypoints),
             n_people: vec![1.0; n_frames],
             identity: vec![0.0; n_frames],
             shot_score: vec![0.0; n_frames],
@@ -118,6 +127,18 @@ fn turn(body: ArrayView2<f32>, neck: [f32; 2]) -> [f32; 2] {
     let height = (nose[0] - neck[0]).hypot(nose[1] - neck[1]);
     let ratio = |a: f32, b: f32| (a / b.max(1e-3)).clamp(-FARTHEST, FARTHEST);
     [ratio(width, height), ratio((nose[0] - neck[0]).abs(), width.abs() / 2.0)]
+}
+
+/// Of each frame in a gap of a hand, the share of the gap's frames in which the other hand was found in its place.
+/// `hand`: mean score of the hand's points; 0: missing.
+pub fn others(hand: &[f32], other: impl Fn(usize) -> bool) -> Vec<f32> {
+    let mut shares = Vec::with_capacity(hand.len());
+    for run in hand.chunk_by(|a, b| (*a > 0.0) == (*b > 0.0)) {
+        let start = shares.len();
+        let n_other = (start..start + run.len()).filter(|&t| other(t)).count();
+        shares.resize(start + run.len(), n_other as f32 / run.len() as f32);
+    }
+    shares
 }
 
 /// From neck to neck, in shoulder widths.
@@ -160,6 +181,14 @@ mod tests {
         let [facing, nose_off] = turned(20.0, 30.0);
         assert!(facing < 0.4 && nose_off == 3.0);
         assert_eq!(turned(0.0, 10.0)[1], FARTHEST);
+    }
+
+    #[test]
+    fn a_gap_is_the_other_hands_by_the_share_of_its_frames() {
+        let hand = [0.9, 0.0, 0.0, 0.0, 0.0, 0.8, 0.0, 0.9];
+        let shares = others(&hand, |t| [1, 2, 4].contains(&t));
+        assert_eq!(shares, [0.0, 0.75, 0.75, 0.75, 0.75, 0.0, 0.0, 0.0]);
+        assert!(others(&[], |_| true).is_empty());
     }
 
     #[test]

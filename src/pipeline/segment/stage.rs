@@ -49,7 +49,7 @@ impl Stage for SegmentStage {
     }
 
     fn version(&self) -> u32 {
-        7
+        8
     }
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {
@@ -127,6 +127,8 @@ impl SegmentStage {
             None => (vec![f32::NAN; n_frames], None),
         };
         let measures = Measures {
+            left_other: measure::others(&of_body.left_hand, |t| extras.other_hand[[t, 0]]),
+            right_other: measure::others(&of_body.right_hand, |t| extras.other_hand[[t, 1]]),
             sound,
             sound_db,
             speech,
@@ -155,6 +157,9 @@ fn report(intervals: &Intervals, ledger: &Ledger) -> Report {
             windows.apart
         )
     };
+    if intervals.resting_secs() >= 0.05 {
+        line += &format!("; hands at rest {:.1} s of it", intervals.resting_secs());
+    }
     if !refused.is_empty() {
         line += &format!("; refused: {}", longest_first(&refused));
     }
@@ -166,6 +171,7 @@ fn report(intervals: &Intervals, ledger: &Ledger) -> Report {
     let facts = serde_json::json!({
         "duration_secs": ledger.duration_secs,
         "kept_secs": kept,
+        "resting_secs": intervals.resting_secs(),
         "refused_secs": refused,
         "n_intervals": intervals.intervals.len(),
         "windows_64": windows,

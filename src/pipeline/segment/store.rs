@@ -9,7 +9,7 @@ use std::path::Path;
 
 impl Measures {
     /// Every array with its name, in the order of the rules.
-    pub fn arrays(&self) -> [(&'static str, &[f32]); 17] {
+    pub fn arrays(&self) -> [(&'static str, &[f32]); 20] {
         [
             ("sound", &self.sound),
             ("sound_db", &self.sound_db),
@@ -24,6 +24,9 @@ impl Measures {
             ("arms", &self.arms),
             ("left_hand", &self.left_hand),
             ("right_hand", &self.right_hand),
+            ("left_other", &self.left_other),
+            ("right_other", &self.right_other),
+            ("rest", &self.rest),
             ("n_people", &self.n_people),
             ("jump", &self.jump),
             ("identity", &self.identity),
@@ -42,7 +45,7 @@ impl Measures {
     pub fn read(path: &Path) -> Result<Self> {
         let mut npz = Npz::open(path)?;
         let person = npz.floats("person", &[None])?.into_iter().collect::<Vec<f32>>();
-        // Earlier versions did not listen for speech, nor look at mouths.
+        // Earlier versions did not listen for speech, nor look at mouths, nor at hands at rest.
         let mut newer = |name: &str| -> Result<Vec<f32>> {
             Ok(match npz.has(name) {
                 true => npz.floats(name, &[Some(person.len())])?.into_iter().collect(),
@@ -50,6 +53,7 @@ impl Measures {
             })
         };
         let (speech, lip_sync) = (newer("speech")?, newer("lip_sync")?);
+        let (left_other, right_other, rest) = (newer("left_other")?, newer("right_other")?, newer("rest")?);
         let mut read =
             |name: &str| -> Result<Vec<f32>> { Ok(npz.floats(name, &[Some(person.len())])?.into_iter().collect()) };
         Ok(Self {
@@ -65,6 +69,9 @@ impl Measures {
             arms: read("arms")?,
             left_hand: read("left_hand")?,
             right_hand: read("right_hand")?,
+            left_other,
+            right_other,
+            rest,
             n_people: read("n_people")?,
             jump: read("jump")?,
             identity: read("identity")?,

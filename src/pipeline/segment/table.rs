@@ -5,6 +5,9 @@ use super::measure::Measures;
 use crate::config;
 use crate::stage::refusal::Refusal;
 
+/// Share of the frames of a gap of a hand from which on it is called the other hand's.
+const MOST_OTHER: f64 = 0.3;
+
 /// What a value must be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bound {
@@ -32,6 +35,8 @@ pub struct FrameRule {
     pub measures_secs: bool,
     /// The value compares with the frame before: it says nothing of a shot's first frame.
     pub compares: bool,
+    /// Holds where the hands rest on each other, whatever the value.
+    pub spares_rest: bool,
 }
 
 /// A rule on pieces: the measure of frames of which too many, or too few, are in a piece of good frames.
@@ -43,6 +48,8 @@ pub struct PieceRule {
     pub counted: Bound,
     /// ...and what share of the piece they must be, 0..1.
     pub share: Bound,
+    /// Whether frames in which the hands rest on each other count as well.
+    pub spares_rest: bool,
 }
 
 impl Bound {
@@ -63,7 +70,7 @@ impl Bound {
 }
 
 /// The rules on frames.
-pub fn frame_rules(rules: &config::SegmentConfig) -> [FrameRule; 14] {
+pub fn frame_rules(rules: &config::SegmentConfig) -> [FrameRule; 16] {
     use Bound::{AtLeast, AtMost};
     let score = AtLeast(rules.joint_score);
     let row = |refusal, values: fn(&Measures) -> &[f32], bound, gap| FrameRule {
@@ -73,8 +80,10 @@ pub fn frame_rules(rules: &config::SegmentConfig) -> [FrameRule; 14] {
         gap,
         measures_secs: false,
         compares: false,
+        spares_rest: false,
     };
     let secs = |rule| FrameRule { measures_secs: true, ..rule };
+    let hands = |rule| FrameRule { measures_secs: true, spares_rest: true, ..rule };
     let (none, body, hand) =
         (Gap::Anywhere(0.0), Gap::Inside(rules.max_body_gap_secs), Gap::Anywhere(rules.max_hand_gap_secs));
     let (quiet, still) = (Gap::Anywhere(rules.max_quiet_secs), Gap::Anywhere(rules.max_still_secs));
@@ -90,8 +99,10 @@ pub fn frame_rules(rules: &config::SegmentConfig) -> [FrameRule; 14] {
         row(Refusal::Turned, |m| &m.facing, AtLeast(rules.min_facing), body),
         row(Refusal::NoseOff, |m| &m.nose_off, AtMost(rules.max_nose_off), body),
         row(Refusal::Arms, |m| &m.arms, score, body),
-        secs(row(Refusal::HandGap, |m| &m.left_hand, score, hand)),
-        secs(row(Refusal::HandGap, |m| &m.right_hand, score, hand)),
+        hands(row(Refusal::OtherHand, |m| &m.left_other, AtMost(MOST_OTHER), hand)),
+        hands(row(Refusal::OtherHand, |m| &m.right_other, AtMost(MOST_OTHER), hand)),
+        hands(row(Refusal::HandGap, |m| &m.left_hand, score, hand)),
+        hands(row(Refusal::HandGap, |m| &m.right_hand, score, hand)),
         FrameRule { compares: true, ..row(Refusal::Jump, |m| &m.jump, AtMost(rules.max_jump), none) },
     ]
 }
@@ -99,7 +110,13 @@ pub fn frame_rules(rules: &config::SegmentConfig) -> [FrameRule; 14] {
 /// The rules on pieces of good frames.
 pub fn piece_rules(rules: &config::SegmentConfig) -> [PieceRule; 3] {
     use Bound::{AtLeast, AtMost};
-    let row = |refusal, values: fn(&Measures) -> &[f32], counted, share| PieceRule { refusal, values, counted, share };
+    let row = |refusal, values: fn(&Measures) -> &[f32], counted, share| PieceRule {
+        refusal,
+        values,
+        counted,
+        share,
+        spares_rest: matches!(refusal, Refusal::HandShare),
+    };
     let (seen, often) = (AtLeast(rules.joint_score), AtLeast(rules.min_hand_share));
     let crowd = AtLeast(f64::from(rules.max_people) + 0.5);
     [

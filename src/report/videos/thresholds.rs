@@ -48,7 +48,7 @@ macro_rules! row {
 }
 
 /// Thresholds of `[segment]`.
-pub const THRESHOLDS: [ThresholdGrid; 18] = [
+pub const THRESHOLDS: [ThresholdGrid; 19] = [
     row!(min_sound_db, "least loudness of the second around a frame", "dB of full scale", -90.0, -10.0),
     row!(min_speech, "least share of speech in the 4 s around a frame", "", 0.0, 1.0),
     row!(min_lip_sync, "least correlation of the mouth with the voice in the 8 s around a frame", "", -0.5, 0.5),
@@ -68,6 +68,7 @@ pub const THRESHOLDS: [ThresholdGrid; 18] = [
     row!(max_body_gap_secs, "longest gap of face or arms that is filled", "s", 0.0, 1.0),
     row!(max_hand_gap_secs, "longest gap of a hand that is masked", "s", 0.0, 1.0),
     row!(min_hand_share, "share of an interval in which each hand is seen", "", 0.0, 1.0),
+    row!(max_rest_move, "farthest the wrists of resting hands move within a second", "shoulder widths", 0.0, 0.4),
     row!(max_jump, "farthest the neck may move between two frames", "shoulder widths", 0.1, 2.1),
     row!(shot_threshold, "shot score from which a frame begins a new shot", "", 0.0, 1.0),
     row!(max_people, "people in view that are not too many", "people", 1.0, 21.0, u32),

@@ -8,6 +8,7 @@ use crate::report::html::chart::timeline::{TimelineSpan, timeline};
 use crate::report::html::numbers::{clock, length, number, with_unit};
 use crate::report::html::{Node, node};
 use crate::stage::counted;
+use crate::stage::ledger::Kept;
 use std::collections::BTreeSet;
 
 /// Largest number of parts of all timelines together, which bounds the page, and smallest number of each.
@@ -27,15 +28,20 @@ pub fn lines(videos: &[VideoSummary]) -> Vec<Node> {
     let mut shown = vec![
         node("p").text(
             "Lines are as long as their videos. Point at an interval, or walk a line with the arrow keys, to read what was \
-             measured.",
+             measured. A good stretch is kept from the length of a window on (min_frames); one that is too short says its \
+             length and what is needed.",
         ),
         legend(videos),
         wide,
     ];
     shown.extend(videos.iter().map(|video| {
         let ledger = &video.ledger;
+        let rest = match ledger.resting_secs() {
+            secs if secs >= 0.05 => format!(", hands at rest in {}", length(secs)),
+            _ => String::new(),
+        };
         let about = format!(
-            "{} kept of {} in {}",
+            "{} kept of {} in {}{rest}",
             length(ledger.kept_secs()),
             length(ledger.duration_secs),
             counted(ledger.kept.len(), "interval")
@@ -71,10 +77,13 @@ fn stretches(video: &VideoSummary) -> Vec<TimelineSpan> {
         .trim_end()
         .to_owned(),
     };
-    let kept = ledger
-        .kept
-        .iter()
-        .map(|kept| stretch(kept.start_secs, kept.end_secs, "kept".to_owned(), "kept", String::new()));
+    let rests = |kept: &Kept| {
+        let inside = |rest: &&Kept| kept.start_secs <= rest.start_secs && rest.end_secs <= kept.end_secs;
+        let span = |rest: &Kept| format!("hands at rest {} to {}", clock(rest.start_secs), clock(rest.end_secs));
+        ledger.resting.iter().filter(inside).map(span).collect::<Vec<_>>().join("\n")
+    };
+    let kept =
+        ledger.kept.iter().map(|kept| stretch(kept.start_secs, kept.end_secs, "kept".to_owned(), "kept", rests(kept)));
     let refused = ledger.refused.iter().map(|refused| {
         let (measured, threshold) = (refused.measured, with_unit(refused.threshold, &refused.unit));
         let description =

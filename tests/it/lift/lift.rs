@@ -261,6 +261,7 @@ fn the_stage_writes_joints_and_bones() {
         person: ndarray::Array2::zeros((70, 5)),
         n_people: ndarray::Array1::ones(70),
         identity: ndarray::Array1::zeros(70),
+        other_hand: ndarray::Array2::from_elem((70, 2), false),
         face: None,
     };
     let [extract, pose2d, segment] = [StageName::Extract, StageName::Pose2d, StageName::Segment]

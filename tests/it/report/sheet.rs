@@ -105,6 +105,7 @@ fn the_verb_draws_loose_files_and_says_what_is_missing() {
         person: Array2::zeros((30, 5)),
         n_people: Array1::ones(30),
         identity: Array1::zeros(30),
+        other_hand: Array2::from_elem((30, 2), false),
         face: None,
     };
     keypoints_npz::write(&dir.join("k.npz"), &keypoints(&motion), &extras).unwrap();

@@ -136,6 +136,31 @@ fn spoilt(change: impl Fn(&mut Measures)) -> (Vec<(usize, usize)>, Vec<String>) 
 }
 
 #[test]
+fn a_gap_says_whether_the_other_hand_was_taken_for_the_missing_one() {
+    let gap = |measures: &mut Measures, share: f32| {
+        measures.left_hand[70..100].fill(0.0);
+        measures.left_other[70..100].fill(share);
+    };
+    let kept = vec![(0, 70), (100, 200)];
+    assert_eq!(spoilt(|m| gap(m, 0.5)), (kept.clone(), vec!["other hand".into()]));
+    assert_eq!(spoilt(|m| gap(m, 0.2)), (kept, vec!["hands".into()]));
+}
+
+#[test]
+fn hands_that_rest_on_each_other_may_hide_each_other() {
+    let mut measures = measures(&good(200));
+    measures.left_hand[20..180].fill(0.0);
+    measures.rest[18..170].fill(0.05);
+    let (intervals, ledger) = judged_measures(&measures, 200.0 / 15.0);
+    assert_eq!(intervals.intervals, [Interval { start: 0, end: 200 }], "ten frames more are a short gap");
+    assert_eq!(intervals.resting, [Interval { start: 18, end: 170 }]);
+    assert!(ledger.is_whole() && (ledger.resting_secs() - 152.0 / 15.0).abs() < 1e-9);
+    measures.rest[18..170].fill(0.15);
+    let (intervals, ledger) = judged_measures(&measures, 200.0 / 15.0);
+    assert!(intervals.intervals.is_empty() && intervals.resting.is_empty() && ledger.resting.is_empty());
+}
+
+#[test]
 fn pauses_and_short_stands_are_kept_and_longer_ones_are_not() {
     assert_eq!(spoilt(|m| m.sound_db[80..125].fill(-60.0)), (vec![(0, 200)], vec![]));
     assert_eq!(spoilt(|m| m.sound_db[80..126].fill(-60.0)), (vec![(0, 80), (126, 200)], vec!["quiet".into()]));

@@ -2,12 +2,13 @@
 //! against the other hand, one hand found twice and hands that look like one of the other side. What was searched in
 //! vain is searched more rarely.
 
-use super::decode::ScoredPoint;
-use super::hand::{DetectedHand, HandModel};
-use super::palm::PalmDetector;
-use super::region;
+use super::sight::middle;
 use crate::config::Pose2dConfig;
 use crate::external::opencv::warp::Region;
+use crate::pipeline::pose2d::decode::ScoredPoint;
+use crate::pipeline::pose2d::hand::{DetectedHand, HandModel};
+use crate::pipeline::pose2d::palm::PalmDetector;
+use crate::pipeline::pose2d::region;
 use crate::types::image::Image;
 use crate::types::pose2d::coco;
 use anyhow::Result;
@@ -214,12 +215,6 @@ fn better(
         (Some(a), Some(b)) => Some(if (is_fine(&b), b.score) > (is_fine(&a), a.score) { b } else { a }),
         (a, b) => a.or(b),
     }
-}
-
-/// Mean of a hand's points.
-fn middle(hand: &DetectedHand) -> ScoredPoint {
-    let sum = hand.points.iter().fold([0.0; 2], |sum, point| [sum[0] + point[0], sum[1] + point[1]]);
-    [sum[0] / 21.0, sum[1] / 21.0, 0.0]
 }
 
 fn shoulder_px(body: &[ScoredPoint; 17]) -> f64 {

@@ -1,0 +1,59 @@
+//! Hands at rest: what is hidden of them is filled, however long. A hand keeps the shape that it has where it is seen in
+//! the same rest; one that is not seen in it at all has the mirrored shape of the other.
+
+use super::gaps;
+use crate::types::interval::Interval;
+use crate::types::pose2d::N_HAND;
+use crate::types::skeleton::{L_HAND, R_HAND};
+use ndarray::{ArrayViewMut3, s};
+
+/// Fills the hands of `joints` [T, 49, 3], those of `interval`, in the stretches `resting` of the video. Each hand has its
+/// wrist at 0; a missing one is NaN, and stays so in a rest in which neither is seen.
+pub fn fill(joints: &mut ArrayViewMut3<f32>, interval: Interval, resting: &[Interval]) {
+    for rest in resting {
+        let [start, end] = [rest.start, rest.end].map(|t| t.clamp(interval.start, interval.end) - interval.start);
+        if start >= end {
+            continue;
+        }
+        for root in [L_HAND, R_HAND] {
+            let mut hand = joints.slice_mut(s![start..end, root..root + N_HAND, ..]);
+            gaps::bridge(hand.view_mut(), end - start);
+            gaps::hold_ends(hand, end - start);
+        }
+        // After that a hand is there in all frames of the rest or in none.
+        for (root, other) in [(L_HAND, R_HAND), (R_HAND, L_HAND)] {
+            if joints[[start, root, 0]].is_nan() {
+                for t in start..end {
+                    for j in 0..N_HAND {
+                        let [x, y, z] = [0, 1, 2].map(|k| joints[[t, other + j, k]]);
+                        joints.slice_mut(s![t, root + j, ..]).assign(&ndarray::arr1(&[-x, y, z]));
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array3;
+
+    #[test]
+    fn a_hidden_hand_keeps_its_shape_or_mirrors_the_other() {
+        let hand = |joints: &mut Array3<f32>, t: usize, root: usize, x: f32| {
+            joints.slice_mut(s![t, root..root + N_HAND, ..]).fill(x);
+        };
+        let mut joints = Array3::from_elem((30, 49, 3), f32::NAN);
+        (0..30).for_each(|t| hand(&mut joints, t, R_HAND, 2.0));
+        hand(&mut joints, 8, L_HAND, 1.0);
+        hand(&mut joints, 29, L_HAND, 5.0);
+        let rests =
+            [Interval { start: 0, end: 3 }, Interval { start: 105, end: 112 }, Interval { start: 115, end: 120 }];
+        fill(&mut joints.view_mut(), Interval { start: 100, end: 130 }, &rests);
+        let left: Vec<String> = (4..21).map(|t| format!("{}", joints[[t, L_HAND + 5, 0]])).collect();
+        assert_eq!(left.join(" "), "NaN 1 1 1 1 1 1 1 NaN NaN NaN -2 -2 -2 -2 -2 NaN");
+        assert_eq!(joints.slice(s![15, L_HAND + 5, ..]).to_vec(), [-2.0, 2.0, 2.0]);
+        assert!(joints[[28, L_HAND, 0]].is_nan() && joints[[29, L_HAND, 0]] == 5.0);
+    }
+}

@@ -1,0 +1,7 @@
+//! Both hands of the speaker: `tracker` finds them from frame to frame, `sight` says what of the found points is seen.
+
+pub mod sight;
+pub mod tracker;
+
+pub use sight::Sight;
+pub use tracker::{HandTracker, guard};
