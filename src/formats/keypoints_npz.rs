@@ -93,7 +93,7 @@ pub fn read_extras(path: &Path) -> Result<Extras> {
     let person = npz.floats("person", &[n_frames, Some(5)])?.into_dimensionality::<Ix2>()?;
     let n_people = npz.numbers("n_people", &[n_frames])?.mapv(|v| v as i64).into_dimensionality::<Ix1>()?;
     let identity = npz.numbers("identity", &[n_frames])?.mapv(|v| v as i64).into_dimensionality::<Ix1>()?;
-    // Earlier versions did not tell.
+    // Files of earlier versions do not tell.
     let other_hand = match npz.has("other_hand") {
         true => npz.numbers("other_hand", &[n_frames, Some(2)])?.mapv(|v| v != 0.0).into_dimensionality::<Ix2>()?,
         false => Array2::from_elem((time_secs.len(), 2), false),

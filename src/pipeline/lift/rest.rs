@@ -20,7 +20,7 @@ pub fn fill(joints: &mut ArrayViewMut3<f32>, interval: Interval, resting: &[Inte
             gaps::bridge(hand.view_mut(), end - start);
             gaps::hold_ends(hand, end - start);
         }
-        // After that a hand is there in all frames of the rest or in none.
+        // Each hand is there now in all frames of the rest or in none.
         for (root, other) in [(L_HAND, R_HAND), (R_HAND, L_HAND)] {
             if joints[[start, root, 0]].is_nan() {
                 for t in start..end {
