@@ -11,4 +11,5 @@ pub mod solve;
 pub use draw::figure::{FigureView, draw_pose};
 pub use performance::{AnimationOptions, Performance, Yaw, perform};
 pub use rig::constraints::Constraints;
+pub use solve::legs::Legs;
 pub use solve::smoothing::Smoothing;

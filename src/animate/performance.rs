@@ -5,10 +5,12 @@ use super::rig::constraints::{ClampTally, Clamps, Constraints};
 use super::rig::rig::{CM, Rig};
 use super::solve::arm::SolveFilters;
 use super::solve::head;
+use super::solve::legs::Legs;
 use super::solve::positions::JointPositions;
 use super::solve::rotations::rotations;
 use super::solve::smoothing::Smoothing;
 use super::solve::track::RotationTrack;
+use super::solve::trunk;
 use crate::formats::bvh::write::BvhClip;
 use crate::math::rotation::Rotation;
 use crate::math::vec3::{Vec3, scale};
@@ -30,6 +32,10 @@ pub struct AnimationOptions {
     pub constraints: Constraints,
     /// The turn of the shoulders.
     pub yaw: Yaw,
+    /// Lower body.
+    pub legs: Legs,
+    /// Whether the chest breathes; no joint of a motion moves against the neck by it.
+    pub breath: bool,
     /// Frame rate of the output; `None`: that of the motion.
     pub fps: Option<FrameRate>,
 }
@@ -115,7 +121,8 @@ pub struct Performance {
     pub report: AnimationReport,
 }
 
-/// Animates a motion on a rig of its own bone lengths; a `posture` turns the head.
+/// Animates a motion on a rig of its own bone lengths; a `posture` turns head and trunk, which moves no joint against the
+/// neck.
 ///
 /// Joint limits are applied before smoothing, so that a joint found on the wrong side does not pull its neighbours in
 /// time, and again after smoothing and at the output rate, so that they hold in every written frame.
@@ -123,7 +130,7 @@ pub fn perform(motion: &Motion, posture: Option<&Posture>, options: &AnimationOp
     let rig = Rig::from_motion(motion);
     let clip_of = |tracks: &[RotationTrack]| {
         let local = (0..motion.n_frames()).map(|t| tracks.iter().map(|track| track[t]).collect()).collect();
-        BvhClip { root: rig.root, skeleton: rig.skeleton.clone(), fps: motion.fps, local }
+        BvhClip { root: rig.root, travel: Vec::new(), skeleton: rig.skeleton.clone(), fps: motion.fps, local }
     };
     let constrained = |mut clip: BvhClip, tally: &mut ClampTally| {
         clip.local.iter_mut().for_each(|frame| options.constraints.apply(&rig, frame, tally));
@@ -145,10 +152,15 @@ pub fn perform(motion: &Motion, posture: Option<&Posture>, options: &AnimationOp
             tracks[joint].fill(Rotation::IDENTITY);
         }
     }
-    let free = clip_of(&tracks);
+    let mut free = clip_of(&tracks);
+    trunk::turn(posture, options.legs, options.breath, &rig, &filters, &mut free);
     let resampled = options.fps.filter(|&fps| fps != motion.fps).map(|fps| free.resampled(fps));
-    let resampled = resampled.map(|clip| constrained(clip, &mut ClampTally::default()));
-    let clip = constrained(free, &mut ClampTally::default());
+    let planted = |clip: BvhClip| {
+        let mut clip = constrained(clip, &mut ClampTally::default());
+        options.legs.plant(&rig, &mut clip);
+        clip
+    };
+    let (resampled, clip) = (resampled.map(planted), planted(free));
 
     let after = joints(&rig, &clip);
     let jerk = |joints: &[(usize, usize)]| {

@@ -86,7 +86,7 @@ impl<'a> Film<'a> {
             label,
             label_px,
         };
-        let has_colours = matches!(body, FilmBody::Figure(_));
+        let has_colours = matches!(body, FilmBody::Figure(..));
         let panels = match beside {
             SecondPanel::Behind { .. } if !has_colours => Vec::new(),
             SecondPanel::Itself | SecondPanel::Behind { .. } if has_colours => {

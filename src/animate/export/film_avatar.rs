@@ -79,7 +79,7 @@ impl<'a> AvatarView<'a> {
     /// Picture of one frame with the mouth open by `mouth`, 0..1.
     pub fn frame(&mut self, frame_idx: usize, mouth: f64) -> Image {
         let Performance { rig, clip, .. } = self.performance;
-        self.avatar.pose_into(rig, clip.root, &clip.local[frame_idx], mouth, &mut self.meshes);
+        self.avatar.pose_into(rig, clip.root_at(frame_idx), &clip.local[frame_idx], mouth, &mut self.meshes);
         let meshes: Vec<&Mesh> = self.meshes.iter().collect();
         self.renderer.draw(&self.camera, &meshes, &self.light, &self.backdrop)
     }
@@ -102,11 +102,11 @@ fn extremes(performance: &Performance) -> Vec<Vec3> {
     let mut points = Vec::new();
     for frame_idx in (0..n_frames).step_by(step) {
         let places = clip.positions(frame_idx);
-        let body = (places[rig.head][1] - clip.root[1]).abs();
+        let body = (places[rig.head][1] - places[0][1]).abs();
         points.extend((0..N_JOINTS).map(|joint| places[rig.positions[joint]]));
         // The crown is about as far above the head's joint as a third of the way from there to the hips.
         points.extend([-0.18, 0.18].map(|aside| add(places[rig.head], [aside * body, 0.36 * body, 0.0])));
-        points.push(add(clip.root, [0.0, -0.12 * body, 0.0]));
+        points.push(add(places[0], [0.0, -0.12 * body, 0.0]));
     }
     points
 }

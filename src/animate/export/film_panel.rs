@@ -34,8 +34,8 @@ impl Default for FilmStyle {
 /// What a film shows of a body.
 #[derive(Clone, Copy, Debug)]
 pub enum FilmBody<'a> {
-    /// Joints as a drawn figure; missing ones are left out.
-    Figure(&'a Motion),
+    /// Joints as a drawn figure; missing ones are left out. Its head turns as that of the performance.
+    Figure(&'a Motion, Option<&'a Performance>),
     /// The avatar of a rig, seen by a camera.
     Avatar(&'a Performance, FilmCamera),
 }
@@ -45,21 +45,21 @@ impl<'a> FilmBody<'a> {
     pub fn new(style: FilmStyle, performance: &'a Performance, motion: Option<&'a Motion>) -> Self {
         match (style, motion) {
             (FilmStyle::Avatar(camera), _) => Self::Avatar(performance, camera),
-            (FilmStyle::Figure, Some(motion)) => Self::Figure(motion),
+            (FilmStyle::Figure, Some(motion)) => Self::Figure(motion, Some(performance)),
             (FilmStyle::Figure, None) => Self::Avatar(performance, FilmCamera::default()),
         }
     }
 
     pub fn fps(self) -> FrameRate {
         match self {
-            Self::Figure(motion) => motion.fps,
+            Self::Figure(motion, _) => motion.fps,
             Self::Avatar(performance, _) => performance.clip.fps,
         }
     }
 
     pub fn n_frames(self) -> usize {
         match self {
-            Self::Figure(motion) => motion.n_frames(),
+            Self::Figure(motion, _) => motion.n_frames(),
             Self::Avatar(performance, _) => performance.clip.n_frames(),
         }
     }
@@ -67,7 +67,7 @@ impl<'a> FilmBody<'a> {
 
 /// Renderer of one body into its area of the picture.
 pub enum FilmPanel<'a> {
-    Figure { motion: &'a Motion, view: FigureView },
+    Figure { motion: &'a Motion, performance: Option<&'a Performance>, view: FigureView },
     Avatar { view: Box<AvatarView<'a>>, corner: [usize; 2] },
 }
 
@@ -75,20 +75,20 @@ impl<'a> FilmPanel<'a> {
     /// Panel in which every frame of the body fits, and of those `beside` it, which are drawn in the same size.
     pub fn new(body: FilmBody<'a>, beside: &[FilmBody], area: FilmArea, yaw_degrees: f32) -> Self {
         match body {
-            FilmBody::Figure(motion) => {
+            FilmBody::Figure(motion, performance) => {
                 let figures = beside.iter().filter_map(|other| match other {
-                    FilmBody::Figure(motion) => Some(*motion),
+                    FilmBody::Figure(motion, _) => Some(*motion),
                     FilmBody::Avatar(..) => None,
                 });
                 let motions: Vec<&Motion> = std::iter::once(motion).chain(figures).collect();
                 let view = fitting(&motions, area, yaw_degrees, trunk_of(motions[0]));
-                Self::Figure { motion, view: FigureView { trunk: trunk_of(motion), ..view } }
+                Self::Figure { motion, performance, view: FigureView { trunk: trunk_of(motion), ..view } }
             }
             FilmBody::Avatar(performance, camera) => {
                 let [left, top, right, bottom] = area.map(|px| px as usize);
                 let avatars = beside.iter().filter_map(|other| match other {
                     FilmBody::Avatar(performance, _) => Some(*performance),
-                    FilmBody::Figure(_) => None,
+                    FilmBody::Figure(..) => None,
                 });
                 let shown: Vec<&Performance> = std::iter::once(performance).chain(avatars).collect();
                 let view = AvatarView::new(performance, &shown, [right - left, bottom - top], camera);
@@ -100,13 +100,24 @@ impl<'a> FilmPanel<'a> {
     /// Draws a frame; `mouth` is how far the mouth is open, 0..1.
     pub fn draw(&mut self, image: &mut Image, frame_idx: usize, mouth: f64) -> anyhow::Result<()> {
         match self {
-            Self::Figure { motion, view } => draw_pose(image, motion.joints.index_axis(Axis(0), frame_idx), view),
+            Self::Figure { motion, performance, view } => {
+                let looks = performance.and_then(|performance| looks(performance, frame_idx));
+                let view = FigureView { looks, ..*view };
+                draw_pose(image, motion.joints.index_axis(Axis(0), frame_idx), &view)
+            }
             Self::Avatar { view, corner } => {
                 draw::paste(image, &view.frame(frame_idx, mouth), *corner);
                 Ok(())
             }
         }
     }
+}
+
+/// Direction in which a head looks, in the axes of a motion.
+fn looks(performance: &Performance, frame_idx: usize) -> Option<[f32; 3]> {
+    let world = performance.rig.skeleton.world(performance.clip.local.get(frame_idx)?);
+    let [x, y, z] = world[performance.rig.head].turn([0.0, 0.0, 1.0]);
+    Some([x, -y, -z].map(|v| v as f32))
 }
 
 /// Trunk size that fits the motion's arms.

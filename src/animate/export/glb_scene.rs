@@ -156,8 +156,13 @@ pub fn animation(buffer: &mut GlbBuffer, clip: &BvhClip) -> Value {
     let times: Vec<[f32; 1]> = (0..clip.n_frames()).map(|frame| [clip.fps.secs(frame) as f32]).collect();
     let once = buffer.floats(&times[..1], "SCALAR", BufferUse::Other);
     let mut every = None;
-    let mut samplers =
-        vec![json!({ "input": once, "output": buffer.floats(&[metres(clip.root)], "VEC3", BufferUse::Other) })];
+    let roots: Vec<[f32; 3]> = (0..clip.n_frames()).map(|frame| metres(clip.root_at(frame))).collect();
+    let (input, roots) = if clip.travel.is_empty() {
+        (once, &roots[..1])
+    } else {
+        (*every.get_or_insert_with(|| buffer.floats(&times, "SCALAR", BufferUse::Other)), &roots[..])
+    };
+    let mut samplers = vec![json!({ "input": input, "output": buffer.floats(roots, "VEC3", BufferUse::Other) })];
     let mut channels = vec![json!({ "sampler": 0, "target": { "node": 0, "path": "translation" } })];
     for joint in (0..clip.skeleton.joints.len()).filter(|&joint| !clip.skeleton.joints[joint].end) {
         let track = signed(clip.local.iter().map(|local| local[joint]));

@@ -83,6 +83,7 @@ impl FileSkeleton {
             skeleton: self.skeleton.clone(),
             fps: clip.fps,
             root: clip.root,
+            travel: clip.travel.clone(),
             local: clip.local.iter().map(turned).collect(),
         }
     }
@@ -197,6 +198,7 @@ mod tests {
             skeleton: rig.skeleton.clone(),
             fps: crate::types::time::FrameRate::new(15, 1),
             root: rig.root,
+            travel: Vec::new(),
             local: vec![(0..rig.skeleton.joints.len()).map(turn).collect()],
         };
         let expected = clip.positions(0);

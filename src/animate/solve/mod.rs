@@ -3,8 +3,10 @@
 pub mod arm;
 pub mod arm_pose;
 pub mod head;
+pub mod legs;
 pub mod positions;
 pub mod roll;
 pub mod rotations;
 pub mod smoothing;
 pub mod track;
+pub mod trunk;

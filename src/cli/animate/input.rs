@@ -34,6 +34,8 @@ enum InputLocation {
 pub struct InputMotion {
     pub motion: Motion,
     pub posture: Option<Posture>,
+    /// Whether the person sits, where hips and knees are seen.
+    pub is_seated: Option<bool>,
     pub sound: Option<Sound>,
 }
 
@@ -131,17 +133,19 @@ impl MotionInput {
             InputLocation::Sample(dataset, sample) => {
                 let sample = dataset.read(sample)?;
                 let body = sample.pose2d.slice(ndarray::s![.., ..N_BODY, ..]).to_owned();
-                let posture = Some(posture_of(body.view(), &sample.motion));
-                InputMotion { motion: sample.motion, posture, sound: Some(sample.sound) }
+                InputMotion { sound: Some(sample.sound), ..InputMotion::seen(sample.motion, body.view()) }
             }
-            InputLocation::File(path) => {
-                InputMotion { motion: motion_file::read(path, Some(fps))?.motion, posture: None, sound: None }
-            }
+            InputLocation::File(path) => InputMotion {
+                motion: motion_file::read(path, Some(fps))?.motion,
+                posture: None,
+                is_seated: None,
+                sound: None,
+            },
         };
         check(&take.motion).with_context(|| format!("no animation of {}", self.name))?;
         match self.keypoints(keypoints, &take.motion)? {
             Some(Keypoints { body, .. }) => {
-                Ok(InputMotion { posture: Some(posture_of(body.view(), &take.motion)), ..take })
+                Ok(InputMotion { sound: take.sound, ..InputMotion::seen(take.motion, body.view()) })
             }
             None => Ok(take),
         }
@@ -170,8 +174,13 @@ impl MotionInput {
     }
 }
 
-fn posture_of(body: ArrayView3<f32>, motion: &Motion) -> Posture {
-    posture::estimate(body, LiftedBody { joints: Some(motion.joints.view()), extra: None })
+impl InputMotion {
+    /// Motion of a person of whom keypoints [T, 17, 3] are known.
+    fn seen(motion: Motion, body: ArrayView3<f32>) -> Self {
+        let lifted = LiftedBody { joints: Some(motion.joints.view()), extra: None };
+        let posture = Some(posture::estimate(body, lifted));
+        Self { posture, is_seated: posture::is_seated(body), motion, sound: None }
+    }
 }
 
 fn read_keypoints(path: &Path, motion: &Motion) -> Result<Keypoints> {

@@ -1,5 +1,6 @@
 //! `orator animate`.
 
+mod body_args;
 mod film_args;
 pub mod input;
 mod retarget_args;

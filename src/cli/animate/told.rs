@@ -8,8 +8,8 @@ pub fn words(report: &AnimationReport) -> String {
     let jerk = |jerk: Jerk| format!("{} -> {}", number(jerk.before), number(jerk.after));
     let mut text = format!("jerk, m/s3: arms {}, hands {}\n", jerk(report.arms), jerk(report.hands));
     text += &match report.face_frames {
-        Some(n) => format!("head: seen in {n} of {} frames\n", report.n_frames),
-        None => "head: at rest\n".to_owned(),
+        Some(n) if n > 0 => format!("head: seen in {n} of {} frames\n", report.n_frames),
+        _ => "head: at rest\n".to_owned(),
     };
     text += &seen(report);
     let clamped: Vec<_> = report.clamps.iter().filter(|clamps| clamps.joint_frames > 0).collect();

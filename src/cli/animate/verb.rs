@@ -1,5 +1,6 @@
 //! `orator animate`.
 
+use super::body_args::BodyArgs;
 use super::film_args::FilmArgs;
 use super::input::{InputMotion, MotionInput, inputs};
 use super::retarget_args::{OpenedRig, RetargetArgs};
@@ -16,7 +17,7 @@ use orator::animate::export::file::{ExportContent, ExportFormat};
 use orator::animate::export::film::{SecondPanel, smooth_rate};
 use orator::animate::export::film_panel::{FilmBody, FilmStyle};
 use orator::animate::export::film_source::SourceCamera;
-use orator::animate::{AnimationOptions, Constraints, Performance, Yaw, perform};
+use orator::animate::{AnimationOptions, Constraints, Legs, Performance, perform};
 use orator::dataset::Split;
 use orator::external::ffmpeg::audio;
 use orator::mocap::motion_file;
@@ -39,8 +40,8 @@ use std::time::Instant;
 /// With --format, IN may be a folder of motions, a speaker's folder of lifted videos or a whole dataset, and --out is a
 /// folder.
 ///
-/// The head turns with the face where keypoints are known: of a dataset and of a run by themselves, else with
-/// --keypoints; otherwise it rests. Bones have the lengths, palms the shape that are the motion's medians.
+/// Head and trunk turn with face, shoulders and hips where keypoints are known: of a dataset and of a run by themselves,
+/// else with --keypoints; otherwise they rest. Bones have the lengths, palms the shape that are the motion's medians.
 ///
 /// What is smoothed away is noise: its amount is measured for every bone, and where there is none a motion changes by no
 /// more than a few millimetres. Limits of elbow, forearm, wrist and every finger joint are those of captured people; every
@@ -66,12 +67,9 @@ pub struct Args {
     figure: FigureArgs,
     #[command(flatten)]
     retarget: RetargetArgs,
-    /// Keypoints of the same frames (`body` [T, 17, 3], COCO), from which the head is turned.
+    /// Keypoints of the same frames (`body` [T, 17, 3], COCO), from which head and trunk are turned.
     #[arg(long, value_name = "FILE.npz", conflicts_with = "format")]
     keypoints: Option<PathBuf>,
-    /// Leave the head at rest though the face is known.
-    #[arg(long, conflicts_with = "keypoints")]
-    neutral_head: bool,
     /// Sound of a film; without: that of the dataset or of the run that the motion is from.
     #[arg(long, value_name = "FILE", conflicts_with = "format")]
     audio: Option<PathBuf>,
@@ -90,9 +88,8 @@ pub struct Args {
     /// Frames a second of a .npy or .txt.
     #[arg(long, value_name = "RATE", default_value = "15")]
     in_fps: FrameRate,
-    /// The turn of the shoulders about the vertical: of spine and chest, or removed, so that the figure faces ahead.
-    #[arg(long, value_enum, default_value = "spine")]
-    shoulder_yaw: ShoulderYaw,
+    #[command(flatten)]
+    body: BodyArgs,
     #[command(flatten)]
     smoothing: SmoothingArgs,
     /// Leave every joint as it was, possible or not.
@@ -102,12 +99,6 @@ pub struct Args {
     /// then bent with the others.
     #[arg(long, value_enum, default_value = "off", conflicts_with = "no_constraints")]
     curl_coherence: Switch,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum ShoulderYaw {
-    Spine,
-    Removed,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -228,8 +219,10 @@ fn animate(
     options: &AnimationOptions,
     ui: &Ui,
 ) -> Result<Done> {
-    let InputMotion { motion, posture, sound: own } = input.read(args.in_fps, args.keypoints.as_deref())?;
-    let (sound, posture) = (sound.or(own), posture.filter(|_| !args.neutral_head));
+    let taken = input.read(args.in_fps, args.keypoints.as_deref())?;
+    let options = &args.body.of(&taken, options);
+    let InputMotion { motion, posture, sound: own, .. } = taken;
+    let (sound, posture) = (sound.or(own), args.body.posture(posture));
     let started = Instant::now();
     let performance = perform(&motion, posture.as_ref(), options);
     let secs = started.elapsed().as_secs_f64();
@@ -333,8 +326,9 @@ fn options(args: &Args) -> Result<AnimationOptions> {
         true => Constraints::NONE,
         false => Constraints { limits: true, curl_coherence: args.curl_coherence == Switch::On },
     };
-    let yaw = if args.shoulder_yaw == ShoulderYaw::Removed { Yaw::Removed } else { Yaw::Spine };
-    Ok(AnimationOptions { smoothing, constraints, yaw, fps: args.figure.options().fps })
+    let (yaw, breath) = (args.body.yaw(), args.body.has_breath());
+    let fps = args.figure.options().fps;
+    Ok(AnimationOptions { smoothing, constraints, yaw, legs: Legs::default(), breath, fps })
 }
 
 /// The part of a sound from a second on, as much as there is of `secs`.

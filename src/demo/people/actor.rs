@@ -86,6 +86,7 @@ impl Actor {
             constraints: Constraints { limits: true, curl_coherence: false },
             yaw: Yaw::Spine,
             fps: Some(fps),
+            ..AnimationOptions::default()
         };
         let own_rig = build.rig();
         let performed = match captured {

@@ -2,7 +2,7 @@
 //! order Z X Y; an end of a bone is an `End Site`. Which skeleton, and in which axes and units, is the caller's.
 
 use crate::math::rotation::Rotation;
-use crate::math::vec3::Vec3;
+use crate::math::vec3::{Vec3, add, scale};
 use crate::motion::fk::{Joint, Skeleton};
 use crate::types::time::FrameRate;
 use std::fmt::Write as _;
@@ -15,8 +15,10 @@ const ROTATION_CHANNELS: &str = "Zrotation Xrotation Yrotation";
 pub struct BvhClip {
     pub skeleton: Skeleton,
     pub fps: FrameRate,
-    /// Position of the root, equal in every frame.
+    /// Position of the root at rest.
     pub root: Vec3,
+    /// Way of the root from there, frame by frame; empty: it stays.
+    pub travel: Vec<Vec3>,
     /// Frame by frame one local rotation a joint (ends: anything).
     pub local: Vec<Vec<Rotation>>,
 }
@@ -27,25 +29,37 @@ impl BvhClip {
         self.local.len()
     }
 
+    /// Position of the root in a frame.
+    pub fn root_at(&self, frame_idx: usize) -> Vec3 {
+        self.travel.get(frame_idx).map_or(self.root, |&way| add(self.root, way))
+    }
+
     /// Positions of all joints in a frame.
     pub fn positions(&self, frame_idx: usize) -> Vec<Vec3> {
-        self.skeleton.positions(self.root, &self.local[frame_idx])
+        self.skeleton.positions(self.root_at(frame_idx), &self.local[frame_idx])
     }
 
     /// Motion at another rate: through the given frames, its speed without a jump at them; the last frame is
-    /// held.
+    /// held. The root travels in straight lines.
     pub fn resampled(&self, fps: FrameRate) -> Self {
         let n_frames = if self.local.is_empty() { 0 } else { fps.frames_in(self.fps.secs(self.n_frames())) };
         let last = self.n_frames().saturating_sub(1);
+        let at = |frame: usize| (fps.secs(frame) * self.fps.per_sec()).min(last as f64);
         let local = (0..n_frames).map(|frame| {
-            let at = (fps.secs(frame) * self.fps.per_sec()).min(last as f64);
+            let at = at(frame);
             let before = at.floor() as usize;
             let near = [before.saturating_sub(1), before, (before + 1).min(last), (before + 2).min(last)];
             let share = at - before as f64;
             let between = |joint: usize| Rotation::cubic(near.map(|t| self.local[t][joint]), share);
             (0..self.skeleton.joints.len()).map(between).collect()
         });
-        Self { local: local.collect(), fps, skeleton: self.skeleton.clone(), root: self.root }
+        let way = |frame: usize| {
+            let (before, share) = (at(frame).floor() as usize, at(frame).fract());
+            let [from, to] = [before, (before + 1).min(last)].map(|t| self.travel.get(t).copied().unwrap_or_default());
+            add(scale(from, 1.0 - share), scale(to, share))
+        };
+        let travel = if self.travel.is_empty() { Vec::new() } else { (0..n_frames).map(way).collect() };
+        Self { local: local.collect(), fps, skeleton: self.skeleton.clone(), root: self.root, travel }
     }
 
     /// The clip as the text of a BVH file. Lengths keep 1e-6 of their unit, angles 1e-5 degrees.
@@ -74,8 +88,9 @@ impl BvhClip {
         }
         let _ = write!(text, "MOTION\nFrames: {}\nFrame Time: {:.8}\n", self.n_frames(), 1.0 / self.fps.per_sec());
         let moving: Vec<usize> = order.into_iter().filter(|&joint| !self.skeleton.joints[joint].end).collect();
-        for local in &self.local {
-            let _ = write!(text, "{:.6} {:.6} {:.6}", self.root[0], self.root[1], self.root[2]);
+        for (frame_idx, local) in self.local.iter().enumerate() {
+            let [x, y, z] = self.root_at(frame_idx);
+            let _ = write!(text, "{x:.6} {y:.6} {z:.6}");
             for &joint in &moving {
                 let [z, x, y] = local[joint].euler_zxy_degrees();
                 let _ = write!(text, " {z:.5} {x:.5} {y:.5}");
@@ -130,7 +145,13 @@ mod tests {
             let r = Rotation::about([0.0, 0.0, 1.0], degrees.to_radians());
             vec![Rotation::IDENTITY, r, Rotation::IDENTITY, Rotation::IDENTITY, Rotation::IDENTITY]
         };
-        BvhClip { skeleton, fps: FrameRate::new(15, 1), root: [0.0, 90.0, 0.0], local: vec![turn(0.0), turn(30.0)] }
+        BvhClip {
+            skeleton,
+            fps: FrameRate::new(15, 1),
+            root: [0.0, 90.0, 0.0],
+            travel: Vec::new(),
+            local: vec![turn(0.0), turn(30.0)],
+        }
     }
 
     #[test]
@@ -184,7 +205,7 @@ mod tests {
                 Rotation::about(axis, angle)
             };
             let local = turns.chunks(2).map(|t| vec![turn(t[0]), turn(t[1]), Rotation::IDENTITY]).collect();
-            let clip = BvhClip { skeleton, fps: FrameRate::new(30, 1), root: [1.0, 90.0, -2.0], local };
+            let clip = BvhClip { skeleton, fps: FrameRate::new(30, 1), root: [1.0, 90.0, -2.0], travel: Vec::new(), local };
             let read = crate::formats::bvh::read::Bvh::parse(&clip.to_bvh()).unwrap();
             proptest::prop_assert_eq!(read.n_frames, clip.n_frames());
             let positions = read.positions(crate::formats::bvh::read::Positions::Replace);

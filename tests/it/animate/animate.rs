@@ -6,7 +6,7 @@ use ndarray::{Array3, s};
 use orator::animate::rig::constraints::ClampTally;
 use orator::animate::rig::limits::{CURL_COHERENCE, ELBOW, FINGERS, Limit, SUPINATION, WRIST};
 use orator::animate::solve::arm_pose::ArmPose;
-use orator::animate::{AnimationOptions, Constraints, Performance, Smoothing, Yaw, perform};
+use orator::animate::{AnimationOptions, Constraints, Legs, Performance, Smoothing, Yaw, perform};
 use orator::formats::bvh::write::BvhClip;
 use orator::math::one_euro::OneEuro;
 use orator::math::rotation::Rotation;
@@ -19,8 +19,14 @@ use orator::types::time::FrameRate;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-const UNTOUCHED: AnimationOptions =
-    AnimationOptions { smoothing: Smoothing::None, constraints: Constraints::NONE, yaw: Yaw::Spine, fps: None };
+const UNTOUCHED: AnimationOptions = AnimationOptions {
+    smoothing: Smoothing::None,
+    constraints: Constraints::NONE,
+    yaw: Yaw::Spine,
+    legs: Legs::Standing,
+    breath: false,
+    fps: None,
+};
 
 fn random_rotation(random: &mut ChaCha8Rng) -> Rotation {
     let [z, x, y] = [180.0, 90.0, 180.0].map(|reach: f64| random.random_range(-reach..reach));

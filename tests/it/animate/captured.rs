@@ -46,7 +46,7 @@ fn on_our_bones(path: &Path, fps: FrameRate) -> Motion {
         local
     };
     let local = (0..poses.shape()[0]).map(frame).collect();
-    let clip = BvhClip { root: rig.root, skeleton: rig.skeleton.clone(), fps, local };
+    let clip = BvhClip { root: rig.root, travel: Vec::new(), skeleton: rig.skeleton.clone(), fps, local };
     Performance { rig, clip, report: Default::default() }.motion()
 }
 

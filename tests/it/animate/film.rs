@@ -40,7 +40,7 @@ fn middle(image: &Image, columns: std::ops::Range<usize>, hue: [u8; 3]) -> f64 {
 #[test]
 fn the_speakers_left_is_at_the_right_of_the_front_view_and_nothing_is_cut() {
     let motion = swinging(4, 20);
-    let mut film = Film::new(FilmBody::Figure(&motion), None, SecondPanel::Itself);
+    let mut film = Film::new(FilmBody::Figure(&motion, None), None, SecondPanel::Itself);
     for frame in [0, 7, 19] {
         let image = film.frame(frame).unwrap();
         assert_eq!([image.width, image.height], SIZE);
@@ -59,7 +59,7 @@ fn missing_joints_and_wild_ones_are_left_out() {
     motion.joints.slice_mut(s![2, 3, ..]).fill(1e30);
     motion.joints.slice_mut(s![3, .., ..]).fill(0.0);
     let mut film =
-        Film::new(FilmBody::Figure(&motion), Some(&Sound { rate: 16_000, samples: vec![] }), SecondPanel::Itself);
+        Film::new(FilmBody::Figure(&motion, None), Some(&Sound { rate: 16_000, samples: vec![] }), SecondPanel::Itself);
     let blank = film.frame(1).unwrap();
     for frame in 0..4 {
         assert!(frame == 1 || film.frame(frame).unwrap() != blank);
@@ -72,8 +72,14 @@ fn the_mp4_has_every_frame_and_the_sound() {
     let path = folder.path().join("talk.mp4");
     let motion = swinging(6, 15);
     let samples = (0..16_000).map(|n| (n as f32 * 0.17).sin() * (n as f32 / 16_000.0)).collect();
-    film::write(&path, FilmBody::Figure(&motion), Some(&Sound { rate: 16_000, samples }), SecondPanel::Itself, &Silent)
-        .unwrap();
+    film::write(
+        &path,
+        FilmBody::Figure(&motion, None),
+        Some(&Sound { rate: 16_000, samples }),
+        SecondPanel::Itself,
+        &Silent,
+    )
+    .unwrap();
     let info = probe::probe(&path).unwrap();
     let secs = info.duration_secs.unwrap();
     assert!((secs - 15.0 / FPS.per_sec()).abs() < 0.1, "{secs} s");
@@ -114,7 +120,7 @@ fn a_click_at_a_second_stands_at_the_picture_of_that_second() {
     let rate = 16_000;
     let sample = |n: usize| (1..4).map(|k| chirp(n as f64 / f64::from(rate) - f64::from(k))).sum::<f64>() as f32;
     let sound = Sound { rate, samples: (0..4 * rate as usize).map(sample).collect() };
-    film::write(&path, FilmBody::Figure(&motion), Some(&sound), SecondPanel::Itself, &Silent).unwrap();
+    film::write(&path, FilmBody::Figure(&motion, None), Some(&sound), SecondPanel::Itself, &Silent).unwrap();
 
     let streams = streams(&path);
     let of = |kind: &str| streams.iter().find(|stream| stream.0 == kind).unwrap_or_else(|| panic!("no {kind}"));
@@ -154,7 +160,7 @@ fn the_video_beside_the_figure_is_in_step() {
     let path = folder.path().join("beside.mp4");
     let motion = swinging(6, 30);
     let beside = SecondPanel::Video { path: &clip.path, from_secs: 2.0 };
-    film::write(&path, FilmBody::Figure(&motion), None, beside, &Silent).unwrap();
+    film::write(&path, FilmBody::Figure(&motion, None), None, beside, &Silent).unwrap();
     // A picture of the clip fills the left half: 64 x 48 px become 600 x 450.
     let read = |image: &Image| {
         let bit = |block: usize| {
@@ -168,7 +174,7 @@ fn the_video_beside_the_figure_is_in_step() {
         assert_eq!(read(&frame.unwrap().image), 60 + 2 * n, "frame {n}");
     }
     let late = SecondPanel::Video { path: &clip.path, from_secs: 60.0 };
-    let error = format!("{:#}", film::write(&path, FilmBody::Figure(&motion), None, late, &Silent).unwrap_err());
+    let error = format!("{:#}", film::write(&path, FilmBody::Figure(&motion, None), None, late, &Silent).unwrap_err());
     assert!(error.contains("lasts 6.0 s"), "{error}");
 }
 
@@ -177,9 +183,9 @@ fn another_motion_is_drawn_beside_in_the_same_size_until_it_ends() {
     let (motion, mut other) = (swinging(6, 30), swinging(7, 20));
     other.fps = orator::types::time::FrameRate::new(30, 1);
     let mut film = Film::new(
-        FilmBody::Figure(&motion),
+        FilmBody::Figure(&motion, None),
         None,
-        SecondPanel::Motion { body: FilmBody::Figure(&other), labels: ["truth", "prediction"] },
+        SecondPanel::Motion { body: FilmBody::Figure(&other, None), labels: ["truth", "prediction"] },
     );
     let half = |image: &Image, from: usize| {
         let coloured = |x, y| {

@@ -7,3 +7,4 @@ pub mod captured;
 pub mod film;
 pub mod gltf;
 pub mod motion_files;
+pub mod posture;

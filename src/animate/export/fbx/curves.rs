@@ -1,4 +1,4 @@
-//! Rotations over time as FBX curves: angles about x, y and z in degrees, a key a frame, linear between. Of the two triples
+//! Rotations over time as FBX curves, and the way of the hips: angles about x, y and z in degrees, a key a frame, linear between. Of the two triples
 //! of angles that give a rotation, and their whole turns, the one nearest to the frame before is taken, so that the curves
 //! have no jumps.
 
@@ -33,28 +33,44 @@ pub fn add(objects: &mut FbxObjects, clip: &BvhClip, models: &[i64]) {
         let Some(&first) = angles.first() else { continue };
         let moves = angles.iter().any(|now| (0..3).any(|k| (now[k] - first[k]).abs() > STILL));
         let angles = if moves { &angles[..] } else { &angles[..1] };
-        let channels: Vec<FbxNode> = ["d|X", "d|Y", "d|Z"]
-            .into_iter()
-            .zip(first)
-            .map(|(channel, value)| property(channel, ["Number", "", "A"], vec![value.into()]))
-            .collect();
-        let node = objects.add("AnimationCurveNode", ("R", "AnimCurveNode", ""), [properties(channels)]);
-        objects.connect(node, layer);
-        objects.drive(node, model, "Lcl Rotation");
-        for (axis, channel) in ["d|X", "d|Y", "d|Z"].into_iter().enumerate() {
-            let values: Vec<f32> = angles.iter().map(|now| now[axis] as f32).collect();
-            let keys = [
-                FbxNode::one("Default", first[axis]),
-                FbxNode::one("KeyVer", KEY_VERSION),
-                FbxNode::one("KeyTime", FbxValue::Longs(times[..values.len()].to_vec())),
-                FbxNode::one("KeyAttrFlags", FbxValue::Ints(vec![LINEAR])),
-                FbxNode::one("KeyAttrDataFloat", FbxValue::Floats(vec![0.0; 4])),
-                FbxNode::one("KeyAttrRefCount", FbxValue::Ints(vec![values.len() as i32])),
-                FbxNode::one("KeyValueFloat", FbxValue::Floats(values)),
-            ];
-            let curve = objects.add("AnimationCurve", ("", "AnimCurve", ""), keys);
-            objects.drive(curve, node, channel);
-        }
+        drive(objects, (layer, model), ("R", "Lcl Rotation"), angles, &times);
+    }
+    if let Some(&hips) = models.first().filter(|_| !clip.travel.is_empty()) {
+        let places: Vec<Vec3> = (0..clip.n_frames()).map(|frame| clip.root_at(frame)).collect();
+        drive(objects, (layer, hips), ("T", "Lcl Translation"), &places, &times);
+    }
+}
+
+/// Adds the curves of three values over time, of which one stands for all times, to a model.
+fn drive(
+    objects: &mut FbxObjects,
+    (layer, model): (i64, i64),
+    (name, of_model): (&'static str, &'static str),
+    track: &[Vec3],
+    times: &[i64],
+) {
+    let Some(&first) = track.first() else { return };
+    let channels: Vec<FbxNode> = ["d|X", "d|Y", "d|Z"]
+        .into_iter()
+        .zip(first)
+        .map(|(channel, value)| property(channel, ["Number", "", "A"], vec![value.into()]))
+        .collect();
+    let node = objects.add("AnimationCurveNode", (name, "AnimCurveNode", ""), [properties(channels)]);
+    objects.connect(node, layer);
+    objects.drive(node, model, of_model);
+    for (axis, channel) in ["d|X", "d|Y", "d|Z"].into_iter().enumerate() {
+        let values: Vec<f32> = track.iter().map(|now| now[axis] as f32).collect();
+        let keys = [
+            FbxNode::one("Default", first[axis]),
+            FbxNode::one("KeyVer", KEY_VERSION),
+            FbxNode::one("KeyTime", FbxValue::Longs(times[..values.len()].to_vec())),
+            FbxNode::one("KeyAttrFlags", FbxValue::Ints(vec![LINEAR])),
+            FbxNode::one("KeyAttrDataFloat", FbxValue::Floats(vec![0.0; 4])),
+            FbxNode::one("KeyAttrRefCount", FbxValue::Ints(vec![values.len() as i32])),
+            FbxNode::one("KeyValueFloat", FbxValue::Floats(values)),
+        ];
+        let curve = objects.add("AnimationCurve", ("", "AnimCurve", ""), keys);
+        objects.drive(curve, node, channel);
     }
 }
 

@@ -1,0 +1,67 @@
+//! Options of `orator animate` about trunk, head and legs.
+
+use super::input::InputMotion;
+use orator::animate::solve::legs::Legs;
+use orator::animate::{AnimationOptions, Yaw};
+use orator::types::posture::Posture;
+
+#[derive(clap::Args)]
+pub struct BodyArgs {
+    /// Leave the head at rest though the face is known.
+    #[arg(long, conflicts_with = "keypoints")]
+    neutral_head: bool,
+    /// The turn of the shoulders about the vertical: of spine and chest, or removed, so that the figure faces ahead.
+    #[arg(long, value_enum, default_value = "spine")]
+    shoulder_yaw: ShoulderYaw,
+    /// Lower body: feet planted under hips that follow the trunk, or legs and hips at rest. Without: seated where hips and
+    /// knees are seen and the thighs hang less than 0.55 of the height from hips to shoulders, else standing.
+    #[arg(long, value_enum)]
+    legs: Option<LegsName>,
+    /// Leave the chest still: it moves the neck by 3 mm, and no joint against it.
+    #[arg(long)]
+    no_breath: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum ShoulderYaw {
+    Spine,
+    Removed,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum LegsName {
+    Seated,
+    Standing,
+    None,
+}
+
+impl BodyArgs {
+    pub fn yaw(&self) -> Yaw {
+        if self.shoulder_yaw == ShoulderYaw::Removed { Yaw::Removed } else { Yaw::Spine }
+    }
+
+    pub fn has_breath(&self) -> bool {
+        !self.no_breath
+    }
+
+    /// Options with the legs that were asked for, else those of the person seen.
+    pub fn of(&self, input: &InputMotion, options: &AnimationOptions) -> AnimationOptions {
+        let legs = match self.legs {
+            Some(LegsName::Seated) => Legs::Seated,
+            Some(LegsName::Standing) => Legs::Standing,
+            Some(LegsName::None) => Legs::None,
+            None if input.is_seated == Some(true) => Legs::Seated,
+            None => Legs::Standing,
+        };
+        AnimationOptions { legs, ..*options }
+    }
+
+    /// The posture as far as it is asked for.
+    pub fn posture(&self, posture: Option<Posture>) -> Option<Posture> {
+        let mut posture = posture?;
+        if self.neutral_head {
+            posture.head.fill(f32::NAN);
+        }
+        Some(posture)
+    }
+}
