@@ -6,6 +6,7 @@ use super::choices::{
 };
 use super::config_path::ConfigPath;
 use super::seq2seq::Seq2seqConfig;
+use crate::types::posture::PostureChannel;
 use crate::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 
@@ -307,11 +308,14 @@ pub struct DatasetConfig {
     pub test: f64,
     /// Seconds of equal sound from which two videos belong to one split; 0: sound is not compared.
     pub duplicate_secs: f64,
+    /// Write angles of head and trunk beside the joints.
+    pub posture: bool,
 }
 
 impl Default for DatasetConfig {
     fn default() -> Self {
-        Self { max_mb: 256, split_by: SplitUnit::Auto, validation: 0.15, test: 0.15, duplicate_secs: 5.0 }
+        let (validation, test, duplicate_secs, posture) = (0.15, 0.15, 5.0, false);
+        Self { max_mb: 256, split_by: SplitUnit::Auto, validation, test, duplicate_secs, posture }
     }
 }
 
@@ -321,6 +325,8 @@ impl Default for DatasetConfig {
 pub struct GanConfig {
     pub preset: NetworkPreset,
     pub representation: MotionRepresentation,
+    /// What is learnt beside the 49 joints.
+    pub channels: Vec<PostureChannel>,
     /// Window length in frames.
     pub window_frames: usize,
     /// Frames between the starts of two windows of an interval.
@@ -351,6 +357,7 @@ impl Default for GanConfig {
         Self {
             preset: NetworkPreset::Light,
             representation: MotionRepresentation::Bones,
+            channels: Vec::new(),
             window_frames: 64,
             stride_frames: 5,
             batch: 32,

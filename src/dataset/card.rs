@@ -60,6 +60,12 @@ pub fn text(info: &DatasetInfo, stats: &DatasetStats, leakage: &Leakage) -> Stri
     if let Some(WordCount { n_words, n_kept, .. }) = stats.footage.words {
         let _ = writeln!(text, "\nOf {n_words} words in the transcripts {n_kept} lie in samples.");
     }
+    if let Some(posture) = &stats.posture {
+        let n_frames = info.splits.get(Split::Train.name()).map_or(0, |split| split.frames).max(1) as f64;
+        let seen = posture.iter().map(|(channel, angles)| (channel.name(), 100.0 * angles.n_seen[0] as f64 / n_frames));
+        let seen: Vec<String> = seen.map(|(name, percent)| format!("the {name} in {percent:.1} %")).collect();
+        let _ = writeln!(text, "\nOf the frames to train on {} were seen.", seen.join(" and "));
+    }
     let _ = write!(
         text,
         "\n`ledger.jsonl` says of every second of every video which it was, with what was measured.\n\n## Splits\n\n\

@@ -48,6 +48,12 @@ pub struct SampleRef {
     /// Words; `None`: no transcript was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub words: Option<ByteRange>,
+    /// Angles of the head; `None`: they were not asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub head: Option<ByteRange>,
+    /// Angles of the trunk, where there are those of the head.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trunk: Option<ByteRange>,
 }
 
 /// Range of bytes in a shard.
@@ -68,7 +74,7 @@ impl SampleRef {
         sample_end <= shard_bytes
             && members
                 .iter()
-                .chain(&self.words)
+                .chain([&self.words, &self.head, &self.trunk].into_iter().flatten())
                 .all(|m| m.offset >= self.offset && end(m.offset, m.size).is_some_and(|e| e <= sample_end))
     }
 }

@@ -1,7 +1,7 @@
 //! Description file `info.json`: the meaning of all numbers, for readers without this program.
 
 use super::index::ShardRef;
-use super::sample::{N_KEYPOINTS, WORDS_EXTENSION};
+use super::sample::{N_KEYPOINTS, OPTIONAL_EXTENSIONS, WORDS_EXTENSION};
 use super::split::{Split, SplitBy, SplitRule, TimeBlock};
 use crate::types::skeleton;
 use crate::types::skeleton::{N_JOINTS, Side};
@@ -192,6 +192,20 @@ impl DatasetInfo {
                        these times (given, shared, aligned, interpolated) and confidence 0..1 or null";
         let member = Member { shape: "N words".into(), element: String::new(), meaning: meaning.into() };
         self.members.insert(WORDS_EXTENSION.to_owned(), member);
+        self
+    }
+
+    /// Describes the angles of head and trunk.
+    pub fn with_posture(mut self) -> Self {
+        let [_, head, trunk] = OPTIONAL_EXTENSIONS;
+        let angles = "yaw to the person's left, pitch downwards, roll towards the right shoulder, radians, in the axes of the joints; \
+                      NaN where an angle was not seen, which is the mask";
+        for (name, of) in
+            [(head, "the head, 0 where it looks as in the clip's median"), (trunk, "the trunk, hips to neck")]
+        {
+            let meaning = format!("{of}: {angles}");
+            self.members.insert(name.to_owned(), Member { shape: "T, 3".into(), element: "float32".into(), meaning });
+        }
         self
     }
 

@@ -2,10 +2,13 @@
 //! LeVeque 1979).
 
 use crate::types::pose3d::Motion;
+use crate::types::posture::{Posture, PostureChannel};
 use crate::types::skeleton::N_JOINTS;
+use ndarray::{ArrayView1, aview1};
 use serde::{Deserialize, Serialize};
 
-/// Moments over the frames in which a joint was seen; rows are joints, columns x, y, z in metres.
+/// Moments over the frames in which a joint was seen; rows are joints, columns x, y, z in metres. Of a posture rows are
+/// its six angles, each of which may be seen alone, in radians in the first column.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointMoments {
     pub n_seen: Vec<u64>,
@@ -19,38 +22,60 @@ pub struct JointMoments {
 
 impl Default for JointMoments {
     fn default() -> Self {
-        let rows = || vec![[0.0; 3]; N_JOINTS];
-        Self { n_seen: vec![0; N_JOINTS], mean: rows(), squares: rows(), min: rows(), max: rows() }
+        Self::with_rows(N_JOINTS)
     }
 }
 
 impl JointMoments {
+    fn with_rows(n: usize) -> Self {
+        let rows = || vec![[0.0; 3]; n];
+        Self { n_seen: vec![0; n], mean: rows(), squares: rows(), min: rows(), max: rows() }
+    }
+
+    /// Moments of postures: rows yaw, pitch, roll of the head, then of the trunk.
+    pub fn of_posture() -> Self {
+        Self::with_rows(3 * PostureChannel::ALL.len())
+    }
+
     /// Adds the joints that were seen.
     pub fn learn(&mut self, motion: &Motion) {
         for (frame, seen) in motion.joints.outer_iter().zip(motion.mask.outer_iter()) {
-            for (joint, row) in frame.outer_iter().enumerate() {
-                if !seen[joint] || row.iter().any(|v| !v.is_finite()) {
-                    continue;
-                }
-                let first = self.n_seen[joint] == 0;
-                self.n_seen[joint] += 1;
-                for (k, &value) in row.iter().enumerate() {
-                    let (value, mean) = (f64::from(value), &mut self.mean[joint][k]);
-                    let delta = value - *mean;
-                    *mean += delta / self.n_seen[joint] as f64;
-                    self.squares[joint][k] += delta * (value - *mean);
-                    let (min, max) = (&mut self.min[joint][k], &mut self.max[joint][k]);
-                    *min = if first { value } else { min.min(value) };
-                    *max = if first { value } else { max.max(value) };
-                }
+            for (joint, row) in frame.outer_iter().enumerate().filter(|(joint, _)| seen[*joint]) {
+                self.learn_row(joint, row);
             }
+        }
+    }
+
+    /// Adds the angles that were seen.
+    pub fn learn_posture(&mut self, posture: &Posture) {
+        for (channel, first) in PostureChannel::ALL.into_iter().zip([0, 3]) {
+            for ((_, k), angle) in posture.channel(channel).indexed_iter() {
+                self.learn_row(first + k, aview1(&[*angle, 0.0, 0.0]));
+            }
+        }
+    }
+
+    fn learn_row(&mut self, joint: usize, row: ArrayView1<f32>) {
+        if row.iter().any(|v| !v.is_finite()) {
+            return;
+        }
+        let first = self.n_seen[joint] == 0;
+        self.n_seen[joint] += 1;
+        for (k, &value) in row.iter().enumerate() {
+            let (value, mean) = (f64::from(value), &mut self.mean[joint][k]);
+            let delta = value - *mean;
+            *mean += delta / self.n_seen[joint] as f64;
+            self.squares[joint][k] += delta * (value - *mean);
+            let (min, max) = (&mut self.min[joint][k], &mut self.max[joint][k]);
+            *min = if first { value } else { min.min(value) };
+            *max = if first { value } else { max.max(value) };
         }
     }
 
     /// Adds the moments of other frames. Rows that `other` lacks count as never seen.
     pub fn merge(&mut self, other: &JointMoments) {
         let rows = other.mean.iter().zip(&other.squares).zip(other.min.iter().zip(&other.max));
-        for (joint, ((mean, squares), (min, max))) in rows.enumerate().take(N_JOINTS) {
+        for (joint, ((mean, squares), (min, max))) in rows.enumerate().take(self.n_seen.len()) {
             let (n, m) = (self.n_seen[joint] as f64, other.n_seen.get(joint).copied().unwrap_or(0) as f64);
             if m == 0.0 {
                 continue;

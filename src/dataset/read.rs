@@ -14,6 +14,7 @@ use crate::formats::wav;
 use crate::stage::workdir::FolderLock;
 use crate::types::file_name::FileName;
 use crate::types::pose3d::Motion;
+use crate::types::posture::Posture;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::{SAMPLE_RATE, Sound};
 use anyhow::{Context, Result, ensure};
@@ -141,8 +142,9 @@ impl Dataset {
         let pose2d = Array3::from_shape_vec((frames.len(), N_KEYPOINTS, 3), pose2d).context("shaping keypoints")?;
         let n_samples = (sample.wav.size.saturating_sub(wav::HEADER_BYTES as u64) / 2) as usize;
         let sound = self.sound(sample, 0..n_samples)?;
-        let (key, motion, words) = (sample.key.to_string(), self.motion(sample, frames)?, self.words(sample)?);
-        Ok(Sample { key, motion, pose2d, sound, words, meta })
+        let (key, words, posture) = (sample.key.to_string(), self.words(sample)?, self.posture(sample)?);
+        let motion = self.motion(sample, frames)?;
+        Ok(Sample { key, motion, pose2d, sound, words, posture, meta })
     }
 
     /// Words of a sample; `None`: no transcript was asked for.
@@ -150,6 +152,15 @@ impl Dataset {
         let Some(range) = sample.words else { return Ok(None) };
         let words = serde_json::from_slice(&self.bytes(sample, range)?);
         words.with_context(|| format!("reading {}.{WORDS_EXTENSION} in {}", sample.key, sample.shard))
+    }
+
+    fn posture(&self, sample: &SampleRef) -> Result<Option<Posture>> {
+        let (Some(head), Some(trunk)) = (sample.head, sample.trunk) else { return Ok(None) };
+        let angles = |range: ByteRange| -> Result<Array2<f32>> {
+            let bytes = self.rows(sample, range, Element::F32, &[3], 0..sample.n_frames)?;
+            Array2::from_shape_vec((sample.n_frames, 3), npy_slice::floats(&bytes)).context("shaping angles")
+        };
+        Ok(Some(Posture { head: angles(head)?, trunk: angles(trunk)? }))
     }
 
     /// Motion of the frames `frames` of a sample; only these are read, no hash is checked.

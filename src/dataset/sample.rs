@@ -5,6 +5,7 @@ use crate::formats::transcript::Word;
 use crate::formats::{npy_slice, wav};
 use crate::types::pose2d::{N_BODY, N_HAND};
 use crate::types::pose3d::Motion;
+use crate::types::posture::{Posture, PostureChannel};
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::{SAMPLE_RATE, Sound};
 use crate::types::sync;
@@ -27,14 +28,18 @@ pub struct Sample {
     pub sound: Sound,
     /// Words said in it, their times from its beginning; `None`: no transcript was asked for.
     pub words: Option<Vec<Word>>,
+    /// Angles of head and trunk; `None`: they were not asked for.
+    pub posture: Option<Posture>,
     /// Metadata: source and properties of the interval.
     pub meta: serde_json::Value,
 }
 
 /// Extensions of the members, in the order of a shard.
 pub const EXTENSIONS: [&str; 5] = ["json", "mask.npy", "pose2d.npy", "pose3d.npy", "wav"];
-/// Extension of the words, behind the others where a sample has them.
+/// Extension of the words.
 pub const WORDS_EXTENSION: &str = "words.json";
+/// Extensions of members behind `EXTENSIONS`, where a sample has them; head and trunk come together.
+pub const OPTIONAL_EXTENSIONS: [&str; 3] = [WORDS_EXTENSION, "head.npy", "trunk.npy"];
 
 impl Sample {
     /// Number of frames T.
@@ -69,8 +74,19 @@ impl Sample {
         ])
     }
 
-    /// Bytes of its words, if it has any. Errors where they contradict the sample.
-    pub fn words_member(&self) -> Result<Option<Vec<u8>>> {
+    /// Bytes of each of `OPTIONAL_EXTENSIONS` that the sample has. Errors where they contradict the sample.
+    pub fn optional_members(&self) -> Result<[Option<Vec<u8>>; 3]> {
+        let n_frames = self.n_frames();
+        let angles = |channel: PostureChannel| -> Result<Option<Vec<u8>>> {
+            let Some(angles) = self.posture.as_ref().map(|posture| posture.channel(channel)) else { return Ok(None) };
+            let (key, name) = (&self.key, channel.name());
+            ensure!(angles.shape() == [n_frames, 3], "{key}: angles of the {name} are not [{n_frames}, 3]");
+            Ok(Some(npy_slice::write_f32(angles.shape(), angles.iter())))
+        };
+        Ok([self.words_member()?, angles(PostureChannel::Head)?, angles(PostureChannel::Trunk)?])
+    }
+
+    fn words_member(&self) -> Result<Option<Vec<u8>>> {
         let Some(said) = &self.words else { return Ok(None) };
         let secs = self.motion.fps.secs(self.n_frames());
         words::check(said, secs).with_context(|| self.key.clone())?;

@@ -6,6 +6,7 @@ use super::write::part::VideoEntry;
 use super::{STRIDE_FRAMES, WINDOW_FRAMES};
 use crate::stage::ledger::WordCount;
 use crate::types::interval::Interval;
+use crate::types::posture::PostureChannel;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::split::Split;
 use ndarray::Array2;
@@ -24,6 +25,21 @@ pub struct DatasetStats {
     pub max: Vec<[f64; 3]>,
     pub windows: WindowCount,
     pub footage: FootageCount,
+    /// Angles of head and trunk by their names; `None`: no sample has any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub posture: Option<BTreeMap<PostureChannel, AngleStats>>,
+}
+
+/// Statistics of the angles of head or trunk in the training split: yaw, pitch, roll in radians.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AngleStats {
+    /// Frames in which each was seen.
+    pub n_seen: [u64; 3],
+    pub mean: [f64; 3],
+    /// Population standard deviation.
+    pub std: [f64; 3],
+    pub min: [f64; 3],
+    pub max: [f64; 3],
 }
 
 /// Number of windows in each split: at the training stride, and without overlap.
@@ -79,6 +95,7 @@ fn table(rows: &[[f64; 3]]) -> Array2<f32> {
 /// Accumulator over the videos of a dataset.
 pub struct StatsCollector {
     moments: JointMoments,
+    posture: Option<JointMoments>,
     windows: WindowCount,
     footage: FootageCount,
 }
@@ -88,7 +105,7 @@ impl Default for StatsCollector {
         let nothing = || Split::ALL.map(|split| (split.name().to_owned(), 0)).into();
         let (strided, apart) = (nothing(), nothing());
         let windows = WindowCount { n_frames: WINDOW_FRAMES, stride: STRIDE_FRAMES, strided, apart };
-        Self { moments: JointMoments::default(), windows, footage: FootageCount::default() }
+        Self { moments: JointMoments::default(), posture: None, windows, footage: FootageCount::default() }
     }
 }
 
@@ -96,8 +113,15 @@ impl StatsCollector {
     /// Adds a video.
     pub fn push(&mut self, part: &VideoEntry) {
         // Of a video in several splits they are those of its training samples.
-        if part.split.map_or(!part.samples.is_empty(), |split| split == Split::Train) {
+        let trains = part.split.map_or(!part.samples.is_empty(), |split| split == Split::Train);
+        if trains {
             self.moments.merge(&part.moments);
+        }
+        if let Some(posture) = &part.posture {
+            let moments = self.posture.get_or_insert_with(JointMoments::of_posture);
+            if trains {
+                moments.merge(posture);
+            }
         }
         for sample in &part.samples {
             let interval = Interval { start: 0, end: sample.n_frames };
@@ -127,6 +151,16 @@ impl StatsCollector {
     pub fn finish(self) -> DatasetStats {
         let std = self.moments.std();
         let JointMoments { n_seen, mean, min, max, .. } = self.moments;
-        DatasetStats { n_seen, mean, std, min, max, windows: self.windows, footage: self.footage }
+        let posture = self.posture.map(|moments| {
+            let std = moments.std();
+            let of = |(channel, first): (PostureChannel, usize)| {
+                let angles = |rows: &[[f64; 3]]| std::array::from_fn(|k| rows[first + k][0]);
+                let (mean, std) = (angles(&moments.mean), angles(&std));
+                let n_seen = std::array::from_fn(|k| moments.n_seen[first + k]);
+                (channel, AngleStats { n_seen, mean, std, min: angles(&moments.min), max: angles(&moments.max) })
+            };
+            PostureChannel::ALL.into_iter().zip([0, 3]).map(of).collect()
+        });
+        DatasetStats { n_seen, mean, std, min, max, windows: self.windows, footage: self.footage, posture }
     }
 }

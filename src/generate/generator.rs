@@ -5,10 +5,10 @@ use super::mel_stream::mel_frames;
 use super::model;
 use super::model::BEST;
 use super::model::SpeakerMetadata;
-use super::normalisation::N_FEATURES;
 use crate::nn::gan::generator::{FRAMES_MULTIPLE, Generator};
 use crate::nn::gan::streaming::StreamingGenerator;
 use crate::types::pose3d::Motion;
+use crate::types::posture::{Posture, PostureChannel};
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::{SAMPLE_RATE, Sound};
 use crate::types::time::FrameRate;
@@ -48,12 +48,17 @@ impl GestureGenerator {
     /// Motion for `sound` (16 kHz): as many whole frames as fit into it, bones of the speaker's lengths. Errors on another
     /// rate, and on sound shorter than a frame.
     pub fn motion(&self, sound: &Sound) -> Result<Motion> {
+        Ok(self.motion_and_posture(sound)?.0)
+    }
+
+    /// As `motion`, with the angles of head and trunk where they were learnt.
+    pub fn motion_and_posture(&self, sound: &Sound) -> Result<(Motion, Option<Posture>)> {
         ensure!(sound.rate == SAMPLE_RATE, "the sound has {} Hz, expected {SAMPLE_RATE}", sound.rate);
         let pieces = sound.samples.chunks(SAMPLE_RATE as usize).map(|piece| Ok(piece.to_vec()));
         self.motion_of_pieces(pieces, sound.samples.len(), CHUNK, &mut |_| ())
     }
 
-    /// Motion for `n_samples` at 16 kHz that come piece by piece, made `chunk` frames at a time: memory does not grow with
+    /// Motion and posture for `n_samples` at 16 kHz that come piece by piece, made `chunk` frames at a time: memory does not grow with
     /// the sound, except for the motion. `made` is called with the number of frames of each chunk. Errors of `motion`,
     /// pieces that are not `n_samples` together, and a `chunk` that is no multiple of 32.
     pub fn motion_of_pieces(
@@ -62,21 +67,29 @@ impl GestureGenerator {
         n_samples: usize,
         chunk: usize,
         made: &mut dyn FnMut(usize),
-    ) -> Result<Motion> {
+    ) -> Result<(Motion, Option<Posture>)> {
         let n_frames = self.n_frames(n_samples)?;
         let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
+        let normal = &self.metadata.normalisation;
+        let mut posture = (!normal.channels.is_empty()).then(|| Posture::unseen(n_frames));
         let mut first = 0;
         for poses in self.features(pieces, n_samples, chunk)? {
             let poses = poses?;
             let part = self.metadata.motion(poses.view());
             joints.slice_mut(s![first..first + poses.ncols(), .., ..]).assign(&part.joints);
+            if let (Some(posture), Some(part)) = (&mut posture, normal.posture(poses.view())) {
+                for channel in PostureChannel::ALL {
+                    let mut frames = posture.channel_mut(channel).slice_mut(s![first..first + poses.ncols(), ..]);
+                    frames.assign(part.channel(channel));
+                }
+            }
             first += poses.ncols();
             made(poses.ncols());
         }
-        Ok(Motion::from_joints(self.fps(), joints))
+        Ok((Motion::from_joints(self.fps(), joints), posture))
     }
 
-    /// Raw output of the network for sound that comes as in [`Self::motion_of_pieces`], [144, T] of one chunk after another,
+    /// Raw output of the network for sound that comes as in [`Self::motion_of_pieces`], [numbers, T] of one chunk after another,
     /// `chunk` frames or less each, which [`SpeakerMetadata::motion`] turns into motion. The sound is continued by its
     /// mirror image up to a multiple of 32 frames.
     pub fn features(
@@ -99,7 +112,7 @@ impl GestureGenerator {
                 poses.iter().all(|number| number.is_finite()),
                 "the network makes numbers that are not finite from frame {first} on: its checkpoint was damaged, or its training failed"
             );
-            Ok(Array2::from_shape_vec((N_FEATURES, n), poses)?)
+            Ok(Array2::from_shape_vec((self.metadata.network.n_out, n), poses)?)
         }))
     }
 

@@ -1,6 +1,6 @@
 //! What a checkpoint of the generator means: the metadata that generation needs, and the network itself.
 
-use super::normalisation::{N_FEATURES, Normalisation};
+use super::normalisation::Normalisation;
 use super::representation::Representation;
 use super::seq2seq::metadata::is_sequence_kind;
 use crate::audio::mel;
@@ -90,7 +90,7 @@ impl SpeakerMetadata {
         }
     }
 
-    /// The generator's numbers [144, T] as motion whose bones have the speaker's lengths in every frame.
+    /// The generator's numbers [144 or more, T] as motion whose bones have the speaker's lengths in every frame.
     pub fn motion(&self, raw: ArrayView2<f32>) -> Motion {
         let mut motion = Motion::from_joints(self.fps, self.representation.joints(raw, &self.normalisation));
         let lengths = &self.normalisation.bone_lengths;
@@ -117,11 +117,8 @@ fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {
         "its audio settings are others than this program's: {:?}",
         metadata.audio
     );
-    ensure!(
-        metadata.network.n_out == N_FEATURES,
-        "it makes {} numbers a pose, not {N_FEATURES}",
-        metadata.network.n_out
-    );
+    let (n_out, n_numbers) = (metadata.network.n_out, metadata.normalisation.n_numbers());
+    ensure!(n_out == n_numbers, "it makes {n_out} numbers a pose, not {n_numbers}");
     let (network, fps) = (&metadata.network, metadata.fps);
     ensure!(network.n_mels == mel::N_MELS, "it reads {} mel bands, not {}", network.n_mels, mel::N_MELS);
     ensure!((4..=MOST_WIDTH).contains(&network.width), "its width is {}, expected 4 to {MOST_WIDTH}", network.width);
@@ -141,6 +138,7 @@ pub const BEST: &str = "best.safetensors";
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::generate::normalisation::N_FEATURES;
     use crate::nn::gan::generator::Preset;
     use crate::types::skeleton::N_BONES;
     use std::collections::BTreeMap;
@@ -148,7 +146,8 @@ mod tests {
     #[test]
     fn facts_that_no_training_writes_are_refused() {
         let table = vec![1.0; N_FEATURES];
-        let normal = Normalisation { mean: table.clone(), std: table, bone_lengths: vec![0.1; N_BONES] };
+        let normal =
+            Normalisation { mean: table.clone(), std: table, bone_lengths: vec![0.1; N_BONES], channels: Vec::new() };
         let network = Config { width: 8, ..Config::from_preset(Preset::Light, N_FEATURES) };
         let facts =
             SpeakerMetadata::new("host", FrameRate::new(15, 1), "", network.clone(), normal, Representation::Positions);

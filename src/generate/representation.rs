@@ -185,10 +185,14 @@ struct Kinematics {
 }
 
 impl PoseDecoder {
-    /// Raw numbers [B, 144, T] to normalised positions [B, 144, T].
+    /// Raw numbers [B, 144, T] to normalised positions [B, 144, T]; those of channels behind them stay as they are.
     pub fn poses(&self, raw: &Tensor) -> Result<Tensor> {
         let Some(k) = &self.kinematics else { return Ok(raw.clone()) };
-        let (batch, _, n_frames) = raw.dims3()?;
+        let (batch, n_numbers, n_frames) = raw.dims3()?;
+        if n_numbers > N_FEATURES {
+            let channels = raw.narrow(1, N_FEATURES, n_numbers - N_FEATURES)?;
+            return Tensor::cat(&[self.poses(&raw.narrow(1, 0, N_FEATURES)?)?, channels], 1);
+        }
         let directions = raw.broadcast_mul(&k.direction_std)?.broadcast_add(&k.direction_mean)?;
         let directions = directions.reshape((batch, N_BONES, 3, n_frames))?;
         let norms = (directions.sqr()?.sum_keepdim(2)? + EPS)?.sqrt()?;
@@ -233,8 +237,13 @@ mod tests {
         let (features, mask) = poses(&normal);
         let bones = Representation::bones(&normal, [(features.view(), mask.view())].into_iter());
         let decoder = bones.decoder(&normal, DType::F64, &Device::Cpu)?;
-        let error = worst(&[pattern(&[2, N_FEATURES, 2], 0.0)?], |v| decoder.poses(&v[0]))?;
-        assert!(error < 1e-6, "{error}");
+        for n_channels in [0, 2] {
+            let numbers = pattern(&[2, N_FEATURES + 3 * n_channels, 2], 0.0)?;
+            let error = worst(std::slice::from_ref(&numbers), |v| decoder.poses(&v[0]))?;
+            assert!(error < 1e-6, "{error}");
+            let channels = |x: &Tensor| x.narrow(1, N_FEATURES, 3 * n_channels)?.flatten_all()?.to_vec1::<f64>();
+            assert_eq!(channels(&decoder.poses(&numbers)?)?, channels(&numbers)?);
+        }
         Ok(())
     }
 

@@ -6,6 +6,7 @@ use super::beat::{aist, angles, consistency};
 use super::body_part::BodyPart;
 use super::definition::MetricFamily;
 use super::distribution::{diversity, frechet_metrics};
+use super::movement::angles as angles_of_posture;
 use super::movement::hellinger;
 use super::movement::{bone_change, cca, derivatives};
 use super::position::pck::PckAxes;
@@ -61,5 +62,6 @@ fn own(settings: &MetricSettings) -> Vec<MetricFamily> {
     all.push(frechet_metrics::basis());
     all.push(frechet_metrics::embedding());
     all.push(cca::metric(BodyPart::Body));
+    all.extend(settings.channels.iter().flat_map(|channel| angles_of_posture::metrics(*channel)));
     all
 }

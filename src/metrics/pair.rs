@@ -9,9 +9,9 @@ use ndarray::{ArrayView2, ArrayView3};
 /// Made and ground truth of the same seconds.
 #[derive(Clone, Copy, Debug)]
 pub struct MotionPair<'a> {
-    /// [T, 49, 3], metres, house axes.
+    /// [T, 49, 3], metres, house axes; angles of head and trunk behind the joints, where they are measured.
     pub predicted: ArrayView3<'a, f32>,
-    /// [T, 49, 3], metres.
+    /// [T, 49, 3], metres; angles as in `predicted`.
     pub ground_truth: ArrayView3<'a, f32>,
     /// [T, 49]: where the real joint was seen (and the predicted one, where it is measured motion as well). What is not
     /// seen is left out everywhere, as is a real joint that is not finite.

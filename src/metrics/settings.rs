@@ -1,5 +1,6 @@
 //! Under which convention metrics are taken, and their parameters.
 
+use crate::types::posture::PostureChannel;
 use crate::types::time::FrameRate;
 use serde::Deserialize;
 use serde::Serialize;
@@ -17,6 +18,9 @@ pub struct MetricSettings {
     pub with_neck: bool,
     /// Whether any finger is seen; where none is, numbers of whole poses are of the arms.
     pub has_fingers: bool,
+    /// What is measured beside the joints.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub channels: Vec<PostureChannel>,
 }
 
 impl Default for MetricSettings {
@@ -27,6 +31,7 @@ impl Default for MetricSettings {
             fps: FrameRate::new(15, 1),
             with_neck: false,
             has_fingers: true,
+            channels: Vec::new(),
         }
     }
 }

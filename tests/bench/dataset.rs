@@ -128,6 +128,7 @@ fn random_interval(seed: u64) -> Sample {
         pose2d: Array3::from_shape_fn((n_frames, 59, 3), |_| rng.random_range(0.0f32..1.0)),
         sound: Sound { rate: SAMPLE_RATE, samples: (0..n_samples).map(|_| rng.random_range(-0.5f32..0.5)).collect() },
         words: None,
+        posture: None,
         meta: json!({ "n_frames": n_frames }),
     }
 }

@@ -62,7 +62,8 @@ pub fn run(args: &Args, progress: &dyn Progress) -> Result<Report> {
             let start = Instant::now();
             let whole = std::iter::once(Ok(sound.samples.clone()));
             let chunk = args.chunk.unwrap_or(CHUNK);
-            let motion = pool.install(|| speaker.motion_of_pieces(whole, sound.samples.len(), chunk, &mut |_| ()))?;
+            let (motion, _) =
+                pool.install(|| speaker.motion_of_pieces(whole, sound.samples.len(), chunk, &mut |_| ()))?;
             secs.push(start.elapsed().as_secs_f64());
             ensure!(motion.joints.iter().all(|v| v.is_finite()), "the motion made is not finite");
             task.advance(1);

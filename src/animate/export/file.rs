@@ -10,6 +10,7 @@ use crate::formats::{authors_txt, npy};
 use crate::stage::progress::Progress;
 use crate::stage::workdir;
 use crate::types::pose3d::Motion;
+use crate::types::posture::Posture;
 use crate::types::sound::Sound;
 use crate::types::time::FrameRate;
 use std::fs::File;
@@ -29,6 +30,8 @@ pub struct ExportContent<'a> {
     pub style: FilmStyle,
     /// Frames a second of a film; `None`: interpolated to 30 or more (`film::smooth_rate`).
     pub film_fps: Option<FrameRate>,
+    /// Angles of head and trunk that a speaker generated, at their rate, for JSON.
+    pub posture: Option<(FrameRate, &'a Posture)>,
 }
 
 /// What a user chooses of the figure in a file.
@@ -121,7 +124,7 @@ impl ExportFormat {
                 workdir::write_file(path, &bytes)
             }
             Self::Vrma => workdir::write_file(path, &vrm::motion(&performance.rig, &performance.clip)),
-            Self::Json => streamed(path, |text| json::write(text, performance, sources.names)),
+            Self::Json => streamed(path, |text| json::write(text, performance, sources.names, sources.posture)),
             Self::Mp4 => {
                 let fps = sources.film_fps.unwrap_or_else(|| film::smooth_rate(performance.clip.fps));
                 let resampled = (fps != performance.clip.fps).then(|| performance.resampled(fps));

@@ -277,6 +277,7 @@ fn animate(
         beside,
         style,
         film_fps: Some(film_fps),
+        posture: None,
     };
     if let Some(rig) = rig {
         rig.write(&performance, outputs, ui)?;

@@ -114,6 +114,9 @@ fn metrics(validation: &Validation) -> String {
     text += &row("PCK 0.2, fingers", predicted.pck_hands, still.pck_hands);
     text += &row(&format!("Frechet cm2 ({})", validation.n_poses), distance(predicted), distance(still));
     text += &row("motion energy / data's", predicted.energy, still.energy);
+    for (channel, of) in &validation.channels {
+        text += &row(&format!("{} error (degrees)", channel.name()), of.generator, of.mean_pose);
+    }
     text += &format!(
         "bones change by {:.4} mm a frame in the network's own output (the paper's released predictions: 2 to 5 mm)",
         validation.bone_change_mm
@@ -161,7 +164,7 @@ fn pairs(dataset: &Dataset, speaker: &GestureGenerator) -> Result<Vec<HeldOutPai
     let pair = |interval: HeldOutInterval| {
         let frames = middle(interval.ground_truth.n_frames(), speaker.fps());
         let HeldOutInterval { key, ground_truth, sound, .. } = interval.cut(frames.clone());
-        let predicted = predictor::motion(speaker, &sound, frames.len())?;
+        let (predicted, _) = predictor::motion(speaker, &sound, frames.len())?;
         Ok(HeldOutPair { name: key, start_secs: speaker.fps().secs(frames.start), ground_truth, predicted })
     };
     intervals.into_iter().map(pair).collect()

@@ -2,13 +2,14 @@
 //! and noted. Bytes of members stay unchanged wherever a dataset can hold them.
 
 use crate::dataset::Split;
-use crate::dataset::sample::{EXTENSIONS, N_KEYPOINTS, Sample, WORDS_EXTENSION};
+use crate::dataset::sample::{EXTENSIONS, N_KEYPOINTS, OPTIONAL_EXTENSIONS, Sample, WORDS_EXTENSION};
 use crate::formats::npy_slice;
 use crate::formats::npy_slice::{Element, Layout};
 use crate::formats::wav;
 use crate::stage::ledger::{Kept, Ledger, Refused};
 use crate::stage::refusal::{FrameRefusal, Refusal};
 use crate::types::pose3d::Motion;
+use crate::types::posture::Posture;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::{SAMPLE_RATE, Sound};
 use crate::types::time::FrameRate;
@@ -27,12 +28,12 @@ struct MemberLocation {
     bytes: u64,
 }
 
-/// Sample to be read: its members in the order of `EXTENSIONS`.
+/// Sample to be read: its members in the order of `EXTENSIONS`, then of `OPTIONAL_EXTENSIONS`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LooseSample {
     pub key: String,
     members: [Option<MemberLocation>; 5],
-    words: Option<MemberLocation>,
+    optional: [Option<MemberLocation>; 3],
 }
 
 /// Samples whose keys differ only behind the last dash.
@@ -56,7 +57,7 @@ pub struct Loose {
 impl LooseVideo {
     /// Tars that hold its samples.
     pub fn tars(&self) -> Vec<&PathBuf> {
-        let members = self.samples.iter().flat_map(|sample| sample.members.iter().chain([&sample.words]));
+        let members = self.samples.iter().flat_map(|sample| sample.members.iter().chain(&sample.optional));
         members.flatten().map(|place| &place.tar).collect()
     }
 }
@@ -107,16 +108,16 @@ fn list(
         let path = entry.path().with_context(reading)?.into_owned();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let (key, ending) = name.split_once('.').unwrap_or((&name, ""));
-        let member = EXTENSIONS.iter().position(|extension| *extension == ending);
-        if member.is_none() && ending != WORDS_EXTENSION {
+        let member = EXTENSIONS.iter().chain(&OPTIONAL_EXTENSIONS).position(|extension| *extension == ending);
+        let Some(member) = member else {
             *unknown.entry(ending.to_owned()).or_default() += 1;
             continue;
-        }
+        };
         let place = MemberLocation { tar: tar.to_owned(), offset: entry.raw_file_position(), bytes: entry.size() };
         ensure!(place.offset.saturating_add(place.bytes) <= length, "{}: {name} is cut off", reading());
-        let fresh = || LooseSample { key: key.to_owned(), members: Default::default(), words: None };
+        let fresh = || LooseSample { key: key.to_owned(), members: Default::default(), optional: Default::default() };
         let sample = samples.entry(key.to_owned()).or_insert_with(fresh);
-        let known = member.map_or(&mut sample.words, |member| &mut sample.members[member]);
+        let Some(known) = sample.members.iter_mut().chain(&mut sample.optional).nth(member) else { continue };
         if let Some(first) = known {
             let same = read_place(first)? == read_place(&place)?;
             ensure!(same, "{name} lies in {} and in {} with other bytes", first.tar.display(), tar.display());
@@ -162,11 +163,20 @@ impl LooseSample {
             *bytes = read_place(place)?;
         }
         let [json, mask, pose2d, pose3d, sound] = &members;
-        let words = self.words.as_ref().map(read_place).transpose()?;
-        let words = words.map(|bytes| serde_json::from_slice(&bytes).context(WORDS_EXTENSION)).transpose();
-        let sample = words.and_then(|words| Ok(Sample { words, ..self.parse(json, mask, pose2d, pose3d, sound)? }));
-        let sample = sample.and_then(|sample| sample.words_member().map(|_| sample));
-        let sample = sample.with_context(|| format!("the sample {} in {tar} is damaged", self.key))?;
+        let [words, head, trunk] = &self.optional;
+        let sample = || -> Result<Sample> {
+            let words = words.as_ref().map(read_place).transpose()?;
+            let words = words.map(|bytes| serde_json::from_slice(&bytes).context(WORDS_EXTENSION)).transpose()?;
+            let posture = match (head, trunk) {
+                (Some(head), Some(trunk)) => Some(Posture { head: angles(head)?, trunk: angles(trunk)? }),
+                (None, None) => None,
+                _ => bail!("of head.npy and trunk.npy it has one: expected both or none"),
+            };
+            let sample = Sample { words, posture, ..self.parse(json, mask, pose2d, pose3d, sound)? };
+            sample.optional_members()?;
+            Ok(sample)
+        };
+        let sample = sample().with_context(|| format!("the sample {} in {tar} is damaged", self.key))?;
         Ok((sample, members.into_iter().next().unwrap_or_default()))
     }
 
@@ -188,10 +198,17 @@ impl LooseSample {
         let sound = read_wav(sound).context("wav")?;
         fps.checked().context("json: fps")?;
         let motion = Motion { fps, joints, mask }.in_range().context("pose3d.npy")?;
-        let sample = Sample { key: self.key.clone(), motion, pose2d, sound, words: None, meta };
+        let sample = Sample { key: self.key.clone(), motion, pose2d, sound, words: None, posture: None, meta };
         sample.members()?;
         Ok(sample)
     }
+}
+
+/// Angles [T, 3] of head or trunk.
+fn angles(place: &MemberLocation) -> Result<Array2<f32>> {
+    let bytes = read_place(place)?;
+    let layout = Layout::parse(&bytes, bytes.len() as u64, Element::F32, &[3]).context("head.npy or trunk.npy")?;
+    Array2::from_shape_vec((layout.n_rows, 3), npy_slice::floats(&bytes[layout.data_at..])).context("shaping angles")
 }
 
 /// Sound of a 16-bit mono wav at the dataset's rate, with any header.

@@ -208,7 +208,7 @@ fn keep(
     let pose2d = Array3::zeros((n_frames, N_KEYPOINTS, 3));
     let key = format!("{name}-{:06}", 0);
     let in_sample = said.map(|said| said.within(0.0, end_secs));
-    let sample = Sample { key, motion, pose2d, sound, words: in_sample, meta };
+    let sample = Sample { key, motion, pose2d, sound, words: in_sample, posture: None, meta };
     sample.members().with_context(|| format!("{} makes no sample", found.motion.display()))?;
     Ok(KeptTake { moved_mm: moved[0], sample, words, lengths })
 }

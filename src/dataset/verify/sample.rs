@@ -1,17 +1,20 @@
 //! Consistency of a sample: matching shapes, joints present where the mask says so, constant bones, keypoints in range.
 
 use crate::dataset::sample::Sample;
+use crate::types::posture::PostureChannel;
 use crate::types::skeleton::{L_HAND, N_JOINTS, NECK, R_HAND, parent};
 use anyhow::{Result, ensure};
 
 /// Largest deviation of a bone from its length, metres: the rounding of float32 half a metre from the neck.
 const BONE_TOLERANCE: f64 = 1e-5;
+/// Largest angle of head or trunk, radians: half a turn and its rounding.
+const MOST_RADIANS: f32 = std::f32::consts::PI + 1e-4;
 
 /// Checks a sample whose video has these bone lengths (metres; 0: not measured).
 pub fn check_sample(sample: &Sample, lengths: &[f64]) -> Result<()> {
     // A sample that cannot be written is damaged.
     sample.members()?;
-    sample.words_member()?;
+    sample.optional_members()?;
     let (joints, mask) = (&sample.motion.joints, &sample.motion.mask);
     for t in 0..sample.n_frames() {
         let at = |joint: usize| -> [f64; 3] { std::array::from_fn(|k| f64::from(joints[[t, joint, k]])) };
@@ -38,6 +41,12 @@ pub fn check_sample(sample: &Sample, lengths: &[f64]) -> Result<()> {
             );
         }
         ensure!(at(NECK) == [0.0; 3] || at(NECK)[0].is_nan(), "frame {t}: the neck is not the origin");
+    }
+    for channel in PostureChannel::ALL {
+        for ((t, _), angle) in sample.posture.iter().flat_map(|posture| posture.channel(channel).indexed_iter()) {
+            let is_angle = angle.is_nan() || angle.abs() <= MOST_RADIANS;
+            ensure!(is_angle, "frame {t}: an angle of the {} is {angle} radians", channel.name());
+        }
     }
     let scores = sample.pose2d.index_axis(ndarray::Axis(2), 2);
     ensure!(sample.pose2d.iter().all(|v| v.is_finite()), "a keypoint is not finite");

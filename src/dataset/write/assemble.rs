@@ -101,6 +101,7 @@ pub fn assemble_into(
     let stats = gatherer.finish();
     let info = DatasetInfo::new(about, &of_speaker(&bones), splits, videos);
     let info = if stats.footage.words.is_some() { info.with_words() } else { info };
+    let info = if stats.posture.is_some() { info.with_posture() } else { info };
     let texts = [
         (INFO, pretty(&info)?),
         (STATS, pretty(&stats)?),

@@ -53,6 +53,9 @@ pub struct VideoEntry {
     pub padded_sound_secs: f64,
     /// Moments of the samples; of a video in several splits, those of its training samples.
     pub moments: JointMoments,
+    /// Moments of head and trunk of the same samples; `None`: they have no angles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub posture: Option<JointMoments>,
 }
 
 /// Properties of a video known before its samples.
@@ -110,6 +113,7 @@ impl EntryWriter {
             samples: Vec::new(),
             padded_sound_secs: 0.0,
             moments: JointMoments::default(),
+            posture: None,
         };
         Ok(Self { dir: dir.to_owned(), part, max_shard_bytes, shards: BTreeMap::new() })
     }
@@ -144,8 +148,15 @@ impl EntryWriter {
         let (dir, max_bytes) = (&self.dir, self.max_shard_bytes);
         let shards = self.shards.entry(split).or_insert_with(|| ShardWriter::new(dir, name, split, max_bytes));
         shards.push_members(sample, members)?;
-        if self.part.split.is_some() || split == Split::Train {
+        let counts = self.part.split.is_some() || split == Split::Train;
+        if counts {
             self.part.moments.learn(&sample.motion);
+        }
+        if let Some(posture) = &sample.posture {
+            let moments = self.part.posture.get_or_insert_with(JointMoments::of_posture);
+            if counts {
+                moments.learn_posture(posture);
+            }
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 //! are recorded while writing.
 
 use crate::dataset::index::{ByteRange, SampleRef, ShardRef};
-use crate::dataset::sample::{EXTENSIONS, Sample, WORDS_EXTENSION};
+use crate::dataset::sample::{EXTENSIONS, OPTIONAL_EXTENSIONS, Sample};
 use crate::dataset::split::Split;
 use crate::types::file_name::FileName;
 use anyhow::{Context, Result};
@@ -46,10 +46,11 @@ impl ShardWriter {
         self.push_members(sample, &sample.members()?)
     }
 
-    /// Appends a sample with these bytes as members, and its words.
+    /// Appends a sample with these bytes as members, and those that only some samples have.
     pub fn push_members(&mut self, sample: &Sample, members: &[Vec<u8>; 5]) -> Result<()> {
-        let words = sample.words_member()?;
-        let bytes: usize = members.iter().chain(&words).map(|m| BLOCK + m.len().next_multiple_of(BLOCK)).sum();
+        let optional = sample.optional_members()?;
+        let members = members.iter().map(Some).chain(optional.iter().map(Option::as_ref));
+        let bytes: usize = members.clone().flatten().map(|m| BLOCK + m.len().next_multiple_of(BLOCK)).sum();
         if self.open.as_ref().is_some_and(|open| open.bytes + (bytes + 2 * BLOCK) as u64 > self.max_bytes) {
             self.close()?;
         }
@@ -65,20 +66,22 @@ impl ShardWriter {
         };
         let offset = open.bytes;
         let mut hasher = blake3::Hasher::new();
-        let mut spans = Vec::with_capacity(EXTENSIONS.len());
-        for (extension, member) in EXTENSIONS.iter().chain([&WORDS_EXTENSION]).zip(members.iter().chain(&words)) {
+        let mut ranges = [None; EXTENSIONS.len() + OPTIONAL_EXTENSIONS.len()];
+        let named = EXTENSIONS.iter().chain(&OPTIONAL_EXTENSIONS).zip(members);
+        for (range, (extension, member)) in ranges.iter_mut().zip(named) {
+            let Some(member) = member else { continue };
             let header = header(&format!("{}.{extension}", sample.key), member.len())?;
             let padding = [0; BLOCK];
             let padding = &padding[..member.len().next_multiple_of(BLOCK) - member.len()];
-            spans.push(ByteRange { offset: open.bytes + BLOCK as u64, size: member.len() as u64 });
+            *range = Some(ByteRange { offset: open.bytes + BLOCK as u64, size: member.len() as u64 });
             for part in [header.as_bytes().as_slice(), member, padding] {
                 hasher.update(part);
                 open.push(part).with_context(|| format!("writing {}", path.display()))?;
             }
         }
         open.n_samples += 1;
-        let words = if words.is_some() { spans.pop() } else { None };
-        let [json, mask, pose2d, pose3d, wav] = spans.try_into().unwrap_or([ByteRange::default(); 5]);
+        let [json, mask, pose2d, pose3d, wav, words, head, trunk] = ranges;
+        let [json, mask, pose2d, pose3d, wav] = [json, mask, pose2d, pose3d, wav].map(Option::unwrap_or_default);
         self.samples.push(SampleRef {
             key: FileName::new(&*sample.key)?,
             split: self.split,
@@ -93,6 +96,8 @@ impl ShardWriter {
             pose3d,
             wav,
             words,
+            head,
+            trunk,
         });
         Ok(())
     }

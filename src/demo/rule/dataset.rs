@@ -135,6 +135,7 @@ impl SpokenClip {
             pose2d: Array3::zeros((self.n_frames, N_KEYPOINTS, 3)),
             sound: self.sound(),
             words: (self.rule == RULE_OF_WORDS).then(|| self.words()),
+            posture: None,
             meta: json!({
                 "video": self.name(), "first_frame": 0, "n_frames": self.n_frames, "fps": FPS, "start_secs": 0.0,
                 "end_secs": secs, "image_size": null, "left_hand_seen": 1.0, "right_hand_seen": 1.0,

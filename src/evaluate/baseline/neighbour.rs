@@ -3,7 +3,6 @@
 
 use crate::audio::mel;
 use crate::evaluate::clips::sound_features::POOLED;
-use crate::types::skeleton::N_JOINTS;
 use crate::types::time::FrameRate;
 use anyhow::Result;
 use ndarray::{Array3, s};
@@ -31,7 +30,7 @@ pub struct Library<'a> {
     pub asks_itself: bool,
     /// Pooled spectrogram of an entry and its number of motion frames; `None`: no sound.
     pub features: &'a (dyn Fn(usize) -> Result<Option<(Vec<f32>, usize)>> + Sync),
-    /// Joints of an entry [T, 49, 3].
+    /// Joints of an entry [T, 49, 3], angles of head and trunk behind them where they are compared.
     pub joints: &'a dyn Fn(usize) -> Result<Array3<f32>>,
 }
 
@@ -64,7 +63,7 @@ pub fn motions(queries: &[Query], library: &Library, fps: FrameRate) -> Result<O
             || vec![None; windows.len()],
             |a, b| Ok(a.into_iter().zip(b).map(|(a, b)| nearer(a, b)).collect()),
         )?;
-    let mut predicted: Vec<Array3<f32>> = queries.iter().map(|a| Array3::zeros((a.n_frames, N_JOINTS, 3))).collect();
+    let mut predicted: Vec<Array3<f32>> = Vec::new();
     // Ordered by entry, so that each is read once.
     let mut places: Vec<(usize, usize, &QueryWindow)> = Vec::with_capacity(windows.len());
     for (window, found) in windows.iter().zip(best) {
@@ -74,6 +73,10 @@ pub fn motions(queries: &[Query], library: &Library, fps: FrameRate) -> Result<O
     places.sort_by_key(|(entry, _, _)| *entry);
     for of_entry in places.chunk_by(|a, b| a.0 == b.0) {
         let joints = joints(of_entry[0].0)?;
+        if predicted.is_empty() {
+            let n_rows = joints.shape()[1];
+            predicted = queries.iter().map(|query| Array3::zeros((query.n_frames, n_rows, 3))).collect();
+        }
         for (_, first, window) in of_entry {
             let from = joints.slice(s![*first..first + window.frames.len(), .., ..]);
             predicted[window.query].slice_mut(s![window.frames.clone(), .., ..]).assign(&from);

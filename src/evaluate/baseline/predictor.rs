@@ -3,20 +3,22 @@
 use crate::formats::transcript::Word;
 use crate::generate::GestureGenerator;
 use crate::types::pose3d::Motion;
+use crate::types::posture::Posture;
 use crate::types::sound::{SAMPLE_RATE, Sound};
 use crate::types::sync;
 use anyhow::{Result, ensure};
 use ndarray::s;
 use std::ops::Range;
 
-/// Generated motion for one sound, exactly `n_frames` long.
-pub fn motion(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> Result<Motion> {
+/// Generated motion for one sound, exactly `n_frames` long, with the posture where it is learnt.
+pub fn motion(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> Result<(Motion, Option<Posture>)> {
     let wanted = sync::sample_at(speaker.fps(), SAMPLE_RATE, n_frames) + 1;
     let mut sound = sound.clone();
     sound.samples.resize(sound.samples.len().max(wanted), 0.0);
-    let predicted = speaker.motion(&sound)?;
+    let (predicted, posture) = speaker.motion_and_posture(&sound)?;
     ensure!(predicted.n_frames() >= n_frames, "{} frames of motion for {n_frames} of sound", predicted.n_frames());
-    Ok(Motion::from_joints(predicted.fps, predicted.joints.slice(s![..n_frames, .., ..]).to_owned()))
+    let motion = Motion::from_joints(predicted.fps, predicted.joints.slice(s![..n_frames, .., ..]).to_owned());
+    Ok((motion, posture.map(|posture| posture.slice(0..n_frames))))
 }
 
 /// Mismatched sound for sound `which`, as long as it: what follows half of all sounds later, with wrap-around, and so

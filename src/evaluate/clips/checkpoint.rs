@@ -11,6 +11,7 @@ use crate::mocap::bvh;
 use crate::motion::resample;
 use crate::pipeline::batch::motion_files::checkpoint_file;
 use crate::types::pose3d::Motion;
+use crate::types::posture::Posture;
 use crate::types::skeleton::{L_HAND, N_JOINTS, is_duplicate};
 use crate::types::sound::Sound;
 use crate::types::sync;
@@ -85,12 +86,18 @@ fn names(speaker: &TrainedSpeaker, place: &Path) -> [String; 4] {
 }
 
 impl EvaluatedCheckpoint {
-    /// Motion for the sound of an interval, `n_frames` at `fps`, which is its own rate but for a captured skeleton. That one
+    /// Motion and, where it is learnt, posture for the sound of an interval, `n_frames` at `fps`, which is its own rate but for a captured skeleton. That one
     /// is read as its captures are imported, and has no fingers (NaN): it holds them as in its first file.
     ///
     /// # Errors
     /// Numbers that are not finite; a captured skeleton that is no speaker's.
-    pub fn motion(&self, sound: &Sound, words: &[Word], n_frames: usize, fps: FrameRate) -> Result<Motion> {
+    pub fn motion(
+        &self,
+        sound: &Sound,
+        words: &[Word],
+        n_frames: usize,
+        fps: FrameRate,
+    ) -> Result<(Motion, Option<Posture>)> {
         let network = match &self.speaker {
             TrainedSpeaker::Gan(of) => return predictor::motion(of, sound, n_frames),
             TrainedSpeaker::Sequence(network) => network,
@@ -110,7 +117,7 @@ impl EvaluatedCheckpoint {
         };
         let n_made = motion.n_frames();
         ensure!(n_made >= n_frames, "{n_made} frames of motion for {n_frames} of sound");
-        Ok(Motion::from_joints(fps, motion.joints.slice_move(s![..n_frames, .., ..])))
+        Ok((Motion::from_joints(fps, motion.joints.slice_move(s![..n_frames, .., ..])), None))
     }
 }
 

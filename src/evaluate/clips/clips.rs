@@ -9,6 +9,7 @@ use crate::mocap::motion_file;
 use crate::motion::bones;
 use crate::motion::resample;
 use crate::types::pose3d::Motion;
+use crate::types::posture::PostureChannel;
 use crate::types::skeleton::{L_HAND, N_JOINTS, NECK, is_duplicate};
 use crate::types::sound::SAMPLE_RATE;
 use crate::types::time::FrameRate;
@@ -31,7 +32,8 @@ const OTHER_UNIT: f64 = 2.5;
 #[derive(Clone, Debug)]
 pub struct EvalClip {
     pub name: String,
-    /// Joints [T, 49, 3], metres, the neck at the origin.
+    /// Joints [T, 49, 3], metres, the neck at the origin; behind them, where the clips have channels, head and trunk as rows
+    /// 49 and 50: yaw, pitch, roll in radians, NaN where not seen.
     pub ground_truth: Array3<f32>,
     pub predicted: Array3<f32>,
     /// Mask [T, 49] of the compared joints, those seen in the ground truth.
@@ -93,6 +95,8 @@ pub struct EvalClips {
     pub notes: Vec<String>,
     /// Whether the model was trained on these clips, so that they prove nothing.
     pub learnt: bool,
+    /// What is compared beside the joints.
+    pub channels: Vec<PostureChannel>,
 }
 
 impl EvalClips {
@@ -113,6 +117,9 @@ impl EvalClips {
                 for k in 0..3 {
                     hasher.update(&clip.ground_truth[[t, joint, k]].to_le_bytes());
                 }
+            }
+            for angle in clip.ground_truth.slice(s![.., N_JOINTS.., ..]) {
+                hasher.update(&angle.to_le_bytes());
             }
             hasher.update(&clip.n_frames().to_le_bytes());
         }
@@ -142,7 +149,13 @@ pub fn read(pairs: &[FilePair], fps: Option<FrameRate>) -> Result<EvalClips> {
     let clip = |pair: &FilePair| clip(pair, fps, rate).with_context(|| format!("clip {}", pair.name));
     let read: Vec<(EvalClip, Vec<String>)> = pairs.par_iter().map(clip).collect::<Result<_>>()?;
     let (clips, notes): (Vec<EvalClip>, Vec<Vec<String>>) = read.into_iter().unzip();
-    Ok(EvalClips { fps: rate, clips, notes: notes.into_iter().flatten().collect(), learnt: false })
+    Ok(EvalClips {
+        fps: rate,
+        clips,
+        notes: notes.into_iter().flatten().collect(),
+        learnt: false,
+        channels: Vec::new(),
+    })
 }
 
 fn clip(pair: &FilePair, given: Option<FrameRate>, fps: FrameRate) -> Result<(EvalClip, Vec<String>)> {

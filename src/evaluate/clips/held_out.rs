@@ -1,16 +1,17 @@
 //! Held-out intervals that a speaker is evaluated on: ground truth and sound.
 
 use crate::dataset::index::SampleRef;
-use crate::dataset::{Dataset, Split};
+use crate::dataset::{Dataset, Sample, Split};
 use crate::formats::transcript::Word;
 use crate::generate::normalisation::Normalisation;
 use crate::motion::bones;
 use crate::types::pose3d::Motion;
-use crate::types::skeleton::N_BONES;
+use crate::types::posture::{Posture, PostureChannel};
+use crate::types::skeleton::{N_BONES, N_JOINTS};
 use crate::types::sound::Sound;
 use crate::types::sync;
 use anyhow::{Result, bail};
-use ndarray::s;
+use ndarray::{Array3, s};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -19,6 +20,8 @@ pub struct HeldOutInterval {
     pub key: String,
     /// Motion with the speaker's bone lengths, as in training; each video has its own.
     pub ground_truth: Motion,
+    /// Angles of head and trunk.
+    pub posture: Option<Posture>,
     pub sound: Sound,
     /// Words said in it, their times from its beginning.
     pub words: Vec<Word>,
@@ -46,10 +49,20 @@ pub fn read(dataset: &Dataset, samples: &[SampleRef], normal: &Normalisation) ->
     let interval = |sample| -> Result<HeldOutInterval> {
         let mut sample = dataset.read(sample)?;
         bones::with_lengths(&mut sample.motion, &lengths);
-        let words = sample.words.unwrap_or_default();
-        Ok(HeldOutInterval { key: sample.key, ground_truth: sample.motion, sound: sample.sound, words })
+        let words = sample.words.take().unwrap_or_default();
+        let Sample { key, motion: ground_truth, posture, sound, .. } = sample;
+        Ok(HeldOutInterval { key, ground_truth, posture, sound, words })
     };
     samples.par_iter().map(interval).collect()
+}
+
+/// Joints [T, 49, 3] with the angles of head and trunk behind them as rows 49 and 50, NaN where there are none.
+pub fn with_posture(joints: &Array3<f32>, posture: Option<&Posture>) -> Array3<f32> {
+    let n_rows = N_JOINTS + PostureChannel::ALL.len();
+    Array3::from_shape_fn((joints.shape()[0], n_rows, 3), |(t, row, k)| match row.checked_sub(N_JOINTS) {
+        None => joints[[t, row, k]],
+        Some(channel) => posture.map_or(f32::NAN, |posture| posture.channel(PostureChannel::ALL[channel])[[t, k]]),
+    })
 }
 
 /// Bone of joint `n + 1` to its parent, metres; 0: not known.
@@ -72,8 +85,9 @@ impl HeldOutInterval {
             ground_truth: Motion {
                 fps: ground_truth.fps,
                 joints: ground_truth.joints.slice(s![frames.clone(), .., ..]).to_owned(),
-                mask: ground_truth.mask.slice(s![frames, ..]).to_owned(),
+                mask: ground_truth.mask.slice(s![frames.clone(), ..]).to_owned(),
             },
+            posture: self.posture.as_ref().map(|posture| posture.slice(frames)),
             sound: Sound { rate: self.sound.rate, samples: sound.to_vec() },
             words: inside.map(moved).collect(),
         }

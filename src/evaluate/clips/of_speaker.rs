@@ -20,11 +20,12 @@ use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::motion::bones;
 use crate::stage::progress::Task;
 use crate::train::gan::train::normalisation;
+use crate::types::posture::{Posture, PostureChannel};
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::Sound;
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result, ensure};
-use ndarray::{Array2, Array3, s};
+use ndarray::{Array2, Array3, Axis, s};
 use rayon::prelude::*;
 
 /// Clips and predictors of checkpoints on a split of `dataset`, the motion of the checkpoints first. Bones have the
@@ -52,17 +53,22 @@ pub fn prepare(
     let normal = learnt_with.or(own_normal.as_ref()).context("there is no checkpoint to measure")?;
     task.detail("reading the intervals");
     let held_out = held_out::read(dataset, &held_out::samples(dataset, split)?, normal)?;
+    let channels = channels(checkpoints, &held_out);
     task.detail("generating motion");
     let mut generated = checkpoints
         .iter()
-        .map(|of| speak(of, &held_out, normal, fps).with_context(|| of.name.clone()))
+        .map(|of| speak(of, &held_out, normal, !channels.is_empty()).with_context(|| of.name.clone()))
         .collect::<Result<Vec<SpokenIntervals>>>()?;
     task.detail("listening");
     let notes = notes::of_checkpoints(dataset, checkpoints, &held_out, split);
     let first = std::mem::take(&mut generated.first_mut().context("there is no checkpoint to measure")?.matched);
-    let clips: Vec<EvalClip> =
-        held_out.into_par_iter().zip(first).map(|(held_out, predicted)| clip(held_out, predicted, fps)).collect();
-    let mut clips = EvalClips { fps, clips, notes, learnt: split == Split::Train };
+    let channels = &channels;
+    let clips: Vec<EvalClip> = held_out
+        .into_par_iter()
+        .zip(first)
+        .map(|(held_out, predicted)| clip(held_out, predicted, fps, !channels.is_empty()))
+        .collect();
+    let mut clips = EvalClips { fps, clips, notes, learnt: split == Split::Train, channels: channels.clone() };
     if checkpoints.iter().any(|of| of.speaker.normalisation().is_none()) {
         let is_known = |joint: usize| generated.iter().all(|spoken| spoken.joints[joint]);
         let common: Vec<usize> = (0..N_JOINTS).filter(|joint| is_known(*joint)).collect();
@@ -86,7 +92,8 @@ pub fn prepare(
         all.push(Predictor { checkpoint: several(at), ..predictor });
     }
     let still = all.len();
-    all.extend(constant_poses(dataset, normal, clips.clips.len())?);
+    let mean_posture = checkpoints.iter().filter_map(|of| of.speaker.normalisation()).find_map(mean_posture);
+    all.extend(constant_poses(dataset, normal, (clips.clips.len(), mean_posture.filter(|_| !channels.is_empty())))?);
     match copied(dataset, normal, &clips, split)? {
         Some(motions) => {
             let description =
@@ -115,7 +122,7 @@ pub fn prepare(
 
 /// Motion of a network for every interval.
 struct SpokenIntervals {
-    /// For the interval's own sound and words: joints [T, 49, 3], metres.
+    /// For the interval's own sound and words: joints [T, 49, 3], metres, and angles behind them as in a clip.
     matched: Vec<Array3<f32>>,
     /// For those of half of the split later.
     mismatched: Vec<Array3<f32>>,
@@ -127,19 +134,19 @@ fn speak(
     checkpoint: &EvaluatedCheckpoint,
     held_out: &[HeldOutInterval],
     normal: &Normalisation,
-    fps: FrameRate,
+    has_channels: bool,
 ) -> Result<SpokenIntervals> {
     let sounds: Vec<&Sound> = held_out.iter().map(|interval| &interval.sound).collect();
     let words: Vec<&[Word]> = held_out.iter().map(|interval| interval.words.as_slice()).collect();
     let other_bones = checkpoint.speaker.normalisation().is_none_or(|own| own.bone_lengths != normal.bone_lengths);
     let motion = |at: usize, sound: &Sound, words: &[Word]| -> Result<Array3<f32>> {
         let HeldOutInterval { key, ground_truth, .. } = &held_out[at];
-        let made = checkpoint.motion(sound, words, ground_truth.n_frames(), fps);
-        let mut made = made.with_context(|| format!("no motion for {key}"))?;
+        let made = checkpoint.motion(sound, words, ground_truth.n_frames(), ground_truth.fps);
+        let (mut made, posture) = made.with_context(|| format!("no motion for {key}"))?;
         if other_bones {
             bones::with_lengths(&mut made, &held_out::lengths(normal));
         }
-        Ok(made.joints)
+        Ok(if has_channels { held_out::with_posture(&made.joints, posture.as_ref()) } else { made.joints })
     };
     let all = 0..held_out.len();
     let matched = all.clone().map(|at| motion(at, sounds[at], words[at])).collect::<Result<Vec<_>>>()?;
@@ -162,8 +169,11 @@ fn restrict(clips: &mut EvalClips, common: &[usize]) {
     }
 }
 
-fn clip(held_out: HeldOutInterval, predicted: Array3<f32>, fps: FrameRate) -> EvalClip {
-    let HeldOutInterval { key, ground_truth, sound, .. } = held_out;
+fn clip(held_out: HeldOutInterval, predicted: Array3<f32>, fps: FrameRate, has_channels: bool) -> EvalClip {
+    let HeldOutInterval { key, mut ground_truth, posture, sound, .. } = held_out;
+    if has_channels {
+        ground_truth.joints = held_out::with_posture(&ground_truth.joints, posture.as_ref());
+    }
     let features = Some(sound_features::from_samples(&sound.samples, fps, ground_truth.n_frames()));
     let mut predicted = predicted;
     let (mask, _) = compared(&ground_truth.joints, &ground_truth.mask, &mut predicted);
@@ -171,8 +181,30 @@ fn clip(held_out: HeldOutInterval, predicted: Array3<f32>, fps: FrameRate) -> Ev
     EvalClip { name: key, ground_truth: ground_truth.joints, predicted, mask, features, audio }
 }
 
-/// Mean and median pose of the training split.
-fn constant_poses(dataset: &Dataset, normal: &Normalisation, n_clips: usize) -> Result<Vec<Predictor>> {
+/// What is measured beside the joints: channels that a checkpoint makes and that the split shows.
+fn channels(checkpoints: &[EvaluatedCheckpoint], held_out: &[HeldOutInterval]) -> Vec<PostureChannel> {
+    let learnt = |channel: PostureChannel| {
+        let of = |normal: &Normalisation| normal.channels.iter().any(|own| own.channel == channel);
+        checkpoints.iter().filter_map(|of| of.speaker.normalisation()).any(of)
+    };
+    let is_seen = |channel: PostureChannel| {
+        let mut postures = held_out.iter().filter_map(|interval| interval.posture.as_ref());
+        postures.any(|posture| posture.channel(channel).iter().any(|v| v.is_finite()))
+    };
+    PostureChannel::ALL.into_iter().filter(|channel| learnt(*channel) && is_seen(*channel)).collect()
+}
+
+/// The mean posture of a checkpoint's training split, one frame; `None`: it learns none.
+fn mean_posture(normal: &Normalisation) -> Option<Posture> {
+    normal.posture(Array2::zeros((normal.n_numbers(), 1)).view())
+}
+
+/// Mean and median pose of the training split, both with the mean posture.
+fn constant_poses(
+    dataset: &Dataset,
+    normal: &Normalisation,
+    (n_clips, mean_posture): (usize, Option<Posture>),
+) -> Result<Vec<Predictor>> {
     let mut constant_poses = ConstantPoses::default();
     for sample in dataset.samples(Split::Train) {
         let interval = held_out::read(dataset, &[sample], normal)?.remove(0);
@@ -181,7 +213,11 @@ fn constant_poses(dataset: &Dataset, normal: &Normalisation, n_clips: usize) -> 
     let mean: Array2<f32> = normal.joints(Array2::zeros((N_FEATURES, 1)).view()).slice(s![0, .., ..]).to_owned();
     let mut median = constant_poses.median();
     median.zip_mut_with(&mean, |v, mean| *v = if v.is_finite() { *v } else { *mean });
-    let predictor = |kind: PredictorKind, pose: Array2<f32>| {
+    let predictor = |kind: PredictorKind, mut pose: Array2<f32>| {
+        if mean_posture.is_some() {
+            let frame = held_out::with_posture(&pose.insert_axis(Axis(0)), mean_posture.as_ref());
+            pose = frame.index_axis_move(Axis(0), 0);
+        }
         let description = format!("the {} of the training split in every frame, which never moves", kind.name());
         Predictor::new(kind, description, vec![ClipMotion::Constant(pose); n_clips])
     };
@@ -214,9 +250,14 @@ pub fn copied(
             let n_frames = interval.ground_truth.n_frames();
             Ok(Some((listener.finish(n_frames).rows, n_frames)))
         },
-        joints: &|entry| Ok(read(entry)?.ground_truth.joints),
+        joints: &|entry| {
+            let HeldOutInterval { ground_truth, posture, .. } = read(entry)?;
+            Ok(match clips.channels.is_empty() {
+                true => ground_truth.joints,
+                false => held_out::with_posture(&ground_truth.joints, posture.as_ref()),
+            })
+        },
     };
     let predicted = neighbour::motions(&query, &library, clips.fps)?;
-    debug_assert!(predicted.iter().flatten().all(|joints| joints.shape()[1..] == [N_JOINTS, 3]));
     Ok(predicted.map(|predicted| predicted.into_iter().map(ClipMotion::Motion).collect()))
 }

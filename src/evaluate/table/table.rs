@@ -66,7 +66,8 @@ pub fn measure(
     predictors: &[Predictor],
     task: &dyn Task,
 ) -> Result<Table> {
-    let settings = MetricSettings { fps: clips.fps, has_fingers: clips.have_fingers(), ..settings.clone() };
+    let (has_fingers, channels) = (clips.have_fingers(), clips.channels.clone());
+    let settings = MetricSettings { fps: clips.fps, has_fingers, channels, ..settings.clone() };
     let catalogue = Catalogue::new(&settings)?;
     ensure!(clips.n_frames() > 0, "there is no frame to measure");
     let (mut rows, mut n_blocks) = (Vec::new(), 0);

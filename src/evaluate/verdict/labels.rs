@@ -4,7 +4,7 @@ use crate::evaluate::table::bootstrap::Estimate;
 use crate::metrics::catalogue::{Better, Definition};
 
 /// Names of metric families; of common prefixes the longest comes first.
-const NAMES: [(&str, &str); 21] = [
+const NAMES: [(&str, &str); 25] = [
     ("pck_3d", "correct keypoints"),
     ("pck_2d", "correct keypoints, front view"),
     ("l1div", "diversity within a clip"),
@@ -26,6 +26,10 @@ const NAMES: [(&str, &str); 21] = [
     ("frechet_window", "Frechet distance, movements of a second"),
     ("frechet_embedding", "Frechet distance, movements, embedded"),
     ("cca", "canonical correlation"),
+    ("angle_error", "angle error"),
+    ("angular_speed", "angular speed"),
+    ("hellinger_angular_speed", "angular speeds unlike the truth's (Hellinger)"),
+    ("angle_correlation", "correlation of angles"),
 ];
 
 /// Name with the part of the body, like `correct keypoints at 0.2, fingers`.

@@ -83,7 +83,8 @@ fn is_main(table: &Table, index: usize) -> bool {
     let has_name = |i: &usize| labels::whole_name(&table.definitions[*i]) == name && table.is_shown(*i);
     let first = (0..table.definitions.len()).find(has_name);
     let is_place = ["pck_3d", "mpjpe"].iter().any(|start| definition.name.starts_with(start));
-    first == Some(index) || (is_place && ["body", "hands"].contains(&definition.part))
+    let is_angle = table.settings.channels.iter().any(|channel| channel.name() == definition.part);
+    first == Some(index) || is_angle || (is_place && ["body", "hands"].contains(&definition.part))
 }
 
 fn named(table: &Table, index: usize) -> String {

@@ -83,7 +83,7 @@ fn family(
 }
 
 /// Of two histograms of counts; NaN where one is empty.
-fn distance(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn distance(a: &[f64], b: &[f64]) -> f64 {
     let both = a.iter().sum::<f64>() * b.iter().sum::<f64>();
     let overlap = a.iter().zip(b).map(|(a, b)| (a * b).sqrt()).sum::<f64>() / both.sqrt();
     // rounding may leave it above 1

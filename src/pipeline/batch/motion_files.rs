@@ -16,6 +16,7 @@ use crate::generate::model::BEST;
 use crate::stage::progress::Progress;
 use crate::stage::workdir::FolderLock;
 use crate::types::pose3d::Motion;
+use crate::types::posture::Posture;
 use crate::types::sound::SAMPLE_RATE;
 use anyhow::{Context as _, Result, ensure};
 use std::path::{Path, PathBuf};
@@ -64,17 +65,17 @@ pub fn write_motion(
     let task = progress.begin("speech to motion", n_frames as u64);
     task.detail(&format!("{secs:.1} s of sound"));
     let pieces = SoundStream::open(audio, SAMPLE_RATE);
-    let motion =
+    let (motion, posture) =
         speaker.motion_of_pieces(pieces, n_samples, CHUNK, &mut |n| task.advance(n as u64)).with_context(no_motion)?;
     drop(task);
     let motion_secs = started.elapsed().as_secs_f64();
-    write_outputs(motion, speech, outputs, progress)?;
+    write_outputs((motion, posture), speech, outputs, progress)?;
     Ok(SpokenMotion { secs, n_frames, motion_secs, note, segments: None })
 }
 
 /// Writes motion for a sound to files of all formats.
 pub(super) fn write_outputs(
-    motion: Motion,
+    (motion, posture): (Motion, Option<Posture>),
     &SpeechSource { audio, figure, .. }: &SpeechSource,
     outputs: &[(PathBuf, ExportFormat)],
     progress: &dyn Progress,
@@ -85,7 +86,9 @@ pub(super) fn write_outputs(
         format.write_joints(path, &motion)?;
     }
     if !figures.is_empty() {
-        let performance = perform(&motion, None, &AnimationOptions { fps: figure.fps, ..AnimationOptions::default() });
+        let performance =
+            perform(&motion, posture.as_ref(), &AnimationOptions { fps: figure.fps, ..AnimationOptions::default() });
+        let posture = posture.as_ref().map(|posture| (motion.fps, posture));
         drop(motion);
         let is_film = figures.iter().any(|(_, format)| *format == ExportFormat::Mp4);
         let sound = if is_film { audio::read_mono(audio, SAMPLE_RATE)? } else { None };
@@ -93,6 +96,7 @@ pub(super) fn write_outputs(
             sound: sound.as_ref(),
             names: figure.names,
             film_fps: figure.fps,
+            posture,
             ..ExportContent::default()
         };
         for (path, format) in figures {

@@ -58,7 +58,7 @@ pub fn write_sequence(
         let text = speaker.bvh(&poses)?;
         outputs.iter().try_for_each(|(path, _)| workdir::write_file(path, text.as_bytes()))?;
     } else {
-        write_outputs(speaker.motion(&poses)?, speech, outputs, progress)?;
+        write_outputs((speaker.motion(&poses)?, None), speech, outputs, progress)?;
     }
     let known = said.as_ref().map(|said| [said.words.len(), speaker.metadata.vocabulary.n_known(&said.words)]);
     let notes = transcript.zip(said).map(|(path, said)| notes(speaker, path, &said, sound.secs()));

@@ -8,7 +8,7 @@ use super::outcome::{DatasetOutcome, SeveralPeople};
 use super::people;
 use super::people::PersonSeen;
 use super::run::DatasetRun;
-use super::video::{FILES, LiftedVideo};
+use super::video::{FILES, LiftedVideo, POSTURE_VERSION};
 use crate::config;
 use crate::config::Settings;
 use crate::config::videos::Videos;
@@ -134,7 +134,10 @@ impl DatasetStage {
 
     /// Opens a video, with its words where the speaker has transcripts.
     fn open(&self, video: &Unit) -> Result<LiftedVideo> {
-        let opened = LiftedVideo::open(&self.work, video, self.fixes_offset)?;
+        let mut opened = LiftedVideo::open(&self.work, video, self.fixes_offset)?;
+        if self.settings.posture {
+            opened = opened.with_posture();
+        }
         let has_words = self.speakers.iter().any(|said| said.name == video.speaker && !said.transcripts.is_empty());
         Ok(if has_words { opened.with_words(self.transcript(video)) } else { opened })
     }
@@ -203,6 +206,11 @@ impl Stage for DatasetStage {
         });
         if let (true, Some(settings)) = (self.fixes_offset, settings.as_object_mut()) {
             settings.insert("fix_offset".to_owned(), true.into());
+        }
+        // Of datasets without angles the settings are those of the versions that knew none.
+        match self.settings.posture {
+            true => settings["estimator"] = POSTURE_VERSION.into(),
+            false => drop(settings["dataset"].as_object_mut().and_then(|dataset| dataset.shift_remove("posture"))),
         }
         if let (false, Some(settings)) = (said.transcripts.is_empty(), settings.as_object_mut()) {
             settings.insert("words".to_owned(), true.into());

@@ -6,6 +6,8 @@ use crate::dataset::bones::VideoBones;
 use crate::dataset::sample::Sample;
 use crate::dataset::words::VideoWords;
 use crate::formats::{joints_npz, keypoints_npz};
+use crate::motion::posture;
+use crate::motion::posture::LiftedBody;
 use crate::stage::Unit;
 use crate::stage::artifacts::{Artifact, StageName, dir};
 use crate::stage::fingerprint::hash_file;
@@ -14,6 +16,7 @@ use crate::stage::record::Record;
 use crate::types::interval::{Interval, Intervals};
 use crate::types::pose2d::Keypoints;
 use crate::types::pose3d::Motion;
+use crate::types::posture::Posture;
 use crate::types::skeleton::{L_HAND, N_HAND_JOINTS, R_HAND};
 use crate::types::sound::{SAMPLE_RATE, Sound};
 use crate::types::sync;
@@ -46,7 +49,12 @@ pub struct LiftedVideo {
     joints: PathBuf,
     /// Its words; `None`: no transcripts were asked for.
     pub words: Option<VideoWords>,
+    /// Whether its samples have the angles of head and trunk.
+    has_posture: bool,
 }
+
+/// Version of the angles of head and trunk, for what is made of them.
+pub const POSTURE_VERSION: u32 = 1;
 
 /// The files read of each video, and whether it may be missing.
 pub const FILES: [(Artifact, bool); 6] = [
@@ -120,6 +128,7 @@ impl LiftedVideo {
             content,
             intervals,
             words: None,
+            has_posture: false,
         })
     }
 
@@ -132,6 +141,14 @@ impl LiftedVideo {
         self.files_hash =
             blake3::hash(format!("{} words {name} {hash}\n", self.files_hash).as_bytes()).to_hex().to_string();
         self.words = Some(VideoWords::read(transcript, sound_secs / rate, self.shift as f64 / rate));
+        self
+    }
+
+    /// Gives its samples the angles of head and trunk.
+    pub fn with_posture(mut self) -> Self {
+        let made_from = format!("{} posture {POSTURE_VERSION}\n", self.files_hash);
+        self.files_hash = blake3::hash(made_from.as_bytes()).to_hex().to_string();
+        self.has_posture = true;
         self
     }
 
@@ -180,7 +197,11 @@ impl LiftedVideo {
             "{} is not 16-bit mono at {SAMPLE_RATE} Hz: run the extract stage again",
             self.sound.display()
         );
-        Ok(Some(LiftedSamples { video: self, keypoints, motion, sound, waiting: intervals.iter() }))
+        let posture = self.has_posture.then(|| {
+            let lifted = LiftedBody { joints: Some(motion.joints.view()), extra: None };
+            posture::estimate(keypoints.body.view(), lifted)
+        });
+        Ok(Some(LiftedSamples { video: self, keypoints, motion, posture, sound, waiting: intervals.iter() }))
     }
 }
 
@@ -189,6 +210,7 @@ pub struct LiftedSamples<'a> {
     video: &'a LiftedVideo,
     keypoints: Keypoints,
     motion: Motion,
+    posture: Option<Posture>,
     sound: hound::WavReader<BufReader<File>>,
     waiting: std::slice::Iter<'a, Interval>,
 }
@@ -235,7 +257,8 @@ impl LiftedSamples<'_> {
         let padded_secs = n_padded as f64 / f64::from(SAMPLE_RATE);
         let words =
             self.video.words.as_ref().map(|words| words.within(fps.secs(interval.start), fps.secs(interval.end)));
-        Ok(CutSample { sample: Sample { key, motion, pose2d, sound, words, meta }, padded_secs })
+        let posture = self.posture.as_ref().map(|posture| posture.slice(interval.start..interval.end));
+        Ok(CutSample { sample: Sample { key, motion, pose2d, sound, words, posture, meta }, padded_secs })
     }
 
     /// The sound under an interval, and how many samples of silence stand in for some that are not there.

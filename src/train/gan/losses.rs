@@ -88,13 +88,14 @@ impl BoneConstancy {
         })
     }
 
-    /// The loss of normalised poses [B, 144, T].
+    /// The loss of normalised poses [B, 144, T]; channels behind them have no say.
     pub fn loss(&self, poses: &Tensor) -> Result<Tensor> {
         let (batch, n_numbers, n_frames) = poses.dims3()?;
         let n_bones = self.inverse_lengths.dim(1)?;
-        if n_bones == 0 || n_frames < 2 || n_numbers != N_FEATURES {
+        if n_bones == 0 || n_frames < 2 || n_numbers < N_FEATURES {
             return poses.zeros_like()?.mean_all();
         }
+        let poses = poses.narrow(1, 0, N_FEATURES)?;
         let metres = poses.broadcast_mul(&self.std)?.broadcast_add(&self.mean)?;
         let neck = Tensor::zeros((batch, 3, n_frames), poses.dtype(), poses.device())?;
         let joints = Tensor::cat(&[neck, metres], 1)?;
@@ -165,7 +166,10 @@ mod tests {
         let bones = BoneConstancy::new(&normal(), DType::F64, &Device::Cpu)?;
         let still = pattern(&[1, N_FEATURES, 1], 0.0)?.broadcast_as((1, N_FEATURES, 5))?.contiguous()?;
         assert!(bones.loss(&still)?.to_scalar::<f64>()? < 1e-12);
-        assert!(bones.loss(&pattern(&[1, N_FEATURES, 5], 0.0)?)?.to_scalar::<f64>()? > 0.01);
+        let moving = pattern(&[1, N_FEATURES, 5], 0.0)?;
+        let loss = bones.loss(&moving)?.to_scalar::<f64>()?;
+        let with_channels = Tensor::cat(&[&moving, &pattern(&[1, 6, 5], 7.0)?], 1)?;
+        assert!(loss > 0.01 && loss == bones.loss(&with_channels)?.to_scalar::<f64>()?);
         Ok(())
     }
 }

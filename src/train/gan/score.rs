@@ -1,7 +1,9 @@
 //! What a validation says of a generator: metrics beside those of the pose that never moves from the mean, the one
 //! score that chooses the best checkpoint, and the alarm of a collapse.
 
+use crate::types::posture::PostureChannel;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Generated motion with less than this share of the data's energy hardly moves.
 const LEAST_ENERGY: f64 = 0.3;
@@ -23,6 +25,14 @@ pub struct ValidationMetrics {
     pub energy: f64,
 }
 
+/// Mean absolute error of the angles of a channel, degrees, where they are seen.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChannelError {
+    pub generator: f64,
+    /// Of the mean posture in every frame.
+    pub mean_pose: f64,
+}
+
 /// The generator beside the mean pose, on the same windows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Validation {
@@ -33,6 +43,9 @@ pub struct Validation {
     pub n_poses: usize,
     pub generator: ValidationMetrics,
     pub mean_pose: ValidationMetrics,
+    /// Of what is learnt beside the joints.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub channels: BTreeMap<PostureChannel, ChannelError>,
     /// Mean change of a bone's length from frame to frame in the network's own output, mm.
     pub bone_change_mm: f64,
     /// How much windows of different sound differ from each other, as a share of what real windows differ by.

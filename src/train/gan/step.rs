@@ -9,7 +9,6 @@ use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
 use crate::generate::model::BEST;
 use crate::generate::model::{GENERATOR, SpeakerMetadata};
-use crate::generate::normalisation::N_FEATURES;
 use crate::generate::representation::PoseDecoder;
 use crate::nn::device;
 use crate::nn::gan::discriminator::{Discriminator, motion};
@@ -83,7 +82,7 @@ impl GanTrainer {
         let generator = Generator::new(&mut generator_params, &metadata.network)?;
         // Another seed, or tensors of the same name would begin alike.
         let mut discriminator_params = Params::new(!settings.seed).on(&device);
-        let discriminator = Discriminator::new(&mut discriminator_params, N_FEATURES)?;
+        let discriminator = Discriminator::new(&mut discriminator_params, metadata.normalisation.n_numbers())?;
         let adam = adam::Config { max_norm: Some(MAX_NORM), ..adam::Config::default() };
         Ok(Self {
             decoder: metadata.representation.decoder(&metadata.normalisation, DType::F32, &device)?,
@@ -186,7 +185,12 @@ impl GanTrainer {
 
     fn stored(&self) -> Result<Value> {
         let (speaker, settings) = (self.metadata.clone(), self.settings.clone());
-        Ok(serde_json::to_value(TrainerState { speaker, settings, step: self.step, best: self.best })?)
+        let mut state = serde_json::to_value(TrainerState { speaker, settings, step: self.step, best: self.best })?;
+        if self.settings.channels.is_empty() {
+            // The bytes of a checkpoint without channels are those of the versions that knew none.
+            state["settings"].as_object_mut().and_then(|settings| settings.shift_remove("channels"));
+        }
+        Ok(state)
     }
 
     /// Takes up the tensors and the place of a checkpoint.

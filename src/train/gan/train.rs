@@ -13,7 +13,7 @@ use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
 pub use crate::generate::model::BEST;
 use crate::generate::model::SpeakerMetadata;
-use crate::generate::normalisation::{N_FEATURES, Normalisation};
+use crate::generate::normalisation::{ChannelNormalisation, Normalisation};
 use crate::generate::representation::Representation;
 use crate::motion::bones;
 use crate::nn::cpu::thread_team::with_spinning_workers;
@@ -24,6 +24,7 @@ use crate::stage::progress::Progress;
 use crate::stage::workdir::{self, FolderLock};
 use crate::train::epochs::{self, EpochSchedule, StepReport, ValidatedTraining};
 use crate::train::resume::{self, sample_windows};
+use crate::types::posture::PostureChannel;
 use crate::types::skeleton::N_BONES;
 use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
@@ -73,7 +74,10 @@ pub fn train(
     let resumed = resume(dataset, requested, folder, progress)?;
     let (settings, normal) = match &resumed {
         Some((stored, _)) => (stored.settings.clone(), stored.speaker.normalisation.clone()),
-        None => (requested.clone(), normalisation(dataset)?),
+        None => {
+            let channels = channels(dataset, &requested.channels)?;
+            (requested.clone(), Normalisation { channels, ..normalisation(dataset)? })
+        }
     };
     let loader = WindowLoader::load(dataset, Split::Train, &normal, settings.window_frames, settings.stride_frames)?;
     ensure!(
@@ -91,7 +95,7 @@ pub fn train(
                 MotionRepresentation::Positions => Representation::Positions,
                 MotionRepresentation::Bones => Representation::bones(&normal, loader.poses()),
             };
-            let network = Config::from_preset(preset(settings.preset), N_FEATURES);
+            let network = Config::from_preset(preset(settings.preset), normal.n_numbers());
             let (info, hash) = (dataset.info(), dataset.hash()?);
             let metadata = SpeakerMetadata::new(&info.speaker, info.fps, &hash, network, normal, representation);
             GanTrainer::new(metadata, settings)?
@@ -238,6 +242,23 @@ fn check(settings: &GanConfig) -> Result<()> {
     );
     device::open(settings.device == ComputeDevice::Cuda)?;
     Ok(())
+}
+
+/// Statistics of the channels that are to be learnt.
+fn channels(dataset: &Dataset, wanted: &[PostureChannel]) -> Result<Vec<ChannelNormalisation>> {
+    let posture = dataset.stats().posture.as_ref();
+    let of = |channel: PostureChannel| -> Result<ChannelNormalisation> {
+        let stats = posture.and_then(|posture| posture.get(&channel)).filter(|stats| stats.n_seen != [0; 3]);
+        let stats = stats.with_context(|| {
+            let (name, dir) = (channel.name(), dataset.dir().display());
+            format!(
+                "gan.channels asks for \"{name}\", which {dir} does not show in any frame to train on: set posture = true \
+                 under [dataset] and make the dataset again, or leave it out"
+            )
+        })?;
+        Ok(ChannelNormalisation::new(channel, stats.n_seen, stats.mean, stats.std))
+    };
+    PostureChannel::ALL.into_iter().filter(|channel| wanted.contains(channel)).map(of).collect()
 }
 
 /// Statistics of the training split; bone lengths where the dataset does not state them are measured.

@@ -2,7 +2,7 @@
 
 use super::losses;
 use super::score;
-use super::score::{Validation, ValidationMetrics};
+use super::score::{ChannelError, Validation, ValidationMetrics};
 use super::step::GanTrainer;
 use super::windows::{WindowBatch, WindowLoader};
 use crate::config::GanConfig;
@@ -77,11 +77,15 @@ impl ValidationWindows {
         let (mut predicted, mut mean_pose, mut ground_truth) =
             (PredictorSums::default(), PredictorSums::default(), PredictorSums::default());
         let (mut change, mut spread) = (RunningMean::default(), WindowSpread::default());
+        let mut angles: Vec<AngleSums> = normal.channels.iter().map(|_| AngleSums::default()).collect();
         let mut n_windows = 0;
         for batch in &self.batches {
             let batch = &batch.on(trainer.device())?;
             let poses = decoder.poses(&generator.forward(&batch.mels, self.n_frames, false)?.detach())?;
             let nothing = poses.zeros_like()?;
+            for (n, (of, sums)) in normal.channels.iter().zip(&mut angles).enumerate() {
+                sums.add(&poses, batch, N_FEATURES + 3 * n, of.std)?;
+            }
             for (tally, poses) in
                 [(&mut predicted, &poses), (&mut mean_pose, &nothing), (&mut ground_truth, &batch.poses)]
             {
@@ -105,6 +109,7 @@ impl ValidationWindows {
             n_poses: ground_truth.poses.n,
             generator,
             mean_pose,
+            channels: normal.channels.iter().zip(&angles).map(|(of, sums)| (of.channel, sums.error())).collect(),
             bone_change_mm: 1e3 * change.mean(),
             spread: spread.share(),
             score: score::score(&generator, &mean_pose),
@@ -131,7 +136,8 @@ fn joints(poses: &Tensor, i: usize, normal: &Normalisation) -> Result<Array3<f32
 
 fn features(x: &Tensor, i: usize) -> Result<Array2<f32>> {
     let values = x.get(i)?.flatten_all()?.to_vec1::<f32>()?;
-    Ok(Array2::from_shape_vec((N_FEATURES, values.len() / N_FEATURES), values)?)
+    let n_numbers = x.dim(1)?;
+    Ok(Array2::from_shape_vec((n_numbers, values.len() / n_numbers), values)?)
 }
 
 /// A predictor's sums so far.
@@ -169,6 +175,34 @@ impl PredictorSums {
                 .filter(|share| share.is_finite())
                 .unwrap_or(0.0),
         }
+    }
+}
+
+/// Errors of the angles of a channel so far, degrees.
+#[derive(Default)]
+struct AngleSums {
+    generator: RunningMean,
+    mean_pose: RunningMean,
+}
+
+impl AngleSums {
+    /// Adds a batch whose angles begin at number `first`, with these deviations in radians.
+    fn add(&mut self, poses: &Tensor, batch: &WindowBatch, first: usize, std: [f32; 3]) -> Result<()> {
+        for (k, std) in std.into_iter().enumerate() {
+            let numbers =
+                |x: &Tensor| -> Result<Vec<f32>> { Ok(x.get_on_dim(1, first + k)?.flatten_all()?.to_vec1()?) };
+            let [made, real, mask] = [numbers(poses)?, numbers(&batch.poses)?, numbers(&batch.mask)?];
+            let degrees = |normalised: f32| f64::from((normalised * std).abs().to_degrees());
+            for ((made, real), _) in made.iter().zip(&real).zip(&mask).filter(|(_, seen)| **seen > 0.0) {
+                self.generator.add([degrees(made - real)]);
+                self.mean_pose.add([degrees(*real)]);
+            }
+        }
+        Ok(())
+    }
+
+    fn error(&self) -> ChannelError {
+        ChannelError { generator: self.generator.mean(), mean_pose: self.mean_pose.mean() }
     }
 }
 
@@ -236,7 +270,7 @@ fn bone_changes(joints: ArrayView3<f32>) -> Vec<f64> {
         .collect()
 }
 
-/// Mask of numbers [144, T] to mask of joints [T, 49]; the hand roots are seen where the wrists are.
+/// Mask of numbers [144 or more, T] to mask of joints [T, 49]; the hand roots are seen where the wrists are.
 fn joints_seen(mask: ArrayView2<f32>) -> Array2<bool> {
     Array2::from_shape_fn((mask.ncols(), N_JOINTS), |(t, joint)| match joint {
         NECK => true,

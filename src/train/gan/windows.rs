@@ -4,9 +4,10 @@
 use crate::audio::mel;
 use crate::dataset::{Dataset, Split};
 use crate::generate::mel_stream::mel_frames;
-use crate::generate::normalisation::{N_FEATURES, Normalisation};
+use crate::generate::normalisation::Normalisation;
 use crate::motion::bones;
 use crate::types::interval::Interval as Span;
+use crate::types::skeleton::N_BONES;
 use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
 use candle_core::{Device, Tensor};
@@ -15,9 +16,9 @@ use rayon::prelude::*;
 
 /// One interval.
 struct TrainingInterval {
-    /// [144, T]
+    /// [numbers, T]: 144 and those of the channels.
     features: Array2<f32>,
-    /// [48, T]: whether the joint (all but the neck) is to be learnt there.
+    /// [48 + 3 x channels, T]: whether the joint (all but the neck), or the angle, is to be learnt there.
     mask: Array2<bool>,
     /// [64, at least the mel frames of T]
     mels: Array2<f32>,
@@ -27,6 +28,8 @@ struct TrainingInterval {
 pub struct WindowLoader {
     fps: FrameRate,
     n_frames: usize,
+    /// Numbers of a pose.
+    n_numbers: usize,
     intervals: Vec<TrainingInterval>,
     /// Interval and first frame of every window.
     starts: Vec<(usize, usize)>,
@@ -36,9 +39,9 @@ pub struct WindowLoader {
 pub struct WindowBatch {
     /// [B, 64, mel frames]
     pub mels: Tensor,
-    /// [B, 144, n_frames], normalised; 0 where missing.
+    /// [B, numbers, n_frames], normalised; 0 where missing.
     pub poses: Tensor,
-    /// [B, 144, n_frames], 1 where the number is to be learnt.
+    /// [B, numbers, n_frames], 1 where the number is to be learnt.
     pub mask: Tensor,
 }
 
@@ -67,7 +70,7 @@ impl WindowLoader {
             let mut sample = dataset.read(sample)?;
             // Every video has its own constant lengths; the generator learns one body.
             bones::with_lengths(&mut sample.motion, &lengths);
-            let (features, mask) = normal.features(&sample.motion);
+            let (features, mask) = normal.features_with_channels(&sample.motion, sample.posture.as_ref());
             // Rounding may ask for one spectrogram frame more than the sound has windows for.
             let enough = mel::n_samples(mel_frames(fps, sample.motion.n_frames()) + 1);
             let mut samples = sample.sound.samples;
@@ -81,10 +84,10 @@ impl WindowLoader {
             (0..n_windows).map(move |window| (i, window * stride)).collect::<Vec<_>>()
         };
         let starts = intervals.iter().enumerate().flat_map(of_interval).collect();
-        Ok(Self { fps, n_frames, intervals, starts })
+        Ok(Self { fps, n_frames, n_numbers: normal.n_numbers(), intervals, starts })
     }
 
-    /// All poses as normalised numbers [144, T] with the joints seen [48, T], interval by interval.
+    /// All poses as normalised numbers [144 or more, T] with the joints seen [48 or more, T], interval by interval.
     pub fn poses(&self) -> impl Iterator<Item = (ArrayView2<'_, f32>, ArrayView2<'_, bool>)> {
         self.intervals.iter().map(|interval| (interval.features.view(), interval.mask.view()))
     }
@@ -108,15 +111,17 @@ impl WindowLoader {
             let first_mel = mel_frames(self.fps, start);
             take(&mut mels, &interval.mels, first_mel, n_mels);
             take(&mut poses, &interval.features, start, self.n_frames);
-            for seen in interval.mask.slice_axis(Axis(1), Slice::from(start..start + self.n_frames)).rows() {
-                (0..3).for_each(|_| mask.extend(seen.iter().map(|seen| f32::from(*seen))));
+            let seen = interval.mask.slice_axis(Axis(1), Slice::from(start..start + self.n_frames));
+            for (row, seen) in seen.outer_iter().enumerate() {
+                let n_numbers = if row < N_BONES { 3 } else { 1 };
+                (0..n_numbers).for_each(|_| mask.extend(seen.iter().map(|seen| f32::from(*seen))));
             }
         }
         let tensor = |values, rows, columns| Tensor::from_vec(values, (which.len(), rows, columns), &Device::Cpu);
         Ok(WindowBatch {
             mels: tensor(mels, mel::N_MELS, n_mels)?,
-            poses: tensor(poses, N_FEATURES, self.n_frames)?,
-            mask: tensor(mask, N_FEATURES, self.n_frames)?,
+            poses: tensor(poses, self.n_numbers, self.n_frames)?,
+            mask: tensor(mask, self.n_numbers, self.n_frames)?,
         })
     }
 }

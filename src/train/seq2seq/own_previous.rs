@@ -73,7 +73,9 @@ mod tests {
     fn chosen_segments_go_on_from_the_networks_poses_at_their_own_frames() {
         let fps = FrameRate::new(15, 1);
         let network = Config { context: 3, audio: 26, ..network_config(fps, 1, 2, [4, 4]) };
-        let normalisation = Normalisation { mean: Vec::new(), std: Vec::new(), bone_lengths: Vec::new() };
+        let nothing = Vec::new;
+        let normalisation =
+            Normalisation { mean: nothing(), std: nothing(), bone_lengths: nothing(), channels: Vec::new() };
         let metadata = SequenceMetadata {
             kind: SequenceMetadata::kind(),
             name: String::new(),

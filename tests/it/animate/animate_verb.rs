@@ -154,6 +154,7 @@ fn a_dataset_has_the_face_and_the_sound_of_its_samples() {
         pose2d: pose2d.clone(),
         sound: sound.clone(),
         words: None,
+        posture: None,
         meta: serde_json::json!({ "first_frame": 0, "n_frames": n_frames }),
     };
     let samples: Vec<(Split, Sample)> = vec![(Split::Train, sample(0)), (Split::Test, sample(1))];

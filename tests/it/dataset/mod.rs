@@ -6,6 +6,7 @@ pub mod forget;
 pub mod import;
 pub mod import_readers;
 pub mod people;
+pub mod posture;
 pub mod shard;
 pub mod shared_sound;
 pub mod sound_offset;

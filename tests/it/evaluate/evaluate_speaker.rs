@@ -112,7 +112,7 @@ fn the_neighbour_by_sound_is_found_where_it_was_taken_from() {
         features,
         audio: None,
     };
-    let clips = EvalClips { fps, clips: vec![clip], notes: Vec::new(), learnt: false };
+    let clips = EvalClips { fps, clips: vec![clip], notes: Vec::new(), learnt: false, channels: Vec::new() };
     let found = copied(&dataset, &normal, &clips, Split::Validation).unwrap().unwrap();
     let ClipMotion::Motion(found) = &found[0] else { panic!("it stands still") };
     let apart = found.iter().zip(&ground_truth.joints).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();

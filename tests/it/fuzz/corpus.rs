@@ -167,7 +167,8 @@ fn weights() {
         contents.write(&at("weights", name)).unwrap();
     };
     let table = vec![1.0; N_FEATURES];
-    let normal = Normalisation { mean: table.clone(), std: table, bone_lengths: vec![0.1; N_BONES] };
+    let normal =
+        Normalisation { mean: table.clone(), std: table, bone_lengths: vec![0.1; N_BONES], channels: Vec::new() };
     let network = Config { width: 4, ..Config::from_preset(Preset::Light, N_FEATURES) };
     let facts = SpeakerMetadata::new("host", FPS, "", network.clone(), normal, Representation::Positions);
     let mut params = Params::new(7);

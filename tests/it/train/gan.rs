@@ -2,7 +2,7 @@
 //! resumes exactly, stops when it breaks, and its checkpoint generates.
 
 use crate::fixtures::faults::stop::{Shared, Stop, bytes};
-use crate::fixtures::gesture_dataset::{FPS, dataset, sample};
+use crate::fixtures::gesture_dataset::{FPS, dataset, dataset_of, sample, with_posture};
 use crate::fixtures::write_dataset::write_dataset;
 use orator::config::GanConfig;
 use orator::config::{AdversarialLoss, MotionRepresentation, NetworkPreset};
@@ -11,6 +11,7 @@ use orator::generate::GestureGenerator;
 use orator::generate::model::BEST;
 use orator::stage::progress::Silent;
 use orator::train::gan::train::train;
+use orator::types::posture::PostureChannel;
 use orator::types::skeleton::{R_HAND, R_WRIST};
 use orator::types::sound::Sound;
 use std::panic::AssertUnwindSafe;
@@ -27,10 +28,14 @@ fn a_training_stopped_at_a_step_ends_with_the_same_bytes() {
     let dataset = dataset(&folder.path().join("dataset"));
     // Behind a checkpoint, and behind a validation; `ORATOR_KILLS` (`make prove`): at every step.
     let stops = if std::env::var("ORATOR_KILLS").is_ok() { vec![1, 2, 3, 4, 5, 6] } else { vec![3, 4] };
-    for (name, stops, settings) in [
-        ("bones", stops, settings()),
+    let posed = dataset_of(&folder.path().join("posed"), with_posture);
+    let channels = PostureChannel::ALL.to_vec();
+    for (name, dataset, stops, settings) in [
+        ("bones", &dataset, stops, settings()),
+        ("channels", &posed, vec![4], GanConfig { channels, ..settings() }),
         (
             "positions",
+            &dataset,
             vec![5],
             GanConfig {
                 representation: MotionRepresentation::Positions,
@@ -41,7 +46,7 @@ fn a_training_stopped_at_a_step_ends_with_the_same_bytes() {
         ),
     ] {
         let place = |part: &str| folder.path().join(format!("{name}-{part}"));
-        let outcome = train(&dataset, &settings, &place("whole"), &Silent).unwrap();
+        let outcome = train(dataset, &settings, &place("whole"), &Silent).unwrap();
         assert_eq!((outcome.steps, outcome.n_windows, outcome.validation.n_windows), (6, 21, 4));
         assert_eq!(outcome.validation.split, "validation");
         let whole = bytes(&place("whole"));
@@ -54,9 +59,9 @@ fn a_training_stopped_at_a_step_ends_with_the_same_bytes() {
         for stop in stops {
             let parts = place(&stop.to_string());
             let progress = Shared(Stop::at(stop));
-            let stopped = std::panic::catch_unwind(AssertUnwindSafe(|| train(&dataset, &settings, &parts, &progress)));
+            let stopped = std::panic::catch_unwind(AssertUnwindSafe(|| train(dataset, &settings, &parts, &progress)));
             assert!(stopped.is_err());
-            let resumed = train(&dataset, &settings, &parts, &Silent).unwrap();
+            let resumed = train(dataset, &settings, &parts, &Silent).unwrap();
             assert_eq!((resumed.began_at, resumed.steps), ([0, 0, 2, 3, 4, 4][stop as usize - 1], 6));
             for ((name, whole), (_, parts)) in whole.iter().zip(bytes(&parts)) {
                 assert!(*whole == parts, "{name} differs after a stop at step {stop}");

@@ -1,5 +1,6 @@
 //! Operators, networks, training.
 
+pub mod channels;
 pub mod gan;
 pub mod gan_program;
 pub mod networks;

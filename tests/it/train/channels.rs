@@ -1,0 +1,112 @@
+//! Head and trunk beside the joints: they are learnt from the sound, spoken and measured; without them nothing changes.
+
+use crate::fixtures::faults::stop::bytes;
+use crate::fixtures::gesture_dataset::{FPS, dataset, dataset_of, sample, with_posture};
+use crate::fixtures::write_dataset::write_dataset;
+use orator::Evaluation;
+use orator::config::{GanConfig, MotionRepresentation};
+use orator::dataset::{Dataset, Split};
+use orator::evaluate::clips::checkpoint::EvaluatedCheckpoint;
+use orator::evaluate::table::result;
+use orator::formats::checkpoint;
+use orator::generate::GestureGenerator;
+use orator::generate::model::BEST;
+use orator::metrics::settings::MetricSettings;
+use orator::stage::progress::Silent;
+use orator::train::gan::train::train;
+use orator::types::posture::PostureChannel;
+
+/// Settings that learn in seconds.
+fn settings(channels: &[PostureChannel]) -> GanConfig {
+    GanConfig {
+        channels: channels.to_vec(),
+        batch: 4,
+        window_frames: 32,
+        steps: 80,
+        learning_rate: 2e-3,
+        epoch_steps: 1_000,
+        checkpoint_every: 1_000,
+        ..GanConfig::default()
+    }
+}
+
+#[test]
+fn head_and_trunk_follow_a_sound_that_was_not_trained_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let phases = [0.0, 0.7, 1.5, 2.2, 3.0, 3.8, 4.6, 5.5];
+    let mut samples: Vec<_> = phases
+        .into_iter()
+        .enumerate()
+        .map(|(n, phase)| (Split::Train, with_posture(sample(&format!("a{n}-00000000-000000"), 128, phase), phase)))
+        .collect();
+    let held_out = with_posture(sample("v-00000000-000000", 150, 1.1), 1.1);
+    samples.push((Split::Validation, held_out.clone()));
+    let place = folder.path().join("dataset");
+    write_dataset(&place, "host", FPS, &samples).unwrap();
+    let dataset = Dataset::open(&place).unwrap();
+    let out = folder.path().join("out");
+    let outcome = train(&dataset, &settings(&PostureChannel::ALL), &out, &Silent).unwrap();
+    let errors = &outcome.validation.channels;
+    assert_eq!(errors.keys().copied().collect::<Vec<_>>(), PostureChannel::ALL);
+    assert!(errors.values().all(|of| of.generator < 0.5 * of.mean_pose), "{errors:?}");
+
+    let speaker = GestureGenerator::open(&out).unwrap();
+    let (motion, posture) = speaker.motion_and_posture(&held_out.sound).unwrap();
+    let posture = posture.unwrap();
+    assert_eq!((motion.n_frames(), posture.head.dim(), posture.trunk.dim()), (150, (150, 3), (150, 3)));
+    assert!(posture.head.iter().chain(&posture.trunk).all(|v| v.is_finite()));
+
+    let checkpoints = [EvaluatedCheckpoint::from(speaker)];
+    let evaluation = Evaluation::of_generators(&dataset, &checkpoints, Split::Validation, &Silent).unwrap();
+    let table = evaluation.measure(&MetricSettings::default(), &Silent).unwrap();
+    let result = result::json(&table);
+    for channel in ["head", "trunk"] {
+        let metric = |name: &str| {
+            let mut metrics = result["metrics"].as_array().unwrap().iter();
+            metrics.find(|metric| metric["name"] == name && metric["part"] == channel).unwrap()
+        };
+        let value = |name: &str, who: &str| metric(name)["values"][who]["value"].as_f64();
+        let error = |who: &str| value("angle_error", who).unwrap();
+        assert!(error("prediction") < 0.5 * error("mean_pose"), "{}", metric("angle_error"));
+        assert!(error("prediction") < error("nearest_neighbour"), "{}", metric("angle_error"));
+        assert!(error("prediction") < error("mismatched_prediction") && error("truth") == 0.0);
+        let follows = value("angle_correlation", "prediction").unwrap();
+        assert!(follows > 0.8, "{}", metric("angle_correlation"));
+        assert_eq!(value("angle_correlation", "mean_pose"), None);
+        let speed = |who: &str| value("angular_speed", who).unwrap();
+        assert!((0.5..1.5).contains(&(speed("prediction") / speed("truth"))) && speed("mean_pose") == 0.0);
+        assert!(value("hellinger_angular_speed", "prediction") < value("hellinger_angular_speed", "mean_pose"));
+    }
+}
+
+#[test]
+fn without_channels_the_bytes_are_those_of_a_dataset_without_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let few = |channels: &[PostureChannel]| GanConfig { batch: 2, steps: 2, ..settings(channels) };
+    let (plain, posed) =
+        (dataset(&folder.path().join("plain")), dataset_of(&folder.path().join("posed"), with_posture));
+    let trained = |dataset: &Dataset, name: &str, settings: GanConfig| {
+        let out = folder.path().join(name);
+        train(dataset, &settings, &out, &Silent).unwrap();
+        (bytes(&out), checkpoint::facts(&out.join(BEST)).unwrap().to_string(), out)
+    };
+    let (of_plain, facts, out) = trained(&plain, "a", few(&[]));
+    assert!(!facts.contains("channels") && GestureGenerator::open(&out).is_ok());
+    let (of_posed, other, _) = trained(&posed, "b", few(&[]));
+    let hashes = [&plain, &posed].map(|dataset| dataset.hash().unwrap());
+    assert_eq!(facts.replace(&hashes[0], &hashes[1]), other);
+    let log = |files: &[(String, Vec<u8>)]| files.iter().find(|(name, _)| name == "metrics.jsonl").unwrap().1.clone();
+    assert!(log(&of_plain) == log(&of_posed), "what is not learnt has a say in the losses");
+
+    // One channel alone, of positions, whose bones have a loss; the other one is not spoken.
+    let trunk = GanConfig { representation: MotionRepresentation::Positions, ..few(&[PostureChannel::Trunk]) };
+    let (_, facts, out) = trained(&posed, "c", trunk);
+    assert!(facts.contains("\"channels\":[\"trunk\"]"), "{facts}");
+    let speaker = GestureGenerator::open(&out).unwrap();
+    let (_, posture) = speaker.motion_and_posture(&sample("d-00000000-000000", 40, 0.3).sound).unwrap();
+    let posture = posture.unwrap();
+    assert!(posture.head.iter().all(|v| v.is_nan()) && posture.trunk.iter().all(|v| v.is_finite()));
+
+    let error = train(&plain, &few(&[PostureChannel::Head]), &folder.path().join("d"), &Silent).unwrap_err();
+    assert!(format!("{error:#}").contains("posture = true"), "{error:#}");
+}
