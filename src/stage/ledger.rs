@@ -2,7 +2,6 @@
 //! stage that failed. `segment` writes it, `lift` moves seconds from kept to refused; later stages only add up.
 
 use super::refusal::FrameRefusal;
-use crate::types::interval::{Interval, Intervals};
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -142,12 +141,12 @@ impl Ledger {
         self.resting.iter().map(|rest| rest.end_secs - rest.start_secs).sum()
     }
 
-    /// With the stretches of `intervals` in which the hands rest; the video's last frame may be cut off by its end.
+    /// With stretches in which the hands rest, from second to second; the video's last frame may be cut off by its end.
     #[must_use]
-    pub fn with_resting(mut self, intervals: &Intervals) -> Self {
-        let secs = |frame: usize| intervals.fps.secs(frame).min(self.duration_secs);
-        let kept = |rest: &Interval| Kept { start_secs: secs(rest.start), end_secs: secs(rest.end) };
-        self.resting = intervals.resting.iter().map(kept).filter(|rest| rest.start_secs < rest.end_secs).collect();
+    pub fn with_resting(mut self, stretches: impl Iterator<Item = (f64, f64)>) -> Self {
+        let until = self.duration_secs;
+        let kept = |(start, end): (f64, f64)| Kept { start_secs: start.min(until), end_secs: end.min(until) };
+        self.resting = stretches.map(kept).filter(|rest| rest.start_secs < rest.end_secs).collect();
         self
     }
 

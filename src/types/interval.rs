@@ -63,6 +63,11 @@ impl Intervals {
         self
     }
 
+    /// Stretches in which the hands rest, from second to second.
+    pub fn resting_stretches(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.resting.iter().map(|rest| (self.fps.secs(rest.start), self.fps.secs(rest.end)))
+    }
+
     /// Seconds in which the hands rest.
     pub fn resting_secs(&self) -> f64 {
         self.resting.iter().map(|rest| self.fps.secs(rest.n_frames())).sum()

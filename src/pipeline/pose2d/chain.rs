@@ -6,7 +6,7 @@ use super::face::FaceTracker;
 use super::face::landmarks::FacePoint;
 use super::face::model::FaceModel;
 use super::hand::{DetectedHand, HandModel};
-use super::hands::{self, HandTracker, Sight};
+use super::hands::{self, HandTracker, SeenHands};
 use super::model_input::ModelInput;
 use super::palm::PalmDetector;
 use super::person::Detector;
@@ -154,7 +154,7 @@ impl Chain {
             (None, None) => [None, None],
         };
         // Sight comes last: what is followed from frame to frame is what was found.
-        let Sight { hands: [left, right], others } = Sight::judge(hands, &mut body.points, image);
+        let SeenHands { hands: [left, right], others } = SeenHands::judge(hands, &mut body.points, image);
         pose.other_hand = others;
         if let Some(face) = &mut self.face {
             pose.face = face.find(image, &body.points, self.settings.joint_score)?;

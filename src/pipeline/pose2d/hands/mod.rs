@@ -3,5 +3,5 @@
 pub mod sight;
 pub mod tracker;
 
-pub use sight::Sight;
+pub use sight::SeenHands;
 pub use tracker::{HandTracker, guard};

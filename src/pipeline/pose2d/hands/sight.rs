@@ -21,13 +21,13 @@ const OTHERS_WRIST: f64 = 0.15;
 
 /// What is seen of a frame's hands, left and right.
 #[derive(Clone, Debug)]
-pub struct Sight {
+pub struct SeenHands {
     pub hands: [Option<DetectedHand>; 2],
     /// Whether what was found was the other hand.
     pub others: [bool; 2],
 }
 
-impl Sight {
+impl SeenHands {
     /// Judges found hands. What is not seen of `hands` and of the wrists of `body` has the score 0.
     pub fn judge(mut hands: [Option<DetectedHand>; 2], body: &mut [ScoredPoint; 17], image: &Image) -> Self {
         let mut others = [false; 2];
@@ -133,7 +133,7 @@ mod tests {
     }
 
     fn judged(hands: [Option<DetectedHand>; 2], body: &mut [ScoredPoint; 17]) -> ([Option<usize>; 2], [bool; 2]) {
-        let sight = Sight::judge(hands, body, &Image::filled(400, 400, [0; 3]));
+        let sight = SeenHands::judge(hands, body, &Image::filled(400, 400, [0; 3]));
         let n_seen = |hand: &DetectedHand| hand.points.iter().filter(|point| point[2] > 0.0).count();
         (sight.hands.each_ref().map(|hand| hand.as_ref().map(n_seen)), sight.others)
     }
