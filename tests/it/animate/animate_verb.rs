@@ -64,6 +64,14 @@ fn a_motion_becomes_files_and_what_was_done_is_told() {
     ] {
         done(dir, &format!("a.npy --out d.bvh {more}"));
     }
+    done(dir, "a.npy --out e.fbx e.vrm e.vrma");
+    // Onto the skeleton of another file, by the bones that were found, and by those that a user wrote.
+    done(dir, "a.npy --retarget made/a.bvh --write-bone-map bones.toml --out f.bvh");
+    let found = std::fs::read_to_string(dir.join("bones.toml")).unwrap();
+    assert!(found.contains("LeftArm = \"LeftArm\"") && found.contains("Chest = \"Chest\""), "{found}");
+    done(dir, "a.npy --retarget made/a.bvh --bone-map bones.toml --out g.bvh");
+    let [by_names, by_map] = ["f.bvh", "g.bvh"].map(|name| std::fs::read(dir.join(name)).unwrap());
+    assert_eq!(by_names, by_map);
 }
 
 #[test]
@@ -216,6 +224,9 @@ fn what_is_wrong_is_said_and_nothing_is_written() {
         ("good.npy --out x.mp4 --audio picture.png", "picture.png"),
         ("good.npy --out x.bvh --audio good.npy", "--audio is for films"),
         ("good.npy --out x.npy --names vrm", "--names is for .bvh"),
+        ("good.npy --out x.vrm --names mixamo", "--names is for .bvh"),
+        ("good.npy --out x.bvh --retarget good.npy", "is given as .bvh or .glb"),
+        ("good.npy --out x.bvh --bone-map bones.toml", "--retarget"),
         ("good.npy --out x.bvh --keypoints good.npy", "good.npy"),
     ] {
         let (code, _, errors) = animate(dir, args);

@@ -5,6 +5,7 @@ use crate::fixtures::figures::{FPS, swinging};
 use orator::animate::export::file::{ExportContent, ExportFormat};
 use orator::animate::rig::names::Names;
 use orator::animate::{AnimationOptions, Performance, perform};
+use orator::formats::bvh::read::Positions;
 use orator::formats::{authors_txt, npy};
 use orator::math::rotation::Rotation;
 use orator::math::vec3::{Vec3, add, norm, sub};
@@ -90,12 +91,31 @@ fn a_preset_changes_the_names_of_a_bvh_and_nothing_else() {
         std::fs::read_to_string(path).unwrap()
     };
     let own = text(Names::Own);
-    for names in Names::ALL {
+    let places = |text: &str| {
+        let bvh = orator::formats::bvh::read::Bvh::parse(text).unwrap();
+        (bvh.positions(Positions::Auto), bvh)
+    };
+    let (own_places, own_bvh) = places(&own);
+    for (names, hips) in Names::ALL.into_iter().zip(["Hips", "mixamorig:Hips", "Hips", "hips", "pelvis"]) {
         let text = text(names);
-        assert_eq!(text.split_once("MOTION").unwrap().1, own.split_once("MOTION").unwrap().1);
         let bvh = Bvh::parse(&text);
-        let expected = ["Hips", "mixamorig:Hips", "Hips", "hips"][Names::ALL.iter().position(|n| *n == names).unwrap()];
-        assert_eq!(bvh.names[0], expected);
-        assert_eq!(bvh.frames.len(), 5);
+        assert_eq!((bvh.names[0].as_str(), bvh.frames.len()), (hips, 5));
+        if names != Names::Mixamo {
+            assert_eq!(text.split_once("MOTION").unwrap().1, own.split_once("MOTION").unwrap().1);
+            continue;
+        }
+        // Mixamo has bones of its own: the others stay where they are.
+        let (places, bvh) = places(&text);
+        assert_eq!(bvh.joints.len(), own_bvh.joints.len() + 3);
+        for (joint, place) in own_bvh.joints.iter().enumerate() {
+            let name = match place.name.as_str() {
+                "Chest" => "Spine1".to_owned(),
+                name => name.replace("Foot_end", "ToeBase"),
+            };
+            let found = bvh.find(&format!("mixamorig:{name}")).unwrap_or_else(|| panic!("no {name}"));
+            for frame in 0..5 {
+                assert!(norm(sub(places[frame][found], own_places[frame][joint])) < 1e-3, "{name}");
+            }
+        }
     }
 }
