@@ -164,7 +164,12 @@ mod tests {
         let (sin, cos) = turn.sin_cos();
         let place = |k: usize| {
             let (u, v) = ((k % 18) as f64 / 17.0 - 0.5, (k / 18) as f64 / 25.0 - 0.5);
-            let [x, y, z] = [80.0 * u, 120.0 * v + if v > 0.3 { chin } else { 0.0 }, 90.0 * u * u];
+            let [x, y, z] = match k {
+                33 => [-30.0, -20.0, 0.0],
+                263 => [30.0, -20.0, 0.0],
+                landmarks::NOSE_TIP => [0.0, 10.0, -20.0],
+                _ => [80.0 * u, 120.0 * v + if v > 0.3 { chin } else { 0.0 }, 90.0 * u * u],
+            };
             [300.0 + x * cos + z * sin, 200.0 + y, z * cos - x * sin]
         };
         (0..landmarks::N_LANDMARKS).map(place).collect()
@@ -174,7 +179,7 @@ mod tests {
         let image = Image::filled(640, 480, [skin, 100, 90]);
         let mut views = PortraitViews::default();
         for t in 0..200 {
-            let turn = 0.005 * (t % 40) as f64;
+            let turn = 0.0125 * (t % 40) as f64;
             views.look(&image, &face(chin, turn), t as f64 / 15.0).unwrap();
         }
         assert!(views.views.len() <= N_VIEWS);
