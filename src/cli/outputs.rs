@@ -1,7 +1,8 @@
 //! The files that verbs of motion write.
 
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 use orator::animate::export::file::ExportFormat;
+use orator::formats::joints::description;
 use std::path::{Path, PathBuf};
 
 /// Files to write, with their formats.
@@ -13,6 +14,10 @@ pub fn outputs(out: &[PathBuf], is_read: impl Fn(&Path) -> bool, input: &str, hi
     for (n, path) in out.iter().enumerate() {
         ensure!(!is_read(path), "{} is {input}; write to another file", path.display());
         ensure!(!out[..n].contains(path), "{} is asked for twice", path.display());
+        let joints = out.iter().find(|joints| description::is_one(path) && description::path_of(joints) == **path);
+        if let Some(joints) = joints {
+            bail!("{} is where the rate of {} is written; write to another file", path.display(), joints.display());
+        }
         ensure!(!path.is_dir(), "{} is a folder; name a file in it{hint}", path.display());
     }
     out.iter().map(|path| Ok((path.clone(), ExportFormat::from_path(path)?))).collect()

@@ -5,11 +5,12 @@
 //! (1 where a hand is missing because the other one was found in its place); where a face model looked, `mouth_opening`
 //! and `face_score` f32 [T].
 
+use super::keypoints::range;
 use super::npz;
 use super::npz::Npz;
 use crate::types::pose2d::{Keypoints, N_BODY, N_HAND};
 use crate::types::time::FrameRate;
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use ndarray::{Array1, Array2, Array3, ArrayD, Ix1, Ix2, Ix3, aview1};
 use std::path::Path;
 
@@ -39,7 +40,10 @@ pub struct FaceFrames {
     pub score: Array1<f32>,
 }
 
-/// Reads the keypoints. A point with a number that is not finite is a missing one (all zeros). Errors: unreadable,
+/// Least width and height of a picture, px: less is no picture's size.
+const SMALLEST_PICTURE: u32 = 16;
+
+/// Reads the keypoints, in pixels. A point with a number that is not finite is a missing one (all zeros). Errors: unreadable,
 /// `body` missing, arrays of wrong or unequal shapes.
 pub fn read(path: &Path) -> Result<Keypoints> {
     Ok(read_noting(path)?.0)
@@ -47,6 +51,48 @@ pub fn read(path: &Path) -> Result<Keypoints> {
 
 /// `read`, and a sentence for each array that was not there with what stands in for it.
 pub fn read_noting(path: &Path) -> Result<(Keypoints, Vec<String>)> {
+    read_sized(path, None)
+}
+
+/// `read_noting` of a picture whose `size` (width, height) is given, where it is, in place of the file's. Coordinates in
+/// 0..1 are shares of the picture: they become pixels by its size.
+///
+/// # Errors
+/// As `read`, and shares of a picture whose size is not known.
+pub fn read_sized(path: &Path, size: Option<[u32; 2]>) -> Result<(Keypoints, Vec<String>)> {
+    let (mut keypoints, known_size, mut notes) = read_as_written(path)?;
+    if let Some(size) = size {
+        keypoints.image_size = size;
+        notes.retain(|note| !note.contains("`image_size`"));
+    }
+    if range::are_shares(range::places(&keypoints)) {
+        let size = size.or(known_size).filter(|size| size.iter().all(|px| *px >= SMALLEST_PICTURE));
+        let Some([width, height]) = size else {
+            bail!(
+                "{}: its coordinates lie in 0..1, shares of the picture's width and height, and the picture's size is not \
+                 known: give it with --size, like --size 1280x720, add `image_size` [1280, 720] to the file, or write pixels",
+                path.display()
+            );
+        };
+        let n_negative = range::places(&keypoints).filter(|place| place[0] < 0.0 || place[1] < 0.0).count();
+        ensure!(
+            n_negative * 5 < range::places(&keypoints).count().max(1),
+            "{}: its coordinates lie between -1 and 1: expected pixels, or shares of the picture from 0 to 1",
+            path.display()
+        );
+        for points in [&mut keypoints.body, &mut keypoints.left_hand, &mut keypoints.right_hand] {
+            for mut point in points.lanes_mut(ndarray::Axis(2)).into_iter().filter(|point| point[2] > 0.0) {
+                point[0] = point[0] * width as f32 - 0.5;
+                point[1] = point[1] * height as f32 - 0.5;
+            }
+        }
+        notes.push(format!("coordinates in 0..1: taken as shares of the picture, {width}x{height} px"));
+    }
+    Ok((keypoints, notes))
+}
+
+/// The keypoints in the unit of the file, the picture's size where the file says it, and `read_noting`'s sentences.
+pub(super) fn read_as_written(path: &Path) -> Result<(Keypoints, Option<[u32; 2]>, Vec<String>)> {
     let mut npz = Npz::open(path)?;
     let mut notes = Vec::new();
     let body = points(npz.floats("body", &[None, Some(N_BODY), Some(3)])?)?;
@@ -66,11 +112,11 @@ pub fn read_noting(path: &Path) -> Result<(Keypoints, Vec<String>)> {
         notes.push("no `fps`: taken as 15".to_owned());
         FrameRate::new(15, 1)
     };
-    let image_size = if npz.has("image_size") {
+    let known_size = if npz.has("image_size") {
         let size = npz.numbers("image_size", &[Some(2)])?;
         let side = |v: f64| if (1.0..=1e6).contains(&v) { Some(v as u32) } else { None };
         match (side(size[0]), side(size[1])) {
-            (Some(width), Some(height)) => [width, height],
+            (Some(width), Some(height)) => Some([width, height]),
             _ => bail!(
                 "{}: `image_size` is {size}, expected width and height of the picture in px, each 1 to 1000000; \
                  leave the array out if they are not known",
@@ -79,10 +125,11 @@ pub fn read_noting(path: &Path) -> Result<(Keypoints, Vec<String>)> {
         }
     } else {
         notes.push("no `image_size`: taken from the farthest points".to_owned());
-        let extent = |axis: usize| body.slice(ndarray::s![.., .., axis]).fold(1.0f32, |m, &v| m.max(v)).min(1e6).ceil();
-        [extent(0) as u32, extent(1) as u32]
+        None
     };
-    Ok((Keypoints { fps, image_size, body, left_hand, right_hand }, notes))
+    let extent = |axis: usize| body.slice(ndarray::s![.., .., axis]).fold(1.0f32, |m, &v| m.max(v)).min(1e6).ceil();
+    let image_size = known_size.unwrap_or_else(|| [extent(0) as u32, extent(1) as u32]);
+    Ok((Keypoints { fps, image_size, body, left_hand, right_hand }, known_size, notes))
 }
 
 /// Reads what the file holds beside the keypoints. Errors: unreadable, missing, wrong shapes.

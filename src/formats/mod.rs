@@ -4,6 +4,7 @@ pub mod authors_txt;
 pub mod bvh;
 pub mod checkpoint;
 pub mod coco_wholebody;
+pub mod joints;
 pub mod joints_npz;
 pub mod keypoints;
 pub mod keypoints_npz;

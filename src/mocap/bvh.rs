@@ -13,7 +13,7 @@ use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, R_HAND, R_WRIST, Side};
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result, ensure};
 use ndarray::Array3;
-use serde_json::{Map, json};
+use serde_json::{Map, Value, json};
 use std::path::Path;
 
 /// The role (`joint_names::ROLES`) of each of the house's joints 0..7.
@@ -39,6 +39,12 @@ pub fn read_as_it_stands(path: &Path) -> Result<CapturedMotion> {
 /// Reads a take from the text of a BVH file, turned as [`read`] does.
 pub fn of_text(text: &str) -> Result<CapturedMotion> {
     of_bvh(&Bvh::parse(text)?, |house| house)
+}
+
+/// Sentence on the unit of a take by its facts; `None` where it is the centimetre, BVH's usual one.
+pub fn unit_note(facts: &Map<String, Value>) -> Option<String> {
+    let unit = facts.get("source_unit").and_then(Value::as_str).filter(|unit| *unit != "centimetre")?;
+    Some(format!("by the length of its arms its unit is the {unit}: brought to metres"))
 }
 
 fn take(path: &Path, placed: impl Fn(House) -> House) -> Result<CapturedMotion> {

@@ -5,6 +5,9 @@ use super::motion_file::USUAL_FPS;
 use super::take::CapturedMotion;
 use super::{bvh, ted};
 use crate::formats::authors_txt;
+use crate::formats::joints::description;
+use crate::motion::units;
+use crate::types::pose3d::Motion;
 use anyhow::{Context, Result, bail};
 use serde_json::Map;
 use std::path::Path;
@@ -38,6 +41,8 @@ pub fn read(kind: MotionKind, path: &Path) -> Result<CapturedMotion> {
     let captured = match kind {
         MotionKind::Authors => {
             let motion = authors_txt::read(path, USUAL_FPS)?;
+            let said = description::rate(path, motion.n_frames())?;
+            let motion = Motion { fps: said.unwrap_or(USUAL_FPS), ..motion };
             CapturedMotion { motion, text: None, facts: Map::new() }
         }
         MotionKind::Ted => ted::read(path)?,
@@ -45,6 +50,7 @@ pub fn read(kind: MotionKind, path: &Path) -> Result<CapturedMotion> {
         MotionKind::Shards => bail!("{} holds samples, no captured motion", path.display()),
     };
     captured.motion.fps.checked().with_context(|| path.display().to_string())?;
+    units::check(&captured.motion).with_context(|| path.display().to_string())?;
     let motion = captured.motion.in_range().with_context(|| path.display().to_string())?;
     Ok(CapturedMotion { motion, ..captured })
 }

@@ -1,9 +1,12 @@
 //! Reads any file that holds a motion: `.npy` [T, 49, 3] or [T, 147] of float32 or float64, `.npz` (`pose3d`), the
-//! authors' `.txt`, `.bvh`. Only .npz and .bvh name their rate; the others take the rate that the caller assumes.
+//! authors' `.txt`, `.bvh`. Of .npy and .txt the description beside them names the rate (`formats::joints::description`);
+//! without one they take the rate that the caller assumes.
 
 use super::bvh;
+use crate::formats::joints::description;
 use crate::formats::npz::{AxisLength, Npz};
 use crate::formats::{authors_txt, npy};
+use crate::motion::units;
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::time::FrameRate;
@@ -20,6 +23,8 @@ pub const USUAL_FPS: FrameRate = FrameRate::new(15, 1);
 #[derive(Clone, Debug)]
 pub struct MotionFile {
     pub motion: Motion,
+    /// Whether the file, or what describes it, says its rate.
+    pub says_rate: bool,
     /// Assumptions as sentences for people.
     pub notes: Vec<String>,
 }
@@ -38,21 +43,24 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let size = std::fs::metadata(path).with_context(|| format!("{} cannot be read", path.display()))?.len();
     ensure!(size > 0, "{} is empty (0 bytes): expected a motion", path.display());
-    let mut notes = Vec::new();
-    let given = |notes: &mut Vec<String>| {
-        if fps.is_none() {
-            notes.push(format!("{name} does not say its rate: taken for {USUAL_FPS}; --fps says otherwise"));
-        }
-        fps.unwrap_or(USUAL_FPS)
-    };
+    let (mut notes, mut says_rate, assumed) = (Vec::new(), true, fps.unwrap_or(USUAL_FPS));
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let motion = match ending.as_str() {
-        "npy" => npy::read(path, given(&mut notes))?,
-        "npz" => of_npz(path, || given(&mut notes))?,
-        // the authors' clips are 15 frames a second, which needs no remark
-        "txt" => authors_txt::read(path, fps.unwrap_or(USUAL_FPS))?,
+        "npz" => {
+            let (motion, is_said) = of_npz(path, assumed)?;
+            says_rate = is_said;
+            motion
+        }
+        "npy" | "txt" => {
+            let read = if ending == "npy" { npy::read } else { authors_txt::read };
+            let motion = read(path, assumed)?;
+            let said = description::rate(path, motion.n_frames())?;
+            says_rate = said.is_some();
+            Motion { fps: said.unwrap_or(assumed), ..motion }
+        }
         "bvh" => {
             let captured = bvh::read_as_it_stands(path)?;
+            notes.extend(bvh::unit_note(&captured.facts).map(|note| format!("{name}: {note}")));
             let turned = captured.facts.get("turned_degrees").and_then(serde_json::Value::as_f64).unwrap_or(0.0);
             if turned.abs() > 0.0 {
                 notes.push(format!("{name} does not face +z: turned by {turned:.0} degrees to face the camera"));
@@ -61,6 +69,10 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
         }
         _ => bail!("{} is no motion file: expected .npy, .npz, .txt (the authors' layout) or .bvh", path.display()),
     };
+    // the authors' clips are 15 frames a second, which needs no remark
+    if !says_rate && fps.is_none() && ending != "txt" {
+        notes.push(format!("{name} does not say its rate: taken for {USUAL_FPS}; --fps says otherwise"));
+    }
     ensure!(motion.n_frames() > 0, "{} has no frame", path.display());
     ensure!(
         motion.mask.iter().any(|seen| *seen),
@@ -70,21 +82,41 @@ pub fn read(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
     );
     motion.fps.checked().with_context(|| path.display().to_string())?;
     let motion = motion.in_range().with_context(|| path.display().to_string())?;
-    Ok(MotionFile { motion, notes })
+    if ending != "bvh" && units::is_upside_down(&motion) {
+        notes.push(format!(
+            "{name}: elbows and wrists lie above the neck throughout, as where y points up; expected x image right, y down, \
+             z away"
+        ));
+    }
+    Ok(MotionFile { motion, says_rate, notes })
 }
 
-/// `pose3d` [T, 49, 3], with `mask` [T, 49] and `fps` where they are.
-fn of_npz(path: &Path, given: impl FnOnce() -> FrameRate) -> Result<Motion> {
+/// Reads the motion of `path`, which its user says to be at `fps`; without, a file that does not say its rate is at 15.
+///
+/// # Errors
+/// As [`read`], and a file that says another rate than `fps`.
+pub fn read_at(path: &Path, fps: Option<FrameRate>) -> Result<MotionFile> {
+    let read = read(path, Some(fps.unwrap_or(USUAL_FPS)))?;
+    if let Some(fps) = fps.filter(|fps| read.says_rate && *fps != read.motion.fps) {
+        let own = read.motion.fps;
+        bail!("{} says {own}, and {fps} is given (--in-fps): leave that away, or correct the file", path.display());
+    }
+    Ok(read)
+}
+
+/// `pose3d` [T, 49, 3], with `mask` [T, 49] and `fps` where they are; and whether it says its rate.
+fn of_npz(path: &Path, assumed: FrameRate) -> Result<(Motion, bool)> {
     let mut npz = Npz::open(path)?;
     let shape: [AxisLength; 3] = [None, Some(N_JOINTS), Some(3)];
     let joints = npz.floats("pose3d", &shape)?.into_dimensionality::<Ix3>()?;
-    let fps = if npz.has("fps") { npz.frame_rate("fps")? } else { given() };
+    let says_rate = npz.has("fps");
+    let fps = if says_rate { npz.frame_rate("fps")? } else { assumed };
     let mut motion = Motion::from_joints(fps, joints);
     if npz.has("mask") {
         let seen = npz.bools("mask", &[Some(motion.n_frames()), Some(N_JOINTS)])?.into_dimensionality::<Ix2>()?;
         motion.mask.zip_mut_with(&seen, |there, seen| *there &= seen);
     }
-    Ok(motion)
+    Ok((motion, says_rate))
 }
 
 #[cfg(test)]

@@ -8,5 +8,6 @@ pub mod hand_bones;
 pub mod jerk;
 pub mod posture;
 pub mod resample;
+pub mod units;
 pub mod upper_body;
 pub mod view;

@@ -6,7 +6,8 @@ use crate::animate::avatar::{Appearance, Avatar};
 use crate::animate::performance::Performance;
 use crate::animate::rig::file_skeleton::{FileSkeleton, RestAxes};
 use crate::animate::rig::names::Names;
-use crate::formats::{authors_txt, npy};
+use crate::formats::joints::description;
+use crate::formats::{authors_txt, joints_npz, npy};
 use crate::stage::progress::Progress;
 use crate::stage::workdir;
 use crate::types::pose3d::Motion;
@@ -46,9 +47,11 @@ pub struct FigureOptions {
 /// Format of a motion file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExportFormat {
-    /// Joints [T, 49, 3] f32.
+    /// Joints [T, 49, 3] f32, their rate beside them (`formats::joints::description`).
     Npy,
-    /// Text layout of Rebol et al. (2021): 147 numbers a line.
+    /// Joints with rate and mask.
+    Npz,
+    /// Text layout of Rebol et al. (2021): 147 numbers a line, their rate beside them.
     AuthorsTxt,
     /// Bone rotations of the whole rig.
     Bvh,
@@ -72,6 +75,7 @@ impl ExportFormat {
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         match extension.as_str() {
             "npy" => Ok(Self::Npy),
+            "npz" => Ok(Self::Npz),
             "txt" => Ok(Self::AuthorsTxt),
             "bvh" => Ok(Self::Bvh),
             "glb" => Ok(Self::Glb),
@@ -81,7 +85,8 @@ impl ExportFormat {
             "json" => Ok(Self::Json),
             "mp4" => Ok(Self::Mp4),
             _ => anyhow::bail!(
-                "{}: motion is written as .npy (joints), .txt (the authors' layout), .json, .bvh, .fbx, .glb, .vrm, .vrma or .mp4; \
+                "{}: motion is written as .npy (joints), .txt (the authors' layout), .npz (joints with rate and mask), \
+                 .json, .bvh, .fbx, .glb, .vrm, .vrma or .mp4; \
                  give the file one of these endings",
                 path.display()
             ),
@@ -95,7 +100,7 @@ impl ExportFormat {
 
     /// Whether the format holds joints and no rig.
     pub fn holds_joints(self) -> bool {
-        matches!(self, Self::Npy | Self::AuthorsTxt)
+        matches!(self, Self::Npy | Self::Npz | Self::AuthorsTxt)
     }
 
     /// Writes a performance; only a film uses the sound.
@@ -107,7 +112,7 @@ impl ExportFormat {
         progress: &dyn Progress,
     ) -> anyhow::Result<()> {
         match self {
-            Self::Npy | Self::AuthorsTxt => self.write_joints(path, &performance.motion()),
+            Self::Npy | Self::Npz | Self::AuthorsTxt => self.write_joints(path, &performance.motion()),
             Self::Bvh => {
                 let skeleton = FileSkeleton::new(&performance.rig.skeleton, sources.names, RestAxes::World);
                 let clip = skeleton.clip(&performance.clip);
@@ -136,11 +141,15 @@ impl ExportFormat {
         }
     }
 
-    /// Writes joints unchanged, which only the joint formats can hold.
+    /// Writes joints unchanged, which only the joint formats can hold, with their rate.
     pub fn write_joints(self, path: &Path, motion: &Motion) -> anyhow::Result<()> {
+        let (fps, shape) = (motion.fps, motion.joints.shape());
         match self {
-            Self::Npy => workdir::replace(path, |attempt| npy::write(attempt, motion)),
-            Self::AuthorsTxt => workdir::write_file(path, authors_txt::format(motion).as_bytes()),
+            Self::Npz => workdir::replace(path, |attempt| joints_npz::write(attempt, motion)),
+            Self::Npy => description::with(path, fps, shape, |attempt| npy::write(attempt, motion)),
+            Self::AuthorsTxt => {
+                description::with(path, fps, shape, |attempt| Ok(std::fs::write(attempt, authors_txt::format(motion))?))
+            }
             _ => anyhow::bail!("{} holds more than joints", path.display()),
         }
     }

@@ -5,15 +5,15 @@ use ndarray::ArrayView3;
 use orator::dataset::index::SampleRef;
 use orator::dataset::{Dataset, Split};
 use orator::formats::keypoints_npz;
-use orator::math::order;
 use orator::mocap::motion_file;
+use orator::mocap::motion_file::MotionFile;
 use orator::motion::posture;
 use orator::motion::posture::LiftedBody;
+use orator::motion::units;
 use orator::stage::artifacts::{Artifact, StageName};
 use orator::types::pose2d::{Keypoints, N_BODY};
 use orator::types::pose3d::Motion;
 use orator::types::posture::Posture;
-use orator::types::skeleton::ARM_BONES;
 use orator::types::sound::Sound;
 use orator::types::time::FrameRate;
 use std::path::{Path, PathBuf};
@@ -37,6 +37,10 @@ pub struct InputMotion {
     /// Whether the person sits, where hips and knees are seen.
     pub is_seated: Option<bool>,
     pub sound: Option<Sound>,
+    /// Whether its rate is its own, or given; else assumed.
+    pub has_rate: bool,
+    /// What had to be assumed to read it, sentences.
+    pub notes: Vec<String>,
 }
 
 /// The motions meant by a file, a lifted video's or a speaker's folder, a folder of motions, or a dataset.
@@ -126,26 +130,26 @@ impl MotionInput {
         }
     }
 
-    /// Reads the motion; `fps` is that of files without a rate. `keypoints` is where the face is from, else what a run
+    /// Reads the motion; `fps` is what its user says to be its rate. `keypoints` is where the face is from, else what a run
     /// or a dataset has.
-    pub fn read(&self, fps: FrameRate, keypoints: Option<&Path>) -> Result<InputMotion> {
+    pub fn read(&self, fps: Option<FrameRate>, keypoints: Option<&Path>) -> Result<InputMotion> {
         let take = match &self.location {
             InputLocation::Sample(dataset, sample) => {
                 let sample = dataset.read(sample)?;
                 let body = sample.pose2d.slice(ndarray::s![.., ..N_BODY, ..]).to_owned();
                 InputMotion { sound: Some(sample.sound), ..InputMotion::seen(sample.motion, body.view()) }
             }
-            InputLocation::File(path) => InputMotion {
-                motion: motion_file::read(path, Some(fps))?.motion,
-                posture: None,
-                is_seated: None,
-                sound: None,
-            },
+            InputLocation::File(path) => {
+                let MotionFile { motion, says_rate, notes } = motion_file::read_at(path, fps)?;
+                let has_rate = says_rate || fps.is_some();
+                InputMotion { motion, posture: None, is_seated: None, sound: None, has_rate, notes }
+            }
         };
         check(&take.motion).with_context(|| format!("no animation of {}", self.name))?;
         match self.keypoints(keypoints, &take.motion)? {
             Some(Keypoints { body, .. }) => {
-                Ok(InputMotion { sound: take.sound, ..InputMotion::seen(take.motion, body.view()) })
+                let InputMotion { motion, sound, has_rate, notes, .. } = take;
+                Ok(InputMotion { sound, has_rate, notes, ..InputMotion::seen(motion, body.view()) })
             }
             None => Ok(take),
         }
@@ -179,7 +183,8 @@ impl InputMotion {
     fn seen(motion: Motion, body: ArrayView3<f32>) -> Self {
         let lifted = LiftedBody { joints: Some(motion.joints.view()), extra: None };
         let posture = Some(posture::estimate(body, lifted));
-        Self { posture, is_seated: posture::is_seated(body), motion, sound: None }
+        let is_seated = posture::is_seated(body);
+        Self { posture, is_seated, motion, sound: None, has_rate: true, notes: Vec::new() }
     }
 }
 
@@ -198,17 +203,7 @@ fn read_keypoints(path: &Path, motion: &Motion) -> Result<Keypoints> {
 /// That there is something to animate, in metres.
 fn check(motion: &Motion) -> Result<()> {
     ensure!(motion.n_frames() > 0, "it has no frames");
-    let mut lengths: Vec<f32> = Vec::new();
-    for frame in motion.joints.outer_iter() {
-        for (a, b) in ARM_BONES {
-            lengths.push((0..3).map(|k| (frame[[a, k]] - frame[[b, k]]).powi(2)).sum::<f32>().sqrt());
-        }
-    }
-    let length = order::median(lengths)
+    units::arm_bone(motion)
         .with_context(|| format!("no arm is seen in any of its {} frames: every joint is NaN", motion.n_frames()))?;
-    ensure!(
-        (0.02..=2.0).contains(&length),
-        "its arm bones are {length} long; joints must be in metres about the neck, x image right, y down, z away"
-    );
-    Ok(())
+    units::check(motion)
 }

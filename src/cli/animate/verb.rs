@@ -21,6 +21,8 @@ use orator::animate::{AnimationOptions, Constraints, Legs, Performance, perform}
 use orator::dataset::Split;
 use orator::external::ffmpeg::audio;
 use orator::mocap::motion_file;
+use orator::mocap::motion_file::USUAL_FPS;
+use orator::motion::units;
 use orator::stage::progress::Progress as _;
 use orator::types::pose3d::Motion;
 use orator::types::sound::{SAMPLE_RATE, Sound};
@@ -32,11 +34,11 @@ use std::time::Instant;
 /// Turn joints into files for animation programs: rotations of a whole figure, smoothed and held within what a body
 /// can do.
 ///
-/// IN is a motion: .npy (joints [frames, 49, 3], metres), .txt (the layout of Rebol et al. 2021), joints.npz or the
-/// folder of a lifted video (work/lift/SPEAKER/VIDEO), or a dataset (work/dataset/SPEAKER) with --sample. The ending of
-/// each output chooses what is written: .bvh (cm, y up, facing +z, T-pose at rest), .fbx (binary 7.4) and .glb (a skinned
-/// avatar with its motion), .vrm (the avatar alone, VRM 1.0) and .vrma (the motion for avatars of VRM), .json, .npy and
-/// .txt (the joints of the figure), .mp4 (a film).
+/// IN is a motion: .npy (joints [frames, 49, 3], metres; its rate in the .npy.json beside it), .txt (the layout of Rebol et
+/// al. 2021), joints.npz or the folder of a lifted video (work/lift/SPEAKER/VIDEO), or a dataset (work/dataset/SPEAKER)
+/// with --sample. The ending of each output chooses what is written: .bvh (cm, y up, facing +z, T-pose at rest), .fbx (binary 7.4) and .glb (a skinned
+/// avatar with its motion), .vrm (the avatar alone, VRM 1.0) and .vrma (the motion for avatars of VRM), .json, .npz,
+/// .npy and .txt (the joints of the figure), .mp4 (a film).
 /// With --format, IN may be a folder of motions, a speaker's folder of lifted videos or a whole dataset, and --out is a
 /// folder.
 ///
@@ -54,7 +56,7 @@ pub struct Args {
     /// What to write; may be given several times. With --format: one folder.
     #[arg(long, value_name = "FILE|FOLDER", required = true, num_args = 1..)]
     out: Vec<PathBuf>,
-    /// Write every motion of IN into the folder --out, in these formats: bvh,fbx,glb,json,mp4,npy,txt,vrm,vrma
+    /// Write every motion of IN into the folder --out, in these formats: bvh,fbx,glb,json,mp4,npy,npz,txt,vrm,vrma
     #[arg(long, value_name = "ENDING", value_delimiter = ',')]
     format: Vec<String>,
     /// Of a dataset: the sample of this key.
@@ -85,9 +87,9 @@ pub struct Args {
     labels: Option<Vec<String>>,
     #[command(flatten)]
     film: FilmArgs,
-    /// Frames a second of a .npy or .txt.
-    #[arg(long, value_name = "RATE", default_value = "15")]
-    in_fps: FrameRate,
+    /// Frames a second of a .npy or .txt that does not say them; without: 15. An error where the file says another rate.
+    #[arg(long, value_name = "RATE")]
+    in_fps: Option<FrameRate>,
     #[command(flatten)]
     body: BodyArgs,
     #[command(flatten)]
@@ -221,7 +223,7 @@ fn animate(
 ) -> Result<Done> {
     let taken = input.read(args.in_fps, args.keypoints.as_deref())?;
     let options = &args.body.of(&taken, options);
-    let InputMotion { motion, posture, sound: own, .. } = taken;
+    let InputMotion { motion, posture, sound: own, has_rate, mut notes, .. } = taken;
     let (sound, posture) = (sound.or(own), args.body.posture(posture));
     let started = Instant::now();
     let performance = perform(&motion, posture.as_ref(), options);
@@ -230,7 +232,12 @@ fn animate(
     let film_fps = options.fps.unwrap_or_else(|| smooth_rate(motion.fps));
     let other = match &args.beside {
         Some(path) if motion_file::has_ending(path) => {
-            let other = motion_file::read(path, Some(args.in_fps))?;
+            let other = motion_file::read(path, Some(args.in_fps.unwrap_or(USUAL_FPS)))?;
+            units::check(&other.motion).with_context(|| path.display().to_string())?;
+            notes.extend(other.notes);
+            if !other.says_rate && args.in_fps.is_none() {
+                notes.push(format!("{} does not say its rate: taken for {USUAL_FPS}", path.display()));
+            }
             Some(perform(&other.motion, None, &AnimationOptions { fps: Some(film_fps), ..*options }))
         }
         _ => None,
@@ -286,8 +293,10 @@ fn animate(
         format.write(path, &performance, &sources, ui).with_context(|| format!("cannot write {}", path.display()))?;
     }
     let Performance { report, clip, .. } = &performance;
+    let assumed = if has_rate { "" } else { " (assumed, the file does not say it: --in-fps gives it)" };
+    let noted: String = notes.iter().map(|note| format!("note: {note}\n")).collect();
     let text = format!(
-        "{} frames at {}, {motion_secs:.1} s; written: {} frames at {}\n{}{silence}",
+        "{} frames at {}{assumed}, {motion_secs:.1} s; written: {} frames at {}\n{}{noted}{silence}",
         motion.n_frames(),
         motion.fps,
         clip.n_frames(),
@@ -298,6 +307,8 @@ fn animate(
         "name": input.name,
         "n_frames": motion.n_frames(),
         "fps": motion.fps,
+        "fps_assumed": !has_rate,
+        "notes": notes,
         "written_frames": clip.n_frames(),
         "written_fps": clip.fps,
         "times_real_time": motion_secs / secs.max(1e-9),

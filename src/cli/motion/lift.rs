@@ -3,16 +3,17 @@
 use crate::cli::Outcome;
 use crate::cli::confine::confine;
 use crate::cli::ui::Ui;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
+use orator::animate::export::file::ExportFormat;
 use orator::config;
+use orator::formats::joints::description;
 use orator::formats::keypoints;
-use orator::formats::keypoints::CoordinateUnit;
+use orator::formats::keypoints::{CoordinateUnit, range};
 use orator::formats::npz::Npz;
 use orator::formats::{keypoints_npz, npy};
 use orator::pipeline::keypoints::take_in;
 use orator::pipeline::lift::Lifter;
 use orator::stage::progress::Progress;
-use orator::stage::workdir;
 use orator::types::pose2d::Keypoints;
 use orator::types::skeleton::{L_ELBOW, L_SHOULDER, L_WRIST};
 use orator::types::time::FrameRate;
@@ -24,7 +25,8 @@ use std::time::Instant;
 ///
 /// KEYPOINTS is ours or another program's: a folder of OpenPose (a JSON file a frame), JSON of MMPose, AlphaPose or
 /// COCO-WholeBody, arrays of MediaPipe or PATS (.npy, .npz); the kind is told by the content. Ours is a .npz that holds `body` [T,17,3] (COCO-17; x px, y px, score) and, if known, `left_hand` and `right_hand`
-/// [T,21,3] (wrist, then thumb to little finger, each base to tip), `fps` and `image_size`. JOINTS.npy becomes
+/// [T,21,3] (wrist, then thumb to little finger, each base to tip), `fps` and `image_size`. JOINTS.npz
+/// holds `pose3d`, `mask` and `fps`; JOINTS.npy the joints alone, with the rate in JOINTS.npy.json beside it. Joints are
 /// float32 [T,49,3]: metres, x image right, y down, z away from the camera, the neck at the origin; neck, right arm,
 /// left arm, left hand, right hand. A joint not seen for up to a second is filled; one missing for longer is NaN. Legs,
 /// face, hips or hands may be missing throughout; both shoulders must be seen now and then. A nose that is missing is
@@ -34,14 +36,14 @@ pub struct Args {
     /// The keypoints.
     #[arg(value_name = "KEYPOINTS")]
     keypoints: PathBuf,
-    /// Frames a second of another program's keypoints.
+    /// Frames a second of the keypoints, in place of what the file says.
     #[arg(long)]
     fps: Option<FrameRate>,
-    /// Width and height in pixels of the picture of another program's keypoints, like 1280x720.
+    /// Width and height in pixels of the picture, like 1280x720; coordinates in 0..1 are shares of it.
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
     size: Option<[u32; 2]>,
-    /// The joints to write.
-    #[arg(long, value_name = "JOINTS.npy")]
+    /// The joints to write: .npz, .npy or .txt.
+    #[arg(long, value_name = "JOINTS.npz")]
     out: PathBuf,
     /// Also write nose, right hip, left hip, float32 [T,3,3], metres about the neck; NaN where not seen for a second.
     #[arg(long, value_name = "FILE.npy")]
@@ -75,6 +77,17 @@ fn is_ours(path: &Path) -> bool {
     }
 }
 
+/// Keypoints of ours, with what is to be said of them.
+fn ours(args: &Args) -> Result<(Keypoints, Vec<String>)> {
+    let (mut keypoints, mut notes) = keypoints_npz::read_sized(&args.keypoints, args.size)?;
+    range::check_pixels(range::places(&keypoints)).with_context(|| args.keypoints.display().to_string())?;
+    if let Some(fps) = args.fps {
+        keypoints.fps = fps;
+        notes.retain(|note| !note.contains("`fps`"));
+    }
+    Ok((keypoints, notes))
+}
+
 /// Keypoints of another program at their own rate, with what is to be said of them.
 fn taken(args: &Args) -> Result<(Keypoints, Vec<String>)> {
     let file = args.keypoints.display();
@@ -88,7 +101,7 @@ fn taken(args: &Args) -> Result<(Keypoints, Vec<String>)> {
             notes.push("no size of the picture: taken from the farthest points (--size gives it)".to_owned());
             found.extent()
         }
-        None => anyhow::bail!("{file}: it does not say its picture's size; give it with --size, like --size 1280x720"),
+        None => bail!("{file}: it does not say its picture's size; give it with --size, like --size 1280x720"),
     };
     let taken = take_in(found, fps, size, fps)?;
     notes.extend(taken.notes);
@@ -97,19 +110,18 @@ fn taken(args: &Args) -> Result<(Keypoints, Vec<String>)> {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     confine([Some(&args.out), args.extra.as_ref()].into_iter().flatten().map(PathBuf::as_path), []);
-    for path in [Some(&args.out), args.extra.as_ref()].into_iter().flatten() {
-        ensure!(
-            path.extension().is_some_and(|e| e == "npy"),
-            "{}: joints are written as .npy; name such a file",
-            path.display()
-        );
+    let format = ExportFormat::from_path(&args.out).ok().filter(|format| format.holds_joints());
+    let format = format.with_context(|| {
+        format!("{}: joints are written as .npz, .npy or .txt; name such a file", args.out.display())
+    })?;
+    if let Some(path) = args.extra.as_ref().filter(|path| path.extension().is_none_or(|ending| ending != "npy")) {
+        bail!("{}: these points are written as .npy; name such a file", path.display());
     }
     ensure!(args.extra.as_ref() != Some(&args.out), "--out and --extra name the same file {}", args.out.display());
     for sigma in [args.smooth_arms, args.smooth_hands] {
         ensure!((0.0..=100.0).contains(&sigma), "a smoothing of {sigma} frames; it must lie between 0 and 100");
     }
-    let (keypoints, mut notes) =
-        if is_ours(&args.keypoints) { keypoints_npz::read_noting(&args.keypoints)? } else { taken(&args)? };
+    let (keypoints, mut notes) = if is_ours(&args.keypoints) { ours(&args)? } else { taken(&args)? };
     let settings = config::LiftConfig {
         body_weights: args.body_weights.unwrap_or_default().into(),
         hand_weights: args.hand_weights.unwrap_or_default().into(),
@@ -130,9 +142,10 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     notes.extend(orator::pipeline::lift::notes(&keypoints, &lifted));
     notes.iter().for_each(|note| ui.say(&format!("{}: {note}", args.keypoints.display())));
     let (motion, camera) = (&lifted.motion, lifted.cameras.first());
-    workdir::replace(&args.out, |attempt| npy::write(attempt, motion))?;
+    format.write_joints(&args.out, motion)?;
     if let Some(path) = &args.extra {
-        workdir::replace(path, |attempt| npy::write_points(attempt, &lifted.extra))?;
+        let write = |attempt: &Path| npy::write_points(attempt, &lifted.extra);
+        description::with(path, motion.fps, lifted.extra.shape(), write)?;
     }
 
     let n = motion.n_frames();
@@ -161,7 +174,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         held(pitch),
         args.out.display()
     );
-    let next = format!("python3 -c \"import numpy; print(numpy.load('{}').shape)\"", args.out.display());
+    let next = format!("orator animate {} --out {}", args.out.display(), args.out.with_extension("bvh").display());
     let facts = json!({
         "out": args.out,
         "n_frames": n,

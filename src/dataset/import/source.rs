@@ -16,6 +16,8 @@ use crate::dataset::write::part;
 use crate::dataset::write::part::{VideoEntry, VideoSource};
 use crate::dataset::write::writer::DatasetWriter;
 use crate::dataset::{INFO, Split};
+use crate::formats::joints::description::path_of;
+use crate::mocap::bvh;
 use crate::motion::bones;
 use crate::stage::fingerprint::hash_file;
 use crate::stage::ledger::{Kept, Ledger, Refused, TranscriptAccount, WordCount};
@@ -203,7 +205,8 @@ fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
             };
             source.ledger.words = kept.words;
             let notes = source.ledger.words.iter().flat_map(|words| words.notes.iter().cloned());
-            let remark = bones.into_iter().chain(notes).collect::<Vec<_>>().join("; ");
+            let unit = kept.sample.meta["imported"].as_object().and_then(bvh::unit_note);
+            let remark = unit.into_iter().chain(bones).chain(notes).collect::<Vec<_>>().join("; ");
             let codes = (!plan.limits.no_sound).then(|| codes([&kept.sample.sound]));
             Ok(InspectedItem { source, codes, remark, ..InspectedItem::default() })
         }
@@ -212,7 +215,8 @@ fn look_at_take(found: &TakeFiles, plan: &ImportPlan) -> Result<InspectedItem> {
 
 /// Hash of the files and of the settings that the sample depends on.
 fn made_from(found: &TakeFiles, plan: &ImportPlan) -> Result<String> {
-    let files = [Some(&found.motion), found.sound.as_ref(), found.transcript.as_ref()];
+    let described = Some(path_of(&found.motion)).filter(|path| path.is_file());
+    let files = [Some(&found.motion), found.sound.as_ref(), found.transcript.as_ref(), described.as_ref()];
     let hashes = files.into_iter().flatten().map(|path| hash_file(path)).collect::<Result<Vec<_>>>()?;
     let all = serde_json::json!([
         env!("CARGO_PKG_VERSION"),

@@ -8,6 +8,7 @@ pub use super::scene::ClipSeeds;
 use crate::external::ffmpeg::audio::read_sound;
 use crate::formats::rendered_truth::LIST;
 use crate::mocap::motion_file;
+use crate::motion::units;
 use crate::stage::progress::Progress;
 use crate::stage::workdir;
 use crate::types::pose3d::Motion;
@@ -173,6 +174,7 @@ fn secs_of(motion: &Motion) -> f64 {
 
 fn captured(path: &Path) -> Result<CapturedClip> {
     let motion = motion_file::read(path, None)?.motion;
+    units::check(&motion).with_context(|| path.display().to_string())?;
     ensure!(secs_of(&motion) >= 1.0, "{} lasts less than a second", path.display());
     let beside = path.with_extension("wav");
     let sound = beside.is_file().then(|| read_sound(&beside)).transpose()?;

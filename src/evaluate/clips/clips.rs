@@ -8,6 +8,7 @@ use crate::external::ffmpeg::sound_stream::SoundStream;
 use crate::mocap::motion_file;
 use crate::motion::bones;
 use crate::motion::resample;
+use crate::motion::units;
 use crate::types::pose3d::Motion;
 use crate::types::posture::PostureChannel;
 use crate::types::skeleton::{L_HAND, N_JOINTS, NECK, is_duplicate};
@@ -162,7 +163,12 @@ fn clip(pair: &FilePair, given: Option<FrameRate>, fps: FrameRate) -> Result<(Ev
     let mut notes = Vec::new();
     let mut side = |path: &PathBuf, what: &str| -> Result<Motion> {
         let read = motion_file::read(path, given)?;
+        units::check(&read.motion).with_context(|| path.display().to_string())?;
         notes.extend(read.notes);
+        if let Some(given) = given.filter(|given| read.says_rate && *given != read.motion.fps) {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            notes.push(format!("{name} says {}: {given} (--fps) is not for it", read.motion.fps));
+        }
         let mut motion = read.motion;
         if motion.fps != fps {
             notes.push(format!("{}: the {what} at {} was resampled to {fps}", pair.name, motion.fps));

@@ -2,7 +2,7 @@
 //! `keypoints.npz`.
 
 use super::entry::point;
-use super::found::{CoordinateUnit, FoundKeypoints, FoundPerson, NamedArrays};
+use super::found::{FoundKeypoints, FoundPerson, NamedArrays};
 use super::{mediapipe, pats};
 use crate::formats::keypoints_npz;
 use crate::formats::npy;
@@ -61,7 +61,7 @@ fn of_arrays(path: &Path, arrays: NamedArrays) -> Result<FoundKeypoints> {
 
 /// Our own file.
 fn ours(path: &Path, fps: Option<FrameRate>) -> Result<FoundKeypoints> {
-    let (keypoints, notes) = keypoints_npz::read_noting(path)?;
+    let (keypoints, image_size, notes) = keypoints_npz::read_as_written(path)?;
     let person = |t: usize| {
         let points = |array: &Array3<f32>| -> Vec<Keypoint> { triples(array.index_axis(Axis(0), t)) };
         let hand = |array: &Array3<f32>| points(array).try_into().unwrap_or_default();
@@ -69,15 +69,9 @@ fn ours(path: &Path, fps: Option<FrameRate>) -> Result<FoundKeypoints> {
         FoundPerson { body, left_hand: hand(&keypoints.left_hand), right_hand: hand(&keypoints.right_hand) }
     };
     let frames = (0..keypoints.n_frames()).map(|t| vec![person(t)]).collect();
-    let says_size = !notes.iter().any(|note| note.contains("image_size"));
     // What the caller says of rate and size takes the place of these two.
     let notes = notes.into_iter().filter(|note| !note.contains("`fps`") && !note.contains("image_size")).collect();
-    Ok(FoundKeypoints {
-        fps,
-        image_size: says_size.then_some(keypoints.image_size),
-        unit: CoordinateUnit::Pixels,
-        ..FoundKeypoints::new("orator, 17 points".to_owned(), frames, notes)
-    })
+    Ok(FoundKeypoints { fps, image_size, ..FoundKeypoints::new("orator, 17 points".to_owned(), frames, notes) })
 }
 
 fn triples(points: ArrayView2<f32>) -> Vec<Keypoint> {

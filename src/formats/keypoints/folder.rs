@@ -3,6 +3,7 @@
 use super::document::{self, FramePeople};
 use super::entry::JsonEntry;
 use super::found::FoundKeypoints;
+use crate::formats::joints::description::is_one;
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,8 +12,9 @@ use std::path::{Path, PathBuf};
 pub fn read(folder: &Path) -> Result<FoundKeypoints> {
     let listed = std::fs::read_dir(folder).with_context(|| format!("cannot list the folder {}", folder.display()))?;
     let paths = listed.filter_map(|entry| entry.ok().map(|entry| entry.path()));
-    let mut files: Vec<PathBuf> =
-        paths.filter(|path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("json"))).collect();
+    let is_frame =
+        |path: &PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("json")) && !is_one(path);
+    let mut files: Vec<PathBuf> = paths.filter(is_frame).collect();
     files.sort();
     ensure!(!files.is_empty(), "{} holds no .json file of a frame", folder.display());
     let mut program = "";

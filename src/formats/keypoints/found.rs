@@ -1,16 +1,9 @@
 //! Keypoints as another program found them: everybody in every frame, at the program's own rate and in its own unit.
 
-use crate::math::order::Ordered;
+use super::range::{MOST_LOOKED_AT, UPPER_BODY, are_shares};
 use crate::types::pose2d::{Keypoint, N_BODY, N_HAND, PersonBox};
 use crate::types::time::FrameRate;
 use ndarray::ArrayD;
-
-/// Points of the body that every format shows and every camera sees: face and arms.
-const UPPER_BODY: usize = 11;
-/// Points that are looked at for the unit.
-const MOST_LOOKED_AT: usize = 20_000;
-/// Median coordinate up to which coordinates are shares of the picture; a person of two pixels is none.
-const MOST_SHARE: f64 = 1.5;
 
 /// Arrays of a file by their names; the only one of a `.npy` file has none.
 pub type NamedArrays = Vec<(String, ArrayD<f32>)>;
@@ -74,10 +67,7 @@ pub struct FoundKeypoints {
 impl FoundKeypoints {
     /// Keypoints of a file that says neither rate nor size; the unit is told by the coordinates.
     pub fn new(format: String, frames: Vec<Vec<FoundPerson>>, notes: Vec<String>) -> Self {
-        let points = seen_points(&frames);
-        let sizes = points.map(|point| f64::from(point.x.abs().max(point.y.abs())));
-        let is_share = Ordered::new(sizes).median().is_some_and(|median| median <= MOST_SHARE);
-        let unit = if is_share { CoordinateUnit::Share } else { CoordinateUnit::Pixels };
+        let unit = if are_shares(places(&frames)) { CoordinateUnit::Share } else { CoordinateUnit::Pixels };
         Self { format, fps: None, image_size: None, unit, frames, notes }
     }
 
@@ -89,6 +79,11 @@ impl FoundKeypoints {
             n_negative += usize::from(point.x < 0.0 || point.y < 0.0);
         }
         n_negative as f64 / n.max(1) as f64
+    }
+
+    /// Places of the points looked at: x, y.
+    pub fn places(&self) -> impl Iterator<Item = [f32; 2]> {
+        places(&self.frames)
     }
 
     /// The farthest point of a body as a picture's size, px: the least that shows all of them.
@@ -114,6 +109,10 @@ impl FoundKeypoints {
         }
         self.unit = CoordinateUnit::Pixels;
     }
+}
+
+fn places(frames: &[Vec<FoundPerson>]) -> impl Iterator<Item = [f32; 2]> {
+    seen_points(frames).map(|point| [point.x, point.y])
 }
 
 fn seen_points(frames: &[Vec<FoundPerson>]) -> impl Iterator<Item = &Keypoint> {

@@ -36,6 +36,11 @@ pub fn read(arrays: &NamedArrays) -> Result<Option<FoundKeypoints>> {
     };
     let found = FoundKeypoints::new("PATS, 52 points".to_owned(), (0..n_frames).map(frame).collect(), Vec::new());
     let from_neck = (0..n_frames).all(|t| place(t, 0) == [0.0; 2]);
+    ensure!(
+        !from_neck || found.unit == CoordinateUnit::Pixels,
+        "its points lie less than 2 from the neck at 0, 0: no pixels; write them in pixels of the video's picture, in which \
+         shoulders are some hundred apart"
+    );
     let unit = if from_neck { CoordinateUnit::FromNeck } else { found.unit };
     Ok(Some(FoundKeypoints { fps: Some(RATE), unit, ..found }))
 }

@@ -1,6 +1,7 @@
 //! The kind of a file or folder of keypoints, by its content.
 
 use super::found::{CoordinateUnit, FoundKeypoints};
+use super::range::check_pixels;
 use super::{arrays, document, folder};
 use anyhow::{Context, Result, bail, ensure};
 use std::path::Path;
@@ -22,6 +23,9 @@ pub fn read(path: &Path) -> Result<FoundKeypoints> {
         "{shown}: its coordinates lie between -1 and 1; write them in pixels (OpenPose: --keypoint_scale 0) or as shares \
          of the picture from 0 to 1 (--keypoint_scale 3)"
     );
+    if found.unit == CoordinateUnit::Pixels {
+        check_pixels(found.places()).with_context(|| shown.to_string())?;
+    }
     Ok(found)
 }
 

@@ -106,7 +106,7 @@ impl Stage for BatchStage {
     }
 
     fn version(&self) -> u32 {
-        1
+        2
     }
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {

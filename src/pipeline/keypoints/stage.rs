@@ -20,7 +20,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// Version of what is read of other programs' files; goes up when the same file gives other keypoints.
-const READERS: u32 = 1;
+const READERS: u32 = 2;
 
 /// Keypoints to sound, timeline and keypoints at the dataset rate.
 pub struct KeypointExtractStage {

@@ -130,7 +130,7 @@ fn a_folder_of_motions_becomes_a_folder_of_files() {
     assert_eq!(facts["motions"].as_array().unwrap().len(), 2);
     let mut names: Vec<_> = std::fs::read_dir(dir.join("made")).unwrap().map(|f| f.unwrap().file_name()).collect();
     names.sort();
-    assert_eq!(names, ["a.bvh", "a.npy", "b.bvh", "b.npy"]);
+    assert_eq!(names, ["a.bvh", "a.npy", "a.npy.json", "b.bvh", "b.npy", "b.npy.json"]);
     // A broken one does not stop the others.
     std::fs::write(dir.join("in/c.txt"), "1 2 3\n").unwrap();
     let (code, json, errors) = animate(dir, "in --out again --format bvh");
@@ -208,6 +208,7 @@ fn what_is_wrong_is_said_and_nothing_is_written() {
         ("empty.npy --out x.bvh", "has no frame"),
         ("few.npy --out x.bvh", "[10, 43, 3], expected [frames, 49, 3]"),
         ("millimetres.npy --out x.bvh", "must be in metres"),
+        ("millimetres.npy --out x.bvh", "seems to be in millimetres; multiply every coordinate by 0.001"),
         ("words.txt --out x.bvh", "line 1, number 1: `a` is no number"),
         ("picture.png --out x.bvh", "is no motion file: expected .npy"),
         ("nothing --out x --format bvh", "holds no motion"),

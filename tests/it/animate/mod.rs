@@ -8,3 +8,4 @@ pub mod film;
 pub mod gltf;
 pub mod motion_files;
 pub mod posture;
+pub mod rates;

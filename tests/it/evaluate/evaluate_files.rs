@@ -189,7 +189,7 @@ fn silent_hours(path: &Path) {
 #[test]
 fn bad_input_is_refused_in_clear_words() {
     let project = bad_files();
-    let cases: [(&[&str], &str); 16] = [
+    let cases: [(&[&str], &str); 17] = [
         (&["t.npy", "gone.npy"], "gone.npy is not there"),
         (&["t.npy", "t.npy"], "a motion beside itself says nothing"),
         (&["t.npy", "empty.npy"], "empty.npy is empty"),
@@ -198,6 +198,7 @@ fn bad_input_is_refused_in_clear_words() {
         (&["missing.npy", "t.npy"], "missing.npy: all joints"),
         (&["t.npy", "many-nan.npy"], "for 18.7 % of the joints"),
         (&["t.npy", "long.npy"], "8.00 s (120 frames at 15 fps) and the prediction 12.00 s"),
+        (&["t.npy", "mm.npy"], "seems to be in millimetres; multiply every coordinate by 0.001"),
         (&["t.npy", "one"], "two files or two folders"),
         (&["one", "other"], "has a partner of its name"),
         (&["nobody", "one"], "has a partner of its name"),
@@ -231,7 +232,6 @@ fn what_can_be_mended_is_measured_with_a_note() {
     };
     noted("t.npy", "few-nan.npy", &[], "no number (NaN) for 100 of");
     noted("t.npy", "longer.npy", &[], "120 frames of truth, 114 of prediction: cut to 114");
-    noted("t.npy", "mm.npy", &[], "1000.00 times as long as the truth's: are both in metres?");
     noted("t.npy", "away.npy", &[], "neck stands 0.87 m from the origin");
     noted("t.npy", "30.npz", &[], "at 30 fps was resampled to 15 fps");
     let exact = noted("t.txt", "t.npy", &[], "does not say its rate");

@@ -18,6 +18,7 @@ use orator::generate::mel_stream::mel_frames;
 use orator::generate::model::SpeakerMetadata;
 use orator::generate::normalisation::{N_FEATURES, Normalisation};
 use orator::generate::representation::Representation;
+use orator::mocap::motion_file;
 use orator::nn::gan::generator::{Config, Generator, Preset};
 use orator::nn::params::Params;
 use orator::types::sound::Sound;
@@ -47,7 +48,11 @@ fn one_sound_becomes_every_kind_of_file() {
     assert!(worst < 0.1, "{worst} mm");
     let film = probe::probe(&made.join("a.mp4")).unwrap();
     assert!((film.duration_secs.unwrap() - 2.05).abs() < 0.1);
-    assert_eq!(std::fs::read_dir(&made).unwrap().count(), 4, "no attempt is left behind");
+    assert_eq!(std::fs::read_dir(&made).unwrap().count(), 6, "no attempt is left behind");
+    for name in ["a.npy", "a.txt"] {
+        let read = motion_file::read(&made.join(name), None).unwrap();
+        assert!(read.says_rate && read.motion.fps == FPS, "{name}");
+    }
 
     // Another kind of sound: a telephone's mp3, a video's track.
     for command in ["-i speech.wav -ar 8000 phone.mp3", "-i made/a.mp4 -c copy talk.mov"] {

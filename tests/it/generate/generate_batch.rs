@@ -43,6 +43,7 @@ fn a_folder_is_made_once_and_goes_on_after_a_bad_file() {
     assert!(generate(dir, "--checkpoint host.safetensors --audio talks/a.wav --out one.npy").status.success());
     let bytes = |file: &str| std::fs::read(dir.join(file)).unwrap();
     assert_eq!(bytes("one.npy"), bytes("made/a.npy"));
+    assert_eq!(bytes("one.npy.json"), bytes("made/a.npy.json"));
 
     assert_eq!(run(dir, args).0, [0, 2, 1]);
     assert_eq!(run(dir, &format!("{args} --again")).0, [2, 0, 1]);

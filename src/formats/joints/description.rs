@@ -1,0 +1,126 @@
+//! The description of a file of joints that cannot say its rate: `motion.npy.json` beside `motion.npy`, `motion.txt.json`
+//! beside `motion.txt`. One object: `format` "orator joints", `version` 1, `fps` [numerator, denominator] (a number is
+//! read too), `n_frames`, `shape`, `units`, `axes`.
+
+use crate::stage::workdir;
+use crate::types::time::FrameRate;
+use anyhow::{Context as _, Result, bail, ensure};
+use serde::Deserialize;
+use serde_json::json;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// What a file says of the joints beside it.
+#[derive(Debug, Deserialize)]
+struct JointsDescription {
+    fps: DescribedRate,
+    n_frames: Option<usize>,
+}
+
+/// Frames a second, as a fraction or as a number.
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+enum DescribedRate {
+    Fraction([u32; 2]),
+    Number(f64),
+}
+
+/// Path of the description of the joints at `path`.
+pub fn path_of(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".json");
+    name.into()
+}
+
+/// Whether a file's name is that of a description.
+pub fn is_one(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+    [".npy.json", ".txt.json"].iter().any(|ending| name.ends_with(ending))
+}
+
+/// Rate of the joints at `path` by their description; `None` where there is none.
+///
+/// # Errors
+/// A description that cannot be read, names no rate of motion, or is of another number of frames than `n_frames`.
+pub fn rate(path: &Path, n_frames: usize) -> Result<Option<FrameRate>> {
+    let (beside, file) = (path_of(path), path.display());
+    let text = match std::fs::read(&beside) {
+        Ok(text) => text,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(error).with_context(|| format!("cannot read {}", beside.display())),
+    };
+    let beside = beside.display();
+    let remedy = || format!("delete it, or write {{\"fps\": [30, 1]}} (or what {file} has) into it");
+    let said: JointsDescription = serde_json::from_slice(&text)
+        .with_context(|| format!("{beside} does not say the frames a second of {file}: {}", remedy()))?;
+    let rate = match said.fps {
+        DescribedRate::Fraction([num, den]) if num > 0 && den > 0 => Some(FrameRate::new(num, den)),
+        DescribedRate::Number(per_sec) => FrameRate::nearest(per_sec),
+        DescribedRate::Fraction(_) => None,
+    };
+    let Some(rate) = rate.filter(|rate| rate.is_plausible()) else {
+        bail!("{beside}: its `fps` is no frame rate of motion, 1 to 1000 frames a second: {}", remedy())
+    };
+    if let Some(described) = said.n_frames {
+        ensure!(
+            described == n_frames,
+            "{beside} describes {described} frames and {file} has {n_frames}: it is of another motion; {}",
+            remedy()
+        );
+    }
+    Ok(Some(rate))
+}
+
+/// Writes the numbers at `path` by `write`, and their description. An old description is gone before the numbers are
+/// there, so that it never speaks for new ones.
+pub fn with(path: &Path, fps: FrameRate, shape: &[usize], write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    let beside = path_of(path);
+    match std::fs::remove_file(&beside) {
+        Err(error) if !matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
+            return Err(error).with_context(|| format!("cannot replace {}", beside.display()));
+        }
+        _ => workdir::replace(path, write)?,
+    }
+    let description = json!({
+        "format": "orator joints",
+        "version": 1,
+        "fps": [fps.num, fps.den],
+        "n_frames": shape.first(),
+        "shape": shape,
+        "units": "metres",
+        "axes": "x image right, y down, z away from the camera, the neck at the origin",
+    });
+    workdir::write_file(&beside, format!("{description}\n").as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rate_comes_back_and_one_of_other_frames_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npy");
+        let text = |said: &str| std::fs::write(path_of(&path), said).unwrap();
+        let says = |words: &str| {
+            let error = format!("{:#}", rate(&path, 4).unwrap_err());
+            assert!(error.contains("a.npy.json") && error.contains(words), "{error}");
+        };
+        assert_eq!(rate(&path, 4).unwrap(), None);
+        let ntsc = FrameRate::new(30_000, 1001);
+        with(&path, ntsc, &[4, 49, 3], |attempt| Ok(std::fs::write(attempt, "numbers")?)).unwrap();
+        assert_eq!(rate(&path, 4).unwrap(), Some(ntsc));
+        assert!(is_one(&path_of(&path)) && !is_one(&path) && !is_one(Path::new("a.json")));
+        assert!(format!("{:#}", rate(&path, 5).unwrap_err()).contains("describes 4 frames"));
+        text("{\"fps\": 29.97}");
+        assert_eq!(rate(&path, 9).unwrap(), Some(ntsc));
+        text("{\"fps\": [30, 0]}");
+        says("1 to 1000");
+        text("{\"fps\": 0.5}");
+        says("1 to 1000");
+        text("{\"rate\": 30}");
+        says("does not say the frames a second");
+        text("no JSON");
+        says("delete it");
+    }
+}

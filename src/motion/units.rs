@@ -1,0 +1,120 @@
+//! The unit and the upright of joints, told by the arms: a person's upper arm and forearm are 0.1 to 0.6 m long.
+
+use crate::math::order;
+use crate::types::pose3d::Motion;
+use crate::types::skeleton::{ARM_BONES, L_ELBOW, L_WRIST, NECK, R_ELBOW, R_WRIST};
+use anyhow::{Result, bail};
+use std::ops::RangeInclusive;
+
+/// Units other than the metre that joints come in, with what turns them into metres.
+const UNITS: [(&str, f32); 8] = [
+    ("feet", 0.3048),
+    ("decimetres", 0.1),
+    ("inches", 0.0254),
+    ("centimetres", 0.01),
+    ("millimetres", 0.001),
+    ("metres divided by 10", 10.0),
+    ("metres divided by 100", 100.0),
+    ("metres divided by 1000", 1000.0),
+];
+/// Median length of a person's arm bones, metres: of an adult, of people, and what is let pass for small and large figures.
+const ADULT: f32 = 0.27;
+const PERSON: RangeInclusive<f32> = 0.1..=0.6;
+const LET_PASS: RangeInclusive<f32> = 0.05..=0.8;
+/// Share of the frames in which arms lie above the neck, from which on y is taken to point up, and the fewest frames.
+const UPSIDE_DOWN: f64 = 0.98;
+const FEWEST_FRAMES: usize = 15;
+
+/// Median length of upper arms and forearms; `None` where no arm is there in any frame.
+pub fn arm_bone(motion: &Motion) -> Option<f32> {
+    let joints = &motion.joints;
+    let length = |t: usize, (a, b): (usize, usize)| {
+        (0..3).map(|k| (joints[[t, a, k]] - joints[[t, b, k]]).powi(2)).sum::<f32>().sqrt()
+    };
+    order::median((0..motion.n_frames()).flat_map(|t| ARM_BONES.map(|bone| length(t, bone))).collect::<Vec<_>>())
+}
+
+/// Checks that the joints are in metres; motion without arms passes. The error says which unit it seems to be, and how to
+/// convert it.
+pub fn check(motion: &Motion) -> Result<()> {
+    let Some(length) = arm_bone(motion).filter(|length| !LET_PASS.contains(length)) else { return Ok(()) };
+    let unlikely = |metres: f32| (length * metres / ADULT).ln().abs();
+    let fitting = UNITS.into_iter().filter(|(_, metres)| PERSON.contains(&(length * metres)));
+    let wanted =
+        "joints must be in metres about the neck (x image right, y down, z away), where a person's are 0.1 to 0.6";
+    match fitting.min_by(|a, b| unlikely(a.1).total_cmp(&unlikely(b.1))) {
+        Some((unit, metres)) => bail!(
+            "its arm bones are {length:.3} long; {wanted}: it seems to be in {unit}; multiply every coordinate by {metres}"
+        ),
+        None => bail!("its arm bones are {length:.3} long, a person's in no known unit; {wanted}"),
+    }
+}
+
+/// Whether y certainly points up: elbows and wrists lie above the neck in nearly every frame.
+pub fn is_upside_down(motion: &Motion) -> bool {
+    let joints = &motion.joints;
+    let mut n = [0usize; 2];
+    for frame in joints.outer_iter() {
+        let below = [L_ELBOW, R_ELBOW, L_WRIST, R_WRIST].map(|joint| frame[[joint, 1]] - frame[[NECK, 1]]);
+        if below.iter().all(|y| y.is_finite()) {
+            n = [n[0] + 1, n[1] + usize::from(below.iter().all(|y| *y < 0.0))];
+        }
+    }
+    n[0] >= FEWEST_FRAMES && n[1] as f64 >= UPSIDE_DOWN * n[0] as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::skeleton::{L_SHOULDER, N_JOINTS, R_SHOULDER};
+    use crate::types::time::FrameRate;
+    use ndarray::Array3;
+
+    /// Arms that hang down, upper arm 0.29, forearm 0.25.
+    fn standing(n_frames: usize) -> Motion {
+        let mut joints = Array3::zeros((n_frames, N_JOINTS, 3));
+        for (side, [shoulder, elbow, wrist]) in
+            [(1.0, [L_SHOULDER, L_ELBOW, L_WRIST]), (-1.0, [R_SHOULDER, R_ELBOW, R_WRIST])]
+        {
+            for (joint, y) in [(shoulder, 0.02), (elbow, 0.31), (wrist, 0.56)] {
+                joints.slice_mut(ndarray::s![.., joint, 0]).fill(0.18f32 * side);
+                joints.slice_mut(ndarray::s![.., joint, 1]).fill(y);
+            }
+        }
+        Motion::from_joints(FrameRate::new(15, 1), joints)
+    }
+
+    #[test]
+    fn a_wrong_unit_is_named_with_what_to_do() {
+        let motion = standing(20);
+        let times = |by: f32| Motion { joints: &motion.joints * by, ..motion.clone() };
+        for by in [0.5, 1.0, 1.6] {
+            check(&times(by)).unwrap();
+        }
+        for (by, unit, metres) in [
+            (1000.0, "millimetres", "0.001"),
+            (100.0, "centimetres", "0.01"),
+            (10.0, "decimetres", "0.1"),
+            (39.37, "inches", "0.0254"),
+            (3.2808, "feet", "0.3048"),
+            (0.1, "metres divided by 10", "10"),
+            (0.001, "metres divided by 1000", "1000"),
+        ] {
+            let text = check(&times(by)).unwrap_err().to_string();
+            let says = format!("seems to be in {unit}; multiply every coordinate by {metres}");
+            assert!(text.ends_with(&says), "{by}: {text}");
+        }
+        assert!(check(&times(1e6)).unwrap_err().to_string().contains("no known unit"));
+        check(&Motion { joints: &motion.joints * f32::NAN, ..motion }).unwrap();
+    }
+
+    #[test]
+    fn only_arms_above_the_neck_throughout_are_upside_down() {
+        let turned = |motion: Motion| Motion { joints: &motion.joints * -1.0, ..motion };
+        assert!(is_upside_down(&turned(standing(20))));
+        assert!(!is_upside_down(&standing(20)) && !is_upside_down(&turned(standing(10))));
+        let mut raised = turned(standing(100));
+        raised.joints.slice_mut(ndarray::s![..3, R_WRIST, 1]).fill(0.1);
+        assert!(!is_upside_down(&raised));
+    }
+}

@@ -1,0 +1,102 @@
+//! Keypoints in shares of the picture, and where no picture is: taken as what they are, or refused.
+
+use crate::fixtures::keypoints::keypoints;
+use ndarray::{Array3, arr1, s};
+use ndarray_npy::{NpzWriter, read_npy, write_npy};
+use orator::train::scene::body::{FilmedScene, Filming};
+use orator::types::pose2d::Keypoints;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::fs::File;
+use std::path::Path;
+use std::process::Command;
+
+fn talker() -> Keypoints {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    keypoints(&FilmedScene::from_rule(Filming::Clean, 30, &mut rng), &mut rng)
+}
+
+/// The keypoints with x and y of every point that is there through `place`.
+fn placed(k: &Keypoints, place: impl Fn([f32; 2]) -> [f32; 2]) -> Keypoints {
+    let mut k = k.clone();
+    for points in [&mut k.body, &mut k.left_hand, &mut k.right_hand] {
+        for mut point in points.lanes_mut(ndarray::Axis(2)) {
+            if point[2] > 0.0 {
+                let [x, y] = place([point[0], point[1]]);
+                point.slice_mut(s![..2]).assign(&arr1(&[x, y]));
+            }
+        }
+    }
+    k
+}
+
+fn write(path: &Path, k: &Keypoints, size: Option<[i64; 2]>) {
+    let mut npz = NpzWriter::new(File::create(path).unwrap());
+    npz.add_array("body", &k.body).unwrap();
+    npz.add_array("left_hand", &k.left_hand).unwrap();
+    npz.add_array("right_hand", &k.right_hand).unwrap();
+    npz.add_array("fps", &arr1(&[15.0])).unwrap();
+    if let Some(size) = size {
+        npz.add_array("image_size", &arr1(&size)).unwrap();
+    }
+    npz.finish().unwrap();
+}
+
+fn lift(dir: &Path, args: &str) -> (Option<Array3<f32>>, String) {
+    let out = dir.join("j.npy");
+    let _ = std::fs::remove_file(&out);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+    let output = command.arg("lift").args(args.split(' ')).args(["--out", "j.npy"]).current_dir(dir).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    (output.status.success().then(|| read_npy(&out).unwrap()), said)
+}
+
+#[test]
+fn shares_of_the_picture_are_lifted_as_their_pixels_or_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    // A wide picture: shares of its width and height have another proportion.
+    let pixels = Keypoints { image_size: [8000, 3000], ..talker() };
+    write(&dir.join("px.npz"), &pixels, Some([8000, 3000]));
+    let shares = placed(&pixels, |[x, y]| [(x + 0.5) / 8000.0, (y + 0.5) / 3000.0]);
+    let expected = lift(dir, "px.npz").0.unwrap();
+    for (size, args) in [(Some([8000, 3000]), ""), (None, " --size 8000x3000"), (Some([1, 1]), " --size 8000x3000")] {
+        write(&dir.join("shares.npz"), &shares, size);
+        let (joints, said) = lift(dir, &format!("shares.npz{args}"));
+        let joints = joints.unwrap_or_else(|| panic!("{said}"));
+        let apart =
+            joints.iter().zip(&expected).map(|(a, b)| (a - b).abs()).filter(|d| d.is_finite()).fold(0.0, f32::max);
+        assert!(apart < 1e-3, "{apart} m apart");
+        assert!(said.contains("taken as shares of the picture, 8000x3000 px"), "{said}");
+    }
+    for size in [None, Some([1, 1])] {
+        write(&dir.join("shares.npz"), &shares, size);
+        let (joints, said) = lift(dir, "shares.npz");
+        assert!(joints.is_none() && said.contains("shares.npz: its coordinates lie in 0..1"), "{said}");
+        assert!(said.contains("--size 1280x720") && said.contains("image_size"), "{said}");
+    }
+}
+
+#[test]
+fn what_lies_in_no_picture_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let k = talker();
+    for (name, place, says) in [
+        ("far", (|[x, y]| [x * 1e4, y * 1e4]) as fn([f32; 2]) -> [f32; 2], "which no picture has room for"),
+        ("left", |[x, y]| [x - 4000.0, y], "have a negative x"),
+        ("up", |[x, y]| [x, -y], "have a negative y"),
+        ("centred", |[x, y]| [x / 2000.0 - 1.0, y / 1500.0 - 1.0], "lie between -1 and 1"),
+    ] {
+        let file = format!("{name}.npz");
+        write(&dir.join(&file), &placed(&k, place), Some([4000, 3000]));
+        let (joints, said) = lift(dir, &file);
+        assert!(joints.is_none() && said.contains(&file) && said.contains(says), "{name}: {said}");
+    }
+    // PATS about the neck, in no pixels.
+    let pats =
+        Array3::from_shape_fn((20, 52, 2), |(t, j, k)| ((t + 3 * j + k) % 7) as f32 / 7.0 * (j > 0) as u8 as f32);
+    write_npy(dir.join("pats.npy"), &pats).unwrap();
+    let (joints, said) = lift(dir, "pats.npy --size 640x480");
+    assert!(joints.is_none() && said.contains("pats.npy") && said.contains("no pixels"), "{said}");
+}
