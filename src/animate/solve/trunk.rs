@@ -40,7 +40,8 @@ pub fn turn(
         posture.and_then(|posture| angle_track(posture, column, axis, range, n_frames, filters))
     };
     let (lean, roll) = (track(1, X, LEAN), track(2, Z, ROLL));
-    if lean.is_none() && roll.is_none() && !has_breath {
+    let is_seen = lean.is_some() || roll.is_some();
+    if !is_seen && !has_breath {
         return;
     }
     let lever = norm(rig.skeleton.joints[rig.neck].offset).max(1.0);
@@ -51,7 +52,10 @@ pub fn turn(
         };
         let yaw = [Rotation::IDENTITY, local[rig.spine], local[rig.spine] * local[rig.chest]];
         let ahead = yaw[2];
-        let tilted = |n: usize| ahead * part(&lean, shares[n]) * part(&roll, shares[n]) * ahead.inverse() * yaw[n];
+        let tilted = |n: usize| match is_seen {
+            true => ahead * part(&lean, shares[n]) * part(&roll, shares[n]) * ahead.inverse() * yaw[n],
+            false => yaw[n],
+        };
         let breath = if has_breath { breath(clip.fps.secs(t)) / lever } else { 0.0 };
         let (hips, spine, chest) = (tilted(0), tilted(1), tilted(2) * Rotation::about(X, -breath));
         local[0] = hips;

@@ -138,6 +138,8 @@ fn a_breath_moves_the_chest_a_little_and_no_joint_against_the_neck() {
     let most = (0..150).map(way).fold(0.0, f64::max);
     assert!((2.0..4.0).contains(&most), "{most} mm");
     assert!((1..150).all(|t| (way(t) - way(t - 1)).abs() < 0.5), "slowly");
+    let hips = |performance: &Performance| performance.clip.local.iter().all(|local| local[0] == Rotation::IDENTITY);
+    assert!(hips(&alive) && alive.clip.travel.is_empty(), "hips and legs rest");
 }
 
 /// Keypoints [T, 17, 3], joints and extra points (nose, right hip, left hip) of a performance before a level camera.
