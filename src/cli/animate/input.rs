@@ -137,7 +137,9 @@ impl MotionInput {
             InputLocation::Sample(dataset, sample) => {
                 let sample = dataset.read(sample)?;
                 let body = sample.pose2d.slice(ndarray::s![.., ..N_BODY, ..]).to_owned();
-                InputMotion { sound: Some(sample.sound), ..InputMotion::seen(sample.motion, body.view()) }
+                let seen = InputMotion::seen(sample.motion, body.view());
+                // A dataset's own angles are those of the whole video.
+                InputMotion { sound: Some(sample.sound), posture: sample.posture.or(seen.posture), ..seen }
             }
             InputLocation::File(path) => {
                 let MotionFile { motion, says_rate, notes } = motion_file::read_at(path, fps)?;
