@@ -1,6 +1,6 @@
 //! Head and trunk in datasets: written, read, verified, imported and forgotten; without them no trace.
 
-use crate::fixtures::gesture_dataset::{dataset, dataset_of, with_posture};
+use crate::fixtures::gesture_dataset::{FPS, dataset, dataset_of, with_posture};
 use crate::fixtures::media::lifted_videos::{settings, shard_as, video};
 use crate::fixtures::support::files_under;
 use ndarray::s;
@@ -37,6 +37,7 @@ fn posed(folder: &Path) -> Dataset {
 fn posed_sample(mut sample: Sample, phase: f64) -> Sample {
     let middle = sample.n_frames() / 2;
     sample.motion.joints.slice_mut(s![middle, 5, ..]).fill(f32::NAN);
+    sample.meta = serde_json::json!({ "first_frame": 0, "fps": FPS, "start_secs": 0.0 });
     with_posture(sample, phase)
 }
 
