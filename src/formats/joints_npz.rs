@@ -1,12 +1,13 @@
 //! The joints file `joints.npz`: the 3D motion of a video. Arrays: `pose3d` f32 [T,49,3] (metres, house order, NaN
-//! where there is no motion), `mask` bool [T,49], `fps` f64 [2] (numerator, denominator).
+//! where there is no motion), `mask` bool [T,49], `fps` f64 [2] (numerator, denominator); of a lifted video `extra` f32
+//! [T,3,3] too: nose, right hip, left hip, in the axes of the joints, NaN where not known.
 
 use super::npz;
 use super::npz::Npz;
 use crate::types::pose3d::Motion;
 use crate::types::skeleton::N_JOINTS;
 use anyhow::{Context, Result};
-use ndarray::{Ix2, Ix3};
+use ndarray::{Array3, Ix2, Ix3};
 use std::path::Path;
 
 /// Reads the motion. Errors: unreadable, an array missing or of a wrong shape.
@@ -18,12 +19,31 @@ pub fn read(path: &Path) -> Result<Motion> {
     motion.in_range().with_context(|| path.display().to_string())
 }
 
+/// Reads nose, right hip and left hip [T, 3, 3] beside the motion; `None` in a file without them. Errors as `read`.
+pub fn read_extra(path: &Path) -> Result<Option<Array3<f32>>> {
+    let mut npz = Npz::open(path)?;
+    if !npz.has("extra") {
+        return Ok(None);
+    }
+    Ok(Some(npz.floats("extra", &[None, Some(3), Some(3)])?.into_dimensionality::<Ix3>()?))
+}
+
 /// Writes the file at `path`; the same motion gives the same bytes.
 pub fn write(path: &Path, motion: &Motion) -> Result<()> {
+    write_with(path, motion, None)
+}
+
+/// Writes the file of a lifted video, with its nose and hips.
+pub fn write_lifted(path: &Path, motion: &Motion, extra: &Array3<f32>) -> Result<()> {
+    write_with(path, motion, Some(extra))
+}
+
+fn write_with(path: &Path, motion: &Motion, extra: Option<&Array3<f32>>) -> Result<()> {
     npz::write(path, |npz| {
         npz.add_array("pose3d", &motion.joints)?;
         npz.add_array("mask", &motion.mask)?;
-        npz.add_array("fps", &npz::rate(motion.fps))
+        npz.add_array("fps", &npz::rate(motion.fps))?;
+        extra.map_or(Ok(()), |extra| npz.add_array("extra", extra))
     })
 }
 
@@ -32,6 +52,18 @@ mod tests {
     use super::*;
     use crate::types::time::FrameRate;
     use ndarray::{Array2, Array3};
+
+    #[test]
+    fn nose_and_hips_lie_beside_the_joints() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("joints.npz");
+        let motion = Motion::from_joints(FrameRate::new(15, 1), Array3::zeros((2, N_JOINTS, 3)));
+        write(&path, &motion).unwrap();
+        assert_eq!(read_extra(&path).unwrap(), None);
+        let extra = Array3::from_shape_fn((2, 3, 3), |(t, point, k)| (9 * t + 3 * point + k) as f32);
+        write_lifted(&path, &motion, &extra).unwrap();
+        assert_eq!((read(&path).unwrap(), read_extra(&path).unwrap()), (motion, Some(extra)));
+    }
 
     proptest::proptest! {
         #![proptest_config(proptest::test_runner::Config::with_cases(24))]

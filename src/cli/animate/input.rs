@@ -1,10 +1,10 @@
 //! Which motions `orator animate` is given, and what is beside them: face keypoints, sound.
 
 use anyhow::{Context as _, Result, bail, ensure};
-use ndarray::ArrayView3;
+use ndarray::{Array3, ArrayView3};
 use orator::dataset::index::SampleRef;
 use orator::dataset::{Dataset, Split};
-use orator::formats::keypoints_npz;
+use orator::formats::{joints_npz, keypoints_npz};
 use orator::mocap::motion_file;
 use orator::mocap::motion_file::MotionFile;
 use orator::motion::posture;
@@ -137,7 +137,7 @@ impl MotionInput {
             InputLocation::Sample(dataset, sample) => {
                 let sample = dataset.read(sample)?;
                 let body = sample.pose2d.slice(ndarray::s![.., ..N_BODY, ..]).to_owned();
-                let seen = InputMotion::seen(sample.motion, body.view());
+                let seen = InputMotion::seen(sample.motion, body.view(), None);
                 // A dataset's own angles are those of the whole video.
                 InputMotion { sound: Some(sample.sound), posture: sample.posture.or(seen.posture), ..seen }
             }
@@ -151,7 +151,12 @@ impl MotionInput {
         match self.keypoints(keypoints, &take.motion)? {
             Some(Keypoints { body, .. }) => {
                 let InputMotion { motion, sound, has_rate, notes, .. } = take;
-                Ok(InputMotion { sound, has_rate, notes, ..InputMotion::seen(motion, body.view()) })
+                Ok(InputMotion {
+                    sound,
+                    has_rate,
+                    notes,
+                    ..InputMotion::seen(motion, body.view(), self.extra()?.as_ref())
+                })
             }
             None => Ok(take),
         }
@@ -161,6 +166,16 @@ impl MotionInput {
     pub fn keypoints(&self, named: Option<&Path>, motion: &Motion) -> Result<Option<Keypoints>> {
         let path = named.map(Path::to_owned).or_else(|| self.of_run(Artifact::Keypoints));
         path.map(|path| read_keypoints(&path, motion)).transpose()
+    }
+
+    /// Nose and hips that were lifted with the joints.
+    fn extra(&self) -> Result<Option<Array3<f32>>> {
+        match &self.location {
+            InputLocation::File(path) if path.extension().is_some_and(|ending| ending == "npz") => {
+                joints_npz::read_extra(path)
+            }
+            _ => Ok(None),
+        }
     }
 
     /// The sound of the run that a lifted video belongs to.
@@ -181,9 +196,9 @@ impl MotionInput {
 }
 
 impl InputMotion {
-    /// Motion of a person of whom keypoints [T, 17, 3] are known.
-    fn seen(motion: Motion, body: ArrayView3<f32>) -> Self {
-        let lifted = LiftedBody { joints: Some(motion.joints.view()), extra: None };
+    /// Motion of a person of whom keypoints [T, 17, 3], perhaps nose and hips [T, 3, 3] in 3D, are known.
+    fn seen(motion: Motion, body: ArrayView3<f32>, extra: Option<&Array3<f32>>) -> Self {
+        let lifted = LiftedBody { joints: Some(motion.joints.view()), extra: extra.map(|extra| extra.view()) };
         let posture = Some(posture::estimate(body, lifted));
         let is_seated = posture::is_seated(body);
         Self { posture, is_seated, motion, sound: None, has_rate: true, notes: Vec::new() }

@@ -197,8 +197,10 @@ impl LiftedVideo {
             "{} is not 16-bit mono at {SAMPLE_RATE} Hz: run the extract stage again",
             self.sound.display()
         );
+        let extra = if self.has_posture { joints_npz::read_extra(&self.joints)? } else { None };
         let posture = self.has_posture.then(|| {
-            let lifted = LiftedBody { joints: Some(motion.joints.view()), extra: None };
+            let lifted =
+                LiftedBody { joints: Some(motion.joints.view()), extra: extra.as_ref().map(|extra| extra.view()) };
             posture::estimate(keypoints.body.view(), lifted)
         });
         Ok(Some(LiftedSamples { video: self, keypoints, motion, posture, sound, waiting: intervals.iter() }))

@@ -115,7 +115,7 @@ impl Stage for LiftStage {
         );
         let ledger = Ledger::read(&self.file(Artifact::SegmentLedger, unit))?;
         let (lifted, intervals, ledger) = self.lift(&mut keypoints, intervals, ledger, out)?;
-        joints_npz::write(&Artifact::Joints.within(out), &lifted.motion)?;
+        joints_npz::write_lifted(&Artifact::Joints.within(out), &lifted.motion, &lifted.extra)?;
         let bones = json!({ "lengths_metres": lifted.lengths.to_vec(), "n_frames": lifted.n_frames });
         write_json(&Artifact::Bones.within(out), &bones)?;
         let camera = json!({ "levelled": self.settings.level, "intervals": lifted.cameras });
