@@ -57,9 +57,9 @@ pub fn estimate(body: ArrayView3<f32>, lifted: LiftedBody) -> Posture {
     let upright = median_direction(&ups).filter(|_| is_often(&ups));
     let level = upright.map_or(Rotation::IDENTITY, |upright| Rotation::between(upright, [0.0, 1.0, 0.0]));
     let rolls = if upright.is_some() { Vec::new() } else { picture_rolls(body) };
-    for t in 0..n_frames {
+    for (t, &up) in ups.iter().enumerate() {
         let yaw = shoulders(t).map(|line| level.turn(line)).map(|[x, _, z]| (-z).atan2(x));
-        let tilt = upright.and(ups[t]).map(|up| {
+        let tilt = upright.and(up).map(|up| {
             let [x, y, z] = Rotation::about([0.0, 1.0, 0.0], -yaw.unwrap_or(0.0)).turn(level.turn(up));
             [z.atan2(y), -x.clamp(-1.0, 1.0).asin()]
         });

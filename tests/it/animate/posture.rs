@@ -66,8 +66,8 @@ fn the_trunk_turns_as_it_was_seen_and_no_joint_moves_against_the_neck() {
             // In the axes of the chest's own yaw, which the joints have.
             let [x, y, z] = before[t][turned.rig.chest].inverse().turn(line);
             let found = [z.atan2(y), -(x / norm(line)).asin()];
-            for k in 0..2 {
-                let off = (found[k] - f64::from(posture.trunk[[t, k + 1]])).to_degrees().abs();
+            for (k, found) in found.into_iter().enumerate() {
+                let off = (found - f64::from(posture.trunk[[t, k + 1]])).to_degrees().abs();
                 assert!(off < 0.6, "{legs:?}, frame {t}, angle {k}: {off} degrees");
             }
             let [yaw, pitch, roll] = after[t][turned.rig.head].euler([1, 0, 2]);

@@ -95,7 +95,7 @@ fn what_lies_in_no_picture_is_refused() {
     }
     // PATS about the neck, in no pixels.
     let pats =
-        Array3::from_shape_fn((20, 52, 2), |(t, j, k)| ((t + 3 * j + k) % 7) as f32 / 7.0 * (j > 0) as u8 as f32);
+        Array3::from_shape_fn((20, 52, 2), |(t, j, k)| ((t + 3 * j + k) % 7) as f32 / 7.0 * f32::from(u8::from(j > 0)));
     write_npy(dir.join("pats.npy"), &pats).unwrap();
     let (joints, said) = lift(dir, "pats.npy --size 640x480");
     assert!(joints.is_none() && said.contains("pats.npy") && said.contains("no pixels"), "{said}");

@@ -166,6 +166,6 @@ mod tests {
         assert_eq!((word(46), word(50), word(54), &bytes[58..61]), (82, 1, 21, &b"\x02Bc"[..]));
         assert_eq!((bytes[61], word(62), word(66), word(70), word(74), word(78)), (b'i', 2, 0, 8, 1, 2));
         assert!(bytes[82..].starts_with(&[0; 26]));
-        assert!(bytes.ends_with(&FOOT_END) && (bytes.len() - 140) % 16 == 0);
+        assert!(bytes.ends_with(&FOOT_END) && (bytes.len() - 140).is_multiple_of(16));
     }
 }

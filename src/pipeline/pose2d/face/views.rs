@@ -179,8 +179,8 @@ mod tests {
         let image = Image::filled(640, 480, [skin, 100, 90]);
         let mut views = PortraitViews::default();
         for t in 0..200 {
-            let turn = 0.0125 * (t % 40) as f64;
-            views.look(&image, &face(chin, turn), t as f64 / 15.0).unwrap();
+            let turn = 0.0125 * f64::from(t % 40);
+            views.look(&image, &face(chin, turn), f64::from(t) / 15.0).unwrap();
         }
         assert!(views.views.len() <= N_VIEWS);
         views.finish().unwrap()
