@@ -3,6 +3,7 @@
 //! tolerance explain (Lepski 1990): a still limb is smoothed over long, a stroke stays as it is. Nothing comes late.
 
 use super::noise;
+use super::order::lower_quantile;
 use super::vec3::{Vec3, add, norm, scale, sub};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -32,6 +33,8 @@ const EXTENT: f64 = 3.0;
 /// Time on each side over which the noise is measured, and over which the windows are evened out, seconds.
 const NOISE_SECS: f64 = 2.5;
 const EVEN_SECS: f64 = 0.14;
+/// Quantile of the windows chosen around a frame that holds for it.
+const NARROW: f64 = 0.25;
 /// Difference of two fits that is no more noise, in standard deviations of what noise makes of it.
 const BIAS: f64 = 2.5;
 
@@ -83,8 +86,14 @@ impl LocalFit {
             chosen.push(self.widest(&fit, &windows.differences, self.strength * noise) as f64);
             fits.push(fit);
         }
+        // Narrow among the frames around, so that a stroke keeps its frames though rest is beside it.
+        let narrow = |t: usize| {
+            let around = t.saturating_sub(self.even_half)..(t + self.even_half + 1).min(chosen.len());
+            lower_quantile(chosen[around].iter().copied(), NARROW).unwrap_or(0.0)
+        };
+        let chosen: Vec<f64> = (0..chosen.len()).map(narrow).collect();
         let between = |(t, fits): (usize, &Vec<Vec3>)| {
-            let at = evened(&chosen, t, self.even_half);
+            let at = evened(&chosen, t, self.even_half / 2);
             let (low, share) = (at.floor() as usize, at.fract());
             let high = fits[(low + 1).min(self.sigmas.len())];
             add(scale(fits[low], 1.0 - share), scale(high, share))
@@ -181,7 +190,7 @@ mod tests {
     #[test]
     fn a_fast_beat_keeps_its_apex_and_its_energy() {
         let beat = beat();
-        let smooth = LocalFit::new(FPS, 1.0, 0.006).run(&beat, &[]);
+        let smooth = LocalFit::new(FPS, 1.0, 0.005).run(&beat, &[]);
         let fall = |track: &[Vec3]| track.iter().map(|v| v[1]).fold(0.0, f64::min);
         let energy = |track: &[Vec3]| track.windows(2).map(|pair| norm(sub(pair[1], pair[0])).powi(2)).sum::<f64>();
         // 5 mm at the end of an arm of 0.6 m.

@@ -17,7 +17,7 @@ const fn limit(flexion: [f64; 2], side: [f64; 2]) -> Limit {
 
 /// Forearm against upper arm; to the side 10 degrees of carrying angle, since a nearly straight arm does not show its
 /// plane of flexion.
-pub const ELBOW: Limit = limit([0.0, 160.0], [-10.0, 10.0]);
+pub const ELBOW: Limit = limit([0.0, 175.0], [-10.0, 10.0]);
 /// Rotation of the hand about the forearm from pronation to supination, 0 with the palm along the elbow's axis: 80 both
 /// ways by AAOS. The axis is seen only in a bent arm, and other skeletons turn theirs against ours, so that people who
 /// were captured are found up to 60 degrees further.

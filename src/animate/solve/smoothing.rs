@@ -41,7 +41,7 @@ const ARMS_HALF_SECS: f64 = 4.0 / 15.0;
 const HANDS_HALF_SECS: f64 = 7.0 / 15.0;
 /// Tolerances of the adaptive filter, radians: 1.5 mm at the end of an upper arm or forearm, 1 mm at the end of a
 /// hand, 0.6 mm at the end of a phalanx.
-const ARMS_RADIANS: f64 = 0.006;
+const ARMS_RADIANS: f64 = 0.005;
 const HANDS_RADIANS: f64 = 0.006;
 const FINGERS_RADIANS: f64 = 0.015;
 /// One-Euro cut-off of hands relative to that of arms.

@@ -35,7 +35,7 @@ const ONE: [f64; 2] = [0.0, 1.0];
 const BONES: &str = "bone_change";
 const LENGTHS: &str = "interval_secs";
 
-const ROWS: [Measure; 17] = [
+const ROWS: [Measure; 18] = [
     row("sound_db", "Loudness of the second", "dB", [-100.0, 0.0], 50, "min_sound_db"),
     row("speech", "Share of speech in the 4 s around", "", ONE, 50, "min_speech"),
     row("lip_sync", "Mouth and voice in the 8 s around", "correlation", [-1.0, 1.0], 50, "min_lip_sync"),
@@ -48,6 +48,7 @@ const ROWS: [Measure; 17] = [
     row("arms", "Lowest score of shoulders and elbows", "", ONE, 40, "joint_score"),
     row("left_hand", "Score of the left hand", "", ONE, 40, "joint_score"),
     row("right_hand", "Score of the right hand", "", ONE, 40, "joint_score"),
+    row("rest", "Wrists that lie together move", "shoulder widths", ONE, 50, "max_rest_move"),
     row("jump", "Step of the neck", "shoulder widths", [0.0, 1.5], 60, "max_jump"),
     row("shot_score", "Shot score", "", ONE, 50, "shot_threshold"),
     row("n_people", "People in view", "people", [-0.5, 10.5], 11, "max_people"),
@@ -113,10 +114,10 @@ mod tests {
     use crate::stage::ledger::Kept;
 
     #[test]
-    fn every_measure_is_counted_but_the_two_that_are_yes_or_no() {
+    fn every_measure_is_counted_but_those_that_are_yes_or_no() {
         let names = Measures::default().arrays().map(|(name, _)| name);
         let missing: Vec<&str> = names.into_iter().filter(|name| ROWS.iter().all(|row| row.name != *name)).collect();
-        assert_eq!(missing, ["sound", "identity"]);
+        assert_eq!(missing, ["sound", "left_other", "right_other", "identity"]);
         let mut spread = MeasureCounts::new();
         let measures = Measures { jump: vec![0.1, 0.7, f32::NAN], ..Measures::default() };
         spread.add_frames(&measures);

@@ -48,7 +48,7 @@ fn look(project: &Project, facts: &Value) {
     assert_eq!(count("#reasons tbody tr"), facts["refused_secs"].as_object().unwrap().len() + 1);
     assert_eq!(
         (count("input[type=range]"), count(".distribution svg"), count(".range svg")),
-        (19.into(), 15.into(), 6.into())
+        (19.into(), 16.into(), 6.into())
     );
     assert!(facts["n_pictures"].as_u64().unwrap() > 0);
     let drawn = "[...document.querySelectorAll('canvas[data-preview]')].filter(c => c.getContext('2d')\
