@@ -31,8 +31,9 @@ const HIPS_SHARE: f64 = 0.5;
 const KNEES: [usize; 2] = [13, 14];
 /// Frames with hip and knee that tell how a person sits, as a share.
 const KNEES_SHARE: f64 = 0.2;
-/// Height from hip to knee over that from shoulder to hip, in the picture: 0.8 standing, 0.0 to 0.4 seated.
-const SEATED_BELOW: f64 = 0.55;
+/// Height from hip to knee over that from shoulder to hip, in the picture: 0.8 standing, -0.2 to 0.3 seated; knees that a
+/// picture cuts off are guessed beneath it, at 0.5.
+const SEATED_BELOW: f64 = 0.4;
 
 /// Posture over the frames of the keypoints [T, 17, 3] (COCO; x px, y px, score).
 pub fn estimate(body: ArrayView3<f32>, lifted: LiftedBody) -> Posture {
