@@ -8,7 +8,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: setup runtime models readers aligner browser blender validator vrm build check test prove prove-rule prove-people demo clean-demo
+.PHONY: setup runtime models readers aligner browser blender validator vrm driver loader build check test prove prove-rule prove-people prove-study demo clean-demo
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -21,10 +21,12 @@ export ORATOR_BLENDER ?= $(abspath $(TARGET)/blender)
 export INSTA_UPDATE := no
 export ORATOR_GLTF_VALIDATOR ?= $(abspath $(TARGET)/validator)
 export ORATOR_VRM ?= $(abspath $(TARGET)/vrm)
+export ORATOR_LOADER ?= $(abspath $(TARGET)/loader)
+export ORATOR_DRIVER ?= $(abspath $(TARGET)/driver)
 
 setup: ; @.ci/setup/system.sh
 runtime: ; @.ci/setup/onnxruntime.sh
-readers aligner browser blender validator vrm: ; @.ci/setup/$@.sh
+readers aligner browser blender validator vrm driver loader: ; @.ci/setup/$@.sh
 models: build ; @.ci/setup/models.sh
 
 build: setup runtime
@@ -41,7 +43,7 @@ check:
 	cargo test --locked --lib --bins
 	cargo test --locked --test it -- $(QUICK)
 
-test: build models readers aligner browser blender validator vrm
+test: build models readers aligner browser blender validator vrm driver
 	@rm -f $(SKIPPED)
 	cargo fmt --check
 	cargo clippy --locked --all-targets -- -D warnings
@@ -50,8 +52,12 @@ test: build models readers aligner browser blender validator vrm
 	@if [ -s $(SKIPPED) ]; then echo 'skipped tests:'; sort -u $(SKIPPED); else echo 'no test was skipped'; fi
 	@echo 'make test: all passed'
 
-prove prove-rule prove-people: build models aligner
+prove prove-rule prove-people: build models aligner loader
 	.ci/$@
+
+# Simulated studies through the analysis: coverage of its intervals, errors of its tests, power.
+prove-study:
+	cargo test --release --locked --test it -- --ignored --nocapture study::coverage
 
 # The synthetic speaker from its videos to its motion: a rendered person seen by the models for real people, or, where
 # they cannot be had, a figure in a suit of markers. DEMO: the folder; DRAW and STEPS: how much of it.

@@ -38,6 +38,7 @@
 //! | 6 | `demo` | synthetic speakers: drawn, rendered, with a known rule, and the checks against them | `types math stage audio motion formats external mocap render animate dataset metrics generate` |
 //! | 7 | `evaluate` | clips, baselines, table, verdict; the lifters' errors | `types math stage config external audio motion formats nn mocap metrics generate animate dataset pipeline train` |
 //! | 8 | `report` | pages for people | `types stage config external formats metrics animate dataset pipeline train evaluate` |
+//! | 9 | `study` | user studies: films built and sealed, served, responses analysed | `types math stage config external audio motion formats mocap metrics generate animate dataset evaluate report` |
 //! | - | `guide` | the pages of the guide, in Markdown | nothing |
 //!
 //! `cli` (in the program only) imports everything and is the one place that prints. `tests/it/house.rs` holds the code to
@@ -91,6 +92,8 @@ pub mod render;
 pub mod report;
 #[doc(hidden)]
 pub mod stage;
+#[doc(hidden)]
+pub mod study;
 #[doc(hidden)]
 pub mod train;
 #[doc(hidden)]

@@ -127,7 +127,11 @@ pub struct Performance {
 /// Joint limits are applied before smoothing, so that a joint found on the wrong side does not pull its neighbours in
 /// time, and again after smoothing and at the output rate, so that they hold in every written frame.
 pub fn perform(motion: &Motion, posture: Option<&Posture>, options: &AnimationOptions) -> Performance {
-    let rig = Rig::from_motion(motion);
+    perform_on(Rig::from_motion(motion), motion, posture, options)
+}
+
+/// Animates a motion on a given rig, as several motions of one person share it.
+pub fn perform_on(rig: Rig, motion: &Motion, posture: Option<&Posture>, options: &AnimationOptions) -> Performance {
     let clip_of = |tracks: &[RotationTrack]| {
         let local = (0..motion.n_frames()).map(|t| tracks.iter().map(|track| track[t]).collect()).collect();
         BvhClip { root: rig.root, travel: Vec::new(), skeleton: rig.skeleton.clone(), fps: motion.fps, local }

@@ -1,7 +1,9 @@
 //! Waveforms to features. Pure: samples in, arrays out.
 
 pub mod fingerprint;
+pub mod loudness;
 pub mod mel;
 pub mod mfcc;
 pub mod onset;
 pub mod openness;
+pub mod pauses;

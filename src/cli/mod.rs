@@ -15,6 +15,7 @@ pub mod outputs;
 pub mod pipeline;
 pub mod program;
 pub mod setup;
+pub mod study;
 pub mod train;
 pub mod ui;
 

@@ -6,7 +6,7 @@ use super::motion::{lift, sheet};
 use super::outcome::Outcome;
 use super::pipeline::{init, report, run, status};
 use super::setup::{completions, doctor, guide, models, words};
-use super::{animate, demo, evaluate, generate, train, ui};
+use super::{animate, demo, evaluate, generate, study, train, ui};
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use orator::pipeline::process::{VERB, serve};
 use orator::stage::workdir;
@@ -42,6 +42,7 @@ enum Verb {
     Evaluate(evaluate::Args),
     Generate(generate::Args),
     Animate(animate::Args),
+    Study(study::Args),
     Demo(demo::Args),
     Guide(guide::Args),
     Completions(completions::Args),
@@ -85,6 +86,7 @@ pub fn main() -> ExitCode {
         Verb::Evaluate(args) => evaluate::run(args, &ui),
         Verb::Generate(args) => generate::run(args, &ui),
         Verb::Animate(args) => animate::run(args, &ui),
+        Verb::Study(args) => study::run(args, &ui),
         Verb::Demo(args) => demo::run(args, &ui),
         Verb::Guide(args) => guide::run(&args, &ui),
         Verb::Completions(args) => completions::run(&args, Cli::command(), &ui),

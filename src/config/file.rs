@@ -333,7 +333,7 @@ fn typed(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
 }
 
 /// Message about a value of the right kind that its setting refuses; `message` is serde's.
-fn refused(value: &Value, message: &str) -> String {
+pub fn refused(value: &Value, message: &str) -> String {
     let Value::String(text) = value else { return format!("{value} is too large") };
     let expected = message.strip_prefix(&format!("unknown variant `{text}`, ")).unwrap_or(message);
     let known: Vec<String> = expected.split('`').skip(1).step_by(2).map(str::to_owned).collect();
@@ -341,7 +341,7 @@ fn refused(value: &Value, message: &str) -> String {
 }
 
 /// ` (did you mean X?)` where a known key is close.
-fn nearest<'k>(name: &str, known: impl Iterator<Item = &'k String>) -> String {
+pub fn nearest<'k>(name: &str, known: impl Iterator<Item = &'k String>) -> String {
     let best = known.map(|key| (strsim::levenshtein(name, key), key)).min();
     match best {
         Some((steps, key)) if steps <= 1 + key.len() / 3 => format!(" (did you mean {key}?)"),
@@ -349,6 +349,7 @@ fn nearest<'k>(name: &str, known: impl Iterator<Item = &'k String>) -> String {
     }
 }
 
-fn line_of(text: &str, offset: usize) -> usize {
+/// Line of a byte of `text`, from 1.
+pub fn line_of(text: &str, offset: usize) -> usize {
     1 + text.as_bytes().iter().take(offset).filter(|byte| **byte == b'\n').count()
 }

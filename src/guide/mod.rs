@@ -16,6 +16,8 @@ pub mod training {}
 pub mod animation {}
 #[doc = include_str!("evaluation.md")]
 pub mod evaluation {}
+#[doc = include_str!("study.md")]
+pub mod study {}
 #[doc = include_str!("models.md")]
 pub mod models {}
 #[doc = include_str!("configuration.md")]

@@ -2,7 +2,8 @@
 
 use super::bodies::{animate, render};
 use super::report::{Bars, Report};
-use super::{dataset, evaluate, generate, lift, lifter, pose2d, run, scale, seq2seq, spaces, train};
+use super::training::{lifter, seq2seq, train};
+use super::{dataset, evaluate, generate, lift, pose2d, run, scale, spaces, study};
 use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser, Subcommand};
 use orator::stage::progress::Progress;
@@ -37,6 +38,7 @@ enum Part {
     Scale(scale::Args),
     Seq2seq(seq2seq::Args),
     Spaces(spaces::Args),
+    Study(study::Args),
     Train(train::Args),
 }
 
@@ -55,6 +57,7 @@ impl Part {
             Part::Scale(args) => scale::run(args, progress),
             Part::Seq2seq(args) => seq2seq::run(args, progress),
             Part::Spaces(args) => spaces::run(args, progress),
+            Part::Study(args) => study::run(args, progress),
             Part::Train(args) => train::run(args, progress),
         }
     }

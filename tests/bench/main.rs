@@ -10,15 +10,16 @@ pub mod disturbed;
 pub mod evaluate;
 pub mod generate;
 pub mod lift;
-pub mod lifter;
 pub mod pose2d;
 pub mod reference;
 pub mod report;
 pub mod run;
 pub mod scale;
-pub mod seq2seq;
+#[path = "../it/fixtures/study/served_study.rs"]
+pub mod served_study;
 pub mod spaces;
-pub mod train;
+pub mod study;
+pub mod training;
 
 fn main() -> std::process::ExitCode {
     command::main()

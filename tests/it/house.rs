@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Floor, room, and the rooms it may import.
-const FLOORS: [(u8, &str, &str); 20] = [
+const FLOORS: [(u8, &str, &str); 21] = [
     (1, "types", ""),
     (1, "math", ""),
     (1, "stage", ""),
@@ -33,6 +33,11 @@ const FLOORS: [(u8, &str, &str); 20] = [
         "types math stage config external audio motion formats nn mocap metrics generate animate dataset pipeline train",
     ),
     (8, "report", "types stage config external formats metrics animate dataset pipeline train evaluate"),
+    (
+        9,
+        "study",
+        "types math stage config external audio motion formats mocap metrics generate animate dataset evaluate report",
+    ),
 ];
 
 /// Folders that import nothing of each other: pairwise siblings under a room.

@@ -25,5 +25,6 @@ mod pose2d;
 mod report;
 mod robustness;
 mod segment;
+mod study;
 mod train;
 mod wording;

@@ -58,6 +58,8 @@ pub struct Appearance {
     pub nose: f64,
     pub lips: f64,
     pub brows: f64,
+    /// Whether there are eyes, brows and a mouth; without them the head is that of a mannequin.
+    pub face: bool,
     pub skin: Reflectance,
     pub lip_colour: Reflectance,
     pub iris: Reflectance,
@@ -149,6 +151,7 @@ impl Appearance {
             nose: 1.0,
             lips: 1.0,
             brows: 1.0,
+            face: true,
             skin: SKINS[2],
             lip_colour: lips_of(SKINS[2], 0.5),
             iris: IRISES[1],
@@ -168,6 +171,11 @@ impl Appearance {
             legs_colour: LEGS[0],
             shoes_colour: SHOES[0],
         }
+    }
+
+    /// The plain figure with a mannequin's head: no face to read.
+    pub fn faceless() -> Self {
+        Self { face: false, ..Self::plain() }
     }
 
     /// Random person; the same for the same seed.
@@ -220,6 +228,7 @@ impl Appearance {
             nose: near(&mut rng, if woman { 0.92 } else { 1.03 }, 0.12),
             lips: near(&mut rng, if woman { 1.08 } else { 0.95 }, 0.15),
             brows: near(&mut rng, if woman { 0.8 } else { 1.15 }, 0.2),
+            face: true,
             skin,
             lip_colour: lips_of(skin, if painted { 1.0 } else { rng.random_range(0.3..0.6) }),
             iris: IRISES[if dark { 0 } else { rng.random_range(0..IRISES.len()) }],

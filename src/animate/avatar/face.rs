@@ -46,6 +46,9 @@ impl HeadForm<'_> {
     /// All features of the face.
     pub fn features(&self, looks: &Appearance) -> Vec<Feature> {
         let mut all = Vec::new();
+        if !looks.face {
+            return all;
+        }
         for left in [eyeball(looks), lid(looks, true), lid(looks, false), self.brow(looks)] {
             all.push(left.mirrored());
             all.push(left);
@@ -239,6 +242,9 @@ fn lid(looks: &Appearance, upper: bool) -> Feature {
 impl HeadForm<'_> {
     /// Colour of the skin of the head at a point.
     pub fn complexion(&self, at: Vec3, looks: &Appearance) -> Reflectance {
+        if !looks.face {
+            return looks.skin;
+        }
         if self.in_mouth(at) {
             return [0.055, 0.012, 0.012];
         }

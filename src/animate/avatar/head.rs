@@ -100,9 +100,12 @@ impl<'a> HeadForm<'a> {
         joined(self.face.distance(at), self.neck.distance(at), 2.2)
     }
 
-    /// Distance to head and neck with sockets and the hollow of the mouth.
+    /// Distance to head and neck with sockets and the hollow of the mouth, where there is a face.
     fn skin(&self, [x, y, z]: Vec3) -> f64 {
         let at = [x.abs(), y, z];
+        if !self.looks.face {
+            return self.bare(at);
+        }
         let [ex, ey, _] = EYE;
         let socket =
             cone([ex - 0.45, ey + 0.15, 9.6], [ex + 0.5, ey + 0.25, 9.4], [1.65, 1.65]).flat([0.0, 1.0, 0.0], 0.75);

@@ -26,6 +26,19 @@ impl FilmCamera {
             Self::ThreeQuarter => [38.0, 9.0],
         }
     }
+
+    /// Turn about the vertical.
+    fn turn(self) -> Rotation {
+        Rotation::about([0.0, 1.0, 0.0], self.degrees()[0].to_radians())
+    }
+
+    /// Camera of `size` px that sees all of these performances.
+    fn framing(self, shown: &[&Performance], size: [usize; 2]) -> PinholeCamera {
+        let upwards = Rotation::about([1.0, 0.0, 0.0], -self.degrees()[1].to_radians());
+        let towards_camera = self.turn().turn(upwards.turn([0.0, 0.0, 1.0]));
+        let points: Vec<Vec3> = shown.iter().flat_map(|performance| extremes(performance)).collect();
+        framed(&points, towards_camera, size)
+    }
 }
 
 /// Focal length over the picture's height: a lens that does not distort hands that reach forward.
@@ -42,6 +55,22 @@ const BELOW: [u8; 3] = [146, 152, 158];
 /// Frames that the framing looks at.
 const N_FRAMED: usize = 600;
 
+/// Body before a camera, which films of several performances on one rig share.
+#[derive(Clone, Debug)]
+pub struct AvatarStage {
+    avatar: Avatar,
+    pub camera: PinholeCamera,
+    from: FilmCamera,
+}
+
+impl AvatarStage {
+    /// Body of the performances' rig, seen in pictures of `size` px in which all of them fit; `None` without a performance.
+    pub fn new(shown: &[&Performance], looks: &Appearance, size: [usize; 2], from: FilmCamera) -> Option<Self> {
+        let avatar = Avatar::new(&shown.first()?.rig, looks);
+        Some(Self { avatar, camera: from.framing(shown, size), from })
+    }
+}
+
 /// Renderer of one performance.
 pub struct AvatarView<'a> {
     performance: &'a Performance,
@@ -56,15 +85,19 @@ pub struct AvatarView<'a> {
 impl<'a> AvatarView<'a> {
     /// View of `size` px in which all the `shown` performances fit.
     pub fn new(performance: &'a Performance, shown: &[&Performance], size: [usize; 2], from: FilmCamera) -> Self {
-        let [yaw, height] = from.degrees().map(f64::to_radians);
-        let turn = Rotation::about([0.0, 1.0, 0.0], yaw);
-        let towards_camera = turn.turn(Rotation::about([1.0, 0.0, 0.0], -height).turn([0.0, 0.0, 1.0]));
-        let points: Vec<Vec3> = shown.iter().flat_map(|performance| extremes(performance)).collect();
+        let avatar = Avatar::new(&performance.rig, &Appearance::plain());
+        Self::on(&AvatarStage { avatar, camera: from.framing(shown, size), from }, performance)
+    }
+
+    /// View of a performance on the rig of the stage.
+    pub fn on(stage: &AvatarStage, performance: &'a Performance) -> Self {
+        let AvatarStage { avatar, camera, from } = stage.clone();
+        let size = camera.size;
         Self {
             performance,
-            avatar: Avatar::new(&performance.rig, &Appearance::plain()),
-            camera: framed(&points, towards_camera, size),
-            light: Light::studio(turn.turn(TO_KEY)),
+            avatar,
+            camera,
+            light: Light::studio(from.turn().turn(TO_KEY)),
             backdrop: Background::gradient(size, ABOVE, BELOW),
             renderer: Renderer::new(size),
             meshes: Vec::new(),

@@ -1,6 +1,6 @@
 //! A rendered person over a clip: body, looks, speech and the pose of every step of time.
 
-use super::acts::Acts;
+use super::acts::{Acts, Carriage};
 use super::body::Build;
 use super::condition::{Manner, Seat};
 use super::contact::{Obstacles, Slab};
@@ -34,6 +34,8 @@ pub struct ActorPose {
 pub struct ActorRole {
     pub manner: Manner,
     pub seat: Seat,
+    /// Whether trunk, head and arms are held as `Carriage` says.
+    pub leans: bool,
     /// Place on the floor, cm, and turn to the person's left, radians.
     pub place: [f64; 2],
     pub turn: f64,
@@ -51,6 +53,8 @@ pub struct Actor {
     /// Neck and hips of the upright body, world cm.
     pub neck: Vec3,
     pub hips: Vec3,
+    /// Near edge of a desk ahead of the hips, metres of a body of unit 1.
+    desk_ahead: f64,
 }
 
 /// Seeds of what a person is.
@@ -77,9 +81,12 @@ impl Actor {
             (role.manner == Manner::Holding && captured.is_none()).then(|| HeldThing::sample(build.hand, &mut rng));
         let secs = fps.secs(n_steps);
         let grip = held.as_ref().map(|held| (held.side, held.grip));
-        let acts = Acts::new(&voice.speech, secs, (role.manner, role.seat), grip, &mut rng);
+        let mut acts = Acts::new(&voice.speech, secs, (role.manner, role.seat), grip, &mut rng);
         let (knees, shins) = (rng.random_range(0.05..0.25), rng.random_range(-0.1..0.25));
         let front = usize::from(rng.random_bool(0.5));
+        if role.leans && captured.is_none() {
+            acts.carriage = Carriage::sample(&mut rng);
+        }
 
         let options = AnimationOptions {
             smoothing: Smoothing::None,
@@ -93,7 +100,7 @@ impl Actor {
             Some(motion) => perform(motion, None, &options),
             None => {
                 let seated = SeatedRig { rig: &own_rig, seat: role.seat, knees, shins };
-                let obstacles = obstacles(&seated, &build, front);
+                let obstacles = obstacles(&seated, &build, acts.carriage, front);
                 let frames: Vec<_> = (0..n_steps)
                     .map(|step| {
                         let now = fps.secs(step);
@@ -125,7 +132,8 @@ impl Actor {
         let hips = add(turn.turn(seated.root(&upright)), shift);
         let unit = rig.skeleton.joints[rig.spine].offset[1] / 10.0;
         let avatar = Avatar::new(&rig, &Appearance::from_seed(seeds.clothes));
-        Self { rig, avatar, held, poses, role, unit, neck, hips }
+        let desk_ahead = DESK_AHEAD + acts.carriage.desk_ahead();
+        Self { rig, avatar, held, poses, role, unit, neck, hips, desk_ahead }
     }
 
     /// Meshes of a pose: those of the body first, then of the held thing.
@@ -142,12 +150,12 @@ impl Actor {
 
     /// Upper side of the desk, and its near edge ahead of the hips, cm.
     pub fn desk(&self) -> [f64; 2] {
-        [self.neck[1] - DESK_BELOW_NECK * CM * self.unit, DESK_AHEAD * CM * self.unit]
+        [self.neck[1] - DESK_BELOW_NECK * CM * self.unit, self.desk_ahead * CM * self.unit]
     }
 }
 
 /// Surfaces below the hands of a seated body, before it is put in its place.
-fn obstacles(seated: &SeatedRig, build: &Build, front: usize) -> Obstacles {
+fn obstacles(seated: &SeatedRig, build: &Build, carriage: Carriage, front: usize) -> Obstacles {
     let unit = build.unit();
     let (upright, mut slabs) = (Default::default(), Vec::new());
     if seated.seat != Seat::Standing {
@@ -162,7 +170,8 @@ fn obstacles(seated: &SeatedRig, build: &Build, front: usize) -> Obstacles {
     }
     if seated.seat == Seat::Desk {
         let top = seated.torso(&upright).neck[1] - DESK_BELOW_NECK * CM * unit;
-        slabs.push(Slab { top, x: [-90.0, 90.0], z: [DESK_AHEAD * CM * unit, 120.0], beneath: DESK_BELOW_NECK + 0.03 });
+        let near = (DESK_AHEAD + carriage.desk_ahead()) * CM * unit;
+        slabs.push(Slab { top, x: [-90.0, 90.0], z: [near, 120.0], beneath: DESK_BELOW_NECK + 0.03 });
     }
-    Obstacles { slabs, front }
+    Obstacles { slabs, carriage, front }
 }

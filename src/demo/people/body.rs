@@ -56,6 +56,7 @@ impl Build {
         let hanging = ArmPosture {
             wrist: [0.2, 0.4, -0.15],
             elbow: 0.3,
+            forward: 0.0,
             roll: 0.5,
             raise: 0.0,
             inwards: 0.0,
@@ -89,6 +90,8 @@ pub struct ArmPosture {
     pub wrist: Vec3,
     /// Direction of the elbow beside straight down: the larger, the more it points outwards.
     pub elbow: f64,
+    /// How far it points ahead of straight down, the length downwards being 1.
+    pub forward: f64,
     /// Turn about the hand's length, radians; 0: thumb up (forwards where the hand hangs), positive: palm down.
     pub roll: f64,
     /// Tangent of the angle of the hand above the forearm's line.
@@ -135,6 +138,7 @@ impl ArmPosture {
         Self {
             wrist: std::array::from_fn(|k| mix(self.wrist[k], goal.wrist[k])),
             elbow: mix(self.elbow, goal.elbow),
+            forward: mix(self.forward, goal.forward),
             roll: mix(self.roll, goal.roll),
             raise: mix(self.raise, goal.raise),
             inwards: mix(self.inwards, goal.inwards),
@@ -151,7 +155,7 @@ pub fn joints(build: &Build, arms: &[ArmPosture; 2], wrists: [Vec3; 2]) -> [Vec3
         let arm = &arms[side];
         let start = [sign * build.shoulder_width / 2.0, 0.0, 0.0];
         let [out, down, away] = wrists[side];
-        let pole = [sign * arm.elbow, 0.95, 0.1];
+        let pole = [sign * arm.elbow, 0.95, 0.1 - arm.forward];
         let (elbow, wrist) = reach([build.upper_arm, build.forearm], start, [sign * out, down, away], pole);
         joints[shoulder] = start;
         joints[shoulder + 1] = elbow;
@@ -206,6 +210,7 @@ mod tests {
         let hanging = ArmPosture {
             wrist: [0.22, 0.5, -0.04],
             elbow: 0.3,
+            forward: 0.0,
             roll: 0.0,
             raise: 0.0,
             inwards: 0.0,

@@ -39,11 +39,13 @@ pub enum Condition {
     Portrait,
     /// A second, silent person who gestures too.
     TwoPeople,
+    /// Behind a desk, the trunk leant ahead, the head bowed, elbows and hands further ahead.
+    LeaningDesk,
 }
 
 impl Condition {
     /// All, in the order in which they are drawn.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Front,
         Self::ThreeQuarter,
         Self::Standing,
@@ -61,6 +63,7 @@ impl Condition {
         Self::Compressed,
         Self::Portrait,
         Self::TwoPeople,
+        Self::LeaningDesk,
     ];
 
     /// Name on the command line, of its folder and of its speaker.
@@ -83,6 +86,7 @@ impl Condition {
             Self::Compressed => "compressed",
             Self::Portrait => "portrait",
             Self::TwoPeople => "two-people",
+            Self::LeaningDesk => "leaning-desk",
         }
     }
 
@@ -105,7 +109,7 @@ impl Condition {
     pub fn seat(self) -> Option<Seat> {
         match self {
             Self::Standing => Some(Seat::Standing),
-            Self::SeatedDesk => Some(Seat::Desk),
+            Self::SeatedDesk | Self::LeaningDesk => Some(Seat::Desk),
             Self::SeatedChair => Some(Seat::Chair),
             _ => None,
         }
@@ -138,7 +142,7 @@ impl Condition {
             Self::ThreeQuarter => Framing { yaw_degrees: [25.0, 50.0], ..half },
             Self::Standing => Framing { below_neck: [1.5, 1.6], sizes: &[[854, 480], [720, 540], [960, 540]], ..half },
             Self::SeatedChair => Framing { below_neck: [0.95, 1.1], sizes: &[[854, 480], [720, 540]], ..half },
-            Self::SeatedDesk => Framing { below_neck: [0.48, 0.62], ..half },
+            Self::SeatedDesk | Self::LeaningDesk => Framing { below_neck: [0.48, 0.62], ..half },
             Self::HandsFolded => Framing { below_neck: [0.58, 0.75], ..half },
             Self::Edge => Framing {
                 yaw_degrees: [0.0, 15.0],

@@ -1,5 +1,6 @@
 //! Contacts: wrists are moved so that hands and forearms stay out of the trunk, the desk, the thighs and each other.
 
+use super::acts::Carriage;
 use super::body;
 use super::body::{ArmPosture, Build, SIDES};
 use super::trunk::TorsoPlace;
@@ -29,6 +30,8 @@ pub struct Slab {
 #[derive(Clone, Debug, Default)]
 pub struct Obstacles {
     pub slabs: Vec<Slab>,
+    /// How the arms are carried.
+    pub carriage: Carriage,
     /// Side of the hand that passes before the other.
     pub front: usize,
 }
@@ -46,7 +49,7 @@ impl Obstacles {
     /// Joints of the arms in the torso's axes, metres, out of everything.
     pub fn free(&self, build: &Build, arms: &[ArmPosture; 2], torso: &TorsoPlace) -> [Vec3; N_JOINTS] {
         let unit = build.unit();
-        let mut wrists = arms.each_ref().map(|posture| scale(posture.wrist, unit));
+        let mut wrists = arms.each_ref().map(|posture| scale(self.carriage.wrist(posture.wrist), unit));
         let mut joints = body::joints(build, arms, wrists);
         for _ in 0..ROUNDS {
             let mut ways = [0, 1].map(|side| {
@@ -128,13 +131,14 @@ mod tests {
         let low = ArmPosture {
             wrist: [0.12, 0.42, -0.36],
             elbow: 0.3,
+            forward: 0.0,
             roll: 1.2,
             raise: 0.0,
             inwards: 0.3,
             fingers: FingerShape::FLAT,
         };
         let inside = ArmPosture { wrist: [0.05, 0.2, -0.04], ..low };
-        let obstacles = Obstacles { slabs: vec![slab], front: 0 };
+        let obstacles = Obstacles { slabs: vec![slab], carriage: Carriage::default(), front: 0 };
         let joints = obstacles.free(&build, &[low, inside], &torso);
         for &joint in &joints[L_HAND..L_HAND + N_HAND_JOINTS] {
             assert!(torso.world(joint)[1] > slab.top, "{joint:?}");

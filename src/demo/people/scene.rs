@@ -86,6 +86,7 @@ impl PeopleScene {
         let role = ActorRole {
             manner: condition.manner(),
             seat,
+            leans: condition == Condition::LeaningDesk,
             place: [0.0; 2],
             turn: rng.random_range(-0.1..0.1),
             speaks: true,

@@ -101,7 +101,7 @@ pub fn stroke(manner: Manner, rng: &mut ChaCha8Rng) -> [Option<ArmPosture>; 2] {
 }
 
 fn posture(wrist: Vec3, elbow: f64, roll: f64, raise: f64, inwards: f64, fingers: FingerShape) -> ArmPosture {
-    ArmPosture { wrist, elbow, roll, raise, inwards, fingers }
+    ArmPosture { wrist, elbow, forward: 0.0, roll, raise, inwards, fingers }
 }
 
 fn near(middle: Vec3, half: Vec3, rng: &mut ChaCha8Rng) -> Vec3 {
@@ -120,6 +120,7 @@ fn open(rng: &mut ChaCha8Rng) -> ArmPosture {
     ArmPosture {
         wrist: near([0.21, 0.2, -0.25], [0.09, 0.14, 0.07], rng),
         elbow: rng.random_range(0.15..0.7),
+        forward: 0.0,
         roll: rng.random_range(-1.1..1.2),
         raise: rng.random_range(-0.1..0.8),
         inwards: rng.random_range(-0.3..0.5),

@@ -202,6 +202,12 @@ impl SoundTrack {
     }
 }
 
+/// Whether films become H.264, which every browser plays, and not MPEG-4 part 2, which none does.
+pub fn has_h264() -> bool {
+    super::library::init();
+    encoder::find_by_name("libx264").is_some()
+}
+
 /// An encoder of pictures of an even size, one thread so that the bytes do not depend on the machine's cores.
 fn open_video([width, height]: [usize; 2], fps: FrameRate, crf: u32) -> Result<encoder::video::Encoder> {
     let x264 = encoder::find_by_name("libx264");

@@ -47,7 +47,7 @@ impl Stage for LiftStage {
     }
 
     fn version(&self) -> u32 {
-        9
+        10
     }
 
     fn settings(&self, _unit: &Unit) -> serde_json::Value {

@@ -1,4 +1,5 @@
 //! A tool for people's videos sends nothing and writes nothing but what it was asked for, as the kernel sees it.
+//! `orator study serve` is the one verb that listens, which is its purpose; it connects to nobody.
 
 use crate::fixtures::faults::scenes::{SCENES, copy, prepare, set_up};
 use crate::fixtures::skip::skip;

@@ -3,6 +3,7 @@
 pub mod bars;
 pub mod curve;
 pub mod dots;
+pub mod forest;
 pub mod histogram;
 pub mod lines;
 pub mod profile;

@@ -1,9 +1,9 @@
 //! `cargo bench -- seq2seq`: a training step of FineMotion's networks in turns with PyTorch's, for the same weights,
 //! batch, losses and optimiser; peak memory of both, how far apart their poses are, and how fast poses are generated.
 
-use super::child::own_peak_mib;
-use super::reference::Reference;
-use super::report::{Report, median};
+use super::super::child::own_peak_mib;
+use super::super::reference::Reference;
+use super::super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
 use candle_core::{DType, Device, Tensor};
 use orator::formats::checkpoint::Contents;

@@ -1,9 +1,9 @@
 //! `cargo bench -- train`: a step of the GAN trainer in turns with PyTorch's, for the same networks, batch, losses and
 //! optimiser; peak memory of both; how far apart they are; and where the time of a step goes.
 
-use super::child::own_peak_mib;
-use super::reference::Reference;
-use super::report::{Report, median};
+use super::super::child::own_peak_mib;
+use super::super::reference::Reference;
+use super::super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
 use orator::audio::mel::N_MELS;

@@ -1,8 +1,8 @@
 //! `cargo bench -- lifter`: a training step of the temporal lifter, one thread, in turns with PyTorch's for the same
 //! network, the same batch and the same optimiser; and how far apart the two networks' outputs are.
 
-use super::reference::Reference;
-use super::report::{Report, median};
+use super::super::reference::Reference;
+use super::super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
 use orator::formats::checkpoint::Contents;

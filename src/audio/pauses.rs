@@ -1,0 +1,73 @@
+//! Where speech pauses: the level of a sound at a moment against that of its speech.
+
+use crate::types::sound::Sound;
+use std::ops::Range;
+
+/// Length of a window of the level, seconds.
+const WINDOW_SECS: f64 = 0.01;
+/// A pause is quiet this long on either side of its middle, seconds.
+const HALF_SECS: f64 = 0.06;
+/// Share of the windows that are not louder than speech.
+const SPEECH_SHARE: f64 = 0.95;
+/// What is this far below speech is none, dB.
+const SPEECH_DB: f32 = -25.0;
+/// Level of silence, dB.
+const FLOOR_DB: f32 = -100.0;
+
+/// Level of a sound over time, dB from that of its speech.
+#[derive(Clone, Debug)]
+pub struct SpeechLevel {
+    windows: Vec<f32>,
+}
+
+impl SpeechLevel {
+    pub fn of(sound: &Sound) -> Self {
+        let window = ((WINDOW_SECS * f64::from(sound.rate)) as usize).max(1);
+        let level = |part: &[f32]| {
+            let mean = part.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>() / part.len() as f64;
+            (10.0 * (mean + 1e-10).log10()) as f32
+        };
+        let mut windows: Vec<f32> = sound.samples.chunks(window).map(level).collect();
+        let mut sorted = windows.clone();
+        sorted.sort_by(f32::total_cmp);
+        let loud = sorted.get(((sorted.len() as f64 * SPEECH_SHARE) as usize).min(sorted.len().saturating_sub(1)));
+        let loud = loud.copied().unwrap_or(0.0);
+        windows.iter_mut().for_each(|level| *level = (*level - loud).max(FLOOR_DB));
+        Self { windows }
+    }
+
+    /// Loudest level around a moment; silence before the beginning and after the end.
+    pub fn around(&self, secs: f64) -> f32 {
+        self.part(secs - HALF_SECS..secs + HALF_SECS).iter().copied().fold(FLOOR_DB, f32::max)
+    }
+
+    /// Share of a stretch of time, seconds, in which there is speech.
+    pub fn speech_share(&self, secs: Range<f64>) -> f64 {
+        let part = self.part(secs);
+        part.iter().filter(|level| **level > SPEECH_DB).count() as f64 / part.len().max(1) as f64
+    }
+
+    fn part(&self, secs: Range<f64>) -> &[f32] {
+        let at = |secs: f64| ((secs / WINDOW_SECS).round().max(0.0) as usize).min(self.windows.len());
+        &self.windows[at(secs.start)..at(secs.end)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pause_is_far_below_speech_whatever_the_gain() {
+        for gain in [1.0, 0.02] {
+            let loud = |i: usize| if (8_000..12_000).contains(&(i % 16_000)) { 0.0 } else { gain * 0.5 };
+            let samples = (0..64_000).map(|i| loud(i) * if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
+            let level = SpeechLevel::of(&Sound { rate: 16_000, samples });
+            assert!(level.around(0.625) < -40.0 && level.around(1.625) < -40.0);
+            assert!(level.around(0.2).abs() < 0.1 && level.around(0.52).abs() < 0.1);
+            assert!((level.speech_share(0.0..4.0) - 0.75).abs() < 0.02);
+            assert_eq!((level.around(-1.0), level.around(9.0)), (FLOOR_DB, FLOOR_DB));
+        }
+        assert_eq!(SpeechLevel::of(&Sound { rate: 16_000, samples: Vec::new() }).speech_share(0.0..1.0), 0.0);
+    }
+}

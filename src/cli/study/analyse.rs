@@ -1,0 +1,115 @@
+//! `orator study analyse`.
+
+use crate::cli::Outcome;
+use crate::cli::confine::confine;
+use crate::cli::ui::Ui;
+use anyhow::{Context, Result, ensure};
+use orator::stage::workdir;
+use orator::study::analyse::result::{FigureSettings, StudyAnalysis};
+use orator::study::analyse::votes::columns::ColumnNames;
+use orator::study::analyse::votes::read::VotesRead;
+use orator::study::analyse::{analyse, page, text};
+use orator::study::plan::TaskDesign;
+use serde::Deserialize as _;
+use serde::de::IntoDeserializer as _;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Analyse the votes of a study: its own, or a table of any other.
+///
+/// A table is CSV (comma, semicolon or tab) or JSON Lines with the columns of `orator study export`, or with fewer:
+/// participant, clip and correct (1 or 0), or participant, clip, condition and score (0 to 100); speaker, task and design
+/// where there are several. Rows that are no votes are named with their line and left out, and the exit code is then 2.
+/// Every estimate has an interval that holds for other participants and other clips; what was not registered before the
+/// first participant is marked as exploratory, what takes votes for independent as naive.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folder of a study, or a table of votes (.csv, .tsv, .jsonl).
+    #[arg(value_name = "STUDY|VOTES")]
+    source: PathBuf,
+    /// Names of columns that are called otherwise, like participant=worker,clip=stimulus
+    #[arg(long, value_name = "FIELD=NAME,...", default_value = "", value_parser = columns, hide_default_value = true)]
+    columns: ColumnNames,
+    /// Design of votes whose table does not say it: turing, turing-single, preference, sliders or mismatch [default: by
+    /// the columns]
+    #[arg(long, value_name = "DESIGN", value_parser = design)]
+    design: Option<TaskDesign>,
+    /// Points of percent on either side of chance that count as no difference; a registered bound goes before it.
+    #[arg(long, value_name = "POINTS", default_value_t = 10.0)]
+    bound: f64,
+    /// Draws of the bootstrap and of sign flips.
+    #[arg(long, value_name = "N", default_value_t = 10_000)]
+    draws: usize,
+    /// Seed of both.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Also write one HTML page with plots, every figure and the methods paragraph.
+    #[arg(long, value_name = "PAGE.html")]
+    report: Option<PathBuf>,
+    /// Also write the methods paragraph, ready to paste.
+    #[arg(long, value_name = "FILE.txt")]
+    methods: Option<PathBuf>,
+}
+
+pub fn columns(text: &str) -> Result<ColumnNames, String> {
+    ColumnNames::parse(text).map_err(|error| format!("{error:#}"))
+}
+
+pub fn design(name: &str) -> Result<TaskDesign, String> {
+    let known = TaskDesign::deserialize(name.into_deserializer());
+    known.map_err(|error: serde::de::value::Error| error.to_string())
+}
+
+pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+    ensure!(
+        (0.1..50.0).contains(&args.bound),
+        "--bound is {}; expected points of percent, 0.1 to below 50",
+        args.bound
+    );
+    ensure!((100..=1_000_000).contains(&args.draws), "--draws is {}; expected 100 to 1000000", args.draws);
+    check_report(args)?;
+    let outputs = args.report.iter().chain(&args.methods).map(PathBuf::as_path);
+    confine(outputs, args.source.is_dir().then_some(args.source.as_path()));
+    let analysis = analysis(args)?;
+    let mut shown = text::text(&analysis);
+    if let Some(path) = &args.report {
+        let html = page::html(&analysis);
+        workdir::write_file(path, html.as_bytes())?;
+        shown += &format!("\nwrote {}\n", path.display());
+    }
+    if let Some(path) = &args.methods {
+        workdir::write_file(path, format!("{}\n", analysis.methods).as_bytes())?;
+        shown += &format!("\nwrote {}\n", path.display());
+    }
+    let next = args.report.is_none().then(|| {
+        format!("orator study analyse {} --report analysis.html --methods methods.txt", args.source.display())
+    });
+    let facts = json!({ "analysis": analysis, "report": args.report, "methods": args.methods });
+    ui.summary(&shown, next.as_deref(), facts);
+    Ok(if analysis.refused.is_empty() { Outcome::Done } else { Outcome::SomeFailed })
+}
+
+/// The page and the paragraph replace nothing that is read.
+fn check_report(args: &Args) -> Result<()> {
+    for (path, ending) in [(&args.report, "html"), (&args.methods, "txt")] {
+        let Some(path) = path else { continue };
+        let fits = path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending));
+        ensure!(fits, "{}: expected a file that ends in .{ending}", path.display());
+        ensure!(!path.is_dir(), "{} is a folder; name a file in it", path.display());
+    }
+    Ok(())
+}
+
+fn analysis(args: &Args) -> Result<StudyAnalysis> {
+    let settings =
+        FigureSettings { bound: args.bound / 100.0, n_draws: args.draws, seed: args.seed, ..FigureSettings::default() };
+    let read = VotesRead::of_file(&args.source, &args.columns, args.design)?;
+    let name = name(&args.source)?;
+    analyse([&name, &name], &read, None, &settings).with_context(|| args.source.display().to_string())
+}
+
+/// Name of a file or folder, without the folders of this machine.
+fn name(path: &Path) -> Result<String> {
+    let path = path.canonicalize().with_context(|| path.display().to_string())?;
+    Ok(path.file_name().unwrap_or_default().to_string_lossy().into_owned())
+}

@@ -1,0 +1,89 @@
+//! `orator study build`.
+
+use crate::cli::Outcome;
+use crate::cli::confine::confine;
+use crate::cli::ui;
+use crate::cli::ui::Ui;
+use anyhow::Result;
+use orator::stage::counted;
+use orator::study::build::{BuiltSpeaker, BuiltStudy, build};
+use orator::study::file::{ConditionSource, StudyFile, filled};
+use orator::study::pages::page_texts::text_keys;
+use orator::study::stimuli::film::SIZE;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Refused pieces of speech that are listed at most; all are in `clips/clips.json`.
+const MOST_LISTED: usize = 10;
+
+/// Make the films of a study, plan who sees what, and seal both before the first participant comes.
+///
+/// A build that was stopped goes on from the films that are there and ends with the same bytes. A folder with answers in
+/// it is left as it is, and so is a sealed one.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The study file; `orator guide study` shows one.
+    #[arg(value_name = "STUDY.toml")]
+    study: PathBuf,
+    /// The study's folder; without: the study file's name without its ending.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+    let file = StudyFile::read(&args.study)?;
+    let keys = text_keys(file.task.iter().map(|task| task.name.as_str()));
+    file.check_texts(&args.study, &keys.iter().map(String::as_str).collect::<Vec<_>>())?;
+    let out = args.out.clone().unwrap_or_else(|| args.study.with_extension(""));
+    // The folder itself, beneath which all is written, and the locks of what is read.
+    let checkpoints = file.speaker.iter().flat_map(|speaker| {
+        file.condition.iter().filter_map(|condition| match &condition.source {
+            ConditionSource::Checkpoint(path) => Some(filled(path, &speaker.name, "")),
+            _ => None,
+        })
+    });
+    let datasets = file.speaker.iter().filter_map(|speaker| speaker.dataset.clone());
+    let locked: Vec<PathBuf> = checkpoints.chain(datasets).collect();
+    confine([out.as_path()], locked.iter().map(PathBuf::as_path));
+    ui::tell_when_stopped("every film that is done is kept, and the same command goes on from there");
+    let built = build(&file, &out, SIZE, ui)?;
+    let next = format!("orator study serve {}", built.folder.display());
+    let mut facts = json!(built);
+    facts["next"] = json!(next);
+    ui.summary(&text(&built), Some(&next), facts);
+    Ok(Outcome::Done)
+}
+
+fn text(built: &BuiltStudy) -> String {
+    let mut text = String::new();
+    for BuiltSpeaker { name, clips, refused } in &built.speakers {
+        let hidden = clips.iter().filter(|clip| clip.unseen > 0.0).count();
+        let loud = clips.iter().filter(|clip| !clip.ends_in_pauses()).count();
+        text += &format!("{name}: {}", counted(clips.len(), "clip"));
+        if hidden > 0 {
+            text += &format!(", {hidden} with joints that were not seen and are hidden in all conditions");
+        }
+        if loud > 0 {
+            text += &format!(", {loud} cut within speech, for want of pauses");
+        }
+        text += "\n";
+        for refused in refused.iter().take(MOST_LISTED) {
+            text += &format!("  no clip of {}: {}\n", refused.name, refused.reason);
+        }
+        if refused.len() > MOST_LISTED {
+            text += &format!("  and of {} more pieces of speech\n", refused.len() - MOST_LISTED);
+        }
+    }
+    built.balance.iter().for_each(|line| text += &format!("{line}\n"));
+    text + &format!(
+        "{} of {} kB at {:.1} LUFS, {} of {}\n{} {}; over all: {}",
+        counted(built.n_films, "film"),
+        built.film_bytes / 1000,
+        built.loudness_lufs,
+        counted(built.n_sessions, "session"),
+        counted(built.n_trials, "trial"),
+        if built.up_to_date { "sealed before:" } else { "sealed" },
+        built.folder.display(),
+        built.seal
+    )
+}

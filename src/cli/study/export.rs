@@ -1,0 +1,71 @@
+//! `orator study export`.
+
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
+use anyhow::Result;
+use orator::study::export::{TableForm, export, export_posts};
+use orator::study::folder::StudyFolder;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Write the responses of a study as tables, also while it is being served.
+///
+/// `votes` has a row for each answered trial: participant, task, design, phase, trial (from 1), clip, speaker, conditions
+/// (from left to right), response and expected (left or right; real or generated; -2 to 2; scores; a number), stalled_secs,
+/// unfocused_secs, response_secs, plays, completed. `participants` has a row for each participant: participant, place,
+/// language, status (active, completed, replaced), answers, failed_checks, begun_ms (since 1970), code, and what the
+/// recruiting site gave along. Several values in a cell are joined by |.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The study's folder.
+    #[arg(value_name = "DIR")]
+    dir: PathBuf,
+    /// Form of the tables.
+    #[arg(long, value_enum, default_value = "csv")]
+    format: TableFormat,
+    /// Lines that an address has collected from the pages of a bundle, in the place of the server's store.
+    #[arg(long, value_name = "FILE")]
+    posts: Option<PathBuf>,
+    /// Folder to write them into; without: DIR/export.
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+}
+
+/// Forms of tables.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum TableFormat {
+    /// Columns, with a header.
+    Csv,
+    /// JSON Lines.
+    Jsonl,
+}
+
+pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
+    let form = match args.format {
+        TableFormat::Csv => TableForm::Csv,
+        TableFormat::Jsonl => TableForm::Jsonl,
+    };
+    let out = args.out.clone().unwrap_or_else(|| args.dir.join("export"));
+    let folder = StudyFolder::new(&args.dir);
+    let exported = match &args.posts {
+        None => export(&folder, form, &out)?,
+        Some(posts) => export_posts(&folder, posts, form, &out)?,
+    };
+    let dropped = match exported.n_dropped {
+        0 => String::new(),
+        n => format!("; {n} collected lines fit no session of the plan and are left out"),
+    };
+    let text = format!(
+        "{} votes of {} participants: {}, {}{dropped}",
+        exported.n_votes,
+        exported.n_participants,
+        exported.votes.display(),
+        exported.participants.display()
+    );
+    let next = match &args.posts {
+        None => format!("orator study analyse {}", args.dir.display()),
+        Some(_) => format!("orator study analyse {}", exported.votes.display()),
+    };
+    ui.summary(&text, Some(&next), json!(exported));
+    Ok(Outcome::Done)
+}

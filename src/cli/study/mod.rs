@@ -1,0 +1,11 @@
+//! `orator study`.
+
+pub mod analyse;
+pub mod build;
+pub mod bundle;
+pub mod export;
+pub mod plan;
+pub mod serve;
+pub mod verb;
+
+pub use verb::{Args, run};

@@ -1,0 +1,97 @@
+//! Estimates with their intervals below one another on one scale, a line where there is no difference and a band of
+//! differences that count as none.
+
+use super::scale::{Scale, circle, drawing, line, rect, words};
+use crate::report::html::node::{Node, node};
+use crate::report::html::numbers::number;
+
+/// Row of the chart.
+#[derive(Clone, Debug)]
+pub struct ForestRow {
+    pub name: String,
+    /// CSS class of its colour.
+    pub class: &'static str,
+    pub value: f64,
+    pub interval: Option<[f64; 2]>,
+    /// Text at the right end.
+    pub said: String,
+}
+
+/// Scale of the chart.
+#[derive(Clone, Copy, Debug)]
+pub struct ForestScale {
+    pub low: f64,
+    pub high: f64,
+    /// Value of no difference.
+    pub middle: Option<f64>,
+    /// Values that count as no difference.
+    pub band: Option<[f64; 2]>,
+    pub unit: &'static str,
+}
+
+const WIDTH: f64 = 720.0;
+const ROW: f64 = 26.0;
+const TOP: f64 = 8.0;
+const LEFT: f64 = 230.0;
+const RIGHT: f64 = 560.0;
+
+/// Chart of the rows from top to bottom.
+pub fn forest(label: &str, rows: &[ForestRow], scale: &ForestScale) -> Node {
+    let x = Scale { low: scale.low, high: scale.high, from: LEFT, to: RIGHT };
+    let floor = TOP + ROW * rows.len() as f64;
+    let mut svg = drawing(WIDTH, floor + 34.0, label).class("forest");
+    if let Some([low, high]) = scale.band.map(|band| band.map(|value| x.at(value))) {
+        svg = svg.child(rect("band", [low, TOP], [(high - low).max(0.0), floor - TOP]));
+    }
+    for tick in x.ticks(5) {
+        svg = svg.child(line("grid", [x.at(tick), TOP], [x.at(tick), floor]));
+        svg = svg.child(words("tick", [x.at(tick), floor + 15.0], "middle", &number(tick)));
+    }
+    if let Some(middle) = scale.middle {
+        svg = svg.child(line("none", [x.at(middle), TOP], [x.at(middle), floor]));
+    }
+    for (place, row) in rows.iter().enumerate() {
+        let y = TOP + ROW * (place as f64 + 0.5);
+        svg = svg.child(words("name", [LEFT - 12.0, y + 4.0], "end", &row.name));
+        let mut drawn = node("g").class(row.class).child(node("title").text(format!("{}: {}", row.name, row.said)));
+        if let Some([low, high]) = row.interval.map(|ends| ends.map(|end| x.at(end))) {
+            drawn = drawn.child(line("range", [low, y], [high, y]));
+            for end in [low, high] {
+                drawn = drawn.child(line("range", [end, y - 4.0], [end, y + 4.0]));
+            }
+        }
+        svg = svg.child(drawn.child(circle("point", [x.at(row.value), y], 4.5)));
+        svg = svg.child(words("tick", [RIGHT + 12.0, y + 4.0], "start", &row.said));
+    }
+    svg.child(line("axis", [LEFT, floor], [RIGHT, floor])).child(words(
+        "tick",
+        [RIGHT, floor + 29.0],
+        "end",
+        scale.unit,
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_lie_on_the_scale() {
+        let row = |name: &str, value, interval| ForestRow {
+            name: name.to_owned(),
+            class: "a",
+            value,
+            interval,
+            said: "50 %".to_owned(),
+        };
+        let rows = [row("<all>", 50.0, Some([40.0, 60.0])), row("b", 75.0, None)];
+        let scale = ForestScale { low: 0.0, high: 100.0, middle: Some(50.0), band: Some([40.0, 60.0]), unit: "%" };
+        let drawn = forest("shares", &rows, &scale).to_string();
+        assert_eq!((drawn.matches("class=\"range\"").count(), drawn.matches("class=\"point\"").count()), (3, 2));
+        assert!(
+            drawn.contains("&lt;all&gt;") && drawn.contains("x=\"362\"") && drawn.contains("cx=\"395\""),
+            "{drawn}"
+        );
+        assert!(forest("", &[], &scale).to_string().contains("<svg"));
+    }
+}

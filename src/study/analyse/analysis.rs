@@ -1,0 +1,116 @@
+//! Analysis of a whole study: exclusions, every task with and without them, marks of what was registered, notes.
+
+use super::exclusion::exclude;
+use super::methods::methods;
+use super::registration::register;
+use super::result::{FigureSettings, StudyAnalysis, TaskAnalysis};
+use super::task::task;
+use super::votes::read::VotesRead;
+use crate::study::file::{ExclusionRules, HypothesisKind, StudyHypothesis};
+use crate::study::vote::StudyVote;
+use anyhow::{Result, ensure};
+
+/// What was fixed before the data were seen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Registration {
+    /// Hash over the sealed study; none where its files are not as they were sealed.
+    pub seal: Option<String>,
+    /// What a reader must know about it.
+    pub notes: Vec<String>,
+    pub hypotheses: Vec<StudyHypothesis>,
+    pub exclusion: ExclusionRules,
+}
+
+/// Analysis of the votes of `source`, which is called `title`.
+pub fn analyse(
+    [title, source]: [&str; 2],
+    read: &VotesRead,
+    registration: Option<&Registration>,
+    settings: &FigureSettings,
+) -> Result<StudyAnalysis> {
+    let (kept, exclusions) = exclude(read, registration.map(|registration| &registration.exclusion));
+    ensure!(exclusions.n_votes > 0, "{source} has no vote of the main phase");
+    ensure!(!kept.is_empty(), "{source}: the exclusion rules leave no vote of {}", exclusions.n_votes);
+    let hypotheses = registration.map(|registration| &registration.hypotheses[..]).unwrap_or_default();
+    let tasks = tasks(&kept, hypotheses, settings)?;
+    let without_exclusions = match exclusions.leaves_out() {
+        true => self::tasks(&exclude(read, None).0, &[], settings)?,
+        false => Vec::new(),
+    };
+    let mut analysis = StudyAnalysis {
+        version: 1,
+        title: title.to_owned(),
+        source: source.to_owned(),
+        seal: registration.and_then(|registration| registration.seal.clone()),
+        settings: settings.clone(),
+        refused: read.refused.clone(),
+        exclusions,
+        tasks,
+        without_exclusions,
+        notes: Vec::new(),
+        methods: String::new(),
+    };
+    analysis.notes = registration.map(|registration| registration.notes.clone()).unwrap_or_default();
+    let more = notes(&analysis, read, hypotheses);
+    analysis.notes.extend(more);
+    analysis.methods = methods(&analysis);
+    Ok(analysis)
+}
+
+/// Tasks in the order of their first vote.
+fn tasks(votes: &[&StudyVote], hypotheses: &[StudyHypothesis], settings: &FigureSettings) -> Result<Vec<TaskAnalysis>> {
+    let mut names: Vec<&str> = Vec::new();
+    for vote in votes {
+        if !names.contains(&vote.task.as_str()) {
+            names.push(&vote.task);
+        }
+    }
+    let one = |name: &str| {
+        let own: Vec<&StudyVote> = votes.iter().copied().filter(|vote| vote.task == name).collect();
+        let equivalence =
+            |hypothesis: &&StudyHypothesis| hypothesis.task == name && hypothesis.kind == HypothesisKind::Equivalence;
+        let bound = hypotheses.iter().find(equivalence).and_then(|hypothesis| hypothesis.points);
+        let bound = bound.map_or(settings.bound, |points| points / 100.0);
+        task(name, &own, &FigureSettings { bound, ..settings.clone() })
+    };
+    let mut tasks = names.into_iter().map(one).collect::<Result<Vec<_>>>()?;
+    register(&mut tasks, hypotheses);
+    Ok(tasks)
+}
+
+/// What a reader must know beside the figures.
+fn notes(analysis: &StudyAnalysis, read: &VotesRead, hypotheses: &[StudyHypothesis]) -> Vec<String> {
+    let mut notes = Vec::new();
+    let registration_is_missing = !analysis.exclusions.registered;
+    if !read.refused.is_empty() {
+        notes.push(format!(
+            "{} rows are no votes and were left out; they are listed with their reasons.",
+            read.refused.len()
+        ));
+    }
+    if registration_is_missing {
+        notes.push("The votes came without a sealed study: nothing of the analysis was registered before, all of it is exploratory.".to_owned());
+    }
+    for rule in analysis.exclusions.rules.iter().filter(|rule| rule.unknown.is_some()) {
+        notes.push(format!(
+            "The rule \"{}\" could not be applied: {}.",
+            rule.rule,
+            rule.unknown.clone().unwrap_or_default()
+        ));
+    }
+    for hypothesis in hypotheses {
+        if !analysis.tasks.iter().any(|task| task.task == hypothesis.task) {
+            notes.push(format!("A hypothesis is about the task {}, which has no vote.", hypothesis.task));
+        }
+    }
+    for task in &analysis.tasks {
+        if task.n_clips < 10 || task.n_participants < 10 {
+            notes.push(format!(
+                "{}: with {} participants and {} clips the crossed figures are rough; 20 of each are wanted.",
+                task.task, task.n_participants, task.n_clips
+            ));
+        }
+        notes.extend(task.missing.iter().map(|missing| format!("{}: {missing}.", task.task)));
+    }
+    notes
+}

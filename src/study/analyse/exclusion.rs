@@ -1,0 +1,155 @@
+//! Whose votes are left out, by rules that were fixed before, and how many each rule leaves out by itself.
+
+use super::votes::read::VotesRead;
+use crate::study::file::ExclusionRules;
+use crate::study::plan::TrialPhase;
+use crate::study::vote::StudyVote;
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What the rules leave out. Votes are those of the main phase.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ExclusionAccount {
+    /// Whether the rules come from a registered study.
+    pub registered: bool,
+    pub n_participants: usize,
+    pub n_votes: usize,
+    pub n_participants_kept: usize,
+    pub n_votes_kept: usize,
+    pub rules: Vec<ExclusionCount>,
+}
+
+/// What one rule leaves out by itself.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ExclusionCount {
+    pub rule: String,
+    /// Participants left out whole.
+    pub n_participants: usize,
+    /// Votes left out, those of such participants with them.
+    pub n_votes: usize,
+    /// Why the rule cannot be applied.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unknown: Option<String>,
+}
+
+/// Rule with the fields it looks at.
+struct ExclusionTest<'r> {
+    words: String,
+    field: &'static str,
+    judge: LeftOut<'r>,
+}
+
+enum LeftOut<'r> {
+    /// Participants that are left out.
+    Participants(BTreeSet<&'r str>),
+    /// Whether a vote is left out.
+    Votes(Box<dyn Fn(&StudyVote) -> bool>),
+}
+
+/// Votes of the main phase that all rules keep, and the account.
+pub fn exclude<'v>(read: &'v VotesRead, rules: Option<&ExclusionRules>) -> (Vec<&'v StudyVote>, ExclusionAccount) {
+    let main: Vec<&StudyVote> = read.votes.iter().filter(|vote| vote.phase == TrialPhase::Main).collect();
+    let applied = rules.map(|rules| of_rules(rules, &read.votes)).unwrap_or_default();
+    let is_left_out = |rule: &ExclusionTest, vote: &StudyVote| match &rule.judge {
+        LeftOut::Participants(names) => names.contains(vote.participant.as_str()),
+        LeftOut::Votes(judge) => judge(vote),
+    };
+    let count = |rule: &ExclusionTest| {
+        let left_out: Vec<_> = main.iter().filter(|vote| is_left_out(rule, vote)).collect();
+        let n_participants = match &rule.judge {
+            LeftOut::Participants(_) => left_out.iter().map(|vote| &vote.participant).collect::<BTreeSet<_>>().len(),
+            LeftOut::Votes(_) => 0,
+        };
+        let unknown = read.absent.contains(&rule.field).then(|| format!("there is no column {}", rule.field));
+        ExclusionCount { rule: rule.words.clone(), n_participants, n_votes: left_out.len(), unknown }
+    };
+    let n_participants =
+        |votes: &[&StudyVote]| votes.iter().map(|vote| &vote.participant).collect::<BTreeSet<_>>().len();
+    let counts = applied.iter().map(count).collect();
+    let kept: Vec<&StudyVote> =
+        main.iter().copied().filter(|vote| !applied.iter().any(|rule| is_left_out(rule, vote))).collect();
+    let account = ExclusionAccount {
+        registered: rules.is_some(),
+        n_participants: n_participants(&main),
+        n_votes: main.len(),
+        n_participants_kept: n_participants(&kept),
+        n_votes_kept: kept.len(),
+        rules: counts,
+    };
+    (kept, account)
+}
+
+fn of_rules<'v>(rules: &ExclusionRules, votes: &'v [StudyVote]) -> Vec<ExclusionTest<'v>> {
+    let mut applied = Vec::new();
+    if let Some(most) = rules.failed_checks {
+        let mut n_failed: BTreeMap<&str, u32> = BTreeMap::new();
+        let is_failed = |vote: &&StudyVote| {
+            vote.phase == TrialPhase::AttentionCheck && vote.expected.as_ref() != Some(&vote.response)
+        };
+        votes.iter().filter(is_failed).for_each(|vote| *n_failed.entry(&vote.participant).or_default() += 1);
+        let names = n_failed.into_iter().filter(|(_, n)| *n >= most.max(1)).map(|(name, _)| name).collect();
+        let words = format!("failed {most} or more attention checks");
+        applied.push(ExclusionTest { words, field: "phase", judge: LeftOut::Participants(names) });
+    }
+    if rules.incomplete {
+        let names = votes.iter().filter(|vote| !vote.completed).map(|vote| vote.participant.as_str()).collect();
+        let words = "did not complete the session".to_owned();
+        applied.push(ExclusionTest { words, field: "completed", judge: LeftOut::Participants(names) });
+    }
+    if let Some(most) = rules.stalled_secs {
+        let judge = LeftOut::Votes(Box::new(move |vote| vote.stalled_secs > most));
+        applied.push(ExclusionTest {
+            words: format!("trial: films stalled over {most} s"),
+            field: "stalled_secs",
+            judge,
+        });
+    }
+    if let Some(most) = rules.unfocused_secs {
+        let judge = LeftOut::Votes(Box::new(move |vote| vote.unfocused_secs > most));
+        applied.push(ExclusionTest {
+            words: format!("trial: page not in front over {most} s"),
+            field: "unfocused_secs",
+            judge,
+        });
+    }
+    applied
+}
+
+impl ExclusionAccount {
+    /// Whether any vote was left out.
+    pub fn leaves_out(&self) -> bool {
+        self.n_votes_kept < self.n_votes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::analyse::votes::columns::ColumnNames;
+
+    #[test]
+    fn each_rule_is_counted_by_itself() {
+        let text = "participant,clip,phase,conditions,response,expected,stalled_secs,unfocused_secs,completed\n\
+            a,1,main,x|y,left,right,0,0,1\n\
+            a,,attention-check,,42,42,0,0,1\n\
+            b,1,main,x|y,left,right,0,0,1\n\
+            b,,attention-check,,42,43,0,0,1\n\
+            c,1,main,x|y,left,right,0,0,0\n\
+            d,1,main,x|y,left,right,2.5,0,1\n\
+            d,2,main,x|y,left,right,2.0,5.5,1\n\
+            d,3,main,x|y,left,right,0,0,1\n";
+        let path = tempfile::tempdir().unwrap();
+        let file = path.path().join("votes.csv");
+        std::fs::write(&file, text).unwrap();
+        let read = VotesRead::of_file(&file, &ColumnNames::default(), None).unwrap();
+        assert_eq!(read.refused, []);
+        let (kept, account) = exclude(&read, Some(&ExclusionRules::default()));
+        let counts: Vec<_> = account.rules.iter().map(|rule| (rule.n_participants, rule.n_votes)).collect();
+        assert_eq!(counts, [(1, 1), (1, 1), (0, 1), (0, 1)]);
+        assert_eq!(kept.iter().map(|vote| vote.clip.as_str()).collect::<Vec<_>>(), ["1", "3"]);
+        assert_eq!((account.n_participants, account.n_participants_kept), (4, 2));
+        assert_eq!((account.n_votes, account.n_votes_kept, account.leaves_out()), (6, 2, true));
+        let (all, account) = exclude(&read, None);
+        assert_eq!((all.len(), account.rules.len(), account.registered), (6, 0, false));
+    }
+}

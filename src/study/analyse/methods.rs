@@ -1,0 +1,248 @@
+//! Paragraph for the methods section of a paper, from the analysis alone: plain text, sources in brackets.
+
+use super::figure::{FigureMethod, FigureOrigin};
+use super::result::{ShareMeasure, StudyAnalysis, TaskAnalysis};
+use super::words::{count, list, p_value, percent, percents, points};
+use crate::study::plan::TaskDesign;
+
+/// Sources by the method that cites them.
+const SOURCES: [(&str, &str); 13] = [
+    (
+        "Bradley and Terry 1952",
+        "Bradley RA, Terry ME (1952). Rank analysis of incomplete block designs. Biometrika 39(3/4):324-345.",
+    ),
+    (
+        "Cameron et al. 2011",
+        "Cameron AC, Gelbach JB, Miller DL (2011). Robust inference with multiway clustering. Journal of Business & Economic Statistics 29(2):238-249.",
+    ),
+    (
+        "Clark 1973",
+        "Clark HH (1973). The language-as-fixed-effect fallacy. Journal of Verbal Learning and Verbal Behavior 12(4):335-359.",
+    ),
+    (
+        "Friedman 1937",
+        "Friedman M (1937). The use of ranks to avoid the assumption of normality implicit in the analysis of variance. Journal of the American Statistical Association 32(200):675-701.",
+    ),
+    (
+        "Holm 1979",
+        "Holm S (1979). A simple sequentially rejective multiple test procedure. Scandinavian Journal of Statistics 6(2):65-70.",
+    ),
+    (
+        "Jonell et al. 2021",
+        "Jonell P, Yoon Y, Wolfert P, Kucherenko T, Henter GE (2021). HEMVIP: human evaluation of multiple videos in parallel. ICMI 2021:707-711.",
+    ),
+    (
+        "Krippendorff 2011",
+        "Krippendorff K (2011). Computing Krippendorff's alpha-reliability. University of Pennsylvania.",
+    ),
+    (
+        "MacKinnon et al. 2021",
+        "MacKinnon JG, Nielsen MO, Webb MD (2021). Wild bootstrap and asymptotic inference with multiway clustering. Journal of Business & Economic Statistics 39(2):505-519.",
+    ),
+    ("Owen 2007", "Owen AB (2007). The pigeonhole bootstrap. The Annals of Applied Statistics 1(2):386-411."),
+    (
+        "Schuirmann 1987",
+        "Schuirmann DJ (1987). A comparison of the two one-sided tests procedure and the power approach for assessing the equivalence of average bioavailability. Journal of Pharmacokinetics and Biopharmaceutics 15(6):657-680.",
+    ),
+    ("Wilcoxon 1945", "Wilcoxon F (1945). Individual comparisons by ranking methods. Biometrics Bulletin 1(6):80-83."),
+    (
+        "Wilson 1927",
+        "Wilson EB (1927). Probable inference, the law of succession, and statistical inference. Journal of the American Statistical Association 22(158):209-212.",
+    ),
+    (
+        "Bates et al. 2015",
+        "Bates D, Maechler M, Bolker B, Walker S (2015). Fitting linear mixed-effects models using lme4. Journal of Statistical Software 67(1):1-48.",
+    ),
+];
+
+/// The paragraph, and the list of its sources.
+pub fn methods(analysis: &StudyAnalysis) -> String {
+    let mut text = participants(analysis);
+    text += &exclusions(analysis);
+    for task in &analysis.tasks {
+        text += &of_task(task);
+    }
+    text += &statistics(analysis);
+    text += &registered(analysis);
+    text += &results(analysis);
+    let cited: Vec<&str> = SOURCES.iter().filter(|(name, _)| text.contains(name)).map(|(_, source)| *source).collect();
+    format!("{}\n\nSources: {}", text.trim_end(), cited.join(" "))
+}
+
+fn participants(analysis: &StudyAnalysis) -> String {
+    let account = &analysis.exclusions;
+    let mut text = format!(
+        "{} participants gave {} votes in {}. ",
+        count(account.n_participants),
+        count(account.n_votes),
+        match analysis.tasks.len() {
+            1 => "one task".to_owned(),
+            n => format!("{n} tasks"),
+        }
+    );
+    if !analysis.refused.is_empty() {
+        text += &format!("{} rows of the table could not be read as votes and were left out. ", analysis.refused.len());
+    }
+    text
+}
+
+fn exclusions(analysis: &StudyAnalysis) -> String {
+    let account = &analysis.exclusions;
+    if account.rules.is_empty() {
+        return "No vote was excluded. ".to_owned();
+    }
+    let rule = |count_of: &super::exclusion::ExclusionCount| match &count_of.unknown {
+        Some(_) => format!("{} (not applicable: not recorded)", count_of.rule),
+        None if count_of.n_participants > 0 => {
+            format!(
+                "{} ({} participants, {} votes)",
+                count_of.rule,
+                count(count_of.n_participants),
+                count(count_of.n_votes)
+            )
+        }
+        None => format!("{} ({} votes)", count_of.rule, count(count_of.n_votes)),
+    };
+    format!(
+        "By rules fixed before the study, votes were excluded of participants or trials that {}; {} participants and {} \
+         votes remain. ",
+        list(&account.rules.iter().map(rule).collect::<Vec<_>>()),
+        count(account.n_participants_kept),
+        count(account.n_votes_kept)
+    )
+}
+
+fn of_task(task: &TaskAnalysis) -> String {
+    let asked = match task.design {
+        TaskDesign::Turing => {
+            "participants saw a real and a generated motion of one speech side by side and chose the real one"
+        }
+        TaskDesign::TuringSingle => "participants saw one film at a time and said whether its motion was real",
+        TaskDesign::Preference => {
+            "participants saw two motions of one speech side by side and gave their preference in five steps"
+        }
+        TaskDesign::Sliders => {
+            "participants scored the conditions of one speech on one page from 0 to 100 (Jonell et al. 2021)"
+        }
+        TaskDesign::Mismatch => {
+            "participants saw two motions, one of which belonged to the speech that was heard, and chose the fitting one"
+        }
+    };
+    let speakers = match task.speakers.len() {
+        0 | 1 => String::new(),
+        n => format!(" of {n} speakers"),
+    };
+    format!(
+        "In the task {}, {asked} ({} votes of {} participants on {} clips{speakers}). ",
+        task.task,
+        count(task.n_votes),
+        count(task.n_participants),
+        count(task.n_clips)
+    )
+}
+
+fn statistics(analysis: &StudyAnalysis) -> String {
+    let settings = &analysis.settings;
+    let is_used =
+        |method: FigureMethod| analysis.tasks.iter().any(|task| task.origins().any(|origin| origin.method == method));
+    let draws = count(settings.n_draws);
+    let mut text = format!(
+        "Votes of one participant, and votes about one clip, are not independent (Clark 1973); estimates have standard \
+         errors with participants and clips crossed (Cameron et al. 2011), judged by the t distribution with \
+         Satterthwaite's degrees of freedom; intervals are {:.0} % ones. ",
+        100.0 * settings.confidence
+    );
+    if analysis.tasks.iter().any(|task| !task.shares.is_empty()) {
+        text += &format!(
+            "Equivalence with chance within \u{b1}{} points was tested by two one-sided tests at 5 % (Schuirmann 1987). ",
+            list(&bounds(analysis))
+        );
+    }
+    if is_used(FigureMethod::CrossedBootstrap) {
+        text += &format!("Bootstrap intervals are of {draws} draws of participants and clips (Owen 2007). ");
+    }
+    if is_used(FigureMethod::SignFlip) {
+        text += "Sign flips of whole participants or clips, whichever are fewer, test the same without a t distribution (MacKinnon et al. 2021). ";
+    }
+    if is_used(FigureMethod::Sides) {
+        text += "The permutation test of sides is exact, over all assignments of the real film to left and right within a participant. ";
+    }
+    if analysis.tasks.iter().flat_map(|task| &task.shares).any(|share| share.model.is_some()) {
+        text += "Mixed logistic regressions have random intercepts of participants and clips (Laplace approximation, as in Bates et al. 2015). ";
+    }
+    if is_used(FigureMethod::Wilcoxon) {
+        text += "Pairs of conditions were also compared by Wilcoxon's signed ranks of participants' mean differences (Wilcoxon 1945). ";
+    }
+    if is_used(FigureMethod::Friedman) {
+        text +=
+            "All conditions together were compared by Friedman's test of participants' mean scores (Friedman 1937). ";
+    }
+    if analysis.tasks.iter().any(|task| !task.strengths.is_empty()) {
+        text += "Strengths of conditions are those of a Bradley-Terry model (Bradley and Terry 1952). ";
+    }
+    if analysis.tasks.iter().flat_map(TaskAnalysis::tests).any(|test| test.adjusted_p.is_some()) {
+        text += "p values of several speakers, conditions or pairs were adjusted by Holm's method (Holm 1979). ";
+    }
+    if analysis.tasks.iter().any(|task| task.agreement.is_some()) {
+        text += "Agreement of participants is Krippendorff's alpha (Krippendorff 2011). ";
+    }
+    text
+}
+
+/// Bounds of the equivalence tests, points of percent.
+fn bounds(analysis: &StudyAnalysis) -> Vec<String> {
+    let tests = analysis.tasks.iter().flat_map(|task| &task.shares).flat_map(|share| &share.figures.equivalence);
+    let mut bounds: Vec<String> = tests.map(|test| points(test.bound)).collect();
+    bounds.sort();
+    bounds.dedup();
+    bounds
+}
+
+fn registered(analysis: &StudyAnalysis) -> String {
+    let is_registered = |origin: &FigureOrigin| !origin.exploratory;
+    match &analysis.seal {
+        Some(seal) if analysis.tasks.iter().any(|task| task.origins().any(|origin| is_registered(&origin))) => format!(
+            "Hypotheses, exclusion rules and analysis were registered before the first participant (BLAKE3 {seal}); all \
+             other figures are exploratory. "
+        ),
+        _ => "The analysis was not pre-registered: all figures are exploratory. ".to_owned(),
+    }
+}
+
+/// Headline figures.
+fn results(analysis: &StudyAnalysis) -> String {
+    let mut text = String::new();
+    for task in &analysis.tasks {
+        for share in task.shares.iter().filter(|share| share.measure != ShareMeasure::TakenForReal) {
+            let figures = &share.figures;
+            let Some((interval, test)) =
+                figures.interval(FigureMethod::Crossed).zip(figures.test(FigureMethod::Crossed))
+            else {
+                continue;
+            };
+            let freedom = test.degrees_of_freedom.map(|freedom| format!("({freedom:.1})")).unwrap_or_default();
+            let statistic = test.statistic.map(|t| format!("t{freedom} = {t:.2}, ")).unwrap_or_default();
+            let adjusted = test.adjusted_p.map(|p| format!(", {} after Holm", p_value(p))).unwrap_or_default();
+            let equivalence = figures
+                .equivalence(FigureMethod::Crossed)
+                .map(|test| format!("; equivalence within \u{b1}{} points {}", points(test.bound), p_value(test.p)));
+            text += &format!(
+                "{}, {}: {} [{}], {statistic}{}{adjusted}{}. ",
+                task.task,
+                super::verdict::scope(share),
+                percent(share.share),
+                percents(interval),
+                p_value(test.p),
+                equivalence.unwrap_or_default()
+            );
+        }
+        for row in &task.scores {
+            let interval = row.figures.interval(FigureMethod::Median);
+            let interval =
+                interval.map(|interval| format!(" [{}, {}]", interval.low, interval.high)).unwrap_or_default();
+            text +=
+                &format!("{}, {}: median {}{interval}, mean {:.1}. ", task.task, row.condition, row.median, row.mean);
+        }
+    }
+    text
+}

@@ -1,0 +1,203 @@
+//! Charts of a task: shares and differences with their intervals, scores, steps of preference, strengths.
+
+use crate::report::html::chart::forest::{ForestRow, ForestScale, forest};
+use crate::report::html::{Node, legend, node, table};
+use crate::study::analyse::figure::FigureMethod;
+use crate::study::analyse::result::{PairAnalysis, ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
+use crate::study::analyse::verdict::scope;
+use crate::study::analyse::words::bare_p;
+use crate::study::plan::TaskDesign;
+
+/// Names of the five steps, from the second condition to the first.
+const STEPS: [&str; 5] = ["second clearly", "second", "neither", "first", "first clearly"];
+
+/// Charts of a task.
+pub fn task(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
+    let mut body = Vec::new();
+    if !task.shares.is_empty() {
+        body.extend(shares(task, analysis));
+    }
+    if !task.scores.is_empty() {
+        body.extend(scores(task));
+    }
+    if task.pairs.iter().any(|pair| pair.steps.is_some()) {
+        body.extend(steps(task));
+    }
+    if !task.pairs.is_empty() {
+        body.extend(pairs(task));
+    }
+    if !task.strengths.is_empty() {
+        body.extend(strengths(task));
+    }
+    body
+}
+
+fn card(chart: Node) -> Node {
+    node("div").class("card scroll wide").attr("tabindex", "0").child(chart)
+}
+
+/// Low and high end with some room around all values.
+fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let [low, high] = values
+        .filter(|value| value.is_finite())
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);
+    if low > high {
+        return [0.0, 1.0];
+    }
+    let room = (0.06 * (high - low)).max(1e-6);
+    [low - room, high + room]
+}
+
+fn shares(task: &TaskAnalysis, analysis: &StudyAnalysis) -> Vec<Node> {
+    let percent = |share: f64| 100.0 * share;
+    let row = |share: &ShareAnalysis, class: &'static str, more: &str, method: FigureMethod| {
+        let interval = share.figures.interval(method);
+        let p = share.figures.test(method).map(|test| format!(", p {}", equal(test.adjusted_p.unwrap_or(test.p))));
+        ForestRow {
+            name: format!("{}{more}", scope(share)),
+            class,
+            value: percent(share.share),
+            interval: interval.map(|interval| [percent(interval.low), percent(interval.high)]),
+            said: format!("{:.1} %{}", percent(share.share), p.unwrap_or_default()),
+        }
+    };
+    let mut rows = Vec::new();
+    let chance = task.shares.iter().filter(|share| share.measure != ShareMeasure::TakenForReal);
+    for (place, share) in chance.enumerate() {
+        rows.push(row(share, if place == 0 { "own" } else { "part" }, "", FigureMethod::Crossed));
+        if place == 0 {
+            rows.push(row(share, "naive", ", naive", FigureMethod::Wilson));
+            let other = analysis.without_exclusions.iter().find(|other| other.task == task.task);
+            let other = other.and_then(TaskAnalysis::pooled);
+            rows.extend(other.map(|other| row(other, "beside", ", nobody excluded", FigureMethod::Crossed)));
+        }
+    }
+    let bound = task.pooled().and_then(|share| share.figures.equivalence(FigureMethod::Crossed)).map(|test| test.bound);
+    let band = bound.map(|bound| [percent(0.5 - bound), percent(0.5 + bound)]);
+    let values = rows.iter().flat_map(|row| row.interval.unwrap_or([row.value; 2])).chain(band.into_iter().flatten());
+    let [low, high] = ends(values);
+    let scale = ForestScale { low, high, middle: Some(50.0), band, unit: "% of votes" };
+    let (what, label) = match task.design {
+        TaskDesign::Turing => ("Share of votes that took the generated motion for the real one.", "Generated chosen"),
+        TaskDesign::Mismatch => ("Share of votes for the motion of the heard speech.", "Matched chosen"),
+        _ => ("Share of right answers.", "Right answers"),
+    };
+    let about = format!("{what} Dashed: chance. Shaded: differences within the bound, which count as none.");
+    let mut keys =
+        vec![("line own", "participants and clips crossed"), ("line naive", "votes taken for independent (Wilson)")];
+    keys.extend((task.shares.len() > 1).then_some(("line part", "parts, p after Holm")));
+    keys.extend((!analysis.without_exclusions.is_empty()).then_some(("line beside", "nobody excluded")));
+    keys.extend(band.map(|_| ("band", "bound of equivalence")));
+    let mut body = vec![node("p").text(about), legend(keys), card(forest(label, &rows, &scale))];
+    let single: Vec<ForestRow> = task
+        .shares
+        .iter()
+        .filter(|share| share.measure == ShareMeasure::TakenForReal)
+        .map(|share| row(share, "part", "", FigureMethod::Crossed))
+        .collect();
+    if !single.is_empty() {
+        let scale = ForestScale { low: 0.0, high: 100.0, middle: None, band: None, unit: "% of votes" };
+        body.push(node("p").text("How often the films of each condition were taken for real."));
+        body.push(card(forest("Taken for real", &single, &scale)));
+    }
+    body
+}
+
+fn scores(task: &TaskAnalysis) -> Vec<Node> {
+    let rows: Vec<ForestRow> = task
+        .scores
+        .iter()
+        .map(|row| ForestRow {
+            name: row.condition.clone(),
+            class: "own",
+            value: row.mean,
+            interval: row.figures.interval(FigureMethod::Crossed).map(|interval| [interval.low, interval.high]),
+            said: match row.figures.interval(FigureMethod::Median) {
+                Some(interval) => format!("median {} [{}, {}]", row.median, interval.low, interval.high),
+                None => format!("median {}", row.median),
+            },
+        })
+        .collect();
+    let scale = ForestScale { low: 0.0, high: 100.0, middle: None, band: None, unit: "mean score" };
+    let about = "Mean scores with intervals for other participants and clips; at the right medians with the intervals that \
+                 the GENEA challenges print, which take scores for independent.";
+    vec![node("p").text(about), card(forest("Scores", &rows, &scale))]
+}
+
+fn pairs(task: &TaskAnalysis) -> Vec<Node> {
+    let factor = if task.design == TaskDesign::TuringSingle { 100.0 } else { 1.0 };
+    let row = |pair: &PairAnalysis| {
+        let test = pair.figures.test(FigureMethod::Crossed);
+        let p = test.map(|test| format!(", p {}", equal(test.adjusted_p.unwrap_or(test.p))));
+        ForestRow {
+            name: format!("{} \u{2212} {}", pair.first, pair.second),
+            class: "own",
+            value: factor * pair.difference,
+            interval: pair
+                .figures
+                .interval(FigureMethod::Crossed)
+                .map(|interval| [factor * interval.low, factor * interval.high]),
+            said: format!("{:+.2}{}", factor * pair.difference, p.unwrap_or_default()),
+        }
+    };
+    let rows: Vec<ForestRow> = task.pairs.iter().map(row).collect();
+    let values = rows.iter().flat_map(|row| row.interval.unwrap_or([row.value; 2]));
+    let [low, high] = ends(values.chain([0.0]));
+    let unit = match task.design {
+        TaskDesign::Sliders => "points of 100",
+        TaskDesign::TuringSingle => "points of percent",
+        _ => "steps",
+    };
+    let scale = ForestScale { low, high, middle: Some(0.0), band: None, unit };
+    let about = "Differences between conditions, the first less the second, with intervals for other participants and clips; \
+                 p after Holm's adjustment where there are several.";
+    vec![node("p").text(about), card(forest("Differences", &rows, &scale))]
+}
+
+fn steps(task: &TaskAnalysis) -> Vec<Node> {
+    let row = |pair: &PairAnalysis| {
+        let steps = pair.steps.unwrap_or_default();
+        let total = steps.iter().sum::<u64>().max(1) as f64;
+        let parts = steps.iter().enumerate().map(|(step, n)| {
+            let share = 100.0 * *n as f64 / total;
+            let said = if share >= 8.0 { format!("{share:.0} %") } else { String::new() };
+            let part = node("span").class(format!("step{step}")).attr("style", format!("width:{share:.3}%"));
+            part.attr("title", format!("{}: {n} votes, {share:.1} %", STEPS[step])).text(said)
+        });
+        let name = node("th").attr("scope", "row").text(format!("{} (first), {}", pair.first, pair.second));
+        node("tr").child(name).child(node("td").child(node("div").class("steps").children(parts)))
+    };
+    let keys = STEPS.iter().enumerate().map(|(step, name)| (format!("step{step}"), *name));
+    let head = ["Pair", "Votes by step"].map(|text| node("th").attr("scope", "col").text(text));
+    let chart = table("preference", head, task.pairs.iter().map(row));
+    vec![
+        node("p").text("Votes of each step of the preference scale."),
+        legend(keys),
+        node("div").class("scroll").child(chart),
+    ]
+}
+
+fn strengths(task: &TaskAnalysis) -> Vec<Node> {
+    let rows: Vec<ForestRow> = task
+        .strengths
+        .iter()
+        .map(|row| ForestRow {
+            name: row.condition.clone(),
+            class: "own",
+            value: row.log_strength,
+            interval: row.interval.as_ref().map(|interval| [interval.low, interval.high]),
+            said: format!("{:+.2}, Elo {:.0}", row.log_strength, row.elo),
+        })
+        .collect();
+    let [low, high] = ends(rows.iter().flat_map(|row| row.interval.unwrap_or([row.value; 2])));
+    let scale = ForestScale { low, high, middle: Some(0.0), band: None, unit: "log odds" };
+    let about =
+        "Strength of each condition: log odds of being put above one of mean strength (Bradley-Terry), and Elo rating.";
+    vec![node("p").text(about), card(forest("Strengths", &rows, &scale))]
+}
+
+/// `= 0.027`, `< 1e-99`.
+fn equal(p: f64) -> String {
+    let text = bare_p(p);
+    if text.starts_with('<') { text } else { format!("= {text}") }
+}

@@ -1,0 +1,92 @@
+//! Whole page. Its bytes depend on the analysis alone.
+
+use super::{charts, tables};
+use crate::report::html::{Node, Page, Section, node};
+use crate::study::analyse::result::{Conclusion, StudyAnalysis, TaskAnalysis};
+use crate::study::analyse::words::{count, list};
+use serde_json::Value;
+
+/// Text of the page.
+pub fn html(analysis: &StudyAnalysis) -> String {
+    let section = |id, title, body| Section { id, title, body };
+    let page = Page {
+        title: analysis.title.clone(),
+        lead: lead(analysis),
+        sections: vec![
+            section("meaning", "What can be concluded", meaning(analysis)),
+            section(
+                "charts",
+                "Estimates and intervals",
+                per_task(&analysis.tasks, |task| charts::task(task, analysis)),
+            ),
+            section("figures", "All figures", figures(analysis)),
+            section("exclusions", "Exclusions", tables::exclusions(analysis)),
+            section("methods", "Methods paragraph", methods(analysis)),
+        ],
+        style: include_str!("page.css"),
+        script: "",
+        data: Value::Null,
+    };
+    page.html()
+}
+
+fn lead(analysis: &StudyAnalysis) -> String {
+    let account = &analysis.exclusions;
+    let tasks: Vec<String> = analysis.tasks.iter().map(|task| task.task.clone()).collect();
+    let left_out = match account.leaves_out() {
+        true => format!(" ({} votes were excluded)", count(account.n_votes - account.n_votes_kept)),
+        false => String::new(),
+    };
+    format!(
+        "{} votes of {} participants{left_out}: {}.",
+        count(account.n_votes_kept),
+        count(account.n_participants_kept),
+        list(&tasks)
+    )
+}
+
+/// Body of each task under its name, which is left out where there is one task.
+fn per_task(tasks: &[TaskAnalysis], body: impl Fn(&TaskAnalysis) -> Vec<Node>) -> Vec<Node> {
+    let title = |task: &TaskAnalysis| (tasks.len() > 1).then(|| node("h3").text(&task.task));
+    tasks.iter().flat_map(|task| title(task).into_iter().chain(body(task))).collect()
+}
+
+/// Verdicts and notes.
+fn meaning(analysis: &StudyAnalysis) -> Vec<Node> {
+    let card = |task: &TaskAnalysis| {
+        let conclusion = task.pooled().map(|share| share.conclusion);
+        let conclusion = conclusion.or(task.pairs.first().map(|pair| pair.conclusion)).unwrap_or(Conclusion::Untested);
+        let class = match conclusion {
+            Conclusion::Equivalent => "card verdict equivalent",
+            Conclusion::Undecided | Conclusion::Untested => "card verdict",
+            _ => "card verdict found",
+        };
+        let verdicts = task.verdicts.iter().map(|verdict| node("p").text(verdict));
+        node("div").class(class).child(node("h3").text(&task.task)).children(verdicts)
+    };
+    let mut body = vec![node("div").class("verdicts").children(analysis.tasks.iter().map(card))];
+    if !analysis.notes.is_empty() {
+        body.push(node("h3").text("Notes"));
+        body.push(node("ul").class("notes").children(analysis.notes.iter().map(|note| node("li").text(note))));
+    }
+    body
+}
+
+fn figures(analysis: &StudyAnalysis) -> Vec<Node> {
+    let about = "Registered: written down and sealed before the first participant. Exploratory: everything else; it can \
+                 suggest, not show. Naive: votes are taken for independent, which votes of one participant or about one clip \
+                 are not; such figures are here because others print them.";
+    let mut body = vec![node("p").text(about)];
+    body.extend(per_task(&analysis.tasks, tables::task));
+    if !analysis.without_exclusions.is_empty() {
+        body.push(node("h3").text("Without exclusions"));
+        body.push(node("p").text("The votes of everybody, by the same methods; nothing of it was registered."));
+        body.extend(per_task(&analysis.without_exclusions, tables::task));
+    }
+    body
+}
+
+fn methods(analysis: &StudyAnalysis) -> Vec<Node> {
+    let about = "Ready to paste; a click selects all of it.";
+    vec![node("p").text(about), node("div").class("methods").attr("tabindex", "0").text(&analysis.methods)]
+}

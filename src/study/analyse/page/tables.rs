@@ -1,0 +1,185 @@
+//! Every figure of a task in a table with its mark, and the account of exclusions.
+
+use crate::report::html::{Node, node, table};
+use crate::study::analyse::figure::{FigureMethod, FigureOrigin, TestFigure};
+use crate::study::analyse::figures::FigureSet;
+use crate::study::analyse::result::{ShareAnalysis, ShareMeasure, StudyAnalysis, TaskAnalysis};
+use crate::study::analyse::verdict::scope;
+use crate::study::analyse::words::{bare_p, count, percent};
+
+/// Columns of the table of figures.
+const COLUMNS: [&str; 6] = ["Method", "Interval", "Statistic", "p", "p after Holm", "Mark"];
+
+/// Table of a task's figures, grouped by the number that they are about.
+pub fn task(task: &TaskAnalysis) -> Vec<Node> {
+    let mut rows = Vec::new();
+    for share in &task.shares {
+        rows.push(group(&share_title(share)));
+        rows.extend(figure_rows(&share.figures, 100.0, " %"));
+        rows.extend(share.model.as_ref().map(|model| {
+            let said = format!(
+                "log odds {:.3} \u{b1} {:.3}; standard deviations of participants {:.2}, of clips {:.2}",
+                model.log_odds, model.standard_error, model.sd_participants, model.sd_clips
+            );
+            let name = node("th").attr("scope", "row").text("mixed model's estimates");
+            node("tr").child(name).child(node("td").attr("colspan", 4).text(said)).child(node("td"))
+        }));
+    }
+    for row in &task.scores {
+        let title = format!(
+            "{}: median {}, mean {:.2} of {} scores ({} participants, {} clips)",
+            row.condition,
+            row.median,
+            row.mean,
+            count(row.n_scores),
+            count(row.n_participants),
+            count(row.n_clips)
+        );
+        rows.push(group(&title));
+        rows.extend(figure_rows(&row.figures, 1.0, ""));
+    }
+    for pair in &task.pairs {
+        let orders = pair.orders.map(|[above, tied, below]| format!("; {above} above, {tied} neither, {below} below"));
+        let title = format!(
+            "{} less {}: {:+.3} in {} votes ({} participants, {} clips{})",
+            pair.first,
+            pair.second,
+            pair.difference,
+            count(pair.n_votes),
+            count(pair.n_participants),
+            count(pair.n_clips),
+            orders.unwrap_or_default()
+        );
+        rows.push(group(&title));
+        rows.extend(figure_rows(&pair.figures, 1.0, ""));
+    }
+    if let Some(test) = &task.overall {
+        rows.push(group("All conditions"));
+        rows.push(figure_row(test.origin, None, Some(test), None));
+    }
+    let head = COLUMNS.iter().map(|title| {
+        let class = if ["Method", "Mark"].contains(title) { "" } else { "num" };
+        node("th").attr("scope", "col").class(class).text(title)
+    });
+    let mut body = vec![node("div").class("scroll").attr("tabindex", "0").child(table("figures", head, rows))];
+    if let Some(alpha) = task.agreement {
+        body.push(
+            node("p")
+                .class("small")
+                .text(format!("Agreement of participants: Krippendorff's alpha = {alpha:.3} (1: perfect, 0: chance).")),
+        );
+    }
+    body
+}
+
+fn share_title(share: &ShareAnalysis) -> String {
+    let what = match share.measure {
+        ShareMeasure::GeneratedChosen => "generated chosen",
+        ShareMeasure::MatchedChosen => "matched chosen",
+        ShareMeasure::Correct => "right",
+        ShareMeasure::TakenForReal => "taken for real",
+    };
+    format!(
+        "{}: {what} in {} of {} votes, {} ({} participants, {} clips)",
+        scope(share),
+        count(share.n_successes as usize),
+        count(share.n_votes as usize),
+        percent(share.share),
+        count(share.n_participants),
+        count(share.n_clips)
+    )
+}
+
+fn group(title: &str) -> Node {
+    node("tr").class("group").child(node("th").attr("colspan", COLUMNS.len()).attr("scope", "rowgroup").text(title))
+}
+
+/// Rows of a set: a method's interval and test together, then equivalence.
+fn figure_rows(set: &FigureSet, factor: f64, unit: &str) -> Vec<Node> {
+    let mut methods: Vec<FigureMethod> = Vec::new();
+    let intervals = set.intervals.iter().map(|interval| interval.origin.method);
+    for method in intervals.chain(set.tests.iter().map(|test| test.origin.method)) {
+        if !methods.contains(&method) {
+            methods.push(method);
+        }
+    }
+    let ends = |low: f64, high: f64| format!("{:.2} to {:.2}{unit}", factor * low, factor * high);
+    let mut rows: Vec<Node> = methods
+        .into_iter()
+        .filter_map(|method| {
+            let (interval, test) = (set.interval(method), set.test(method));
+            let origin = interval.map(|interval| interval.origin).or(test.map(|test| test.origin))?;
+            Some(figure_row(origin, interval.map(|interval| ends(interval.low, interval.high)), test, None))
+        })
+        .collect();
+    rows.extend(set.equivalence.iter().map(|test| {
+        let shown = TestFigure { origin: test.origin, ..TestFigure::new(test.origin.method, test.p) };
+        let outcome = if test.passes { "shown" } else { "not shown" };
+        let name = format!(
+            "equivalence within \u{b1}{} points ({}): {outcome}",
+            100.0 * test.bound,
+            test.origin.method.name()
+        );
+        let interval = format!("90 %: {}", ends(test.low, test.high));
+        figure_row(test.origin, Some(interval), Some(&shown), Some(name))
+    }));
+    rows
+}
+
+fn figure_row(origin: FigureOrigin, interval: Option<String>, test: Option<&TestFigure>, name: Option<String>) -> Node {
+    let number = |text: String| node("td").class("num").text(text);
+    let statistic = test.and_then(|test| {
+        let freedom = test.degrees_of_freedom.map(|freedom| format!(" ({freedom:.1})")).unwrap_or_default();
+        test.statistic.map(|statistic| format!("{statistic:.2}{freedom}"))
+    });
+    let mark = match (origin.exploratory, origin.naive) {
+        (false, _) => node("span").class("registered").text("registered"),
+        (true, false) => node("span").text("exploratory"),
+        (true, true) => node("span").text("exploratory, naive"),
+    };
+    let row = if origin.naive { node("tr").class("is-naive") } else { node("tr") };
+    row.child(node("th").attr("scope", "row").text(name.unwrap_or_else(|| origin.method.name().to_owned())))
+        .child(number(interval.unwrap_or_default()))
+        .child(number(statistic.unwrap_or_default()))
+        .child(number(test.map(|test| bare_p(test.p)).unwrap_or_default()))
+        .child(number(test.and_then(|test| test.adjusted_p).map(bare_p).unwrap_or_default()))
+        .child(node("td").class("mark").child(mark))
+}
+
+/// Rules with what each leaves out by itself, and rows that are no votes.
+pub fn exclusions(analysis: &StudyAnalysis) -> Vec<Node> {
+    let account = &analysis.exclusions;
+    let number = |n: usize| node("td").class("num").text(count(n));
+    let cells = |name: &str, participants: usize, votes: usize, said: &str| {
+        let name = node("th").attr("scope", "row").text(name);
+        node("tr").child(name).child(number(participants)).child(number(votes)).child(node("td").text(said))
+    };
+    let mut rows = vec![cells("answered", account.n_participants, account.n_votes, "")];
+    rows.extend(
+        account.rules.iter().map(|rule| {
+            cells(&rule.rule, rule.n_participants, rule.n_votes, rule.unknown.as_deref().unwrap_or_default())
+        }),
+    );
+    rows.push(cells("analysed", account.n_participants_kept, account.n_votes_kept, ""));
+    let head = ["", "Participants", "Votes", ""]
+        .map(|title| node("th").attr("scope", "col").class(if title.is_empty() { "" } else { "num" }).text(title));
+    let about = match account.registered {
+        true => "Rules that were registered, with what each leaves out by itself; a vote may fall under several.",
+        false => "No rules were registered; every vote is analysed.",
+    };
+    let mut body = vec![node("p").text(about), node("div").class("scroll").child(table("figures", head, rows))];
+    if !analysis.refused.is_empty() {
+        let most = 200;
+        body.push(node("h3").text(format!("{} rows that are no votes", count(analysis.refused.len()))));
+        let rows = analysis.refused.iter().take(most);
+        body.push(
+            node("ul")
+                .class("notes")
+                .children(rows.map(|row| node("li").text(format!("line {}: {}", row.line, row.reason)))),
+        );
+        if analysis.refused.len() > most {
+            body.push(node("p").class("small").text(format!("The first {most} are shown; the JSON result has all.")));
+        }
+    }
+    body
+}

@@ -1,0 +1,121 @@
+//! Summary of an analysis for the terminal.
+
+use super::figure::FigureMethod;
+use super::result::{StudyAnalysis, TaskAnalysis};
+use super::verdict::scope;
+use super::words::{bare_p, count, percent, percents, points};
+use std::fmt::Write as _;
+
+/// Rows without a vote that are named.
+const MOST_REFUSED: usize = 20;
+
+/// Summary: verdicts first, then the headline figures, marks, exclusions and notes.
+pub fn text(analysis: &StudyAnalysis) -> String {
+    let mut text = String::new();
+    let account = &analysis.exclusions;
+    let _ = writeln!(
+        text,
+        "{}: {} votes of {} participants",
+        analysis.title,
+        count(account.n_votes_kept),
+        count(account.n_participants_kept)
+    );
+    for task in &analysis.tasks {
+        let _ = writeln!(text, "\n{}", task.task);
+        for verdict in &task.verdicts {
+            let _ = writeln!(text, "  {verdict}");
+        }
+        text += &rows(task);
+    }
+    if analysis.tasks.iter().any(|task| task.origins().any(|origin| origin.exploratory)) {
+        text += "\n* exploratory: not registered before the data were seen\n";
+    }
+    if account.leaves_out() {
+        text += "\nexcluded, by each rule alone\n";
+        for rule in &account.rules {
+            let _ =
+                writeln!(text, "  {:<44} {:>6} participants {:>8} votes", rule.rule, rule.n_participants, rule.n_votes);
+        }
+        for (task, all) in analysis.tasks.iter().zip(&analysis.without_exclusions) {
+            if let Some((kept, all)) = task.pooled().zip(all.pooled()) {
+                let _ = writeln!(
+                    text,
+                    "  {}: {} of {} votes, {} of {} without exclusions",
+                    task.task,
+                    percent(kept.share),
+                    count(kept.n_votes as usize),
+                    percent(all.share),
+                    count(all.n_votes as usize)
+                );
+            }
+        }
+    }
+    if !analysis.notes.is_empty() {
+        text += "\nnotes\n";
+        for note in &analysis.notes {
+            let _ = writeln!(text, "  {note}");
+        }
+    }
+    if !analysis.refused.is_empty() {
+        let _ = writeln!(text, "\nrows that are no votes: {}", count(analysis.refused.len()));
+        for row in analysis.refused.iter().take(MOST_REFUSED) {
+            let _ = writeln!(text, "  line {}: {}", row.line, row.reason);
+        }
+        if analysis.refused.len() > MOST_REFUSED {
+            text += "  ... (--json has all)\n";
+        }
+    }
+    text
+}
+
+/// Headline figures of a task.
+fn rows(task: &TaskAnalysis) -> String {
+    let mut text = String::new();
+    let mark = |is_exploratory: bool| if is_exploratory { "*" } else { " " };
+    for share in &task.shares {
+        let _ = writeln!(
+            text,
+            "\n  {:<46} {:>8} of {:>8} votes",
+            scope(share),
+            percent(share.share),
+            count(share.n_votes as usize)
+        );
+        for interval in &share.figures.intervals {
+            let naive = if interval.origin.naive { ", naive" } else { "" };
+            let name = format!("{}{naive}", interval.origin.method.name());
+            let test = share.figures.test(interval.origin.method);
+            let p = test.map(|test| format!("  p {}", bare_p(test.p))).unwrap_or_default();
+            let _ = writeln!(text, "    {name:<44} {:>16}{p}{}", percents(interval), mark(interval.origin.exploratory));
+        }
+        let alone = |method| share.figures.interval(method).is_none();
+        for test in share.figures.tests.iter().filter(|test| alone(test.origin.method)) {
+            let naive = if test.origin.naive { ", naive" } else { "" };
+            let name = format!("{}{naive}", test.origin.method.name());
+            let _ = writeln!(text, "    {name:<44} {:>16}  p {}{}", "", bare_p(test.p), mark(test.origin.exploratory));
+        }
+        for test in &share.figures.equivalence {
+            let naive = if test.origin.naive { ", naive" } else { "" };
+            let name = format!("equivalence \u{b1}{} points{naive}", points(test.bound));
+            let outcome = if test.passes { "shown" } else { "not shown" };
+            let _ =
+                writeln!(text, "    {name:<44} {outcome:>16}  p {}{}", bare_p(test.p), mark(test.origin.exploratory));
+        }
+    }
+    for row in &task.scores {
+        let interval = row.figures.interval(FigureMethod::Median);
+        let interval = interval.map(|interval| format!("[{}, {}]", interval.low, interval.high)).unwrap_or_default();
+        let _ =
+            writeln!(text, "  {:<24} median {:>5} {interval:<12} mean {:>6.2}", row.condition, row.median, row.mean);
+    }
+    for row in &task.strengths {
+        let _ = writeln!(text, "  {:<24} strength {:>+6.2}  Elo {:>6.0}", row.condition, row.log_strength, row.elo);
+    }
+    if let Some(test) = &task.overall {
+        let _ =
+            writeln!(text, "  {}: p {}{}", test.origin.method.name(), bare_p(test.p), mark(test.origin.exploratory));
+    }
+    if let Some(alpha) = task.agreement {
+        let _ = writeln!(text, "  Krippendorff's alpha {alpha:.3}");
+    }
+    text
+}

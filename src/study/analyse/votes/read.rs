@@ -1,0 +1,270 @@
+//! File of votes: CSV or JSON Lines, of this program or of another. A row that cannot be used is kept with its line and
+//! the reason.
+
+use super::columns::{ColumnNames, FIELDS};
+use super::row::{check, vote};
+use super::{delimited, json_lines};
+use crate::study::plan::TaskDesign;
+use crate::study::response::Response;
+use crate::study::vote::StudyVote;
+use anyhow::{Context, Result, bail, ensure};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::io::Read as _;
+use std::path::Path;
+
+/// Bytes of the largest file.
+const MOST_BYTES: u64 = 1 << 30;
+
+/// Votes of a source.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct VotesRead {
+    pub votes: Vec<StudyVote>,
+    pub refused: Vec<RefusedRow>,
+    /// Fields of exported votes that the source lacks: exclusion rules on them cannot hold.
+    pub absent: Vec<&'static str>,
+}
+
+/// Row of a table that is no vote.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RefusedRow {
+    /// Line in the file, from 1.
+    pub line: u64,
+    pub reason: String,
+}
+
+impl VotesRead {
+    /// Votes that are known to be whole, such as those of a study's own store.
+    pub fn of_votes(votes: Vec<StudyVote>) -> Self {
+        let mut read = Self::default();
+        for (row, vote) in votes.into_iter().enumerate() {
+            match check(&vote) {
+                Ok(()) => read.votes.push(vote),
+                Err(reason) => read.refused.push(RefusedRow { line: row as u64 + 1, reason }),
+            }
+        }
+        read
+    }
+
+    /// Reads a file. `design` is that of rows that do not say theirs.
+    pub fn of_file(path: &Path, names: &ColumnNames, design: Option<TaskDesign>) -> Result<Self> {
+        let place = || path.display().to_string();
+        let mut bytes = Vec::new();
+        let file = fs::File::open(path).with_context(place)?;
+        ensure!(file.metadata().with_context(place)?.is_file(), "{}: it is no file", place());
+        file.take(MOST_BYTES + 1).read_to_end(&mut bytes).with_context(place)?;
+        ensure!(bytes.len() as u64 <= MOST_BYTES, "{}: it is larger than 1 GiB", place());
+        let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let is_json = ending == "jsonl" || ending == "ndjson" || ending == "json";
+        Self::of_bytes(&bytes, is_json, names, design).with_context(place)
+    }
+
+    fn of_bytes(bytes: &[u8], is_json: bool, names: &ColumnNames, design: Option<TaskDesign>) -> Result<Self> {
+        let rows = if is_json { json_lines::rows(bytes, names)? } else { delimited::rows(bytes, names)? };
+        let (mut read, mut seen) = (Self::default(), BTreeSet::new());
+        let mut pages = SliderPages::default();
+        let mut present: BTreeSet<&str> = BTreeSet::new();
+        let n_rows = rows.len();
+        for (line, row) in rows {
+            let row = row.inspect(|cells| present.extend(cells.values.keys().copied()));
+            let is_score =
+                row.as_ref().is_ok_and(|cells| cells.values.get("score").is_some_and(|cell| !cell.is_empty()));
+            let read_vote = row.and_then(|cells| vote(&cells, design)).and_then(|vote| {
+                let place = (vote.participant.clone(), vote.task.clone(), vote.trial);
+                match is_score || vote.trial == 0 || seen.insert(place) {
+                    true => Ok(vote),
+                    false => Err(format!("{} answered trial {} of {} above", vote.participant, vote.trial, vote.task)),
+                }
+            });
+            let added = read_vote.and_then(|vote| match is_score {
+                true => pages.add(vote, &mut read.votes),
+                false => {
+                    read.votes.push(vote);
+                    Ok(())
+                }
+            });
+            read.refused.extend(added.err().map(|reason| RefusedRow { line, reason }));
+        }
+        if read.votes.is_empty() {
+            let why =
+                read.refused.first().map(|row| format!(": line {}: {}", row.line, row.reason)).unwrap_or_default();
+            bail!("none of {n_rows} rows is a vote{why}");
+        }
+        number_trials(&mut read.votes);
+        read.absent = FIELDS[..15].iter().copied().filter(|field| !present.contains(field)).collect();
+        Ok(read)
+    }
+}
+
+/// Pages of sliders whose scores stand in rows of their own.
+#[derive(Default)]
+struct SliderPages(BTreeMap<(String, String, String, u32), usize>);
+
+impl SliderPages {
+    /// Adds a score to its page: the one of the participant, task, clip and trial.
+    fn add(&mut self, vote: StudyVote, votes: &mut Vec<StudyVote>) -> std::result::Result<(), String> {
+        let key = (vote.participant.clone(), vote.task.clone(), vote.clip.clone(), vote.trial);
+        let page = *self.0.entry(key).or_insert(votes.len());
+        let Some(whole) = votes.get_mut(page) else {
+            votes.push(vote);
+            return Ok(());
+        };
+        if vote.conditions.iter().any(|condition| whole.conditions.contains(condition)) {
+            return Err(format!(
+                "{} gave {} of {} a score above",
+                vote.participant,
+                vote.conditions.join(", "),
+                vote.clip
+            ));
+        }
+        if let (Response::Scores(all), Response::Scores(one)) = (&mut whole.response, vote.response) {
+            all.extend(one);
+            whole.conditions.extend(vote.conditions);
+        }
+        Ok(())
+    }
+}
+
+/// Gives votes without a trial their place among those of the participant.
+fn number_trials(votes: &mut [StudyVote]) {
+    let mut n_trials: BTreeMap<String, u32> = BTreeMap::new();
+    for vote in votes {
+        let n = n_trials.entry(vote.participant.clone()).or_default();
+        *n += 1;
+        if vote.trial == 0 {
+            vote.trial = *n;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::plan::TrialPhase;
+    use crate::study::response::ScreenSide;
+
+    fn read(text: &str) -> Result<VotesRead> {
+        VotesRead::of_bytes(text.as_bytes(), false, &ColumnNames::default(), None)
+    }
+
+    #[test]
+    fn a_short_table_of_another_program_is_read() {
+        let names = ColumnNames::parse("participant=worker, clip=Stimulus ID,correct=ok").unwrap();
+        let text = "\u{feff}Worker;stimulus id;ok;response_secs\r\nw1;c1;1;2,5\r\n\"w;2\";c1;no;3\r\n\r\n";
+        let read = VotesRead::of_bytes(text.as_bytes(), false, &names, None).unwrap();
+        assert_eq!(read.votes.len(), 2, "{:?}", read.refused);
+        let vote = &read.votes[1];
+        assert_eq!((vote.participant.as_str(), vote.trial, vote.task.as_str()), ("w;2", 1, "real-or-generated"));
+        assert_eq!(
+            (&vote.response, &vote.conditions[1]),
+            (&Response::Side(ScreenSide::Right), &"generated".to_owned())
+        );
+        assert_eq!(read.votes[0].response_secs, 2.5);
+        assert!(read.absent.contains(&"completed") && !read.absent.contains(&"clip"));
+    }
+
+    #[test]
+    fn scores_in_rows_of_their_own_become_pages() {
+        let read =
+            read("participant,clip,condition,score\na,1,N,80\na,1,M,20\na,2,N,70\nb,1,M,10\nb,1,M,11\n").unwrap();
+        assert_eq!(read.votes.len(), 3);
+        assert_eq!(read.votes[0].response, Response::Scores(vec![80, 20]));
+        assert_eq!((read.votes[0].conditions.join(" "), read.votes[1].trial), ("N M".to_owned(), 2));
+        assert_eq!(read.refused.len(), 1);
+        assert_eq!((read.refused[0].line, read.refused[0].reason.as_str()), (6, "b gave M of 1 a score above"));
+    }
+
+    #[test]
+    fn exported_votes_come_back_from_both_formats() {
+        let vote = StudyVote {
+            participant: "p".to_owned(),
+            task: "t".to_owned(),
+            design: TaskDesign::Sliders,
+            phase: TrialPhase::Main,
+            trial: 3,
+            clip: "ellen/4".to_owned(),
+            speaker: "ellen".to_owned(),
+            conditions: vec!["N".to_owned(), "M".to_owned()],
+            response: Response::Scores(vec![60, 0]),
+            expected: None,
+            stalled_secs: 0.5,
+            unfocused_secs: 0.0,
+            response_secs: 4.25,
+            plays: 2,
+            completed: true,
+        };
+        let line = serde_json::to_string(&vote).unwrap();
+        let json = VotesRead::of_bytes(line.as_bytes(), true, &ColumnNames::default(), None).unwrap();
+        assert_eq!(json.votes, std::slice::from_ref(&vote));
+        let head = FIELDS[..15].join(",");
+        for response in ["\"{\"\"scores\"\":[60,0]}\"", "60|0"] {
+            let row = format!("p,t,sliders,main,3,ellen/4,ellen,N|M,{response},,0.5,0,4.25,2,true");
+            assert_eq!(read(&format!("{head}\n{row}\n")).unwrap().votes, std::slice::from_ref(&vote), "{response}");
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_line() {
+        let head = "participant,clip,design,conditions,response,expected,trial\n";
+        let rows = [
+            ("a,1,turing,x|y,left,right,1", ""),
+            ("a,1,turing,x|y,left,right,1", "a answered trial 1 of real-or-generated above"),
+            ("a,1,turing,x|y,up,right,2", "response is \"up\"; expected left or right"),
+            ("a,1,turing,x,left,right,3", "two conditions, a side and the expected side are needed"),
+            ("a,1,sliders,x|y,60|101,,4", "a score from 0 to 100 is needed for each condition"),
+            ("a,1,preference,x|x,1,,5", "two different conditions and a step from -2 to 2 are needed"),
+            ("a,1,tuning,x|y,left,right,6", "design is \"tuning\"; expected turing, turing-single"),
+            (",1,turing,x|y,left,right,7", "participant is empty"),
+            ("a,,turing,x|y,left,right,8", "clip is empty"),
+            ("a,1,turing,x|y,left,right,1.5", "trial is 1.5; expected a whole number"),
+            ("a,1,turing,x|y,left", "it has 5 cells where the header has 7"),
+            ("a,1,turing,x|y,\"{\"\"side\"\":\"\"up\"\"}\",right,9", "expected an answer like"),
+        ];
+        let text: String = rows.iter().map(|(row, _)| format!("{row}\n")).collect();
+        let read = read(&format!("{head}{text}")).unwrap();
+        assert_eq!((read.votes.len(), read.refused.len()), (1, rows.len() - 1));
+        for ((row, (_, reason)), refused) in rows.iter().enumerate().skip(1).zip(&read.refused) {
+            assert!(refused.line == row as u64 + 2 && refused.reason.contains(reason), "{reason}: {refused:?}");
+        }
+    }
+
+    #[test]
+    fn tables_that_are_none_are_errors() {
+        for (text, told) in [
+            ("", "it is empty"),
+            ("participant,clip,correct\n", "none of 0 rows"),
+            ("participant,clip\na,1\n", "there is no answer"),
+            ("worker,clip,correct\na,1,1\n", "there is no column \"participant\""),
+            ("participant,participant,clip,correct\na,a,1,1\n", "two columns are called \"participant\""),
+            ("participant,clip,correct\na,1,maybe\n", "line 2: correct is \"maybe\"; expected 1 or 0"),
+        ] {
+            let error = format!("{:#}", read(text).unwrap_err());
+            assert!(error.contains(told), "{told}: {error}");
+        }
+        let utf16 = VotesRead::of_bytes(b"\xff\xfea\0", false, &ColumnNames::default(), None).unwrap_err();
+        assert!(utf16.to_string().contains("save it as UTF-8"));
+        for (columns, told) in [("worker", "is no pair"), ("who=worker", "no field \"who\""), ("clip=", "has no name")]
+        {
+            assert!(ColumnNames::parse(columns).unwrap_err().to_string().contains(told), "{told}");
+        }
+        let names = ColumnNames::parse("clip=video").unwrap();
+        let error = VotesRead::of_bytes(b"participant,clip,correct\na,1,1\n", false, &names, None).unwrap_err();
+        assert!(error.to_string().contains("there is no column \"video\""), "{error}");
+    }
+
+    #[test]
+    fn no_bytes_make_it_panic() {
+        let head = b"participant,clip,condition,score,design,trial\n".to_vec();
+        let mut state = 1_u32;
+        for n in 0..400 {
+            let mut bytes = head.clone();
+            for _ in 0..n {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                bytes.push(b"a1,\"\n|;{\xff\xc3-.e\0"[(state >> 24) as usize % 14]);
+            }
+            let _ = VotesRead::of_bytes(&bytes, n % 2 == 0, &ColumnNames::default(), None);
+            let _ = VotesRead::of_bytes(&bytes[head.len()..], true, &ColumnNames::default(), None);
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! Row of a table to a vote.
+
+use crate::study::plan::{TaskDesign, TrialPhase};
+use crate::study::response::{Response, ScreenSide};
+use crate::study::vote::StudyVote;
+use serde::Deserialize;
+use serde::de::IntoDeserializer as _;
+use std::collections::BTreeMap;
+
+/// Rows of the longest table.
+pub const MOST_ROWS: usize = 2_000_000;
+
+/// Conditions that a table of others need not name.
+const NATURAL: &str = "natural";
+const GENERATED: &str = "generated";
+/// Letters of the longest name.
+const LONGEST: usize = 200;
+
+/// Cells of a row by field, without outer space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RowCells {
+    pub values: BTreeMap<&'static str, String>,
+    /// Whether `0,5` is a number.
+    pub has_decimal_comma: bool,
+}
+
+type Read<T> = std::result::Result<T, String>;
+
+impl RowCells {
+    fn get(&self, field: &str) -> Option<&str> {
+        self.values.get(field).map(String::as_str).filter(|cell| !cell.is_empty())
+    }
+
+    fn name(&self, field: &str) -> Read<Option<String>> {
+        match self.get(field) {
+            Some(name) if name.chars().count() > LONGEST => Err(format!("{field} is longer than {LONGEST} letters")),
+            Some(name) if name.contains(char::is_control) => Err(format!("{field} has a control character")),
+            name => Ok(name.map(str::to_owned)),
+        }
+    }
+
+    fn needed(&self, field: &str) -> Read<String> {
+        self.name(field)?.ok_or_else(|| format!("{field} is empty"))
+    }
+
+    fn number(&self, field: &str) -> Read<Option<f64>> {
+        let Some(cell) = self.get(field) else { return Ok(None) };
+        let point = if self.has_decimal_comma { cell.replace(',', ".") } else { cell.to_owned() };
+        match point.parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok(Some(number)),
+            _ => Err(format!("{field} is \"{}\"; expected a number", short(cell))),
+        }
+    }
+
+    /// Whole number from `low` to `high`.
+    fn whole(&self, field: &str, [low, high]: [i64; 2]) -> Read<Option<i64>> {
+        let Some(number) = self.number(field)? else { return Ok(None) };
+        let is_right = number.fract() == 0.0 && number >= low as f64 && number <= high as f64;
+        is_right
+            .then_some(Some(number as i64))
+            .ok_or_else(|| format!("{field} is {number}; expected a whole number from {low} to {high}"))
+    }
+
+    fn secs(&self, field: &str) -> Read<f64> {
+        match self.number(field)?.unwrap_or(0.0) {
+            secs if secs >= 0.0 => Ok(secs),
+            secs => Err(format!("{field} is {secs}; expected seconds")),
+        }
+    }
+
+    fn yes_or_no(&self, field: &str) -> Read<Option<bool>> {
+        self.get(field)
+            .map(|cell| truth(cell).ok_or_else(|| expected(field, cell, "1 or 0, true or false")))
+            .transpose()
+    }
+
+    /// Value of a field that is spelt as in JSON.
+    fn keyword<T: for<'a> Deserialize<'a>>(&self, field: &str, words: &str) -> Read<Option<T>> {
+        let Some(cell) = self.get(field) else { return Ok(None) };
+        let word: serde::de::value::StrDeserializer<serde::de::value::Error> = cell.into_deserializer();
+        T::deserialize(word).map(Some).map_err(|_| expected(field, cell, words))
+    }
+}
+
+/// Vote of a row, or why there is none. `design` holds where no column says it. A row of one score is a vote of one
+/// condition; a row without a trial has the trial 0.
+pub fn vote(cells: &RowCells, design: Option<TaskDesign>) -> Read<StudyVote> {
+    let words = "turing, turing-single, preference, sliders or mismatch";
+    let is_score = cells.get("score").is_some();
+    let default = match (design, is_score, cells.get("step").is_some()) {
+        (Some(design), _, _) => design,
+        (None, true, _) => TaskDesign::Sliders,
+        (None, false, true) => TaskDesign::Preference,
+        (None, false, false) => TaskDesign::Turing,
+    };
+    let design = cells.keyword("design", words)?.unwrap_or(default);
+    let phase = cells.keyword("phase", "practice, training, main or attention-check")?.unwrap_or(TrialPhase::Main);
+    let (conditions, response, expected) = answer(cells, design, phase)?;
+    let vote = StudyVote {
+        participant: cells.needed("participant")?,
+        task: cells.name("task")?.unwrap_or_else(|| title(design).to_owned()),
+        design,
+        phase,
+        trial: cells.whole("trial", [0, i64::from(u32::MAX)])?.unwrap_or(0) as u32,
+        clip: if phase == TrialPhase::Main { cells.needed("clip")? } else { cells.name("clip")?.unwrap_or_default() },
+        speaker: cells.name("speaker")?.unwrap_or_default(),
+        conditions,
+        response,
+        expected,
+        stalled_secs: cells.secs("stalled_secs")?,
+        unfocused_secs: cells.secs("unfocused_secs")?,
+        response_secs: cells.secs("response_secs")?,
+        plays: cells.whole("plays", [0, i64::from(u32::MAX)])?.unwrap_or(0) as u32,
+        completed: cells.yes_or_no("completed")?.unwrap_or(true),
+    };
+    check(&vote)?;
+    Ok(vote)
+}
+
+/// Name of a task without one.
+fn title(design: TaskDesign) -> &'static str {
+    match design {
+        TaskDesign::Turing => "real-or-generated",
+        TaskDesign::TuringSingle => "real-or-not",
+        TaskDesign::Preference => "preference",
+        TaskDesign::Sliders => "sliders",
+        TaskDesign::Mismatch => "matched-or-mismatched",
+    }
+}
+
+/// Conditions, response and right response of a row.
+fn answer(cells: &RowCells, design: TaskDesign, phase: TrialPhase) -> Read<(Vec<String>, Response, Option<Response>)> {
+    let names = cells.get("conditions").map(|names| names.split('|').map(|name| name.trim().to_owned()).collect());
+    let condition = cells.name("condition")?;
+    let names: Option<Vec<String>> = names.or_else(|| condition.clone().map(|name| vec![name]));
+    if let Some(cell) = cells.get("response") {
+        let expected = cells.get("expected").map(|cell| response("expected", cell, design, phase)).transpose()?;
+        return Ok((names.unwrap_or_default(), response("response", cell, design, phase)?, expected));
+    }
+    if let Some(is_correct) = cells.yes_or_no("correct")? {
+        if !matches!(design, TaskDesign::Turing | TaskDesign::Mismatch) {
+            return Err("correct belongs to the designs turing and mismatch; give response and expected".to_owned());
+        }
+        let shown = condition.unwrap_or_else(|| GENERATED.to_owned());
+        let conditions = if design == TaskDesign::Turing { vec![NATURAL.to_owned(), shown] } else { vec![shown; 2] };
+        let chosen = if is_correct { ScreenSide::Left } else { ScreenSide::Right };
+        return Ok((conditions, Response::Side(chosen), Some(Response::Side(ScreenSide::Left))));
+    }
+    if let Some(step) = cells.whole("step", [-2, 2])? {
+        return Ok((names.unwrap_or_default(), Response::Step(step as i8), None));
+    }
+    match cells.whole("score", [0, 100])? {
+        Some(score) => Ok((names.unwrap_or_default(), Response::Scores(vec![score as u8]), None)),
+        None => Err("it has no answer".to_owned()),
+    }
+}
+
+/// Response as JSON or in plain words: `left`, `real`, `-1`, `70|20`.
+fn response(field: &str, cell: &str, design: TaskDesign, phase: TrialPhase) -> Read<Response> {
+    if cell.starts_with('{') {
+        return serde_json::from_str(cell).map_err(|_| expected(field, cell, "an answer like {\"side\":\"left\"}"));
+    }
+    if phase == TrialPhase::AttentionCheck
+        && let Ok(number) = cell.parse()
+    {
+        return Ok(Response::Number(number));
+    }
+    let read = match design {
+        TaskDesign::Turing | TaskDesign::Mismatch => match cell.to_lowercase().as_str() {
+            "left" => Some(Response::Side(ScreenSide::Left)),
+            "right" => Some(Response::Side(ScreenSide::Right)),
+            _ => None,
+        },
+        TaskDesign::TuringSingle => match cell.to_lowercase().as_str() {
+            "real" => Some(Response::Real(true)),
+            "generated" => Some(Response::Real(false)),
+            other => truth(other).map(Response::Real),
+        },
+        TaskDesign::Preference => cell.parse().ok().map(Response::Step),
+        TaskDesign::Sliders => {
+            cell.split('|').map(|score| score.trim().parse().ok()).collect::<Option<_>>().map(Response::Scores)
+        }
+    };
+    let words = match design {
+        TaskDesign::Turing | TaskDesign::Mismatch => "left or right",
+        TaskDesign::TuringSingle => "real or generated",
+        TaskDesign::Preference => "a step from -2 to 2",
+        TaskDesign::Sliders => "scores from 0 to 100 like 70|20",
+    };
+    read.ok_or_else(|| expected(field, cell, words))
+}
+
+/// What a vote of the main phase must be for the analysis of its design.
+pub fn check(vote: &StudyVote) -> Read<()> {
+    if vote.phase != TrialPhase::Main {
+        return Ok(());
+    }
+    if vote.conditions.iter().any(String::is_empty) {
+        return Err("a condition has no name".to_owned());
+    }
+    let n = vote.conditions.len();
+    let is_side = |response: &Option<Response>| matches!(response, Some(Response::Side(_)));
+    match (vote.design, &vote.response) {
+        (TaskDesign::Turing | TaskDesign::Mismatch, Response::Side(_)) if n == 2 && is_side(&vote.expected) => Ok(()),
+        (TaskDesign::Turing | TaskDesign::Mismatch, _) => {
+            Err("two conditions, a side and the expected side are needed".to_owned())
+        }
+        (TaskDesign::TuringSingle, Response::Real(_)) if n == 1 && matches!(vote.expected, Some(Response::Real(_))) => {
+            Ok(())
+        }
+        (TaskDesign::TuringSingle, _) => {
+            Err("one condition, real or generated as the response and as what was expected are needed".to_owned())
+        }
+        (TaskDesign::Preference, Response::Step(-2..=2)) if n == 2 && vote.conditions[0] != vote.conditions[1] => {
+            Ok(())
+        }
+        (TaskDesign::Preference, _) => Err("two different conditions and a step from -2 to 2 are needed".to_owned()),
+        (TaskDesign::Sliders, Response::Scores(scores))
+            if n >= 1 && scores.len() == n && scores.iter().all(|score| *score <= 100) =>
+        {
+            Ok(())
+        }
+        (TaskDesign::Sliders, _) => Err("a score from 0 to 100 is needed for each condition".to_owned()),
+    }
+}
+
+fn truth(cell: &str) -> Option<bool> {
+    match cell.to_lowercase().as_str() {
+        "1" | "true" | "yes" => Some(true),
+        "0" | "false" | "no" => Some(false),
+        _ => None,
+    }
+}
+
+fn expected(field: &str, cell: &str, words: &str) -> String {
+    format!("{field} is \"{}\"; expected {words}", short(cell))
+}
+
+fn short(cell: &str) -> String {
+    cell.chars().take(40).collect()
+}

@@ -1,0 +1,73 @@
+//! Numbers of an analysis as words.
+
+use super::figure::IntervalFigure;
+
+/// Count with commas between thousands.
+pub fn count(n: usize) -> String {
+    let digits = n.to_string();
+    let mut text = String::new();
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// `p = 0.027`, `p = 6.5e-12`.
+pub fn p_value(p: f64) -> String {
+    format!("p = {}", bare_p(p))
+}
+
+/// p value without its letter.
+pub fn bare_p(p: f64) -> String {
+    match p {
+        p if p >= 0.9995 => "1".to_owned(),
+        p if p >= 0.001 => format!("{p:.3}"),
+        p if p >= 1e-99 => format!("{p:.1e}"),
+        _ => "< 1e-99".to_owned(),
+    }
+}
+
+/// Share in percent, one decimal.
+pub fn percent(share: f64) -> String {
+    format!("{:.1} %", 100.0 * share)
+}
+
+/// Ends of an interval of a share: `50.3 to 54.7 %`.
+pub fn percents(interval: &IntervalFigure) -> String {
+    format!("{:.1} to {:.1} %", 100.0 * interval.low, 100.0 * interval.high)
+}
+
+/// Bound of a share in points of percent: `10`.
+pub fn points(bound: f64) -> String {
+    let points = (1000.0 * bound).round() / 10.0;
+    format!("{points}")
+}
+
+/// Names with commas and a last `and`.
+pub fn list(names: &[String]) -> String {
+    match names {
+        [] => "none".to_owned(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_well() {
+        assert_eq!([0, 999, 1083, 2_000_000].map(count), ["0", "999", "1,083", "2,000,000"]);
+        assert_eq!([1.0, 0.0268, 6.51e-12, 0.0].map(bare_p), ["1", "0.027", "6.5e-12", "< 1e-99"]);
+        assert_eq!(
+            ([0.1, 0.05, 0.025].map(points), percent(0.525)),
+            (["10", "5", "2.5"].map(str::to_owned), "52.5 %".to_owned())
+        );
+        let names = ["a", "b", "c"].map(str::to_owned);
+        assert_eq!((list(&names), list(&names[..1])), ("a, b and c".to_owned(), "a".to_owned()));
+    }
+}

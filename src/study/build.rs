@@ -1,0 +1,246 @@
+//! A study folder from a study file: clips, motion, films, plan and key, and the seal last. A build that was stopped goes
+//! on from the films that are there; the same input gives the same bytes, whatever the number of workers.
+
+use super::design::{ClipNeeds, design};
+use super::file::{StudyFile, StudySpeaker};
+use super::folder::StudyFolder;
+use super::plan::{FilmContent, StudyKey, StudyPlan};
+use super::preregistration::Preregistration;
+use super::seal::StudySeal;
+use super::stimuli::cut::{RefusedPiece, StudyClip};
+use super::stimuli::film::check_encoder;
+use super::stimuli::film_name::film_name;
+use super::stimuli::film_size::{common_bytes, padded};
+use super::stimuli::filmed::{CutSpeaker, FilmedSpeaker, equally_loud};
+use crate::formats::wav;
+use crate::stage::progress::Progress;
+use crate::stage::workdir::{self, lock, write_file};
+use anyhow::{Context, Result, ensure};
+use rayon::prelude::*;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What was built.
+#[derive(Clone, Debug, Serialize)]
+pub struct BuiltStudy {
+    pub folder: PathBuf,
+    /// Hash over all that is sealed.
+    pub seal: String,
+    /// Whether it was there already.
+    pub up_to_date: bool,
+    pub n_sessions: usize,
+    pub n_trials: usize,
+    pub n_films: usize,
+    /// Bytes of each film.
+    pub film_bytes: u64,
+    /// Loudness of the films, LUFS.
+    pub loudness_lufs: f64,
+    /// How equally votes are spread, a sentence a task; empty where nothing was planned now.
+    pub balance: Vec<String>,
+    pub speakers: Vec<BuiltSpeaker>,
+}
+
+/// Name of the account of clips, beside their sounds.
+const CLIPS: &str = "clips.json";
+
+/// Clips of a speaker.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct BuiltSpeaker {
+    pub name: String,
+    pub clips: Vec<StudyClip>,
+    /// Pieces of speech that gave no clip.
+    pub refused: Vec<RefusedPiece>,
+}
+
+/// Builds the study of a file in the folder `out`, with films of `size` px (`film::SIZE` but for tests).
+///
+/// # Errors
+/// No encoder for browsers; a folder with another study or with responses; speech or motion that is missing or too short.
+pub fn build(file: &StudyFile, out: &Path, size: [usize; 2], progress: &dyn Progress) -> Result<BuiltStudy> {
+    check_encoder()?;
+    let folder = StudyFolder::new(out);
+    ensure!(!out.is_file(), "{} is a file; name a folder for the study", out.display());
+    let _lock = lock(out)?;
+    if folder.seal().exists() {
+        return sealed(file, &folder);
+    }
+    let has_responses = folder.responses().exists();
+    ensure!(!has_responses, "{} has responses: build into another folder (--out)", out.display());
+    let n_clips = |speaker: &StudySpeaker| speaker.clips.unwrap_or_else(|| ClipNeeds::of(file).total());
+    let rank = |clip: &str| -> u64 {
+        let hash = blake3::hash(format!("{} clip {clip}", file.seed).as_bytes());
+        hash.as_bytes()[..8].iter().fold(0, |number, byte| number << 8 | u64::from(*byte))
+    };
+    let task = progress.begin("clips", file.speaker.len() as u64);
+    let cut = file.speaker.iter().map(|speaker| {
+        let cut = CutSpeaker::new(file, speaker, n_clips(speaker), rank);
+        task.advance(1);
+        cut.with_context(|| format!("speaker {}", speaker.name))
+    });
+    let mut cut = cut.collect::<Result<Vec<CutSpeaker>>>()?;
+    drop(task);
+    let loudness_lufs = equally_loud(cut.iter_mut().flat_map(|speaker| &mut speaker.sounds));
+    let account = ClipAccount { loudness_lufs, speakers: cut.iter().map(BuiltSpeaker::of).collect() };
+    write_clips(&folder, &account, &cut)?;
+    let named = |speaker: &CutSpeaker| {
+        let clips = speaker.cut.best_first.iter().map(|clip| format!("{}/{clip}", speaker.name()));
+        (speaker.name().to_owned(), clips.collect())
+    };
+    let clips: BTreeMap<String, Vec<String>> = cut.iter().map(named).collect();
+    ClipNeeds::of(file).check(file, &clips)?;
+    let filmed = cut.into_iter().map(|speaker| Ok((speaker.name().to_owned(), speaker.filmed(file, size, progress)?)));
+    let filmed: BTreeMap<String, FilmedSpeaker> = filmed.collect::<Result<_>>()?;
+    let mut key = StudyKey { films: BTreeMap::new() };
+    let designed = design(file, &clips, &mut |mut content| {
+        let speaker = filmed.get(&content.speaker).with_context(|| format!("no speaker {}", content.speaker))?;
+        content.motion_of = speaker.motion_of(&content)?;
+        let name = film_name(file.seed, &content);
+        let same = key.films.insert(name.clone(), content.clone()).is_none_or(|other| other == content);
+        ensure!(same, "two films are called {name}: choose another seed");
+        Ok(name)
+    })?;
+    let made = make_films(&folder, &key, &filmed, progress)?;
+    publish(&folder, &made)?;
+    file.write(&folder.study_file())?;
+    write_json(&folder.plan(), &designed.plan)?;
+    write_json(&folder.key(), &key)?;
+    Preregistration::new(file).write(&folder.preregistration())?;
+    StudySeal::of(&folder)?.write(&folder)?;
+    let balance = designed.balance.iter().map(ToString::to_string).collect();
+    let built = account.built(&folder, false, balance)?;
+    remove(&made_films(&folder))?;
+    Ok(built)
+}
+
+/// A study that was built before.
+///
+/// # Errors
+/// It is another one than that of the file.
+fn sealed(file: &StudyFile, folder: &StudyFolder) -> Result<BuiltStudy> {
+    let there = StudyFile::read(&folder.study_file())?;
+    ensure!(
+        there == *file,
+        "{} is sealed, and {} in it is not this study: build into another folder (--out)",
+        folder.dir().display(),
+        folder.study_file().display()
+    );
+    let account: ClipAccount = read_json(&clips_folder(folder).join(CLIPS))?;
+    remove(&made_films(folder))?;
+    account.built(folder, true, Vec::new())
+}
+
+/// What `clips.json` tells.
+#[derive(Serialize, Deserialize)]
+struct ClipAccount {
+    /// Loudness of the films, LUFS.
+    loudness_lufs: f64,
+    speakers: Vec<BuiltSpeaker>,
+}
+
+impl ClipAccount {
+    /// Account of the study that lies in the folder.
+    fn built(self, folder: &StudyFolder, up_to_date: bool, balance: Vec<String>) -> Result<BuiltStudy> {
+        let plan: StudyPlan = read_json(&folder.plan())?;
+        let key: StudyKey = read_json(&folder.key())?;
+        let first = key.films.keys().next().context("the study has no film")?;
+        let film = folder.film(first);
+        Ok(BuiltStudy {
+            folder: folder.dir().to_owned(),
+            seal: StudySeal::verify(folder)?.seal,
+            up_to_date,
+            n_sessions: plan.sessions.len(),
+            n_trials: plan.sessions.first().map_or(0, |session| session.trials.len()),
+            n_films: key.films.len(),
+            film_bytes: fs::metadata(&film).with_context(|| format!("cannot read {}", film.display()))?.len(),
+            loudness_lufs: self.loudness_lufs,
+            balance,
+            speakers: self.speakers,
+        })
+    }
+}
+
+impl BuiltSpeaker {
+    fn of(speaker: &CutSpeaker) -> Self {
+        let (clips, refused) = (speaker.cut.clips.clone(), speaker.cut.refused.clone());
+        Self { name: speaker.name().to_owned(), clips, refused }
+    }
+}
+
+/// Writes the clips' sounds, for other systems to move to, and how they were cut.
+fn write_clips(folder: &StudyFolder, account: &ClipAccount, speakers: &[CutSpeaker]) -> Result<()> {
+    let clips = clips_folder(folder);
+    for speaker in speakers {
+        for (clip, sound) in speaker.cut.clips.iter().zip(&speaker.sounds) {
+            let path = clips.join(speaker.name()).join(format!("{}.wav", clip.name));
+            workdir::replace(&path, |attempt| wav::write(attempt, sound))?;
+        }
+    }
+    write_json(&clips.join(CLIPS), account)
+}
+
+/// Makes the films of the key in a hidden folder, those that are there already excepted, and gives their files.
+fn make_films(
+    folder: &StudyFolder,
+    key: &StudyKey,
+    speakers: &BTreeMap<String, FilmedSpeaker>,
+    progress: &dyn Progress,
+) -> Result<BTreeMap<String, PathBuf>> {
+    let made = made_films(folder);
+    fs::create_dir_all(&made).with_context(|| format!("cannot make the folder {}", made.display()))?;
+    let task = progress.begin("films", key.films.len() as u64);
+    let film = |(name, content): (&String, &FilmContent)| -> Result<(String, PathBuf)> {
+        let speaker = speakers.get(&content.speaker).with_context(|| format!("no speaker {}", content.speaker))?;
+        let performance = speaker.performance(content)?;
+        let scene = speaker.scene(content, &performance);
+        let path = made.join(format!("{}.mp4", scene.hash()));
+        if path.is_file() {
+            task.skip(1);
+        } else {
+            workdir::replace(&path, |attempt| scene.write(attempt))?;
+            task.advance(1);
+        }
+        Ok((name.clone(), path))
+    };
+    key.films.par_iter().map(film).collect()
+}
+
+/// Puts the films, all of one length in bytes, where participants reach them, and nothing else there.
+fn publish(folder: &StudyFolder, films: &BTreeMap<String, PathBuf>) -> Result<()> {
+    let length = |path: &PathBuf| Ok(usize::try_from(fs::metadata(path)?.len())?);
+    let lengths = films.values().map(length).collect::<Result<Vec<usize>>>();
+    let n_bytes = common_bytes(lengths.with_context(|| format!("films in {}", folder.dir().display()))?);
+    remove(&folder.public())?;
+    for (name, made) in films {
+        let film = fs::read(made).with_context(|| format!("cannot read {}", made.display()))?;
+        write_file(&folder.film(name), &padded(film, n_bytes)?)?;
+    }
+    Ok(())
+}
+
+fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    let mut json = serde_json::to_vec_pretty(value)?;
+    json.push(b'\n');
+    write_file(path, &json)
+}
+
+fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
+    let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    serde_json::from_slice(&bytes)
+        .with_context(|| format!("{} is not as `orator study build` writes it", path.display()))
+}
+
+fn remove(path: &Path) -> Result<()> {
+    workdir::remove(path).with_context(|| format!("cannot remove {}", path.display()))
+}
+
+fn clips_folder(folder: &StudyFolder) -> PathBuf {
+    folder.dir().join("clips")
+}
+
+/// Where films lie until all of them are made.
+fn made_films(folder: &StudyFolder) -> PathBuf {
+    folder.dir().join(".films")
+}

@@ -1,0 +1,106 @@
+//! Clips of one speaker for one task, dealt to sessions with the comparison and the arrangement that each is shown in.
+
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+/// Clip with what it is shown in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct DealtClip {
+    pub clip: usize,
+    pub comparison: usize,
+    /// Row of the square of screen places.
+    pub arrangement: usize,
+}
+
+/// Deck that, however many are dealt, has dealt all clips equally often, to one; within each clip all comparisons, and
+/// within each of them all arrangements.
+pub struct ClipDeck {
+    order: Vec<usize>,
+    n_comparisons: usize,
+    n_arrangements: usize,
+    /// Turns by which this deck is ahead of another: decks dealt side by side do not show all the same at once.
+    ahead: usize,
+    n_dealt: usize,
+    rng: ChaCha8Rng,
+}
+
+impl ClipDeck {
+    pub fn new(n_clips: usize, [n_comparisons, n_arrangements]: [usize; 2], ahead: usize, rng: ChaCha8Rng) -> Self {
+        let (order, n_comparisons, n_arrangements) =
+            ((0..n_clips).collect(), n_comparisons.max(1), n_arrangements.max(1));
+        Self { order, n_comparisons, n_arrangements, ahead, n_dealt: 0, rng }
+    }
+
+    /// Clips for one session, none twice: `n` of them, at most as many as there are.
+    pub fn deal(&mut self, n: usize) -> Vec<DealtClip> {
+        let mut hand: Vec<DealtClip> = Vec::new();
+        let n_clips = self.order.len();
+        let (n_comparisons, n_arrangements) = (self.n_comparisons, self.n_arrangements);
+        // Consecutive cards take turns in their comparison; after this many, clips would meet the same ones again.
+        let n_turns = lcm(n_clips.max(1), n_comparisons);
+        for _ in 0..n.min(n_clips) {
+            let at = self.n_dealt % (n_clips * n_comparisons * n_arrangements);
+            if at == 0 {
+                // Everything was dealt equally often. Clips in this hand come last, so that none of them comes twice.
+                self.order.shuffle(&mut self.rng);
+                self.order.sort_by_key(|clip| hand.iter().any(|dealt| dealt.clip == *clip));
+            }
+            let (place, visit) = (at % n_clips, at / n_clips);
+            let turn = (at + at / n_turns) % n_comparisons;
+            let comparison = (turn + self.ahead) % n_comparisons;
+            let arrangement = (visit / n_comparisons + place / n_comparisons + turn + self.ahead) % n_arrangements;
+            hand.push(DealtClip { clip: self.order[place], comparison, arrangement });
+            self.n_dealt += 1;
+        }
+        hand
+    }
+}
+
+fn lcm(a: usize, b: usize) -> usize {
+    let (mut x, mut y) = (a, b);
+    while y != 0 {
+        (x, y) = (y, x % y);
+    }
+    a / x * b
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use std::collections::{BTreeMap, BTreeSet};
+
+    proptest::proptest! {
+        #[test]
+        fn at_any_time_all_was_dealt_equally_often(
+            n_clips in 1usize..13, n_comparisons in 1usize..6, n_arrangements in 1usize..5,
+            ahead in 0usize..4, hands in proptest::collection::vec(1usize..13, 1..40), seed in 0u64..100,
+        ) {
+            let mut deck = ClipDeck::new(n_clips, [n_comparisons, n_arrangements], ahead, ChaCha8Rng::seed_from_u64(seed));
+            let mut counts: [BTreeMap<DealtClip, usize>; 3] = Default::default();
+            for clip in 0..n_clips {
+                for comparison in 0..n_comparisons {
+                    for arrangement in 0..n_arrangements {
+                        let cell = |comparison, arrangement| DealtClip { clip, comparison, arrangement };
+                        counts[0].insert(cell(0, 0), 0);
+                        counts[1].insert(cell(comparison, 0), 0);
+                        counts[2].insert(cell(comparison, arrangement), 0);
+                    }
+                }
+            }
+            for n in hands {
+                let hand = deck.deal(n.min(n_clips));
+                let clips: BTreeSet<usize> = hand.iter().map(|dealt| dealt.clip).collect();
+                assert_eq!(clips.len(), n.min(n_clips), "a clip is there twice");
+                for dealt in hand {
+                    *counts[0].get_mut(&DealtClip { comparison: 0, arrangement: 0, ..dealt }).unwrap() += 1;
+                    *counts[1].get_mut(&DealtClip { arrangement: 0, ..dealt }).unwrap() += 1;
+                    *counts[2].get_mut(&dealt).unwrap() += 1;
+                }
+                for counts in &counts {
+                    assert!(counts.values().max().unwrap() - counts.values().min().unwrap() <= 1, "{counts:?}");
+                }
+            }
+        }
+    }
+}

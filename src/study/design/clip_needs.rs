@@ -1,0 +1,72 @@
+//! How many clips of each speaker a design needs so that no participant hears one twice.
+
+use crate::study::file::{ClipReuse, StudyFile};
+use anyhow::{Result, ensure};
+use std::collections::BTreeMap;
+
+/// Clips of each speaker, by what they are for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ClipNeeds {
+    pub reuse: ClipReuse,
+    /// For the sound check and the practice trial.
+    pub practice: usize,
+    pub checks: usize,
+    /// By task.
+    pub training: Vec<usize>,
+    /// By task.
+    pub main: Vec<usize>,
+}
+
+impl ClipNeeds {
+    /// Least numbers that a file allows; trials are shared out evenly between its speakers.
+    pub fn of(file: &StudyFile) -> Self {
+        let share = |n: usize| n.div_ceil(file.speaker.len().max(1));
+        Self {
+            reuse: file.clips.reuse,
+            practice: 1,
+            checks: share(file.attention_checks),
+            training: file.task.iter().map(|task| share(task.training)).collect(),
+            main: file.task.iter().map(|task| share(task.trials)).collect(),
+        }
+    }
+
+    /// Clips that each speaker must have.
+    pub fn total(&self) -> usize {
+        let of_tasks = |needs: &[usize]| match self.reuse {
+            ClipReuse::Never => needs.iter().sum::<usize>(),
+            ClipReuse::OtherTasks => needs.iter().copied().max().unwrap_or(0),
+        };
+        self.practice + self.checks + of_tasks(&self.training) + of_tasks(&self.main)
+    }
+
+    /// That each speaker has them.
+    ///
+    /// # Errors
+    /// The speakers that have fewer, with the number needed and what to do.
+    pub fn check(&self, file: &StudyFile, clips: &BTreeMap<String, Vec<String>>) -> Result<()> {
+        let n_clips = |name: &String| clips.get(name).map_or(0, Vec::len);
+        let few = file.speaker.iter().filter(|speaker| n_clips(&speaker.name) < self.total());
+        let few: Vec<String> = few.map(|speaker| format!("{} has {}", speaker.name, n_clips(&speaker.name))).collect();
+        let tasks = file.task.iter().zip(self.main.iter().zip(&self.training));
+        let tasks = tasks.map(|(task, (main, training))| format!("{main} + {training} for {}", task.name));
+        let tasks: Vec<String> = tasks.collect();
+        let remedy = match (self.reuse, Self { reuse: ClipReuse::OtherTasks, ..self.clone() }.total()) {
+            (ClipReuse::Never, fewer) if fewer < self.total() => {
+                format!(", or reuse = \"other-tasks\" in [clips], which needs {fewer}")
+            }
+            _ => String::new(),
+        };
+        ensure!(
+            few.is_empty(),
+            "{} clips are needed of each speaker so that no participant hears one twice ({} of trials and training, {} for \
+             attention checks, {} for practice), and {}: give more recordings, shorter clips (seconds in [clips]), fewer \
+             trials{remedy}",
+            self.total(),
+            tasks.join(", "),
+            self.checks,
+            self.practice,
+            few.join(", ")
+        );
+        Ok(())
+    }
+}

@@ -1,0 +1,296 @@
+//! Design of a study, from its file and its clips.
+
+use super::balance::TaskBalance;
+use super::checks::numbers;
+use super::clip_deck::ClipDeck;
+use super::clip_needs::ClipNeeds;
+use super::designer::Designer;
+use super::latin_square::SquareRows;
+use super::shared_clips::SharedClips;
+use super::stream::stream;
+use super::task_design::TaskDesigner;
+use crate::study::file::StudyFile;
+use crate::study::plan::{FilmContent, PlannedTask, StudyPlan};
+use anyhow::Result;
+use rand::seq::SliceRandom;
+use std::collections::BTreeMap;
+
+/// Version of the plan's file.
+const VERSION: u32 = 1;
+
+/// Plan of a study, and how equally its votes are spread.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DesignedStudy {
+    pub plan: StudyPlan,
+    pub balance: Vec<TaskBalance>,
+}
+
+/// Designs the sessions of a study. `clips`: names `speaker/clip` by speaker, the best first, each with motion of every
+/// condition; of all speakers as many are taken. `film` names the film of a content whose `motion_of` it knows itself.
+///
+/// # Errors
+/// Too few clips, with the number needed; what `film` refuses.
+pub fn design(
+    file: &StudyFile,
+    clips: &BTreeMap<String, Vec<String>>,
+    film: &mut dyn FnMut(FilmContent) -> Result<String>,
+) -> Result<DesignedStudy> {
+    let needs = ClipNeeds::of(file);
+    needs.check(file, clips)?;
+    let of_speaker = |name: &String| clips.get(name).map_or(&[][..], Vec::as_slice);
+    let n_clips = file.speaker.iter().map(|speaker| of_speaker(&speaker.name).len()).min().unwrap_or(0);
+    let shared = file.speaker.iter().map(|speaker| {
+        let mut clips = of_speaker(&speaker.name)[..n_clips].to_vec();
+        clips.shuffle(&mut stream(file.seed, &format!("clips of {}", speaker.name)));
+        SharedClips::new(&needs, clips)
+    });
+    let shared: Vec<SharedClips> = shared.collect();
+    let tasks: Vec<TaskDesigner> = (0..file.task.len()).map(|at| TaskDesigner::new(file, at, &shared)).collect();
+    let n_main = |at: usize| shared.iter().map(|shared| shared.main[at].len()).collect::<Vec<usize>>();
+    let balance = tasks.iter().enumerate().map(|(at, task)| TaskBalance::new(task, &n_main(at))).collect();
+    let deck = |(at, shared): (usize, &SharedClips)| {
+        ClipDeck::new(shared.checks.len(), [1, 1], 0, stream(file.seed, &format!("checks {at}")))
+    };
+    let check_decks = shared.iter().enumerate().map(deck).collect();
+    let mut rng = stream(file.seed, "numbers");
+    let check_numbers = shared.iter().map(|shared| shared.checks.iter().map(|_| numbers(&mut rng)).collect()).collect();
+    let task_rows = SquareRows::new(file.task.len(), stream(file.seed, "tasks"));
+    let rng = stream(file.seed, "checks");
+    let mut designer = Designer { file, shared, tasks, balance, check_decks, check_numbers, task_rows, rng, film };
+    let sessions = (0..file.n_sessions()).map(|session| designer.session(session)).collect::<Result<_>>()?;
+    let sound_check = designer.sound_check()?;
+    let planned = |at: usize| {
+        let task = &file.task[at];
+        let (name, scale) = (task.name.clone(), task.scale.clone());
+        PlannedTask { name, design: task.design, replay: task.replay, scale }
+    };
+    let tasks = (0..file.task.len()).map(planned).collect();
+    let plan = StudyPlan { version: VERSION, seed: file.seed, tasks, sound_check, sessions };
+    Ok(DesignedStudy { plan, balance: designer.balance })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::file::ClipReuse;
+    use crate::study::plan::{PlannedSession, TaskDesign, Trial, TrialPhase};
+    use crate::study::response::{Response, ScreenSide};
+    use std::collections::BTreeSet;
+    use std::path::Path;
+
+    /// Film by the name that the tests give it.
+    type Films = BTreeMap<String, FilmContent>;
+
+    fn designed(file: &StudyFile, n_clips: &[usize]) -> Result<(DesignedStudy, Films)> {
+        let clips = file.speaker.iter().zip(n_clips).map(|(speaker, n)| {
+            let names = (0..*n).map(|k| format!("{}/{k}", speaker.name)).collect();
+            (speaker.name.clone(), names)
+        });
+        let mut films = Films::new();
+        let mut film = |content: FilmContent| {
+            let name = format!("{content:?}");
+            films.insert(name.clone(), content);
+            Ok(name)
+        };
+        let designed = design(file, &clips.collect(), &mut film)?;
+        Ok((designed, films))
+    }
+
+    /// Study file of tasks, each a design, trials, training and the number of models.
+    fn file(tasks: &[(TaskDesign, usize, usize)], n_speakers: usize, n_models: usize, more: &str) -> StudyFile {
+        let mut text = format!("title = \"t\"\n{more}\n[[condition]]\nname = \"real\"\nkind = \"natural\"\n");
+        for model in 0..n_models {
+            text += &format!("[[condition]]\nname = \"m{model}\"\nkind = \"checkpoint\"\ncheckpoint = \"m\"\n");
+            text += &format!("[[condition]]\nname = \"x{model}\"\nkind = \"mismatched\"\nof = \"m{model}\"\n");
+        }
+        (0..n_speakers).for_each(|k| text += &format!("[[speaker]]\nname = \"s{k}\"\ndataset = \"d\"\n"));
+        for (at, (design, trials, training)) in tasks.iter().enumerate() {
+            let design_name = serde_json::to_value(design).unwrap();
+            text += &format!(
+                "[[task]]\nname = \"t{at}\"\ndesign = {design_name}\ntrials = {trials}\ntraining = {training}\n"
+            );
+            match design {
+                TaskDesign::Sliders => text += "scale = \"appropriateness\"\n",
+                TaskDesign::Preference => {}
+                TaskDesign::Turing | TaskDesign::TuringSingle | TaskDesign::Mismatch => text += "feedback = true\n",
+            }
+        }
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("study.toml");
+        std::fs::write(&path, text).unwrap();
+        StudyFile::read(Path::new(&path)).unwrap()
+    }
+
+    /// Everything that must hold in any design.
+    fn check(file: &StudyFile, designed: &DesignedStudy, films: &Films) {
+        let plan = &designed.plan;
+        assert_eq!(plan.sessions.len(), file.n_sessions());
+        let speech = |trial: &Trial| films[&trial.films[0]].clip.clone();
+        for session in &plan.sessions {
+            let trials = &session.trials;
+            assert_eq!(trials.len(), plan.sessions[0].trials.len());
+            let mut heard = BTreeSet::new();
+            for trial in trials {
+                assert!(trial.films.iter().all(|film| films[film].clip == speech(trial)));
+                let block = if file.clips.reuse == ClipReuse::Never { 0 } else { trial.task };
+                assert!(heard.insert((block, speech(trial))), "{} is heard twice", speech(trial));
+                let is_told = trial.phase == TrialPhase::Training && file.task[trial.task].feedback;
+                assert_eq!(trial.expected.is_some(), is_told || trial.phase == TrialPhase::AttentionCheck);
+            }
+            assert!(trials[0].phase == TrialPhase::Practice || !file.practice);
+            for (at, task) in file.task.iter().enumerate() {
+                let of = |phase| trials.iter().filter(move |trial| trial.task == at && trial.phase == phase);
+                assert_eq!(
+                    (of(TrialPhase::Main).count(), of(TrialPhase::Training).count()),
+                    (task.trials, task.training)
+                );
+                let first = |phase| trials.iter().position(|trial| trial.task == at && trial.phase == phase);
+                assert!(task.training == 0 || first(TrialPhase::Training) < first(TrialPhase::Main));
+                let mut n_of: BTreeMap<&str, usize> = file.speaker.iter().map(|s| (s.name.as_str(), 0)).collect();
+                of(TrialPhase::Main)
+                    .for_each(|trial| *n_of.get_mut(films[&trial.films[0]].speaker.as_str()).unwrap() += 1);
+                assert!(n_of.values().max().unwrap() - n_of.values().min().unwrap() <= 1, "{n_of:?}");
+            }
+            let is_check = |trial: &Trial| trial.phase == TrialPhase::AttentionCheck;
+            assert_eq!(trials.iter().filter(|trial| is_check(trial)).count(), file.attention_checks);
+            assert!(!trials.iter().take(2).any(is_check));
+            assert!(!trials.windows(2).any(|pair| is_check(&pair[0]) && is_check(&pair[1])));
+            for trial in trials.iter().filter(|trial| is_check(trial)) {
+                let numbers: Vec<u16> = trial.films.iter().filter_map(|film| films[film].number).collect();
+                assert_eq!(trial.expected, Some(Response::Number(numbers[0])));
+                assert!(numbers.len() == 1 && (10..=99).contains(&numbers[0]));
+                let like = trials.iter().find(|other| other.task == trial.task && other.phase == TrialPhase::Main);
+                assert_eq!(like.unwrap().films.len(), trial.films.len());
+            }
+        }
+        for n in [file.participants, plan.sessions.len()] {
+            balanced(file, &plan.sessions[..n], films);
+        }
+    }
+
+    /// Counts votes of cells anew, from what the films show.
+    fn balanced(file: &StudyFile, sessions: &[PlannedSession], films: &Films) {
+        for (at, task) in file.task.iter().enumerate() {
+            let (mut cells, mut sides): (BTreeMap<_, usize>, BTreeMap<_, usize>) = Default::default();
+            let trials = sessions.iter().flat_map(|session| &session.trials);
+            for trial in trials.filter(|trial| trial.task == at && trial.phase == TrialPhase::Main) {
+                let clip = films[&trial.films[0]].clip.clone();
+                let shown: Vec<String> = trial.films.iter().map(|film| films[film].condition.clone()).collect();
+                let set: BTreeSet<String> = shown.iter().cloned().collect();
+                *cells.entry((clip.clone(), set)).or_default() += 1;
+                *sides.entry((clip, shown)).or_default() += 1;
+            }
+            let spread = |counts: &BTreeMap<_, usize>| counts.values().max().unwrap() - counts.values().min().unwrap();
+            if task.design == TaskDesign::TuringSingle && task.conditions.len() > 2 {
+                continue; // The real one is as frequent as all others.
+            }
+            assert!(spread(&cells) <= 1, "{cells:?}");
+            assert!(sides.values().max().unwrap() - sides.values().min().unwrap() <= 1, "{sides:?}");
+        }
+    }
+
+    #[test]
+    fn the_papers_study_is_equal_in_every_cell() {
+        let tasks = [(TaskDesign::Turing, 20, 3), (TaskDesign::Mismatch, 10, 3)];
+        let file = file(&tasks, 2, 1, "participants = 100\ntask_order = \"written\"");
+        let needed = ClipNeeds::of(&file).total();
+        assert_eq!(needed, 1 + 1 + 2 + 2 + 10 + 5);
+        let (study, films) = designed(&file, &[needed, needed]).unwrap();
+        check(&file, &study, &films);
+        assert_eq!((study.balance[0].votes, study.balance[0].arranged), ([100, 100], [50, 50]));
+        assert_eq!((study.balance[1].votes, study.balance[1].arranged), ([100, 100], [50, 50]));
+        let said = "t0: 100 votes of each of 20 cells, 50 in each order of films";
+        assert_eq!(study.balance[0].to_string(), said);
+        for session in &study.plan.sessions {
+            let is_left = |trial: &&Trial| {
+                trial.task == 0 && trial.phase == TrialPhase::Main && films[&trial.films[0]].condition == "real"
+            };
+            assert_eq!(session.trials.iter().filter(is_left).count(), 10, "real ones on the left");
+        }
+        let training = study.plan.sessions.iter().flat_map(|session| &session.trials);
+        for trial in training.filter(|trial| trial.task == 0 && trial.phase == TrialPhase::Training) {
+            let is_left = films[&trial.films[0]].condition == "real";
+            let side = if is_left { ScreenSide::Left } else { ScreenSide::Right };
+            assert_eq!(trial.expected, Some(Response::Side(side)));
+        }
+    }
+
+    #[test]
+    fn every_clip_comes_in_every_place_about_equally_often() {
+        let file =
+            file(&[(TaskDesign::Turing, 8, 0)], 1, 1, "participants = 80\nattention_checks = 0\npractice = false");
+        let (study, films) = designed(&file, &[ClipNeeds::of(&file).total()]).unwrap();
+        let mut counts: BTreeMap<(usize, &str), usize> = BTreeMap::new();
+        for session in &study.plan.sessions[..80] {
+            for (place, trial) in session.trials.iter().enumerate() {
+                *counts.entry((place, &films[&trial.films[0]].clip)).or_default() += 1;
+            }
+        }
+        assert_eq!(counts.len(), 64);
+        assert!(counts.values().all(|count| *count == 10), "{counts:?}");
+    }
+
+    #[test]
+    fn single_films_are_real_half_of_the_time() {
+        let file = file(&[(TaskDesign::TuringSingle, 12, 0)], 1, 3, "participants = 9");
+        let (study, films) = designed(&file, &[30]).unwrap();
+        check(&file, &study, &films);
+        for session in &study.plan.sessions {
+            let main = session.trials.iter().filter(|trial| trial.phase == TrialPhase::Main);
+            let n_real = main.filter(|trial| films[&trial.films[0]].condition == "real").count();
+            assert!((5..=7).contains(&n_real), "{n_real}");
+        }
+    }
+
+    #[test]
+    fn too_few_clips_are_refused_with_the_number_needed() {
+        let tasks = [(TaskDesign::Turing, 20, 3), (TaskDesign::Mismatch, 10, 3)];
+        let file = file(&tasks, 1, 1, "participants = 10");
+        let error = designed(&file, &[30]).unwrap_err().to_string();
+        assert!(
+            error.starts_with("39 clips are needed of each speaker so that no participant hears one twice"),
+            "{error}"
+        );
+        assert!(
+            error.contains("20 + 3 for t0, 10 + 3 for t1 of trials and training, 2 for attention checks"),
+            "{error}"
+        );
+        assert!(
+            error.contains("s0 has 30") && error.ends_with("reuse = \"other-tasks\" in [clips], which needs 26"),
+            "{error}"
+        );
+    }
+
+    proptest::proptest! {
+        #![proptest_config(proptest::test_runner::Config::with_cases(48))]
+        #[test]
+        fn any_design_is_balanced_and_comes_again_by_its_seed(
+            tasks in proptest::collection::vec((0usize..5, 3usize..12, 0usize..4), 1..4),
+            n_speakers in 1usize..4, n_models in 1usize..4, participants in 1usize..25, seed in 0u64..1000,
+            more in 0usize..7, n_checks in 0usize..3, reuse in proptest::bool::ANY, practice in proptest::bool::ANY,
+        ) {
+            let all = [TaskDesign::Turing, TaskDesign::TuringSingle, TaskDesign::Preference, TaskDesign::Sliders, TaskDesign::Mismatch];
+            let tasks: Vec<_> = tasks.into_iter().map(|(design, trials, training)| (all[design], trials, training)).collect();
+            let n_main: usize = tasks.iter().map(|task| task.1).sum();
+            let n_checks = n_checks.min((n_main - 2) / 2);
+            let reuse = if reuse { "reuse = \"other-tasks\"" } else { "" };
+            let text = |seed: u64| format!("participants = {participants}\nseed = {seed}\nattention_checks = {n_checks}\n\
+                                            practice = {practice}\n[clips]\n{reuse}");
+            let of_seed = |seed: u64| {
+                let file = file(&tasks, n_speakers, n_models, &text(seed));
+                let needed = ClipNeeds::of(&file).total();
+                let n_clips: Vec<usize> = (0..n_speakers).map(|speaker| needed + more * (1 + speaker)).collect();
+                (designed(&file, &n_clips).unwrap(), file)
+            };
+            let ((study, films), file) = of_seed(seed);
+            check(&file, &study, &films);
+            let ((again, _), _) = of_seed(seed);
+            assert!(study == again);
+            let ((other, _), _) = of_seed(seed + 1);
+            assert!(study.plan.sessions != other.plan.sessions);
+            for balance in &study.balance {
+                assert!(balance.votes[1] - balance.votes[0] <= 1 && balance.arranged[1] - balance.arranged[0] <= 1);
+            }
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! Sessions one after the other: blocks of tasks, practice, training and main trials, attention checks among them.
+
+use super::balance::TaskBalance;
+use super::checks::{N_VARIANTS, places};
+use super::clip_deck::ClipDeck;
+use super::comparison::right_response;
+use super::latin_square::SquareRows;
+use super::shared_clips::SharedClips;
+use super::task_design::{DealtTrial, TaskDesigner, deal};
+use crate::study::file::{StudyCondition, StudyFile, TaskOrder};
+use crate::study::plan::{FilmContent, PlannedSession, Trial, TrialPhase};
+use crate::study::response::Response;
+use anyhow::{Context, Result};
+use rand::Rng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+/// State of a design between sessions.
+pub struct Designer<'a> {
+    pub file: &'a StudyFile,
+    /// By speaker.
+    pub shared: Vec<SharedClips>,
+    pub tasks: Vec<TaskDesigner<'a>>,
+    pub balance: Vec<TaskBalance>,
+    /// By speaker.
+    pub check_decks: Vec<ClipDeck>,
+    /// By speaker, check clip and variant.
+    pub check_numbers: Vec<Vec<Vec<u16>>>,
+    pub task_rows: SquareRows,
+    pub rng: ChaCha8Rng,
+    pub film: &'a mut dyn FnMut(FilmContent) -> Result<String>,
+}
+
+/// Clip and its speaker, by their names.
+type NamedClip = [String; 2];
+
+impl Designer<'_> {
+    /// Session of that number; they are made in their order.
+    pub fn session(&mut self, session: usize) -> Result<PlannedSession> {
+        let order = match self.file.task_order {
+            TaskOrder::Balanced => {
+                let row = self.task_rows.deal();
+                self.task_rows.row(row).to_vec()
+            }
+            TaskOrder::Written => (0..self.tasks.len()).collect(),
+        };
+        let n_main = self.file.task.iter().map(|task| task.trials).sum();
+        let places = places(n_main, self.file.attention_checks, &mut self.rng);
+        let mut checks = deal(&mut self.check_decks, places.len(), session);
+        checks.shuffle(&mut self.rng);
+        let (mut trials, mut n_before) = (Vec::new(), 0);
+        for (nth, at) in order.into_iter().enumerate() {
+            if nth == 0 && self.file.practice {
+                for trial in self.tasks[at].practice(session) {
+                    let clip = self.clip(trial.speaker, self.shared[trial.speaker].practice.get(trial.dealt.clip))?;
+                    trials.push(self.trial(at, TrialPhase::Practice, clip, trial)?);
+                }
+            }
+            for trial in self.tasks[at].training(session) {
+                let clip = self.clip(trial.speaker, self.shared[trial.speaker].training[at].get(trial.dealt.clip))?;
+                trials.push(self.trial(at, TrialPhase::Training, clip, trial)?);
+            }
+            let main = self.tasks[at].main(session);
+            if session < self.file.participants {
+                self.balance[at].count(&main);
+            }
+            for trial in main {
+                if places.contains(&n_before)
+                    && let Some(check) = checks.pop()
+                {
+                    trials.push(self.check(at, check)?);
+                }
+                let clip = self.clip(trial.speaker, self.shared[trial.speaker].main[at].get(trial.dealt.clip))?;
+                trials.push(self.trial(at, TrialPhase::Main, clip, trial)?);
+                n_before += 1;
+            }
+        }
+        Ok(PlannedSession { trials })
+    }
+
+    fn clip(&self, speaker: usize, clip: Option<&String>) -> Result<NamedClip> {
+        let clip = clip.context("the design deals a clip that is not there")?;
+        Ok([clip.clone(), self.file.speaker[speaker].name.clone()])
+    }
+
+    fn trial(&mut self, at: usize, phase: TrialPhase, clip: NamedClip, trial: DealtTrial) -> Result<Trial> {
+        let task = &self.tasks[at];
+        let comparison = &task.comparisons[trial.dealt.comparison];
+        let row = task.arrangements.row(trial.dealt.arrangement);
+        let shown: Vec<&StudyCondition> = row.iter().map(|place| comparison[*place]).collect();
+        let (design, muted) = (task.task.design, !task.task.sound);
+        let tells = phase == TrialPhase::Training && task.task.feedback;
+        let expected = if tells { right_response(design, &shown) } else { None };
+        let shown = shown.iter().map(|condition| (condition.name.clone(), None)).collect();
+        Ok(Trial { task: at, phase, films: self.films(&clip, shown, muted)?, expected })
+    }
+
+    /// Attention check that looks like a trial of the task until its number comes, in one of the films.
+    fn check(&mut self, at: usize, check: DealtTrial) -> Result<Trial> {
+        let variant = self.rng.random_range(0..N_VARIANTS);
+        let number = self.check_numbers[check.speaker][check.dealt.clip][variant];
+        let task = &self.tasks[at];
+        let comparison = &task.comparisons[variant % task.comparisons.len()];
+        let numbered = variant / task.comparisons.len() % comparison.len();
+        let row = task.arrangements.row(self.rng.random_range(0..task.arrangements.n_rows()));
+        let shown = |place: &usize| (comparison[*place].name.clone(), (*place == numbered).then_some(number));
+        let shown = row.iter().map(shown).collect();
+        let muted = !task.task.sound;
+        let clip = self.clip(check.speaker, self.shared[check.speaker].checks.get(check.dealt.clip))?;
+        let films = self.films(&clip, shown, muted)?;
+        Ok(Trial { task: at, phase: TrialPhase::AttentionCheck, films, expected: Some(Response::Number(number)) })
+    }
+
+    /// Film with sound whose clip is in no trial but practice.
+    pub fn sound_check(&mut self) -> Result<String> {
+        let clip = self.clip(0, self.shared.first().and_then(|shared| shared.practice.first()))?;
+        let comparison = self.tasks.first().and_then(|task| task.comparisons.first());
+        let condition = comparison.and_then(|comparison| comparison.first()).context("no task compares anything")?;
+        let shown = vec![(condition.name.clone(), None)];
+        self.films(&clip, shown, false).map(|films| films.concat())
+    }
+
+    /// Names of the films of a clip: a condition each, and the number that it shows.
+    fn films(&mut self, clip: &NamedClip, shown: Vec<(String, Option<u16>)>, muted: bool) -> Result<Vec<String>> {
+        let name = |(condition, number)| {
+            let [clip, speaker] = clip.clone();
+            (self.film)(FilmContent { motion_of: clip.clone(), clip, speaker, condition, number, muted })
+        };
+        shown.into_iter().map(name).collect()
+    }
+}

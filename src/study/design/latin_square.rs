@@ -1,0 +1,75 @@
+//! Orders in which everything stands equally often in every place and after every other (Williams 1949).
+
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+/// Rows of a Latin square of `n` things, balanced for what comes before: `n` rows, twice as many for an odd `n`.
+pub fn williams(n: usize) -> Vec<Vec<usize>> {
+    // 0, 1, n - 1, 2, n - 2, ...: neighbours differ by each number once.
+    let first: Vec<usize> =
+        (0..n).map(|place| if place % 2 == 1 { place / 2 + 1 } else { (n - place / 2) % n }).collect();
+    let mut rows: Vec<Vec<usize>> =
+        (0..n).map(|shift| first.iter().map(|thing| (thing + shift) % n).collect()).collect();
+    if n % 2 == 1 && n > 1 {
+        let mirrored: Vec<Vec<usize>> = rows.iter().map(|row| row.iter().rev().copied().collect()).collect();
+        rows.extend(mirrored);
+    }
+    rows
+}
+
+/// Rows of a square, handed out one a session: each once before any comes again.
+pub struct SquareRows {
+    square: Vec<Vec<usize>>,
+    order: Vec<usize>,
+    n_given: usize,
+    rng: ChaCha8Rng,
+}
+
+impl SquareRows {
+    pub fn new(n: usize, rng: ChaCha8Rng) -> Self {
+        let square = williams(n);
+        Self { order: (0..square.len()).collect(), square, n_given: 0, rng }
+    }
+
+    pub fn n_rows(&self) -> usize {
+        self.square.len()
+    }
+
+    /// Number of the next row.
+    pub fn deal(&mut self) -> usize {
+        let n_rows = self.square.len().max(1);
+        if self.n_given.is_multiple_of(n_rows) {
+            self.order.shuffle(&mut self.rng);
+        }
+        self.n_given += 1;
+        self.order.get((self.n_given - 1) % n_rows).copied().unwrap_or(0)
+    }
+
+    /// Row of that number, counted on from the last to the first.
+    pub fn row(&self, number: usize) -> &[usize] {
+        self.square.get(number % self.square.len().max(1)).map_or(&[], Vec::as_slice)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn places_and_neighbours_are_balanced() {
+        for n in 1..12 {
+            let rows = williams(n);
+            let (mut places, mut neighbours) = (BTreeMap::new(), BTreeMap::new());
+            for row in &rows {
+                row.iter().enumerate().for_each(|at| *places.entry(at).or_insert(0) += 1);
+                row.windows(2).for_each(|pair| *neighbours.entry((pair[0], pair[1])).or_insert(0) += 1);
+            }
+            assert_eq!((places.len(), neighbours.len()), (n * n, n * (n - 1)));
+            assert!(places.values().all(|count| count * n == rows.len()), "{n}: {rows:?}");
+            assert!(neighbours.values().all(|count| count * n == rows.len()), "{n}: {rows:?}");
+        }
+        assert_eq!(williams(1), [[0]]);
+        assert!(williams(0).is_empty());
+    }
+}

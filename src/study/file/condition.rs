@@ -1,0 +1,122 @@
+//! Conditions: where the motion of a film comes from.
+
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Compared condition.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "WrittenCondition", into = "WrittenCondition")]
+pub struct StudyCondition {
+    pub name: String,
+    pub source: ConditionSource,
+    /// Whether it is the real one of a Turing test.
+    pub real: bool,
+}
+
+/// Source of a condition's motion. In a path `{speaker}` and `{clip}` stand for their names.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ConditionSource {
+    /// Motion of the dataset.
+    Natural,
+    /// Motion that a model makes of the speech; folder or file of its checkpoint.
+    Checkpoint(PathBuf),
+    /// Motion of the named condition for the speech of another clip; in the file the only model's unless it is said.
+    Mismatched(String),
+    /// Mean pose of the dataset, unmoved.
+    MeanPose,
+    /// Motion in files, one a clip.
+    Files(PathBuf),
+}
+
+impl ConditionSource {
+    /// Condition whose motion a mismatched one takes.
+    pub fn mismatch_of(&self) -> Option<&str> {
+        match self {
+            Self::Mismatched(of) => Some(of),
+            Self::Natural | Self::Checkpoint(_) | Self::MeanPose | Self::Files(_) => None,
+        }
+    }
+
+    pub fn path_mut(&mut self) -> Option<&mut PathBuf> {
+        match self {
+            Self::Checkpoint(path) | Self::Files(path) => Some(path),
+            Self::Natural | Self::Mismatched(_) | Self::MeanPose => None,
+        }
+    }
+}
+
+/// `pattern` with the names of a speaker and a clip in the place of `{speaker}` and `{clip}`; a clip's name in a path is
+/// its last part, `speaker/clip` gives `clip`.
+pub fn filled(pattern: &Path, speaker: &str, clip: &str) -> PathBuf {
+    let clip = clip.rsplit('/').next().unwrap_or(clip);
+    pattern.to_string_lossy().replace("{speaker}", speaker).replace("{clip}", clip).into()
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum ConditionKind {
+    Natural,
+    Checkpoint,
+    Mismatched,
+    MeanPose,
+    Files,
+}
+
+/// Condition as it stands in the file.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenCondition {
+    name: String,
+    kind: ConditionKind,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    checkpoint: Option<PathBuf>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    of: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    files: Option<PathBuf>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    real: Option<bool>,
+}
+
+impl TryFrom<WrittenCondition> for StudyCondition {
+    type Error = String;
+
+    fn try_from(written: WrittenCondition) -> Result<Self, String> {
+        let WrittenCondition { name, kind, checkpoint, of, files, real } = written;
+        let missing = |key: &str, example: &str| format!("condition {name}: the key {key} is missing, like {example}");
+        let source = match (kind, checkpoint, of, files) {
+            (ConditionKind::Natural, None, None, None) => ConditionSource::Natural,
+            (ConditionKind::MeanPose, None, None, None) => ConditionSource::MeanPose,
+            (ConditionKind::Checkpoint, Some(path), None, None) => ConditionSource::Checkpoint(path),
+            (ConditionKind::Mismatched, None, of, None) => ConditionSource::Mismatched(of.unwrap_or_default()),
+            (ConditionKind::Files, None, None, Some(path)) => ConditionSource::Files(path),
+            (ConditionKind::Checkpoint, None, None, None) => {
+                return Err(missing("checkpoint", "checkpoint = \"models/{speaker}\""));
+            }
+            (ConditionKind::Files, None, None, None) => return Err(missing("files", "files = \"theirs/{clip}.bvh\"")),
+            _ => {
+                let rule = "checkpoint, of and files each belong to the kind checkpoint, mismatched and files alone";
+                return Err(format!("condition {name}: {rule}; remove the others"));
+            }
+        };
+        let real = real.unwrap_or(source == ConditionSource::Natural);
+        Ok(Self { name, source, real })
+    }
+}
+
+impl From<StudyCondition> for WrittenCondition {
+    fn from(condition: StudyCondition) -> Self {
+        let StudyCondition { name, source, real } = condition;
+        let written =
+            Self { name, kind: ConditionKind::Natural, checkpoint: None, of: None, files: None, real: Some(real) };
+        match source {
+            ConditionSource::Natural => written,
+            ConditionSource::MeanPose => Self { kind: ConditionKind::MeanPose, ..written },
+            ConditionSource::Checkpoint(path) => {
+                Self { kind: ConditionKind::Checkpoint, checkpoint: Some(path), ..written }
+            }
+            ConditionSource::Mismatched(of) => Self { kind: ConditionKind::Mismatched, of: Some(of), ..written },
+            ConditionSource::Files(path) => Self { kind: ConditionKind::Files, files: Some(path), ..written },
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! Presets, and how a study file is laid over one.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeArray, DeTable, DeValue};
+
+/// Published study whose design a file takes over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StudyPreset {
+    /// Rebol, Guetl, Pietroszek 2021.
+    Rebol,
+    /// Kucherenko et al. 2021.
+    Genea2020,
+}
+
+impl StudyPreset {
+    pub const ALL: [Self; 2] = [Self::Rebol, Self::Genea2020];
+
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Rebol => "rebol",
+            Self::Genea2020 => "genea2020",
+        }
+    }
+
+    /// Its study file, without speakers and models.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Rebol => include_str!("rebol.toml"),
+            Self::Genea2020 => include_str!("genea2020.toml"),
+        }
+    }
+}
+
+/// Lays `written` over `below`: tables key by key, lists of named tables by name, all else as a whole.
+pub fn lay<'t>(written: DeTable<'t>, below: &mut DeTable<'t>) {
+    for (key, value) in written {
+        let Some(under) = below.get_mut(key.get_ref().as_ref()) else {
+            below.insert(key, value);
+            continue;
+        };
+        let span = value.span();
+        let merged = match (std::mem::replace(under.get_mut(), DeValue::Boolean(false)), value.into_inner()) {
+            (DeValue::Table(mut under), DeValue::Table(value)) => {
+                lay(value, &mut under);
+                DeValue::Table(under)
+            }
+            (DeValue::Array(mut under), DeValue::Array(entries))
+                if under.iter().all(|entry| name_of(entry).is_some()) =>
+            {
+                entries.into_iter().for_each(|entry| lay_entry(entry, &mut under));
+                DeValue::Array(under)
+            }
+            (_, value) => value,
+        };
+        // The place of an error is that of what is written.
+        *under = Spanned::new(span, merged);
+    }
+}
+
+/// Lays a table of a list over that of its name, or puts it at the end.
+fn lay_entry<'t>(entry: Spanned<DeValue<'t>>, below: &mut DeArray<'t>) {
+    let span = entry.span();
+    let place = below.iter_mut().find(|other| name_of(other) == name_of(&entry));
+    match (place, entry.into_inner()) {
+        (Some(place), DeValue::Table(table)) => {
+            if let DeValue::Table(mut under) = std::mem::replace(place.get_mut(), DeValue::Boolean(false)) {
+                lay(table, &mut under);
+                *place = Spanned::new(span, DeValue::Table(under));
+            }
+        }
+        (_, entry) => below.push(Spanned::new(span, entry)),
+    }
+}
+
+fn name_of<'v>(entry: &'v Spanned<DeValue<'_>>) -> Option<&'v str> {
+    match entry.get_ref() {
+        DeValue::Table(table) => match table.get("name")?.get_ref() {
+            DeValue::String(name) => Some(name),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// Byte ranges of all that is written, by key: `clips.seconds`, `task[NAME].trials`, `hypothesis[0].kind`.
+pub fn spans(table: &DeTable<'_>) -> BTreeMap<String, Range<usize>> {
+    let mut found = BTreeMap::new();
+    collect(table, "", &mut found);
+    found
+}
+
+fn collect(table: &DeTable<'_>, prefix: &str, found: &mut BTreeMap<String, Range<usize>>) {
+    for (name, value) in table {
+        let key = format!("{prefix}{}", name.get_ref());
+        let end = value.span().end.max(name.span().end);
+        found.insert(key.clone(), name.span().start..end);
+        match value.get_ref() {
+            DeValue::Table(inner) => collect(inner, &format!("{key}."), found),
+            DeValue::Array(entries) => {
+                for (at, entry) in entries.iter().enumerate() {
+                    let DeValue::Table(inner) = entry.get_ref() else { continue };
+                    let key = name_of(entry).map_or_else(|| format!("{key}[{at}]"), |name| format!("{key}[{name}]"));
+                    found.insert(key.clone(), entry.span());
+                    collect(inner, &format!("{key}."), found);
+                }
+            }
+            _ => {}
+        }
+    }
+}

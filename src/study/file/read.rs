@@ -1,0 +1,275 @@
+//! A study file read over its preset, and the resolved one written.
+
+use super::layers::{self, StudyPreset};
+use super::study_file::StudyFile;
+use super::{defaults, rules};
+use crate::config::file::{line_of, nearest, refused};
+use crate::config::{ConfigError, Problem, SourceLocation};
+use crate::stage::workdir;
+use anyhow::{Context, Result};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// A documented study file.
+pub const EXAMPLE: &str = include_str!("example.toml");
+
+impl StudyFile {
+    /// Reads `file` over its preset; paths in it count from its folder.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or [`ConfigError`] with what is wrong in it.
+    pub fn read(file: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(file).with_context(|| {
+            format!("cannot read the study file {}; `orator guide study` shows one", file.display())
+        })?;
+        let file = std::path::absolute(file)?;
+        resolve(&text, &file).map_err(|problems| ConfigError { file, problems }.into())
+    }
+
+    /// Writes the file with every default in it, atomically.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn write(&self, file: &Path) -> Result<()> {
+        workdir::write_file(file, toml::to_string_pretty(self)?.as_bytes())
+    }
+
+    /// Names of texts that the page does not have.
+    ///
+    /// # Errors
+    /// Each unknown key with the nearest of `known`.
+    pub fn check_texts(&self, file: &Path, known: &[&str]) -> Result<()> {
+        let known: Vec<String> = known.iter().map(|key| (*key).to_owned()).collect();
+        let keys = self.texts.iter().flat_map(|(language, texts)| texts.keys().map(move |key| (language, key)));
+        let unknown = keys.filter(|(_, key)| !known.contains(key)).map(|(language, key)| Problem {
+            key: format!("texts.{language}.{key}"),
+            location: SourceLocation::Line(line_of_key(file, language, key)),
+            message: format!("the page has no such text{}", nearest(key, known.iter())),
+        });
+        let problems: Vec<Problem> = unknown.collect();
+        if problems.is_empty() { Ok(()) } else { Err(ConfigError { file: file.to_owned(), problems }.into()) }
+    }
+}
+
+/// Line of a text in the file as it stands; 1 where it cannot be read.
+fn line_of_key(file: &Path, language: &str, key: &str) -> usize {
+    let text = std::fs::read_to_string(file).unwrap_or_default();
+    let spans = DeTable::parse(&text).map(|table| layers::spans(table.get_ref())).unwrap_or_default();
+    spans.get(&format!("texts.{language}.{key}")).map_or(1, |span| line_of(&text, span.start))
+}
+
+/// Study file of a text, or all that is wrong with it.
+pub fn resolve(text: &str, file: &Path) -> Result<StudyFile, Vec<Problem>> {
+    let whole = |at: usize, message: String| {
+        vec![Problem { key: String::new(), location: SourceLocation::Line(line_of(text, at)), message }]
+    };
+    let written = DeTable::parse(text).map_err(|error| {
+        whole(
+            error.span().map_or(0, |span| span.start),
+            format!("not valid TOML: {}", error.message().replace('\n', ", ")),
+        )
+    })?;
+    let spans = layers::spans(written.get_ref());
+    let span = written.span();
+    let preset = preset_of(written.get_ref()).map_err(|(at, message)| whole(at, message))?;
+    let mut merged: Spanned<DeTable> =
+        DeTable::parse(preset.map_or("", StudyPreset::text)).map_err(|error| whole(0, error.to_string()))?;
+    layers::lay(written.into_inner(), merged.get_mut());
+    let read = StudyFile::deserialize(toml::de::Deserializer::from(Spanned::new(span, merged.into_inner())));
+    let mut study = read.map_err(|error| vec![worded(text, &error, &spans)])?;
+    study.preset = None;
+    defaults::fill_in(&mut study);
+    let folder = file.parent().unwrap_or(Path::new(""));
+    paths_of(&mut study).for_each(|path| *path = folder.join(&path));
+    let place = |key: &str| spans.get(key).map(|span| line_of(text, span.start));
+    let problems = rules::check(&study).into_iter().map(|(key, message)| {
+        let entry = || place(key.rsplit_once('.')?.0);
+        let line = place(&key).or_else(entry).or_else(|| place("preset")).unwrap_or(1);
+        Problem { key, location: SourceLocation::Line(line), message }
+    });
+    let mut problems: Vec<Problem> = problems.collect();
+    problems.sort_by(|a, b| (a.location, &a.key).cmp(&(b.location, &b.key)));
+    if problems.is_empty() { Ok(study) } else { Err(problems) }
+}
+
+/// Preset that the file names, or the place and what was expected.
+fn preset_of(written: &DeTable<'_>) -> Result<Option<StudyPreset>, (usize, String)> {
+    let Some(value) = written.get("preset") else { return Ok(None) };
+    let DeValue::String(name) = value.get_ref() else {
+        return Err((value.span().start, "preset: expected a string, \"rebol\" or \"genea2020\"".to_owned()));
+    };
+    let preset = StudyPreset::ALL.into_iter().find(|preset| preset.name() == &**name);
+    preset.map(Some).ok_or_else(|| {
+        let known = StudyPreset::ALL.map(|preset| preset.name().to_owned());
+        let message = format!("preset: {name:?} is not known: expected {}", known.join(" or "));
+        (value.span().start, message + &nearest(name, known.iter()))
+    })
+}
+
+/// Problem for an error of serde: the key at its place and what was expected.
+fn worded(text: &str, error: &toml::de::Error, spans: &BTreeMap<String, Range<usize>>) -> Problem {
+    let at = error.span().map_or(0, |span| span.start);
+    let around = spans.iter().filter(|(_, span)| span.contains(&at)).min_by_key(|(_, span)| span.len());
+    let key = around.map_or_else(String::new, |(key, _)| key.clone());
+    let message = error.message();
+    let quoted: Vec<String> = message.split('`').skip(1).step_by(2).map(str::to_owned).collect();
+    let message = if message.starts_with("unknown field") {
+        let (name, known) = quoted.split_first().map_or(("", &[][..]), |(name, known)| (name.as_str(), known));
+        let near = nearest(name, known.iter());
+        let is_named = key.rsplit('.').next() == Some(name);
+        let listed = format!("the keys here are {}", known.join(", "));
+        if is_named { format!("unknown key{near}; {listed}") } else { format!("unknown key {name}{near}; {listed}") }
+    } else if message.starts_with("unknown variant") {
+        refused(&toml::Value::String(quoted.first().cloned().unwrap_or_default()), message)
+    } else if message.starts_with("missing field") {
+        format!("the key {} is missing", quoted.first().map_or("", String::as_str))
+    } else {
+        message.replace('`', "\"")
+    };
+    Problem { key, location: SourceLocation::Line(line_of(text, at)), message }
+}
+
+fn paths_of(study: &mut StudyFile) -> impl Iterator<Item = &mut PathBuf> {
+    let speakers = study.speaker.iter_mut().flat_map(|speaker| speaker.dataset.iter_mut().chain(&mut speaker.sounds));
+    speakers.chain(study.condition.iter_mut().filter_map(|condition| condition.source.path_mut()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::file::{ConditionSource, HypothesisKind, TaskOrder};
+
+    const SMALLEST: &str = "title = \"t\"\npreset = \"rebol\"\n[[speaker]]\nname = \"ellen\"\ndataset = \"data\"\n\
+                            [[condition]]\nname = \"model\"\nkind = \"checkpoint\"\ncheckpoint = \"models/{speaker}\"\n";
+
+    fn read(text: &str) -> StudyFile {
+        resolve(text, Path::new("/s/study.toml")).unwrap()
+    }
+
+    fn problems(text: &str) -> Vec<String> {
+        let found = resolve(text, Path::new("/s/study.toml")).err().unwrap_or_default();
+        found.iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn the_smallest_file_takes_all_from_its_preset() {
+        let file = read(SMALLEST);
+        assert_eq!((file.participants, file.n_sessions(), file.task_order), (100, 150, TaskOrder::Written));
+        let tasks: Vec<_> = file.task.iter().map(|task| (task.trials, task.training, task.replay)).collect();
+        assert_eq!(tasks, [(20, 3, false), (10, 3, false)]);
+        assert_eq!(file.task[0].conditions, ["real", "model"]);
+        assert_eq!(file.task[1].conditions, ["mismatched", "model"]);
+        assert_eq!(file.find_condition("mismatched").unwrap().source, ConditionSource::Mismatched("model".into()));
+        assert_eq!(
+            file.find_condition("model").unwrap().source,
+            ConditionSource::Checkpoint("/s/models/{speaker}".into())
+        );
+        assert_eq!(file.speaker[0].dataset.as_deref(), Some(Path::new("/s/data")));
+        let kinds: Vec<_> = file.hypothesis.iter().map(|hypothesis| hypothesis.kind).collect();
+        use HypothesisKind::{DiffersFromChance, Equivalence, GreaterThanChance};
+        assert_eq!(kinds, [DiffersFromChance, Equivalence, GreaterThanChance]);
+    }
+
+    #[test]
+    fn what_is_written_is_laid_over_the_preset_by_name() {
+        let text = format!(
+            "participants = 7\nattention_checks = 1\n{SMALLEST}[[task]]\nname = \"matched-or-mismatched\"\n\
+                            trials = 0\n[[task]]\nname = \"real-or-generated\"\ntrials = 5\n[exclusion]\nstalled_secs = 9\n"
+        );
+        let file = read(&text);
+        assert_eq!((file.participants, file.task.len(), file.task[0].trials, file.task[0].training), (7, 1, 5, 3));
+        assert_eq!((file.exclusion.stalled_secs, file.exclusion.unfocused_secs), (Some(9.0), Some(5.0)));
+    }
+
+    #[test]
+    fn the_challenges_preset_mismatches_natural_motion_where_there_is_sound() {
+        let file = read(&SMALLEST.replace("rebol", "genea2020"));
+        assert_eq!(file.task[0].conditions, ["natural", "model"]);
+        assert_eq!(file.task[1].conditions, ["natural", "mismatched", "model"]);
+        assert_eq!((file.task[0].sound, file.task[1].sound, file.exclusion.failed_checks), (false, true, Some(2)));
+    }
+
+    #[test]
+    fn the_example_is_read_and_what_is_written_comes_back() {
+        let file = read(EXAMPLE);
+        assert_eq!(file.hypothesis[0].points, Some(10.0));
+        let dir = tempfile::tempdir().unwrap();
+        let dropped = format!("{SMALLEST}[[task]]\nname = \"matched-or-mismatched\"\ntrials = 0\n");
+        let bare = SMALLEST.replace("preset = \"rebol\"", "participants = 3")
+            + "[exclusion]\nincomplete = false\n[[condition]]\nname = \"real\"\nkind = \"natural\"\n\
+                   [[task]]\nname = \"single\"\ndesign = \"turing-single\"\ntrials = 9\n";
+        for file in [file, read(SMALLEST), read(&SMALLEST.replace("rebol", "genea2020")), read(&dropped), read(&bare)] {
+            let path = dir.path().join("study.toml");
+            file.write(&path).unwrap();
+            assert_eq!(StudyFile::read(&path).unwrap(), file);
+        }
+    }
+
+    #[test]
+    fn each_problem_names_line_key_and_remedy() {
+        let one = |text: &str| problems(&format!("{SMALLEST}{text}"));
+        assert!(
+            one("[clips]\nsecond = 3\n")[0].starts_with("line 11: clips.second: unknown key (did you mean seconds?)")
+        );
+        assert!(one("[[task]]\nname = \"x\"\ntrials = 3\n")[0].ends_with("the key design is missing"));
+        let wrong = one("[[task]]\nname = \"x\"\ndesign = \"sliders\"\ntrials = 3\nscale = \"appropriate\"\n");
+        assert_eq!(
+            wrong,
+            ["line 14: task[x].scale: \"appropriate\": expected human-likeness or appropriateness \
+                            (did you mean appropriateness?)"]
+        );
+        let wrong = one("[[task]]\nname = \"x\"\ndesign = \"turin\"\ntrials = 3\n");
+        assert!(wrong[0].starts_with("line 12: task[x].design: \"turin\" is not known"), "{wrong:?}");
+        assert!(wrong[0].ends_with("(did you mean turing?)"), "{wrong:?}");
+        assert_eq!(
+            one("[[condition]]\nname = \"b\"\nkind = \"files\"\n"),
+            ["line 6: condition[model]: condition b: the key files is missing, like files = \"theirs/{clip}.bvh\""]
+        );
+        assert_eq!(
+            one("[[hypothesis]]\ntask = \"real-or-generated\"\nkind = \"differs\"\n[[hypothesis]]\n\
+                 task = \"real-or-fake\"\nkind = \"equivalence\"\n"),
+            [
+                "line 12: hypothesis[0].kind: does not fit the task real-or-generated: expected differs-from-chance, \
+                 greater-than-chance or equivalence",
+                "line 14: hypothesis[1].task: no task is called \"real-or-fake\"; there are: real-or-generated, \
+                 matched-or-mismatched",
+            ]
+        );
+        assert!(problems("title = \"t\"\npreset = \"rebel\"\n")[0].ends_with("(did you mean rebol?)"));
+        assert!(problems("title = \"t\"\n")[0].ends_with("the key participants is missing"));
+        assert!(problems("title = 3\nparticipants = 4\n")[0].starts_with("line 1: title: invalid type"));
+        assert!(problems("[x")[0].starts_with("line 1: not valid TOML"));
+        let bare = problems("title = \"\"\npreset = \"rebol\"\nseed = 3\n").join("\n");
+        for said in ["title: expected a title", "no speaker is named", "condition[mismatched].of: expected the name"] {
+            assert!(bare.contains(said), "{said}: {bare}");
+        }
+    }
+
+    #[test]
+    fn unknown_texts_are_named_with_the_nearest() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("study.toml");
+        std::fs::write(&path, format!("{SMALLEST}[texts.en]\nwelcom = \"Hi\"\n")).unwrap();
+        let file = StudyFile::read(&path).unwrap();
+        let error = file.check_texts(&path, &["welcome", "consent"]).unwrap_err().to_string();
+        assert!(
+            error.ends_with("line 11: texts.en.welcom: the page has no such text (did you mean welcome?)"),
+            "{error}"
+        );
+        file.check_texts(&path, &["welcom"]).unwrap();
+    }
+
+    proptest::proptest! {
+        #![proptest_config(proptest::test_runner::Config::with_cases(128))]
+        #[test]
+        fn no_text_panics(
+            text in "(\\[?\\[?(task|speaker|clips|texts|condition|preset|[a-z]{1,4})[\\].=]?[a-z_]{0,6} ?=? ?[\"0-9a-z.\\[\\]{}-]{0,8}\n){0,8}|.{0,60}",
+        ) {
+            let _ = resolve(&text, Path::new("study.toml"));
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! A user study of gestures, whole: films of several conditions are built and sealed, served to participants, their
+//! responses collected and analysed (Rebol, Guetl, Pietroszek 2021, section V; Kucherenko et al. 2021). `StudyFile` is
+//! what a researcher writes, `folder` what lies on disk, `plan` what each participant sees.
+
+pub mod analyse;
+pub mod build;
+pub mod bundle;
+pub mod design;
+pub mod export;
+pub mod file;
+pub mod folder;
+pub mod pages;
+pub mod plan;
+pub mod power;
+pub mod preregistration;
+pub mod response;
+pub mod seal;
+pub mod server;
+pub mod simulate;
+pub mod stats;
+pub mod stimuli;
+pub mod store;
+pub mod vote;

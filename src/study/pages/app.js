@@ -1,0 +1,232 @@
+// The steps of a session: consent, instructions, a check of the sound, the trials, the end.
+
+import { backend, patiently, Refusal } from "./backend.js";
+import { button, byId, el, paragraphs, say, show } from "./dom.js";
+import { forget, keep, recall } from "./memory.js";
+import { checkSound } from "./sound.js";
+import { currentLanguage, firstText, has, nameOfLanguage, preferredLanguage, t, useLanguage, useTexts } from "./texts.js";
+import { runTrial } from "./trial.js";
+
+let study = null;
+// Task whose instructions were shown since the page was loaded.
+let instructed = null;
+
+const text = (words) => el("div", { class: "text" }, ...paragraphs(words));
+const row = (...nodes) => el("p", { class: "row" }, ...nodes);
+const waits = (secs) => say(t("answer.offline", { seconds: Math.round(secs) }));
+
+// Shows a step with one button, and waits for it.
+function step(heading, nodes, label) {
+  return new Promise((resolve) => show(heading, [...nodes, row(button(label, resolve))]));
+}
+
+async function start() {
+  show("\u2026", []);
+  try {
+    study = await backend.study();
+  } catch {
+    // The texts come with the study: these words are the only ones without them.
+    show("The study cannot be reached.", [row(button("Try again", start))]);
+    return;
+  }
+  useTexts(study.texts);
+  const kept = recall("language");
+  useLanguage(study.languages.includes(kept) ? kept : preferredLanguage(study.languages));
+  entitle();
+  if (recall("token")) await resume();
+  else consent();
+}
+
+function entitle() {
+  const title = has("study.title") ? t("study.title") : study.title;
+  document.title = title;
+  byId("title").textContent = title;
+}
+
+function languageChoice() {
+  if (study.languages.length < 2) return null;
+  const options = study.languages.map((code) =>
+    el("option", { value: code, lang: code, selected: code === currentLanguage() }, nameOfLanguage(code)),
+  );
+  const onchange = (event) => {
+    useLanguage(event.target.value);
+    keep("language", event.target.value);
+    entitle();
+    consent();
+    byId("language").focus();
+  };
+  return row(el("label", { for: "language" }, t("language.choose")), el("select", { id: "language", onchange }, ...options));
+}
+
+function consent() {
+  const box = el("input", { type: "checkbox", id: "agree", onchange: () => (go.disabled = !box.checked) });
+  const go = button(t("continue"), () => instructions());
+  go.disabled = true;
+  const onsubmit = (event) => {
+    event.preventDefault();
+    if (!go.disabled) instructions();
+  };
+  const agree = el("label", { class: "agree", for: "agree" }, box, el("span", {}, t("consent.agree")));
+  show(t("consent.title"), [languageChoice(), text(t("consent.text")), el("form", { onsubmit }, agree, row(go))]);
+}
+
+async function instructions() {
+  keep("language", currentLanguage());
+  const words = t("instructions.text", { n: study.n_trials });
+  await step(t("instructions.title"), [text(words)], t("continue"));
+  if (study.sound_check) await checkSound(`films/${study.sound_check}.mp4`);
+  await begin();
+}
+
+async function begin() {
+  let begun;
+  try {
+    begun = await patiently(() => backend.begin(currentLanguage()), waits);
+  } catch (error) {
+    if (error.status === 409) show(t("full.title"), [text(t("full.text"))]);
+    else refused(error);
+    return;
+  }
+  keep("token", begun.token);
+  await proceed(begun.state);
+}
+
+// Goes on after a reload: first with an answer that was on its way.
+async function resume() {
+  try {
+    let state = await patiently(() => backend.state(), waits);
+    if (!state.completion) await step(t("resume.title"), [text(t("resume.text"))], t("resume.go"));
+    const pending = recall("pending");
+    if (pending && pending.position === state.position) state = (await send(pending)).state;
+    await proceed(state);
+  } catch (error) {
+    refused(error);
+  }
+}
+
+async function proceed(state) {
+  try {
+    while (!state.completion) state = await oneTrial(state);
+    complete(state.completion);
+  } catch (error) {
+    refused(error);
+  }
+}
+
+async function oneTrial({ position, n_trials: total, trial }) {
+  const task = study.tasks[trial.task];
+  withdrawal(true);
+  byId("tools").replaceChildren(
+    el("progress", { max: `${total}`, value: `${position}`, "aria-label": t("trial.progress") }),
+  );
+  if (instructed !== trial.task) {
+    const words = firstText(`instructions.${task.name}`, `instructions.${task.scale || task.design}`);
+    const heading = firstText(`title.${task.name}`, `title.${task.scale || task.design}`);
+    await step(heading, [text(words)], t("continue"));
+    instructed = trial.task;
+  }
+  const plays = recall("plays");
+  const answer = await runTrial({
+    task,
+    trial,
+    heading: t("trial.title", { n: position + 1, total }),
+    playsBefore: plays?.position === position ? plays.n : 0,
+    onplay: (n) => keep("plays", { position, n }),
+  });
+  const { feedback, state } = await send({ position, ...answer });
+  if (feedback) await tell(task, answer.response, feedback);
+  return state;
+}
+
+// Sends an answer until it is stored; one that the server has otherwise gives way to what it has.
+async function send(answer) {
+  keep("pending", answer);
+  say(t("answer.saving"));
+  let reply;
+  try {
+    reply = await patiently(() => backend.answer(answer), waits);
+  } catch (error) {
+    if (error.status !== 409 && error.status !== 400) throw error;
+    keep("pending", null);
+    reply = { state: await patiently(() => backend.state(), waits) };
+    if (error.status === 400 && reply.state.position === answer.position) throw error;
+  }
+  keep("pending", null);
+  say("");
+  return reply;
+}
+
+// Tells the right response of a training trial.
+async function tell(task, given, right) {
+  const isRight = JSON.stringify(given) === JSON.stringify(right);
+  const [[, value]] = Object.entries(right);
+  const words = firstText(`feedback.${task.design}.${value}`, "feedback.none");
+  const verdict = el("p", { class: isRight ? "right" : "wrong" }, t(isRight ? "feedback.right" : "feedback.wrong"));
+  await step(t("feedback.title"), [verdict, el("p", {}, words)], t("continue"));
+}
+
+function complete({ code, return_url: address }) {
+  withdrawal(true);
+  byId("tools").replaceChildren();
+  const field = el("input", { type: "text", id: "code", class: "code", readonly: true, value: code });
+  const copy = button(t("done.copy"), async () => {
+    field.select();
+    try {
+      await navigator.clipboard.writeText(code);
+    } catch {
+      document.execCommand("copy");
+    }
+    say(t("done.copied"));
+  });
+  const isLink = address && ["https:", "http:"].includes(new URL(address, location.href).protocol);
+  const back = isLink ? row(el("a", { class: "button main", href: address, rel: "noreferrer" }, t("done.return"))) : null;
+  show(t("done.title"), [text(t("done.text")), row(el("label", { for: "code" }, t("done.code")), field, copy), back]);
+}
+
+// The button by which a participant leaves, in the foot of the page.
+function withdrawal(isShown) {
+  const leave = button(t("withdraw.button"), confirmWithdrawal, "quiet");
+  byId("footer").replaceChildren(...(isShown ? [leave] : []));
+}
+
+function confirmWithdrawal() {
+  const note = el("p", { role: "status" });
+  const cancel = button(t("withdraw.cancel"), () => dialog.close());
+  const confirm = button(t("withdraw.confirm"), async () => {
+    confirm.disabled = true;
+    try {
+      await patiently(() => backend.withdraw(), (secs) => (note.textContent = t("answer.offline", { seconds: Math.round(secs) })));
+    } catch (error) {
+      // Nothing is there to delete.
+      if (![401, 410].includes(error.status)) {
+        note.textContent = t("error.text", { sentence: error.message });
+        confirm.disabled = false;
+        return;
+      }
+    }
+    dialog.close();
+    forget();
+    withdrawal(false);
+    byId("tools").replaceChildren();
+    show(t("withdraw.done.title"), [text(t("withdraw.done.text"))]);
+  }, "");
+  const heading = el("h2", { id: "withdraw-title" }, t("withdraw.title"));
+  const dialog = el("dialog", { "aria-labelledby": "withdraw-title", onclose: () => dialog.remove() }, heading, text(t("withdraw.text")), note, row(cancel, confirm));
+  document.body.append(dialog);
+  dialog.showModal();
+}
+
+// Shows why nothing goes on. A session that is over is forgotten.
+function refused(error) {
+  const isOver = error instanceof Refusal && [401, 404, 410].includes(error.status);
+  withdrawal(!isOver && Boolean(recall("token")));
+  if (isOver) {
+    forget();
+    show(t("gone.title"), [text(t("gone.text")), row(button(t("gone.again"), () => location.reload()))]);
+    return;
+  }
+  const sentence = error instanceof Refusal ? error.message : t("error.unknown");
+  show(t("error.title"), [text(t("error.text", { sentence })), row(button(t("error.retry"), () => location.reload()))]);
+}
+
+start();

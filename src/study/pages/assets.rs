@@ -1,0 +1,51 @@
+//! Files of the pages by their path on the server.
+
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const PAGE: &str = "text/html; charset=utf-8";
+
+/// Path, content type and text of every file.
+pub const ASSETS: [(&str, &str, &str); 13] = [
+    ("/", PAGE, PARTICIPANT_PAGE),
+    ("/app.css", "text/css; charset=utf-8", include_str!("page.css")),
+    ("/app.js", SCRIPT, include_str!("app.js")),
+    ("/backend.js", SCRIPT, include_str!("backend.js")),
+    ("/dom.js", SCRIPT, include_str!("dom.js")),
+    ("/memory.js", SCRIPT, include_str!("memory.js")),
+    ("/player.js", SCRIPT, include_str!("player.js")),
+    ("/questions.js", SCRIPT, include_str!("questions.js")),
+    ("/sound.js", SCRIPT, include_str!("sound.js")),
+    ("/texts.js", SCRIPT, include_str!("texts.js")),
+    ("/trial.js", SCRIPT, include_str!("trial.js")),
+    ("/operator", PAGE, include_str!("operator.html")),
+    ("/operator.js", SCRIPT, include_str!("operator.js")),
+];
+
+/// The participants' page.
+pub const PARTICIPANT_PAGE: &str = include_str!("page.html");
+
+/// Tones that the film of the sound check plays; `sound.js` asks for their number.
+pub const SOUND_CHECK_TONES: usize = 3;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pages_load_what_is_here_and_nothing_stands_inline() {
+        for (path, content_type, text) in ASSETS {
+            for quoted in text.split('"').skip(1).step_by(2).filter(|quoted| quoted.starts_with("./")) {
+                let module = quoted.trim_start_matches('.');
+                assert!(ASSETS.iter().any(|(other, ..)| *other == module), "{path} loads {quoted}");
+            }
+            for wrong in ["innerHTML", "style=", "://", "eval(", "document.write", "userAgent"] {
+                assert!(!text.contains(wrong), "{path} has {wrong}");
+            }
+            if content_type == PAGE {
+                assert!(!text.contains("<style") && text.matches("<script").count() == 1, "{path}");
+                assert!(text.contains("<script type=\"module\" src=\""), "{path}");
+            }
+        }
+        let sound = include_str!("sound.js");
+        assert!(sound.contains(&format!("const TONES = {SOUND_CHECK_TONES};")));
+    }
+}

@@ -1,0 +1,182 @@
+// A trial: its films, its question, and what was measured until the answer.
+
+import { button, el, say, show } from "./dom.js";
+import { Screening } from "./player.js";
+import { question, questionKeys, slider } from "./questions.js";
+import { firstText, t } from "./texts.js";
+
+const filmUrl = (film) => `films/${film}.mp4`;
+const rounded = (secs) => Math.round(secs * 1000) / 1000;
+
+// Shows a trial and resolves with its answer: response, plays, stalled_secs, unfocused_secs, response_secs.
+// `playsBefore`: how often its films were begun before the page was loaded anew; `onplay(plays)` keeps that.
+export function runTrial({ task, trial, heading, playsBefore, onplay }) {
+  const inTurn = trial.films.length > 2 || (task.design === "sliders" && trial.phase !== "attention-check");
+  return new Promise((resolve) => {
+    const view = inTurn ? filmsInTurn(task, trial) : filmsTogether(task, trial);
+    const next = el("button", { type: "submit", class: "main", disabled: true }, t("answer.send"));
+    let endedAt = 0;
+    view.onchange = () => {
+      next.disabled = view.isPlaying() || view.response() === null;
+    };
+    view.onend = () => {
+      endedAt = performance.now();
+      view.onchange();
+    };
+    view.onplay = () => onplay(playsBefore + view.plays());
+    const onsubmit = (event) => {
+      event.preventDefault();
+      if (next.disabled) return;
+      next.disabled = true;
+      const total = (name) => rounded(view.screenings.reduce((sum, one) => sum + one[name], 0));
+      const answer = {
+        response: view.response(),
+        plays: Math.min(1000, playsBefore + view.plays()),
+        stalled_secs: total("stalledSecs"),
+        unfocused_secs: total("unfocusedSecs"),
+        response_secs: rounded((performance.now() - endedAt) / 1000),
+      };
+      for (const screening of view.screenings) screening.close();
+      resolve(answer);
+    };
+    const phase = ["practice", "training"].includes(trial.phase) ? el("p", { class: "note" }, t(`phase.${trial.phase}`)) : null;
+    const form = el("form", { onsubmit, novalidate: true }, ...view.nodes, el("p", { class: "row" }, next));
+    show(heading, [phase, form], view.focus);
+  });
+}
+
+const captioned = (video, label) => {
+  video.setAttribute("aria-label", label);
+  return el("figure", {}, video, el("figcaption", { dir: "auto", "aria-hidden": "true" }, label));
+};
+
+// A button that plays a screening; `onseen` after the first time. Without `replay` it plays once.
+function playButton(screening, labels, replay, { onstart, onbegin, onseen, onend }) {
+  let wasSeen = false;
+  const press = async () => {
+    play.disabled = true;
+    play.textContent = t("films.loading");
+    say(t("films.loading"));
+    try {
+      onstart();
+      await screening.play();
+    } catch (error) {
+      play.disabled = false;
+      play.textContent = labels.play;
+      say(t(error?.name === "NotAllowedError" ? "films.again-please" : "films.failed"));
+      play.focus();
+      onend();
+      return;
+    }
+    play.dataset.seen = "yes";
+    play.disabled = !replay;
+    play.textContent = replay ? labels.again : labels.seen;
+    say(t("films.ended"));
+    if (!wasSeen) onseen();
+    wasSeen = true;
+    onend();
+  };
+  const play = button(labels.play, press);
+  screening.onbegin = onbegin;
+  screening.onstall = (stands) => say(stands ? t("films.stalled") : "");
+  screening.videos[0].addEventListener("playing", () => {
+    play.textContent = t("films.playing");
+    say(t("films.playing"));
+  });
+  return play;
+}
+
+// One film, or two side by side, started together.
+function filmsTogether(task, trial) {
+  const screening = new Screening(trial.films.map(filmUrl));
+  const isPair = trial.films.length > 1;
+  const names = isPair ? [t("film.left"), t("film.right")] : [t("film.one")];
+  const films = screening.videos.map((video, at) => captioned(video, names[at]));
+  const stage = el("div", { class: isPair ? "films pair" : "films one", role: "group", "aria-label": t("films.group") }, ...films);
+  const asked = question(task, trial, () => view.onchange());
+  const labels = { play: t(isPair ? "films.play.both" : "films.play.one"), again: t("films.play.again"), seen: t("films.seen") };
+  const play = playButton(screening, labels, task.replay, {
+    onstart: () => {},
+    onbegin() {
+      view.onplay();
+      view.onchange();
+    },
+    onseen: () => asked.enable(),
+    onend() {
+      view.onend();
+      // What the two films were apart, for who measures the page.
+      stage.dataset.startApartMs = Math.round(1000 * screening.apart.start);
+      stage.dataset.mostApartMs = Math.round(1000 * screening.apart.most);
+    },
+  });
+  const hint = el("p", { class: "note" }, t(task.replay ? "films.often" : "films.once"));
+  const view = {
+    screenings: [screening],
+    nodes: [stage, el("p", { class: "row" }, play, el("span", { class: "keys" }, t("keys.play"))), hint, asked.node],
+    focus: play,
+    plays: () => screening.plays,
+    isPlaying: () => screening.playing,
+    response: () => (asked.node.disabled ? null : asked.response()),
+  };
+  return view;
+}
+
+// Several films, one after the other in one place, each with its button and its slider.
+function filmsInTurn(task, trial) {
+  const isCheck = trial.phase === "attention-check";
+  const seen = new Set();
+  const screenings = trial.films.map((film) => new Screening([filmUrl(film)]));
+  const films = screenings.map((screening, at) => captioned(screening.videos[0], t("film.number", { n: at + 1 })));
+  const stage = el("div", { class: "films stack", role: "group", "aria-label": t("films.group") }, ...films);
+  const asked = isCheck ? question(task, trial, () => view.onchange()) : null;
+  const sliders = isCheck ? [] : screenings.map((_, at) => slider(at + 1, () => view.onchange()));
+  const shown = (at) => films.forEach((film, k) => film.classList.toggle("shown", k === at));
+  shown(0);
+  // No film begins while another plays.
+  const lock = (on) => plays.forEach((play, at) => (play.disabled = on || (seen.has(at) && !task.replay)));
+  const plays = screenings.map((screening, at) => {
+    const n = at + 1;
+    const labels = {
+      play: t("films.play.number", { n }),
+      again: t("films.play.number-again", { n }),
+      seen: t("films.seen.number", { n }),
+    };
+    return playButton(screening, labels, task.replay, {
+      onstart() {
+        shown(at);
+        lock(true);
+        view.onchange();
+      },
+      onbegin: () => view.onplay(),
+      onseen() {
+        seen.add(at);
+        sliders[at]?.enable();
+        if (seen.size === trial.films.length) asked?.enable();
+      },
+      onend() {
+        lock(false);
+        view.onend();
+      },
+    });
+  });
+  const rows = plays.map((play, at) => el("div", { class: "score" }, play, sliders[at]?.node ?? null));
+  const head = isCheck ? null : el("h2", { id: "question" }, firstText(...questionKeys(task, trial.phase)));
+  const group = el("div", { class: "scores", role: "group", "aria-labelledby": isCheck ? null : "question" }, ...rows);
+  const hint = el("p", { class: "note" }, t(task.replay ? "films.often" : "films.once"));
+  const keys = isCheck ? null : el("p", { class: "keys" }, t("keys.sliders"));
+  const view = {
+    screenings,
+    nodes: [stage, head, hint, group, asked?.node, keys].filter(Boolean),
+    focus: plays[0],
+    // The most often played film's count, as of films that are played together.
+    plays: () => Math.max(...screenings.map((screening) => screening.plays)),
+    isPlaying: () => screenings.some((screening) => screening.playing),
+    response() {
+      if (seen.size < trial.films.length) return null;
+      if (isCheck) return asked.response();
+      const scores = sliders.map((one) => one.score());
+      return scores.includes(null) ? null : { scores };
+    },
+  };
+  return view;
+}

@@ -1,0 +1,264 @@
+//! Participants that a wanted power needs, by simulated studies that go through the very analysis: the crossed test
+//! against chance and the crossed test of equivalence. More participants cannot make up for few clips: where the power
+//! stays below what is wanted, that is said.
+
+use super::analyse::figure::FigureMethod;
+use super::analyse::outcome::BinaryVote;
+use super::analyse::result::{FigureSettings, ShareAnalysis, ShareMeasure};
+use super::analyse::share::{CHANCE, ShareCell, share};
+use super::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
+use super::stats::equivalence::votes_needed;
+use super::stats::proportion::BinomialCount;
+use anyhow::{Result, ensure};
+use rayon::prelude::*;
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, Normal};
+use std::collections::BTreeMap;
+
+/// Fewest and most participants that are tried.
+const FEWEST: usize = 5;
+const MOST: usize = 1280;
+/// Level of all tests.
+const LEVEL: f64 = 0.05;
+
+/// What is asked.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PowerQuestion {
+    /// Votes of each participant.
+    pub n_trials: usize,
+    pub n_clips: usize,
+    pub sd_participants: f64,
+    pub sd_clips: f64,
+    /// Wanted power, a share.
+    pub power: f64,
+    /// True share that is to be found different from chance.
+    pub effect: f64,
+    /// Bound of equivalence, a share.
+    pub bound: f64,
+    pub n_simulations: usize,
+    pub seed: u64,
+}
+
+/// Power of a number of participants.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PowerRow {
+    pub n_participants: usize,
+    pub n_votes: usize,
+    pub power: f64,
+    /// 95 % interval of the simulated power.
+    pub low: f64,
+    pub high: f64,
+}
+
+/// Answer for one test.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PowerCurve {
+    /// True share.
+    pub share: f64,
+    /// Fewest participants of which the simulated power reaches the wanted one; none of those tried.
+    pub n_participants: Option<usize>,
+    pub rows: Vec<PowerRow>,
+    /// Votes by the formula that takes them for independent.
+    pub naive_votes: u64,
+    /// Simulated power of that many votes, in whole participants.
+    pub at_naive: PowerRow,
+}
+
+/// Answer: difference from chance and equivalence with it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PowerPlan {
+    pub question: PowerQuestion,
+    pub difference: PowerCurve,
+    pub equivalence: PowerCurve,
+}
+
+/// Participants needed for both tests; `tell` hears of each number that was tried.
+pub fn plan(question: &PowerQuestion, tell: &(dyn Fn(&PowerRow) + Sync)) -> Result<PowerPlan> {
+    ensure!(question.n_trials > 0 && question.n_clips > 1, "a participant has at least one trial, a study two clips");
+    ensure!(
+        question.n_trials <= question.n_clips,
+        "{} trials of {} clips: a participant sees no clip twice; give more clips or fewer trials",
+        question.n_trials,
+        question.n_clips
+    );
+    ensure!((0.1..1.0).contains(&question.power), "the power is a share from 0.1 to below 1");
+    ensure!((0.001..=0.499).contains(&(question.effect - CHANCE).abs()), "the effect is a share other than 0.5");
+    ensure!((0.001..0.5).contains(&question.bound), "the bound is a share below 0.5");
+    ensure!((100..=100_000).contains(&question.n_simulations), "simulations are 100 to 100000");
+    let deviations = [question.sd_participants, question.sd_clips];
+    ensure!(deviations.iter().all(|sd| (0.0..=5.0).contains(sd)), "standard deviations are 0 to 5 log odds");
+    let z = |share: f64| Normal::standard().inverse_cdf(share);
+    let naive = ((z(1.0 - LEVEL / 2.0) + z(question.power)) / (question.effect - CHANCE)).powi(2) / 4.0;
+    let found =
+        |analysis: &ShareAnalysis| analysis.figures.test(FigureMethod::Crossed).is_some_and(|test| test.p < LEVEL);
+    let equivalent =
+        |analysis: &ShareAnalysis| analysis.figures.equivalence(FigureMethod::Crossed).is_some_and(|test| test.passes);
+    Ok(PowerPlan {
+        question: question.clone(),
+        difference: curve(question, question.effect, naive.ceil() as u64, &found, tell),
+        equivalence: curve(question, CHANCE, votes_needed(question.bound, question.power)?, &equivalent, tell),
+    })
+}
+
+/// Power of `n_participants`: share of simulated studies of which the outcome holds.
+pub fn power(
+    question: &PowerQuestion,
+    n_participants: usize,
+    share_of_all: f64,
+    holds: &(dyn Fn(&ShareAnalysis) -> bool + Sync),
+) -> PowerRow {
+    let design = CrossedDesign { n_participants, n_trials: question.n_trials, n_clips: question.n_clips };
+    let effects =
+        CrossedEffects { share: share_of_all, sd_participants: question.sd_participants, sd_clips: question.sd_clips };
+    let settings =
+        FigureSettings { bound: question.bound, n_draws: 0, with_models: false, ..FigureSettings::default() };
+    let stream = |k: usize| ((n_participants as u64) << 32) + k as u64;
+    let one = |k: &usize| holds(&simulated(&design, &effects, &settings, question.seed, stream(*k)));
+    let n_found = (0..question.n_simulations).into_par_iter().filter(one).count() as u64;
+    let count = BinomialCount::new(n_found, question.n_simulations as u64);
+    let interval =
+        count.and_then(|count| count.wilson(0.95)).map_or([0.0, 1.0], |interval| [interval.low, interval.high]);
+    PowerRow {
+        n_participants,
+        n_votes: n_participants * question.n_trials,
+        power: n_found as f64 / question.n_simulations as f64,
+        low: interval[0],
+        high: interval[1],
+    }
+}
+
+/// Analysis of a simulated study.
+pub fn simulated(
+    design: &CrossedDesign,
+    effects: &CrossedEffects,
+    settings: &FigureSettings,
+    seed: u64,
+    stream: u64,
+) -> ShareAnalysis {
+    let votes = crossed_votes(design, effects, seed, stream).into_iter();
+    let votes = votes.map(|vote| BinaryVote { vote, speaker: "", condition: "", sides: None }).collect();
+    share(&ShareCell { measure: ShareMeasure::GeneratedChosen, speaker: None, condition: None, votes }, settings)
+}
+
+/// Doubles participants until the power is reached, then halves the interval to within a twentieth.
+fn curve(
+    question: &PowerQuestion,
+    share: f64,
+    naive_votes: u64,
+    holds: &(dyn Fn(&ShareAnalysis) -> bool + Sync),
+    tell: &(dyn Fn(&PowerRow) + Sync),
+) -> PowerCurve {
+    let mut rows: BTreeMap<usize, PowerRow> = BTreeMap::new();
+    let mut at = |n: usize| -> PowerRow {
+        *rows.entry(n).or_insert_with(|| {
+            let row = power(question, n, share, holds);
+            tell(&row);
+            row
+        })
+    };
+    let (mut low, mut high) = (0, FEWEST);
+    while at(high).power < question.power && high < MOST {
+        (low, high) = (high, 2 * high);
+    }
+    let is_reached = at(high).power >= question.power;
+    while is_reached && high - low > (high / 20).max(1) {
+        let middle = low + (high - low) / 2;
+        if at(middle).power >= question.power { high = middle } else { low = middle }
+    }
+    let naive = (naive_votes as usize).div_ceil(question.n_trials).clamp(2, MOST);
+    let at_naive = at(naive);
+    PowerCurve {
+        share,
+        n_participants: is_reached.then_some(high),
+        rows: rows.into_values().collect(),
+        naive_votes,
+        at_naive,
+    }
+}
+
+/// Table for people.
+pub fn text(plan: &PowerPlan) -> String {
+    let question = &plan.question;
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let mut text = format!(
+        "{} votes a participant, {} clips; standard deviations of log odds: participants {:.2}, clips {:.2}\n\
+         {} simulated studies a row, tests at 5 % with participants and clips crossed\n",
+        question.n_trials, question.n_clips, question.sd_participants, question.sd_clips, question.n_simulations
+    );
+    let curves = [
+        (&plan.difference, format!("a true share of {} is found different from 50 %", percent(question.effect))),
+        (
+            &plan.equivalence,
+            format!("a true share of 50 % is found equivalent within \u{b1}{} points", 100.0 * question.bound),
+        ),
+    ];
+    for (curve, what) in curves {
+        text += &format!("\n{what}\n  participants    votes    power    95 % interval\n");
+        for row in &curve.rows {
+            let mark = if Some(row.n_participants) == curve.n_participants { "  <- enough" } else { "" };
+            text += &format!(
+                "  {:>12} {:>8} {:>8}    {} to {}{mark}\n",
+                row.n_participants,
+                row.n_votes,
+                percent(row.power),
+                percent(row.low),
+                percent(row.high)
+            );
+        }
+        text += &match curve.n_participants {
+            Some(n) => format!("  {n} participants for a power of {}\n", percent(question.power)),
+            None => format!(
+                "  not with {MOST} participants: the {} clips leave too much to chance; take more clips\n",
+                question.n_clips
+            ),
+        };
+        text += &format!(
+            "  the formula for independent votes says {} votes ({} participants), of which the power is {}\n",
+            curve.naive_votes,
+            curve.at_naive.n_participants,
+            percent(curve.at_naive.power)
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn question() -> PowerQuestion {
+        PowerQuestion {
+            n_trials: 20,
+            n_clips: 40,
+            sd_participants: 0.3,
+            sd_clips: 0.3,
+            power: 0.9,
+            effect: 0.58,
+            bound: 0.1,
+            n_simulations: 200,
+            seed: 1,
+        }
+    }
+
+    #[test]
+    fn enough_participants_are_found_and_the_formula_is_too_hopeful() {
+        let plan = plan(&question(), &|_| {}).unwrap();
+        let needed = plan.difference.n_participants.unwrap();
+        assert!((15..120).contains(&needed), "{needed}");
+        assert!(plan.difference.at_naive.power < 0.9 && plan.difference.naive_votes > 300, "{:?}", plan.difference);
+        assert_eq!(plan.equivalence.naive_votes, 271);
+        assert!(plan.difference.rows.is_sorted_by_key(|row| row.n_participants));
+        assert!(text(&plan).contains("<- enough"), "{}", text(&plan));
+    }
+
+    #[test]
+    fn few_clips_bound_the_power() {
+        let few = PowerQuestion { n_trials: 4, n_clips: 4, sd_clips: 1.0, n_simulations: 100, ..question() };
+        let curve = power(&few, 320, 0.58, &|analysis| {
+            analysis.figures.test(FigureMethod::Crossed).is_some_and(|test| test.p < LEVEL)
+        });
+        assert!(curve.power < 0.5, "{curve:?}");
+        assert!(plan(&PowerQuestion { n_trials: 9, ..few.clone() }, &|_| {}).is_err());
+        assert!(plan(&PowerQuestion { effect: 0.5, ..few }, &|_| {}).is_err());
+    }
+}

@@ -1,0 +1,171 @@
+//! What is fixed before the first participant: number of participants, tasks, hypotheses with the statistic that judges
+//! each, exclusion rules, settings of the analysis. The analysis marks all else as exploratory.
+
+use super::file::{AnalysisSettings, ExclusionRules, HypothesisKind, StudyFile, StudyHypothesis};
+use super::plan::TaskDesign;
+use crate::stage::workdir;
+use anyhow::{Context, Result, ensure};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Version of the file.
+const VERSION: u32 = 1;
+
+/// Pre-registration of a study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Preregistration {
+    pub version: u32,
+    /// Program that made it and its version.
+    pub program: String,
+    pub title: String,
+    /// Participants whose responses are wanted; collection ends when as many were not left out.
+    pub participants: usize,
+    /// Sessions that are planned at most.
+    pub sessions: usize,
+    pub tasks: Vec<RegisteredTask>,
+    pub hypotheses: Vec<RegisteredHypothesis>,
+    pub exclusion: ExclusionRules,
+    pub analysis: AnalysisSettings,
+}
+
+/// Task with the votes that it will bring.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RegisteredTask {
+    pub name: String,
+    pub design: TaskDesign,
+    pub conditions: Vec<String>,
+    /// Analysed trials a participant.
+    pub trials: usize,
+    pub votes: usize,
+}
+
+/// Hypothesis with what judges it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RegisteredHypothesis {
+    pub claim: StudyHypothesis,
+    /// In words: estimate, error, test, adjustment.
+    pub statistic: String,
+}
+
+impl Preregistration {
+    pub fn new(file: &StudyFile) -> Self {
+        let registered = |claim: &StudyHypothesis| {
+            let design = file.task.iter().find(|task| task.name == claim.task).map(|task| task.design);
+            RegisteredHypothesis { claim: claim.clone(), statistic: statistic(claim, design, file.analysis.alpha) }
+        };
+        let tasks = file.task.iter().map(|task| RegisteredTask {
+            name: task.name.clone(),
+            design: task.design,
+            conditions: task.conditions.clone(),
+            trials: task.trials,
+            votes: task.trials * file.participants,
+        });
+        Self {
+            version: VERSION,
+            program: concat!("orator ", env!("CARGO_PKG_VERSION")).to_owned(),
+            title: file.title.clone(),
+            participants: file.participants,
+            sessions: file.n_sessions(),
+            tasks: tasks.collect(),
+            hypotheses: file.hypothesis.iter().map(registered).collect(),
+            exclusion: file.exclusion.clone(),
+            analysis: file.analysis.clone(),
+        }
+    }
+
+    /// The hypotheses alone.
+    pub fn claims(&self) -> Vec<StudyHypothesis> {
+        self.hypotheses.iter().map(|hypothesis| hypothesis.claim.clone()).collect()
+    }
+
+    /// Writes the file, atomically.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        workdir::write_file(path, &serde_json::to_vec_pretty(self)?)
+    }
+
+    /// Reads the file.
+    ///
+    /// # Errors
+    /// A file that is missing, damaged or of a later version.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).with_context(|| {
+            format!("cannot read the pre-registration {}; `orator study build` writes one", path.display())
+        })?;
+        let read: Self = serde_json::from_slice(&bytes)
+            .with_context(|| format!("{} is damaged: build the study again or restore the file", path.display()))?;
+        let (found, path) = (read.version, path.display());
+        ensure!(
+            found == VERSION,
+            "{path} has version {found} and this program reads {VERSION}: use the one that wrote it"
+        );
+        Ok(read)
+    }
+}
+
+/// Words for what judges a hypothesis.
+fn statistic(claim: &StudyHypothesis, design: Option<TaskDesign>, alpha: f64) -> String {
+    let error = "with the standard error of participants and clips crossed and a t distribution";
+    let share = match design {
+        Some(TaskDesign::Mismatch) => "share of votes for the matched film",
+        _ => "share of right responses",
+    };
+    let judged = match claim.kind {
+        HypothesisKind::DiffersFromChance => format!("two-sided test of the {share} against 50 %, {error}"),
+        HypothesisKind::GreaterThanChance => {
+            format!("two-sided test of the {share} against 50 %, {error}; the share must be above 50 %")
+        }
+        HypothesisKind::Equivalence => {
+            let points = claim.points.unwrap_or_default();
+            format!("two one-sided tests of the {share} against 50 % - {points} and 50 % + {points}, {error}")
+        }
+        HypothesisKind::Differs => {
+            let difference = match design {
+                Some(TaskDesign::Preference) => "mean preferred step of two conditions against 0",
+                Some(TaskDesign::TuringSingle) => {
+                    "difference of two conditions' shares of films taken for real against 0"
+                }
+                _ => "mean difference of two conditions' scores of one page against 0",
+            };
+            format!("two-sided test of the {difference}, {error}")
+        }
+    };
+    let is_family = claim.per_speaker || claim.kind == HypothesisKind::Differs && claim.conditions.is_empty();
+    let adjusted = if is_family { ", p adjusted by Holm within the task" } else { "" };
+    format!("{judged}, alpha {alpha}{adjusted}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::file::EXAMPLE;
+
+    #[test]
+    fn it_holds_what_the_file_says_and_comes_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("study.toml");
+        std::fs::write(&path, EXAMPLE).unwrap();
+        let file = StudyFile::read(&path).unwrap();
+        let made = Preregistration::new(&file);
+        assert_eq!((made.participants, made.sessions), (100, 150));
+        assert_eq!(made.tasks.iter().map(|task| task.votes).collect::<Vec<_>>(), [2000, 1000]);
+        assert_eq!(made.claims(), file.hypothesis);
+        assert!(
+            made.hypotheses[0]
+                .statistic
+                .starts_with("two one-sided tests of the share of right responses against 50 % - 10")
+        );
+        let path = dir.path().join("preregistration.json");
+        made.write(&path).unwrap();
+        assert_eq!(Preregistration::read(&path).unwrap(), made);
+        for (damage, said) in [("{", "is damaged"), ("{}", "is damaged"), (r#""version": 1"#, "version 9")] {
+            let whole = std::fs::read_to_string(&path).unwrap();
+            let damaged = if damage.len() > 2 { whole.replace(damage, r#""version": 9"#) } else { damage.to_owned() };
+            std::fs::write(&path, damaged).unwrap();
+            assert!(Preregistration::read(&path).unwrap_err().to_string().contains(said));
+            std::fs::write(&path, whole).unwrap();
+        }
+    }
+}

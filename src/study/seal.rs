@@ -1,0 +1,234 @@
+//! Seal of a study: a BLAKE3 hash of each file that was there before the first participant, and one over all, which is
+//! what a researcher publishes beforehand.
+
+use super::folder::StudyFolder;
+use crate::stage::fingerprint::hash_file;
+use crate::stage::workdir;
+use anyhow::{Context, Result, bail, ensure};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Version of the file.
+const VERSION: u32 = 1;
+
+/// Hashes of a study's files.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StudySeal {
+    pub version: u32,
+    /// BLAKE3 over the lines `FILE HASH` of all files, in their order.
+    pub seal: String,
+    /// BLAKE3 of each file, in hexadecimal digits, by its path in the study's folder.
+    pub files: BTreeMap<String, String>,
+}
+
+/// Files of a study that are not as they were sealed.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct BrokenSeal {
+    pub changed: Vec<String>,
+    pub added: Vec<String>,
+    pub missing: Vec<String>,
+}
+
+impl BrokenSeal {
+    pub fn is_whole(&self) -> bool {
+        self.changed.is_empty() && self.added.is_empty() && self.missing.is_empty()
+    }
+}
+
+impl fmt::Display for BrokenSeal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kinds = [("changed", &self.changed), ("added", &self.added), ("missing", &self.missing)];
+        let said = kinds.iter().filter(|(_, files)| !files.is_empty()).map(|(kind, files)| {
+            let more = if files.len() > 8 { format!(" and {} more", files.len() - 8) } else { String::new() };
+            format!("{kind}: {}{more}", files[..files.len().min(8)].join(", "))
+        });
+        write!(f, "{}", said.collect::<Vec<_>>().join("; "))
+    }
+}
+
+impl StudySeal {
+    /// Hashes the files of a finished study.
+    ///
+    /// # Errors
+    /// A file that is missing or cannot be read.
+    pub fn of(folder: &StudyFolder) -> Result<Self> {
+        let listed = sealed_files(folder)?;
+        if let Some((name, _)) = listed.iter().find(|(_, path)| !path.is_file()) {
+            bail!("{} has no {name}: build the study again", folder.dir().display());
+        }
+        let files: BTreeMap<String, String> =
+            listed.iter().map(|(name, path)| Ok((name.clone(), hash_file(path)?))).collect::<Result<_>>()?;
+        Ok(Self { version: VERSION, seal: over_all(&files), files })
+    }
+
+    /// Writes the seal, atomically: the last file of a build.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn write(&self, folder: &StudyFolder) -> Result<()> {
+        workdir::write_file(&folder.seal(), &serde_json::to_vec_pretty(self)?)
+    }
+
+    /// Reads the seal of a study.
+    ///
+    /// # Errors
+    /// No seal, one that is damaged, of a later version, or changed itself.
+    pub fn read(folder: &StudyFolder) -> Result<Self> {
+        let path = folder.seal();
+        let bytes = fs::read(&path).with_context(|| {
+            format!("{} is no finished study: it has no seal; `orator study build` makes one", folder.dir().display())
+        })?;
+        let path = path.display();
+        let read: Self = serde_json::from_slice(&bytes)
+            .with_context(|| format!("{path} is damaged: restore it, or build the study again"))?;
+        ensure!(
+            read.version == VERSION,
+            "{path} has version {} and this program reads {VERSION}: use the one that wrote it",
+            read.version
+        );
+        ensure!(read.seal == over_all(&read.files), "{path} was changed itself: its hashes do not give {}", read.seal);
+        Ok(read)
+    }
+
+    /// Reads the seal and holds every file to it.
+    ///
+    /// # Errors
+    /// The files that were changed, added or lost.
+    pub fn verify(folder: &StudyFolder) -> Result<Self> {
+        let seal = Self::read(folder)?;
+        let broken = seal.compare(folder)?;
+        ensure!(
+            broken.is_whole(),
+            "{} is not as it was sealed ({broken}): restore those files, or build the study in a new folder",
+            folder.dir().display()
+        );
+        Ok(seal)
+    }
+
+    /// Files that are not as they were sealed.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn compare(&self, folder: &StudyFolder) -> Result<BrokenSeal> {
+        let mut broken = BrokenSeal::default();
+        let listed = sealed_files(folder)?;
+        for (name, path) in &listed {
+            match self.files.get(name) {
+                _ if !path.is_file() => {}
+                Some(hash) if *hash == hash_file(path)? => {}
+                Some(_) => broken.changed.push(name.clone()),
+                None => broken.added.push(name.clone()),
+            }
+        }
+        let is_there = |name: &String| listed.get(name).is_some_and(|path| path.is_file());
+        broken.missing = self.files.keys().filter(|name| !is_there(name)).cloned().collect();
+        Ok(broken)
+    }
+}
+
+fn over_all(files: &BTreeMap<String, String>) -> String {
+    let lines: String = files.iter().map(|(name, hash)| format!("{name} {hash}\n")).collect();
+    blake3::hash(lines.as_bytes()).to_hex().to_string()
+}
+
+/// Files that a seal covers, by name: the four of the study, whether there or not, and all that participants can reach.
+/// Hidden files are passed over; nobody is served one.
+fn sealed_files(folder: &StudyFolder) -> Result<BTreeMap<String, PathBuf>> {
+    let mut paths = vec![folder.study_file(), folder.plan(), folder.key(), folder.preregistration()];
+    collect(&folder.public(), &mut paths)?;
+    let named = paths.into_iter().map(|path| {
+        let name = path.strip_prefix(folder.dir()).unwrap_or(&path).to_string_lossy().replace('\\', "/");
+        (name, path)
+    });
+    Ok(named.collect())
+}
+
+fn collect(dir: &Path, paths: &mut Vec<PathBuf>) -> Result<()> {
+    let unreadable = || format!("cannot list {}", dir.display());
+    for entry in fs::read_dir(dir).with_context(unreadable)? {
+        let entry = entry.with_context(unreadable)?;
+        let kind = entry.file_type().with_context(unreadable)?;
+        if entry.file_name().as_encoded_bytes().starts_with(b".") {
+            continue;
+        }
+        if kind.is_dir() {
+            collect(&entry.path(), paths)?;
+        } else {
+            let path = entry.path();
+            ensure!(kind.is_file(), "{} is no plain file: put the film itself in its place", path.display());
+            paths.push(path);
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Study of four files and two films.
+    fn study() -> (tempfile::TempDir, StudyFolder) {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = StudyFolder::new(dir.path());
+        let files = [folder.study_file(), folder.plan(), folder.key(), folder.preregistration()];
+        for path in files.into_iter().chain(["00", "01"].map(|film| folder.film(film))) {
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(&path, path.to_string_lossy().as_bytes()).unwrap();
+        }
+        (dir, folder)
+    }
+
+    #[test]
+    fn what_was_changed_added_or_lost_is_named() {
+        let (_dir, folder) = study();
+        let seal = StudySeal::of(&folder).unwrap();
+        assert_eq!(seal.files.len(), 6);
+        assert!(StudySeal::verify(&folder).unwrap_err().to_string().contains("no finished study"));
+        seal.write(&folder).unwrap();
+        fs::write(folder.responses(), "answers").unwrap();
+        fs::write(folder.public().join(".hidden"), "").unwrap();
+        assert_eq!(StudySeal::verify(&folder).unwrap(), seal);
+        fs::write(folder.plan(), "another").unwrap();
+        fs::write(folder.film("02"), "more").unwrap();
+        fs::remove_file(folder.film("00")).unwrap();
+        let said = StudySeal::verify(&folder).unwrap_err().to_string();
+        assert!(
+            said.contains("(changed: plan.json; added: public/films/02.mp4; missing: public/films/00.mp4)"),
+            "{said}"
+        );
+        fs::remove_file(folder.key()).unwrap();
+        assert!(StudySeal::of(&folder).unwrap_err().to_string().contains("has no key.json"));
+        assert_eq!(seal.compare(&folder).unwrap().missing, ["key.json", "public/films/00.mp4"]);
+    }
+
+    #[test]
+    fn a_damaged_or_changed_seal_is_refused() {
+        let (_dir, folder) = study();
+        StudySeal::of(&folder).unwrap().write(&folder).unwrap();
+        let whole = fs::read_to_string(folder.seal()).unwrap();
+        let digit = whole.find("plan.json\": \"").unwrap() + 13;
+        let mut forged = whole.clone();
+        forged.replace_range(digit..=digit, if &whole[digit..=digit] == "0" { "1" } else { "0" });
+        for (text, said) in [
+            (whole[..whole.len() / 2].to_owned(), "is damaged"),
+            ("[]".to_owned(), "is damaged"),
+            (forged, "was changed itself"),
+            (whole.replace("\"version\": 1", "\"version\": 2"), "version 2"),
+        ] {
+            fs::write(folder.seal(), text).unwrap();
+            let error = StudySeal::verify(&folder).unwrap_err().to_string();
+            assert!(error.contains(said), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_link_in_the_place_of_a_film_is_refused() {
+        let (_dir, folder) = study();
+        std::os::unix::fs::symlink("/etc/hostname", folder.film("03")).unwrap();
+        assert!(StudySeal::of(&folder).unwrap_err().to_string().contains("no plain file"));
+    }
+}

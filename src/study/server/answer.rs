@@ -1,0 +1,106 @@
+//! Whether an answer fits its trial: its form, its numbers, and whether it passes a check.
+
+use super::reply::ApiError;
+use crate::study::plan::{PlannedTask, TaskDesign, Trial, TrialPhase};
+use crate::study::response::Response;
+use crate::study::store::answers::GivenAnswer;
+
+/// Seconds that a page may report: a day.
+const MOST_SECS: f64 = 86_400.0;
+/// How often films are played at most.
+const MOST_PLAYS: u32 = 1000;
+
+/// Checks an answer to `trial`, one of `task`.
+///
+/// # Errors
+/// Says which part of the answer the trial does not take.
+pub fn check(answer: &GivenAnswer, trial: &Trial, task: &PlannedTask) -> Result<(), ApiError> {
+    if !fits(&answer.response, trial, task) {
+        return Err(ApiError::bad("The response does not fit the trial's task."));
+    }
+    if !(1..=MOST_PLAYS).contains(&answer.plays) {
+        return Err(ApiError::bad("The films must be played before an answer."));
+    }
+    let secs = [answer.stalled_secs, answer.unfocused_secs, answer.response_secs];
+    if !secs.iter().all(|secs| (0.0..=MOST_SECS).contains(secs)) {
+        return Err(ApiError::bad("A time must lie between 0 and 86400 seconds."));
+    }
+    Ok(())
+}
+
+fn fits(response: &Response, trial: &Trial, task: &PlannedTask) -> bool {
+    match (trial.phase, task.design, response) {
+        (TrialPhase::AttentionCheck, _, Response::Number(number)) => (10..=99).contains(number),
+        (TrialPhase::AttentionCheck, ..) => false,
+        (_, TaskDesign::Turing | TaskDesign::Mismatch, Response::Side(_)) => true,
+        (_, TaskDesign::TuringSingle, Response::Real(_)) => true,
+        (_, TaskDesign::Preference, Response::Step(step)) => (-2..=2).contains(step),
+        (_, TaskDesign::Sliders, Response::Scores(scores)) => {
+            scores.len() == trial.films.len() && scores.iter().all(|score| *score <= 100)
+        }
+        _ => false,
+    }
+}
+
+/// Whether `response` is wrong in an attention check.
+pub fn fails_check(response: &Response, trial: &Trial) -> bool {
+    trial.phase == TrialPhase::AttentionCheck && trial.expected.as_ref().is_some_and(|right| right != response)
+}
+
+/// Right response, which a practice or training trial tells after its answer.
+pub fn feedback(trial: &Trial) -> Option<&Response> {
+    let tells = matches!(trial.phase, TrialPhase::Practice | TrialPhase::Training);
+    trial.expected.as_ref().filter(|_| tells)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::response::ScreenSide;
+
+    #[test]
+    fn each_design_takes_its_own_form_of_response() {
+        let (side, real) = (Response::Side(ScreenSide::Left), Response::Real(false));
+        let scores = |scores: &[u8]| Response::Scores(scores.to_vec());
+        let (step, number) = (Response::Step(-2), Response::Number(42));
+        let all = [side, real, step, number, scores(&[0, 100])];
+        let fitting = |design, phase| -> Vec<usize> {
+            let task = PlannedTask { name: "t".to_owned(), design, replay: false, scale: String::new() };
+            let trial = Trial { task: 0, phase, films: vec![String::new(), String::new()], expected: None };
+            all.iter().enumerate().filter(|(_, one)| fits(one, &trial, &task)).map(|(k, _)| k).collect()
+        };
+        use TaskDesign::{Mismatch, Preference, Sliders, Turing, TuringSingle};
+        for (design, form) in [(Turing, 0), (Mismatch, 0), (TuringSingle, 1), (Preference, 2), (Sliders, 4)] {
+            for phase in [TrialPhase::Practice, TrialPhase::Training, TrialPhase::Main] {
+                assert_eq!(fitting(design, phase), [form], "{design:?}");
+            }
+            assert_eq!(fitting(design, TrialPhase::AttentionCheck), [3], "{design:?}");
+        }
+    }
+
+    #[test]
+    fn numbers_keep_to_their_ranges() {
+        let task = |design| PlannedTask { name: "t".to_owned(), design, replay: false, scale: String::new() };
+        let trial = |phase| Trial { task: 0, phase, films: vec![String::new()], expected: None };
+        let given = |response, plays, secs| GivenAnswer {
+            position: 0,
+            response,
+            plays,
+            stalled_secs: secs,
+            unfocused_secs: 0.0,
+            response_secs: 0.0,
+        };
+        let takes = |design, phase, response, plays, secs| {
+            check(&given(response, plays, secs), &trial(phase), &task(design)).is_ok()
+        };
+        use TrialPhase::{AttentionCheck, Main};
+        assert!(takes(TaskDesign::Preference, Main, Response::Step(2), 1, 0.0));
+        assert!(!takes(TaskDesign::Preference, Main, Response::Step(3), 1, 0.0));
+        assert!(!takes(TaskDesign::Sliders, Main, Response::Scores(vec![101]), 1, 0.0));
+        assert!(!takes(TaskDesign::Sliders, Main, Response::Scores(vec![1, 2]), 1, 0.0));
+        assert!(!takes(TaskDesign::Turing, AttentionCheck, Response::Number(9), 1, 0.0));
+        for (plays, secs) in [(0, 0.0), (1001, 0.0), (1, -1.0), (1, f64::NAN), (1, f64::INFINITY), (1, 86_401.0)] {
+            assert!(!takes(TaskDesign::TuringSingle, Main, Response::Real(true), plays, secs), "{plays} {secs}");
+        }
+    }
+}

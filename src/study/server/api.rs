@@ -1,0 +1,198 @@
+//! The interface by which a page takes part: it begins, answers trial by trial, and may withdraw.
+
+use super::answer::{check, fails_check, feedback};
+use super::app::{App, now_ms};
+use super::body::{JsonBody, bearer, unauthorized};
+use super::reply::{ApiError, json_reply, not_found};
+use super::secret::{completion_code, participant_id};
+use super::{films, served::ServedStudy};
+use crate::study::plan::TrialPhase;
+use crate::study::response::Response;
+use crate::study::store::answers::{GivenAnswer, Recorded, TrialTerms, record};
+use crate::study::store::participants::{self, Newcomer, PARAMETERS, Participant, Status};
+use axum::extract::{FromRequestParts, Path, State};
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::{IntoResponse, Response as HttpResponse};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Letters of what recruiting sites give along.
+const LONGEST_PARAMETER: usize = 128;
+
+type Shared = State<Arc<App>>;
+
+/// Where a participant stands, as the page reads it.
+#[derive(Serialize)]
+struct SessionState<'a> {
+    /// Trials answered.
+    position: u32,
+    n_trials: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trial: Option<ShownTrial<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    completion: Option<Completion>,
+}
+
+#[derive(Serialize)]
+struct ShownTrial<'a> {
+    /// Index into the study's tasks.
+    task: usize,
+    phase: TrialPhase,
+    films: &'a [String],
+}
+
+#[derive(Serialize)]
+struct Completion {
+    code: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    return_url: Option<String>,
+}
+
+fn session_state<'a>(study: &'a ServedStudy, participant: &Participant) -> SessionState<'a> {
+    let trials = study.trials(participant.session);
+    let trial = trials.get(participant.position as usize);
+    let code = || participant.code.clone();
+    SessionState {
+        position: participant.position,
+        n_trials: trials.len(),
+        trial: trial.map(|trial| ShownTrial { task: trial.task, phase: trial.phase, films: &trial.films }),
+        completion: trial.is_none().then(|| Completion {
+            code: code(),
+            return_url: study.return_url.as_ref().map(|url| url.replace("{code}", &code())),
+        }),
+    }
+}
+
+/// Who asks: session and name, by a token that was signed here and does not ask too often.
+pub struct Asker {
+    session: u32,
+    id: String,
+}
+
+impl FromRequestParts<Arc<App>> for Asker {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, app: &Arc<App>) -> Result<Self, ApiError> {
+        let (session, id) = app.secret.verify(bearer(&parts.headers)?).ok_or_else(unauthorized)?;
+        if app.limits.allow_participant(&id) { Ok(Self { session, id }) } else { Err(ApiError::too_often()) }
+    }
+}
+
+fn gone() -> ApiError {
+    ApiError::new(StatusCode::GONE, "This session has ended: too much time passed, and its place was given to another.")
+}
+
+fn withdrawn() -> ApiError {
+    ApiError::new(StatusCode::GONE, "This session was withdrawn; nothing of it is kept.")
+}
+
+/// `GET /api/study`
+pub async fn study(State(app): Shared) -> HttpResponse {
+    json_reply(&app.study.page)
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Beginning {
+    consent: bool,
+    language: String,
+    #[serde(default)]
+    parameters: BTreeMap<String, String>,
+}
+
+/// `POST /api/begin`
+pub async fn begin(State(app): Shared, JsonBody(body): JsonBody<Beginning>) -> Result<HttpResponse, ApiError> {
+    if !app.limits.allow_begin() {
+        return Err(ApiError::too_often());
+    }
+    if !body.consent {
+        return Err(ApiError::bad("Nobody takes part without consent."));
+    }
+    if !app.study.languages.contains(&body.language) {
+        return Err(ApiError::bad("The study does not have that language."));
+    }
+    if !body.parameters.iter().all(|(name, value)| is_parameter(name, value)) {
+        return Err(ApiError::bad("A parameter is unknown, too long, or holds other than letters, digits and -_.:@."));
+    }
+    let (id, code) =
+        participant_id().and_then(|id| Ok((id, completion_code()?))).map_err(|_| ApiError::not_stored())?;
+    let newcomer = Newcomer { id, language: body.language, parameters: body.parameters, code };
+    let quota = app.study.quota;
+    let begun = app.store.write(move |db| participants::begin(db, &newcomer, quota, now_ms())).await;
+    let begun = begun.map_err(|_| ApiError::not_stored())?;
+    let participant = begun.ok_or_else(|| ApiError::conflict("The study has all its participants. Thank you."))?;
+    let token = app.secret.token(participant.session, &participant.id);
+    Ok(json_reply(&json!({ "token": token, "state": session_state(&app.study, &participant) })))
+}
+
+fn is_parameter(name: &str, value: &str) -> bool {
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.:@".contains(&byte);
+    let begins_plain = value.bytes().next().is_none_or(|byte| byte.is_ascii_alphanumeric());
+    PARAMETERS.contains(&name) && value.len() <= LONGEST_PARAMETER && begins_plain && value.bytes().all(is_plain)
+}
+
+/// `GET /api/state`
+pub async fn state(State(app): Shared, Asker { id, .. }: Asker) -> Result<HttpResponse, ApiError> {
+    let found = app.store.write(move |db| participants::find(db, &id)).await.map_err(|_| ApiError::not_stored())?;
+    match found {
+        Some(participant) if participant.status == Status::Replaced => Err(gone()),
+        Some(participant) => Ok(json_reply(&session_state(&app.study, &participant))),
+        None => Err(withdrawn()),
+    }
+}
+
+/// `POST /api/answer`
+pub async fn answer(
+    State(app): Shared,
+    Asker { session, id }: Asker,
+    JsonBody(answer): JsonBody<GivenAnswer>,
+) -> Result<HttpResponse, ApiError> {
+    let trials = app.study.trials(session);
+    let out_of_turn = || ApiError::conflict("That trial has not been given out.");
+    let trial = trials.get(answer.position as usize).ok_or_else(out_of_turn)?;
+    check(&answer, trial, app.study.task(trial))?;
+    let terms = TrialTerms {
+        least_ms: app.study.least_ms(trial),
+        is_last: answer.position as usize + 1 == trials.len(),
+        fails_check: fails_check(&answer.response, trial),
+    };
+    let recorded = app.store.write(move |db| record(db, &id, &answer, terms, now_ms())).await;
+    match recorded.map_err(|_| ApiError::not_stored())? {
+        Recorded::Stored(participant) => {
+            Ok(json_reply(&Acknowledged { feedback: feedback(trial), state: session_state(&app.study, &participant) }))
+        }
+        Recorded::Unknown => Err(withdrawn()),
+        Recorded::Replaced => Err(gone()),
+        Recorded::Differs => Err(ApiError::conflict("That trial has another answer already.")),
+        Recorded::OutOfTurn => Err(out_of_turn()),
+        Recorded::TooSoon(left_ms) => {
+            let sentence = "The films cannot have been seen yet.";
+            Err(ApiError::new(StatusCode::TOO_EARLY, sentence).retry_after(left_ms / 1000 + 1))
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Acknowledged<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    feedback: Option<&'a Response>,
+    state: SessionState<'a>,
+}
+
+/// `POST /api/withdraw`
+pub async fn withdraw(State(app): Shared, Asker { id, .. }: Asker) -> Result<HttpResponse, ApiError> {
+    app.limits.forget(&id);
+    let known = app.store.erase(move |db| participants::withdraw(db, &id)).await.map_err(|_| ApiError::not_stored())?;
+    if known { Ok(json_reply(&json!({ "withdrawn": true }))) } else { Err(withdrawn()) }
+}
+
+/// `GET /films/{16 hexadecimal digits}.mp4`
+pub async fn film(State(app): Shared, Path(name): Path<String>, headers: HeaderMap) -> HttpResponse {
+    match name.strip_suffix(".mp4").and_then(|name| app.study.film(name)) {
+        Some(film) => films::reply(film, &headers).await,
+        None => not_found().await.into_response(),
+    }
+}

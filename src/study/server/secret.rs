@@ -1,0 +1,168 @@
+//! The secret of a study's server: a key that signs the tokens of participants, and the operator's token.
+
+use crate::stage::workdir;
+use anyhow::{Context, Result, ensure};
+use base64::Engine;
+use base64::engine::general_purpose::URL_SAFE_NO_PAD;
+use serde::{Deserialize, Serialize};
+use std::fs::{self, File, Permissions};
+use std::io::Read;
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+
+/// Bytes of a participant's random name.
+const ID: usize = 12;
+/// Bytes of a token: session, name, signature.
+const TOKEN: usize = 4 + ID + blake3::OUT_LEN;
+/// Letters of a completion code, without those that look alike.
+const CODE_LETTERS: &[u8; 32] = b"ABCDEFGHJKLMNPQRSTUVWXYZ23456789";
+
+/// Bytes that nobody can foretell.
+///
+/// # Errors
+/// A system without a source of them.
+pub fn random<const N: usize>() -> Result<[u8; N]> {
+    let mut bytes = [0; N];
+    let read = File::open("/dev/urandom").and_then(|mut source| source.read_exact(&mut bytes));
+    read.context("cannot read /dev/urandom")?;
+    Ok(bytes)
+}
+
+/// A random completion code, ten letters.
+///
+/// # Errors
+/// No randomness.
+pub fn completion_code() -> Result<String> {
+    Ok(random::<10>()?.into_iter().map(|byte| char::from(CODE_LETTERS[usize::from(byte % 32)])).collect())
+}
+
+/// A random name of a participant.
+///
+/// # Errors
+/// No randomness.
+pub fn participant_id() -> Result<String> {
+    Ok(hex(&random::<ID>()?))
+}
+
+/// Key and operator's token of one study.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StudySecret {
+    key: [u8; 32],
+    operator_token: String,
+}
+
+impl StudySecret {
+    /// Reads the secret at `path`; makes it the first time.
+    ///
+    /// # Errors
+    /// A file that others can read, or that is none of these.
+    pub fn open(path: &Path) -> Result<Self> {
+        if !path.exists() {
+            let secret = Self { key: random()?, operator_token: hex(&random::<16>()?) };
+            workdir::replace(path, |attempt| {
+                fs::set_permissions(attempt, Permissions::from_mode(0o600))?;
+                Ok(fs::write(attempt, serde_json::to_vec(&secret)?)?)
+            })?;
+        }
+        let read = || -> Result<Self> {
+            let mode = path.metadata()?.permissions().mode();
+            let others = mode & 0o077;
+            ensure!(others == 0, "others than its owner can read it; `chmod 600` it");
+            Ok(serde_json::from_slice(&fs::read(path)?)?)
+        };
+        read().with_context(|| format!("cannot use {}", path.display()))
+    }
+
+    /// Takes the operator's token from the file `path` in place of the one made.
+    ///
+    /// # Errors
+    /// No such file, or fewer than 16 characters.
+    pub fn set_operator_token(&mut self, path: &Path) -> Result<()> {
+        let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let token = text.trim();
+        let is_long = token.len() >= 16 && token.bytes().all(|byte| byte.is_ascii_graphic());
+        ensure!(is_long, "{}: the operator's token must be at least 16 letters and digits", path.display());
+        self.operator_token = token.to_owned();
+        Ok(())
+    }
+
+    pub fn operator_token(&self) -> &str {
+        &self.operator_token
+    }
+
+    /// Whether `token` is the operator's; the time it takes tells nothing of it.
+    pub fn is_operator(&self, token: &str) -> bool {
+        self.sign(token.as_bytes()) == self.sign(self.operator_token.as_bytes())
+    }
+
+    /// Token of the participant `id`, a name of [`participant_id`], in `session`.
+    pub fn token(&self, session: u32, id: &str) -> String {
+        let mut bytes = session.to_le_bytes().to_vec();
+        bytes.extend(unhex(id));
+        let signature = self.sign(&bytes);
+        bytes.extend(signature.as_bytes());
+        URL_SAFE_NO_PAD.encode(bytes)
+    }
+
+    /// Session and name of the participant whom a token was made for; `None`: it was not made here.
+    pub fn verify(&self, token: &str) -> Option<(u32, String)> {
+        let bytes: [u8; TOKEN] = URL_SAFE_NO_PAD.decode(token).ok()?.try_into().ok()?;
+        let (said, signature) = bytes.split_at(4 + ID);
+        let (session, id) = said.split_at(4);
+        let signature = blake3::Hash::from_bytes(signature.try_into().ok()?);
+        // The comparison of hashes takes the same time wherever they differ.
+        let is_signed = self.sign(said) == signature;
+        is_signed.then(|| Some((u32::from_le_bytes(session.try_into().ok()?), hex(id)))).flatten()
+    }
+
+    fn sign(&self, bytes: &[u8]) -> blake3::Hash {
+        blake3::keyed_hash(&self.key, bytes)
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn unhex(text: &str) -> Vec<u8> {
+    let pairs = text.as_bytes().chunks_exact(2).filter_map(|pair| std::str::from_utf8(pair).ok());
+    pairs.filter_map(|pair| u8::from_str_radix(pair, 16).ok()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_token_is_taken_whole_or_not_at_all() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("secret.json");
+        let secret = StudySecret::open(&path).unwrap();
+        assert_eq!(path.metadata().unwrap().permissions().mode() & 0o777, 0o600);
+        let id = participant_id().unwrap();
+        let token = secret.token(7, &id);
+        assert_eq!(StudySecret::open(&path).unwrap().verify(&token), Some((7, id.clone())), "the same key again");
+        for k in 0..token.len() {
+            let mut letters = token.clone().into_bytes();
+            letters[k] = if letters[k] == b'A' { b'B' } else { b'A' };
+            assert_eq!(secret.verify(std::str::from_utf8(&letters).unwrap()), None, "letter {k}");
+            assert_eq!(secret.verify(&token[..k]), None, "{k} letters");
+        }
+        for wrong in ["", "=", "\u{e9}", &format!("{token}="), &format!("{token}AAAA"), &token.repeat(100)] {
+            assert_eq!(secret.verify(wrong), None, "{wrong}");
+        }
+        let mut other = StudySecret { key: random().unwrap(), operator_token: String::new() };
+        assert_eq!(other.verify(&token), None, "another study's");
+        assert!(secret.is_operator(secret.operator_token()) && !secret.is_operator("") && !secret.is_operator(&token));
+
+        let given = dir.path().join("operator");
+        fs::write(&given, "short\n").unwrap();
+        assert!(format!("{:#}", other.set_operator_token(&given).unwrap_err()).contains("16 letters"));
+        fs::write(&given, "0123456789abcdef\n").unwrap();
+        other.set_operator_token(&given).unwrap();
+        assert!(other.is_operator("0123456789abcdef"));
+        fs::set_permissions(&path, Permissions::from_mode(0o644)).unwrap();
+        assert!(format!("{:#}", StudySecret::open(&path).err().unwrap()).contains("chmod 600"));
+    }
+}

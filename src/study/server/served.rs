@@ -1,0 +1,118 @@
+//! What a server serves: the plan's sessions and films, and the texts of the page.
+
+use crate::external::ffmpeg::probe::probe;
+use crate::study::file::StudyFile;
+use crate::study::folder::StudyFolder;
+use crate::study::pages::page_texts::page_texts;
+use crate::study::plan::{PlannedTask, StudyPlan, TaskDesign, Trial, TrialPhase};
+use crate::study::store::participants::Quota;
+use anyhow::{Context, Result, ensure};
+use serde_json::json;
+use std::collections::{BTreeSet, HashMap};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Milliseconds by which an answer may come before the stated end of its films: players round.
+const LEEWAY_MS: f64 = 250.0;
+
+/// Film as it is served.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ServedFilm {
+    pub path: PathBuf,
+    /// Bytes.
+    pub size: u64,
+    secs: f64,
+}
+
+/// Study as it is served.
+#[derive(Debug)]
+pub struct ServedStudy {
+    pub title: String,
+    pub languages: Vec<String>,
+    pub plan: StudyPlan,
+    /// BLAKE3 hash of the plan's file.
+    pub plan_hash: String,
+    pub quota: Quota,
+    /// Address to which a participant returns at the end.
+    pub return_url: Option<String>,
+    /// Texts and tasks, as the page reads them.
+    pub page: serde_json::Value,
+    /// By opaque name.
+    films: HashMap<String, ServedFilm>,
+}
+
+impl ServedStudy {
+    /// Reads the study in `folder`. `abandoned_secs`: time without an answer after which a place is given again.
+    ///
+    /// # Errors
+    /// A file that is missing or unreadable, a plan that names what is not there.
+    pub fn open(folder: &StudyFolder, abandoned_secs: f64) -> Result<Self> {
+        let file = StudyFile::read(&folder.study_file())?;
+        let (plan, plan_hash) = read_plan(&folder.plan())?;
+        let trials = || plan.sessions.iter().flat_map(|session| &session.trials);
+        let is_known = |trial: &Trial| trial.task < plan.tasks.len() && !trial.films.is_empty();
+        ensure!(trials().all(is_known), "{}: a trial without a film or a task", folder.plan().display());
+        let sound_check = Some(&plan.sound_check).filter(|film| !film.is_empty());
+        let names: BTreeSet<&String> = trials().flat_map(|trial| &trial.films).chain(sound_check).collect();
+        let films = names.into_iter().map(|name| Ok((name.clone(), open_film(&folder.film(name), name)?)));
+        let films = films.collect::<Result<_>>()?;
+        let quota = Quota {
+            n_sessions: u32::try_from(plan.sessions.len()).context("too many sessions")?,
+            wanted: u32::try_from(file.participants).context("too many participants")?,
+            excluded_from: file.exclusion.failed_checks,
+            abandoned_ms: (1000.0 * abandoned_secs) as i64,
+        };
+        let page = json!({
+            "title": file.title,
+            "languages": file.languages,
+            "texts": page_texts(&file.languages, &file.texts),
+            "tasks": plan.tasks,
+            "n_trials": plan.sessions.first().map_or(0, |session| session.trials.len()),
+            "sound_check": sound_check,
+        });
+        let (title, languages, return_url) = (file.title, file.languages, file.return_url);
+        Ok(Self { title, languages, plan, plan_hash, quota, return_url, page, films })
+    }
+
+    /// Film of that opaque name; no other file is served.
+    pub fn film(&self, name: &str) -> Option<&ServedFilm> {
+        self.films.get(name)
+    }
+
+    /// Films of the study.
+    pub fn n_films(&self) -> usize {
+        self.films.len()
+    }
+
+    /// Trials of a session, in their order.
+    pub fn trials(&self, session: u32) -> &[Trial] {
+        self.plan.sessions.get(session as usize).map_or(&[], |session| &session.trials)
+    }
+
+    /// Task of a trial of the plan.
+    pub fn task(&self, trial: &Trial) -> &PlannedTask {
+        &self.plan.tasks[trial.task]
+    }
+
+    /// Milliseconds in which the films of a trial can be seen: two together, those of sliders and more than two in turn.
+    pub fn least_ms(&self, trial: &Trial) -> i64 {
+        let is_rated = self.task(trial).design == TaskDesign::Sliders && trial.phase != TrialPhase::AttentionCheck;
+        let secs = trial.films.iter().filter_map(|film| self.film(film)).map(|film| film.secs);
+        let secs = if is_rated || trial.films.len() > 2 { secs.sum() } else { secs.fold(0.0, f64::max) };
+        (1000.0 * secs - LEEWAY_MS).max(0.0) as i64
+    }
+}
+
+fn read_plan(path: &Path) -> Result<(StudyPlan, String)> {
+    let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let plan = serde_json::from_slice(&bytes).with_context(|| format!("{} is not a study's plan", path.display()))?;
+    Ok((plan, blake3::hash(&bytes).to_hex().to_string()))
+}
+
+fn open_film(path: &Path, name: &str) -> Result<ServedFilm> {
+    let is_opaque = name.len() == 16 && name.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'));
+    ensure!(is_opaque, "the plan names a film {name:?}, which is not 16 hexadecimal digits");
+    let size = fs::metadata(path).with_context(|| format!("cannot read the film {}", path.display()))?.len();
+    let secs = probe(path)?.duration_secs.with_context(|| format!("{} does not state its length", path.display()))?;
+    Ok(ServedFilm { path: path.to_owned(), size, secs })
+}

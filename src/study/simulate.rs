@@ -1,0 +1,101 @@
+//! Votes of a study that never took place: participants and clips drawn from populations with known effects. Power and
+//! the checks of the analysis rest on them.
+
+use super::stats::cluster::votes::ClipVote;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use serde::Serialize;
+
+/// Steps and reach, in standard deviations, of the integral over a normal distribution.
+const STEPS: i32 = 400;
+const REACH: f64 = 8.0;
+
+/// Who votes about what: every participant about as many different clips, every clip about as often.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct CrossedDesign {
+    pub n_participants: usize,
+    /// Votes of each participant.
+    pub n_trials: usize,
+    pub n_clips: usize,
+}
+
+/// Population that participants and clips are drawn from.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CrossedEffects {
+    /// Share of successes over all participants and clips.
+    pub share: f64,
+    /// Standard deviation of participants, log odds.
+    pub sd_participants: f64,
+    /// Standard deviation of clips, log odds.
+    pub sd_clips: f64,
+}
+
+impl CrossedEffects {
+    /// Log odds of a typical participant and clip that give the share over all, by bisection.
+    pub fn log_odds(&self) -> f64 {
+        let sd = self.sd_participants.hypot(self.sd_clips);
+        let (mut low, mut high) = (-50.0, 50.0);
+        for _ in 0..80 {
+            let middle = (low + high) / 2.0;
+            if mean_probability(middle, sd) < self.share { low = middle } else { high = middle }
+        }
+        (low + high) / 2.0
+    }
+}
+
+/// Probability of success at these log odds.
+fn probability(log_odds: f64) -> f64 {
+    1.0 / (1.0 + (-log_odds).exp())
+}
+
+/// Mean probability where log odds have this mean and standard deviation.
+fn mean_probability(mean: f64, sd: f64) -> f64 {
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for step in 0..=STEPS {
+        let z = REACH * f64::from(2 * step - STEPS) / f64::from(STEPS);
+        let weight = (-z * z / 2.0).exp();
+        sum += weight * probability(mean + sd * z);
+        weights += weight;
+    }
+    sum / weights
+}
+
+/// Votes of a study, drawn anew for each `stream` of the seed.
+pub fn crossed_votes(design: &CrossedDesign, effects: &CrossedEffects, seed: u64, stream: u64) -> Vec<ClipVote> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(stream);
+    let mut drawn =
+        |n: usize, sd: f64| -> Vec<f64> { (0..n).map(|_| sd * rng.sample::<f64, _>(StandardNormal)).collect() };
+    let participants = drawn(design.n_participants, effects.sd_participants);
+    let clips = drawn(design.n_clips, effects.sd_clips);
+    let mean = effects.log_odds();
+    let places =
+        (0..design.n_participants).flat_map(|participant| (0..design.n_trials).map(move |trial| (participant, trial)));
+    let mut vote = |(participant, trial): (usize, usize)| {
+        let clip = (participant * design.n_trials + trial) % design.n_clips.max(1);
+        let is_success = rng.random::<f64>() < probability(mean + participants[participant] + clips[clip]);
+        ClipVote { participant, clip, score: f64::from(u8::from(is_success)) }
+    };
+    places.map(&mut vote).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_and_balance_are_those_asked_for() {
+        let effects = CrossedEffects { share: 0.6, sd_participants: 0.5, sd_clips: 0.5 };
+        assert!(effects.log_odds() > (0.6f64 / 0.4).ln());
+        assert!(CrossedEffects { share: 0.5, ..effects }.log_odds().abs() < 1e-9);
+        let design = CrossedDesign { n_participants: 2000, n_trials: 10, n_clips: 2000 };
+        let votes = crossed_votes(&design, &effects, 1, 0);
+        let share = votes.iter().map(|vote| vote.score).sum::<f64>() / votes.len() as f64;
+        assert!((share - 0.6).abs() < 0.015, "{share}");
+        let of_clip = |clip: usize| votes.iter().filter(|vote| vote.clip == clip).count();
+        assert!((0..2000).all(|clip| of_clip(clip) == 10));
+        assert_eq!(votes, crossed_votes(&design, &effects, 1, 0));
+        assert_ne!(votes, crossed_votes(&design, &effects, 1, 1));
+    }
+}

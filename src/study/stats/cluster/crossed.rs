@@ -1,0 +1,239 @@
+//! Mean score with the error that other participants and other clips would bring: crossed variance, a t distribution
+//! with Satterthwaite's degrees of freedom. Assumes that participants and clips are each a sample, drawn independently,
+//! and that votes which share neither are independent. Two of both are needed, some 20 for the t distribution to hold.
+
+use super::super::error::{StatisticsError, at_least};
+use super::super::estimate::StudentEstimate;
+use super::votes::{CLIP, ClipVote, PAIR, PARTICIPANT, VoteGroups, scores};
+use std::ops::Range;
+
+/// Mean of all votes, each with the same weight.
+pub fn crossed_estimate(votes: &[ClipVote]) -> Result<StudentEstimate, StatisticsError> {
+    estimate(&[votes], &[1.0])
+}
+
+/// Mean of the votes in `first` less that in `second`; participants and clips may occur in both, and what these have
+/// in common then cancels.
+pub fn crossed_difference(first: &[ClipVote], second: &[ClipVote]) -> Result<StudentEstimate, StatisticsError> {
+    estimate(&[first, second], &[1.0, -1.0])
+}
+
+/// Weighted sum of the cells' means. Degrees of freedom as by Satterthwaite 1946, of an effective number of groups.
+fn estimate(cells: &[&[ClipVote]], weights: &[f64]) -> Result<StudentEstimate, StatisticsError> {
+    let groups = VoteGroups::new(cells)?;
+    let mut start = 0;
+    let mut contrast = Contrast(Vec::new());
+    for (votes, weight) in cells.iter().zip(weights) {
+        // With two of both there are two votes that share nothing.
+        let own = VoteGroups::new(&[votes])?;
+        at_least("participants", 2, own.n[PARTICIPANT])?;
+        at_least("clips", 2, own.n[CLIP])?;
+        contrast.0.push((start..start + votes.len(), *weight));
+        start += votes.len();
+    }
+    // Rounding alone makes equal scores differ from their mean by a few last places.
+    if cells.iter().all(|votes| votes.iter().all(|vote| vote.score == votes[0].score)) {
+        return Err(StatisticsError::NoSpread { what: "scores" });
+    }
+    let scores = scores(cells);
+    let variance = contrast.variance(&groups, &scores);
+    let freedom = variance.degrees_of_freedom(contrast.effective_groups(&groups));
+    StudentEstimate::new(contrast.value(&scores), variance.total().sqrt(), freedom)
+}
+
+/// Cells, each a range of the votes, and the weights of their means in a sum.
+pub(in super::super) struct Contrast(pub Vec<(Range<usize>, f64)>);
+
+/// Variance of a contrast: the parts of participants, clips and single votes. A part whose estimate is negative is 0.
+pub(in super::super) struct CrossedVariance {
+    parts: [f64; 3],
+}
+
+impl CrossedVariance {
+    pub fn total(&self) -> f64 {
+        self.parts.iter().sum()
+    }
+
+    /// Degrees of freedom of the total (Satterthwaite 1946), as of mean squares of participants, of clips and of single
+    /// votes with degrees of freedom `of`; that of participants contains single votes, and so does that of clips.
+    fn degrees_of_freedom(&self, of: [f64; 3]) -> f64 {
+        let [participants, clips, votes] = self.parts;
+        let share = |part: f64, freedom: f64| part * part / freedom;
+        let error = match (participants > 0.0, clips > 0.0) {
+            (true, true) => share(participants + votes, of[0]) + share(clips + votes, of[1]) + share(votes, of[2]),
+            (true, false) => share(participants + votes, of[0]),
+            (false, true) => share(clips + votes, of[1]),
+            (false, false) => share(votes, of[2]),
+        };
+        (self.total().powi(2) / error).max(1.0)
+    }
+}
+
+impl Contrast {
+    pub fn value(&self, scores: &[f64]) -> f64 {
+        self.0.iter().map(|(cell, weight)| weight * mean(&scores[cell.clone()])).sum()
+    }
+
+    /// Covariances of votes that share a participant, a clip or both, as means of products of their deviations less the
+    /// mean product of votes that share nothing: without bias where the design is balanced, and then those of the
+    /// analysis of variance. Their sum is the two-way clustered variance of Cameron, Gelbach and Miller 2011 but for its
+    /// divisor. 0 where no two votes share nothing.
+    pub fn variance(&self, groups: &VoteGroups, scores: &[f64]) -> CrossedVariance {
+        let sums: Vec<[Vec<(f64, f64)>; 3]> = self.0.iter().map(|(cell, _)| group_sums(cell, groups, scores)).collect();
+        let mut parts = [0.0; 3];
+        for (a, (cell_a, weight_a)) in sums.iter().zip(&self.0) {
+            for (b, (cell_b, weight_b)) in sums.iter().zip(&self.0) {
+                // Pairs of votes and sums of their products; pairs that share both are in all three.
+                let [participants, clips, both] = [PARTICIPANT, CLIP, PAIR].map(|kind| {
+                    let pairs = a[kind].iter().zip(&b[kind]);
+                    pairs.fold((0.0, 0.0), |(n, sum), (a, b)| (n + a.0 * b.0, sum + a.1 * b.1))
+                });
+                let all = (cell_a.len() * cell_b.len()) as f64;
+                let n_apart = all - participants.0 - clips.0 + both.0;
+                // Deviations add up to 0, so that those of all pairs do.
+                let apart = if n_apart > 0.0 { (both.1 - participants.1 - clips.1) / n_apart } else { 0.0 };
+                let weight = weight_a * weight_b / all;
+                let covariance = |(n, sum): (f64, f64)| weight * (sum - n * apart);
+                parts[PARTICIPANT] += covariance((participants.0 - both.0, participants.1 - both.1));
+                parts[CLIP] += covariance((clips.0 - both.0, clips.1 - both.1));
+                parts[PAIR] += covariance(both);
+            }
+        }
+        CrossedVariance { parts: parts.map(|part| part.max(0.0)) }
+    }
+
+    /// Number of participants, clips and pairs, groups with few votes counting less (Carter, Schnepel and Steigerwald
+    /// 2017), less the number of means that separate groups have given.
+    fn effective_groups(&self, groups: &VoteGroups) -> [f64; 3] {
+        [PARTICIPANT, CLIP, PAIR].map(|kind| {
+            let mut shares = vec![0.0; groups.n[kind]];
+            let mut is_shared = false;
+            for (cell, _) in &self.0 {
+                let before = shares.clone();
+                for vote in cell.clone() {
+                    let group = groups.of[kind][vote];
+                    shares[group] += 1.0 / cell.len() as f64;
+                    is_shared |= before[group] > 0.0;
+                }
+            }
+            let (sum, squares) = shares.iter().fold((0.0, 0.0), |(sum, squares), s| (sum + s, squares + s * s));
+            let n_means = if is_shared { 1 } else { self.0.len() };
+            (sum * sum / squares - n_means as f64).max(1.0)
+        })
+    }
+}
+
+/// Number of votes and sum of deviations from the cell's mean, for each group.
+fn group_sums(cell: &Range<usize>, groups: &VoteGroups, scores: &[f64]) -> [Vec<(f64, f64)>; 3] {
+    let mean = mean(&scores[cell.clone()]);
+    [PARTICIPANT, CLIP, PAIR].map(|kind| {
+        let mut sums = vec![(0.0, 0.0); groups.n[kind]];
+        for vote in cell.clone() {
+            let (n, sum) = &mut sums[groups.of[kind][vote]];
+            *n += 1.0;
+            *sum += scores[vote] - mean;
+        }
+        sums
+    })
+}
+
+fn mean(scores: &[f64]) -> f64 {
+    scores.iter().sum::<f64>() / scores.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// Score with an effect of the participant, one of the clip, and chance; `n` selects another set of numbers.
+    fn score(n: usize, participant: usize, clip: usize) -> f64 {
+        let random = |kind: u64, number: usize| {
+            ChaCha8Rng::seed_from_u64(n as u64 * 1_000_000 + kind * 10_000 + number as u64).random::<f64>()
+        };
+        random(0, participant) + 0.7 * random(1, clip) + random(2, 100 * participant + clip)
+    }
+
+    fn crossed(n: usize, participants: usize, clips: Range<usize>) -> Vec<ClipVote> {
+        let votes = (0..participants).flat_map(|participant| clips.clone().map(move |clip| (participant, clip)));
+        votes.map(|(participant, clip)| ClipVote { participant, clip, score: score(n, participant, clip) }).collect()
+    }
+
+    /// Where every participant votes on every clip, the variance is that of the two-way analysis of variance:
+    /// (mean square of participants + of clips - of the rest) / votes.
+    #[test]
+    fn full_crossing_gives_the_analysis_of_variance() {
+        let (n_p, n_c) = (9, 7);
+        let votes = crossed(1, n_p, 0..n_c);
+        let mean = |kept: &dyn Fn(&ClipVote) -> bool| {
+            let scores: Vec<f64> = votes.iter().filter(|vote| kept(vote)).map(|vote| vote.score).collect();
+            scores.iter().sum::<f64>() / scores.len() as f64
+        };
+        let grand = mean(&|_| true);
+        let squares = |n: usize, of: &dyn Fn(usize) -> f64| (0..n).map(|k| (of(k) - grand).powi(2)).sum::<f64>();
+        let of_participants = squares(n_p, &|p| mean(&|vote| vote.participant == p)) * n_c as f64;
+        let of_clips = squares(n_c, &|c| mean(&|vote| vote.clip == c)) * n_p as f64;
+        let all: f64 = votes.iter().map(|vote| (vote.score - grand).powi(2)).sum();
+        let rest = all - of_participants - of_clips;
+        let (p, c) = (n_p as f64, n_c as f64);
+        let squares = [of_participants / (p - 1.0), of_clips / (c - 1.0), rest / ((p - 1.0) * (c - 1.0))];
+        let expected = (squares[0] + squares[1] - squares[2]) / (p * c);
+        let estimate = crossed_estimate(&votes).unwrap();
+        assert!((estimate.standard_error.powi(2) / expected - 1.0).abs() < 1e-9, "{estimate:?} {expected}");
+        assert!((estimate.value - grand).abs() < 1e-12);
+    }
+
+    /// The mean of the estimated variances is the variance of the means, over 400 drawn studies.
+    #[test]
+    fn variance_is_unbiased() {
+        for differ in [false, true] {
+            let studies: Vec<(f64, f64)> = (0..400)
+                .map(|n| {
+                    let votes = crossed(31 * n, 12, 0..10);
+                    let other: Vec<ClipVote> = crossed(31 * n + 7000, 12, 6..14);
+                    let estimate =
+                        if differ { crossed_difference(&votes, &other) } else { crossed_estimate(&votes) }.unwrap();
+                    (estimate.value, estimate.standard_error.powi(2))
+                })
+                .collect();
+            let mean = |of: &dyn Fn(&(f64, f64)) -> f64| studies.iter().map(of).sum::<f64>() / 400.0;
+            let centre = mean(&|study| study.0);
+            let ratio = mean(&|study| study.1) / mean(&|study| (study.0 - centre).powi(2));
+            assert!((ratio - 1.0).abs() < 0.15, "{differ} {ratio}");
+        }
+    }
+
+    #[test]
+    fn votes_on_both_cells_cancel_what_they_share() {
+        let votes = crossed(3, 12, 0..10);
+        let mut better = votes.clone();
+        better
+            .iter_mut()
+            .for_each(|vote| vote.score += if (vote.participant + vote.clip) % 2 == 0 { 0.3 } else { 0.1 });
+        let (alone, difference) = (crossed_estimate(&votes).unwrap(), crossed_difference(&better, &votes).unwrap());
+        assert!((difference.value - 0.2).abs() < 1e-12 && difference.standard_error < alone.standard_error / 5.0);
+        let same = crossed_difference(&votes, &votes);
+        assert!(matches!(same, Err(StatisticsError::NoSpread { .. })), "{same:?}");
+    }
+
+    #[test]
+    fn two_participants_and_clips_are_needed() {
+        let what = |result| match result {
+            Err(StatisticsError::TooFew { what, .. }) => what,
+            _ => "",
+        };
+        assert_eq!(what(crossed_estimate(&crossed(1, 1, 0..9))), "participants");
+        assert_eq!(what(crossed_estimate(&crossed(1, 9, 0..1))), "clips");
+        assert_eq!(what(crossed_estimate(&[])), "votes");
+        // Each vote shares its participant or its clip with every other.
+        let star =
+            [(0, 0), (0, 1), (1, 0)].map(|(participant, clip)| ClipVote { participant, clip, score: clip as f64 });
+        assert!(crossed_estimate(&star[..2]).is_err() && crossed_estimate(&star).is_ok());
+        let same = crossed(1, 5, 0..5).into_iter().map(|vote| ClipVote { score: 0.3, ..vote }).collect::<Vec<_>>();
+        assert!(matches!(crossed_estimate(&same), Err(StatisticsError::NoSpread { .. })));
+        assert_eq!(what(crossed_difference(&crossed(1, 9, 0..9), &crossed(1, 9, 0..1))), "clips");
+        let wrong = [ClipVote { participant: 0, clip: 0, score: f64::NAN }];
+        assert!(matches!(crossed_estimate(&wrong), Err(StatisticsError::NotFinite { .. })));
+    }
+}

@@ -1,0 +1,111 @@
+//! Two one-sided tests: whether a value lies within a stated bound of another (Schuirmann 1987). A test that finds no
+//! difference does not show that there is none; this one can. The bound is fixed before the data are seen.
+
+use super::error::{StatisticsError, within};
+use super::estimate::{ConfidenceInterval, StudentEstimate};
+use super::proportion::BinomialCount;
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+/// Level of each one-sided test.
+const LEVEL: f64 = 0.05;
+
+/// Outcome of two one-sided tests.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Equivalence {
+    /// Largest difference that counts as none, in the unit of the estimate: 0.05 is 5 points of percent.
+    pub bound: f64,
+    /// Larger of the two one-sided p values.
+    pub p: f64,
+    /// 90 % interval of the value, which lies inside the bounds when the test passes.
+    pub interval: ConfidenceInterval,
+}
+
+impl Equivalence {
+    /// Tests at 5 % whether the true value of `estimate` is less than `bound` away from `expected`.
+    pub fn of_estimate(estimate: &StudentEstimate, expected: f64, bound: f64) -> Result<Self, StatisticsError> {
+        within("bound", bound, f64::MIN_POSITIVE..=f64::MAX)?;
+        let above = estimate.beyond(estimate.statistic(expected - bound));
+        let below = estimate.beyond(-estimate.statistic(expected + bound));
+        Ok(Self { bound, p: above.max(below), interval: estimate.interval(1.0 - 2.0 * LEVEL)? })
+    }
+
+    /// Exact binomial form for independent trials: the bounds must lie between 0 and 1.
+    pub fn of_count(count: &BinomialCount, expected: f64, bound: f64) -> Result<Self, StatisticsError> {
+        within("bound", bound, f64::MIN_POSITIVE..=1.0)?;
+        let p = count.at_least(expected - bound)?.max(count.at_most(expected + bound)?);
+        Ok(Self { bound, p, interval: count.exact(1.0 - 2.0 * LEVEL)? })
+    }
+
+    /// Whether equivalence within the bound is shown at 5 %.
+    pub fn passes(&self) -> bool {
+        self.p < LEVEL
+    }
+}
+
+/// Independent votes from which two one-sided tests at 5 % pass with probability `power` where half of all votes
+/// succeed in truth: (z of 0.95 + z of (1 + power) / 2)^2 / (4 bound^2), rounded up.
+pub fn votes_needed(bound: f64, power: f64) -> Result<u64, StatisticsError> {
+    within("bound", bound, 1e-6..=0.5)?;
+    within("power", power, 0.0..=1.0 - f64::EPSILON)?;
+    let normal = Normal::standard();
+    let z = normal.inverse_cdf(1.0 - LEVEL) + normal.inverse_cdf((1.0 + power) / 2.0);
+    Ok((z * z / (4.0 * bound * bound)).ceil() as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 1,050 of 2,000 votes, the pooled counts of Rebol, Guetl and Pietroszek 2021, table III.
+    #[test]
+    fn pooled_votes_of_the_paper_are_equivalent_to_chance() {
+        let count = BinomialCount::new(1050, 2000).unwrap();
+        let exact = |bound| Equivalence::of_count(&count, 0.5, bound).unwrap();
+        assert!((exact(0.10).p / 6.51e-12 - 1.0).abs() < 0.01 && exact(0.10).passes(), "{}", exact(0.10).p);
+        assert!((exact(0.05).p - 0.0131).abs() < 5e-5 && exact(0.05).passes(), "{}", exact(0.05).p);
+        assert!(!exact(0.03).passes());
+        let estimate = StudentEstimate::new(0.525, count.standard_error(), f64::INFINITY).unwrap();
+        let asymptotic = Equivalence::of_estimate(&estimate, 0.5, 0.05).unwrap();
+        assert!((asymptotic.p - 0.0126).abs() < 5e-5, "{}", asymptotic.p);
+    }
+
+    #[test]
+    fn votes_for_equivalence_follow_the_formula() {
+        assert_eq!([0.05, 0.10].map(|bound| votes_needed(bound, 0.9).unwrap()), [1083, 271]);
+        assert!(votes_needed(0.0, 0.9).is_err() && votes_needed(0.05, 1.0).is_err());
+    }
+
+    #[test]
+    fn numbers_are_those_of_statsmodels() {
+        let golden: serde_json::Value =
+            serde_json::from_str(include_str!("../../../fixtures/reference/study_stats_golden.json")).unwrap();
+        for case in golden["equivalence"].as_array().unwrap() {
+            let values: Vec<f64> = serde_json::from_value(case["values"].clone()).unwrap();
+            let bound = case["bound"].as_f64().unwrap();
+            let test = Equivalence::of_estimate(&StudentEstimate::of_mean(&values).unwrap(), 0.5, bound).unwrap();
+            let expected = case["p"].as_f64().unwrap();
+            assert!((test.p - expected).abs() <= 1e-9 * expected, "{} {expected}", test.p);
+        }
+        for case in golden["binomial_equivalence"].as_array().unwrap() {
+            let number = |name: &str| case[name].as_f64().unwrap();
+            let count = BinomialCount::new(number("successes") as u64, number("trials") as u64).unwrap();
+            let found = Equivalence::of_count(&count, 0.5, number("bound")).unwrap().p;
+            assert!((found - number("p")).abs() <= 1e-9 * number("p"), "{found} {case}");
+        }
+    }
+
+    /// The interval is inside the bounds exactly where the test passes.
+    #[test]
+    fn interval_and_p_value_agree() {
+        for value in [0.47, 0.5, 0.52, 0.529, 0.531, 0.56] {
+            let estimate = StudentEstimate::new(value, 0.012, 39.0).unwrap();
+            let test = Equivalence::of_estimate(&estimate, 0.5, 0.05).unwrap();
+            let inside = test.interval.low > 0.45 && test.interval.high < 0.55;
+            assert_eq!(inside, test.passes(), "{value}");
+        }
+        let estimate = StudentEstimate::new(0.5, 0.01, 9.0).unwrap();
+        assert!(Equivalence::of_estimate(&estimate, 0.5, f64::NAN).is_err());
+        assert!(Equivalence::of_count(&BinomialCount::new(1, 2).unwrap(), 0.95, 0.1).is_err());
+    }
+}

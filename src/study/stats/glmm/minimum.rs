@@ -1,0 +1,94 @@
+//! Minimum of a smooth function of a few parameters whose curvature is about 1: quasi-Newton steps (Broyden, Fletcher,
+//! Goldfarb, Shanno 1970) with central differences, and the curvature at the minimum.
+
+use ndarray::{Array1, Array2};
+
+const MOST: usize = 200;
+/// Step of the differences for slopes and for curvatures.
+const SLOPE_STEP: f64 = 1e-3;
+const CURVATURE_STEP: f64 = 0.02;
+/// Largest slope at a minimum.
+const FLAT: f64 = 1e-4;
+
+/// Where the search ended.
+pub(super) struct Minimum {
+    pub at: Array1<f64>,
+    pub value: f64,
+    pub converged: bool,
+}
+
+fn moved(at: &Array1<f64>, moves: &[(usize, f64)]) -> Array1<f64> {
+    let mut moved = at.clone();
+    moves.iter().for_each(|(k, step)| moved[*k] += step);
+    moved
+}
+
+fn slopes(f: &mut impl FnMut(&Array1<f64>) -> f64, at: &Array1<f64>) -> Array1<f64> {
+    (0..at.len())
+        .map(|k| (f(&moved(at, &[(k, SLOPE_STEP)])) - f(&moved(at, &[(k, -SLOPE_STEP)]))) / (2.0 * SLOPE_STEP))
+        .collect()
+}
+
+/// Searches from `start`; a step is at most 5 long in each parameter.
+pub(super) fn minimum(mut f: impl FnMut(&Array1<f64>) -> f64, start: Array1<f64>) -> Minimum {
+    let n = start.len();
+    let (mut at, mut inverse) = (start, Array2::<f64>::eye(n));
+    let (mut value, mut slope) = (f(&at), slopes(&mut f, &at));
+    for _ in 0..MOST {
+        if slope.iter().all(|v| v.abs() < FLAT) {
+            return Minimum { at, value, converged: true };
+        }
+        let mut direction = -inverse.dot(&slope);
+        if direction.dot(&slope) >= 0.0 {
+            inverse = Array2::eye(n);
+            direction = -slope.clone();
+        }
+        let longest = direction.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        direction *= (5.0 / longest).min(1.0);
+        let fall = direction.dot(&slope);
+        let mut share = 1.0;
+        let (next, next_value) = loop {
+            let next = &at + &(&direction * share);
+            let next_value = f(&next);
+            if next_value <= value + 1e-4 * share * fall {
+                break (next, next_value);
+            }
+            share *= 0.4;
+            if share < 1e-7 {
+                // No way down that differences can tell.
+                let converged = slope.iter().all(|v| v.abs() < 100.0 * FLAT);
+                return Minimum { at, value, converged };
+            }
+        };
+        let next_slope = slopes(&mut f, &next);
+        let (step, change) = (&next - &at, &next_slope - &slope);
+        let along = step.dot(&change);
+        if along > 1e-12 {
+            let turned = inverse.dot(&change);
+            let factor = (1.0 + change.dot(&turned) / along) / along;
+            for i in 0..n {
+                for j in 0..n {
+                    inverse[[i, j]] += factor * step[i] * step[j] - (turned[i] * step[j] + step[i] * turned[j]) / along;
+                }
+            }
+        }
+        (at, value, slope) = (next, next_value, next_slope);
+    }
+    Minimum { at, value, converged: false }
+}
+
+/// Second derivatives [n, n].
+pub(super) fn curvature(mut f: impl FnMut(&Array1<f64>) -> f64, at: &Array1<f64>) -> Array2<f64> {
+    let (n, h) = (at.len(), CURVATURE_STEP);
+    let centre = f(at);
+    let mut second = Array2::zeros((n, n));
+    for i in 0..n {
+        second[[i, i]] = (f(&moved(at, &[(i, h)])) + f(&moved(at, &[(i, -h)])) - 2.0 * centre) / (h * h);
+        for j in 0..i {
+            let mut corner = |a: f64, b: f64| f(&moved(at, &[(i, a), (j, b)]));
+            let mixed = (corner(h, h) + corner(-h, -h) - corner(h, -h) - corner(-h, h)) / (4.0 * h * h);
+            (second[[i, j]], second[[j, i]]) = (mixed, mixed);
+        }
+    }
+    second
+}

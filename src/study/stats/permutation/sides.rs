@@ -1,0 +1,116 @@
+//! Randomisation test of the plan's own draw: which side the real film was on. Assumes nothing about participants or
+//! clips, only that the plan drew sides at random. It tests the sharp hypothesis that nobody's choice depends on where
+//! the real film is, for any clip. Easy clips that hard ones outweigh contradict it and may lead to its rejection.
+
+use super::super::error::{StatisticsError, at_least};
+use serde::Serialize;
+use statrs::distribution::{Discrete, Hypergeometric};
+
+/// Trials among which the plan fixed how often the real film is on the left and drew at random in which: those of a
+/// participant, or of a participant and a condition. Of trials whose sides were drawn one by one,
+/// `BinomialCount::test` is the exact test.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SideBlock {
+    trials: u64,
+    real_left: u64,
+    chosen_left: u64,
+    /// Trials in which the left film was both real and chosen.
+    left_hits: u64,
+}
+
+/// Outcome of a randomisation test.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SideTest {
+    /// Trials in which the real film was chosen.
+    pub correct: u64,
+    /// Mean of `correct` over all draws of sides, the choices being as they are.
+    pub expected: f64,
+    /// Share of draws whose `correct` is as far from `expected` or farther, on either side.
+    pub p: f64,
+}
+
+impl SideBlock {
+    /// Adds a trial.
+    pub fn push(&mut self, real_left: bool, chosen_left: bool) {
+        self.trials += 1;
+        self.real_left += u64::from(real_left);
+        self.chosen_left += u64::from(chosen_left);
+        self.left_hits += u64::from(real_left && chosen_left);
+    }
+}
+
+/// Exact test over all draws of sides that leave the number of real films on the left of each block: a sum of
+/// hypergeometric counts (Fisher 1935), by convolution.
+pub fn side_test(blocks: &[SideBlock]) -> Result<SideTest, StatisticsError> {
+    let trials: u64 = blocks.iter().map(|block| block.trials).sum();
+    at_least("trials", 1, trials.min(1) as usize)?;
+    // Probabilities of the number of left hits.
+    let mut distribution = vec![1.0];
+    let mut mean = 0.0;
+    for block in blocks.iter().filter(|block| block.trials > 0) {
+        let counts = Hypergeometric::new(block.trials, block.real_left, block.chosen_left);
+        let most = block.real_left.min(block.chosen_left);
+        let weights: Vec<f64> = (0..=most).map(|k| counts.as_ref().map_or(0.0, |counts| counts.pmf(k))).collect();
+        let mut sums = vec![0.0; distribution.len() + most as usize];
+        for (k, before) in distribution.iter().enumerate() {
+            weights.iter().zip(&mut sums[k..]).for_each(|(weight, sum)| *sum += before * weight);
+        }
+        distribution = sums;
+        mean += block.real_left as f64 * block.chosen_left as f64 / block.trials as f64;
+    }
+    let total = |of: fn(&SideBlock) -> u64| blocks.iter().map(of).sum::<u64>();
+    let hits = total(|block| block.left_hits);
+    let far = (hits as f64 - mean).abs() - 1e-9;
+    let outcomes = distribution.iter().enumerate().filter(|(k, _)| (*k as f64 - mean).abs() >= far);
+    let p: f64 = outcomes.map(|(_, p)| p).sum();
+    // Each hit more on the left is one more on the right.
+    let right_less_left =
+        trials as f64 - total(|block| block.real_left) as f64 - total(|block| block.chosen_left) as f64;
+    let correct = |hits: f64| 2.0 * hits + right_less_left;
+    Ok(SideTest { correct: correct(hits as f64) as u64, expected: correct(mean), p: p.min(1.0) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn block(trials: &[(bool, bool)]) -> SideBlock {
+        let mut block = SideBlock::default();
+        trials.iter().for_each(|(real, chosen)| block.push(*real, *chosen));
+        block
+    }
+
+    /// Two blocks of three trials, one real film on the left in the first, two in the second: all nine draws.
+    #[test]
+    fn p_is_the_share_of_all_draws() {
+        let (first, second) = ([true, false, false], [true, true, false]);
+        for chosen in 0..64u32 {
+            let chosen: Vec<bool> = (0..6).map(|k| chosen >> k & 1 == 1).collect();
+            let right = |real: [bool; 3], chosen: &[bool]| (0..3).filter(|k| real[*k] == chosen[*k]).count() as f64;
+            let mut draws = Vec::new();
+            for a in 0..3 {
+                for b in 0..3 {
+                    let (mut x, mut y) = (first, second);
+                    x.rotate_right(a);
+                    y.rotate_right(b);
+                    draws.push(right(x, &chosen[..3]) + right(y, &chosen[3..]));
+                }
+            }
+            let mean = draws.iter().sum::<f64>() / 9.0;
+            let far = |correct: f64| (correct - mean).abs();
+            let p = draws.iter().filter(|draw| far(**draw) >= far(draws[0]) - 1e-9).count() as f64 / 9.0;
+            let blocks = [(first, &chosen[..3]), (second, &chosen[3..])]
+                .map(|(real, chosen)| block(&real.into_iter().zip(chosen.iter().copied()).collect::<Vec<_>>()));
+            let test = side_test(&blocks).unwrap();
+            assert_eq!(test.correct as f64, draws[0]);
+            assert!((test.p - p).abs() < 1e-12 && (test.expected - mean).abs() < 1e-12, "{test:?} {p} {mean}");
+        }
+    }
+
+    #[test]
+    fn who_always_chooses_left_shows_nothing() {
+        let left = block(&[(true, true), (false, true), (true, true), (false, true)]);
+        assert_eq!(side_test(&[left, SideBlock::default()]), Ok(SideTest { correct: 2, expected: 2.0, p: 1.0 }));
+        assert!(side_test(&[]).is_err() && side_test(&[SideBlock::default()]).is_err());
+    }
+}

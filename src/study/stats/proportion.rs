@@ -1,0 +1,167 @@
+//! A number of successes among independent trials: Wilson's and the exact interval, the exact binomial test. Votes of
+//! one participant, or about one clip, are not independent: `cluster` is for those.
+
+use super::error::{StatisticsError, at_least, tail, within};
+use super::estimate::ConfidenceInterval;
+use serde::Serialize;
+use statrs::distribution::{Beta, Binomial, ContinuousCDF, Discrete, DiscreteCDF, Normal};
+
+/// Outcomes whose probability exceeds that of the observed one by less than this share count as equally likely
+/// (scipy's `binomtest`).
+const EQUALLY_LIKELY: f64 = 1e-7;
+
+/// Successes among independent trials.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct BinomialCount {
+    successes: u64,
+    trials: u64,
+}
+
+impl BinomialCount {
+    /// Refuses 0 trials and more successes than trials.
+    pub fn new(successes: u64, trials: u64) -> Result<Self, StatisticsError> {
+        at_least("votes", 1, trials.min(1) as usize)?;
+        within("successes", successes as f64, 0.0..=trials as f64)?;
+        Ok(Self { successes, trials })
+    }
+
+    pub fn successes(&self) -> u64 {
+        self.successes
+    }
+
+    pub fn trials(&self) -> u64 {
+        self.trials
+    }
+
+    /// Share of successes, 0 to 1.
+    pub fn share(&self) -> f64 {
+        self.successes as f64 / self.trials as f64
+    }
+
+    /// Standard error of the share by its own variance (Wald): 0 where all trials agree.
+    pub fn standard_error(&self) -> f64 {
+        (self.share() * (1.0 - self.share()) / self.trials as f64).sqrt()
+    }
+
+    /// Interval of the score test (Wilson 1927): covers close to `confidence` on average over shares.
+    pub fn wilson(&self, confidence: f64) -> Result<ConfidenceInterval, StatisticsError> {
+        let z = Normal::standard().inverse_cdf(1.0 - tail(confidence)?);
+        let (n, share) = (self.trials as f64, self.share());
+        let scale = 1.0 + z * z / n;
+        let centre = (share + z * z / (2.0 * n)) / scale;
+        let half = z / scale * (share * (1.0 - share) / n + z * z / (4.0 * n * n)).sqrt();
+        // The ends are 0 and 1 there but for rounding.
+        let low = if self.successes == 0 { 0.0 } else { centre - half };
+        let high = if self.successes == self.trials { 1.0 } else { centre + half };
+        Ok(ConfidenceInterval { low, high })
+    }
+
+    /// Exact interval (Clopper and Pearson 1934): covers at least `confidence` at every share.
+    pub fn exact(&self, confidence: f64) -> Result<ConfidenceInterval, StatisticsError> {
+        let tail = tail(confidence)?;
+        let (k, n) = (self.successes as f64, self.trials as f64);
+        let quantile = |share, a, b| Beta::new(a, b).map(|beta| beta.inverse_cdf(share));
+        let low = quantile(tail, k, n - k + 1.0).unwrap_or(0.0);
+        let high = quantile(1.0 - tail, k + 1.0, n - k).unwrap_or(1.0);
+        Ok(ConfidenceInterval { low, high })
+    }
+
+    /// Exact two-sided p value of the hypothesis that each trial succeeds with `probability`: that of all outcomes no
+    /// likelier than the observed one.
+    pub fn test(&self, probability: f64) -> Result<f64, StatisticsError> {
+        let distribution = self.distribution(probability)?;
+        let (k, n) = (self.successes, self.trials);
+        let mean = probability * n as f64;
+        let observed = distribution.pmf(k) * (1.0 + EQUALLY_LIKELY);
+        let is_unlikely = |outcome: u64| distribution.pmf(outcome) <= observed;
+        let p = if k as f64 == mean {
+            1.0
+        } else if (k as f64) < mean {
+            let other = first(mean.ceil() as u64, n + 1, is_unlikely);
+            self.at_most(probability)? + tail_from(&distribution, other)
+        } else {
+            let other = first(0, mean.floor() as u64 + 1, |outcome| !is_unlikely(outcome));
+            self.at_least(probability)? + other.checked_sub(1).map_or(0.0, |last| distribution.cdf(last))
+        };
+        Ok(p.min(1.0))
+    }
+
+    /// Probability of this many successes or fewer where each trial succeeds with `probability`.
+    pub fn at_most(&self, probability: f64) -> Result<f64, StatisticsError> {
+        Ok(self.distribution(probability)?.cdf(self.successes))
+    }
+
+    /// Probability of this many successes or more where each trial succeeds with `probability`.
+    pub fn at_least(&self, probability: f64) -> Result<f64, StatisticsError> {
+        Ok(tail_from(&self.distribution(probability)?, self.successes))
+    }
+
+    fn distribution(&self, probability: f64) -> Result<Binomial, StatisticsError> {
+        within("probability", probability, 0.0..=1.0)?;
+        let refused = StatisticsError::OutOfRange { what: "probability", value: probability, least: 0.0, most: 1.0 };
+        Binomial::new(probability, self.trials).map_err(|_| refused)
+    }
+}
+
+/// Probability of `outcome` or more.
+fn tail_from(distribution: &Binomial, outcome: u64) -> f64 {
+    outcome.checked_sub(1).map_or(1.0, |before| distribution.sf(before))
+}
+
+/// First of `low..high` for which `holds`, which does not change back from there on; `high` if none.
+fn first(mut low: u64, mut high: u64, holds: impl Fn(u64) -> bool) -> u64 {
+    while low < high {
+        let middle = low + (high - low) / 2;
+        if holds(middle) { high = middle } else { low = middle + 1 }
+    }
+    low
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_those_of_scipy_and_statsmodels() {
+        let golden: serde_json::Value =
+            serde_json::from_str(include_str!("../../../fixtures/reference/study_stats_golden.json")).unwrap();
+        for case in golden["proportion"].as_array().unwrap() {
+            let number = |name: &str| case[name].as_f64().unwrap();
+            let count = BinomialCount::new(number("successes") as u64, number("trials") as u64).unwrap();
+            let (wilson, exact) = (count.wilson(0.95).unwrap(), count.exact(0.95).unwrap());
+            let p = count.test(number("probability")).unwrap();
+            let found = [wilson.low, wilson.high, exact.low, exact.high, p];
+            for (found, name) in found.into_iter().zip(["wilson_low", "wilson_high", "exact_low", "exact_high", "p"]) {
+                let expected = number(name);
+                assert!(
+                    (found - expected).abs() <= 1e-9 * expected.abs().max(1e-6),
+                    "{name} {found} {expected} {case}"
+                );
+            }
+        }
+    }
+
+    /// Counts of Rebol, Guetl and Pietroszek 2021, table III, as if their votes were independent.
+    #[test]
+    fn votes_of_the_paper_have_their_known_probabilities() {
+        let p = |successes, trials| BinomialCount::new(successes, trials).unwrap().test(0.5).unwrap();
+        let near = |found: f64, expected: f64| assert!((found - expected).abs() < 5e-4, "{found} {expected}");
+        near(p(1050, 2000), 0.027);
+        near(p(538, 1000), 0.018);
+        near(p(512, 1000), 0.467);
+        // 71.2 % and 58.8 % of 500 chose the matching sound.
+        assert!(p(356, 500) < 1e-20 && p(294, 500) < 1e-4);
+    }
+
+    #[test]
+    fn ends_and_refusals() {
+        let none = BinomialCount::new(0, 20).unwrap();
+        let all = BinomialCount::new(20, 20).unwrap();
+        assert_eq!((none.exact(0.95).unwrap().low, all.exact(0.95).unwrap().high), (0.0, 1.0));
+        assert_eq!((none.wilson(0.95).unwrap().low, all.wilson(0.95).unwrap().high), (0.0, 1.0));
+        assert_eq!((none.test(0.0).unwrap(), all.test(1.0).unwrap(), all.test(0.0).unwrap()), (1.0, 1.0, 0.0));
+        assert!((all.test(0.5).unwrap() - 2.0 * 0.5f64.powi(20)).abs() < 1e-18);
+        assert!(BinomialCount::new(0, 0).is_err() && BinomialCount::new(3, 2).is_err());
+        assert!(none.test(f64::NAN).is_err() && none.test(1.5).is_err() && none.wilson(0.0).is_err());
+    }
+}

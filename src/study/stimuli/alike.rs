@@ -1,0 +1,92 @@
+//! Motions of one clip by several conditions, made alike in all but the movement: the same bones, the same joints seen at
+//! the same moments, head and trunk only where all conditions have them, the same smoothing.
+
+use super::condition_motion::ShownMotion;
+use crate::animate::performance::perform_on;
+use crate::animate::rig::rig::Rig;
+use crate::animate::{AnimationOptions, Performance};
+use crate::mocap::motion_file::USUAL_FPS;
+use crate::motion::bones;
+use crate::types::pose3d::Motion;
+use crate::types::posture::{Posture, PostureChannel};
+use crate::types::skeleton::{N_BONES, N_JOINTS};
+use ndarray::{Array2, Array3, Axis, Zip, s};
+
+/// Sight that all films of one speech share.
+#[derive(Clone, Debug)]
+pub struct CommonSight {
+    /// Mask [T, 49] of the joints that every condition shows.
+    joints: Array2<bool>,
+    /// Masks [T, 3] of the angles of head and trunk.
+    angles: [Array2<bool>; 2],
+}
+
+impl CommonSight {
+    /// What all of these motions, which are equally long, show.
+    pub fn of(shown: &[&ShownMotion]) -> Option<Self> {
+        let (n_frames, n_joints) = shown.first()?.motion.mask.dim();
+        let mut joints = Array2::from_elem((n_frames, n_joints), true);
+        let mut angles = [(); 2].map(|()| Array2::from_elem((n_frames, 3), true));
+        let unseen = Posture::unseen(n_frames);
+        for ShownMotion { motion, posture, .. } in shown {
+            let there = motion.joints.map_axis(Axis(2), |place| place.iter().all(|v| v.is_finite()));
+            Zip::from(&mut joints).and(&motion.mask).and(&there).for_each(|all, seen, there| *all &= *seen && *there);
+            let posture = posture.as_ref().unwrap_or(&unseen);
+            for (all, channel) in angles.iter_mut().zip(PostureChannel::ALL) {
+                all.zip_mut_with(posture.channel(channel), |all, angle| *all &= angle.is_finite());
+            }
+        }
+        Some(Self { joints, angles })
+    }
+
+    /// Performance of a motion as far as all show it, on the body that all share, at its own rate.
+    pub fn performance(&self, shown: &ShownMotion, body: &CommonBody) -> Performance {
+        let mut motion = shown.motion.clone();
+        for ((frame, joint), seen) in self.joints.indexed_iter() {
+            if !seen {
+                motion.joints.slice_mut(s![frame, joint, ..]).fill(f32::NAN);
+                motion.mask[[frame, joint]] = false;
+            }
+        }
+        bones::with_lengths(&mut motion, &body.lengths);
+        let posture = shown.posture.clone().map(|mut posture| {
+            for (seen, channel) in self.angles.iter().zip(PostureChannel::ALL) {
+                let angles = posture.channel_mut(channel);
+                angles.zip_mut_with(seen, |angle, seen| *angle = if *seen { *angle } else { f32::NAN });
+            }
+            posture
+        });
+        let is_posed = self.angles.iter().flatten().any(|seen| *seen);
+        let posture = posture.filter(|_| is_posed);
+        perform_on(body.rig.clone(), &motion, posture.as_ref(), &AnimationOptions::default())
+    }
+}
+
+/// Body that all films of a speaker show.
+#[derive(Clone, Debug)]
+pub struct CommonBody {
+    /// Bones, metres; 0: as the motion has them.
+    lengths: [f32; N_BONES],
+    rig: Rig,
+}
+
+impl CommonBody {
+    /// Body with the stated bones (metres), else those of the motion that knows most of them, and the median palms of all.
+    pub fn of(stated: &[f32], shown: &[&ShownMotion]) -> Self {
+        let known = |lengths: &[f32; N_BONES]| lengths.iter().filter(|length| **length > 0.0).count();
+        let stated = std::array::from_fn(|bone| stated.get(bone).copied().unwrap_or(0.0));
+        let measured = shown.iter().map(|shown| bones::measure(&shown.motion)).filter(|_| known(&stated) == 0);
+        let lengths =
+            measured.fold(stated, |best, lengths| if known(&lengths) > known(&best) { lengths } else { best });
+        let mut all = Array3::zeros((0, N_JOINTS, 3));
+        let mut fps = USUAL_FPS;
+        for shown in shown {
+            let mut motion = shown.motion.clone();
+            bones::with_lengths(&mut motion, &lengths);
+            fps = motion.fps;
+            // Equal shapes: nothing to fail.
+            let _ = all.append(Axis(0), motion.joints.view());
+        }
+        Self { lengths, rig: Rig::from_motion(&Motion::from_joints(fps, all)) }
+    }
+}

@@ -1,0 +1,221 @@
+//! Motion of every condition for the clips of one speaker.
+
+use super::cut::StudyClip;
+use super::speaker_source::{SpeakerSource, SpokenPiece};
+use crate::dataset::Dataset;
+use crate::evaluate::clips::checkpoint::EvaluatedCheckpoint;
+use crate::mocap::motion_file;
+use crate::motion::{resample, units};
+use crate::study::file::{ConditionSource, StudyCondition, filled};
+use crate::types::pose3d::Motion;
+use crate::types::posture::{Posture, PostureChannel};
+use crate::types::sync;
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, ensure};
+use ndarray::{Array2, Array3, Axis, s};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Frames by which a file of another system may miss the length of its clip.
+const SPARE_FRAMES: usize = 2;
+
+/// What a condition shows for the speech of a clip.
+#[derive(Clone, Debug)]
+pub struct ShownMotion {
+    /// Number of the clip that the motion belongs to: another one's in a mismatched condition.
+    pub of: usize,
+    pub motion: Motion,
+    pub posture: Option<Posture>,
+}
+
+/// Models of a speaker's conditions, by the conditions' names.
+pub struct ConditionModels(BTreeMap<String, EvaluatedCheckpoint>);
+
+impl ConditionModels {
+    /// Opens the checkpoints of a speaker.
+    ///
+    /// # Errors
+    /// A path without a checkpoint; the condition is named.
+    pub fn open(conditions: &[StudyCondition], speaker: &str) -> Result<Self> {
+        let mut models = BTreeMap::new();
+        for condition in conditions {
+            let ConditionSource::Checkpoint(path) = &condition.source else { continue };
+            let opened = EvaluatedCheckpoint::open_all(&[filled(path, speaker, "")]);
+            let opened = opened.with_context(|| format!("condition {} of the speaker {speaker}", condition.name))?;
+            models.extend(opened.into_iter().map(|model| (condition.name.clone(), model)));
+        }
+        Ok(Self(models))
+    }
+
+    /// Rate of the first model's motion.
+    pub fn fps(&self) -> Option<FrameRate> {
+        self.0.values().next().map(|model| model.speaker.fps())
+    }
+}
+
+/// Motions by condition, then by clip.
+///
+/// # Errors
+/// A model that gives none, a file of another system that is missing or of another length, too few clips to mismatch.
+pub fn motions(
+    source: &SpeakerSource,
+    clips: &[StudyClip],
+    conditions: &[StudyCondition],
+    models: &ConditionModels,
+    tick: &dyn Fn(),
+) -> Result<BTreeMap<String, Vec<ShownMotion>>> {
+    let mut shown: BTreeMap<String, Vec<ShownMotion>> = BTreeMap::new();
+    let own = || conditions.iter().filter(|condition| condition.source.mismatch_of().is_none());
+    // Clips of a piece are neighbours: each piece is read, and heard by each model, once.
+    for of_piece in clips.chunk_by(|a, b| a.piece == b.piece) {
+        let piece = source.read(of_piece[0].piece)?;
+        for condition in own() {
+            let of_condition = shown.entry(condition.name.clone()).or_default();
+            let place = || format!("condition {}, speaker {}, {}", condition.name, source.name, piece.name);
+            let whole = whole_motion(source, &piece, condition, models).with_context(place)?;
+            for clip in of_piece {
+                let of = of_condition.len();
+                of_condition.push(match (&whole, &condition.source) {
+                    (Some((motion, posture)), _) => cut(of, motion, posture.as_ref(), clip),
+                    (None, ConditionSource::Files(pattern)) => {
+                        let path = filled(pattern, &source.name, &clip.name);
+                        let motion = of_file(&path, source.fps, clip.frames.len()).with_context(place)?;
+                        ShownMotion { of, motion, posture: None }
+                    }
+                    (None, _) => constant(of, source, clip.frames.len()).with_context(place)?,
+                });
+            }
+        }
+        tick();
+    }
+    let others = other_clips(clips);
+    for condition in conditions {
+        let Some(of) = condition.source.mismatch_of() else { continue };
+        let (name, n) = (&source.name, clips.len());
+        ensure!(
+            n > 1,
+            "the speaker {name} has {n} clip, and the condition {} shows another's motion: 2 are needed",
+            condition.name
+        );
+        let matched = shown.get(of).with_context(|| format!("condition {}: no condition {of}", condition.name))?;
+        let turned = others.iter().map(|other| matched[*other].clone()).collect();
+        shown.insert(condition.name.clone(), turned);
+    }
+    Ok(shown)
+}
+
+/// Motion of a condition for a whole piece of speech; `None` of one that is made clip by clip.
+fn whole_motion(
+    source: &SpeakerSource,
+    piece: &SpokenPiece,
+    condition: &StudyCondition,
+    models: &ConditionModels,
+) -> Result<Option<(Motion, Option<Posture>)>> {
+    match &condition.source {
+        ConditionSource::Natural => {
+            let natural = piece.natural.clone().context("it has no natural motion: give the speaker a dataset")?;
+            Ok(Some(natural))
+        }
+        ConditionSource::Checkpoint(_) => {
+            let model = models.0.get(&condition.name).context("no model is open")?;
+            Ok(Some(generated(model, piece, source.fps)?))
+        }
+        ConditionSource::MeanPose | ConditionSource::Files(_) | ConditionSource::Mismatched(_) => Ok(None),
+    }
+}
+
+/// Motion that a model makes of a piece of speech, at `fps`.
+fn generated(model: &EvaluatedCheckpoint, piece: &SpokenPiece, fps: FrameRate) -> Result<(Motion, Option<Posture>)> {
+    let (own, n_frames) = (model.speaker.fps(), piece.n_frames);
+    if own == fps || model.speaker.is_captured() {
+        return model.motion(&piece.sound, &piece.words, n_frames, fps);
+    }
+    let n_own = own.frames_in(fps.secs(n_frames.saturating_sub(1))) + 1;
+    let (motion, posture) = model.motion(&piece.sound, &piece.words, n_own, own)?;
+    let nearest = |frame: usize| ((fps.secs(frame) * own.per_sec()).round() as usize).min(n_own - 1);
+    let posture = posture.map(|posture| {
+        let frames: Vec<usize> = (0..n_frames).map(nearest).collect();
+        Posture { head: posture.head.select(Axis(0), &frames), trunk: posture.trunk.select(Axis(0), &frames) }
+    });
+    Ok((resample::at_rate(&motion, fps), posture))
+}
+
+fn cut(of: usize, motion: &Motion, posture: Option<&Posture>, clip: &StudyClip) -> ShownMotion {
+    let frames = clip.frames.clone();
+    let motion = Motion {
+        fps: motion.fps,
+        joints: motion.joints.slice(s![frames.clone(), .., ..]).to_owned(),
+        mask: motion.mask.slice(s![frames.clone(), ..]).to_owned(),
+    };
+    ShownMotion { of, motion, posture: posture.map(|posture| posture.slice(frames)) }
+}
+
+/// Mean pose of the training split, unmoved.
+fn constant(of: usize, source: &SpeakerSource, n_frames: usize) -> Result<ShownMotion> {
+    let dataset: &Dataset = source.dataset.as_ref().context("a mean pose needs a dataset: give the speaker one")?;
+    let stats = dataset.stats();
+    let mean = stats.mean();
+    let pose = |joint: usize, k: usize| if stats.n_seen[joint] > 0 { mean[[joint, k]] } else { f32::NAN };
+    let (n_joints, of_axes) = mean.dim();
+    let joints = Array3::from_shape_fn((n_frames, n_joints, of_axes), |(_, joint, k)| pose(joint, k));
+    let angles = |channel: PostureChannel| {
+        let stats = stats.posture.as_ref().and_then(|posture| posture.get(&channel));
+        let angle = |k: usize| stats.filter(|stats| stats.n_seen[k] > 0).map_or(f32::NAN, |stats| stats.mean[k] as f32);
+        Array2::from_shape_fn((n_frames, 3), |(_, k)| angle(k))
+    };
+    let posture = stats.posture.as_ref().map(|_| {
+        let [head, trunk] = PostureChannel::ALL.map(angles);
+        Posture { head, trunk }
+    });
+    Ok(ShownMotion { of, motion: Motion::from_joints(source.fps, joints), posture })
+}
+
+/// Motion of a file of another system, which is as long as its clip.
+fn of_file(path: &Path, fps: FrameRate, n_frames: usize) -> Result<Motion> {
+    let read = motion_file::read(path, Some(fps))?.motion;
+    units::check(&read).with_context(|| path.display().to_string())?;
+    let motion = resample::at_rate(&read, fps);
+    let (n, path) = (motion.n_frames(), path.display());
+    ensure!(
+        n.abs_diff(n_frames) <= SPARE_FRAMES,
+        "{path} lasts {:.2} s and its clip {:.2} s: make the motion of the clip's own sound, in the folder clips",
+        fps.secs(n),
+        fps.secs(n_frames)
+    );
+    let frames: Vec<usize> = (0..n_frames).map(|frame| frame.min(n - 1)).collect();
+    let (joints, mask) = (motion.joints.select(Axis(0), &frames), motion.mask.select(Axis(0), &frames));
+    Ok(Motion { fps, joints, mask })
+}
+
+/// For each clip the number of another one, of another piece of speech where there are enough; each once.
+fn other_clips(clips: &[StudyClip]) -> Vec<usize> {
+    let n = clips.len();
+    let n_near = |shift: &usize| (0..n).filter(|at| clips[*at].piece == clips[(at + shift) % n].piece).count();
+    let shift = (1..n).min_by_key(n_near).unwrap_or(0);
+    (0..n).map(|at| (at + shift) % n.max(1)).collect()
+}
+
+/// Samples of the sound that belong to a clip.
+pub fn sound_of(piece: &SpokenPiece, clip: &StudyClip, fps: FrameRate) -> Vec<f32> {
+    let range = sync::samples_of(fps, piece.sound.rate, clip.frames.clone());
+    let mut samples = piece.sound.samples.get(range.start..).unwrap_or_default().to_vec();
+    samples.resize(range.len(), 0.0);
+    samples
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mismatched_clip_is_another_ones_and_of_another_talk_where_there_is_one() {
+        let clip = |piece: usize| StudyClip { name: String::new(), piece, frames: 0..9, cut_db: 0.0, unseen: 0.0 };
+        let of = |pieces: &[usize]| other_clips(&pieces.iter().map(|piece| clip(*piece)).collect::<Vec<_>>());
+        assert_eq!(of(&[0, 0, 1, 1]), [2, 3, 0, 1]);
+        assert_eq!(of(&[0, 0, 0]), [1, 2, 0]);
+        let pieces = [0, 0, 0, 1, 2, 2];
+        let others = of(&pieces);
+        assert!((0..6).all(|at| others[at] != at && others.contains(&at)));
+        assert!((0..6).all(|at| pieces[at] != pieces[others[at]]), "{others:?}");
+    }
+}

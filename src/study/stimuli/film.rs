@@ -1,0 +1,101 @@
+//! One film: the faceless avatar alone before a plain backdrop, with the sound of its clip, and in an attention check a
+//! number. Every film of a study has the same size, rate and length; its mouth does not move.
+
+use crate::animate::Performance;
+use crate::animate::export::film_avatar::{AvatarStage, AvatarView, FilmCamera};
+use crate::external::ffmpeg::encode::{VideoWriter, has_h264};
+use crate::external::opencv::draw;
+use crate::types::image::Image;
+use crate::types::sound::Sound;
+use anyhow::{Result, ensure};
+use std::path::Path;
+
+/// Width and height of the pictures of a study, px.
+pub const SIZE: [usize; 2] = [800, 600];
+/// Where all films of a study are seen from.
+pub const CAMERA: FilmCamera = FilmCamera::Front;
+/// Raised where the same content gives other bytes.
+const VERSION: u32 = 1;
+/// Constant rate factor. Equal quality, not an equal bit rate: at an equal rate lively motion would look worse.
+const CRF: u32 = 20;
+/// Height of the number's digits, of the picture's, and the border of its plate, of the digits'.
+const DIGITS: f32 = 0.18;
+const BORDER: f32 = 0.27;
+
+/// What a film shows and lets hear.
+pub struct FilmScene<'a> {
+    pub performance: &'a Performance,
+    pub stage: &'a AvatarStage,
+    /// Sound, as long as the film; `None`: it is silent.
+    pub sound: Option<&'a Sound>,
+    /// Number that is shown in the middle third.
+    pub number: Option<u16>,
+}
+
+/// That films can be written which browsers play.
+///
+/// # Errors
+/// An ffmpeg without libx264.
+pub fn check_encoder() -> Result<()> {
+    ensure!(
+        has_h264(),
+        "this ffmpeg has no libx264, and browsers do not play what it writes instead: install an ffmpeg with libx264 (`orator doctor` shows which one is used)"
+    );
+    Ok(())
+}
+
+impl FilmScene<'_> {
+    /// Hash of all that the bytes of the film follow from.
+    pub fn hash(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        let mut numbers = |values: &[f64]| {
+            values.iter().for_each(|value| {
+                hasher.update(&value.to_le_bytes());
+            });
+        };
+        let clip = &self.performance.clip;
+        numbers(&[f64::from(VERSION), f64::from(CRF), self.number.map_or(0.0, f64::from), clip.fps.per_sec()]);
+        numbers(&self.stage.camera.size.map(|px| px as f64));
+        let camera = self.stage.camera;
+        numbers(&[&[camera.focal_px, camera.axes.w][..], &camera.position, &camera.axes.v].concat());
+        clip.skeleton.joints.iter().for_each(|joint| numbers(&joint.offset));
+        for frame in 0..clip.n_frames() {
+            numbers(&clip.root_at(frame));
+            clip.local[frame].iter().for_each(|turn| numbers(&[&[turn.w][..], &turn.v].concat()));
+        }
+        for sample in self.sound.into_iter().flat_map(|sound| &sound.samples) {
+            hasher.update(&sample.to_le_bytes());
+        }
+        hasher.finalize().to_hex().to_string()
+    }
+
+    /// Writes the mp4, in place.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let clip = &self.performance.clip;
+        let mut view = AvatarView::on(self.stage, self.performance);
+        let mut writer = VideoWriter::with_crf(path, self.stage.camera.size, clip.fps, self.sound, CRF)?;
+        for frame in 0..clip.n_frames() {
+            let mut image = view.frame(frame, 0.0);
+            if let Some(number) = self.number.filter(|_| 3 * frame / clip.n_frames() == 1) {
+                draw_number(&mut image, number)?;
+            }
+            writer.push(&image)?;
+        }
+        writer.finish()
+    }
+}
+
+/// Draws the number on a plate in the middle of the picture.
+fn draw_number(image: &mut Image, number: u16) -> Result<()> {
+    let text = number.to_string();
+    let digits = DIGITS * image.height as f32;
+    let width = draw::text_width(&text, digits)?;
+    let [x, y] = [image.width as f32 / 2.0, image.height as f32 / 2.0];
+    let [half, tall] = [width, digits].map(|length| length / 2.0 + BORDER * digits);
+    draw::polygon(
+        image,
+        &[[x - half, y - tall], [x + half, y - tall], [x + half, y + tall], [x - half, y + tall]],
+        [250; 3],
+    )?;
+    draw::text(image, &text, [x - width / 2.0, y + digits / 2.0], digits, [20; 3])
+}

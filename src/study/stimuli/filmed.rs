@@ -1,0 +1,212 @@
+//! Speakers with their clips, each condition's performance of each clip, and the clips' sounds at one loudness: all that
+//! films are drawn from.
+
+use super::alike::{CommonBody, CommonSight};
+use super::condition_motion::{ConditionModels, ShownMotion, motions, sound_of};
+use super::cut::{CutSpeech, StudyClip, cut};
+use super::film::{CAMERA, FilmScene};
+use super::speaker_source::SpeakerSource;
+use crate::animate::Performance;
+use crate::animate::avatar::Appearance;
+use crate::animate::export::film::smooth_rate;
+use crate::animate::export::film_avatar::AvatarStage;
+use crate::audio::loudness;
+use crate::mocap::motion_file::USUAL_FPS;
+use crate::stage::progress::Progress;
+use crate::study::file::{StudyFile, StudySpeaker};
+use crate::study::plan::FilmContent;
+use crate::types::sound::Sound;
+use crate::types::sync;
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, bail};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// Loudness of all films, LUFS (EBU R 128), less where a clip would be clipped.
+const LOUDNESS_LUFS: f64 = -23.0;
+/// Largest amplitude.
+const PEAK: f64 = 0.9;
+/// Seconds over which a sound comes and goes at its ends, so that a cut does not click.
+const FADE_SECS: f64 = 0.01;
+
+/// Speaker whose speech is cut.
+pub struct CutSpeaker {
+    source: SpeakerSource,
+    models: ConditionModels,
+    pub cut: CutSpeech,
+    /// Sounds of the clips, as long as the films.
+    pub sounds: Vec<Sound>,
+}
+
+/// Speaker whose films can be drawn.
+pub struct FilmedSpeaker {
+    clips: Vec<StudyClip>,
+    sounds: Vec<Sound>,
+    film_fps: FrameRate,
+    /// By condition, then by clip: the clip of the motion, and the motion on the rig.
+    performances: BTreeMap<String, Vec<(usize, Performance)>>,
+    stage: AvatarStage,
+}
+
+impl CutSpeaker {
+    pub fn name(&self) -> &str {
+        &self.source.name
+    }
+
+    /// Cuts `n_clips` clips of a speaker, fewer where there are no more; `rank` orders clips that are equally good.
+    ///
+    /// # Errors
+    /// No dataset, sound or checkpoint where the file has one.
+    pub fn new(file: &StudyFile, speaker: &StudySpeaker, n_clips: usize, rank: impl Fn(&str) -> u64) -> Result<Self> {
+        let name = &speaker.name;
+        let models = ConditionModels::open(&file.condition, name)?;
+        let source = match (&speaker.dataset, &speaker.sounds) {
+            (Some(dataset), _) => SpeakerSource::of_dataset(name, dataset, speaker.split)?,
+            (None, Some(sounds)) => SpeakerSource::of_sounds(name, sounds, models.fps().unwrap_or(USUAL_FPS))?,
+            (None, None) => bail!("the speaker {name} has neither a dataset nor sounds"),
+        };
+        let fps = source.fps;
+        let cut = cut(&source, fps.frames_in(file.clips.seconds), n_clips, rank)?;
+        let film_fps = smooth_rate(fps);
+        let mut sounds = Vec::new();
+        for of_piece in cut.clips.chunk_by(|a, b| a.piece == b.piece) {
+            let piece = source.read(of_piece[0].piece)?;
+            for clip in of_piece {
+                let n_film_frames = film_fps.frames_in(fps.secs(clip.frames.len()));
+                let mut samples = sound_of(&piece, clip, fps);
+                samples.resize(sync::sample_at(film_fps, piece.sound.rate, n_film_frames), 0.0);
+                sounds.push(faded(Sound { rate: piece.sound.rate, samples }));
+            }
+        }
+        Ok(Self { source, models, cut, sounds })
+    }
+
+    /// Puts the motion of every condition on the rig that all share, for films of `size` px.
+    ///
+    /// # Errors
+    /// A condition without motion for a clip.
+    pub fn filmed(self, file: &StudyFile, size: [usize; 2], progress: &dyn Progress) -> Result<FilmedSpeaker> {
+        let Self { source, models, cut, sounds } = self;
+        let n_pieces = cut.clips.chunk_by(|a, b| a.piece == b.piece).count();
+        let task = progress.begin(&format!("motion of {}", source.name), n_pieces as u64);
+        let motions = motions(&source, &cut.clips, &file.condition, &models, &|| task.advance(1))?;
+        drop(task);
+        let all: Vec<&ShownMotion> = motions.values().flatten().collect();
+        let body = CommonBody::of(&source.bone_lengths, &all);
+        let sight = |clip: usize| {
+            let of_clip: Vec<&ShownMotion> = motions.values().map(|of_condition| &of_condition[clip]).collect();
+            CommonSight::of(&of_clip).context("the study has no condition")
+        };
+        let sights: Vec<CommonSight> = (0..cut.clips.len()).map(sight).collect::<Result<_>>()?;
+        let task = progress.begin(&format!("avatar of {}", source.name), all.len() as u64);
+        let performances: BTreeMap<String, Vec<(usize, Performance)>> = motions
+            .iter()
+            .map(|(condition, shown)| {
+                let performed = shown.par_iter().zip(&sights).map(|(shown, sight)| {
+                    let performance = sight.performance(shown, &body);
+                    task.advance(1);
+                    (shown.of, performance)
+                });
+                (condition.clone(), performed.collect())
+            })
+            .collect();
+        drop(task);
+        let shown: Vec<&Performance> = performances.values().flatten().map(|(_, performance)| performance).collect();
+        let stage = AvatarStage::new(&shown, &Appearance::faceless(), size, CAMERA);
+        let stage = stage.with_context(|| format!("the speaker {} has no clip", source.name))?;
+        let (clips, film_fps) = (cut.clips, smooth_rate(source.fps));
+        Ok(FilmedSpeaker { clips, sounds, film_fps, performances, stage })
+    }
+}
+
+/// Brings all sounds to one loudness, which is returned, LUFS; a silent one stays.
+pub fn equally_loud<'s>(sounds: impl Iterator<Item = &'s mut Sound>) -> f64 {
+    let measured: Vec<(&mut Sound, f64)> =
+        sounds.filter_map(|sound| loudness::integrated(sound).map(|lufs| (sound, lufs))).collect();
+    let loudest = |(sound, lufs): &(&mut Sound, f64)| {
+        let peak = sound.samples.iter().map(|v| f64::from(v.abs())).fold(1e-9, f64::max);
+        lufs + 20.0 * (PEAK / peak).log10()
+    };
+    let target = measured.iter().map(loudest).fold(LOUDNESS_LUFS, f64::min);
+    for (sound, lufs) in measured {
+        let gain = 10f64.powf((target - lufs) / 20.0) as f32;
+        sound.samples.iter_mut().for_each(|sample| *sample *= gain);
+    }
+    target
+}
+
+impl FilmedSpeaker {
+    /// Number of the clip `speaker/clip`.
+    fn find(&self, clip: &str) -> Option<usize> {
+        let name = clip.rsplit('/').next().unwrap_or(clip);
+        self.clips.iter().position(|known| known.name == name)
+    }
+
+    /// Name `speaker/clip` of the clip whose motion the condition of that content shows.
+    ///
+    /// # Errors
+    /// A clip or a condition that the speaker does not have.
+    pub fn motion_of(&self, content: &FilmContent) -> Result<String> {
+        let (of, _) = self.shown(content)?;
+        Ok(format!("{}/{}", content.speaker, self.clips[*of].name))
+    }
+
+    fn shown(&self, content: &FilmContent) -> Result<&(usize, Performance)> {
+        let missing = || format!("no motion of {} by {}", content.clip, content.condition);
+        let clip = self.find(&content.clip).with_context(missing)?;
+        self.performances.get(&content.condition).and_then(|of_condition| of_condition.get(clip)).with_context(missing)
+    }
+
+    /// Performance of the film of that content, at the film's rate.
+    ///
+    /// # Errors
+    /// A clip or a condition that the speaker does not have.
+    pub fn performance(&self, content: &FilmContent) -> Result<Performance> {
+        let (_, performance) = self.shown(content)?;
+        Ok(performance.resampled(self.film_fps))
+    }
+
+    /// Scene of the film of that content with its performance.
+    pub fn scene<'a>(&'a self, content: &FilmContent, performance: &'a Performance) -> FilmScene<'a> {
+        let sound = self.find(&content.clip).and_then(|clip| self.sounds.get(clip)).filter(|_| !content.muted);
+        FilmScene { performance, stage: &self.stage, sound, number: content.number }
+    }
+}
+
+fn faded(mut sound: Sound) -> Sound {
+    let n = ((FADE_SECS * f64::from(sound.rate)) as usize).min(sound.samples.len());
+    let length = sound.samples.len();
+    for at in 0..n {
+        let gain = at as f32 / n as f32;
+        sound.samples[at] *= gain;
+        sound.samples[length - 1 - at] *= gain;
+    }
+    sound
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sounds_become_equally_loud_without_being_clipped() {
+        let noise = |gain: f32, peak: f32| {
+            let mut samples: Vec<f32> =
+                (0..48_000u64).map(|i| gain * ((i * i * 7_919 % 2_003) as f32 / 1_001.5 - 1.0)).collect();
+            samples[24_000] = peak;
+            Sound { rate: 16_000, samples }
+        };
+        for (peak, expected) in [(0.3, LOUDNESS_LUFS..LOUDNESS_LUFS + 0.01), (1.0, -40.0..LOUDNESS_LUFS)] {
+            let mut sounds = [noise(0.3, 0.3), noise(0.02, 0.02), noise(0.01, peak)];
+            let target = equally_loud(sounds.iter_mut());
+            assert!(expected.contains(&target), "{target}");
+            for sound in &sounds {
+                assert!((loudness::integrated(sound).unwrap() - target).abs() < 0.2);
+                assert!(sound.samples.iter().all(|v| v.abs() <= 0.901));
+            }
+        }
+        let mut silent = [Sound { rate: 16_000, samples: vec![0.0; 16_000] }];
+        assert_eq!(equally_loud(silent.iter_mut()), LOUDNESS_LUFS);
+        assert!(silent[0].samples.iter().all(|v| *v == 0.0));
+    }
+}

@@ -1,0 +1,130 @@
+//! Speech of a speaker: intervals of a dataset, or sound files. What is read is kept only as long as it is looked at.
+
+use crate::config::patterns::{OF_SOUNDS, OF_TRANSCRIPTS, SearchRoot, expand};
+use crate::dataset::Dataset;
+use crate::dataset::index::SampleRef;
+use crate::external::ffmpeg::audio;
+use crate::formats::transcript::{Transcript, Word};
+use crate::types::pose3d::Motion;
+use crate::types::posture::Posture;
+use crate::types::sound::Sound;
+use crate::types::split::Split;
+use crate::types::time::FrameRate;
+use anyhow::{Context, Result, bail, ensure};
+use std::path::{Path, PathBuf};
+
+/// Where the speech of one speaker comes from.
+pub struct SpeakerSource {
+    pub name: String,
+    /// Rate of the motion.
+    pub fps: FrameRate,
+    /// Bones of the speaker, metres, 0 where they are not known; none of a speaker without a dataset.
+    pub bone_lengths: Vec<f32>,
+    pub dataset: Option<Dataset>,
+    pieces: Vec<Piece>,
+}
+
+/// Continuous piece of speech.
+struct Piece {
+    name: String,
+    place: Place,
+}
+
+enum Place {
+    Sample(Box<SampleRef>),
+    File(PathBuf),
+}
+
+/// A piece of speech in memory.
+pub struct SpokenPiece {
+    /// Name, once among those of the speaker.
+    pub name: String,
+    pub sound: Sound,
+    /// Words with their times from the beginning of the sound.
+    pub words: Vec<Word>,
+    pub n_frames: usize,
+    pub natural: Option<(Motion, Option<Posture>)>,
+}
+
+impl SpeakerSource {
+    /// Intervals of a split of the dataset at `dir`.
+    ///
+    /// # Errors
+    /// No dataset, or none of its intervals in that split.
+    pub fn of_dataset(name: &str, dir: &Path, split: Split) -> Result<Self> {
+        let dataset = Dataset::open(dir)?;
+        let samples = dataset.samples(split);
+        if samples.is_empty() {
+            let others = Split::ALL.into_iter().filter(|other| !dataset.samples(*other).is_empty());
+            let others: Vec<&str> = others.map(Split::name).collect();
+            let (dir, split) = (dataset.dir().display(), split.name());
+            bail!(
+                "{dir} has no interval in the {split} split; it has {}: say so by `split` of the speaker {name}",
+                others.join(", ")
+            );
+        }
+        let bone_lengths = dataset.info().bone_lengths_metres.iter().map(|metres| *metres as f32).collect();
+        let piece = |sample: SampleRef| Piece { name: sample.key.to_string(), place: Place::Sample(Box::new(sample)) };
+        let pieces = samples.into_iter().map(piece).collect();
+        Ok(Self { name: name.to_owned(), fps: dataset.info().fps, bone_lengths, dataset: Some(dataset), pieces })
+    }
+
+    /// Sound files that `pattern` names, with the transcripts beside them, for motion at `fps`.
+    ///
+    /// # Errors
+    /// No file; two of one name.
+    pub fn of_sounds(name: &str, pattern: &Path, fps: FrameRate) -> Result<Self> {
+        let (mut missing, entry) = (Vec::new(), pattern.to_string_lossy());
+        let root = SearchRoot::new(Path::new("/"), &[]);
+        let found = expand(&entry, &root, ("sound", &OF_SOUNDS), &mut missing).map_err(anyhow::Error::msg);
+        let mut files = found.with_context(|| format!("sounds of the speaker {name}"))?;
+        ensure!(missing.is_empty(), "sounds of the speaker {name}: {}", missing.join("; "));
+        files.sort();
+        let mut pieces: Vec<Piece> = Vec::new();
+        for file in files {
+            let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let twice = pieces.iter().any(|piece| piece.name == stem);
+            ensure!(!twice, "{}: two sounds of the speaker {name} are called {stem}; rename one", file.display());
+            pieces.push(Piece { name: stem, place: Place::File(file) });
+        }
+        Ok(Self { name: name.to_owned(), fps, bone_lengths: Vec::new(), dataset: None, pieces })
+    }
+
+    pub fn n_pieces(&self) -> usize {
+        self.pieces.len()
+    }
+
+    /// Reads a piece.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or a damaged dataset.
+    pub fn read(&self, piece: usize) -> Result<SpokenPiece> {
+        let Piece { name, place } = &self.pieces[piece];
+        match (place, &self.dataset) {
+            (Place::Sample(sample), Some(dataset)) => {
+                let sample = dataset.read(sample)?;
+                let n_frames = sample.n_frames();
+                Ok(SpokenPiece {
+                    name: name.clone(),
+                    sound: sample.sound,
+                    words: sample.words.unwrap_or_default(),
+                    n_frames,
+                    natural: Some((sample.motion, sample.posture)),
+                })
+            }
+            (Place::File(file), _) => {
+                let sound = audio::read_sound(file)?;
+                let words = transcript_beside(file).map(|path| Transcript::read(&path)).transpose()?;
+                let n_frames = (sound.secs() * self.fps.per_sec() + 1e-6) as usize;
+                let words = words.map(|transcript| transcript.words).unwrap_or_default();
+                Ok(SpokenPiece { name: name.clone(), sound, words, n_frames, natural: None })
+            }
+            (Place::Sample(_), None) => bail!("{name}: its dataset is closed"),
+        }
+    }
+}
+
+/// Transcript of the sound's own name in its folder.
+fn transcript_beside(sound: &Path) -> Option<PathBuf> {
+    OF_TRANSCRIPTS.iter().map(|ending| sound.with_extension(ending)).find(|path| path.is_file())
+}

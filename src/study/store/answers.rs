@@ -1,0 +1,146 @@
+//! Answers: each trial has one, in the order of the session, and it stays as it was given.
+
+use super::participants::{Participant, Status, find};
+use crate::study::response::Response;
+use rusqlite::{Connection, OptionalExtension, Row, params};
+use serde::{Deserialize, Serialize};
+
+/// Answer to a trial as a page sends it.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GivenAnswer {
+    /// Index of the trial in its session.
+    pub position: u32,
+    pub response: Response,
+    /// How often the films were played.
+    pub plays: u32,
+    /// Seconds in which a film had stopped for want of data.
+    pub stalled_secs: f64,
+    /// Seconds in which the page was not in front.
+    pub unfocused_secs: f64,
+    /// Seconds from the end of the films to the answer.
+    pub response_secs: f64,
+}
+
+/// What a trial asks of its answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TrialTerms {
+    /// Milliseconds from the trial's first appearance before which its films cannot have been seen.
+    pub least_ms: i64,
+    /// Whether it is the session's last.
+    pub is_last: bool,
+    /// Whether the answer fails an attention check.
+    pub fails_check: bool,
+}
+
+/// What became of an answer.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Recorded {
+    /// Stored, now or before; where the participant stands.
+    Stored(Participant),
+    /// No participant of that name: withdrawn.
+    Unknown,
+    /// The place was given to another.
+    Replaced,
+    /// Another answer is stored at its position.
+    Differs,
+    /// The trial has not been given out yet.
+    OutOfTurn,
+    /// Films cannot have been seen yet; milliseconds until then.
+    TooSoon(i64),
+}
+
+/// Stores `answer` of the participant `id`.
+///
+/// # Errors
+/// A database that fails; nothing is stored.
+pub fn record(
+    db: &Connection,
+    id: &str,
+    answer: &GivenAnswer,
+    terms: TrialTerms,
+    now_ms: i64,
+) -> rusqlite::Result<Recorded> {
+    let Some(participant) = find(db, id)? else { return Ok(Recorded::Unknown) };
+    if answer.position < participant.position {
+        let is_same = at(db, id, answer.position)?.is_some_and(|stored| stored == *answer);
+        return Ok(if is_same { Recorded::Stored(participant) } else { Recorded::Differs });
+    }
+    if participant.status == Status::Replaced {
+        return Ok(Recorded::Replaced);
+    }
+    if answer.position > participant.position || participant.status == Status::Completed {
+        return Ok(Recorded::OutOfTurn);
+    }
+    let left_ms = terms.least_ms - (now_ms - participant.given_ms);
+    if left_ms > 0 {
+        return Ok(Recorded::TooSoon(left_ms));
+    }
+    insert(db, id, answer)?;
+    let after = Participant {
+        position: participant.position + 1,
+        given_ms: now_ms,
+        failed_checks: participant.failed_checks + u32::from(terms.fails_check),
+        status: if terms.is_last { Status::Completed } else { Status::Active },
+        ..participant
+    };
+    let sql = "UPDATE participant SET position = ?2, given_ms = ?3, failed_checks = ?4, status = ?5 WHERE id = ?1";
+    db.execute(sql, params![id, after.position, after.given_ms, after.failed_checks, after.status])?;
+    Ok(Recorded::Stored(after))
+}
+
+/// Adds the row of an answer.
+///
+/// # Errors
+/// A database that fails, or an answer at that position.
+pub fn insert(db: &Connection, id: &str, answer: &GivenAnswer) -> rusqlite::Result<()> {
+    let response = serde_json::to_string(&answer.response).unwrap_or_default();
+    let sql = "INSERT INTO answer VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
+    let secs = [answer.stalled_secs, answer.unfocused_secs, answer.response_secs];
+    db.execute(sql, params![id, answer.position, response, answer.plays, secs[0], secs[1], secs[2]]).map(drop)
+}
+
+const COLUMNS: &str = "position, response, plays, stalled_secs, unfocused_secs, response_secs";
+
+fn of_row(row: &Row) -> rusqlite::Result<GivenAnswer> {
+    let response: String = row.get(1)?;
+    let unreadable = |error| rusqlite::Error::FromSqlConversionFailure(1, rusqlite::types::Type::Text, Box::new(error));
+    Ok(GivenAnswer {
+        position: row.get(0)?,
+        response: serde_json::from_str(&response).map_err(unreadable)?,
+        plays: row.get(2)?,
+        stalled_secs: row.get(3)?,
+        unfocused_secs: row.get(4)?,
+        response_secs: row.get(5)?,
+    })
+}
+
+fn at(db: &Connection, id: &str, position: u32) -> rusqlite::Result<Option<GivenAnswer>> {
+    let sql = format!("SELECT {COLUMNS} FROM answer WHERE participant = ?1 AND position = ?2");
+    db.query_row(&sql, params![id, position], of_row).optional()
+}
+
+/// Answers of a participant in the order of the session.
+///
+/// # Errors
+/// A database that fails.
+pub fn of(db: &Connection, id: &str) -> rusqlite::Result<Vec<GivenAnswer>> {
+    let sql = format!("SELECT {COLUMNS} FROM answer WHERE participant = ?1 ORDER BY position");
+    db.prepare(&sql)?.query_map([id], of_row)?.collect()
+}
+
+/// Answers whose films stopped for want of data, and for how long.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct StallCount {
+    pub trials: u32,
+    pub secs: f64,
+}
+
+/// Counts the answers whose films stopped.
+///
+/// # Errors
+/// A database that fails.
+pub fn stalls(db: &Connection) -> rusqlite::Result<StallCount> {
+    let sql = "SELECT COUNT(*), TOTAL(stalled_secs) FROM answer WHERE stalled_secs > 0";
+    db.query_row(sql, [], |row| Ok(StallCount { trials: row.get(0)?, secs: row.get(1)? }))
+}

@@ -1,0 +1,34 @@
+//! Record of one answered trial, which `serve` exports and the analysis reads.
+
+use super::plan::{TaskDesign, TrialPhase};
+use super::response::Response;
+use serde::{Deserialize, Serialize};
+
+/// One answered trial with all that the analysis needs: a row of `orator study export`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StudyVote {
+    /// Random name of the participant.
+    pub participant: String,
+    pub task: String,
+    pub design: TaskDesign,
+    pub phase: TrialPhase,
+    /// Place in the session, from 1.
+    pub trial: u32,
+    pub clip: String,
+    pub speaker: String,
+    /// Conditions of the films from left to right.
+    pub conditions: Vec<String>,
+    pub response: Response,
+    /// Right response, where there is one: the real film's, the matched film's, the shown number.
+    pub expected: Option<Response>,
+    /// Seconds in which a film had stopped for want of data.
+    pub stalled_secs: f64,
+    /// Seconds in which the page was not in front.
+    pub unfocused_secs: f64,
+    /// Seconds from the end of the films to the answer.
+    pub response_secs: f64,
+    /// How often the films were played.
+    pub plays: u32,
+    /// Whether the participant completed the session.
+    pub completed: bool,
+}

@@ -1,0 +1,156 @@
+//! `orator study analyse` on tables of votes: the counts of a published study, a made-up study of every design with a
+//! known preference, tables that are damaged; its page in a browser.
+
+use crate::fixtures::browser::Browser;
+use crate::fixtures::study::votes::{Rng32, counted_votes, votes_of_all_designs};
+use crate::fixtures::support::Project;
+use serde_json::Value;
+
+fn near(found: &Value, expected: f64, within: f64) {
+    let number = found.as_f64().unwrap_or(f64::NAN);
+    assert!((number - expected).abs() <= within, "{found} {expected}");
+}
+
+/// Entry of a list of figures by method.
+fn by(figures: &Value, method: &str) -> Value {
+    let found = figures.as_array().unwrap().iter().find(|figure| figure["method"] == method);
+    found.unwrap_or_else(|| panic!("no {method} in {figures}")).clone()
+}
+
+/// Counts of Rebol, Guetl and Pietroszek 2021, table III: 512 and 538 of 1,000 votes took the generated gestures for
+/// real ones, 356 and 294 of 500 chose the matching ones.
+#[test]
+fn counts_of_a_published_study_come_out_as_known() {
+    let project = Project::with_clips("study-counts", 0, 1.0);
+    let table = counted_votes(&[
+        ("real-or-generated", "turing", "oliver", 1000 - 512, 1000),
+        ("real-or-generated", "turing", "gruber", 1000 - 538, 1000),
+        ("matched-or-mismatched", "mismatch", "oliver", 356, 500),
+        ("matched-or-mismatched", "mismatch", "gruber", 294, 500),
+    ]);
+    std::fs::write(project.dir().join("votes.csv"), table).unwrap();
+    let answer = project.answer(&["study", "analyse", "votes.csv", "--draws", "400"]);
+    assert_eq!(answer.code, 0, "{}", answer.errors);
+    let analysis = &answer.json["analysis"];
+    let shares = |task: usize| analysis["tasks"][task]["shares"].as_array().unwrap().clone();
+    for (share, (votes, chosen, p)) in
+        shares(0).iter().zip([(2000, 0.525, 0.0268), (1000, 0.538, 0.01766), (1000, 0.512, 0.4673)])
+    {
+        assert_eq!(share["n_votes"], votes);
+        near(&share["share"], chosen, 1e-12);
+        let test = by(&share["tests"], "binomial");
+        near(&test["p"], p, 1e-4);
+        assert!(test["naive"] == true && test["exploratory"] == true);
+    }
+    let pooled = &shares(0)[0];
+    near(&by(&pooled["equivalence"], "binomial")["p"], 6.5e-12, 5e-13);
+    assert!(by(&pooled["equivalence"], "binomial")["passes"] == true);
+    let wilson = by(&pooled["intervals"], "wilson");
+    near(&wilson["low"], 0.5031, 1e-4);
+    near(&wilson["high"], 0.5468, 1e-4);
+    for (share, chosen) in shares(1).iter().zip([0.65, 0.588, 0.712]) {
+        near(&share["share"], chosen, 1e-12);
+        assert!(by(&share["tests"], "crossed")["p"].as_f64().unwrap() < 1e-3);
+        assert_eq!(share["conclusion"], "above");
+    }
+    let methods = analysis["methods"].as_str().unwrap();
+    assert!(methods.contains("100 participants gave 3,000 votes in 2 tasks") && methods.contains("Schuirmann 1987"));
+    assert!(methods.contains("all figures are exploratory"), "{methods}");
+    let verdict = analysis["tasks"][0]["verdicts"][0].as_str().unwrap();
+    assert!(verdict.contains("52.5 % of 2,000 votes"), "{verdict}");
+    // the narrower bound
+    let answer = project.answer(&["study", "analyse", "votes.csv", "--draws", "100", "--bound", "5"]);
+    let pooled = &answer.json["analysis"]["tasks"][0]["shares"][0];
+    near(&by(&pooled["equivalence"], "binomial")["p"], 0.013, 5e-4);
+}
+
+#[test]
+fn a_known_preference_is_found_in_every_design_and_its_page_is_whole() {
+    let project = Project::with_clips("study-page", 0, 1.0);
+    std::fs::write(project.dir().join("votes.csv"), votes_of_all_designs(60, 5)).unwrap();
+    let args =
+        ["study", "analyse", "votes.csv", "--draws", "300", "--report", "deep/page.html", "--methods", "methods.txt"];
+    let answer = project.answer(&args);
+    assert_eq!(answer.code, 0, "{}", answer.errors);
+    let tasks = &answer.json["analysis"]["tasks"];
+    let conclusion = |task: usize| tasks[task]["shares"][0]["conclusion"].as_str().unwrap_or_default().to_owned();
+    assert_eq!([0, 1, 2].map(conclusion), ["below", "above", "above"], "{}", tasks[0]["verdicts"]);
+    // exact permutation of sides: the table says who was on which
+    assert!(by(&tasks[0]["shares"][0]["tests"], "sides")["p"].as_f64().unwrap() < 0.05);
+    // preferences: natural over good over bad, by all methods
+    for task in [3, 4] {
+        for pair in tasks[task]["pairs"].as_array().unwrap() {
+            let names = ["bad", "good", "natural"];
+            let place = |side: &str| names.iter().position(|name| pair[side] == *name).unwrap();
+            assert_eq!(pair["difference"].as_f64().unwrap() > 0.0, place("first") > place("second"), "{pair}");
+            assert!(by(&pair["tests"], "wilcoxon")["adjusted_p"].as_f64().unwrap() < 0.01, "{pair}");
+        }
+    }
+    let scores = tasks[4]["scores"].as_array().unwrap();
+    assert_eq!(
+        scores.iter().map(|row| row["condition"].as_str().unwrap()).collect::<Vec<_>>(),
+        ["natural", "good", "bad"]
+    );
+    assert!(tasks[4]["overall"]["p"].as_f64().unwrap() < 1e-6);
+    assert!(tasks[4]["agreement"].as_f64().unwrap() > 0.1);
+    let page = project.dir().join("deep/page.html");
+    let html = std::fs::read_to_string(&page).unwrap();
+    assert!(!html.contains("://") && !html.contains(&*project.dir().to_string_lossy()));
+    let methods = std::fs::read_to_string(project.dir().join("methods.txt")).unwrap();
+    assert_eq!(methods.trim_end(), answer.json["analysis"]["methods"].as_str().unwrap());
+    let again = project.answer(&args);
+    assert_eq!((again.json == answer.json, std::fs::read_to_string(&page).unwrap() == html), (true, true));
+    let Some(mut browser) = Browser::open(&page, [1280, 900]) else { return };
+    let mut count = |selector: &str| browser.value(&format!("document.querySelectorAll('{selector}').length"));
+    assert_eq!((count(".verdict"), count(".steps")), (5.into(), 3.into()));
+    assert!(count("svg.forest").as_u64().unwrap() >= 7 && count(".figures tbody tr").as_u64().unwrap() > 60);
+    assert_eq!(count(".registered"), 0, "nothing was registered");
+    for (width, scheme) in [(360, "dark"), (360, "light"), (1280, "dark"), (1280, "light")] {
+        browser.resize([width, 800]);
+        browser.colours(scheme);
+        let wide = browser.value("document.documentElement.scrollWidth").as_u64().unwrap();
+        assert!(wide <= u64::from(width), "{wide} px wide in a window of {width} px");
+    }
+    assert!(browser.problems.is_empty(), "{:?}", browser.problems);
+}
+
+#[test]
+fn damaged_tables_are_told_by_line_and_never_end_the_program_otherwise() {
+    let project = Project::with_clips("study-damaged", 0, 1.0);
+    let good = counted_votes(&[("t", "turing", "s", 60, 200)]);
+    let with_bad = format!("{good}p1,c1,s,t,turing,maybe\n<script>alert(1)</script>,c1,s,t,turing,2\n");
+    std::fs::write(project.dir().join("bad.csv"), &with_bad).unwrap();
+    let answer = project.answer(&["study", "analyse", "bad.csv", "--draws", "100", "--report", "p.html"]);
+    assert_eq!(answer.code, 2, "{}", answer.errors);
+    let refused = &answer.json["analysis"]["refused"];
+    assert_eq!((&refused[0]["line"], &refused[1]["line"]), (&202.into(), &203.into()));
+    assert!(refused[0]["reason"].as_str().unwrap().contains("correct is \"maybe\""), "{refused}");
+    assert_eq!(answer.json["analysis"]["tasks"][0]["n_votes"], 200);
+    let html = std::fs::read_to_string(project.dir().join("p.html")).unwrap();
+    assert!(!html.contains("<script>alert"));
+    let mut rng = Rng32(9);
+    for round in 0..12 {
+        let mut bytes = good.clone().into_bytes();
+        for _ in 0..40 {
+            let place = rng.below(bytes.len() as u32) as usize;
+            match rng.below(3) {
+                0 => bytes[place] = rng.below(256) as u8,
+                1 => drop(bytes.remove(place)),
+                _ => bytes.insert(place, b",;\"\n\xff|{"[rng.below(7) as usize]),
+            }
+        }
+        std::fs::write(project.dir().join("fuzz.csv"), &bytes).unwrap();
+        let answer = project.answer(&["study", "analyse", "fuzz.csv", "--draws", "100"]);
+        assert!([0, 1, 2].contains(&answer.code) && !answer.errors.contains("panicked"), "{round}: {}", answer.errors);
+    }
+    for (args, told) in [
+        (vec!["study", "analyse", "none.csv"], "none.csv"),
+        (vec!["study", "analyse", "bad.csv", "--columns", "who=x"], "no field \"who\""),
+        (vec!["study", "analyse", "bad.csv", "--columns", "clip=film"], "no column \"film\""),
+        (vec!["study", "analyse", "bad.csv", "--bound", "70"], "--bound is 70"),
+        (vec!["study", "analyse", "bad.csv", "--report", "p.txt"], "ends in .html"),
+    ] {
+        let answer = project.answer(&args);
+        assert!(answer.code == 1 && answer.errors.contains(told), "{told}: {}", answer.errors);
+    }
+}

@@ -1,0 +1,187 @@
+// Participants who take part in a study by a rule.
+//
+//   node participant.mjs --url URL --answers FILE [--seed N] [--participants N] [--at-once N]
+//
+// FILE: {"scores": {FILM: 0 to 1}, "numbers": {FILM: NUMBER}, "certainty": 0 to 1}. The film of the higher score is
+// chosen, with the probability `certainty`; one film alone is taken for real above 0.5; sliders are set to the score.
+// An attention check is answered with the number of its film. One line of JSON a participant is printed.
+//
+// For tests of the page: --touch, --width, --height, --scheme dark, --language CODE, --audit (axe-core at every step),
+// --pictures DIR, --reload-at POSITION, --offline-at POSITION, --away-at POSITION, --withdraw-at POSITION.
+
+import { mkdirSync, readFileSync } from "node:fs";
+import { join } from "node:path";
+import { parseArgs } from "node:util";
+import { audit, launch, open } from "./page.mjs";
+
+const text = { type: "string" };
+const { values: options } = parseArgs({
+  options: {
+    url: text, answers: text, seed: text, participants: text, "at-once": text, width: text, height: text, scheme: text,
+    language: text, pictures: text, "reload-at": text, "offline-at": text, "withdraw-at": text,
+    "away-at": text,
+    touch: { type: "boolean" }, audit: { type: "boolean" },
+  },
+});
+const rule = { scores: {}, numbers: {}, certainty: 1, ...(options.answers ? JSON.parse(readFileSync(options.answers, "utf8")) : {}) };
+const at = (name) => (options[name] === undefined ? -1 : Number(options[name]));
+
+// Numbers from 0 to 1 that a seed fixes (mulberry32).
+function random(seed) {
+  let state = seed >>> 0;
+  return () => {
+    state = (state + 0x6d2b79f5) >>> 0;
+    let bits = Math.imul(state ^ (state >>> 15), state | 1);
+    bits ^= bits + Math.imul(bits ^ (bits >>> 7), bits | 61);
+    return ((bits ^ (bits >>> 14)) >>> 0) / 2 ** 32;
+  };
+}
+
+// What the page shows.
+const look = (page) =>
+  page.evaluate(() => {
+    const has = (selector) => Boolean(document.querySelector(selector));
+    const films = [...document.querySelectorAll("main .films video")].map((video) => video.src.match(/([0-9a-f]{16})\.mp4/)?.[1]);
+    const kind = has("#agree") ? "consent"
+      : has("#tones") ? "sound"
+      : has("#code") ? "end"
+      : has("main form #number") ? "check"
+      : has("main form .score input[type=range]") ? "sliders"
+      : has("main form .choices") ? "choice"
+      : has("main .main") ? "text" : "nothing";
+    const options = [...document.querySelectorAll(".choices input")].map((input) => input.value);
+    const heading = document.querySelector("h1")?.textContent;
+    return { kind, films, options, heading, inTurn: has(".films.stack") };
+  });
+
+// Index of the option that the rule chooses.
+function chosen({ films, options: values }, draw) {
+  const follows = draw() < rule.certainty;
+  const scores = films.map((film) => rule.scores[film] ?? 0.5);
+  if (films.length === 1) return (scores[0] > 0.5) === follows ? 0 : 1;
+  const lead = (scores[1] - scores[0]) * (follows ? 1 : -1);
+  if (values.length === 2) return lead === 0 ? Math.floor(2 * draw()) : Number(lead > 0);
+  return Math.max(0, Math.min(4, 2 + Math.sign(lead) * Math.ceil(2 * Math.abs(lead))));
+}
+
+async function participate(browser, seed) {
+  const draw = random(seed);
+  const { width, height, touch, scheme, language } = options;
+  const size = { width: width ? Number(width) : undefined, height: height ? Number(height) : undefined };
+  const { page, context, problems, lookAway, hands } = await open(browser, options.url, { ...size, touch, scheme, language });
+  const report = { seed, steps: [], findings: [], apart_ms: [], trials: 0, answers: [], code: null, problems };
+  page.on("request", (request) => request.url().endsWith("/api/answer") && report.answers.push(JSON.parse(request.postData())));
+  let position = 0;
+  let hasReloaded = false;
+  const step = async (name) => {
+    report.steps.push(name);
+    if (options.pictures) {
+      mkdirSync(options.pictures, { recursive: true });
+      const file = `${String(report.steps.length).padStart(2, "0")}-${name}.png`;
+      await page.screenshot({ path: join(options.pictures, file) });
+    }
+    if (options.audit) report.findings.push(...(await audit(page)).map((finding) => `${name}: ${finding}`));
+  };
+  const isOpen = (selector) => page.waitForSelector(`${selector}:not(:disabled)`);
+  // Waits until another step is shown, with what `shown` names in it.
+  const leave = async (act, shown = "main .main") => {
+    await page.evaluate(() => (document.querySelector("h1").dataset.isOld = "yes"));
+    await act();
+    const isNew = (selector) => document.querySelector("h1")?.dataset.isOld !== "yes" && document.querySelector(selector);
+    await page.waitForFunction(isNew, {}, shown);
+  };
+  const seeTogether = async () => {
+    await hands.press("main form button[type=button]");
+    if (position === at("away-at")) {
+      await page.waitForFunction(() => document.querySelector("video").currentTime > 0.5);
+      await lookAway(1000);
+    }
+    await isOpen("main form fieldset");
+    const { startApartMs, mostApartMs } = await page.$eval(".films", (stage) => ({ ...stage.dataset }));
+    report.apart_ms.push([Number(startApartMs), Number(mostApartMs)]);
+  };
+  const seeInTurn = async (n, after) => {
+    for (let k = 0; k < n; k += 1) {
+      await hands.press(`.score:nth-child(${k + 1}) button`);
+      await page.waitForSelector(`.score:nth-child(${k + 1}) button[data-seen]`);
+      await after(k);
+    }
+  };
+  const answer = async (view) => {
+    if (position === at("withdraw-at")) {
+      await hands.press("#footer button");
+      await page.waitForSelector("dialog[open]");
+      await step("withdrawal");
+      await leave(() => hands.press("dialog button:last-child"), "main .text");
+      await step("withdrawn");
+      return false;
+    }
+    if (position === at("reload-at") && !hasReloaded) {
+      hasReloaded = true;
+      await hands.press("main form button[type=button]");
+      await page.waitForFunction(() => document.querySelector("video").currentTime > 0.3);
+      await page.reload();
+      await page.waitForSelector("main .main");
+      await step("resumed");
+      await leave(() => hands.press("main .main"));
+      return true;
+    }
+    if (view.kind === "sliders") {
+      await seeInTurn(view.films.length, async (k) => {
+        const score = Math.round(100 * (rule.scores[view.films[k]] ?? draw()));
+        const input = `.score:nth-child(${k + 1}) input`;
+        await isOpen(`.score:nth-child(${k + 1}) fieldset`);
+        await hands.slide(input, score);
+      });
+    } else if (view.inTurn) await seeInTurn(view.films.length, async () => {});
+    else await seeTogether();
+    if (view.kind === "choice") await hands.choose(chosen(view, draw));
+    if (view.kind === "check") await hands.type("#number", `${view.films.map((film) => rule.numbers[film]).find(Boolean) ?? 11}`);
+    await step(`${view.kind}-answered`);
+    await leave(async () => {
+      if (position === at("offline-at")) {
+        await page.setOfflineMode(true);
+        await hands.submit();
+        await page.waitForFunction(() => /[1-9]/.test(document.querySelector("#status").textContent));
+        await step("offline");
+        await page.setOfflineMode(false);
+      } else await hands.submit();
+    });
+    position += 1;
+    report.trials += 1;
+    return true;
+  };
+  await page.waitForSelector("main .main");
+  for (;;) {
+    const view = await look(page);
+    await step(view.kind);
+    if (view.kind === "consent") {
+      await hands.press("#agree");
+      await isOpen("main .main");
+      await leave(() => hands.press("main .main"));
+    } else if (view.kind === "sound") {
+      await hands.press("main button[type=button]");
+      await isOpen("main fieldset");
+      await hands.type("#tones", "3");
+      await leave(() => hands.submit());
+    } else if (view.kind === "end") {
+      report.code = await page.$eval("#code", (input) => input.value);
+      break;
+    } else if (view.kind === "text") await leave(() => hands.press("main .main"));
+    else if (!(await answer(view))) break;
+  }
+  await context.close();
+  return report;
+}
+
+const browser = await launch();
+try {
+  const seed = Number(options.seed ?? 1);
+  const waiting = Array.from({ length: Number(options.participants ?? 1) }, (_, k) => seed + k);
+  const line = async () => {
+    for (let next = waiting.shift(); next !== undefined; next = waiting.shift()) console.log(JSON.stringify(await participate(browser, next)));
+  };
+  await Promise.all(Array.from({ length: Number(options["at-once"] ?? 1) }, line));
+} finally {
+  await browser.close();
+}

@@ -1,0 +1,198 @@
+//! `orator study build`: a sealed folder whose films tell nothing, the same bytes after a stop and on any number of workers.
+
+use crate::fixtures::faults::stop::{Shared, Stop};
+use crate::fixtures::study::films::{SIZE, speaker};
+use orator::stage::progress::{Progress, Silent};
+use orator::study::build::build;
+use orator::study::file::StudyFile;
+use orator::study::folder::StudyFolder;
+use orator::study::plan::{StudyKey, StudyPlan};
+use orator::study::seal::StudySeal;
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Study of few and short films: two tasks, one of them without sound.
+const STUDY: &str = r#"
+title = "Is it real?"
+seed = 3
+participants = 4
+attention_checks = 1
+task_order = "written"
+[clips]
+seconds = 1.0
+[[speaker]]
+name = "host"
+dataset = "data"
+[[condition]]
+name = "real"
+kind = "natural"
+[[condition]]
+name = "model"
+kind = "checkpoint"
+checkpoint = "models/{speaker}"
+[[condition]]
+name = "mismatched"
+kind = "mismatched"
+of = "real"
+[[task]]
+name = "real-or-generated"
+design = "turing"
+conditions = ["real", "model"]
+trials = 3
+[[task]]
+name = "fits"
+design = "mismatch"
+conditions = ["real", "mismatched"]
+trials = 2
+training = 1
+"#;
+
+fn file(dir: &Path) -> StudyFile {
+    let path = dir.join("study.toml");
+    if !path.exists() {
+        speaker(dir);
+        fs::write(&path, STUDY).unwrap();
+    }
+    StudyFile::read(&path).unwrap()
+}
+
+/// Files below a folder with their contents, locks aside.
+fn contents(dir: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    let mut waiting = vec![dir.to_owned()];
+    while let Some(folder) = waiting.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            match path.is_dir() {
+                true => waiting.push(path),
+                false => {
+                    drop(all.insert(path.strip_prefix(dir).unwrap().display().to_string(), fs::read(&path).unwrap()))
+                }
+            }
+        }
+    }
+    all.remove(".lock");
+    all
+}
+
+fn orator(dir: &Path, args: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_orator")).args(args.split_whitespace()).current_dir(dir).output().unwrap()
+}
+
+#[test]
+fn a_study_is_built_sealed_and_the_same_after_a_stop() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let file = file(dir);
+    let study = StudyFolder::new(dir.join("study"));
+    let built = build(&file, study.dir(), SIZE, &Silent).unwrap();
+    let seal = StudySeal::verify(&study).unwrap();
+    assert_eq!((built.seal.as_str(), built.up_to_date), (seal.seal.as_str(), false));
+
+    // What participants can reach is the films of the plan, all of one length and date of nothing.
+    let plan: StudyPlan = serde_json::from_slice(&fs::read(study.plan()).unwrap()).unwrap();
+    let key: StudyKey = serde_json::from_slice(&fs::read(study.key()).unwrap()).unwrap();
+    let films = contents(&study.public());
+    let planned = plan.sessions.iter().flat_map(|session| &session.trials).flat_map(|trial| &trial.films);
+    let planned: BTreeSet<String> =
+        planned.chain([&plan.sound_check]).map(|film| format!("films/{film}.mp4")).collect();
+    assert_eq!(films.keys().cloned().collect::<BTreeSet<_>>(), planned);
+    assert_eq!(key.films.len(), films.len());
+    assert!(films.values().all(|film| film.len() as u64 == built.film_bytes));
+    let is_opaque = |name: &&String| name.len() == 16 && name.bytes().all(|digit| digit.is_ascii_hexdigit());
+    assert_eq!(key.films.keys().filter(is_opaque).count(), key.films.len());
+    for (name, content) in &key.films {
+        assert_eq!(content.motion_of != content.clip, content.condition == "mismatched", "{name}");
+        let sealed = seal.files.get(&format!("public/films/{name}.mp4")).unwrap();
+        assert_eq!(*sealed, blake3::hash(&films[&format!("films/{name}.mp4")]).to_hex().to_string());
+    }
+    assert!(key.films.values().any(|content| content.number.is_some()));
+    let whole = contents(study.dir());
+    assert!(whole.keys().all(|name| !name.contains(".films")), "what was made on the way is gone");
+    assert!(whole.contains_key("clips/clips.json") && whole.keys().any(|name| name.ends_with(".wav")));
+
+    // Again: nothing to do. Another study, or one with answers: refused.
+    let output = orator(dir, "--json study build study.toml");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let facts: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((facts["seal"].as_str(), facts["up_to_date"].as_bool()), (Some(seal.seal.as_str()), Some(true)));
+    assert_eq!(facts["next"], "orator study serve study");
+    let other = StudyFile { participants: 5, ..file.clone() };
+    let refused = build(&other, study.dir(), SIZE, &Silent).unwrap_err().to_string();
+    assert!(refused.contains("is sealed") && refused.contains("--out"), "{refused}");
+
+    // Stopped while films are made, then finished on one worker.
+    let again = dir.join("again");
+    let stopped = catch_unwind(AssertUnwindSafe(|| build(&file, &again, SIZE, &Shared(Stop::at(31)) as &dyn Progress)));
+    assert!(stopped.is_err() && !again.join("seal.json").exists() && !again.join("public").exists());
+    let made = contents(&again.join(".films"));
+    assert!(!made.is_empty());
+    // Other workers may have made all the others before they ended.
+    fs::remove_file(again.join(".films").join(made.keys().next_back().unwrap())).unwrap();
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    one.install(|| build(&file, &again, SIZE, &Silent)).unwrap();
+    let again = contents(&again);
+    assert_eq!(again.keys().collect::<Vec<_>>(), whole.keys().collect::<Vec<_>>());
+    let different: Vec<&String> = whole.keys().filter(|name| whole[*name] != again[*name]).collect();
+    assert!(different.is_empty(), "{different:?}");
+    fs::write(study.film("0000000000000000"), "planted").unwrap();
+    assert!(build(&file, study.dir(), SIZE, &Silent).unwrap_err().to_string().contains("0000000000000000"));
+}
+
+/// The confined program, which may not do all that the library may.
+#[test]
+fn the_command_line_builds_a_study() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    speaker(dir);
+    let (head, _) = STUDY.split_once("[[task]]").unwrap();
+    let head = head.replace("attention_checks = 1", "attention_checks = 0\npractice = false");
+    let task =
+        "[[task]]\nname = \"fits\"\ndesign = \"mismatch\"\nconditions = [\"real\", \"mismatched\"]\ntrials = 1\n";
+    fs::write(dir.join("study.toml"), head.replace("participants = 4", "participants = 1") + task).unwrap();
+    let output = orator(dir, "study build study.toml --out made/here");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let seal = StudySeal::verify(&StudyFolder::new(dir.join("made/here"))).unwrap();
+    assert!(said.contains("host: 2 clips") && said.contains(&seal.seal), "{said}");
+    assert!(said.contains("next: orator study serve made/here"), "{said}");
+}
+
+#[test]
+fn what_is_missing_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let file = file(dir);
+    let say = |change: &dyn Fn(&mut StudyFile)| {
+        let mut changed = file.clone();
+        change(&mut changed);
+        format!("{:#}", build(&changed, &dir.join("out"), SIZE, &Silent).unwrap_err())
+    };
+    let cases: [(&str, String); 5] = [
+        ("clips are needed", say(&|file| file.task[0].trials = 400)),
+        ("shorter clips", say(&|file| file.clips.seconds = 30.0)),
+        ("no dataset", say(&|file| file.speaker[0].dataset = Some(dir.join("nowhere")))),
+        (
+            "condition model",
+            say(&|file| fs::rename(dir.join("models"), dir.join("moved")).map(|()| file.seed = 9).unwrap()),
+        ),
+        (
+            "has no interval in the validation split",
+            say(&|file| {
+                fs::rename(dir.join("moved"), dir.join("models")).unwrap();
+                file.speaker[0].split = orator::types::split::Split::Validation;
+            }),
+        ),
+    ];
+    for (says, text) in cases {
+        assert!(text.contains(says), "{says}: {text}");
+    }
+    let output = orator(dir, "study build nothing.toml");
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("nothing.toml") && said.contains("orator guide study"), "{said}");
+}

@@ -1,0 +1,131 @@
+//! Long run: simulated studies with known truth through the very analysis. Coverage of intervals, errors of tests,
+//! power against the plan, and how far the naive binomial test is off.
+
+use orator::study::analyse::figure::FigureMethod;
+use orator::study::analyse::outcome::BinaryVote;
+use orator::study::analyse::result::{FigureSettings, ShareAnalysis, ShareMeasure};
+use orator::study::analyse::share::{ShareCell, share};
+use orator::study::power::{PowerQuestion, power, simulated};
+use orator::study::simulate::{CrossedDesign, CrossedEffects, crossed_votes};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use rayon::prelude::*;
+
+const STUDIES: u64 = 2000;
+/// Studies that power is foretold by.
+const FORETOLD: usize = 10_000;
+/// Draws of bootstrap and sign flips in each study.
+const DRAWS: usize = 1000;
+const METHODS: [FigureMethod; 7] = [
+    FigureMethod::Crossed,
+    FigureMethod::CrossedBootstrap,
+    FigureMethod::SignFlip,
+    FigureMethod::Sides,
+    FigureMethod::Participants,
+    FigureMethod::Wilson,
+    FigureMethod::Binomial,
+];
+
+/// Shares of studies, percent.
+#[derive(Default)]
+struct Rates {
+    covered: f64,
+    rejected: f64,
+    has_interval: bool,
+    has_test: bool,
+}
+
+fn rates(studies: &[ShareAnalysis], truth: f64, method: FigureMethod) -> Rates {
+    let percent = |n: usize| 100.0 * n as f64 / studies.len() as f64;
+    let interval = |study: &&ShareAnalysis| {
+        study.figures.interval(method).is_some_and(|interval| interval.low <= truth && truth <= interval.high)
+    };
+    let test = |study: &&ShareAnalysis| study.figures.test(method).is_some_and(|test| test.p < 0.05);
+    Rates {
+        covered: percent(studies.iter().filter(interval).count()),
+        rejected: percent(studies.iter().filter(test).count()),
+        has_interval: studies[0].figures.interval(method).is_some(),
+        has_test: studies[0].figures.test(method).is_some(),
+    }
+}
+
+/// Prints a scenario's rates, and gives those of each method.
+fn scenario(name: &str, truth: f64, study: impl Fn(u64) -> ShareAnalysis + Sync + Send) -> Vec<Rates> {
+    let studies: Vec<ShareAnalysis> = (0..STUDIES).into_par_iter().map(study).collect();
+    eprintln!("\n{name}, {STUDIES} studies, true share {:.0} %", 100.0 * truth);
+    let all: Vec<Rates> = METHODS.iter().map(|method| rates(&studies, truth, *method)).collect();
+    for (method, rates) in METHODS.iter().zip(&all).filter(|(_, rates)| rates.has_interval || rates.has_test) {
+        let covered = if rates.has_interval { format!("covers {:5.1} %", rates.covered) } else { " ".repeat(14) };
+        let rejected = if rates.has_test { format!("rejects {:5.1} %", rates.rejected) } else { String::new() };
+        eprintln!("  {:<38} {covered}  {rejected}", method.name());
+    }
+    all
+}
+
+fn settings() -> FigureSettings {
+    FigureSettings { n_draws: DRAWS, with_models: false, ..FigureSettings::default() }
+}
+
+/// Nobody can tell, and everybody prefers a side.
+fn with_sides(design: &CrossedDesign, stream: u64) -> ShareAnalysis {
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    rng.set_stream(stream);
+    let none = CrossedEffects { share: 0.5, sd_participants: 0.0, sd_clips: 0.0 };
+    let mut prefers = vec![0.0; design.n_participants];
+    prefers.iter_mut().for_each(|odds: &mut f64| *odds = rng.sample::<f64, _>(StandardNormal));
+    let votes = crossed_votes(design, &none, 7, stream).into_iter().map(|mut vote| {
+        let (is_left, odds): (bool, f64) = (rng.random(), prefers[vote.participant]);
+        let chose_left = rng.random::<f64>() < 1.0 / (1.0 + (-odds).exp());
+        vote.score = f64::from(u8::from(is_left != chose_left));
+        BinaryVote { vote, speaker: "", condition: "", sides: Some([is_left, chose_left]) }
+    });
+    let votes = votes.collect();
+    share(&ShareCell { measure: ShareMeasure::GeneratedChosen, speaker: None, condition: None, votes }, &settings())
+}
+
+#[test]
+#[ignore = "minutes: make prove-study"]
+fn intervals_cover_tests_err_and_power_is_as_the_analysis_says() {
+    let designs = [
+        ("100 participants, 20 votes each, 40 clips", CrossedDesign { n_participants: 100, n_trials: 20, n_clips: 40 }),
+        ("40 participants, 10 votes each, 20 clips", CrossedDesign { n_participants: 40, n_trials: 10, n_clips: 20 }),
+    ];
+    let [crossed, bootstrap, flips, sides, _, _, binomial] = [0, 1, 2, 3, 4, 5, 6];
+    for (name, design) in designs {
+        for (sd_participants, sd_clips) in [(0.3, 0.3), (0.6, 0.6)] {
+            for truth in [0.5, 0.55] {
+                let effects = CrossedEffects { share: truth, sd_participants, sd_clips };
+                let title = format!("{name}, standard deviations {sd_participants} and {sd_clips}");
+                let rates = scenario(&title, truth, |k| simulated(&design, &effects, &settings(), 3, k));
+                assert!((93.0..=97.0).contains(&rates[crossed].covered), "{}", rates[crossed].covered);
+                // Percentiles of a normal shape are a little narrow for 20 clips.
+                assert!((92.0..=97.0).contains(&rates[bootstrap].covered), "{}", rates[bootstrap].covered);
+                if truth == 0.5 {
+                    assert!((4.0..=6.0).contains(&rates[crossed].rejected), "{}", rates[crossed].rejected);
+                    assert!(rates[flips].rejected <= 6.0, "{}", rates[flips].rejected);
+                    assert!(rates[binomial].rejected > 6.0, "{}", rates[binomial].rejected);
+                    continue;
+                }
+                let question = PowerQuestion {
+                    n_trials: design.n_trials,
+                    n_clips: design.n_clips,
+                    sd_participants,
+                    sd_clips,
+                    power: 0.9,
+                    effect: truth,
+                    bound: 0.1,
+                    n_simulations: FORETOLD,
+                    seed: 11,
+                };
+                let is_found =
+                    |study: &ShareAnalysis| study.figures.test(FigureMethod::Crossed).is_some_and(|test| test.p < 0.05);
+                let foretold = 100.0 * power(&question, design.n_participants, truth, &is_found).power;
+                eprintln!("  power foretold {foretold:.1} %, found {:.1} %", rates[crossed].rejected);
+                assert!((foretold - rates[crossed].rejected).abs() <= 3.0);
+            }
+        }
+        let rates = scenario(&format!("{name}, nobody can tell, sides preferred"), 0.5, |k| with_sides(&design, k));
+        assert!(rates[sides].rejected <= 6.0 && rates[binomial].rejected <= 6.0);
+    }
+}

@@ -1,0 +1,135 @@
+//! Films of every kind of condition are alike in all but the motion.
+
+use crate::fixtures::study::films::{SIZE, speaker};
+use crate::fixtures::study::mp4;
+use orator::demo::rule::dataset::{RULE, SpokenClip};
+use orator::external::ffmpeg::frames::FrameReader;
+use orator::external::ffmpeg::probe::probe;
+use orator::stage::progress::Silent;
+use orator::study::file::StudyFile;
+use orator::study::plan::FilmContent;
+use orator::study::stimuli::film_size::{common_bytes, padded};
+use orator::study::stimuli::filmed::{CutSpeaker, equally_loud};
+use orator::types::split::Split;
+use orator::types::time::FrameRate;
+
+const STUDY: &str = r#"
+title = "Kinds of motion"
+participants = 4
+attention_checks = 0
+practice = false
+[clips]
+seconds = 2.0
+[[speaker]]
+name = "host"
+dataset = "data"
+[[condition]]
+name = "real"
+kind = "natural"
+[[condition]]
+name = "model"
+kind = "checkpoint"
+checkpoint = "models/{speaker}"
+[[condition]]
+name = "mismatched"
+kind = "mismatched"
+of = "real"
+[[condition]]
+name = "still"
+kind = "mean-pose"
+[[condition]]
+name = "theirs"
+kind = "files"
+files = "theirs/{clip}.npy"
+[[task]]
+name = "liking"
+design = "sliders"
+scale = "human-likeness"
+conditions = ["real", "model", "mismatched", "still", "theirs"]
+trials = 1
+"#;
+
+#[test]
+fn films_of_all_conditions_differ_in_motion_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    speaker(dir);
+    std::fs::write(dir.join("study.toml"), STUDY).unwrap();
+    let file = StudyFile::read(&dir.join("study.toml")).unwrap();
+    let cut = || CutSpeaker::new(&file, &file.speaker[0], 4, |name| name.len() as u64).unwrap();
+    let mut host = cut();
+    assert!(host.cut.clips.len() == 4 && host.cut.refused.is_empty());
+    for clip in &host.cut.clips {
+        assert!(clip.cut_db < -15.0 && clip.unseen == 0.0 && clip.frames.len() == 30, "{clip:?}");
+    }
+    let missing = format!("{:#}", cut().filmed(&file, SIZE, &Silent).map(drop).unwrap_err());
+    assert!(missing.contains("theirs") && missing.contains(".npy"), "{missing}");
+
+    // Another system's motion, at its own rate.
+    let clips = host.cut.clips.clone();
+    for (number, clip) in clips.iter().enumerate() {
+        let motion = SpokenClip { rule: RULE, seed: 6, split: Split::Test, number, n_frames: 30 }.motion();
+        std::fs::create_dir_all(dir.join("theirs")).unwrap();
+        orator::animate::export::file::ExportFormat::Npy
+            .write_joints(&dir.join(format!("theirs/{}.npy", clip.name)), &motion)
+            .unwrap();
+    }
+    let lufs = equally_loud(host.sounds.iter_mut());
+    assert!((-40.0..=-23.0).contains(&lufs), "{lufs}");
+    let host = host.filmed(&file, SIZE, &Silent).unwrap();
+
+    let name = |clip: usize| format!("host/{}", clips[clip].name);
+    let content = |condition: &str, number| FilmContent {
+        clip: name(1),
+        speaker: "host".into(),
+        condition: condition.into(),
+        motion_of: name(1),
+        number,
+        muted: false,
+    };
+    let (mut films, mut skeletons) = (Vec::new(), Vec::new());
+    for (condition, number) in
+        [("real", None), ("model", None), ("mismatched", None), ("still", None), ("theirs", None), ("real", Some(47))]
+    {
+        let content = content(condition, number);
+        let performance = host.performance(&content).unwrap();
+        let scene = host.scene(&content, &performance);
+        assert_eq!(performance.clip.n_frames(), 60);
+        skeletons.push(performance.rig.skeleton.clone());
+        let path = dir.join(format!("{condition}{}.mp4", number.unwrap_or(0)));
+        scene.write(&path).unwrap();
+        films.push(path);
+    }
+    assert_eq!(host.motion_of(&content("real", None)).unwrap(), name(1));
+    assert_ne!(host.motion_of(&content("mismatched", None)).unwrap(), name(1));
+
+    assert!(skeletons.windows(2).all(|pair| pair[0] == pair[1]), "one body");
+    let bytes = common_bytes(films.iter().map(|film| std::fs::metadata(film).unwrap().len() as usize));
+    films.iter().for_each(|film| std::fs::write(film, padded(std::fs::read(film).unwrap(), bytes).unwrap()).unwrap());
+    let mut headers = Vec::new();
+    for film in &films {
+        let data = std::fs::read(film).unwrap();
+        assert_eq!(data.len(), bytes);
+        let order: Vec<String> = mp4::boxes(&data).into_iter().map(|found| found.kind).collect();
+        let at = |kind: &str| order.iter().position(|other| other == kind).unwrap();
+        assert!(at("moov") < at("mdat") && order.last().unwrap() == "free", "{order:?}");
+        // Neither a title nor a program's name, and no time of day.
+        let said = mp4::find(&data, "moov/udta").concat();
+        assert!(said.ends_with(b"\0\0\0\x08ilst") && mp4::find(&data, "moov/meta").is_empty());
+        assert!(mp4::find(&data, "moov/mvhd")[0][4..12].iter().all(|byte| *byte == 0));
+        // The first picture is a key frame.
+        let keys = &mp4::find(&data, "moov/trak/mdia/minf/stbl/stss")[0];
+        assert!(mp4::number(&keys[4..]) >= 1 && mp4::number(&keys[8..]) == 1);
+        let [movie, times, edits] =
+            ["moov/mvhd", "moov/trak/mdia/minf/stbl/stts", "moov/trak/edts/elst"].map(|path| mp4::find(&data, path));
+        headers.push((movie, times, edits));
+        let media = probe(film).unwrap();
+        let video = media.video.unwrap();
+        assert_eq!((video.codec.as_str(), video.image_size, video.fps), ("h264", SIZE, Some(FrameRate::new(30, 1))));
+        assert_eq!(media.audio.unwrap().codec, "aac");
+        assert_eq!(FrameReader::open(film, FrameRate::new(30, 1)).unwrap().count(), 60);
+    }
+    assert!(headers.windows(2).all(|pair| pair[0] == pair[1]), "films differ in what their headers say");
+    let sounds: Vec<_> = films.iter().map(|film| orator::read_sound(film).unwrap()).collect();
+    assert!(sounds.windows(2).all(|pair| pair[0] == pair[1]), "films of one clip sound alike");
+}

@@ -1,0 +1,12 @@
+//! User studies: built, served, analysed.
+
+mod analyse;
+mod build;
+mod bundle;
+mod coverage;
+mod films;
+mod pages;
+mod serve;
+mod serve_crowd;
+mod serve_hostile;
+mod whole;

@@ -1,0 +1,129 @@
+//! Whole sessions of every design in a real browser, against the real server: by keys alone and by touch alone, light and
+//! dark, with a reload, a lost network, a look away and a withdrawal; axe-core looks at every step.
+
+use crate::fixtures::served_study::MadeStudy;
+use crate::fixtures::skip::{browser_driver, skip};
+use orator::study::plan::{PlannedTask, StudyPlan, TaskDesign, Trial, TrialPhase};
+use orator::study::response::{Response, ScreenSide};
+use orator::study::seal::StudySeal;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+/// Study of all designs, ten trials with films of 1.6 s; the films of even index are preferred.
+fn every_design(n_sessions: usize) -> MadeStudy {
+    let made = MadeStudy::new(n_sessions, n_sessions, 4, 40);
+    let mut plan: StudyPlan = serde_json::from_slice(&fs::read(made.folder.plan()).unwrap()).unwrap();
+    let designs = [
+        (TaskDesign::Turing, false, ""),
+        (TaskDesign::TuringSingle, true, ""),
+        (TaskDesign::Preference, false, ""),
+        (TaskDesign::Mismatch, false, ""),
+        (TaskDesign::Sliders, true, "human-likeness"),
+        (TaskDesign::Sliders, false, "appropriateness"),
+    ];
+    let task = |(k, (design, replay, scale)): (usize, (TaskDesign, bool, &str))| PlannedTask {
+        name: format!("task-{k}"),
+        design,
+        replay,
+        scale: scale.to_owned(),
+    };
+    plan.tasks = designs.into_iter().enumerate().map(task).collect();
+    let films = |indices: &[usize]| indices.iter().map(|k| made.films[*k].clone()).collect::<Vec<_>>();
+    let trial = |task, phase, indices: &[usize], expected| Trial { task, phase, films: films(indices), expected };
+    let side = |side| Some(Response::Side(side));
+    let trials = vec![
+        trial(0, TrialPhase::Practice, &[0, 1], None),
+        trial(0, TrialPhase::Training, &[2, 3], side(ScreenSide::Left)),
+        trial(0, TrialPhase::Main, &[5, 4], None),
+        trial(0, TrialPhase::AttentionCheck, &[6, 7], Some(Response::Number(42))),
+        trial(1, TrialPhase::Main, &[0], None),
+        trial(2, TrialPhase::Main, &[1, 0], None),
+        trial(3, TrialPhase::Training, &[2, 3], side(ScreenSide::Right)),
+        trial(4, TrialPhase::Main, &[0, 1, 2], None),
+        trial(4, TrialPhase::AttentionCheck, &[1, 6, 3], Some(Response::Number(42))),
+        trial(5, TrialPhase::Main, &[4, 5, 6, 7], None),
+    ];
+    plan.sessions.iter_mut().for_each(|session| session.trials.clone_from(&trials));
+    plan.sound_check.clone_from(&made.films[0]);
+    fs::write(made.folder.plan(), serde_json::to_vec(&plan).unwrap()).unwrap();
+    let file = fs::read_to_string(made.folder.study_file()).unwrap();
+    fs::write(made.folder.study_file(), file.replace("[\"en\"]", "[\"en\", \"de\", \"ar\"]")).unwrap();
+    StudySeal::of(&made.folder).unwrap().write(&made.folder).unwrap();
+    made
+}
+
+/// Takes part at `address` by the rule of `made`, and gives what the participant reports.
+fn take_part(made: &MadeStudy, address: &str, driver: &Path, more: &str) -> Value {
+    let score = |k: usize| if k % 2 == 0 { 0.9 } else { 0.1 };
+    let scores: BTreeMap<_, _> = made.films.iter().enumerate().map(|(k, film)| (film, score(k))).collect();
+    let rule = json!({ "scores": scores, "numbers": { &made.films[6]: 42 } });
+    let answers = made.path().join("answers.json");
+    fs::write(&answers, rule.to_string()).unwrap();
+    let mut command = Command::new("node");
+    command.arg("tests/it/study/browser/participant.mjs").env("ORATOR_DRIVER", driver);
+    command.args(["--audit", "--url", &format!("http://{address}/"), "--answers"]).arg(&answers);
+    let done = command.args(more.split_whitespace()).output().unwrap();
+    assert!(done.status.success(), "{more}: {}", String::from_utf8_lossy(&done.stderr));
+    let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!(report["findings"], json!([]), "{more}");
+    report
+}
+
+fn is_code(report: &Value) -> bool {
+    report["code"].as_str().is_some_and(|code| code.len() == 10)
+}
+
+#[test]
+fn a_session_by_keys_and_one_by_touch_are_stored_as_they_were_answered() {
+    let Some(driver) = browser_driver() else { return };
+    if Command::new("chromium").arg("--version").output().is_err() {
+        return skip("no browser is installed (package chromium)");
+    }
+    let made = every_design(3);
+    let served = made.serve(&[]);
+    let by_keys = take_part(&made, &served.address, &driver, "--width 1280 --language en --away-at 1");
+    let dark = "--width 360 --height 640 --touch --scheme dark --language ar --reload-at 1 --offline-at 2";
+    let by_touch = take_part(&made, &served.address, &driver, dark);
+    for report in [&by_keys, &by_touch] {
+        println!("apart at the start and later, ms: {}", report["apart_ms"]);
+        assert!(is_code(report) && report["trials"] == 10, "{report}");
+        for apart in report["apart_ms"].as_array().unwrap() {
+            // Two frames: a machine under load is late to correct.
+            assert!(apart[1].as_u64().unwrap() <= 80, "{report}");
+        }
+    }
+    assert_eq!(by_keys["problems"], json!([]));
+    let withdrawn = take_part(&made, &served.address, &driver, "--touch --width 360 --language de --withdraw-at 2");
+    assert_eq!(withdrawn["code"], Value::Null);
+
+    let votes = made.exported("votes");
+    assert_eq!(votes.len(), 20, "who withdrew has left nothing");
+    let expected = [
+        json!({ "side": "left" }),
+        json!({ "side": "left" }),
+        json!({ "side": "right" }),
+        json!({ "number": 42 }),
+        json!({ "real": true }),
+        json!({ "step": 2 }),
+        json!({ "side": "left" }),
+    ];
+    for votes in votes.chunks(10) {
+        for (vote, expected) in votes.iter().zip(&expected) {
+            assert_eq!(vote["response"], *expected, "{vote}");
+        }
+        assert_eq!(votes[8]["response"], json!({ "number": 42 }));
+        for (at, wanted) in [(7, &[90, 10, 90][..]), (9, &[90, 10, 90, 10])] {
+            let scores = votes[at]["response"]["scores"].as_array().unwrap().clone();
+            assert_eq!(scores.len(), wanted.len());
+            // A finger is not as exact as a key.
+            let is_near = |(score, wanted): (&Value, &i64)| (score.as_i64().unwrap() - wanted).abs() <= 6;
+            assert!(scores.iter().zip(wanted).all(is_near), "{scores:?}");
+        }
+    }
+    let plays = |at: usize| votes[at]["plays"].as_u64().unwrap();
+    assert_eq!((plays(1), plays(11)), (1, 2), "the reload in the middle of a film counts as a play");
+    assert!(votes[1]["unfocused_secs"].as_f64().unwrap() >= 0.9, "{}", votes[1]);
+}

@@ -1,0 +1,174 @@
+//! `orator study serve` and `export`: a whole session, resumption, quotas, withdrawal, films.
+
+use crate::fixtures::served_study::{Client, MadeStudy, fitting};
+use serde_json::{Value, json};
+use std::fs;
+use std::process::Command;
+use std::time::Duration;
+
+#[test]
+fn a_session_from_consent_to_code_and_tables() {
+    let study = MadeStudy::new(2, 2, 4, 20);
+    let served = study.serve(&[]);
+    let address = served.address.clone();
+    let mut client = Client::new();
+    let (status, about) = client.get(&address, "/api/study").unwrap();
+    assert_eq!((status, &about["title"], &about["n_trials"]), (200, &json!("A made-up study"), &json!(4)));
+    let (status, begun) = client.begin(&address, "p1").unwrap();
+    assert_eq!((status, &begun["state"]["position"]), (200, &json!(0)), "{begun}");
+    assert_eq!(begun["state"]["trial"], json!({ "task": 0, "phase": "training", "films": study.films[..2] }));
+
+    let (status, said) = client.answer(&address, 0, &fitting(0, true)).unwrap();
+    assert_eq!(status, 425, "before the films of 0.8 s can have ended: {said}");
+    std::thread::sleep(Duration::from_millis(800));
+    let (status, said) = client.answer(&address, 0, &fitting(0, false)).unwrap();
+    assert_eq!((status, &said["feedback"], &said["state"]["position"]), (200, &json!({ "side": "left" }), &json!(1)));
+    let again = client.answer(&address, 0, &fitting(0, false)).unwrap();
+    assert_eq!(again, (200, said), "the same answer again is acknowledged");
+    assert_eq!(client.answer(&address, 0, &fitting(0, true)).unwrap().0, 409, "another is not");
+    assert_eq!(client.answer(&address, 2, &fitting(2, true)).unwrap().0, 409, "nor one of a later trial");
+    assert_eq!(served.terminate(), Some(0));
+
+    let served = study.serve(&[]);
+    let address = served.address.clone();
+    let (status, state) = client.get(&address, "/api/state").unwrap();
+    assert_eq!((status, &state["position"]), (200, &json!(1)), "the token outlives the server");
+    for position in 1..4 {
+        std::thread::sleep(Duration::from_millis(800));
+        let (status, said) = client.answer(&address, position, &fitting(position, true)).unwrap();
+        assert_eq!((status, said.get("feedback")), (200, None), "{said}");
+    }
+    let (_, state) = client.get(&address, "/api/state").unwrap();
+    let code = state["completion"]["code"].as_str().unwrap();
+    assert!(code.len() == 10 && state.get("trial").is_none(), "{state}");
+
+    let operator = Client { token: served.operator_token.clone(), ..Client::new() };
+    let (status, progress) = operator.get(&address, "/api/operator").unwrap();
+    assert_eq!((status, &progress["answers"]), (200, &json!(4)));
+    assert_eq!((&progress["quota"]["completed"], &progress["quota"]["wanted"]), (&json!(1), &json!(2)));
+    assert_eq!(client.get(&address, "/api/operator").unwrap().0, 401);
+    assert_eq!(operator.get(&address, "/api/state").unwrap().0, 401);
+
+    let votes = study.exported("votes");
+    let expected: Vec<Value> = vec![json!({ "side": "left" }), json!({ "number": 42 }), json!({ "side": "left" })];
+    assert_eq!(votes.iter().map(|vote| vote["expected"].clone()).take(3).collect::<Vec<_>>(), expected);
+    assert_eq!((&votes[2]["trial"], &votes[2]["clip"]), (&json!(3), &json!("ellen/2")));
+    assert_eq!((&votes[2]["conditions"], &votes[3]["completed"]), (&json!(["real", "model"]), &json!(true)));
+    let people = study.exported("participants");
+    assert_eq!((people.len(), &people[0]["PROLIFIC_PID"], &people[0]["code"]), (1, &json!("p1"), &json!(code)));
+    study.export("csv");
+    let table = fs::read_to_string(study.path().join("export/votes.csv")).unwrap();
+    let row = table.lines().nth(2).unwrap();
+    assert!(row.ends_with(",ellen/1,ellen,real|model,42,42,0.25,0,1.5,1,true"), "{row}");
+    assert!(table.starts_with("participant,task,design,phase,trial,clip,"), "{table}");
+}
+
+#[test]
+fn places_are_given_in_order_and_those_of_who_left_again() {
+    let study = MadeStudy::new(3, 2, 3, 5);
+    let served = study.serve(&[]);
+    let address = &served.address;
+    let mut clients = [(); 3].map(|()| Client::new());
+    assert_eq!(clients[0].begin(address, "a").unwrap().0, 200);
+    assert_eq!(clients[1].begin(address, "b").unwrap().0, 200);
+    assert_eq!(clients[2].begin(address, "c").unwrap().0, 409, "two are wanted");
+    assert_eq!(clients[0].post(address, "/api/withdraw", &json!({})).unwrap().0, 200);
+    assert_eq!(clients[2].begin(address, "c").unwrap().0, 200, "a place is free again");
+    let places: Vec<Value> = study.exported("participants").into_iter().map(|mut row| row["place"].take()).collect();
+    assert_eq!(places, [json!(2), json!(1)], "in the order of arrival");
+    // Who fails the attention check does not count as wanted.
+    for position in 0..3 {
+        assert_eq!(clients[1].answer(address, position, &fitting(position, false)).unwrap().0, 200);
+    }
+    let mut fourth = Client::new();
+    assert_eq!(fourth.begin(address, "d").unwrap().0, 200);
+    drop(served);
+
+    let served = study.serve(&["--abandoned-after", "0"]);
+    let mut fifth = Client::new();
+    assert_eq!(fifth.begin(&served.address, "e").unwrap().0, 200, "an abandoned place");
+    assert_eq!(clients[2].get(&served.address, "/api/state").unwrap().0, 410, "was given to another");
+    assert_eq!(clients[2].answer(&served.address, 0, &fitting(0, true)).unwrap().0, 410);
+    let operator = Client { token: served.operator_token.clone(), ..Client::new() };
+    let quota = operator.get(&served.address, "/api/operator").unwrap().1["quota"].clone();
+    assert_eq!((&quota["excluded"], &quota["withdrawn"], &quota["replaced"]), (&json!(1), &json!(1), &json!(1)));
+}
+
+#[test]
+fn a_withdrawal_leaves_no_byte() {
+    let study = MadeStudy::new(60, 60, 12, 5);
+    let served = study.serve(&[]);
+    let address = &served.address;
+    let mut leaver = Client::new();
+    for k in 0..40 {
+        let mut client = if k == 20 { std::mem::replace(&mut leaver, Client::new()) } else { Client::new() };
+        client.begin(address, &format!("pid-of-participant-{k:03}")).unwrap();
+        for position in 0..12 {
+            assert_eq!(client.answer(address, position, &fitting(position, k % 2 == 0)).unwrap().0, 200);
+        }
+        if k == 20 {
+            leaver = client;
+        }
+    }
+    let people = study.exported("participants");
+    let of_leaver = people.iter().find(|row| row["PROLIFIC_PID"] == "pid-of-participant-020").unwrap();
+    let traces = ["participant", "code", "PROLIFIC_PID"].map(|key| of_leaver[key].as_str().unwrap().to_owned());
+    let files = || fs::read_dir(study.path()).unwrap().map(|entry| entry.unwrap().path());
+    let is_store = |path: &std::path::Path| path.to_str().unwrap().contains("responses.sqlite");
+    let holds = |trace: &str| {
+        let mut bytes = files().filter(|path| is_store(path)).map(|path| fs::read(path).unwrap());
+        bytes.any(|bytes| bytes.windows(trace.len()).any(|window| window == trace.as_bytes()))
+    };
+    assert!(traces.iter().all(|trace| holds(trace)));
+    assert_eq!(leaver.post(address, "/api/withdraw", &json!({})).unwrap().0, 200);
+    for trace in &traces {
+        assert!(!holds(trace), "{trace} is still in the database or its log");
+    }
+    assert!(holds("pid-of-participant-021"), "others stay");
+    assert_eq!(leaver.get(address, "/api/state").unwrap().0, 410);
+    assert_eq!(leaver.post(address, "/api/withdraw", &json!({})).unwrap().0, 410);
+    assert_eq!(leaver.answer(address, 0, &fitting(0, true)).unwrap().0, 410);
+    assert_eq!(study.exported("votes").len(), 39 * 12);
+}
+
+#[test]
+fn a_study_that_was_changed_is_not_served() {
+    let study = MadeStudy::new(1, 1, 2, 5);
+    fs::write(study.folder.film(&study.films[1]), "another").unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+    let ended = command.args(["study", "serve", "--port", "0"]).arg(study.path()).output().unwrap();
+    let said = String::from_utf8(ended.stderr).unwrap();
+    assert!(ended.status.code() == Some(1) && said.contains(&study.films[1]), "{said}");
+}
+
+#[test]
+fn films_come_whole_in_ranges_and_by_head() {
+    let study = MadeStudy::new(1, 1, 2, 5);
+    let served = study.serve(&[]);
+    let bytes = fs::read(study.folder.film(&study.films[0])).unwrap();
+    let url = format!("http://{}/films/{}.mp4", served.address, study.films[0]);
+    let agent: ureq::Agent = ureq::Agent::config_builder().http_status_as_error(false).proxy(None).build().into();
+    let get = |range: &str| {
+        let mut reply = agent.get(&url).header("Range", range).call().unwrap();
+        let header = |name: &str| reply.headers().get(name).map_or("", |value| value.to_str().unwrap()).to_owned();
+        let (status, range, cache) = (reply.status().as_u16(), header("content-range"), header("cache-control"));
+        (status, range, cache, reply.body_mut().read_to_vec().unwrap())
+    };
+    let size = bytes.len();
+    let forever = "public, max-age=31536000, immutable";
+    assert_eq!(get("none"), (200, String::new(), forever.to_owned(), bytes.clone()));
+    assert_eq!(get("bytes=10-19"), (206, format!("bytes 10-19/{size}"), forever.to_owned(), bytes[10..20].to_vec()));
+    let (status, range, _, last) = get("bytes=-7");
+    assert_eq!(
+        (status, range, &last[..]),
+        (206, format!("bytes {}-{}/{size}", size - 7, size - 1), &bytes[size - 7..])
+    );
+    let (status, range, ..) = get(&format!("bytes={size}-"));
+    assert_eq!((status, range), (416, format!("bytes */{size}")));
+    let head = agent.head(&url).call().unwrap();
+    let header = |name: &str| head.headers().get(name).map_or("", |value| value.to_str().unwrap());
+    assert_eq!((head.status().as_u16(), header("content-length")), (200, &*size.to_string()));
+    assert_eq!((header("content-type"), header("accept-ranges")), ("video/mp4", "bytes"));
+    assert_eq!((header("x-content-type-options"), header("referrer-policy")), ("nosniff", "no-referrer"));
+    assert!(header("content-security-policy").starts_with("default-src 'none'; script-src 'self';"));
+}
