@@ -1,4 +1,5 @@
 # make demo    everything on a synthetic speaker, from a bare machine to a trained model and its motion
+# make demo-study   a user study of that speaker: films, server, scripted participants in a browser, analysis
 # make check   format, clippy and the quick tests: no root, no other program, a few minutes
 # make test    everything CI runs
 # make prove   the long proofs and the speeds
@@ -8,7 +9,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := build
-.PHONY: setup runtime models readers aligner browser blender validator vrm driver loader build check test prove prove-rule prove-people prove-study demo clean-demo
+.PHONY: setup runtime models readers aligner browser blender validator vrm driver loader build check test prove prove-rule prove-people prove-study demo demo-study clean-demo
 
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 ORATOR := $(TARGET)/release/orator
@@ -83,5 +84,12 @@ demo: build
 	@printf '\nfiles:\n'; ls -d $(addprefix $(DEMO)/,videos/host work/dataset/host work/gan/host/best.safetensors \
 		motion.npy motion.bvh motion.glb motion.mp4 contact_sheet.png evaluation.html)
 
+# A user study of the synthetic speaker: built, served on this machine, answered in Chromium by scripted participants with
+# a known preference, analysed.
+STUDY := $(TARGET)/demo-study
+
+demo-study: build browser driver
+	ORATOR=$(ORATOR) .ci/demo-study $(STUDY) 8
+
 clean-demo:
-	rm -rf $(DEMO) $(TARGET)/demo-test
+	rm -rf $(DEMO) $(STUDY) $(TARGET)/demo-test

@@ -15,7 +15,7 @@ const PAUSE_LU: f64 = -10.0;
 const OFFSET: f64 = -0.691;
 /// Shelf that stands for the head: frequency in Hz, quality, gain in dB, and the gain's share at that frequency.
 const SHELF: (f64, f64, f64, f64) =
-    (1681.974_450_955_533, 0.707_175_236_955_419_6, 3.999_843_853_973_347, 0.499_666_774);
+    (1_681.974_450_955_533, 0.707_175_236_955_419_6, 3.999_843_853_973_347, 0.499_666_774);
 /// High pass: frequency in Hz, quality.
 const HIGH_PASS: (f64, f64) = (38.135_470_876_024_44, 0.500_327_037_323_877_3);
 

@@ -139,12 +139,22 @@ fn write_tables(
     Ok(Exported { votes, participants: of_participants, n_votes, n_participants: all.len(), n_dropped: 0 })
 }
 
-/// All votes of a study's own store, in the order of [`export`].
+/// All votes of a study, in the order of [`export`]: of its own store, or of the file `posts` that an address has collected
+/// from the pages of a bundle.
 ///
 /// # Errors
-/// Those of [`export`].
-pub fn votes(folder: &StudyFolder) -> Result<Vec<StudyVote>> {
+/// Those of [`export_posts`].
+pub fn votes(folder: &StudyFolder, posts: Option<&Path>) -> Result<Vec<StudyVote>> {
     let joined = JoinedPlan::read(folder)?;
+    if let Some(posts) = posts {
+        let of = |one: CollectedParticipant| {
+            let participant = joined.participant(&one);
+            let votes = one.answers.into_iter().map(|answer| joined.vote(&participant, answer));
+            votes.collect::<Result<Vec<_>>>()
+        };
+        let collected = read_posts(&BundledPlan::read(folder)?, posts)?.participants;
+        return Ok(collected.into_iter().map(of).collect::<Result<Vec<_>>>()?.concat());
+    }
     let db = database::open_to_read(&folder.responses())?;
     db.execute_batch("BEGIN")?;
     let mut votes = Vec::new();

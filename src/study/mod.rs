@@ -10,6 +10,7 @@ pub mod export;
 pub mod file;
 pub mod folder;
 pub mod pages;
+pub mod pilot;
 pub mod plan;
 pub mod power;
 pub mod preregistration;

@@ -132,8 +132,11 @@ fn statistic(claim: &StudyHypothesis, design: Option<TaskDesign>, alpha: f64) ->
             format!("two-sided test of the {difference}, {error}")
         }
     };
-    let is_family = claim.per_speaker || claim.kind == HypothesisKind::Differs && claim.conditions.is_empty();
-    let adjusted = if is_family { ", p adjusted by Holm within the task" } else { "" };
+    let is_one = !claim.per_speaker && claim.conditions.is_empty() && claim.kind != HypothesisKind::Differs;
+    let adjusted = match is_one || claim.kind == HypothesisKind::Equivalence {
+        true => "",
+        false => ", p adjusted by Holm where the task has several such tests",
+    };
     format!("{judged}, alpha {alpha}{adjusted}")
 }
 

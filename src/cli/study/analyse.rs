@@ -8,7 +8,9 @@ use orator::stage::workdir;
 use orator::study::analyse::result::{FigureSettings, StudyAnalysis};
 use orator::study::analyse::votes::columns::ColumnNames;
 use orator::study::analyse::votes::read::VotesRead;
-use orator::study::analyse::{analyse, page, text};
+use orator::study::analyse::{Registration, analyse, page, text};
+use orator::study::export;
+use orator::study::folder::StudyFolder;
 use orator::study::plan::TaskDesign;
 use serde::Deserialize as _;
 use serde::de::IntoDeserializer as _;
@@ -24,7 +26,7 @@ use std::path::{Path, PathBuf};
 /// first participant is marked as exploratory, what takes votes for independent as naive.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folder of a study, or a table of votes (.csv, .tsv, .jsonl).
+    /// Folder of a study, or a table of votes (.csv, .tsv, .jsonl)
     #[arg(value_name = "STUDY|VOTES")]
     source: PathBuf,
     /// Names of columns that are called otherwise, like participant=worker,clip=stimulus
@@ -37,12 +39,15 @@ pub struct Args {
     /// Points of percent on either side of chance that count as no difference; a registered bound goes before it.
     #[arg(long, value_name = "POINTS", default_value_t = 10.0)]
     bound: f64,
-    /// Draws of the bootstrap and of sign flips.
-    #[arg(long, value_name = "N", default_value_t = 10_000)]
-    draws: usize,
-    /// Seed of both.
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
+    /// Draws of the bootstrap and of sign flips [default: as registered, else 10000]
+    #[arg(long, value_name = "N")]
+    draws: Option<usize>,
+    /// Seed of both [default: as registered, else 1]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Lines that an address has collected from the pages of a bundle, in the place of the study's own store.
+    #[arg(long, value_name = "FILE")]
+    posts: Option<PathBuf>,
     /// Also write one HTML page with plots, every figure and the methods paragraph.
     #[arg(long, value_name = "PAGE.html")]
     report: Option<PathBuf>,
@@ -66,7 +71,9 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
         "--bound is {}; expected points of percent, 0.1 to below 50",
         args.bound
     );
-    ensure!((100..=1_000_000).contains(&args.draws), "--draws is {}; expected 100 to 1000000", args.draws);
+    if let Some(draws) = args.draws {
+        ensure!((100..=1_000_000).contains(&draws), "--draws is {draws}; expected 100 to 1000000");
+    }
     check_report(args)?;
     let outputs = args.report.iter().chain(&args.methods).map(PathBuf::as_path);
     confine(outputs, args.source.is_dir().then_some(args.source.as_path()));
@@ -101,11 +108,29 @@ fn check_report(args: &Args) -> Result<()> {
 }
 
 fn analysis(args: &Args) -> Result<StudyAnalysis> {
-    let settings =
-        FigureSettings { bound: args.bound / 100.0, n_draws: args.draws, seed: args.seed, ..FigureSettings::default() };
-    let read = VotesRead::of_file(&args.source, &args.columns, args.design)?;
     let name = name(&args.source)?;
-    analyse([&name, &name], &read, None, &settings).with_context(|| args.source.display().to_string())
+    let settings = |registered: FigureSettings| FigureSettings {
+        bound: args.bound / 100.0,
+        n_draws: args.draws.unwrap_or(registered.n_draws),
+        seed: args.seed.unwrap_or(registered.seed),
+        ..registered
+    };
+    if !args.source.is_dir() {
+        ensure!(args.posts.is_none(), "--posts needs the study's folder; {} is a file", args.source.display());
+        let read = VotesRead::of_file(&args.source, &args.columns, args.design)?;
+        let settings = settings(FigureSettings::default());
+        return analyse([&name, &name], &read, None, &settings).with_context(|| args.source.display().to_string());
+    }
+    let options = [(args.design.is_some(), "--design"), (args.columns != ColumnNames::default(), "--columns")];
+    for (is_given, option) in options {
+        ensure!(!is_given, "{option} is for tables of votes; {} is the folder of a study", args.source.display());
+    }
+    let folder = StudyFolder::new(&args.source);
+    let registration = Registration::of_folder(&folder)?;
+    let read = VotesRead::of_votes(export::votes(&folder, args.posts.as_deref())?);
+    let settings = settings(FigureSettings::from(&registration.settings));
+    analyse([&registration.title, &name], &read, Some(&registration), &settings)
+        .with_context(|| args.source.display().to_string())
 }
 
 /// Name of a file or folder, without the folders of this machine.

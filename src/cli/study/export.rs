@@ -64,7 +64,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     );
     let next = match &args.posts {
         None => format!("orator study analyse {}", args.dir.display()),
-        Some(_) => format!("orator study analyse {}", exported.votes.display()),
+        Some(posts) => format!("orator study analyse {} --posts {}", args.dir.display(), posts.display()),
     };
     ui.summary(&text, Some(&next), json!(exported));
     Ok(Outcome::Done)

@@ -2,24 +2,14 @@
 
 use super::exclusion::exclude;
 use super::methods::methods;
-use super::registration::register;
+use super::registration::{Registration, judged, register};
 use super::result::{FigureSettings, StudyAnalysis, TaskAnalysis};
 use super::task::task;
 use super::votes::read::VotesRead;
-use crate::study::file::{ExclusionRules, HypothesisKind, StudyHypothesis};
+use crate::study::file::{HypothesisKind, StudyHypothesis};
+use crate::study::preregistration::RegisteredHypothesis;
 use crate::study::vote::StudyVote;
 use anyhow::{Result, ensure};
-
-/// What was fixed before the data were seen.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Registration {
-    /// Hash over the sealed study; none where its files are not as they were sealed.
-    pub seal: Option<String>,
-    /// What a reader must know about it.
-    pub notes: Vec<String>,
-    pub hypotheses: Vec<StudyHypothesis>,
-    pub exclusion: ExclusionRules,
-}
 
 /// Analysis of the votes of `source`, which is called `title`.
 pub fn analyse(
@@ -45,6 +35,7 @@ pub fn analyse(
         settings: settings.clone(),
         refused: read.refused.clone(),
         exclusions,
+        hypotheses: judged(&tasks, hypotheses, settings.level()),
         tasks,
         without_exclusions,
         notes: Vec::new(),
@@ -58,7 +49,11 @@ pub fn analyse(
 }
 
 /// Tasks in the order of their first vote.
-fn tasks(votes: &[&StudyVote], hypotheses: &[StudyHypothesis], settings: &FigureSettings) -> Result<Vec<TaskAnalysis>> {
+fn tasks(
+    votes: &[&StudyVote],
+    hypotheses: &[RegisteredHypothesis],
+    settings: &FigureSettings,
+) -> Result<Vec<TaskAnalysis>> {
     let mut names: Vec<&str> = Vec::new();
     for vote in votes {
         if !names.contains(&vote.task.as_str()) {
@@ -67,9 +62,9 @@ fn tasks(votes: &[&StudyVote], hypotheses: &[StudyHypothesis], settings: &Figure
     }
     let one = |name: &str| {
         let own: Vec<&StudyVote> = votes.iter().copied().filter(|vote| vote.task == name).collect();
-        let equivalence =
-            |hypothesis: &&StudyHypothesis| hypothesis.task == name && hypothesis.kind == HypothesisKind::Equivalence;
-        let bound = hypotheses.iter().find(equivalence).and_then(|hypothesis| hypothesis.points);
+        let equivalence = |claim: &&StudyHypothesis| claim.task == name && claim.kind == HypothesisKind::Equivalence;
+        let mut claims = hypotheses.iter().map(|hypothesis| &hypothesis.claim);
+        let bound = claims.find(equivalence).and_then(|claim| claim.points);
         let bound = bound.map_or(settings.bound, |points| points / 100.0);
         task(name, &own, &FigureSettings { bound, ..settings.clone() })
     };
@@ -79,7 +74,7 @@ fn tasks(votes: &[&StudyVote], hypotheses: &[StudyHypothesis], settings: &Figure
 }
 
 /// What a reader must know beside the figures.
-fn notes(analysis: &StudyAnalysis, read: &VotesRead, hypotheses: &[StudyHypothesis]) -> Vec<String> {
+fn notes(analysis: &StudyAnalysis, read: &VotesRead, hypotheses: &[RegisteredHypothesis]) -> Vec<String> {
     let mut notes = Vec::new();
     let registration_is_missing = !analysis.exclusions.registered;
     if !read.refused.is_empty() {
@@ -99,8 +94,9 @@ fn notes(analysis: &StudyAnalysis, read: &VotesRead, hypotheses: &[StudyHypothes
         ));
     }
     for hypothesis in hypotheses {
-        if !analysis.tasks.iter().any(|task| task.task == hypothesis.task) {
-            notes.push(format!("A hypothesis is about the task {}, which has no vote.", hypothesis.task));
+        let about = &hypothesis.claim.task;
+        if !analysis.tasks.iter().any(|task| task.task == *about) {
+            notes.push(format!("A hypothesis is about the task {about}, which has no vote."));
         }
     }
     for task in &analysis.tasks {

@@ -21,4 +21,5 @@ pub mod verdict;
 pub mod votes;
 pub mod words;
 
-pub use analysis::{Registration, analyse};
+pub use analysis::analyse;
+pub use registration::Registration;

@@ -5,6 +5,7 @@ use super::exclusion::ExclusionAccount;
 use super::figure::{FigureOrigin, IntervalFigure, TestFigure};
 use super::figures::FigureSet;
 use super::votes::read::RefusedRow;
+use crate::study::file::AnalysisSettings;
 use crate::study::plan::TaskDesign;
 use serde::Serialize;
 
@@ -21,12 +22,48 @@ pub struct StudyAnalysis {
     /// Rows of the source that are no votes.
     pub refused: Vec<RefusedRow>,
     pub exclusions: ExclusionAccount,
+    /// What became of each registered hypothesis.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub hypotheses: Vec<JudgedHypothesis>,
     pub tasks: Vec<TaskAnalysis>,
     /// Tasks with the votes of everybody.
     pub without_exclusions: Vec<TaskAnalysis>,
     pub notes: Vec<String>,
     /// Paragraph for the methods section of a paper.
     pub methods: String,
+}
+
+/// Registered hypothesis with its outcome.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct JudgedHypothesis {
+    pub task: String,
+    /// In words.
+    pub claim: String,
+    /// What judges it, as registered.
+    pub statistic: String,
+    /// One for each speaker, condition or pair that it is about; none where the task has no vote.
+    pub claims: Vec<JudgedClaim>,
+}
+
+/// Outcome of a hypothesis for one speaker, condition or pair.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct JudgedClaim {
+    pub scope: String,
+    /// Of the registered test, adjusted where it is one of several.
+    pub p: Option<f64>,
+    /// Whether the votes show it; none where the test could not be made.
+    pub holds: Option<bool>,
+}
+
+impl JudgedClaim {
+    /// Outcome in words. A test that does not reject shows nothing, so the opposite is never said.
+    pub fn outcome(&self) -> &'static str {
+        match self.holds {
+            Some(true) => "shown",
+            Some(false) => "not shown",
+            None => "not tested",
+        }
+    }
 }
 
 /// What an analysis depends on beside the votes.
@@ -47,6 +84,14 @@ impl FigureSettings {
     /// Error of the first kind of the tests that conclusions rest on.
     pub fn level(&self) -> f64 {
         1.0 - self.confidence
+    }
+}
+
+impl From<&AnalysisSettings> for FigureSettings {
+    /// Settings as they were registered.
+    fn from(registered: &AnalysisSettings) -> Self {
+        let AnalysisSettings { alpha, resamples, seed } = *registered;
+        Self { confidence: 1.0 - alpha, n_draws: resamples, seed, ..Self::default() }
     }
 }
 
@@ -122,6 +167,16 @@ pub struct ShareAnalysis {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<ModelFigure>,
     pub conclusion: Conclusion,
+}
+
+impl ShareAnalysis {
+    /// Share of right responses: the real film found, the matched film chosen.
+    pub fn right_share(&self) -> f64 {
+        match self.measure {
+            ShareMeasure::GeneratedChosen => 1.0 - self.share,
+            ShareMeasure::MatchedChosen | ShareMeasure::Correct | ShareMeasure::TakenForReal => self.share,
+        }
+    }
 }
 
 /// Scores of a condition.

@@ -1,16 +1,123 @@
 //! Strengths of conditions from votes that put one above another.
 
+use super::figure::{FigureMethod, FigureOrigin, IntervalFigure};
 use super::outcome::Numbering;
 use super::result::{FigureSettings, StrengthFigure};
+use crate::study::response::Response;
 use crate::study::stats::error::StatisticsError;
+use crate::study::stats::paired::bradley_terry::{BradleyTerry, participant_intervals};
+use crate::study::stats::paired::elo::EloSettings;
+use crate::study::stats::paired::votes::PairedVote;
 use crate::study::vote::StudyVote;
 
-/// Strengths of the conditions; none are estimated yet.
+/// Draws of participants for the intervals.
+const MOST_DRAWS: usize = 2000;
+
+/// Strengths of the conditions, the highest first, with intervals by draws of participants.
+///
+/// # Errors
+/// Fewer than two conditions, and votes that do not lead from each condition to each other one.
 pub fn strengths(
-    _votes: &[&StudyVote],
-    _numbering: &Numbering,
-    _conditions: &[String],
-    _settings: &FigureSettings,
+    votes: &[&StudyVote],
+    numbering: &Numbering,
+    conditions: &[String],
+    settings: &FigureSettings,
 ) -> Result<Vec<StrengthFigure>, StatisticsError> {
-    Ok(Vec::new())
+    let paired: Vec<PairedVote> = votes.iter().flat_map(|vote| paired(vote, numbering, conditions)).collect();
+    let n = conditions.len();
+    let model = BradleyTerry::fit(&paired, n)?;
+    let ratings = EloSettings::default().ratings(&paired, n, settings.seed)?;
+    let n_draws = settings.n_draws.min(MOST_DRAWS);
+    let intervals = match n_draws {
+        0 => None,
+        // Without enough draws that have finite strengths there are strengths without intervals.
+        _ => participant_intervals(&paired, n, settings.confidence, n_draws, settings.seed).ok(),
+    };
+    let origin = FigureOrigin::new(FigureMethod::BradleyTerry);
+    let row = |k: usize| StrengthFigure {
+        condition: conditions[k].clone(),
+        log_strength: model.strengths[k],
+        interval: intervals.as_ref().map(|all| IntervalFigure { origin, low: all[k].low, high: all[k].high }),
+        elo: ratings[k],
+    };
+    let mut rows: Vec<StrengthFigure> = (0..n).map(row).collect();
+    rows.sort_by(|a, b| b.log_strength.total_cmp(&a.log_strength));
+    Ok(rows)
+}
+
+/// What a vote says of pairs: its step of preference as a share of a win, or which of two scores is higher.
+fn paired(vote: &StudyVote, numbering: &Numbering, conditions: &[String]) -> Vec<PairedVote> {
+    let place = |name: &String| conditions.iter().position(|condition| condition == name);
+    let Some(shown) = vote.conditions.iter().map(place).collect::<Option<Vec<usize>>>() else { return Vec::new() };
+    let participant = numbering.vote(vote, 0.0).participant;
+    let pair = |a: usize, b: usize, share: f64| PairedVote { participant, first: shown[a], second: shown[b], share };
+    match &vote.response {
+        // Steps go from the left film, -2, to the right one, 2.
+        Response::Step(step) if shown.len() == 2 => vec![pair(0, 1, (2.0 - f64::from(*step)) / 4.0)],
+        Response::Scores(scores) if scores.len() == shown.len() => {
+            let pairs = (0..shown.len()).flat_map(|a| (a + 1..scores.len()).map(move |b| (a, b)));
+            pairs.map(|(a, b)| pair(a, b, 0.5 + 0.5 * f64::from(scores[a].cmp(&scores[b]) as i8))).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::plan::{TaskDesign, TrialPhase};
+
+    fn vote(participant: usize, conditions: &[&str], response: Response) -> StudyVote {
+        StudyVote {
+            participant: format!("p{participant}"),
+            task: "t".to_owned(),
+            design: TaskDesign::Preference,
+            phase: TrialPhase::Main,
+            trial: 1,
+            clip: "c".to_owned(),
+            speaker: String::new(),
+            conditions: conditions.iter().map(|name| (*name).to_owned()).collect(),
+            response,
+            expected: None,
+            stalled_secs: 0.0,
+            unfocused_secs: 0.0,
+            response_secs: 1.0,
+            plays: 1,
+            completed: true,
+        }
+    }
+
+    #[test]
+    fn steps_and_scores_rank_conditions() {
+        let names = ["bad", "good", "natural"].map(str::to_owned);
+        let settings = FigureSettings { n_draws: 200, ..FigureSettings::default() };
+        let mut steps = Vec::new();
+        let mut pages = Vec::new();
+        for n in 0..30 {
+            let turned = n % 5 == 0;
+            for (worse, better) in [("bad", "good"), ("good", "natural"), ("bad", "natural")] {
+                steps.push(vote(n, &[worse, better], Response::Step(if turned { -1 } else { 2 })));
+                steps.push(vote(n, &[better, worse], Response::Step(-1)));
+            }
+            let scores = if turned { vec![50, 60, 40] } else { vec![20, 90, 60] };
+            pages.push(vote(n, &["bad", "natural", "good"], Response::Scores(scores)));
+            pages.push(vote(
+                n,
+                &["bad", "natural", "good"],
+                Response::Scores(vec![30, if turned { 20 } else { 35 }, 30]),
+            ));
+        }
+        for votes in [steps, pages] {
+            let votes: Vec<&StudyVote> = votes.iter().collect();
+            let rows = strengths(&votes, &Numbering::new(&votes), &names, &settings).unwrap();
+            let ranked: Vec<&str> = rows.iter().map(|row| row.condition.as_str()).collect();
+            assert_eq!(ranked, ["natural", "good", "bad"]);
+            assert!(rows.is_sorted_by(|a, b| a.elo >= b.elo));
+            let interval = rows[0].interval.as_ref().unwrap();
+            assert!(interval.low < rows[0].log_strength && rows[0].log_strength < interval.high);
+        }
+        let one_way = vote(0, &["bad", "good"], Response::Step(2));
+        let votes = [&one_way];
+        assert!(strengths(&votes, &Numbering::new(&votes), &names, &settings).is_err());
+    }
 }

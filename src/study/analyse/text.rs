@@ -3,7 +3,7 @@
 use super::figure::FigureMethod;
 use super::result::{StudyAnalysis, TaskAnalysis};
 use super::verdict::scope;
-use super::words::{bare_p, count, percent, percents, points};
+use super::words::{bare_p, count, p_value, percent, percents, points};
 use std::fmt::Write as _;
 
 /// Rows without a vote that are named.
@@ -20,6 +20,16 @@ pub fn text(analysis: &StudyAnalysis) -> String {
         count(account.n_votes_kept),
         count(account.n_participants_kept)
     );
+    if !analysis.hypotheses.is_empty() {
+        text += "\nregistered hypotheses\n";
+        for hypothesis in &analysis.hypotheses {
+            let _ = writeln!(text, "  {}: {}", hypothesis.task, hypothesis.claim);
+            for claim in &hypothesis.claims {
+                let p = claim.p.map(|p| format!(", {}", p_value(p))).unwrap_or_default();
+                let _ = writeln!(text, "    {}: {}{p}", claim.scope, claim.outcome());
+            }
+        }
+    }
     for task in &analysis.tasks {
         let _ = writeln!(text, "\n{}", task.task);
         for verdict in &task.verdicts {

@@ -103,7 +103,7 @@ pub fn cut(source: &SpeakerSource, n_frames: usize, n_wanted: usize, rank: impl 
         clips.extend(more);
     }
     let best_first = clips.iter().map(|clip| clip.name.clone()).collect();
-    clips.sort_by(|a, b| (a.piece, a.frames.start).cmp(&(b.piece, b.frames.start)));
+    clips.sort_by_key(|clip| (clip.piece, clip.frames.start));
     Ok(CutSpeech { clips, best_first, refused })
 }
 

@@ -70,7 +70,8 @@ fn contents(dir: &Path) -> BTreeMap<String, Vec<u8>> {
             match path.is_dir() {
                 true => waiting.push(path),
                 false => {
-                    drop(all.insert(path.strip_prefix(dir).unwrap().display().to_string(), fs::read(&path).unwrap()))
+                    let name = path.strip_prefix(dir).unwrap().display().to_string();
+                    all.insert(name, fs::read(&path).unwrap());
                 }
             }
         }

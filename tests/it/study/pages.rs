@@ -57,7 +57,7 @@ fn every_design(n_sessions: usize) -> MadeStudy {
 
 /// Takes part at `address` by the rule of `made`, and gives what the participant reports.
 fn take_part(made: &MadeStudy, address: &str, driver: &Path, more: &str) -> Value {
-    let score = |k: usize| if k % 2 == 0 { 0.9 } else { 0.1 };
+    let score = |k: usize| if k.is_multiple_of(2) { 0.9 } else { 0.1 };
     let scores: BTreeMap<_, _> = made.films.iter().enumerate().map(|(k, film)| (film, score(k))).collect();
     let rule = json!({ "scores": scores, "numbers": { &made.films[6]: 42 } });
     let answers = made.path().join("answers.json");
@@ -88,7 +88,7 @@ fn a_session_by_keys_and_one_by_touch_are_stored_as_they_were_answered() {
     let dark = "--width 360 --height 640 --touch --scheme dark --language ar --reload-at 1 --offline-at 2";
     let by_touch = take_part(&made, &served.address, &driver, dark);
     for report in [&by_keys, &by_touch] {
-        println!("apart at the start and later, ms: {}", report["apart_ms"]);
+        eprintln!("apart at the start and later, ms: {}", report["apart_ms"]);
         assert!(is_code(report) && report["trials"] == 10, "{report}");
         for apart in report["apart_ms"].as_array().unwrap() {
             // Two frames: a machine under load is late to correct.

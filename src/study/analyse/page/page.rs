@@ -9,20 +9,20 @@ use serde_json::Value;
 /// Text of the page.
 pub fn html(analysis: &StudyAnalysis) -> String {
     let section = |id, title, body| Section { id, title, body };
+    let mut sections = vec![section("meaning", "What can be concluded", meaning(analysis))];
+    if !analysis.hypotheses.is_empty() {
+        sections.push(section("hypotheses", "Registered hypotheses", tables::hypotheses(analysis)));
+    }
+    sections.extend([
+        section("charts", "Estimates and intervals", per_task(&analysis.tasks, |task| charts::task(task, analysis))),
+        section("figures", "All figures", figures(analysis)),
+        section("exclusions", "Exclusions", tables::exclusions(analysis)),
+        section("methods", "Methods paragraph", methods(analysis)),
+    ]);
     let page = Page {
         title: analysis.title.clone(),
         lead: lead(analysis),
-        sections: vec![
-            section("meaning", "What can be concluded", meaning(analysis)),
-            section(
-                "charts",
-                "Estimates and intervals",
-                per_task(&analysis.tasks, |task| charts::task(task, analysis)),
-            ),
-            section("figures", "All figures", figures(analysis)),
-            section("exclusions", "Exclusions", tables::exclusions(analysis)),
-            section("methods", "Methods paragraph", methods(analysis)),
-        ],
+        sections,
         style: include_str!("page.css"),
         script: "",
         data: Value::Null,

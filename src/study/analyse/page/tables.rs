@@ -146,6 +146,24 @@ fn figure_row(origin: FigureOrigin, interval: Option<String>, test: Option<&Test
         .child(node("td").class("mark").child(mark))
 }
 
+/// Registered hypotheses with their outcomes.
+pub fn hypotheses(analysis: &StudyAnalysis) -> Vec<Node> {
+    let rows = analysis.hypotheses.iter().flat_map(|hypothesis| {
+        let title = group(&format!("{}: {}. {}.", hypothesis.task, hypothesis.claim, hypothesis.statistic));
+        let rows = hypothesis.claims.iter().map(|claim| {
+            let name = node("th").attr("scope", "row").text(&claim.scope);
+            let p = node("td").class("num").text(claim.p.map(bare_p).unwrap_or_default());
+            node("tr").child(name).child(p).child(node("td").text(claim.outcome()))
+        });
+        std::iter::once(title).chain(rows).collect::<Vec<_>>()
+    });
+    let head = [("About", ""), ("p", "num"), ("Outcome", "")]
+        .map(|(title, class)| node("th").attr("scope", "col").class(class).text(title));
+    let about = "Written down and sealed before the first participant. What is not shown is not refuted: a test that does \
+                 not reject says nothing.";
+    vec![node("p").text(about), node("div").class("scroll").attr("tabindex", "0").child(table("figures", head, rows))]
+}
+
 /// Rules with what each leaves out by itself, and rows that are no votes.
 pub fn exclusions(analysis: &StudyAnalysis) -> Vec<Node> {
     let account = &analysis.exclusions;

@@ -29,7 +29,7 @@ pub fn rows(bytes: &[u8], names: &ColumnNames) -> Result<LinedRows> {
             continue;
         }
         if rows.len() == MOST_ROWS {
-            bail!("it has more than {} rows", MOST_ROWS);
+            bail!("it has more than {MOST_ROWS} rows");
         }
         rows.push((line, cells(&record, header.len(), &places, delimiter == b';')));
     }
