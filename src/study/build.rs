@@ -82,7 +82,8 @@ pub fn build(file: &StudyFile, out: &Path, size: [usize; 2], progress: &dyn Prog
     });
     let mut cut = cut.collect::<Result<Vec<CutSpeaker>>>()?;
     drop(task);
-    let loudness_lufs = equally_loud(cut.iter_mut().flat_map(|speaker| &mut speaker.sounds));
+    let loudness_lufs =
+        equally_loud(cut.iter_mut().flat_map(|speaker| speaker.sounds.iter_mut().chain(&mut speaker.tones)));
     let account = ClipAccount { loudness_lufs, speakers: cut.iter().map(BuiltSpeaker::of).collect() };
     write_clips(&folder, &account, &cut)?;
     let named = |speaker: &CutSpeaker| {

@@ -100,7 +100,25 @@ pub struct FilmContent {
     /// Number that an attention check shows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub number: Option<u16>,
-    /// Whether nothing is heard, as in a task without sound.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub muted: bool,
+    #[serde(default, skip_serializing_if = "FilmSound::is_speech")]
+    pub sound: FilmSound,
+}
+
+/// What a film lets hear.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FilmSound {
+    /// The clip's speech.
+    #[default]
+    Speech,
+    /// Nothing, in a task without sound.
+    Silence,
+    /// Tones to be counted, in the sound check.
+    Tones,
+}
+
+impl FilmSound {
+    fn is_speech(&self) -> bool {
+        *self == Self::Speech
+    }
 }

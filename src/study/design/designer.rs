@@ -7,8 +7,8 @@ use super::comparison::right_response;
 use super::latin_square::SquareRows;
 use super::shared_clips::SharedClips;
 use super::task_design::{DealtTrial, TaskDesigner, deal};
-use crate::study::file::{StudyCondition, StudyFile, TaskOrder};
-use crate::study::plan::{FilmContent, PlannedSession, Trial, TrialPhase};
+use crate::study::file::{StudyCondition, StudyFile, StudyTask, TaskOrder};
+use crate::study::plan::{FilmContent, FilmSound, PlannedSession, Trial, TrialPhase};
 use crate::study::response::Response;
 use anyhow::{Context, Result};
 use rand::Rng;
@@ -88,11 +88,11 @@ impl Designer<'_> {
         let comparison = &task.comparisons[trial.dealt.comparison];
         let row = task.arrangements.row(trial.dealt.arrangement);
         let shown: Vec<&StudyCondition> = row.iter().map(|place| comparison[*place]).collect();
-        let (design, muted) = (task.task.design, !task.task.sound);
+        let (design, sound) = (task.task.design, heard(task.task));
         let tells = phase == TrialPhase::Training && task.task.feedback;
         let expected = if tells { right_response(design, &shown) } else { None };
         let shown = shown.iter().map(|condition| (condition.name.clone(), None)).collect();
-        Ok(Trial { task: at, phase, films: self.films(&clip, shown, muted)?, expected })
+        Ok(Trial { task: at, phase, films: self.films(&clip, shown, sound)?, expected })
     }
 
     /// Attention check that looks like a trial of the task until its number comes, in one of the films.
@@ -105,27 +105,32 @@ impl Designer<'_> {
         let row = task.arrangements.row(self.rng.random_range(0..task.arrangements.n_rows()));
         let shown = |place: &usize| (comparison[*place].name.clone(), (*place == numbered).then_some(number));
         let shown = row.iter().map(shown).collect();
-        let muted = !task.task.sound;
+        let sound = heard(task.task);
         let clip = self.clip(check.speaker, self.shared[check.speaker].checks.get(check.dealt.clip))?;
-        let films = self.films(&clip, shown, muted)?;
+        let films = self.films(&clip, shown, sound)?;
         Ok(Trial { task: at, phase: TrialPhase::AttentionCheck, films, expected: Some(Response::Number(number)) })
     }
 
-    /// Film with sound whose clip is in no trial but practice.
+    /// Film with tones whose clip is in no trial but practice.
     pub fn sound_check(&mut self) -> Result<String> {
         let clip = self.clip(0, self.shared.first().and_then(|shared| shared.practice.first()))?;
         let comparison = self.tasks.first().and_then(|task| task.comparisons.first());
         let condition = comparison.and_then(|comparison| comparison.first()).context("no task compares anything")?;
         let shown = vec![(condition.name.clone(), None)];
-        self.films(&clip, shown, false).map(|films| films.concat())
+        self.films(&clip, shown, FilmSound::Tones).map(|films| films.concat())
     }
 
     /// Names of the films of a clip: a condition each, and the number that it shows.
-    fn films(&mut self, clip: &NamedClip, shown: Vec<(String, Option<u16>)>, muted: bool) -> Result<Vec<String>> {
+    fn films(&mut self, clip: &NamedClip, shown: Vec<(String, Option<u16>)>, sound: FilmSound) -> Result<Vec<String>> {
         let name = |(condition, number)| {
             let [clip, speaker] = clip.clone();
-            (self.film)(FilmContent { motion_of: clip.clone(), clip, speaker, condition, number, muted })
+            (self.film)(FilmContent { motion_of: clip.clone(), clip, speaker, condition, number, sound })
         };
         shown.into_iter().map(name).collect()
     }
+}
+
+/// What the films of a task let hear.
+fn heard(task: &StudyTask) -> FilmSound {
+    if task.sound { FilmSound::Speech } else { FilmSound::Silence }
 }

@@ -65,7 +65,7 @@ function duration(secs) {
 }
 
 function draw(progress) {
-  const { title, quota, answers, participants, cells, stalls } = progress;
+  const { title, quota, answers, participants, stalls } = progress;
   byId("title").textContent = title;
   document.title = `Progress: ${title}`;
   byId("tools").replaceChildren(
@@ -79,10 +79,6 @@ function draw(progress) {
   if (stalls) counts.push(["Trials with a stalled film", stalls.trials], ["Seconds stalled in all", Math.round(stalls.secs)]);
   const done = el("progress", { max: `${quota.wanted}`, value: `${Math.min(quota.completed, quota.wanted)}`, "aria-label": "Completed of the wanted" });
   const nodes = [el("p", {}, `${quota.completed} of ${quota.wanted} participants have completed the study.`), done, el("h2", {}, "Quota"), table(["What", "Number"], counts, "Quota")];
-  if (cells) {
-    const rows = cells.map((cell) => [cell.task, cell.cell, cell.votes, cell.wanted]);
-    nodes.push(el("h2", {}, "Votes a cell"), table(["Task", "Cell", "Votes", "Wanted"], rows, "Votes a cell"));
-  }
   const places = participants.map((one) => [one.place, one.status, `${one.position} of ${one.n_trials}`, duration(one.idle_secs)]);
   nodes.push(el("h2", {}, "Places"), table(["Place", "State", "Trials answered", "Since the last"], places, "Places"));
   if (document.querySelector("h1")?.textContent === "Progress" && !byId("token")) byId("main").replaceChildren(document.querySelector("h1"), ...nodes);

@@ -124,6 +124,9 @@ pub async fn begin(State(app): Shared, JsonBody(body): JsonBody<Beginning>) -> R
     let begun = app.store.write(move |db| participants::begin(db, &newcomer, quota, now_ms())).await;
     let begun = begun.map_err(|_| ApiError::not_stored())?;
     let participant = begun.ok_or_else(|| ApiError::conflict("The study has all its participants. Thank you."))?;
+    if participant.status == Status::Replaced {
+        return Err(gone());
+    }
     let token = app.secret.token(participant.session, &participant.id);
     Ok(json_reply(&json!({ "token": token, "state": session_state(&app.study, &participant) })))
 }

@@ -6,6 +6,7 @@ use super::condition_motion::{ConditionModels, ShownMotion, motions, sound_of};
 use super::cut::{CutSpeech, StudyClip, cut};
 use super::film::{CAMERA, FilmScene};
 use super::speaker_source::SpeakerSource;
+use super::tones::tones;
 use crate::animate::Performance;
 use crate::animate::avatar::Appearance;
 use crate::animate::export::film::smooth_rate;
@@ -14,7 +15,8 @@ use crate::audio::loudness;
 use crate::mocap::motion_file::USUAL_FPS;
 use crate::stage::progress::Progress;
 use crate::study::file::{StudyFile, StudySpeaker};
-use crate::study::plan::FilmContent;
+use crate::study::pages::assets::SOUND_CHECK_TONES;
+use crate::study::plan::{FilmContent, FilmSound};
 use crate::types::sound::Sound;
 use crate::types::sync;
 use crate::types::time::FrameRate;
@@ -36,12 +38,15 @@ pub struct CutSpeaker {
     pub cut: CutSpeech,
     /// Sounds of the clips, as long as the films.
     pub sounds: Vec<Sound>,
+    /// Sound of the sound check, as long; none where there is no clip.
+    pub tones: Option<Sound>,
 }
 
 /// Speaker whose films can be drawn.
 pub struct FilmedSpeaker {
     clips: Vec<StudyClip>,
     sounds: Vec<Sound>,
+    tones: Option<Sound>,
     film_fps: FrameRate,
     /// By condition, then by clip: the clip of the motion, and the motion on the rig.
     performances: BTreeMap<String, Vec<(usize, Performance)>>,
@@ -78,7 +83,8 @@ impl CutSpeaker {
                 sounds.push(faded(Sound { rate: piece.sound.rate, samples }));
             }
         }
-        Ok(Self { source, models, cut, sounds })
+        let tones = sounds.first().map(|sound| tones(SOUND_CHECK_TONES, sound.rate, sound.samples.len()));
+        Ok(Self { source, models, cut, sounds, tones })
     }
 
     /// Puts the motion of every condition on the rig that all share, for films of `size` px.
@@ -86,7 +92,7 @@ impl CutSpeaker {
     /// # Errors
     /// A condition without motion for a clip.
     pub fn filmed(self, file: &StudyFile, size: [usize; 2], progress: &dyn Progress) -> Result<FilmedSpeaker> {
-        let Self { source, models, cut, sounds } = self;
+        let Self { source, models, cut, sounds, tones } = self;
         let n_pieces = cut.clips.chunk_by(|a, b| a.piece == b.piece).count();
         let task = progress.begin(&format!("motion of {}", source.name), n_pieces as u64);
         let motions = motions(&source, &cut.clips, &file.condition, &models, &|| task.advance(1))?;
@@ -115,7 +121,7 @@ impl CutSpeaker {
         let stage = AvatarStage::new(&shown, &Appearance::faceless(), size, CAMERA);
         let stage = stage.with_context(|| format!("the speaker {} has no clip", source.name))?;
         let (clips, film_fps) = (cut.clips, smooth_rate(source.fps));
-        Ok(FilmedSpeaker { clips, sounds, film_fps, performances, stage })
+        Ok(FilmedSpeaker { clips, sounds, tones, film_fps, performances, stage })
     }
 }
 
@@ -168,7 +174,11 @@ impl FilmedSpeaker {
 
     /// Scene of the film of that content with its performance.
     pub fn scene<'a>(&'a self, content: &FilmContent, performance: &'a Performance) -> FilmScene<'a> {
-        let sound = self.find(&content.clip).and_then(|clip| self.sounds.get(clip)).filter(|_| !content.muted);
+        let sound = match content.sound {
+            FilmSound::Speech => self.find(&content.clip).and_then(|clip| self.sounds.get(clip)),
+            FilmSound::Silence => None,
+            FilmSound::Tones => self.tones.as_ref(),
+        };
         FilmScene { performance, stage: &self.stage, sound, number: content.number }
     }
 }

@@ -9,3 +9,4 @@ pub mod film_name;
 pub mod film_size;
 pub mod filmed;
 pub mod speaker_source;
+pub mod tones;

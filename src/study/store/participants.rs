@@ -8,6 +8,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// What recruiting sites give along (Prolific, Mechanical Turk).
 pub const PARAMETERS: [&str; 6] = ["PROLIFIC_PID", "STUDY_ID", "SESSION_ID", "workerId", "assignmentId", "hitId"];
 
+/// Those of them that name a person.
+const PERSON: [&str; 2] = ["PROLIFIC_PID", "workerId"];
+
 /// Where a participant stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -155,13 +158,27 @@ pub struct Newcomer {
     pub code: String,
 }
 
-/// Gives the first free session to `newcomer`; whoever had abandoned it is replaced. `None`: the study has all the
-/// participants wanted.
+impl Newcomer {
+    /// Whether the recruiting site gives the same person along.
+    fn is(&self, participant: &Participant) -> bool {
+        PERSON.iter().any(|name| {
+            let person = self.parameters.get(*name).filter(|person| !person.is_empty());
+            person.is_some() && person == participant.parameters.get(*name)
+        })
+    }
+}
+
+/// Gives the first free session to `newcomer`; whoever had abandoned it is replaced. Who comes again by the name that the
+/// recruiting site gives along is the participant of before. `None`: the study has all the participants wanted.
 ///
 /// # Errors
 /// A database that fails.
 pub fn begin(db: &Connection, newcomer: &Newcomer, quota: Quota, now_ms: i64) -> rusqlite::Result<Option<Participant>> {
-    let holders = all(db)?.into_iter().filter(|participant| quota.holds(participant, now_ms));
+    let all = all(db)?;
+    if let Some(known) = all.iter().find(|participant| newcomer.is(participant)) {
+        return Ok(Some(known.clone()));
+    }
+    let holders = all.into_iter().filter(|participant| quota.holds(participant, now_ms));
     let taken: BTreeSet<u32> = holders.map(|participant| participant.session).collect();
     let Some(session) = (0..quota.n_sessions).find(|session| !taken.contains(session)) else { return Ok(None) };
     if taken.len() >= quota.wanted as usize {

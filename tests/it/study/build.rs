@@ -6,7 +6,8 @@ use orator::stage::progress::{Progress, Silent};
 use orator::study::build::build;
 use orator::study::file::StudyFile;
 use orator::study::folder::StudyFolder;
-use orator::study::plan::{StudyKey, StudyPlan};
+use orator::study::pages::assets::SOUND_CHECK_TONES;
+use orator::study::plan::{FilmSound, StudyKey, StudyPlan};
 use orator::study::seal::StudySeal;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -112,6 +113,13 @@ fn a_study_is_built_sealed_and_the_same_after_a_stop() {
         assert_eq!(*sealed, blake3::hash(&films[&format!("films/{name}.mp4")]).to_hex().to_string());
     }
     assert!(key.films.values().any(|content| content.number.is_some()));
+    // The page asks how many tones there were.
+    assert_eq!(key.films[&plan.sound_check].sound, FilmSound::Tones);
+    let heard = orator::read_sound(&study.film(&plan.sound_check)).unwrap();
+    let loudest = heard.samples.iter().fold(0f32, |most, sample| most.max(sample.abs()));
+    let steps = heard.samples.chunks(heard.rate as usize / 50);
+    let is_loud: Vec<bool> = steps.map(|step| step.iter().any(|sample| sample.abs() > loudest / 2.0)).collect();
+    assert_eq!(is_loud.windows(2).filter(|pair| !pair[0] && pair[1]).count(), SOUND_CHECK_TONES);
     let whole = contents(study.dir());
     assert!(whole.keys().all(|name| !name.contains(".films")), "what was made on the way is gone");
     assert!(whole.contains_key("clips/clips.json") && whole.keys().any(|name| name.ends_with(".wav")));

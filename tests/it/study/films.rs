@@ -7,7 +7,7 @@ use orator::external::ffmpeg::frames::FrameReader;
 use orator::external::ffmpeg::probe::probe;
 use orator::stage::progress::Silent;
 use orator::study::file::StudyFile;
-use orator::study::plan::FilmContent;
+use orator::study::plan::{FilmContent, FilmSound};
 use orator::study::stimuli::film_size::{common_bytes, padded};
 use orator::study::stimuli::filmed::{CutSpeaker, equally_loud};
 use orator::types::split::Split;
@@ -85,7 +85,7 @@ fn films_of_all_conditions_differ_in_motion_alone() {
         condition: condition.into(),
         motion_of: name(1),
         number,
-        muted: false,
+        sound: FilmSound::Speech,
     };
     let (mut films, mut skeletons) = (Vec::new(), Vec::new());
     for (condition, number) in
