@@ -77,6 +77,10 @@ fn a_known_preference_is_found_in_every_design_and_its_page_is_whole() {
     assert_eq!([0, 1, 2].map(conclusion), ["below", "above", "above"], "{}", tasks[0]["verdicts"]);
     // exact permutation of sides: the table says who was on which
     assert!(by(&tasks[0]["shares"][0]["tests"], "sides")["p"].as_f64().unwrap() < 0.05);
+    // the mixed model agrees, and says how much participants and clips differ
+    let model = &tasks[0]["shares"][0]["model"];
+    assert!(model["log_odds"].as_f64().unwrap() < 0.0 && model["sd_clips"].as_f64().unwrap() < 0.5, "{model}");
+    assert!(by(&tasks[0]["shares"][0]["tests"], "mixed-model")["p"].as_f64().unwrap() < 0.01);
     // preferences: natural over good over bad, by all methods
     for task in [3, 4] {
         for pair in tasks[task]["pairs"].as_array().unwrap() {
@@ -85,6 +89,16 @@ fn a_known_preference_is_found_in_every_design_and_its_page_is_whole() {
             assert_eq!(pair["difference"].as_f64().unwrap() > 0.0, place("first") > place("second"), "{pair}");
             assert!(by(&pair["tests"], "wilcoxon")["adjusted_p"].as_f64().unwrap() < 0.01, "{pair}");
         }
+    }
+    for task in [3, 4] {
+        let strengths = tasks[task]["strengths"].as_array().unwrap();
+        assert_eq!(
+            strengths.iter().map(|row| row["condition"].as_str().unwrap()).collect::<Vec<_>>(),
+            ["natural", "good", "bad"]
+        );
+        let [high, low] = [&strengths[0], &strengths[2]];
+        assert!(high["interval"]["low"].as_f64().unwrap() > low["interval"]["high"].as_f64().unwrap());
+        assert!(high["elo"].as_f64().unwrap() > 1000.0 && low["elo"].as_f64().unwrap() < 1000.0);
     }
     let scores = tasks[4]["scores"].as_array().unwrap();
     assert_eq!(
@@ -112,6 +126,51 @@ fn a_known_preference_is_found_in_every_design_and_its_page_is_whole() {
         assert!(wide <= u64::from(width), "{wide} px wide in a window of {width} px");
     }
     assert!(browser.problems.is_empty(), "{:?}", browser.problems);
+}
+
+#[test]
+fn a_pilot_says_how_much_participants_and_clips_differ() {
+    let project = Project::with_clips("study-pilot", 0, 1.0);
+    std::fs::write(project.dir().join("pilot.csv"), votes_of_all_designs(40, 3)).unwrap();
+    let study = r#"
+title = "Planned"
+participants = 20
+attention_checks = 0
+practice = false
+[clips]
+seconds = 2.0
+[[speaker]]
+name = "ada"
+dataset = "data"
+[[condition]]
+name = "natural"
+kind = "natural"
+[[condition]]
+name = "good"
+kind = "checkpoint"
+checkpoint = "model"
+[[task]]
+name = "pick"
+design = "turing"
+trials = 10
+"#;
+    std::fs::write(project.dir().join("study.toml"), study).unwrap();
+    let plan =
+        ["study", "plan", "study.toml", "--clips", "30", "--simulations", "100", "--power", "0.8", "--effect", "60"];
+    let answer = project.answer(&[&plan[..], &["--pilot", "pilot.csv"]].concat());
+    assert_eq!(answer.code, 0, "{}", answer.errors);
+    let (pilot, question) = (&answer.json["pilot"], &answer.json["plan"]["question"]);
+    assert_eq!((&pilot["n_participants"], &pilot["n_clips"]), (&40.into(), &30.into()));
+    near(&pilot["share"], 0.34, 0.06);
+    for factor in ["sd_participants", "sd_clips"] {
+        assert_eq!(question[factor], pilot[factor]);
+    }
+    let wanted = answer.json["plan"]["difference"]["n_participants"].as_u64().unwrap();
+    assert!((10..80).contains(&wanted), "{wanted}");
+    let elsewhere = counted_votes(&[("other", "turing", "s", 60, 200)]);
+    std::fs::write(project.dir().join("other.csv"), elsewhere).unwrap();
+    let answer = project.answer(&[&plan[..], &["--pilot", "other.csv"]].concat());
+    assert!(answer.code == 1 && answer.errors.contains("no vote of the task pick; its tasks are other"));
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use crate::fixtures::skip::{browser_driver, skip};
 use crate::fixtures::study::films::speaker;
+use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -36,6 +37,15 @@ design = "preference"
 trials = 2
 "#;
 
+/// Analysis of the study in the folder.
+fn analysis(dir: &Path) -> Value {
+    let mut orator = Command::new(env!("CARGO_BIN_EXE_orator"));
+    let output =
+        orator.current_dir(dir).args(["--json", "study", "analyse", "study", "--draws", "200"]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice::<Value>(&output.stdout).unwrap()["analysis"].take()
+}
+
 #[test]
 fn a_study_of_scripted_participants_finds_their_preference() {
     let Some(driver) = browser_driver() else { return };
@@ -54,5 +64,24 @@ fn a_study_of_scripted_participants_finds_their_preference() {
     let [said, failed] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
     assert!(output.status.success(), "{said}\n{failed}");
     assert!(said.contains("the analysis finds the preference"), "{said}");
-    assert!(fs::read_to_string(dir.join("analysis.html")).unwrap().contains("real-or-generated"));
+    let page = fs::read_to_string(dir.join("analysis.html")).unwrap();
+    assert!(page.contains("real-or-generated") && page.contains("Registered hypotheses"));
+
+    // What was sealed counts as registered, and nothing where a sealed file was changed.
+    let registered = analysis(dir);
+    let seal: Value = serde_json::from_slice(&fs::read(dir.join("study/seal.json")).unwrap()).unwrap();
+    assert_eq!(registered["seal"], seal["seal"]);
+    let hypotheses = registered["hypotheses"].as_array().unwrap();
+    assert_eq!(hypotheses.len(), 3, "{hypotheses:?}");
+    assert!(hypotheses.iter().all(|hypothesis| !hypothesis["claims"].as_array().unwrap().is_empty()));
+    let is_registered = |analysis: &Value| {
+        let tests = analysis["tasks"][0]["shares"][0]["tests"].as_array().unwrap();
+        tests.iter().any(|test| test["exploratory"] == false)
+    };
+    assert!(is_registered(&registered));
+    let file = dir.join("study/study.toml");
+    fs::write(&file, fs::read_to_string(&file).unwrap() + "\n").unwrap();
+    let changed = analysis(dir);
+    assert!(changed["seal"].is_null() && !is_registered(&changed));
+    assert!(changed["notes"][0].as_str().unwrap().contains("changed: study.toml"), "{}", changed["notes"]);
 }
