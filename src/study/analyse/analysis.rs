@@ -18,7 +18,8 @@ pub fn analyse(
     registration: Option<&Registration>,
     settings: &FigureSettings,
 ) -> Result<StudyAnalysis> {
-    let (kept, exclusions) = exclude(read, registration.map(|registration| &registration.exclusion));
+    let (kept, mut exclusions) = exclude(read, registration.map(|registration| &registration.exclusion));
+    exclusions.registered = registration.is_some_and(|registration| registration.seal.is_some());
     ensure!(exclusions.n_votes > 0, "{source} has no vote of the main phase");
     ensure!(!kept.is_empty(), "{source}: the exclusion rules leave no vote of {}", exclusions.n_votes);
     let hypotheses = registration.map(|registration| &registration.hypotheses[..]).unwrap_or_default();
@@ -42,7 +43,7 @@ pub fn analyse(
         methods: String::new(),
     };
     analysis.notes = registration.map(|registration| registration.notes.clone()).unwrap_or_default();
-    let more = notes(&analysis, read, hypotheses);
+    let more = notes(&analysis, read, registration);
     analysis.notes.extend(more);
     analysis.methods = methods(&analysis);
     Ok(analysis)
@@ -74,16 +75,15 @@ fn tasks(
 }
 
 /// What a reader must know beside the figures.
-fn notes(analysis: &StudyAnalysis, read: &VotesRead, hypotheses: &[RegisteredHypothesis]) -> Vec<String> {
+fn notes(analysis: &StudyAnalysis, read: &VotesRead, registration: Option<&Registration>) -> Vec<String> {
     let mut notes = Vec::new();
-    let registration_is_missing = !analysis.exclusions.registered;
     if !read.refused.is_empty() {
         notes.push(format!(
             "{} rows are no votes and were left out; they are listed with their reasons.",
             read.refused.len()
         ));
     }
-    if registration_is_missing {
+    if registration.is_none() {
         notes.push("The votes came without a sealed study: nothing of the analysis was registered before, all of it is exploratory.".to_owned());
     }
     for rule in analysis.exclusions.rules.iter().filter(|rule| rule.unknown.is_some()) {
@@ -93,7 +93,7 @@ fn notes(analysis: &StudyAnalysis, read: &VotesRead, hypotheses: &[RegisteredHyp
             rule.unknown.clone().unwrap_or_default()
         ));
     }
-    for hypothesis in hypotheses {
+    for hypothesis in registration.map(|registration| &registration.hypotheses[..]).unwrap_or_default() {
         let about = &hypothesis.claim.task;
         if !analysis.tasks.iter().any(|task| task.task == *about) {
             notes.push(format!("A hypothesis is about the task {about}, which has no vote."));

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// What the rules leave out. Votes are those of the main phase.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ExclusionAccount {
-    /// Whether the rules come from a registered study.
+    /// Whether the rules were registered before the data were seen.
     pub registered: bool,
     pub n_participants: usize,
     pub n_votes: usize,

@@ -1,6 +1,6 @@
 //! Paragraph for the methods section of a paper, from the analysis alone: plain text, sources in brackets.
 
-use super::figure::{FigureMethod, FigureOrigin};
+use super::figure::FigureMethod;
 use super::result::{ShareMeasure, StudyAnalysis, TaskAnalysis};
 use super::words::{count, list, p_value, percent, percents, points};
 use crate::study::plan::TaskDesign;
@@ -199,13 +199,12 @@ fn bounds(analysis: &StudyAnalysis) -> Vec<String> {
 }
 
 fn registered(analysis: &StudyAnalysis) -> String {
-    let is_registered = |origin: &FigureOrigin| !origin.exploratory;
     match &analysis.seal {
-        Some(seal) if analysis.tasks.iter().any(|task| task.origins().any(|origin| is_registered(&origin))) => format!(
+        Some(seal) => format!(
             "Hypotheses, exclusion rules and analysis were registered before the first participant (BLAKE3 {seal}); all \
              other figures are exploratory. "
         ),
-        _ => "The analysis was not pre-registered: all figures are exploratory. ".to_owned(),
+        None => "The analysis was not pre-registered: all figures are exploratory. ".to_owned(),
     }
 }
 

@@ -4,6 +4,13 @@
 use crate::fixtures::browser::Browser;
 use crate::fixtures::study::votes::{Rng32, counted_votes, votes_of_all_designs};
 use crate::fixtures::support::Project;
+use orator::study::analyse::figure::FigureMethod;
+use orator::study::analyse::result::FigureSettings;
+use orator::study::analyse::votes::columns::ColumnNames;
+use orator::study::analyse::votes::read::VotesRead;
+use orator::study::analyse::{Registration, analyse};
+use orator::study::file::{AnalysisSettings, ExclusionRules, HypothesisKind, StudyHypothesis};
+use orator::study::preregistration::RegisteredHypothesis;
 use serde_json::Value;
 
 fn near(found: &Value, expected: f64, within: f64) {
@@ -34,7 +41,7 @@ fn counts_of_a_published_study_come_out_as_known() {
     let analysis = &answer.json["analysis"];
     let shares = |task: usize| analysis["tasks"][task]["shares"].as_array().unwrap().clone();
     for (share, (votes, chosen, p)) in
-        shares(0).iter().zip([(2000, 0.525, 0.0268), (1000, 0.538, 0.01766), (1000, 0.512, 0.4673)])
+        shares(0).iter().zip([(2000, 0.525, 0.0268), (1000, 0.538, 0.01766), (1000, 0.512, 0.46705)])
     {
         assert_eq!(share["n_votes"], votes);
         near(&share["share"], chosen, 1e-12);
@@ -126,6 +133,60 @@ fn a_known_preference_is_found_in_every_design_and_its_page_is_whole() {
         assert!(wide <= u64::from(width), "{wide} px wide in a window of {width} px");
     }
     assert!(browser.problems.is_empty(), "{:?}", browser.problems);
+}
+
+/// Statements that were written down before keep their mark, all else does not.
+#[test]
+fn registered_hypotheses_are_judged_and_marked() {
+    let dir = tempfile::tempdir().unwrap();
+    let table = dir.path().join("votes.csv");
+    std::fs::write(&table, votes_of_all_designs(60, 5)).unwrap();
+    let read = VotesRead::of_file(&table, &ColumnNames::default(), None).unwrap();
+    let claim = |task: &str, kind, per_speaker| RegisteredHypothesis {
+        claim: StudyHypothesis {
+            task: task.to_owned(),
+            kind,
+            conditions: Vec::new(),
+            per_speaker,
+            points: (kind == HypothesisKind::Equivalence).then_some(5.0),
+        },
+        statistic: "crossed".to_owned(),
+    };
+    let registration = Registration {
+        title: "Made up".to_owned(),
+        seal: Some("5ea1".to_owned()),
+        notes: Vec::new(),
+        hypotheses: vec![
+            claim("pick", HypothesisKind::DiffersFromChance, false),
+            claim("pick", HypothesisKind::Equivalence, false),
+            claim("fit", HypothesisKind::GreaterThanChance, true),
+            claim("rate", HypothesisKind::Differs, false),
+        ],
+        exclusion: ExclusionRules { failed_checks: None, incomplete: false, stalled_secs: None, unfocused_secs: None },
+        settings: AnalysisSettings::default(),
+    };
+    let settings = FigureSettings { n_draws: 200, ..FigureSettings::from(&registration.settings) };
+    let analysis = analyse(["Made up", "votes.csv"], &read, Some(&registration), &settings).unwrap();
+    let outcomes: Vec<Vec<(&str, Option<bool>)>> = analysis
+        .hypotheses
+        .iter()
+        .map(|judged| judged.claims.iter().map(|claim| (claim.scope.as_str(), claim.holds)).collect())
+        .collect();
+    let pairs = [("bad and good", Some(true)), ("bad and natural", Some(true)), ("good and natural", Some(true))];
+    assert_eq!(outcomes[0], [("all votes", Some(true))]);
+    assert_eq!(outcomes[1], [("all votes", Some(false))]);
+    assert_eq!(outcomes[2], [("speaker ada", Some(true)), ("speaker ben", Some(true))]);
+    assert_eq!(outcomes[3], pairs);
+    let marked: Vec<(&str, usize)> = analysis
+        .tasks
+        .iter()
+        .map(|task| (task.task.as_str(), task.origins().filter(|origin| !origin.exploratory).count()))
+        .collect();
+    // Interval and test of each registered share, the test of equivalence, interval and test of three pairs.
+    assert_eq!(marked, [("pick", 3), ("single", 0), ("fit", 4), ("prefer", 0), ("rate", 6)]);
+    assert!(analysis.methods.contains("BLAKE3 5ea1"), "{}", analysis.methods);
+    let pooled = analysis.tasks[0].pooled().unwrap();
+    assert_eq!(pooled.figures.equivalence(FigureMethod::Crossed).unwrap().bound, 0.05);
 }
 
 #[test]

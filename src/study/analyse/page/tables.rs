@@ -181,9 +181,10 @@ pub fn exclusions(analysis: &StudyAnalysis) -> Vec<Node> {
     rows.push(cells("analysed", account.n_participants_kept, account.n_votes_kept, ""));
     let head = ["", "Participants", "Votes", ""]
         .map(|title| node("th").attr("scope", "col").class(if title.is_empty() { "" } else { "num" }).text(title));
-    let about = match account.registered {
-        true => "Rules that were registered, with what each leaves out by itself; a vote may fall under several.",
-        false => "No rules were registered; every vote is analysed.",
+    let about = match (account.registered, account.rules.is_empty()) {
+        (true, _) => "Rules that were registered, with what each leaves out by itself; a vote may fall under several.",
+        (false, false) => "Rules of the study, which do not count as registered, with what each leaves out by itself.",
+        (false, true) => "No rules were registered; every vote is analysed.",
     };
     let mut body = vec![node("p").text(about), node("div").class("scroll").child(table("figures", head, rows))];
     if !analysis.refused.is_empty() {
