@@ -149,7 +149,7 @@ fn figure_row(origin: FigureOrigin, interval: Option<String>, test: Option<&Test
 /// Registered hypotheses with their outcomes.
 pub fn hypotheses(analysis: &StudyAnalysis) -> Vec<Node> {
     let rows = analysis.hypotheses.iter().flat_map(|hypothesis| {
-        let title = group(&format!("{}: {}. {}.", hypothesis.task, hypothesis.claim, hypothesis.statistic));
+        let title = group(&format!("{}: {} ({}).", hypothesis.task, hypothesis.claim, hypothesis.statistic));
         let rows = hypothesis.claims.iter().map(|claim| {
             let name = node("th").attr("scope", "row").text(&claim.scope);
             let p = node("td").class("num").text(claim.p.map(bare_p).unwrap_or_default());
