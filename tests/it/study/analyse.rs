@@ -172,7 +172,7 @@ fn registered_hypotheses_are_judged_and_marked() {
         .iter()
         .map(|judged| judged.claims.iter().map(|claim| (claim.scope.as_str(), claim.holds)).collect())
         .collect();
-    let pairs = [("bad and good", Some(true)), ("bad and natural", Some(true)), ("good and natural", Some(true))];
+    let pairs = [("natural and good", Some(true)), ("natural and bad", Some(true)), ("good and bad", Some(true))];
     assert_eq!(outcomes[0], [("all votes", Some(true))]);
     assert_eq!(outcomes[1], [("all votes", Some(false))]);
     assert_eq!(outcomes[2], [("speaker ada", Some(true)), ("speaker ben", Some(true))]);

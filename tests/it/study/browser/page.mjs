@@ -7,7 +7,7 @@ import { join, resolve } from "node:path";
 const packages = createRequire(join(resolve(process.env.ORATOR_DRIVER ?? "target/driver"), "/"));
 const puppeteer = packages("puppeteer-core");
 
-const PATIENCE_MS = 60_000;
+const PATIENCE_MS = 180_000;
 
 export const launch = () =>
   puppeteer.launch({
