@@ -4,8 +4,8 @@
 //! The items below are the public interface. A [`Pipeline`] is opened with a [`Config`] and does all that `orator run`
 //! does; [`Lifter`], [`GestureGenerator`], [`perform`], [`Dataset`] and [`Evaluation`] do one thing each. Errors are
 //! [`anyhow::Error`]s that name file, place and remedy; those a program handles apart are found by `downcast_ref`:
-//! [`ConfigError`], [`ModelError`], [`UnreadableMedia`], [`NothingKept`], [`BusyFolder`], [`NoSpace`]. The rooms
-//! themselves are public for the program, tests and benchmarks, and may change.
+//! [`ConfigError`], [`ModelError`], [`UnreadableMedia`], [`NothingKept`], [`BusyFolder`], [`NoSpace`],
+//! [`StoppedTraining`]. The rooms themselves are public for the program, tests and benchmarks, and may change.
 //!
 //! A frame: `external::ffmpeg` -> `external::opencv` (crop, warp) -> `external::onnx` -> `pipeline::pose2d` (decode,
 //! track) -> *keypoints* -> `pipeline::segment` -> `pipeline::lift` -> *joints* -> `dataset::write` -> *shard* ->
@@ -146,3 +146,4 @@ pub use external::ffmpeg::UnreadableMedia;
 pub use external::onnx::ModelError;
 pub use pipeline::dataset::NothingKept;
 pub use stage::workdir::{BusyFolder, NoSpace};
+pub use train::stopped::StoppedTraining;

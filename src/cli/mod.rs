@@ -1,5 +1,6 @@
 //! The command line: the one place with clap, indicatif and println. One file a verb; a verb's doc comment is its
-//! `--help`. Exit codes: 0 all done; 1 usage, configuration, or a check that did not pass; 2 some units failed, the others are done.
+//! `--help`. Exit codes: 0 all done; 1 usage, configuration, or a check that did not pass; 2 some units failed, the others are done;
+//! 130 and 143 stopped by Ctrl-C or SIGTERM.
 
 pub mod animate;
 pub mod config_args;
@@ -15,6 +16,7 @@ pub mod outputs;
 pub mod pipeline;
 pub mod program;
 pub mod setup;
+pub mod signals;
 pub mod study;
 pub mod train;
 pub mod ui;

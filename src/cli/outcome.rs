@@ -7,6 +7,8 @@ pub enum Outcome {
     Done,
     /// Some units failed (each was reported); the others are done.
     SomeFailed,
+    /// Ended early by request (Ctrl-C, SIGTERM), at a place from which the same command goes on.
+    Stopped,
     /// What was looked at (the set-up, a dataset) is not as it must be; what is wrong was printed.
     Wrong,
 }

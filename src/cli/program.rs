@@ -1,5 +1,6 @@
 //! The command line: the one place with clap, indicatif and println. One file a verb; a verb's doc comment is its
-//! `--help`. Exit codes: 0 all done; 1 usage, configuration, or a check that did not pass; 2 some units failed, the others are done.
+//! `--help`. Exit codes: 0 all done; 1 usage, configuration, or a check that did not pass; 2 some units failed, the others are done;
+//! 130 and 143 stopped by Ctrl-C or SIGTERM.
 
 use super::dataset::{align, forget, import, verify as dataset};
 use super::motion::{lift, sheet};
@@ -96,6 +97,7 @@ pub fn main() -> ExitCode {
         Ok(_) if ui.has_lost_output() => ExitCode::from(1),
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::SomeFailed) => ExitCode::from(2),
+        Ok(Outcome::Stopped) => ExitCode::from(ui.stop_code()),
         Ok(Outcome::Wrong) => ExitCode::from(1),
         Err(error) => {
             ui.error(&error);

@@ -1,5 +1,6 @@
 //! What a verb prints: progress bars on standard error, a closing summary (or one JSON object) on standard output.
 
+use super::signals::StopRequest;
 use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressState, ProgressStyle};
 use orator::stage::progress::{PARTS, Progress, Task};
 use std::borrow::Cow;
@@ -14,12 +15,13 @@ pub struct Ui {
     json: bool,
     bars: MultiProgress,
     has_lost_output: AtomicBool,
+    stop: StopRequest,
 }
 
 impl Ui {
     /// With `json` the summary is one JSON object; bars go to standard error and hide themselves where that is no terminal.
     pub fn new(json: bool) -> Self {
-        Self { json, bars: MultiProgress::new(), has_lost_output: AtomicBool::new(false) }
+        Self { json, bars: MultiProgress::new(), has_lost_output: AtomicBool::new(false), stop: StopRequest::default() }
     }
 
     /// The closing words of a verb: the summary for people and the next command to type, or `facts` for programs.
@@ -55,6 +57,17 @@ impl Ui {
         self.has_lost_output.load(Ordering::Relaxed)
     }
 
+    /// From here on the first Ctrl-C or SIGTERM asks for an end (`is_to_stop`); the second ends the program and says what
+    /// is kept.
+    pub fn listens_for_stop(&self, kept: &'static str) {
+        self.stop.listen("stopping after this step, with a checkpoint; the next signal ends at once", kept);
+    }
+
+    /// Exit code of what ended by request.
+    pub fn stop_code(&self) -> u8 {
+        self.stop.code().unwrap_or(1)
+    }
+
     /// Writes a line on standard output. A reader who has gone away (`orator status | head`) is no failure.
     fn print(&self, line: &str) {
         let mut out = std::io::stdout();
@@ -65,15 +78,6 @@ impl Ui {
             note(&format!("error: cannot write to standard output: {error}"));
         }
     }
-}
-
-/// From here on Ctrl-C ends the program with exit code 130 and says what is kept: `kept`, and how to go on.
-pub fn tell_when_stopped(kept: &'static str) {
-    // A second handler of this process is none: the first goes on telling.
-    let _ = ctrlc::set_handler(move || {
-        note(&format!("\nstopped; {kept}"));
-        std::process::exit(130);
-    });
 }
 
 /// Writes a line on standard error, where that can still be written.
@@ -109,6 +113,10 @@ impl Progress for Ui {
         Box::new(Bar { bar, n_skipped })
     }
 
+    fn is_to_stop(&self) -> bool {
+        self.stop.code().is_some()
+    }
+
     fn say(&self, line: &str) {
         // `MultiProgress::suspend` would panic on a terminal that is gone.
         if self.bars.is_hidden() {
@@ -142,6 +150,11 @@ impl Task for Bar {
     }
     fn detail(&self, text: &str) {
         self.bar.set_message(shown(text).into_owned());
+    }
+    fn milestone(&self, line: &str) {
+        if self.bar.is_hidden() {
+            note(line);
+        }
     }
 }
 

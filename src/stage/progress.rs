@@ -10,6 +10,10 @@ pub trait Progress: Send + Sync {
     fn begin(&self, label: &str, total: u64) -> Box<dyn Task + '_>;
     /// A line the user should see while work goes on (a warning, a milestone).
     fn say(&self, line: &str);
+    /// Whether the user has asked for an end: work that can end early, at a place from which it goes on, ends there.
+    fn is_to_stop(&self) -> bool {
+        false
+    }
     /// Something happened to a unit; says its message unless overridden.
     fn event(&self, event: &Event<'_>) {
         if let Some(message) = event.message() {
@@ -62,6 +66,8 @@ pub trait Task: Send + Sync {
     }
     /// A short text beside the bar (a loss, the unit at hand).
     fn detail(&self, text: &str);
+    /// How far the task is, for those who see no bar.
+    fn milestone(&self, _line: &str) {}
 }
 
 /// Shows nothing.

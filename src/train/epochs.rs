@@ -1,15 +1,17 @@
 //! The loop of a training whose best step is chosen by validation: steps, at the end of each epoch a validation,
-//! checkpoints on the way.
+//! checkpoints on the way. Who asks for an end gets it after the step at hand, with a checkpoint.
 
 use super::log::MetricsLog;
+use super::pace::TrainingPace;
 use super::resume::kept;
+use super::stopped::StoppedTraining;
 use crate::formats::checkpoint;
+use crate::generate::model::BEST;
 use crate::stage::progress::Progress;
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 /// Steps between two lines of the log.
 const LOG_EVERY: usize = 10;
@@ -47,8 +49,18 @@ pub trait ValidatedTraining {
     fn validate(&self) -> Result<Self::Validation>;
     /// The score, lower is better, and why the network has collapsed, if it has.
     fn judged(validation: &Self::Validation) -> (f64, Option<&str>);
+    /// A validation's figures in a few words.
+    fn words(validation: &Self::Validation) -> String;
     fn save(&self, folder: &Path) -> Result<()>;
     fn save_best(&self, folder: &Path, validation: &Self::Validation) -> Result<()>;
+}
+
+/// A validation that is logged, behind it a checkpoint that is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ValidatedStep {
+    pub step: usize,
+    /// Step of the best checkpoint so far.
+    pub best_step: usize,
 }
 
 /// How the loop ended.
@@ -62,12 +74,13 @@ pub struct EpochsEnd<V> {
     pub best_step: usize,
 }
 
-/// Trains to the last step, or until the score no longer becomes better. Errors: those of a step, with the checkpoint that is
-/// kept; no step to do and no checkpoint.
+/// Trains to the last step, or until the score no longer becomes better; `validated` is called behind each validation.
+/// Errors: those of a step, with the checkpoint that is kept; no step to do and no checkpoint; `StoppedTraining`.
 pub fn run<T: ValidatedTraining>(
     training: &mut T,
     folder: &Path,
     progress: &dyn Progress,
+    validated: &mut dyn FnMut(ValidatedStep),
 ) -> Result<EpochsEnd<T::Validation>> {
     let EpochSchedule { steps, epoch_steps, checkpoint_every, .. } = training.schedule();
     let section = training.names().1;
@@ -75,36 +88,55 @@ pub fn run<T: ValidatedTraining>(
     let mut log = MetricsLog::open(folder, began_at)?;
     let task = progress.begin(&format!("train {}", training.names().0), steps as u64);
     task.advance(began_at.min(steps) as u64);
-    let start = Instant::now();
-    let mut last = None;
+    let mut pace = TrainingPace::new(began_at, steps);
+    let (mut last, mut saved_at) = (None, began_at);
     while training.n_done() < steps && !is_over(training) {
+        if progress.is_to_stop() {
+            if training.n_done() > saved_at {
+                training.save(folder)?;
+            }
+            return Err(stopped(training, folder)?.into());
+        }
         let report = training.step().with_context(|| kept(folder, section))?;
         let step = training.n_done();
         task.advance(1);
         if step.is_multiple_of(LOG_EVERY) {
-            let speed = (step - began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
-            task.detail(&format!("{}  {speed:.2} steps/s", report.words));
+            task.detail(&format!("{}  {:.2} steps/s", report.words, pace.per_sec(step)));
             log.write(&report.line)?;
         }
+        if let Some(line) = pace.line(step, &report.words) {
+            task.milestone(&line);
+        }
         let is_last = step == steps;
-        let ends_epoch = step.is_multiple_of(epoch_steps);
-        if ends_epoch || is_last {
+        let is_validated = step.is_multiple_of(epoch_steps) || is_last;
+        if is_validated {
             let validation = training.validate()?;
             log.write(&json!({ "step": step, "epoch": step.div_ceil(epoch_steps), "validation": validation }))?;
             let (score, alarm) = T::judged(&validation);
+            // In f32, whose decimals come back exactly from JSON.
+            let score = score as f32;
+            let before = *training.best();
+            let standing = match before {
+                Some((best_step, best)) if best <= score => format!("best {best:.3} at step {best_step}"),
+                _ => "the best so far".to_owned(),
+            };
+            progress.say(&format!("step {step}: {}, score {score:.3} ({standing})", T::words(&validation)));
             if let (Some(alarm), true) = (alarm, step > epoch_steps) {
                 progress.say(&format!("step {step}: {alarm}"));
             }
-            // In f32, whose decimals come back exactly from JSON.
-            let score = score as f32;
-            if training.best().is_none_or(|(_, best)| score < best) {
+            if before.is_none_or(|(_, best)| score < best) {
                 *training.best() = Some((step, score));
                 training.save_best(folder, &validation)?;
             }
             last = Some(validation);
         }
-        if ends_epoch || is_last || step.is_multiple_of(checkpoint_every) {
+        if is_validated || step.is_multiple_of(checkpoint_every) {
             training.save(folder)?;
+            saved_at = step;
+        }
+        if is_validated {
+            let best_step = training.best().map_or(step, |(best_step, _)| best_step);
+            validated(ValidatedStep { step, best_step });
         }
     }
     let Some((_, newest)) = checkpoint::list(folder)?.pop() else {
@@ -117,6 +149,13 @@ pub fn run<T: ValidatedTraining>(
     let done = training.n_done();
     let best_step = training.best().map_or(done, |(step, _)| step);
     Ok(EpochsEnd { began_at, stopped_early: done < steps, validation, newest, best_step })
+}
+
+/// What is kept of a training that ends here.
+fn stopped(training: &mut impl ValidatedTraining, folder: &Path) -> Result<StoppedTraining> {
+    let newest = checkpoint::list(folder)?.pop().map(|(_, path)| path);
+    let best = training.best().map(|(step, _)| (step, folder.join(BEST)));
+    Ok(StoppedTraining { step: training.n_done(), steps: training.schedule().steps, newest, best })
 }
 
 /// Whether the score has not become better for as many epochs as the patience allows.

@@ -4,6 +4,8 @@
 use super::log::MetricsLog;
 use super::optim::adam;
 use super::optim::adam::Adam;
+use super::pace::TrainingPace;
+use super::stopped::StoppedTraining;
 use crate::formats::checkpoint::{Contents, expect_same};
 use crate::nn::Mode;
 use crate::nn::params::Params;
@@ -112,7 +114,7 @@ pub fn start_from(training_task: &dyn TrainingTask, path: &Path) -> Result<Strin
 /// Trains and writes the weights to `out`. A checkpoint beside it (`<out>.checkpoint`) lets an interrupted training
 /// go on, to the same bytes, when called again with the same schedule and data; it is removed at the end. The log is
 /// `<out>.jsonl`. Gives the errors on held-out samples; with no steps that is all it does. One training at a time works
-/// on `out` (`BusyFolder`).
+/// on `out` (`BusyFolder`); where `progress` asks for an end, it ends with a checkpoint and `StoppedTraining`.
 pub fn train(
     training_task: &mut dyn TrainingTask,
     schedule: &Schedule,
@@ -169,6 +171,7 @@ fn train_until(
     let task = progress.begin("training", (schedule.steps - start.min(schedule.steps)) as u64);
     let measure_every = schedule.steps.div_ceil(MEASURES);
     let (mut sum, mut n_summed) = (0.0, 0);
+    let mut pace = TrainingPace::new(start, schedule.steps);
     for step in start..end {
         let (x, y) = batch(training_task, schedule, step, n_points)?;
         // the running statistics settle as the training does: 0.1 falls to 0.001
@@ -194,13 +197,21 @@ fn train_until(
             log.write(&json!({ "step": step + 1, "errors": errors }))?;
             (sum, n_summed) = (0.0, 0);
         }
-        if (step + 1) % schedule.checkpoint_every.max(1) == 0 || step + 1 == end {
+        if let Some(line) = pace.line(step + 1, &format!("loss {loss:.4}")) {
+            task.milestone(&line);
+        }
+        let is_to_stop = progress.is_to_stop() && step + 1 < schedule.steps;
+        if (step + 1) % schedule.checkpoint_every.max(1) == 0 || step + 1 == end || is_to_stop {
             let mut facts = facts(training_task, schedule);
             facts["step"] = json!(step + 1);
             let mut contents = Contents { facts, tensors: BTreeMap::new() };
             contents.add("net.", training_task.params().tensors()?);
             contents.add("", adam.tensors("adam.")?);
             contents.write(&beside(out, ".checkpoint"))?;
+        }
+        if is_to_stop {
+            let newest = Some(beside(out, ".checkpoint"));
+            return Err(StoppedTraining { step: step + 1, steps: schedule.steps, newest, best: None }.into());
         }
     }
     Ok(())

@@ -2,7 +2,7 @@
 
 use crate::cli::Outcome;
 use crate::cli::confine::confine;
-use crate::cli::ui;
+use crate::cli::signals;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator::pipeline::batch::{BatchReport, BatchState, SpeechBatch};
@@ -15,7 +15,7 @@ const MOST_LISTED: usize = 30;
 pub fn run(batch: &SpeechBatch, ui: &Ui) -> Result<Outcome> {
     let checkpoints = batch.sounds.iter().filter_map(|sound| sound.checkpoint.as_deref());
     confine([batch.folder.as_path()], checkpoints.chain(batch.checkpoint.as_deref()));
-    ui::tell_when_stopped("every sound that is done is kept, and the same command goes on from there");
+    signals::tell_when_stopped("every sound that is done is kept, and the same command goes on from there");
     let report = batch.run(ui)?;
     ui.summary(&text(&report), None, json!(report));
     Ok(if report.failed > 0 { Outcome::SomeFailed } else { Outcome::Done })

@@ -4,7 +4,7 @@ use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::confine::this_program;
 use crate::cli::setup::models::fetch;
-use crate::cli::ui;
+use crate::cli::signals;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -60,7 +60,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let (from, to) = (args.from.unwrap_or(default.from), args.to.unwrap_or(default.to));
     let selection = Selection { from, to, speakers: args.speaker, jobs: args.jobs, force: args.force };
     let pipeline = Pipeline::open(args.config.load()?)?.with_processes(this_program());
-    ui::tell_when_stopped("every stage of a video that is done is kept, and the same command goes on from there");
+    signals::tell_when_stopped("every stage of a video that is done is kept, and the same command goes on from there");
     let report = match pipeline.run(&selection, ui) {
         Err(error) if is_missing_model(&error) && ui.asks(&format!("{error:#}\nget the models now?")) => {
             let settings = &pipeline.config().settings;

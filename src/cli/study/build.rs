@@ -2,7 +2,7 @@
 
 use crate::cli::Outcome;
 use crate::cli::confine::confine;
-use crate::cli::ui;
+use crate::cli::signals;
 use crate::cli::ui::Ui;
 use anyhow::Result;
 use orator::stage::counted;
@@ -45,7 +45,7 @@ pub fn run(args: &Args, ui: &Ui) -> Result<Outcome> {
     let datasets = file.speaker.iter().filter_map(|speaker| speaker.dataset.clone());
     let locked: Vec<PathBuf> = checkpoints.chain(datasets).collect();
     confine([out.as_path()], locked.iter().map(PathBuf::as_path));
-    ui::tell_when_stopped("every film that is done is kept, and the same command goes on from there");
+    signals::tell_when_stopped("every film that is done is kept, and the same command goes on from there");
     let built = build(&file, &out, SIZE, ui)?;
     let next = format!("orator study serve {}", built.folder.display());
     let mut facts = json!(built);

@@ -1,30 +1,22 @@
 //! `orator train gan`.
 
+use super::watched::{Places, WatchedPage, middle, shown};
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
-use anyhow::{Context, Result, bail};
-use orator::config::Config;
-use orator::dataset::index::SampleRef;
-use orator::dataset::{Dataset, Split};
+use anyhow::Result;
+use orator::dataset::Dataset;
 use orator::evaluate::baseline::predictor;
 use orator::evaluate::clips::held_out;
 use orator::evaluate::clips::held_out::HeldOutInterval;
 use orator::generate::GestureGenerator;
-use orator::report::training::page;
 use orator::report::training::strip::HeldOutPair;
-use orator::stage::progress::Progress as _;
+use orator::train::epochs::ValidatedStep;
 use orator::train::gan::score::{Validation, ValidationMetrics};
 use orator::train::gan::train;
-use orator::types::time::FrameRate;
 use serde_json::json;
-use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
-
-/// Intervals on the page of a training, and how much of each is generated.
-const N_PAIRS: usize = 3;
-const PAIR_SECS: f64 = 8.0;
 
 /// Train a speaker's speech-to-gesture generator.
 ///
@@ -52,22 +44,18 @@ pub struct Args {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let config = if args.dataset.is_some() { args.config.load_or_default()? } else { args.config.load()? };
-    let folder_of = |given: Option<PathBuf>, room: &str| -> Result<PathBuf> {
-        match given {
-            Some(path) => Ok(path),
-            None => Ok(config.settings.work.dir.join(room).join(speaker(args.speaker.as_ref(), &config)?)),
-        }
-    };
-    let (folder, out) = (folder_of(args.dataset, "dataset")?, folder_of(args.out, "gan")?);
+    let Args { speaker, dataset, out, .. } = &args;
+    let places = Places { config: &config, speaker: speaker.as_ref(), dataset: dataset.as_ref(), out: out.as_ref() };
+    let (dataset, out) = places.open("gan")?;
     let mut settings = config.settings.gan.clone();
     settings.steps = args.steps.unwrap_or(settings.steps);
-    let dataset = Dataset::open(&folder).context("`orator run` makes the dataset to train on")?;
 
     let start = Instant::now();
-    let outcome = train::train(&dataset, &settings, &out, ui)?;
+    let poses = || pairs(&dataset, &GestureGenerator::open(&out.join(train::BEST))?);
+    let mut page = WatchedPage::new(&out, dataset.info().speaker.clone(), Box::new(poses), ui);
+    let outcome = train::train_watched(&dataset, &settings, &out, ui, &mut |at| page.update(at))?;
     let steps_per_sec = (outcome.steps - outcome.began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
-    let of_best = || pairs(&dataset, &GestureGenerator::open(&outcome.best)?);
-    let page = page(&out, &dataset.info().speaker, of_best, ui);
+    let page = page.finish(ValidatedStep { step: outcome.steps, best_step: outcome.best_step });
     let text = format!(
         "{}: {} steps{} ({steps_per_sec:.2} a second, {:.1} % of it waiting for data) on {} windows, {} parameters\n\
          {}\nnewest checkpoint  {}\nbest (step {})  {}{}",
@@ -127,37 +115,6 @@ fn metrics(validation: &Validation) -> String {
     text
 }
 
-/// Writes the page of the training; the training is done, so that what hinders the page is said, and is no error.
-pub(super) fn page(
-    folder: &Path,
-    speaker: &str,
-    pairs: impl FnOnce() -> Result<Vec<HeldOutPair>>,
-    ui: &Ui,
-) -> Option<PathBuf> {
-    match pairs().and_then(|pairs| page::write(folder, speaker, &pairs)) {
-        Ok(()) => Some(folder.join(page::PAGE)),
-        Err(error) => {
-            ui.say(&format!("no page of this training: {error:#}"));
-            None
-        }
-    }
-}
-
-/// A few intervals that were not trained on; of the training split where there are no others.
-pub(super) fn shown(dataset: &Dataset) -> Vec<SampleRef> {
-    let splits = [Split::Validation, Split::Train].map(|split| dataset.samples(split));
-    let samples = splits.into_iter().find(|samples| !samples.is_empty()).unwrap_or_default();
-    let n = samples.len().min(N_PAIRS);
-    (0..n).map(|i| samples[i * samples.len() / n].clone()).collect()
-}
-
-/// Frames in the middle of so many.
-pub(super) fn middle(n_frames: usize, fps: FrameRate) -> Range<usize> {
-    let span = ((PAIR_SECS * fps.per_sec()) as usize).min(n_frames);
-    let first = (n_frames - span) / 2;
-    first..first + span
-}
-
 /// True and generated poses of these intervals.
 fn pairs(dataset: &Dataset, speaker: &GestureGenerator) -> Result<Vec<HeldOutPair>> {
     let intervals = held_out::read(dataset, &shown(dataset), &speaker.metadata.normalisation)?;
@@ -168,16 +125,4 @@ fn pairs(dataset: &Dataset, speaker: &GestureGenerator) -> Result<Vec<HeldOutPai
         Ok(HeldOutPair { name: key, start_secs: speaker.fps().secs(frames.start), ground_truth, predicted })
     };
     intervals.into_iter().map(pair).collect()
-}
-
-/// The speaker's name: given, or the only one configured.
-pub(super) fn speaker(given: Option<&String>, config: &Config) -> Result<String> {
-    let names: Vec<&str> = config.settings.speaker.iter().map(|speaker| speaker.name.as_str()).collect();
-    match (given, names.as_slice()) {
-        (Some(name), _) if names.contains(&name.as_str()) => Ok(name.clone()),
-        (Some(name), _) => bail!("no speaker {name:?} in {}; it names {}", config.file.display(), names.join(", ")),
-        (None, [only]) => Ok((*only).to_owned()),
-        (None, []) => bail!("{} names no speaker; say --dataset and --out", config.file.display()),
-        (None, _) => bail!("say which speaker with --speaker: {}", names.join(", ")),
-    }
 }

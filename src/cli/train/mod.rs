@@ -8,6 +8,8 @@ pub mod lifter;
 pub mod noise;
 pub mod pose;
 pub mod seq2seq;
+mod stopped;
 pub mod verb;
+mod watched;
 
 pub use verb::{Args, run};

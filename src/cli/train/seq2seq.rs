@@ -1,10 +1,10 @@
 //! `orator train seq2seq`.
 
-use super::gan::{middle, page, shown, speaker};
+use super::watched::{Places, WatchedPage, middle, shown};
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use ndarray::s;
 use orator::dataset::Dataset;
 use orator::evaluate::clips::held_out;
@@ -14,12 +14,13 @@ use orator::formats::word_vectors::WordVectors;
 use orator::generate::seq2seq::SequenceGenerator;
 use orator::generate::seq2seq::poses::PoseNumbers;
 use orator::report::training::strip::HeldOutPair;
+use orator::train::epochs::ValidatedStep;
 use orator::train::seq2seq::captures::CaptureFolder;
 use orator::train::seq2seq::source::TrainingSource;
 use orator::train::seq2seq::train;
 use orator::types::pose3d::Motion;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Train a sequence-to-sequence network of FineMotion's entry to GENEA 2020.
@@ -61,32 +62,28 @@ pub struct Args {
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let is_named = args.dataset.is_some() || args.captures.is_some();
     let config = if is_named { args.config.load_or_default()? } else { args.config.load()? };
-    let in_work = |given: Option<PathBuf>, room: &str| -> Result<PathBuf> {
-        match given {
-            Some(path) => Ok(path),
-            None => Ok(config.settings.work.dir.join(room).join(speaker(args.speaker.as_ref(), &config)?)),
-        }
-    };
-    let out = in_work(args.out, "seq2seq")?;
     let mut settings = config.settings.seq2seq.clone();
     settings.steps = args.steps.unwrap_or(settings.steps);
     let vectors = args.words.as_deref().map(WordVectors::open).transpose()?;
     let start = Instant::now();
-    let train = |source| train::train(source, vectors.as_ref(), &settings, &out, ui);
-    let (outcome, page) = match &args.captures {
-        None => {
-            let folder = in_work(args.dataset, "dataset")?;
-            let dataset = Dataset::open(&folder).context("`orator run` makes the dataset to train on")?;
-            let outcome = train(TrainingSource::Dataset(&dataset))?;
-            let of_best = || pairs(&dataset, &SequenceGenerator::open(&outcome.best)?);
-            let page = page(&out, &dataset.info().speaker, of_best, ui);
-            (outcome, page)
-        }
-        Some(folder) => {
+    let train = |source: TrainingSource, out: &Path, poses| {
+        let mut page = WatchedPage::new(out, source.name(), poses, ui);
+        let validated = &mut |at| page.update(at);
+        let outcome = train::train_watched(source, vectors.as_ref(), &settings, out, ui, validated)?;
+        let page = page.finish(ValidatedStep { step: outcome.steps, best_step: outcome.best_step });
+        anyhow::Ok((outcome, page))
+    };
+    let (outcome, page) = match (&args.captures, &args.out) {
+        (Some(folder), Some(out)) => {
             let captures = CaptureFolder::open(folder, &args.hold_out, JointMapping::parse(&args.joint)?)?;
-            let outcome = train(TrainingSource::Captures(&captures))?;
-            let page = page(&out, &captures.name(), || Ok(Vec::new()), ui);
-            (outcome, page)
+            train(TrainingSource::Captures(&captures), out, Box::new(|| Ok(Vec::new())))?
+        }
+        _ => {
+            let Args { speaker, dataset, out, .. } = &args;
+            let (speaker, dataset, out) = (speaker.as_ref(), dataset.as_ref(), out.as_ref());
+            let (dataset, out) = Places { config: &config, speaker, dataset, out }.open("seq2seq")?;
+            let poses = || pairs(&dataset, &SequenceGenerator::open(&out.join(train::BEST))?);
+            train(TrainingSource::Dataset(&dataset), &out, Box::new(poses))?
         }
     };
     let steps_per_sec = (outcome.steps - outcome.began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);

@@ -1,8 +1,8 @@
 //! `orator train`: one file a network.
 
-use super::{basis, embedding, gan, lifter, noise, pose, seq2seq};
+use super::{basis, embedding, gan, lifter, noise, pose, seq2seq, stopped};
 use crate::cli::Outcome;
-use crate::cli::ui;
+use crate::cli::signals;
 use crate::cli::ui::Ui;
 
 /// Train the lifters, a model of bodies, a speaker's generator, or the spaces that `evaluate` compares motion in.
@@ -24,8 +24,12 @@ enum Network {
 }
 
 pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
-    ui::tell_when_stopped("the newest checkpoint is kept, and the same command goes on from it");
+    const KEPT: &str = "the newest checkpoint is kept, and the same command goes on from it";
     match args.network {
+        Network::Basis(_) | Network::Noise(_) => signals::tell_when_stopped("nothing is kept of what was begun"),
+        _ => ui.listens_for_stop(KEPT),
+    }
+    let ended = match args.network {
         Network::Basis(args) => basis::run(args, ui),
         Network::Embedding(args) => embedding::run(args, ui),
         Network::Gan(args) => gan::run(args, ui),
@@ -33,5 +37,6 @@ pub fn run(args: Args, ui: &Ui) -> anyhow::Result<Outcome> {
         Network::Noise(args) => noise::run(&args, ui),
         Network::Pose(args) => pose::run(&args, ui),
         Network::Seq2seq(args) => seq2seq::run(args, ui),
-    }
+    };
+    ended.or_else(|error| stopped::told(error, ui))
 }

@@ -1,6 +1,7 @@
 //! Page of a training: curves, and generated beside true poses.
 
 pub mod charts;
+pub mod live;
 pub mod page;
 pub mod picture;
 pub mod strip;

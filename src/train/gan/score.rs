@@ -56,6 +56,27 @@ pub struct Validation {
     pub alarm: Option<String>,
 }
 
+impl Validation {
+    /// The figures in a line, those of the mean pose in brackets.
+    pub fn words(&self) -> String {
+        let (own, still) = (&self.generator, &self.mean_pose);
+        let share = |share: f64| format!("{:.0} %", 100.0 * share);
+        let frechet = match (own.frechet, still.frechet) {
+            (Some(own), Some(still)) => format!(", Frechet {own:.0} cm2 ({still:.0})"),
+            _ => String::new(),
+        };
+        format!(
+            "{} L1 {:.3} (mean pose {:.3}), PCK {} ({}){frechet}, energy {}",
+            self.split,
+            own.l1,
+            still.l1,
+            share(own.pck),
+            share(still.pck),
+            share(own.energy)
+        )
+    }
+}
+
 /// The score, lower is better, 0 for perfect motion: the L1 error and the Frechet distance, each as a share of the mean
 /// pose's, and half the distance of the motion energy from the data's, |ln(energy)| / 2. The first asks for the right
 /// pose at the right time, the second for poses like the speaker's, the third for as much motion. The adversarial loss

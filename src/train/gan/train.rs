@@ -5,7 +5,7 @@
 use super::score::Validation;
 use super::step::{GanTrainer, Losses, TrainerState};
 use super::validate::ValidationWindows;
-use super::windows::WindowLoader;
+use super::windows::{WindowLoader, needed};
 use crate::config::GanConfig;
 use crate::config::{ComputeDevice, MotionRepresentation, NetworkPreset};
 use crate::dataset::{Dataset, Split};
@@ -22,7 +22,8 @@ use crate::nn::gan::generator::Preset;
 use crate::nn::gan::generator::{Config, FRAMES_MULTIPLE};
 use crate::stage::progress::Progress;
 use crate::stage::workdir::{self, FolderLock};
-use crate::train::epochs::{self, EpochSchedule, StepReport, ValidatedTraining};
+use crate::train::epochs::{self, EpochSchedule, StepReport, ValidatedStep, ValidatedTraining};
+use crate::train::no_window;
 use crate::train::resume::{self, sample_windows};
 use crate::types::posture::PostureChannel;
 use crate::types::skeleton::N_BONES;
@@ -55,12 +56,23 @@ pub struct TrainingOutcome {
 ///
 /// # Errors
 /// No window to train on; a checkpoint of another speaker or version; another training at work in `folder`; a loss that
-/// is not finite or explodes (the last good checkpoint stays).
+/// is not finite or explodes (the last good checkpoint stays); `StoppedTraining` where `progress` asks for an end.
 pub fn train(
     dataset: &Dataset,
     requested: &GanConfig,
     folder: &Path,
     progress: &dyn Progress,
+) -> Result<TrainingOutcome> {
+    train_watched(dataset, requested, folder, progress, &mut |_| ())
+}
+
+/// [`train`], with a call behind each validation, when log and checkpoints are written.
+pub fn train_watched(
+    dataset: &Dataset,
+    requested: &GanConfig,
+    folder: &Path,
+    progress: &dyn Progress,
+    validated: &mut dyn FnMut(ValidatedStep),
 ) -> Result<TrainingOutcome> {
     check(requested)?;
     ensure!(
@@ -72,6 +84,9 @@ pub fn train(
     let _model = FolderLock::shared(folder)?;
     let _lock = workdir::lock(folder)?;
     let resumed = resume(dataset, requested, folder, progress)?;
+    let window_frames = resumed.as_ref().map_or(requested, |(stored, _)| &stored.settings).window_frames;
+    // Before the statistics, of which an empty split has none.
+    no_window::ensure_window(dataset, needed(window_frames))?;
     let (settings, normal) = match &resumed {
         Some((stored, _)) => (stored.settings.clone(), stored.speaker.normalisation.clone()),
         None => {
@@ -80,13 +95,8 @@ pub fn train(
         }
     };
     let loader = WindowLoader::load(dataset, Split::Train, &normal, settings.window_frames, settings.stride_frames)?;
-    ensure!(
-        !loader.is_empty(),
-        "{}: no interval of the training split is as long as a window of {} frames; more footage, or a smaller \
-         gan.window_frames",
-        dataset.dir().display(),
-        settings.window_frames
-    );
+    let place = dataset.dir().display();
+    progress.say(&format!("{} windows of {place}; what is learnt goes to {}", loader.len(), folder.display()));
     let held_out = ValidationWindows::load(dataset, &settings, &normal, progress)?;
     let mut trainer = match &resumed {
         Some((stored, _)) => GanTrainer::new(stored.speaker.clone(), settings)?,
@@ -113,7 +123,7 @@ pub fn train(
         stepping: Duration::ZERO,
         waiting: Duration::ZERO,
     };
-    let end = with_spinning_workers(|| epochs::run(&mut training, folder, progress))?;
+    let end = with_spinning_workers(|| epochs::run(&mut training, folder, progress, validated))?;
     let waiting = training.waiting.as_secs_f64() / training.stepping.as_secs_f64().max(1e-9);
     Ok(TrainingOutcome {
         steps: trainer.step,
@@ -178,6 +188,10 @@ impl ValidatedTraining for GanTraining<'_> {
 
     fn judged(validation: &Validation) -> (f64, Option<&str>) {
         (validation.score, validation.alarm.as_deref())
+    }
+
+    fn words(validation: &Validation) -> String {
+        validation.words()
     }
 
     fn save(&self, folder: &Path) -> Result<()> {

@@ -4,7 +4,7 @@ use super::losses;
 use super::score;
 use super::score::{ChannelError, Validation, ValidationMetrics};
 use super::step::GanTrainer;
-use super::windows::{WindowBatch, WindowLoader};
+use super::windows::{WindowBatch, WindowLoader, needed};
 use crate::config::GanConfig;
 use crate::dataset::{Dataset, Split};
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
@@ -13,6 +13,7 @@ use crate::metrics::distribution::frechet::{GaussianFit, frechet};
 use crate::metrics::movement::energy::MotionEnergy;
 use crate::metrics::position::pck::{CorrectKeypoints, PckAxes};
 use crate::stage::progress::Progress;
+use crate::train::no_window;
 use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WRIST, is_duplicate, parent};
 use crate::types::time::FrameRate;
 use anyhow::Result;
@@ -52,7 +53,8 @@ impl ValidationWindows {
         let mut split = Split::Validation;
         let mut loader = WindowLoader::load(dataset, split, normal, n_frames, n_frames)?;
         if loader.is_empty() {
-            progress.say("the dataset has no validation window: the figures below are on training windows");
+            let cause = no_window::cause(dataset, split, needed(n_frames)).unwrap_or_default();
+            progress.say(&format!("no window is held out, the figures below are on those to train on: {cause}"));
             split = Split::Train;
             loader = WindowLoader::load(dataset, split, normal, n_frames, n_frames)?;
         }

@@ -6,6 +6,8 @@ use crate::dataset::{Dataset, Split};
 use crate::generate::mel_stream::mel_frames;
 use crate::generate::normalisation::Normalisation;
 use crate::motion::bones;
+use crate::nn::gan::generator::FRAMES_MULTIPLE;
+use crate::train::no_window::NeededFrames;
 use crate::types::interval::Interval as Span;
 use crate::types::skeleton::N_BONES;
 use crate::types::time::FrameRate;
@@ -43,6 +45,11 @@ pub struct WindowBatch {
     pub poses: Tensor,
     /// [B, numbers, n_frames], 1 where the number is to be learnt.
     pub mask: Tensor,
+}
+
+/// A window of so many frames, as it is cut out of an interval.
+pub const fn needed(n_frames: usize) -> NeededFrames {
+    NeededFrames { name: "window", n_frames, key: Some(("gan.window_frames", FRAMES_MULTIPLE)) }
 }
 
 impl WindowBatch {

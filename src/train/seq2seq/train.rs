@@ -9,10 +9,11 @@ use super::source::TrainingSource;
 use super::step::{SequenceLosses, SequenceState, SequenceTrainer};
 use super::validate::{SequenceValidation, ValidationSegments};
 use crate::config::{Seq2seqConfig, SequenceNetwork};
+use crate::dataset::Split;
 use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
 use crate::formats::word_vectors::WordVectors;
-use crate::generate::model::BEST;
+pub use crate::generate::model::BEST;
 use crate::generate::seq2seq::architecture::{Architecture, network_config};
 use crate::generate::seq2seq::metadata::SequenceMetadata;
 use crate::generate::seq2seq::vocabulary::{PADDING, UNKNOWN, Vocabulary};
@@ -21,7 +22,9 @@ use crate::nn::seq2seq::config::Config;
 use crate::nn::seq2seq::embedding::set_word_vectors;
 use crate::stage::progress::Progress;
 use crate::stage::workdir::{self, FolderLock};
-use crate::train::epochs::{self, EpochSchedule, StepReport, ValidatedTraining};
+use crate::train::epochs::{self, EpochSchedule, StepReport, ValidatedStep, ValidatedTraining};
+use crate::train::no_window;
+use crate::train::no_window::NeededFrames;
 use crate::train::resume::{self, sample_windows, stream};
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
@@ -55,7 +58,8 @@ pub struct SequenceOutcome {
 ///
 /// # Errors
 /// Data that cannot be read, by the name of its file; no segment to train on; a checkpoint of other data; another training
-/// at work in `folder`; a loss that is not finite or explodes (the last good checkpoint stays).
+/// at work in `folder`; a loss that is not finite or explodes (the last good checkpoint stays); `StoppedTraining` where
+/// `progress` asks for an end.
 pub fn train(
     source: TrainingSource,
     vectors: Option<&WordVectors>,
@@ -63,7 +67,25 @@ pub fn train(
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<SequenceOutcome> {
+    train_watched(source, vectors, requested, folder, progress, &mut |_| ())
+}
+
+/// [`train`], with a call behind each validation, when log and checkpoints are written.
+pub fn train_watched(
+    source: TrainingSource,
+    vectors: Option<&WordVectors>,
+    requested: &Seq2seqConfig,
+    folder: &Path,
+    progress: &dyn Progress,
+    validated: &mut dyn FnMut(ValidatedStep),
+) -> Result<SequenceOutcome> {
     check(requested)?;
+    let Config { previous, predicted, .. } = network_config(source.fps(), 0, 0, [0, 0]);
+    let needed = NeededFrames { name: "segment", n_frames: previous + predicted, key: None };
+    if let TrainingSource::Dataset(dataset) = source {
+        // Before the statistics, of which an empty split has none.
+        no_window::ensure_window(dataset, needed)?;
+    }
     // Others may listen to the model while it learns, and nobody may forget it.
     let _model = FolderLock::shared(folder)?;
     let _lock = workdir::lock(folder)?;
@@ -103,15 +125,27 @@ pub fn train(
         !train.is_empty(),
         "{}: no motion to train on is as long as a segment of {} frames",
         source.place(),
-        trainer.metadata.network.previous + trainer.metadata.network.predicted
+        needed.n_frames
     );
+    progress.say(&format!(
+        "{} segments of {}; what is learnt goes to {}",
+        train.len(),
+        source.place(),
+        folder.display()
+    ));
     let held_out = SegmentLoader::new(splits.held_out, &trainer.metadata, 0);
     if held_out.is_empty() {
-        progress.say("no segment is held out: the figures below are on those to train on");
+        let cause = match source {
+            TrainingSource::Dataset(dataset) => {
+                no_window::cause(dataset, Split::Validation, needed).unwrap_or_default()
+            }
+            TrainingSource::Captures(_) => "`--hold-out NAME` names captures to validate on".to_owned(),
+        };
+        progress.say(&format!("no segment is held out, the figures below are on those to train on: {cause}"));
     }
     let held_out = ValidationSegments::new(&held_out, &train, trainer.settings.batch)?;
     let mut training = SequenceTraining { trainer: &mut trainer, loader: &train, held_out: &held_out };
-    let end = with_spinning_workers(|| epochs::run(&mut training, folder, progress))?;
+    let end = with_spinning_workers(|| epochs::run(&mut training, folder, progress, validated))?;
     Ok(SequenceOutcome {
         steps: trainer.step,
         began_at: end.began_at,
@@ -253,6 +287,11 @@ impl ValidatedTraining for SequenceTraining<'_> {
 
     fn judged(validation: &SequenceValidation) -> (f64, Option<&str>) {
         (validation.score, validation.alarm.as_deref())
+    }
+
+    fn words(validation: &SequenceValidation) -> String {
+        let SequenceValidation { split, l1, mean_pose_l1, energy, .. } = validation;
+        format!("{split} L1 {l1:.3} (mean pose {mean_pose_l1:.3}), energy {:.0} %", 100.0 * energy)
     }
 
     fn save(&self, folder: &Path) -> Result<()> {

@@ -9,3 +9,4 @@ pub mod pose;
 pub mod rule;
 pub mod seq2seq;
 pub mod seq2seq_program;
+pub mod watched;

@@ -1,0 +1,60 @@
+//! What is said of a training that was asked to end, and did.
+
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
+use anyhow::Result;
+use orator::StoppedTraining;
+use serde_json::json;
+
+/// The closing words of a training that ended by request; any other error stays one.
+pub fn told(error: anyhow::Error, ui: &Ui) -> Result<Outcome> {
+    let stopped: StoppedTraining = error.downcast()?;
+    let StoppedTraining { step, steps, newest, best } = &stopped;
+    let mut text = format!("stopped after step {step} of {steps}");
+    match newest {
+        Some(newest) => text += &format!("\nnewest checkpoint  {}", newest.display()),
+        None => text += "; there is no checkpoint yet",
+    }
+    if let Some((step, best)) = best {
+        text += &format!("\nbest (step {step})  {}", best.display());
+    }
+    let next = same_command();
+    let facts = json!({
+        "stopped": true,
+        "step": step,
+        "steps": steps,
+        "newest": newest,
+        "best": best.as_ref().map(|(_, best)| best),
+        "best_step": best.as_ref().map(|(step, _)| step),
+        "next": next,
+    });
+    ui.summary(&text, Some(&next), facts);
+    Ok(Outcome::Stopped)
+}
+
+/// The command as it was typed, for a shell.
+fn same_command() -> String {
+    let words = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
+    std::iter::once("orator".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
+/// A word as a shell reads it.
+fn quoted(word: &str) -> String {
+    let is_plain = |letter: char| letter.is_alphanumeric() || "-_./=:,+@%".contains(letter);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn words_are_quoted_for_a_shell() {
+        let words = ["--set", "gan.steps=5", "my data", "it's", ""].map(quoted);
+        assert_eq!(words, ["--set", "gan.steps=5", "'my data'", r"'it'\''s'", "''"]);
+    }
+}

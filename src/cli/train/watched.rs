@@ -1,0 +1,109 @@
+//! What `orator train gan` and `orator train seq2seq` share: where a training lies, and its page while it goes on.
+
+use crate::cli::ui::Ui;
+use anyhow::{Context, Result, bail};
+use orator::config::Config;
+use orator::dataset::index::SampleRef;
+use orator::dataset::{Dataset, Split};
+use orator::report::training::live::{LivePage, PosesOfBest};
+use orator::stage::progress::Progress as _;
+use orator::train::epochs::ValidatedStep;
+use orator::types::file_name::FileName;
+use orator::types::time::FrameRate;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Intervals on the page of a training, and how much of each is generated.
+const N_PAIRS: usize = 3;
+const PAIR_SECS: f64 = 8.0;
+
+/// Folders of a training as the command line has them.
+pub struct Places<'a> {
+    pub config: &'a Config,
+    pub speaker: Option<&'a String>,
+    pub dataset: Option<&'a PathBuf>,
+    pub out: Option<&'a PathBuf>,
+}
+
+impl Places<'_> {
+    /// Opens the dataset, and says where what is learnt goes: `work/ROOM/SPEAKER` unless told. A dataset named without a
+    /// speaker is of its own.
+    pub fn open(&self, room: &str) -> Result<(Dataset, PathBuf)> {
+        let work = &self.config.settings.work.dir;
+        let named = match self.dataset {
+            Some(_) => self.speaker.cloned(),
+            None => Some(speaker(self.speaker, self.config)?),
+        };
+        let folder = match (self.dataset, &named) {
+            (Some(folder), _) => folder.clone(),
+            (None, name) => work.join("dataset").join(name.as_deref().unwrap_or_default()),
+        };
+        let dataset = Dataset::open(&folder).context("`orator run` makes the dataset to train on")?;
+        let out = match self.out {
+            Some(out) => out.clone(),
+            None => {
+                let name = FileName::new(named.unwrap_or_else(|| dataset.info().speaker.clone()));
+                work.join(room).join(&*name.context("the speaker names no folder: say --out")?)
+            }
+        };
+        Ok((dataset, out))
+    }
+}
+
+/// The speaker's name: given, or the only one configured.
+fn speaker(given: Option<&String>, config: &Config) -> Result<String> {
+    let names: Vec<&str> = config.settings.speaker.iter().map(|speaker| speaker.name.as_str()).collect();
+    match (given, names.as_slice()) {
+        (Some(name), _) if names.contains(&name.as_str()) => Ok(name.clone()),
+        (Some(name), _) => bail!("no speaker {name:?} in {}; it names {}", config.file.display(), names.join(", ")),
+        (None, [only]) => Ok((*only).to_owned()),
+        (None, []) => bail!("{} names no speaker; say --dataset", config.file.display()),
+        (None, _) => bail!("say which speaker with --speaker: {}", names.join(", ")),
+    }
+}
+
+/// The page of a training. What hinders it is said, once on the way, and ends nothing.
+pub struct WatchedPage<'a> {
+    page: LivePage<'a>,
+    ui: &'a Ui,
+    is_told: bool,
+}
+
+impl<'a> WatchedPage<'a> {
+    pub fn new(folder: &'a Path, speaker: String, poses: PosesOfBest<'a>, ui: &'a Ui) -> Self {
+        Self { page: LivePage::new(folder, speaker, poses), ui, is_told: false }
+    }
+
+    /// Writes the page behind a validation.
+    pub fn update(&mut self, at: ValidatedStep) {
+        if let Err(error) = self.page.write(at)
+            && !self.is_told
+        {
+            self.is_told = true;
+            self.ui.say(&format!("no page of this training yet: {error:#}"));
+        }
+    }
+
+    /// Writes the page of a training that is done; `None`: it cannot be written.
+    pub fn finish(mut self, at: ValidatedStep) -> Option<PathBuf> {
+        let written = self.page.write(at).inspect_err(|error| {
+            self.ui.say(&format!("no page of this training: {error:#}"));
+        });
+        written.ok().map(|()| self.page.path())
+    }
+}
+
+/// A few intervals that were not trained on; of the training split where there are no others.
+pub fn shown(dataset: &Dataset) -> Vec<SampleRef> {
+    let splits = [Split::Validation, Split::Train].map(|split| dataset.samples(split));
+    let samples = splits.into_iter().find(|samples| !samples.is_empty()).unwrap_or_default();
+    let n = samples.len().min(N_PAIRS);
+    (0..n).map(|i| samples[i * samples.len() / n].clone()).collect()
+}
+
+/// Frames in the middle of so many.
+pub fn middle(n_frames: usize, fps: FrameRate) -> Range<usize> {
+    let span = ((PAIR_SECS * fps.per_sec()) as usize).min(n_frames);
+    let first = (n_frames - span) / 2;
+    first..first + span
+}

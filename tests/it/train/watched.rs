@@ -1,0 +1,163 @@
+//! A training that is watched and stopped: Ctrl-C and SIGTERM end it after the step at hand with a checkpoint from which it
+//! ends in the bytes of one that was left alone; in a pipe it says how far it is; its page lies there from the first
+//! validation on; a dataset alone is enough, and one without windows is told why.
+
+use crate::fixtures::gesture_dataset::{FPS, sample};
+use crate::fixtures::write_dataset::write_dataset;
+use orator::dataset::{Dataset, Sample, Split};
+use orator::stage::progress::Silent;
+use orator::train::seq2seq::source::TrainingSource;
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+const STEPS: usize = 40;
+
+fn anna(dir: &Path, samples: &[(Split, Sample)]) {
+    write_dataset(&dir.join("data/anna"), "anna", FPS, samples).unwrap();
+}
+
+fn enough() -> [(Split, Sample); 2] {
+    [(Split::Train, sample("a-00000000-000000", 99, 0.0)), (Split::Validation, sample("c-00000000-000000", 128, 4.0))]
+}
+
+/// `orator train NETWORK` of a dataset alone, in a folder without a configuration.
+fn train(dir: &Path, network: &str, out: &str) -> Command {
+    let small = match network {
+        "gan" => "--set gan.batch=2 --set gan.window_frames=32 --set gan.epoch_steps=7",
+        _ => "--set seq2seq.batch=3 --set seq2seq.hidden=8 --set seq2seq.epoch_steps=7",
+    };
+    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+    command.args(["train", network, "--dataset", "data/anna", "--json", "--steps", &STEPS.to_string()]);
+    command.args(small.split(' ')).current_dir(dir).stdout(Stdio::piped()).stderr(Stdio::piped());
+    if !out.is_empty() {
+        command.args(["--out", out]);
+    }
+    command
+}
+
+/// Starts a training and sends it a signal when it says that it has come to `step`: exit code, answer, and what was said.
+fn signalled(mut training: Command, step: usize, signal: Signal) -> (Option<i32>, Value, String) {
+    let mut child = training.spawn().unwrap();
+    let mut said = String::new();
+    let mut lines = BufReader::new(child.stderr.take().unwrap());
+    while lines.read_line(&mut said).unwrap() > 0 {
+        if said.lines().last().is_some_and(|line| line.starts_with(&format!("step {step} of {STEPS}: "))) {
+            kill_process(Pid::from_child(&child), signal).unwrap();
+            break;
+        }
+    }
+    lines.read_to_string(&mut said).unwrap();
+    let output = child.wait_with_output().unwrap();
+    (output.status.code(), serde_json::from_slice(&output.stdout).unwrap(), said)
+}
+
+fn stopped_twice(network: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    anna(dir, &enough());
+    let calm = train(dir, network, "calm").output().unwrap();
+    assert!(calm.status.success(), "{}", String::from_utf8_lossy(&calm.stderr));
+
+    let (code, answer, said) = signalled(train(dir, network, "stopped"), 4, Signal::INT);
+    assert_eq!(code, Some(130), "{said}");
+    let step = answer["step"].as_u64().unwrap();
+    assert!(answer["stopped"] == true && (4..STEPS as u64).contains(&step), "{answer}");
+    let newest = dir.join(answer["newest"].as_str().unwrap());
+    assert!(newest.is_file() && newest.ends_with(format!("step-{step:07}.safetensors")), "{answer}");
+    let next = format!("orator train {network} --dataset data/anna --json --steps {STEPS} ");
+    assert!(answer["next"].as_str().unwrap().starts_with(&next), "{answer}");
+    assert!(said.contains("stopping after this step") && said.contains("what is learnt goes to stopped"), "{said}");
+
+    let (code, answer, said) = signalled(train(dir, network, "stopped"), 24, Signal::TERM);
+    assert_eq!(code, Some(143), "{said}");
+    assert!(answer["step"].as_u64().unwrap() > step && said.contains("going on from"), "{answer} {said}");
+    // Three epochs are over: their validations were said, and the page is there before the training ends.
+    assert!(said.contains("step 21: validation L1 ") && said.contains(", score "), "{said}");
+    assert!(
+        answer["best_step"].is_u64()
+            && ["html", "png"].iter().all(|kind| { dir.join(format!("stopped/training.{kind}")).is_file() })
+    );
+
+    assert!(train(dir, network, "stopped").status().unwrap().success());
+    let last = format!("step-{STEPS:07}.safetensors");
+    for file in [&last, "best.safetensors", "metrics.jsonl", "training.html", "training.png"] {
+        let read = |out: &str| std::fs::read(dir.join(out).join(file)).unwrap();
+        assert!(read("stopped") == read("calm"), "{network}: {file} differs");
+    }
+    // Twenty lines of a training, however short, and none on standard output.
+    let said = String::from_utf8(calm.stderr).unwrap();
+    let lines = said.lines().filter(|line| line.contains(&format!(" of {STEPS}: ")) && line.contains(" left"));
+    assert_eq!(lines.count(), 20, "{said}");
+    assert_eq!(String::from_utf8(calm.stdout).unwrap().lines().count(), 1);
+}
+
+#[test]
+fn a_stopped_gan_goes_on_to_the_same_bytes() {
+    stopped_twice("gan");
+}
+
+#[test]
+fn a_stopped_sequence_network_goes_on_to_the_same_bytes() {
+    stopped_twice("seq2seq");
+}
+
+#[test]
+fn a_dataset_alone_is_trained_on_in_the_work_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    anna(dir, &enough());
+    let output = train(dir, "gan", "").args(["--set", "gan.steps=2"]).arg("--steps=2").output();
+    // `--steps` twice is a mistake, and nothing was written.
+    assert!(!output.unwrap().status.success() && !dir.join("work").exists());
+    let output = train(dir, "gan", "").output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && dir.join("work/gan/anna/best.safetensors").is_file(), "{said}");
+    assert!(said.contains("windows of data/anna; what is learnt goes to ") && said.contains("work/gan/anna"), "{said}");
+}
+
+#[test]
+fn a_dataset_without_windows_is_told_why_and_what_mends_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let refused = |network: &str| {
+        let output = train(dir, network, "out").output().unwrap();
+        assert_eq!(output.status.code(), Some(1));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let held_out = |n_frames| (Split::Validation, sample("c-00000000-000000", n_frames, 4.0));
+    anna(dir, &[held_out(64)]);
+    for network in ["gan", "seq2seq"] {
+        let text = refused(network);
+        assert!(text.contains("the train split is empty (validation 1 interval of 4.3 s, test 0 intervals"), "{text}");
+        assert!(text.contains("import it again with other shares"), "{text}");
+    }
+    std::fs::remove_dir_all(dir.join("data")).unwrap();
+    anna(dir, &[(Split::Train, sample("a-00000000-000000", 20, 0.0)), held_out(64)]);
+    for (network, name, frames) in [("gan", "window", 32), ("seq2seq", "segment", 23)] {
+        let text = refused(network);
+        let expected = format!("the only interval of the train split has 20 frames (1.3 s), a {name} {frames} frames");
+        assert!(text.contains(&expected) && text.contains("longer stretches of speech"), "{text}");
+    }
+    std::fs::remove_dir_all(dir.join("data")).unwrap();
+    anna(dir, &[(Split::Train, sample("a-00000000-000000", 50, 0.0)), held_out(64)]);
+    let output = train(dir, "gan", "out").args(["--set", "gan.window_frames=64"]).output().unwrap();
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(text.contains("`--set gan.window_frames=32` asks for shorter ones"), "{text}");
+}
+
+#[test]
+fn a_sequence_network_without_a_held_out_split_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    anna(folder.path(), &[(Split::Train, sample("a-00000000-000000", 99, 0.0))]);
+    let dataset = Dataset::open(folder.path().join("data/anna")).unwrap();
+    let needed = orator::train::no_window::NeededFrames { name: "window", n_frames: 64, key: None };
+    let cause = orator::train::no_window::cause(&dataset, Split::Validation, needed).unwrap();
+    assert!(cause.starts_with("the validation split is empty (train 1 interval of 6.6 s, test 0 intervals"), "{cause}");
+    let settings = orator::config::Seq2seqConfig { steps: 0, batch: 3, hidden: 8, ..Default::default() };
+    let out = folder.path().join("out");
+    let ended = orator::train::seq2seq::train::train(TrainingSource::Dataset(&dataset), None, &settings, &out, &Silent);
+    assert!(format!("{:#}", ended.unwrap_err()).contains("nothing to train"));
+}
