@@ -17,6 +17,7 @@ pub mod pipeline;
 pub mod program;
 pub mod setup;
 pub mod signals;
+pub mod stderr;
 pub mod study;
 pub mod train;
 pub mod ui;

@@ -8,7 +8,7 @@ use anyhow::{Result, bail};
 /// What is cut out of the intervals of a dataset.
 #[derive(Clone, Copy, Debug)]
 pub struct NeededFrames {
-    /// What it is called: "window".
+    /// What it is called: "a window".
     pub name: &'static str,
     pub n_frames: usize,
     /// Key of the configuration that says how long it is, and what its values are multiples of.
@@ -46,7 +46,7 @@ pub fn cause(dataset: &Dataset, split: Split, needed: NeededFrames) -> Option<St
         1 => format!("the only interval of the {} split has {}", split.name(), long(longest)),
         n => format!("the longest of the {n} intervals of the {} split has {}", split.name(), long(longest)),
     };
-    Some(format!("{found}, a {name} {}; {remedy}", long(n_frames)))
+    Some(format!("{found}, {name} needs {}; {remedy}", long(n_frames)))
 }
 
 /// That a split is empty, what the others hold, and the line that fills it.

@@ -49,7 +49,7 @@ pub struct WindowBatch {
 
 /// A window of so many frames, as it is cut out of an interval.
 pub const fn needed(n_frames: usize) -> NeededFrames {
-    NeededFrames { name: "window", n_frames, key: Some(("gan.window_frames", FRAMES_MULTIPLE)) }
+    NeededFrames { name: "a window", n_frames, key: Some(("gan.window_frames", FRAMES_MULTIPLE)) }
 }
 
 impl WindowBatch {

@@ -81,7 +81,7 @@ pub fn train_watched(
 ) -> Result<SequenceOutcome> {
     check(requested)?;
     let Config { previous, predicted, .. } = network_config(source.fps(), 0, 0, [0, 0]);
-    let needed = NeededFrames { name: "segment", n_frames: previous + predicted, key: None };
+    let needed = NeededFrames { name: "a segment", n_frames: previous + predicted, key: None };
     if let TrainingSource::Dataset(dataset) = source {
         // Before the statistics, of which an empty split has none.
         no_window::ensure_window(dataset, needed)?;
