@@ -1,6 +1,7 @@
 //! Restriction of a verb that reads foreign files: from its start on it writes beside its outputs and locks alone, opens no
 //! socket and starts no program.
 
+use super::signals;
 use orator::external::sandbox::{FileAccess, restrict};
 use std::path::{Path, PathBuf};
 
@@ -14,6 +15,7 @@ pub fn confine<'p>(outputs: impl IntoIterator<Item = &'p Path>, locked: impl Int
         if path.is_file() { path.parent().map(Path::to_owned) } else { Some(path) }
     });
     let writes = outputs.chain(locked).filter_map(|path| folder_of(&path)).collect();
+    signals::prepare();
     // What the kernel does not enforce is said by `orator doctor`.
     let _ = restrict(&FileAccess { reads: None, writes });
 }

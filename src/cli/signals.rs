@@ -2,10 +2,18 @@
 //! when asked again.
 
 use super::stderr::note;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
-use tokio::runtime::Builder;
+use std::sync::{Arc, LazyLock};
+use tokio::runtime::{Builder, Runtime};
 use tokio::signal::unix::{SignalKind, signal};
+
+/// Where signals arrive: a pair of sockets, which a restricted program cannot open any more.
+static RUNTIME: LazyLock<Option<Runtime>> = LazyLock::new(|| Builder::new_current_thread().enable_all().build().ok());
+
+/// Opens what signals need. It comes before the program is restricted, and starts no thread.
+pub fn prepare() {
+    LazyLock::force(&RUNTIME);
+}
 
 /// From here on Ctrl-C or SIGTERM ends the program (exit code 130 or 143) and says what is kept: `kept`, and how to go on.
 pub fn tell_when_stopped(kept: &'static str) {
@@ -43,7 +51,7 @@ fn end(code: u8, kept: &str) {
 /// Calls with the exit code of each signal, from a thread of its own. Where there can be none, a signal ends the program
 /// as it does by default.
 fn listen(mut called: impl FnMut(u8) + Send + 'static) {
-    let Ok(runtime) = Builder::new_current_thread().enable_all().build() else { return };
+    let Some(runtime) = &*RUNTIME else { return };
     let guard = runtime.enter();
     let (interrupt, terminate) = (signal(SignalKind::interrupt()), signal(SignalKind::terminate()));
     drop(guard);
