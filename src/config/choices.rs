@@ -125,3 +125,14 @@ pub enum ComputeDevice {
     /// The first NVIDIA card, in a build with the feature `cuda`.
     Cuda,
 }
+
+/// What chooses the settings of a training that are `"auto"`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GanRecipe {
+    /// The minutes of speech that the dataset has.
+    #[default]
+    Auto,
+    /// Rebol et al. 2021 and the code they built on: for many hours of speech.
+    Paper,
+}

@@ -2,6 +2,7 @@
 //! the wrong type is a `Problem` with its line. All problems are found before any is reported.
 
 use super::Settings;
+use super::auto::AUTO;
 use std::collections::BTreeMap;
 use std::fmt;
 use toml::de::{DeTable, DeValue};
@@ -171,7 +172,9 @@ impl Reader {
                 self.lay(written, inner, &format!("{key}."), location_at);
                 continue;
             }
-            match typed(value.get_ref(), default) {
+            let model = if takes_number(&key, default) { Value::Float(0.0) } else { default.clone() };
+            let model = if matches!(value.get_ref(), DeValue::String(_)) { default.clone() } else { model };
+            match typed(value.get_ref(), &model) {
                 Ok(value) => {
                     *default = value;
                     self.locations.insert(key, location);
@@ -296,6 +299,13 @@ fn section<'t, 'a>(written: &'t mut DeTable<'a>, name: Option<&str>) -> Option<&
     }
 }
 
+/// Whether a key whose default is the word "auto" takes a number as well.
+fn takes_number(key: &str, default: &Value) -> bool {
+    let Some((section, name)) = key.split_once('.').filter(|_| default.as_str() == Some(AUTO)) else { return false };
+    let alone = Table::from_iter([(name.to_owned(), Value::Float(1.0))]);
+    Table::from_iter([(section.to_owned(), Value::Table(alone))]).try_into::<Settings>().is_ok()
+}
+
 /// `value` in the type of `default`, or what was expected.
 fn typed(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
     let wrong = |expected: &str| Err(format!("expected {expected}, found {}", value.type_str()));
@@ -334,6 +344,9 @@ fn typed(value: &DeValue<'_>, default: &Value) -> Result<Value, String> {
 
 /// Message about a value of the right kind that its setting refuses; `message` is serde's.
 pub fn refused(value: &Value, message: &str) -> String {
+    if let Some(at) = message.find("expected \"auto\"") {
+        return format!("{value} does not fit: {}", message[at..].lines().next().unwrap_or_default());
+    }
     let Value::String(text) = value else { return format!("{value} is too large") };
     let expected = message.strip_prefix(&format!("unknown variant `{text}`, ")).unwrap_or(message);
     let known: Vec<String> = expected.split('`').skip(1).step_by(2).map(str::to_owned).collect();

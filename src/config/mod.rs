@@ -2,9 +2,11 @@
 //! defaults in, paths absolute, every value in its range). Each section is one small struct whose defaults are the
 //! documented ones; the top level `pipeline.toml` documents them and a test holds the two together.
 
+pub mod auto;
 pub mod choices;
 pub mod config_path;
 pub mod file;
+pub mod gan;
 pub mod keypoints;
 pub mod load;
 pub mod patterns;
@@ -14,13 +16,15 @@ pub mod seq2seq;
 pub mod transcripts;
 pub mod videos;
 
+pub use auto::Auto;
 pub use choices::{
-    AdversarialLoss, ComputeDevice, ContinuityLoss, DistanceLoss, FollowRule, MotionRepresentation, NetworkPreset,
-    ReachLoss, SequenceNetwork, SpeechRule, SplitUnit,
+    AdversarialLoss, ComputeDevice, ContinuityLoss, DistanceLoss, FollowRule, GanRecipe, MotionRepresentation,
+    NetworkPreset, ReachLoss, SequenceNetwork, SpeechRule, SplitUnit,
 };
 pub use config_path::ConfigPath;
 pub use file::Problem;
 pub use file::SourceLocation;
+pub use gan::GanConfig;
 pub use keypoints::KeypointSource;
 pub use load::Config;
 pub use load::ConfigError;

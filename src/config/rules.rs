@@ -1,6 +1,7 @@
 //! Ranges of the settings: one line a key.
 
 use super::Settings;
+use super::auto::Auto;
 use super::file::{Problem, SourceLocation};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -49,14 +50,30 @@ pub fn check(settings: &Settings, locations: &BTreeMap<String, SourceLocation>) 
         rules.problem("gan.window_frames", format!("{} is not a multiple of 32", s.gan.window_frames));
     }
     rules.within("gan.stride_frames", s.gan.stride_frames as f64, 1.0, 4096.0, "frames");
-    rules.within("gan.batch", s.gan.batch as f64, 2.0, 4096.0, "windows");
-    rules.within("gan.steps", s.gan.steps as f64, 1.0, 1e9, "steps");
-    rules.within("gan.learning_rate", s.gan.learning_rate, 1e-9, 1.0, "");
+    rules.count("gan.batch", s.gan.batch, 2.0, 4096.0, "windows");
+    rules.count("gan.steps", s.gan.steps, 1.0, 1e9, "steps");
+    rules.number("gan.learning_rate", s.gan.learning_rate, 1e-9, 1.0, "");
     rules.within("gan.lambda_l1", s.gan.lambda_l1, 0.0, 1e4, "");
     rules.within("gan.lambda_velocity", s.gan.lambda_velocity, 0.0, 1e4, "");
-    rules.within("gan.epoch_steps", s.gan.epoch_steps as f64, 1.0, 1e9, "steps");
-    rules.within("gan.lambda_gan", s.gan.lambda_gan, 0.0, 1e4, "");
+    rules.count("gan.epoch_steps", s.gan.epoch_steps, 1.0, 1e9, "steps");
+    rules.number("gan.lambda_gan", s.gan.lambda_gan, 0.0, 1e4, "");
     rules.within("gan.lambda_bone", s.gan.lambda_bone, 0.0, 1e4, "");
+    rules.count("gan.warmup_steps", s.gan.warmup_steps, 0.0, 1e9, "steps");
+    rules.number("gan.fade_to", s.gan.fade_to, 0.0, 1.0, "");
+    rules.count("gan.adversarial_from", s.gan.adversarial_from, 0.0, 1e9, "steps");
+    rules.count("gan.adversarial_ramp", s.gan.adversarial_ramp, 0.0, 1e9, "steps");
+    rules.number("gan.ema_decay", s.gan.ema_decay, 0.0, 0.999_999, "");
+    rules.number("gan.dropout", s.gan.dropout, 0.0, 0.9, "");
+    rules.number("gan.weight_decay", s.gan.weight_decay, 0.0, 10.0, "");
+    rules.number("gan.augment_speed", s.gan.augment_speed, 0.0, 0.5, "");
+    rules.number("gan.augment_pitch", s.gan.augment_pitch, 0.0, 16.0, "bands");
+    rules.number("gan.augment_gain_db", s.gan.augment_gain_db, 0.0, 40.0, "dB");
+    rules.number("gan.augment_noise_db", s.gan.augment_noise_db, -120.0, 20.0, "dB");
+    rules.count("gan.augment_mask_bands", s.gan.augment_mask_bands, 0.0, 32.0, "bands");
+    rules.number("gan.augment_mask_secs", s.gan.augment_mask_secs, 0.0, 2.0, "seconds");
+    rules.number("gan.augment_pose_noise", s.gan.augment_pose_noise, 0.0, 2.0, "deviations");
+    rules.within("gan.augment_mirror", s.gan.augment_mirror, 0.0, 1.0, "");
+    rules.count("gan.patience", s.gan.patience, 0.0, 1e9, "epochs");
     rules.within("gan.checkpoint_every", s.gan.checkpoint_every as f64, 1.0, 1e9, "steps");
     rules.within("gan.keep_checkpoints", s.gan.keep_checkpoints as f64, 1.0, 1e6, "checkpoints");
     rules.within("seq2seq.stride_frames", s.seq2seq.stride_frames as f64, 0.0, 4096.0, "frames");
@@ -94,6 +111,20 @@ impl Rules<'_> {
         if !(low..=high).contains(&value) {
             let message = format!("{value} is out of range: expected {low} to {high} {unit}");
             self.problem(key, message.trim_end().to_owned());
+        }
+    }
+
+    /// A number that is not left to the program.
+    fn number(&mut self, key: &str, value: Auto<f64>, low: f64, high: f64, unit: &str) {
+        if let Some(value) = value.given() {
+            self.within(key, value, low, high, unit);
+        }
+    }
+
+    /// A whole number that is not left to the program.
+    fn count(&mut self, key: &str, value: Auto<usize>, low: f64, high: f64, unit: &str) {
+        if let Some(value) = value.given() {
+            self.within(key, value as f64, low, high, unit);
         }
     }
 

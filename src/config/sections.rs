@@ -1,12 +1,10 @@
 //! The sections of `pipeline.toml` with their defaults. What each key means, its unit and its reason stand in the
 //! top level `pipeline.toml`; here are the types.
 
-use super::choices::{
-    AdversarialLoss, ComputeDevice, FollowRule, MotionRepresentation, NetworkPreset, SpeechRule, SplitUnit,
-};
+use super::choices::{FollowRule, SpeechRule, SplitUnit};
 use super::config_path::ConfigPath;
+use super::gan::GanConfig;
 use super::seq2seq::Seq2seqConfig;
-use crate::types::posture::PostureChannel;
 use crate::types::time::FrameRate;
 use serde::{Deserialize, Serialize};
 
@@ -316,64 +314,5 @@ impl Default for DatasetConfig {
     fn default() -> Self {
         let (validation, test, duplicate_secs, posture) = (0.15, 0.15, 5.0, false);
         Self { max_mb: 256, split_by: SplitUnit::Auto, validation, test, duplicate_secs, posture }
-    }
-}
-
-/// `[gan]`: the generator's training.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct GanConfig {
-    pub preset: NetworkPreset,
-    pub representation: MotionRepresentation,
-    /// What is learnt beside the 49 joints.
-    pub channels: Vec<PostureChannel>,
-    /// Window length in frames.
-    pub window_frames: usize,
-    /// Frames between the starts of two windows of an interval.
-    pub stride_frames: usize,
-    pub batch: usize,
-    pub steps: usize,
-    pub learning_rate: f64,
-    pub adversarial: AdversarialLoss,
-    /// Weights of the losses.
-    pub lambda_l1: f64,
-    pub lambda_velocity: f64,
-    pub lambda_gan: f64,
-    pub lambda_bone: f64,
-    pub seed: u64,
-    /// Steps of an epoch: at its end comes a validation.
-    pub epoch_steps: usize,
-    /// Epochs without a better score after which the training ends; 0: never.
-    pub patience: usize,
-    /// Steps between checkpoints; one comes with each validation too.
-    pub checkpoint_every: usize,
-    /// Checkpoints kept.
-    pub keep_checkpoints: usize,
-    pub device: ComputeDevice,
-}
-
-impl Default for GanConfig {
-    fn default() -> Self {
-        Self {
-            preset: NetworkPreset::Light,
-            representation: MotionRepresentation::Bones,
-            channels: Vec::new(),
-            window_frames: 64,
-            stride_frames: 5,
-            batch: 32,
-            steps: 1500,
-            learning_rate: 5e-4,
-            adversarial: AdversarialLoss::LeastSquares,
-            lambda_l1: 1.0,
-            lambda_velocity: 0.0,
-            lambda_gan: 0.15,
-            lambda_bone: 0.1,
-            seed: 1337,
-            epoch_steps: 100,
-            patience: 0,
-            checkpoint_every: 100,
-            keep_checkpoints: 3,
-            device: ComputeDevice::Cpu,
-        }
     }
 }

@@ -1,5 +1,6 @@
 //! What trainings that go on from a checkpoint share: windows of a step, settings that count, advice when one breaks.
 
+use crate::config::auto::AUTO;
 use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
 use crate::stage::progress::Progress;
@@ -24,16 +25,19 @@ pub fn sample_windows(seed: u64, step: usize, n: usize, n_windows: usize) -> Vec
 }
 
 /// Settings to go on with: the checkpoint's, but for those named in `free`; and a line for each difference, its key
-/// behind the name of the section.
+/// behind the name of the section. What is requested as `"auto"` is what the checkpoint has.
 pub fn settings<T: Serialize + DeserializeOwned>(
     stored: &T,
-    requested: &T,
+    requested: &impl Serialize,
     section: &str,
     free: &[&str],
 ) -> Result<(T, Vec<String>)> {
     let (mut kept, requested) = (serde_json::to_value(stored)?, serde_json::to_value(requested)?);
     let mut differences = Vec::new();
     for (key, value) in requested.as_object().into_iter().flatten() {
+        if value.as_str() == Some(AUTO) {
+            continue;
+        }
         if free.contains(&key.as_str()) {
             kept[key] = value.clone();
         } else if kept[key] != *value {

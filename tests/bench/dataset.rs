@@ -193,6 +193,9 @@ fn pour(path: &Path, to: &mut dyn Write) -> Result<()> {
     }
 }
 
+/// Windows of a step.
+const BATCH: usize = 32;
+
 struct Loaded {
     n_windows: usize,
     load_secs: f64,
@@ -203,11 +206,13 @@ struct Loaded {
 /// Batches as training draws them, then training itself, on the same dataset.
 fn loader(args: &Args, dir: &Path, out: &Path) -> Result<Loaded> {
     let settings = config::GanConfig {
+        recipe: config::GanRecipe::Paper,
         preset: config::NetworkPreset::Light,
         window_frames: 64,
         stride_frames: 5,
-        steps: args.steps,
+        steps: args.steps.into(),
         checkpoint_every: args.steps,
+        batch: BATCH.into(),
         ..Default::default()
     };
     let dataset = Dataset::open(dir)?;
@@ -217,7 +222,7 @@ fn loader(args: &Args, dir: &Path, out: &Path) -> Result<Loaded> {
     let mut rng = ChaCha8Rng::seed_from_u64(1337);
     let (mut n_loaded, start) = (0, Instant::now());
     while start.elapsed().as_secs_f64() < 2.0 {
-        let which: Vec<usize> = (0..settings.batch).map(|_| rng.random_range(0..examples.len())).collect();
+        let which: Vec<usize> = (0..BATCH).map(|_| rng.random_range(0..examples.len())).collect();
         n_loaded += examples.batch(&which)?.poses.dim(0)?;
     }
     let windows_a_second = n_loaded as f64 / start.elapsed().as_secs_f64();
@@ -228,7 +233,7 @@ fn loader(args: &Args, dir: &Path, out: &Path) -> Result<Loaded> {
     train::train(&dataset, &settings, out, &steps)?;
     let at = steps.at.lock().map(|at| at.clone()).unwrap_or_default();
     let gaps = at.windows(2).map(|pair| (pair[1] - pair[0]).as_secs_f64()).collect();
-    Ok(Loaded { n_windows, load_secs, windows_a_second, trained_a_second: settings.batch as f64 / median(gaps) })
+    Ok(Loaded { n_windows, load_secs, windows_a_second, trained_a_second: BATCH as f64 / median(gaps) })
 }
 
 /// Notes when each step of a training ends.

@@ -48,7 +48,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let places = Places { config: &config, speaker: speaker.as_ref(), dataset: dataset.as_ref(), out: out.as_ref() };
     let (dataset, out) = places.open("gan")?;
     let mut settings = config.settings.gan.clone();
-    settings.steps = args.steps.unwrap_or(settings.steps);
+    if let Some(steps) = args.steps {
+        settings.steps = steps.into();
+    }
 
     let start = Instant::now();
     let poses = || pairs(&dataset, &GestureGenerator::open(&out.join(train::BEST))?);

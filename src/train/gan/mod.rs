@@ -1,7 +1,10 @@
 //! Training of the speech-to-gesture GAN: `windows` (data) -> `step` (networks, `losses`, optimiser) -> `validate` and
 //! `score` (which checkpoint is best); `train` is the loop.
 
+pub mod augment;
+pub mod average;
 pub mod losses;
+pub mod recipe;
 pub mod score;
 pub mod step;
 pub mod train;

@@ -1,7 +1,10 @@
 //! A generator and its discriminator in training: one step, and all of it to a checkpoint and back.
 
+use super::augment;
+use super::average;
 use super::losses;
 use super::losses::BoneConstancy;
+use super::recipe::settings::GanSettings;
 use super::score::Validation;
 use super::windows::WindowBatch;
 use crate::config::{ComputeDevice, GanConfig};
@@ -13,19 +16,25 @@ use crate::generate::representation::PoseDecoder;
 use crate::nn::device;
 use crate::nn::gan::discriminator::{Discriminator, motion};
 use crate::nn::gan::generator::Generator;
+use crate::nn::ops::resize;
 use crate::nn::params::Params;
 use crate::train::optim::adam;
 use crate::train::optim::adam::Adam;
 use crate::train::resume;
 use anyhow::{Context, Result, ensure};
 use candle_core::{DType, Device, Tensor};
+use rand::Rng;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// The generator of the last step, where the generator of the checkpoint is a mean over steps.
+const LAST_STEP: &str = "training.generator.";
 const DISCRIMINATOR: &str = "discriminator.";
 const ADAM_G: &str = "adam.generator.";
 const ADAM_D: &str = "adam.discriminator.";
+/// Tells the random numbers of dropout from the others of a step.
+const DROPOUT: u64 = 0x6472_6f70;
 /// Norm to which the gradient of each network is clipped.
 pub const MAX_NORM: f64 = 10.0;
 /// Loss beyond which a training has exploded.
@@ -49,7 +58,7 @@ pub struct Losses {
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct TrainerState {
     pub speaker: SpeakerMetadata,
-    pub settings: GanConfig,
+    pub settings: GanSettings,
     /// Steps done.
     pub step: usize,
     /// Step and score of the best validation so far.
@@ -59,10 +68,12 @@ pub struct TrainerState {
 /// Networks, optimisers and where they are.
 pub struct GanTrainer {
     pub metadata: SpeakerMetadata,
-    pub settings: GanConfig,
+    pub settings: GanSettings,
     pub generator: Generator,
     pub decoder: PoseDecoder,
     generator_params: Params,
+    /// Mean of the generator over the steps, where the settings want one.
+    mean: Option<(Generator, Params)>,
     discriminator: Discriminator,
     discriminator_params: Params,
     adam_g: Adam,
@@ -76,21 +87,31 @@ pub struct GanTrainer {
 
 impl GanTrainer {
     /// Networks as the seed makes them.
-    pub fn new(metadata: SpeakerMetadata, settings: GanConfig) -> Result<Self> {
+    pub fn new(metadata: SpeakerMetadata, settings: GanSettings) -> Result<Self> {
         let device = device::open(settings.device == ComputeDevice::Cuda)?;
         let mut generator_params = Params::new(settings.seed).on(&device);
         let generator = Generator::new(&mut generator_params, &metadata.network)?;
+        let mean = if settings.ema_decay > 0.0 {
+            let mut params = Params::frozen().on(&device);
+            let mean = Generator::new(&mut params, &metadata.network)?;
+            params.load(&generator_params.tensors()?)?;
+            Some((mean, params))
+        } else {
+            None
+        };
         // Another seed, or tensors of the same name would begin alike.
         let mut discriminator_params = Params::new(!settings.seed).on(&device);
         let discriminator = Discriminator::new(&mut discriminator_params, metadata.normalisation.n_numbers())?;
         let adam = adam::Config { max_norm: Some(MAX_NORM), ..adam::Config::default() };
+        let decaying = adam::Config { weight_decay: settings.weight_decay, ..adam };
         Ok(Self {
             decoder: metadata.representation.decoder(&metadata.normalisation, DType::F32, &device)?,
             bones: BoneConstancy::new(&metadata.normalisation, DType::F32, &device)?,
-            adam_g: Adam::new(&generator_params, adam)?,
+            adam_g: Adam::new(&generator_params, decaying)?,
             adam_d: Adam::new(&discriminator_params, adam)?,
             generator_params,
             generator,
+            mean,
             discriminator_params,
             discriminator,
             metadata,
@@ -118,8 +139,9 @@ impl GanTrainer {
     /// `step`, with a call at the end of each phase, by its name: for measuring where the time goes.
     pub fn step_in_phases(&mut self, batch: &WindowBatch, phase: &mut dyn FnMut(&'static str)) -> Result<Losses> {
         let batch = batch.on(self.device())?;
-        let GanConfig { lambda_l1, lambda_velocity, lambda_gan, lambda_bone, learning_rate, .. } = self.settings;
-        let raw = self.generator.forward(&batch.mels, self.settings.window_frames, true)?;
+        let GanSettings { lambda_l1, lambda_velocity, lambda_bone, .. } = self.settings;
+        let (lambda_gan, learning_rate) = (self.settings.adversarial_weight(self.step), self.settings.rate(self.step));
+        let raw = self.predict(&batch)?;
         let generated = self.decoder.poses(&raw)?;
         // Differences count where both frames do, so that a missing joint looks the same in both.
         let mask = losses::both_seen(&batch.mask)?;
@@ -127,8 +149,10 @@ impl GanTrainer {
         phase("generator forward");
 
         let mut of_discriminator = 0.0;
+        let generated_motion = if lambda_gan > 0.0 { self.with_noise(generated_motion, 0)? } else { generated_motion };
         if lambda_gan > 0.0 {
-            let real_scores = self.discriminator.forward(&(motion(&batch.poses)? * &mask)?, true)?;
+            let real_motion = self.with_noise((motion(&batch.poses)? * &mask)?, 1)?;
+            let real_scores = self.discriminator.forward(&real_motion, true)?;
             let generated_scores = self.discriminator.forward(&generated_motion.detach(), true)?;
             let loss = self.settings.adversarial.discriminator(&real_scores, &generated_scores)?;
             of_discriminator = number(&loss)?;
@@ -158,15 +182,56 @@ impl GanTrainer {
         phase("generator backward");
         let gradient_norm = self.adam_g.step(&gradients, learning_rate)?;
         phase("generator's Adam");
+        if let Some((_, mean)) = &self.mean {
+            average::update(mean, &self.generator_params, self.settings.ema_decay, self.step)?;
+        }
         self.step += 1;
         let l1 = number(&l1)?;
         Ok(Losses { l1, velocity, bone, adversarial, discriminator: of_discriminator, gradient_norm })
     }
 
+    /// Raw poses of a batch while training: channels of the encoded sound are dropped.
+    fn predict(&self, batch: &WindowBatch) -> Result<Tensor> {
+        let (n_frames, dropout) = (self.settings.window_frames, self.settings.dropout);
+        if dropout == 0.0 {
+            return Ok(self.generator.forward(&batch.mels, n_frames, true)?);
+        }
+        let encoded = resize::linear(&self.generator.encode(&batch.mels, true)?, n_frames)?;
+        let (n_windows, n_channels, _) = encoded.dims3()?;
+        let mut rng = resume::stream(self.settings.seed ^ DROPOUT, self.step);
+        let of = |_| if rng.random_bool(dropout) { 0.0 } else { 1.0 / (1.0 - dropout) as f32 };
+        let kept: Vec<f32> = (0..n_windows * n_channels).map(of).collect();
+        let kept = Tensor::from_vec(kept, (n_windows, n_channels, 1), encoded.device())?;
+        Ok(self.generator.decode(&encoded.broadcast_mul(&kept)?, true)?)
+    }
+
+    /// Motion as the discriminator sees it: noise keeps it from learning the windows by heart (Arjovsky & Bottou 2017).
+    fn with_noise(&self, motion: Tensor, which: u64) -> Result<Tensor> {
+        let std = self.settings.augment_pose_noise;
+        if std == 0.0 {
+            return Ok(motion);
+        }
+        let noise = augment::gaussian(motion.elem_count(), std, self.settings.seed ^ which, self.step);
+        Ok((&motion + Tensor::from_vec(noise, motion.shape(), motion.device())?)?)
+    }
+
+    /// The generator that is validated and generates: the mean over the steps, where there is one.
+    pub fn listener(&self) -> &Generator {
+        self.mean.as_ref().map_or(&self.generator, |(mean, _)| mean)
+    }
+
+    /// Its numbers.
+    fn listener_tensors(&self) -> Result<BTreeMap<String, Tensor>> {
+        Ok(self.mean.as_ref().map_or(&self.generator_params, |(_, params)| params).tensors()?)
+    }
+
     /// Writes the checkpoint of this step; old ones go.
     pub fn save(&self, folder: &Path) -> Result<()> {
         let mut contents = Contents { facts: self.stored()?, tensors: BTreeMap::new() };
-        contents.add(GENERATOR, self.generator_params.tensors()?);
+        contents.add(GENERATOR, self.listener_tensors()?);
+        if self.mean.is_some() {
+            contents.add(LAST_STEP, self.generator_params.tensors()?);
+        }
         contents.add(DISCRIMINATOR, self.discriminator_params.tensors()?);
         contents.add("", self.adam_g.tensors(ADAM_G)?);
         contents.add("", self.adam_d.tensors(ADAM_D)?);
@@ -179,23 +244,24 @@ impl GanTrainer {
         let mut facts = self.stored()?;
         facts["validation"] = serde_json::to_value(validation)?;
         let mut contents = Contents { facts, tensors: BTreeMap::new() };
-        contents.add(GENERATOR, self.generator_params.tensors()?);
+        contents.add(GENERATOR, self.listener_tensors()?);
         contents.write(&folder.join(BEST))
     }
 
     fn stored(&self) -> Result<Value> {
         let (speaker, settings) = (self.metadata.clone(), self.settings.clone());
-        let mut state = serde_json::to_value(TrainerState { speaker, settings, step: self.step, best: self.best })?;
-        if self.settings.channels.is_empty() {
-            // The bytes of a checkpoint without channels are those of the versions that knew none.
-            state["settings"].as_object_mut().and_then(|settings| settings.shift_remove("channels"));
-        }
-        Ok(state)
+        Ok(serde_json::to_value(TrainerState { speaker, settings, step: self.step, best: self.best })?)
     }
 
     /// Takes up the tensors and the place of a checkpoint.
     pub fn load(&mut self, stored: &TrainerState, contents: &Contents) -> Result<()> {
-        self.generator_params.load(&contents.part(GENERATOR))?;
+        match &self.mean {
+            Some((_, mean)) => {
+                mean.load(&contents.part(GENERATOR))?;
+                self.generator_params.load(&contents.part(LAST_STEP))?;
+            }
+            None => self.generator_params.load(&contents.part(GENERATOR))?,
+        }
         self.discriminator_params.load(&contents.part(DISCRIMINATOR))?;
         self.adam_g.load(ADAM_G, &contents.tensors)?;
         self.adam_d.load(ADAM_D, &contents.tensors)?;
@@ -215,8 +281,8 @@ impl TrainerState {
     }
 
     /// The settings to go on with: the checkpoint's, but for those that may change; and a line for each difference.
-    pub fn settings(&self, requested: &GanConfig) -> Result<(GanConfig, Vec<String>)> {
-        resume::settings(&self.settings, requested, "gan", &FREE)
+    pub fn settings(&self, asked: &GanConfig) -> Result<(GanSettings, Vec<String>)> {
+        resume::settings(&self.settings, asked, "gan", &FREE)
     }
 }
 

@@ -2,6 +2,9 @@
 //! seed give the same checkpoints, also when the training was interrupted: the windows of a step depend on the seed
 //! and the step alone (the place of the loader is the step), everything else is in the checkpoint.
 
+use super::augment;
+use super::recipe::material::TrainingMaterial;
+use super::recipe::settings::GanSettings;
 use super::score::Validation;
 use super::step::{GanTrainer, Losses, TrainerState};
 use super::validate::ValidationWindows;
@@ -84,14 +87,16 @@ pub fn train_watched(
     let _model = FolderLock::shared(folder)?;
     let _lock = workdir::lock(folder)?;
     let resumed = resume(dataset, requested, folder, progress)?;
-    let window_frames = resumed.as_ref().map_or(requested, |(stored, _)| &stored.settings).window_frames;
+    let window_frames = resumed.as_ref().map_or(requested.window_frames, |(stored, _)| stored.settings.window_frames);
     // Before the statistics, of which an empty split has none.
     no_window::ensure_window(dataset, needed(window_frames))?;
     let (settings, normal) = match &resumed {
         Some((stored, _)) => (stored.settings.clone(), stored.speaker.normalisation.clone()),
         None => {
             let channels = channels(dataset, &requested.channels)?;
-            (requested.clone(), Normalisation { channels, ..normalisation(dataset)? })
+            let material = TrainingMaterial::measure(dataset, window_frames);
+            let settings = GanSettings::new(requested, &material);
+            (settings, Normalisation { channels, ..normalisation(dataset)? })
         }
     };
     let loader = WindowLoader::load(dataset, Split::Train, &normal, settings.window_frames, settings.stride_frames)?;
@@ -157,7 +162,7 @@ impl ValidatedTraining for GanTraining<'_> {
     }
 
     fn schedule(&self) -> EpochSchedule {
-        let GanConfig { steps, epoch_steps, checkpoint_every, patience, .. } = self.trainer.settings;
+        let GanSettings { steps, epoch_steps, checkpoint_every, patience, .. } = self.trainer.settings;
         EpochSchedule { steps, epoch_steps, checkpoint_every, patience }
     }
 
@@ -170,9 +175,12 @@ impl ValidatedTraining for GanTraining<'_> {
     }
 
     fn step(&mut self) -> Result<StepReport> {
-        let GanConfig { seed, batch, .. } = self.trainer.settings;
+        let GanSettings { seed, batch, .. } = self.trainer.settings;
         let before = Instant::now();
-        let batch = self.loader.batch(&sample_windows(seed, self.trainer.step, batch, self.loader.len()))?;
+        let step = self.trainer.step;
+        let which = sample_windows(seed, step, batch, self.loader.len());
+        let changes = augment::changes(&self.trainer.settings, step, self.loader.fps());
+        let batch = self.loader.batch_changed(&which, &changes)?;
         self.waiting += before.elapsed();
         let losses = self.trainer.step(&batch)?;
         self.stepping += before.elapsed();
@@ -249,9 +257,11 @@ fn check(settings: &GanConfig) -> Result<()> {
         "gan.window_frames is {}: it must be a multiple of {FRAMES_MULTIPLE}",
         settings.window_frames
     );
-    ensure!(settings.batch > 1, "gan.batch is {}: batch norm needs at least 2 windows", settings.batch);
+    if let Some(batch) = settings.batch.given() {
+        ensure!(batch > 1, "gan.batch is {batch}: batch norm needs at least 2 windows");
+    }
     ensure!(
-        settings.checkpoint_every > 0 && settings.epoch_steps > 0 && settings.stride_frames > 0,
+        settings.checkpoint_every > 0 && settings.epoch_steps.given() != Some(0) && settings.stride_frames > 0,
         "gan.checkpoint_every, gan.epoch_steps and gan.stride_frames must be at least 1"
     );
     device::open(settings.device == ComputeDevice::Cuda)?;

@@ -1,11 +1,11 @@
 //! The generator on windows it was not trained on, beside the pose that never moves from the mean.
 
 use super::losses;
+use super::recipe::settings::GanSettings;
 use super::score;
 use super::score::{ChannelError, Validation, ValidationMetrics};
 use super::step::GanTrainer;
 use super::windows::{WindowBatch, WindowLoader, needed};
-use crate::config::GanConfig;
 use crate::dataset::{Dataset, Split};
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::metrics::distribution::frechet;
@@ -45,7 +45,7 @@ impl ValidationWindows {
     /// training split, which is said.
     pub fn load(
         dataset: &Dataset,
-        settings: &GanConfig,
+        settings: &GanSettings,
         normal: &Normalisation,
         progress: &dyn Progress,
     ) -> Result<Self> {
@@ -74,7 +74,7 @@ impl ValidationWindows {
 
     /// Both predictors on the same windows.
     pub fn validate(&self, trainer: &GanTrainer) -> Result<Validation> {
-        let GanTrainer { generator, decoder, .. } = trainer;
+        let (generator, decoder) = (trainer.listener(), &trainer.decoder);
         let normal = &trainer.metadata.normalisation;
         let (mut predicted, mut mean_pose, mut ground_truth) =
             (PredictorSums::default(), PredictorSums::default(), PredictorSums::default());

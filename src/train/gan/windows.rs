@@ -1,15 +1,17 @@
 //! What training reads: the intervals of a split as normalised poses and log-mels in memory, and windows of them as
 //! batches. The spectrogram of an interval is computed once; a window takes the frames of its own seconds.
 
+use super::augment::{self, WindowChange, WindowRows};
 use crate::audio::mel;
 use crate::dataset::{Dataset, Split};
 use crate::generate::mel_stream::mel_frames;
-use crate::generate::normalisation::Normalisation;
+use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::motion::bones;
 use crate::nn::gan::generator::FRAMES_MULTIPLE;
 use crate::train::no_window::NeededFrames;
 use crate::types::interval::Interval as Span;
 use crate::types::skeleton::N_BONES;
+use crate::types::sound::SAMPLE_RATE;
 use crate::types::time::FrameRate;
 use anyhow::{Result, ensure};
 use candle_core::{Device, Tensor};
@@ -32,6 +34,7 @@ pub struct WindowLoader {
     n_frames: usize,
     /// Numbers of a pose.
     n_numbers: usize,
+    normal: Normalisation,
     intervals: Vec<TrainingInterval>,
     /// Interval and first frame of every window.
     starts: Vec<(usize, usize)>,
@@ -91,12 +94,17 @@ impl WindowLoader {
             (0..n_windows).map(move |window| (i, window * stride)).collect::<Vec<_>>()
         };
         let starts = intervals.iter().enumerate().flat_map(of_interval).collect();
-        Ok(Self { fps, n_frames, n_numbers: normal.n_numbers(), intervals, starts })
+        Ok(Self { fps, n_frames, n_numbers: normal.n_numbers(), normal: normal.clone(), intervals, starts })
     }
 
     /// All poses as normalised numbers [144 or more, T] with the joints seen [48 or more, T], interval by interval.
     pub fn poses(&self) -> impl Iterator<Item = (ArrayView2<'_, f32>, ArrayView2<'_, bool>)> {
         self.intervals.iter().map(|interval| (interval.features.view(), interval.mask.view()))
+    }
+
+    /// Rate of the poses.
+    pub fn fps(&self) -> FrameRate {
+        self.fps
     }
 
     /// Number of windows.
@@ -106,6 +114,62 @@ impl WindowLoader {
 
     pub fn is_empty(&self) -> bool {
         self.starts.is_empty()
+    }
+
+    /// The windows of these numbers (each below `len`) as one batch, each with its change.
+    pub fn batch_changed(&self, which: &[usize], changes: &[WindowChange]) -> Result<WindowBatch> {
+        if changes.is_empty() {
+            return self.batch(which);
+        }
+        ensure!(which.len() == changes.len() && which.iter().all(|i| *i < self.len()), "windows {which:?}");
+        let both: Vec<_> = which.iter().zip(changes).collect();
+        let rows: Vec<WindowRows> = both.par_iter().map(|(i, change)| self.changed(self.starts[**i], change)).collect();
+        let tensor = |of: fn(&WindowRows) -> &Array2<f32>| {
+            let values: Vec<f32> = rows.iter().flat_map(|rows| of(rows).iter().copied()).collect();
+            let (n_rows, n_columns) = of(&rows[0]).dim();
+            Tensor::from_vec(values, (rows.len(), n_rows, n_columns), &Device::Cpu)
+        };
+        Ok(WindowBatch { mels: tensor(|r| &r.mels)?, poses: tensor(|r| &r.poses)?, mask: tensor(|r| &r.mask)? })
+    }
+
+    /// A window that begins about frame `start` of an interval, changed.
+    fn changed(&self, (interval, start): (usize, usize), change: &WindowChange) -> WindowRows {
+        let TrainingInterval { features, mask, mels } = &self.intervals[interval];
+        let last = features.ncols() - 1;
+        let n = self.n_frames;
+        // As much of the interval as it has.
+        let speed = change.speed.min(last as f64 / (n - 1).max(1) as f64);
+        let latest = last as f64 - (n - 1) as f64 * speed;
+        let first = (start as f64 + change.shift_secs * self.fps.per_sec()).clamp(0.0, latest);
+        let at = |t: usize| first + t as f64 * speed;
+        let mut poses = Array2::zeros((self.n_numbers, n));
+        let mut seen = Array2::zeros((self.n_numbers, n));
+        for t in 0..n {
+            let (low, high, share) = between(at(t), last);
+            for number in 0..self.n_numbers {
+                let row = if number < N_FEATURES { number / 3 } else { number - N_FEATURES + N_BONES };
+                if mask[[row, low]] && (share == 0.0 || mask[[row, high]]) {
+                    let (before, after) = (features[[number, low]], features[[number, high]]);
+                    poses[[number, t]] = before + share * (after - before);
+                    seen[[number, t]] = 1.0;
+                }
+            }
+        }
+        let mel_rate = f64::from(SAMPLE_RATE) / mel::HOP as f64;
+        let first_mel = first * mel_rate / self.fps.per_sec();
+        let n_mels = mel_frames(self.fps, n);
+        let mut sound = Array2::zeros((mel::N_MELS, n_mels));
+        for t in 0..n_mels {
+            let (low, high, share) = between(first_mel + t as f64 * speed, mels.ncols() - 1);
+            for band in 0..mel::N_MELS {
+                sound[[band, t]] = mels[[band, low]] + share * (mels[[band, high]] - mels[[band, low]]);
+            }
+        }
+        change.change_sound(&mut sound);
+        if change.is_mirrored {
+            augment::mirror(&mut poses, &mut seen, &self.normal);
+        }
+        WindowRows { mels: sound, poses, mask: seen }
     }
 
     /// The windows of these numbers (each below `len`) as one batch.
@@ -131,6 +195,12 @@ impl WindowLoader {
             mask: tensor(mask, self.n_numbers, self.n_frames)?,
         })
     }
+}
+
+/// Neighbours of a moment between frames, none behind `last`, and how far it is on the way to the second, 0..1.
+fn between(at: f64, last: usize) -> (usize, usize, f32) {
+    let low = (at.max(0.0) as usize).min(last);
+    (low, (low + 1).min(last), if low < last { (at - low as f64) as f32 } else { 0.0 })
 }
 
 fn take(to: &mut Vec<f32>, from: &Array2<f32>, first: usize, n: usize) {

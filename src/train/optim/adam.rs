@@ -25,11 +25,13 @@ pub struct Config {
     pub amsgrad: bool,
     /// Gradients with a larger Euclidean norm, over all tensors together, are scaled down to it.
     pub max_norm: Option<f64>,
+    /// Share of each weight (a tensor of two axes or more) that a step of rate 1 takes away (Loshchilov & Hutter 2019).
+    pub weight_decay: f64,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { beta1: 0.9, beta2: 0.999, eps: 1e-8, amsgrad: false, max_norm: None }
+        Self { beta1: 0.9, beta2: 0.999, eps: 1e-8, amsgrad: false, max_norm: None, weight_decay: 0.0 }
     }
 }
 
@@ -99,7 +101,7 @@ impl Adam {
             return Ok(norm);
         }
         self.step += 1;
-        let Config { beta1, beta2, eps, max_norm, .. } = self.config;
+        let Config { beta1, beta2, eps, max_norm, weight_decay, .. } = self.config;
         let age = self.step.min(i32::MAX as u64) as i32;
         let scale = max_norm.map_or(1.0, |max| if norm > max { max / norm } else { 1.0 });
         let scalars = AdamScalars {
@@ -109,9 +111,12 @@ impl Adam {
             scale: scale as f32,
             rate: (learning_rate / (1.0 - beta1.powi(age))) as f32,
             correction: (1.0 / (1.0 - beta2.powi(age))).sqrt() as f32,
+            keep: 1.0,
         };
+        let keep = (1.0 - learning_rate * weight_decay) as f32;
         for (slot, gradient) in self.slots.iter_mut().zip(&gradients) {
             let Some(gradient) = gradient else { continue };
+            let scalars = AdamScalars { keep: if slot.var.rank() > 1 { keep } else { 1.0 }, ..scalars };
             match &mut slot.moments {
                 MomentStorage::Cpu(moments) => slot.var.inplace_op2(gradient, &AdamUpdate { moments, scalars })?,
                 MomentStorage::Device(moments) => moments.update(&slot.var, gradient, &scalars)?,
@@ -205,7 +210,7 @@ impl InplaceOp2 for AdamUpdate<'_> {
         let Some((start, end)) = layout.contiguous_offsets() else { candle_core::bail!("adam: variable in pieces") };
         let grad = crate::nn::cpu::tensor::slice::<f32>(grad, grad_layout)?;
         let moments = &mut *self.moments.borrow_mut();
-        let AdamScalars { beta1, beta2, eps, scale, rate, correction } = self.scalars;
+        let AdamScalars { beta1, beta2, eps, scale, rate, correction, keep } = self.scalars;
         let update = |value: &mut f32, grad: &f32, first: &mut f32, second: &mut f32, largest: Option<&mut f32>| {
             let grad = grad * scale;
             *first = beta1 * *first + (1.0 - beta1) * grad;
@@ -217,7 +222,7 @@ impl InplaceOp2 for AdamUpdate<'_> {
                 }
                 None => *second,
             };
-            *value -= rate * *first / (spread.sqrt() * correction + eps);
+            *value = keep * *value - rate * *first / (spread.sqrt() * correction + eps);
         };
         let values = values[start..end].chunks_mut(GRAIN).zip(grad.chunks(GRAIN));
         let both = values.zip(moments.first.chunks_mut(GRAIN)).zip(moments.second.chunks_mut(GRAIN));

@@ -36,7 +36,7 @@ impl DeviceMoments {
 
     /// Moves `var` against `grad`.
     pub fn update(&mut self, var: &Var, grad: &Tensor, numbers: &AdamScalars) -> Result<()> {
-        let AdamScalars { beta1, beta2, eps, scale, rate, correction } = *numbers;
+        let AdamScalars { beta1, beta2, eps, scale, rate, correction, keep } = *numbers;
         let of = f64::from;
         let grad = (grad.detach() * of(scale))?;
         self.first = ((&self.first * of(beta1))? + (&grad * of(1.0 - beta1))?)?;
@@ -49,7 +49,7 @@ impl DeviceMoments {
             None => &self.second,
         };
         let step = ((&self.first * of(rate))? / (spread.sqrt()? * of(correction))?.affine(1.0, of(eps))?)?;
-        var.set(&(var.as_detached_tensor() - step)?)
+        var.set(&((var.as_detached_tensor() * of(keep))? - step)?)
     }
 }
 
@@ -70,4 +70,6 @@ pub struct AdamScalars {
     pub rate: f32,
     /// Square root of the second moment's bias correction.
     pub correction: f32,
+    /// What is left of the weights by their decay.
+    pub keep: f32,
 }

@@ -7,7 +7,7 @@ use super::super::report::{Report, median};
 use anyhow::{Context, Result, ensure};
 use candle_core::{Device, Tensor};
 use orator::audio::mel::N_MELS;
-use orator::config::GanConfig;
+use orator::config::{GanConfig, GanRecipe};
 use orator::formats::checkpoint::{self, Contents};
 use orator::generate::mel_stream::mel_frames;
 use orator::generate::model::SpeakerMetadata;
@@ -16,6 +16,8 @@ use orator::generate::representation::Representation;
 use orator::nn::cpu::thread_team::with_spinning_workers;
 use orator::nn::gan::generator::Config;
 use orator::stage::progress::Progress;
+use orator::train::gan::recipe::material::TrainingMaterial;
+use orator::train::gan::recipe::settings::GanSettings;
 use orator::train::gan::step::{GanTrainer, Losses, MAX_NORM};
 use orator::train::gan::windows::WindowBatch;
 use orator::types::skeleton::{N_BONES, N_JOINTS, NECK, is_duplicate, parent};
@@ -63,7 +65,8 @@ struct Fixed {
 impl Fixed {
     fn new(args: &Args) -> Result<Self> {
         let preset = serde_json::from_value(json!(args.preset))?;
-        let settings = GanConfig { preset, batch: args.batch, ..GanConfig::default() };
+        let asked = GanConfig { recipe: GanRecipe::Paper, preset, batch: args.batch.into(), ..GanConfig::default() };
+        let settings = GanSettings::new(&asked, &TrainingMaterial { train_secs: 0.0, validation_secs: 0.0 });
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let table = |value: f32| ndarray::Array2::from_elem((N_JOINTS, 3), value);
         let length = |joint: usize| if is_duplicate(joint) { 0.0 } else { 0.1 };

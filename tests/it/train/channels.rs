@@ -4,7 +4,7 @@ use crate::fixtures::faults::stop::bytes;
 use crate::fixtures::gesture_dataset::{FPS, dataset, dataset_of, sample, with_posture};
 use crate::fixtures::write_dataset::write_dataset;
 use orator::Evaluation;
-use orator::config::{GanConfig, MotionRepresentation};
+use orator::config::{GanConfig, GanRecipe, MotionRepresentation};
 use orator::dataset::{Dataset, Split};
 use orator::evaluate::clips::checkpoint::EvaluatedCheckpoint;
 use orator::evaluate::table::result;
@@ -20,11 +20,13 @@ use orator::types::posture::PostureChannel;
 fn settings(channels: &[PostureChannel]) -> GanConfig {
     GanConfig {
         channels: channels.to_vec(),
-        batch: 4,
+        recipe: GanRecipe::Paper,
+        batch: 4.into(),
         window_frames: 32,
-        steps: 80,
-        learning_rate: 2e-3,
-        epoch_steps: 1_000,
+        steps: 80.into(),
+        learning_rate: 2e-3.into(),
+        lambda_gan: 0.15.into(),
+        epoch_steps: 1_000.into(),
         checkpoint_every: 1_000,
         ..GanConfig::default()
     }
@@ -83,7 +85,7 @@ fn head_and_trunk_follow_a_sound_that_was_not_trained_on() {
 #[test]
 fn without_channels_the_bytes_are_those_of_a_dataset_without_them() {
     let folder = tempfile::tempdir().unwrap();
-    let few = |channels: &[PostureChannel]| GanConfig { batch: 2, steps: 2, ..settings(channels) };
+    let few = |channels: &[PostureChannel]| GanConfig { batch: 2.into(), steps: 2.into(), ..settings(channels) };
     let (plain, posed) =
         (dataset(&folder.path().join("plain")), dataset_of(&folder.path().join("posed"), with_posture));
     let trained = |dataset: &Dataset, name: &str, settings: GanConfig| {

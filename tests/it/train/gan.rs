@@ -5,7 +5,7 @@ use crate::fixtures::faults::stop::{Shared, Stop, bytes};
 use crate::fixtures::gesture_dataset::{FPS, dataset, dataset_of, sample, with_posture};
 use crate::fixtures::write_dataset::write_dataset;
 use orator::config::GanConfig;
-use orator::config::{AdversarialLoss, MotionRepresentation, NetworkPreset};
+use orator::config::{AdversarialLoss, GanRecipe, MotionRepresentation, NetworkPreset};
 use orator::dataset::{Dataset, Split};
 use orator::generate::GestureGenerator;
 use orator::generate::model::BEST;
@@ -18,8 +18,8 @@ use std::panic::AssertUnwindSafe;
 use std::path::Path;
 
 fn settings() -> GanConfig {
-    let gan = GanConfig { batch: 2, window_frames: 32, ..GanConfig::default() };
-    GanConfig { steps: 6, epoch_steps: 3, checkpoint_every: 2, keep_checkpoints: 2, ..gan }
+    let gan = GanConfig { recipe: GanRecipe::Paper, batch: 2.into(), window_frames: 32, ..GanConfig::default() };
+    GanConfig { steps: 6.into(), epoch_steps: 3.into(), checkpoint_every: 2, keep_checkpoints: 2, ..gan }
 }
 
 #[test]
@@ -75,10 +75,10 @@ fn the_checkpoints_settings_win_and_differences_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");
-    train(&dataset, &GanConfig { steps: 3, ..settings() }, &out, &Silent).unwrap();
+    train(&dataset, &GanConfig { steps: 3.into(), ..settings() }, &out, &Silent).unwrap();
     let stop = Stop::at(u64::MAX);
     let other = GanConfig {
-        learning_rate: 1e-3,
+        learning_rate: 1e-3.into(),
         preset: NetworkPreset::Paper,
         representation: MotionRepresentation::Positions,
         ..settings()
@@ -101,7 +101,7 @@ fn the_checkpoints_settings_win_and_differences_are_told() {
     let second = folder.path().join("second");
     write_dataset(&second, "host", FPS, &grown).unwrap();
     let stop = Stop::at(u64::MAX);
-    let longer = GanConfig { steps: 7, ..settings() };
+    let longer = GanConfig { steps: 7.into(), ..settings() };
     train(&Dataset::open(&second).unwrap(), &longer, &out, &Shared(stop.clone())).unwrap();
     assert!(stop.said.lock().unwrap().join("\n").contains("the dataset is another now"));
     let third = folder.path().join("third");
@@ -117,7 +117,7 @@ fn patience_ends_a_training_whose_score_does_not_fall() {
     let out = folder.path().join("out");
     // Steps too small to change anything: the first score is never beaten.
     let settings =
-        GanConfig { steps: 40, epoch_steps: 1, patience: 3, learning_rate: 1e-30, lambda_gan: 0.0, ..settings() };
+        GanConfig { steps: 40.into(), epoch_steps: 1.into(), patience: 3.into(), learning_rate: 1e-30.into(), lambda_gan: 0.0.into(), ..settings() };
     let outcome = train(&dataset, &settings, &out, &Silent).unwrap();
     assert!(outcome.stopped_early && outcome.steps < 40, "{outcome:?}");
     assert_eq!(outcome.steps, outcome.best_step + 3);
@@ -133,11 +133,12 @@ fn a_few_windows_are_learnt_by_heart_and_spoken() {
     write_dataset(&dataset_folder, "host", FPS, &[(Split::Train, long.clone())]).unwrap();
     let dataset = Dataset::open(&dataset_folder).unwrap();
     let settings = GanConfig {
-        batch: 4,
-        steps: 60,
-        learning_rate: 2e-3,
-        lambda_gan: 0.0,
-        epoch_steps: 1_000,
+        recipe: GanRecipe::Paper,
+        batch: 4.into(),
+        steps: 60.into(),
+        learning_rate: 2e-3.into(),
+        lambda_gan: 0.0.into(),
+        epoch_steps: 1_000.into(),
         checkpoint_every: 1_000,
         ..GanConfig::default()
     };
@@ -176,7 +177,7 @@ fn a_training_that_explodes_keeps_its_last_good_checkpoint() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");
-    let wild = GanConfig { learning_rate: 1e30, checkpoint_every: 1, steps: 50, ..settings() };
+    let wild = GanConfig { learning_rate: 1e30.into(), checkpoint_every: 1, steps: 50.into(), ..settings() };
     let error = format!("{:#}", train(&dataset, &wild, &out, &Silent).unwrap_err());
     assert!(error.contains("the training broke") && error.contains("learning_rate"), "{error}");
     let none = GanConfig { window_frames: 128, ..settings() };

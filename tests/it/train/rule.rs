@@ -42,5 +42,5 @@ fn the_settings_of_the_proof_are_settings() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/rule.toml");
     let gan = orator::config::load(&file, &[]).unwrap().settings.gan;
     assert_eq!((gan.preset, gan.representation), (NetworkPreset::Light, MotionRepresentation::Bones));
-    assert!(gan.lambda_gan > 0.0);
+    assert!(gan.lambda_gan.given().is_some_and(|weight| weight > 0.0));
 }

@@ -1,0 +1,29 @@
+//! How much there is to learn from.
+
+use crate::dataset::{Dataset, Split};
+
+/// Speech of a dataset.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrainingMaterial {
+    /// Seconds to train on, in intervals that hold a window.
+    pub train_secs: f64,
+    /// Seconds held out for validation, likewise.
+    pub validation_secs: f64,
+}
+
+impl TrainingMaterial {
+    /// Seconds of a dataset in intervals of `window_frames` at least.
+    pub fn measure(dataset: &Dataset, window_frames: usize) -> Self {
+        let fps = dataset.info().fps;
+        let secs = |split: Split| {
+            let samples = dataset.samples(split).into_iter();
+            samples.filter(|sample| sample.n_frames >= window_frames).map(|sample| fps.secs(sample.n_frames)).sum()
+        };
+        Self { train_secs: secs(Split::Train), validation_secs: secs(Split::Validation) }
+    }
+
+    /// Minutes to train on.
+    pub fn minutes(&self) -> f64 {
+        self.train_secs / 60.0
+    }
+}

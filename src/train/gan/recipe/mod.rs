@@ -1,0 +1,6 @@
+//! What a training does with the speech there is: `material` (minutes, windows) -> `values` (the numbers of a recipe, as
+//! data) -> `settings` (every number of the training, as its checkpoints keep them).
+
+pub mod material;
+pub mod settings;
+pub mod values;

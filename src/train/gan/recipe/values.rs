@@ -1,0 +1,106 @@
+//! The numbers of the recipes. `paper` is one row: Rebol et al. 2021 and the code they built on (Ginosar et al. 2019).
+//! `auto` is a table over the minutes of training speech.
+
+use super::material::TrainingMaterial;
+use crate::config::GanRecipe;
+
+/// What a recipe chooses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RecipeValues {
+    pub steps: f64,
+    pub batch: usize,
+    pub learning_rate: f64,
+    pub warmup_steps: f64,
+    pub fade_to: f64,
+    pub lambda_gan: f64,
+    /// Step of the first adversarial loss and length of its ramp, as shares of the steps.
+    pub adversarial_from: f64,
+    pub adversarial_ramp: f64,
+    pub ema_decay: f64,
+    pub dropout: f64,
+    pub weight_decay: f64,
+    pub augment_speed: f64,
+    pub augment_pitch: f64,
+    pub augment_gain_db: f64,
+    pub augment_noise_db: f64,
+    pub augment_mask_bands: f64,
+    pub augment_mask_secs: f64,
+    pub augment_pose_noise: f64,
+    pub epoch_steps: usize,
+    pub patience: usize,
+}
+
+/// Rebol et al. 2021, after Ginosar et al. 2019: 300 epochs of 300 steps, weights of 1, nothing else.
+pub const PAPER: RecipeValues = RecipeValues {
+    steps: 90_000.0,
+    batch: 32,
+    learning_rate: 1e-4,
+    warmup_steps: 0.0,
+    fade_to: 1.0,
+    lambda_gan: 1.0,
+    adversarial_from: 0.0,
+    adversarial_ramp: 0.0,
+    ema_decay: 0.0,
+    dropout: 0.0,
+    weight_decay: 0.0,
+    augment_speed: 0.0,
+    augment_pitch: 0.0,
+    augment_gain_db: 0.0,
+    augment_noise_db: -120.0,
+    augment_mask_bands: 0.0,
+    augment_mask_secs: 0.0,
+    augment_pose_noise: 0.0,
+    epoch_steps: 300,
+    patience: 0,
+};
+
+const BASE: RecipeValues = RecipeValues {
+    steps: 1_800.0,
+    learning_rate: 5e-4,
+    lambda_gan: 0.15,
+    epoch_steps: 100,
+    ..PAPER
+};
+
+/// Values at so many minutes of training speech, from few to many.
+pub const AUTO: [(f64, RecipeValues); 4] = [
+    (2.0, RecipeValues { steps: 900.0, ..BASE }),
+    (10.0, RecipeValues { steps: 1_800.0, ..BASE }),
+    (30.0, RecipeValues { steps: 2_700.0, ..BASE }),
+    (120.0, RecipeValues { steps: 4_500.0, ..BASE }),
+];
+
+impl RecipeValues {
+    /// What `recipe` chooses for this much speech.
+    pub fn of(recipe: GanRecipe, material: &TrainingMaterial) -> Self {
+        match recipe {
+            GanRecipe::Paper => PAPER,
+            GanRecipe::Auto => auto(material.minutes()),
+        }
+    }
+}
+
+/// Values between the two rows of [`AUTO`] around `minutes`, linear in their logarithm; beyond the table its last row.
+fn auto(minutes: f64) -> RecipeValues {
+    let after = AUTO.iter().position(|(row, _)| *row >= minutes).unwrap_or(AUTO.len() - 1);
+    let (low, high) = (&AUTO[after.saturating_sub(1)], &AUTO[after]);
+    let share = if high.0 > low.0 { ((minutes / low.0).ln() / (high.0 / low.0).ln()).clamp(0.0, 1.0) } else { 0.0 };
+    let between = |of: fn(&RecipeValues) -> f64| of(&low.1) + share * (of(&high.1) - of(&low.1));
+    RecipeValues {
+        // Whole epochs.
+        steps: (between(|row| row.steps) / high.1.epoch_steps as f64).round() * high.1.epoch_steps as f64,
+        learning_rate: between(|row| row.learning_rate),
+        lambda_gan: between(|row| row.lambda_gan),
+        ema_decay: between(|row| row.ema_decay),
+        dropout: between(|row| row.dropout),
+        weight_decay: between(|row| row.weight_decay),
+        augment_speed: between(|row| row.augment_speed),
+        augment_pitch: between(|row| row.augment_pitch),
+        augment_gain_db: between(|row| row.augment_gain_db),
+        augment_noise_db: between(|row| row.augment_noise_db),
+        augment_mask_bands: between(|row| row.augment_mask_bands),
+        augment_mask_secs: between(|row| row.augment_mask_secs),
+        augment_pose_noise: between(|row| row.augment_pose_noise),
+        ..high.1
+    }
+}
