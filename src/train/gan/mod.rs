@@ -3,6 +3,7 @@
 
 pub mod augment;
 pub mod average;
+pub mod block_metrics;
 pub mod losses;
 pub mod recipe;
 pub mod score;

@@ -33,6 +33,22 @@ pub struct ChannelError {
     pub mean_pose: f64,
 }
 
+/// Share by which an error is below another, 1: there is none left, with the ends of the interval of 95 % over blocks;
+/// `None`: too few blocks.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ErrorReduction {
+    pub value: f64,
+    pub low: Option<f64>,
+    pub high: Option<f64>,
+}
+
+impl ErrorReduction {
+    /// Whether the whole interval is above 0.
+    pub fn is_sure(&self) -> bool {
+        self.low.is_some_and(|low| low > 0.0)
+    }
+}
+
 /// The generator beside the mean pose, on the same windows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Validation {
@@ -43,6 +59,14 @@ pub struct Validation {
     pub n_poses: usize,
     pub generator: ValidationMetrics,
     pub mean_pose: ValidationMetrics,
+    /// L1 error of the generator's poses for another sound of the same speaker.
+    #[serde(default)]
+    pub other_sound: f64,
+    /// How far the generator's L1 error is below the mean pose's, and below that for another sound.
+    #[serde(default)]
+    pub below_mean_pose: Option<ErrorReduction>,
+    #[serde(default)]
+    pub below_other_sound: Option<ErrorReduction>,
     /// Of what is learnt beside the joints.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub channels: BTreeMap<PostureChannel, ChannelError>,
@@ -81,12 +105,13 @@ impl Validation {
 /// pose's, and half the distance of the motion energy from the data's, |ln(energy)| / 2. The first asks for the right
 /// pose at the right time, the second for poses like the speaker's, the third for as much motion. The adversarial loss
 /// has no part in it: it measures the two networks against each other. Without a Frechet distance its share is 1.
-pub fn score(generator: &ValidationMetrics, mean_pose: &ValidationMetrics) -> f64 {
+pub fn score(generator: &ValidationMetrics, mean_pose: &ValidationMetrics, other_sound: f64) -> f64 {
     let frechet = match (generator.frechet, mean_pose.frechet) {
         (Some(own), Some(still)) if still > 0.0 => own / still,
         _ => 1.0,
     };
-    generator.l1 / mean_pose.l1.max(1e-9) + frechet + 0.5 * generator.energy.max(1e-6).ln().abs()
+    let hearing = generator.l1 / other_sound.max(1e-9);
+    generator.l1 / mean_pose.l1.max(1e-9) + hearing + frechet + 0.5 * generator.energy.max(1e-6).ln().abs()
 }
 
 /// Says what is wrong with a generator that hardly moves, or moves alike whatever it hears.
@@ -111,7 +136,7 @@ mod tests {
         let still =
             ValidationMetrics { l1: 0.8, pck: 0.3, pck_body: 0.3, pck_hands: 0.3, frechet: Some(200.0), energy: 0.0 };
         let good = ValidationMetrics { l1: 0.4, frechet: Some(50.0), energy: 1.0, ..still };
-        assert!((score(&good, &still) - 0.75).abs() < 1e-12);
+        assert!((score(&good, &still, 0.8) - 0.75).abs() < 1e-12);
         for worse in [
             ValidationMetrics { l1: 0.5, ..good },
             ValidationMetrics { frechet: Some(90.0), ..good },
@@ -120,7 +145,7 @@ mod tests {
             ValidationMetrics { frechet: None, ..good },
             still,
         ] {
-            assert!(score(&worse, &still) > score(&good, &still), "{worse:?}");
+            assert!(score(&worse, &still, 0.8) > score(&good, &still, 0.8), "{worse:?}");
         }
     }
 

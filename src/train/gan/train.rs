@@ -3,11 +3,12 @@
 //! and the step alone (the place of the loader is the step), everything else is in the checkpoint.
 
 use super::augment;
+use super::recipe::account;
 use super::recipe::material::TrainingMaterial;
 use super::recipe::settings::GanSettings;
 use super::score::Validation;
 use super::step::{GanTrainer, Losses, TrainerState};
-use super::validate::ValidationWindows;
+use super::validate::ValidationIntervals;
 use super::windows::{WindowLoader, needed};
 use crate::config::GanConfig;
 use crate::config::{ComputeDevice, MotionRepresentation, NetworkPreset};
@@ -102,7 +103,7 @@ pub fn train_watched(
     let loader = WindowLoader::load(dataset, Split::Train, &normal, settings.window_frames, settings.stride_frames)?;
     let place = dataset.dir().display();
     progress.say(&format!("{} windows of {place}; what is learnt goes to {}", loader.len(), folder.display()));
-    let held_out = ValidationWindows::load(dataset, &settings, &normal, progress)?;
+    let held_out = ValidationIntervals::load(dataset, &settings, &normal, progress)?;
     let mut trainer = match &resumed {
         Some((stored, _)) => GanTrainer::new(stored.speaker.clone(), settings)?,
         None => {
@@ -120,6 +121,11 @@ pub fn train_watched(
         trainer.load(stored, contents)?;
         // One too many is left by a kill before the oldest was removed.
         checkpoint::prune(folder, trainer.settings.keep_checkpoints)?;
+    }
+    if resumed.is_none() {
+        let material = TrainingMaterial::measure(dataset, window_frames);
+        let secs_a_step = secs_a_step(&trainer, &loader)?;
+        account::lines(&trainer.settings, &material, secs_a_step).iter().for_each(|line| progress.say(line));
     }
     let mut training = GanTraining {
         trainer: &mut trainer,
@@ -144,11 +150,28 @@ pub fn train_watched(
     })
 }
 
+/// Seconds of a step on this machine, measured on networks that are dropped; 0 of a training of few steps.
+fn secs_a_step(trainer: &GanTrainer, loader: &WindowLoader) -> Result<f64> {
+    const FEW: usize = 100;
+    if trainer.settings.steps < FEW {
+        return Ok(0.0);
+    }
+    let mut trial = GanTrainer::new(trainer.metadata.clone(), trainer.settings.clone())?;
+    let batch = loader.batch(&sample_windows(trial.settings.seed, 0, trial.settings.batch, loader.len()))?;
+    with_spinning_workers(|| {
+        trial.step(&batch)?;
+        let start = Instant::now();
+        trial.step(&batch)?;
+        trial.step(&batch)?;
+        Ok(start.elapsed().as_secs_f64() / 2.0)
+    })
+}
+
 /// A trainer with its windows.
 struct GanTraining<'a> {
     trainer: &'a mut GanTrainer,
     loader: &'a WindowLoader,
-    held_out: &'a ValidationWindows,
+    held_out: &'a ValidationIntervals,
     /// Time of the steps, and of it until their batches were there.
     stepping: Duration,
     waiting: Duration,

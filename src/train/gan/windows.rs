@@ -17,6 +17,7 @@ use anyhow::{Result, ensure};
 use candle_core::{Device, Tensor};
 use ndarray::{Array2, ArrayView2, Axis, Slice};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// One interval.
 struct TrainingInterval {
@@ -102,6 +103,34 @@ impl WindowLoader {
         self.intervals.iter().map(|interval| (interval.features.view(), interval.mask.view()))
     }
 
+    /// Intervals, each with its frames, the long ones in parts of `longest` frames.
+    pub fn parts(&self, longest: usize) -> Vec<(usize, Range<usize>)> {
+        let of_interval = |(i, interval): (usize, &TrainingInterval)| {
+            let n = interval.features.ncols();
+            (0..n).step_by(longest).map(move |start| (i, start..(start + longest).min(n))).collect::<Vec<_>>()
+        };
+        self.intervals.iter().enumerate().flat_map(of_interval).collect()
+    }
+
+    /// These frames of an interval as a batch of one. The sound goes on to a multiple of 32 frames, behind the interval's
+    /// end by its mirror image.
+    pub fn part(&self, interval: usize, frames: Range<usize>) -> Result<WindowBatch> {
+        let TrainingInterval { features, mask, mels } = &self.intervals[interval];
+        let (first, n_mels) = (mel_frames(self.fps, frames.start), mel_frames(self.fps, frames.len()));
+        let n_heard = mel_frames(self.fps, frames.len().next_multiple_of(FRAMES_MULTIPLE));
+        let last = mels.ncols() - 1;
+        let heard = |k: usize| if first + k <= last { first + k } else { (2 * last).saturating_sub(first + k) };
+        let sound = Array2::from_shape_fn((mel::N_MELS, n_heard.max(n_mels)), |(band, k)| mels[[band, heard(k)]]);
+        let shape = (self.n_numbers, frames.len());
+        let poses = Array2::from_shape_fn(shape, |(number, t)| features[[number, frames.start + t]]);
+        let mask = Array2::from_shape_fn(shape, |(number, t)| f32::from(mask[[row_of(number), frames.start + t]]));
+        let tensor = |of: Array2<f32>| -> Result<Tensor> {
+            let (rows, columns) = of.dim();
+            Ok(Tensor::from_vec(of.into_raw_vec_and_offset().0, (1, rows, columns), &Device::Cpu)?)
+        };
+        Ok(WindowBatch { mels: tensor(sound)?, poses: tensor(poses)?, mask: tensor(mask)? })
+    }
+
     /// Rate of the poses.
     pub fn fps(&self) -> FrameRate {
         self.fps
@@ -147,7 +176,7 @@ impl WindowLoader {
         for t in 0..n {
             let (low, high, share) = between(at(t), last);
             for number in 0..self.n_numbers {
-                let row = if number < N_FEATURES { number / 3 } else { number - N_FEATURES + N_BONES };
+                let row = row_of(number);
                 if mask[[row, low]] && (share == 0.0 || mask[[row, high]]) {
                     let (before, after) = (features[[number, low]], features[[number, high]]);
                     poses[[number, t]] = before + share * (after - before);
@@ -195,6 +224,11 @@ impl WindowLoader {
             mask: tensor(mask, self.n_numbers, self.n_frames)?,
         })
     }
+}
+
+/// Row of a number in the mask of joints and angles.
+fn row_of(number: usize) -> usize {
+    if number < N_FEATURES { number / 3 } else { number - N_FEATURES + N_BONES }
 }
 
 /// Neighbours of a moment between frames, none behind `last`, and how far it is on the way to the second, 0..1.
