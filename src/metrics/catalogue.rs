@@ -34,6 +34,11 @@ pub struct IntervalSums {
     pub blocks: Vec<MetricSums>,
 }
 
+/// Number of equal blocks of about `length` frames that fit `n_frames` best, at least 1.
+pub fn n_blocks(n_frames: usize, length: usize) -> usize {
+    ((n_frames as f64 / length.max(1) as f64).round() as usize).max(1)
+}
+
 impl Catalogue {
     /// Errors: an alpha that is not above 0.
     pub fn new(settings: &MetricSettings) -> anyhow::Result<Self> {
@@ -80,7 +85,7 @@ impl Catalogue {
     /// into, so that the blocks add up to the whole and no value depends on how long they are.
     pub fn measure_blocks(&self, interval: &MotionPair, n_frames: usize) -> IntervalSums {
         let pair = PairedFrames::new(interval);
-        let n = ((pair.n_frames() as f64 / n_frames.max(1) as f64).round() as usize).max(1);
+        let n = n_blocks(pair.n_frames(), n_frames);
         let mut facts = BlockSums::new(n, N_FACTS, pair.n_frames(), 0.0);
         let other_rate = interval.fps != self.fps;
         for t in 0..pair.n_frames() {

@@ -12,7 +12,7 @@ use orator::evaluate::clips::held_out::HeldOutInterval;
 use orator::generate::GestureGenerator;
 use orator::report::training::strip::HeldOutPair;
 use orator::train::epochs::ValidatedStep;
-use orator::train::gan::score::{Validation, ValidationMetrics};
+use orator::train::gan::score::{Validation, ValidationMetrics, below_mean_pose};
 use orator::train::gan::train;
 use serde_json::json;
 use std::path::PathBuf;
@@ -92,7 +92,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     Ok(if page.is_some() { Outcome::Done } else { Outcome::SomeFailed })
 }
 
-/// The last validation as a table, and the alarm where there is one.
+/// The last validation as a table, with the warnings that are due.
 fn metrics(validation: &Validation) -> String {
     let (predicted, still) = (&validation.generator, &validation.mean_pose);
     let row = |name: &str, predicted: f64, still: f64| format!("{name:24}{predicted:9.3}   {still:9.3}\n");
@@ -111,6 +111,9 @@ fn metrics(validation: &Validation) -> String {
         "bones change by {:.4} mm a frame in the network's own output (the paper's released predictions: 2 to 5 mm)",
         validation.bone_change_mm
     );
+    if let Some(below) = below_mean_pose([predicted.l1, still.l1], Some([predicted.pck, still.pck])) {
+        text += &format!("\n{below}");
+    }
     if let Some(alarm) = &validation.alarm {
         text += &format!("\nALARM: {alarm}");
     }

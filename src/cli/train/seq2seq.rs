@@ -15,6 +15,7 @@ use orator::generate::seq2seq::SequenceGenerator;
 use orator::generate::seq2seq::poses::PoseNumbers;
 use orator::report::training::strip::HeldOutPair;
 use orator::train::epochs::ValidatedStep;
+use orator::train::gan::score::below_mean_pose;
 use orator::train::seq2seq::captures::CaptureFolder;
 use orator::train::seq2seq::source::TrainingSource;
 use orator::train::seq2seq::train;
@@ -107,6 +108,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         outcome.best.display(),
         page.as_ref().map(|page| format!("\ncurves and poses  {}", page.display())).unwrap_or_default(),
     );
+    if let Some(below) = below_mean_pose([validation.l1, validation.mean_pose_l1], None) {
+        text += &format!("\n{below}");
+    }
     if let Some(alarm) = &validation.alarm {
         text += &format!("\nALARM: {alarm}");
     }

@@ -1,33 +1,22 @@
-//! Metrics in blocks of about 4 s, the units of the bootstrap, since neighbouring frames are correlated. The blocks add
-//! up to the whole.
+//! Metrics in blocks, the units of the bootstrap and of tests, since neighbouring frames are correlated. The blocks add
+//! up to the whole, and none reaches over the end of a clip.
 
 use crate::evaluate::baseline::baselines::Predictor;
 use crate::evaluate::clips::clips::EvalClips;
-use crate::metrics::catalogue::{Catalogue, IntervalSums, MotionPair};
+use crate::metrics::catalogue::{Catalogue, IntervalSums, MotionPair, n_blocks};
 use ndarray::{Array2, s};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Length of a block, seconds; a clip has the number of equal blocks that fits best. Above an hour of motion blocks
-/// become longer, which bounds their number.
-const BLOCK_SECS: f64 = 4.0;
-const MOST_SECS: f64 = 3600.0;
+/// Length of the blocks of the truth's halves, seconds, whatever is compared with it.
+const HALVES_SECS: f64 = 4.0;
 /// Length, seconds, of the pieces in which longer clips are measured in parallel and in bounded memory; differences
 /// across a border are not counted.
 const PIECE_SECS: f64 = 600.0;
 
-/// Length of the blocks of these clips, seconds.
-pub fn block_secs(clips: &EvalClips) -> f64 {
-    BLOCK_SECS * (clips.secs() / MOST_SECS).ceil().max(1.0)
-}
-
-/// Length of the blocks of these clips, frames.
-fn block_frames(clips: &EvalClips) -> usize {
-    ((block_secs(clips) * clips.fps.per_sec()).round() as usize).max(1)
-}
-
-/// Metric sums of a predictor over all clips and their blocks, independent of the number of threads.
-pub fn measure(catalogue: &Catalogue, clips: &EvalClips, predictor: &Predictor) -> IntervalSums {
+/// Metric sums of a predictor over all clips and their blocks of about `length` frames, independent of the number of
+/// threads.
+pub fn measure(catalogue: &Catalogue, clips: &EvalClips, predictor: &Predictor, length: usize) -> IntervalSums {
     let all: Vec<IntervalSums> = pieces(clips)
         .into_par_iter()
         .map(|(clip, frames)| {
@@ -50,7 +39,7 @@ pub fn measure(catalogue: &Catalogue, clips: &EvalClips, predictor: &Predictor) 
                 fps: clips.fps,
                 onsets: onsets.as_deref(),
             };
-            catalogue.measure_blocks(&interval, block_frames(clips))
+            catalogue.measure_blocks(&interval, length)
         })
         .collect();
     together(all)
@@ -66,10 +55,39 @@ fn pieces(clips: &EvalClips) -> Vec<(usize, Range<usize>)> {
     (0..clips.clips.len()).flat_map(of_clip).collect()
 }
 
+/// Frames of each block of about `length` frames.
+pub fn frames(clips: &EvalClips, length: usize) -> Vec<usize> {
+    let of_piece = |(_, frames): (usize, Range<usize>)| {
+        let (n, n_frames) = (n_blocks(frames.len(), length), frames.len());
+        let first = move |block: usize| (block * n_frames).div_ceil(n);
+        (0..n).map(move |block| first(block + 1) - first(block))
+    };
+    pieces(clips).into_iter().flat_map(of_piece).collect()
+}
+
+/// Mean distance of the joints that are seen from the ground truth's, metres, of every frame of every clip. NaN where
+/// no joint is seen.
+pub fn frame_errors(clips: &EvalClips, predictor: &Predictor) -> Vec<Vec<f64>> {
+    let of_clip = |clip: usize| {
+        let (of, Some(predicted)) = (&clips.clips[clip], predictor.motion(clips, clip)) else { return Vec::new() };
+        let of_frame = |t: usize| {
+            let distance = |joint: usize| {
+                let squares =
+                    (0..3).map(|k| f64::from(predicted[[t, joint, k]] - of.ground_truth[[t, joint, k]]).powi(2));
+                squares.sum::<f64>().sqrt()
+            };
+            let seen: Vec<usize> = (0..of.mask.ncols()).filter(|joint| of.mask[[t, *joint]]).collect();
+            seen.iter().map(|joint| distance(*joint)).sum::<f64>() / seen.len() as f64
+        };
+        (0..of.n_frames().min(predicted.shape()[0])).map(of_frame).collect()
+    };
+    (0..clips.clips.len()).into_par_iter().map(of_clip).collect()
+}
+
 /// One half of the ground truth against the other: every second block is treated as the prediction of the one before
 /// it.
 pub fn halves(catalogue: &Catalogue, clips: &EvalClips) -> IntervalSums {
-    let length = block_frames(clips);
+    let length = ((HALVES_SECS * clips.fps.per_sec()).round() as usize).max(1);
     let stretches = |clip: usize| (0..clips.clips[clip].n_frames() / length).map(move |i| (clip, i * length));
     let all: Vec<(usize, usize)> = (0..clips.clips.len()).flat_map(stretches).collect();
     let beside = |pair: &[(usize, usize)]| {

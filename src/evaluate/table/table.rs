@@ -1,7 +1,11 @@
 //! Table of every metric of every predictor with its interval, on the same clips and the same draws.
 
+use super::block_length::BlockLength;
 use super::blocks;
 use super::bootstrap::{Estimate, draws};
+use super::left_out::BlockGroups;
+use super::sign_flips;
+use super::sign_flips::TestedDifference;
 use crate::evaluate::baseline::baselines::{NumberedCheckpoint, Predictor, PredictorKind};
 use crate::evaluate::clips::clips::EvalClips;
 use crate::metrics::catalogue::{Better, Catalogue, Definition, IntervalSums};
@@ -13,7 +17,7 @@ use ndarray::{Array2, s};
 /// Number of draws behind an interval; costly metrics (Frechet distances, correlations) take fewer.
 pub const N_DRAWS: usize = 1000;
 pub const N_COSTLY_DRAWS: usize = 100;
-/// Number of blocks below which no conclusion is drawn.
+/// Number of blocks below which bootstrap intervals say little.
 pub const FEW_BLOCKS: usize = 10;
 
 /// Metrics of one predictor.
@@ -28,8 +32,8 @@ pub struct PredictorRow {
     pub values: Vec<Estimate>,
     /// Reasons of missing values; empty where there is a value.
     pub reasons: Vec<String>,
-    /// Draws [`N_DRAWS`, definitions]; NaN beyond the draws of costly metrics. Empty without draws.
-    drawn: Array2<f64>,
+    /// Values without each group of blocks [groups, definitions]. Empty where blocks are missing.
+    left_out: Array2<f64>,
 }
 
 /// Metrics of all predictors.
@@ -41,8 +45,9 @@ pub struct Table {
     pub truth_of: Vec<Option<usize>>,
     pub n_clips: usize,
     pub n_blocks: usize,
-    /// Approximate length of a block, seconds.
-    pub block_secs: f64,
+    /// Approximate length of the blocks; a clip has the number of equal blocks that fits best.
+    pub block_length: BlockLength,
+    groups: BlockGroups,
     pub n_frames: usize,
     pub secs: f64,
     pub with_sound: bool,
@@ -70,20 +75,35 @@ pub fn measure(
     let settings = MetricSettings { fps: clips.fps, has_fingers, channels, ..settings.clone() };
     let catalogue = Catalogue::new(&settings)?;
     ensure!(clips.n_frames() > 0, "there is no frame to measure");
-    let (mut rows, mut n_blocks) = (Vec::new(), 0);
+    let fps = clips.fps.per_sec();
+    let block_length = BlockLength::new(clips.secs(), fps, &differences(clips, predictors));
+    let frames = blocks::frames(clips, block_length.frames(fps));
+    let groups = BlockGroups::new(&frames);
+    let mut rows = Vec::new();
     for predictor in predictors {
         task.detail(&NumberedCheckpoint::name_of(predictor.kind, predictor.checkpoint.as_ref()));
-        let measured = blocks::measure(&catalogue, clips, predictor);
-        n_blocks = measured.blocks.len();
+        let measured = blocks::measure(&catalogue, clips, predictor, block_length.frames(fps));
         let row = row(&catalogue, predictor.kind, &predictor.description, &measured);
-        rows.push(PredictorRow { checkpoint: predictor.checkpoint.clone(), ..row });
+        let left_out = match measured.blocks.len() == frames.len() {
+            true => {
+                let counts = groups.counts_without();
+                let mut values = catalogue.draw_cheap(&measured.blocks, counts.view());
+                let costly = catalogue.draw_costly(&measured.blocks, counts.view());
+                for index in (0..values.ncols()).filter(|index| catalogue.is_costly(*index)) {
+                    values.column_mut(index).assign(&costly.column(index));
+                }
+                values
+            }
+            false => Array2::default((0, 0)),
+        };
+        rows.push(PredictorRow { checkpoint: predictor.checkpoint.clone(), left_out, ..row });
         task.advance(1);
     }
     task.detail("truth");
     rows.extend(halves(&catalogue, clips));
     let truth = Predictor::truth(clips);
     // Without blocks, since the ground truth has no draws.
-    let whole = blocks::measure(&catalogue, clips, &truth).whole;
+    let whole = blocks::measure(&catalogue, clips, &truth, usize::MAX).whole;
     rows.push(row(&catalogue, PredictorKind::Truth, &truth.description, &IntervalSums { whole, blocks: Vec::new() }));
     task.advance(1);
     let definitions = catalogue.definitions().to_vec();
@@ -93,8 +113,9 @@ pub fn measure(
         definitions,
         truth_of,
         n_clips: clips.clips.len(),
-        n_blocks,
-        block_secs: blocks::block_secs(clips),
+        n_blocks: frames.len(),
+        block_length,
+        groups,
         n_frames: clips.n_frames(),
         secs: clips.secs(),
         with_sound: clips.have_sound(),
@@ -103,6 +124,25 @@ pub fn measure(
         rows,
         notes: clips.notes.clone(),
     })
+}
+
+/// Differences between the errors of a prediction and of what verdicts compare it with, metres, of every frame of every
+/// clip.
+fn differences(clips: &EvalClips, predictors: &[Predictor]) -> Vec<Vec<Vec<f64>>> {
+    use PredictorKind::{LatePrediction, MeanPose, MedianPose, MismatchedPrediction, Prediction};
+    let errors: Vec<_> = predictors.iter().map(|predictor| blocks::frame_errors(clips, predictor)).collect();
+    let is_compared = |own: &Predictor, other: &Predictor| match other.kind {
+        MeanPose | MedianPose => true,
+        LatePrediction | MismatchedPrediction => own.checkpoint == other.checkpoint,
+        _ => false,
+    };
+    let less = |(own, other): (&Vec<f64>, &Vec<f64>)| own.iter().zip(other).map(|(a, b)| a - b).collect();
+    let mut differences = Vec::new();
+    for (own, of_own) in predictors.iter().zip(&errors).filter(|(own, _)| own.kind == Prediction) {
+        let others = predictors.iter().zip(&errors).filter(|(other, _)| is_compared(own, other));
+        differences.extend(others.map(|(_, of_other)| of_own.iter().zip(of_other).map(less).collect()));
+    }
+    differences
 }
 
 /// One half of the ground truth against the other, for metrics of whole sets only, since frames have no partner.
@@ -157,7 +197,7 @@ fn row(catalogue: &Catalogue, kind: PredictorKind, description: &str, measured: 
         description: description.to_owned(),
         reasons: values.iter().enumerate().map(reason).collect(),
         values: values.iter().enumerate().map(estimate).collect(),
-        drawn,
+        left_out: Array2::default((0, 0)),
     }
 }
 
@@ -190,20 +230,36 @@ impl Table {
         self.definitions[index].better != Better::Neither && has_value
     }
 
-    /// Gain of `a` over `b` in a metric, in its unit, positive where `a` is better, with the interval of paired draws.
-    /// NaN where neither direction of the metric is better.
-    pub fn gain(&self, a: &PredictorRow, b: &PredictorRow, index: usize) -> Estimate {
-        let good = |value: f64, truth: f64| match self.definitions.get(index).map(|d| d.better) {
-            Some(Better::Higher) => value,
-            Some(Better::Lower) => -value,
-            Some(Better::NearerTruth) => -(value - truth).abs(),
-            Some(Better::Neither) | None => f64::NAN,
+    /// Gain of `a` over `b` in a metric, in its unit, positive where `a` is better. NaN where neither direction of the
+    /// metric is better.
+    pub fn gain(&self, a: &PredictorRow, b: &PredictorRow, index: usize) -> f64 {
+        let value = |row: &PredictorRow, index: usize| row.values[index].value;
+        self.good(index, |index| value(a, index)) - self.good(index, |index| value(b, index))
+    }
+
+    /// Gains of `a` over other rows in metrics, `(index, row)`, tested together: the level is that of all of them.
+    pub fn tested_gains(&self, a: &PredictorRow, others: &[(usize, &PredictorRow)]) -> Vec<TestedDifference> {
+        let n = self.groups.len();
+        let contributions = |(index, b): &(usize, &PredictorRow)| {
+            if a.left_out.nrows() != n || b.left_out.nrows() != n {
+                return vec![f64::NAN; n];
+            }
+            let good = |row: &PredictorRow, group: usize| self.good(*index, |index| row.left_out[[group, index]]);
+            let without: Vec<f64> = (0..n).map(|group| good(a, group) - good(b, group)).collect();
+            self.groups.contributions(self.gain(a, b, *index), &without)
         };
+        let inflation = self.block_length.variance_inflation(self.secs / n.max(1) as f64);
+        sign_flips::test(&others.iter().map(contributions).collect::<Vec<_>>(), inflation)
+    }
+
+    /// How good values are in a metric: more is better.
+    fn good(&self, index: usize, value: impl Fn(usize) -> f64) -> f64 {
         let truth = self.truth_of.get(index).copied().flatten().unwrap_or(index);
-        let of_values = |row: &PredictorRow| good(row.values[index].value, row.values[truth].value);
-        let of_draw = |row: &PredictorRow, draw: usize| good(row.drawn[[draw, index]], row.drawn[[draw, truth]]);
-        let n = a.drawn.nrows().min(b.drawn.nrows());
-        let drawn: Vec<f64> = (0..n).map(|draw| of_draw(a, draw) - of_draw(b, draw)).collect();
-        Estimate::from_draws(of_values(a) - of_values(b), &drawn)
+        match self.definitions.get(index).map(|definition| definition.better) {
+            Some(Better::Higher) => value(index),
+            Some(Better::Lower) => -value(index),
+            Some(Better::NearerTruth) => -(value(index) - value(truth)).abs(),
+            Some(Better::Neither) | None => f64::NAN,
+        }
     }
 }

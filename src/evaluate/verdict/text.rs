@@ -11,10 +11,12 @@ use std::fmt::Write as _;
 ///
 /// `all` shows every metric; otherwise arms, fingers and wrists are shown for correct keypoints and joint errors only.
 pub fn text(table: &Table, all: bool) -> String {
-    let Table { n_clips, n_blocks, n_frames, secs, block_secs, .. } = table;
+    let Table { n_clips, n_blocks, n_frames, secs, .. } = table;
     let clips = if *n_clips == 1 { "clip" } else { "clips" };
-    let mut text =
-        format!("{n_clips} {clips}, {secs:.1} s, {n_frames} frames, {n_blocks} blocks of about {block_secs} s\n\n");
+    let mut text = format!(
+        "{n_clips} {clips}, {secs:.1} s, {n_frames} frames, {n_blocks} blocks of about {:.1} s\n\n",
+        table.block_length.secs
+    );
     let is_shown = |i: &usize| (all || is_main(table, *i)) && table.is_shown(*i);
     let shown: Vec<usize> = (0..table.definitions.len()).filter(is_shown).collect();
     let first: Vec<String> = shown.iter().map(|i| named(table, *i)).collect();

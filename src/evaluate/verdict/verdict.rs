@@ -1,11 +1,12 @@
 //! Conclusions from a table: whether the prediction is better than no motion, and whether it follows the sound. Several
-//! metrics vote, each with the interval of its paired difference, since one alone is misleading (a constant pose has
+//! metrics vote, tested together on their paired differences by sign flips of blocks, since one alone is misleading (a constant pose has
 //! many correct keypoints).
 
 use super::labels;
 use crate::evaluate::baseline::baselines::PredictorKind;
 use crate::evaluate::table::bootstrap::Estimate;
-use crate::evaluate::table::table::{FEW_BLOCKS, PredictorRow, Table};
+use crate::evaluate::table::sign_flips::{FEWEST_BLOCKS, TestedDifference};
+use crate::evaluate::table::table::{PredictorRow, Table};
 use crate::metrics::catalogue::Better;
 use serde::Serialize;
 
@@ -42,8 +43,10 @@ pub struct Vote {
     /// Predictor of the comparison.
     pub against: PredictorKind,
     pub answer: Answer,
-    /// Gain in the metric's unit; below 0: worse.
+    /// Gain in the metric's unit with the interval of all votes together; below 0: worse.
     pub gain: Estimate,
+    /// p value among all votes of the verdict.
+    pub p: f64,
 }
 
 /// Question with its conclusion.
@@ -131,20 +134,20 @@ pub fn better_than_nothing(table: &Table, own: &PredictorRow) -> Verdict {
 
 /// Better of the constant poses in a metric.
 fn better_constant_pose(table: &Table, index: usize) -> Option<&PredictorRow> {
-    let better = |a: &PredictorRow, b: &PredictorRow| table.gain(a, b, index).value >= 0.0;
+    let better = |a: &PredictorRow, b: &PredictorRow| table.gain(a, b, index) >= 0.0;
     let constant_poses =
         [PredictorKind::MeanPose, PredictorKind::MedianPose].into_iter().filter_map(|kind| table.row(kind));
     constant_poses.reduce(|a, b| if better(a, b) { a } else { b })
 }
 
-/// Comparison of the prediction with the better of the constant poses in one metric, whatever its aspect.
+/// Comparison of the prediction with the better of the constant poses in one metric alone, whatever its aspect.
 pub fn against_nothing(table: &Table, own: &PredictorRow, index: usize) -> Option<Answer> {
-    let gain = table.gain(own, better_constant_pose(table, index)?, index);
-    (gain.value.is_finite() && table.n_blocks >= FEW_BLOCKS).then(|| answer(&gain))
+    let tested = table.tested_gains(own, &[(index, better_constant_pose(table, index)?)]).into_iter().next()?;
+    (tested.mean.value.is_finite() && table.n_blocks >= FEWEST_BLOCKS).then(|| answer(&tested))
 }
 
-fn answer(gain: &Estimate) -> Answer {
-    match (gain.is_apart_from_zero(), gain.value > 0.0) {
+fn answer(tested: &TestedDifference) -> Answer {
+    match (tested.mean.is_apart_from_zero(), tested.mean.value > 0.0) {
         (true, true) => Answer::Yes,
         (true, false) => Answer::No,
         (false, _) => Answer::Undecided,
@@ -189,9 +192,14 @@ fn hindrance(table: &Table, votes: &[Vote]) -> Option<String> {
     if votes.is_empty() {
         return Some("this convention has no figure that could say".to_owned());
     }
-    let Table { n_blocks, block_secs, .. } = table;
-    (*n_blocks < FEW_BLOCKS)
-        .then(|| format!("{n_blocks} blocks of about {block_secs} s are too few to say (at least {FEW_BLOCKS})"))
+    let (n_blocks, secs) = (table.n_blocks, table.block_length.secs);
+    let (blocks, are) = if n_blocks == 1 { ("block", "is") } else { ("blocks", "are") };
+    (n_blocks < FEWEST_BLOCKS).then(|| {
+        let least = FEWEST_BLOCKS;
+        format!(
+            "{n_blocks} {blocks} of about {secs:.1} s {are} too few to say (at least {least}); hold out more motion"
+        )
+    })
 }
 
 /// Votes of the metrics of these aspects, each against its own row.
@@ -201,15 +209,22 @@ fn votes<'a>(
     aspects: &[Aspect],
     against: impl Fn(usize) -> Option<&'a PredictorRow>,
 ) -> Vec<Vote> {
-    let vote = |index: usize| {
+    let asked = |index: usize| {
         let aspect = aspect(table, index).filter(|aspect| aspects.contains(aspect))?;
         let other = against(index)?;
-        let gain = table.gain(own, other, index);
-        let answer = answer(&gain);
-        let metric = labels::name(&table.definitions[index]);
-        gain.value.is_finite().then_some(Vote { metric, aspect, against: other.kind, answer, gain })
+        table.gain(own, other, index).is_finite().then_some((aspect, (index, other)))
     };
-    (0..table.definitions.len()).filter_map(vote).collect()
+    let (aspects, compared): (Vec<_>, Vec<_>) = (0..table.definitions.len()).filter_map(asked).unzip();
+    let tested = table.tested_gains(own, &compared);
+    let vote = |((aspect, (index, other)), tested): ((Aspect, (usize, &PredictorRow)), TestedDifference)| Vote {
+        metric: labels::name(&table.definitions[index]),
+        aspect,
+        against: other.kind,
+        answer: answer(&tested),
+        gain: Estimate { value: table.gain(own, other, index), ..tested.mean },
+        p: tested.p,
+    };
+    aspects.into_iter().zip(compared).zip(tested).map(vote).collect()
 }
 
 /// Aspect of a metric; `None` for metrics that repeat another.

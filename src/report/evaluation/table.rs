@@ -39,8 +39,8 @@ pub fn body(table: &Table) -> Vec<Node> {
     }
     let drawn = format!(
         "In brackets, or under the pointer: 95 % intervals of {N_DRAWS} draws of the blocks (Frechet distances and correlations: {N_COSTLY_DRAWS}). \
-         Against doing nothing: the prediction beside the better of the poses that never move, on the same draws: better, \
-         worse, or not told apart."
+         Against doing nothing: the prediction beside the better of the poses that never move, each figure tested by \
+         itself by sign flips of the blocks: better, worse, or not told apart."
     );
     let table = html::table("figures", std::iter::once(first).chain(against).chain(heads), rows);
     vec![node("p").class("small").text(drawn), node("div").class("scroll").attr("tabindex", "0").child(table)]

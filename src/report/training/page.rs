@@ -11,6 +11,7 @@ use crate::report::html::picture as page_picture;
 use crate::report::html::{Node, Page, Section, node};
 use crate::stage::counted;
 use crate::stage::workdir;
+use crate::train::gan::score::below_mean_pose;
 use crate::train::log;
 use anyhow::{Context, Result};
 use serde_json::Value;
@@ -85,7 +86,7 @@ fn lead(training_log: &TrainingLog) -> String {
     )
 }
 
-/// Table of the best epoch, and a warning where one is due.
+/// Table of the best epoch, and warnings where they are due.
 fn best(training_log: &TrainingLog) -> Vec<Node> {
     let Some(best) = training_log.best.map(|line| &line["validation"]) else {
         return vec![node("p").class("empty").text("The log has no validation.")];
@@ -114,7 +115,13 @@ fn best(training_log: &TrainingLog) -> Vec<Node> {
         ),
         None => "The mean pose never moves.".to_owned(),
     };
+    let pair = |of: &str| {
+        let [model, still] = metrics(best, of).map(Value::as_f64);
+        Some([model?, still?])
+    };
+    let below = pair("l1").and_then(|l1| below_mean_pose(l1, pair("pck")));
+    let below = below.map(|below| node("p").class("note").text(below));
     let alarm = best["alarm"].as_str().map(|alarm| node("p").class("note").text(format!("Alarm: {alarm}.")));
     let table = node("div").class("scroll figures").child(table);
-    [table, node("p").class("small").text(about)].into_iter().chain(alarm).collect()
+    below.into_iter().chain([table, node("p").class("small").text(about)]).chain(alarm).collect()
 }

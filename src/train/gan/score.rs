@@ -114,6 +114,19 @@ pub fn score(generator: &ValidationMetrics, mean_pose: &ValidationMetrics, other
     generator.l1 / mean_pose.l1.max(1e-9) + hearing + frechet + 0.5 * generator.energy.max(1e-6).ln().abs()
 }
 
+/// Says that a model is below the mean pose, if it is: by the L1 error or by the share of correct keypoints, each `[model,
+/// mean pose]`, where measured. Shares are in 0..1.
+pub fn below_mean_pose(l1: [f64; 2], pck: Option<[f64; 2]>) -> Option<String> {
+    let error = (l1[0] > l1[1]).then(|| format!("L1 {:.3} against {:.3}", l1[0], l1[1]));
+    let share = pck.filter(|[model, still]| model < still);
+    let share = share.map(|[model, still]| format!("PCK {:.1} % against {:.1} %", 100.0 * model, 100.0 * still));
+    let what: Vec<String> = error.into_iter().chain(share).collect();
+    let what = (!what.is_empty()).then(|| what.join(", "))?;
+    Some(format!(
+        "The model is below the mean pose: a pose that never moves is nearer to where the speaker is ({what})."
+    ))
+}
+
 /// Says what is wrong with a generator that hardly moves, or moves alike whatever it hears.
 pub fn alarm(energy: f64, spread: f64) -> Option<String> {
     if energy < LEAST_ENERGY {
@@ -147,6 +160,17 @@ mod tests {
         ] {
             assert!(score(&worse, &still, 0.8) > score(&good, &still, 0.8), "{worse:?}");
         }
+    }
+
+    #[test]
+    fn a_model_below_the_mean_pose_is_named() {
+        assert_eq!(below_mean_pose([0.4, 0.5], Some([0.6, 0.3])), None);
+        assert_eq!(below_mean_pose([0.4, 0.5], None), None);
+        assert_eq!(below_mean_pose([f64::NAN, 0.5], Some([f64::NAN, 0.3])), None);
+        let said = below_mean_pose([0.8, 0.5], Some([0.25, 0.3])).unwrap();
+        assert!(said.ends_with("(L1 0.800 against 0.500, PCK 25.0 % against 30.0 %)."), "{said}");
+        assert!(below_mean_pose([0.4, 0.5], Some([0.2, 0.3])).is_some_and(|said| !said.contains("L1")));
+        assert!(below_mean_pose([0.6, 0.5], None).is_some_and(|said| !said.contains("PCK")));
     }
 
     #[test]

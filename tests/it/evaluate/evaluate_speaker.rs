@@ -40,7 +40,9 @@ fn a_training_ends_with_its_page_and_its_speaker_is_measured() {
     let answer = project.answer(&["evaluate", "--dataset", &data, "--checkpoint", &out]);
     assert_eq!(answer.code, 0, "{}", answer.errors);
     let result = &answer.json;
-    assert_eq!((&result["n_clips"], &result["n_blocks"]), (&1.into(), &2.into()));
+    assert_eq!(result["n_clips"], 1);
+    let n_blocks = result["n_blocks"].as_u64().unwrap();
+    assert!((1..7).contains(&n_blocks), "{n_blocks}");
     let names: Vec<&str> =
         result["predictors"].as_array().unwrap().iter().map(|row| row["name"].as_str().unwrap()).collect();
     let expected = [
@@ -62,7 +64,8 @@ fn a_training_ends_with_its_page_and_its_speaker_is_measured() {
     }
     assert_eq!((value("pck_3d", "truth"), value("mpjpe", "truth")), (1.0, 0.0));
     let sentence = result["better_than_nothing"]["sentence"].as_str().unwrap();
-    assert!(sentence.contains("2 blocks of about 4 s are too few"), "{sentence}");
+    assert!(sentence.contains(&format!("{n_blocks} block")), "{sentence}");
+    assert!(sentence.contains("too few to say (at least 7)"), "{sentence}");
     let wrong = project.answer(&["evaluate", "--dataset", &data, "--checkpoint", &out, "--split", "test"]);
     assert!(wrong.code == 1 && wrong.errors.contains("it has train, validation"), "{}", wrong.errors);
 }

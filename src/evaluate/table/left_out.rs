@@ -1,0 +1,85 @@
+//! What each group of blocks adds to a metric that is any function of sums over blocks: from the values without it
+//! (the jackknife; Efron and Tibshirani 1993, chapter 11). Of a mean over frames these are the groups' own sums.
+
+use ndarray::Array2;
+
+/// Most groups; more blocks are joined with their neighbours, which bounds the values to compute and makes the groups
+/// less dependent.
+const MOST_GROUPS: usize = 32;
+
+/// Groups of neighbouring blocks.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BlockGroups {
+    /// Group of each block.
+    of_block: Vec<usize>,
+    /// Share of the frames in each group, sum 1.
+    shares: Vec<f64>,
+}
+
+impl BlockGroups {
+    /// Groups of blocks of so many frames each.
+    pub fn new(frames: &[usize]) -> Self {
+        let n = frames.len().min(MOST_GROUPS);
+        let of_block: Vec<usize> = (0..frames.len()).map(|block| block * n / frames.len()).collect();
+        let total = frames.iter().sum::<usize>().max(1) as f64;
+        let mut shares = vec![0.0; n];
+        of_block.iter().zip(frames).for_each(|(group, frames)| shares[*group] += *frames as f64 / total);
+        Self { of_block, shares }
+    }
+
+    /// Number of groups.
+    pub fn len(&self) -> usize {
+        self.shares.len()
+    }
+
+    /// Whether there is no block.
+    pub fn is_empty(&self) -> bool {
+        self.shares.is_empty()
+    }
+
+    /// How often each block counts without each group [groups, blocks]: 0 or 1.
+    pub fn counts_without(&self) -> Array2<f64> {
+        let is_left = |(group, block): (usize, usize)| f64::from(u8::from(self.of_block[block] != group));
+        Array2::from_shape_fn((self.shares.len(), self.of_block.len()), is_left)
+    }
+
+    /// What each group adds, in the unit of `value` and with it as their mean. `value` is that of all blocks, `without`
+    /// has one value a group, without that group.
+    pub fn contributions(&self, value: f64, without: &[f64]) -> Vec<f64> {
+        let n = self.shares.len() as f64;
+        let own = |(share, without): (&f64, &f64)| n * (1.0 - share) * (value - without);
+        let changes: Vec<f64> = self.shares.iter().zip(without).map(own).collect();
+        let bias = changes.iter().sum::<f64>() / n;
+        self.shares.iter().zip(changes).map(|(share, change)| n * share * value + change - bias).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_add_their_sums_to_a_mean() {
+        let frames = [30, 30, 10, 20, 45];
+        let sums = [3.0, -2.0, 7.0, 0.5, 1.0];
+        let groups = BlockGroups::new(&frames);
+        let mean = |counts: &[f64]| {
+            let total = |of: &dyn Fn(usize) -> f64| (0..5).map(|k| counts[k] * of(k)).sum::<f64>();
+            total(&|k| sums[k]) / total(&|k| frames[k] as f64)
+        };
+        let without: Vec<f64> = groups.counts_without().outer_iter().map(|row| mean(&row.to_vec())).collect();
+        let found = groups.contributions(mean(&[1.0; 5]), &without);
+        for (found, sum) in found.iter().zip(sums) {
+            assert!((found - 5.0 * sum / 135.0).abs() < 1e-12, "{found}");
+        }
+    }
+
+    #[test]
+    fn many_blocks_are_joined() {
+        let groups = BlockGroups::new(&[60; 900]);
+        assert_eq!((groups.len(), groups.counts_without().dim()), (32, (32, 900)));
+        assert!(groups.shares.iter().all(|share| (share - 1.0 / 32.0).abs() < 2e-3));
+        assert!(groups.counts_without().column(899).iter().sum::<f64>() == 31.0);
+        assert!(BlockGroups::new(&[]).is_empty() && BlockGroups::new(&[]).contributions(1.0, &[]).is_empty());
+    }
+}
