@@ -101,7 +101,9 @@ fn networks_of_both_trainings_stand_in_one_table() {
     let metrics = |answer: &Answer| answer.json["metrics"].as_array().unwrap().clone();
     for (one, several) in metrics(&alone).iter().zip(metrics(&answer)) {
         for who in ["prediction", "mismatched_prediction", "nearest_neighbour"] {
-            assert_eq!(one["values"][who], several["values"][who], "{} {who}", one["plain_name"]);
+            // Intervals differ: all rows of a table share blocks, as long as the slowest of its errors needs.
+            let value = |metric: &Value| metric["values"][who]["value"].clone();
+            assert_eq!(value(one), value(&several), "{} {who}", one["plain_name"]);
         }
     }
     let genea = project.answer(&[&several[..], &["--convention", "genea"]].concat());

@@ -116,8 +116,14 @@ fn patience_ends_a_training_whose_score_does_not_fall() {
     let dataset = dataset(&folder.path().join("dataset"));
     let out = folder.path().join("out");
     // Steps too small to change anything: the first score is never beaten.
-    let settings =
-        GanConfig { steps: 40.into(), epoch_steps: 1.into(), patience: 3.into(), learning_rate: 1e-30.into(), lambda_gan: 0.0.into(), ..settings() };
+    let settings = GanConfig {
+        steps: 40.into(),
+        epoch_steps: 1.into(),
+        patience: 3.into(),
+        learning_rate: 1e-30.into(),
+        lambda_gan: 0.0.into(),
+        ..settings()
+    };
     let outcome = train(&dataset, &settings, &out, &Silent).unwrap();
     assert!(outcome.stopped_early && outcome.steps < 40, "{outcome:?}");
     assert_eq!(outcome.steps, outcome.best_step + 3);

@@ -32,7 +32,9 @@ pub fn lines(settings: &GanSettings, material: &TrainingMaterial, secs_a_step: f
 fn ending(of: &GanSettings) -> String {
     match of.patience {
         0 => String::new(),
-        epochs => format!("; ends after {epochs} validations without a better score, when more training no longer helps"),
+        epochs => {
+            format!("; ends after {epochs} validations without a better score, when more training no longer helps")
+        }
     }
 }
 

@@ -54,13 +54,8 @@ pub const PAPER: RecipeValues = RecipeValues {
     patience: 0,
 };
 
-const BASE: RecipeValues = RecipeValues {
-    steps: 1_800.0,
-    learning_rate: 5e-4,
-    lambda_gan: 0.15,
-    epoch_steps: 100,
-    ..PAPER
-};
+const BASE: RecipeValues =
+    RecipeValues { steps: 1_800.0, learning_rate: 5e-4, lambda_gan: 0.15, epoch_steps: 100, ..PAPER };
 
 /// Values at so many minutes of training speech, from few to many.
 pub const AUTO: [(f64, RecipeValues); 4] = [
