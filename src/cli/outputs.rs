@@ -23,6 +23,17 @@ pub fn outputs(out: &[PathBuf], is_read: impl Fn(&Path) -> bool, input: &str, hi
     out.iter().map(|path| Ok((path.clone(), ExportFormat::from_path(path)?))).collect()
 }
 
+/// A file's name for a take: `motion.bvh` becomes `motion-2.bvh`.
+pub fn of_take(path: &Path, take: usize) -> PathBuf {
+    let mut name = path.file_stem().unwrap_or_default().to_os_string();
+    name.push(format!("-{take}"));
+    if let Some(ending) = path.extension() {
+        name.push(".");
+        name.push(ending);
+    }
+    path.with_file_name(name)
+}
+
 /// Whether two paths lead to one file.
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     a == b || a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))

@@ -29,9 +29,18 @@ pub struct GestureGenerator {
 impl GestureGenerator {
     /// Opens a checkpoint of `orator train gan`: a file, or the folder of a training (its best checkpoint).
     pub fn open(path: &Path) -> Result<Self> {
+        Self::open_take(path, None)
+    }
+
+    /// As `open`; with a seed, one of the different takes of a speech (`variant`). Errors as well on a checkpoint that was
+    /// trained without dropout.
+    pub fn open_take(path: &Path, seed: Option<u64>) -> Result<Self> {
         let file = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
         ensure!(file.is_file(), "there is no checkpoint {}; `orator train gan` writes one", file.display());
-        let (metadata, generator) = model::load(&file)?;
+        let (metadata, generator) = match seed {
+            Some(seed) => model::load_variant(&file, seed)?,
+            None => model::load(&file)?,
+        };
         Ok(Self { metadata, generator })
     }
 

@@ -7,5 +7,6 @@ pub mod normalisation;
 pub mod representation;
 pub mod seq2seq;
 pub mod trained;
+pub mod variant;
 
 pub use generator::GestureGenerator;

@@ -3,6 +3,7 @@
 use super::normalisation::Normalisation;
 use super::representation::Representation;
 use super::seq2seq::metadata::is_sequence_kind;
+use super::variant;
 use crate::audio::mel;
 use crate::formats::checkpoint::Contents;
 use crate::motion::bones;
@@ -38,6 +39,17 @@ pub struct SpeakerMetadata {
     pub representation: Representation,
     /// Hash of the dataset it learnt from.
     pub dataset: String,
+    /// Videos it learnt from, those of the models that it began from among them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub videos: Vec<TrainedVideo>,
+}
+
+/// A video that a model learnt from.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct TrainedVideo {
+    pub speaker: String,
+    /// BLAKE3 of the file, as the dataset has it.
+    pub content: String,
 }
 
 /// Parameters of the spectrogram.
@@ -87,6 +99,7 @@ impl SpeakerMetadata {
             normalisation,
             representation,
             dataset: dataset.to_owned(),
+            videos: Vec::new(),
         }
     }
 
@@ -103,6 +116,15 @@ impl SpeakerMetadata {
 pub fn load(path: &Path) -> Result<(SpeakerMetadata, Generator)> {
     let contents = Contents::read(path)?;
     build(&contents).with_context(|| format!("{} is no checkpoint of `orator train gan`", path.display()))
+}
+
+/// As [`load`], the take of a speech that `seed` stands for (`variant`).
+pub fn load_variant(path: &Path, seed: u64) -> Result<(SpeakerMetadata, Generator)> {
+    let mut contents = Contents::read(path)?;
+    // First, so that a file of another kind is named as such.
+    build(&contents).with_context(|| format!("{} is no checkpoint of `orator train gan`", path.display()))?;
+    variant::vary(&mut contents, seed).with_context(|| format!("{} has no takes", path.display()))?;
+    build(&contents)
 }
 
 fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {

@@ -11,7 +11,7 @@ use crate::formats::transcript::Word;
 use crate::types::pose3d::Motion;
 use crate::types::sound::{SAMPLE_RATE, Sound};
 use crate::types::time::FrameRate;
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 use std::path::Path;
 
 /// Checkpoint of `orator train gan` or of `orator train seq2seq`.
@@ -37,6 +37,18 @@ impl TrainedSpeaker {
             true => Self::Sequence(Box::new(SequenceGenerator::open(path)?)),
             false => Self::Gan(Box::new(GestureGenerator::open(path)?)),
         })
+    }
+
+    /// Opens a checkpoint as `open` does, as the take of a speech that `seed` stands for. Errors where a network has one take
+    /// only.
+    pub fn open_take(path: &Path, seed: u64) -> Result<Self> {
+        match Self::open(path)? {
+            Self::Gan(_) => Ok(Self::Gan(Box::new(GestureGenerator::open_take(path, Some(seed))?))),
+            Self::Sequence(_) => bail!(
+                "{} is of `orator train seq2seq`, which has one take of a speech: leave out --seed and --variants",
+                path.display()
+            ),
+        }
     }
 
     /// The speaker's name.

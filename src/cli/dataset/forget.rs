@@ -73,7 +73,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         done.with_context(|| format!("{what} is forgotten by half; run the same command again to finish"))?;
     }
     let terms: Vec<_> = task.removals.iter().flat_map(|removal| removal.terms.clone()).collect();
-    let searched = search(&task.folders, &terms).context("nothing is proved")?;
+    let mut searched = search(&task.folders, &terms).context("nothing is proved")?;
+    // A model that is kept lists what it learnt from; it is named as kept.
+    searched.places.retain(|place| !kept.iter().any(|model| Path::new(&place.file).starts_with(model)));
     let mut text = match lines.is_empty() {
         true => vec![format!("nothing of {what} was there")],
         false => vec![format!("forgotten: {what}"), format!("  {}", lines.join("\n  "))],
@@ -158,6 +160,12 @@ fn of_project(args: &Args, locks: &mut Vec<FolderLock>) -> Result<ForgetTask> {
     }
     let others: Vec<&KnownVideo> = all.iter().filter(|k| !videos.contains(k)).collect();
     let removal = Removal::of_work(work, &speaker, &videos, &others, whole)?;
+    if is_locked {
+        let own = models_dirs(work, &speaker);
+        for folder in removal.models.iter().filter(|folder| !own.contains(folder)) {
+            locks.push(FolderLock::exclusive(folder).context(NOT_NOW)?);
+        }
+    }
     let mut advice: Vec<String> = Vec::new();
     for video in &videos {
         let twins = others.iter().filter(|other| video.content.is_some() && other.content == video.content);

@@ -4,7 +4,7 @@ use super::batch;
 use crate::cli::Outcome;
 use crate::cli::confine::confine;
 use crate::cli::figure_args::FigureArgs;
-use crate::cli::outputs::{is_same_file, names, next_output, outputs};
+use crate::cli::outputs::{OutputFiles, is_same_file, names, next_output, of_take, outputs};
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
 use orator::generate::seq2seq::metadata::is_sequence;
@@ -43,6 +43,12 @@ pub struct Args {
     /// Let a sequence-to-sequence network keep its decoder's state from one segment to the next.
     #[arg(long)]
     carry_state: bool,
+    /// Another take of the speech: a number, of which each gives other motion and the same one always the same.
+    #[arg(long, value_name = "N", requires = "audio")]
+    seed: Option<u64>,
+    /// So many different takes, of the seeds from --seed (or 1) on: `motion.bvh` becomes `motion-1.bvh`, `motion-2.bvh`, ...
+    #[arg(long, value_name = "K", requires = "audio", value_parser = clap::value_parser!(u64).range(1..=1000))]
+    variants: Option<u64>,
     /// What to write; may be given several times.
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "audio")]
     out: Vec<PathBuf>,
@@ -67,24 +73,37 @@ pub struct Args {
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let Some(audio) = &args.audio else { return batch::run(&batch(args)?, ui) };
-    confine(args.out.iter().map(PathBuf::as_path), args.checkpoint.as_deref());
+    let takes = takes(&args);
+    let files: Vec<Vec<PathBuf>> = takes.iter().map(|take| take.files(&args.out)).collect();
+    confine(files.iter().flatten().map(PathBuf::as_path), args.checkpoint.as_deref());
     let Some(given) = &args.checkpoint else { bail!("give --checkpoint") };
-    let outputs = outputs(&args.out, |path| is_same_file(path, audio), "the speech itself", "")?;
-    args.figure.check(&outputs)?;
+    let outputs: Vec<OutputFiles> = files
+        .iter()
+        .map(|files| outputs(files, |path| is_same_file(path, audio), "the speech itself", ""))
+        .collect::<Result<_>>()?;
+    outputs.iter().try_for_each(|outputs| args.figure.check(outputs))?;
     let checkpoint = checkpoint_file(given)?;
     if checkpoint != *given {
         ui.say(&format!("checkpoint {}", checkpoint.display()));
     }
     let _lock = model_lock(&checkpoint)?;
-    let trained = TrainedSpeaker::open(&checkpoint)?;
     let (seams, figure) = (seams(args.carry_state), args.figure.options());
     let source = SpeechSource { audio, transcript: args.transcript.as_deref(), seams, figure };
-    let written = speaker::write(&trained, &source, &outputs, ui)?;
-    let speed = written.secs / written.motion_secs.max(1e-6);
-    let names = names(&outputs);
+    let mut made = Vec::new();
+    for (take, outputs) in takes.iter().zip(&outputs) {
+        let trained = match take.seed {
+            Some(seed) => TrainedSpeaker::open_take(&checkpoint, seed)?,
+            None => TrainedSpeaker::open(&checkpoint)?,
+        };
+        made.push((speaker::write(&trained, &source, outputs, ui)?, trained));
+    }
+    let Some((written, trained)) = made.first() else { bail!("no take was asked for") };
+    let speed = written.secs * made.len() as f64 / made.iter().map(|made| made.0.motion_secs).sum::<f64>().max(1e-6);
+    let names: Vec<String> = outputs.iter().flat_map(names).collect();
     let note = written.note.as_ref().map_or(String::new(), |note| format!("note: {note}\n"));
+    let n_takes = if made.len() > 1 { format!("{} takes of ", made.len()) } else { String::new() };
     let text = format!(
-        "{:.1} s of speech, {} frames of {} at {}, {speed:.0} x real time\n{note}{}wrote {}",
+        "{n_takes}{:.1} s of speech, {} frames of {} at {}, {speed:.0} x real time\n{note}{}wrote {}",
         written.secs,
         written.n_frames,
         trained.name(),
@@ -94,11 +113,13 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     );
     let said = args.transcript.as_ref().map_or(String::new(), |path| format!(" --transcript {}", path.display()));
     let carried = if args.carry_state { " --carry-state" } else { "" };
+    let seed = takes.first().and_then(|take| take.seed).map_or(String::new(), |seed| format!(" --seed {seed}"));
     // A captured skeleton is written as .bvh alone.
-    let next = next_output(&outputs).filter(|_| !trained.is_captured()).map(|out| {
+    let next = outputs.first().and_then(next_output).filter(|_| !trained.is_captured()).map(|out| {
         let (checkpoint, audio, out) = (given.display(), audio.display(), out.display());
-        format!("orator generate --checkpoint {checkpoint} --audio {audio}{said}{carried} --out {out}")
+        format!("orator generate --checkpoint {checkpoint} --audio {audio}{said}{carried}{seed} --out {out}")
     });
+    let seeds: Vec<Option<u64>> = takes.iter().map(|take| take.seed).collect();
     let facts = json!({
         "audio_secs": written.secs,
         "n_frames": written.n_frames,
@@ -107,12 +128,41 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         "checkpoint": checkpoint,
         "speaker": trained.name(),
         "segments": written.segments,
+        "seeds": seeds,
         "outputs": names,
         "note": written.note,
         "next": next,
     });
     ui.summary(&text, next.as_deref(), facts);
     Ok(Outcome::Done)
+}
+
+/// A take of the speech.
+struct Take {
+    /// `None`: the network as it was trained.
+    seed: Option<u64>,
+    /// From 1, where there are several.
+    number: Option<usize>,
+}
+
+impl Take {
+    /// Files of this take.
+    fn files(&self, out: &[PathBuf]) -> Vec<PathBuf> {
+        let file = |path: &PathBuf| self.number.map_or_else(|| path.clone(), |number| of_take(path, number));
+        out.iter().map(file).collect()
+    }
+}
+
+/// The takes asked for.
+fn takes(args: &Args) -> Vec<Take> {
+    match (args.seed, args.variants) {
+        (seed, None) => vec![Take { seed, number: None }],
+        (seed, Some(n)) => {
+            let first = seed.unwrap_or(1);
+            let take = |i: u64| Take { seed: Some(first.wrapping_add(i)), number: Some(i as usize + 1) };
+            (0..n).map(take).collect()
+        }
+    }
 }
 
 /// Lines on seams, and on the words that were read.

@@ -34,6 +34,10 @@ pub struct Args {
     /// Steps to train altogether, instead of `gan.steps`.
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
+    /// Begin with another speaker's model: a checkpoint of `orator train gan`, or its folder. Normalisation and skeleton are
+    /// the new speaker's. No effect on a training that goes on.
+    #[arg(long, value_name = "FILE|FOLDER")]
+    from: Option<PathBuf>,
     /// Folder of the checkpoints; `work/gan/<speaker>` when left out.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -55,7 +59,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let start = Instant::now();
     let poses = || pairs(&dataset, &GestureGenerator::open(&out.join(train::BEST))?);
     let mut page = WatchedPage::new(&out, dataset.info().speaker.clone(), Box::new(poses), ui);
-    let outcome = train::train_watched(&dataset, &settings, &out, ui, &mut |at| page.update(at))?;
+    let outcome = train::train_watched(&dataset, &settings, args.from.as_deref(), &out, ui, &mut |at| page.update(at))?;
     let steps_per_sec = (outcome.steps - outcome.began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
     let page = page.finish(ValidatedStep { step: outcome.steps, best_step: outcome.best_step });
     let text = format!(

@@ -6,6 +6,7 @@ use super::dataset;
 use super::known::KnownVideo;
 use super::search::SearchTerm;
 use crate::dataset::split::SplitRecord;
+use crate::formats::checkpoint;
 use crate::stage::artifacts;
 use crate::stage::artifacts::{StageName, speaker_dir};
 use crate::stage::fingerprint::hash_file;
@@ -21,6 +22,29 @@ pub const PENDING: &str = "FORGETTING.txt";
 /// The folders that a speaker's models are trained into, if no others are named.
 pub fn models_dirs(work: &Path, speaker: &str) -> [PathBuf; 2] {
     ["gan", "seq2seq"].map(|kind| work.join(kind).join(speaker))
+}
+
+/// Folders of models, of any speaker, that say that they learnt from one of the videos, or began with a model that did.
+///
+/// # Errors
+/// A folder that cannot be listed.
+pub fn models_that_learnt_from(work: &Path, videos: &[&KnownVideo]) -> Result<Vec<PathBuf>> {
+    let contents: BTreeSet<&str> = videos.iter().filter_map(|video| video.content.as_deref()).collect();
+    let mut folders = Vec::new();
+    for kind in ["gan", "seq2seq"] {
+        for folder in listed(&work.join(kind))? {
+            let mut checkpoints = listed(&folder)?;
+            checkpoints.retain(|path| path.extension().is_some_and(|ending| ending == "safetensors"));
+            // All of a folder list the same videos; a file that cannot be read is left to the search.
+            let facts = checkpoints.iter().find_map(|path| checkpoint::facts(path).ok()).unwrap_or_default();
+            let listed = facts["speaker"]["videos"].as_array().into_iter().flatten();
+            let mut hashes = listed.filter_map(|video| video["content"].as_str());
+            if hashes.any(|hash| contents.contains(hash)) {
+                folders.push(folder);
+            }
+        }
+    }
+    Ok(folders)
 }
 
 /// Data to remove for some videos of a speaker, or for all.
@@ -78,6 +102,10 @@ impl Removal {
         let has_samples = names.iter().any(|name| dataset::has_samples(&dir, name));
         let models = models_dirs(work, speaker).into_iter();
         removal.models.extend(models.filter(|models| models.exists() && (whole || has_samples)));
+        let others = models_that_learnt_from(work, videos)?;
+        removal.models.extend(others);
+        removal.models.sort();
+        removal.models.dedup();
         let left_over = workdir::left_over(&dir);
         if !names.is_empty() || (whole && dir.exists()) || dir.join(PENDING).exists() {
             removal.dataset = Some((dir.clone(), names));

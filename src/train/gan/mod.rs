@@ -7,6 +7,7 @@ pub mod block_metrics;
 pub mod losses;
 pub mod recipe;
 pub mod score;
+pub mod start;
 pub mod step;
 pub mod train;
 pub mod validate;

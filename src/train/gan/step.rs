@@ -253,6 +253,19 @@ impl GanTrainer {
         Ok(serde_json::to_value(TrainerState { speaker, settings, step: self.step, best: self.best })?)
     }
 
+    /// Takes over the weights of another speaker's generator, and of the discriminator where its checkpoint has one.
+    pub fn begin_with(&self, generator: &BTreeMap<String, Tensor>, other: &Contents) -> Result<()> {
+        self.generator_params.load(generator)?;
+        if let Some((_, mean)) = &self.mean {
+            mean.load(generator)?;
+        }
+        let discriminator = other.part(DISCRIMINATOR);
+        if !discriminator.is_empty() {
+            self.discriminator_params.load(&discriminator)?;
+        }
+        Ok(())
+    }
+
     /// Takes up the tensors and the place of a checkpoint.
     pub fn load(&mut self, stored: &TrainerState, contents: &Contents) -> Result<()> {
         match &self.mean {

@@ -7,6 +7,7 @@ use super::recipe::account;
 use super::recipe::material::TrainingMaterial;
 use super::recipe::settings::GanSettings;
 use super::score::Validation;
+use super::start::{self, StartingModel};
 use super::step::{GanTrainer, Losses, TrainerState};
 use super::validate::ValidationIntervals;
 use super::windows::{WindowLoader, needed};
@@ -67,13 +68,15 @@ pub fn train(
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<TrainingOutcome> {
-    train_watched(dataset, requested, folder, progress, &mut |_| ())
+    train_watched(dataset, requested, None, folder, progress, &mut |_| ())
 }
 
-/// [`train`], with a call behind each validation, when log and checkpoints are written.
+/// [`train`], with a call behind each validation, when log and checkpoints are written. `from`: the checkpoint of another
+/// speaker, or its folder, that a training begins with; one that goes on has begun.
 pub fn train_watched(
     dataset: &Dataset,
     requested: &GanConfig,
+    from: Option<&Path>,
     folder: &Path,
     progress: &dyn Progress,
     validated: &mut dyn FnMut(ValidatedStep),
@@ -88,6 +91,10 @@ pub fn train_watched(
     let _model = FolderLock::shared(folder)?;
     let _lock = workdir::lock(folder)?;
     let resumed = resume(dataset, requested, folder, progress)?;
+    let start = from.filter(|_| resumed.is_none()).map(StartingModel::read).transpose()?;
+    if let Some(start) = &start {
+        progress.say(&format!("beginning with {}", start.account()));
+    }
     let window_frames = resumed.as_ref().map_or(requested.window_frames, |(stored, _)| stored.settings.window_frames);
     // Before the statistics, of which an empty split has none.
     no_window::ensure_window(dataset, needed(window_frames))?;
@@ -96,7 +103,7 @@ pub fn train_watched(
         None => {
             let channels = channels(dataset, &requested.channels)?;
             let material = TrainingMaterial::measure(dataset, window_frames);
-            let settings = GanSettings::new(requested, &material);
+            let settings = GanSettings::new(requested, &material, start.is_some());
             (settings, Normalisation { channels, ..normalisation(dataset)? })
         }
     };
@@ -113,8 +120,12 @@ pub fn train_watched(
             };
             let network = Config::from_preset(preset(settings.preset), normal.n_numbers());
             let (info, hash) = (dataset.info(), dataset.hash()?);
-            let metadata = SpeakerMetadata::new(&info.speaker, info.fps, &hash, network, normal, representation);
-            GanTrainer::new(metadata, settings)?
+            let mut metadata = SpeakerMetadata::new(&info.speaker, info.fps, &hash, network, normal, representation);
+            metadata.videos = start::videos(dataset);
+            match &start {
+                None => GanTrainer::new(metadata, settings)?,
+                Some(start) => start.begin(metadata, settings)?,
+            }
         }
     };
     if let Some((stored, contents)) = &resumed {
@@ -261,6 +272,9 @@ fn resume(
                     .to_owned(),
             );
             metadata.dataset = hash;
+            metadata.videos.extend(start::videos(dataset));
+            metadata.videos.sort();
+            metadata.videos.dedup();
         }
         Ok((stored, differences))
     })

@@ -78,9 +78,9 @@ fn silence() -> f64 {
 
 impl GanSettings {
     /// What was asked for, and what its recipe chooses for this much speech. The adversarial loss and the fade follow the
-    /// number of steps that counts.
-    pub fn new(asked: &GanConfig, material: &TrainingMaterial) -> Self {
-        let values = RecipeValues::of(asked.recipe, material);
+    /// number of steps that counts. `has_start`: the training begins with another speaker's model.
+    pub fn new(asked: &GanConfig, material: &TrainingMaterial, has_start: bool) -> Self {
+        let values = RecipeValues::of(asked.recipe, material, has_start);
         let steps = asked.steps.or(values.steps as usize);
         let of_steps = |share: f64| (share * steps as f64).round() as usize;
         let epoch_steps = asked.epoch_steps.or(values.epoch_steps);

@@ -65,12 +65,18 @@ pub const AUTO: [(f64, RecipeValues); 4] = [
     (120.0, RecipeValues { steps: 4_500.0, ..BASE }),
 ];
 
+/// Learning rate of a network that has learnt another speaker, as a share of one that knows nothing.
+const RATE_OF_A_START: f64 = 0.5;
+
 impl RecipeValues {
-    /// What `recipe` chooses for this much speech.
-    pub fn of(recipe: GanRecipe, material: &TrainingMaterial) -> Self {
-        match recipe {
-            GanRecipe::Paper => PAPER,
-            GanRecipe::Auto => auto(material.minutes()),
+    /// What `recipe` chooses for this much speech; `has_start`: for a network that has learnt another speaker already.
+    pub fn of(recipe: GanRecipe, material: &TrainingMaterial, has_start: bool) -> Self {
+        match (recipe, auto(material.minutes())) {
+            (GanRecipe::Paper, _) => PAPER,
+            (GanRecipe::Auto, values) if has_start => {
+                RecipeValues { learning_rate: values.learning_rate * RATE_OF_A_START, ..values }
+            }
+            (GanRecipe::Auto, values) => values,
         }
     }
 }
