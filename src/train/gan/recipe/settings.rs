@@ -142,3 +142,65 @@ impl GanSettings {
         self.lambda_gan * share.min(1.0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings(asked: GanConfig) -> GanSettings {
+        GanSettings::new(&asked, &TrainingMaterial { train_secs: 600.0, validation_secs: 60.0 }, false)
+    }
+
+    #[test]
+    fn what_is_given_counts_and_the_rest_follows_the_steps() {
+        let asked = GanConfig { steps: 400.into(), dropout: 0.0.into(), batch: 8.into(), ..GanConfig::default() };
+        let of = settings(asked);
+        assert_eq!((of.steps, of.dropout, of.batch), (400, 0.0, 8));
+        assert!((of.rate(of.steps) - of.learning_rate * of.fade_to).abs() < 1e-12);
+        let chosen = settings(GanConfig::default());
+        assert!(chosen.steps > 400 && chosen.dropout > 0.0);
+    }
+
+    #[test]
+    fn the_rate_rises_along_a_line_and_falls_along_half_a_cosine() {
+        let of = GanSettings {
+            learning_rate: 1.0,
+            warmup_steps: 9,
+            fade_to: 0.1,
+            steps: 109,
+            ..settings(GanConfig::default())
+        };
+        assert_eq!((of.rate(0), of.rate(4), of.rate(9)), (0.1, 0.5, 1.0));
+        assert!((of.rate(59) - 0.55).abs() < 1e-12 && (of.rate(109) - 0.1).abs() < 1e-12);
+        assert!((of.rate(500) - 0.1).abs() < 1e-12, "a training that goes on behind its last step");
+        let still = settings(GanConfig { recipe: GanRecipe::Paper, ..GanConfig::default() });
+        assert_eq!((still.rate(0), still.rate(70_000)), (1e-4, 1e-4));
+    }
+
+    #[test]
+    fn the_adversarial_loss_comes_when_it_is_told_to() {
+        let of = GanSettings {
+            lambda_gan: 0.5,
+            adversarial_from: 100,
+            adversarial_ramp: 9,
+            ..settings(GanConfig::default())
+        };
+        let weights = [0, 99, 100, 104, 109, 1_000].map(|step| of.adversarial_weight(step));
+        assert_eq!(weights, [0.0, 0.0, 0.05, 0.25, 0.5, 0.5]);
+        let always = GanSettings { adversarial_from: 0, adversarial_ramp: 0, ..of };
+        assert_eq!(always.adversarial_weight(0), 0.5);
+    }
+
+    #[test]
+    fn settings_of_versions_without_recipes_are_read() {
+        let mut stored =
+            serde_json::to_value(settings(GanConfig { recipe: GanRecipe::Paper, ..GanConfig::default() })).unwrap();
+        let written = stored.clone();
+        for key in ["recipe", "warmup_steps", "fade_to", "adversarial_from", "adversarial_ramp", "ema_decay", "dropout"]
+        {
+            stored.as_object_mut().unwrap().remove(key);
+        }
+        let read: GanSettings = serde_json::from_value(stored).unwrap();
+        assert_eq!(serde_json::to_value(read).unwrap(), written);
+    }
+}
