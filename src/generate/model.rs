@@ -123,7 +123,7 @@ pub fn load_variant(path: &Path, seed: u64) -> Result<(SpeakerMetadata, Generato
     let mut contents = Contents::read(path)?;
     // First, so that a file of another kind is named as such.
     build(&contents).with_context(|| format!("{} is no checkpoint of `orator train gan`", path.display()))?;
-    variant::vary(&mut contents, seed).with_context(|| format!("{} has no takes", path.display()))?;
+    variant::vary(&mut contents, GENERATOR, seed).with_context(|| format!("{} has no takes", path.display()))?;
     build(&contents)
 }
 

@@ -2,7 +2,6 @@
 //! et al. 2014) are left out for the whole of a take. Each take is then one network of those that were trained, hears as
 //! they do, and has no seams, however long the sound.
 
-use super::model::GENERATOR;
 use crate::formats::checkpoint::Contents;
 use anyhow::{Result, ensure};
 use candle_core::{DType, Tensor};
@@ -13,18 +12,18 @@ use rand_chacha::ChaCha8Rng;
 const FIRST_LAYER: &str = "enter.0.conv.weight";
 
 /// Leaves out channels of the encoded sound of a checkpoint of `orator train gan`, by this seed, each with the probability
-/// of its training's dropout. The same seed leaves out the same.
+/// of its training's dropout. The same seed leaves out the same. The names of the generator's tensors begin with `prefix`.
 ///
 /// # Errors
 /// A checkpoint that was trained without dropout, whose takes would only be worse.
-pub fn vary(contents: &mut Contents, seed: u64) -> Result<()> {
+pub fn vary(contents: &mut Contents, prefix: &str, seed: u64) -> Result<()> {
     let dropout = contents.facts["settings"]["dropout"].as_f64().unwrap_or(0.0);
     ensure!(
         dropout > 0.0 && dropout < 1.0,
         "it was trained without dropout, so that it has one take of a speech only: leave out --seed and --variants, or train \
          with gan.recipe = \"auto\", or with a gan.dropout"
     );
-    let name = format!("{GENERATOR}{FIRST_LAYER}");
+    let name = format!("{prefix}{FIRST_LAYER}");
     let Some(weight) = contents.tensors.get_mut(&name) else { anyhow::bail!("tensor {name} is missing") };
     let (_, n_channels, _) = weight.dims3()?;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -44,7 +43,7 @@ mod tests {
         let weight = Tensor::ones((2, 64, 3), DType::F32, &Device::Cpu).unwrap();
         Contents {
             facts: serde_json::json!({ "settings": { "dropout": dropout } }),
-            tensors: BTreeMap::from([(format!("{GENERATOR}{FIRST_LAYER}"), weight)]),
+            tensors: BTreeMap::from([(format!("generator.{FIRST_LAYER}"), weight)]),
         }
     }
 
@@ -52,7 +51,7 @@ mod tests {
     fn a_seed_leaves_out_its_channels_whole() -> Result<()> {
         let varied = |seed| -> Result<Vec<f32>> {
             let mut contents = contents(0.25);
-            vary(&mut contents, seed)?;
+            vary(&mut contents, "generator.", seed)?;
             Ok(contents
                 .tensors
                 .into_values()
@@ -66,7 +65,7 @@ mod tests {
         assert!(n_dropped.is_multiple_of(6) && (30..180).contains(&n_dropped), "{n_dropped}");
         assert!(first.iter().all(|value| *value == 0.0 || (value - 4.0 / 3.0).abs() < 1e-6));
         assert!(first == varied(1)? && first != varied(2)?);
-        assert!(vary(&mut contents(0.0), 1).is_err());
+        assert!(vary(&mut contents(0.0), "generator.", 1).is_err());
         Ok(())
     }
 }

@@ -81,9 +81,27 @@ const TEN_MINUTES: RecipeValues = RecipeValues {
 
 /// Values at so many minutes of training speech, from few to many.
 pub const AUTO: [(f64, RecipeValues); 4] = [
-    (2.0, RecipeValues { steps: 450.0, ema_decay: 0.98, epoch_steps: 50, patience: 5, ..TEN_MINUTES }),
+    (
+        2.0,
+        RecipeValues {
+            steps: 450.0,
+            lambda_gan: 0.05,
+            ema_decay: 0.98,
+            dropout: 0.5,
+            weight_decay: 0.3,
+            augment_speed: 0.1,
+            augment_pitch: 2.0,
+            augment_gain_db: 6.0,
+            augment_noise_db: -15.0,
+            augment_mask_bands: 16.0,
+            augment_mask_secs: 0.25,
+            epoch_steps: 50,
+            patience: 5,
+            ..TEN_MINUTES
+        },
+    ),
     (10.0, TEN_MINUTES),
-    (30.0, RecipeValues { steps: 2_400.0, dropout: 0.2, ..TEN_MINUTES }),
+    (30.0, RecipeValues { steps: 1_800.0, dropout: 0.25, ..TEN_MINUTES }),
     (
         120.0,
         RecipeValues {
@@ -155,7 +173,7 @@ mod tests {
         }
         assert_eq!((of(0.1), of(10_000.0)), (AUTO[0].1, AUTO[3].1));
         let (few, some, many) = (of(10.0), of(17.32), of(30.0));
-        assert_eq!(some.steps, 1_800.0);
+        assert_eq!(some.steps, 1_500.0);
         assert!(few.dropout > some.dropout && some.dropout > many.dropout);
         for minutes in [0.5, 3.0, 5.0, 17.0, 60.0, 90.0] {
             let row = of(minutes);
