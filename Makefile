@@ -64,7 +64,7 @@ prove-study:
 # they cannot be had, a figure in a suit of markers. DEMO: the folder; DRAW and STEPS: how much of it.
 DEMO := $(TARGET)/demo
 DRAW :=
-STEPS := 600
+STEPS :=
 
 demo: build
 	@if $(ORATOR) models fetch --models-dir $(ORATOR_MODELS); then \
@@ -74,7 +74,7 @@ demo: build
 		echo 'The models for real people cannot be had (no network, or no npm): the speaker wears a suit of markers.'; \
 		$(ORATOR) demo draw $(DEMO) $(DRAW) && $(ORATOR) run -c $(DEMO)/pipeline.toml; \
 	fi
-	$(ORATOR) train gan -c $(DEMO)/pipeline.toml --steps $(STEPS)
+	$(ORATOR) train gan -c $(DEMO)/pipeline.toml $(if $(STEPS),--steps $(STEPS))
 	$(ORATOR) generate --checkpoint $(DEMO)/work/gan/host --audio $(DEMO)/speech.wav \
 		--out $(addprefix $(DEMO)/motion.,npy bvh glb mp4)
 	$(ORATOR) demo sheet $(DEMO) --motion $(DEMO)/motion.npy --out $(DEMO)/contact_sheet.png

@@ -283,3 +283,30 @@ fn terms(videos: &[&KnownVideo], others: &[&KnownVideo]) -> Vec<SearchTerm> {
     }
     terms
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::checkpoint::Contents;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn a_model_that_began_with_one_of_the_videos_is_found() {
+        let work = tempfile::tempdir().unwrap();
+        let model = |name: &str, hashes: &[&str]| {
+            let videos: Vec<_> =
+                hashes.iter().map(|hash| serde_json::json!({"speaker": "a", "content": hash})).collect();
+            let facts = serde_json::json!({ "speaker": { "videos": videos } });
+            let folder = work.path().join("gan").join(name);
+            fs::create_dir_all(&folder).unwrap();
+            Contents { facts, tensors: BTreeMap::new() }.write(&folder.join("best.safetensors")).unwrap();
+            folder
+        };
+        let (both, _other) = (model("ben", &["aa11", "bb22"]), model("cleo", &["cc33"]));
+        fs::write(work.path().join("gan/ben/step-0000001.safetensors"), "half").unwrap();
+        let video = KnownVideo { content: Some("aa11".to_owned()), ..KnownVideo::default() };
+        assert_eq!(models_that_learnt_from(work.path(), &[&video]).unwrap(), [both]);
+        let unknown = KnownVideo::default();
+        assert!(models_that_learnt_from(work.path(), &[&unknown]).unwrap().is_empty());
+    }
+}

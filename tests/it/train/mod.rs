@@ -1,6 +1,7 @@
 //! Operators, networks, training.
 
 pub mod channels;
+pub mod from_another;
 pub mod gan;
 pub mod gan_program;
 pub mod networks;

@@ -1,9 +1,7 @@
 //! The synthetic speaker with a known rule, by the program: what its dataset must be like before anything is trained on it.
-//! That a training learns the rule is proved by the commands in `fixtures/rule.toml`.
+//! That the defaults learn the rule is proved by `make prove-rule`.
 
-use orator::config::{MotionRepresentation, NetworkPreset};
 use serde_json::Value;
-use std::path::Path;
 use std::process::Command;
 
 fn answer(args: &[&str]) -> Value {
@@ -35,12 +33,4 @@ fn neither_the_mean_pose_nor_the_sound_of_the_moment_explains_the_gestures() {
     let data = row("the data itself");
     assert!((number(&data, "/poses/energy") - 1.0).abs() < 1e-9 && number(&data, "/poses/l1") == 0.0, "{data}");
     assert!(number(&data, "/speed_correlation/1") < 0.95, "without variation there is nothing to tell apart: {data}");
-}
-
-#[test]
-fn the_settings_of_the_proof_are_settings() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/rule.toml");
-    let gan = orator::config::load(&file, &[]).unwrap().settings.gan;
-    assert_eq!((gan.preset, gan.representation), (NetworkPreset::Light, MotionRepresentation::Bones));
-    assert!(gan.lambda_gan.given().is_some_and(|weight| weight > 0.0));
 }

@@ -1,0 +1,88 @@
+//! A training that begins with another speaker's model: weights of the one, normalisation and skeleton of the other, and the
+//! videos of both in the list.
+
+use crate::fixtures::faults::stop::{Shared, Stop, bytes};
+use crate::fixtures::gesture_dataset::{FPS, sample};
+use crate::fixtures::write_dataset::write_dataset;
+use orator::config::{GanConfig, NetworkPreset};
+use orator::dataset::{Dataset, Split};
+use orator::formats::checkpoint;
+use orator::generate::GestureGenerator;
+use orator::generate::model::BEST;
+use orator::stage::progress::Silent;
+use orator::train::epochs::ValidatedStep;
+use orator::train::gan::train::{train, train_watched};
+use std::path::Path;
+
+fn speaker(folder: &Path, name: &str, phase: f64) -> Dataset {
+    let samples = [
+        (Split::Train, sample(&format!("{name}-00000000-000000"), 128, phase)),
+        (Split::Validation, sample(&format!("{name}-00000001-000000"), 64, phase + 1.0)),
+    ];
+    let dir = folder.join(name);
+    write_dataset(&dir, name, FPS, &samples).unwrap();
+    Dataset::open(&dir).unwrap()
+}
+
+fn settings() -> GanConfig {
+    let gan = GanConfig { batch: 2.into(), window_frames: 32, checkpoint_every: 3, ..GanConfig::default() };
+    GanConfig { steps: 6.into(), epoch_steps: 3.into(), ..gan }
+}
+
+#[test]
+fn it_takes_the_weights_and_keeps_its_own_body() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let (anna, ben) = (speaker(dir, "anna", 0.0), speaker(dir, "ben", 1.5));
+    let of_anna = dir.join("anna-gan");
+    train(&anna, &settings(), &of_anna, &Silent).unwrap();
+    let stop = Stop::at(u64::MAX);
+    let ignore = &mut |_: ValidatedStep| ();
+    let of_ben = dir.join("ben-gan");
+    train_watched(&ben, &settings(), Some(&of_anna), &of_ben, &Shared(stop.clone()), ignore).unwrap();
+    let said = stop.said.lock().unwrap().join("\n");
+    assert!(said.contains("beginning with what") && said.contains("learnt of anna"), "{said}");
+
+    let model = GestureGenerator::open(&of_ben).unwrap().metadata;
+    assert_eq!(model.name, "ben");
+    let alone = dir.join("ben-alone");
+    train(&ben, &settings(), &alone, &Silent).unwrap();
+    let own = GestureGenerator::open(&alone).unwrap().metadata;
+    assert_eq!((&model.normalisation, &model.representation), (&own.normalisation, &own.representation));
+    assert_eq!(own.videos.len(), ben.info().videos.len());
+    let speakers: Vec<&str> = model.videos.iter().map(|video| video.speaker.as_str()).collect();
+    assert!(speakers.contains(&"anna") && speakers.contains(&"ben"), "{speakers:?}");
+    let weights = |out: &Path| std::fs::read(checkpoint::path(out, 3)).unwrap();
+    assert!(weights(&of_ben) != weights(&alone), "the weights had no say");
+
+    // One that goes on has begun, and ends with the same bytes.
+    let parts = dir.join("ben-parts");
+    let half = GanConfig { warmup_steps: 0.into(), fade_to: 1.0.into(), ..settings() };
+    let whole = dir.join("ben-whole");
+    train_watched(&ben, &half, Some(&of_anna), &whole, &Silent, ignore).unwrap();
+    train_watched(&ben, &GanConfig { steps: 3.into(), ..half.clone() }, Some(&of_anna), &parts, &Silent, ignore)
+        .unwrap();
+    train_watched(&ben, &half, None, &parts, &Silent, ignore).unwrap();
+    let last = |out: &Path| std::fs::read(checkpoint::path(out, 6)).unwrap();
+    assert!(last(&whole) == last(&parts));
+    assert!(bytes(&whole).iter().any(|(name, _)| name == BEST));
+}
+
+#[test]
+fn what_cannot_be_begun_with_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let (anna, ben) = (speaker(dir, "anna", 0.0), speaker(dir, "ben", 1.5));
+    let fails = |from: &Path, settings: &GanConfig| {
+        let result = train_watched(&ben, settings, Some(from), &dir.join("out"), &Silent, &mut |_| ());
+        format!("{:#}", result.unwrap_err())
+    };
+    assert!(fails(&dir.join("nowhere"), &settings()).contains("nowhere"));
+    std::fs::create_dir(dir.join("empty")).unwrap();
+    assert!(fails(&dir.join("empty"), &settings()).contains("no checkpoint in"));
+    let of_anna = dir.join("anna-gan");
+    train(&anna, &GanConfig { steps: 2.into(), ..settings() }, &of_anna, &Silent).unwrap();
+    let paper = GanConfig { preset: NetworkPreset::Paper, ..settings() };
+    let error = fails(&of_anna, &paper);
+    assert!(error.contains("gan.preset") && error.contains(BEST), "{error}");
+}
