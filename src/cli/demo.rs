@@ -94,6 +94,9 @@ enum DemoVerb {
         /// Words that the sound does not tell apart: some send a hand to a place of their own (version 2 of the rule).
         #[arg(long)]
         words: bool,
+        /// Another speaker by the rule: other vowels send the hands to its places, after other delays. 0: the rule's own.
+        #[arg(long, value_name = "N", default_value_t = 0)]
+        habits: u64,
         /// Seed of the speech and of the speaker's variation.
         #[arg(long, default_value_t = 1)]
         seed: u64,
@@ -148,9 +151,9 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             draw(&dir, &plan, rendered, ui)
         }
         DemoVerb::Measure { dir } => measure(&dir, ui),
-        DemoVerb::Speaker { dir, hours, words, seed } => {
+        DemoVerb::Speaker { dir, hours, words, habits, seed } => {
             let rule = if words { dataset::RULE_OF_WORDS } else { dataset::RULE };
-            speak(&dir, &dataset::clips(hours, seed, rule)?, rule, ui)
+            speak(&dir, &dataset::clips(hours, seed, rule, habits)?, rule, ui)
         }
         DemoVerb::Learned { dataset, checkpoint, picture } => {
             learned(&dataset, checkpoint.as_deref(), picture.as_deref(), ui)

@@ -198,7 +198,7 @@ impl TestClip {
 
     /// The rule as if nothing were said with these sounds.
     fn without_words(&self, fps: FrameRate) -> Array3<f32> {
-        RuleGestures::new(&self.clip.speech(), &[]).motion(self.clip.n_frames, fps).joints
+        RuleGestures::of_habits(&self.clip.habits(), &self.clip.speech(), &[]).motion(self.clip.n_frames, fps).joints
     }
 }
 

@@ -54,7 +54,7 @@ impl WordPlaces {
     /// Counts the words of a clip for predicted joints [T, 49, 3] from the neck, metres.
     pub fn count(&mut self, clip: &SpokenClip, predicted: ArrayView3<f32>, fps: FrameRate) {
         let (speech, said) = (clip.speech(), clip.words());
-        let rule = RuleGestures::new(&speech, &said);
+        let rule = RuleGestures::of_habits(&clip.habits(), &speech, &said);
         let strokes: Vec<(f64, WordGesture)> =
             said.iter().filter_map(|word| gesture(&word.word).map(|gesture| (word.start_secs, gesture))).collect();
         for (n, (start, own)) in strokes.iter().enumerate() {
@@ -102,9 +102,10 @@ mod tests {
         let fps = FrameRate::new(15, 1);
         let (mut of_rule, mut of_beats) = (WordPlaces::default(), WordPlaces::default());
         for number in 0..12 {
-            let clip = SpokenClip { rule: RULE_OF_WORDS, seed: 1, split: Split::Test, number, n_frames: 900 };
+            let clip =
+                SpokenClip { rule: RULE_OF_WORDS, seed: 1, split: Split::Test, number, n_frames: 900, habits: 0 };
             of_rule.count(&clip, clip.predictable().joints.view(), fps);
-            let beats = RuleGestures::new(&clip.speech(), &[]).motion(clip.n_frames, fps);
+            let beats = RuleGestures::of_habits(&clip.habits(), &clip.speech(), &[]).motion(clip.n_frames, fps);
             of_beats.count(&clip, beats.joints.view(), fps);
         }
         assert!(of_rule.all.n_words > 80 && of_rule.alone.n_words > 10, "{of_rule:?}");

@@ -2,6 +2,7 @@
 //! Each clip follows from seed, split and number alone, so splits share neither speech nor variation, and its
 //! predictable part can be computed again.
 
+use super::habits::Habits;
 use super::rule::RuleGestures;
 use super::words;
 use crate::dataset::bones::VideoBones;
@@ -52,6 +53,13 @@ pub struct SpokenClip {
     pub split: Split,
     pub number: usize,
     pub n_frames: usize,
+    /// Number of the speaker's habits.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub habits: u64,
+}
+
+fn is_zero(number: &u64) -> bool {
+    *number == 0
 }
 
 impl SpokenClip {
@@ -68,6 +76,11 @@ impl SpokenClip {
         let Self { rule, seed, split, number, .. } = self;
         let hash = blake3::hash(format!("{rule} {seed} {} {number} {purpose}", split.name()).as_bytes());
         ChaCha8Rng::from_seed(*hash.as_bytes())
+    }
+
+    /// Habits of its speaker.
+    pub fn habits(&self) -> Habits {
+        Habits::numbered(self.habits)
     }
 
     /// Speech of the clip.
@@ -95,19 +108,22 @@ impl SpokenClip {
     /// Motion of the clip: rule and variation.
     pub fn motion(&self) -> Motion {
         let rng = &mut self.rng("whims");
-        RuleGestures::with_variation(&self.speech(), &self.words(), self.secs(), rng).motion(self.n_frames, FPS)
+        let (speech, words) = (self.speech(), self.words());
+        RuleGestures::varied(&self.habits(), &speech, &words, self.secs(), rng).motion(self.n_frames, FPS)
     }
 
     /// Predictable part of the motion: the rule alone.
     pub fn predictable(&self) -> Motion {
-        RuleGestures::new(&self.speech(), &self.words()).motion(self.n_frames, FPS)
+        RuleGestures::of_habits(&self.habits(), &self.speech(), &self.words()).motion(self.n_frames, FPS)
     }
 
     /// BLAKE3 of the clip's parameters; the text is fixed by existing datasets.
     fn content_hash(&self) -> String {
-        let Self { rule, seed, split, number, n_frames } = self;
-        let text =
-            format!("Clip {{ rule: {rule}, seed: {seed}, split: {split:?}, number: {number}, n_frames: {n_frames} }}");
+        let Self { rule, seed, split, number, n_frames, habits } = self;
+        let habits = if *habits == 0 { String::new() } else { format!(", habits: {habits}") };
+        let text = format!(
+            "Clip {{ rule: {rule}, seed: {seed}, split: {split:?}, number: {number}, n_frames: {n_frames}{habits} }}"
+        );
         blake3::hash(text.as_bytes()).to_hex().to_string()
     }
 
@@ -168,10 +184,11 @@ impl SpokenClip {
 }
 
 /// Clips of `hours` of training, ten minutes of validation, and ten of test, thirty where the rule has words.
-pub fn clips(hours: f64, seed: u64, rule: u32) -> Result<Vec<SpokenClip>> {
+pub fn clips(hours: f64, seed: u64, rule: u32, habits: u64) -> Result<Vec<SpokenClip>> {
     ensure!((0.01..=100.0).contains(&hours), "--hours {hours}: expected 0.01 to 100");
     let n_train = (hours * 3600.0 / FPS.secs(CLIP_FRAMES)).ceil() as usize;
-    let of = |split, n| (0..n).map(move |number| SpokenClip { rule, seed, split, number, n_frames: CLIP_FRAMES });
+    let of =
+        |split, n| (0..n).map(move |number| SpokenClip { rule, seed, split, number, n_frames: CLIP_FRAMES, habits });
     let n_test = if rule == RULE_OF_WORDS { TEST_CLIPS_OF_WORDS } else { HELD_OUT_CLIPS };
     let parts = [(Split::Train, n_train), (Split::Validation, HELD_OUT_CLIPS), (Split::Test, n_test)];
     Ok(parts.into_iter().flat_map(|(split, n)| of(split, n)).collect())
@@ -180,12 +197,16 @@ pub fn clips(hours: f64, seed: u64, rule: u32) -> Result<Vec<SpokenClip>> {
 /// Writes `clips` as a dataset into the existing, empty folder `dir`.
 pub fn write(dir: &Path, clips: &[SpokenClip], progress: &dyn Progress) -> Result<DatasetInfo> {
     let rule = clips.first().map_or(RULE, |clip| clip.rule);
+    let name = match clips.first().map_or(0, |clip| clip.habits) {
+        0 => NAME.to_owned(),
+        habits => format!("{NAME}-{habits}"),
+    };
     let about = About {
         licence: "cc0-1.0".to_owned(),
         consent: "none needed: nobody is shown".to_owned(),
         source: "made by orator demo speaker".to_owned(),
         notes: vec![format!("Gestures follow version {rule} of a known rule; pose2d is 0 everywhere.")],
-        ..About::new(NAME, FPS)
+        ..About::new(&name, FPS)
     };
     let writer = DatasetWriter::new(dir, about, SHARD_BYTES);
     let task = progress.begin("speak", clips.len() as u64);
@@ -216,7 +237,8 @@ mod tests {
 
     fn verify_rule(rule: u32) {
         let dir = tempfile::tempdir().unwrap();
-        let two = |split| (0..2).map(move |number| SpokenClip { rule, seed: 7, split, number, n_frames: 90 });
+        let two =
+            |split| (0..2).map(move |number| SpokenClip { rule, seed: 7, split, number, n_frames: 90, habits: 3 });
         let clips: Vec<SpokenClip> = Split::ALL.into_iter().flat_map(two).collect();
         let info = write(dir.path(), &clips, &Silent).unwrap();
         assert_eq!(info.splits.values().map(|split| split.samples).collect::<Vec<_>>(), [2, 2, 2]);
@@ -238,11 +260,11 @@ mod tests {
 
     #[test]
     fn no_two_clips_share_speech() {
-        let clips = clips(0.1, 3, RULE).unwrap();
+        let clips = clips(0.1, 3, RULE, 0).unwrap();
         assert_eq!(clips.len(), 6 + 2 * HELD_OUT_CLIPS);
         let said: Vec<_> = clips.iter().map(|clip| format!("{:?}", clip.speech().syllables)).collect();
         let different: std::collections::BTreeSet<&String> = said.iter().collect();
         assert_eq!(different.len(), said.len());
-        assert!(super::clips(f64::NAN, 1, RULE).is_err() && super::clips(0.0, 1, RULE).is_err());
+        assert!(super::clips(f64::NAN, 1, RULE, 0).is_err() && super::clips(0.0, 1, RULE, 0).is_err());
     }
 }

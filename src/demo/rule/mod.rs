@@ -2,6 +2,7 @@
 
 pub mod baselines;
 pub mod dataset;
+pub mod habits;
 pub mod ridge;
 pub mod rule;
 pub mod words;

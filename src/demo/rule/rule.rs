@@ -1,8 +1,9 @@
 //! Gesture rule of the synthetic speaker: a deterministic function of its speech (the predictable part), and random
 //! variation on top.
 
+use super::habits::{ArmTarget, CENTRE, HIGH, Habits, POINT, REST, WIDE};
 use super::words::{self, N_PLACES, WordGesture};
-use crate::demo::drawn::figure::{ArmControls, Controls, DrawnFigure, N_ARM};
+use crate::demo::drawn::figure::{ArmControls, Controls, DrawnFigure};
 use crate::demo::drawn::gesture::minimum_jerk;
 use crate::demo::drawn::speech::{Speech, Syllable};
 use crate::formats::transcript::Word;
@@ -16,8 +17,6 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
-/// Delay from an onset to its stroke, seconds: left hand, right hand.
-pub const DELAYS: [f64; 2] = [0.4, 0.2];
 /// Durations of a stroke, its hold and its return, seconds.
 pub const STROKE: f64 = 0.4;
 pub const HOLD: f64 = 0.5;
@@ -27,23 +26,6 @@ const LIFT_DELAYS: [f64; 2] = [0.2, 0.8];
 const LIFT: f64 = 0.2;
 /// Stress above which a syllable is an accent.
 const ACCENT: f64 = 0.5;
-
-/// Wrist out, down, away (metres), roll, raise, curl, index, spread.
-type ArmTarget = [f64; N_ARM];
-/// Rest pose: hands in the lap.
-const REST: ArmTarget = [0.16, 0.36, -0.2, 0.9, 0.3, 0.45, 0.0, 0.05];
-const WIDE: ArmTarget = [0.42, 0.16, -0.24, -0.4, 0.6, 0.1, 0.0, 0.16];
-const HIGH: ArmTarget = [0.26, -0.06, -0.26, 0.2, 1.0, 0.15, -0.1, 0.12];
-const POINT: ArmTarget = [0.04, 0.1, -0.38, 0.6, 0.5, 0.8, -0.8, 0.02];
-const CENTRE: ArmTarget = [0.1, 0.14, -0.36, -0.2, 0.8, 0.3, 0.0, 0.1];
-/// Stroke targets of the left and the right hand by vowel of `speech`.
-const PLACES: [[Option<ArmTarget>; 2]; 5] = [
-    [Some(WIDE), Some(WIDE)],
-    [None, Some(HIGH)],
-    [None, Some(POINT)],
-    [Some(HIGH), None],
-    [Some(CENTRE), Some(CENTRE)],
-];
 
 /// Seconds from the beginning of a word to the stroke it causes.
 pub const WORD_DELAY: f64 = 0.3;
@@ -109,11 +91,16 @@ struct Variation([[[f64; 2]; 2]; 9]);
 impl<'a> RuleGestures<'a> {
     /// Predictable part: gestures of the rule for `speech` and the words said in it.
     pub fn new(speech: &'a Speech, said: &[Word]) -> Self {
+        Self::of_habits(&Habits::default(), speech, said)
+    }
+
+    /// As `new`, for a speaker of other habits.
+    pub fn of_habits(habits: &Habits, speech: &'a Speech, said: &[Word]) -> Self {
         let mut strokes: [Vec<(f64, ArmTarget)>; 2] = std::array::from_fn(|hand| {
             let accents = speech.syllables.iter().filter(|syllable| syllable.stress > ACCENT);
             let stroke = accents.filter_map(|accent| {
-                let place = PLACES.get(accent.vowel)?[hand]?;
-                Some((accent.start + DELAYS[hand], towards(&place, reach(accent))))
+                let place = habits.places.get(accent.vowel)?[hand]?;
+                Some((accent.start + habits.delays[hand], towards(&place, reach(accent))))
             });
             stroke.collect()
         });
@@ -123,16 +110,21 @@ impl<'a> RuleGestures<'a> {
 
     /// Gestures of `secs` seconds with random variation.
     pub fn with_variation(speech: &'a Speech, said: &[Word], secs: f64, rng: &mut ChaCha8Rng) -> Self {
+        Self::varied(&Habits::default(), speech, said, secs, rng)
+    }
+
+    /// As `with_variation`, for a speaker of other habits.
+    pub fn varied(habits: &Habits, speech: &'a Speech, said: &[Word], secs: f64, rng: &mut ChaCha8Rng) -> Self {
         let mut strokes: [Vec<(f64, ArmTarget)>; 2] = Default::default();
         for accent in speech.syllables.iter().filter(|syllable| syllable.stress > ACCENT) {
             let passed_over = rng.random_bool(PASSED_OVER);
             let late = LATE * normal(rng);
             let reach = reach(accent) * rng.random_range(0.85..1.15);
-            for (hand, place) in PLACES.get(accent.vowel).into_iter().flatten().enumerate() {
+            for (hand, place) in habits.places.get(accent.vowel).into_iter().flatten().enumerate() {
                 let Some(place) = place else { continue };
                 let goal = missed(&towards(place, reach), rng);
                 if !passed_over {
-                    strokes[hand].push((accent.start + DELAYS[hand] + late, goal));
+                    strokes[hand].push((accent.start + habits.delays[hand] + late, goal));
                 }
             }
         }
@@ -281,7 +273,8 @@ mod tests {
         let speech = speech(1);
         let n_frames = FPS.frames_in(SECS);
         let speeds = wrist_speeds(RuleGestures::new(&speech, &[]).motion(n_frames, FPS).joints.view(), FPS);
-        let accents = speech.syllables.iter().filter(|s| s.stress > ACCENT && PLACES[s.vowel][hand].is_some());
+        let accents =
+            speech.syllables.iter().filter(|s| s.stress > ACCENT && Habits::default().places[s.vowel][hand].is_some());
         let onsets: Vec<f64> = accents.map(|accent| accent.start).collect();
         let at = |delay: f64| {
             let bump = |secs: f64| -> f64 { onsets.iter().map(|t| (-((secs - t - delay) / 0.1).powi(2)).exp()).sum() };

@@ -1,5 +1,6 @@
 //! Operators, networks, training.
 
+pub mod best_checkpoint;
 pub mod channels;
 pub mod from_another;
 pub mod gan;
