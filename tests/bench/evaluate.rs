@@ -111,7 +111,7 @@ struct Unheard {
 /// Ground truth with its random variation; the predicted one is what the rule alone would have it do.
 fn speaker(n_clips: usize, n_frames: usize) -> Vec<Unheard> {
     let clip = |number: usize| {
-        let rule = Rule { rule: RULE, seed: 1, split: Split::Validation, number, n_frames };
+        let rule = Rule { rule: RULE, seed: 1, split: Split::Validation, number, n_frames, habits: 0 };
         let ground_truth = rule.motion();
         Unheard {
             mask: ground_truth.mask,

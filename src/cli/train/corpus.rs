@@ -47,7 +47,7 @@ pub fn gather(args: &CorpusArgs, ui: &Ui) -> Result<Corpus> {
     let mut speakers = Vec::new();
     for seed in 0..CLIPS + HELD_OUT {
         let number = args.seed.wrapping_add(seed as u64);
-        let clip = dataset::clips(CLIP_SECS / 3600.0, number, dataset::RULE)?
+        let clip = dataset::clips(CLIP_SECS / 3600.0, number, dataset::RULE, 0)?
             .into_iter()
             .next()
             .context("no clip of the rule")?;

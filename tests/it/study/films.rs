@@ -68,7 +68,7 @@ fn films_of_all_conditions_differ_in_motion_alone() {
     // Another system's motion, at its own rate.
     let clips = host.cut.clips.clone();
     for (number, clip) in clips.iter().enumerate() {
-        let motion = SpokenClip { rule: RULE, seed: 6, split: Split::Test, number, n_frames: 30 }.motion();
+        let motion = SpokenClip { rule: RULE, seed: 6, split: Split::Test, number, n_frames: 30, habits: 0 }.motion();
         std::fs::create_dir_all(dir.join("theirs")).unwrap();
         orator::animate::export::file::ExportFormat::Npy
             .write_joints(&dir.join(format!("theirs/{}.npy", clip.name)), &motion)
