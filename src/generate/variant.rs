@@ -8,11 +8,17 @@ use candle_core::{DType, Tensor};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+/// Channels are left out with this multiple of the probability of training, at most [`MOST_LEFT_OUT`]. Of a speaker of ten
+/// minutes, trained with 0.3, takes hear as well as the whole network up to 0.6 (correlation of wrist speeds 0.82 and
+/// 0.82, wrists 12 mm apart), not with 0.8 (0.74).
+const OF_TRAINING: f64 = 2.0;
+const MOST_LEFT_OUT: f64 = 0.9;
+
 /// The layer that reads the encoded sound, [out, channels, kernel].
 const FIRST_LAYER: &str = "enter.0.conv.weight";
 
-/// Leaves out channels of the encoded sound of a checkpoint of `orator train gan`, by this seed, each with the probability
-/// of its training's dropout. The same seed leaves out the same. The names of the generator's tensors begin with `prefix`.
+/// Leaves out channels of the encoded sound of a checkpoint of `orator train gan`, by this seed, each with twice the
+/// probability of its training's dropout. The same seed leaves out the same. The names of the generator's tensors begin with `prefix`.
 ///
 /// # Errors
 /// A checkpoint that was trained without dropout, whose takes would only be worse.
@@ -26,8 +32,9 @@ pub fn vary(contents: &mut Contents, prefix: &str, seed: u64) -> Result<()> {
     let name = format!("{prefix}{FIRST_LAYER}");
     let Some(weight) = contents.tensors.get_mut(&name) else { anyhow::bail!("tensor {name} is missing") };
     let (_, n_channels, _) = weight.dims3()?;
+    let share = (OF_TRAINING * dropout).min(MOST_LEFT_OUT);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let kept = (0..n_channels).map(|_| if rng.random_bool(dropout) { 0.0 } else { 1.0 / (1.0 - dropout) });
+    let kept = (0..n_channels).map(|_| if rng.random_bool(share) { 0.0 } else { 1.0 / (1.0 - share) });
     let kept = Tensor::from_iter(kept, weight.device())?.to_dtype(DType::F32)?.reshape((1, n_channels, 1))?;
     *weight = weight.broadcast_mul(&kept)?;
     Ok(())
@@ -62,8 +69,8 @@ mod tests {
         };
         let first = varied(1)?;
         let n_dropped = first.iter().filter(|value| **value == 0.0).count();
-        assert!(n_dropped.is_multiple_of(6) && (30..180).contains(&n_dropped), "{n_dropped}");
-        assert!(first.iter().all(|value| *value == 0.0 || (value - 4.0 / 3.0).abs() < 1e-6));
+        assert!(n_dropped.is_multiple_of(6) && (120..264).contains(&n_dropped), "{n_dropped}");
+        assert!(first.iter().all(|value| *value == 0.0 || (value - 2.0).abs() < 1e-6));
         assert!(first == varied(1)? && first != varied(2)?);
         assert!(vary(&mut contents(0.0), "generator.", 1).is_err());
         Ok(())

@@ -105,7 +105,7 @@ fn networks_of_both_trainings_stand_in_one_table() {
             // errors needs.
             let value = |metric: &Value| metric["values"][who]["value"].as_f64();
             let is_same = match (value(one), value(&several)) {
-                (Some(one), Some(several)) => (one - several).abs() <= 1e-9 * one.abs(),
+                (Some(one), Some(several)) => (one - several).abs() <= 1e-6 * (1.0 + one.abs()),
                 (one, several) => one == several,
             };
             assert!(is_same, "{} {who}", one["plain_name"]);
