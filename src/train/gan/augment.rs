@@ -4,6 +4,7 @@
 
 use super::recipe::settings::GanSettings;
 use crate::audio::mel;
+use crate::generate::mel_stream::mel_frames;
 use crate::generate::normalisation::Normalisation;
 use crate::train::resume;
 use crate::types::skeleton::{self, N_JOINTS};
@@ -59,11 +60,12 @@ pub fn changes(settings: &GanSettings, step: usize, fps: FrameRate) -> Vec<Windo
     }
     let mut rng = resume::stream(settings.seed ^ CHANGES, step);
     let reach = 0.5 * fps.secs(settings.stride_frames);
-    (0..settings.batch).map(|_| WindowChange::draw(settings, reach, &mut rng)).collect()
+    let n_mels = mel_frames(fps, settings.window_frames);
+    (0..settings.batch).map(|_| WindowChange::draw(settings, reach, n_mels, &mut rng)).collect()
 }
 
 impl WindowChange {
-    fn draw(of: &GanSettings, reach: f64, rng: &mut ChaCha8Rng) -> Self {
+    fn draw(of: &GanSettings, reach: f64, n_mels: usize, rng: &mut ChaCha8Rng) -> Self {
         let mut within = |reach: f64| (2.0 * rng.random::<f64>() - 1.0) * reach;
         let shift_secs = within(reach);
         let speed = within(of.augment_speed).exp();
@@ -77,7 +79,6 @@ impl WindowChange {
             [first, first + length]
         };
         let masked_bands = span(of.augment_mask_bands, mel::N_MELS);
-        let n_mels = (of.window_frames as f64 * MEL_RATE / 15.0) as usize;
         let masked_frames = span((of.augment_mask_secs * MEL_RATE) as usize, n_mels);
         let is_mirrored = rng.random_bool(of.augment_mirror.clamp(0.0, 1.0));
         let seed = rng.random();

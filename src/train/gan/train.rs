@@ -161,11 +161,11 @@ pub fn train_watched(
     })
 }
 
-/// Seconds of a step on this machine, measured on networks that are dropped; 0 of a training of few steps.
-fn secs_a_step(trainer: &GanTrainer, loader: &WindowLoader) -> Result<f64> {
+/// Seconds of a step on this machine, measured on networks that are dropped; `None` of a training of few steps.
+fn secs_a_step(trainer: &GanTrainer, loader: &WindowLoader) -> Result<Option<f64>> {
     const FEW: usize = 100;
     if trainer.settings.steps < FEW {
-        return Ok(0.0);
+        return Ok(None);
     }
     let mut trial = GanTrainer::new(trainer.metadata.clone(), trainer.settings.clone())?;
     let batch = loader.batch(&sample_windows(trial.settings.seed, 0, trial.settings.batch, loader.len()))?;
@@ -174,7 +174,7 @@ fn secs_a_step(trainer: &GanTrainer, loader: &WindowLoader) -> Result<f64> {
         let start = Instant::now();
         trial.step(&batch)?;
         trial.step(&batch)?;
-        Ok(start.elapsed().as_secs_f64() / 2.0)
+        Ok(Some(start.elapsed().as_secs_f64() / 2.0))
     })
 }
 

@@ -4,8 +4,9 @@ use super::material::TrainingMaterial;
 use super::settings::GanSettings;
 use crate::config::GanRecipe;
 
-/// Five lines on the settings of a training that begins; `secs_a_step`: time of a step on this machine.
-pub fn lines(settings: &GanSettings, material: &TrainingMaterial, secs_a_step: f64) -> Vec<String> {
+/// Five lines on the settings of a training that begins; `secs_a_step`: time of a step on this machine,
+/// where it was measured.
+pub fn lines(settings: &GanSettings, material: &TrainingMaterial, secs_a_step: Option<f64>) -> Vec<String> {
     let of = settings;
     let minutes = |secs: f64| format!("{:.1} min", secs / 60.0);
     let name = match of.recipe {
@@ -13,13 +14,9 @@ pub fn lines(settings: &GanSettings, material: &TrainingMaterial, secs_a_step: f
         GanRecipe::Paper => "paper",
     };
     let (train, held_out) = (minutes(material.train_secs), minutes(material.validation_secs));
-    let steps = format!(
-        "{} steps of {} windows, about {} here, with a validation each {} steps",
-        of.steps,
-        of.batch,
-        minutes(secs_a_step * of.steps as f64),
-        of.epoch_steps
-    );
+    let time = secs_a_step.map(|secs| format!(", about {} here", minutes(secs * of.steps as f64))).unwrap_or_default();
+    let steps =
+        format!("{} steps of {} windows{time}, with a validation each {} steps", of.steps, of.batch, of.epoch_steps);
     vec![
         format!("recipe {name} for {train} of speech, {held_out} held out"),
         format!("  {steps}{}", ending(of)),
