@@ -49,7 +49,7 @@ test: build models readers aligner browser blender validator vrm driver
 	cargo fmt --check
 	cargo clippy --locked --all-targets -- -D warnings
 	cargo test --locked
-	$(MAKE) demo DEMO=$(TARGET)/demo-test STEPS=30
+	$(MAKE) demo DEMO=$(TARGET)/demo-test STEPS=30 SPEECH=1
 	@if [ -s $(SKIPPED) ]; then echo 'skipped tests:'; sort -u $(SKIPPED); else echo 'no test was skipped'; fi
 	@echo 'make test: all passed'
 
@@ -61,20 +61,24 @@ prove-study:
 	cargo test --release --locked --test it -- --ignored --nocapture study::coverage
 
 # The synthetic speaker from its videos to its motion: a rendered person seen by the models for real people, or, where
-# they cannot be had, a figure in a suit of markers. DEMO: the folder; DRAW and STEPS: how much of it.
+# they cannot be had, a figure in a suit of markers. A model begins with SPEECH minutes of the same figure without video
+# and goes on with what the videos gave; it is judged on a video that it did not see. DEMO: the folder; DRAW and STEPS: how
+# much of it.
 DEMO := $(TARGET)/demo
 DRAW :=
 STEPS :=
+SPEECH := 20
 
 demo: build
 	@if $(ORATOR) models fetch --models-dir $(ORATOR_MODELS); then \
-		$(ORATOR) demo draw $(DEMO) --rendered $(DRAW) && \
+		$(ORATOR) demo draw $(DEMO) --rendered --speech $(SPEECH) $(DRAW) && \
 		$(ORATOR) run -c $(DEMO)/pipeline.toml --set models.dir=$(ORATOR_MODELS); \
 	else \
 		echo 'The models for real people cannot be had (no network, or no npm): the speaker wears a suit of markers.'; \
-		$(ORATOR) demo draw $(DEMO) $(DRAW) && $(ORATOR) run -c $(DEMO)/pipeline.toml; \
+		$(ORATOR) demo draw $(DEMO) --speech $(SPEECH) $(DRAW) && $(ORATOR) run -c $(DEMO)/pipeline.toml; \
 	fi
-	$(ORATOR) train gan -c $(DEMO)/pipeline.toml $(if $(STEPS),--steps $(STEPS))
+	$(ORATOR) train gan --dataset $(DEMO)/speech --out $(DEMO)/work/gan/spoken $(if $(STEPS),--steps $(STEPS))
+	$(ORATOR) train gan -c $(DEMO)/pipeline.toml --from $(DEMO)/work/gan/spoken $(if $(STEPS),--steps $(STEPS))
 	$(ORATOR) generate --checkpoint $(DEMO)/work/gan/host --audio $(DEMO)/speech.wav \
 		--out $(addprefix $(DEMO)/motion.,npy bvh glb mp4)
 	$(ORATOR) demo sheet $(DEMO) --motion $(DEMO)/motion.npy --out $(DEMO)/contact_sheet.png

@@ -14,6 +14,7 @@ use orator::demo::drawn::folder;
 use orator::demo::drawn::folder::DemoPlan;
 use orator::demo::host;
 use orator::demo::labels;
+use orator::demo::more_speech;
 use orator::demo::people;
 use orator::demo::people::condition::Condition;
 use orator::demo::people::folder::PeoplePlan;
@@ -63,6 +64,10 @@ enum DemoVerb {
         /// figure in a marker suit for the marker models.
         #[arg(long, conflicts_with = "people")]
         rendered: bool,
+        /// Minutes of more speech of the same figure, without video: a dataset DIR/speech of sound and joints, for `orator
+        /// train gan --from`.
+        #[arg(long, value_name = "MIN", conflicts_with = "people", value_parser = clap::value_parser!(u32).range(1..=6000))]
+        speech: Option<u32>,
         /// Draw pictures of rendered people with labels of this form instead of videos.
         #[arg(long, value_enum, conflicts_with_all = ["videos", "people", "rendered", "secs", "fps"])]
         labels: Option<LabelForm>,
@@ -139,7 +144,20 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         DemoVerb::Draw { dir, labels: Some(LabelForm::CocoWholebody), images, seed, .. } => {
             label(&dir, images, seed, ui)
         }
-        DemoVerb::Draw { dir, videos, people, conditions, truth_only, motion, rendered, secs, fps, seed, .. } => {
+        DemoVerb::Draw {
+            dir,
+            videos,
+            people,
+            conditions,
+            truth_only,
+            motion,
+            rendered,
+            speech,
+            secs,
+            fps,
+            seed,
+            ..
+        } => {
             let fps = FrameRate::new(fps.clamp(1, 120), 1);
             if let Some(n_clips) = people {
                 let conditions = Condition::of_names(&conditions)?;
@@ -148,7 +166,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             }
             let usual = DemoPlan::default();
             let plan = DemoPlan { n_videos: videos, secs: secs.unwrap_or(usual.secs), fps, seed, ..usual };
-            draw(&dir, &plan, rendered, ui)
+            draw(&dir, &plan, rendered, speech, ui)
         }
         DemoVerb::Measure { dir } => measure(&dir, ui),
         DemoVerb::Speaker { dir, hours, words, habits, seed } => {
@@ -162,12 +180,36 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     }
 }
 
-fn draw(dir: &Path, plan: &DemoPlan, rendered: bool, ui: &Ui) -> Result<Outcome> {
+fn draw(dir: &Path, plan: &DemoPlan, rendered: bool, speech: Option<u32>, ui: &Ui) -> Result<Outcome> {
+    let more = speech.map(|minutes| say_more(dir, plan, rendered, 60.0 * f64::from(minutes), ui)).transpose()?;
     let videos = if rendered { host::draw(dir, plan, ui)? } else { folder::draw(dir, plan, ui)? };
     let next = format!("orator run -c {}", dir.join("pipeline.toml").display());
-    let text = format!("drew {} videos of {} s into {}", videos.len(), plan.secs, dir.join("videos/host").display());
-    ui.summary(&text, Some(&next), json!({ "videos": videos, "next": next }));
+    let mut text =
+        format!("drew {} videos of {} s into {}", videos.len(), plan.secs, dir.join("videos/host").display());
+    if let Some((secs, dataset)) = &more {
+        text += &format!("\nand {secs:.0} s of the same figure without video into {}", dataset.display());
+    }
+    let more = more.map(|(_, dataset)| dataset);
+    ui.summary(&text, Some(&next), json!({ "videos": videos, "speech": more, "next": next }));
     Ok(Outcome::Done)
+}
+
+/// Speech of the demo's figure without video: seconds to train on, and the dataset. What is there already stays.
+fn say_more(dir: &Path, plan: &DemoPlan, rendered: bool, secs: f64, ui: &Ui) -> Result<(f64, PathBuf)> {
+    let out = dir.join("speech");
+    let folder = std::path::absolute(&out)?;
+    let _lock = FolderLock::exclusive(&folder)?;
+    if workdir::has_files(&folder) {
+        let made = Dataset::open(&folder)?;
+        ensure!(
+            made.info().notes.contains(&more_speech::note(plan, rendered, secs)),
+            "{} holds other speech than that of this figure; choose another folder, or remove it",
+            out.display()
+        );
+    } else {
+        workdir::build_folder(&folder, |attempt| more_speech::write(attempt, plan, rendered, secs, ui))?;
+    }
+    Ok((secs, out))
 }
 
 fn render(dir: &Path, plan: &PeoplePlan, ui: &Ui) -> Result<Outcome> {

@@ -5,16 +5,12 @@
 use super::habits::Habits;
 use super::rule::RuleGestures;
 use super::words;
-use crate::dataset::bones::VideoBones;
 use crate::dataset::info::{About, DatasetInfo};
-use crate::dataset::sample::{N_KEYPOINTS, Sample};
-use crate::dataset::split::SplitBy;
-use crate::dataset::write::part::VideoSource;
+use crate::dataset::sample::Sample;
 use crate::dataset::write::writer::DatasetWriter;
 use crate::demo::drawn::speech::Speech;
+use crate::demo::spoken_video::SpokenVideo;
 use crate::formats::transcript::Word;
-use crate::motion::bones;
-use crate::stage::ledger::{Kept, Ledger, TranscriptAccount, WordCount};
 use crate::stage::progress::Progress;
 use crate::types::pose3d::Motion;
 use crate::types::sound::{SAMPLE_RATE, Sound};
@@ -22,7 +18,6 @@ use crate::types::split::Split;
 use crate::types::sync;
 use crate::types::time::FrameRate;
 use anyhow::{Context, Result, ensure};
-use ndarray::Array3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -143,42 +138,14 @@ impl SpokenClip {
         Ok(clip)
     }
 
-    fn sample(&self) -> Sample {
-        let secs = self.secs();
-        Sample {
-            key: format!("{}-{:06}", self.name(), 0),
+    fn spoken(&self) -> SpokenVideo {
+        SpokenVideo {
+            name: self.name(),
+            content: self.content_hash(),
             motion: self.motion(),
-            pose2d: Array3::zeros((self.n_frames, N_KEYPOINTS, 3)),
             sound: self.sound(),
             words: (self.rule == RULE_OF_WORDS).then(|| self.words()),
-            posture: None,
-            meta: json!({
-                "video": self.name(), "first_frame": 0, "n_frames": self.n_frames, "fps": FPS, "start_secs": 0.0,
-                "end_secs": secs, "image_size": null, "left_hand_seen": 1.0, "right_hand_seen": 1.0,
-                "sound_samples_padded": 0, "rule": self,
-            }),
-        }
-    }
-
-    fn source(&self, sample: &Sample) -> VideoSource {
-        let secs = self.secs();
-        let words = sample.words.as_ref().map(|words| TranscriptAccount {
-            count: WordCount { n_words: words.len(), n_kept: words.len(), ..WordCount::default() },
-            ..TranscriptAccount::default()
-        });
-        let lengths = bones::measure(&sample.motion).map(f64::from).to_vec();
-        VideoSource {
-            name: self.name(),
-            file: format!("{}.mp4", self.name()),
-            content: self.content_hash(),
-            ledger: Ledger {
-                duration_secs: secs,
-                kept: vec![Kept { start_secs: 0.0, end_secs: secs }],
-                words,
-                ..Ledger::default()
-            },
-            bones: VideoBones { lengths_metres: lengths, n_frames: self.n_frames },
-            ..VideoSource::default()
+            meta: json!({ "rule": self }),
         }
     }
 }
@@ -211,11 +178,9 @@ pub fn write(dir: &Path, clips: &[SpokenClip], progress: &dyn Progress) -> Resul
     let writer = DatasetWriter::new(dir, about, SHARD_BYTES);
     let task = progress.begin("speak", clips.len() as u64);
     for some in clips.chunks(16) {
-        let samples: Vec<Sample> = some.par_iter().map(SpokenClip::sample).collect();
-        for (clip, sample) in some.iter().zip(&samples) {
-            let mut video = writer.video(clip.source(sample), clip.split, SplitBy::Name)?;
-            video.push(sample, 0.0)?;
-            video.finish(None)?;
+        let spoken: Vec<SpokenVideo> = some.par_iter().map(SpokenClip::spoken).collect();
+        for (clip, spoken) in some.iter().zip(spoken) {
+            spoken.write(&writer, clip.split)?;
             task.advance(1);
         }
     }
