@@ -49,7 +49,7 @@ test: build models readers aligner browser blender validator vrm driver
 	cargo fmt --check
 	cargo clippy --locked --all-targets -- -D warnings
 	cargo test --locked
-	$(MAKE) demo DEMO=$(TARGET)/demo-test STEPS=30 SPEECH=1
+	$(MAKE) demo DEMO=$(TARGET)/demo-test DRAW= STEPS=30 SPEECH=1
 	@if [ -s $(SKIPPED) ]; then echo 'skipped tests:'; sort -u $(SKIPPED); else echo 'no test was skipped'; fi
 	@echo 'make test: all passed'
 
@@ -62,10 +62,10 @@ prove-study:
 
 # The synthetic speaker from its videos to its motion: a rendered person seen by the models for real people, or, where
 # they cannot be had, a figure in a suit of markers. A model begins with SPEECH minutes of the same figure without video
-# and goes on with what the videos gave; it is judged on a video that it did not see. DEMO: the folder; DRAW and STEPS: how
+# and goes on with what the videos gave; it is judged on videos that it did not see. DEMO: the folder; DRAW and STEPS: how
 # much of it.
 DEMO := $(TARGET)/demo
-DRAW :=
+DRAW := --videos 6
 STEPS :=
 SPEECH := 20
 

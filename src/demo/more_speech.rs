@@ -4,8 +4,7 @@
 use super::drawn::folder::{DATASET_FPS, DemoPlan};
 use super::drawn::scene::DrawnScene;
 use super::drawn::truth::DrawnTruth;
-use super::people::condition::Condition;
-use super::people::scene::{ClipSeeds, PeopleScene};
+use super::host;
 use super::spoken_video::SpokenVideo;
 use crate::dataset::info::{About, DatasetInfo};
 use crate::dataset::write::writer::DatasetWriter;
@@ -71,9 +70,7 @@ pub fn write(
 fn clip(plan: &DemoPlan, is_rendered: bool, number: u64) -> Result<SpokenVideo> {
     let seed = plan.seed.wrapping_mul(1000).wrapping_add(number);
     let (motion, mut sound) = if is_rendered {
-        let body = plan.seed.wrapping_mul(1000);
-        let seeds = ClipSeeds { body, clothes: body, camera: body, motion: seed, voice: Some(body) };
-        let scene = PeopleScene::new(Condition::Front, seeds, CLIP_SECS, DATASET_FPS, None);
+        let scene = host::scene(plan.seed.wrapping_mul(1000), seed, CLIP_SECS, DATASET_FPS);
         (Motion::from_joints(DATASET_FPS, scene.truth_without_pictures().joints), scene.sound().clone())
     } else {
         let scene = DrawnScene::new(seed, CLIP_SECS, plan.size);

@@ -4,7 +4,7 @@ use super::mel_stream::MelStream;
 use super::mel_stream::mel_frames;
 use super::model;
 use super::model::BEST;
-use super::model::SpeakerMetadata;
+use super::model::{GenerationChoice, SpeakerMetadata};
 use crate::nn::gan::generator::{FRAMES_MULTIPLE, Generator};
 use crate::nn::gan::streaming::StreamingGenerator;
 use crate::types::pose3d::Motion;
@@ -29,18 +29,15 @@ pub struct GestureGenerator {
 impl GestureGenerator {
     /// Opens a checkpoint of `orator train gan`: a file, or the folder of a training (its best checkpoint).
     pub fn open(path: &Path) -> Result<Self> {
-        Self::open_take(path, None)
+        Self::open_as(path, &GenerationChoice::default())
     }
 
-    /// As `open`; with a seed, one of the different takes of a speech (`variant`). Errors as well on a checkpoint that was
+    /// As `open`, as this speaker and take. Errors as well on a speaker that the network does not know, and on takes of one that was
     /// trained without dropout.
-    pub fn open_take(path: &Path, seed: Option<u64>) -> Result<Self> {
+    pub fn open_as(path: &Path, choice: &GenerationChoice) -> Result<Self> {
         let file = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
         ensure!(file.is_file(), "there is no checkpoint {}; `orator train gan` writes one", file.display());
-        let (metadata, generator) = match seed {
-            Some(seed) => model::load_variant(&file, seed)?,
-            None => model::load(&file)?,
-        };
+        let (metadata, generator) = model::load(&file, choice)?;
         Ok(Self { metadata, generator })
     }
 

@@ -7,12 +7,12 @@ use super::variant;
 use crate::audio::mel;
 use crate::formats::checkpoint::Contents;
 use crate::motion::bones;
-use crate::nn::gan::generator::{Config, Generator};
+use crate::nn::gan::generator::{Config, Generator, SPEAKER_EMBEDDING};
 use crate::nn::params::Params;
 use crate::types::pose3d::Motion;
 use crate::types::sound::SAMPLE_RATE;
 use crate::types::time::FrameRate;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -103,6 +103,13 @@ impl SpeakerMetadata {
         }
     }
 
+    /// Adds videos to those it learnt from.
+    pub fn add_videos(&mut self, videos: Vec<TrainedVideo>) {
+        self.videos.extend(videos);
+        self.videos.sort();
+        self.videos.dedup();
+    }
+
     /// The generator's numbers [144 or more, T] as motion whose bones have the speaker's lengths in every frame.
     pub fn motion(&self, raw: ArrayView2<f32>) -> Motion {
         let mut motion = Motion::from_joints(self.fps, self.representation.joints(raw, &self.normalisation));
@@ -112,25 +119,70 @@ impl SpeakerMetadata {
     }
 }
 
-/// Reads a checkpoint of `orator train gan`. Errors name the file and what is wrong with it.
-pub fn load(path: &Path) -> Result<(SpeakerMetadata, Generator)> {
-    let contents = Contents::read(path)?;
-    build(&contents).with_context(|| format!("{} is no checkpoint of `orator train gan`", path.display()))
+/// What generates where a checkpoint leaves a choice.
+#[derive(Clone, Debug, Default)]
+pub struct GenerationChoice {
+    /// Name of the speaker; needed where a network knows several.
+    pub speaker: Option<String>,
+    /// Which take of a speech (`variant`); `None`: the network as it was trained.
+    pub seed: Option<u64>,
 }
 
-/// As [`load`], the take of a speech that `seed` stands for (`variant`).
-pub fn load_variant(path: &Path, seed: u64) -> Result<(SpeakerMetadata, Generator)> {
+/// Reads a checkpoint of `orator train gan`, as a network of one speaker. Errors name the file and what is wrong with it.
+pub fn load(path: &Path, choice: &GenerationChoice) -> Result<(SpeakerMetadata, Generator)> {
     let mut contents = Contents::read(path)?;
-    // First, so that a file of another kind is named as such.
-    build(&contents).with_context(|| format!("{} is no checkpoint of `orator train gan`", path.display()))?;
-    variant::vary(&mut contents, GENERATOR, seed).with_context(|| format!("{} has no takes", path.display()))?;
-    build(&contents)
+    let is_none = || format!("{} is no checkpoint of `orator train gan`", path.display());
+    check(&contents.facts["speaker"]).with_context(is_none)?;
+    choose(&mut contents, choice.speaker.as_deref()).with_context(|| path.display().to_string())?;
+    if let Some(seed) = choice.seed {
+        variant::vary(&mut contents, GENERATOR, seed).with_context(|| format!("{} has no takes", path.display()))?;
+    }
+    build(&contents).with_context(is_none)
+}
+
+/// The speakers that a checkpoint of `orator train gan` knows, in the order of their numbers.
+pub fn speakers(facts: &serde_json::Value) -> Result<Vec<SpeakerMetadata>> {
+    check(&facts["speaker"])?;
+    let first = [facts["speaker"].clone()];
+    let others = facts["other_speakers"].as_array().cloned().unwrap_or_default();
+    let all = first.into_iter().chain(others).map(serde_json::from_value);
+    let all: Vec<SpeakerMetadata> = all.collect::<serde_json::Result<_>>().context("its facts are incomplete")?;
+    let n_speakers = all[0].network.n_speakers.max(1);
+    ensure!(n_speakers == all.len(), "it names {} speakers of {n_speakers}", all.len());
+    Ok(all)
+}
+
+/// Leaves one speaker of a network of several.
+fn choose(contents: &mut Contents, name: Option<&str>) -> Result<()> {
+    let all = speakers(&contents.facts)?;
+    let names = || all.iter().map(|speaker| speaker.name.as_str()).collect::<Vec<_>>().join(", ");
+    let number = match name {
+        None if all.len() == 1 => return Ok(()),
+        None => bail!("it knows several speakers; say with --speaker which of them is to speak: {}", names()),
+        Some(name) => all.iter().position(|speaker| speaker.name == name),
+    };
+    let number = number.with_context(|| format!("it does not know {:?} but {}", name.unwrap_or_default(), names()))?;
+    if all.len() > 1 {
+        let mut chosen = all[number].clone();
+        chosen.network.n_speakers = 1;
+        contents.facts["speaker"] = serde_json::to_value(chosen)?;
+        let key = format!("{GENERATOR}{SPEAKER_EMBEDDING}");
+        let table = contents.tensors.get_mut(&key).with_context(|| format!("tensor {key} is missing"))?;
+        *table = table.narrow(0, number, 1)?;
+    }
+    Ok(())
+}
+
+/// Errors unless these facts of a speaker are of a checkpoint that this program reads.
+fn check(facts: &serde_json::Value) -> Result<()> {
+    let kind = &facts["kind"];
+    ensure!(!is_sequence_kind(kind), "it is one of `orator train seq2seq`, with which `orator generate` speaks");
+    ensure!(kind == KIND, "its kind is {kind}, this program reads {KIND:?}");
+    Ok(())
 }
 
 fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {
-    let kind = &contents.facts["speaker"]["kind"];
-    ensure!(!is_sequence_kind(kind), "it is one of `orator train seq2seq`, with which `orator generate` speaks");
-    ensure!(kind == KIND, "its kind is {kind}, this program reads {KIND:?}");
+    check(&contents.facts["speaker"])?;
     let metadata: SpeakerMetadata =
         serde_json::from_value(contents.facts["speaker"].clone()).context("its facts are incomplete")?;
     ensure!(metadata.skeleton == SKELETON, "its skeleton is {:?}, expected {SKELETON:?}", metadata.skeleton);
@@ -144,6 +196,7 @@ fn build(contents: &Contents) -> Result<(SpeakerMetadata, Generator)> {
     let (network, fps) = (&metadata.network, metadata.fps);
     ensure!(network.n_mels == mel::N_MELS, "it reads {} mel bands, not {}", network.n_mels, mel::N_MELS);
     ensure!((4..=MOST_WIDTH).contains(&network.width), "its width is {}, expected 4 to {MOST_WIDTH}", network.width);
+    ensure!(network.n_speakers <= 1, "it knows {} speakers", network.n_speakers);
     contents.expect_numbers(network.width * network.width)?;
     ensure!(fps.is_plausible(), "it moves at {fps}, expected 1 to 1000 frames a second");
     metadata.normalisation.check()?;

@@ -1,7 +1,7 @@
 //! A trained speaker of either kind: sound, and where it reads them words, to motion of the 49 joints.
 
 use super::GestureGenerator;
-use super::model::BEST;
+use super::model::{BEST, GenerationChoice};
 use super::normalisation::Normalisation;
 use super::seq2seq::SequenceGenerator;
 use super::seq2seq::architecture::Architecture;
@@ -21,11 +21,18 @@ pub enum TrainedSpeaker {
 }
 
 impl TrainedSpeaker {
-    /// Opens a checkpoint, or the best one of a folder. Errors name the file.
+    /// Opens a checkpoint of one speaker, or the best one of a folder. Errors name the file.
     pub fn open(path: &Path) -> Result<Self> {
+        Self::open_as(path, &GenerationChoice::default())
+    }
+
+    /// Opens a checkpoint as `open` does, as this speaker and take. Errors where a network does not know the speaker, or has one
+    /// take only.
+    pub fn open_as(path: &Path, choice: &GenerationChoice) -> Result<Self> {
         let file = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
+        let gan = || Ok(Self::Gan(Box::new(GestureGenerator::open_as(path, choice)?)));
         if !file.is_file() {
-            return Ok(Self::Gan(Box::new(GestureGenerator::open(path)?)));
+            return gan();
         }
         let kind = &checkpoint::facts(&file)?["speaker"]["kind"];
         ensure!(
@@ -33,22 +40,27 @@ impl TrainedSpeaker {
             "{} is a checkpoint of neither `orator train gan` nor `orator train seq2seq`",
             file.display()
         );
-        Ok(match is_sequence_kind(kind) {
-            true => Self::Sequence(Box::new(SequenceGenerator::open(path)?)),
-            false => Self::Gan(Box::new(GestureGenerator::open(path)?)),
-        })
+        if !is_sequence_kind(kind) {
+            return gan();
+        }
+        let speaker = SequenceGenerator::open(path)?;
+        ensure!(
+            choice.seed.is_none(),
+            "{} is of `orator train seq2seq`, which has one take of a speech: leave out --seed and --variants",
+            path.display()
+        );
+        if let Some(name) = choice.speaker.as_ref().filter(|name| **name != speaker.metadata.name) {
+            bail!("{} is of {}, not of {name:?}: leave out --speaker", path.display(), speaker.metadata.name);
+        }
+        Ok(Self::Sequence(Box::new(speaker)))
     }
 
-    /// Opens a checkpoint as `open` does, as the take of a speech that `seed` stands for. Errors where a network has one take
-    /// only.
-    pub fn open_take(path: &Path, seed: u64) -> Result<Self> {
-        match Self::open(path)? {
-            Self::Gan(_) => Ok(Self::Gan(Box::new(GestureGenerator::open_take(path, Some(seed))?))),
-            Self::Sequence(_) => bail!(
-                "{} is of `orator train seq2seq`, which has one take of a speech: leave out --seed and --variants",
-                path.display()
-            ),
-        }
+    /// Opens a checkpoint as `open` does; of a network of several speakers the one of this name.
+    pub fn open_for(path: &Path, speaker: &str) -> Result<Self> {
+        let file = if path.is_dir() { path.join(BEST) } else { path.to_owned() };
+        let is_of_several = file.is_file() && checkpoint::facts(&file)?["other_speakers"].is_array();
+        let speaker = is_of_several.then(|| speaker.to_owned());
+        Self::open_as(path, &GenerationChoice { speaker, seed: None })
     }
 
     /// The speaker's name.

@@ -40,6 +40,10 @@ pub trait ValidatedTraining {
     /// The speaker's name, and the section of the configuration.
     fn names(&self) -> (&str, &'static str);
     fn schedule(&self) -> EpochSchedule;
+    /// Whether it begins with what another training learnt, so that its first step may make it worse.
+    fn has_learnt(&self) -> bool {
+        false
+    }
     /// Steps done.
     fn n_done(&self) -> usize;
     /// Step and score of the best validation so far.
@@ -90,6 +94,14 @@ pub fn run<T: ValidatedTraining>(
     task.advance(began_at.min(steps) as u64);
     let mut pace = TrainingPace::new(began_at, steps);
     let (mut last, mut saved_at) = (None, began_at);
+    if began_at == 0 && training.has_learnt() {
+        let validation = training.validate()?;
+        log.write(&json!({ "step": 0, "epoch": 0, "validation": validation }))?;
+        let score = T::judged(&validation).0 as f32;
+        progress.say(&format!("before the first step: {}, score {score:.3}", T::words(&validation)));
+        *training.best() = Some((0, score));
+        training.save_best(folder, &validation)?;
+    }
     while training.n_done() < steps && !is_over(training) {
         if progress.is_to_stop() {
             if training.n_done() > saved_at {

@@ -32,7 +32,8 @@ impl MetricsLog {
     /// Opens the file `path` as a log without events.
     pub fn lines_alone(path: &Path, step: usize) -> Result<Self> {
         let text = text(path)?;
-        let seen = |line: &&str| parsed(line).is_some_and(|line| step_of(&line) <= step as u64);
+        // A training without a checkpoint begins anew, with its validation before the first step.
+        let seen = |line: &&str| step > 0 && parsed(line).is_some_and(|line| step_of(&line) <= step as u64);
         let kept: String = text.lines().filter(seen).map(|line| format!("{line}\n")).collect();
         Ok(Self { lines: AppendedFile::open(path, kept.as_bytes())?, events: None })
     }

@@ -217,7 +217,8 @@ fn loader(args: &Args, dir: &Path, out: &Path) -> Result<Loaded> {
     };
     let dataset = Dataset::open(dir)?;
     let start = Instant::now();
-    let examples = WindowLoader::load(&dataset, Split::Train, &train::normalisation(&dataset)?, 64, 5)?;
+    let examples =
+        WindowLoader::load(&dataset, Split::Train, &orator::train::gan::begin::normalisation(&dataset)?, 64, 5)?;
     let load_secs = start.elapsed().as_secs_f64();
     let mut rng = ChaCha8Rng::seed_from_u64(1337);
     let (mut n_loaded, start) = (0, Instant::now());

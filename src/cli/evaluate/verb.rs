@@ -155,8 +155,9 @@ fn title(args: &MotionArgs) -> String {
 /// What is measured, from files or from a dataset.
 fn evaluation(args: &MotionArgs, ui: &Ui) -> Result<Evaluation> {
     if let Some(dataset) = &args.dataset {
-        let checkpoints = EvaluatedCheckpoint::open_all(&args.checkpoint)?;
-        return Evaluation::of_generators(&Dataset::open(dataset)?, &checkpoints, args.split, ui);
+        let dataset = Dataset::open(dataset)?;
+        let checkpoints = EvaluatedCheckpoint::open_all(&args.checkpoint, &dataset.info().speaker)?;
+        return Evaluation::of_generators(&dataset, &checkpoints, args.split, ui);
     }
     let (Some(truth), Some(prediction)) = (&args.truth, &args.prediction) else {
         bail!("nothing to measure: give --truth and --prediction, or --dataset and --checkpoint")

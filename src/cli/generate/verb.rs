@@ -7,6 +7,7 @@ use crate::cli::figure_args::FigureArgs;
 use crate::cli::outputs::{OutputFiles, is_same_file, names, next_output, of_take, outputs};
 use crate::cli::ui::Ui;
 use anyhow::{Context as _, Result, bail, ensure};
+use orator::generate::model::GenerationChoice;
 use orator::generate::seq2seq::metadata::is_sequence;
 use orator::generate::trained::TrainedSpeaker;
 use orator::nn::seq2seq::predict::StateAtSeams;
@@ -40,6 +41,9 @@ pub struct Args {
     /// sounds a folder of files with their names; left out, those beside the sounds are taken.
     #[arg(long, value_name = "FILE|FOLDER")]
     transcript: Option<PathBuf>,
+    /// Who is to speak, of a network of several speakers.
+    #[arg(long, value_name = "NAME", requires = "audio")]
+    speaker: Option<String>,
     /// Let a sequence-to-sequence network keep its decoder's state from one segment to the next.
     #[arg(long)]
     carry_state: bool,
@@ -91,10 +95,8 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
     let source = SpeechSource { audio, transcript: args.transcript.as_deref(), seams, figure };
     let mut made = Vec::new();
     for (take, outputs) in takes.iter().zip(&outputs) {
-        let trained = match take.seed {
-            Some(seed) => TrainedSpeaker::open_take(&checkpoint, seed)?,
-            None => TrainedSpeaker::open(&checkpoint)?,
-        };
+        let choice = GenerationChoice { speaker: args.speaker.clone(), seed: take.seed };
+        let trained = TrainedSpeaker::open_as(&checkpoint, &choice)?;
         made.push((speaker::write(&trained, &source, outputs, ui)?, trained));
     }
     let Some((written, trained)) = made.first() else { bail!("no take was asked for") };
@@ -112,6 +114,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         names.join(", ")
     );
     let said = args.transcript.as_ref().map_or(String::new(), |path| format!(" --transcript {}", path.display()));
+    let said = args.speaker.as_ref().map_or(said.clone(), |name| format!("{said} --speaker {name}"));
     let carried = if args.carry_state { " --carry-state" } else { "" };
     let seed = takes.first().and_then(|take| take.seed).map_or(String::new(), |seed| format!(" --seed {seed}"));
     // A captured skeleton is written as .bvh alone.

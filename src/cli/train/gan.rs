@@ -1,6 +1,6 @@
 //! `orator train gan`.
 
-use super::watched::{Places, WatchedPage, middle, shown};
+use super::watched::{ALL, Places, WatchedPage, middle, shown};
 use crate::cli::Outcome;
 use crate::cli::config_args::ConfigArgs;
 use crate::cli::ui::Ui;
@@ -10,6 +10,7 @@ use orator::evaluate::baseline::predictor;
 use orator::evaluate::clips::held_out;
 use orator::evaluate::clips::held_out::HeldOutInterval;
 use orator::generate::GestureGenerator;
+use orator::generate::model::GenerationChoice;
 use orator::report::training::strip::HeldOutPair;
 use orator::train::epochs::ValidatedStep;
 use orator::train::gan::score::{Validation, ValidationMetrics, below_mean_pose};
@@ -20,7 +21,8 @@ use std::time::Instant;
 
 /// Train a speaker's speech-to-gesture generator.
 ///
-/// Reads the dataset that `orator run` made and trains with the settings of `[gan]`, one model a speaker. Checkpoints,
+/// Reads the dataset that `orator run` made and trains with the settings of `[gan]`, one model a speaker, or one of several
+/// speakers (`--speaker all`, several `--dataset`), who are told apart by an embedding. Checkpoints,
 /// `metrics.jsonl`, TensorBoard events and a page of curves go to the output folder; started again, it goes on from the
 /// newest checkpoint there, with that checkpoint's settings, and ends with the same bytes as a training that was never
 /// interrupted.
@@ -28,7 +30,7 @@ use std::time::Instant;
 pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
-    /// The speaker; may be left out when the configuration names one only.
+    /// The speaker, or `all` of the configuration; may be left out when it names one only.
     #[arg(long, value_name = "NAME")]
     speaker: Option<String>,
     /// Steps to train altogether, instead of `gan.steps`.
@@ -41,31 +43,51 @@ pub struct Args {
     /// Folder of the checkpoints; `work/gan/<speaker>` when left out.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// The dataset; `work/dataset/<speaker>` when left out.
-    #[arg(long, value_name = "DIR")]
-    dataset: Option<PathBuf>,
+    /// The dataset, or those of several speakers; `work/dataset/<speaker>` when left out.
+    #[arg(long, value_name = "DIR", num_args = 1..)]
+    dataset: Vec<PathBuf>,
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    let config = if args.dataset.is_some() { args.config.load_or_default()? } else { args.config.load()? };
-    let Args { speaker, dataset, out, .. } = &args;
-    let places = Places { config: &config, speaker: speaker.as_ref(), dataset: dataset.as_ref(), out: out.as_ref() };
-    let (dataset, out) = places.open("gan")?;
+    let config = if !args.dataset.is_empty() { args.config.load_or_default()? } else { args.config.load()? };
+    let Args { speaker, out, .. } = &args;
+    let places =
+        Places { config: &config, speaker: speaker.as_ref(), dataset: args.dataset.first(), out: out.as_ref() };
+    let is_named = |name: &String| config.settings.speaker.iter().any(|of| of.name == *name);
+    let are_all = args.dataset.is_empty() && speaker.as_ref().is_some_and(|name| name == ALL && !is_named(name));
+    let (datasets, out) = if are_all || args.dataset.len() > 1 {
+        places.open_several("gan", &args.dataset)?
+    } else {
+        let (dataset, out) = places.open("gan")?;
+        (vec![dataset], out)
+    };
+    let datasets: Vec<&Dataset> = datasets.iter().collect();
+    let names: Vec<&str> = datasets.iter().map(|dataset| dataset.info().speaker.as_str()).collect();
+    let names = names.join(", ");
     let mut settings = config.settings.gan.clone();
     if let Some(steps) = args.steps {
         settings.steps = steps.into();
     }
 
     let start = Instant::now();
-    let poses = || pairs(&dataset, &GestureGenerator::open(&out.join(train::BEST))?);
-    let mut page = WatchedPage::new(&out, dataset.info().speaker.clone(), Box::new(poses), ui);
-    let outcome = train::train_watched(&dataset, &settings, args.from.as_deref(), &out, ui, &mut |at| page.update(at))?;
+    let poses = || {
+        let mut all = Vec::new();
+        for dataset in &datasets {
+            let speaker = (datasets.len() > 1).then(|| dataset.info().speaker.clone());
+            let choice = GenerationChoice { speaker, seed: None };
+            all.extend(pairs(dataset, &GestureGenerator::open_as(&out.join(train::BEST), &choice)?, datasets.len())?);
+        }
+        Ok(all)
+    };
+    let mut page = WatchedPage::new(&out, names.clone(), Box::new(poses), ui);
+    let validated = &mut |at| page.update(at);
+    let outcome = train::train_watched(&datasets, &settings, args.from.as_deref(), &out, ui, validated)?;
     let steps_per_sec = (outcome.steps - outcome.began_at) as f64 / start.elapsed().as_secs_f64().max(1e-9);
     let page = page.finish(ValidatedStep { step: outcome.steps, best_step: outcome.best_step });
     let text = format!(
         "{}: {} steps{} ({steps_per_sec:.2} a second, {:.1} % of it waiting for data) on {} windows, {} parameters\n\
          {}\nnewest checkpoint  {}\nbest (step {})  {}{}",
-        dataset.info().speaker,
+        names,
         outcome.steps,
         if outcome.stopped_early { ", ended early: the score had stopped falling" } else { "" },
         100.0 * outcome.waiting,
@@ -77,9 +99,11 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         outcome.best.display(),
         page.as_ref().map(|page| format!("\ncurves and poses  {}", page.display())).unwrap_or_default(),
     );
-    let next = format!("orator generate --checkpoint {} --audio speech.wav --out motion.bvh", outcome.best.display());
+    let best = outcome.best.display();
+    let spoken = if datasets.len() > 1 { format!(" --speaker {}", datasets[0].info().speaker) } else { String::new() };
+    let next = format!("orator generate --checkpoint {best}{spoken} --audio speech.wav --out motion.bvh");
     let facts = json!({
-        "speaker": dataset.info().speaker,
+        "speaker": names,
         "steps": outcome.steps,
         "stopped_early": outcome.stopped_early,
         "steps_per_sec": steps_per_sec,
@@ -91,6 +115,7 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
         "best": outcome.best,
         "best_step": outcome.best_step,
         "page": page,
+        "next": next,
     });
     ui.summary(&text, Some(&next), facts);
     Ok(if page.is_some() { Outcome::Done } else { Outcome::SomeFailed })
@@ -124,9 +149,11 @@ fn metrics(validation: &Validation) -> String {
     text
 }
 
-/// True and generated poses of these intervals.
-fn pairs(dataset: &Dataset, speaker: &GestureGenerator) -> Result<Vec<HeldOutPair>> {
-    let intervals = held_out::read(dataset, &shown(dataset), &speaker.metadata.normalisation)?;
+/// True and generated poses of a few intervals, of which so many speakers share the page.
+fn pairs(dataset: &Dataset, speaker: &GestureGenerator, n_speakers: usize) -> Result<Vec<HeldOutPair>> {
+    let mut samples = shown(dataset);
+    samples.truncate(samples.len().div_ceil(n_speakers));
+    let intervals = held_out::read(dataset, &samples, &speaker.metadata.normalisation)?;
     let pair = |interval: HeldOutInterval| {
         let frames = middle(interval.ground_truth.n_frames(), speaker.fps());
         let HeldOutInterval { key, ground_truth, sound, .. } = interval.cut(frames.clone());

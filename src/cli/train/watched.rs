@@ -13,6 +13,8 @@ use orator::types::time::FrameRate;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+/// Name that stands for all speakers of the configuration, unless one is called so.
+pub const ALL: &str = "all";
 /// Intervals on the page of a training, and how much of each is generated.
 const N_PAIRS: usize = 3;
 const PAIR_SECS: f64 = 8.0;
@@ -26,6 +28,18 @@ pub struct Places<'a> {
 }
 
 impl Places<'_> {
+    /// Opens the datasets of `speakers`, and says where what is learnt of all goes: `work/ROOM/all` unless told.
+    pub fn open_several(&self, room: &str, datasets: &[PathBuf]) -> Result<(Vec<Dataset>, PathBuf)> {
+        let work = &self.config.settings.work.dir;
+        let folders: Vec<PathBuf> = match datasets {
+            [] => self.config.settings.speaker.iter().map(|of| work.join("dataset").join(&of.name)).collect(),
+            given => given.to_vec(),
+        };
+        let open = |folder: &PathBuf| Dataset::open(folder).context("`orator run` makes the datasets to train on");
+        let out = self.out.cloned().unwrap_or_else(|| work.join(room).join(ALL));
+        Ok((folders.iter().map(open).collect::<Result<_>>()?, out))
+    }
+
     /// Opens the dataset, and says where what is learnt goes: `work/ROOM/SPEAKER` unless told. A dataset named without a
     /// speaker is of its own.
     pub fn open(&self, room: &str) -> Result<(Dataset, PathBuf)> {

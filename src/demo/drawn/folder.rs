@@ -105,7 +105,7 @@ pub fn draw(dir: &Path, plan: &DemoPlan, progress: &dyn Progress) -> anyhow::Res
     Ok(videos)
 }
 
-/// Configuration lines for the splits: the last two videos validate and test; fewer than three all train.
+/// Configuration lines for the splits: the last third tests, one video before it validates; fewer than three all train.
 fn splits(n_videos: usize) -> String {
     if n_videos < 3 {
         return "train = [\"*.mp4\"]".to_owned();
@@ -113,7 +113,8 @@ fn splits(n_videos: usize) -> String {
     let list = |numbers: std::ops::RangeInclusive<usize>| {
         numbers.map(|number| format!("\"clip-{number}.mp4\"")).collect::<Vec<_>>().join(", ")
     };
+    let first_test = n_videos - n_videos / 3 + 1;
     let (train, validation, test) =
-        (list(1..=n_videos - 2), list(n_videos - 1..=n_videos - 1), list(n_videos..=n_videos));
+        (list(1..=first_test - 2), list(first_test - 1..=first_test - 1), list(first_test..=n_videos));
     format!("train = [{train}]\nvalidation = [{validation}]\ntest = [{test}]")
 }

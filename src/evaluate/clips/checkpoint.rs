@@ -32,11 +32,12 @@ pub struct EvaluatedCheckpoint {
 
 impl EvaluatedCheckpoint {
     /// Opens checkpoints of `orator train gan` and `orator train seq2seq`: files, or folders of trainings (the best
-    /// checkpoint, else the newest). Each is named by its kind, and where several are of one kind by its folder too.
+    /// checkpoint, else the newest); of networks of several speakers the one of this name. Each is named by its kind, and
+    /// where several are of one kind by its folder too.
     ///
     /// # Errors
     /// A path that is not there, a checkpoint of another kind, one that is given twice.
-    pub fn open_all(paths: &[PathBuf]) -> Result<Vec<Self>> {
+    pub fn open_all(paths: &[PathBuf], speaker: &str) -> Result<Vec<Self>> {
         let files: Vec<PathBuf> = paths.iter().map(|path| checkpoint_file(path)).collect::<Result<_>>()?;
         let places: Vec<PathBuf> = files.iter().map(std::fs::canonicalize).collect::<std::io::Result<_>>()?;
         for (at, place) in places.iter().enumerate() {
@@ -44,7 +45,7 @@ impl EvaluatedCheckpoint {
             ensure!(earlier.is_none(), "{} is given twice: give each checkpoint once", paths[at].display());
         }
         let speakers: Vec<TrainedSpeaker> =
-            files.iter().map(|file| TrainedSpeaker::open(file)).collect::<Result<_>>()?;
+            files.iter().map(|file| TrainedSpeaker::open_for(file, speaker)).collect::<Result<_>>()?;
         let names = speakers.iter().zip(&places).map(|(speaker, place)| names(speaker, place)).collect::<Vec<_>>();
         let opened = speakers.into_iter().enumerate().map(|(at, speaker)| {
             let is_alone = |level: &usize| names.iter().filter(|of| of[*level] == names[at][*level]).count() == 1;

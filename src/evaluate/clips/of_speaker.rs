@@ -19,7 +19,7 @@ use crate::formats::transcript::Word;
 use crate::generate::normalisation::{N_FEATURES, Normalisation};
 use crate::motion::bones;
 use crate::stage::progress::Task;
-use crate::train::gan::train::normalisation;
+use crate::train::gan::begin::normalisation;
 use crate::types::posture::{Posture, PostureChannel};
 use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::Sound;

@@ -5,8 +5,8 @@
 use super::conv_block::ConvBlock;
 use crate::nn::ops::conv2d::Conv;
 use crate::nn::ops::resize;
-use crate::nn::params::Params;
-use candle_core::{Result, Tensor};
+use crate::nn::params::{Init, Params};
+use candle_core::{IndexOp, Result, Tensor};
 use serde::{Deserialize, Serialize};
 
 /// The UNet halves time five times.
@@ -14,6 +14,9 @@ pub const FRAMES_MULTIPLE: usize = 32;
 const N_ENTER: usize = 2;
 const N_LEVELS: usize = 5;
 const N_DECODER: usize = 4;
+/// Table [speakers, width] of a network of several speakers, and bound of its first values.
+pub const SPEAKER_EMBEDDING: &str = "speaker.embedding";
+const EMBEDDING_BOUND: f64 = 0.3;
 
 /// How the spectrogram is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -50,6 +53,14 @@ pub struct Config {
     /// Weight of a new batch in the running statistics of the batch norms (PyTorch's convention).
     #[serde(default = "before_it_was_stated")]
     pub norm_momentum: f64,
+    /// Speakers that a vector each tells apart, which is added to the encoded sound (speaker embedding); 0: the network
+    /// knows one speaker and has none.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub n_speakers: usize,
+}
+
+fn is_zero(n: &usize) -> bool {
+    *n == 0
 }
 
 fn before_it_was_stated() -> f64 {
@@ -61,7 +72,7 @@ impl Config {
     /// steps on a CPU never catches up with: `light` takes 0.1.
     pub fn from_preset(preset: Preset, n_out: usize) -> Self {
         let norm_momentum = if preset == Preset::Paper { 0.01 } else { 0.1 };
-        Self { preset, n_mels: 64, width: 256, n_out, norm_momentum }
+        Self { preset, n_mels: 64, width: 256, n_out, norm_momentum, n_speakers: 0 }
     }
 }
 
@@ -70,6 +81,8 @@ impl Config {
 pub struct Generator {
     preset: Preset,
     audio_encoder: Vec<ConvBlock>,
+    /// [speakers, width]
+    embedding: Option<Tensor>,
     enter: Vec<ConvBlock>,
     downs: Vec<ConvBlock>,
     ups: Vec<ConvBlock>,
@@ -86,6 +99,12 @@ impl Generator {
     pub fn new(params: &mut Params, config: &Config) -> Result<Self> {
         let (n, momentum) = (config.width, config.norm_momentum);
         let audio_encoder = audio_encoder(params, config)?;
+        let embedding = match config.n_speakers {
+            0 => None,
+            n_speakers => {
+                Some(params.trainable(SPEAKER_EMBEDDING, &[n_speakers, n], Init::Uniform(EMBEDDING_BOUND))?)
+            }
+        };
         let mut row = |name: &str, n_blocks: usize, (kernel, stride): (usize, usize)| {
             let block = |i| ConvBlock::new(params, &format!("{name}.{i}"), &[n, n, kernel], stride, momentum);
             (0..n_blocks).map(block).collect::<Result<Vec<_>>>()
@@ -93,6 +112,7 @@ impl Generator {
         Ok(Self {
             preset: config.preset,
             audio_encoder,
+            embedding,
             enter: row("enter", N_ENTER, PLAIN)?,
             downs: row("down", N_LEVELS, DOWN)?,
             ups: row("up", N_LEVELS, PLAIN)?,
@@ -102,21 +122,26 @@ impl Generator {
     }
 
     /// `mels` [B, n_mels, T_mel] to poses [B, n_out, n_frames]; `n_frames` is a multiple of [`FRAMES_MULTIPLE`] and
-    /// both span the same time.
-    pub fn forward(&self, mels: &Tensor, n_frames: usize, train: bool) -> Result<Tensor> {
+    /// both span the same time. `speakers` as in [`Self::encode`].
+    pub fn forward(&self, mels: &Tensor, speakers: &[u32], n_frames: usize, train: bool) -> Result<Tensor> {
         if n_frames == 0 || !n_frames.is_multiple_of(FRAMES_MULTIPLE) {
             candle_core::bail!("the generator makes a multiple of {FRAMES_MULTIPLE} frames, not {n_frames}");
         }
-        self.decode(&resize::linear(&self.encode(mels, train)?, n_frames)?, train)
+        self.decode(&resize::linear(&self.encode(mels, speakers, train)?, n_frames)?, train)
     }
 
-    /// `mels` [B, n_mels, T_mel] to encoded sound [B, width, about T_mel / 8].
-    pub fn encode(&self, mels: &Tensor, train: bool) -> Result<Tensor> {
+    /// `mels` [B, n_mels, T_mel] to encoded sound [B, width, about T_mel / 8]. `speakers`: the number of each sound's
+    /// speaker, which a network of one does not ask for.
+    pub fn encode(&self, mels: &Tensor, speakers: &[u32], train: bool) -> Result<Tensor> {
         let encoded = match self.preset {
             Preset::Light => through(&self.audio_encoder, mels.t()?, train)?,
             Preset::Paper => through(&self.audio_encoder, mels.t()?.unsqueeze(3)?, train)?.squeeze(2)?,
         };
-        encoded.t()?.contiguous()
+        let encoded = encoded.t()?.contiguous()?;
+        match &self.embedding {
+            None => Ok(encoded),
+            Some(table) => encoded.broadcast_add(&of_speakers(table, speakers, encoded.dim(0)?)?),
+        }
     }
 
     /// Encoded sound at every pose frame, [B, width, T], to poses [B, n_out, T]; T is a multiple of
@@ -133,6 +158,18 @@ impl Generator {
         }
         self.last.forward(&through(&self.decoder, x, train)?)?.t()?.contiguous()
     }
+}
+
+/// Vectors [`n_sounds` or 1, width, 1] of the speakers of so many sounds.
+fn of_speakers(table: &Tensor, speakers: &[u32], n_sounds: usize) -> Result<Tensor> {
+    let n_speakers = table.dim(0)?;
+    if n_speakers == 1 {
+        return table.i(0)?.reshape((1, (), 1));
+    }
+    if speakers.len() != n_sounds || speakers.iter().any(|speaker| *speaker as usize >= n_speakers) {
+        candle_core::bail!("{n_sounds} sounds are of speakers {speakers:?}; the network knows {n_speakers}");
+    }
+    table.index_select(&Tensor::new(speakers, table.device())?, 0)?.unsqueeze(2)
 }
 
 /// One block after the other.
@@ -188,10 +225,30 @@ mod tests {
         let net = Generator::new(&mut params, &config)?;
         for (n_mel, n_frames) in [(418, 64), (427, 64), (213, 32), (1000, 160)] {
             let mels = pattern(&[2, 64, n_mel], 0.0)?.to_dtype(DType::F32)?;
-            assert_eq!(net.forward(&mels, n_frames, true)?.dims(), [2, 6, n_frames]);
+            assert_eq!(net.forward(&mels, &[], n_frames, true)?.dims(), [2, 6, n_frames]);
         }
         let mels = pattern(&[2, 64, 100], 0.0)?.to_dtype(DType::F32)?;
-        assert!(net.forward(&mels, 15, false).is_err());
+        assert!(net.forward(&mels, &[], 15, false).is_err());
+        Ok(())
+    }
+
+    #[test]
+    fn a_speakers_vector_is_added_to_what_is_heard() -> Result<()> {
+        let mut params = Params::with_dtype(0, DType::F64);
+        let config = Config { n_mels: 5, width: 8, n_speakers: 3, ..Config::from_preset(Preset::Light, 3) };
+        let net = Generator::new(&mut params, &config)?;
+        let mels = pattern(&[2, 5, 41], 0.0)?;
+        let added = |speakers: &[u32]| net.encode(&mels, speakers, false);
+        let difference = (added(&[2, 1])? - added(&[0, 1])?)?;
+        let table = &params.tensors()?[SPEAKER_EMBEDDING];
+        let expected =
+            (table.i(2)? - table.i(0)?)?.reshape((1, 8, 1))?.broadcast_as(difference.narrow(0, 0, 1)?.shape())?;
+        let worst_of = |a: &Tensor| a.abs()?.flatten_all()?.max(0)?.to_scalar::<f64>();
+        assert!(worst_of(&(difference.narrow(0, 0, 1)? - expected)?)? < 1e-12);
+        assert_eq!(worst_of(&difference.narrow(0, 1, 1)?)?, 0.0);
+        assert!(added(&[0]).is_err() && added(&[0, 3]).is_err() && added(&[]).is_err());
+        let error = worst(&[table.clone()], |v| of_speakers(&v[0], &[1, 2, 1], 3)?.sqr())?;
+        assert!(error < 1e-7, "{error}");
         Ok(())
     }
 
@@ -201,7 +258,7 @@ mod tests {
             let mut params = Params::with_dtype(1, DType::F64);
             let net = Generator::new(&mut params, &Config { n_mels, width: 4, ..Config::from_preset(preset, 3) })?;
             let mels = pattern(&[2, n_mels, 41], 0.0)?;
-            let error = worst(&[mels], |v| net.forward(&v[0], 32, false))?;
+            let error = worst(&[mels], |v| net.forward(&v[0], &[], 32, false))?;
             assert!(error < 1e-5, "{preset:?}: {error}");
         }
         Ok(())

@@ -55,7 +55,7 @@ pub struct StreamingGenerator<'a, M> {
 }
 
 impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
-    /// `n_mel_frames` of sound, which `mels` makes as they are asked for, in order, become `n_frames` of poses, `chunk`
+    /// The generator is of one speaker. `n_mel_frames` of sound, which `mels` makes as they are asked for, in order, become `n_frames` of poses, `chunk`
     /// at a time; both are multiples of 32 frames and `n_frames` spans the same time as the sound.
     pub fn new(
         generator: &'a Generator,
@@ -114,7 +114,7 @@ impl<'a, M: FnMut(Range<usize>) -> Result<Tensor>> StreamingGenerator<'a, M> {
             end if end == n_encoded => self.n_mel_frames,
             end => ((end - 1) * HOPS + heard_behind(self.preset) + 1).min(self.n_mel_frames),
         };
-        let encoded = self.generator.encode(&(self.mels)(first * HOPS..end)?, false)?;
+        let encoded = self.generator.encode(&(self.mels)(first * HOPS..end)?, &[], false)?;
         encoded.narrow(2, piece.start - first, piece.len())
     }
 }
@@ -171,7 +171,7 @@ mod tests {
             // 6.67 spectrogram frames a pose frame, and other numbers, even and odd.
             for (n_mel, n_frames) in [(213, 32), (427, 64), (2994, 448), (6829, 1024), (2003, 608)] {
                 let mels = pattern(&[1, 8, n_mel], 3.0)?;
-                let whole = net.forward(&mels, n_frames, false)?;
+                let whole = net.forward(&mels, &[], n_frames, false)?;
                 for chunk in [32, 96, 256, 4096] {
                     let mels = |frames: Range<usize>| mels.narrow(2, frames.start, frames.len());
                     let chunks = StreamingGenerator::new(&net, preset, n_mel, n_frames, chunk, mels)?;

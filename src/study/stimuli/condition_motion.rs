@@ -40,7 +40,7 @@ impl ConditionModels {
         let mut models = BTreeMap::new();
         for condition in conditions {
             let ConditionSource::Checkpoint(path) = &condition.source else { continue };
-            let opened = EvaluatedCheckpoint::open_all(&[filled(path, speaker, "")]);
+            let opened = EvaluatedCheckpoint::open_all(&[filled(path, speaker, "")], speaker);
             let opened = opened.with_context(|| format!("condition {} of the speaker {speaker}", condition.name))?;
             models.extend(opened.into_iter().map(|model| (condition.name.clone(), model)));
         }

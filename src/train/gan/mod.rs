@@ -3,10 +3,13 @@
 
 pub mod augment;
 pub mod average;
+pub mod begin;
 pub mod block_metrics;
+pub mod joined_windows;
 pub mod losses;
 pub mod recipe;
 pub mod score;
+pub mod speakers;
 pub mod start;
 pub mod step;
 pub mod train;

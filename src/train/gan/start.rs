@@ -6,14 +6,14 @@ use super::step::GanTrainer;
 use crate::dataset::Dataset;
 use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
-use crate::generate::model::{BEST, GENERATOR, SpeakerMetadata, TrainedVideo};
+use crate::generate::model::{self, BEST, SpeakerMetadata, TrainedVideo};
 use anyhow::{Context, Result, bail, ensure};
 use std::path::{Path, PathBuf};
 
 /// Model that a training begins with.
 pub struct StartingModel {
     path: PathBuf,
-    speaker: SpeakerMetadata,
+    speakers: Vec<SpeakerMetadata>,
     contents: Contents,
 }
 
@@ -22,22 +22,25 @@ impl StartingModel {
     pub fn read(path: &Path) -> Result<Self> {
         let path = if path.is_dir() { in_folder(path)? } else { path.to_owned() };
         let contents = Contents::read(&path)?;
-        let speaker = serde_json::from_value(contents.facts["speaker"].clone());
-        let speaker = speaker.with_context(|| format!("{} is no checkpoint of `orator train gan`", path.display()))?;
-        Ok(Self { path, speaker, contents })
+        let speakers = model::speakers(&contents.facts);
+        let speakers =
+            speakers.with_context(|| format!("{} is no checkpoint of `orator train gan`", path.display()))?;
+        Ok(Self { path, speakers, contents })
     }
 
-    /// The file and its speaker.
+    /// The file and its speakers.
     pub fn account(&self) -> String {
-        format!("what {} learnt of {}", self.path.display(), self.speaker.name)
+        let names: Vec<&str> = self.speakers.iter().map(|speaker| speaker.name.as_str()).collect();
+        format!("what {} learnt of {}", self.path.display(), names.join(", "))
     }
 
-    /// A trainer of the speaker that `metadata` describes, with the weights of this model and its videos in the list.
+    /// A trainer of these speakers, with the weights of this model and its videos in their lists.
     ///
     /// # Errors
     /// Networks of another shape.
-    pub fn begin(&self, mut metadata: SpeakerMetadata, settings: GanSettings) -> Result<GanTrainer> {
-        let (own, other) = (&metadata.network, &self.speaker.network);
+    pub fn begin(&self, mut speakers: Vec<SpeakerMetadata>, settings: GanSettings) -> Result<GanTrainer> {
+        let (Some(own), Some(other)) = (speakers.first(), self.speakers.first()) else { bail!("there is no speaker") };
+        let (own, other) = (&own.network, &other.network);
         ensure!(
             own.preset == other.preset && own.width == other.width && own.n_out == other.n_out,
             "{} is a network of preset {:?}, width {} and {} numbers a pose, the training's one of preset {:?}, width {} and \
@@ -50,13 +53,11 @@ impl StartingModel {
             own.width,
             own.n_out
         );
-        metadata.videos.extend(self.speaker.videos.iter().cloned());
-        metadata.videos.sort();
-        metadata.videos.dedup();
-        let trainer = GanTrainer::new(metadata, settings)?;
-        trainer
-            .begin_with(&self.contents.part(GENERATOR), &self.contents)
-            .with_context(|| format!("cannot begin with {}", self.path.display()))?;
+        let earlier = self.speakers.iter().flat_map(|speaker| speaker.videos.iter().cloned());
+        let earlier: Vec<TrainedVideo> = earlier.collect();
+        speakers.iter_mut().for_each(|speaker| speaker.add_videos(earlier.clone()));
+        let trainer = GanTrainer::new(speakers, settings)?;
+        trainer.begin_with(&self.contents).with_context(|| format!("cannot begin with {}", self.path.display()))?;
         Ok(trainer)
     }
 }

@@ -3,26 +3,25 @@
 use super::augment;
 use super::average;
 use super::losses;
-use super::losses::BoneConstancy;
 use super::recipe::settings::GanSettings;
 use super::score::Validation;
+use super::speakers::LearntSpeakers;
 use super::windows::WindowBatch;
 use crate::config::{ComputeDevice, GanConfig};
 use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
 use crate::generate::model::BEST;
 use crate::generate::model::{GENERATOR, SpeakerMetadata};
-use crate::generate::representation::PoseDecoder;
 use crate::nn::device;
 use crate::nn::gan::discriminator::{Discriminator, motion};
-use crate::nn::gan::generator::Generator;
+use crate::nn::gan::generator::{Generator, SPEAKER_EMBEDDING};
 use crate::nn::ops::resize;
 use crate::nn::params::Params;
 use crate::train::optim::adam;
 use crate::train::optim::adam::Adam;
 use crate::train::resume;
 use anyhow::{Context, Result, ensure};
-use candle_core::{DType, Device, Tensor};
+use candle_core::{Device, Tensor};
 use rand::Rng;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -58,6 +57,9 @@ pub struct Losses {
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct TrainerState {
     pub speaker: SpeakerMetadata,
+    /// The others of a training of several.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub other_speakers: Vec<SpeakerMetadata>,
     pub settings: GanSettings,
     /// Steps done.
     pub step: usize,
@@ -67,10 +69,9 @@ pub struct TrainerState {
 
 /// Networks, optimisers and where they are.
 pub struct GanTrainer {
-    pub metadata: SpeakerMetadata,
+    pub speakers: LearntSpeakers,
     pub settings: GanSettings,
     pub generator: Generator,
-    pub decoder: PoseDecoder,
     generator_params: Params,
     /// Mean of the generator over the steps, where the settings want one.
     mean: Option<(Generator, Params)>,
@@ -78,7 +79,6 @@ pub struct GanTrainer {
     discriminator_params: Params,
     adam_g: Adam,
     adam_d: Adam,
-    bones: BoneConstancy,
     /// Steps done.
     pub step: usize,
     /// Step and score of the best validation so far.
@@ -86,14 +86,15 @@ pub struct GanTrainer {
 }
 
 impl GanTrainer {
-    /// Networks as the seed makes them.
-    pub fn new(metadata: SpeakerMetadata, settings: GanSettings) -> Result<Self> {
+    /// Networks as the seed makes them, for one speaker or several.
+    pub fn new(speakers: Vec<SpeakerMetadata>, settings: GanSettings) -> Result<Self> {
         let device = device::open(settings.device == ComputeDevice::Cuda)?;
         let mut generator_params = Params::new(settings.seed).on(&device);
-        let generator = Generator::new(&mut generator_params, &metadata.network)?;
+        let speakers = LearntSpeakers::new(speakers, &device)?;
+        let generator = Generator::new(&mut generator_params, speakers.network())?;
         let mean = if settings.ema_decay > 0.0 {
             let mut params = Params::frozen().on(&device);
-            let mean = Generator::new(&mut params, &metadata.network)?;
+            let mean = Generator::new(&mut params, speakers.network())?;
             params.load(&generator_params.tensors()?)?;
             Some((mean, params))
         } else {
@@ -101,12 +102,10 @@ impl GanTrainer {
         };
         // Another seed, or tensors of the same name would begin alike.
         let mut discriminator_params = Params::new(!settings.seed).on(&device);
-        let discriminator = Discriminator::new(&mut discriminator_params, metadata.normalisation.n_numbers())?;
+        let discriminator = Discriminator::new(&mut discriminator_params, speakers.n_numbers())?;
         let adam = adam::Config { max_norm: Some(MAX_NORM), ..adam::Config::default() };
         let decaying = adam::Config { weight_decay: settings.weight_decay, ..adam };
         Ok(Self {
-            decoder: metadata.representation.decoder(&metadata.normalisation, DType::F32, &device)?,
-            bones: BoneConstancy::new(&metadata.normalisation, DType::F32, &device)?,
             adam_g: Adam::new(&generator_params, decaying)?,
             adam_d: Adam::new(&discriminator_params, adam)?,
             generator_params,
@@ -114,7 +113,7 @@ impl GanTrainer {
             mean,
             discriminator_params,
             discriminator,
-            metadata,
+            speakers,
             settings,
             step: 0,
             best: None,
@@ -142,7 +141,7 @@ impl GanTrainer {
         let GanSettings { lambda_l1, lambda_velocity, lambda_bone, .. } = self.settings;
         let (lambda_gan, learning_rate) = (self.settings.adversarial_weight(self.step), self.settings.rate(self.step));
         let raw = self.predict(&batch)?;
-        let generated = self.decoder.poses(&raw)?;
+        let generated = self.speakers.poses(&raw, &batch.speakers)?;
         // Differences count where both frames do, so that a missing joint looks the same in both.
         let mask = losses::both_seen(&batch.mask)?;
         let generated_motion = (motion(&generated)? * &mask)?;
@@ -170,8 +169,10 @@ impl GanTrainer {
         if lambda_velocity > 0.0 {
             velocity = add(losses::velocity(&generated, &batch.poses, &batch.mask)?, lambda_velocity)?;
         }
-        if lambda_bone > 0.0 && !self.metadata.representation.keeps_lengths() {
-            bone = add(self.bones.loss(&generated)?, lambda_bone)?;
+        if lambda_bone > 0.0
+            && let Some(loss) = self.speakers.bone_loss(&generated, &batch.speakers)?
+        {
+            bone = add(loss, lambda_bone)?;
         }
         if lambda_gan > 0.0 {
             let scores = self.discriminator.forward(&generated_motion, true)?;
@@ -194,9 +195,9 @@ impl GanTrainer {
     fn predict(&self, batch: &WindowBatch) -> Result<Tensor> {
         let (n_frames, dropout) = (self.settings.window_frames, self.settings.dropout);
         if dropout == 0.0 {
-            return Ok(self.generator.forward(&batch.mels, n_frames, true)?);
+            return Ok(self.generator.forward(&batch.mels, &batch.speakers, n_frames, true)?);
         }
-        let encoded = resize::linear(&self.generator.encode(&batch.mels, true)?, n_frames)?;
+        let encoded = resize::linear(&self.generator.encode(&batch.mels, &batch.speakers, true)?, n_frames)?;
         let (n_windows, n_channels, _) = encoded.dims3()?;
         let mut rng = resume::stream(self.settings.seed ^ DROPOUT, self.step);
         let of = |_| if rng.random_bool(dropout) { 0.0 } else { 1.0 / (1.0 - dropout) as f32 };
@@ -249,15 +250,24 @@ impl GanTrainer {
     }
 
     fn stored(&self) -> Result<Value> {
-        let (speaker, settings) = (self.metadata.clone(), self.settings.clone());
-        Ok(serde_json::to_value(TrainerState { speaker, settings, step: self.step, best: self.best })?)
+        let settings = self.settings.clone();
+        let mut speakers = self.speakers.all().iter().cloned();
+        let speaker = speakers.next().context("a training without a speaker")?;
+        let other_speakers = speakers.collect();
+        Ok(serde_json::to_value(TrainerState { speaker, other_speakers, settings, step: self.step, best: self.best })?)
     }
 
     /// Takes over the weights of another speaker's generator, and of the discriminator where its checkpoint has one.
-    pub fn begin_with(&self, generator: &BTreeMap<String, Tensor>, other: &Contents) -> Result<()> {
-        self.generator_params.load(generator)?;
+    /// Vectors of speakers stay this training's own.
+    pub fn begin_with(&self, other: &Contents) -> Result<()> {
+        let mut generator = other.part(GENERATOR);
+        generator.remove(SPEAKER_EMBEDDING);
+        if let Some(own) = self.generator_params.tensors()?.remove(SPEAKER_EMBEDDING) {
+            generator.insert(SPEAKER_EMBEDDING.to_owned(), own);
+        }
+        self.generator_params.load(&generator)?;
         if let Some((_, mean)) = &self.mean {
-            mean.load(generator)?;
+            mean.load(&generator)?;
         }
         let discriminator = other.part(DISCRIMINATOR);
         if !discriminator.is_empty() {
@@ -291,6 +301,11 @@ impl TrainerState {
             "it is no checkpoint that this version can go on from; choose another --out, or move that folder away"
         );
         serde_json::from_value(contents.facts.clone()).context("its facts are not those of this program's version")
+    }
+
+    /// All speakers, in the order of their numbers.
+    pub fn speakers(&self) -> Vec<SpeakerMetadata> {
+        std::iter::once(&self.speaker).chain(&self.other_speakers).cloned().collect()
     }
 
     /// The settings to go on with: the checkpoint's, but for those that may change; and a line for each difference.

@@ -3,36 +3,33 @@
 //! and the step alone (the place of the loader is the step), everything else is in the checkpoint.
 
 use super::augment;
+use super::begin;
+use super::joined_windows::JoinedWindows;
 use super::recipe::account;
 use super::recipe::material::TrainingMaterial;
 use super::recipe::settings::GanSettings;
 use super::score::Validation;
-use super::start::{self, StartingModel};
+use super::start::StartingModel;
 use super::step::{GanTrainer, Losses, TrainerState};
 use super::validate::ValidationIntervals;
 use super::windows::{WindowLoader, needed};
+use crate::config::ComputeDevice;
 use crate::config::GanConfig;
-use crate::config::{ComputeDevice, MotionRepresentation, NetworkPreset};
 use crate::dataset::{Dataset, Split};
 use crate::formats::checkpoint;
 use crate::formats::checkpoint::Contents;
 pub use crate::generate::model::BEST;
 use crate::generate::model::SpeakerMetadata;
-use crate::generate::normalisation::{ChannelNormalisation, Normalisation};
-use crate::generate::representation::Representation;
-use crate::motion::bones;
+use crate::generate::normalisation::Normalisation;
 use crate::nn::cpu::thread_team::with_spinning_workers;
 use crate::nn::device;
-use crate::nn::gan::generator::Preset;
-use crate::nn::gan::generator::{Config, FRAMES_MULTIPLE};
+use crate::nn::gan::generator::FRAMES_MULTIPLE;
 use crate::stage::progress::Progress;
 use crate::stage::workdir::{self, FolderLock};
 use crate::train::epochs::{self, EpochSchedule, StepReport, ValidatedStep, ValidatedTraining};
 use crate::train::no_window;
 use crate::train::resume::{self, sample_windows};
-use crate::types::posture::PostureChannel;
-use crate::types::skeleton::N_BONES;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -68,13 +65,14 @@ pub fn train(
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<TrainingOutcome> {
-    train_watched(dataset, requested, None, folder, progress, &mut |_| ())
+    train_watched(&[dataset], requested, None, folder, progress, &mut |_| ())
 }
 
-/// [`train`], with a call behind each validation, when log and checkpoints are written. `from`: the checkpoint of another
-/// speaker, or its folder, that a training begins with; one that goes on has begun.
+/// [`train`] of one speaker or several, a dataset each, with a call behind each validation, when log and checkpoints are
+/// written. `from`: the checkpoint of another speaker, or its folder, that a training begins with; one that goes on has
+/// begun.
 pub fn train_watched(
-    dataset: &Dataset,
+    datasets: &[&Dataset],
     requested: &GanConfig,
     from: Option<&Path>,
     folder: &Path,
@@ -82,63 +80,66 @@ pub fn train_watched(
     validated: &mut dyn FnMut(ValidatedStep),
 ) -> Result<TrainingOutcome> {
     check(requested)?;
-    ensure!(
-        !dataset.info().no_sound,
-        "{} was imported without sound, so that there is no speech to learn from; import it with its sound files",
-        dataset.dir().display()
-    );
+    begin::check(datasets)?;
     // Others may listen to the model while it learns, and nobody may forget it.
     let _model = FolderLock::shared(folder)?;
     let _lock = workdir::lock(folder)?;
-    let resumed = resume(dataset, requested, folder, progress)?;
+    let resumed = resume(datasets, requested, folder, progress)?;
     let start = from.filter(|_| resumed.is_none()).map(StartingModel::read).transpose()?;
     if let Some(start) = &start {
         progress.say(&format!("beginning with {}", start.account()));
     }
     let window_frames = resumed.as_ref().map_or(requested.window_frames, |(stored, _)| stored.settings.window_frames);
     // Before the statistics, of which an empty split has none.
-    no_window::ensure_window(dataset, needed(window_frames))?;
-    let (settings, normal) = match &resumed {
-        Some((stored, _)) => (stored.settings.clone(), stored.speaker.normalisation.clone()),
+    datasets.iter().try_for_each(|dataset| no_window::ensure_window(dataset, needed(window_frames)))?;
+    let (settings, normals) = match &resumed {
+        Some((stored, _)) => {
+            (stored.settings.clone(), stored.speakers().into_iter().map(|of| of.normalisation).collect())
+        }
         None => {
-            let channels = channels(dataset, &requested.channels)?;
-            let material = TrainingMaterial::measure(dataset, window_frames);
+            let material = TrainingMaterial::measure(datasets, window_frames);
             let settings = GanSettings::new(requested, &material, start.is_some());
-            (settings, Normalisation { channels, ..normalisation(dataset)? })
+            let normal = |dataset: &&Dataset| begin::normalisation_with_channels(dataset, &requested.channels);
+            (settings, datasets.iter().map(normal).collect::<Result<Vec<_>>>()?)
         }
     };
-    let loader = WindowLoader::load(dataset, Split::Train, &normal, settings.window_frames, settings.stride_frames)?;
-    let place = dataset.dir().display();
-    progress.say(&format!("{} windows of {place}; what is learnt goes to {}", loader.len(), folder.display()));
-    let held_out = ValidationIntervals::load(dataset, &settings, &normal, progress)?;
+    let spoken: Vec<(&Dataset, Normalisation)> = datasets.iter().copied().zip(normals).collect();
+    let load = |(dataset, normal): &(&Dataset, Normalisation)| {
+        WindowLoader::load(dataset, Split::Train, normal, settings.window_frames, settings.stride_frames)
+    };
+    let loaders: Vec<WindowLoader> = spoken.iter().map(load).collect::<Result<_>>()?;
+    let n_windows: usize = loaders.iter().map(WindowLoader::len).sum();
+    let places: Vec<String> = datasets.iter().map(|dataset| dataset.dir().display().to_string()).collect();
+    let places = places.join(", ");
+    progress.say(&format!("{n_windows} windows of {places}; what is learnt goes to {}", folder.display()));
+    let held_out = ValidationIntervals::load(&spoken, &settings, progress)?;
     let mut trainer = match &resumed {
-        Some((stored, _)) => GanTrainer::new(stored.speaker.clone(), settings)?,
+        Some((stored, _)) => GanTrainer::new(stored.speakers(), settings)?,
         None => {
-            let representation = match settings.representation {
-                MotionRepresentation::Positions => Representation::Positions,
-                MotionRepresentation::Bones => Representation::bones(&normal, loader.poses()),
-            };
-            let network = Config::from_preset(preset(settings.preset), normal.n_numbers());
-            let (info, hash) = (dataset.info(), dataset.hash()?);
-            let mut metadata = SpeakerMetadata::new(&info.speaker, info.fps, &hash, network, normal, representation);
-            metadata.videos = start::videos(dataset);
+            let both = spoken.iter().zip(&loaders);
+            let speakers: Vec<SpeakerMetadata> = both
+                .map(|((dataset, normal), loader)| begin::metadata(dataset, normal, loader, &settings, datasets.len()))
+                .collect::<Result<_>>()?;
             match &start {
-                None => GanTrainer::new(metadata, settings)?,
-                Some(start) => start.begin(metadata, settings)?,
+                None => GanTrainer::new(speakers, settings)?,
+                Some(start) => start.begin(speakers, settings)?,
             }
         }
     };
+    let loader = JoinedWindows::new(loaders);
     if let Some((stored, contents)) = &resumed {
         trainer.load(stored, contents)?;
         // One too many is left by a kill before the oldest was removed.
         checkpoint::prune(folder, trainer.settings.keep_checkpoints)?;
     }
     if resumed.is_none() {
-        let material = TrainingMaterial::measure(dataset, window_frames);
+        let material = TrainingMaterial::measure(datasets, window_frames);
         let secs_a_step = secs_a_step(&trainer, &loader)?;
         account::lines(&trainer.settings, &material, secs_a_step).iter().for_each(|line| progress.say(line));
     }
     let mut training = GanTraining {
+        names: trainer.speakers.names(),
+        has_learnt: start.is_some(),
         trainer: &mut trainer,
         loader: &loader,
         held_out: &held_out,
@@ -162,13 +163,14 @@ pub fn train_watched(
 }
 
 /// Seconds of a step on this machine, measured on networks that are dropped; `None` of a training of few steps.
-fn secs_a_step(trainer: &GanTrainer, loader: &WindowLoader) -> Result<Option<f64>> {
+fn secs_a_step(trainer: &GanTrainer, loader: &JoinedWindows) -> Result<Option<f64>> {
     const FEW: usize = 100;
     if trainer.settings.steps < FEW {
         return Ok(None);
     }
-    let mut trial = GanTrainer::new(trainer.metadata.clone(), trainer.settings.clone())?;
-    let batch = loader.batch(&sample_windows(trial.settings.seed, 0, trial.settings.batch, loader.len()))?;
+    let mut trial = GanTrainer::new(trainer.speakers.all().to_vec(), trainer.settings.clone())?;
+    let which = sample_windows(trial.settings.seed, 0, trial.settings.batch, loader.len());
+    let batch = loader.batch_changed(&which, &[])?;
     with_spinning_workers(|| {
         trial.step(&batch)?;
         let start = Instant::now();
@@ -180,8 +182,11 @@ fn secs_a_step(trainer: &GanTrainer, loader: &WindowLoader) -> Result<Option<f64
 
 /// A trainer with its windows.
 struct GanTraining<'a> {
+    names: String,
+    /// Whether it begins with another model.
+    has_learnt: bool,
     trainer: &'a mut GanTrainer,
-    loader: &'a WindowLoader,
+    loader: &'a JoinedWindows,
     held_out: &'a ValidationIntervals,
     /// Time of the steps, and of it until their batches were there.
     stepping: Duration,
@@ -192,12 +197,16 @@ impl ValidatedTraining for GanTraining<'_> {
     type Validation = Validation;
 
     fn names(&self) -> (&str, &'static str) {
-        (&self.trainer.metadata.name, "gan")
+        (&self.names, "gan")
     }
 
     fn schedule(&self) -> EpochSchedule {
         let GanSettings { steps, epoch_steps, checkpoint_every, patience, .. } = self.trainer.settings;
         EpochSchedule { steps, epoch_steps, checkpoint_every, patience }
+    }
+
+    fn has_learnt(&self) -> bool {
+        self.has_learnt
     }
 
     fn n_done(&self) -> usize {
@@ -247,7 +256,7 @@ impl ValidatedTraining for GanTraining<'_> {
 
 /// The newest checkpoint, and what it says with the settings that count now. Tells where these differ from `requested`.
 fn resume(
-    dataset: &Dataset,
+    datasets: &[&Dataset],
     requested: &GanConfig,
     folder: &Path,
     progress: &dyn Progress,
@@ -256,36 +265,18 @@ fn resume(
         let mut stored = TrainerState::from_checkpoint(contents)?;
         let (settings, mut differences) = stored.settings(requested)?;
         stored.settings = settings;
-        let (info, metadata) = (dataset.info(), &mut stored.speaker);
+        let n_stored = 1 + stored.other_speakers.len();
         ensure!(
-            metadata.name == info.speaker && metadata.fps == info.fps,
-            "it is of {} at {}, the dataset of {} at {}; choose another --out",
-            metadata.name,
-            metadata.fps,
-            info.speaker,
-            info.fps
+            n_stored == datasets.len(),
+            "it is of {n_stored} speakers, and this training has {}; choose another --out",
+            datasets.len()
         );
-        let hash = dataset.hash()?;
-        if metadata.dataset != hash {
-            differences.push(
-                "the dataset is another now: its windows are trained on, with the checkpoint's mean, deviation and bones"
-                    .to_owned(),
-            );
-            metadata.dataset = hash;
-            metadata.videos.extend(start::videos(dataset));
-            metadata.videos.sort();
-            metadata.videos.dedup();
+        let speakers = std::iter::once(&mut stored.speaker).chain(&mut stored.other_speakers);
+        for (metadata, dataset) in speakers.zip(datasets) {
+            begin::go_on(metadata, dataset, &mut differences)?;
         }
         Ok((stored, differences))
     })
-}
-
-/// The network of a preset of the configuration.
-pub const fn preset(preset: NetworkPreset) -> Preset {
-    match preset {
-        NetworkPreset::Light => Preset::Light,
-        NetworkPreset::Paper => Preset::Paper,
-    }
 }
 
 fn check(settings: &GanConfig) -> Result<()> {
@@ -303,33 +294,4 @@ fn check(settings: &GanConfig) -> Result<()> {
     );
     device::open(settings.device == ComputeDevice::Cuda)?;
     Ok(())
-}
-
-/// Statistics of the channels that are to be learnt.
-fn channels(dataset: &Dataset, wanted: &[PostureChannel]) -> Result<Vec<ChannelNormalisation>> {
-    let posture = dataset.stats().posture.as_ref();
-    let of = |channel: PostureChannel| -> Result<ChannelNormalisation> {
-        let stats = posture.and_then(|posture| posture.get(&channel)).filter(|stats| stats.n_seen != [0; 3]);
-        let stats = stats.with_context(|| {
-            let (name, dir) = (channel.name(), dataset.dir().display());
-            format!(
-                "gan.channels asks for \"{name}\", which {dir} does not show in any frame to train on: set posture = true \
-                 under [dataset] and make the dataset again, or leave it out"
-            )
-        })?;
-        Ok(ChannelNormalisation::new(channel, stats.n_seen, stats.mean, stats.std))
-    };
-    PostureChannel::ALL.into_iter().filter(|channel| wanted.contains(channel)).map(of).collect()
-}
-
-/// Statistics of the training split; bone lengths where the dataset does not state them are measured.
-pub fn normalisation(dataset: &Dataset) -> Result<Normalisation> {
-    let stated = &dataset.info().bone_lengths_metres;
-    let mut lengths: Vec<f32> = (0..N_BONES).map(|bone| stated.get(bone).map_or(0.0, |v| *v as f32)).collect();
-    if lengths.iter().all(|length| *length == 0.0) {
-        let longest = dataset.samples(Split::Train).into_iter().max_by_key(|sample| sample.n_frames);
-        let longest = longest.context("the training split of the dataset is empty")?;
-        lengths = bones::measure(&dataset.read(&longest)?.motion).to_vec();
-    }
-    Ok(Normalisation::new(&dataset.stats().mean(), &dataset.stats().std(), lengths))
 }

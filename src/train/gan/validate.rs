@@ -17,7 +17,7 @@ use crate::nn::gan::generator::FRAMES_MULTIPLE;
 use crate::stage::progress::Progress;
 use crate::train::no_window;
 use crate::types::skeleton::{L_HAND, L_WRIST, N_JOINTS, NECK, R_HAND, R_WRIST};
-use anyhow::Result;
+use anyhow::{Context, Result};
 use candle_core::Tensor;
 use ndarray::{Array2, Array3, ArrayView2};
 
@@ -36,12 +36,36 @@ pub struct ValidationIntervals {
 }
 
 impl ValidationIntervals {
-    /// Intervals of the validation split, evenly chosen where they are many, or where that has none of the training split,
-    /// which is said.
+    /// Intervals of the validation splits, evenly chosen where they are many, or where one has none of its training split,
+    /// which is said. The speakers have their numbers in the order of `datasets`.
     pub fn load(
+        datasets: &[(&Dataset, Normalisation)],
+        settings: &GanSettings,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let mut all: Option<Self> = None;
+        for (speaker, (dataset, normal)) in (0..).zip(datasets) {
+            let most = MOST_FRAMES / datasets.len();
+            let own = Self::of_speaker(dataset, settings, normal, speaker, most, progress)?;
+            all = Some(match all {
+                None => own,
+                Some(mut all) => {
+                    all.pieces.extend(own.pieces);
+                    all.settings.joints.retain(|joint| own.settings.joints.contains(joint));
+                    all.split = if own.split == Split::Train { own.split } else { all.split };
+                    all
+                }
+            });
+        }
+        all.context("there is no speaker to validate on")
+    }
+
+    fn of_speaker(
         dataset: &Dataset,
         settings: &GanSettings,
         normal: &Normalisation,
+        speaker: u32,
+        most_frames: usize,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let n_frames = settings.window_frames;
@@ -56,10 +80,11 @@ impl ValidationIntervals {
         let longest = PIECE.max(n_frames);
         let parts: Vec<_> = loader.parts(longest).into_iter().filter(|part| part.1.len() >= n_frames).collect();
         let all: usize = parts.iter().map(|part| part.1.len()).sum();
-        let n = (parts.len() * MOST_FRAMES).div_ceil(all.max(MOST_FRAMES)).min(parts.len());
+        let n = (parts.len() * most_frames).div_ceil(all.max(most_frames)).min(parts.len());
         let chosen = (0..n).map(|i| parts[i * parts.len() / n].clone());
-        let pieces: Vec<WindowBatch> =
-            chosen.map(|(interval, frames)| loader.part(interval, frames)).collect::<Result<_>>()?;
+        let piece =
+            |(interval, frames)| anyhow::Ok(WindowBatch { speakers: vec![speaker], ..loader.part(interval, frames)? });
+        let pieces: Vec<WindowBatch> = chosen.map(piece).collect::<Result<_>>()?;
         let mut masks = Vec::new();
         for piece in &pieces {
             masks.push(joints_seen(features(&piece.mask, 0)?.view()));
@@ -70,22 +95,26 @@ impl ValidationIntervals {
 
     /// Both predictors on the same blocks.
     pub fn validate(&self, trainer: &GanTrainer) -> Result<Validation> {
-        let (generator, decoder) = (trainer.listener(), &trainer.decoder);
-        let normal = &trainer.metadata.normalisation;
+        let (generator, speakers) = (trainer.listener(), trainer.speakers.all());
         let (mut predicted, mut mean_pose, mut ground_truth) =
             (PredictorSums::default(), PredictorSums::default(), PredictorSums::default());
-        let (mut change, mut spread, mut errors) =
-            (RunningMean::default(), BlockSpread::default(), BlockErrors::default());
-        let mut angles: Vec<AngleSums> = normal.channels.iter().map(|_| AngleSums::default()).collect();
+        let (mut change, mut spread) = (RunningMean::default(), BlockSpread::default());
+        let mut errors: Vec<BlockErrors> = speakers.iter().map(|_| BlockErrors::default()).collect();
+        let channels = &speakers[0].normalisation.channels;
+        let mut angles: Vec<AngleSums> = channels.iter().map(|_| AngleSums::default()).collect();
         let mut n_windows = 0;
         for piece in &self.pieces {
             let piece = &piece.on(trainer.device())?;
             let n_heard = piece.poses.dim(2)?.next_multiple_of(FRAMES_MULTIPLE);
-            let poses = decoder.poses(&generator.forward(&piece.mels, n_heard, false)?.detach())?;
+            let Some(speaker) = piece.speakers.first().map(|speaker| *speaker as usize) else { continue };
+            let normal = &speakers[speaker].normalisation;
+            let raw = generator.forward(&piece.mels, &piece.speakers, n_heard, false)?.detach();
+            let poses = trainer.speakers.poses(&raw, &piece.speakers)?;
             let batch = &WindowBatch {
                 mels: piece.mels.clone(),
                 poses: self.blocks(&piece.poses)?,
                 mask: self.blocks(&piece.mask)?,
+                speakers: piece.speakers.clone(),
             };
             let poses = self.blocks(&poses.narrow(2, 0, piece.poses.dim(2)?)?)?;
             for (n, (of, sums)) in normal.channels.iter().zip(&mut angles).enumerate() {
@@ -99,7 +128,7 @@ impl ValidationIntervals {
                 ground_truth.add(block.ground_truth.view(), &block, &self.settings);
                 change.add(bone_changes(block.predicted.view()));
                 spread.add(&block);
-                errors.push(NormalisedBlock {
+                errors[speaker].push(NormalisedBlock {
                     predicted: features(&poses, i)?,
                     ground_truth: features(&batch.poses, i)?,
                     mask: features(&batch.mask, i)?,
@@ -107,7 +136,8 @@ impl ValidationIntervals {
                 n_windows += 1;
             }
         }
-        let [own, still, other] = errors.by_block();
+        // Another sound is one of the same speaker.
+        let [own, still, other] = errors.iter().map(BlockErrors::by_block).fold([const { Vec::new() }; 3], joined);
         let generator = predicted.metrics(&ground_truth, mean_error(&own));
         let mean_pose = mean_pose.metrics(&ground_truth, mean_error(&still));
         let other_sound = mean_error(&other);
@@ -120,7 +150,7 @@ impl ValidationIntervals {
             other_sound,
             below_mean_pose: Some(reduction(&own, &still)),
             below_other_sound: Some(reduction(&own, &other)),
-            channels: normal.channels.iter().zip(&angles).map(|(of, sums)| (of.channel, sums.error())).collect(),
+            channels: channels.iter().zip(&angles).map(|(of, sums)| (of.channel, sums.error())).collect(),
             bone_change_mm: 1e3 * change.mean(),
             spread: spread.share(),
             score: score::score(&generator, &mean_pose, other_sound),
@@ -135,6 +165,12 @@ impl ValidationIntervals {
         let whole = numbers.narrow(2, 0, n * self.n_frames)?.reshape((n_numbers, n, self.n_frames))?;
         Ok(whole.transpose(0, 1)?.contiguous()?)
     }
+}
+
+/// Figures by block of one speaker behind those of others.
+fn joined(mut all: [Vec<[f64; 2]>; 3], own: [Vec<[f64; 2]>; 3]) -> [Vec<[f64; 2]>; 3] {
+    all.iter_mut().zip(own).for_each(|(all, own)| all.extend(own));
+    all
 }
 
 fn block(predicted: &Tensor, batch: &WindowBatch, i: usize, normal: &Normalisation) -> Result<HeldOutBlock> {

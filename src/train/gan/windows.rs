@@ -49,6 +49,8 @@ pub struct WindowBatch {
     pub poses: Tensor,
     /// [B, numbers, n_frames], 1 where the number is to be learnt.
     pub mask: Tensor,
+    /// Number of each window's speaker, [B].
+    pub speakers: Vec<u32>,
 }
 
 /// A window of so many frames, as it is cut out of an interval.
@@ -60,7 +62,8 @@ impl WindowBatch {
     /// Copy of the batch on this device.
     pub fn on(&self, device: &Device) -> Result<Self> {
         let on = |tensor: &Tensor| tensor.to_device(device);
-        Ok(Self { mels: on(&self.mels)?, poses: on(&self.poses)?, mask: on(&self.mask)? })
+        let (mels, poses, mask) = (on(&self.mels)?, on(&self.poses)?, on(&self.mask)?);
+        Ok(Self { mels, poses, mask, speakers: self.speakers.clone() })
     }
 }
 
@@ -128,7 +131,7 @@ impl WindowLoader {
             let (rows, columns) = of.dim();
             Ok(Tensor::from_vec(of.into_raw_vec_and_offset().0, (1, rows, columns), &Device::Cpu)?)
         };
-        Ok(WindowBatch { mels: tensor(sound)?, poses: tensor(poses)?, mask: tensor(mask)? })
+        Ok(WindowBatch { mels: tensor(sound)?, poses: tensor(poses)?, mask: tensor(mask)?, speakers: vec![0] })
     }
 
     /// Rate of the poses.
@@ -158,7 +161,12 @@ impl WindowLoader {
             let (n_rows, n_columns) = of(&rows[0]).dim();
             Tensor::from_vec(values, (rows.len(), n_rows, n_columns), &Device::Cpu)
         };
-        Ok(WindowBatch { mels: tensor(|r| &r.mels)?, poses: tensor(|r| &r.poses)?, mask: tensor(|r| &r.mask)? })
+        Ok(WindowBatch {
+            mels: tensor(|r| &r.mels)?,
+            poses: tensor(|r| &r.poses)?,
+            mask: tensor(|r| &r.mask)?,
+            speakers: vec![0; which.len()],
+        })
     }
 
     /// A window that begins about frame `start` of an interval, changed.
@@ -222,6 +230,7 @@ impl WindowLoader {
             mels: tensor(mels, mel::N_MELS, n_mels)?,
             poses: tensor(poses, self.n_numbers, self.n_frames)?,
             mask: tensor(mask, self.n_numbers, self.n_frames)?,
+            speakers: vec![0; which.len()],
         })
     }
 }

@@ -8,7 +8,7 @@ use crate::formats::bvh::exponential_maps::FPS;
 use crate::generate::representation::Representation;
 use crate::generate::seq2seq::poses::PoseNumbers;
 use crate::generate::seq2seq::sound;
-use crate::train::gan::train::normalisation;
+use crate::train::gan::begin::normalisation;
 use crate::types::sound::SAMPLE_RATE;
 use crate::types::time::FrameRate;
 use anyhow::{Result, bail, ensure};

@@ -91,17 +91,18 @@ impl Fixed {
             mels,
             poses: tensor(poses, N_FEATURES, n_frames)?,
             mask: tensor(mask, N_FEATURES, n_frames)?,
+            speakers: vec![0; args.batch],
         };
         let facts = SpeakerMetadata::new("benchmark", FPS, "", network, normalisation, representation);
-        Ok(Self { trainer: GanTrainer::new(facts, settings)?, batch })
+        Ok(Self { trainer: GanTrainer::new(vec![facts], settings)?, batch })
     }
 
     /// Weights, batch and settings for the reference.
     fn contents(&self, folder: &Path) -> Result<Contents> {
         self.trainer.save(folder)?;
         let mut contents = Contents::read(&checkpoint::path(folder, 0))?;
-        let GanTrainer { metadata: SpeakerMetadata { normalisation, representation, .. }, settings, .. } =
-            &self.trainer;
+        let settings = &self.trainer.settings;
+        let SpeakerMetadata { normalisation, representation, .. } = &self.trainer.speakers.all()[0];
         let Representation::Bones { mean, std } = representation else { anyhow::bail!("no bones to compare") };
         let parents: Vec<f32> = (1..N_JOINTS).map(|joint| parent(joint).unwrap_or(NECK) as f32).collect();
         let numbers = [settings.lambda_l1, settings.lambda_gan, settings.learning_rate, MAX_NORM];
@@ -150,8 +151,8 @@ impl Fixed {
     /// first step, each over its own size.
     fn apart(&mut self, theirs: &mut Reference) -> Result<(f64, f64)> {
         let their: Vec<f64> = serde_json::from_value(theirs.ask("forward")?["poses"].clone())?;
-        let raw = self.trainer.generator.forward(&self.batch.mels, self.trainer.settings.window_frames, true)?;
-        let own = self.trainer.decoder.poses(&raw)?.flatten_all()?.to_vec1::<f32>()?;
+        let raw = self.trainer.generator.forward(&self.batch.mels, &[], self.trainer.settings.window_frames, true)?;
+        let own = self.trainer.speakers.poses(&raw, &self.batch.speakers)?.flatten_all()?.to_vec1::<f32>()?;
         let n = own.len().div_ceil(EVERY);
         ensure!(their.len() == n, "the reference gave {} outputs, expected {n}", their.len());
         let most = their.iter().fold(1e-9f64, |most, v| most.max(v.abs()));

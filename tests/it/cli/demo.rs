@@ -1,6 +1,7 @@
 //! The synthetic speaker: what was drawn is what is read back, and a run finds it where it is.
 
 use crate::fixtures::support::{Project, speaker_clip};
+use orator::dataset::{Dataset, Split};
 use orator::demo::drawn::truth::DrawnTruth;
 use orator::external::ffmpeg::audio;
 use orator::external::ffmpeg::frames::FrameReader;
@@ -56,4 +57,29 @@ fn a_video_does_not_depend_on_what_memory_held_before() {
     };
     let first = video("1");
     assert!(!first.is_empty() && ["2", "85"].iter().all(|fill| video(fill) == first));
+}
+
+/// A dataset of more speech of the same figure stands beside the videos, is made once, and is another speaker's for another seed.
+#[test]
+fn more_speech_of_the_figure_is_a_dataset() {
+    let project = Project::with_clips("speech", 0, 1.0);
+    let folder = project.dir().to_string_lossy().into_owned();
+    let draw = |more: &[&str]| {
+        let plan = ["demo", "draw", &folder, "--rendered", "--videos", "1", "--secs", "1", "--speech", "1"];
+        project.answer(&[&plan, more].concat())
+    };
+    let drawn = draw(&[]);
+    assert_eq!(drawn.code, 0, "{}", drawn.errors);
+    let dataset = Dataset::open(&project.dir().join("speech")).unwrap();
+    let secs =
+        |split| -> f64 { dataset.samples(split).iter().map(|sample| dataset.info().fps.secs(sample.n_frames)).sum() };
+    assert_eq!((secs(Split::Train), secs(Split::Validation), secs(Split::Test)), (60.0, 240.0, 0.0));
+    let hash = dataset.hash().unwrap();
+    drop(dataset);
+    let hash_again = || Dataset::open(&project.dir().join("speech")).unwrap().hash().unwrap();
+    let again = draw(&[]);
+    assert_eq!(again.code, 0, "{}", again.errors);
+    assert_eq!(hash_again(), hash);
+    let other = draw(&["--seed", "2"]);
+    assert!(other.code != 0 && other.errors.contains("other speech"), "{}", other.errors);
 }

@@ -11,7 +11,7 @@ use orator::dataset::{Dataset, Split};
 use orator::pipeline::lift::lifter::reach_secs;
 use orator::stage::Unit;
 use orator::stage::progress::Silent;
-use orator::train::gan::train::normalisation;
+use orator::train::gan::begin::normalisation;
 use orator::train::gan::windows::WindowLoader;
 use orator::types::sync;
 use rand::{Rng, SeedableRng};

@@ -12,7 +12,7 @@ use orator::evaluate::clips::clips::{EvalClip, EvalClips};
 use orator::evaluate::clips::held_out;
 use orator::evaluate::clips::of_speaker::copied;
 use orator::evaluate::clips::sound_features::from_samples;
-use orator::train::gan::train::normalisation;
+use orator::train::gan::begin::normalisation;
 use orator::types::time::FrameRate;
 use std::path::Path;
 

@@ -2,7 +2,7 @@
 
 use crate::fixtures::fuzzing::harness::{corpus, fuzz_bytes, fuzz_file};
 use orator::formats::checkpoint::Contents;
-use orator::generate::model;
+use orator::generate::model::{self, GenerationChoice};
 use orator::metrics::space::{basis::Basis, embedding};
 use orator::pipeline::lift::weights;
 
@@ -13,7 +13,9 @@ fn checkpoint() {
 
 #[test]
 fn speaker() {
-    fuzz_file("speaker", &corpus("weights", "speaker"), "best.safetensors", |path| drop(model::load(path)));
+    fuzz_file("speaker", &corpus("weights", "speaker"), "best.safetensors", |path| {
+        drop(model::load(path, &GenerationChoice::default()))
+    });
 }
 
 #[test]

@@ -160,7 +160,7 @@ fn one_pass(speaker: &GestureGenerator, sound: &Sound, n_frames: usize) -> anyho
     let mels = mel::log_mel(&samples);
     let (n, bands) = mels.dim();
     let mels = Tensor::from_vec(mels.iter().copied().collect(), (1, n, bands), &Device::Cpu)?.t()?.contiguous()?;
-    let poses = speaker.generator.forward(&mels, padded, false)?.flatten_all()?.to_vec1()?;
+    let poses = speaker.generator.forward(&mels, &[], padded, false)?.flatten_all()?.to_vec1()?;
     Ok(ndarray::Array2::from_shape_vec((N_FEATURES, padded), poses)?.slice_move(s![.., ..n_frames]))
 }
 

@@ -142,7 +142,7 @@ fn generator(preset: Preset, network: &str, train: bool, dtype: DType) -> anyhow
     let mut params = Params::with_dtype(0, dtype);
     let net = Generator::new(&mut params, &Config::from_preset(preset, 147))?;
     let mels = pattern(&[2, 64, 418], if preset == Preset::Paper { 15.0 } else { 25.0 })?;
-    compare(network, train, dtype, &params, &mels, None, |mels| net.forward(mels, 64, train))
+    compare(network, train, dtype, &params, &mels, None, |mels| net.forward(mels, &[], 64, train))
 }
 
 #[test]
@@ -192,6 +192,6 @@ fn sizes_on_the_way_are_the_published_ones() -> anyhow::Result<()> {
     let mut params = Params::new(0);
     let net = Generator::new(&mut params, &Config { width: 8, ..Config::from_preset(Preset::Paper, 3) })?;
     let mels = pattern(&[2, 64, 418], 1.0)?.to_dtype(DType::F32)?;
-    assert_eq!(net.encode(&mels, false)?.dims(), [2, 8, 51]);
+    assert_eq!(net.encode(&mels, &[], false)?.dims(), [2, 8, 51]);
     Ok(())
 }

@@ -11,4 +11,5 @@ pub mod pose;
 pub mod rule;
 pub mod seq2seq;
 pub mod seq2seq_program;
+pub mod several_speakers;
 pub mod watched;

@@ -44,7 +44,7 @@ fn generator_discriminator_and_lifter_agree_with_pytorch() -> anyhow::Result<()>
     let config = Config { width: 16, ..Config::from_preset(Preset::Light, 6) };
     let net = Generator::new(&mut params, &config)?;
     fill(&params)?;
-    agree("light", &net.forward(&pattern(&[2, 64, 427], 1.0)?, 2 * generator::FRAMES_MULTIPLE, false)?)?;
+    agree("light", &net.forward(&pattern(&[2, 64, 427], 1.0)?, &[], 2 * generator::FRAMES_MULTIPLE, false)?)?;
 
     let mut params = Params::with_dtype(0, DType::F64);
     let net = Discriminator::new(&mut params, 12)?;

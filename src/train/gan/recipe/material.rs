@@ -12,13 +12,14 @@ pub struct TrainingMaterial {
 }
 
 impl TrainingMaterial {
-    /// Seconds of a dataset in intervals of `window_frames` at least.
-    pub fn measure(dataset: &Dataset, window_frames: usize) -> Self {
-        let fps = dataset.info().fps;
-        let secs = |split: Split| {
+    /// Seconds of datasets in intervals of `window_frames` at least.
+    pub fn measure(datasets: &[&Dataset], window_frames: usize) -> Self {
+        let of_dataset = |dataset: &Dataset, split: Split| -> f64 {
+            let fps = dataset.info().fps;
             let samples = dataset.samples(split).into_iter();
             samples.filter(|sample| sample.n_frames >= window_frames).map(|sample| fps.secs(sample.n_frames)).sum()
         };
+        let secs = |split: Split| datasets.iter().map(|dataset| of_dataset(dataset, split)).sum();
         Self { train_secs: secs(Split::Train), validation_secs: secs(Split::Validation) }
     }
 

@@ -1,0 +1,150 @@
+//! One network of several speakers, told apart by an embedding: it generates as each of them, goes on to the bit, and gives a
+//! new speaker a start.
+
+use crate::fixtures::faults::stop::bytes;
+use crate::fixtures::gesture_dataset::{FPS, sample};
+use crate::fixtures::support::Answer;
+use crate::fixtures::write_dataset::write_dataset;
+use ndarray::Array3;
+use orator::config::GanConfig;
+use orator::dataset::{Dataset, Split};
+use orator::formats::{checkpoint, wav};
+use orator::generate::GestureGenerator;
+use orator::generate::model::GenerationChoice;
+use orator::stage::progress::Silent;
+use orator::train::epochs::ValidatedStep;
+use orator::train::gan::train::{train, train_watched};
+use orator::types::skeleton::{L_WRIST, parent};
+use orator::types::sound::Sound;
+use std::path::Path;
+use std::process::Command;
+
+const CONFIG: &str = r#"
+[[speaker]]
+name = "anna"
+videos = ["videos/anna/*.mp4"]
+[[speaker]]
+name = "ben"
+videos = ["videos/ben/*.mp4"]
+[gan]
+steps = 4
+epoch_steps = 2
+batch = 4
+window_frames = 32
+"#;
+
+fn speaker(folder: &Path, name: &str, phase: f64, scale: f32) -> Dataset {
+    let of = |split, number: u32, n_frames, phase| {
+        let mut sample = sample(&format!("{name}-{number:08}-000000"), n_frames, phase);
+        sample.motion.joints *= scale;
+        (split, sample)
+    };
+    let samples = [of(Split::Train, 0, 128, phase), of(Split::Validation, 1, 64, phase + 1.0)];
+    let dir = folder.join(name);
+    write_dataset(&dir, name, FPS, &samples).unwrap();
+    Dataset::open(&dir).unwrap()
+}
+
+fn settings() -> GanConfig {
+    let gan = GanConfig { batch: 4.into(), window_frames: 32, checkpoint_every: 3, ..GanConfig::default() };
+    GanConfig { steps: 6.into(), epoch_steps: 3.into(), warmup_steps: 0.into(), fade_to: 1.0.into(), ..gan }
+}
+
+fn orator(dir: &Path, args: &str) -> Answer {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_orator"));
+    let output = command.arg("--json").args(args.split_whitespace()).current_dir(dir).output().unwrap();
+    let json = serde_json::from_slice(&output.stdout).unwrap_or_default();
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    Answer { code: output.status.code().unwrap_or(-1), json, errors }
+}
+
+fn as_speaker(folder: &Path, name: &str) -> anyhow::Result<GestureGenerator> {
+    GestureGenerator::open_as(folder, &GenerationChoice { speaker: Some(name.to_owned()), seed: None })
+}
+
+#[test]
+fn each_speaks_with_a_body_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let (anna, ben) = (speaker(dir, "anna", 0.0, 1.0), speaker(dir, "ben", 1.5, 1.2));
+    let ignore = &mut |_: ValidatedStep| ();
+    let both = dir.join("both");
+    train_watched(&[&anna, &ben], &settings(), None, &both, &Silent, ignore).unwrap();
+
+    let said = Sound { rate: 16_000, samples: (0..48_000).map(|n| (n as f32 * 0.05).sin() * 0.3).collect() };
+    let motion = |name: &str| -> Array3<f32> {
+        let generator = as_speaker(&both, name).unwrap();
+        assert_eq!(generator.name(), name);
+        generator.motion(&said).unwrap().joints
+    };
+    let (of_anna, of_ben) = (motion("anna"), motion("ben"));
+    let elbow = parent(L_WRIST).unwrap();
+    let arm = |joints: &Array3<f32>| -> f32 {
+        (0..3).map(|k| (joints[[9, L_WRIST, k]] - joints[[9, elbow, k]]).powi(2)).sum::<f32>().sqrt()
+    };
+    assert!((arm(&of_ben) / arm(&of_anna) - 1.2).abs() < 0.01, "{} {}", arm(&of_ben), arm(&of_anna));
+    let error = format!("{:#}", GestureGenerator::open(&both).err().unwrap());
+    assert!(error.contains("--speaker") && error.contains("anna, ben"), "{error}");
+    let error = format!("{:#}", as_speaker(&both, "carl").err().unwrap());
+    assert!(error.contains("\"carl\"") && error.contains("anna, ben"), "{error}");
+
+    // Stopped and gone on with, it ends with the same bytes.
+    let parts = dir.join("parts");
+    let half = GanConfig { steps: 3.into(), ..settings() };
+    train_watched(&[&anna, &ben], &half, None, &parts, &Silent, ignore).unwrap();
+    let error = train(&anna, &settings(), &parts, &Silent).unwrap_err();
+    assert!(format!("{error:#}").contains("2 speakers"), "{error:#}");
+    train_watched(&[&anna, &ben], &settings(), None, &parts, &Silent, ignore).unwrap();
+    let last = |out: &Path| std::fs::read(checkpoint::path(out, 6)).unwrap();
+    assert!(last(&both) == last(&parts));
+    let names = |out: &Path| bytes(out).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+    assert_eq!(names(&both), names(&parts));
+
+    // A new speaker begins with what both taught, and is alone in its own network.
+    let carl = speaker(dir, "carl", 0.7, 0.9);
+    let of_carl = dir.join("carl-gan");
+    train_watched(&[&carl], &settings(), Some(&both), &of_carl, &Silent, ignore).unwrap();
+    let model = GestureGenerator::open(&of_carl).unwrap().metadata;
+    assert_eq!((model.name.as_str(), model.network.n_speakers), ("carl", 0));
+    let learnt: Vec<&str> = model.videos.iter().map(|video| video.speaker.as_str()).collect();
+    assert!(["anna", "ben", "carl"].iter().all(|name| learnt.contains(name)), "{learnt:?}");
+    // And the other way round.
+    train_watched(&[&anna, &ben], &settings(), Some(&of_carl), &dir.join("all"), &Silent, ignore).unwrap();
+    assert_eq!(as_speaker(&dir.join("all"), "ben").unwrap().metadata.network.n_speakers, 1);
+
+    let error = train_watched(&[&anna, &anna], &settings(), None, &dir.join("twice"), &Silent, ignore).unwrap_err();
+    assert!(format!("{error:#}").contains("both of anna"), "{error:#}");
+}
+
+#[test]
+fn the_commands_train_all_speak_as_one_and_measure_each() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let made = dir.join("work/dataset");
+    std::fs::create_dir_all(&made).unwrap();
+    let _two = (speaker(&made, "anna", 0.0, 1.0), speaker(&made, "ben", 1.5, 1.2));
+    std::fs::write(dir.join("pipeline.toml"), CONFIG).unwrap();
+    let trained = orator(dir, "train gan --speaker all");
+    assert_eq!((trained.code, trained.json["speaker"].as_str()), (0, Some("anna, ben")), "{}", trained.errors);
+    assert!(trained.json["next"].as_str().is_some_and(|next| next.contains("--speaker anna")), "{}", trained.json);
+    let again = orator(dir, "train gan --dataset work/dataset/anna work/dataset/ben --out again");
+    let best = |folder: &str| std::fs::read(dir.join(folder).join("best.safetensors")).unwrap();
+    assert!(again.code == 0 && best("again") == best("work/gan/all"), "{}", again.errors);
+
+    let samples = (0..32_000).map(|n| (n as f32 * 0.05).sin() * 0.3).collect();
+    wav::write(&dir.join("speech.wav"), &Sound { rate: 16_000, samples }).unwrap();
+    let generate = |more: &str| {
+        orator(dir, &format!("generate --checkpoint work/gan/all --audio speech.wav --out motion.bvh {more}"))
+    };
+    let silent = generate("");
+    assert!(silent.code != 0 && silent.errors.contains("--speaker"), "{}", silent.errors);
+    let spoken = generate("--speaker ben");
+    assert_eq!((spoken.code, spoken.json["speaker"].as_str()), (0, Some("ben")), "{}", spoken.errors);
+    for name in ["anna", "ben"] {
+        let measured = orator(
+            dir,
+            &format!("evaluate --dataset work/dataset/{name} --checkpoint work/gan/all --split validation"),
+        );
+        assert_eq!(measured.code, 0, "{}", measured.errors);
+    }
+}
