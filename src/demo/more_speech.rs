@@ -80,5 +80,5 @@ fn clip(plan: &DemoPlan, is_rendered: bool, number: u64) -> Result<SpokenVideo> 
     let name = format!("spoken-{number}");
     let content = blake3::hash(format!("orator demo, more speech {is_rendered} {seed}").as_bytes());
     let content = content.to_hex().to_string();
-    Ok(SpokenVideo { name, content, motion, sound, words: None, meta: json!({}) })
+    Ok(SpokenVideo { name, content, motion, sound, words: None, posture: None, meta: json!({}) })
 }

@@ -9,6 +9,7 @@ use crate::formats::transcript::Word;
 use crate::motion::bones;
 use crate::stage::ledger::{Kept, Ledger, TranscriptAccount, WordCount};
 use crate::types::pose3d::Motion;
+use crate::types::posture::Posture;
 use crate::types::sound::Sound;
 use crate::types::split::Split;
 use anyhow::Result;
@@ -25,6 +26,8 @@ pub struct SpokenVideo {
     /// 16 kHz, as long as the motion.
     pub sound: Sound,
     pub words: Option<Vec<Word>>,
+    /// Angles of head and trunk, as long as the motion; `None`: not known.
+    pub posture: Option<Posture>,
     /// More to keep beside the sample: an object.
     pub meta: Value,
 }
@@ -80,7 +83,7 @@ impl SpokenVideo {
             motion: self.motion,
             sound: self.sound,
             words: self.words,
-            posture: None,
+            posture: self.posture,
             meta,
         }
     }

@@ -8,6 +8,7 @@ use crate::demo::rule::baselines::{RuleBaselines, sound_of_frames, wrist_speeds}
 use crate::demo::rule::dataset::{RULE_OF_WORDS, SpokenClip};
 use crate::demo::rule::ridge::correlation;
 use crate::demo::rule::rule::RuleGestures;
+use crate::demo::rule::speech_dataset::{is_by_speech, predictable};
 use crate::formats::transcript::Word;
 use crate::generate::seq2seq::architecture::Architecture;
 use crate::generate::trained::TrainedSpeaker;
@@ -53,8 +54,8 @@ pub struct Learned {
     pub n_clips: usize,
     pub secs: f64,
     pub rows: Vec<LearnedRow>,
-    /// Penalties of the ridge regressions to speeds and to poses.
-    pub ridge_strengths: [f64; 2],
+    /// Penalties of the ridge regressions of the frame and of a second, to speeds and to poses.
+    pub ridge_strengths: [[f64; 2]; 2],
     /// Whether the generator reaches the targets; `None`: no generator.
     pub good: Option<bool>,
     /// First clip, for the picture.
@@ -83,7 +84,8 @@ const HELD: f64 = 0.05;
 /// Clip of the test split.
 struct TestClip {
     sample: Sample,
-    clip: SpokenClip,
+    /// `None` of the second rule.
+    clip: Option<SpokenClip>,
     predictable: Array3<f32>,
     sound: Array2<f64>,
     /// Steps [T - 1, 2] in which no word moves the left and the right hand.
@@ -133,14 +135,16 @@ pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &d
         }
     }
     rows.push(row("mean pose", each(&|test| baselines.still(test.sample.n_frames()))));
-    rows.push(row("ridge of the frame, to poses", each(&|test| baselines.ridge_poses(&test.sound))));
-    let speeds: Vec<Array2<f64>> = tests.iter().map(|test| baselines.ridge_speeds(&test.sound)).collect();
-    rows.push(LearnedRow {
-        predictor: "ridge of the frame, to speeds",
-        speed_correlation: judge.correlation(&speeds),
-        poses: None,
-        places: None,
-    });
+    let names = [
+        ["ridge of the frame, to poses", "ridge of the frame, to speeds"],
+        ["ridge of a second, to poses", "ridge of a second, to speeds"],
+    ];
+    for (ridge, [to_poses, to_speeds]) in baselines.ridges.iter().zip(names) {
+        rows.push(row(to_poses, each(&|test| ridge.poses(&test.sound))));
+        let speeds: Vec<Array2<f64>> = tests.iter().map(|test| ridge.speeds(&test.sound)).collect();
+        let speed_correlation = judge.correlation(&speeds);
+        rows.push(LearnedRow { predictor: to_speeds, speed_correlation, poses: None, places: None });
+    }
     rows.push(row("nearest training window by sound", each(&|test| baselines.nearest(&test.sound))));
     rows.push(row("the data itself", each(&|test| test.sample.motion.joints.clone())));
     rows.push(row("the rule without variation", each(&|test| test.predictable.clone())));
@@ -153,7 +157,7 @@ pub fn measure(dataset: &Dataset, speaker: Option<&TrainedSpeaker>, progress: &d
         secs: fps.secs(n_frames),
         good: speaker.map(|speaker| if judge.has_words() { good_words(&rows, speaker) } else { good(&rows) }),
         rows,
-        ridge_strengths: baselines.strengths,
+        ridge_strengths: baselines.ridges.each_ref().map(|ridge| ridge.strengths),
         first,
     })
 }
@@ -185,10 +189,11 @@ fn good_words(rows: &[LearnedRow], speaker: &TrainedSpeaker) -> bool {
 
 impl TestClip {
     fn new(sample: Sample) -> Result<Self> {
-        let clip = SpokenClip::from_sample(&sample)?;
-        let predictable = clip.predictable().joints;
+        let clip = (!is_by_speech(&sample)).then(|| SpokenClip::from_sample(&sample)).transpose()?;
+        let predictable = clip.map_or_else(|| predictable(&sample), |clip| clip.predictable()).joints;
         let sound = sound_of_frames(&sample.sound, sample.n_frames(), sample.motion.fps);
-        let of_beats = places::of_beats(&clip, sample.motion.fps);
+        let all = || Array2::from_elem((sample.n_frames().saturating_sub(1), 2), true);
+        let of_beats = clip.map_or_else(all, |clip| places::of_beats(&clip, sample.motion.fps));
         Ok(Self { sample, clip, predictable, sound, of_beats })
     }
 
@@ -198,7 +203,10 @@ impl TestClip {
 
     /// The rule as if nothing were said with these sounds.
     fn without_words(&self, fps: FrameRate) -> Array3<f32> {
-        RuleGestures::of_habits(&self.clip.habits(), &self.clip.speech(), &[]).motion(self.clip.n_frames, fps).joints
+        let of_clip = |clip: SpokenClip| {
+            RuleGestures::of_habits(&clip.habits(), &clip.speech(), &[]).motion(clip.n_frames, fps).joints
+        };
+        self.clip.map_or_else(|| self.predictable.clone(), of_clip)
     }
 }
 
@@ -211,12 +219,14 @@ struct Judge<'a> {
 
 impl Judge<'_> {
     fn has_words(&self) -> bool {
-        self.tests.iter().any(|test| test.clip.rule == RULE_OF_WORDS)
+        self.tests.iter().filter_map(|test| test.clip).any(|clip| clip.rule == RULE_OF_WORDS)
     }
 
     fn places(&self, predicted: &[Array3<f32>]) -> WordPlaces {
         let mut places = WordPlaces::default();
-        predicted.iter().zip(self.tests).for_each(|(joints, test)| places.count(&test.clip, joints.view(), self.fps));
+        for (joints, test) in predicted.iter().zip(self.tests) {
+            test.clip.iter().for_each(|clip| places.count(clip, joints.view(), self.fps));
+        }
         places
     }
 

@@ -144,6 +144,7 @@ impl SpokenClip {
             content: self.content_hash(),
             motion: self.motion(),
             sound: self.sound(),
+            posture: None,
             words: (self.rule == RULE_OF_WORDS).then(|| self.words()),
             meta: json!({ "rule": self }),
         }

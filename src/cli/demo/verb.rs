@@ -1,15 +1,16 @@
 //! `orator demo`.
 
-use super::Outcome;
-use super::ui::Ui;
+use super::learned;
+use crate::cli::Outcome;
+use crate::cli::ui::Ui;
 use anyhow::{Context, Result, bail, ensure};
 use orator::config;
 use orator::dataset::Dataset;
+use orator::dataset::info::DatasetInfo;
 use orator::demo::GENERATOR;
 use orator::demo::check::pipeline;
 use orator::demo::check::pipeline::{LEAST_FRAMES, LEAST_JOINTS, Millimetres};
-use orator::demo::check::places::PlaceShare;
-use orator::demo::check::{learned, sheet, traces};
+use orator::demo::check::sheet;
 use orator::demo::drawn::folder;
 use orator::demo::drawn::folder::DemoPlan;
 use orator::demo::host;
@@ -18,10 +19,8 @@ use orator::demo::more_speech;
 use orator::demo::people;
 use orator::demo::people::condition::Condition;
 use orator::demo::people::folder::PeoplePlan;
-use orator::demo::rule::dataset;
-use orator::demo::rule::dataset::SpokenClip;
+use orator::demo::rule::{dataset, speech_dataset};
 use orator::external::opencv::png;
-use orator::generate::trained::TrainedSpeaker;
 use orator::mocap::motion_file;
 use orator::stage::workdir::{self, FolderLock};
 use orator::types::time::FrameRate;
@@ -102,6 +101,10 @@ enum DemoVerb {
         /// Another speaker by the rule: other vowels send the hands to its places, after other delays. 0: the rule's own.
         #[arg(long, value_name = "N", default_value_t = 0)]
         habits: u64,
+        /// Speech in place of the rule's own: a folder of NAME.wav with NAME.tsv (start, end, word), in the split that NAME
+        /// begins with; the gestures follow another rule (version 3), of loud syllables, phrases and eight words.
+        #[arg(long, value_name = "DIR", conflicts_with_all = ["hours", "words", "habits"])]
+        speech: Option<PathBuf>,
         /// Seed of the speech and of the speaker's variation.
         #[arg(long, default_value_t = 1)]
         seed: u64,
@@ -169,12 +172,18 @@ pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
             draw(&dir, &plan, rendered, speech, ui)
         }
         DemoVerb::Measure { dir } => measure(&dir, ui),
-        DemoVerb::Speaker { dir, hours, words, habits, seed } => {
+        DemoVerb::Speaker { dir, speech: Some(folder), seed, .. } => {
+            let speech = speech_dataset::speech_of(&folder)?;
+            let write = |attempt: &Path| speech_dataset::write(attempt, &speech, seed, ui);
+            speak(&dir, speech.len(), speech_dataset::RULE_OF_SPEECH, ui, write)
+        }
+        DemoVerb::Speaker { dir, hours, words, habits, seed, speech: None } => {
             let rule = if words { dataset::RULE_OF_WORDS } else { dataset::RULE };
-            speak(&dir, &dataset::clips(hours, seed, rule, habits)?, rule, ui)
+            let clips = dataset::clips(hours, seed, rule, habits)?;
+            speak(&dir, clips.len(), rule, ui, |attempt| dataset::write(attempt, &clips, ui))
         }
         DemoVerb::Learned { dataset, checkpoint, picture } => {
-            learned(&dataset, checkpoint.as_deref(), picture.as_deref(), ui)
+            learned::run(&dataset, checkpoint.as_deref(), picture.as_deref(), ui)
         }
         DemoVerb::Sheet { dir, out, motion } => draw_sheet(&dir, &out, motion.as_deref(), ui),
     }
@@ -295,78 +304,22 @@ fn measure(dir: &Path, ui: &Ui) -> Result<Outcome> {
     Ok(if good { Outcome::Done } else { Outcome::SomeFailed })
 }
 
-fn speak(dir: &Path, clips: &[SpokenClip], rule: u32, ui: &Ui) -> Result<Outcome> {
+fn speak(
+    dir: &Path,
+    n_clips: usize,
+    rule: u32,
+    ui: &Ui,
+    write: impl FnOnce(&Path) -> Result<DatasetInfo>,
+) -> Result<Outcome> {
     let out = std::path::absolute(dir)?;
     let _lock = FolderLock::exclusive(&out)?;
     ensure!(!workdir::has_files(&out), "{} is not empty; choose another folder", dir.display());
-    let info = workdir::build_folder(&out, |attempt| dataset::write(attempt, clips, ui))?;
+    let info = workdir::build_folder(&out, write)?;
     let secs: Vec<String> = info.splits.iter().map(|(name, split)| format!("{name} {:.0} s", split.secs)).collect();
-    let text = format!("{} clips by version {rule} of the rule: {}", clips.len(), secs.join(", "));
+    let text = format!("{n_clips} clips by version {rule} of the rule: {}", secs.join(", "));
     let next = format!("orator demo learned --dataset {}", dir.display());
-    ui.summary(&text, Some(&next), json!({ "dataset": dir, "clips": clips.len(), "next": next }));
+    ui.summary(&text, Some(&next), json!({ "dataset": dir, "clips": n_clips, "next": next }));
     Ok(Outcome::Done)
-}
-
-fn learned(dataset: &Path, checkpoint: Option<&Path>, picture: Option<&Path>, ui: &Ui) -> Result<Outcome> {
-    let dataset = Dataset::open(dataset)?;
-    let speaker = checkpoint.map(TrainedSpeaker::open).transpose()?;
-    let learned = learned::measure(&dataset, speaker.as_ref(), ui)?;
-    let heads = "predictor                          speed L  speed R  PCK 0.2   energy   pauses       L1";
-    let has_words = learned.rows.iter().any(|row| row.places.is_some());
-    let of_words = if has_words { "   right places: all words     lone words" } else { "" };
-    let mut text = format!("test split: {} clips, {:.0} s\n{heads}{of_words}\n", learned.n_clips, learned.secs);
-    for row in &learned.rows {
-        let [left, right] = row.speed_correlation;
-        text += &format!("{:34}{left:>9.3}{right:>9.3}", row.predictor);
-        text += &row.poses.map_or(String::new(), |p| {
-            format!("{:>7.1} %{:>7.1} %{:>7.1} %{:>9.3}", 100.0 * p.pck, 100.0 * p.energy, 100.0 * p.pauses, p.l1)
-        });
-        let share = |share: PlaceShare| {
-            let [low, high] = share.interval().map(|end| 100.0 * end);
-            format!("{:7.1} % ({low:.0} to {high:.0})", 100.0 * share.share())
-        };
-        text += &row.places.map_or(String::new(), |p| format!("    {}{}", share(p.all), share(p.alone)));
-        text += "\n";
-    }
-    if let Some(places) = learned.rows.iter().find_map(|row| row.places) {
-        text += &format!(
-            "right places: the wrist is nearest to the word's place at the end of its stroke, of {} words, {} of them with no \
-             other such word within 5 s; chance {:.0} %; speeds are those of beats, where no word moves the hand\n",
-            places.all.n_words,
-            places.alone.n_words,
-            100.0 * PlaceShare::CHANCE
-        );
-    }
-    text += "speed: correlation of a wrist's speed (m/s, frame by frame, not smoothed, all clips in a row) with that of the\n\
-             rule without variation; PCK, energy (mean squared joint speed, share of the data's) and L1 (normalised): against the data;\n\
-             pauses: the energy where the rule holds both wrists still, which no sound tells.";
-    if let (Some(good), true) = (learned.good, has_words) {
-        text += &format!(
-            "\ntargets: right places {:.0} % (of lone words {:.0} % for a network of the words of a segment), with another text or \
-             without words within {:.0} points of chance, speed {} on beats: {}",
-            100.0 * learned::LEAST_PLACES,
-            100.0 * learned::LEAST_LONE_PLACES,
-            100.0 * learned::MOST_FROM_CHANCE,
-            learned::LEAST_BEATS,
-            if good { "met" } else { "MISSED" }
-        );
-    } else if let Some(good) = learned.good {
-        text += &format!(
-            "\ntargets of the generator: speed {}, PCK {} x that of another sound and of the mean pose, energy {:.0} to {:.0} %: {}",
-            learned::LEAST_CORRELATION,
-            learned::LEAST_PCK,
-            100.0 * learned::ENERGY.start(),
-            100.0 * learned::ENERGY.end(),
-            if good { "met" } else { "MISSED" }
-        );
-    }
-    if let (Some(path), Some(clip)) = (picture, &learned.first) {
-        let image = traces::picture(clip, dataset.info().fps)?;
-        workdir::replace(path, |attempt| png::write(attempt, &image))?;
-        text += &format!("\nwrote {}", path.display());
-    }
-    ui.summary(&text, None, serde_json::to_value(&learned)?);
-    Ok(if learned.good == Some(false) { Outcome::SomeFailed } else { Outcome::Done })
 }
 
 fn draw_sheet(dir: &Path, out: &Path, generated: Option<&Path>, ui: &Ui) -> Result<Outcome> {

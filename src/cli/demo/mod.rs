@@ -1,0 +1,6 @@
+//! `orator demo`.
+
+pub mod learned;
+pub mod verb;
+
+pub use verb::{Args, run};
