@@ -207,7 +207,6 @@ fn draw(dir: &Path, plan: &DemoPlan, rendered: bool, speech: Option<u32>, ui: &U
 fn say_more(dir: &Path, plan: &DemoPlan, rendered: bool, secs: f64, ui: &Ui) -> Result<(f64, PathBuf)> {
     let out = dir.join("speech");
     let folder = std::path::absolute(&out)?;
-    let _lock = FolderLock::exclusive(&folder)?;
     if workdir::has_files(&folder) {
         let made = Dataset::open(&folder)?;
         ensure!(
@@ -216,6 +215,7 @@ fn say_more(dir: &Path, plan: &DemoPlan, rendered: bool, secs: f64, ui: &Ui) -> 
             out.display()
         );
     } else {
+        let _lock = FolderLock::exclusive(&folder)?;
         workdir::build_folder(&folder, |attempt| more_speech::write(attempt, plan, rendered, secs, ui))?;
     }
     Ok((secs, out))

@@ -4,11 +4,12 @@
 use super::places::{self, PlaceShare, WordPlaces};
 use super::traces;
 use crate::dataset::{Dataset, Sample, Split};
-use crate::demo::rule::baselines::{RuleBaselines, sound_of_frames, wrist_speeds};
+use crate::demo::rule::baselines::{RuleBaselines, sound_of_frames};
 use crate::demo::rule::dataset::{RULE_OF_WORDS, SpokenClip};
 use crate::demo::rule::ridge::correlation;
 use crate::demo::rule::rule::RuleGestures;
 use crate::demo::rule::speech_dataset::{is_by_speech, predictable};
+use crate::demo::rule::wrists::wrist_speeds;
 use crate::formats::transcript::Word;
 use crate::generate::seq2seq::architecture::Architecture;
 use crate::generate::trained::TrainedSpeaker;

@@ -1,9 +1,9 @@
 //! Whether words with gestures send their hand to their place, and which frames belong to them.
 
-use crate::demo::rule::baselines::WRISTS;
 use crate::demo::rule::dataset::SpokenClip;
 use crate::demo::rule::rule::{HOLD, RETURN, RuleGestures, STROKE, WORD_DELAY};
 use crate::demo::rule::words::{N_PLACES, WordGesture, gesture};
+use crate::demo::rule::wrists::WRISTS;
 use crate::types::time::FrameRate;
 use ndarray::{Array2, ArrayView3};
 use serde::Serialize;

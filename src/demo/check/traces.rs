@@ -2,7 +2,7 @@
 //! speaker and by the trained model; below, a few poses of the latter two.
 
 use crate::animate::draw::figure::{FigureView, INK, LEFT, PAPER, RIGHT, draw_pose, mix};
-use crate::demo::rule::baselines::{WRISTS, wrist_speeds};
+use crate::demo::rule::wrists::{WRISTS, wrist_speeds};
 use crate::external::opencv::draw;
 use crate::types::image::Image;
 use crate::types::time::FrameRate;

@@ -1,10 +1,10 @@
 //! Baselines for a speaker trained on the rule, learnt from the training split: ridge regression from the sound of the
 //! same frame and of a second, the training window with the nearest sound, and the mean pose.
 
-use super::ridge_listener::{HeardFrames, RidgeListener};
+use super::ridge_listener::{HeardFrames, RidgeListener, TrainingClip};
 use crate::audio::mel;
 use crate::dataset::{Dataset, Sample, Split};
-use crate::types::skeleton::{L_WRIST, N_JOINTS, R_WRIST};
+use crate::types::skeleton::N_JOINTS;
 use crate::types::sound::Sound;
 use crate::types::sync;
 use crate::types::time::FrameRate;
@@ -12,8 +12,6 @@ use anyhow::{Result, ensure};
 use ndarray::{Array2, Array3, ArrayView3, Axis, concatenate, s};
 use rayon::prelude::*;
 
-/// Left and right wrist.
-pub const WRISTS: [usize; 2] = [L_WRIST, R_WRIST];
 /// Frames of a window of the nearest neighbour.
 const WINDOW: usize = 64;
 /// What the two ridge regressions hear: the frame alone, and a second, most of it before the frame.
@@ -35,14 +33,6 @@ pub fn sound_of_frames(sound: &Sound, n_frames: usize, fps: FrameRate) -> Array2
     frames
 }
 
-/// Speed of each wrist from each frame to the next, [T - 1, 2], m/s, no smoothing.
-pub fn wrist_speeds(joints: ArrayView3<f32>, fps: FrameRate) -> Array2<f64> {
-    Array2::from_shape_fn((joints.shape()[0].saturating_sub(1), 2), |(t, hand)| {
-        let step = |k: usize| f64::from(joints[[t + 1, WRISTS[hand], k]] - joints[[t, WRISTS[hand], k]]);
-        (0..3).map(|k| step(k).powi(2)).sum::<f64>().sqrt() * fps.per_sec()
-    })
-}
-
 /// Baselines fitted to the training split.
 pub struct RuleBaselines {
     /// Hears the frame, and a second of sound.
@@ -50,12 +40,6 @@ pub struct RuleBaselines {
     /// Sound [64 x 64] and motion of the training windows.
     windows: Vec<(Array2<f64>, Array3<f32>)>,
     mean: Array2<f32>,
-}
-
-/// Sound [T, 64] and joints [T, 49, 3] of a clip.
-pub struct TrainingClip {
-    pub sound: Array2<f64>,
-    pub joints: Array3<f32>,
 }
 
 impl RuleBaselines {

@@ -1,13 +1,19 @@
 //! Ridge regressions from the sound about a frame to its pose and to the speeds of its wrists.
 
-use super::baselines::{TrainingClip, wrist_speeds};
 use super::ridge::{Ridge, RidgeSums};
+use super::wrists::wrist_speeds;
 use crate::types::skeleton::N_JOINTS;
 use crate::types::time::FrameRate;
 use ndarray::{Array2, Array3, s};
 
 /// Ridge penalties; validation chooses.
 const STRENGTHS: [f64; 8] = [1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
+
+/// Sound [T, 64] and joints [T, 49, 3] of a clip.
+pub struct TrainingClip {
+    pub sound: Array2<f64>,
+    pub joints: Array3<f32>,
+}
 
 /// Frames of sound that a regression hears: so many before a frame, itself, and so many behind it.
 #[derive(Clone, Copy, Debug)]

@@ -255,8 +255,8 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::demo::rule::baselines::wrist_speeds;
     use crate::demo::rule::ridge::correlation;
+    use crate::demo::rule::wrists::wrist_speeds;
     use ndarray::{Array1, s};
     use rand::SeedableRng;
 

@@ -78,7 +78,7 @@ fn regularisation(of: &GanSettings) -> String {
     part(of.augment_mirror > 0.0, format!("{:.0} % mirrored", 100.0 * of.augment_mirror));
     part(of.augment_pose_noise > 0.0, format!("noise {:.2} on poses", of.augment_pose_noise));
     part(of.dropout > 0.0, format!("dropout {:.2}", of.dropout));
-    part(of.weight_decay > 0.0, format!("weight decay {}", of.weight_decay));
+    part(of.weight_decay > 0.0, format!("weight decay {:.2}", of.weight_decay));
     match parts.is_empty() {
         true => "nothing against learning by heart".to_owned(),
         false => format!("against learning by heart, the more the less speech there is: {}", parts.join(", ")),
