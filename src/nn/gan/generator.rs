@@ -14,9 +14,10 @@ pub const FRAMES_MULTIPLE: usize = 32;
 const N_ENTER: usize = 2;
 const N_LEVELS: usize = 5;
 const N_DECODER: usize = 4;
-/// Table [speakers, width] of a network of several speakers, and bound of its first values.
+/// Table [speakers, width] of a network of several speakers, and bound of its first values: as large as what is heard, so that
+/// the first layers tell the speakers apart from the first step on.
 pub const SPEAKER_EMBEDDING: &str = "speaker.embedding";
-const EMBEDDING_BOUND: f64 = 0.3;
+const EMBEDDING_BOUND: f64 = 1.5;
 
 /// How the spectrogram is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
