@@ -49,7 +49,7 @@ pub struct Args {
 }
 
 pub fn run(args: Args, ui: &Ui) -> Result<Outcome> {
-    let config = if !args.dataset.is_empty() { args.config.load_or_default()? } else { args.config.load()? };
+    let config = if args.dataset.is_empty() { args.config.load()? } else { args.config.load_or_default()? };
     let Args { speaker, out, .. } = &args;
     let places =
         Places { config: &config, speaker: speaker.as_ref(), dataset: args.dataset.first(), out: out.as_ref() };

@@ -248,7 +248,7 @@ mod tests {
         assert!(worst_of(&(difference.narrow(0, 0, 1)? - expected)?)? < 1e-12);
         assert_eq!(worst_of(&difference.narrow(0, 1, 1)?)?, 0.0);
         assert!(added(&[0]).is_err() && added(&[0, 3]).is_err() && added(&[]).is_err());
-        let error = worst(&[table.clone()], |v| of_speakers(&v[0], &[1, 2, 1], 3)?.sqr())?;
+        let error = worst(std::slice::from_ref(table), |v| of_speakers(&v[0], &[1, 2, 1], 3)?.sqr())?;
         assert!(error < 1e-7, "{error}");
         Ok(())
     }

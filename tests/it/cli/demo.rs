@@ -70,13 +70,13 @@ fn more_speech_of_the_figure_is_a_dataset() {
     };
     let drawn = draw(&[]);
     assert_eq!(drawn.code, 0, "{}", drawn.errors);
-    let dataset = Dataset::open(&project.dir().join("speech")).unwrap();
+    let dataset = Dataset::open(project.dir().join("speech")).unwrap();
     let secs =
         |split| -> f64 { dataset.samples(split).iter().map(|sample| dataset.info().fps.secs(sample.n_frames)).sum() };
     assert_eq!((secs(Split::Train), secs(Split::Validation), secs(Split::Test)), (60.0, 240.0, 0.0));
     let hash = dataset.hash().unwrap();
     drop(dataset);
-    let hash_again = || Dataset::open(&project.dir().join("speech")).unwrap().hash().unwrap();
+    let hash_again = || Dataset::open(project.dir().join("speech")).unwrap().hash().unwrap();
     let again = draw(&[]);
     assert_eq!(again.code, 0, "{}", again.errors);
     assert_eq!(hash_again(), hash);

@@ -14,7 +14,7 @@ fn checkpoint() {
 #[test]
 fn speaker() {
     fuzz_file("speaker", &corpus("weights", "speaker"), "best.safetensors", |path| {
-        drop(model::load(path, &GenerationChoice::default()))
+        drop(model::load(path, &GenerationChoice::default()));
     });
 }
 

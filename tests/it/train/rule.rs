@@ -45,17 +45,18 @@ fn speech_of_others_is_gestured_to_by_the_second_rule() {
     let said = dir.path().join("said");
     std::fs::create_dir(&said).unwrap();
     for (n, split) in ["train", "train", "validation", "test", "test"].into_iter().enumerate() {
-        let rate = 16_000;
+        let rate = 16_000u32;
         // Syllables of a fifth of a second in phrases of two, of which some are loud.
         let loudness = |secs: f64| {
             let syllable = (secs / 0.2) as usize;
             let is_loud = (syllable * 7 + n).is_multiple_of(5);
             if secs % 2.5 < 2.0 && secs % 0.2 < 0.15 { if is_loud { 0.7 } else { 0.2 } } else { 0.0 }
         };
-        let times = (0..12 * rate).map(|i| i as f64 / rate as f64);
+        let times = (0..12 * rate).map(|i| f64::from(i) / f64::from(rate));
         let samples = times.map(|t| (loudness(t) * (t * 1_500.0).sin()) as f32).collect();
-        wav::write(&said.join(format!("{split}-{n}.wav")), &Sound { rate: rate as u32, samples }).unwrap();
-        let rows: String = (0..5).map(|k| format!("{}\t{}\triver\n", 2.0 * k as f64, 2.0 * k as f64 + 0.3)).collect();
+        wav::write(&said.join(format!("{split}-{n}.wav")), &Sound { rate, samples }).unwrap();
+        let row = |k: u32| format!("{}\t{}\triver\n", 2 * k, 2.0 * f64::from(k) + 0.3);
+        let rows: String = (0..5).map(row).collect();
         std::fs::write(said.join(format!("{split}-{n}.tsv")), rows).unwrap();
     }
     let path = |name: &str| dir.path().join(name).to_string_lossy().into_owned();
