@@ -31,6 +31,9 @@ pub struct GanConfig {
     pub adversarial: AdversarialLoss,
     /// Weights of the losses.
     pub lambda_l1: f64,
+    /// Of the mean squared error, under which a pose that the sound leaves open comes out as the mean of what it may be; under
+    /// the absolute one as the median, which for a hand that mostly rests is rest.
+    pub lambda_mse: f64,
     pub lambda_velocity: f64,
     pub lambda_gan: Auto<f64>,
     pub lambda_bone: f64,
@@ -88,6 +91,7 @@ impl Default for GanConfig {
             fade_to: number,
             adversarial: AdversarialLoss::LeastSquares,
             lambda_l1: 1.0,
+            lambda_mse: 0.0,
             lambda_velocity: 0.0,
             lambda_gan: number,
             lambda_bone: 0.1,

@@ -12,6 +12,12 @@ pub fn l1(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
     ((made - real)?.abs()? * mask)?.sum_all()? / n
 }
 
+/// Mean squared difference over the numbers whose mask is 1; all three of one shape.
+pub fn mse(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
+    let n = mask.sum_all()?.maximum(1.0)?;
+    ((made - real)?.sqr()? * mask)?.sum_all()? / n
+}
+
 /// Mean absolute difference of the frame-to-frame differences, over the numbers whose mask is 1 in both frames; all
 /// three [B, C, T].
 pub fn velocity(made: &Tensor, real: &Tensor, mask: &Tensor) -> Result<Tensor> {
@@ -125,6 +131,7 @@ mod tests {
         let (made, real) = (pattern(&shape, 0.0)?, pattern(&shape, 3.0)?);
         let mask = pattern(&shape, 9.0)?.gt(0.0)?.to_dtype(DType::F64)?;
         assert!(worst(std::slice::from_ref(&made), |v| l1(&v[0], &real, &mask))? < 1e-7);
+        assert!(worst(std::slice::from_ref(&made), |v| mse(&v[0], &real, &mask))? < 1e-7);
         assert!(worst(std::slice::from_ref(&made), |v| velocity(&v[0], &real, &mask))? < 1e-7);
         for game in [AdversarialLoss::LeastSquares, AdversarialLoss::Log] {
             assert!(worst(&[made.clone(), real.clone()], |v| game.discriminator(&v[0], &v[1]))? < 1e-7);
@@ -155,6 +162,9 @@ mod tests {
         assert!((number(AdversarialLoss::Log.discriminator(&real, &made))? - expected).abs() < 1e-12);
         assert!((number(AdversarialLoss::Log.generator(&made))? - (log(2.0) + log(0.0) + 90.0) / 3.0).abs() < 1e-12);
         assert_eq!(number(AdversarialLoss::LeastSquares.generator(&row([2.0, 0.0, 1.0])?))?, 2.0 / 3.0);
+        // Squares of 1.5, 1 and 3; the third is not seen.
+        let loss = mse(&row([2.0, 0.0, 3.0])?, &row([0.5, -1.0, 0.0])?, &row([1.0, 1.0, 0.0])?);
+        assert_eq!(number(loss)?, (2.25 + 1.0) / 2.0);
         // Speeds 1, -2 against 0, 3, of which the second is not seen.
         let loss = velocity(&row([1.0, 2.0, 0.0])?, &row([1.0, 1.0, 4.0])?, &row([1.0, 1.0, 0.0])?);
         assert_eq!(number(loss)?, 1.0);

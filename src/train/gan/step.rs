@@ -46,6 +46,9 @@ const FREE: [&str; 5] = ["steps", "patience", "checkpoint_every", "keep_checkpoi
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Losses {
     pub l1: f64,
+    /// Not measured where it has no weight.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mse: Option<f64>,
     pub velocity: f64,
     pub bone: f64,
     pub adversarial: f64,
@@ -138,7 +141,7 @@ impl GanTrainer {
     /// `step`, with a call at the end of each phase, by its name: for measuring where the time goes.
     pub fn step_in_phases(&mut self, batch: &WindowBatch, phase: &mut dyn FnMut(&'static str)) -> Result<Losses> {
         let batch = batch.on(self.device())?;
-        let GanSettings { lambda_l1, lambda_velocity, lambda_bone, .. } = self.settings;
+        let GanSettings { lambda_l1, lambda_mse, lambda_velocity, lambda_bone, .. } = self.settings;
         let (lambda_gan, learning_rate) = (self.settings.adversarial_weight(self.step), self.settings.rate(self.step));
         let raw = self.predict(&batch)?;
         let generated = self.speakers.poses(&raw, &batch.speakers)?;
@@ -166,6 +169,10 @@ impl GanTrainer {
             total = (&total + (&loss * weight)?)?;
             number(&loss)
         };
+        let mut mse = None;
+        if lambda_mse > 0.0 {
+            mse = Some(add(losses::mse(&generated, &batch.poses, &batch.mask)?, lambda_mse)?);
+        }
         if lambda_velocity > 0.0 {
             velocity = add(losses::velocity(&generated, &batch.poses, &batch.mask)?, lambda_velocity)?;
         }
@@ -188,7 +195,7 @@ impl GanTrainer {
         }
         self.step += 1;
         let l1 = number(&l1)?;
-        Ok(Losses { l1, velocity, bone, adversarial, discriminator: of_discriminator, gradient_norm })
+        Ok(Losses { l1, mse, velocity, bone, adversarial, discriminator: of_discriminator, gradient_norm })
     }
 
     /// Raw poses of a batch while training: channels of the encoded sound are dropped.
