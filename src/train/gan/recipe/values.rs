@@ -117,8 +117,9 @@ pub const AUTO: [(f64, RecipeValues); 4] = [
     ),
 ];
 
-/// Learning rate of a network that has learnt another speaker, as a share of one that knows nothing.
-const RATE_OF_A_START: f64 = 0.5;
+/// Learning rate of a network that has learnt another speaker, as a share of one that knows nothing. Begun with a network of
+/// five others, two minutes of a sixth were learnt to PCK 74 % with 0.2, 70 % with 0.5.
+const RATE_OF_A_START: f64 = 0.2;
 
 impl RecipeValues {
     /// What `recipe` chooses for this much speech; `has_start`: for a network that has learnt another speaker already.
